@@ -1,0 +1,46 @@
+# Everything runs in .venv, which the first target that needs it creates and fills under
+# requirements/constraints.txt; it is filled again when that file or pyproject.toml changes.
+
+PYTHON ?= python3
+VENV := .venv
+RUN := $(VENV)/bin/python -m
+STAMP := $(VENV)/installed-
+
+.PHONY: help demo test lint bench reproduce clean
+.NOTPARALLEL:
+
+help:
+	@echo "make demo       run one mission of three robots and show it in results/demo"
+	@echo "make test       lint, then the tests"
+	@echo "make lint       ruff and pyright"
+	@echo "make bench      speed against peers"
+	@echo "make reproduce  the experiments of Rocha04, into docs/results"
+	@echo "make clean      remove .venv, builds and caches; results stay"
+
+demo: $(STAMP)baselines
+	$(RUN) baselines.run room --strategy gradient --robots 3 --seed 0 --out results/demo
+
+test: lint
+	$(RUN) pytest
+
+lint: $(STAMP)dev
+	$(RUN) ruff check .
+	$(RUN) ruff format --check .
+	$(RUN) pyright
+
+bench: $(STAMP)baselines $(STAMP)bench
+	$(RUN) benchmarks.speed
+
+reproduce: $(STAMP)baselines
+	$(RUN) baselines.papers.rocha04 --out docs/results
+
+# The stamp .venv/installed-EXTRA says that the package is installed with that extra.
+$(STAMP)%: pyproject.toml requirements/constraints.txt
+	@$(RUN) pip --version >/dev/null 2>&1 || $(PYTHON) -m venv $(VENV)
+	@echo "installing entropy_explore_env[$*] in $(VENV), a minute or two the first time ..." >&2
+	@$(RUN) pip install -qq --disable-pip-version-check -c requirements/constraints.txt -e ".[$*]"
+	@touch $@
+
+clean:
+	rm -rf $(VENV) build dist *.egg-info .pytest_cache .ruff_cache .hypothesis
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -1,0 +1,106 @@
+"""Teams of robots that map an unknown 3-D world, as PettingZoo and Gymnasium environments.
+
+    import entropy_explore_env
+    env = entropy_explore_env.parallel_env("room", robots=3)
+
+Importing registers, for every scenario (room → Room-v0), `gymnasium.make`, `gymnasium.make_vec` and
+`pettingzoo.make("parallel" | "aec", ...)` under `entropy_explore_env/`.
+"""
+
+from __future__ import annotations
+
+import gymnasium
+import pettingzoo
+
+from entropy_explore_env.config import (
+    Action,
+    Channel,
+    Ending,
+    Grid,
+    Observation,
+    RangeSensor,
+    Reward,
+    Robot,
+    Scenario,
+    with_settings,
+)
+from entropy_explore_env.envs.parallel_env import EntropyExploreEnv, env, parallel_env
+from entropy_explore_env.envs.single_env import SingleRobotEnv
+from entropy_explore_env.envs.vector_env import EntropyExploreVectorEnv
+from entropy_explore_env.errors import (
+    ActionError,
+    CallOrderError,
+    EntropyExploreError,
+    MissingExtraError,
+    SettingError,
+    WorldError,
+)
+from entropy_explore_env.missions.missions import Missions
+from entropy_explore_env.missions.state import MissionEnd
+from entropy_explore_env.missions.view import RobotView
+from entropy_explore_env.robots.channel import Delivery
+from entropy_explore_env.robots.motion import MoveEnd
+from entropy_explore_env.scenarios import SCENARIOS, find_scenario
+from entropy_explore_env.worlds.files import load_octomap
+from entropy_explore_env.worlds.world import World
+
+__version__ = "0.1.0"
+
+__all__ = [
+    "SCENARIOS",
+    "Action",
+    "ActionError",
+    "CallOrderError",
+    "Channel",
+    "Delivery",
+    "Ending",
+    "EntropyExploreEnv",
+    "EntropyExploreError",
+    "EntropyExploreVectorEnv",
+    "Grid",
+    "MissingExtraError",
+    "MissionEnd",
+    "Missions",
+    "MoveEnd",
+    "Observation",
+    "RangeSensor",
+    "Reward",
+    "Robot",
+    "RobotView",
+    "Scenario",
+    "SettingError",
+    "SingleRobotEnv",
+    "World",
+    "WorldError",
+    "env",
+    "find_scenario",
+    "load_octomap",
+    "parallel_env",
+    "with_settings",
+]
+
+
+def environment_id(scenario: str) -> str:
+    """The id of a named scenario: `room-furnished` → `entropy_explore_env/RoomFurnished-v0`."""
+    words = scenario.split("-")
+    return "entropy_explore_env/" + "".join(word[:1].upper() + word[1:] for word in words) + "-v0"
+
+
+def _register() -> None:
+    """Register every named scenario with Gymnasium and PettingZoo.
+
+    A robot on its own waits for nobody: under Gymnasium a step lasts until it may decide again.
+    """
+    for scenario in SCENARIOS:
+        name = environment_id(scenario)
+        gymnasium.register(
+            id=name,
+            entry_point="entropy_explore_env.envs.single_env:SingleRobotEnv",
+            vector_entry_point="entropy_explore_env.envs.vector_env:EntropyExploreVectorEnv",
+            kwargs={"scenario": scenario, "robots": 1, "decision_period_s": None},
+        )
+        pettingzoo.register("parallel", name, parallel_env, kwargs={"scenario": scenario})
+        pettingzoo.register("aec", name, env, kwargs={"scenario": scenario})
+
+
+_register()

@@ -1,0 +1,476 @@
+"""Settings of a scenario: frozen, checked once, with the unit in every field's name (SI, bits)."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any, Literal, TypeVar, get_args
+
+import numpy as np
+
+from entropy_explore_env.errors import SettingError
+
+BITS_OF_UNIT_GAUSSIAN = 0.5 * math.log2(2.0 * math.pi * math.e)
+"""Differential entropy of N(0, 1) in bits: Rocha04, eq. 15 at σ = 1."""
+
+MAX_VOXELS = 2**31 - 1
+"""Voxels are numbered by 32-bit integers."""
+
+Settings = TypeVar("Settings")
+
+
+def gaussian_entropy_bits(sigma: float) -> float:
+    """Differential entropy of a Gaussian in bits, log2 √(2πe) + log2 σ (Rocha04, eq. 15)."""
+    return BITS_OF_UNIT_GAUSSIAN + math.log2(sigma)
+
+
+def _check(settings: object, name: str, allowed: str, accepts: Callable[[Any], bool]) -> None:
+    """Raise a SettingError unless the field is a number that `accepts` takes; NaN never is."""
+    value = getattr(settings, name)
+    number = isinstance(value, int | float | np.integer | np.floating) and not isinstance(value, bool)
+    if not number or math.isnan(value) or not accepts(value):
+        raise SettingError(f"{type(settings).__name__}.{name}", value, allowed)
+
+
+def _check_positive(settings: object, *names: str, finite: bool = True) -> None:
+    allowed = "a number > 0" + ("" if finite else ", or inf")
+    for name in names:
+        _check(settings, name, allowed, lambda v: v > 0 and (math.isfinite(v) or not finite))
+
+
+def _check_not_negative(settings: object, *names: str) -> None:
+    for name in names:
+        _check(settings, name, "a finite number ≥ 0", lambda v: v >= 0 and math.isfinite(v))
+
+
+def _check_count(settings: object, name: str, least: int, most: int) -> None:
+    value = getattr(settings, name)
+    whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
+    if not whole or not least <= value <= most:
+        raise SettingError(
+            f"{type(settings).__name__}.{name}", value, f"a whole number from {least} to {most}"
+        )
+
+
+def _check_counts(settings: object, name: str, least: int, most: int) -> None:
+    value = getattr(settings, name)
+    whole = isinstance(value, tuple) and len(value) == 3
+    if not whole or not all(
+        isinstance(n, int | np.integer) and not isinstance(n, bool) and least <= n <= most for n in value
+    ):
+        allowed = f"three whole numbers (x, y, z), each from {least} to {most}"
+        raise SettingError(f"{type(settings).__name__}.{name}", value, allowed)
+
+
+def _check_choice(settings: object, name: str, choices: object) -> None:
+    value, members = getattr(settings, name), get_args(choices)
+    if value not in members:
+        raise SettingError(f"{type(settings).__name__}.{name}", value, "one of " + ", ".join(members))
+
+
+def _check_kind(settings: object, name: str, kind: type) -> None:
+    value = getattr(settings, name)
+    if not isinstance(value, kind):
+        raise SettingError(f"{type(settings).__name__}.{name}", value, f"a {kind.__name__}")
+
+
+@dataclass(frozen=True)
+class Grid:
+    """The voxels of a workspace. Frame: map, z up, metres (REP-103).
+
+    Attributes:
+        shape: Voxels along x, y and z; one along z is a 2-D world.
+        voxel_size_m: Edge of a voxel (`vsz` of Rocha04).
+        origin_m: Lower corner of voxel (0, 0, 0) in the map frame.
+    """
+
+    shape: tuple[int, int, int]
+    voxel_size_m: float
+    origin_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        """Check every field."""
+        _check_counts(self, "shape", 1, MAX_VOXELS)
+        if math.prod(self.shape) > MAX_VOXELS:
+            raise SettingError("Grid.shape", self.shape, f"at most {MAX_VOXELS} voxels in all")
+        _check_positive(self, "voxel_size_m")
+        finite = isinstance(self.origin_m, tuple) and len(self.origin_m) == 3
+        if not finite or not all(isinstance(v, int | float) and math.isfinite(v) for v in self.origin_m):
+            raise SettingError("Grid.origin_m", self.origin_m, "three finite numbers (x, y, z)")
+
+    @property
+    def voxels(self) -> int:
+        """Number of voxels V = X·Y·Z."""
+        return math.prod(self.shape)
+
+    @property
+    def flat(self) -> bool:
+        """Whether the world is 2-D: one voxel high."""
+        return self.shape[2] == 1
+
+    @property
+    def size_m(self) -> np.ndarray:
+        """(3,) float64, extent along x, y and z in metres."""
+        return np.asarray(self.shape) * self.voxel_size_m
+
+    def voxel_of(self, position_m: np.ndarray) -> np.ndarray:
+        """Indices (..., 3) int64 of the voxels that hold the points (..., 3), map frame, metres."""
+        scaled = (np.asarray(position_m) - np.asarray(self.origin_m)) / self.voxel_size_m
+        return np.floor(scaled).astype(np.int64)
+
+    def centre_of(self, voxel: np.ndarray) -> np.ndarray:
+        """Centres (..., 3) in metres, map frame, of the voxels with indices (..., 3)."""
+        return np.asarray(self.origin_m) + (np.asarray(voxel) + 0.5) * self.voxel_size_m
+
+
+@dataclass(frozen=True)
+class Robot:
+    """How a robot moves: a straight line from rest to rest (Rocha04, table 1).
+
+    Attributes:
+        motion: `free` flies anywhere; `planar` keeps the height of its sensor and looks level.
+        reach_m: Largest displacement of one decision (ξ of Rocha04, eq. 32); inf = the workspace.
+        max_speed_m_s: Top speed.
+        acceleration_m_s2: Of speeding up and of braking.
+        turn_rate_rad_s: Of yaw and pitch, while driving; inf = at once.
+        body_radius_m: The body is a ball; 0 = a point that blocks nobody.
+        sensor_height_m: Planar robots: height of the sensor above the workspace's floor.
+    """
+
+    motion: Literal["free", "planar"] = "free"
+    reach_m: float = 0.5
+    max_speed_m_s: float = 0.25
+    acceleration_m_s2: float = 0.25
+    turn_rate_rad_s: float = math.pi / 2
+    body_radius_m: float = 0.1
+    sensor_height_m: float = 0.5
+
+    def __post_init__(self) -> None:
+        """Check every field."""
+        _check_choice(self, "motion", Literal["free", "planar"])
+        _check_positive(self, "max_speed_m_s", "acceleration_m_s2")
+        _check_positive(self, "reach_m", "turn_rate_rad_s", finite=False)
+        _check_not_negative(self, "body_radius_m", "sensor_height_m")
+
+
+@dataclass(frozen=True)
+class RangeSensor:
+    """A range sensor that samples yaw and pitch around its gaze (Rocha04, eqs. 3-5, table 1).
+
+    Attributes:
+        field_of_view_rad: Full widths (yaw, pitch); (π/6, π/12) at π/90 gives 16 × 8 rays.
+        angular_step_rad: Between neighbouring rays.
+        max_range_m: Farthest return; inf = the workspace's boundary, which is a wall.
+        sigma_min: Standard deviation of coverage right before the sensor (eq. 5).
+        sigma_slope_per_m: Its growth with the measured distance, ζ (eq. 5).
+        range_noise_m: Standard deviation of the measured distance.
+        voxels_behind: Voxels behind the hit that a ray still updates (as covered: eq. 4).
+        scan_time_s: A scan takes this long, standing still.
+    """
+
+    field_of_view_rad: tuple[float, float] = (math.pi / 6, math.pi / 12)
+    angular_step_rad: float = math.pi / 90
+    max_range_m: float = math.inf
+    sigma_min: float = 0.08
+    sigma_slope_per_m: float = 0.006
+    range_noise_m: float = 0.0
+    voxels_behind: int = 1
+    scan_time_s: float = 0.5
+
+    def __post_init__(self) -> None:
+        """Check every field."""
+        limits = (2 * math.pi, math.pi)
+        view = self.field_of_view_rad
+        if (
+            not isinstance(view, tuple)
+            or len(view) != 2
+            or not all(
+                isinstance(v, int | float) and 0 <= v <= limit + 1e-9
+                for v, limit in zip(view, limits, strict=True)
+            )
+        ):
+            raise SettingError("RangeSensor.field_of_view_rad", view, "(yaw in [0, 2π], pitch in [0, π])")
+        _check_positive(self, "angular_step_rad", "sigma_min", "scan_time_s")
+        _check_positive(self, "max_range_m", finite=False)
+        _check_not_negative(self, "sigma_slope_per_m", "range_noise_m")
+        _check(self, "sigma_min", "a number from 1e-4 to 1e4", lambda v: 1e-4 <= v <= 1e4)
+        _check_count(self, "voxels_behind", 0, 1000)
+        if self.rays > 1_000_000:
+            raise SettingError(
+                "RangeSensor.angular_step_rad", self.angular_step_rad, "at most 1,000,000 rays"
+            )
+
+    @property
+    def columns(self) -> int:
+        """Rays side by side; a full turn is not closed by a second ray at its end."""
+        return self._samples(self.field_of_view_rad[0], closed=True)
+
+    @property
+    def rows(self) -> int:
+        """Rays above each other."""
+        return self._samples(self.field_of_view_rad[1], closed=False)
+
+    @property
+    def rays(self) -> int:
+        """R, rays of a scan."""
+        return self.columns * self.rows
+
+    def _samples(self, width_rad: float, closed: bool) -> int:
+        steps = math.floor(width_rad / self.angular_step_rad + 1e-9)
+        full_turn = closed and width_rad > 2 * math.pi - self.angular_step_rad / 2
+        return max(steps, 1) if full_turn else steps + 1
+
+
+@dataclass(frozen=True)
+class Channel:
+    """What robots tell each other: the most useful measurements of a scan (Rocha04, eqs. 42-43).
+
+    Attributes:
+        burst: Most measurements of one batch; 0 shares none.
+        i_min_bits: Least utility of a measurement that is worth sending.
+        range_m: Farthest teammate that hears; inf = all.
+        loss_probability: Of a message on its way to one teammate.
+        delay_s: From sending to hearing.
+        announcements: Whether robots announce the viewpoints that they choose.
+    """
+
+    burst: int = 64
+    i_min_bits: float = 0.3219
+    range_m: float = math.inf
+    loss_probability: float = 0.0
+    delay_s: float = 0.0
+    announcements: bool = True
+
+    def __post_init__(self) -> None:
+        """Check every field."""
+        _check_count(self, "burst", 0, 1_000_000)
+        _check_not_negative(self, "i_min_bits")
+        _check_positive(self, "range_m", finite=False)
+        _check(self, "loss_probability", "a number from 0 to 1", lambda v: 0 <= v <= 1)
+        _check(self, "delay_s", "a number from 0 to 3600", lambda v: 0 <= v <= 3600)
+        _check_kind(self, "announcements", bool)
+
+
+@dataclass(frozen=True)
+class Ending:
+    """When a mission is over (Rocha04, eq. 41).
+
+    The threshold is the entropy of a map in which every voxel that can be seen at all has the
+    standard deviation `sigma_end`; where everything can be seen it is V·h(σ_end), as in Rocha04.
+
+    Attributes:
+        sigma_end: Standard deviation of coverage at which a voxel counts as known.
+        whose: Whether one robot's map has to pass the threshold, or all robots' maps.
+        time_limit_s: Simulated time after which the mission is cut off (a truncation); inf = never.
+        max_cycles: Steps after which it is cut off; None = never.
+    """
+
+    sigma_end: float = 0.03
+    whose: Literal["any", "all"] = "any"
+    time_limit_s: float = 10_000.0
+    max_cycles: int | None = None
+
+    def __post_init__(self) -> None:
+        """Check every field."""
+        _check(self, "sigma_end", "a number from 1e-4 to 1e4", lambda v: 1e-4 <= v <= 1e4)
+        _check_choice(self, "whose", Literal["any", "all"])
+        _check_positive(self, "time_limit_s", finite=False)
+        if self.max_cycles is not None:
+            _check_count(self, "max_cycles", 1, 2**62)
+
+
+@dataclass(frozen=True)
+class Reward:
+    """What a step is worth, in shares of H(0) - H_th, so that map size does not matter.
+
+    Attributes:
+        kind: `individual`: bits that the robot's own measurements took from its own map;
+            `team`: mean decrease of the robots' map entropies.
+        cost_per_s: Subtracted for every second that passes.
+    """
+
+    kind: Literal["individual", "team"] = "individual"
+    cost_per_s: float = 0.0
+
+    def __post_init__(self) -> None:
+        """Check every field."""
+        _check_choice(self, "kind", Literal["individual", "team"])
+        _check_not_negative(self, "cost_per_s")
+
+
+@dataclass(frozen=True)
+class Action:
+    """How a viewpoint is written as an action.
+
+    Attributes:
+        kind: `continuous`, a Box(-1, 1); or `discrete`, voxels within reach × gaze directions.
+        yaws: Discrete gazes around the horizon.
+        pitches: Discrete gazes up and down, from -π/4 to π/4; planar robots have one, level.
+    """
+
+    kind: Literal["continuous", "discrete"] = "continuous"
+    yaws: int = 16
+    pitches: int = 3
+
+    def __post_init__(self) -> None:
+        """Check every field."""
+        _check_choice(self, "kind", Literal["continuous", "discrete"])
+        _check_count(self, "yaws", 1, 360)
+        _check_count(self, "pitches", 1, 90)
+
+
+@dataclass(frozen=True)
+class Observation:
+    """Which parts an observation has; a part that is left out costs nothing.
+
+    Attributes:
+        panorama: Utility and free distance of rays around the robot, by its own belief.
+        panorama_yaws: Directions around the horizon; None = 16, in 2-D worlds 32.
+        panorama_pitches: Directions up and down, from -π/4 to π/4; planar robots have one.
+        panorama_utility: `bits`, or `log2` for log2(1 + bits), which suits networks.
+        own: The robot's pose, time, remaining entropy and whether it decides (part `self`).
+        team: Where teammates were last heard, and what they announced.
+        patch: The belief around the robot.
+        patch_shape: Its voxels along x, y and z; odd, the robot in the middle.
+        overview: The whole belief, pooled.
+        overview_shape: Cells of the pooled belief along x, y and z, at most the world's.
+        action_mask: Discrete actions: whether the mask is part of the observation, too.
+        flat: One Box of all parts, in the order of this list.
+    """
+
+    panorama: bool = True
+    panorama_yaws: int | None = None
+    panorama_pitches: int = 3
+    panorama_utility: Literal["bits", "log2"] = "bits"
+    own: bool = True
+    team: bool = True
+    patch: bool = False
+    patch_shape: tuple[int, int, int] = (11, 11, 5)
+    overview: bool = False
+    overview_shape: tuple[int, int, int] = (8, 8, 4)
+    action_mask: bool = False
+    flat: bool = False
+
+    def __post_init__(self) -> None:
+        """Check every field."""
+        for name in ("panorama", "own", "team", "patch", "overview", "action_mask", "flat"):
+            _check_kind(self, name, bool)
+        if self.panorama_yaws is not None:
+            _check_count(self, "panorama_yaws", 1, 360)
+        _check_count(self, "panorama_pitches", 1, 90)
+        _check_choice(self, "panorama_utility", Literal["bits", "log2"])
+        _check_counts(self, "patch_shape", 1, 255)
+        if not all(n % 2 for n in self.patch_shape):
+            raise SettingError("Observation.patch_shape", self.patch_shape, "odd numbers only")
+        _check_counts(self, "overview_shape", 1, 64)
+
+
+@dataclass(frozen=True)
+class Scenario:
+    """One task: a kind of world, the team in it, what it may do and when it is over.
+
+    Attributes:
+        name: What people call it.
+        grid: Size and resolution of the workspace; a world from a file brings its own.
+        world: How the truth is made: `empty`, `furnished`, or the path of a world file.
+        robots: Team size A.
+        sigma_prior: Standard deviation of coverage before any measurement; the mean is ½.
+        decision_period_s: A step lasts this long; None = until the next robot has to decide.
+    """
+
+    name: str
+    grid: Grid
+    world: str = "empty"
+    robots: int = 3
+    sigma_prior: float = 30.0
+    decision_period_s: float | None = 1.0
+    robot: Robot = field(default_factory=Robot)
+    sensor: RangeSensor = field(default_factory=RangeSensor)
+    channel: Channel = field(default_factory=Channel)
+    ending: Ending = field(default_factory=Ending)
+    reward: Reward = field(default_factory=Reward)
+    action: Action = field(default_factory=Action)
+    observation: Observation = field(default_factory=Observation)
+
+    def __post_init__(self) -> None:
+        """Check every field, and that the parts fit each other."""
+        for name, kind in (("name", str), ("world", str), ("grid", Grid), *_PARTS):
+            _check_kind(self, name, kind)
+        _check_count(self, "robots", 1, 1000)
+        _check(self, "sigma_prior", "a number from 1e-3 to 1e4", lambda v: 1e-3 <= v <= 1e4)
+        if self.decision_period_s is not None:
+            _check_positive(self, "decision_period_s")
+        if self.ending.sigma_end >= self.sigma_prior:
+            raise SettingError(
+                "Ending.sigma_end", self.ending.sigma_end, f"below sigma_prior = {self.sigma_prior}"
+            )
+        if self.action.kind == "discrete" and not math.isfinite(self.robot.reach_m):
+            raise SettingError("Action.kind", "discrete", "continuous where Robot.reach_m is inf")
+        if self.action.kind == "discrete" and self.robot.reach_m < self.grid.voxel_size_m:
+            allowed = f"at least a voxel ({self.grid.voxel_size_m} m) for discrete actions"
+            raise SettingError("Robot.reach_m", self.robot.reach_m, allowed)
+        if self.planar and not self.grid.flat and self.robot.sensor_height_m >= self.grid.size_m[2]:
+            allowed = f"below the workspace's height ({self.grid.size_m[2]} m)"
+            raise SettingError("Robot.sensor_height_m", self.robot.sensor_height_m, allowed)
+
+    @property
+    def planar(self) -> bool:
+        """Whether robots stay in a plane and look level: planar robots, and any robot in 2-D."""
+        return self.robot.motion == "planar" or self.grid.flat
+
+    @cached_property
+    def agents(self) -> tuple[str, ...]:
+        """Names of the robots: robot_0, robot_1, …"""
+        return tuple(f"robot_{a}" for a in range(self.robots))
+
+
+_PARTS: tuple[tuple[str, type], ...] = (
+    ("robot", Robot),
+    ("sensor", RangeSensor),
+    ("channel", Channel),
+    ("ending", Ending),
+    ("reward", Reward),
+    ("action", Action),
+    ("observation", Observation),
+)
+
+
+def with_settings(scenario: Scenario, settings: Mapping[str, Any]) -> Scenario:
+    """A copy of the scenario with some settings changed.
+
+    Args:
+        scenario: What to start from.
+        settings: Field name → value. A part (`channel`, `robot`, …) takes either an object of its
+            class or a mapping of its own fields: `{"channel": {"burst": 32}}`. `max_cycles` and
+            `time_limit_s` are short for the fields of `ending`.
+
+    Raises:
+        SettingError: A name is unknown or a value is not allowed.
+    """
+    changes = dict(settings)
+    for name in ("max_cycles", "time_limit_s"):
+        if name in changes:
+            ending = changes.get("ending", {})
+            shortcut = {name: changes.pop(name)}
+            changes["ending"] = (
+                {**ending, **shortcut} if isinstance(ending, Mapping) else _replaced(ending, shortcut)
+            )
+    return _replaced(scenario, changes)
+
+
+def _replaced(settings: Settings, changes: Mapping[str, Any]) -> Settings:
+    """Like dataclasses.replace, into nested parts, with a named error for an unknown field."""
+    fields = [f.name for f in dataclasses.fields(settings)]  # type: ignore[arg-type]
+    values: dict[str, Any] = {}
+    for name, value in changes.items():
+        if name not in fields:
+            raise SettingError(
+                f"{type(settings).__name__}.{name}", value, "one of the fields " + ", ".join(fields)
+            )
+        current = getattr(settings, name)
+        nested = isinstance(value, Mapping) and dataclasses.is_dataclass(current)
+        values[name] = _replaced(current, value) if nested else value
+    return dataclasses.replace(settings, **values)  # type: ignore[type-var]

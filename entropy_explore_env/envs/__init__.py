@@ -1,0 +1,1 @@
+"""Adapters: missions as PettingZoo and Gymnasium environments."""

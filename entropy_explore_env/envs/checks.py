@@ -1,0 +1,99 @@
+"""Actions from outside, checked before anything changes, as the arrays that missions take."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from gymnasium import spaces
+
+from entropy_explore_env.errors import ActionError
+
+_ROUNDING = 1e-6
+
+
+class ActionChecker:
+    """Checks actions against one robot's action space.
+
+    Attributes:
+        width: Numbers of a continuous action; 1 where actions are discrete.
+    """
+
+    def __init__(self, space: spaces.Box | spaces.Discrete) -> None:
+        """Take the space's bounds."""
+        self._discrete = isinstance(space, spaces.Discrete)
+        self._count = int(space.n) if isinstance(space, spaces.Discrete) else 0
+        self.width = 1 if isinstance(space, spaces.Discrete) else int(space.shape[0])
+
+    def one(self, name: str, action: object) -> tuple[np.ndarray, np.ndarray]:
+        """A single robot's action as ((1, N) float64, (1,) int64)."""
+        return self.batch([(name, action)])
+
+    def batch(self, actions: Sequence[tuple[str, Any]]) -> tuple[np.ndarray, np.ndarray]:
+        """A team's actions as arrays.
+
+        Args:
+            actions: (agent, action) in the order of the robots.
+
+        Returns:
+            (A, N) float64 continuous actions and (A,) int64 discrete ones; one of them is zeros.
+
+        Raises:
+            ActionError: An action has the wrong shape or type, is not finite or outside its space.
+        """
+        boxes, numbers = np.zeros((len(actions), self.width)), np.zeros(len(actions), np.int64)
+        for row, (agent, action) in enumerate(actions):
+            if self._discrete:
+                numbers[row] = self._number(agent, action)
+            else:
+                boxes[row] = self._box(agent, action)
+        if not self._discrete and not (np.abs(boxes) <= 1.0 + _ROUNDING).all():
+            row = int(np.argmin((np.abs(boxes) <= 1.0 + _ROUNDING).all(axis=1)))
+            allowed = "finite numbers from -1 to 1"
+            raise ActionError(f"actions[{actions[row][0]}]", boxes[row].tolist(), allowed)
+        return boxes, numbers
+
+    def table(self, actions: object, missions: int, robots: int) -> tuple[np.ndarray, np.ndarray]:
+        """Actions of many missions as arrays.
+
+        Args:
+            actions: (E, A, N) numbers, or (E, A) whole numbers; without the axis A for one robot.
+            missions: E.
+            robots: A.
+
+        Returns:
+            (E, A, N) float64 and (E, A) int64.
+
+        Raises:
+            ActionError: As for `batch`.
+        """
+        given = np.asarray(actions)
+        leading = (missions,) if robots == 1 else (missions, robots)
+        shape = leading if self._discrete else (*leading, self.width)
+        wanted = "whole numbers" if self._discrete else "floating-point numbers"
+        kind = np.integer if self._discrete else np.floating
+        if given.shape != shape or not np.issubdtype(given.dtype, kind):
+            raise ActionError("actions", f"{given.dtype} {given.shape}", f"{wanted} of shape {shape}")
+        if self._discrete:
+            if ((given < 0) | (given >= self._count)).any():
+                raise ActionError("actions", given.tolist(), f"whole numbers from 0 to {self._count - 1}")
+            return np.zeros((missions, robots, 1)), given.reshape(missions, robots).astype(np.int64)
+        if not (np.abs(given) <= 1.0 + _ROUNDING).all():
+            raise ActionError("actions", "an array with other numbers", "finite numbers from -1 to 1")
+        boxes = np.ascontiguousarray(given.reshape(missions, robots, self.width), np.float64)
+        return boxes, np.zeros((missions, robots), np.int64)
+
+    def _number(self, agent: str, action: object) -> int:
+        number = action.item() if isinstance(action, np.ndarray) and action.shape == () else action
+        whole = isinstance(number, int | np.integer) and not isinstance(number, bool)
+        if not whole or not 0 <= number < self._count:
+            raise ActionError(f"actions[{agent}]", action, f"a whole number from 0 to {self._count - 1}")
+        return int(number)
+
+    def _box(self, agent: str, action: object) -> np.ndarray:
+        array = np.asarray(action)
+        if array.shape != (self.width,) or not np.issubdtype(array.dtype, np.floating):
+            allowed = f"{self.width} floating-point numbers from -1 to 1"
+            raise ActionError(f"actions[{agent}]", action, allowed)
+        return array

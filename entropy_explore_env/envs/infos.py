@@ -1,0 +1,60 @@
+"""What infos say of a robot after a step."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from entropy_explore_env.missions.action import write_mask
+from entropy_explore_env.missions.missions import Missions
+from entropy_explore_env.missions.state import MissionEnd
+from entropy_explore_env.missions.tick import grid_position, pose_at
+from entropy_explore_env.robots.motion import MoveEnd
+
+_MOVE_ENDS = [end.name for end in MoveEnd]
+_MISSION_ENDS = [end.name for end in MissionEnd]
+
+
+def robot_infos(missions: Missions, mission: int) -> list[dict[str, Any]]:
+    """An info for each robot of a mission.
+
+    Keys: `deciding` (whether its next action counts), `time_s`, `entropy_bits`, `own_bits` and
+    `received_bits` (taken from its map in this step), `move_end` and `end` (names of a MoveEnd and
+    a MissionEnd), and `action_mask` where actions are discrete.
+    """
+    clock = missions.state.missions[mission]
+    robots = missions.state.robots[mission]
+    time_s, end = float(clock["time_s"]), _MISSION_ENDS[clock["end"]]
+    infos: list[dict[str, Any]] = [
+        {
+            "deciding": deciding,
+            "time_s": time_s,
+            "entropy_bits": entropy_bits,
+            "own_bits": own_bits,
+            "received_bits": received_bits,
+            "move_end": _MOVE_ENDS[move_end],
+            "end": end,
+        }
+        for deciding, entropy_bits, own_bits, received_bits, move_end in zip(
+            robots["deciding"].tolist(),
+            robots["entropy_bits"].tolist(),
+            robots["own_bits"].tolist(),
+            robots["received_bits"].tolist(),
+            robots["move_end"].tolist(),
+            strict=True,
+        )
+    ]
+    if missions.scenario.action.kind == "discrete":
+        for robot, info in enumerate(infos):
+            info["action_mask"] = action_mask(missions, mission, robot)
+    return infos
+
+
+def action_mask(missions: Missions, mission: int, robot: int) -> np.ndarray:
+    """(N,) int8: 1 for each discrete action that makes sense by the robot's own belief."""
+    rules, state = missions.rules, missions.state
+    mask = np.empty(len(rules.moves) * len(rules.gazes), np.int8)
+    pose = pose_at(rules.numbers[0], state.robots[mission, robot], state.missions[mission]["time_s"])
+    write_mask(rules, grid_position(rules.numbers[0], pose), state.mean[mission, robot], mask)
+    return mask

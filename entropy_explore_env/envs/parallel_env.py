@@ -1,0 +1,190 @@
+"""A team of robots as a PettingZoo environment: an adapter of one mission, without physics of its own."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from gymnasium import spaces
+from pettingzoo import AECEnv, ParallelEnv
+from pettingzoo.utils import OrderEnforcingWrapper, parallel_to_aec
+
+from entropy_explore_env.config import Scenario, with_settings
+from entropy_explore_env.envs.checks import ActionChecker
+from entropy_explore_env.envs.infos import robot_infos
+from entropy_explore_env.errors import ActionError, CallOrderError, SettingError
+from entropy_explore_env.missions.action import action_space
+from entropy_explore_env.missions.missions import Missions
+from entropy_explore_env.missions.state import MissionEnd
+from entropy_explore_env.missions.view import RobotView, view_of
+from entropy_explore_env.reports.painting import FRAMES_PER_S, RENDER_MODES, Painter, check_render_mode
+from entropy_explore_env.scenarios import find_scenario
+from entropy_explore_env.worlds.load import with_world
+
+
+class EntropyExploreEnv(ParallelEnv[str, Any, Any]):
+    """One mission of a team; agents are robot_0, robot_1, …
+
+    Every robot has the same spaces (see `missions.observation` and `missions.action`). A robot that
+    is driving or scanning is busy: its action is ignored, and `infos[agent]["deciding"]` says for
+    the next step whether it will count. All robots end together: terminated when the map's entropy
+    reached the threshold, truncated at the limit of time or steps. `envs.infos` lists the infos.
+    """
+
+    metadata = {  # noqa: RUF012 - the form that PettingZoo asks for
+        "name": "entropy_explore_env_v0",
+        "render_modes": list(RENDER_MODES),
+        "render_fps": FRAMES_PER_S,
+        "is_parallelizable": True,
+    }
+
+    def __init__(
+        self, scenario: str | Scenario = "room", render_mode: str | None = None, **settings: object
+    ) -> None:
+        """Make the environment; `reset` starts a mission.
+
+        Args:
+            scenario: A scenario's name, or a Scenario.
+            render_mode: None, "human" or "rgb_array".
+            **settings: Fields of the Scenario to change: see `config.with_settings`.
+
+        Raises:
+            SettingError: A setting is unknown or out of its range.
+            WorldError: The world's file cannot be used.
+        """
+        check_render_mode(render_mode)
+        self.scenario = with_world(with_settings(find_scenario(scenario), settings))
+        self.missions = Missions(self.scenario)
+        self.render_mode = render_mode
+        self.possible_agents = list(self.scenario.agents)
+        self.agents: list[str] = []
+        self._action_spaces = {agent: action_space(self.scenario) for agent in self.possible_agents}
+        self._observation_spaces = {agent: self.missions.layout.space() for agent in self.possible_agents}
+        self._checker = ActionChecker(self._action_spaces[self.possible_agents[0]])
+        self._painter = Painter(render_mode)
+
+    def observation_space(self, agent: str) -> spaces.Space:
+        """The agent's observation space, the same object on every call."""
+        return self._observation_spaces[agent]
+
+    def action_space(self, agent: str) -> spaces.Space:
+        """The agent's action space, the same object on every call."""
+        return self._action_spaces[agent]
+
+    @functools.cached_property
+    def state_space(self) -> spaces.Box:
+        """Space of `state()`."""
+        return self.missions.layout.flat_space(self.scenario.robots)
+
+    def state(self) -> np.ndarray:
+        """What all robots observe, one after the other: (A·F,) float32, for centralised critics."""
+        return self.missions.observations[0].flatten()
+
+    def view(self, agent: str) -> RobotView:
+        """What a robot knows; strategies see this and nothing else.
+
+        Raises:
+            CallOrderError: There was no reset yet.
+            SettingError: No robot has this name.
+        """
+        if self.missions.episodes[0] < 0:
+            raise CallOrderError("view before reset: call reset() first")
+        if agent not in self._action_spaces:
+            raise SettingError("agent", agent, "one of " + ", ".join(self.possible_agents))
+        return view_of(self.missions, 0, self.possible_agents.index(agent))
+
+    def reset(
+        self, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[dict[str, Any], dict[str, dict[str, Any]]]:
+        """Start a mission.
+
+        Args:
+            seed: Of all random streams; None goes on to the next mission of the last seed.
+            options: Not used.
+
+        Returns:
+            Observations and infos by agent.
+
+        Raises:
+            SettingError: The seed is not a whole number ≥ 0.
+            WorldError: The world has too little room for the team.
+        """
+        del options
+        self.missions.reset(0, seed)
+        self.agents = list(self.possible_agents)
+        self._painter.watch(self.missions)
+        return self._observations(), self._infos()
+
+    def step(
+        self, actions: Mapping[str, Any]
+    ) -> tuple[dict[str, Any], dict[str, float], dict[str, bool], dict[str, bool], dict[str, dict[str, Any]]]:
+        """Advance by one step: `decision_period_s`, or until the next robot has to decide.
+
+        Args:
+            actions: An action for every agent; those of busy robots are ignored.
+
+        Returns:
+            Observations, rewards, terminations, truncations and infos by agent.
+
+        Raises:
+            CallOrderError: There was no reset, or the mission is over.
+            ActionError: An action is missing, of the wrong shape or type, not finite or outside
+                its space. Nothing has changed then.
+        """
+        boxes, numbers = self._checker.batch(self._in_order(actions))
+        self.missions.step(boxes[None], numbers[None])
+        observations, infos = self._observations(), self._infos()
+        rewards = dict(zip(self.agents, self.missions.state.robots[0]["reward"].tolist(), strict=True))
+        end = self.missions.over(0)
+        terminations = dict.fromkeys(self.agents, end is MissionEnd.MAPPED)
+        truncations = dict.fromkeys(self.agents, end in (MissionEnd.TIME_UP, MissionEnd.CYCLES_UP))
+        if end is not MissionEnd.RUNNING:
+            self.agents = []
+        self._painter.watch(self.missions)
+        return observations, rewards, terminations, truncations, infos
+
+    def _in_order(self, actions: Mapping[str, Any]) -> list[tuple[str, Any]]:
+        """The actions in the order of the robots, if there is one for each."""
+        if not self.agents:
+            late = "after the mission's end" if self.missions.episodes[0] >= 0 else "before reset"
+            raise CallOrderError(f"step {late}: call reset() first")
+        if not isinstance(actions, Mapping):
+            raise ActionError("actions", actions, "a dict from agent to action")
+        if len(actions) != len(self.agents) or any(agent not in actions for agent in self.agents):
+            raise ActionError(
+                "actions", sorted(map(str, actions)), "one for each of " + ", ".join(self.agents)
+            )
+        return [(agent, actions[agent]) for agent in self.agents]
+
+    def _observations(self) -> dict[str, Any]:
+        rows = self.missions.observations[0].copy()
+        split = self.missions.layout.split
+        return {agent: split(row) for agent, row in zip(self.agents, rows, strict=True)}
+
+    def _infos(self) -> dict[str, dict[str, Any]]:
+        return dict(zip(self.agents, robot_infos(self.missions, 0), strict=True))
+
+    def render(self) -> np.ndarray | None:
+        """The picture of this moment, (480, 640, 3) uint8 for `rgb_array`; `human` shows it by itself."""
+        return self._painter.picture(self.missions)
+
+    def close(self) -> None:
+        """Close the window, if there is one."""
+        self._painter.close()
+        self.missions.close()
+
+
+def parallel_env(
+    scenario: str | Scenario = "room", render_mode: str | None = None, **settings: object
+) -> EntropyExploreEnv:
+    """A team's mission as a ParallelEnv: see `EntropyExploreEnv`."""
+    return EntropyExploreEnv(scenario, render_mode, **settings)
+
+
+def env(
+    scenario: str | Scenario = "room", render_mode: str | None = None, **settings: object
+) -> AECEnv[str, Any, Any]:
+    """The same as an AECEnv: robots act in turn, and the step is taken when all have."""
+    return OrderEnforcingWrapper(parallel_to_aec(parallel_env(scenario, render_mode, **settings)))

@@ -1,0 +1,100 @@
+"""One robot on its own as a Gymnasium environment."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import gymnasium
+import numpy as np
+
+from entropy_explore_env.config import Scenario, with_settings
+from entropy_explore_env.envs.checks import ActionChecker
+from entropy_explore_env.envs.infos import robot_infos
+from entropy_explore_env.errors import CallOrderError, SettingError
+from entropy_explore_env.missions.action import action_space
+from entropy_explore_env.missions.missions import Missions
+from entropy_explore_env.missions.state import MissionEnd
+from entropy_explore_env.missions.view import RobotView, view_of
+from entropy_explore_env.reports.painting import FRAMES_PER_S, RENDER_MODES, Painter, check_render_mode
+from entropy_explore_env.scenarios import find_scenario
+from entropy_explore_env.worlds.load import with_world
+
+
+class SingleRobotEnv(gymnasium.Env[Any, Any]):
+    """A mission of one robot. Spaces and infos are those of the team's environment."""
+
+    metadata = {"render_modes": list(RENDER_MODES), "render_fps": FRAMES_PER_S}  # noqa: RUF012 - Gymnasium's form
+
+    def __init__(
+        self, scenario: str | Scenario = "room", render_mode: str | None = None, **settings: object
+    ) -> None:
+        """Make the environment; `reset` starts a mission.
+
+        Args:
+            scenario: A scenario's name, or a Scenario; its team size is set to 1.
+            render_mode: None, "human" or "rgb_array".
+            **settings: Fields of the Scenario to change: see `config.with_settings`.
+
+        Raises:
+            SettingError: A setting is unknown or out of its range, or `robots` is not 1.
+            WorldError: The world's file cannot be used.
+        """
+        check_render_mode(render_mode)
+        if settings.get("robots", 1) != 1:
+            raise SettingError("robots", settings["robots"], "1; parallel_env() takes a team")
+        self.scenario = with_world(with_settings(find_scenario(scenario), {**settings, "robots": 1}))
+        self.missions = Missions(self.scenario)
+        self.render_mode = render_mode
+        space = action_space(self.scenario)
+        self.action_space = space
+        self.observation_space = self.missions.layout.space()
+        self._checker = ActionChecker(space)
+        self._painter = Painter(render_mode)
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Any, dict[str, Any]]:
+        """Start a mission; see `EntropyExploreEnv.reset`."""
+        super().reset(seed=seed)
+        del options
+        self.missions.reset(0, seed)
+        self._painter.watch(self.missions)
+        return self._observation(), robot_infos(self.missions, 0)[0]
+
+    def step(self, action: object) -> tuple[Any, float, bool, bool, dict[str, Any]]:
+        """Advance by one step; see `EntropyExploreEnv.step`."""
+        if self.missions.episodes[0] < 0:
+            raise CallOrderError("step before reset: call reset() first")
+        if self.missions.over(0) is not MissionEnd.RUNNING:
+            raise CallOrderError("step after the mission's end: call reset() first")
+        boxes, numbers = self._checker.one("robot_0", action)
+        self.missions.step(boxes[None], numbers[None])
+        self._painter.watch(self.missions)
+        end = self.missions.over(0)
+        truncated = end in (MissionEnd.TIME_UP, MissionEnd.CYCLES_UP)
+        reward = float(self.missions.state.robots[0, 0]["reward"])
+        return (
+            self._observation(),
+            reward,
+            end is MissionEnd.MAPPED,
+            truncated,
+            robot_infos(self.missions, 0)[0],
+        )
+
+    def _observation(self) -> np.ndarray | dict[str, np.ndarray]:
+        return self.missions.layout.split(self.missions.observations[0, 0].copy())
+
+    def view(self) -> RobotView:
+        """What the robot knows; strategies see this and nothing else."""
+        if self.missions.episodes[0] < 0:
+            raise CallOrderError("view before reset: call reset() first")
+        return view_of(self.missions, 0, 0)
+
+    def render(self) -> Any:  # noqa: ANN401 - Gymnasium's signature
+        """The picture of this moment, (480, 640, 3) uint8 for `rgb_array`."""
+        return self._painter.picture(self.missions)
+
+    def close(self) -> None:
+        """Close the window, if there is one."""
+        self._painter.close()
+        self.missions.close()

@@ -1,0 +1,198 @@
+"""Many missions as one Gymnasium VectorEnv: one compiled call steps all of them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from gymnasium import spaces
+from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector.utils import batch_space
+
+from entropy_explore_env.config import Scenario, with_settings
+from entropy_explore_env.envs.checks import ActionChecker
+from entropy_explore_env.errors import CallOrderError, SettingError
+from entropy_explore_env.missions.action import action_space
+from entropy_explore_env.missions.missions import Missions
+from entropy_explore_env.missions.state import MissionEnd
+from entropy_explore_env.reports.painting import FRAMES_PER_S, RENDER_MODES, Painter, check_render_mode
+from entropy_explore_env.scenarios import find_scenario
+from entropy_explore_env.worlds.load import with_world
+
+_RUNNING, _MAPPED = MissionEnd.RUNNING.code, MissionEnd.MAPPED.code
+
+
+class EntropyExploreVectorEnv(VectorEnv[Any, Any, Any]):
+    """E missions of A robots.
+
+    With one robot, spaces are those of the single-robot environment with a leading axis E. With a
+    team, observations, actions and the infos below have leading axes (E, A), and the reward of a
+    mission, (E,), is the mean of its robots' rewards.
+
+    Infos, each with a mask `_name` (E,) as Gymnasium has it: `deciding`, `entropy_bits`, `own_bits`,
+    `received_bits` and `reward_robots`, (E, A); `time_s` and `end` (code of a MissionEnd), (E,).
+    `final_obs` and `final_info` where autoreset is SAME_STEP.
+    """
+
+    def __init__(
+        self,
+        scenario: str | Scenario = "room",
+        num_envs: int = 1,
+        *,
+        threads: int | None = 1,
+        autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
+        render_mode: str | None = None,
+        **settings: object,
+    ) -> None:
+        """Make the missions; `reset` starts them.
+
+        Args:
+            scenario: A scenario's name, or a Scenario.
+            num_envs: Number of missions E.
+            threads: Threads that share the missions; None = one a processor. Results are the same.
+            autoreset_mode: When a mission that is over starts anew: with the next step (its action
+                is ignored), within the same step, or never.
+            render_mode: None, "human" or "rgb_array", of the first mission.
+            **settings: Fields of the Scenario to change: see `config.with_settings`.
+
+        Raises:
+            SettingError: A setting is unknown or out of its range.
+            WorldError: The world's file cannot be used.
+        """
+        check_render_mode(render_mode)
+        try:
+            self.autoreset_mode = AutoresetMode(autoreset_mode)
+        except ValueError:
+            allowed = "one of " + ", ".join(mode.value for mode in AutoresetMode)
+            raise SettingError("autoreset_mode", autoreset_mode, allowed) from None
+        self.scenario = with_world(with_settings(find_scenario(scenario), settings))
+        self.missions = Missions(self.scenario, num_envs, threads)
+        self.num_envs = self.missions.count
+        self.metadata = {
+            "autoreset_mode": self.autoreset_mode,
+            "render_modes": list(RENDER_MODES),
+            "render_fps": FRAMES_PER_S,
+        }
+        self.render_mode = render_mode
+        robots = self.scenario.robots
+        space, observation = action_space(self.scenario), self.missions.layout.space()
+        self._checker = ActionChecker(space)
+        self.single_action_space = space if robots == 1 else batch_space(space, robots)
+        self.single_observation_space = observation if robots == 1 else batch_space(observation, robots)
+        self.action_space = batch_space(self.single_action_space, self.num_envs)
+        self.observation_space: spaces.Space = batch_space(self.single_observation_space, self.num_envs)
+        self._painter = Painter(render_mode)
+
+    def reset(
+        self, *, seed: int | list[int | None] | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Any, dict[str, Any]]:
+        """Start all missions, or those of `options["reset_mask"]` (E,) bool.
+
+        Args:
+            seed: A number, of which mission e takes `seed + e`; or one number (or None) a mission.
+            options: May hold a reset mask.
+
+        Returns:
+            Observations and infos.
+
+        Raises:
+            SettingError: The seeds or the mask do not fit.
+            WorldError: A world has too little room for the team.
+        """
+        mask = np.asarray((options or {}).get("reset_mask", np.ones(self.num_envs, bool)))
+        if mask.shape != (self.num_envs,) or mask.dtype != np.bool_ or not mask.any():
+            raise SettingError("reset_mask", mask, f"a bool array of shape ({self.num_envs},), not all False")
+        seeds = self._seeds(seed)
+        for mission in np.flatnonzero(mask):
+            self.missions.reset(int(mission), seeds[mission])
+        self._painter.watch(self.missions)
+        return self._observations(), self._infos()
+
+    def _seeds(self, seed: int | list[int | None] | None) -> list[int | None]:
+        if seed is None or isinstance(seed, int | np.integer):
+            return [None if seed is None else int(seed) + mission for mission in range(self.num_envs)]
+        seeds = list(seed)
+        if len(seeds) != self.num_envs:
+            raise SettingError("seed", seed, f"a whole number, or {self.num_envs} of them")
+        return seeds
+
+    def step(self, actions: object) -> tuple[Any, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
+        """Advance all missions by one step.
+
+        Args:
+            actions: (E, A, N) or (E, A); without the axis A for one robot.
+
+        Returns:
+            Observations, rewards (E,) float64, terminations and truncations (E,) bool, infos.
+
+        Raises:
+            CallOrderError: There was no reset, or missions are over and nothing starts them anew.
+            ActionError: The actions have the wrong shape or type, are not finite or outside their
+                space. Nothing has changed then.
+        """
+        if min(self.missions.episodes) < 0:
+            raise CallOrderError("step before reset: call reset() first")
+        clocks, robots = self.missions.state.missions, self.missions.state.robots
+        boxes, numbers = self._checker.table(actions, self.num_envs, self.scenario.robots)
+        over = np.flatnonzero(clocks["end"] != _RUNNING)
+        if len(over) and self.autoreset_mode is AutoresetMode.DISABLED:
+            raise CallOrderError(
+                f"step after the end of missions {over.tolist()}: reset them with a reset_mask"
+            )
+        self.missions.step(boxes, numbers)
+        rewards = robots["reward"].mean(axis=1)
+        rewards[over] = 0.0
+        for mission in over:
+            self.missions.reset(int(mission))
+        terminations, truncations = clocks["end"] == _MAPPED, clocks["end"] > _MAPPED
+        infos = self._infos()
+        ended = np.flatnonzero(terminations | truncations)
+        if len(ended) and self.autoreset_mode is AutoresetMode.SAME_STEP:
+            infos = self._reset_within(ended, infos)
+        self._painter.watch(self.missions)
+        return self._observations(), rewards, terminations, truncations, infos
+
+    def _reset_within(self, ended: np.ndarray, last: dict[str, Any]) -> dict[str, Any]:
+        """Start missions that have just ended anew; their last observation and info are kept."""
+        mask = np.zeros(self.num_envs, bool)
+        mask[ended] = True
+        last_observations = np.empty(self.num_envs, object)
+        for mission in ended:
+            last_observations[mission] = self._split(self.missions.observations[mission].copy())
+            self.missions.reset(int(mission))
+        final = {name: mask.copy() if name.startswith("_") else value for name, value in last.items()}
+        infos = self._infos()
+        infos["reward_robots"] = last["reward_robots"]
+        return {
+            **infos,
+            "final_obs": last_observations,
+            "_final_obs": mask,
+            "final_info": final,
+            "_final_info": mask,
+        }
+
+    def _split(self, rows: np.ndarray) -> np.ndarray | dict[str, np.ndarray]:
+        """An observation from rows (..., A, F); one robot has no axis of its own."""
+        return self.missions.layout.split(rows[..., 0, :] if self.scenario.robots == 1 else rows)
+
+    def _observations(self) -> np.ndarray | dict[str, np.ndarray]:
+        return self._split(self.missions.observations.copy())
+
+    def _infos(self) -> dict[str, Any]:
+        clocks, robots = self.missions.state.missions, self.missions.state.robots
+        infos: dict[str, Any] = {name: clocks[name].copy() for name in ("time_s", "end")}
+        for name in ("deciding", "entropy_bits", "own_bits", "received_bits"):
+            infos[name] = robots[name].copy()
+        infos["reward_robots"] = robots["reward"].copy()
+        infos.update({f"_{name}": np.ones(self.num_envs, bool) for name in list(infos)})
+        return infos
+
+    def render(self) -> Any:  # noqa: ANN401 - Gymnasium's signature
+        """The picture of the first mission, (480, 640, 3) uint8 for `rgb_array`."""
+        return self._painter.picture(self.missions)
+
+    def close_extras(self, **kwargs: object) -> None:
+        """End the threads and close the window."""
+        del kwargs
+        self._painter.close()
+        self.missions.close()

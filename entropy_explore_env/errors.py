@@ -1,0 +1,40 @@
+"""The named errors of the package: each says the field, the value it had and what is allowed."""
+
+from __future__ import annotations
+
+
+class EntropyExploreError(ValueError):
+    """Anything that the caller asked for and cannot have; the message is one line."""
+
+
+class SettingError(EntropyExploreError):
+    """A setting is unknown, of the wrong kind or out of its range."""
+
+    def __init__(self, field: str, value: object, allowed: str) -> None:
+        """Name the field, show the value, say what is allowed."""
+        super().__init__(f"{field} = {value!r}: allowed is {allowed}")
+        self.field, self.value, self.allowed = field, value, allowed
+
+    def __reduce__(self) -> tuple[type, tuple[str, object, str]]:
+        """Survive the way back from a worker process."""
+        return type(self), (self.field, self.value, self.allowed)
+
+
+class ActionError(SettingError):
+    """An action has the wrong shape or type, is not finite, or its robot is missing."""
+
+
+class WorldError(SettingError):
+    """A world cannot be used: a file that is missing or broken, or no room for the robots."""
+
+
+class CallOrderError(EntropyExploreError):
+    """A call came at the wrong time: `step` before `reset`, or after the mission's end."""
+
+
+class MissingExtraError(EntropyExploreError, ImportError):
+    """An optional package is needed; the message names the extra that installs it."""
+
+    def __init__(self, package: str, extra: str) -> None:
+        """Name the package that is missing and the extra that brings it."""
+        super().__init__(f"{package} is not installed: pip install 'entropy_explore_env[{extra}]'")

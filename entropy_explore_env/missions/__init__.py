@@ -1,0 +1,1 @@
+"""Robots in worlds, many missions at once."""

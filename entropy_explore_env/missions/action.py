@@ -1,0 +1,152 @@
+"""Actions and viewpoints: the same viewpoint can be written as an action, and read back from it.
+
+A viewpoint is (x, y, z, yaw, pitch): map frame, metres, radians, pitch downwards.
+
+Continuous, Box(-1, 1): displacement in shares of the reach (x, y, z; planar robots x, y), yaw/π
+and, unless planar, pitch/(π/2). A displacement longer than the reach is shortened to it. Where the
+reach is infinite, the first numbers are a place in the workspace instead, -1…1 along each axis.
+
+Discrete: number m·D + g means move m of `discrete_moves` (a voxel offset from the robot's voxel, to
+that voxel's centre) and gaze g of the D in `gaze_set`.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from gymnasium import spaces
+from numba import njit
+
+from entropy_explore_env.belief.raycast import STOP_AT_COVERED
+from entropy_explore_env.config import Scenario
+from entropy_explore_env.errors import ActionError
+from entropy_explore_env.missions.rules import Rules, rules_of
+
+_ROUNDING = 1e-6
+"""A displacement may exceed the reach by this share: the rounding of float32 actions."""
+
+
+def action_space(scenario: Scenario) -> spaces.Box | spaces.Discrete:
+    """A new space object of one robot's action."""
+    if scenario.action.kind == "continuous":
+        return spaces.Box(-1.0, 1.0, (3 if scenario.planar else 5,), np.float32)
+    rules = rules_of(scenario)
+    return spaces.Discrete(len(rules.moves) * len(rules.gazes))
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def decode_action(rules, pose, box, number, viewpoint):
+    """Turn an action into a viewpoint.
+
+    Args:
+        rules: The scenario.
+        pose: (5,) float64, the robot's pose.
+        box: (N,) float64 continuous action; not read where actions are discrete.
+        number: Discrete action; not read where they are continuous.
+        viewpoint: (5,) float64, filled in; within reach of the pose.
+    """
+    settings = rules.numbers[0]
+    axes = 2 if settings.planar else 3
+    for i in range(5):
+        viewpoint[i] = pose[i]
+    if settings.discrete:
+        move, gaze = rules.moves[number // len(rules.gazes)], rules.gazes[number % len(rules.gazes)]
+        for axis in range(axes):
+            voxel = math.floor((pose[axis] - settings.origin_m[axis]) / settings.voxel_size_m) + move[axis]
+            viewpoint[axis] = settings.origin_m[axis] + (voxel + 0.5) * settings.voxel_size_m
+        viewpoint[3], viewpoint[4] = gaze[0], gaze[1]
+    else:
+        for axis in range(axes):
+            if math.isinf(settings.reach_m):
+                extent = settings.size[axis] * settings.voxel_size_m
+                viewpoint[axis] = settings.origin_m[axis] + 0.5 * (box[axis] + 1.0) * extent
+            else:
+                viewpoint[axis] = pose[axis] + box[axis] * settings.reach_m
+        viewpoint[3] = box[axes] * math.pi
+        viewpoint[4] = 0.0 if settings.planar else box[axes + 1] * math.pi / 2.0
+    if not math.isinf(settings.reach_m):
+        length = 0.0
+        for axis in range(axes):
+            length += (viewpoint[axis] - pose[axis]) ** 2
+        length = math.sqrt(length)
+        if length > settings.reach_m * (1.0 + _ROUNDING):
+            for axis in range(axes):
+                viewpoint[axis] = pose[axis] + (viewpoint[axis] - pose[axis]) * settings.reach_m / length
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def write_mask(rules, start, mean, out):
+    """Mark the discrete actions that make sense by the robot's own belief.
+
+    A move makes sense if it ends inside the workspace, within reach, in a voxel that is not
+    believed covered; to stay always does.
+
+    Args:
+        rules: The scenario.
+        start: (3,) float64, the robot in grid units.
+        mean: (V,) float32, its expected coverage.
+        out: (K·D,) filled with 0 and 1.
+    """
+    settings, gazes = rules.numbers[0], len(rules.gazes)
+    for move in range(len(rules.moves)):
+        inside, voxel, apart = True, 0, 0.0
+        for axis in range(3):
+            index = int(math.floor(start[axis])) + rules.moves[move, axis]
+            inside = inside and 0 <= index < settings.size[axis]
+            voxel = voxel * settings.size[axis] + index
+            if axis < 2 or not settings.planar:
+                apart += (index + 0.5 - start[axis]) ** 2
+        near = math.sqrt(apart) * settings.voxel_size_m <= settings.reach_m * (1.0 + _ROUNDING)
+        sensible = move == 0 or (inside and near and mean[voxel] <= STOP_AT_COVERED)
+        for gaze in range(gazes):
+            out[move * gazes + gaze] = 1 if sensible else 0
+
+
+def encode_viewpoint(rules: Rules, pose: np.ndarray, viewpoint: np.ndarray) -> np.ndarray | np.int64:
+    """The action that sends a robot to a viewpoint.
+
+    Continuous actions hold it up to float32 rounding; a place beyond the reach is pulled onto it.
+    Discrete actions hold it exactly if it is the centre of a voxel within reach with a gaze of the
+    set; otherwise the nearest move and the nearest gaze are taken.
+
+    Args:
+        rules: The scenario.
+        pose: (5,) the robot's pose.
+        viewpoint: (5,) x, y, z, yaw, pitch.
+
+    Returns:
+        (N,) float32, or an int64.
+
+    Raises:
+        ActionError: The viewpoint has the wrong shape or is not finite.
+    """
+    wanted = np.asarray(viewpoint, dtype=np.float64)
+    if wanted.shape != (5,) or not np.isfinite(wanted).all():
+        raise ActionError("viewpoint", viewpoint, "five finite numbers (x, y, z, yaw, pitch)")
+    settings = rules.numbers[0]
+    axes = 2 if settings["planar"] else 3
+    if not settings["discrete"]:
+        return _encoded_box(settings, pose, wanted, axes)
+    corner = np.floor((pose[:axes] - settings["origin_m"][:axes]) / settings["voxel_size_m"])
+    ends = settings["origin_m"][:axes] + (corner + rules.moves[:, :axes] + 0.5) * settings["voxel_size_m"]
+    move = int(np.argmin(((ends - wanted[:axes]) ** 2).sum(axis=1)))
+    yaw, pitch = rules.gazes[:, 0], rules.gazes[:, 1]
+    toward = math.cos(wanted[4])
+    alike = np.cos(pitch) * toward * np.cos(yaw - wanted[3]) + np.sin(pitch) * math.sin(wanted[4])
+    return np.int64(move * len(rules.gazes) + int(np.argmax(alike)))
+
+
+def _encoded_box(settings: np.void, pose: np.ndarray, wanted: np.ndarray, axes: int) -> np.ndarray:
+    """The continuous action for a viewpoint."""
+    if math.isinf(settings["reach_m"]):
+        extent = np.asarray(settings["size"][:axes]) * settings["voxel_size_m"]
+        move = 2.0 * (wanted[:axes] - settings["origin_m"][:axes]) / extent - 1.0
+    else:
+        move = (wanted[:axes] - pose[:axes]) / settings["reach_m"]
+        length = math.sqrt(float((move**2).sum()))
+        if length > 1.0:
+            move = move / length
+    yaw = (wanted[3] + math.pi) % (2.0 * math.pi) - math.pi
+    gaze = [yaw / math.pi] if settings["planar"] else [yaw / math.pi, wanted[4] / (math.pi / 2.0)]
+    return np.clip(np.concatenate([move, gaze]), -1.0, 1.0).astype(np.float32)

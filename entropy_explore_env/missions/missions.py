@@ -1,0 +1,262 @@
+"""Robots in worlds, many missions at once: the arrays, how they are reset, and the one tick."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+
+from entropy_explore_env.belief.coverage_map import PRIOR_MEAN, map_entropy_bits
+from entropy_explore_env.config import Grid, Scenario, gaussian_entropy_bits
+from entropy_explore_env.errors import CallOrderError, SettingError, WorldError
+from entropy_explore_env.missions.observation import ObservationLayout, observation_rules
+from entropy_explore_env.missions.rules import rules_of
+from entropy_explore_env.missions.state import MissionEnd, MissionState, new_state
+from entropy_explore_env.missions.tick import observe_mission, step_missions
+from entropy_explore_env.randomness import Stream, check_seed, generator, splitmix_states
+from entropy_explore_env.robots.range_sensor import Scan, new_scan
+from entropy_explore_env.worlds.load import make_world
+from entropy_explore_env.worlds.world import World
+
+_CHUNKS_PER_THREAD = 4
+"""Missions differ in work; smaller chunks even it out."""
+_PLACING_ATTEMPTS = 200
+
+
+class Missions:
+    """E missions of one scenario, advanced together by one compiled call.
+
+    A single mission is a batch of one. Results do not depend on how many missions there are, on
+    the number of threads, or on what other missions do.
+
+    Attributes:
+        scenario: The task, its grid taken over from the world file if there is one.
+        count: Number of missions E.
+        state: All that changes, as arrays.
+        worlds: The true world of each mission; None before its first reset.
+        layout: What an observation is made of.
+        observations: (E, A, F) float32 of the latest step or reset.
+    """
+
+    def __init__(self, scenario: Scenario, count: int = 1, threads: int | None = 1) -> None:
+        """Make room for the missions; `reset` starts them.
+
+        Args:
+            scenario: The task.
+            count: Number of missions E.
+            threads: Threads that share the missions; None = one a processor.
+
+        Raises:
+            SettingError: A count is not a whole number ≥ 1.
+            WorldError: The world's file cannot be used.
+        """
+        for name, value in (("missions", count), ("threads", 1 if threads is None else threads)):
+            if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < 1:
+                raise SettingError(name, value, "a whole number ≥ 1")
+        self.scenario = scenario
+        self.count = int(count)
+        self.threads = min(self.count, threads or len(os.sched_getaffinity(0)))
+        self.rules = rules_of(scenario)
+        self.layout = ObservationLayout(scenario)
+        self._parts = observation_rules(scenario, self.layout)
+        self.state: MissionState = new_state(scenario, self.count)
+        self.worlds: list[World | None] = [None] * self.count
+        self.seeds = [0] * self.count
+        self.episodes = [-1] * self.count
+        self.observations = np.zeros((self.count, scenario.robots, self.layout.size), np.float32)
+        self._scans = [self._new_scan() for _ in range(self.threads)]
+        self._pool: ThreadPoolExecutor | None = None
+
+    def _new_scan(self) -> Scan:
+        sensor = self.scenario.sensor
+        return new_scan(self.scenario.grid, sensor, sensor.rays, self.scenario.robots)
+
+    @property
+    def grid(self) -> Grid:
+        """Voxels of the workspace."""
+        return self.scenario.grid
+
+    @property
+    def mean(self) -> np.ndarray:
+        """(E, A, X, Y, Z) float32 expected coverage by each robot's belief; a view."""
+        return self.state.mean.reshape(self.count, self.scenario.robots, *self.grid.shape)
+
+    @property
+    def precision(self) -> np.ndarray:
+        """(E, A, X, Y, Z) float32 1/σ² by each robot's belief; a view."""
+        return self.state.precision.reshape(self.count, self.scenario.robots, *self.grid.shape)
+
+    def reset(self, mission: int, seed: int | None = None) -> None:
+        """Start a mission anew: world, starts and random streams drawn, beliefs at the prior.
+
+        Args:
+            mission: Which of the E.
+            seed: Of all its random streams. None goes on to the next episode of the last seed.
+
+        Raises:
+            SettingError: The seed is not a whole number ≥ 0.
+            WorldError: The world has too little room for the team.
+        """
+        if seed is not None or self.episodes[mission] < 0:
+            number, episode = check_seed(seed), 0
+        else:
+            number, episode = self.seeds[mission], self.episodes[mission] + 1
+        world = make_world(self.scenario, generator(number, episode, Stream.WORLD))
+        layout = world.layout(self.scenario)
+        poses = start_poses(self.scenario, world, layout.starts, generator(number, episode, Stream.STARTS))
+        self.seeds[mission], self.episodes[mission] = number, episode
+        state = self.state
+        if world is not self.worlds[mission]:
+            self.worlds[mission] = world
+            state.truth[mission] = world.occupied.ravel()
+            state.blocked[mission] = layout.blocked.ravel()
+        for array in state[4:]:
+            array[mission] = np.zeros((), array.dtype)
+        state.mean[mission] = PRIOR_MEAN
+        state.precision[mission] = self.rules.numbers["prior_precision"][0]
+        self._set_entropies(mission, layout.visible_voxels)
+        robots = state.robots[mission]
+        for field in ("origin", "goal", "target", "scan_pose"):
+            robots[field] = poses
+        robots["deciding"] = True
+        robots["sensor_chance"][:, 0] = splitmix_states(number, episode, Stream.SENSOR, len(robots))
+        robots["channel_chance"][:, 0] = splitmix_states(number, episode, Stream.CHANNEL, len(robots))
+        state.heard[mission]["heard_s"] = state.heard[mission]["announced_s"] = -1.0
+        state.mail[mission]["due_s"] = np.inf
+        out = self.observations[mission]
+        observe_mission(self.rules, self._parts, state, self._scans[0], mission, out)
+
+    def _set_entropies(self, mission: int, visible_voxels: int) -> None:
+        """H(0) by eq. 25, and H_th: voxels that can be seen at σ_end, the others at the prior."""
+        prior = np.full((1, 1, 1), self.rules.numbers["prior_precision"][0], np.float32)
+        voxel_bits = float(map_entropy_bits(prior))
+        known_bits = gaussian_entropy_bits(self.scenario.ending.sigma_end)
+        hidden = self.grid.voxels - visible_voxels
+        clock = self.state.missions[mission]
+        clock["entropy_start_bits"] = self.grid.voxels * voxel_bits
+        clock["entropy_end_bits"] = visible_voxels * known_bits + hidden * voxel_bits
+        self.state.robots[mission]["entropy_bits"] = clock["entropy_start_bits"]
+
+    def strategy_generator(self, mission: int) -> np.random.Generator:
+        """The random stream of whoever chooses the actions in this mission's episode."""
+        return generator(self.seeds[mission], self.episodes[mission], Stream.STRATEGY)
+
+    def step(self, boxes: np.ndarray, numbers: np.ndarray) -> np.ndarray:
+        """Advance every mission that is not over by one step.
+
+        Args:
+            boxes: (E, A, N) float64 continuous actions; ignored where actions are discrete.
+            numbers: (E, A) int64 discrete actions; ignored where they are continuous.
+
+        Returns:
+            (E, A, F) float32 observations; overwritten by the next call.
+
+        Raises:
+            CallOrderError: A mission was never reset.
+        """
+        if min(self.episodes) < 0:
+            raise CallOrderError("step before reset: call reset() first")
+        if self.threads == 1:
+            self._step_range(0, 0, self.count, boxes, numbers)
+        else:
+            self._step_threaded(boxes, numbers)
+        return self.observations
+
+    def _step_range(self, thread: int, first: int, last: int, boxes: np.ndarray, numbers: np.ndarray) -> None:
+        step_missions(
+            self.rules,
+            self._parts,
+            self.state,
+            self._scans[thread],
+            boxes,
+            numbers,
+            first,
+            last,
+            self.observations,
+        )
+
+    def _step_threaded(self, boxes: np.ndarray, numbers: np.ndarray) -> None:
+        """Share the missions among threads: each takes the next chunk as soon as it is free."""
+        if self._pool is None:
+            self._pool = ThreadPoolExecutor(self.threads, "missions")
+        size = max(1, self.count // (self.threads * _CHUNKS_PER_THREAD))
+        chunks = iter(range(0, self.count, size))
+
+        def work(thread: int) -> None:
+            for first in chunks:
+                self._step_range(thread, first, min(first + size, self.count), boxes, numbers)
+
+        for done in [self._pool.submit(work, thread) for thread in range(self.threads)]:
+            done.result()
+
+    def over(self, mission: int) -> MissionEnd:
+        """Why the mission is over, or MissionEnd.RUNNING."""
+        return list(MissionEnd)[int(self.state.missions[mission]["end"])]
+
+    def close(self) -> None:
+        """End the threads; the missions can still be stepped."""
+        if self._pool is not None:
+            self._pool.shutdown()
+            self._pool = None
+
+    def __getstate__(self) -> dict[str, object]:
+        """All but the threads and their scratch space."""
+        kept = dict(self.__dict__)
+        del kept["_pool"], kept["_scans"]
+        return kept
+
+    def __setstate__(self, kept: dict[str, object]) -> None:
+        """Take the arrays back and make new scratch space."""
+        self.__dict__.update(kept)
+        self._scans = [self._new_scan() for _ in range(self.threads)]
+        self._pool = None
+
+
+def start_poses(scenario: Scenario, world: World, starts: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """Draw where robots start: voxel centres with room, apart from each other, any yaw, level.
+
+    Args:
+        scenario: The task.
+        world: The true world.
+        starts: (N,) flat indices of voxels where a robot may start.
+        rng: The stream of starts.
+
+    Returns:
+        (A, 5) float64 poses.
+
+    Raises:
+        WorldError: The bodies find no room.
+    """
+    apart_m = max(2.0 * scenario.robot.body_radius_m + 1e-3 * world.grid.voxel_size_m, 1e-9)
+    for _ in range(_PLACING_ATTEMPTS):
+        places = _spread(world.grid, starts, scenario.robots, apart_m, rng)
+        if places is not None:
+            yaw = rng.uniform(-np.pi, np.pi, (scenario.robots, 1))
+            return np.hstack([places, yaw, np.zeros((scenario.robots, 1))])
+    allowed = f"at most what fits into {len(starts)} free voxels, bodies {apart_m:.3g} m apart"
+    raise WorldError("Scenario.robots", scenario.robots, allowed)
+
+
+def _spread(
+    grid: Grid, starts: np.ndarray, robots: int, apart_m: float, rng: np.random.Generator
+) -> np.ndarray | None:
+    """(A, 3) places that keep their distance, in the order of one random permutation; None if stuck."""
+    tried = (
+        rng.permutation(starts)
+        if len(starts) <= 64 * robots
+        else rng.choice(starts, 64 * robots, replace=False)
+    )
+    taken = np.zeros((0, 3))
+    for place in grid.centre_of(np.stack(np.unravel_index(tried, grid.shape), axis=-1)):
+        if not len(taken) or np.sqrt(((taken - place) ** 2).sum(axis=1)).min() >= apart_m:
+            taken = np.vstack([taken, place])
+        if len(taken) == robots:
+            return taken
+    return None
+
+
+def stack_actions(actions: Sequence[np.ndarray | np.integer | int]) -> np.ndarray:
+    """Actions of one mission's robots as one array: (A, N) or (A,)."""
+    return np.stack([np.asarray(action) for action in actions])

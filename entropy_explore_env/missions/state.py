@@ -1,0 +1,167 @@
+"""The state of many missions: NumPy arrays with leading axes mission E and robot A.
+
+What belongs to one mission, robot, pair of robots or message lies in the fields of structured
+arrays, so `state.robots["entropy_bits"]` is (E, A). Nothing else is carried from step to step:
+pickle, deepcopy and replay follow from the arrays. Map frame, metres, radians, seconds, bits; a pose
+or viewpoint is (x, y, z, yaw, pitch).
+"""
+
+from __future__ import annotations
+
+import enum
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from entropy_explore_env.config import Scenario
+
+
+class MissionEnd(enum.Enum):
+    """Why a mission is over; the value is a sentence for people."""
+
+    RUNNING = "The mission goes on."
+    MAPPED = "The entropy of the map, or of all maps, fell to the threshold."
+    TIME_UP = "The simulated time reached its limit."
+    CYCLES_UP = "The number of steps reached its limit."
+
+    @property
+    def code(self) -> int:
+        """Number of this end in arrays."""
+        return list(MissionEnd).index(self)
+
+
+MISSION = np.dtype(
+    [
+        ("entropy_start_bits", "f8"),  # H(0), Rocha04 eq. 25
+        ("entropy_end_bits", "f8"),  # H_th, the threshold that ends the mission
+        ("time_s", "f8"),
+        ("cycles", "i8"),  # steps so far
+        ("end", "i8"),  # code of a MissionEnd
+        ("letters", "i8"),  # delayed messages sent so far
+    ],
+    align=True,
+)
+
+ROBOT = np.dtype(
+    [
+        ("entropy_bits", "f8"),  # of its map, carried by H -= I (Rocha04, eq. 29)
+        ("deciding", "?"),  # whether it chooses a viewpoint in the next step
+        ("origin", "f8", (5,)),  # pose at which the latest drive began
+        ("goal", "f8", (5,)),  # pose at which it ends, or ended
+        ("target", "f8", (5,)),  # viewpoint that was chosen, whether or not the drive ends there
+        ("scan_pose", "f8", (5,)),  # pose of the latest scan
+        ("depart_s", "f8"),  # start of the drive
+        ("ready_s", "f8"),  # end of the scan after it
+        ("move_end", "i8"),  # code of a MoveEnd of the latest drive
+        ("depth_m", "f8"),  # r̂ of the latest scan (RochaMI, eq. 4)
+        ("half_angle_rad", "f8"),  # α̂ of it
+        ("own_bits", "f8"),  # taken from its map by its own scans in the latest step
+        ("received_bits", "f8"),  # taken from its map by teammates' measurements in the latest step
+        ("reward", "f8"),  # of the latest step
+        ("sensor_chance", "u8", (1,)),  # random state of range noise
+        ("channel_chance", "u8", (1,)),  # random state of message loss
+        # counted from the mission's start
+        ("distance_m", "f8"),
+        ("scans", "i8"),
+        ("measurements", "i8"),
+        ("blocked_moves", "i8"),
+        ("messages_sent", "i8"),
+        ("measurements_sent", "i8"),
+        ("bits_sent", "i8"),
+        ("messages_received", "i8"),
+        ("measurements_received", "i8"),
+        ("bits_received", "i8"),
+        ("messages_lost", "i8"),  # per teammate that a message did not reach by chance
+        ("messages_out_of_range", "i8"),  # per teammate that was too far away for a message
+    ],
+    align=True,
+)
+
+COUNTED = ROBOT.names[ROBOT.names.index("distance_m") :] if ROBOT.names else ()
+"""Fields of ROBOT that count from the mission's start."""
+
+HEARD = np.dtype(
+    [
+        ("heard_s", "f8"),  # when the last message that arrived was sent; -1 = none did
+        ("position", "f8", (3,)),  # where its sender was
+        ("announced_s", "f8"),  # when the last announcement that arrived was sent; -1 = none did
+        ("announced", "f8", (7,)),  # its viewpoint, r̂ and α̂
+    ],
+    align=True,
+)
+
+LETTER = np.dtype(
+    [
+        ("due_s", "f8"),  # when it arrives; inf = a free place
+        ("sent_s", "f8"),
+        ("serial", "i8"),  # order of sending
+        ("sender", "i8"),
+        ("count", "i8"),  # measurements in it; -1 = an announcement
+        ("position", "f8", (3,)),  # where the sender was
+        ("announced", "f8", (7,)),
+    ],
+    align=True,
+)
+
+
+class MissionState(NamedTuple):
+    """Everything about E missions of A robots; V voxels, R rays of a scan, Q places for messages."""
+
+    truth: np.ndarray
+    """(E, V) float32 true coverage, 0 or 1."""
+    blocked: np.ndarray
+    """(E, V) float32, 1 where a robot's body does not fit; `truth` itself for small bodies."""
+    mean: np.ndarray
+    """(E, A, V) float32 expected coverage by each robot's belief."""
+    precision: np.ndarray
+    """(E, A, V) float32 1/σ² of coverage by each robot's belief."""
+    missions: np.ndarray
+    """(E,) MISSION."""
+    robots: np.ndarray
+    """(E, A) ROBOT."""
+    heard: np.ndarray
+    """(E, A, A) HEARD: what robot a heard from b."""
+    scan_range_m: np.ndarray
+    """(E, A, R) float64 distances of the latest scan."""
+    scan_returned: np.ndarray
+    """(E, A, R) int8, a Return each."""
+    scan_utility_bits: np.ndarray
+    """(E, A, R) float64 utility of each ray of the latest scan."""
+    mail: np.ndarray
+    """(E, Q) LETTER: messages in flight."""
+    mail_to: np.ndarray
+    """(E, Q, A) bool: who will hear them."""
+    mail_rays: np.ndarray
+    """(E, Q, B, 5) float64: direction (3), distance in metres, Return."""
+
+
+def new_state(scenario: Scenario, missions: int) -> MissionState:
+    """Arrays for E missions of a scenario, not yet reset."""
+    e, a, r = missions, scenario.robots, scenario.sensor.rays
+    v, q, b = scenario.grid.voxels, mail_places(scenario), min(scenario.channel.burst, r)
+    truth = np.zeros((e, v), np.float32)
+    small_body = scenario.robot.body_radius_m <= 0.5 * scenario.grid.voxel_size_m + 1e-9
+    return MissionState(
+        truth=truth,
+        blocked=truth if small_body else np.zeros((e, v), np.float32),
+        mean=np.zeros((e, a, v), np.float32),
+        precision=np.zeros((e, a, v), np.float32),
+        missions=np.zeros(e, MISSION),
+        robots=np.zeros((e, a), ROBOT),
+        heard=np.zeros((e, a, a), HEARD),
+        scan_range_m=np.zeros((e, a, r)),
+        scan_returned=np.zeros((e, a, r), np.int8),
+        scan_utility_bits=np.zeros((e, a, r)),
+        mail=np.zeros((e, q), LETTER),
+        mail_to=np.zeros((e, q, a), np.bool_),
+        mail_rays=np.zeros((e, q, b if q else 0, 5)),
+    )
+
+
+def mail_places(scenario: Scenario) -> int:
+    """Messages that can be in flight at once: two a scan and robot, while the delay lasts."""
+    if scenario.channel.delay_s == 0.0 or scenario.robots == 1:
+        return 0
+    scans = math.floor(scenario.channel.delay_s / scenario.sensor.scan_time_s) + 2
+    return 2 * scans * scenario.robots

@@ -1,0 +1,145 @@
+"""What one robot knows: its own belief, its pose, its last scan, what teammates told it.
+
+Strategies see this and nothing else; the truth is not in it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from entropy_explore_env.config import Scenario
+from entropy_explore_env.missions.action import encode_viewpoint
+from entropy_explore_env.missions.missions import Missions
+from entropy_explore_env.missions.rules import Rules
+from entropy_explore_env.missions.tick import pose_at
+from entropy_explore_env.robots.motion import MoveEnd
+
+
+@dataclass(frozen=True)
+class ScanView:
+    """A robot's latest scan, R rays. Before the first one, all `returned` are 0.
+
+    Attributes:
+        pose: (5,) where it was taken: x, y, z, yaw, pitch.
+        range_m: (R,) measured distances.
+        returned: (R,) int8, a `Return` each: nothing, free up to the range, hit.
+        utility_bits: (R,) what each ray brought to the robot's own map.
+    """
+
+    pose: np.ndarray
+    range_m: np.ndarray
+    returned: np.ndarray
+    utility_bits: np.ndarray
+
+
+@dataclass(frozen=True)
+class TeammateView:
+    """What a robot last heard of a teammate; times are -1 and the rest 0 if it never heard.
+
+    Attributes:
+        heard_s: When the last message was sent that reached the robot.
+        position_m: (3,) where the teammate was then.
+        announced_s: When the last announcement was sent that reached the robot.
+        viewpoint: (5,) the viewpoint that it announced: x, y, z, yaw, pitch.
+        depth_m: r̂, mean measured distance of the teammate's latest scan then.
+        half_angle_rad: α̂, largest angle of a measured ray from its gaze.
+    """
+
+    heard_s: float
+    position_m: np.ndarray
+    announced_s: float
+    viewpoint: np.ndarray
+    depth_m: float
+    half_angle_rad: float
+
+
+@dataclass(frozen=True)
+class RobotView:
+    """What one robot knows. Arrays are read-only and change as the mission goes on.
+
+    Attributes:
+        robot: Its number.
+        scenario: The public settings.
+        time_s: Simulated time.
+        deciding: Whether it chooses a viewpoint now.
+        pose: (5,) x, y, z, yaw, pitch: map frame, metres, radians, pitch downwards.
+        mean: (X, Y, Z) float32, expected coverage.
+        precision: (X, Y, Z) float32, 1/σ² of it.
+        entropy_bits: Entropy of its map.
+        move_end: Why its latest drive ended where it did.
+        target: (5,) the viewpoint that it chose last.
+        depth_m, half_angle_rad: r̂ and α̂ of its latest scan.
+        scan: Its latest scan.
+        teammates: Robot number → what it heard of it.
+    """
+
+    robot: int
+    scenario: Scenario
+    time_s: float
+    deciding: bool
+    pose: np.ndarray
+    mean: np.ndarray
+    precision: np.ndarray
+    entropy_bits: float
+    move_end: MoveEnd
+    target: np.ndarray
+    depth_m: float
+    half_angle_rad: float
+    scan: ScanView
+    teammates: dict[int, TeammateView]
+    rules: Rules
+
+    def action_for(self, viewpoint: np.ndarray) -> np.ndarray | np.int64:
+        """The action that sends the robot to a viewpoint (5,): see `encode_viewpoint`."""
+        return encode_viewpoint(self.rules, self.pose, viewpoint)
+
+
+def view_of(missions: Missions, mission: int, robot: int) -> RobotView:
+    """The view of one robot of one mission."""
+    state, rules, shape = missions.state, missions.rules, missions.grid.shape
+    time_s = float(state.missions[mission]["time_s"])
+    own, here = state.robots[mission, robot], (mission, robot)
+    heard = state.heard[here]
+    return RobotView(
+        robot=robot,
+        scenario=missions.scenario,
+        time_s=time_s,
+        deciding=bool(own["deciding"]),
+        pose=pose_at(rules.numbers[0], own, time_s),
+        mean=read_only(state.mean[here].reshape(shape)),
+        precision=read_only(state.precision[here].reshape(shape)),
+        entropy_bits=float(own["entropy_bits"]),
+        move_end=list(MoveEnd)[own["move_end"]],
+        target=own["target"].copy(),
+        depth_m=float(own["depth_m"]),
+        half_angle_rad=float(own["half_angle_rad"]),
+        scan=ScanView(
+            own["scan_pose"].copy(),
+            read_only(state.scan_range_m[here]),
+            read_only(state.scan_returned[here]),
+            read_only(state.scan_utility_bits[here]),
+        ),
+        teammates={mate: _teammate(heard[mate]) for mate in range(len(heard)) if mate != robot},
+        rules=rules,
+    )
+
+
+def _teammate(heard: np.void) -> TeammateView:
+    announced = heard["announced"].copy()
+    return TeammateView(
+        heard_s=float(heard["heard_s"]),
+        position_m=heard["position"].copy(),
+        announced_s=float(heard["announced_s"]),
+        viewpoint=announced[:5],
+        depth_m=float(announced[5]),
+        half_angle_rad=float(announced[6]),
+    )
+
+
+def read_only(array: np.ndarray) -> np.ndarray:
+    """A view of an array that cannot be written through."""
+    view = array.view()
+    view.setflags(write=False)
+    return view

@@ -1,0 +1,71 @@
+"""Named random streams: every kind of draw has its own, all spawned from one seed.
+
+Python code draws from NumPy generators; compiled code from SplitMix64 (Steele, Lea & Flood 2014),
+whose whole state is one 64-bit number in an array.
+"""
+
+from __future__ import annotations
+
+import enum
+import math
+
+import numpy as np
+from numba import njit
+
+from entropy_explore_env.errors import SettingError
+
+
+class Stream(enum.IntEnum):
+    """What a random draw is for; switching one kind on leaves the others as they were."""
+
+    WORLD = 0
+    STARTS = 1
+    SENSOR = 2
+    CHANNEL = 3
+    STRATEGY = 4
+
+
+def seed_sequence(seed: int, episode: int, stream: Stream) -> np.random.SeedSequence:
+    """The seed of one stream in the `episode`-th mission after a reset with `seed`."""
+    return np.random.SeedSequence(entropy=seed, spawn_key=(episode, int(stream)))
+
+
+def generator(seed: int, episode: int, stream: Stream) -> np.random.Generator:
+    """A NumPy generator for one stream."""
+    return np.random.default_rng(seed_sequence(seed, episode, stream))
+
+
+def splitmix_states(seed: int, episode: int, stream: Stream, robots: int) -> np.ndarray:
+    """(robots,) uint64 start states for compiled draws, one a robot."""
+    return seed_sequence(seed, episode, stream).generate_state(robots, np.uint64)
+
+
+def check_seed(seed: object) -> int:
+    """The seed as an int; a fresh one from the operating system where it is None.
+
+    Raises:
+        SettingError: It is neither None nor a whole number ≥ 0.
+    """
+    if seed is None:
+        return int(np.random.SeedSequence().generate_state(1, np.uint64)[0])
+    if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
+        raise SettingError("seed", seed, "a whole number ≥ 0, or None")
+    return int(seed)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def draw_uniform(state):
+    """A uniform number in [0, 1) from SplitMix64; `state`, (1,) uint64, is advanced in place."""
+    mixed = state[0] + np.uint64(0x9E3779B97F4A7C15)
+    state[0] = mixed
+    mixed = (mixed ^ (mixed >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
+    mixed = (mixed ^ (mixed >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
+    mixed = mixed ^ (mixed >> np.uint64(31))
+    return np.float64(mixed >> np.uint64(11)) * (1.0 / 9007199254740992.0)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def draw_gaussian(state):
+    """A standard normal number (Box & Muller 1958); two uniform draws from `state`."""
+    radius = math.sqrt(-2.0 * math.log(1.0 - draw_uniform(state)))
+    return radius * math.cos(2.0 * math.pi * draw_uniform(state))

@@ -1,0 +1,1 @@
+"""What a person looks at: figures, records and pictures of missions."""

@@ -1,0 +1,107 @@
+"""From missions to pictures: what a Frame shows of a mission, and when."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from entropy_explore_env.errors import SettingError
+from entropy_explore_env.missions.missions import Missions
+from entropy_explore_env.missions.tick import pose_at
+from entropy_explore_env.reports.rendering import Frame, Window, draw_frame
+
+RENDER_MODES = ("human", "rgb_array")
+FRAMES_PER_S = 10
+
+
+def check_render_mode(render_mode: str | None) -> None:
+    """Raise a SettingError unless the mode is None or known."""
+    if render_mode is not None and render_mode not in RENDER_MODES:
+        raise SettingError("render_mode", render_mode, "None, " + " or ".join(RENDER_MODES))
+
+
+def entropy_share(missions: Missions, mission: int, robot: int) -> np.ndarray:
+    """(X, Y, Z) float32: how much of each voxel's entropy is left, 1 at the prior, 0 at σ_end."""
+    known, prior = (missions.rules.numbers[name][0] for name in ("end_precision", "prior_precision"))
+    share = np.log2(missions.precision[mission, robot] / known) / np.log2(prior / known)
+    return np.clip(share, 0.0, 1.0)
+
+
+def remaining_share(missions: Missions, mission: int) -> np.ndarray:
+    """(A,) how much is left of the bits that the mission asks each robot's map for, 1 … 0."""
+    clock = missions.state.missions[mission]
+    start, end = clock["entropy_start_bits"], clock["entropy_end_bits"]
+    return (missions.state.robots[mission]["entropy_bits"] - end) / (start - end)
+
+
+class Painter:
+    """Follows the first of some missions and makes pictures of it; idle without a render mode."""
+
+    def __init__(self, render_mode: str | None) -> None:
+        """Take the mode: None, `human` or `rgb_array`."""
+        self._mode = render_mode
+        self._window: Window | None = None
+        self._times: list[float] = []
+        self._shares: list[np.ndarray] = []
+        self._places: list[np.ndarray] = []
+
+    def watch(self, missions: Missions) -> None:
+        """Note the moment after a reset or a step; a `human` sees it at once."""
+        if self._mode is None:
+            return
+        time_s = float(missions.state.missions[0]["time_s"])
+        if self._times and time_s <= self._times[-1]:
+            self._times, self._shares, self._places = [], [], []
+        self._times.append(time_s)
+        self._shares.append(remaining_share(missions, 0))
+        self._places.append(missions.state.robots[0]["goal"][:, :3].copy())
+        if self._mode == "human":
+            if self._window is None:
+                self._window = Window(frames_per_s=float(FRAMES_PER_S))
+            self._window.show(self.paint(missions))
+
+    def picture(self, missions: Missions) -> np.ndarray | None:
+        """The picture of this moment for `rgb_array`, (480, 640, 3) uint8; else None."""
+        return self.paint(missions) if self._mode == "rgb_array" else None
+
+    def paint(self, missions: Missions) -> np.ndarray:
+        """Draw this moment of the first mission: the belief of robot_0, and the whole team.
+
+        Args:
+            missions: Has to be watched, for the curves and the ways behind the robots.
+
+        Returns:
+            (480, 640, 3) uint8.
+        """
+        robots = missions.state.robots[0]
+        time_s = float(missions.state.missions[0]["time_s"])
+        poses = np.stack([pose_at(missions.rules.numbers[0], robot, time_s) for robot in robots])
+        places = np.stack([*self._places, poses[:, :3]]) if self._places else poses[None, :, :3]
+        shares = np.stack(self._shares) if self._shares else np.zeros((0, len(robots)))
+        status = (
+            f"time {time_s:,.0f} s",
+            f"entropy left {remaining_share(missions, 0).min():.1%}",
+            f"scans {robots['scans'].sum():,}",
+            f"shared {robots['measurements_sent'].sum():,}",
+            f"driven {robots['distance_m'].sum():,.1f} m",
+        )
+        frame = Frame(
+            entropy_share=entropy_share(missions, 0, 0),
+            coverage=missions.mean[0, 0],
+            voxel_size_m=missions.grid.voxel_size_m,
+            origin_m=np.asarray(missions.grid.origin_m),
+            positions_m=poses[:, :3],
+            gazes_rad=poses[:, 3:],
+            targets_m=robots["target"][:, :3],
+            paths_m=[places[:, robot] for robot in range(len(robots))],
+            curve_s=np.asarray(self._times),
+            curve_share=shares,
+            title=f"{missions.scenario.name}: what robot_0 knows",
+            status=status,
+        )
+        return draw_frame(frame)
+
+    def close(self) -> None:
+        """Close the window, if there is one."""
+        if self._window is not None:
+            self._window.close()
+            self._window = None

@@ -1,0 +1,458 @@
+"""One moment of a mission as a picture: maps of entropy and coverage, robots, entropy curves.
+
+Maps keep the proportions of the workspace: x to the right, y (from above) or z (from the side) up.
+"""
+
+from __future__ import annotations
+
+import os
+import zlib
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from entropy_explore_env.errors import MissingExtraError, SettingError
+from entropy_explore_env.reports.glyphs import (
+    COLOUR_CODES,
+    COLOURS,
+    INK,
+    LINE_HEIGHT,
+    PAPER,
+    UNKNOWN_LEVEL,
+    Box,
+    colour_codes,
+    disc,
+    draw_axes,
+    draw_key,
+    draw_legend,
+    legend_rows,
+    line_pixels,
+    paint,
+    robot_colour,
+    shared_palette,
+    shortened,
+    square,
+    stamp,
+    text_width,
+    write,
+)
+
+KNOWN_BELOW = 0.9
+"""A voxel with less than this share of its entropy left counts as known."""
+
+
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """What one picture shows. Frame of reference: map, metres, z up.
+
+    Attributes:
+        entropy_share: (X, Y, Z), a voxel's entropy in [0, 1] of what it was at first; of one robot's
+            belief or the mean of all robots'.
+        coverage: (X, Y, Z), expected coverage in [0, 1].
+        voxel_size_m: Edge of a voxel.
+        origin_m: (3,), lower corner of voxel (0, 0, 0).
+        positions_m: (A, 3), where the robots are.
+        gazes_rad: (A, 2), yaw counter-clockwise and pitch downwards (REP-103).
+        targets_m: (A, 3), the viewpoints that they chose; NaN = none.
+        paths_m: The ways so far, one (N, 3) a robot, or none at all.
+        curve_s: (T,), times of the entropy curves; T may be 0.
+        curve_share: (T, A), remaining entropy at those times, about in [0, 1].
+        title: One line.
+        status: Lines such as "t 123 s".
+    """
+
+    entropy_share: np.ndarray
+    coverage: np.ndarray
+    voxel_size_m: float
+    origin_m: np.ndarray
+    positions_m: np.ndarray
+    gazes_rad: np.ndarray
+    targets_m: np.ndarray
+    paths_m: list[np.ndarray]
+    curve_s: np.ndarray
+    curve_share: np.ndarray
+    title: str
+    status: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        """Check that the arrays fit each other."""
+        robots, times = len(self.positions_m), len(self.curve_s)
+        if np.ndim(self.entropy_share) != 3:
+            raise SettingError("Frame.entropy_share", np.shape(self.entropy_share), "a shape (X, Y, Z)")
+        wanted: dict[str, tuple[int, ...]] = {
+            "coverage": np.shape(self.entropy_share),
+            "origin_m": (3,),
+            "positions_m": (robots, 3),
+            "gazes_rad": (robots, 2),
+            "targets_m": (robots, 3),
+        }
+        if times:
+            wanted["curve_share"] = (times, robots)
+        for name, shape in wanted.items():
+            if np.shape(getattr(self, name)) != shape:
+                raise SettingError(f"Frame.{name}", np.shape(getattr(self, name)), f"a shape {shape}")
+        if len(self.paths_m) not in (0, robots):
+            raise SettingError("Frame.paths_m", len(self.paths_m), f"0 or {robots} paths")
+
+
+@dataclass(frozen=True)
+class View(Box):
+    """A map in the picture: x to the right, axis `up` (1 = y, 2 = z) up; the third is looked along."""
+
+    quantity: Literal["entropy", "coverage"] = "entropy"
+    up: Literal[1, 2] = 1
+
+    @property
+    def title(self) -> str:
+        """What it shows."""
+        return f"{self.quantity}, from {'above' if self.up == 1 else 'the side'}"
+
+    def place(self, points_m: np.ndarray, origin_m: np.ndarray, size_m: np.ndarray) -> np.ndarray:
+        """Where points (N, 3) of the map frame, metres, lie in the picture: (N, 2) float64, x and y."""
+        share = np.clip((points_m - origin_m) / size_m, -1.0, 2.0)
+        x, y = self.left + share[:, 0] * self.width, self.top + (1.0 - share[:, self.up]) * self.height
+        return np.stack([x, y], axis=1)
+
+
+@dataclass(frozen=True, eq=False)
+class Layout:
+    """Where everything lies in the picture.
+
+    Attributes:
+        unit: Pixels of the picture along a pixel of the font.
+        views: The maps.
+        curves: The axes of the entropy curves.
+        status: Where the status lines go.
+        paper: (H, W, 3) uint8, read-only; all that does not change from frame to frame.
+    """
+
+    unit: int
+    views: tuple[View, ...]
+    curves: Box
+    status: Box
+    paper: np.ndarray
+
+
+_MARGIN, _HEADER, _GAP, _KEY = 8, 30, 8, 14
+"""Heights in units: edge of the picture, title, between maps, key to the colours."""
+
+_COLUMN, _SIDE, _BELOW = 196, 150, 110
+"""In units: least width of a map's key, least width of a panel beside the maps, least height below."""
+
+_STATUS_LINES = 8
+"""At most so many are shown."""
+
+
+@lru_cache(maxsize=16)
+def lay_out(
+    shape: tuple[int, int, int], voxel_size_m: float, robots: int, lines: int, width: int, height: int
+) -> Layout:
+    """Arrange maps, curves, legend and status so that the maps become as large as they can.
+
+    Args:
+        shape: Voxels (X, Y, Z).
+        voxel_size_m: Edge of a voxel.
+        robots: Team size A.
+        lines: Number of status lines.
+        width: Of the picture in pixels.
+        height: Of the picture in pixels.
+    """
+    unit = max(1, min(width // 560, height // 420))
+    text = (lines + legend_rows(robots) + 2) * LINE_HEIGHT
+    below = max(_BELOW, text) * unit
+    ways = ((2, 0), (2, below), (1, below))
+    choices = [_arranged(shape, width, height, unit, *way) for way in ways]
+    scale, views, panel = max(choices, key=lambda choice: choice[0])
+    paper = np.full((height, width, 3), PAPER, dtype=np.uint8)
+    for view in views:
+        write(paper, view.title, view.left, view.top - LINE_HEIGHT * unit, INK, unit)
+        view.grown(1).of(paper)[:] = INK
+    for quantity in ("entropy", "coverage"):
+        lowest = [view for view in views if view.quantity == quantity][-1]
+        draw_key(paper, quantity, lowest, unit, scale / voxel_size_m if quantity == "entropy" else None)
+    status, legend, curves = _panel_boxes(panel, robots, lines, unit)
+    draw_legend(paper, legend, robots, unit)
+    draw_axes(paper, curves, unit)
+    paper.setflags(write=False)
+    return Layout(unit, views, curves, status, paper)
+
+
+def _arranged(
+    shape: tuple[int, int, int], width: int, height: int, unit: int, columns: int, below: int
+) -> tuple[float, tuple[View, ...], Box]:
+    """One way to arrange the maps: (pixels a voxel, maps, what is left); 0 pixels = keys do not fit.
+
+    Args:
+        shape: Voxels (X, Y, Z).
+        width: Of the picture.
+        height: Of the picture.
+        unit: Pixels along a pixel of the font.
+        columns: 2 = entropy beside coverage, 1 = entropy above coverage.
+        below: Height of the panel below the maps; 0 = it is beside them.
+    """
+    ups = (1,) if shape[2] == 1 else (1, 2)
+    margin, gap = _MARGIN * unit, _GAP * unit
+    stacks = 2 // columns
+    room_x = width - 2 * margin - (_SIDE * unit + 2 * gap if below == 0 else 0)
+    room_y = height - _HEADER * unit - margin - below
+    column = (room_x - (columns - 1) * 2 * gap) // columns
+    around = stacks * (len(ups) * (LINE_HEIGHT * unit + gap) + _KEY * unit)
+    scale = min(column / shape[0], (room_y - around) / (stacks * sum(shape[up] for up in ups)))
+    map_width = max(1, round(scale * shape[0]))
+    if column < _COLUMN * unit:
+        scale = 0.0
+    elif below == 0:
+        column = max(map_width, _COLUMN * unit)
+    views: list[View] = []
+    top = _HEADER * unit
+    for stack, quantity in enumerate(("entropy", "coverage")):
+        left = margin + (stack * (column + 2 * gap) if columns == 2 else 0)
+        top = _HEADER * unit if columns == 2 else top
+        for up in ups:
+            map_height = max(1, round(scale * shape[up]))
+            views.append(View(left, top + LINE_HEIGHT * unit, map_width, map_height, quantity, up))
+            top += LINE_HEIGHT * unit + map_height + gap
+        top += _KEY * unit
+    if below == 0:
+        left = margin + columns * column + (columns + 1) * gap
+        top = _HEADER * unit
+        return scale, tuple(views), Box(left, top, width - margin - left, height - margin - top)
+    return scale, tuple(views), Box(margin, top + gap, width - 2 * margin, height - margin - top - gap)
+
+
+def _panel_boxes(panel: Box, robots: int, lines: int, unit: int) -> tuple[Box, Box, Box]:
+    """Status, legend and the axes of the curves within the side panel."""
+    narrow = panel.width < 1.6 * panel.height
+    text_width_px = panel.width if narrow else _SIDE * unit
+    status = Box(panel.left, panel.top, text_width_px, lines * LINE_HEIGHT * unit)
+    legend_top = status.top + status.height + (_GAP * unit if lines else 0)
+    legend = Box(panel.left, legend_top, text_width_px, (legend_rows(robots) + 1) * LINE_HEIGHT * unit)
+    left, top = panel.left, legend.top + legend.height + 2 * _GAP * unit
+    if not narrow:
+        left, top = panel.left + text_width_px + 2 * _GAP * unit, panel.top
+    inset = text_width("100 %", unit) + 4 * unit
+    width = panel.left + panel.width - left - inset
+    height = panel.top + panel.height - top - 2 * LINE_HEIGHT * unit
+    return status, legend, Box(left + inset, top + LINE_HEIGHT * unit, width, min(height, 2 * width))
+
+
+def draw_frame(frame: Frame, width: int = 640, height: int = 480) -> np.ndarray:
+    """Draw one moment of a mission.
+
+    The entropy maps show means along the line of sight; the coverage maps the most covered of the
+    known voxels (those with less than KNOWN_BELOW of their entropy left), so that thin walls stay.
+
+    Args:
+        frame: What to show; not changed.
+        width: Of the picture in pixels, at least 480.
+        height: Of the picture in pixels, at least 360.
+
+    Returns:
+        (height, width, 3) uint8.
+
+    Raises:
+        SettingError: The picture would be too small to read.
+    """
+    for name, value, least in (("width", width, 480), ("height", height, 360)):
+        if value < least:
+            raise SettingError(name, value, f"at least {least} pixels")
+    shape = np.shape(frame.entropy_share)
+    robots, status = len(frame.positions_m), frame.status[:_STATUS_LINES]
+    layout = lay_out(shape, float(frame.voxel_size_m), robots, len(status), width, height)
+    image, unit = layout.paper.copy(), layout.unit
+    scale = 2 * unit if text_width(frame.title, 2 * unit) <= width - 2 * _MARGIN * unit else unit
+    title = shortened(frame.title, width - 2 * _MARGIN * unit, scale)
+    write(image, title, _MARGIN * unit, _HEADER // 2 * unit - 4 * scale, INK, scale)
+    for i, line in enumerate(status):
+        box = layout.status
+        write(image, shortened(line, box.width, unit), box.left, box.top + i * LINE_HEIGHT * unit, INK, unit)
+    for view in layout.views:
+        _draw_map(image, view, frame)
+        _draw_robots(image, view, frame, unit)
+    _draw_curves(image, layout.curves, frame, unit)
+    return image
+
+
+def _draw_map(image: np.ndarray, view: View, frame: Frame) -> None:
+    """Fill a map's rectangle with its quantity, seen along the axis that is left over."""
+    sight = 3 - view.up
+    if view.quantity == "entropy":
+        seen = np.asarray(frame.entropy_share).mean(axis=sight, dtype=np.float64)
+        levels = np.clip(_pooled(seen, view, np.add), 0.0, 1.0) * 255.0
+    else:
+        known = np.asarray(frame.entropy_share) < KNOWN_BELOW
+        seen = np.where(known, frame.coverage, np.float32(-1.0)).max(axis=sight)
+        pooled = _pooled(seen, view, np.maximum)
+        levels = np.where(pooled < 0.0, UNKNOWN_LEVEL, np.minimum(pooled, 1.0) * (UNKNOWN_LEVEL - 1))
+    levels = np.rint(levels).astype(np.uint8)
+    columns, rows = (
+        np.minimum((2 * np.arange(pixels) + 1) * cells // (2 * pixels), cells - 1)
+        for pixels, cells in zip((view.width, view.height), levels.shape, strict=True)
+    )
+    view.of(image)[:] = np.take(COLOURS[view.quantity], levels.T[rows[::-1]][:, columns], axis=0)
+
+
+def _pooled(values: np.ndarray, view: View, pool: np.ufunc) -> np.ndarray:
+    """Pool cells (N, M) that share a pixel, by mean (np.add) or maximum; at most (width, height) are left."""
+    for axis, pixels in enumerate((view.width, view.height)):
+        cells = values.shape[axis]
+        if cells > pixels:
+            starts = np.arange(pixels) * cells // pixels
+            values = pool.reduceat(values, starts, axis=axis)
+            if pool is np.add:
+                counts = np.diff(starts, append=cells)
+                values = values / (counts[:, None] if axis == 0 else counts)
+    return values
+
+
+def _draw_robots(image: np.ndarray, view: View, frame: Frame, unit: int) -> None:
+    """Ways so far, chosen viewpoints, then the robots with their gazes, each in its robot's colour."""
+    window = view.grown(5 * unit)
+    canvas = window.of(image)
+    origin = np.asarray(frame.origin_m, dtype=np.float64)
+    size = np.array(np.shape(frame.entropy_share)) * frame.voxel_size_m
+
+    def placed(points_m: np.ndarray) -> np.ndarray:
+        return view.place(np.reshape(points_m, (-1, 3)), origin, size) - (window.left, window.top)
+
+    for robot, path_m in enumerate(frame.paths_m):
+        paint(canvas, line_pixels(placed(path_m)), square(unit), robot_colour(robot))
+    for robot, target in enumerate(placed(frame.targets_m)):
+        stamp(canvas, line_pixels(target[None]), disc(4.0 * unit, 2.5 * unit), robot_colour(robot))
+    yaw, pitch = np.asarray(frame.gazes_rad, dtype=np.float64).T
+    level, rise = (1.0, np.sin(yaw)) if view.up == 1 else (np.cos(pitch), -np.sin(pitch))
+    ticks = 11.0 * unit * np.stack([np.cos(yaw) * level, -rise], axis=1)
+    for robot, position in enumerate(placed(frame.positions_m)):
+        tick = line_pixels(np.stack([position, position + ticks[robot]]))
+        stamp(canvas, tick, square(2 * unit), robot_colour(robot))
+        stamp(canvas, line_pixels(position[None]), disc(4.0 * unit), robot_colour(robot))
+
+
+def _draw_curves(image: np.ndarray, box: Box, frame: Frame, unit: int) -> None:
+    """One entropy curve a robot, from time 0 to the last time."""
+    if len(frame.curve_s) == 0:
+        return
+    few = np.unique(np.linspace(0, len(frame.curve_s) - 1, 4 * box.width).astype(np.int64))
+    times, shares = np.asarray(frame.curve_s)[few], np.asarray(frame.curve_share)[few]
+    last = float(times[-1])
+    label = f"{last:.0f} s" if last >= 10.0 else f"{last:.1f} s"
+    right = box.left + box.width - text_width(label, unit)
+    write(image, label, right, box.top + box.height + 4 * unit, INK, unit)
+    window = box.grown(unit)
+    x = unit + times / (last or 1.0) * (box.width - 1)
+    y = unit + (1.0 - np.clip(shares, 0.0, 1.0)) * (box.height - unit)
+    for robot in range(shares.shape[1]):
+        pixels = line_pixels(np.stack([x, y[:, robot]], axis=1))
+        paint(window.of(image), pixels, square(2 * unit), robot_colour(robot))
+
+
+class Window:
+    """Shows pictures on the screen, with pygame-ce.
+
+    Once a person closes the window, later pictures are not shown.
+    """
+
+    def __init__(self, title: str = "entropy_explore_env", frames_per_s: float | None = 30.0) -> None:
+        """Open nothing yet.
+
+        Args:
+            title: Of the window.
+            frames_per_s: `show` waits so that there are at most so many; None = it never waits.
+
+        Raises:
+            MissingExtraError: pygame-ce is not installed.
+        """
+        os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")
+        try:
+            import pygame
+        except ImportError as error:
+            raise MissingExtraError("pygame-ce", "render") from error
+        self._pygame: Any = pygame
+        self._title = title
+        self._frames_per_s = frames_per_s
+        self._screen: Any = None
+        self._clock: Any = None
+        self.dismissed = False
+
+    def show(self, rgb: np.ndarray) -> None:
+        """Show a picture (H, W, 3) uint8 at once; the window takes its size."""
+        if self.dismissed:
+            return
+        pygame, size = self._pygame, (rgb.shape[1], rgb.shape[0])
+        if self._screen is None or self._screen.get_size() != size:
+            pygame.display.init()
+            pygame.display.set_caption(self._title)
+            self._screen = pygame.display.set_mode(size)
+            self._clock = self._clock or pygame.time.Clock()
+        self._screen.blit(pygame.image.frombuffer(np.ascontiguousarray(rgb), size, "RGB"), (0, 0))
+        pygame.display.flip()
+        if any(event.type == pygame.QUIT for event in pygame.event.get()):
+            self.close()
+            self.dismissed = True
+        elif self._frames_per_s is not None:
+            self._clock.tick(self._frames_per_s)
+
+    def close(self) -> None:
+        """Close the window; without one, do nothing."""
+        if self._screen is not None:
+            self._screen = None
+            self._pygame.display.quit()
+
+
+def animate(frames: Iterable[np.ndarray], path: Path, frame_s: float) -> None:
+    """Write pictures as an animated GIF that repeats for ever; the file appears only when complete.
+
+    All pictures share one palette of 256 colours, made from all of them, so that colours do not
+    flicker. GIF counts time in 1/100 s; pictures that equal the one before only make it last longer.
+
+    Args:
+        frames: (H, W, 3) uint8 each, all of one size.
+        path: The file; what it held before is replaced.
+        frame_s: Seconds that each picture is shown, at least 0.02.
+
+    Raises:
+        SettingError: There are no pictures, or of different sizes, or their time is too short.
+        MissingExtraError: Pillow is not installed.
+    """
+    try:
+        from PIL import Image
+    except ImportError as error:
+        raise MissingExtraError("pillow", "baselines") from error
+    if not frame_s >= 0.02:
+        raise SettingError("frame_s", frame_s, "at least 0.02 s")
+    path = Path(path)
+    packed, usage = [], np.zeros(COLOUR_CODES, dtype=np.int64)
+    shape: tuple[int, ...] = ()
+    for picture in frames:
+        shape = shape or picture.shape
+        if picture.shape != shape:
+            raise SettingError("frames", picture.shape, f"pictures of one shape, {shape}")
+        codes = colour_codes(picture)
+        usage += np.bincount(codes.ravel(), minlength=COLOUR_CODES)
+        packed.append(zlib.compress(codes.tobytes(), 1))
+    if not packed:
+        raise SettingError("frames", "none", "at least one picture")
+    palette, nearest = shared_palette(usage)
+
+    def pictures() -> Iterator[Image.Image]:
+        for data in packed:
+            codes = np.frombuffer(zlib.decompress(data), dtype=np.uint16).reshape(shape[:2])
+            image = Image.fromarray(nearest[codes])
+            image.putpalette(palette.tobytes())
+            yield image
+
+    animation = pictures()
+    options = {"append_images": animation, "duration": round(1000 * frame_s), "loop": 0, "optimize": False}
+    part = path.with_name(f".{path.name}.{os.getpid()}.part")
+    try:
+        with part.open("wb") as file:
+            next(animation).save(file, format="GIF", save_all=True, **options)
+            file.flush()
+            os.fsync(file.fileno())
+        part.replace(path)
+    finally:
+        part.unlink(missing_ok=True)

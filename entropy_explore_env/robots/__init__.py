@@ -1,0 +1,1 @@
+"""What a robot does: it senses, moves and talks."""

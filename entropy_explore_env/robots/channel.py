@@ -1,0 +1,85 @@
+"""The channel: which measurements of a scan are worth sending (Rocha04, eq. 43), and what it costs.
+
+One measurement is a 3-D vector from the sensor to what it saw, three 32-bit numbers: 96 bits. A
+batch opens with the sensor's position, 96 bits. An announcement is a viewpoint (position, yaw,
+pitch) with r̂ and α̂ (RochaMI), seven 32-bit numbers: 224 bits. A broadcast is charged once to its
+sender and once to each teammate that hears it.
+"""
+
+from __future__ import annotations
+
+import enum
+import math
+
+from numba import njit
+
+from entropy_explore_env.randomness import draw_uniform
+
+BITS_PER_MEASUREMENT = 96
+BITS_PER_BATCH = 96
+BITS_PER_ANNOUNCEMENT = 224
+
+
+class Delivery(enum.Enum):
+    """What became of a message on its way to one teammate; the value is a sentence for people."""
+
+    HEARD = "The message arrives, at once or after the channel's delay."
+    OUT_OF_RANGE = "The teammate was farther away than the channel reaches when it was sent."
+    LOST = "The message was lost by chance."
+
+    @property
+    def code(self) -> int:
+        """Number of this delivery in arrays."""
+        return list(Delivery).index(self)
+
+
+_HEARD, _OUT_OF_RANGE, _LOST = (delivery.code for delivery in Delivery)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def select_measurements(utility, burst, i_min_bits, order):
+    """Choose the measurements that a robot sends (Rocha04, eq. 43), the most useful first.
+
+    At most `burst`; fewer only if all those with at least `i_min_bits` are in; nothing left out is
+    more useful than something sent. Equal utilities go by ray number.
+
+    Args:
+        utility: (R,) float64 bits of each ray; negative for a ray that measured nothing.
+        burst: Most measurements.
+        i_min_bits: Least utility.
+        order: (R,) int64, its first places are filled with the chosen rays.
+
+    Returns:
+        How many were chosen.
+    """
+    chosen = 0
+    for ray in range(len(utility)):
+        bits = utility[ray]
+        if bits < i_min_bits or (chosen == burst and (burst == 0 or bits <= utility[order[chosen - 1]])):
+            continue
+        place = chosen if chosen < burst else burst - 1
+        while place > 0 and utility[order[place - 1]] < bits:
+            order[place] = order[place - 1]
+            place -= 1
+        order[place] = ray
+        chosen = min(chosen + 1, burst)
+    return chosen
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def deliver(sender_m, receiver_m, range_m, loss_probability, chance):
+    """Whether a message reaches a teammate: the code of a Delivery.
+
+    Args:
+        sender_m, receiver_m: (3,) float64 positions when it is sent.
+        range_m: Reach of the channel.
+        loss_probability: Of losing it.
+        chance: (1,) uint64 random state of the sender; drawn from only if a loss is possible.
+    """
+    lost = loss_probability > 0.0 and draw_uniform(chance) < loss_probability
+    apart = 0.0
+    for axis in range(3):
+        apart += (sender_m[axis] - receiver_m[axis]) ** 2
+    if math.sqrt(apart) > range_m:
+        return _OUT_OF_RANGE
+    return _LOST if lost else _HEARD

@@ -1,0 +1,154 @@
+"""Motion: a straight drive from rest to rest, stopped short by obstacles and teammates' bodies.
+
+Lengths in metres where the name says so, else in grid units (voxel edges); times in seconds.
+A drive that has begun is never changed: every robot owns the tube that its body sweeps until it
+arrives, and others stop before it. So bodies never overlap, whatever the timing.
+"""
+
+from __future__ import annotations
+
+import enum
+import math
+
+from numba import njit
+
+from entropy_explore_env.belief.raycast import OBSTACLE, OPEN, STOP_AT_COVERED, cast_ray
+
+
+class MoveEnd(enum.Enum):
+    """Why a drive ended where it did; the value is a sentence for people."""
+
+    ARRIVED = "The robot reached its viewpoint."
+    OBSTACLE = "A solid voxel was in the way: the robot stands in the last voxel in which its body fits."
+    WALL = "The workspace ends there: the robot stands in its last voxel on the way."
+    TEAMMATE = "A teammate's body, or the way that it still has to drive, was in the way."
+
+    @property
+    def code(self) -> int:
+        """Number of this end in arrays."""
+        return list(MoveEnd).index(self)
+
+
+_ARRIVED, _OBSTACLE, _WALL, _TEAMMATE = (end.code for end in MoveEnd)
+_TOUCH = 1e-6
+"""Bodies stop this far apart, in voxel edges, so that rounding cannot make them overlap."""
+_HALVINGS = 60
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def driving_time(length_m, max_speed_m_s, acceleration_m_s2):
+    """Seconds from rest to rest: 2√(L/a) below L = v²/a, else L/v + v/a."""
+    if length_m < max_speed_m_s * max_speed_m_s / acceleration_m_s2:
+        return 2.0 * math.sqrt(length_m / acceleration_m_s2)
+    return length_m / max_speed_m_s + max_speed_m_s / acceleration_m_s2
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def driven_share(elapsed_s, length_m, max_speed_m_s, acceleration_m_s2):
+    """Share in [0, 1] of a drive that is behind the robot `elapsed_s` after its start."""
+    duration = driving_time(length_m, max_speed_m_s, acceleration_m_s2)
+    if elapsed_s >= duration or length_m <= 0.0:
+        return 1.0
+    ramp = min(max_speed_m_s / acceleration_m_s2, duration / 2.0)
+    if elapsed_s <= ramp:
+        way = 0.5 * acceleration_m_s2 * elapsed_s * elapsed_s
+    elif elapsed_s >= duration - ramp:
+        left = duration - elapsed_s
+        way = length_m - 0.5 * acceleration_m_s2 * left * left
+    else:
+        way = acceleration_m_s2 * ramp * (elapsed_s - 0.5 * ramp)
+    return min(max(way / length_m, 0.0), 1.0)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def turning_time(yaw, pitch, new_yaw, new_pitch, turn_rate_rad_s):
+    """Seconds to turn the gaze, yaw and pitch at once, each the short way round."""
+    turn = abs(new_yaw - yaw) % (2.0 * math.pi)
+    turn = min(turn, 2.0 * math.pi - turn)
+    return max(turn, abs(new_pitch - pitch)) / turn_rate_rad_s
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def free_way(blocked, size, start, direction, length, crossed, entered):
+    """How far a body can drive on a line before something solid.
+
+    Args:
+        blocked: (V,) float32, above ½ where the body does not fit.
+        size: (X, Y, Z) voxels.
+        start: (3,) float64 in grid units.
+        direction: (3,) float64 unit vector.
+        length: Wanted way in grid units.
+        crossed, entered: Scratch space of `cast_ray`.
+
+    Returns:
+        (way, code): the way in grid units (to the middle of the last voxel's crossing, if blocked)
+        and the code of a MoveEnd.
+    """
+    if length <= 0.0:
+        return 0.0, _ARRIVED
+    at, n, end = cast_ray(
+        blocked, STOP_AT_COVERED, size, start, direction, length, False, 0, crossed, entered
+    )
+    if end == OPEN:
+        return length, _ARRIVED
+    middle = 0.5 * (entered[n - 1] + at)
+    return (0.0 if n == 1 else middle), (_OBSTACLE if end == OBSTACLE else _WALL)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _gap(start, direction, way, begin, finish):
+    """Distance between the point `way` along a line and the segment from `begin` to `finish`."""
+    along, length = 0.0, 0.0
+    for axis in range(3):
+        edge = finish[axis] - begin[axis]
+        along += (start[axis] + way * direction[axis] - begin[axis]) * edge
+        length += edge * edge
+    share = min(max(along / length, 0.0), 1.0) if length > 0.0 else 0.0
+    gap = 0.0
+    for axis in range(3):
+        nearest = begin[axis] + share * (finish[axis] - begin[axis])
+        gap += (start[axis] + way * direction[axis] - nearest) ** 2
+    return math.sqrt(gap)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def way_to_teammate(start, direction, way, begin, finish, touching):
+    """How far a body can drive before it touches a teammate or the tube that it still sweeps.
+
+    Bodies that touch already may only part.
+
+    The distance from a point on a line to a segment is convex along the line, so bisection finds
+    the nearest place and, before it, the first contact.
+
+    Args:
+        start: (3,) float64 in grid units.
+        direction: (3,) float64 unit vector.
+        way: Wanted way in grid units.
+        begin, finish: (3,) float64, where the teammate is and where its drive ends.
+        touching: Sum of the two radii.
+
+    Returns:
+        The way in grid units, at most `way`.
+    """
+    apart = touching + _TOUCH
+    low, high = 0.0, way
+    for _ in range(_HALVINGS):
+        third = (high - low) / 3.0
+        if _gap(start, direction, low + third, begin, finish) <= _gap(
+            start, direction, high - third, begin, finish
+        ):
+            high -= third
+        else:
+            low += third
+    if _gap(start, direction, low, begin, finish) >= apart:
+        return way
+    if _gap(start, direction, 0.0, begin, finish) < apart:
+        return way if low <= _TOUCH else 0.0
+    near, high = 0.0, low
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (near + high)
+        if _gap(start, direction, middle, begin, finish) >= apart:
+            near = middle
+        else:
+            high = middle
+    return near

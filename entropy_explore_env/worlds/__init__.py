@@ -1,0 +1,1 @@
+"""The truth: worlds, made from recipes or read from files."""

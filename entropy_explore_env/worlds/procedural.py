@@ -1,0 +1,62 @@
+"""Worlds made from a recipe and a random generator."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from scipy import ndimage
+
+from entropy_explore_env.config import Grid
+from entropy_explore_env.errors import WorldError
+from entropy_explore_env.worlds.world import World
+
+_ATTEMPTS = 100
+_FURNITURE_SHARE = 0.08
+"""Share of the floor plan that furniture covers, about."""
+
+
+def empty(grid: Grid, rng: np.random.Generator) -> World:
+    """A workspace with nothing in it but its walls; nothing is drawn."""
+    del rng
+    return World(grid, np.zeros(grid.shape, bool), "empty")
+
+
+def furnished(grid: Grid, rng: np.random.Generator) -> World:
+    """A room with boxes on its floor, against each other or alone; its free space hangs together.
+
+    Args:
+        grid: The workspace.
+        rng: Draws number, size and place of the boxes.
+
+    Raises:
+        WorldError: The grid is too small for a box and a way around it.
+    """
+    for _ in range(_ATTEMPTS):
+        occupied = _boxes(grid, rng)
+        _, parts = ndimage.label(~occupied)
+        if parts == 1 and occupied.any():
+            return World(grid, occupied, "furnished")
+    raise WorldError("Grid.shape", grid.shape, "a workspace with room for furniture")
+
+
+def _boxes(grid: Grid, rng: np.random.Generator) -> np.ndarray:
+    """Boxes of 0.5-2 m on the floor, 0.5 m to three quarters of the room high."""
+    occupied = np.zeros(grid.shape, bool)
+    floor = grid.shape[0] * grid.shape[1]
+    while occupied[:, :, 0].sum() < _FURNITURE_SHARE * floor:
+        low = np.asarray([0.5, 0.5, 0.5])
+        high = np.minimum([2.0, 2.0, 3.0], 0.5 * grid.size_m)
+        edges_m = rng.uniform(low, np.maximum(high, low + 1e-9))
+        edges = np.clip(np.rint(edges_m / grid.voxel_size_m).astype(int), 1, grid.shape)
+        if not grid.flat:
+            edges[2] = min(edges[2], max(1, math.floor(0.75 * grid.shape[2])))
+        corner = [
+            int(rng.integers(0, n - edge + 1)) for n, edge in zip(grid.shape[:2], edges[:2], strict=True)
+        ]
+        occupied[corner[0] : corner[0] + edges[0], corner[1] : corner[1] + edges[1], : edges[2]] = True
+    return occupied
+
+
+RECIPES = {"empty": empty, "furnished": furnished}
+"""Name of a recipe → World from a grid and a generator."""

@@ -1,0 +1,131 @@
+"""The truth: which voxels of a workspace are solid, where a body fits, what can be seen at all."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy import ndimage
+
+from entropy_explore_env.config import Grid, Scenario
+from entropy_explore_env.errors import WorldError
+
+
+@dataclass(frozen=True, eq=False)
+class World:
+    """A true world. The boundary of the grid is a wall.
+
+    Attributes:
+        grid: Its voxels.
+        occupied: (X, Y, Z) bool, read-only; whether a voxel is solid.
+        name: Where it came from.
+    """
+
+    grid: Grid
+    occupied: np.ndarray
+    name: str
+
+    def __post_init__(self) -> None:
+        """Check the array and make it read-only."""
+        if self.occupied.shape != self.grid.shape or self.occupied.dtype != np.bool_:
+            found = f"{self.occupied.shape} {self.occupied.dtype}"
+            raise WorldError("World.occupied", found, f"{self.grid.shape} bool")
+        if self.occupied.all():
+            raise WorldError("World.occupied", self.name, "at least one free voxel")
+        self.occupied.setflags(write=False)
+
+    def body_blocked(self, body_radius_m: float) -> np.ndarray:
+        """Where the centre of a ball-shaped body cannot be, judged at voxel centres.
+
+        Args:
+            body_radius_m: Radius of the body in metres.
+
+        Returns:
+            (X, Y, Z) bool: in the voxel's centre the body would touch a solid voxel or leave the
+            workspace. With a radius of at most half a voxel these are the solid voxels.
+        """
+        radius = body_radius_m / self.grid.voxel_size_m
+        if radius <= 0.5 + 1e-9:
+            return self.occupied
+        height = 0 if self.grid.flat else math.ceil(radius - 0.5)
+        reach = math.ceil(radius - 0.5)
+        offsets = np.ogrid[-reach : reach + 1, -reach : reach + 1, -height : height + 1]
+        gaps = [np.maximum(np.abs(axis) - 0.5, 0.0) for axis in offsets]
+        ball = gaps[0] ** 2 + gaps[1] ** 2 + gaps[2] ** 2 < radius**2 - 1e-9
+        walled = np.pad(
+            self.occupied, [(reach, reach), (reach, reach), (height, height)], constant_values=True
+        )
+        swollen = ndimage.binary_dilation(walled, ball)
+        inside = tuple(
+            slice(pad, pad + n) for pad, n in zip((reach, reach, height), self.grid.shape, strict=True)
+        )
+        return swollen[inside]
+
+    @cached_property
+    def _layouts(self) -> dict[tuple[float, int | None, int], Layout]:
+        return {}
+
+    def layout(self, scenario: Scenario) -> Layout:
+        """Where robots of this scenario can start and go, and what they can see; worked out once.
+
+        Raises:
+            WorldError: No voxel has room for a robot.
+        """
+        height = plane_index(scenario)
+        key = (scenario.robot.body_radius_m, height, scenario.sensor.voxels_behind)
+        if key not in self._layouts:
+            self._layouts[key] = self._laid_out(*key)
+        return self._layouts[key]
+
+    def _laid_out(self, body_radius_m: float, height: int | None, voxels_behind: int) -> Layout:
+        blocked = self.body_blocked(body_radius_m)
+        room = ~blocked
+        if height is not None:
+            room = np.zeros_like(blocked)
+            room[:, :, height] = ~blocked[:, :, height]
+        starts = _largest_component(room)
+        if not starts.any():
+            allowed = f"a world with room for a body of radius {body_radius_m} m"
+            raise WorldError("world", self.name, allowed)
+        labels, _ = ndimage.label(~self.occupied)
+        seen = np.isin(labels, np.unique(labels[starts]))
+        if voxels_behind:
+            seen |= ndimage.binary_dilation(seen, iterations=voxels_behind) & self.occupied
+        return Layout(blocked, np.flatnonzero(starts), int(seen.sum()))
+
+
+@dataclass(frozen=True, eq=False)
+class Layout:
+    """What a kind of robot can do in a world.
+
+    Attributes:
+        blocked: (X, Y, Z) bool, voxels in which its body does not fit.
+        starts: (N,) flat indices of the voxels where it may start: the largest connected part.
+        visible_voxels: How many voxels can be seen from there at all: the free space that hangs
+            together with it, and the skin of the solid voxels around.
+    """
+
+    blocked: np.ndarray
+    starts: np.ndarray
+    visible_voxels: int
+
+
+def plane_index(scenario: Scenario) -> int | None:
+    """Voxel layer of a planar robot's sensor; None for a free-flying robot."""
+    if scenario.grid.flat:
+        return 0
+    if scenario.robot.motion == "free":
+        return None
+    return int(scenario.robot.sensor_height_m / scenario.grid.voxel_size_m)
+
+
+def _largest_component(room: np.ndarray) -> np.ndarray:
+    """The largest face-connected part of a (X, Y, Z) bool array."""
+    labels, parts = ndimage.label(room)
+    if parts <= 1:
+        return room
+    sizes = np.bincount(labels.ravel())
+    sizes[0] = 0
+    return labels == int(sizes.argmax())

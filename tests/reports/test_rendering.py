@@ -1,0 +1,353 @@
+"""Pictures of missions: what lies where, on worlds with no two edges equal."""
+
+from __future__ import annotations
+
+import dataclasses
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from entropy_explore_env.errors import MissingExtraError, SettingError
+from entropy_explore_env.reports.glyphs import (
+    COLOURS,
+    ROBOT_COLOURS,
+    UNKNOWN_COLOUR,
+    line_pixels,
+    shortened,
+    text_mask,
+    text_width,
+    write,
+)
+from entropy_explore_env.reports.rendering import Frame, View, Window, animate, draw_frame, lay_out
+
+SHAPE = (7, 11, 5)
+VOXEL_M = 0.5
+ORIGIN_M = np.array([-2.0, 1.0, 0.25])
+WORLDS = [(7, 11, 5), (41, 41, 17), (120, 80, 1), (300, 120, 30), (20, 23, 90), (400, 40, 1), (1, 2, 3)]
+
+
+def frame_of(shape: tuple[int, int, int] = SHAPE, robots: int = 2, times: int = 9) -> Frame:
+    """A mission in which nothing is known and the robots stand in the workspace's lower corner."""
+    corner = np.tile(ORIGIN_M, (robots, 1))
+    return Frame(
+        entropy_share=np.ones(shape, np.float32),
+        coverage=np.full(shape, 0.5, np.float32),
+        voxel_size_m=VOXEL_M,
+        origin_m=ORIGIN_M,
+        positions_m=corner,
+        gazes_rad=np.zeros((robots, 2)),
+        targets_m=np.full((robots, 3), np.nan),
+        paths_m=[],
+        curve_s=np.linspace(0.0, 60.0, times),
+        curve_share=np.linspace(1.0, 0.4, times)[:, None] * np.ones(robots),
+        title="box, nobody moves",
+        status=("t 60 s", "entropy 40 %"),
+    )
+
+
+def views_of(frame: Frame, width: int = 640, height: int = 480) -> dict[tuple[str, int], View]:
+    """The maps of the picture by what they show and the axis that points up."""
+    shape, robots = frame.entropy_share.shape, len(frame.positions_m)
+    layout = lay_out(shape, frame.voxel_size_m, robots, len(frame.status), width, height)
+    return {(view.quantity, view.up): view for view in layout.views}
+
+
+def pixel_of(view: View, voxel: tuple[float, float, float]) -> tuple[int, int]:
+    """Row and column of a place in voxels, worked out by hand: x to the right, `up` upwards."""
+    column = view.left + voxel[0] / SHAPE[0] * view.width
+    row = view.top + view.height - voxel[view.up] / SHAPE[view.up] * view.height
+    return int(row), int(column)
+
+
+@pytest.mark.parametrize("shape", WORLDS)
+@pytest.mark.parametrize("robots", [0, 1, 5, 12])
+def test_picture_has_the_wanted_size_and_maps_keep_their_proportions(
+    shape: tuple[int, int, int], robots: int
+) -> None:
+    frame = frame_of(shape, robots)
+    for width, height in ((640, 480), (480, 360), (1280, 720)):
+        picture = draw_frame(frame, width, height)
+        assert picture.shape == (height, width, 3)
+        assert picture.dtype == np.uint8
+        views = views_of(frame, width, height)
+        ups = (1,) if shape[2] == 1 else (1, 2)
+        assert set(views) == {(quantity, up) for quantity in ("entropy", "coverage") for up in ups}
+        for (_, up), view in views.items():
+            assert view.left >= 0 and view.top >= 0
+            assert view.left + view.width <= width and view.top + view.height <= height
+            voxel_px = view.width / shape[0]
+            assert abs(view.height - voxel_px * shape[up]) <= 1 + 0.5 * shape[up] / shape[0]
+
+
+def test_flat_world_has_larger_views_from_above() -> None:
+    flat, deep = frame_of((120, 80, 1)), frame_of((120, 80, 60))
+    assert views_of(flat)["entropy", 1].width > views_of(deep)["entropy", 1].width
+
+
+def test_maps_do_not_overlap() -> None:
+    for shape in WORLDS:
+        taken = np.zeros((480, 640), dtype=int)
+        for view in views_of(frame_of(shape)).values():
+            taken[view.top : view.top + view.height, view.left : view.left + view.width] += 1
+        assert taken.max() == 1
+
+
+@pytest.mark.parametrize("quantity", ["entropy", "coverage"])
+@pytest.mark.parametrize("up", [1, 2])
+def test_robot_is_drawn_where_it_stands(quantity: str, up: int) -> None:
+    place = (1.5, 8.5, 3.5)
+    frame = frame_of(robots=2)
+    positions = frame.positions_m.copy()
+    positions[1] = ORIGIN_M + np.array(place) * VOXEL_M
+    frame = dataclasses.replace(frame, positions_m=positions)
+    row, column = pixel_of(views_of(frame)[quantity, up], place)
+    assert tuple(draw_frame(frame)[row, column]) == ROBOT_COLOURS[1]
+
+
+def test_gaze_points_by_yaw_from_above_and_by_pitch_downwards_from_the_side() -> None:
+    place = (3.5, 5.5, 2.5)
+    frame = frame_of(robots=1)
+    position = (ORIGIN_M + np.array(place) * VOXEL_M)[None]
+    for gaze, up, offset in (
+        ((0.0, 0.0), 1, (0, 9)),
+        ((np.pi / 2, 0.0), 1, (-9, 0)),
+        ((np.pi, 0.0), 2, (0, -9)),
+        ((0.0, np.pi / 2), 2, (9, 0)),
+    ):
+        picture = draw_frame(dataclasses.replace(frame, positions_m=position, gazes_rad=np.array([gaze])))
+        row, column = pixel_of(views_of(frame)["entropy", up], place)
+        assert tuple(picture[row + offset[0], column + offset[1]]) == ROBOT_COLOURS[0]
+        assert tuple(picture[row - offset[0], column - offset[1]]) != ROBOT_COLOURS[0]
+
+
+def test_chosen_viewpoint_is_a_ring_and_the_way_a_line() -> None:
+    target, way = (5.5, 2.5, 1.5), [(0.5, 9.5, 4.5), (4.5, 9.5, 4.5)]
+    frame = dataclasses.replace(
+        frame_of(robots=1),
+        targets_m=(ORIGIN_M + np.array(target) * VOXEL_M)[None],
+        paths_m=[ORIGIN_M + np.array(way) * VOXEL_M],
+    )
+    picture, view = draw_frame(frame), views_of(frame)["entropy", 1]
+    row, column = pixel_of(view, target)
+    assert tuple(picture[row, column]) == tuple(COLOURS["entropy"][255])
+    assert tuple(picture[row + 4, column]) == tuple(picture[row, column - 4]) == ROBOT_COLOURS[0]
+    for x in (1.0, 2.5, 4.0):
+        row, column = pixel_of(view, (x, 9.5, 4.5))
+        assert tuple(picture[row, column]) == ROBOT_COLOURS[0]
+
+
+def test_one_known_voxel_lights_its_own_rectangle_of_the_coverage_maps() -> None:
+    voxel = (5, 2, 3)
+    frame = frame_of(robots=0)
+    frame.entropy_share[voxel], frame.coverage[voxel] = 0.0, 1.0
+    picture, views = draw_frame(frame), views_of(frame)
+    for up in (1, 2):
+        view = views["coverage", up]
+        lit = (view.of(picture) != UNKNOWN_COLOUR).any(axis=-1)
+        rows, columns = np.nonzero(lit)
+        assert lit[rows.min() : rows.max() + 1, columns.min() : columns.max() + 1].all()
+        edges = np.array([columns.min(), columns.max() + 1]) * SHAPE[0] / view.width
+        np.testing.assert_allclose(edges, [5, 6], atol=SHAPE[0] / view.width)
+        edges = (view.height - np.array([rows.max() + 1, rows.min()])) * SHAPE[up] / view.height
+        np.testing.assert_allclose(edges, [voxel[up], voxel[up] + 1], atol=SHAPE[up] / view.height)
+        assert (view.of(picture)[lit] == COLOURS["coverage"][254]).all()
+
+
+def test_entropy_maps_show_the_mean_along_the_line_of_sight() -> None:
+    frame = frame_of(robots=0)
+    frame.entropy_share[2, 7] = [0.0, 0.0, 0.0, 1.0, 1.0]
+    picture, views = draw_frame(frame), views_of(frame)
+    above = picture[pixel_of(views["entropy", 1], (2.5, 7.5, 0.0))]
+    side = picture[pixel_of(views["entropy", 2], (2.5, 0.0, 0.5))]
+    np.testing.assert_array_equal(above, COLOURS["entropy"][round(0.4 * 255)])
+    np.testing.assert_array_equal(side, COLOURS["entropy"][round(10 / 11 * 255)])
+
+
+def test_a_wall_one_voxel_thick_stays_visible_in_a_world_larger_than_the_picture() -> None:
+    frame = frame_of((1000, 700, 1), robots=0)
+    frame.entropy_share[:] = 0.0
+    frame.coverage[:] = 0.0
+    frame.coverage[333, 100:600] = 1.0
+    view = views_of(frame)["coverage", 1]
+    dark = (view.of(draw_frame(frame)) == COLOURS["coverage"][254]).all(axis=-1)
+    columns = np.flatnonzero(dark.any(axis=0))
+    assert len(columns) == 1
+    assert abs(columns[0] - 333.5 / 1000 * view.width) <= 1
+    assert abs(dark.sum() - 500 / 700 * view.height) <= 2
+
+
+def test_entropy_is_averaged_not_sampled_in_a_world_larger_than_the_picture() -> None:
+    frame = frame_of((1000, 700, 1), robots=0)
+    frame.entropy_share[::2] = 0.0
+    view = views_of(frame)["entropy", 1]
+    seen = np.unique(view.of(draw_frame(frame)).reshape(-1, 3), axis=0)
+    assert {tuple(colour) for colour in seen} <= {tuple(c) for c in COLOURS["entropy"][80:176]}
+
+
+def test_drawing_changes_none_of_its_inputs() -> None:
+    frame = dataclasses.replace(frame_of(), paths_m=[np.zeros((4, 3)), np.ones((2, 3))])
+    arrays = [value for value in vars(frame).values() if isinstance(value, np.ndarray)] + frame.paths_m
+    before = [array.copy() for array in arrays]
+    for array in arrays:
+        array.setflags(write=False)
+    first = draw_frame(frame)
+    first[:] = 0
+    second, third = draw_frame(frame), draw_frame(frame)
+    np.testing.assert_array_equal(second, third)
+    assert second.any()
+    for array, copy in zip(arrays, before, strict=True):
+        np.testing.assert_array_equal(array, copy)
+
+
+def test_curves_begin_at_the_upper_left_and_end_at_the_last_time() -> None:
+    times, shares = np.array([0.0, 30.0]), np.array([[1.0], [0.0]])
+    picture = draw_frame(dataclasses.replace(frame_of(robots=1), curve_s=times, curve_share=shares))
+    box = lay_out(SHAPE, VOXEL_M, 1, 2, 640, 480).curves
+    assert tuple(picture[box.top, box.left]) == ROBOT_COLOURS[0]
+    assert tuple(picture[box.top + box.height - 1, box.left + box.width - 1]) == ROBOT_COLOURS[0]
+    y, x = box.height // 2, box.width // 2
+    middle = box.of(picture)[y - 3 : y + 3, x - 3 : x + 3]
+    assert (middle == ROBOT_COLOURS[0]).all(axis=-1).any()
+
+
+@pytest.mark.parametrize("times", [0, 1, 100_000])
+def test_curves_of_any_length(times: int) -> None:
+    assert draw_frame(frame_of(times=times)).shape == (480, 640, 3)
+
+
+def test_points_that_are_far_away_or_not_finite_are_no_trouble() -> None:
+    frame = dataclasses.replace(
+        frame_of(robots=2),
+        positions_m=np.array([[1e12, -1e12, 0.0], [np.nan, 0.0, 0.0]]),
+        paths_m=[np.array([[-1e30, 0.0, 0.0], [1e30, 5.0, 1.0]]), np.zeros((0, 3))],
+    )
+    assert draw_frame(frame).shape == (480, 640, 3)
+
+
+def test_frame_and_picture_name_what_does_not_fit() -> None:
+    frame = frame_of(robots=2)
+    for name, value in (
+        ("coverage", np.zeros((7, 11, 4))),
+        ("targets_m", np.zeros((1, 3))),
+        ("gazes_rad", np.zeros((2, 3))),
+        ("curve_share", np.zeros((9, 1))),
+        ("paths_m", [np.zeros((1, 3))]),
+    ):
+        with pytest.raises(SettingError, match=name):
+            dataclasses.replace(frame, **{name: value})
+    with pytest.raises(SettingError, match="width"):
+        draw_frame(frame, 100, 480)
+    with pytest.raises(SettingError, match="height"):
+        draw_frame(frame, 640, 100)
+
+
+def test_every_printable_ascii_character_has_a_glyph_of_its_own() -> None:
+    drawn = {text_mask(chr(code)).tobytes() + bytes(text_mask(chr(code)).shape) for code in range(33, 127)}
+    assert len(drawn) == 127 - 33
+    assert text_mask("é").tobytes() == text_mask("e").tobytes()
+    assert text_mask("漢").shape == (9, 5)
+
+
+def test_text_is_cut_off_at_the_edge_and_shortened_to_fit() -> None:
+    picture = np.zeros((12, 20, 3), np.uint8)
+    for left, top in ((-30, 2), (-3, -3), (15, 8), (40, 2), (2, 40)):
+        write(picture, "Ag%", left, top, (255, 255, 255))
+    assert picture.any()
+    assert text_width("robot 0", 2) == text_mask("robot 0", 2).shape[1] == 2 * text_width("robot 0")
+    for width in (20, 50, 90):
+        assert text_width(shortened("remaining entropy", width)) <= width
+    assert shortened("short", 500) == "short"
+
+
+def test_a_line_has_no_gaps() -> None:
+    pixels = line_pixels(np.array([[0.0, 0.0], [9.5, 3.2], [np.nan, 1.0], [2.0, 30.0]]))
+    assert np.abs(np.diff(pixels, axis=0)).max() == 1
+    assert tuple(pixels[0]) == (0, 0) and tuple(pixels[-1]) == (2, 30)
+
+
+def test_window_shows_pictures_and_a_person_can_close_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    pygame = pytest.importorskip("pygame")
+    monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
+    window = Window(frames_per_s=None)
+    window.close()
+    picture = draw_frame(frame_of())
+    window.show(picture)
+    shown = pygame.surfarray.array3d(pygame.display.get_surface()).swapaxes(0, 1)
+    np.testing.assert_array_equal(shown, picture)
+    window.show(draw_frame(frame_of(), 800, 600))
+    assert pygame.display.get_surface().get_size() == (800, 600)
+    window.close()
+    assert not pygame.display.get_init()
+    window.show(picture)
+    pygame.event.post(pygame.event.Event(pygame.QUIT))
+    window.show(picture)
+    assert window.dismissed
+    window.show(picture)
+    assert not pygame.display.get_init()
+
+
+def test_window_holds_its_frame_rate(monkeypatch: pytest.MonkeyPatch) -> None:
+    pygame = pytest.importorskip("pygame")
+    monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
+    window, picture = Window(frames_per_s=50.0), np.zeros((40, 60, 3), np.uint8)
+    window.show(picture)
+    begin = pygame.time.get_ticks()
+    for _ in range(5):
+        window.show(picture)
+    assert pygame.time.get_ticks() - begin >= 80
+    window.close()
+
+
+def test_missing_packages_name_the_extra(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setitem(sys.modules, "pygame", None)
+    monkeypatch.setitem(sys.modules, "PIL", None)
+    with pytest.raises(MissingExtraError, match=r"\[render\]"):
+        Window()
+    with pytest.raises(MissingExtraError, match=r"\[baselines\]"):
+        animate([np.zeros((4, 4, 3), np.uint8)], tmp_path / "a.gif", 0.1)
+
+
+def explored(share: float) -> np.ndarray:
+    """The picture of a box of which this share is known."""
+    frame = frame_of()
+    frame.entropy_share[: round(share * SHAPE[0])] = 0.2
+    frame.coverage[:, : round(share * SHAPE[1])] = share
+    return draw_frame(dataclasses.replace(frame, title=f"{share:.2f}"))
+
+
+def test_animation_has_every_picture_and_one_palette(tmp_path: Path) -> None:
+    image = pytest.importorskip("PIL.Image")
+    pictures, path = [explored(share) for share in np.linspace(0, 1, 6)], tmp_path / "mission.gif"
+    animate(iter(pictures), path, 0.05)
+    assert [entry.name for entry in tmp_path.iterdir()] == ["mission.gif"]
+    with image.open(path) as animation:
+        assert animation.n_frames == 6 and animation.size == (640, 480)
+        assert animation.info["loop"] == 0
+        for nth, picture in enumerate(pictures):
+            animation.seek(nth)
+            assert animation.info["duration"] == 50
+            seen = np.asarray(animation.convert("RGB")).astype(int)
+            assert np.abs(seen - picture).max() <= 8
+
+
+def test_animation_of_more_colours_than_a_palette_holds(tmp_path: Path) -> None:
+    image = pytest.importorskip("PIL.Image")
+    picture = np.random.default_rng(3).integers(0, 256, (50, 70, 3), dtype=np.uint8)
+    animate([picture, picture[::-1]], tmp_path / "noise.gif", 0.02)
+    with image.open(tmp_path / "noise.gif") as animation:
+        assert animation.n_frames == 2
+
+
+def test_an_animation_that_fails_leaves_the_old_file(tmp_path: Path) -> None:
+    pytest.importorskip("PIL")
+    path = tmp_path / "mission.gif"
+    path.write_bytes(b"old")
+    picture = np.zeros((4, 6, 3), np.uint8)
+    wrong = (([], 0.1), ([picture, picture[:2]], 0.1), ([picture], 0.0), ([picture], float("nan")))
+    for frames, frame_s in wrong:
+        with pytest.raises(SettingError):
+            animate(frames, path, frame_s)
+    assert path.read_bytes() == b"old"
+    assert [entry.name for entry in tmp_path.iterdir()] == ["mission.gif"]
