@@ -95,6 +95,15 @@ class EntropyExploreEnv(ParallelEnv[str, Any, Any]):
             raise SettingError("agent", agent, "one of " + ", ".join(self.possible_agents))
         return view_of(self.missions, 0, self.possible_agents.index(agent))
 
+    def deciding_agents(self) -> list[str]:
+        """The robots whose actions count in the next step, by number."""
+        deciding = self.missions.state.robots[0]["deciding"].tolist()
+        return [agent for agent, decides in zip(self.agents, deciding, strict=False) if decides]
+
+    def strategy_generator(self) -> np.random.Generator:
+        """The mission's random stream for whoever chooses the actions."""
+        return self.missions.strategy_generator(0)
+
     def reset(
         self, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[dict[str, Any], dict[str, dict[str, Any]]]:

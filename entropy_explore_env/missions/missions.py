@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
@@ -22,7 +21,8 @@ from entropy_explore_env.worlds.world import World
 
 _CHUNKS_PER_THREAD = 4
 """Missions differ in work; smaller chunks even it out."""
-_PLACING_ATTEMPTS = 200
+_PLACING_ATTEMPTS = 64
+"""Random places tried for a robot before all are."""
 
 
 class Missions:
@@ -217,6 +217,8 @@ class Missions:
 def start_poses(scenario: Scenario, world: World, starts: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     """Draw where robots start: voxel centres with room, apart from each other, any yaw, level.
 
+    Robots are placed one after the other, so a smaller team starts like the first of a larger one.
+
     Args:
         scenario: The task.
         world: The true world.
@@ -229,34 +231,25 @@ def start_poses(scenario: Scenario, world: World, starts: np.ndarray, rng: np.ra
     Raises:
         WorldError: The bodies find no room.
     """
-    apart_m = max(2.0 * scenario.robot.body_radius_m + 1e-3 * world.grid.voxel_size_m, 1e-9)
-    for _ in range(_PLACING_ATTEMPTS):
-        places = _spread(world.grid, starts, scenario.robots, apart_m, rng)
-        if places is not None:
-            yaw = rng.uniform(-np.pi, np.pi, (scenario.robots, 1))
-            return np.hstack([places, yaw, np.zeros((scenario.robots, 1))])
-    allowed = f"at most what fits into {len(starts)} free voxels, bodies {apart_m:.3g} m apart"
-    raise WorldError("Scenario.robots", scenario.robots, allowed)
+    grid = world.grid
+    apart_m = 2.0 * scenario.robot.body_radius_m + 1e-3 * grid.voxel_size_m
+    poses = np.zeros((scenario.robots, 5))
+    for robot in range(scenario.robots):
+        tried = starts[rng.integers(len(starts), size=_PLACING_ATTEMPTS)]
+        place = _first_apart(grid, tried, poses[:robot, :3], apart_m)
+        if place is None:
+            place = _first_apart(grid, rng.permutation(starts), poses[:robot, :3], apart_m)
+        if place is None:
+            allowed = f"at most {robot}, for whose bodies, {apart_m:.3g} m apart, the world has room"
+            raise WorldError("Scenario.robots", scenario.robots, allowed)
+        poses[robot, :3] = place
+        poses[robot, 3] = rng.uniform(-np.pi, np.pi)
+    return poses
 
 
-def _spread(
-    grid: Grid, starts: np.ndarray, robots: int, apart_m: float, rng: np.random.Generator
-) -> np.ndarray | None:
-    """(A, 3) places that keep their distance, in the order of one random permutation; None if stuck."""
-    tried = (
-        rng.permutation(starts)
-        if len(starts) <= 64 * robots
-        else rng.choice(starts, 64 * robots, replace=False)
-    )
-    taken = np.zeros((0, 3))
-    for place in grid.centre_of(np.stack(np.unravel_index(tried, grid.shape), axis=-1)):
-        if not len(taken) or np.sqrt(((taken - place) ** 2).sum(axis=1)).min() >= apart_m:
-            taken = np.vstack([taken, place])
-        if len(taken) == robots:
-            return taken
-    return None
-
-
-def stack_actions(actions: Sequence[np.ndarray | np.integer | int]) -> np.ndarray:
-    """Actions of one mission's robots as one array: (A, N) or (A,)."""
-    return np.stack([np.asarray(action) for action in actions])
+def _first_apart(grid: Grid, tried: np.ndarray, taken: np.ndarray, apart_m: float) -> np.ndarray | None:
+    """(3,) centre of the first of the voxels (N,) that is far enough from those taken (K, 3)."""
+    centres = grid.centre_of(np.stack(np.unravel_index(tried, grid.shape), axis=-1))
+    gaps = np.sqrt(((centres[:, None] - taken) ** 2).sum(axis=-1))
+    clear = np.flatnonzero((gaps >= apart_m).all(axis=1))
+    return centres[clear[0]] if len(clear) else None

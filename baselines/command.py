@@ -1,0 +1,92 @@
+"""The form that all commands share: arguments from a dataclass, results out, progress and errors aside.
+
+Results go to standard output (with `--json` exactly one JSON object), progress to standard error.
+Exit codes: 0 done, 1 a claim or goal does not hold where `--strict` asked, 2 bad input, 130
+interrupted.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import json
+import re
+import sys
+from collections.abc import Callable, Sequence
+from typing import Any, TypeVar
+
+from entropy_explore_env.errors import EntropyExploreError, MissingExtraError
+
+Arguments = TypeVar("Arguments")
+
+BAD_INPUT = 2
+INTERRUPTED = 130
+_FRAME = re.compile(r"[─-╿]+")
+
+
+def parse(
+    kind: type[Arguments],
+    words: Sequence[str],
+    default: Arguments | None = None,
+    description: str | None = None,
+) -> Arguments:
+    """Arguments from the words of a command line.
+
+    Args:
+        kind: A dataclass; its fields are the options.
+        words: What follows the command.
+        default: Values for what is not given; None = those of the dataclass.
+        description: The first line of the help.
+
+    Raises:
+        UsageError: The words do not fit; the message is one line.
+        SystemExit: The help was asked for.
+    """
+    try:
+        import tyro
+    except ImportError:
+        raise MissingExtraError("tyro", "baselines") from None
+    complaint = io.StringIO()
+    try:
+        with contextlib.redirect_stderr(complaint):
+            extra = {} if default is None else {"default": default}
+            return tyro.cli(kind, args=list(words), description=description, **extra)
+    except SystemExit as stop:
+        if stop.code in (0, None):
+            raise
+        raise UsageError(_one_line(complaint.getvalue())) from None
+
+
+class UsageError(EntropyExploreError):
+    """The words of a command line do not fit its options."""
+
+
+def _one_line(complaint: str) -> str:
+    """The parser's framed message as one line."""
+    words = " ".join(_FRAME.sub(" ", complaint).split())
+    return words.split(" For full helptext")[0] or "the arguments do not fit; see --help"
+
+
+def run_command(main: Callable[[Sequence[str]], int], words: Sequence[str] | None = None) -> int:
+    """Run a command's main function; its errors become one line on standard error and an exit code.
+
+    Args:
+        main: Takes the words of the command line, returns an exit code.
+        words: None = those of the process.
+    """
+    try:
+        return main(sys.argv[1:] if words is None else words)
+    except EntropyExploreError as error:
+        print("error: " + " ".join(str(error).split()), file=sys.stderr)
+        return BAD_INPUT
+    except OSError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return BAD_INPUT
+    except KeyboardInterrupt:
+        print("interrupted", file=sys.stderr)
+        return INTERRUPTED
+
+
+def print_json(results: dict[str, Any]) -> None:
+    """Print exactly one JSON object on standard output."""
+    print(json.dumps(results, indent=2, allow_nan=False))

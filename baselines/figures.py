@@ -1,0 +1,97 @@
+"""Figures of a mission for reading: curves, and slices of the map with the ways of the robots."""
+
+from __future__ import annotations
+
+import io
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from entropy_explore_env.config import Grid
+from entropy_explore_env.missions.missions import Missions
+from entropy_explore_env.reports.glyphs import robot_colour
+from entropy_explore_env.reports.painting import entropy_share
+from entropy_explore_env.reports.recording import Recorder
+
+COLOURS = tuple(tuple(level / 255 for level in robot_colour(robot)) for robot in range(8))
+"""Of the robots, as in every other picture; colour-blind people can tell them apart."""
+
+
+def png(figure: Figure, dots_per_inch: int = 110) -> bytes:
+    """The figure as the bytes of a PNG file, the same bytes for the same figure."""
+    buffer = io.BytesIO()
+    figure.savefig(buffer, format="png", dpi=dots_per_inch, metadata={"Software": None})
+    return buffer.getvalue()
+
+
+def mission_picture(recorder: Recorder, title: str, strategy: str) -> bytes:
+    """Entropy curves, shared measurements, and slices of robot_0's map with all robots' ways.
+
+    Args:
+        recorder: Of a mission that has ended.
+        title: What it was: the scenario and its world.
+        strategy: Name of the strategy.
+
+    Returns:
+        A PNG file.
+    """
+    missions: Missions = recorder.missions
+    robots = missions.scenario.robots
+    with mpl.rc_context({"font.size": 9, "axes.spines.top": False, "axes.spines.right": False}):
+        figure = Figure(figsize=(11, 7.2), layout="constrained")
+        curves, shared, above, covered = figure.subplots(2, 2).ravel()
+        for robot in range(robots):
+            colour = COLOURS[robot % len(COLOURS)]
+            curves.step(
+                recorder.time_s,
+                recorder.entropy_bits[:, robot] / 1000,
+                where="post",
+                color=colour,
+                label=f"robot_{robot}",
+            )
+        threshold = float(missions.state.missions[0]["entropy_end_bits"]) / 1000
+        curves.axhline(threshold, color="0.4", linewidth=1, linestyle="--", label="threshold")
+        curves.set(xlabel="simulated time (s)", ylabel="entropy of the map (1000 bits)", title="Entropy")
+        curves.legend(frameon=False, fontsize=8)
+        shared.step(recorder.time_s, recorder.shared, where="post", color="0.2")
+        shared.set(
+            xlabel="simulated time (s)",
+            ylabel="measurements sent by the team",
+            title="Shared measurements, cumulative",
+        )
+        _slice(figure, above, recorder, entropy=True)
+        _slice(figure, covered, recorder, entropy=False)
+        team = f"{robots} robot{'s' if robots > 1 else ''}"
+        figure.suptitle(
+            f"{title}, {strategy}, {team}, seed {missions.seeds[0]}", x=0.01, ha="left", fontsize=11
+        )
+        return png(figure)
+
+
+def _slice(figure: Figure, axes: Axes, recorder: Recorder, entropy: bool) -> None:
+    """The layer of the map that the robots scanned from most, and the ways over it."""
+    missions, grid = recorder.missions, recorder.missions.grid
+    layer = _busiest_layer(recorder.places_m, grid)
+    share = entropy_share(missions, 0, 0)[:, :, layer]
+    shown = share if entropy else np.ma.masked_where(share > 0.9, missions.mean[0, 0][:, :, layer])
+    colours = mpl.colormaps["magma" if entropy else "Greys"].with_extremes(bad="#c9d6e8")
+    low, size = np.asarray(grid.origin_m), grid.size_m
+    extent = (low[0], low[0] + size[0], low[1], low[1] + size[1])
+    image = axes.imshow(shown.T, origin="lower", extent=extent, cmap=colours, vmin=0, vmax=1, aspect="equal")
+    for robot in range(missions.scenario.robots):
+        way, colour = recorder.places_m[:, robot], COLOURS[robot % len(COLOURS)]
+        axes.plot(way[:, 0], way[:, 1], color=colour, linewidth=0.9)
+        axes.plot(*way[0, :2], marker="o", color=colour, markersize=5, markeredgecolor="white")
+        axes.plot(*way[-1, :2], marker="s", color=colour, markersize=5, markeredgecolor="white")
+    what = "entropy left" if entropy else "coverage (blue: unknown)"
+    height = f" at z = {grid.centre_of(np.array([0, 0, layer]))[2]:.2f} m" if not grid.flat else ""
+    axes.set(xlabel="x (m)", ylabel="y (m)", title=f"robot_0's map{height}: {what}")
+    figure.colorbar(image, ax=axes, shrink=0.7)
+
+
+def _busiest_layer(places_m: np.ndarray, grid: Grid) -> int:
+    """Index along z of the layer with the most scans."""
+    layers = grid.voxel_of(places_m.reshape(-1, 3))[:, 2]
+    return int(np.bincount(np.clip(layers, 0, grid.shape[2] - 1)).argmax())

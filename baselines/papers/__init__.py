@@ -1,0 +1,1 @@
+"""Reproductions: one paper a file, each run by `python -m baselines.papers.NAME`."""

@@ -1,0 +1,323 @@
+"""The report of Rocha04: Markdown with the claims, and tables 1-2 and figures 3-8 beside it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.figure import Figure
+
+from baselines.experiment import (
+    Claim,
+    Record,
+    csv_table,
+    markdown_table,
+    mean_interval,
+    median_interval,
+    ratio_interval,
+)
+from baselines.figures import COLOURS, png
+from baselines.papers.rocha04_cells import BURSTS, CHANGES, I_MINS, STANDARD, TEAMS, team_id
+from baselines.papers.rocha04_claims import Records, times
+from entropy_explore_env.config import Scenario
+from entropy_explore_env.reports.recording import write_atomically
+from entropy_explore_env.scenarios import ROOM
+
+STYLE = {"font.size": 9, "axes.spines.top": False, "axes.spines.right": False}
+_PAPER_SINGLE = {"t_mission_s": 2142.0, "half_s": 254.9, "end_s": 1899.5}
+
+
+def write_report(folder: Path, records: Records, claims: Sequence[Claim], quick: bool) -> Path:
+    """Write `rocha04.md` and, in a folder `rocha04` beside it, its figures and tables.
+
+    Returns:
+        Path of the report.
+    """
+    beside = folder / "rocha04"
+    with mpl.rc_context(STYLE):
+        pictures = {
+            "figure-3": _figure_3(records),
+            "figure-4": _figure_4(records),
+            "figure-5": _figure_time(records, "burst"),
+            "figure-6": _figure_time(records, "I_min"),
+            "figure-7": _figure_shared(records, "burst"),
+            "figure-8": _figure_shared(records, "I_min"),
+        }
+        for name, (figure, table) in pictures.items():
+            write_atomically(beside / f"{name}.png", png(figure))
+            write_atomically(beside / f"{name}.csv", csv_table(table))
+    write_atomically(beside / "table-1.csv", csv_table(_table_1(ROOM)))
+    write_atomically(beside / "table-2.csv", csv_table(_table_2()))
+    text = _text(records, claims, quick)
+    write_atomically(folder / "rocha04.md", text)
+    return folder / "rocha04.md"
+
+
+def print_claims(claims: Sequence[Claim]) -> None:
+    """A table of the claims on standard output."""
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table(title="Rocha04", title_justify="left")
+    for head, justify in (
+        ("claim", "left"),
+        ("paper", "right"),
+        ("ours", "right"),
+        ("95 % interval", "right"),
+    ):
+        table.add_column(head, justify="right" if justify == "right" else "left")
+    table.add_column("holds")
+    for claim in claims:
+        holds = "[green]yes[/green]" if claim.holds else "[red]no[/red]"
+        table.add_row(claim.claim, _shown(claim.paper), _shown(claim.ours), _interval(claim), holds)
+    Console().print(table)
+
+
+def _shown(value: float | str | None) -> str:
+    if value is None:
+        return "-"
+    if isinstance(value, str):
+        return value
+    return f"{value:,.0f}" if abs(value) >= 1000 else f"{value:,.4g}"
+
+
+def _interval(claim: Claim) -> str:
+    return "" if claim.low is None else f"{_shown(claim.low)} … {_shown(claim.high)}"
+
+
+def _middle(cell: list[Record]) -> Record:
+    """The mission with the median time of a cell."""
+    return sorted(cell, key=lambda record: (record["t_mission_s"], record["seed"]))[len(cell) // 2]
+
+
+def _figure_3(records: Records) -> tuple[Figure, dict[str, list[object]]]:
+    """Entropy along the mission of one robot, halves marked; the median mission."""
+    record = _middle(records["single"])
+    series = record["series"]
+    figure = Figure(figsize=(6.4, 3.8), layout="constrained")
+    axes = figure.subplots()
+    axes.plot(series["time_s"], np.asarray(series["entropy_bits"]) / 1000, color=COLOURS[0])
+    middle = 0.5 * (record["entropy_start_bits"] + record["entropy_threshold_bits"]) / 1000
+    for time_s, level in (
+        (record["half_s"], middle),
+        (record["t_mission_s"], record["entropy_threshold_bits"] / 1000),
+    ):
+        axes.plot(
+            [time_s, time_s], [record["entropy_threshold_bits"] / 1000, level], "--", color="0.5", linewidth=1
+        )
+        axes.plot([0, time_s], [level, level], "--", color="0.5", linewidth=1)
+        axes.annotate(
+            f" {time_s:,.0f} s", (time_s, level), fontsize=8, va="bottom", ha="right" if level < 0 else "left"
+        )
+    ratio = record["t_mission_s"] / record["half_s"]
+    axes.set(
+        xlabel="simulated time (s)",
+        ylabel="entropy (1000 bits)",
+        title=f"Fig. 3: one robot, median mission (seed {record['seed']}); ratio {ratio:.1f}, paper 7.45",
+    )
+    return figure, {"time_s": series["time_s"], "entropy_bits": series["entropy_bits"]}
+
+
+def _figure_4(records: Records) -> tuple[Figure, dict[str, list[object]]]:
+    """Entropy for team sizes, burst 64, I_min 0.3219; the median mission of each."""
+    figure = Figure(figsize=(6.4, 3.8), layout="constrained")
+    axes = figure.subplots()
+    table: dict[str, list[object]] = {"robots": [], "time_s": [], "entropy_bits": []}
+    for robots in (1, *TEAMS):
+        record = _middle(records[team_id(robots, *STANDARD)])
+        series = record["series"]
+        received = record["measurements"] / robots
+        label = f"{robots} robot{'s' if robots > 1 else ''}, {received:,.0f} own measurements each"
+        axes.plot(
+            series["time_s"],
+            np.asarray(series["entropy_bits"]) / 1000,
+            color=COLOURS[robots - 1],
+            label=label,
+        )
+        table["robots"] += [robots] * len(series["time_s"])
+        table["time_s"] += series["time_s"]
+        table["entropy_bits"] += series["entropy_bits"]
+    axes.legend(frameon=False)
+    axes.set(
+        xlabel="simulated time (s)",
+        ylabel="entropy of the best map (1000 bits)",
+        title="Fig. 4: team sizes, burst 64, I_min 0.3219; median missions",
+    )
+    return figure, table
+
+
+def _lines(what: str) -> list[tuple[str, int, float]]:
+    """Label, burst and I_min of the lines of a figure over burst or I_min."""
+    if what == "burst":
+        return [(f"burst {burst}", burst, STANDARD[1]) for burst in BURSTS]
+    return [(f"I_min {i_min_bits}", STANDARD[0], i_min_bits) for i_min_bits in I_MINS]
+
+
+def _figure_time(records: Records, what: str) -> tuple[Figure, dict[str, list[object]]]:
+    """Mean mission time over team size, with 95 % intervals."""
+    figure = Figure(figsize=(6.4, 3.8), layout="constrained")
+    axes = figure.subplots()
+    table: dict[str, list[object]] = {name: [] for name in ("line", "robots", "mean_s", "low_s", "high_s")}
+    for number, (label, burst, i_min_bits) in enumerate(_lines(what)):
+        points = [mean_interval(times(records, team_id(robots, burst, i_min_bits))) for robots in (1, *TEAMS)]
+        mean, low, high = (np.asarray(column) for column in zip(*points, strict=True))
+        robots = np.asarray([1, *TEAMS]) + 0.05 * (number - 1)
+        axes.errorbar(
+            robots, mean, [mean - low, high - mean], marker="o", capsize=3, color=COLOURS[number], label=label
+        )
+        table["line"] += [label] * len(points)
+        table["robots"] += [1, *TEAMS]
+        for name, column in (("mean_s", mean), ("low_s", low), ("high_s", high)):
+            table[name] += column.round(2).tolist()
+    walks = [
+        times(records, "single-random" if robots == 1 else f"team-{robots}-random").mean()
+        for robots in (1, *TEAMS)
+    ]
+    axes.plot([1, *TEAMS], walks, ":", marker="x", color="0.4", label="random walk, burst 64, I_min 0.3219")
+    axes.plot([1], [_PAPER_SINGLE["t_mission_s"]], "k*", label="the paper's mean of 10 starts")
+    axes.set(
+        xlabel="robots",
+        ylabel="mission time (s)",
+        xticks=[1, *TEAMS],
+        ylim=(0, None),
+        title=f"Fig. {5 if what == 'burst' else 6}: mean mission time, 95 % intervals",
+    )
+    axes.legend(frameon=False)
+    return figure, table
+
+
+def _figure_shared(records: Records, what: str) -> tuple[Figure, dict[str, list[object]]]:
+    """Measurements shared so far along the mission of two robots; the median mission of each line."""
+    figure = Figure(figsize=(6.4, 3.8), layout="constrained")
+    axes = figure.subplots()
+    table: dict[str, list[object]] = {"line": [], "time_s": [], "shared_measurements": []}
+    for number, (label, burst, i_min_bits) in enumerate(_lines(what)):
+        series = _middle(records[team_id(2, burst, i_min_bits)])["series"]
+        axes.plot(series["time_s"], series["shared_measurements"], color=COLOURS[number], label=label)
+        table["line"] += [label] * len(series["time_s"])
+        table["time_s"] += series["time_s"]
+        table["shared_measurements"] += series["shared_measurements"]
+    other = "I_min 0.3219" if what == "burst" else "burst 64"
+    axes.set(
+        xlabel="simulated time (s)",
+        ylabel="measurements sent by the team",
+        title=f"Fig. {7 if what == 'burst' else 8}: shared measurements, 2 robots, {other}; median missions",
+    )
+    axes.legend(frameon=False)
+    return figure, table
+
+
+def _table_1(room: Scenario) -> dict[str, list[object]]:
+    """Table 1 with our settings."""
+    grid, robot, sensor = room.grid, room.robot, room.sensor
+    view = sensor.field_of_view_rad
+    rows: list[tuple[str, object, object]] = [
+        ("voxels", "10 x 10 x 4 m", "x".join(map(str, grid.shape))),
+        ("voxel size (m)", 0.25, grid.voxel_size_m),
+        ("velocity (m/s)", 0.25, robot.max_speed_m_s),
+        ("acceleration (m/s2)", 0.25, robot.acceleration_m_s2),
+        ("search radius (m)", 0.5, robot.reach_m),
+        ("sigma_min", 0.08, sensor.sigma_min),
+        ("zeta (1/m)", 0.006, sensor.sigma_slope_per_m),
+        ("field of view (rad)", "pi/6 x pi/12", f"{view[0]:.6f} x {view[1]:.6f}"),
+        ("angular step (rad)", "pi/90", f"{sensor.angular_step_rad:.6f}"),
+        ("prior sigma", 30.0, room.sigma_prior),
+        ("scan time (s)", "not given", sensor.scan_time_s),
+        ("turn rate (rad/s)", "not given", robot.turn_rate_rad_s),
+        ("body radius (m)", "not given", robot.body_radius_m),
+    ]
+    return {"parameter": [r[0] for r in rows], "paper": [r[1] for r in rows], "ours": [r[2] for r in rows]}
+
+
+def _table_2() -> dict[str, list[object]]:
+    """Table 2."""
+    sets = [" ".join(map(str, values)) for values in ((1, *TEAMS), BURSTS, I_MINS)]
+    return {"parameter": ["tsz", "burst", "I_min"], "values": sets}
+
+
+def _text(records: Records, claims: Sequence[Claim], quick: bool) -> str:
+    """The report."""
+    single, team = len(records["single"]), len(records[team_id(2, *STANDARD)])
+    option = " --quick" if quick else ""
+    capped = sum(not record["finished"] for cell in records.values() for record in cell)
+    held = sum(claim.holds for claim in claims)
+    rows = [
+        [c.claim, _shown(c.paper), _shown(c.ours), _interval(c), "yes" if c.holds else "**no**"]
+        for c in claims
+    ]
+    figures = "\n".join(f"![Figure {n}](rocha04/figure-{n}.png)" for n in range(3, 9))
+    parts = [
+        "# Rocha, Dias and Carvalho 2004, reproduced",
+        f"Written by `python -m baselines.papers.rocha04{option} --out docs/results`: {single} starts of one robot, "
+        f"{team} of each team, seeds 0, 1, …, the same in every cell. Intervals are 95 % bootstrap intervals over "
+        f"missions; {capped} missions were cut off by the time limit. Tables 1-2 and the figures' numbers lie as CSV "
+        "in `rocha04/`.",
+        f"## Claims: {held} of {len(claims)} hold",
+        markdown_table(["claim", "paper", "ours", "95 % interval", "holds"], rows),
+        "## One robot",
+        _single_table(records),
+    ]
+    if not quick:
+        parts += ["## One thing changed at a time", _changes_text(records), _reading(records)]
+    parts += ["## Figures", figures]
+    return "\n\n".join(part.strip() for part in parts) + "\n"
+
+
+def _single_table(records: Records) -> str:
+    """Gradient and random walk beside each other: the paper's figures of merit."""
+    rows = []
+    for name, cell in (("gradient", "single"), ("random", "single-random")):
+        found = records[cell]
+        time_s = times(records, cell)
+        rows.append(
+            [
+                name,
+                "{:,.0f} ({:,.0f} … {:,.0f})".format(*mean_interval(time_s)),
+                "{:,.0f} ({:,.0f} … {:,.0f})".format(*median_interval(time_s)),
+                f"{time_s.max():,.0f}",
+                "{:,.0f} ({:,.0f} … {:,.0f})".format(*mean_interval([record["scans"] for record in found])),
+                f"{np.mean([record['t_mission_s'] / record['scans'] for record in found]):.2f}",
+            ]
+        )
+    head = ["strategy", "mean t (s)", "median t (s)", "worst t (s)", "mean scans", "s a scan"]
+    return markdown_table(head, [*rows, ["the paper", "2,142", "-", "-", "1,211", "1.77"]])
+
+
+def _changes_text(records: Records) -> str:
+    """Mission times with one setting changed, paired with the room as it is."""
+    base = times(records, "single")
+    rows = []
+    for name, (text, _, _) in CHANGES.items():
+        cell = f"change-{name}"
+        changed = records[cell]
+        time_s = times(records, cell)
+        rows.append(
+            [
+                text,
+                f"{time_s.mean():,.0f}",
+                f"{np.median(time_s):,.0f}",
+                "{:.2f} ({:.2f} … {:.2f})".format(*ratio_interval(time_s, base)),
+                f"{np.mean([record['scans'] for record in changed]):,.0f}",
+                f"{time_s.sum() / sum(record['scans'] for record in changed):.2f}",
+                sum(not record["finished"] for record in changed),
+            ]
+        )
+    head = ["changed", "mean t (s)", "median t (s)", "t over the room's", "mean scans", "s a scan", "cut off"]
+    return markdown_table(head, rows)
+
+
+def _reading(records: Records) -> str:
+    """What the changes say of the difference to the paper, in numbers from the same records."""
+    single = records["single"]
+    ours = times(records, "single").sum() / sum(record["scans"] for record in single)
+    ratios = {
+        name: ratio_interval(times(records, f"change-{name}"), times(records, "single")) for name in CHANGES
+    }
+    slower = sorted((name for name in ratios if ratios[name][1] > 1), key=lambda name: -ratios[name][0])
+    listed = "; ".join(f"{CHANGES[name][0]}: {ratios[name][0]:.2f} x" for name in slower) or "none"
+    return (
+        f"Our robot takes {ours:.2f} s a scan, the paper's 1.77 s. Changes that make a mission longer, with the "
+        f"interval above 1: {listed}."
+    )

@@ -1,0 +1,32 @@
+"""The strategies by name."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from types import MappingProxyType
+
+from baselines.gradient import GradientStrategy
+from baselines.random_walk import RandomWalk
+from baselines.strategy import Strategy
+from entropy_explore_env.errors import SettingError
+
+STRATEGIES: MappingProxyType[str, Callable[[], Strategy]] = MappingProxyType(
+    {
+        "random": RandomWalk,
+        "gradient": GradientStrategy,
+        "gradient-plane": partial(GradientStrategy, motion_plane=True),
+    }
+)
+"""Name → a function that makes the strategy."""
+
+
+def make_strategy(name: str) -> Strategy:
+    """A new strategy.
+
+    Raises:
+        SettingError: None has this name.
+    """
+    if name not in STRATEGIES:
+        raise SettingError("strategy", name, "one of " + ", ".join(STRATEGIES))
+    return STRATEGIES[name]()

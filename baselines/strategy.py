@@ -1,0 +1,73 @@
+"""What a strategy is: it chooses viewpoints for robots from what each of them knows."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Protocol
+
+import numpy as np
+
+from entropy_explore_env.config import Scenario
+from entropy_explore_env.missions.view import RobotView
+
+_DRAWS = 64
+
+
+class Strategy(Protocol):
+    """Chooses viewpoints for a team, robot by robot.
+
+    A strategy sees RobotViews and nothing else. What it returns goes through the environment's
+    action space, like a learned policy's choice.
+    """
+
+    def reset(self, scenario: Scenario, rng: np.random.Generator) -> None:
+        """A new mission begins.
+
+        Args:
+            scenario: The public settings.
+            rng: The mission's stream for the strategy's own draws.
+        """
+        ...
+
+    def choose(self, views: Sequence[RobotView]) -> list[np.ndarray]:
+        """Choose where robots go.
+
+        Args:
+            views: One of each robot that decides now, by number.
+
+        Returns:
+            For each view a viewpoint (5,): x, y, z, yaw, pitch; map frame, metres, radians.
+        """
+        ...
+
+
+def random_viewpoint(view: RobotView, rng: np.random.Generator) -> np.ndarray:
+    """A viewpoint drawn uniformly within reach, inside the workspace; the gaze in any direction.
+
+    Args:
+        view: Of the robot; planar robots stay in their plane and look level.
+        rng: To draw from.
+
+    Returns:
+        (5,) viewpoint.
+    """
+    grid, reach_m = view.scenario.grid, view.scenario.robot.reach_m
+    low = np.asarray(grid.origin_m)
+    high = low + grid.size_m
+    axes = 2 if view.scenario.planar else 3
+    viewpoint = view.pose.copy()
+    for _ in range(_DRAWS):
+        place = view.pose[:3].copy()
+        if math.isinf(reach_m):
+            place[:axes] = rng.uniform(low[:axes], high[:axes])
+            viewpoint[:3] = place
+            break
+        step = rng.uniform(-reach_m, reach_m, axes)
+        place[:axes] += step
+        if (step**2).sum() <= reach_m**2 and (place > low).all() and (place < high).all():
+            viewpoint[:3] = place
+            break
+    viewpoint[3] = rng.uniform(-math.pi, math.pi)
+    viewpoint[4] = 0.0 if view.scenario.planar else math.asin(rng.uniform(-1.0, 1.0))
+    return viewpoint

@@ -1,0 +1,237 @@
+"""Ray insertion: scans of the 2004 bundle, taken in the empty room, fused into one map.
+
+Both sides get the same sensor positions and end points, and both insert every ray voxel by voxel.
+One pass before the clock starts makes OctoMap's nodes, so that only updates are timed.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+
+from benchmarks.peers import OctoMapTree
+from benchmarks.rows import Effort, Goal, Row, compared, interleave, seconds
+from entropy_explore_env.belief.coverage_map import PRIOR_MEAN, measurement_precision
+from entropy_explore_env.config import Grid, RangeSensor
+from entropy_explore_env.robots.range_sensor import (
+    Return,
+    Scan,
+    fuse_scan,
+    new_scan,
+    sensor_model,
+    take_scan,
+    trace_measurement,
+)
+from entropy_explore_env.scenarios import ROOM
+
+FINE_GRID = Grid((103, 103, 43), 0.1, ROOM.grid.origin_m)
+"""The room of 10.25 × 10.25 × 4.25 m in voxels of 0.1 m, rounded up."""
+GRIDS = (ROOM.grid, FINE_GRID)
+
+_HIT = int(Return.HIT)
+_FLOOR_SCANS = 8
+_FLOOR_PASSES = 40
+_STEEPEST_RAD = math.pi / 4
+
+
+@dataclass(frozen=True)
+class Measurements:
+    """Scans that are known: S of them, R rays each; map frame, metres."""
+
+    positions_m: np.ndarray
+    """(S, 3) float64."""
+    ends_m: np.ndarray
+    """(S, R, 3) float64."""
+
+    @property
+    def rays(self) -> int:
+        """How many rays there are in all."""
+        return self.ends_m.shape[0] * self.ends_m.shape[1]
+
+
+def measure_room(grid: Grid, sensor: RangeSensor, scans: int, seed: int = 0) -> Measurements:
+    """Scans of an empty room from random places, in random directions up to 45° up or down."""
+    rng = np.random.default_rng(seed)
+    starts = rng.uniform(0.5, np.asarray(grid.shape) - 0.5, (scans, 3))
+    yaws = rng.uniform(-math.pi, math.pi, scans)
+    pitches = rng.uniform(-_STEEPEST_RAD, _STEEPEST_RAD, scans)
+    truth, model, chance = np.zeros(grid.voxels, np.float32), sensor_model(sensor), np.zeros(1, np.uint64)
+    scan = new_scan(grid, sensor, sensor.rays, 1)
+    positions = np.asarray(grid.origin_m) + starts * grid.voxel_size_m
+    ends = np.zeros((scans, sensor.rays, 3))
+    for i in range(scans):
+        size, edge = grid.shape, grid.voxel_size_m
+        take_scan(scan, model, truth, size, edge, starts[i], yaws[i], pitches[i], 0, chance)
+        ends[i] = positions[i] + scan.rays["direction"] * scan.rays["range_m"][:, None]
+    return Measurements(positions, ends)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def fuse_measurements(
+    scan: Scan,
+    numbers: np.void,
+    grid: tuple[tuple[int, int, int], float, np.ndarray],
+    positions_m: np.ndarray,
+    ends_m: np.ndarray,
+    mean: np.ndarray,
+    precision: np.ndarray,
+) -> int:
+    """Trace, weigh and fuse known measurements, with the library's own functions.
+
+    Args:
+        scan: Working space for R rays.
+        numbers: SENSOR_NUMBERS.
+        grid: ((X, Y, Z) voxels, voxel edge in metres, (3,) origin in metres).
+        positions_m: (S, 3) float64.
+        ends_m: (S, R, 3) float64.
+        mean, precision: (V,) float32 belief, changed in place.
+
+    Returns:
+        How many voxels the rays crossed.
+    """
+    size, voxel_size_m, origin_m = grid
+    start, voxels = np.empty(3), 0
+    for i in range(len(positions_m)):
+        for axis in range(3):
+            start[axis] = (positions_m[i, axis] - origin_m[axis]) / voxel_size_m
+        for index in range(ends_m.shape[1]):
+            ray, squared = scan.rays[index], 0.0
+            for axis in range(3):
+                ray.direction[axis] = ends_m[i, index, axis] - positions_m[i, axis]
+                squared += ray.direction[axis] * ray.direction[axis]
+            ray.range_m = math.sqrt(squared)
+            for axis in range(3):
+                ray.direction[axis] /= ray.range_m
+            ray.returned = _HIT
+            trace_measurement(scan, index, numbers, size, voxel_size_m, start, mean)
+            voxels += ray.voxels
+            scan.order[index] = index
+        fuse_scan(scan, ends_m.shape[1], mean, precision)
+    return voxels
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def fuse_floor(
+    crossed: np.ndarray, ends: np.ndarray, gain: float, mean: np.ndarray, precision: np.ndarray, passes: int
+) -> float:
+    """The least that fusion has to do: two adds, one division and one product a voxel, nothing else.
+
+    Args:
+        crossed: (N,) int32 voxels of one scan's rays, one after the other.
+        ends: (R,) int64, where each ray's voxels end in `crossed`.
+        gain: float32 precision that is added.
+        mean, precision: (V,) float32, changed in place.
+        passes: How often; all but the first find everything in cache.
+
+    Returns:
+        Sum of the rays' products, so that none is optimised away.
+    """
+    total = 0.0
+    for _ in range(passes):
+        first = 0
+        for end in ends:
+            shrink = 1.0
+            for i in range(first, end):
+                voxel = np.uint32(crossed[i])
+                after = precision[voxel] + gain
+                share = precision[voxel] / after
+                precision[voxel] = after
+                mean[voxel] += share
+                shrink *= share
+            total += shrink
+            first = end
+    return total
+
+
+class Fusion:
+    """Our side: one map, and the measurements that are fused into it."""
+
+    def __init__(self, grid: Grid, sensor: RangeSensor, measurements: Measurements) -> None:
+        """Start at the prior; one pass warms the map, the caches and the compiler."""
+        self.measurements = measurements
+        self.scan = new_scan(grid, sensor, sensor.rays, 1)
+        self.mean = np.full(grid.voxels, PRIOR_MEAN, np.float32)
+        self.precision = np.full(grid.voxels, ROOM.sigma_prior**-2, np.float32)
+        self._numbers = sensor_model(sensor).numbers[0]
+        self._grid = (grid.shape, grid.voxel_size_m, np.asarray(grid.origin_m, np.float64))
+        self.voxels = self.fuse()
+
+    def fuse(self, first: int = 0, last: int | None = None) -> int:
+        """Fuse some of the scans; returns how many voxels they crossed."""
+        positions, ends = self.measurements.positions_m[first:last], self.measurements.ends_m[first:last]
+        return fuse_measurements(
+            self.scan, self._numbers, self._grid, positions, ends, self.mean, self.precision
+        )
+
+
+class Floor:
+    """The floor: the same voxels, found beforehand, with everything in cache."""
+
+    def __init__(self, fusion: Fusion, sensor: RangeSensor) -> None:
+        """Note the voxels of a few scans."""
+        self._lists = [self._listed(fusion, i) for i in range(_FLOOR_SCANS)]
+        self._mean, self._precision = fusion.mean.copy(), fusion.precision.copy()
+        self._gain = np.float32(measurement_precision(3.0, sensor.sigma_min, sensor.sigma_slope_per_m))
+        self.voxels = _FLOOR_PASSES * sum(len(crossed) for crossed, _ in self._lists)
+        self.run()
+
+    @staticmethod
+    def _listed(fusion: Fusion, number: int) -> tuple[np.ndarray, np.ndarray]:
+        """Voxels of one scan, ray after ray, and where each ray ends."""
+        fusion.fuse(number, number + 1)
+        counts = fusion.scan.rays["voxels"]
+        rays = [row[:count] for row, count in zip(fusion.scan.crossed, counts, strict=True)]
+        return np.concatenate(rays), np.cumsum(counts)
+
+    def run(self) -> None:
+        """One scan after the other, each many times."""
+        for crossed, ends in self._lists:
+            fuse_floor(crossed, ends, self._gain, self._mean, self._precision, _FLOOR_PASSES)
+
+
+def fusion_rows(effort: Effort) -> list[Row]:
+    """Rays a second beside OctoMap, and nanoseconds a voxel beside the floor, on both grids."""
+    return [row for grid in GRIDS for row in grid_rows(grid, effort)]
+
+
+def grid_rows(grid: Grid, effort: Effort) -> list[Row]:
+    """Both rows of one grid."""
+    sensor = ROOM.sensor
+    measurements = measure_room(grid, sensor, effort.scans)
+    fusion, tree = Fusion(grid, sensor, measurements), OctoMapTree(grid.voxel_size_m)
+    floor = Floor(fusion, sensor)
+    positions, ends = measurements.positions_m, measurements.ends_m
+    tree.insert(positions, ends)
+    taken = interleave(
+        {
+            "ours": lambda _: seconds(fusion.fuse),
+            "floor": lambda _: seconds(floor.run),
+            "octomap": lambda _: seconds(lambda: tree.insert(positions, ends)),
+        },
+        effort.rounds,
+    )
+    rates = {name: [measurements.rays / s for s in taken[name]] for name in ("ours", "octomap")}
+    per_voxel = [1e9 * s / fusion.voxels for s in taken["ours"]]
+    floor_ns = [1e9 * s / floor.voxels for s in taken["floor"]]
+    where = f"{sensor.rays}-ray scans, voxels of {grid.voxel_size_m:g} m"
+    return [
+        compared(
+            f"fusion, {where}",
+            "octomap-python insertPointCloud",
+            rates["ours"],
+            rates["octomap"],
+            "rays/s",
+            Goal("≥", 5.0),
+        ),
+        compared(
+            f"fusion a voxel, {where} ({fusion.voxels / measurements.rays:.1f} voxels a ray)",
+            "two adds, a division, a product, in cache",
+            per_voxel,
+            floor_ns,
+            "ns",
+            Goal("≤", 6.0),
+        ),
+    ]

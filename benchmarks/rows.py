@@ -1,0 +1,121 @@
+"""A row of the speed table: what we do, what a peer does, and the ratio that is to be reached.
+
+Other work on the machine slows both down. So each job and its peer are measured in turns, round by
+round, and the ratio is the median of the rounds' ratios, not the ratio of the medians.
+"""
+
+from __future__ import annotations
+
+import operator
+import statistics
+import time
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+_COMPARE = {"≥": operator.ge, "≤": operator.le, "<": operator.lt, "=": operator.eq}
+
+Job = Callable[[int], float]
+"""Does its work in round k and returns what was measured."""
+
+
+@dataclass(frozen=True)
+class Effort:
+    """How much is measured.
+
+    Attributes:
+        scans: Scans that are fused in a round.
+        rounds: Rounds of jobs that take less than a second.
+        long_rounds: Rounds of jobs that may take seconds.
+        steps: Steps of an environment in a round.
+        batch_steps: The same for vector environments, if that many missions need no more.
+        batches: Missions E of the vector environments.
+        starts: Fresh processes, with everything cached.
+    """
+
+    scans: int = 400
+    rounds: int = 21
+    long_rounds: int = 9
+    steps: int = 600
+    batch_steps: int = 40
+    batches: tuple[int, ...] = (1, 16, 64, 256)
+    starts: int = 5
+
+
+FULL = Effort()
+QUICK = Effort(scans=200, rounds=7, long_rounds=3, steps=200, batch_steps=10, starts=1)
+
+
+@dataclass(frozen=True)
+class Goal:
+    """What a row is to reach: the sign, the limit and the limit's unit (× for ratios)."""
+
+    sign: str
+    limit: float
+    unit: str = "×"
+
+    @property
+    def text(self) -> str:
+        """Such as "≥ 5 ×"."""
+        return f"{self.sign} {self.limit:g} {self.unit}"
+
+    def holds(self, value: float) -> bool:
+        """Whether a value reaches it."""
+        return bool(_COMPARE[self.sign](value, self.limit))
+
+
+@dataclass(frozen=True)
+class Row:
+    """One line of the table; None where there is no peer, no ratio or no goal."""
+
+    job: str
+    peer: str | None
+    ours: float
+    theirs: float | None
+    unit: str
+    ratio: float | None
+    goal: str | None
+    holds: bool | None
+
+
+def interleave(jobs: Mapping[str, Job], rounds: int) -> dict[str, list[float]]:
+    """Let the jobs take turns: A B A B …
+
+    Returns:
+        For each job what it measured in every round.
+    """
+    measured: dict[str, list[float]] = {name: [] for name in jobs}
+    for number in range(rounds):
+        for name, job in jobs.items():
+            measured[name].append(job(number))
+    return measured
+
+
+def compared(
+    job: str, peer: str, ours: Sequence[float], theirs: Sequence[float], unit: str, goal: Goal | None = None
+) -> Row:
+    """The row of a job beside a peer; the goal is about the ratio ours/theirs."""
+    ratio = statistics.median(a / b for a, b in zip(ours, theirs, strict=True))
+    holds = None if goal is None else goal.holds(ratio)
+    return Row(
+        job,
+        peer,
+        float(statistics.median(ours)),
+        float(statistics.median(theirs)),
+        unit,
+        float(ratio),
+        None if goal is None else goal.text,
+        holds,
+    )
+
+
+def alone(job: str, values: Iterable[float], unit: str, goal: Goal) -> Row:
+    """The row of a job without a peer; the goal is about the median itself."""
+    value = float(statistics.median(values))
+    return Row(job, None, value, None, unit, None, goal.text, goal.holds(value))
+
+
+def seconds(work: Callable[[], object]) -> float:
+    """Seconds that some work takes."""
+    started = time.perf_counter()
+    work()
+    return time.perf_counter() - started

@@ -1,0 +1,168 @@
+"""Our speed beside peers, in one process and on one thread unless said: `python -m benchmarks.speed`.
+
+Each job and its peer take turns; every figure is a median over the rounds, and every ratio the
+median of the rounds' ratios. Needs the extras `bench` and `baselines`.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import importlib.metadata
+import os
+import platform
+import sys
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from baselines.command import parse, print_json, run_command
+from benchmarks.fusion import fusion_rows
+from benchmarks.peers import load_octomap, load_spread
+from benchmarks.rows import FULL, QUICK, Effort, Row
+from benchmarks.startup import startup_rows
+from benchmarks.stepping import profile_rows, spread_rows, vector_rows
+from entropy_explore_env.errors import SettingError
+from entropy_explore_env.reports.recording import write_atomically
+
+GOAL_MISSED = 1
+JOBS: tuple[tuple[str, Callable[[Effort], list[Row]]], ...] = (
+    ("fusion beside octomap-python and the floor", fusion_rows),
+    ("ParallelEnv beside mpe2 simple_spread", spread_rows),
+    ("VectorEnv beside the ParallelEnv, on one and two threads", vector_rows),
+    ("where a step's time goes", profile_rows),
+    ("first steps of fresh processes", startup_rows),
+)
+"""What is measured, in this order, and what people read while they wait."""
+
+_PACKAGES = ("numpy", "numba", "octomap-python", "mpe2", "pettingzoo", "gymnasium")
+
+
+@dataclass(frozen=True)
+class Args:
+    """Measure our speed beside peers, in the same run."""
+
+    json: bool = False
+    """Print one JSON object and nothing else."""
+    quick: bool = False
+    """Fewer rounds: less than a minute instead of a few."""
+    strict: bool = False
+    """Exit with 1 if a goal does not hold."""
+    out: Path | None = None
+    """A Markdown file for the table."""
+
+
+def main(words: Sequence[str]) -> int:
+    """Run the command; the exit code."""
+    args = parse(Args, words, description=__doc__)
+    if args.out is not None and (args.out.is_dir() or not _parent_exists(args.out)):
+        raise SettingError("out", str(args.out), "a file in a folder that exists")
+    load_octomap()
+    load_spread()
+    rows: list[Row] = []
+    for number, (title, job) in enumerate(JOBS, start=1):
+        print(f"[{number}/{len(JOBS)}] {title} …", file=sys.stderr, flush=True)
+        rows += job(QUICK if args.quick else FULL)
+    about = {**machine(), "command": " ".join(["python -m benchmarks.speed", *words])}
+    if args.out is not None:
+        write_atomically(args.out, markdown(about, rows))
+    if args.json:
+        print_json({"machine": about, "rows": [dataclasses.asdict(row) for row in rows]})
+    else:
+        print_table(about, rows)
+    return GOAL_MISSED if args.strict and any(row.holds is False for row in rows) else 0
+
+
+def _parent_exists(path: Path) -> bool:
+    return path.absolute().parent.is_dir()
+
+
+def machine() -> dict[str, Any]:
+    """What the figures were measured on."""
+    usable = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
+    return {
+        "processor": _processor(),
+        "cores": usable,
+        "load_1_min": round(os.getloadavg()[0], 2) if hasattr(os, "getloadavg") else None,
+        "system": f"{platform.system()} {platform.machine()}",
+        "python": platform.python_version(),
+        "packages": {name: importlib.metadata.version(name) for name in _PACKAGES},
+    }
+
+
+def _processor() -> str:
+    """The processor's name, as the system tells it."""
+    table = Path("/proc/cpuinfo")
+    lines = table.read_text().splitlines() if table.exists() else []
+    names = [line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")]
+    return names[0] if names else platform.processor() or "unknown"
+
+
+def cells(row: Row) -> tuple[str, ...]:
+    """A row as people read it: job, ours, peer, theirs, ratio, goal, holds."""
+    return (
+        row.job,
+        f"{shown(row.ours)} {row.unit}",
+        row.peer or "–",
+        "–" if row.theirs is None else f"{shown(row.theirs)} {row.unit}",
+        "–" if row.ratio is None else f"{shown(row.ratio)} ×",
+        row.goal or "–",
+        {True: "yes", False: "no", None: "–"}[row.holds],
+    )
+
+
+def shown(value: float) -> str:
+    """Three digits, whole thousands in full."""
+    return f"{value:,.0f}" if abs(value) >= 100 else f"{value:.3g}"
+
+
+COLUMNS = ("job", "ours", "peer", "theirs", "ratio", "goal", "holds")
+
+
+def sentence(about: dict[str, Any]) -> str:
+    """The machine in one sentence."""
+    packages = ", ".join(f"{name} {version}" for name, version in about["packages"].items())
+    return (
+        f"{about['processor']}, {about['cores']} cores (load {about['load_1_min']} at the end), "
+        f"{about['system']}, Python {about['python']}; {packages}."
+    )
+
+
+def print_table(about: dict[str, Any], rows: Sequence[Row]) -> None:
+    """Print the table and the machine on standard output."""
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table(title="Speed beside peers", title_justify="left")
+    for name in COLUMNS:
+        table.add_column(name, justify="left" if name in ("job", "peer", "holds") else "right")
+    colours = {True: "green", False: "red", None: ""}
+    for row in rows:
+        *most, last = cells(row)
+        colour = colours[row.holds]
+        table.add_row(*most, f"[{colour}]{last}[/{colour}]" if colour else last)
+    console = Console()
+    console.print(table)
+    console.print(sentence(about), highlight=False)
+
+
+def markdown(about: dict[str, Any], rows: Sequence[Row]) -> str:
+    """The page for `docs/results/`: table, machine, command."""
+    lines = [
+        "# Speed beside peers",
+        "",
+        f"Made by `{about['command']}`. One process, one thread unless said. Each job and its peer take "
+        "turns; figures are medians over the rounds, ratios are medians of the rounds' ratios.",
+        "",
+        "| " + " | ".join(COLUMNS) + " |",
+        "| --- | ---: | --- | ---: | ---: | ---: | --- |",
+        *("| " + " | ".join(cells(row)) + " |" for row in rows),
+        "",
+        f"Machine: {sentence(about)}",
+        "",
+    ]
+    return "\n".join(lines)
+
+
+if __name__ == "__main__":
+    raise SystemExit(run_command(main))

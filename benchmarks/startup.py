@@ -1,0 +1,63 @@
+"""The time from nothing to the first step, in fresh processes."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+import entropy_explore_env
+from benchmarks.rows import Effort, Goal, Row, alone, seconds
+
+_FIRST_STEP = """
+import sys
+import entropy_explore_env
+env = entropy_explore_env.parallel_env("room")
+env.reset(seed=0)
+env.step({agent: env.action_space(agent).sample() for agent in env.agents})
+assert "torch" not in sys.modules, "torch was imported"
+"""
+_TIMEOUT_S = 300.0
+
+
+def startup_rows(effort: Effort) -> list[Row]:
+    """Import, reset and first step of `room`, interpreter start included: cached, and from nothing."""
+    job = "python start, import, reset, first step"
+    first_step()
+    warm = [first_step() for _ in range(effort.starts)]
+    with tempfile.TemporaryDirectory() as empty:
+        cold = first_step(empty)
+    return [
+        alone(f"{job}, compiled code cached, no torch", warm, "s", Goal("<", 2.0, "s")),
+        alone(f"{job}, nothing cached", [cold], "s", Goal("<", 20.0, "s")),
+    ]
+
+
+def first_step(cache: str | None = None) -> float:
+    """Seconds that a fresh process takes.
+
+    Args:
+        cache: Folder of compiled code; None = the one that this process uses.
+
+    Raises:
+        RuntimeError: The process failed; the message is its last line.
+    """
+    root = str(Path(entropy_explore_env.__file__).parents[1])
+    paths = [root, *filter(None, [os.environ.get("PYTHONPATH")])]
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(paths)}
+    if cache is not None:
+        environment["NUMBA_CACHE_DIR"] = cache
+    done: list[subprocess.CompletedProcess[str]] = []
+
+    def start() -> None:
+        command = [sys.executable, "-c", _FIRST_STEP]
+        done.append(
+            subprocess.run(command, env=environment, capture_output=True, text=True, timeout=_TIMEOUT_S)
+        )
+
+    taken = seconds(start)
+    if done[0].returncode != 0:
+        raise RuntimeError("the first step failed: " + done[0].stderr.strip().splitlines()[-1])
+    return taken

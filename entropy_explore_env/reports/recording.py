@@ -1,0 +1,89 @@
+"""A mission as it went: time series noted step by step, and files that are whole or not there."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from pathlib import Path
+
+import numpy as np
+
+from entropy_explore_env.missions.missions import Missions
+
+
+def write_atomically(path: Path, content: bytes | str) -> None:
+    """Write a file so that it is there whole or not at all: temporary file, fsync, rename.
+
+    Args:
+        path: Where; its folder is made if it is missing.
+        content: What; text is written as UTF-8.
+    """
+    path.parent.mkdir(parents=True, exist_ok=True)
+    data = content.encode() if isinstance(content, str) else content
+    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+    try:
+        with os.fdopen(handle, "wb") as file:
+            file.write(data)
+            file.flush()
+            os.fsync(file.fileno())
+        Path(temporary).chmod(0o644)
+        Path(temporary).replace(path)
+    except BaseException:
+        Path(temporary).unlink(missing_ok=True)
+        raise
+
+
+class Recorder:
+    """Notes the first of some missions after every step.
+
+    Attributes:
+        missions: Those missions; their state is what was noted last.
+    """
+
+    def __init__(self, missions: Missions) -> None:
+        """Follow these missions; nothing is noted yet."""
+        self.missions = missions
+        self._times: list[float] = []
+        self._entropies: list[np.ndarray] = []
+        self._scans: list[int] = []
+        self._sent: list[int] = []
+        self._places: list[np.ndarray] = []
+
+    def note(self) -> None:
+        """Note this moment."""
+        robots = self.missions.state.robots[0]
+        self._times.append(float(self.missions.state.missions[0]["time_s"]))
+        self._entropies.append(robots["entropy_bits"].copy())
+        self._scans.append(int(robots["scans"].sum()))
+        self._sent.append(int(robots["measurements_sent"].sum()))
+        self._places.append(robots["scan_pose"][:, :3].copy())
+
+    @property
+    def latest_s(self) -> float:
+        """The time noted last."""
+        return self._times[-1]
+
+    @property
+    def time_s(self) -> np.ndarray:
+        """(T,) float64 times noted."""
+        return np.asarray(self._times)
+
+    @property
+    def entropy_bits(self) -> np.ndarray:
+        """(T, A) float64 entropy of each robot's map."""
+        return np.stack(self._entropies)
+
+    @property
+    def scans(self) -> np.ndarray:
+        """(T,) int64 scans of the team so far."""
+        return np.asarray(self._scans)
+
+    @property
+    def shared(self) -> np.ndarray:
+        """(T,) int64 measurements that the team has sent so far."""
+        return np.asarray(self._sent)
+
+    @property
+    def places_m(self) -> np.ndarray:
+        """(T, A, 3) float64 where each robot took its latest scan."""
+        return np.stack(self._places)

@@ -1,0 +1,1 @@
+"""Slow references that the tests compare the library with."""

@@ -1,0 +1,134 @@
+"""Scenes that several tests share: small worlds, random beliefs, missions of random actions.
+
+No two edges of a world are equal, so that swapped axes show.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from hypothesis import HealthCheck, settings
+from hypothesis import strategies as st
+
+from entropy_explore_env.belief.raycast import longest_crossing
+from entropy_explore_env.config import Scenario, with_settings
+from entropy_explore_env.missions.missions import Missions
+from entropy_explore_env.scenarios import BOX
+from tests.reference import rocha04
+
+SHAPES = ((7, 11, 5), (3, 8, 6), (9, 6, 1), (13, 2, 4), (1, 10, 3))
+
+
+def drawn(examples: int = 60) -> settings:
+    """Hypothesis settings: the same examples every time, however slow the machine."""
+    return settings(
+        max_examples=examples,
+        deadline=None,
+        derandomize=True,
+        suppress_health_check=[HealthCheck.too_slow, HealthCheck.filter_too_much],
+    )
+
+
+seeds = st.integers(0, 2**32 - 1)
+
+
+@st.composite
+def rays(draw: st.DrawFn) -> tuple[rocha04.Voxel, np.ndarray, np.ndarray]:
+    """A grid's size, a start inside it and a direction; level in 2-D."""
+    size = draw(st.sampled_from(SHAPES))
+    inside = st.floats(0.01, 0.99)
+    start = np.array([draw(st.integers(0, n - 1)) + draw(inside) for n in size])
+    yaw = draw(st.floats(-math.pi, math.pi))
+    pitch = 0.0 if size[2] == 1 else draw(st.floats(-math.pi / 2, math.pi / 2))
+    return size, start, np.array(rocha04.gaze(yaw, pitch))
+
+
+def flat_index(voxels: Any, size: rocha04.Voxel) -> list[int]:
+    """Numbers of voxels in C order, z fastest."""
+    return [(x * size[1] + y) * size[2] + z for x, y, z in voxels]
+
+
+def random_cover(size: rocha04.Voxel, share: float, seed: int) -> np.ndarray:
+    """(X, Y, Z) float32, 1 in about this share of the voxels and 0 elsewhere."""
+    return (np.random.default_rng(seed).random(size) < share).astype(np.float32)
+
+
+def random_belief(size: rocha04.Voxel, seed: int) -> tuple[np.ndarray, np.ndarray]:
+    """Mean and precision, (X, Y, Z) float32: some voxels unknown, some known very well."""
+    rng = np.random.default_rng(seed)
+    mean = rng.random(size).astype(np.float32)
+    sigma = 10.0 ** rng.uniform(-2.0, 1.5, size)
+    return mean, (sigma**-2.0).astype(np.float32)
+
+
+def as_reference(mean: np.ndarray, precision: np.ndarray) -> dict[rocha04.Voxel, rocha04.Belief]:
+    """The same belief as voxel → (μ, σ)."""
+    sigma = precision.astype(np.float64) ** -0.5
+    return {
+        (x, y, z): (float(mean[x, y, z]), float(sigma[x, y, z])) for x, y, z in np.ndindex(*mean.shape)
+    }
+
+
+def as_arrays(
+    beliefs: dict[rocha04.Voxel, rocha04.Belief], size: rocha04.Voxel
+) -> tuple[np.ndarray, np.ndarray]:
+    """Mean and precision, (X, Y, Z) float64, of a reference belief."""
+    mean, precision = np.zeros(size), np.zeros(size)
+    for voxel, (mu, sigma) in beliefs.items():
+        mean[voxel], precision[voxel] = mu, sigma**-2.0
+    return mean, precision
+
+
+def ray_space(
+    size: rocha04.Voxel, length: float = math.inf, behind: int = 0
+) -> tuple[np.ndarray, np.ndarray]:
+    """Scratch space of a ray, filled with what must not be taken for a result."""
+    places = longest_crossing(*size, length, behind)
+    return np.full(places, -1, np.int32), np.full(places, np.nan)
+
+
+def free_box(**changes: Any) -> Scenario:
+    """The tiny box, where a step lasts until the next robot has to decide; with some settings changed."""
+    return with_settings(BOX, {"decision_period_s": None, **changes})
+
+
+def started(scenario: Scenario, seed: int = 0, missions: int = 1) -> Missions:
+    """Missions after their reset, mission m with seed + m."""
+    these = Missions(scenario, missions)
+    for mission in range(missions):
+        these.reset(mission, seed + mission)
+    return these
+
+
+def random_actions(missions: Missions, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+    """Continuous and discrete actions of all robots, drawn uniformly."""
+    robots, rules = missions.scenario.robots, missions.rules
+    axes = 3 if missions.scenario.planar else 5
+    boxes = rng.uniform(-1.0, 1.0, (missions.count, robots, axes)).astype(np.float32).astype(np.float64)
+    numbers = rng.integers(0, len(rules.moves) * len(rules.gazes), (missions.count, robots))
+    return boxes, numbers
+
+
+def wander(
+    missions: Missions, steps: int, seed: int, after: Callable[[int], None] | None = None
+) -> None:
+    """Step with random actions, and call `after(step)` after each."""
+    rng = np.random.default_rng(seed)
+    for step in range(steps):
+        missions.step(*random_actions(missions, rng))
+        if after is not None:
+            after(step)
+
+
+def put(missions: Missions, robot: int, pose: Any, mission: int = 0) -> None:
+    """Stand a robot that decides somewhere."""
+    for field in ("origin", "goal", "target", "scan_pose"):
+        missions.state.robots[mission, robot][field] = pose
+
+
+def build(missions: Missions, solid: np.ndarray, mission: int = 0) -> None:
+    """Make these voxels, (X, Y, Z) bool, the truth; bodies are smaller than half a voxel."""
+    missions.state.truth[mission] = solid.ravel()
