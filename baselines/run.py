@@ -20,7 +20,7 @@ import tyro
 
 from baselines.command import parse, print_json, run_command
 from baselines.mission import run_mission, scripted
-from baselines.strategies import STRATEGIES, make_strategy
+from baselines.strategies import make_strategy
 from entropy_explore_env.config import Channel, Ending, RangeSensor, Robot, Scenario, with_settings
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.errors import SettingError
@@ -28,7 +28,7 @@ from entropy_explore_env.reports.metrics import mission_figures
 from entropy_explore_env.reports.painting import Painter, remaining_share
 from entropy_explore_env.reports.recording import Recorder, write_atomically
 from entropy_explore_env.reports.rendering import animate
-from entropy_explore_env.scenarios import SCENARIOS, find_scenario
+from entropy_explore_env.scenarios import find_scenario
 
 _GIF_FRAMES = 80
 _GIF_FRAME_S = 0.1

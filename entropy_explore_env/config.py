@@ -423,7 +423,7 @@ class Scenario:
 
     @cached_property
     def agents(self) -> tuple[str, ...]:
-        """Names of the robots: robot_0, robot_1, …"""
+        """Names of the robots: robot_0, robot_1 and so on."""
         return tuple(f"robot_{a}" for a in range(self.robots))
 
 

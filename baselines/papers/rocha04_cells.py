@@ -28,9 +28,13 @@ CHANGES: dict[str, tuple[str, dict[str, Any], str]] = {
     "reach-4": ("search radius ξ of 1 m", {"robot": {"reach_m": 1.0}}, "gradient"),
     "plane": ("motion plane, eqs. 38-40, instead of eqs. 33-34", {}, "gradient-plane"),
     "furnished": ("boxes on the floor (the worlds of room-furnished)", {"world": "furnished"}, "gradient"),
-    "level": ("planar robots at 0.5 m that look level", {"robot": {"motion": "planar"}}, "gradient"),
+    "plane-scan-0": (
+        "motion plane and scan time 0.001 s (two changes)",
+        {"sensor": {"scan_time_s": 0.001}},
+        "gradient-plane",
+    ),
 }
-"""Name → (what is changed, the settings, the strategy): one thing at a time, one robot."""
+"""Name → (what is changed, the settings, the strategy): one thing at a time (the last: two), one robot."""
 
 
 def team_id(robots: int, burst: int, i_min_bits: float) -> str:

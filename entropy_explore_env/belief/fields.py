@@ -17,7 +17,9 @@ def entropy_gradient(precision, i, j, k, voxel_size_m):
 
     Args:
         precision: (X, Y, Z) float32, 1/σ².
-        i, j, k: Indices of voxel l.
+        i: Index of voxel l along x.
+        j: Along y.
+        k: Along z.
         voxel_size_m: Edge of a voxel.
 
     Returns:

@@ -48,8 +48,9 @@ class ActionChecker:
                 numbers[row] = self._number(agent, action)
             else:
                 boxes[row] = self._box(agent, action)
-        if not self._discrete and not (np.abs(boxes) <= 1.0 + _ROUNDING).all():
-            row = int(np.argmin((np.abs(boxes) <= 1.0 + _ROUNDING).all(axis=1)))
+        inside = np.abs(boxes) <= 1.0 + _ROUNDING
+        if not inside.all():
+            row = int(np.argmin(inside.all(axis=1)))
             allowed = "finite numbers from -1 to 1"
             raise ActionError(f"actions[{actions[row][0]}]", boxes[row].tolist(), allowed)
         return boxes, numbers
@@ -93,7 +94,7 @@ class ActionChecker:
 
     def _box(self, agent: str, action: object) -> np.ndarray:
         array = np.asarray(action)
-        if array.shape != (self.width,) or not np.issubdtype(array.dtype, np.floating):
+        if array.shape != (self.width,) or array.dtype.kind != "f":
             allowed = f"{self.width} floating-point numbers from -1 to 1"
             raise ActionError(f"actions[{agent}]", action, allowed)
         return array

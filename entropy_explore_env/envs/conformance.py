@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import argparse
 import copy
+import itertools
 import math
 import os
 import pickle
@@ -24,22 +25,26 @@ import numpy as np
 
 from entropy_explore_env.config import Scenario, with_settings
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
-from entropy_explore_env.envs.single_env import SingleRobotEnv
 from entropy_explore_env.envs.vector_env import EntropyExploreVectorEnv
-from entropy_explore_env.errors import ActionError, CallOrderError, EntropyExploreError, SettingError
+from entropy_explore_env.errors import ActionError, CallOrderError, EntropyExploreError
 from entropy_explore_env.missions.missions import Missions
 from entropy_explore_env.missions.rules import rules_of
 from entropy_explore_env.missions.state import MissionEnd
+from entropy_explore_env.randomness import check_seed
 from entropy_explore_env.scenarios import find_scenario
 from entropy_explore_env.worlds.load import with_world
 
 EPISODES = 2
-"""How many episodes in a row are compared: that after a reset with a seed, and the one that follows."""
+"""So many episodes in a row are compared: the one of a seed, and those that follow it."""
 BATCH = 8
+_OTHER = 1
+"""The kind of actions that are not the episode's own."""
 _CHILD = "from entropy_explore_env.envs.conformance import answer_parent; answer_parent()"
+_PARTS = ("observations", "rewards", "terminations", "truncations", "infos")
+_ROBOT_INFOS = ("deciding", "entropy_bits", "own_bits", "received_bits")
 
-Story = dict[str, Any]
-"""Moment ("episode 1, step 17") → copies of all that the environment returned then."""
+Leaves = dict[str, tuple[Any, ...]]
+"""Place ("episode 1, step 17 › rewards › robot_0") → type and value of what was there, down to the bit."""
 
 
 class ConformanceError(AssertionError):
@@ -58,105 +63,439 @@ class Task:
     scenario: Scenario
     seed: int
 
-    def actions(self, mission: int, episode: int, step: int, other: int = 0) -> np.ndarray:
-        """A team's actions: (A, N) float32 or (A,) int64; `other` gives different ones for a moment."""
-        rng = np.random.default_rng([self.seed + mission, episode, step, other])
-        rules, robots = rules_of(self.scenario), self.scenario.robots
+    @property
+    def choices(self) -> int:
+        """Number of discrete actions."""
+        rules = rules_of(self.scenario)
+        return len(rules.moves) * len(rules.gazes)
+
+    def actions(self, mission: int, episode: int, step: int, kind: int = 0) -> np.ndarray:
+        """A team's actions, (A, N) float32 or (A,) int64; another `kind` gives other ones."""
+        rng = np.random.default_rng([self.seed + mission, episode, step, kind])
         if self.scenario.action.kind == "discrete":
-            return rng.integers(0, len(rules.moves) * len(rules.gazes), robots)
-        return rng.uniform(-1.0, 1.0, (robots, 3 if self.scenario.planar else 5)).astype(np.float32)
+            return rng.integers(0, self.choices, self.scenario.robots)
+        shape = (self.scenario.robots, 3 if self.scenario.planar else 5)
+        return rng.uniform(-1.0, 1.0, shape).astype(np.float32)
+
+    def table(self, missions: int, episode: int, step: int) -> np.ndarray:
+        """Actions of many missions as a VectorEnv takes them: no axis A for one robot."""
+        actions = np.stack([self.actions(mission, episode, step) for mission in range(missions)])
+        return actions[:, 0] if self.scenario.robots == 1 else actions
 
 
-def require_same(where: str, first: object, second: object) -> None:
-    """Raise a ConformanceError unless two results are the same, bit by bit."""
-    if type(first) is not type(second):
-        raise ConformanceError(f"{where}: {type(first).__name__}, then {type(second).__name__}")
-    if isinstance(first, Mapping) and isinstance(second, Mapping):
-        if list(first) != list(second):
-            raise ConformanceError(f"{where}: keys {list(first)}, then {list(second)}")
-        for key in first:
-            require_same(f"{where}[{key!r}]" if isinstance(first, dict) else where, first[key], second[key])
-    elif isinstance(first, list | tuple) and isinstance(second, list | tuple):
-        require_same(where, dict(enumerate(first)), dict(enumerate(second)))
-    elif isinstance(first, np.ndarray) and isinstance(second, np.ndarray):
-        _require_same_array(where, first, second)
-    elif _bits(first) != _bits(second):
-        raise ConformanceError(f"{where}: {first!r}, then {second!r}")
+def parts_of(value: object) -> dict[Any, Any] | None:
+    """What a container holds, by key, number or field; None if it is none."""
+    if isinstance(value, Mapping):
+        return dict(value)
+    if isinstance(value, np.ndarray) and value.dtype.names:  # bytes between fields mean nothing
+        return {name: value[name] for name in value.dtype.names}
+    if isinstance(value, list | tuple) or (isinstance(value, np.ndarray) and value.dtype == object):
+        return dict(enumerate(value))
+    return None
 
 
-def _bits(value: object) -> object:
-    """Something to compare a number by: a float's hexadecimal digits, so that NaN is NaN and -0 is not 0."""
-    return float(value).hex() if isinstance(value, float | np.floating) else value
+def walk(value: object, where: str = "") -> Iterator[tuple[str, Any]]:
+    """A value and, if it is a container, all that is in it, with their places."""
+    yield where, value
+    for key, part in (parts_of(value) or {}).items():
+        yield from walk(part, f"{where} › {key}" if where else str(key))
 
 
-def _require_same_array(where: str, first: np.ndarray, second: np.ndarray) -> None:
-    """The same dtype, shape and bytes."""
-    if (first.dtype, first.shape) != (second.dtype, second.shape):
-        raise ConformanceError(f"{where}: {first.dtype} {first.shape}, then {second.dtype} {second.shape}")
-    if first.dtype == object:
-        require_same(where, first.tolist(), second.tolist())
-    elif first.tobytes() != second.tobytes():
-        byte = np.frombuffer(first.tobytes(), np.uint8) != np.frombuffer(second.tobytes(), np.uint8)
-        place = int(np.argmax(byte)) // first.dtype.itemsize
-        index = tuple(int(i) for i in np.unravel_index(place, first.shape))
-        raise ConformanceError(f"{where} at {index}: {first[index]!r}, then {second[index]!r}")
+def leaves(value: object, where: str = "") -> Leaves:
+    """What a value is made of, as something that nobody can change any more."""
+    found: Leaves = {}
+    for place, part in walk(value, where):
+        kind = type(part).__name__
+        if parts_of(part) is not None:
+            found[place] = (kind,)
+        elif isinstance(part, np.ndarray):
+            found[place] = (kind, part.dtype.str, part.shape, part.tobytes())
+        else:
+            found[place] = (kind, repr(part))
+    return found
 
 
-def moment_of(env: EntropyExploreEnv, result: tuple[Any, ...]) -> dict[str, Any]:
-    """A copy of what reset or step returned, by name, and of the state."""
-    names = ("observations", "rewards", "terminations", "truncations", "infos")
-    named = zip(names if len(result) == 5 else ("observations", "infos"), result, strict=True)
-    return copy.deepcopy({**dict(named), "state": env.state()})
+def require_same(what: str, first: Leaves, second: Leaves) -> None:
+    """Raise a ConformanceError at the first place where two results differ."""
+    for where in {**first, **second}:
+        one, two = first.get(where, ("nothing",)), second.get(where, ("nothing",))
+        if one != two:
+            raise ConformanceError(f"{what} › {where}: {_difference(one, two)}")
+    if list(first) != list(second):
+        raise ConformanceError(f"{what}: the same keys in another order")
+
+
+def _difference(one: tuple[Any, ...], two: tuple[Any, ...]) -> str:
+    """The first entry that differs in arrays of one kind, else both values."""
+    if len(one) < 4 or one[:3] != two[:3]:
+        return ", then ".join(" ".join(map(str, leaf[:3])) for leaf in (one, two))
+    first, second = (np.frombuffer(leaf[3], leaf[1]).reshape(leaf[2]) for leaf in (one, two))
+    unequal = np.asarray([a.tobytes() != b.tobytes() for a, b in zip(first.flat, second.flat, strict=True)])
+    place = tuple(int(i) for i in np.unravel_index(int(unequal.argmax()), one[2]))
+    return f"at {place} {first[place]!r}, then {second[place]!r}"
+
+
+def snapshot(env: EntropyExploreEnv | EntropyExploreVectorEnv) -> Leaves:
+    """All that a call may change."""
+    missions: Missions = env.missions
+    kept = {"seeds": missions.seeds, "episodes": missions.episodes, "observations": missions.observations}
+    agents = env.agents if isinstance(env, EntropyExploreEnv) else []
+    return leaves({**missions.state._asdict(), **kept, "agents": agents})
+
+
+def play(env: EntropyExploreEnv, task: Task, mission: int = 0) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Play whole episodes after a reset with the mission's seed; yields what was returned, by moment."""
+    for episode in range(EPISODES):
+        yield f"episode {episode}, step 0", named(env, env.reset(None if episode else task.seed + mission))
+        yield from finish(env, task, mission, episode)
 
 
 def finish(
-    env: EntropyExploreEnv, task: Task, mission: int = 0, episode: int = 0, step: int = 0, other: int = 0
-) -> Story:
-    """Play an episode from here to its end; `step` have been taken."""
-    story: Story = {}
+    env: EntropyExploreEnv, task: Task, mission: int, episode: int, step: int = 0
+) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Play an episode to its end; `step` steps of it have been taken."""
     while env.agents:
         step += 1
-        actions = task.actions(mission, episode, step, other)
-        result = env.step(dict(zip(env.agents, actions, strict=True)))
-        story[f"episode {episode}, step {step}"] = moment_of(env, result)
-    return story
+        result = env.step(by_agent(env, task.actions(mission, episode, step)))
+        yield f"episode {episode}, step {step}", named(env, result)
 
 
-def play(env: EntropyExploreEnv, task: Task, mission: int = 0) -> Story:
-    """Play whole episodes after a reset with the mission's seed."""
-    story: Story = {}
-    for episode in range(EPISODES):
-        start = env.reset(seed=None if episode else task.seed + mission)
-        story[f"episode {episode}, step 0"] = moment_of(env, start)
-        story |= finish(env, task, mission, episode)
-    return story
+def story(moments: Iterator[tuple[str, dict[str, Any]]]) -> Leaves:
+    """The leaves of a play, taken moment by moment."""
+    found: Leaves = {}
+    for moment, parts in moments:
+        found |= leaves(parts, moment)
+    return found
+
+
+def named(env: EntropyExploreEnv, result: tuple[Any, ...]) -> dict[str, Any]:
+    """What reset or step returned, by name, and the state."""
+    names = _PARTS if len(result) == 5 else (_PARTS[0], _PARTS[-1])
+    return {**dict(zip(names, result, strict=True)), "state": env.state()}
+
+
+def by_agent(env: EntropyExploreEnv, actions: np.ndarray) -> dict[str, Any]:
+    """A team's actions as a ParallelEnv takes them."""
+    return dict(zip(env.possible_agents, actions, strict=True))
 
 
 def check_spaces(task: Task) -> None:
-    """Observations lie in their spaces, spaces stay the same objects, rewards are finite."""
+    """Every observation lies in its space, spaces stay the same objects, rewards are finite."""
     env = EntropyExploreEnv(task.scenario)
-    agents = list(task.scenario.agents)
-    spaces = {agent: (env.observation_space(agent), env.action_space(agent)) for agent in agents}
-    state_space = env.state_space
-    for where, moment in play(env, task).items():
-        for name in ("observations", "rewards", "terminations", "truncations", "infos"):
-            if name in moment and list(moment[name]) != agents:
-                raise ConformanceError(f"{where}: {name} for {list(moment[name])}, not {agents}")
-        for agent in agents:
-            if not spaces[agent][0].contains(moment["observations"][agent]):
-                raise ConformanceError(f"{where}: the observation of {agent} is outside its space")
-            reward = moment.get("rewards", {agent: 0.0})[agent]
+    agents = env.possible_agents
+    spaces = [env.state_space, *map(env.observation_space, agents), *map(env.action_space, agents)]
+    for where, moment in play(env, task):
+        if any(list(moment[name]) != agents for name in _PARTS if name in moment):
+            raise ConformanceError(f"{where}: not everything is given for all of {agents}")
+        seen = [moment["state"], *moment["observations"].values()]
+        for name, space, value in zip(["state", *agents], spaces, seen, strict=False):
+            if not space.contains(value):
+                raise ConformanceError(f"{where}: what {name} observes is outside its space")
+        for agent, reward in moment.get("rewards", {}).items():
             if not isinstance(reward, float) or not math.isfinite(reward):
                 raise ConformanceError(f"{where}: the reward of {agent} is {reward!r}")
-        if not state_space.contains(moment["state"]):
-            raise ConformanceError(f"{where}: state() is outside state_space")
-    for agent in agents:
-        if (env.observation_space(agent), env.action_space(agent)) != spaces[agent] or any(
-            now is not then
-            for now, then in zip(
-                (env.observation_space(agent), env.action_space(agent)), spaces[agent], strict=True
-            )
-        ):
-            raise ConformanceError(f"the spaces of {agent} are other objects than before the episodes")
-    if env.state_space is not state_space:
-        raise ConformanceError("state_space is another object than before the episodes")
+    later = [env.state_space, *map(env.observation_space, agents), *map(env.action_space, agents)]
+    if any(now is not then for now, then in zip(later, spaces, strict=True)):
+        raise ConformanceError("spaces: other objects than before the episodes")
+
+
+def check_repeatable(task: Task) -> None:
+    """A seed gives the same episodes in a second environment, and again in the first; others differ."""
+    env = EntropyExploreEnv(task.scenario)
+    first = story(play(env, task))
+    require_same("second environment", first, story(play(EntropyExploreEnv(task.scenario), task)))
+    require_same("second time", first, story(play(env, task)))
+    if leaves(env.reset(task.seed)) == leaves(env.reset(task.seed + 1)):
+        raise ConformanceError(f"seeds {task.seed} and {task.seed + 1} begin alike")
+
+
+def check_processes(task: Task) -> None:
+    """Two fresh processes play the same episodes as this one."""
+    path = os.pathsep.join(part or os.curdir for part in sys.path)
+    pipes = dict.fromkeys(("stdin", "stdout", "stderr"), subprocess.PIPE)
+    children = []
+    for hash_seed in ("1", "2"):
+        variables = {**os.environ, "PYTHONPATH": path, "PYTHONHASHSEED": hash_seed}
+        children.append(subprocess.Popen([sys.executable, "-c", _CHILD], env=variables, **pipes))
+    here = story(play(EntropyExploreEnv(task.scenario), task))
+    for number, child in enumerate(children, 1):
+        answer, errors = child.communicate(pickle.dumps((task.scenario, task.seed)))
+        if child.returncode:
+            last = errors.decode(errors="replace").strip().splitlines()[-1:]
+            raise ConformanceError(f"process {number} ended with {child.returncode}: {' '.join(last)}")
+        require_same(f"process {number}", here, pickle.loads(answer))
+
+
+def answer_parent() -> None:
+    """Play the task that comes in and put the story out: what a child of `check_processes` does."""
+    task = Task(*pickle.load(sys.stdin.buffer))
+    sys.stdout.buffer.write(pickle.dumps(story(play(EntropyExploreEnv(task.scenario), task))))
+
+
+def check_batches(task: Task) -> None:
+    """A VectorEnv of one or eight, on one or two threads, holds the missions of ParallelEnvs."""
+    calls, missions = play_batch(task, BATCH, threads=1)
+    require_same(f"batch of {BATCH}, two threads", calls, play_batch(task, BATCH, threads=2)[0])
+    require_same("batch of one", missions[0], play_batch(task, 1, threads=1)[1][0])
+    for mission, found in enumerate(missions):
+        moments = play(EntropyExploreEnv(task.scenario), task, mission)
+        alone = story((where, row_of_team(moment)) for where, moment in moments)
+        require_same(f"ParallelEnv, then mission {mission} of {BATCH}", alone, found)
+
+
+def play_batch(task: Task, missions: int, threads: int) -> tuple[Leaves, list[Leaves]]:
+    """Play a VectorEnv until every mission has ended its episodes; all calls, and each mission's story."""
+    env = EntropyExploreVectorEnv(task.scenario, missions, threads=threads)
+    episode, step, over = [0] * missions, [0] * missions, np.zeros(missions, bool)
+    result: tuple[Any, ...] = env.reset(seed=task.seed)
+    calls = leaves(result, "call 0")
+    stories = [leaves(row_of(result, e), "episode 0, step 0") for e in range(missions)]
+    for call in itertools.count(1):
+        actions = np.stack([task.actions(e, episode[e], step[e] + 1) for e in range(missions)])
+        result = env.step(actions[:, 0] if task.scenario.robots == 1 else actions)
+        calls |= leaves(result, f"call {call}")
+        for e in range(missions):
+            episode[e], step[e] = (episode[e] + 1, 0) if over[e] else (episode[e], step[e] + 1)
+            if episode[e] < EPISODES:
+                stories[e] |= leaves(row_of(result, e), f"episode {episode[e]}, step {step[e]}")
+        if min(episode) >= EPISODES:
+            break
+        over = result[2] | result[3]
+    env.close()
+    return calls, stories
+
+
+def row_of(result: tuple[Any, ...], mission: int) -> dict[str, Any]:
+    """One mission of what a VectorEnv returned; after a reset, rewards and ends are 0."""
+    observations, infos = result[0], result[-1]
+    ends = [float(array[mission]) for array in result[1:4]] if len(result) == 5 else [0.0, 0.0, 0.0]
+    parts = observations if isinstance(observations, dict) else {"flat": observations}
+    return {
+        "observations": {name: part[mission].ravel() for name, part in parts.items()},
+        "reward, terminated, truncated": ends,
+        "infos": {name: infos[name][mission].tolist() for name in ("time_s", *_ROBOT_INFOS)},
+        "reward_robots": infos["reward_robots"][mission].tolist(),
+        "end": list(MissionEnd)[infos["end"][mission]].name,
+    }
+
+
+def row_of_team(moment: dict[str, Any]) -> dict[str, Any]:
+    """A ParallelEnv's moment as `row_of` has it."""
+    infos, observations = (list(moment[name].values()) for name in ("infos", "observations"))
+    rewards = list(moment.get("rewards", dict.fromkeys(moment["infos"], 0.0)).values())
+    ends = [float(all(moment[name].values())) if name in moment else 0.0 for name in _PARTS[2:4]]
+    robots = [parts if isinstance(parts, dict) else {"flat": parts} for parts in observations]
+    return {
+        "observations": {name: np.stack([parts[name] for parts in robots]).ravel() for name in robots[0]},
+        "reward, terminated, truncated": [float(np.mean(rewards)), *ends],
+        "infos": {"time_s": infos[0]["time_s"], **{name: [i[name] for i in infos] for name in _ROBOT_INFOS}},
+        "reward_robots": rewards,
+        "end": infos[0]["end"],
+    }
+
+
+def check_copies(task: Task) -> None:
+    """A pickled and a deep copy, taken in mid-episode, go on alike and apart from the original."""
+    first = [moment for moment, _ in play(EntropyExploreEnv(task.scenario), task) if "episode 0" in moment]
+    half = len(first) // 2
+    env = EntropyExploreEnv(task.scenario)
+    env.reset(task.seed)
+    for step in range(1, half + 1):
+        env.step(by_agent(env, task.actions(0, 0, step)))
+    pickled, copied, other = pickle.loads(pickle.dumps(env)), copy.deepcopy(env), copy.deepcopy(env)
+    before = snapshot(env)
+    while other.agents:
+        other.step(by_agent(other, task.actions(0, 0, half + 1, _OTHER)))
+    other.reset(task.seed + 1)
+    require_same("the original, before and after its copy is used", before, snapshot(env))
+    rest = [story(_rest(each, task, half)) for each in (env, pickled, copied)]
+    require_same("original, then pickled copy", rest[0], rest[1])
+    require_same("original, then deep copy", rest[0], rest[2])
+
+
+def _rest(env: EntropyExploreEnv, task: Task, step: int) -> Iterator[tuple[str, dict[str, Any]]]:
+    """The rest of the first episode and the next one."""
+    yield from finish(env, task, 0, 0, step)
+    yield "episode 1, step 0", named(env, env.reset())
+    yield from finish(env, task, 0, 1)
+
+
+def check_fresh(task: Task) -> None:
+    """What a call returns is new, shares no memory with other calls, and is not changed by them."""
+    returned = dict(play(EntropyExploreEnv(task.scenario), task))
+    then = {where: leaves(parts) for where, parts in play(EntropyExploreEnv(task.scenario), task)}
+    batch = EntropyExploreVectorEnv(task.scenario, 2)
+    returned["vector call 0"] = {"all": batch.reset(seed=task.seed)}
+    for call in range(1, len(then)):
+        then[f"vector call {call - 1}"] = leaves(returned[f"vector call {call - 1}"])
+        returned[f"vector call {call}"] = {"all": batch.step(task.table(2, 0, call))}
+    for where, parts in then.items():
+        require_same(f"at once, then later › {where}", parts, leaves(returned[where]))
+    require_apart(returned)
+
+
+def require_apart(returned: Mapping[str, object]) -> None:
+    """Raise a ConformanceError if calls returned a container twice, or arrays of the same memory."""
+    owners: dict[int, str] = {}
+    for call, result in returned.items():
+        mine: dict[int, str] = {}
+        for where, part in walk(result, call):
+            if isinstance(part, dict | list) and id(part) in mine:
+                raise ConformanceError(f"{where}: the same object as {mine[id(part)]}")
+            while isinstance(part, np.ndarray) and isinstance(part.base, np.ndarray):
+                part = part.base
+            if isinstance(part, dict | list) or (isinstance(part, np.ndarray) and part.size):
+                mine[id(part)] = where
+        for owner in mine.keys() & owners.keys():
+            raise ConformanceError(f"{mine[owner]}: shares an object or memory with {owners[owner]}")
+        owners |= mine
+
+
+def check_busy(task: Task) -> None:
+    """What busy robots are told to do makes no difference."""
+    env, other = EntropyExploreEnv(task.scenario), EntropyExploreEnv(task.scenario)
+    infos = env.reset(task.seed)[1]
+    other.reset(task.seed)
+    for step in itertools.count(1):
+        actions, others = (by_agent(env, task.actions(0, 0, step, kind)) for kind in (0, _OTHER))
+        mixed = {agent: (actions if infos[agent]["deciding"] else others)[agent] for agent in actions}
+        result = env.step(actions)
+        require_same(f"step {step}, other actions", *map(leaves, (result, other.step(mixed))))
+        infos = result[-1]
+        if not env.agents:
+            break
+
+
+def check_call_order(task: Task) -> None:
+    """Calls before reset and after the end raise a CallOrderError and change nothing."""
+    env, batch = EntropyExploreEnv(task.scenario), EntropyExploreVectorEnv(task.scenario, 2)
+    actions, table = by_agent(env, task.actions(0, 0, 1)), task.table(2, 0, 1)
+    require_refused("step before reset", env, CallOrderError, lambda: env.step(actions))
+    require_refused("view before reset", env, CallOrderError, lambda: env.view("robot_0"))
+    require_refused("vector step before reset", batch, CallOrderError, lambda: batch.step(table))
+    story(play(env, task))
+    require_refused("step after the end", env, CallOrderError, lambda: env.step(actions))
+    never = EntropyExploreVectorEnv(task.scenario, 2, autoreset_mode="Disabled")
+    never.reset(seed=task.seed)
+    while not any(np.logical_or(*never.step(table)[2:4])):
+        pass
+    require_refused("vector step after the end", never, CallOrderError, lambda: never.step(table))
+
+
+def check_bad_actions(task: Task) -> None:
+    """A bad action raises an ActionError with field, value and what is allowed, and changes nothing."""
+    env = EntropyExploreEnv(task.scenario)
+    env.reset(task.seed)
+    good = by_agent(env, task.actions(0, 0, 1))
+    fewer, one = dict(list(good.items())[:-1]), good["robot_0"]
+    teams = {"a robot without action": fewer, "no dict": list(good.values()), "None": None}
+    teams |= {"a stranger": {**good, "robot_x": one}, "a stranger in place": {**fewer, "robot_x": one}}
+    for name, team in teams.items():
+        require_refused(name, env, ActionError, lambda team=team: env.step(team))  # type: ignore[arg-type]
+    for agent, action in good.items():
+        for name, wrong in bad_actions(task, action).items():
+            team = {**good, agent: wrong}
+            refusal = require_refused(f"{name}, {agent}", env, ActionError, lambda team=team: env.step(team))
+            if f"actions[{agent}]" not in refusal:
+                raise ConformanceError(f"{name}, {agent}: not named in {refusal!r}")
+    batch = EntropyExploreVectorEnv(task.scenario, 2)
+    batch.reset(seed=task.seed)
+    for name, wrong in bad_actions(task, task.table(2, 0, 1)).items():
+        require_refused(f"vector, {name}", batch, ActionError, lambda wrong=wrong: batch.step(wrong))
+
+
+def bad_actions(task: Task, good: np.ndarray) -> dict[str, Any]:
+    """What must be refused in place of a robot's action or of a VectorEnv's, by what is wrong with it."""
+    wrong: dict[str, Any] = {"None": None, "text": "up", "a dict": {}, "ragged": [[0.0], [0.0, 0.0]]}
+    wrong |= {"complex": good * 1j, "too many": np.stack([good, good]), "an object": object()}
+    if task.scenario.action.kind == "discrete":
+        wrong |= {"negative": np.full_like(good, -1), "past": np.full_like(good, task.choices)}
+        return {**wrong, "NaN": np.full(good.shape, math.nan), "bool": np.ones(good.shape, bool)}
+    entries = {"NaN": math.nan, "inf": math.inf, "-inf": -math.inf, "above": 1.01, "below": -1.01}
+    for name, entry in entries.items():
+        wrong[name] = good.copy()
+        wrong[name].flat[-1] = entry
+    return {**wrong, "too short": good[..., :-1], "whole": np.zeros(good.shape, int), "bool": good > 0}
+
+
+def require_refused(
+    what: str,
+    env: EntropyExploreEnv | EntropyExploreVectorEnv,
+    kind: type[EntropyExploreError],
+    call: Callable[[], object],
+) -> str:
+    """Raise a ConformanceError unless a call raises this kind of error, changing nothing; its message."""
+    before = snapshot(env)
+    try:
+        call()
+    except kind as error:
+        require_same(f"{what}, state before and after", before, snapshot(env))
+        return str(error)
+    except Exception as error:
+        raise ConformanceError(f"{what}: {type(error).__name__} ({error}), not {kind.__name__}") from error
+    raise ConformanceError(f"{what}: accepted")
+
+
+CHECKS: tuple[Callable[[Task], None], ...] = (
+    *(check_spaces, check_repeatable, check_processes, check_batches, check_copies),
+    *(check_fresh, check_busy, check_call_order, check_bad_actions),
+)
+
+
+def check_conformance(
+    scenario: str | Scenario,
+    *,
+    steps: int | None = 100,
+    seed: int = 0,
+    report: Callable[[str], None] = lambda line: None,
+    **settings: object,
+) -> None:
+    """Run all checks.
+
+    Args:
+        scenario: A scenario's name, or a Scenario.
+        steps: Episodes are cut off after so many; None = where the scenario ends them.
+        seed: Of mission 0; mission e of a batch takes seed + e.
+        report: Is told each check that holds.
+        **settings: Fields of the Scenario to change: see `config.with_settings`.
+
+    Raises:
+        ConformanceError: The contract is broken.
+        SettingError: A setting is unknown or out of its range.
+        WorldError: The world cannot be used.
+    """
+    limit = {} if steps is None else {"max_cycles": steps}
+    changed = with_settings(find_scenario(scenario), {**settings, **limit})
+    task = Task(with_world(changed), check_seed(seed))
+    for check in CHECKS:
+        try:
+            check(task)
+        except ConformanceError as error:
+            raise ConformanceError(f"{check.__name__}: {error}") from error
+        report(f"{check.__name__}: {(check.__doc__ or '').strip()}")
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """The command; returns its exit status: 0 all holds, 1 something does not, 2 bad input."""
+    parser = argparse.ArgumentParser("python -m entropy_explore_env.envs.conformance")
+    parser.add_argument("scenario", metavar="SCENARIO", help="name of a scenario")
+    parser.add_argument("--robots", type=int, help="team size; default: the scenario's")
+    parser.add_argument("--steps", type=int, default=100, help="an episode is cut off after so many")
+    parser.add_argument("--seed", type=int, default=0)
+    given = parser.parse_args(arguments)
+    settings = {} if given.robots is None else {"robots": given.robots}
+    try:
+        check_conformance(given.scenario, steps=given.steps, seed=given.seed, report=print, **settings)
+    except ConformanceError as error:
+        print(f"does not hold: {error}")
+        return 1
+    except EntropyExploreError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        return 130
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -25,7 +25,7 @@ from entropy_explore_env.worlds.load import with_world
 
 
 class EntropyExploreEnv(ParallelEnv[str, Any, Any]):
-    """One mission of a team; agents are robot_0, robot_1, …
+    """One mission of a team; agents are robot_0, robot_1 and so on.
 
     Every robot has the same spaces (see `missions.observation` and `missions.action`). A robot that
     is driving or scanning is busy: its action is ignored, and `infos[agent]["deciding"]` says for
@@ -168,9 +168,8 @@ class EntropyExploreEnv(ParallelEnv[str, Any, Any]):
         return [(agent, actions[agent]) for agent in self.agents]
 
     def _observations(self) -> dict[str, Any]:
-        rows = self.missions.observations[0].copy()
-        split = self.missions.layout.split
-        return {agent: split(row) for agent, row in zip(self.agents, rows, strict=True)}
+        rows = self.missions.layout.split_rows(self.missions.observations[0].copy())
+        return dict(zip(self.agents, rows, strict=True))
 
     def _infos(self) -> dict[str, dict[str, Any]]:
         return dict(zip(self.agents, robot_infos(self.missions, 0), strict=True))

@@ -4,7 +4,8 @@ A viewpoint is (x, y, z, yaw, pitch): map frame, metres, radians, pitch downward
 
 Continuous, Box(-1, 1): displacement in shares of the reach (x, y, z; planar robots x, y), yaw/π
 and, unless planar, pitch/(π/2). A displacement longer than the reach is shortened to it. Where the
-reach is infinite, the first numbers are a place in the workspace instead, -1…1 along each axis.
+reach is infinite, the first numbers are a place in the workspace instead: along each axis -1 is the
+centre of the first voxel and 1 that of the last.
 
 Discrete: number m·D + g means move m of `discrete_moves` (a voxel offset from the robot's voxel, to
 that voxel's centre) and gaze g of the D in `gaze_set`.
@@ -59,8 +60,9 @@ def decode_action(rules, pose, box, number, viewpoint):
     else:
         for axis in range(axes):
             if math.isinf(settings.reach_m):
-                extent = settings.size[axis] * settings.voxel_size_m
-                viewpoint[axis] = settings.origin_m[axis] + 0.5 * (box[axis] + 1.0) * extent
+                share = 0.5 * (box[axis] + 1.0)
+                voxels = 0.5 + share * (settings.size[axis] - 1)
+                viewpoint[axis] = settings.origin_m[axis] + voxels * settings.voxel_size_m
             else:
                 viewpoint[axis] = pose[axis] + box[axis] * settings.reach_m
         viewpoint[3] = box[axes] * math.pi
@@ -92,7 +94,7 @@ def write_mask(rules, start, mean, out):
     for move in range(len(rules.moves)):
         inside, voxel, apart = True, 0, 0.0
         for axis in range(3):
-            index = int(math.floor(start[axis])) + rules.moves[move, axis]
+            index = math.floor(start[axis]) + rules.moves[move, axis]
             inside = inside and 0 <= index < settings.size[axis]
             voxel = voxel * settings.size[axis] + index
             if axis < 2 or not settings.planar:
@@ -140,8 +142,10 @@ def encode_viewpoint(rules: Rules, pose: np.ndarray, viewpoint: np.ndarray) -> n
 def _encoded_box(settings: np.void, pose: np.ndarray, wanted: np.ndarray, axes: int) -> np.ndarray:
     """The continuous action for a viewpoint."""
     if math.isinf(settings["reach_m"]):
-        extent = np.asarray(settings["size"][:axes]) * settings["voxel_size_m"]
-        move = 2.0 * (wanted[:axes] - settings["origin_m"][:axes]) / extent - 1.0
+        last = np.maximum(settings["size"][:axes] - 1, 1) * settings["voxel_size_m"]
+        move = (
+            2.0 * (wanted[:axes] - settings["origin_m"][:axes] - 0.5 * settings["voxel_size_m"]) / last - 1.0
+        )
     else:
         move = (wanted[:axes] - pose[:axes]) / settings["reach_m"]
         length = math.sqrt(float((move**2).sum()))

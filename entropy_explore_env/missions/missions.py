@@ -21,6 +21,7 @@ from entropy_explore_env.worlds.world import World
 
 _CHUNKS_PER_THREAD = 4
 """Missions differ in work; smaller chunks even it out."""
+_ENDS = list(MissionEnd)
 _PLACING_ATTEMPTS = 64
 """Random places tried for a robot before all are."""
 
@@ -193,7 +194,7 @@ class Missions:
 
     def over(self, mission: int) -> MissionEnd:
         """Why the mission is over, or MissionEnd.RUNNING."""
-        return list(MissionEnd)[int(self.state.missions[mission]["end"])]
+        return _ENDS[self.state.missions["end"][mission]]
 
     def close(self) -> None:
         """End the threads; the missions can still be stepped."""

@@ -83,15 +83,22 @@ class ObservationLayout:
             low, high = np.tile(low, robots), np.tile(high, robots)
         return spaces.Box(low, high, dtype=np.float32)
 
-    def split(self, vector: np.ndarray) -> np.ndarray | dict[str, np.ndarray]:
-        """An observation from a flat vector (..., size) float32; parts are views of it."""
+    def split(self, vectors: np.ndarray) -> np.ndarray | dict[str, np.ndarray]:
+        """An observation from flat vectors (..., size) float32; parts are views of them."""
         if self.flat:
-            return vector
-        split: dict[str, np.ndarray] = {}
+            return vectors
+        parts: dict[str, np.ndarray] = {}
         for name, part in self.parts.items():
-            values = vector[..., part.start : part.stop].reshape(vector.shape[:-1] + part.shape)
-            split[name] = values.astype(np.int8) if name == "action_mask" else values
-        return split
+            values = vectors[..., part.start : part.stop].reshape(vectors.shape[:-1] + part.shape)
+            parts[name] = values.astype(np.int8) if name == "action_mask" else values
+        return parts
+
+    def split_rows(self, rows: np.ndarray) -> list[np.ndarray] | list[dict[str, np.ndarray]]:
+        """The observations of robots one by one, from their flat vectors (A, size) float32."""
+        together = self.split(rows)
+        if isinstance(together, np.ndarray):
+            return list(together)
+        return [{name: values[row] for name, values in together.items()} for row in range(len(rows))]
 
 
 def _part_space(name: str, part: Part) -> spaces.Box:
@@ -178,7 +185,8 @@ def observe_panorama(rules, start, mean, precision, scan, out):
     Args:
         rules: The scenario.
         start: (3,) float64, the robot in grid units.
-        mean, precision: (V,) float32, its belief.
+        mean: (V,) float32, its expected coverage.
+        precision: (V,) float32, 1/σ² of it.
         scan: Scratch space.
         out: (2·D,) float32, filled in.
     """
@@ -274,9 +282,9 @@ def observe_patch(numbers, shape, robot, start, mean, precision, heard, out):
     """Fill (4·x·y·z,): the belief around the robot's voxel; outside the workspace it is covered."""
     size_x, size_y, size_z = numbers.size[0], numbers.size[1], numbers.size[2]
     cells = shape[0] * shape[1] * shape[2]
-    corner_x = int(math.floor(start[0])) - shape[0] // 2
-    corner_y = int(math.floor(start[1])) - shape[1] // 2
-    corner_z = int(math.floor(start[2])) - shape[2] // 2
+    corner_x = math.floor(start[0]) - shape[0] // 2
+    corner_y = math.floor(start[1]) - shape[1] // 2
+    corner_z = math.floor(start[2]) - shape[2] // 2
     for i in range(shape[0]):
         for j in range(shape[1]):
             for k in range(shape[2]):
@@ -291,9 +299,9 @@ def observe_patch(numbers, shape, robot, start, mean, precision, heard, out):
     for mate in range(len(heard)):
         if mate != robot and heard[mate].heard_s >= 0.0:
             there, low = heard[mate].position, numbers.origin_m
-            x = int(math.floor((there[0] - low[0]) / numbers.voxel_size_m)) - corner_x
-            y = int(math.floor((there[1] - low[1]) / numbers.voxel_size_m)) - corner_y
-            z = int(math.floor((there[2] - low[2]) / numbers.voxel_size_m)) - corner_z
+            x = math.floor((there[0] - low[0]) / numbers.voxel_size_m) - corner_x
+            y = math.floor((there[1] - low[1]) / numbers.voxel_size_m) - corner_y
+            z = math.floor((there[2] - low[2]) / numbers.voxel_size_m) - corner_z
             if 0 <= x < shape[0] and 0 <= y < shape[1] and 0 <= z < shape[2]:
                 out[3 * cells + (x * shape[1] + y) * shape[2] + z] = 1.0
 
@@ -332,7 +340,8 @@ def observe_robot(rules, parts, state, scan, mission, robot, pose, out):
         parts: Its ObservationRules.
         state: The MissionState.
         scan: Scratch space.
-        mission, robot: Whose.
+        mission: Which mission.
+        robot: Whose observation.
         pose: (5,) float64, where it is now.
         out: (F,) float32, filled in.
     """

@@ -11,7 +11,6 @@ from entropy_explore_env.config import Observation, Scenario
 from entropy_explore_env.robots.range_sensor import SensorModel, sensor_model
 from entropy_explore_env.worlds.world import plane_index
 
-
 NUMBERS = np.dtype(
     [
         ("size", "i8", (3,)),  # X, Y, Z voxels

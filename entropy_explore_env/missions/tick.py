@@ -34,6 +34,7 @@ from entropy_explore_env.robots.motion import (
 from entropy_explore_env.robots.range_sensor import (
     Return,
     fuse_scan,
+    in_view,
     take_scan,
     trace_measurement,
     visibility_parameters,
@@ -58,7 +59,8 @@ def step_missions(rules, parts, state, scan, boxes, numbers, first, last, out):
         scan: Scratch space, not shared with another thread.
         boxes: (E, A, N) float64 continuous actions.
         numbers: (E, A) int64 discrete actions.
-        first, last: Range of missions.
+        first: The first mission.
+        last: One past the last.
         out: (E, A, F) float32 observations, filled in.
     """
     for mission in range(first, last):
@@ -242,14 +244,17 @@ def scan_and_share(rules, state, scan, mission, index):
     numbers, robot = rules.numbers[0], state.robots[mission, index]
     goal = robot.goal
     size = (numbers.size[0], numbers.size[1], numbers.size[2])
-    bodies = place_bodies(numbers, state.robots[mission], index, state.missions[mission].time_s, scan.bodies)
+    start = grid_position(numbers, goal)
+    bodies = place_bodies(
+        rules, state.robots[mission], index, state.missions[mission].time_s, start, scan.bodies
+    )
     take_scan(
         scan,
         rules.sensor,
         state.truth[mission],
         size,
         numbers.voxel_size_m,
-        grid_position(numbers, goal),
+        start,
         goal[3],
         goal[4],
         bodies,
@@ -277,15 +282,16 @@ def scan_and_share(rules, state, scan, mission, index):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def place_bodies(numbers, robots, index, time_s, bodies):
-    """Put the teammates' bodies, (A, 4) in grid units, into `bodies`; returns how many."""
-    count = 0
+def place_bodies(rules, robots, index, time_s, start, bodies):
+    """Put the teammates' bodies that the robot may see, in grid units, into `bodies`; returns how many."""
+    numbers, goal, count = rules.numbers[0], robots[index].goal, 0
     if numbers.body_radius_m > 0.0:
         for mate in range(len(robots)):
             if mate != index:
                 copy_numbers(grid_position(numbers, pose_at(numbers, robots[mate], time_s)), bodies[count], 3)
                 bodies[count, 3] = numbers.body_radius_m / numbers.voxel_size_m
-                count += 1
+                if in_view(rules.sensor, goal[3], goal[4], start, bodies[count]):
+                    count += 1
     return count
 
 

@@ -11,6 +11,7 @@ from __future__ import annotations
 import enum
 import math
 
+import numpy as np
 from numba import njit
 
 from entropy_explore_env.randomness import draw_uniform
@@ -52,17 +53,11 @@ def select_measurements(utility, burst, i_min_bits, order):
     Returns:
         How many were chosen.
     """
+    ranked = np.argsort(-utility, kind="mergesort")  # stable: equal utilities stay in ray order
     chosen = 0
-    for ray in range(len(utility)):
-        bits = utility[ray]
-        if bits < i_min_bits or (chosen == burst and (burst == 0 or bits <= utility[order[chosen - 1]])):
-            continue
-        place = chosen if chosen < burst else burst - 1
-        while place > 0 and utility[order[place - 1]] < bits:
-            order[place] = order[place - 1]
-            place -= 1
-        order[place] = ray
-        chosen = min(chosen + 1, burst)
+    while chosen < min(burst, len(utility)) and utility[ranked[chosen]] >= i_min_bits:
+        order[chosen] = ranked[chosen]
+        chosen += 1
     return chosen
 
 
@@ -71,15 +66,17 @@ def deliver(sender_m, receiver_m, range_m, loss_probability, chance):
     """Whether a message reaches a teammate: the code of a Delivery.
 
     Args:
-        sender_m, receiver_m: (3,) float64 positions when it is sent.
+        sender_m: (3,) float64 position of the sender.
+        receiver_m: (3,) float64 position of the teammate when it is sent.
         range_m: Reach of the channel.
         loss_probability: Of losing it.
         chance: (1,) uint64 random state of the sender; drawn from only if a loss is possible.
     """
     lost = loss_probability > 0.0 and draw_uniform(chance) < loss_probability
-    apart = 0.0
-    for axis in range(3):
-        apart += (sender_m[axis] - receiver_m[axis]) ** 2
-    if math.sqrt(apart) > range_m:
-        return _OUT_OF_RANGE
+    if not math.isinf(range_m):
+        apart = 0.0
+        for axis in range(3):
+            apart += (sender_m[axis] - receiver_m[axis]) ** 2
+        if math.sqrt(apart) > range_m:
+            return _OUT_OF_RANGE
     return _LOST if lost else _HEARD

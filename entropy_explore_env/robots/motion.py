@@ -78,7 +78,8 @@ def free_way(blocked, size, start, direction, length, crossed, entered):
         start: (3,) float64 in grid units.
         direction: (3,) float64 unit vector.
         length: Wanted way in grid units.
-        crossed, entered: Scratch space of `cast_ray`.
+        crossed: (L,) int32 scratch space of `cast_ray`.
+        entered: (L,) float64, likewise.
 
     Returns:
         (way, code): the way in grid units (to the middle of the last voxel's crossing, if blocked)
@@ -124,7 +125,8 @@ def way_to_teammate(start, direction, way, begin, finish, touching):
         start: (3,) float64 in grid units.
         direction: (3,) float64 unit vector.
         way: Wanted way in grid units.
-        begin, finish: (3,) float64, where the teammate is and where its drive ends.
+        begin: (3,) float64, where the teammate is.
+        finish: (3,) float64, where its drive ends.
         touching: Sum of the two radii.
 
     Returns:

@@ -144,6 +144,29 @@ def point_rays(model, yaw, pitch, rays):
             direction[0], direction[1], direction[2] = along * level, across * level, -down
 
 
+@njit(cache=True, nogil=True, error_model="numpy")
+def in_view(model, yaw, pitch, start, body):
+    """Whether a body may be hit by a ray of the bundle around a gaze; True rather too often.
+
+    A ray's angle from the gaze is at most the bundle's half diagonal in yaw and pitch.
+
+    Args:
+        model: The SensorModel.
+        yaw: Of the gaze, radians.
+        pitch: Of the gaze, radians.
+        start: (3,) float64 the sensor in grid units.
+        body: (4,) float64 centre and radius in grid units.
+    """
+    x, y, z = body[0] - start[0], body[1] - start[1], body[2] - start[2]
+    distance = math.sqrt(x * x + y * y + z * z)
+    if distance <= body[3]:
+        return True
+    half = math.sqrt(model.yaw_offsets[-1] ** 2 + model.pitch_offsets[-1] ** 2)
+    widest = half + math.asin(body[3] / distance)
+    ahead = (x * math.cos(yaw) + y * math.sin(yaw)) * math.cos(pitch) - z * math.sin(pitch)
+    return widest >= math.pi or ahead >= distance * math.cos(widest) - 1e-9
+
+
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 def body_distance(start, direction, bodies, count):
     """Distance in grid units to the first of `count` balls (x, y, z, radius) on a ray; inf if none."""
@@ -218,7 +241,8 @@ def take_scan(scan, model, truth, size, voxel_size_m, start, yaw, pitch, bodies,
         size: (X, Y, Z) voxels.
         voxel_size_m: Edge of a voxel.
         start: (3,) float64 position of the sensor in grid units.
-        yaw, pitch: Gaze in radians.
+        yaw: Of the gaze, radians.
+        pitch: Of the gaze, radians, downwards.
         bodies: How many of `scan.bodies` stand in the way.
         chance: (1,) uint64 random state; drawn from only where range noise is on.
     """
@@ -258,7 +282,8 @@ def fuse_scan(scan, count, mean, precision):
     Args:
         scan: With crossings filled in; its `utility` is filled with the bits of each ray.
         count: How many rays of `scan.order`, in this order; those that measured nothing bring 0.
-        mean, precision: (V,) float32 belief, changed in place.
+        mean: (V,) float32 expected coverage, changed in place.
+        precision: (V,) float32 1/σ², changed in place.
 
     Returns:
         Bits taken from the map's entropy in all.

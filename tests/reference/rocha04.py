@@ -19,6 +19,9 @@ Belief = tuple[float, float]
 LEAST_CHORD = 1e-9
 """A voxel that a ray touches for less than this, in its corner or along its edge, is not crossed."""
 
+LEAST_SLOPE = 1e-100
+"""A ray with less of a component along an axis never reaches a plane across it."""
+
 HIT, WALL, OPEN = "hit", "wall", "open"
 
 
@@ -47,7 +50,7 @@ def pieces_of(start: Vector, direction: Vector, size: Voxel) -> list[Piece]:
     cuts = [0.0]
     leaves = math.inf
     for at, along, cells in zip(start, direction, size, strict=True):
-        if along == 0.0:
+        if abs(along) < LEAST_SLOPE:
             continue
         crossings = [(plane - at) / along for plane in range(cells + 1)]
         cuts += [cut for cut in crossings if cut > 0.0]

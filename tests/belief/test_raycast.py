@@ -1,0 +1,195 @@
+"""Ray traversal against the slow reference, and by hand where rounding would decide."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import assume, given
+from hypothesis import strategies as st
+
+from entropy_explore_env.belief.raycast import (
+    NEVER_STOP,
+    OBSTACLE,
+    OPEN,
+    STOP_AT_COVERED,
+    WALL,
+    cast_ray,
+    longest_crossing,
+)
+from tests.reference import rocha04
+from tests.reference.scenes import SHAPES, drawn, flat_index, random_cover, ray_space, rays, seeds
+
+ENDS = {OPEN: rocha04.OPEN, OBSTACLE: rocha04.HIT, WALL: rocha04.WALL}
+SIZE = (7, 11, 5)
+NOTHING = np.zeros(SIZE, np.float32)
+
+
+def cast(cover, start, direction, length=math.inf, behind=0, hit_at_length=False, stop=STOP_AT_COVERED):
+    """The library's ray as a reference Trace (voxels by number), and the distances of entry."""
+    size = cover.shape
+    crossed, entered = ray_space(size, length, behind)
+    start, direction = np.asarray(start, np.float64), np.asarray(direction, np.float64)
+    way, n, end = cast_ray(
+        cover.ravel(), stop, size, start, direction, float(length), hit_at_length, behind, crossed, entered
+    )
+    assert (crossed[n:] == -1).all()
+    return rocha04.Trace(way, crossed[:n].tolist(), ENDS[end]), entered[:n]
+
+
+@drawn(400)
+@given(rays(), seeds, st.sampled_from([0.0, 0.05, 0.3]), st.floats(0.05, 20.0), st.integers(0, 3))
+def test_a_ray_crosses_what_the_reference_says(ray, seed, share, length, behind):
+    size, start, direction = ray
+    assume(rocha04.is_generic(start, direction, size, length))
+    cover = random_cover(size, share, seed)
+    for longest in (length, math.inf):
+        ours, entered = cast(cover, start, direction, longest, behind)
+        theirs = rocha04.trace(lambda v: cover[v] > 0.5, start, direction, size, longest, behind)
+        assert ours.end == theirs.end
+        assert ours.voxels == flat_index(theirs.voxels, size)
+        assert ours.length == pytest.approx(theirs.length, rel=1e-9, abs=1e-9)
+        pieces = rocha04.pieces_of(start, direction, size)[: len(entered)]
+        expected = [min(piece.entered, theirs.length) for piece in pieces]
+        assert entered == pytest.approx(expected, rel=1e-9, abs=1e-9)
+
+
+@drawn(200)
+@given(rays(), st.floats(0.05, 20.0), st.integers(0, 3))
+def test_a_measured_distance_crosses_the_same_voxels_whatever_they_hold(ray, length, behind):
+    size, start, direction = ray
+    assume(rocha04.is_generic(start, direction, size, length))
+    theirs = rocha04.trace(lambda v: False, start, direction, size, length, behind, hit_at_longest=True)
+    for cover in (np.zeros(size, np.float32), np.ones(size, np.float32)):
+        ours, _ = cast(cover, start, direction, length, behind, hit_at_length=True, stop=NEVER_STOP)
+        assert ours.voxels == flat_index(theirs.voxels, size)
+        assert (ours.length, ours.end) == (pytest.approx(theirs.length), theirs.end)
+
+
+@drawn(60)
+@given(rays(), seeds, st.sampled_from([0.5, 1.5, 3.0, math.inf]), st.integers(0, 2))
+def test_a_ray_is_unbroken_and_crosses_no_voxel_twice(ray, seed, length, behind):
+    """Holds for every ray, also through edges and corners."""
+    size, start, direction = ray
+    for at in (start, np.floor(start), np.floor(start) + 0.5):
+        ours, entered = cast(random_cover(size, 0.05, seed), at, direction, length, behind)
+        assert len(ours.voxels) <= longest_crossing(*size, length, behind)
+        assert len(set(ours.voxels)) == len(ours.voxels)
+        places = np.stack(np.unravel_index(ours.voxels, size), axis=-1)
+        assert (np.abs(np.diff(places, axis=0)).sum(axis=1) == 1).all()
+        assert (np.diff(entered) >= 0.0).all()
+        assert entered[0] == 0.0
+
+
+@pytest.mark.parametrize("size", SHAPES)
+@pytest.mark.parametrize("axis", [0, 1, 2])
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_along_an_axis(size, axis, sign):
+    direction = np.zeros(3)
+    direction[axis] = sign
+    start = np.array(size) // 2 + np.array([0.5, 0.25, 0.75])
+    ours, entered = cast(np.zeros(size, np.float32), start, direction)
+    theirs = rocha04.trace(lambda v: False, start, direction, size, math.inf, 0)
+    assert ours == (theirs.length, flat_index(theirs.voxels, size), rocha04.WALL)
+    wall = size[axis] - start[axis] if sign > 0.0 else start[axis]
+    assert ours.length == wall
+    assert (np.diff(entered[1:]) == 1.0).all()
+
+
+def test_from_a_face_forwards_the_voxel_before_it_is_not_crossed():
+    ours, entered = cast(NOTHING, (3.0, 5.5, 2.5), (1.0, 0.0, 0.0))
+    assert ours == (4.0, flat_index([(x, 5, 2) for x in (3, 4, 5, 6)], SIZE), rocha04.WALL)
+    assert entered.tolist() == [0.0, 1.0, 2.0, 3.0]
+
+
+def test_from_a_face_backwards_the_start_voxel_counts_for_no_length():
+    """A point on a face belongs to the voxel above it: the ray starts there and leaves at once."""
+    ours, entered = cast(NOTHING, (3.0, 5.5, 2.5), (-1.0, 0.0, 0.0))
+    assert ours == (3.0, flat_index([(x, 5, 2) for x in (3, 2, 1, 0)], SIZE), rocha04.WALL)
+    assert entered.tolist() == [0.0, 0.0, 1.0, 2.0]
+
+
+@pytest.mark.parametrize(
+    ("start", "direction", "voxel"),
+    [
+        ((7.0, 5.5, 2.5), (1.0, 0.0, 0.0), (6, 5, 2)),
+        ((0.0, 5.5, 2.5), (-1.0, 0.0, 0.0), (0, 5, 2)),
+        ((3.5, 11.0, 2.5), (0.0, 1.0, 0.0), (3, 10, 2)),
+        ((3.5, 5.5, 5.0), (0.0, 0.0, 1.0), (3, 5, 4)),
+    ],
+)
+def test_from_the_boundary_outwards_a_ray_has_no_length(start, direction, voxel):
+    assert cast(NOTHING, start, direction)[0] == (0.0, flat_index([voxel], SIZE), rocha04.WALL)
+
+
+def test_from_the_upper_boundary_inwards():
+    ours, _ = cast(NOTHING, (7.0, 11.0, 5.0), (0.0, 0.0, -1.0))
+    assert ours == (5.0, flat_index([(6, 10, z) for z in (4, 3, 2, 1, 0)], SIZE), rocha04.WALL)
+
+
+def test_along_a_face_a_ray_stays_above_it():
+    ours, _ = cast(NOTHING, (0.5, 5.0, 2.0), (1.0, 0.0, 0.0))
+    assert ours == (6.5, flat_index([(x, 5, 2) for x in range(7)], SIZE), rocha04.WALL)
+
+
+@pytest.mark.parametrize("signs", [(1, 1, 1), (-1, 1, 1), (1, -1, -1), (-1, -1, -1), (1, 1, 0), (0, -1, 1)])
+def test_through_edges_and_corners_only_touched_voxels_come_extra(signs):
+    """Exactly diagonal: the voxels that the reference crosses, and between them touched ones."""
+    direction = np.array(signs, np.float64)
+    start = np.array([3.5, 5.5, 2.5])
+    theirs = rocha04.trace(lambda v: False, start, direction, SIZE, math.inf, 0)
+    ours, entered = cast(NOTHING, start, direction)  # not of unit length, so that ties are exact
+    crossed = flat_index(theirs.voxels, SIZE)
+    assert ours.length == theirs.length
+    assert [voxel for voxel in ours.voxels if voxel in crossed] == crossed
+    left = np.append(entered[1:], ours.length)
+    touched = [voxel for voxel, inside in zip(ours.voxels, left - entered, strict=True) if inside == 0.0]
+    assert sorted(touched + crossed) == sorted(ours.voxels)
+    an_edge = abs(direction).sum() - 1
+    assert (len(crossed) - 1) * an_edge <= len(touched) <= len(crossed) * an_edge
+
+
+def test_a_ray_through_an_edge_goes_along_x_first_then_y_then_z():
+    ours, _ = cast(NOTHING, (0.5, 0.5, 0.5), (1.0, 1.0, 1.0), 1.0)
+    path = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (1, 1, 1)]
+    assert ours.voxels == flat_index(path, SIZE)
+
+
+def test_a_covered_voxel_at_the_start_is_left_freely():
+    cover = NOTHING.copy()
+    cover[2, 5, 2] = cover[5, 5, 2] = 1.0
+    ours, _ = cast(cover, (2.25, 5.5, 2.5), (1.0, 0.0, 0.0), behind=1)
+    assert ours == (2.75, flat_index([(x, 5, 2) for x in (2, 3, 4, 5)], SIZE), rocha04.HIT)
+
+
+def test_coverage_of_a_half_does_not_stop_a_ray():
+    cover = NOTHING.copy()
+    cover[4, 5, 2] = 0.5
+    assert cast(cover, (2.25, 5.5, 2.5), (1.0, 0.0, 0.0))[0].end == rocha04.WALL
+    cover[4, 5, 2] = np.nextafter(np.float32(0.5), np.float32(1.0))
+    assert cast(cover, (2.25, 5.5, 2.5), (1.0, 0.0, 0.0))[0].end == rocha04.HIT
+
+
+def test_behind_a_hit_at_the_last_voxel_there_is_nothing():
+    cover = NOTHING.copy()
+    cover[6, 5, 2] = 1.0
+    ours, _ = cast(cover, (4.5, 5.5, 2.5), (1.0, 0.0, 0.0), behind=3)
+    assert ours == (1.5, flat_index([(4, 5, 2), (5, 5, 2), (6, 5, 2)], SIZE), rocha04.HIT)
+
+
+def test_a_range_that_ends_on_a_face_is_open_and_does_not_reach_the_voxel_there():
+    ours, _ = cast(NOTHING, (2.5, 5.5, 2.5), (1.0, 0.0, 0.0), 1.5)
+    assert ours == (1.5, flat_index([(2, 5, 2), (3, 5, 2)], SIZE), rocha04.OPEN)
+    ours, _ = cast(NOTHING, (2.5, 5.5, 2.5), (1.0, 0.0, 0.0), 4.5)
+    assert ours.end == rocha04.OPEN  # exactly as far as the wall: the range ends first
+
+
+def test_a_measured_distance_up_to_a_face_is_a_hit_of_the_voxel_there():
+    ours, _ = cast(NOTHING, (2.5, 5.5, 2.5), (1.0, 0.0, 0.0), 1.5, 2, hit_at_length=True)
+    assert ours == (1.5, flat_index([(x, 5, 2) for x in (2, 3, 4, 5)], SIZE), rocha04.HIT)
+
+
+def test_a_measured_distance_beyond_the_wall_ends_at_the_wall():
+    ours, _ = cast(NOTHING, (2.5, 5.5, 2.5), (1.0, 0.0, 0.0), 9.0, 2, hit_at_length=True)
+    assert ours == (4.5, flat_index([(x, 5, 2) for x in (2, 3, 4, 5, 6)], SIZE), rocha04.WALL)

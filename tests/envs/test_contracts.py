@@ -1,0 +1,131 @@
+"""What others ask of an environment: the checkers of PettingZoo, Gymnasium and Stable-Baselines3."""
+
+from __future__ import annotations
+
+import functools
+import itertools
+from types import SimpleNamespace
+from typing import Any
+
+import gymnasium
+import pytest
+from gymnasium.utils.env_checker import check_env
+from pettingzoo.test import (
+    api_test,
+    max_cycles_test,
+    parallel_api_test,
+    parallel_seed_test,
+    render_test,
+    seed_test,
+)
+
+import entropy_explore_env
+from entropy_explore_env import SCENARIOS, env, environment_id, parallel_env
+
+PARTS: dict[str, dict[str, Any]] = {
+    "nothing": {"panorama": False, "own": False, "team": False},
+    "self": {"panorama": False, "team": False},
+    "default": {},
+    "everything": {"patch": True, "overview": True, "action_mask": True},
+    "flat": {"patch": True, "overview": True, "action_mask": True, "flat": True},
+}
+KINDS = ("continuous", "discrete")
+TEAMS = [
+    pytest.param(scenario, robots, kind, id=f"{scenario}-{robots}-{kind}")
+    for scenario, robots, kind in itertools.product(SCENARIOS, range(1, 6), KINDS)
+]
+SINGLES = [
+    pytest.param(scenario, kind, parts, id=f"{scenario}-{kind}-{parts}")
+    for scenario, kind, parts in itertools.product(SCENARIOS, KINDS, PARTS)
+    if parts != "nothing"  # Gymnasium does not allow an empty observation space
+]
+
+# PettingZoo wants arrays; ours is a Dict of parts, as PettingZoo's own games with an action mask
+# have it. `flat` gives an array, and is checked without this exception.
+OBSERVATIONS_ARE_DICTS = (
+    "ignore:Observation is not a NumPy array:UserWarning",
+    "ignore:Observation space for each agent probably should be:UserWarning",
+)
+
+
+def settings(robots: int, kind: str, parts: str) -> dict[str, Any]:
+    return {"robots": robots, "action": {"kind": kind}, "observation": PARTS[parts]}
+
+
+@pytest.mark.parametrize("parts", ["nothing", "default", "everything", "flat"])
+@pytest.mark.parametrize(("scenario", "robots", "kind"), TEAMS)
+def test_pettingzoo_parallel_api(scenario: str, robots: int, kind: str, parts: str) -> None:
+    parallel_api_test(parallel_env(scenario, max_cycles=8, **settings(robots, kind, parts)), num_cycles=10)
+
+
+@pytest.mark.filterwarnings(*OBSERVATIONS_ARE_DICTS)
+@pytest.mark.parametrize("parts", ["nothing", "default", "everything"])
+@pytest.mark.parametrize(("scenario", "robots", "kind"), TEAMS)
+def test_pettingzoo_api(scenario: str, robots: int, kind: str, parts: str) -> None:
+    api_test(env(scenario, max_cycles=8, **settings(robots, kind, parts)), num_cycles=10 * robots)
+
+
+@pytest.mark.parametrize(("scenario", "robots", "kind"), TEAMS)
+def test_pettingzoo_api_with_flat_observations(scenario: str, robots: int, kind: str) -> None:
+    api_test(env(scenario, max_cycles=8, **settings(robots, kind, "flat")), num_cycles=10 * robots)
+
+
+@pytest.mark.parametrize(("scenario", "robots", "kind"), TEAMS)
+def test_pettingzoo_seeds(scenario: str, robots: int, kind: str) -> None:
+    given = settings(robots, kind, "everything")
+    parallel_seed_test(functools.partial(parallel_env, scenario, **given), num_cycles=10)
+    seed_test(functools.partial(env, scenario, **given), num_cycles=10)
+
+
+@pytest.mark.parametrize(("scenario", "robots", "kind"), TEAMS)
+def test_pettingzoo_max_cycles(scenario: str, robots: int, kind: str) -> None:
+    made = [functools.partial(make, scenario, **settings(robots, kind, "default")) for make in (parallel_env, env)]
+    max_cycles_test(SimpleNamespace(parallel_env=made[0], env=made[1]))
+
+
+def test_pettingzoo_max_cycles_of_the_package() -> None:
+    max_cycles_test(entropy_explore_env)
+
+
+@pytest.mark.parametrize("robots", [1, 2, 5])
+@pytest.mark.parametrize("scenario", SCENARIOS)
+def test_pettingzoo_rendering(scenario: str, robots: int) -> None:
+    pytest.importorskip("pygame")
+    shapes = []
+
+    def is_picture(picture: Any) -> bool:
+        shapes.append(picture.shape)
+        return True
+
+    render_test(functools.partial(env, scenario, robots=robots), {"rgb_array": is_picture})
+    assert shapes == [(480, 640, 3)] * 5
+
+
+@pytest.mark.parametrize(("scenario", "kind", "parts"), SINGLES)
+def test_gymnasium_check_env(scenario: str, kind: str, parts: str) -> None:
+    made = gymnasium.make(
+        environment_id(scenario), disable_env_checker=True, **settings(1, kind, parts), render_mode="rgb_array"
+    )
+    check_env(made.unwrapped, skip_render_check=parts != "default")
+    made.close()
+
+
+@pytest.mark.parametrize(("scenario", "kind", "parts"), SINGLES)
+def test_gymnasium_passive_checker_has_nothing_to_say(scenario: str, kind: str, parts: str) -> None:
+    made = gymnasium.make(environment_id(scenario), max_cycles=5, **settings(1, kind, parts))
+    made.reset(seed=0)
+    over = False
+    while not over:
+        _, _, terminated, truncated, _ = made.step(made.action_space.sample())
+        over = terminated or truncated
+    made.close()
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("scenario", SCENARIOS)
+def test_stable_baselines3_check_env(scenario: str, kind: str) -> None:
+    checker = pytest.importorskip("stable_baselines3.common.env_checker")
+    for parts in ({"flat": True}, PARTS["flat"]):
+        made = gymnasium.make(environment_id(scenario), action={"kind": kind}, observation=parts)
+        checker.check_env(made.unwrapped, skip_render_check=True)
+        made.close()

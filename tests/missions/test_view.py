@@ -1,0 +1,63 @@
+"""What a robot's view shows, and that nothing can be changed through it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from entropy_explore_env.missions.view import view_of
+from entropy_explore_env.robots.motion import MoveEnd
+from tests.reference.scenes import free_box, put, started, wander
+
+
+def test_a_view_shows_the_robot_s_own_state():
+    missions = started(free_box(robots=3, world="furnished"), seed=4)
+    wander(missions, 15, 0)
+    for robot in range(3):
+        view, own = view_of(missions, 0, robot), missions.state.robots[0, robot]
+        assert (view.robot, view.deciding) == (robot, own["deciding"])
+        assert view.time_s == missions.state.missions[0]["time_s"]
+        assert view.entropy_bits == own["entropy_bits"]
+        assert view.move_end is list(MoveEnd)[own["move_end"]]
+        np.testing.assert_array_equal(view.mean, missions.mean[0, robot])
+        np.testing.assert_array_equal(view.precision, missions.precision[0, robot])
+        np.testing.assert_array_equal(view.scan.utility_bits, missions.state.scan_utility_bits[0, robot])
+        assert view.scan.pose.tolist() == own["scan_pose"].tolist()
+        if view.deciding:
+            assert view.pose.tolist() == own["goal"].tolist() == view.scan.pose.tolist()
+        assert sorted(view.teammates) == [mate for mate in range(3) if mate != robot]
+
+
+def test_nothing_can_be_changed_through_a_view():
+    missions = started(free_box())
+    before = [array.tobytes() for array in missions.state]
+    view = view_of(missions, 0, 0)
+    for array in (view.mean, view.precision, view.scan.range_m, view.scan.returned, view.scan.utility_bits):
+        with pytest.raises(ValueError, match="read-only"):
+            array[...] = 0
+    for array in (view.pose, view.target, view.scan.pose, view.teammates[1].viewpoint):
+        array[...] = 7.0
+    assert [array.tobytes() for array in missions.state] == before
+
+
+def test_a_view_before_anything_was_measured_or_heard():
+    view = view_of(started(free_box()), 0, 0)
+    assert (view.scan.returned == 0).all()
+    assert (view.teammates[1].heard_s, view.teammates[1].announced_s) == (-1.0, -1.0)
+    assert not view.teammates[1].viewpoint.any()
+    assert view.deciding
+
+
+@pytest.mark.parametrize("kind", ["continuous", "discrete"])
+def test_the_action_for_a_viewpoint_goes_there(kind):
+    missions = started(free_box(robots=1, action={"kind": kind}))
+    put(missions, 0, (1.75, 2.75, 1.25, 0.0, 0.0))
+    wanted = np.array([2.25, 2.25, 1.25, np.pi / 2, np.pi / 4])
+    action = view_of(missions, 0, 0).action_for(wanted)
+    boxes, numbers = np.zeros((1, 1, 5)), np.zeros((1, 1), np.int64)
+    if kind == "continuous":
+        boxes[0, 0] = action
+    else:
+        numbers[0, 0] = action
+    missions.step(boxes, numbers)
+    assert missions.state.robots[0, 0]["goal"] == pytest.approx(wanted, abs=1e-6)

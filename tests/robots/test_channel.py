@@ -1,0 +1,103 @@
+"""What a robot sends (Rocha04, eq. 43), and whether it arrives."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from entropy_explore_env.robots.channel import (
+    BITS_PER_ANNOUNCEMENT,
+    BITS_PER_BATCH,
+    BITS_PER_MEASUREMENT,
+    Delivery,
+    deliver,
+    select_measurements,
+)
+from tests.reference import rocha04
+from tests.reference.scenes import drawn, seeds
+
+
+def select(utility, burst, i_min):
+    order = np.full(len(utility), -7, np.int64)
+    count = select_measurements(np.asarray(utility, np.float64), burst, float(i_min), order)
+    assert (order[count:] == -7).all() or count == len(utility) or burst == 0
+    return order[:count].tolist()
+
+
+# Few different values, so that ties are common; -1 stands for a ray that measured nothing.
+utilities = st.lists(
+    st.one_of(st.sampled_from([-1.0, 0.0, 0.25, 0.3219, 0.5, 2.0]), st.floats(0.0, 5.0)), max_size=40
+)
+
+
+@drawn(400)
+@given(utilities, st.integers(0, 45), st.sampled_from([0.0, 0.0291, 0.25, 0.3219, 0.6215, 3.0]))
+def test_the_selection_fulfils_equation_43_and_is_that_of_the_reference(utility, burst, i_min):
+    chosen = select(utility, burst, i_min)
+    assert rocha04.is_valid_selection(utility, chosen, burst, i_min)
+    assert chosen == rocha04.select(utility, burst, i_min)
+
+
+@drawn(100)
+@given(st.integers(1, 30), st.integers(0, 35))
+def test_of_equal_measurements_the_first_are_sent(rays, burst):
+    assert select([0.5] * rays, burst, 0.5) == list(range(min(rays, burst)))
+
+
+def test_selections_by_hand():
+    utility = [0.5, 2.0, 0.1, 2.0, 1.0]
+    assert select(utility, 3, 0.3) == [1, 3, 4]
+    assert select(utility, 5, 0.3) == [1, 3, 4, 0]
+    assert select(utility, 1, 0.3) == [1]
+    assert select(utility, 5, 2.0) == [1, 3]
+    assert select(utility, 5, np.nextafter(2.0, 3.0)) == []
+    assert select(utility, 0, 0.0) == []
+    assert select([-1.0, 0.0, -1.0], 3, 0.0) == [1]
+
+
+def reached(distance, range_m, loss, chance=None):
+    there = np.array([3.0, 4.0, 0.0]) / 5.0 * distance
+    chance = np.array([1], np.uint64) if chance is None else chance
+    return list(Delivery)[deliver(np.zeros(3), there, range_m, loss, chance)]
+
+
+def test_a_message_reaches_as_far_as_the_channel():
+    assert reached(5.0, math.inf, 0.0) is Delivery.HEARD
+    assert reached(5.0, 5.0, 0.0) is Delivery.HEARD
+    assert reached(5.0, 4.999, 0.0) is Delivery.OUT_OF_RANGE
+    assert reached(0.0, 1e-9, 0.0) is Delivery.HEARD
+
+
+def test_chance_is_drawn_only_where_a_message_can_be_lost():
+    chance = np.array([9], np.uint64)
+    reached(1.0, 5.0, 0.0, chance)
+    assert chance[0] == 9
+    reached(1.0, 5.0, 0.5, chance)
+    assert chance[0] != 9
+    in_range, out_of_range = np.array([9], np.uint64), np.array([9], np.uint64)
+    reached(1.0, 5.0, 0.5, in_range)
+    reached(9.0, 5.0, 0.5, out_of_range)
+    assert in_range[0] == out_of_range[0]  # the next draws do not depend on where teammates are
+
+
+@pytest.mark.parametrize("loss", [0.1, 0.5, 0.9])
+def test_messages_are_lost_as_often_as_asked(loss):
+    chance = np.array([123], np.uint64)
+    lost = sum(reached(1.0, 5.0, loss, chance) is Delivery.LOST for _ in range(4000))
+    assert abs(lost / 4000 - loss) < 4 * math.sqrt(loss * (1 - loss) / 4000)
+
+
+@drawn(20)
+@given(seeds)
+def test_a_loss_probability_of_1_loses_everything(seed):
+    chance = np.array([seed], np.uint64)
+    assert all(reached(1.0, 5.0, 1.0, chance) is Delivery.LOST for _ in range(50))
+    assert reached(9.0, 5.0, 1.0, chance) is Delivery.OUT_OF_RANGE
+
+
+def test_what_messages_cost():
+    assert (BITS_PER_MEASUREMENT, BITS_PER_BATCH, BITS_PER_ANNOUNCEMENT) == (96, 96, 224)

@@ -1,0 +1,188 @@
+"""Worlds from files: small OctoMaps of known voxels, broken files, a real corridor."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from entropy_explore_env.errors import SettingError, WorldError
+from entropy_explore_env.missions.missions import Missions
+from entropy_explore_env.scenarios import BOX
+from entropy_explore_env.worlds import files
+from entropy_explore_env.worlds.files import load_octomap
+from entropy_explore_env.worlds.load import make_world, with_world
+from tests.reference.scenes import free_box, wander
+
+octomap = pytest.importorskip("octomap", reason="octomap-python is not installed")
+
+UNKNOWN, FREE, SOLID = -1, 0, 1
+SHAPE = (7, 11, 5)
+EDGE_M = 0.2
+LOW = np.array([-4, 3, -2])
+"""Lower corner of the written voxels, in voxels from the map's origin."""
+CORRIDOR = Path(__file__).parents[2].parent / "shared" / "worlds" / "octomap" / "geb079.bt"
+
+
+def write(path, labels, edge_m=EDGE_M, low=LOW):
+    """An OctoMap of voxels (X, Y, Z), -1, 0 or 1, whose lower corner is at `low` voxels."""
+    tree = octomap.OcTree(edge_m)
+    for voxel in np.argwhere(labels != UNKNOWN):
+        tree.updateNode((voxel + low + 0.5) * edge_m, bool(labels[tuple(voxel)] == SOLID))
+    tree.updateInnerOccupancy()
+    assert tree.writeBinary(str(path).encode())
+    return path
+
+
+def some_labels(seed=0):
+    """Mostly free; some solid, some unknown; the corners known, so that the box is the whole."""
+    labels = np.random.default_rng(seed).choice([FREE, FREE, FREE, SOLID, UNKNOWN], SHAPE)
+    labels[0, 0, 0] = labels[-1, -1, -1] = SOLID
+    labels[2:6, 2:6, 0:4] = FREE  # whole branches of the tree, stored as one
+    return labels
+
+
+def test_known_voxels_are_where_they_were_put(tmp_path):
+    labels = some_labels()
+    world = load_octomap(write(tmp_path / "room.bt", labels))
+    assert world.grid.shape == SHAPE
+    assert world.grid.voxel_size_m == pytest.approx(EDGE_M)
+    assert world.grid.origin_m == pytest.approx(tuple(LOW * EDGE_M))
+    np.testing.assert_array_equal(world.occupied, labels != FREE)  # unknown counts as solid
+    assert world.name == "room"
+    same = load_octomap(tmp_path / "room.bt", EDGE_M)
+    np.testing.assert_array_equal(same.occupied, world.occupied)
+
+
+@pytest.mark.parametrize("parts", [1, 2, 3, 4, 5])
+def test_resampled_voxels_are_free_if_half_is_free_and_less_than_a_quarter_solid(tmp_path, parts):
+    """New voxels `parts` halves of an old one wide, judged by counting eighths of old voxels."""
+    labels = some_labels(parts)
+    world = load_octomap(write(tmp_path / "room.bt", labels), parts * EDGE_M / 2)
+    fine = labels.repeat(2, 0).repeat(2, 1).repeat(2, 2)
+    fine = np.pad(fine, [(0, -n % parts) for n in fine.shape], constant_values=UNKNOWN)
+    shape = tuple(n // parts for n in fine.shape)
+    assert world.grid.shape == shape
+    assert world.grid.origin_m == pytest.approx(tuple(LOW * EDGE_M))
+    for voxel in np.ndindex(*shape):
+        block = fine[tuple(slice(i * parts, (i + 1) * parts) for i in voxel)]
+        free = (block == FREE).mean() >= 0.5 and (block == SOLID).mean() < 0.25
+        assert world.occupied[voxel] == (not free), voxel
+
+
+@pytest.mark.parametrize("edge_m", [0.05, 0.08, 0.1, 0.15, 0.3])
+def test_a_wall_one_voxel_thick_stays_a_wall_in_voxels_four_times_as_large(tmp_path, edge_m):
+    labels = np.full((16, 12, 8), FREE)
+    labels[6] = SOLID
+    world = load_octomap(write(tmp_path / "wall.bt", labels, edge_m, np.zeros(3, int)), 4 * edge_m)
+    assert world.grid.shape == (4, 3, 2)
+    assert world.occupied[1].all()
+    assert not world.occupied[[0, 2, 3]].any()
+
+
+BROKEN = {
+    "empty": b"",
+    "noise": np.random.default_rng(0).bytes(4096),
+    "text": b"# Octomap OcTree binary file\n",
+    "no data": b"# Octomap OcTree binary file\nid OcTree\nsize 9\nres 0.1\ndata\n",
+    "noise after the header": b"# Octomap OcTree binary file\nid OcTree\nsize 900\nres 0.1\ndata\n"
+    + np.random.default_rng(1).bytes(900),
+    "another tree": b"# Octomap OcTree binary file\nid ColorOcTree\nsize 1\nres 0.1\ndata\n\x00\x00",
+    "no resolution": b"# Octomap OcTree binary file\nid OcTree\nsize 1\nres 0\ndata\n\x01\x00",
+    "resolution below 0": b"# Octomap OcTree binary file\nid OcTree\nsize 1\nres -1\ndata\n\x01\x00",
+    "resolution nan": b"# Octomap OcTree binary file\nid OcTree\nsize 1\nres nan\ndata\n\x01\x00",
+}
+
+
+def refused(path, voxel_size_m=None):
+    """The one line that a file is refused with."""
+    with pytest.raises(WorldError) as raised:
+        load_octomap(path, voxel_size_m)
+    error = raised.value
+    assert error.field in ("world file", "voxel_size_m")
+    assert error.allowed
+    assert "\n" not in str(error)
+    assert str(error) == f"{error.field} = {error.value!r}: allowed is {error.allowed}"
+    return error
+
+
+@pytest.mark.parametrize("kind", BROKEN)
+def test_broken_files_are_refused(tmp_path, kind):
+    path = tmp_path / "broken.bt"
+    path.write_bytes(BROKEN[kind])
+    assert refused(path).value == str(path)
+
+
+@pytest.mark.parametrize("share", [0.3, 0.9])
+def test_truncated_files_are_refused(tmp_path, share):
+    path = write(tmp_path / "room.bt", some_labels())
+    whole = path.read_bytes()
+    path.write_bytes(whole[: int(share * len(whole))])
+    assert refused(path).value == str(path)
+
+
+def test_missing_files_and_folders_are_refused(tmp_path):
+    assert refused(tmp_path / "nowhere.bt").allowed == "a file that exists"
+    assert refused(tmp_path).allowed == "a file that exists"
+
+
+def test_files_too_large_are_refused_unread(tmp_path, monkeypatch):
+    path = write(tmp_path / "room.bt", some_labels())
+    monkeypatch.setattr(files, "MAX_FILE_BYTES", 100)
+    assert "MiB" in refused(path).allowed
+
+
+def test_a_file_whose_box_is_absurdly_large_is_refused(tmp_path):
+    """A few bytes: two voxels far from each other."""
+    tree = octomap.OcTree(0.01)
+    tree.updateNode(np.array([-100.0, -100.0, -100.0]), False)
+    tree.updateNode(np.array([100.0, 100.0, 100.0]), False)
+    path = tmp_path / "sparse.bt"
+    assert tree.writeBinary(str(path).encode())
+    assert path.stat().st_size < 1000
+    assert "voxels" in refused(path).allowed
+
+
+def test_voxels_so_small_that_there_are_too_many_are_refused(tmp_path):
+    error = refused(write(tmp_path / "room.bt", some_labels()), 1e-4)
+    assert (error.field, error.value) == ("voxel_size_m", 1e-4)
+
+
+def test_a_map_without_free_space_is_refused(tmp_path):
+    path = write(tmp_path / "solid.bt", np.full(SHAPE, SOLID))
+    assert "free space" in refused(path).allowed
+    assert "free space" in refused(path, 0.3).allowed
+
+
+@pytest.mark.parametrize("size", [0.0, -1.0, math.nan, math.inf])
+def test_a_voxel_size_that_is_none_is_refused(tmp_path, size):
+    with pytest.raises(SettingError, match=r"voxel_size_m = .*: allowed is a number > 0"):
+        load_octomap(tmp_path / "nowhere.bt", size)
+
+
+def test_a_mission_in_a_world_from_a_file(tmp_path):
+    labels = some_labels()
+    path = write(tmp_path / "room.bt", labels)
+    scenario = with_world(free_box(world=str(path), grid=BOX.grid, robots=2, robot={"reach_m": 2.0}))
+    assert scenario.grid.voxel_size_m == 0.5  # the scenario's, not the file's
+    assert scenario.grid.origin_m == pytest.approx(tuple(LOW * EDGE_M))
+    missions = Missions(scenario)
+    missions.reset(0, 1)
+    wander(missions, 10, 0)
+    assert missions.worlds[0] is make_world(scenario, np.random.default_rng(0))  # read once
+    assert (missions.state.robots["scans"] > 0).all()
+
+
+@pytest.mark.skipif(not CORRIDOR.exists(), reason=f"{CORRIDOR} is not here: it is no part of the project")
+def test_a_real_corridor():
+    """Building 079, Freiburg: about 39 × 15 × 3 m, at 0.4 m a few thousand voxels of free space."""
+    world = load_octomap(CORRIDOR, 0.4)
+    assert world.grid.size_m == pytest.approx([39.0, 15.0, 3.1], rel=0.2)
+    assert world.occupied.dtype == np.bool_
+    free = (~world.occupied).sum() * 0.4**3
+    assert 50.0 < free < 1000.0  # m³
+    starts = world.layout(free_box(grid=world.grid)).starts
+    assert len(starts) > 0.3 * (~world.occupied).sum()
+    assert not world.occupied.ravel()[starts].any()

@@ -1,0 +1,174 @@
+"""True worlds: where bodies fit, where robots may start, what can be seen at all."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from entropy_explore_env.config import Grid
+from entropy_explore_env.errors import WorldError
+from entropy_explore_env.worlds.world import World, plane_index
+from tests.reference.scenes import drawn, free_box, random_cover, seeds
+
+SIZE = (7, 11, 5)
+STEPS = [(1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0, 0, 1), (0, 0, -1)]
+
+
+def world_of(occupied, voxel_size_m=0.5):
+    return World(Grid(occupied.shape, voxel_size_m), occupied, "by hand")
+
+
+def part_of(room, voxel):
+    """Voxels of `room` that hang together with one of them by faces: a search breadth first."""
+    part, queue = {voxel}, deque([voxel])
+    while queue:
+        x, y, z = queue.popleft()
+        for dx, dy, dz in STEPS:
+            near = (x + dx, y + dy, z + dz)
+            inside = all(0 <= n < size for n, size in zip(near, room.shape, strict=True))
+            if inside and room[near] and near not in part:
+                part.add(near)
+                queue.append(near)
+    return part
+
+
+def parts_of(room):
+    left, parts = {tuple(voxel) for voxel in np.argwhere(room).tolist()}, []
+    while left:
+        parts.append(part_of(room, min(left)))
+        left -= parts[-1]
+    return parts
+
+
+def body_hits(occupied, voxel, radius):
+    """Whether a ball in a voxel's centre meets a solid voxel or the boundary; edges of 1."""
+    centre = np.array(voxel) + 0.5
+    flat = occupied.shape[2] == 1
+    axes = 2 if flat else 3
+    walls = np.minimum(centre, np.array(occupied.shape) - centre)[:axes]
+    gaps = [
+        np.linalg.norm(np.maximum(np.abs(np.array(solid) + 0.5 - centre) - 0.5, 0.0)[:axes])
+        for solid in np.argwhere(occupied)
+    ]
+    return occupied[voxel] or walls.min() < radius - 1e-9 or min(gaps, default=math.inf) < radius - 1e-9
+
+
+@drawn(40)
+@given(
+    seeds,
+    st.sampled_from([SIZE, (3, 8, 6), (9, 6, 1)]),
+    st.sampled_from([0.0, 0.1, 0.25, 0.3, 0.5, 0.6, 0.75, 0.8, 1.1]),
+)
+def test_a_body_fits_where_it_meets_nothing_solid(seed, size, body_radius_m):
+    occupied = random_cover(size, 0.06, seed) > 0.5
+    blocked = world_of(occupied).body_blocked(body_radius_m)
+    expected = np.zeros(size, bool)
+    for voxel in np.ndindex(*size):
+        expected[voxel] = body_hits(occupied, voxel, body_radius_m / 0.5)
+    np.testing.assert_array_equal(blocked, expected)
+
+
+@drawn(40)
+@given(seeds, st.sampled_from([SIZE, (3, 8, 6), (9, 6, 1)]), st.sampled_from([0.1, 0.4]), st.integers(0, 1))
+def test_starts_are_the_largest_part_and_all_that_hangs_together_with_it_is_visible(
+    seed, size, body_radius_m, behind
+):
+    occupied = random_cover(size, 0.35, seed) > 0.5
+    world = world_of(occupied)
+    room = ~world.body_blocked(body_radius_m)
+    scenario = free_box(
+        grid=world.grid, robot={"body_radius_m": body_radius_m}, sensor={"voxels_behind": behind}
+    )
+    if not room.any():
+        with pytest.raises(WorldError, match="room for a body"):
+            world.layout(scenario)
+        return
+    layout = world.layout(scenario)
+    starts = {tuple(int(n) for n in np.unravel_index(index, size)) for index in layout.starts}
+    parts = parts_of(room)
+    assert starts in parts
+    assert len(starts) == max(len(part) for part in parts)
+    free = [part for part in parts_of(~occupied) if part & starts]
+    seen = set().union(*free)
+    skin = {
+        tuple(voxel)
+        for voxel in np.argwhere(occupied).tolist()
+        if any(tuple(np.add(voxel, step).tolist()) in seen for step in STEPS)
+    }
+    assert layout.visible_voxels == len(seen) + behind * len(skin)
+    assert world.layout(scenario) is layout
+
+
+def divided_room():
+    """A wall at x = 2 leaves 2 and 4 layers; in the larger part a closed chest with a hollow in it."""
+    occupied = np.zeros(SIZE, bool)
+    occupied[2] = True
+    occupied[4:7, 4:7, 0:3] = True
+    occupied[5, 5, 1] = False
+    return occupied
+
+
+def test_a_divided_room_by_hand():
+    world = world_of(divided_room())
+    layout = world.layout(free_box(grid=world.grid))
+    starts = np.zeros(SIZE, bool)
+    starts.ravel()[layout.starts] = True
+    assert starts[3:].sum() == starts.sum() == 4 * 55 - 27
+    assert not starts[5, 5, 1]
+    # Seen from there: the part itself, the wall at x = 2, and of the chest's 26 solid voxels the
+    # outer ones: of its 3 × 3 × 3 all but the hollow, (6, 5, 0), (5, 5, 0) and (5, 6, 0)… by faces:
+    free_faces = sum(
+        any(
+            0 <= x + dx < 7 and 0 <= y + dy < 11 and 0 <= z + dz < 5 and starts[x + dx, y + dy, z + dz]
+            for dx, dy, dz in STEPS
+        )
+        for x, y, z in np.argwhere(divided_room()).tolist()
+    )
+    assert layout.visible_voxels == starts.sum() + free_faces
+    assert layout.visible_voxels < 4 * 55 + 55
+    blind = free_box(grid=world.grid, sensor={"voxels_behind": 0})
+    assert world.layout(blind).visible_voxels == starts.sum()
+
+
+def test_planar_robots_start_in_their_plane():
+    world = world_of(divided_room())
+    planar = free_box(grid=world.grid, robot={"motion": "planar", "sensor_height_m": 1.2})
+    assert plane_index(planar) == 2
+    starts = np.stack(np.unravel_index(world.layout(planar).starts, SIZE), axis=-1)
+    assert (starts[:, 2] == 2).all()
+    assert len(starts) == 4 * 11 - 9
+    assert plane_index(free_box()) is None
+    assert plane_index(free_box(grid=Grid((9, 6, 1), 0.5))) == 0
+
+
+def test_layouts_of_other_bodies_are_other_layouts():
+    world = world_of(divided_room())
+    small, large = (
+        world.layout(free_box(grid=world.grid, robot={"body_radius_m": r})) for r in (0.1, 0.3)
+    )
+    assert len(large.starts) < len(small.starts)
+
+
+@pytest.mark.parametrize(
+    "occupied", [np.zeros((7, 11, 4), bool), np.zeros(SIZE, np.int8), np.ones(SIZE, bool), np.zeros(385, bool)]
+)
+def test_worlds_that_are_none_are_refused(occupied):
+    with pytest.raises(WorldError, match=r"World\.occupied = .*: allowed is") as raised:
+        World(Grid(SIZE, 0.5), occupied, "bad")
+    assert raised.value.field == "World.occupied"
+
+
+def test_the_truth_cannot_be_written():
+    with pytest.raises(ValueError, match="read-only"):
+        world_of(np.zeros(SIZE, bool)).occupied[0, 0, 0] = True
+
+
+def test_a_body_that_fits_nowhere():
+    with pytest.raises(WorldError) as raised:
+        world_of(np.zeros(SIZE, bool)).layout(free_box(robot={"body_radius_m": 2.0}))
+    assert str(raised.value) == "world = 'by hand': allowed is a world with room for a body of radius 2.0 m"
