@@ -30,7 +30,7 @@ from entropy_explore_env.reports.recording import Recorder, write_atomically
 from entropy_explore_env.reports.rendering import animate
 from entropy_explore_env.scenarios import find_scenario
 
-_GIF_FRAMES = 80
+_GIF_FRAMES = 50
 _GIF_FRAME_S = 0.1
 _SERIES_POINTS = 500
 

@@ -105,6 +105,8 @@ def pose_at(numbers, robot, time_s):
     elapsed = time_s - robot.depart_s
     pose = np.empty(5)
     copy_numbers(goal, pose, 5)
+    if time_s >= robot.ready_s - numbers.scan_time_s:
+        return pose
     length = math.sqrt((goal[0] - origin[0]) ** 2 + (goal[1] - origin[1]) ** 2 + (goal[2] - origin[2]) ** 2)
     share = driven_share(elapsed, length, numbers.max_speed_m_s, numbers.acceleration_m_s2)
     if share < 1.0:
@@ -314,8 +316,13 @@ def send(rules, state, scan, mission, index, count):
     for mate in range(state.robots.shape[1]):
         if mate == index:
             continue
-        there = pose_at(numbers, state.robots[mission, mate], clock.time_s)
-        code = deliver(here, there, numbers.channel_range_m, numbers.loss_probability, robot.channel_chance)
+        apart_m = 0.0
+        if not math.isinf(numbers.channel_range_m):
+            there = pose_at(numbers, state.robots[mission, mate], clock.time_s)
+            apart_m = math.sqrt(
+                (here[0] - there[0]) ** 2 + (here[1] - there[1]) ** 2 + (here[2] - there[2]) ** 2
+            )
+        code = deliver(apart_m, numbers.channel_range_m, numbers.loss_probability, robot.channel_chance)
         if code == _LOST:
             robot.messages_lost += 1
         elif code == _OUT_OF_RANGE:

@@ -9,7 +9,6 @@ sender and once to each teammate that hears it.
 from __future__ import annotations
 
 import enum
-import math
 
 import numpy as np
 from numba import njit
@@ -62,21 +61,16 @@ def select_measurements(utility, burst, i_min_bits, order):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def deliver(sender_m, receiver_m, range_m, loss_probability, chance):
+def deliver(apart_m, range_m, loss_probability, chance):
     """Whether a message reaches a teammate: the code of a Delivery.
 
     Args:
-        sender_m: (3,) float64 position of the sender.
-        receiver_m: (3,) float64 position of the teammate when it is sent.
+        apart_m: Distance between the two when it is sent.
         range_m: Reach of the channel.
         loss_probability: Of losing it.
         chance: (1,) uint64 random state of the sender; drawn from only if a loss is possible.
     """
     lost = loss_probability > 0.0 and draw_uniform(chance) < loss_probability
-    if not math.isinf(range_m):
-        apart = 0.0
-        for axis in range(3):
-            apart += (sender_m[axis] - receiver_m[axis]) ** 2
-        if math.sqrt(apart) > range_m:
-            return _OUT_OF_RANGE
+    if apart_m > range_m:
+        return _OUT_OF_RANGE
     return _LOST if lost else _HEARD

@@ -79,7 +79,9 @@ def test_pettingzoo_seeds(scenario: str, robots: int, kind: str) -> None:
 
 @pytest.mark.parametrize(("scenario", "robots", "kind"), TEAMS)
 def test_pettingzoo_max_cycles(scenario: str, robots: int, kind: str) -> None:
-    made = [functools.partial(make, scenario, **settings(robots, kind, "default")) for make in (parallel_env, env)]
+    made = [
+        functools.partial(make, scenario, **settings(robots, kind, "default")) for make in (parallel_env, env)
+    ]
     max_cycles_test(SimpleNamespace(parallel_env=made[0], env=made[1]))
 
 
@@ -104,7 +106,10 @@ def test_pettingzoo_rendering(scenario: str, robots: int) -> None:
 @pytest.mark.parametrize(("scenario", "kind", "parts"), SINGLES)
 def test_gymnasium_check_env(scenario: str, kind: str, parts: str) -> None:
     made = gymnasium.make(
-        environment_id(scenario), disable_env_checker=True, **settings(1, kind, parts), render_mode="rgb_array"
+        environment_id(scenario),
+        disable_env_checker=True,
+        **settings(1, kind, parts),
+        render_mode="rgb_array",
     )
     check_env(made.unwrapped, skip_render_check=parts != "default")
     made.close()

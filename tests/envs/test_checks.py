@@ -1,0 +1,162 @@
+"""Bad actions: each is refused with its robot's name, its value and what is allowed."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from gymnasium import spaces
+
+from entropy_explore_env import ActionError, parallel_env
+from entropy_explore_env.envs.checks import ActionChecker
+from entropy_explore_env.envs.conformance import require_same, snapshot
+
+BOX = ActionChecker(spaces.Box(-1.0, 1.0, (5,), np.float32))
+DISCRETE = ActionChecker(spaces.Discrete(7))
+
+
+@pytest.mark.parametrize(
+    "action",
+    [
+        np.linspace(-1, 1, 5),
+        np.linspace(-1, 1, 5).astype(np.float32),
+        [-1.0, -0.5, 0.0, 0.5, 1.0],
+        np.linspace(-1, 1, 5).astype(np.float16),
+    ],
+)
+def test_boxes_of_any_floating_type_are_taken(action: Any) -> None:
+    boxes, numbers = BOX.batch([("robot_0", action), ("robot_1", np.zeros(5))])
+    assert boxes.dtype == np.float64 and numbers.dtype == np.int64
+    np.testing.assert_array_equal(boxes, [[-1, -0.5, 0, 0.5, 1], [0] * 5])
+    assert boxes.flags.owndata
+
+
+def test_boxes_may_leave_the_space_by_rounding_alone() -> None:
+    BOX.one("robot_0", np.full(5, 1.0 + 5e-7))
+    with pytest.raises(ActionError):
+        BOX.one("robot_0", np.full(5, 1.0 + 5e-6))
+
+
+@pytest.mark.parametrize("action", [6, np.int64(6), np.int8(6), np.array(6), np.uint64(6)])
+def test_whole_numbers_of_any_type_are_taken(action: Any) -> None:
+    assert DISCRETE.batch([("robot_0", 0), ("robot_1", action)])[1].tolist() == [0, 6]
+
+
+@pytest.mark.parametrize("row", [0, 1, 2])
+@pytest.mark.parametrize(
+    "action", [np.array([0, 0, np.nan, 0, 0]), np.array([0, 0, 0, 0, -np.inf]), np.full(5, 1.01)]
+)
+def test_a_number_outside_is_refused_wherever_it_stands(row: int, action: np.ndarray) -> None:
+    team: list[tuple[str, Any]] = [(f"robot_{n}", np.zeros(5)) for n in range(3)]
+    team[row] = (f"robot_{row}", action)
+    with pytest.raises(ActionError, match="finite numbers from -1 to 1") as caught:
+        BOX.batch(team)
+    assert caught.value.field == f"actions[robot_{row}]"
+    np.testing.assert_array_equal(caught.value.value, action)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    "action",
+    [
+        None,
+        "up",
+        {},
+        object(),
+        0.0,
+        np.zeros(4),
+        np.zeros(6),
+        np.zeros((1, 5)),
+        np.zeros(5, int),
+        np.zeros(5, bool),
+    ]
+    + [
+        np.zeros(5, complex),
+        np.zeros(5, object),
+        [0.0, 0.0, 0.0, 0.0, None],
+        [[0.0], [0.0, 0.0]],
+        np.zeros(5, "m8[s]"),
+    ],
+)
+def test_what_is_no_box_is_refused(action: Any) -> None:
+    with pytest.raises(ActionError, match=r"5 floating-point numbers") as caught:
+        BOX.one("robot_0", action)
+    assert caught.value.field == "actions[robot_0]"
+
+
+@pytest.mark.parametrize(
+    "action",
+    [None, "1", -1, 7, 1.0, np.float64(1), np.nan, True, np.True_, [1], np.zeros(1, int), np.array(1.0)],
+)
+def test_what_is_no_number_of_the_set_is_refused(action: Any) -> None:
+    with pytest.raises(ActionError, match="a whole number from 0 to 6") as caught:
+        DISCRETE.one("robot_0", action)
+    assert caught.value.field == "actions[robot_0]"
+
+
+@pytest.mark.parametrize(
+    "actions",
+    [None, {}, [], {"robot_0": np.zeros(5)}, {"robot_0": np.zeros(5), "robot_2": np.zeros(5)}]
+    + [
+        {f"robot_{n}": np.zeros(5) for n in range(3)},
+        {0: np.zeros(5), 1: np.zeros(5)},
+        [np.zeros(5)] * 2,
+        np.zeros((2, 5)),
+    ],
+)
+def test_actions_for_others_than_the_team_are_refused_and_change_nothing(actions: Any) -> None:
+    env = parallel_env("box-7x11x5", robots=2)
+    env.reset(seed=0)
+    before = snapshot(env)
+    with pytest.raises(ActionError, match="actions = "):
+        env.step(actions)
+    require_same("bad actions", before, snapshot(env))
+
+
+def test_tables_are_checked_as_a_whole() -> None:
+    boxes, _ = BOX.table(np.zeros((4, 2, 5), np.float32), 4, 2)
+    assert boxes.shape == (4, 2, 5) and boxes.dtype == np.float64
+    assert BOX.table(np.zeros((4, 5), np.float32), 4, 1)[0].shape == (4, 1, 5)
+    assert DISCRETE.table(np.arange(6).reshape(3, 2), 3, 2)[1].tolist() == [[0, 1], [2, 3], [4, 5]]
+    assert DISCRETE.table(np.arange(3), 3, 1)[1].tolist() == [[0], [1], [2]]
+
+
+@pytest.mark.parametrize("entry", [np.nan, np.inf, -1.01])
+def test_a_number_outside_is_named_in_a_table(entry: float) -> None:
+    table = np.zeros((4, 2, 5))
+    table[2, 1, 3] = entry
+    with pytest.raises(ActionError, match="finite numbers from -1 to 1") as caught:
+        BOX.table(table, 4, 2)
+    assert str(entry) in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    "table",
+    [
+        None,
+        "up",
+        np.zeros((4, 2, 4)),
+        np.zeros((2, 4, 5)),
+        np.zeros((4, 2, 5), int),
+        np.zeros((4, 2, 5), object),
+    ]
+    + [np.zeros((1, 4, 2, 5)), np.zeros(40), [[1.0], [1.0, 2.0]]],
+)
+def test_what_is_no_table_of_boxes_is_refused(table: Any) -> None:
+    with pytest.raises(ActionError, match=r"\(4, 2, 5\)"):
+        BOX.table(table, 4, 2)
+
+
+@pytest.mark.parametrize(
+    "table",
+    [
+        np.zeros((4, 2)),
+        np.full((4, 2), -1),
+        np.full((4, 2), 7),
+        np.zeros((2, 4), int),
+        np.zeros((4, 2), bool),
+    ],
+)
+def test_what_is_no_table_of_numbers_is_refused(table: np.ndarray) -> None:
+    with pytest.raises(ActionError, match="whole numbers"):
+        DISCRETE.table(table, 4, 2)

@@ -1,0 +1,156 @@
+"""Infos say what is true, and the action mask marks the moves that make sense."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+from entropy_explore_env import SCENARIOS, EntropyExploreEnv, RobotView, parallel_env
+from entropy_explore_env.config import Grid
+
+BOX = "box-7x11x5"
+DISCRETE = {"kind": "discrete", "yaws": 5, "pitches": 3}
+FLAT_GRID = Grid((9, 6, 1), 0.5, (-1.0, 2.0, 0.0))
+
+
+def sensible_moves(view: RobotView) -> list[bool]:
+    """Slowly, by the definition: inside, within reach, not believed covered; to stay always is."""
+    grid, sensible = view.scenario.grid, []
+    for move in view.rules.moves:
+        voxel = grid.voxel_of(view.pose[:3]) + move
+        inside = bool((voxel >= 0).all() and (voxel < grid.shape).all())
+        way = grid.centre_of(voxel) - view.pose[:3]
+        near = (
+            math.sqrt(float((way[: 2 if view.scenario.planar else 3] ** 2).sum()))
+            <= view.scenario.robot.reach_m + 1e-6
+        )
+        stays = not move.any()
+        sensible.append(stays or (inside and near and view.mean[tuple(voxel)] <= 0.5))
+    return sensible
+
+
+def sampled(
+    env: EntropyExploreEnv, rng: np.random.Generator, infos: dict[str, Any], masked: bool
+) -> dict[str, int]:
+    """A random action for each robot, of those that its mask allows."""
+    choices = {
+        agent: np.flatnonzero(info["action_mask"]) if masked else len(info["action_mask"])
+        for agent, info in infos.items()
+    }
+    return {agent: int(rng.choice(those)) for agent, those in choices.items()}
+
+
+@pytest.mark.parametrize("flat", [False, True])
+@pytest.mark.parametrize("robots", [1, 3])
+@pytest.mark.parametrize("scenario", SCENARIOS)
+def test_masks_of_infos_and_observations_are_what_the_definition_says(
+    scenario: str, robots: int, flat: bool
+) -> None:
+    observation = {"action_mask": True, "flat": flat}
+    env = parallel_env(scenario, robots=robots, action=DISCRETE, observation=observation, max_cycles=25)
+    rng = np.random.default_rng(0)
+    observations, infos = env.reset(seed=1)
+    busy = refused = 0
+    while env.agents:
+        observations, _, _, _, infos = env.step(sampled(env, rng, infos, masked=False))
+        for agent, info in infos.items():
+            mask, view = info["action_mask"], env.view(agent)
+            assert mask.dtype == np.int8 and mask.shape == (env.action_space(agent).n,)  # type: ignore[attr-defined]
+            seen = observations[agent][-len(mask) :] if flat else observations[agent]["action_mask"]
+            np.testing.assert_array_equal(seen, mask)
+            np.testing.assert_array_equal(mask, np.repeat(sensible_moves(view), 15))
+            busy += not info["deciding"]
+            refused += int((mask == 0).sum())
+    assert busy and refused
+
+
+@pytest.mark.parametrize(
+    "settings", [{}, {"grid": FLAT_GRID}, {"robot": {"motion": "planar", "reach_m": 1.0}}]
+)
+def test_masked_moves_arrive_in_an_empty_world_and_others_do_not(settings: dict[str, Any]) -> None:
+    """In a box without obstacles, a move that the mask allows ends in the middle of its voxel."""
+    settings = {
+        "action": DISCRETE,
+        "decision_period_s": None,
+        "max_cycles": 150,
+        "ending": {"sigma_end": 1e-3},
+        **settings,
+    }
+    env = parallel_env(BOX, robots=1, **settings)
+    rng = np.random.default_rng(2)
+    infos = env.reset(seed=3)[1]
+    ends = []
+    while env.agents:
+        view, action = env.view("robot_0"), sampled(env, rng, infos, masked=len(ends) % 2 == 0)["robot_0"]
+        allowed = infos["robot_0"]["action_mask"][action]
+        grid, gazes = view.scenario.grid, len(view.rules.gazes)
+        voxel = grid.voxel_of(view.pose[:3]) + view.rules.moves[action // gazes]
+        expected = np.array([*grid.centre_of(voxel), *view.rules.gazes[action % gazes]])
+        if view.scenario.planar:
+            expected[2] = view.pose[2]
+        infos = env.step({"robot_0": action})[4]
+        ends.append(infos["robot_0"]["move_end"])
+        if allowed:
+            assert ends[-1] == "ARRIVED"
+            np.testing.assert_allclose(env.view("robot_0").pose, expected, atol=1e-9)
+        elif not ((voxel >= 0) & (voxel < grid.shape)).all():
+            assert ends[-1] == "WALL"
+    assert {"ARRIVED", "WALL"} <= set(ends)
+
+
+def test_masks_rule_out_what_is_believed_covered() -> None:
+    """In the furnished room, some moves into boxes that were seen are masked away."""
+    env = parallel_env("room-furnished", robots=1, action=DISCRETE, decision_period_s=None, max_cycles=150)
+    rng = np.random.default_rng(0)
+    infos = env.reset(seed=0)[1]
+    solid = masked = 0
+    while env.agents:
+        infos = env.step(sampled(env, rng, infos, masked=True))[4]
+        view, world = env.view("robot_0"), env.missions.worlds[0]
+        assert world is not None
+        for move, allowed in zip(view.rules.moves, infos["robot_0"]["action_mask"][::15], strict=True):
+            voxel = view.scenario.grid.voxel_of(view.pose[:3]) + move
+            if ((voxel >= 0) & (voxel < view.scenario.grid.shape)).all() and world.occupied[tuple(voxel)]:
+                solid += 1
+                masked += not allowed
+    assert solid > 20 and masked > solid / 2
+
+
+def test_continuous_actions_have_no_mask() -> None:
+    env = parallel_env(BOX, observation={"action_mask": True})
+    observations, infos = env.reset(seed=0)
+    assert "action_mask" not in infos["robot_0"] and "action_mask" not in observations["robot_0"]
+    env = parallel_env(BOX, action=DISCRETE)
+    observations, infos = env.reset(seed=0)
+    assert "action_mask" in infos["robot_0"] and "action_mask" not in observations["robot_0"]
+
+
+def test_infos_agree_with_views_and_are_plain_python() -> None:
+    env = parallel_env(BOX, robots=3, max_cycles=60)
+    rng = np.random.default_rng(0)
+    kinds = {
+        "deciding": bool,
+        "time_s": float,
+        "entropy_bits": float,
+        "own_bits": float,
+        "received_bits": float,
+    }
+    kinds |= {"move_end": str, "end": str}
+    _, infos = env.reset(seed=0)
+    deciding = set()
+    while env.agents:
+        for agent, info in infos.items():
+            view = env.view(agent)
+            assert {name: type(value) for name, value in info.items()} == kinds
+            assert (info["deciding"], info["time_s"]) == (view.deciding, view.time_s)
+            assert (info["entropy_bits"], info["move_end"]) == (view.entropy_bits, view.move_end.name)
+            assert info["own_bits"] >= 0.0 and info["received_bits"] >= 0.0
+            deciding.add(info["deciding"])
+        actions = {agent: rng.uniform(-1, 1, 5).astype(np.float32) for agent in env.agents}
+        observations, _, _, _, infos = env.step(actions)
+        for agent, observation in observations.items():
+            assert observation["self"][9] == infos[agent]["deciding"]
+    assert deciding == {True, False}

@@ -1,0 +1,435 @@
+"""A team's environment: how it is made, how missions begin and end, rewards, state, views, pictures."""
+
+from __future__ import annotations
+
+import copy
+import math
+import pickle
+from typing import Any
+
+import numpy as np
+import pettingzoo
+import pytest
+from pettingzoo import AECEnv
+
+from entropy_explore_env import (
+    SCENARIOS,
+    ActionError,
+    CallOrderError,
+    EntropyExploreEnv,
+    SettingError,
+    WorldError,
+    env,
+    environment_id,
+    find_scenario,
+    parallel_env,
+    with_settings,
+)
+from entropy_explore_env.envs.conformance import leaves, require_same, snapshot
+
+BOX = "box-7x11x5"
+BOX_VOXELS = 7 * 11 * 5
+QUICK = {"max_cycles": 40}
+
+
+def team_actions(team: EntropyExploreEnv, rng: np.random.Generator) -> dict[str, Any]:
+    space = team.action_space("robot_0")
+    if hasattr(space, "n"):
+        return {agent: int(rng.integers(space.n)) for agent in team.agents}  # type: ignore[attr-defined]
+    return {agent: rng.uniform(-1, 1, space.shape).astype(np.float32) for agent in team.agents}
+
+
+def played(team: EntropyExploreEnv, seed: int = 0) -> list[tuple[Any, ...]]:
+    """What step returned, from reset to the end, under random actions."""
+    rng = np.random.default_rng(seed)
+    results: list[tuple[Any, ...]] = []
+    team.reset(seed=seed)
+    while team.agents:
+        results.append(team.step(team_actions(team, rng)))
+    return results
+
+
+@pytest.mark.parametrize(
+    ("scenario", "name"), [("room", "Room"), ("room-furnished", "RoomFurnished"), (BOX, "Box7x11x5")]
+)
+def test_every_scenario_has_an_id_that_pettingzoo_makes(scenario: str, name: str) -> None:
+    assert environment_id(scenario) == f"entropy_explore_env/{name}-v0"
+    made = pettingzoo.make("parallel", environment_id(scenario), robots=4, channel={"burst": 3})
+    assert isinstance(made, EntropyExploreEnv)
+    assert made.possible_agents == ["robot_0", "robot_1", "robot_2", "robot_3"]
+    expected = with_settings(find_scenario(scenario), {"robots": 4, "channel": {"burst": 3}})
+    assert made.scenario == expected
+    turns = pettingzoo.make("aec", environment_id(scenario), robots=2)
+    assert isinstance(turns, AECEnv)
+    assert turns.possible_agents == ["robot_0", "robot_1"]
+
+
+def test_ids_are_those_of_all_scenarios() -> None:
+    assert len({environment_id(scenario) for scenario in SCENARIOS}) == len(SCENARIOS) == 3
+
+
+def test_made_by_id_or_by_name_or_by_scenario_plays_the_same() -> None:
+    made = pettingzoo.make("parallel", environment_id(BOX), **QUICK)
+    by_name = played(parallel_env(BOX, **QUICK))
+    require_same("id", leaves(by_name), leaves(played(made.unwrapped)))
+    require_same("scenario", leaves(by_name), leaves(played(EntropyExploreEnv(SCENARIOS[BOX], **QUICK))))
+
+
+def test_taking_turns_plays_the_same_as_acting_together() -> None:
+    turns, together = env(BOX, robots=3, **QUICK), parallel_env(BOX, robots=3, **QUICK)
+    turns.reset(seed=7)
+    first = together.reset(seed=7)
+    rng = np.random.default_rng(1)
+    for agent in together.agents:
+        require_same("reset", leaves(first[0][agent]), leaves(turns.observe(agent)))
+    while together.agents:
+        actions = team_actions(together, rng)
+        rewards = together.step(actions)[1]
+        for agent in actions:
+            assert turns.agent_selection == agent
+            turns.step(actions[agent])
+        assert turns.rewards == rewards
+    assert all(turns.truncations.values())
+
+
+def test_the_mission_ends_for_all_robots_together_when_a_map_is_known() -> None:
+    """With σ_end = 10 the threshold is V log2(30 / 10) bits below the start."""
+    team = parallel_env(BOX, robots=3, ending={"sigma_end": 10.0})
+    results = played(team)
+    for _, _, terminations, truncations, infos in results[:-1]:
+        assert not any([*terminations.values(), *truncations.values()])
+        assert {info["end"] for info in infos.values()} == {"RUNNING"}
+    _, _, terminations, truncations, infos = results[-1]
+    assert list(terminations.values()) == [True] * 3
+    assert list(truncations.values()) == [False] * 3
+    assert {info["end"] for info in infos.values()} == {"MAPPED"}
+    threshold = BOX_VOXELS * math.log2(math.sqrt(2 * math.pi * math.e) * 10.0)
+    assert min(info["entropy_bits"] for info in infos.values()) <= threshold
+    assert min(info["entropy_bits"] for info in results[-2][4].values()) > threshold
+    assert team.agents == [] and len(team.possible_agents) == 3
+
+
+def test_all_maps_have_to_pass_the_threshold_where_the_scenario_says_so() -> None:
+    settings = {"robots": 3, "channel": {"burst": 0}}
+    one = played(parallel_env(BOX, ending={"sigma_end": 10.0}, **settings))
+    all_maps = played(parallel_env(BOX, ending={"sigma_end": 10.0, "whose": "all"}, **settings))
+    threshold = BOX_VOXELS * math.log2(math.sqrt(2 * math.pi * math.e) * 10.0)
+    passed = [
+        [info["entropy_bits"] <= threshold for info in results[-1][4].values()] for results in (one, all_maps)
+    ]
+    assert any(passed[0]) and not all(passed[0])
+    assert all(passed[1])
+    require_same("until one ends", leaves(one[:-1]), leaves(all_maps[: len(one) - 1]))
+
+
+@pytest.mark.parametrize(
+    ("settings", "end", "steps"),
+    [({"max_cycles": 7}, "CYCLES_UP", 7), ({"time_limit_s": 12.5}, "TIME_UP", 13)],
+)
+def test_limits_truncate(settings: dict[str, Any], end: str, steps: int) -> None:
+    """Steps last 1 s in the box, so 12.5 s are 13 steps, the last one half as long."""
+    results = played(parallel_env(BOX, **settings))
+    assert len(results) == steps
+    for _, _, terminations, truncations, _ in results[:-1]:
+        assert not any([*terminations.values(), *truncations.values()])
+    _, _, terminations, truncations, infos = results[-1]
+    assert not any(terminations.values()) and all(truncations.values())
+    assert {info["end"] for info in infos.values()} == {end}
+    assert infos["robot_0"]["time_s"] == settings.get("time_limit_s", 7.0)
+
+
+def test_a_step_lasts_one_period_or_until_the_next_robot_decides() -> None:
+    for period in (0.5, 2.0):
+        team = parallel_env(BOX, decision_period_s=period, max_cycles=10)
+        times = [result[4]["robot_0"]["time_s"] for result in played(team)]
+        assert times == [period * n for n in range(1, 11)]
+    for _, _, _, _, infos in played(parallel_env(BOX, robots=3, decision_period_s=None, max_cycles=30)):
+        assert any(info["deciding"] for info in infos.values())
+
+
+@pytest.mark.parametrize("kind", ["individual", "team"])
+def test_rewards_are_bits_gained_as_shares_of_all_bits(kind: str) -> None:
+    """H(0) - H_th is V log2(30 / 0.03): every voxel of the box can be seen."""
+    span = BOX_VOXELS * math.log2(1000.0)
+    team = parallel_env(BOX, robots=3, reward={"kind": kind}, max_cycles=80)
+    before = {agent: info["entropy_bits"] for agent, info in team.reset(seed=0)[1].items()}
+    assert before["robot_0"] == pytest.approx(
+        BOX_VOXELS * math.log2(math.sqrt(2 * math.pi * math.e) * 30), rel=1e-7
+    )
+    received = 0.0
+    for _, rewards, _, _, infos in played(team):
+        gained = {agent: before[agent] - info["entropy_bits"] for agent, info in infos.items()}
+        before = {agent: info["entropy_bits"] for agent, info in infos.items()}
+        for agent, info in infos.items():
+            own = info["own_bits"] if kind == "individual" else sum(gained.values()) / 3
+            assert rewards[agent] == pytest.approx(own / span, rel=1e-6, abs=1e-9)
+            assert gained[agent] == pytest.approx(info["own_bits"] + info["received_bits"], abs=1e-6)
+            received += info["received_bits"]
+    assert received > 0.0
+
+
+@pytest.mark.parametrize("period", [1.0, None])
+def test_team_rewards_add_up_to_the_mean_decrease_of_entropy(period: float | None) -> None:
+    team = parallel_env(
+        BOX, robots=4, reward={"kind": "team"}, decision_period_s=period, ending={"sigma_end": 5.0}
+    )
+    start = [info["entropy_bits"] for info in team.reset(seed=3)[1].values()]
+    results = played(team, seed=3)
+    assert any(results[-1][2].values())
+    end = [info["entropy_bits"] for info in results[-1][4].values()]
+    total = sum(result[1]["robot_0"] for result in results)
+    span = BOX_VOXELS * math.log2(30.0 / 5.0)
+    assert total * span == pytest.approx(np.mean(start) - np.mean(end), rel=1e-7)
+    assert all(len(set(result[1].values())) == 1 for result in results)
+
+
+@pytest.mark.parametrize("kind", ["individual", "team"])
+def test_time_costs_what_the_scenario_says(kind: str) -> None:
+    free = parallel_env(BOX, robots=2, reward={"kind": kind}, decision_period_s=None, **QUICK)
+    costly = parallel_env(
+        BOX, robots=2, reward={"kind": kind, "cost_per_s": 0.01}, decision_period_s=None, **QUICK
+    )
+    before_s = 0.0
+    for with_cost, without in zip(played(costly), played(free), strict=True):
+        time_s = with_cost[4]["robot_0"]["time_s"]
+        for agent in without[1]:
+            cost = without[1][agent] - with_cost[1][agent]
+            assert cost == pytest.approx(0.01 * (time_s - before_s), abs=1e-12)
+        before_s = time_s
+
+
+@pytest.mark.parametrize("flat", [False, True])
+@pytest.mark.parametrize("kind", ["continuous", "discrete"])
+def test_state_is_what_all_robots_observe(flat: bool, kind: str) -> None:
+    observation = {"flat": flat, "patch": True, "overview": True, "action_mask": True}
+    team = parallel_env(BOX, robots=3, observation=observation, action={"kind": kind}, **QUICK)
+    space = team.state_space
+    for result in [team.reset(seed=0), *played(team)][:1] + played(team):
+        pass
+    observations = result[0].values()
+    parts = [list(robot.values()) if isinstance(robot, dict) else [robot] for robot in observations]
+    expected = np.concatenate([part.ravel() for robot in parts for part in robot]).astype(np.float32)
+    assert space.contains(team.state())
+    np.testing.assert_array_equal(team.state(), expected)
+    assert team.state_space is space and team.state() is not team.state()
+
+
+def test_view_is_the_robot_s_own() -> None:
+    team = parallel_env(BOX, robots=3, **QUICK)
+    results = played(team, seed=5)
+    views = {agent: team.view(agent) for agent in team.possible_agents}
+    for number, (agent, view) in enumerate(views.items()):
+        info = results[-1][4][agent]
+        assert (view.robot, view.time_s, view.deciding) == (number, info["time_s"], info["deciding"])
+        assert view.entropy_bits == info["entropy_bits"]
+        assert view.move_end.name == info["move_end"]
+        assert view.mean.shape == view.precision.shape == (7, 11, 5)
+        assert set(view.teammates) == {0, 1, 2} - {number}
+        own = results[-1][0][agent]["self"]
+        np.testing.assert_allclose(own[:3], 2 * view.pose[:3] / [3.5, 5.5, 2.5] - 1, atol=1e-6)
+        np.testing.assert_allclose(own[3:5], [np.cos(view.pose[3]), np.sin(view.pose[3])], atol=1e-6)
+        with pytest.raises(ValueError, match="read-only"):
+            view.mean[0, 0, 0] = 0.0
+    assert len({view.mean.tobytes() for view in views.values()}) == 3
+
+
+def test_view_wants_a_reset_and_a_robot_of_the_team() -> None:
+    team = parallel_env(BOX)
+    with pytest.raises(CallOrderError, match="before reset"):
+        team.view("robot_0")
+    team.reset(seed=0)
+    with pytest.raises(SettingError, match="robot_0, robot_1"):
+        team.view("robot_2")
+
+
+@pytest.mark.parametrize("scenario", SCENARIOS)
+def test_viewpoints_survive_being_written_as_actions(scenario: str) -> None:
+    """Continuous: up to rounding. Discrete: exactly, for centres of voxels and gazes of the set."""
+    rng = np.random.default_rng(0)
+    for kind in ("continuous", "discrete"):
+        team = parallel_env(scenario, robots=1, action={"kind": kind}, decision_period_s=None)
+        team.reset(seed=2)
+        for _ in range(60):
+            view = team.view("robot_0")
+            grid, reach = view.scenario.grid, view.scenario.robot.reach_m
+            aim = view.pose[:3] + rng.uniform(-1, 1, 3) * reach / math.sqrt(3)
+            gaze = [rng.uniform(-math.pi, math.pi), rng.uniform(-math.pi / 2, math.pi / 2)]
+            if kind == "discrete":
+                step = rng.integers(-1, 2, 3) * [1, 1, 0]
+                aim = grid.centre_of(grid.voxel_of(view.pose[:3]) + step)
+                gaze = [rng.integers(-7, 9) * math.pi / 8, rng.integers(-1, 2) * math.pi / 4]
+                if np.linalg.norm(aim - view.pose[:3]) > reach:
+                    continue
+            viewpoint = np.array([*aim, *gaze])
+            team.step({"robot_0": view.action_for(viewpoint)})
+            tolerance = 1e-12 if kind == "discrete" else 4e-7
+            np.testing.assert_allclose(team.view("robot_0").target, viewpoint, atol=tolerance)
+
+
+def test_a_place_beyond_reach_is_pulled_onto_it() -> None:
+    team = parallel_env("room", robots=1)
+    team.reset(seed=0)
+    view = team.view("robot_0")
+    away = np.array([5.0, 5.0, 2.0]) - view.pose[:3]
+    team.step({"robot_0": view.action_for(np.array([5.0, 5.0, 2.0, 0.0, 0.0]))})
+    expected = view.pose[:3] + 0.5 * away / np.linalg.norm(away)
+    np.testing.assert_allclose(team.view("robot_0").target[:3], expected, atol=1e-6)
+
+
+@pytest.mark.parametrize("viewpoint", [np.zeros(4), np.full(5, np.nan), np.array([0, 0, 0, np.inf, 0])])
+def test_a_viewpoint_that_is_none_is_refused(viewpoint: np.ndarray) -> None:
+    team = parallel_env(BOX)
+    team.reset(seed=0)
+    with pytest.raises(ActionError, match="viewpoint"):
+        team.view("robot_0").action_for(viewpoint)
+
+
+def test_reset_without_a_seed_goes_on_to_another_mission_that_the_seed_determines() -> None:
+    first, second = parallel_env("room-furnished", **QUICK), parallel_env("room-furnished", **QUICK)
+    begun = [first.reset(seed=4), first.reset(), first.reset()]
+    second.reset(seed=4)
+    played(second, seed=4)  # however long the mission before took
+    require_same("second mission", leaves(begun[1]), leaves(second.reset()))
+    starts = {tuple(observations["robot_0"]["self"][:3]) for observations, _ in begun}
+    assert len(starts) == 3
+
+
+def test_without_any_seed_missions_differ() -> None:
+    starts = {tuple(parallel_env("room").reset()[0]["robot_0"]["self"]) for _ in range(4)}
+    assert len(starts) == 4
+
+
+@pytest.mark.parametrize("seed", [-1, 0.5, "1", True, [1], math.nan])
+def test_bad_seeds_are_refused_and_change_nothing(seed: Any) -> None:
+    team = parallel_env(BOX)
+    team.reset(seed=0)
+    before = snapshot(team)
+    with pytest.raises(SettingError, match="seed"):
+        team.reset(seed=seed)
+    require_same("bad seed", before, snapshot(team))
+
+
+@pytest.mark.parametrize(
+    ("settings", "field"),
+    [
+        ({"robot": {"max_speed_m_s": 0.0}}, "Robot.max_speed_m_s"),
+        ({"robot": {"speed": 1.0}}, "Robot.speed"),
+        ({"robots": 0}, "Scenario.robots"),
+        ({"robots": 2.0}, "Scenario.robots"),
+        ({"robots": True}, "Scenario.robots"),
+        ({"burst": 3}, "Scenario.burst"),
+        ({"channel": {"burst": -1}}, "Channel.burst"),
+        ({"channel": {"loss_probability": math.nan}}, "Channel.loss_probability"),
+        ({"channel": 3}, "channel"),
+        ({"decision_period_s": 0.0}, "Scenario.decision_period_s"),
+        ({"decision_period_s": math.inf}, "Scenario.decision_period_s"),
+        ({"max_cycles": 0}, "Ending.max_cycles"),
+        ({"time_limit_s": -1.0}, "Ending.time_limit_s"),
+        ({"reward": {"kind": "none"}}, "Reward.kind"),
+        ({"observation": {"flat": 1}}, "Observation.flat"),
+        ({"observation": {"patch_shape": (4, 5, 5)}}, "Observation.patch_shape"),
+        ({"action": {"kind": "discrete"}, "robot": {"reach_m": 0.1}}, "Robot.reach_m"),
+        ({"action": {"kind": "discrete"}, "robot": {"reach_m": math.inf}}, "Action.kind"),
+        ({"world": "nowhere"}, "Scenario.world"),
+        ({"world": "nowhere.bt"}, "nowhere.bt"),
+        ({"render_mode": "ansi"}, "render_mode"),
+        ({"ending": 5, "max_cycles": 3}, "ending"),
+    ],
+)
+def test_bad_settings_are_named_with_their_value_and_what_is_allowed(
+    settings: dict[str, Any], field: str
+) -> None:
+    with pytest.raises(SettingError) as caught:
+        parallel_env(BOX, **settings)
+    assert field in str(caught.value)
+    assert repr(caught.value.value) in str(caught.value) and caught.value.allowed in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("scenario", ["box", "", None, 3, ["room"]])
+def test_unknown_scenarios_are_refused_with_the_known_names(scenario: Any) -> None:
+    with pytest.raises(SettingError, match="room, room-furnished, box-7x11x5"):
+        parallel_env(scenario)
+
+
+def test_errors_survive_the_way_back_from_a_worker() -> None:
+    with pytest.raises(SettingError) as caught:
+        parallel_env(BOX, robots=0)
+    again = pickle.loads(pickle.dumps(caught.value))
+    assert type(again) is SettingError and str(again) == str(caught.value)
+
+
+def test_too_many_robots_are_refused_before_anything_changes() -> None:
+    """Bodies of 1.7 m in a box of 3.5 × 5.5 × 2.5 m: two find room, three do not."""
+    assert len(parallel_env(BOX, robots=1, robot={"body_radius_m": 1.0}).reset(seed=0)[0]) == 1
+    for settings in ({"robots": 12, "robot": {"body_radius_m": 1.0}}, {"robots": BOX_VOXELS + 1}):
+        team = parallel_env(BOX, **settings)
+        before = snapshot(team)
+        with pytest.raises(WorldError, match="robots") as caught:
+            team.reset(seed=0)
+        assert caught.value.value == settings["robots"]
+        require_same("refused reset", before, snapshot(team))
+        assert team.agents == []
+        with pytest.raises(CallOrderError):
+            team.step({})
+
+
+def test_a_body_larger_than_the_world_is_refused() -> None:
+    with pytest.raises(WorldError, match="body"):
+        parallel_env(BOX, robots=1, robot={"body_radius_m": 2.0}).reset(seed=0)
+
+
+def test_state_and_picture_want_a_reset() -> None:
+    team = parallel_env(BOX, render_mode="rgb_array")
+    with pytest.raises(CallOrderError):
+        team.render()
+    with pytest.raises(CallOrderError):
+        team.state()
+
+
+def test_bad_actions_of_robots_that_take_turns_are_refused_at_once() -> None:
+    turns = env(BOX, robots=2)
+    turns.reset(seed=0)
+    with pytest.raises((ActionError, AssertionError)):
+        turns.step(np.full(5, np.nan, np.float32))
+    assert turns.agent_selection == "robot_0"
+
+
+@pytest.mark.parametrize("scenario", SCENARIOS)
+def test_pictures(scenario: str) -> None:
+    team = parallel_env(scenario, robots=2, render_mode="rgb_array", max_cycles=5)
+    silent = parallel_env(scenario, robots=2, max_cycles=5)
+    assert silent.render() is None
+    team.reset(seed=0)
+    first = team.render()
+    assert first is not None and first.shape == (480, 640, 3) and first.dtype == np.uint8
+    require_same("picture or not", leaves(played(silent)), leaves(played(team)))
+    last = team.render()
+    assert last is not None and (first != last).any() and np.ptp(last) > 100
+    team.close()
+    team.close()
+
+
+def test_a_window_shows_every_step() -> None:
+    pygame = pytest.importorskip("pygame")
+    team = parallel_env(BOX, render_mode="human", max_cycles=3)
+    assert len(played(team)) == 3
+    assert team.render() is None
+    assert pygame.display.get_surface().get_size() == (640, 480)
+    team.close()
+    assert pygame.display.get_surface() is None
+    team.reset(seed=0)  # a closed environment can go on
+    team.close()
+
+
+def test_an_environment_with_a_window_can_be_copied() -> None:
+    pytest.importorskip("pygame")
+    team = parallel_env(BOX, render_mode="human", max_cycles=3)
+    team.reset(seed=0)
+    try:
+        copied = copy.deepcopy(team)
+        pickled = pickle.loads(pickle.dumps(team))
+        require_same("copy", snapshot(team), snapshot(copied))
+        require_same("pickle", snapshot(team), snapshot(pickled))
+    finally:
+        team.close()

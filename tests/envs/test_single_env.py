@@ -1,0 +1,175 @@
+"""One robot under Gymnasium: the same mission as a team of one."""
+
+from __future__ import annotations
+
+import copy
+import math
+import pickle
+from typing import Any
+
+import gymnasium
+import numpy as np
+import pytest
+
+from entropy_explore_env import (
+    SCENARIOS,
+    ActionError,
+    CallOrderError,
+    SettingError,
+    SingleRobotEnv,
+    WorldError,
+    environment_id,
+    parallel_env,
+)
+from entropy_explore_env.envs.conformance import leaves, require_same
+
+BOX = "box-7x11x5"
+KINDS = ("continuous", "discrete")
+
+
+def random_actions(env: gymnasium.Env[Any, Any], count: int, seed: int = 0) -> list[Any]:
+    env.action_space.seed(seed)
+    return [env.action_space.sample() for _ in range(count)]
+
+
+@pytest.mark.parametrize("scenario", SCENARIOS)
+def test_gymnasium_makes_a_robot_that_waits_for_nobody(scenario: str) -> None:
+    env = gymnasium.make(environment_id(scenario), max_cycles=20)
+    assert isinstance(env.unwrapped, SingleRobotEnv)
+    assert env.unwrapped.scenario.robots == 1
+    assert env.unwrapped.scenario.decision_period_s is None
+    assert env.reset(seed=0)[1]["deciding"]
+    for action in random_actions(env, 20):
+        *_, truncated, info = env.step(action)
+        assert info["deciding"]
+    assert truncated
+
+
+@pytest.mark.parametrize("period", [None, 1.0])
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("scenario", SCENARIOS)
+def test_plays_the_same_as_a_team_of_one(scenario: str, kind: str, period: float | None) -> None:
+    settings = {
+        "action": {"kind": kind},
+        "decision_period_s": period,
+        "max_cycles": 30,
+        "observation": {"patch": True},
+    }
+    env, team = SingleRobotEnv(scenario, **settings), parallel_env(scenario, robots=1, **settings)
+    for seed in (3, None):
+        expected = [part["robot_0"] for part in team.reset(seed=seed)]
+        require_same("reset", leaves(expected), leaves(list(env.reset(seed=seed))))
+        for action in random_actions(env, 30):
+            expected = [part["robot_0"] for part in team.step({"robot_0": action})]
+            require_same("step", leaves(expected), leaves(list(env.step(action))))
+        assert team.agents == []
+
+
+@pytest.mark.parametrize("robots", [2, 0, None, "1"])
+def test_a_team_is_refused(robots: Any) -> None:
+    with pytest.raises(SettingError, match="robots"):
+        SingleRobotEnv(BOX, robots=robots)
+    with pytest.raises(SettingError, match="robots"):
+        gymnasium.make(environment_id(BOX), robots=robots)
+
+
+def test_calls_in_the_wrong_order_are_refused() -> None:
+    env = SingleRobotEnv(BOX, max_cycles=2)
+    action = np.zeros(5, np.float32)
+    for call in (lambda: env.step(action), env.view):
+        with pytest.raises(CallOrderError, match="before reset"):
+            call()
+    env.reset(seed=0)
+    env.step(action)
+    assert env.step(action)[3] is True
+    with pytest.raises(CallOrderError, match="end"):
+        env.step(action)
+    env.reset()
+    env.step(action)
+
+
+@pytest.mark.parametrize(
+    "action", [np.full(5, np.nan), np.zeros(4), np.zeros(5, int), np.full(5, 1.5), None, "up", 0.0]
+)
+def test_bad_actions_are_refused_and_change_nothing(action: Any) -> None:
+    env = SingleRobotEnv(BOX)
+    env.reset(seed=0)
+    before = leaves(env.missions.state._asdict())
+    with pytest.raises(ActionError, match=r"actions\[robot_0\]"):
+        env.step(action)
+    require_same("bad action", before, leaves(env.missions.state._asdict()))
+
+
+@pytest.mark.parametrize("seed", [-1, 0.5, "1", True, math.nan])
+def test_bad_seeds_are_refused_and_change_nothing(seed: Any) -> None:
+    env = SingleRobotEnv(BOX)
+    env.reset(seed=0)
+    before = leaves(env.missions.state._asdict())
+    with pytest.raises(SettingError, match="seed"):
+        env.reset(seed=seed)
+    require_same("bad seed", before, leaves(env.missions.state._asdict()))
+
+
+def test_no_room_is_refused_before_anything_changes() -> None:
+    env = SingleRobotEnv(BOX, robot={"body_radius_m": 2.0})
+    with pytest.raises(WorldError):
+        env.reset(seed=0)
+    with pytest.raises(CallOrderError):
+        env.step(np.zeros(5, np.float32))
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_copies_in_mid_episode_go_on_alike(kind: str) -> None:
+    env = SingleRobotEnv(BOX, action={"kind": kind}, max_cycles=30, sensor={"range_noise_m": 0.05})
+    env.reset(seed=1)
+    actions = random_actions(env, 30)
+    for action in actions[:12]:
+        env.step(action)
+    copies = [copy.deepcopy(env), pickle.loads(pickle.dumps(env))]
+    rest = leaves([env.step(action) for action in actions[12:]])
+    for copied in copies:
+        require_same("copy", rest, leaves([copied.step(action) for action in actions[12:]]))
+        require_same("next episode", leaves(copy.deepcopy(env).reset()), leaves(copied.reset()))
+
+
+def test_view_matches_what_the_robot_is_told() -> None:
+    env = SingleRobotEnv(BOX)
+    env.reset(seed=0)
+    info = env.step(random_actions(env, 1)[0])[4]
+    view = env.view()
+    assert (view.time_s, view.entropy_bits, view.deciding) == (
+        info["time_s"],
+        info["entropy_bits"],
+        info["deciding"],
+    )
+    assert view.teammates == {}
+
+
+def test_pictures_and_windows() -> None:
+    env = gymnasium.make(environment_id(BOX), render_mode="rgb_array")
+    env.reset(seed=0)
+    picture = env.render()
+    assert isinstance(picture, np.ndarray) and picture.shape == (480, 640, 3) and picture.dtype == np.uint8
+    env.close()
+    pygame = pytest.importorskip("pygame")
+    window = gymnasium.make(environment_id(BOX), render_mode="human")
+    window.reset(seed=0)
+    window.step(window.action_space.sample())
+    assert window.render() is None
+    assert pygame.display.get_surface() is not None
+    window.close()
+    assert pygame.display.get_surface() is None
+
+
+def test_gymnasium_s_wrappers_find_what_they_need() -> None:
+    env = gymnasium.wrappers.RecordEpisodeStatistics(
+        gymnasium.wrappers.FlattenObservation(gymnasium.make(environment_id(BOX), max_cycles=10))
+    )
+    env.reset(seed=0)
+    rewards = []
+    for action in random_actions(env, 10):
+        observation, reward, _, truncated, info = env.step(action)
+        assert env.observation_space.contains(observation)
+        rewards.append(float(reward))
+    assert truncated and info["episode"]["l"] == 10
+    assert info["episode"]["r"] == pytest.approx(sum(rewards))
