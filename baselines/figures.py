@@ -87,7 +87,8 @@ def _slice(figure: Figure, axes: Axes, recorder: Recorder, entropy: bool) -> Non
         axes.plot(*way[-1, :2], marker="s", color=colour, markersize=5, markeredgecolor="white")
     what = "entropy left" if entropy else "coverage (blue: unknown)"
     height = f" at z = {grid.centre_of(np.array([0, 0, layer]))[2]:.2f} m" if not grid.flat else ""
-    axes.set(xlabel="x (m)", ylabel="y (m)", title=f"robot_0's map{height}: {what}")
+    axes.set(xlabel="x (m)", ylabel="y (m)")
+    axes.set_title(f"robot_0's map{height}: {what}", loc="left")
     figure.colorbar(image, ax=axes, shrink=0.7)
 
 

@@ -49,6 +49,10 @@ def test_continuous_actions_hold_a_viewpoint_up_to_rounding(seed, motion, reach_
     if math.isfinite(reach_m):
         way = wanted[:3] - pose[:3]
         wanted[:3] = pose[:3] + way / np.linalg.norm(way) * rng.uniform(0.0, reach_m)
+    else:  # from the centre of the first voxel to that of the last
+        low, half = np.asarray(ODD_GRID.origin_m), 0.5 * ODD_GRID.voxel_size_m
+        axes = slice(0, 2 if planar else 3)
+        wanted[axes] = np.clip(wanted[:3], low + half, low + ODD_GRID.size_m - half)[axes]
     wanted[3] = rng.choice([rng.uniform(-math.pi, math.pi), -math.pi, math.pi, 0.0])
     wanted[4] = 0.0 if planar else rng.choice([rng.uniform(-math.pi / 2, math.pi / 2), math.pi / 2, -math.pi / 2])
     action = encode_viewpoint(rules, pose, wanted)
@@ -86,13 +90,17 @@ def test_a_continuous_action_never_reaches_beyond_the_reach(seed, motion):
     np.testing.assert_allclose(got[:2], expected, atol=1e-6)
 
 
-def test_with_infinite_reach_an_action_is_a_place_in_the_workspace():
-    rules = rules_of(free_box(grid=ODD_GRID, robot={"reach_m": math.inf}))
-    pose = np.array([0.0, 1.0, 3.0, 0.0, 0.0])
-    for box, place in (((-1, -1, -1), (0, 0, 0)), ((1, 1, 1), (1, 1, 1)), ((0, 0.5, -0.5), (0.5, 0.75, 0.25))):
-        got = decode(rules, pose, np.array([*box, 0.5, -0.5]))
-        np.testing.assert_allclose(got[:3], np.asarray(ODD_GRID.origin_m) + np.array(place) * ODD_GRID.size_m)
-        assert got[3:].tolist() == [math.pi / 2, -math.pi / 4]
+def test_with_infinite_reach_an_action_is_a_place_from_the_first_voxel_s_centre_to_the_last_s():
+    for grid in (ODD_GRID, Grid((7, 1, 5), 0.25)):
+        rules = rules_of(free_box(grid=grid, robot={"reach_m": math.inf}))
+        pose = np.array([0.0, 1.0, 3.0, 0.0, 0.0])
+        for box, share in (((-1, -1, -1), (0, 0, 0)), ((1, 1, 1), (1, 1, 1)), ((0, 0.5, -0.5), (0.5, 0.75, 0.25))):
+            got = decode(rules, pose, np.array([*box, 0.5, -0.5]))
+            expected = grid.centre_of(np.array(share) * (np.array(grid.shape) - 1))
+            np.testing.assert_allclose(got[:3], expected)
+            assert got[3:].tolist() == [math.pi / 2, -math.pi / 4]
+            again = decode(rules, pose, encode_viewpoint(rules, pose, got))
+            np.testing.assert_allclose(again[:3], expected, atol=1e-6)
 
 
 @pytest.mark.parametrize("motion", ["free", "planar"])
