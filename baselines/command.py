@@ -33,7 +33,7 @@ def parse(
     """Arguments from the words of a command line.
 
     Args:
-        kind: A dataclass; its fields are the options.
+        kind: A dataclass; its fields, all with defaults, are the options.
         words: What follows the command.
         default: Values for what is not given; None = those of the dataclass.
         description: The first line of the help.
@@ -49,8 +49,8 @@ def parse(
     complaint = io.StringIO()
     try:
         with contextlib.redirect_stderr(complaint):
-            extra = {} if default is None else {"default": default}
-            return tyro.cli(kind, args=list(words), description=description, **extra)
+            start = kind() if default is None else default
+            return tyro.cli(kind, args=list(words), description=description, default=start)
     except SystemExit as stop:
         if stop.code in (0, None):
             raise

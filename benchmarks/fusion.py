@@ -13,7 +13,7 @@ import numpy as np
 from numba import njit
 
 from benchmarks.peers import OctoMapTree
-from benchmarks.rows import Effort, Goal, Row, compared, interleave, seconds
+from benchmarks.rows import Effort, Goal, Row, compared, interleave, timed
 from entropy_explore_env.belief.coverage_map import PRIOR_MEAN, measurement_precision
 from entropy_explore_env.config import Grid, RangeSensor
 from entropy_explore_env.robots.range_sensor import (
@@ -33,7 +33,7 @@ GRIDS = (ROOM.grid, FINE_GRID)
 
 _HIT = int(Return.HIT)
 _FLOOR_SCANS = 8
-_FLOOR_PASSES = 40
+_FLOOR_PASSES = 400
 _STEEPEST_RAD = math.pi / 4
 
 
@@ -207,15 +207,15 @@ def grid_rows(grid: Grid, effort: Effort) -> list[Row]:
     tree.insert(positions, ends)
     taken = interleave(
         {
-            "ours": lambda _: seconds(fusion.fuse),
-            "floor": lambda _: seconds(floor.run),
-            "octomap": lambda _: seconds(lambda: tree.insert(positions, ends)),
+            "ours": lambda _: timed(fusion.fuse),
+            "floor": lambda _: timed(floor.run),
+            "octomap": lambda _: timed(lambda: tree.insert(positions, ends)),
         },
         effort.rounds,
     )
-    rates = {name: [measurements.rays / s for s in taken[name]] for name in ("ours", "octomap")}
-    per_voxel = [1e9 * s / fusion.voxels for s in taken["ours"]]
-    floor_ns = [1e9 * s / floor.voxels for s in taken["floor"]]
+    rates = {name: [measurements.rays / t.cpu_s for t in taken[name]] for name in ("ours", "octomap")}
+    per_voxel = [1e9 * t.cpu_s / fusion.voxels for t in taken["ours"]]
+    floor_ns = [1e9 * t.cpu_s / floor.voxels for t in taken["floor"]]
     where = f"{sensor.rays}-ray scans, voxels of {grid.voxel_size_m:g} m"
     return [
         compared(

@@ -1,7 +1,9 @@
 """A row of the speed table: what we do, what a peer does, and the ratio that is to be reached.
 
 Other work on the machine slows both down. So each job and its peer are measured in turns, round by
-round, and the ratio is the median of the rounds' ratios, not the ratio of the medians.
+round, and the ratio is the median of the rounds' ratios, not the ratio of the medians. What runs on
+one thread is timed by that thread's processor time, which does not run while others have the
+processor; two threads and fresh processes are timed by the wall clock.
 """
 
 from __future__ import annotations
@@ -14,8 +16,26 @@ from dataclasses import dataclass
 
 _COMPARE = {"≥": operator.ge, "≤": operator.le, "<": operator.lt, "=": operator.eq}
 
-Job = Callable[[int], float]
-"""Does its work in round k and returns what was measured."""
+
+
+@dataclass(frozen=True)
+class Taken:
+    """Seconds that some work took: of this thread's processor time, and by the wall clock."""
+
+    cpu_s: float
+    wall_s: float
+
+
+Job = Callable[[int], Taken]
+"""Does its work in round k."""
+
+
+def timed(work: Callable[[], object]) -> Taken:
+    """Do some work and time it."""
+    wall, cpu = time.perf_counter(), time.thread_time()
+    work()
+    cpu_s = time.thread_time() - cpu
+    return Taken(cpu_s, time.perf_counter() - wall)
 
 
 @dataclass(frozen=True)
@@ -77,13 +97,13 @@ class Row:
     holds: bool | None
 
 
-def interleave(jobs: Mapping[str, Job], rounds: int) -> dict[str, list[float]]:
+def interleave(jobs: Mapping[str, Job], rounds: int) -> dict[str, list[Taken]]:
     """Let the jobs take turns: A B A B …
 
     Returns:
-        For each job what it measured in every round.
+        For each job what it took in every round.
     """
-    measured: dict[str, list[float]] = {name: [] for name in jobs}
+    measured: dict[str, list[Taken]] = {name: [] for name in jobs}
     for number in range(rounds):
         for name, job in jobs.items():
             measured[name].append(job(number))
@@ -113,9 +133,3 @@ def alone(job: str, values: Iterable[float], unit: str, goal: Goal) -> Row:
     value = float(statistics.median(values))
     return Row(job, None, value, None, unit, None, goal.text, goal.holds(value))
 
-
-def seconds(work: Callable[[], object]) -> float:
-    """Seconds that some work takes."""
-    started = time.perf_counter()
-    work()
-    return time.perf_counter() - started

@@ -9,7 +9,7 @@ import tempfile
 from pathlib import Path
 
 import entropy_explore_env
-from benchmarks.rows import Effort, Goal, Row, alone, seconds
+from benchmarks.rows import Effort, Goal, Row, alone, timed
 
 _FIRST_STEP = """
 import sys
@@ -36,7 +36,7 @@ def startup_rows(effort: Effort) -> list[Row]:
 
 
 def first_step(cache: str | None = None) -> float:
-    """Seconds that a fresh process takes.
+    """Seconds by the wall clock that a fresh process takes.
 
     Args:
         cache: Folder of compiled code; None = the one that this process uses.
@@ -57,7 +57,7 @@ def first_step(cache: str | None = None) -> float:
             subprocess.run(command, env=environment, capture_output=True, text=True, timeout=_TIMEOUT_S)
         )
 
-    taken = seconds(start)
+    taken = timed(start).wall_s
     if done[0].returncode != 0:
         raise RuntimeError("the first step failed: " + done[0].stderr.strip().splitlines()[-1])
     return taken

@@ -9,15 +9,14 @@ from __future__ import annotations
 import math
 import sys
 import time
-from collections.abc import Callable
-from functools import partial
+from collections.abc import Callable, Sequence
 from types import FrameType
 from typing import Any
 
 import numpy as np
 
 from benchmarks.peers import Spread
-from benchmarks.rows import Effort, Goal, Row, compared, interleave, seconds
+from benchmarks.rows import Effort, Goal, Job, Row, Taken, compared, interleave, timed
 from entropy_explore_env.config import Ending, Scenario, with_settings
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.envs.vector_env import EntropyExploreVectorEnv
@@ -31,6 +30,9 @@ TURNING = with_settings(
 ENDLESS = with_settings(TURNING, {"ending": Ending(sigma_end=1e-3, time_limit_s=math.inf)})
 """The same, but no mission ends while the clock runs."""
 
+LOOPED = 64
+"""Missions of the batch that has goals, and that stands beside a Python loop."""
+
 _FULL_SHARE = 0.99
 """A teammate right before the sensor may leave fewer measurements than a burst holds: 1 % at most."""
 _WARMING_STEPS = 3
@@ -39,8 +41,12 @@ _SINGLES = 8
 
 
 def turns(steps: int, missions: int, seed: int) -> np.ndarray:
-    """(steps, missions, A, 5) float32 actions: no displacement, a random yaw, level."""
-    actions = np.zeros((steps, missions, ROBOTS, 5), np.float32)
+    """Actions: no displacement, a random yaw, level.
+
+    Returns:
+        (warming + steps, missions, A, 5) float32.
+    """
+    actions = np.zeros((_WARMING_STEPS + steps, missions, ROBOTS, 5), np.float32)
     actions[..., 3] = np.random.default_rng(seed).uniform(-1.0, 1.0, actions.shape[:-1])
     return actions
 
@@ -67,26 +73,68 @@ class SingleTeam:
         """Make the environment."""
         self.env = EntropyExploreEnv(scenario)
 
-    def run(self, seed: int, actions: np.ndarray) -> float:
-        """Seconds that the steps of one mission take; its reset is not timed, later ones are.
+    def run(self, seed: int, actions: np.ndarray) -> Taken:
+        """What the steps of one mission take; its reset is not timed, later ones are.
 
         Args:
             seed: Of the mission.
             actions: (steps, A, 5) float32.
         """
-        env = self.env
-        named = [dict(zip(env.possible_agents, row, strict=True)) for row in actions]
+        env, named = self.env, by_agent(actions)
+
+        def go_on() -> None:
+            for action in named[_WARMING_STEPS:]:
+                if not env.agents:
+                    env.reset()
+                env.step(action)
+
         env.reset(seed=seed)
         for action in named[:_WARMING_STEPS]:
             env.step(action)
-        started = time.perf_counter()
-        for action in named[_WARMING_STEPS:]:
-            if not env.agents:
-                env.reset()
-            env.step(action)
-        taken = time.perf_counter() - started
+        taken = timed(go_on)
         check_bursts(env.missions.state.robots, env.scenario.channel.burst)
         return taken
+
+    def run_some(self, seeds: Sequence[int], actions: np.ndarray) -> Taken:
+        """What some missions of a batch take, one after the other.
+
+        Args:
+            seeds: Which of them.
+            actions: (steps, E, A, 5) float32.
+        """
+        taken = [self.run(seed, actions[:, seed]) for seed in seeds]
+        return Taken(sum(t.cpu_s for t in taken), sum(t.wall_s for t in taken))
+
+
+def by_agent(actions: np.ndarray) -> list[dict[str, np.ndarray]]:
+    """Actions (steps, A, 5) of one mission as the dicts that a ParallelEnv takes."""
+    return [dict(zip(TURNING.agents, row, strict=True)) for row in actions]
+
+
+class Fleet:
+    """E ParallelEnvs, stepped one after the other in a Python loop; mission e has seed e."""
+
+    def __init__(self, missions: int) -> None:
+        """Make the environments."""
+        self.envs = [EntropyExploreEnv(ENDLESS) for _ in range(missions)]
+
+    def run(self, actions: np.ndarray) -> Taken:
+        """What the steps take after a reset of all.
+
+        Args:
+            actions: (steps, E, A, 5) float32.
+        """
+        named = list(zip(*(by_agent(actions[:, e]) for e in range(len(self.envs))), strict=True))
+
+        def go_on(steps: list[tuple[dict[str, np.ndarray], ...]]) -> None:
+            for step in steps:
+                for env, action in zip(self.envs, step, strict=True):
+                    env.step(action)
+
+        for seed, env in enumerate(self.envs):
+            env.reset(seed=seed)
+        go_on(named[:_WARMING_STEPS])
+        return timed(lambda: go_on(named[_WARMING_STEPS:]))
 
 
 class Batch:
@@ -97,38 +145,39 @@ class Batch:
         self.missions = missions
         self.env = EntropyExploreVectorEnv(ENDLESS, missions, threads=threads, autoreset_mode="SameStep")
 
-    def run(self, actions: np.ndarray) -> float:
-        """Seconds that the steps take after a reset.
+    def run(self, actions: np.ndarray) -> Taken:
+        """What the steps take after a reset of all.
 
         Args:
             actions: (steps, E, A, 5) float32.
         """
+
+        def go_on(steps: np.ndarray) -> None:
+            for action in steps:
+                self.env.step(action)
+
         self.env.reset(seed=0)
-        for action in actions[:_WARMING_STEPS]:
-            self.env.step(action)
-        started = time.perf_counter()
-        for action in actions[_WARMING_STEPS:]:
-            self.env.step(action)
-        taken = time.perf_counter() - started
+        go_on(actions[:_WARMING_STEPS])
+        taken = timed(lambda: go_on(actions[_WARMING_STEPS:]))
         check_bursts(self.env.missions.state.robots, ENDLESS.channel.burst)
         return taken
 
 
 def spread_rows(effort: Effort) -> list[Row]:
     """Steps a second of the ParallelEnv beside simple_spread."""
-    team, peer = SingleTeam(TURNING), Spread(ROBOTS, seed=0)
+    team, peer, steps = SingleTeam(TURNING), Spread(ROBOTS, seed=0), effort.steps
     peer.run(_WARMING_STEPS)
-
-    def ours(number: int) -> float:
-        return effort.steps / team.run(number, turns(effort.steps + _WARMING_STEPS, 1, number)[:, 0])
-
     taken = interleave(
-        {"ours": ours, "spread": lambda _: effort.steps / seconds(lambda: peer.run(effort.steps))},
+        {
+            "ours": lambda number: team.run(number, turns(steps, 1, number)[:, 0]),
+            "spread": lambda _: timed(lambda: peer.run(steps)),
+        },
         effort.rounds,
     )
+    rates = {name: [steps / t.cpu_s for t in taken[name]] for name in taken}
     job = f"ParallelEnv.step, {ROBOTS} robots × {TURNING.sensor.rays} rays, sharing in each step"
     peer_name = f"mpe2 simple_spread_v3, N = {ROBOTS}"
-    return [compared(job, peer_name, taken["ours"], taken["spread"], "steps/s", Goal("≥", 2.0))]
+    return [compared(job, peer_name, rates["ours"], rates["spread"], "steps/s", Goal("≥", 2.0))]
 
 
 def vector_rows(effort: Effort) -> list[Row]:
@@ -137,44 +186,48 @@ def vector_rows(effort: Effort) -> list[Row]:
 
 
 def batch_rows(missions: int, effort: Effort) -> list[Row]:
-    """Rows of one batch size; with one mission there is nothing for a second thread."""
-    steps = max(effort.batch_steps, effort.steps // missions)
-    single = SingleTeam(ENDLESS)
-    batches = {str(threads): Batch(missions, threads) for threads in ((1, 2) if missions > 1 else (1,))}
+    """Rows of one batch size: beside one ParallelEnv, as many in a Python loop, and two threads."""
+    steps, some = max(effort.batch_steps, effort.steps // missions), min(missions, _SINGLES)
+    single, batch = SingleTeam(ENDLESS), Batch(missions, 1)
+    jobs: dict[str, Job] = {
+        "single": lambda number: single.run_some(
+            [(number * some + i) % missions for i in range(some)], turns(steps, missions, number)
+        ),
+        "batch": lambda number: batch.run(turns(steps, missions, number)),
+    }
+    if missions == LOOPED:
+        fleet = Fleet(missions)
+        jobs["loop"] = lambda number: fleet.run(turns(steps, missions, number))
+    if missions > 1:
+        threaded = Batch(missions, 2)
+        jobs["threaded"] = lambda number: threaded.run(turns(steps, missions, number))
+    taken = interleave(jobs, effort.long_rounds)
 
-    def robot_steps_alone(number: int) -> float:
-        actions = turns(steps + _WARMING_STEPS, missions, number)
-        some = min(missions, _SINGLES)
-        chosen = [(number * some + i) % missions for i in range(some)]
-        return ROBOTS * steps * some / sum(single.run(e, actions[:, e]) for e in chosen)
+    def rates(name: str, wall: bool = False) -> list[float]:
+        work = ROBOTS * steps * (some if name == "single" else missions)
+        return [work / (t.wall_s if wall else t.cpu_s) for t in taken[name]]
 
-    def robot_steps_together(batch: Batch, number: int) -> float:
-        return ROBOTS * steps * missions / batch.run(turns(steps + _WARMING_STEPS, missions, number))
-
-    jobs = {threads: partial(robot_steps_together, batch) for threads, batch in batches.items()}
-    taken = interleave({"single": robot_steps_alone, **jobs}, effort.long_rounds)
-    for batch in batches.values():
-        batch.env.close()
     job = f"VectorEnv.step, {missions} mission{'s' * (missions > 1)} × {ROBOTS} robots"
-    unit = "robot-steps/s"
-    wanted, doubled = (Goal("≥", 1.15), Goal("≥", 1.7)) if missions == 64 else (None, None)
-    rows = [compared(f"{job}, 1 thread", "our ParallelEnv", taken["1"], taken["single"], unit, wanted)]
-    if "2" in taken:
-        rows.append(compared(f"{job}, 2 threads", "1 thread", taken["2"], taken["1"], unit, doubled))
+    unit, wanted = "robot-steps/s", Goal("≥", 1.15) if missions == LOOPED else None
+    rows = [compared(job, "one ParallelEnv, in cache", rates("batch"), rates("single"), unit, wanted)]
+    if "loop" in taken:
+        peer = f"{missions} ParallelEnvs in a Python loop"
+        rows.append(compared(job, peer, rates("batch"), rates("loop"), unit, wanted))
+    if "threaded" in taken:
+        two, one = rates("threaded", wall=True), rates("batch", wall=True)
+        doubled = Goal("≥", 1.7) if missions == LOOPED else None
+        rows.append(compared(f"{job}, 2 threads", "1 thread", two, one, unit, doubled))
     return rows
 
 
 def profile_rows(effort: Effort) -> list[Row]:
     """Where a step's time goes, whether Python works once a mission, and what a belief takes."""
-    many = Batch(max(effort.batches), 1)
-    few = Batch(16, 1)
-    counts = [python_calls(batch) for batch in (many, few)]
-    job = "Python calls in a VectorEnv.step"
+    many, few = Batch(max(effort.batches), 1), Batch(16, 1)
     calls = compared(
-        f"{job}, {many.missions} missions",
+        f"Python calls in a VectorEnv.step, {many.missions} missions",
         f"{few.missions} missions",
-        counts[:1],
-        counts[1:],
+        [python_calls(many)],
+        [python_calls(few)],
         "calls",
         Goal("=", 1.0),
     )
@@ -183,40 +236,49 @@ def profile_rows(effort: Effort) -> list[Row]:
 
 def compiled_share(effort: Effort) -> list[Row]:
     """Microseconds in the compiled call beside those of the whole step."""
-    team, batch = SingleTeam(ENDLESS), Batch(64, 1)
+    team, batch = SingleTeam(ENDLESS), Batch(LOOPED, 1)
+    steps, few = effort.steps, effort.batch_steps
     rows = []
-    for name, env, run in (
-        ("ParallelEnv.step", team.env, lambda n: team.run(n, turns(effort.steps, 1, n)[:, 0])),
-        ("VectorEnv.step, 64 missions", batch.env, lambda n: batch.run(turns(effort.batch_steps, 64, n))),
+    for name, missions, run in (
+        ("ParallelEnv.step", team.env.missions, lambda n: team.run(n, turns(steps, 1, n)[:, 0])),
+        (f"VectorEnv.step, {LOOPED} missions", batch.env.missions, lambda n: batch.run(turns(few, LOOPED, n))),
     ):
         inside, whole = [], []
         for number in range(effort.long_rounds):
-            calls = _Stopwatch(env.missions._step_range)
-            env.missions._step_range = calls  # type: ignore[method-assign]
+            watch = Stopwatch(missions.step)
+            missions.step = watch
             taken = run(number)
-            timed = calls.taken[_WARMING_STEPS:]
-            inside.append(1e6 * sum(timed) / len(timed))
-            whole.append(1e6 * taken / len(timed))
-            del env.missions._step_range
-        rows.append(compared(f"compiled part of {name}", "the whole step", inside, whole, "µs"))
+            del missions.step
+            calls = watch.cpu_s[_WARMING_STEPS:]
+            inside.append(1e6 * sum(calls) / len(calls))
+            whole.append(1e6 * taken.cpu_s / len(calls))
+        rows.append(compared(f"Missions.step, the compiled call of {name}", "the whole step", inside, whole, "µs"))
     return rows
 
 
-class _Stopwatch:
-    """Times every call of a function."""
+class Stopwatch:
+    """Stands in for a function and times every call of it.
+
+    Attributes:
+        cpu_s: Processor time of every call.
+    """
 
     def __init__(self, function: Callable[..., Any]) -> None:
-        self.function, self.taken = function, list[float]()
+        """Stand in for a function."""
+        self.function = function
+        self.cpu_s: list[float] = []
 
-    def __call__(self, *given: object) -> None:
-        started = time.perf_counter()
-        self.function(*given)
-        self.taken.append(time.perf_counter() - started)
+    def __call__(self, *given: object) -> object:
+        """Call the function."""
+        started = time.thread_time()
+        result = self.function(*given)
+        self.cpu_s.append(time.thread_time() - started)
+        return result
 
 
 def python_calls(batch: Batch, steps: int = 5) -> float:
     """Calls of Python and C functions in one step."""
-    actions = turns(steps + _WARMING_STEPS, batch.missions, 0)
+    actions = turns(steps, batch.missions, 0)
     batch.run(actions)
     count = 0
 

@@ -73,9 +73,7 @@ def _single_claims(single: list[Record], name: str, who: str) -> list[Claim]:
         values = [record[field] for record in single]
         mean, low, high = mean_interval(values)
         lowest, highest = small_mean_range(values, PAPER_STARTS)
-        text = (
-            f"{who}: mean {field}; means of {PAPER_STARTS} starts lie in {lowest:,.0f} … {highest:,.0f}"
-        )
+        text = f"{who}: mean {field}; means of {PAPER_STARTS} starts lie in {lowest:,.0f} … {highest:,.0f}"
         claims.append(Claim(f"{name}-{figure}", text, paper, mean, low, high, lowest <= paper <= highest))
     ratios = [record["t_mission_s"] / record["half_s"] for record in single if record["half_s"]]
     median, low, high = median_interval(ratios)
@@ -85,7 +83,8 @@ def _single_claims(single: list[Record], name: str, who: str) -> list[Claim]:
         "ours lie in "
         f"{lowest:.1f} … {highest:.1f}; median"
     )
-    return [*claims, Claim(f"{name}-halves", text, 7.452, median, low, high, bool(lowest <= 7.452 <= highest))]
+    holds = bool(lowest <= 7.452 <= highest)
+    return [*claims, Claim(f"{name}-halves", text, 7.452, median, low, high, holds)]
 
 
 def _team_size_claims(records: Records) -> list[Claim]:

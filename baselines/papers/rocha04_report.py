@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import matplotlib as mpl
 import numpy as np
@@ -26,7 +27,7 @@ from entropy_explore_env.config import Scenario
 from entropy_explore_env.reports.recording import write_atomically
 from entropy_explore_env.scenarios import ROOM
 
-STYLE = {"font.size": 9, "axes.spines.top": False, "axes.spines.right": False}
+STYLE: Any = {"font.size": 9, "axes.spines.top": False, "axes.spines.right": False}
 _PAPER_SINGLE = {"t_mission_s": 2142.0, "half_s": 254.9, "end_s": 1899.5}
 
 
@@ -238,8 +239,9 @@ def _table_1(room: Scenario) -> dict[str, list[object]]:
 
 def _table_2() -> dict[str, list[object]]:
     """Table 2."""
-    sets = [" ".join(map(str, values)) for values in ((1, *TEAMS), BURSTS, I_MINS)]
-    return {"parameter": ["tsz", "burst", "I_min"], "values": sets}
+    names: list[object] = ["tsz", "burst", "I_min"]
+    sets: list[object] = [" ".join(map(str, values)) for values in ((1, *TEAMS), BURSTS, I_MINS)]
+    return {"parameter": names, "values": sets}
 
 
 def _text(records: Records, claims: Sequence[Claim], quick: bool) -> str:

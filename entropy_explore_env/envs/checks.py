@@ -86,7 +86,7 @@ class ActionChecker:
         return boxes, np.zeros((missions, robots), np.int64)
 
     def _number(self, agent: str, action: object) -> int:
-        number = action.item() if isinstance(action, np.ndarray) and action.shape == () else action
+        number: Any = action.item() if isinstance(action, np.ndarray) and action.shape == () else action
         whole = isinstance(number, int | np.integer) and not isinstance(number, bool)
         if not whole or not 0 <= number < self._count:
             raise ActionError(f"actions[{agent}]", action, f"a whole number from 0 to {self._count - 1}")

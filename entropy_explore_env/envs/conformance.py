@@ -18,6 +18,7 @@ import pickle
 import subprocess
 import sys
 from collections.abc import Callable, Iterator, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any
 
@@ -211,19 +212,25 @@ def check_repeatable(task: Task) -> None:
 
 def check_processes(task: Task) -> None:
     """Two fresh processes play the same episodes as this one."""
+    with ThreadPoolExecutor(2) as pool:
+        answers = [pool.submit(_ask_child, task, hash_seed) for hash_seed in ("1", "2")]
+        here = story(play(EntropyExploreEnv(task.scenario), task))
+    for number, answer in enumerate(answers, 1):
+        require_same(f"process {number}", here, answer.result())
+
+
+def _ask_child(task: Task, hash_seed: str) -> Leaves:
+    """The story of the task as a fresh process plays it; it imports from where this one does."""
     path = os.pathsep.join(part or os.curdir for part in sys.path)
-    pipes = dict.fromkeys(("stdin", "stdout", "stderr"), subprocess.PIPE)
-    children = []
-    for hash_seed in ("1", "2"):
-        variables = {**os.environ, "PYTHONPATH": path, "PYTHONHASHSEED": hash_seed}
-        children.append(subprocess.Popen([sys.executable, "-c", _CHILD], env=variables, **pipes))
-    here = story(play(EntropyExploreEnv(task.scenario), task))
-    for number, child in enumerate(children, 1):
-        answer, errors = child.communicate(pickle.dumps((task.scenario, task.seed)))
-        if child.returncode:
-            last = errors.decode(errors="replace").strip().splitlines()[-1:]
-            raise ConformanceError(f"process {number} ended with {child.returncode}: {' '.join(last)}")
-        require_same(f"process {number}", here, pickle.loads(answer))
+    variables = {**os.environ, "PYTHONPATH": path, "PYTHONHASHSEED": hash_seed}
+    question = pickle.dumps((task.scenario, task.seed))
+    child = subprocess.run(
+        [sys.executable, "-c", _CHILD], input=question, capture_output=True, env=variables, check=False
+    )
+    if child.returncode:
+        last = child.stderr.decode(errors="replace").strip().splitlines()[-1:]
+        raise ConformanceError(f"a fresh process ended with {child.returncode}: {' '.join(last)}")
+    return pickle.loads(child.stdout)
 
 
 def answer_parent() -> None:

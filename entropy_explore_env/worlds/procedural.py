@@ -5,11 +5,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from scipy import ndimage
 
 from entropy_explore_env.config import Grid
 from entropy_explore_env.errors import WorldError
-from entropy_explore_env.worlds.world import World
+from entropy_explore_env.worlds.world import World, connected_parts
 
 _ATTEMPTS = 100
 _FURNITURE_SHARE = 0.08
@@ -34,7 +33,7 @@ def furnished(grid: Grid, rng: np.random.Generator) -> World:
     """
     for _ in range(_ATTEMPTS):
         occupied = _boxes(grid, rng)
-        _, parts = ndimage.label(~occupied)
+        _, parts = connected_parts(~occupied)
         if parts == 1 and occupied.any():
             return World(grid, occupied, "furnished")
     raise WorldError("Grid.shape", grid.shape, "a workspace with room for furniture")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
+from typing import cast
 
 import numpy as np
 from scipy import ndimage
@@ -89,7 +90,7 @@ class World:
         if not starts.any():
             allowed = f"a world with room for a body of radius {body_radius_m} m"
             raise WorldError("world", self.name, allowed)
-        labels, _ = ndimage.label(~self.occupied)
+        labels, _ = connected_parts(~self.occupied)
         seen = np.isin(labels, np.unique(labels[starts]))
         if voxels_behind:
             seen |= ndimage.binary_dilation(seen, iterations=voxels_behind) & self.occupied
@@ -121,9 +122,14 @@ def plane_index(scenario: Scenario) -> int | None:
     return int(scenario.robot.sensor_height_m / scenario.grid.voxel_size_m)
 
 
+def connected_parts(room: np.ndarray) -> tuple[np.ndarray, int]:
+    """Face-connected parts of a (X, Y, Z) bool array: their numbers, from 1, by voxel, and how many."""
+    return cast("tuple[np.ndarray, int]", ndimage.label(room))
+
+
 def _largest_component(room: np.ndarray) -> np.ndarray:
     """The largest face-connected part of a (X, Y, Z) bool array."""
-    labels, parts = ndimage.label(room)
+    labels, parts = connected_parts(room)
     if parts <= 1:
         return room
     sizes = np.bincount(labels.ravel())

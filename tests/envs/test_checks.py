@@ -69,8 +69,6 @@ def test_a_number_outside_is_refused_wherever_it_stands(row: int, action: np.nda
         np.zeros((1, 5)),
         np.zeros(5, int),
         np.zeros(5, bool),
-    ]
-    + [
         np.zeros(5, complex),
         np.zeros(5, object),
         [0.0, 0.0, 0.0, 0.0, None],
@@ -96,8 +94,12 @@ def test_what_is_no_number_of_the_set_is_refused(action: Any) -> None:
 
 @pytest.mark.parametrize(
     "actions",
-    [None, {}, [], {"robot_0": np.zeros(5)}, {"robot_0": np.zeros(5), "robot_2": np.zeros(5)}]
-    + [
+    [
+        None,
+        {},
+        [],
+        {"robot_0": np.zeros(5)},
+        {"robot_0": np.zeros(5), "robot_2": np.zeros(5)},
         {f"robot_{n}": np.zeros(5) for n in range(3)},
         {0: np.zeros(5), 1: np.zeros(5)},
         [np.zeros(5)] * 2,
@@ -139,8 +141,10 @@ def test_a_number_outside_is_named_in_a_table(entry: float) -> None:
         np.zeros((2, 4, 5)),
         np.zeros((4, 2, 5), int),
         np.zeros((4, 2, 5), object),
-    ]
-    + [np.zeros((1, 4, 2, 5)), np.zeros(40), [[1.0], [1.0, 2.0]]],
+        np.zeros((1, 4, 2, 5)),
+        np.zeros(40),
+        [[1.0], [1.0, 2.0]],
+    ],
 )
 def test_what_is_no_table_of_boxes_is_refused(table: Any) -> None:
     with pytest.raises(ActionError, match=r"\(4, 2, 5\)"):

@@ -204,9 +204,7 @@ def test_state_is_what_all_robots_observe(flat: bool, kind: str) -> None:
     observation = {"flat": flat, "patch": True, "overview": True, "action_mask": True}
     team = parallel_env(BOX, robots=3, observation=observation, action={"kind": kind}, **QUICK)
     space = team.state_space
-    for result in [team.reset(seed=0), *played(team)][:1] + played(team):
-        pass
-    observations = result[0].values()
+    observations = played(team)[-1][0].values()
     parts = [list(robot.values()) if isinstance(robot, dict) else [robot] for robot in observations]
     expected = np.concatenate([part.ravel() for robot in parts for part in robot]).astype(np.float32)
     assert space.contains(team.state())
@@ -360,7 +358,7 @@ def test_errors_survive_the_way_back_from_a_worker() -> None:
 
 
 def test_too_many_robots_are_refused_before_anything_changes() -> None:
-    """Bodies of 1.7 m in a box of 3.5 × 5.5 × 2.5 m: two find room, three do not."""
+    """Balls of 2 m in a box of 3.5 × 5.5 × 2.5 m: one finds room, twelve do not."""
     assert len(parallel_env(BOX, robots=1, robot={"body_radius_m": 1.0}).reset(seed=0)[0]) == 1
     for settings in ({"robots": 12, "robot": {"body_radius_m": 1.0}}, {"robots": BOX_VOXELS + 1}):
         team = parallel_env(BOX, **settings)
@@ -433,3 +431,25 @@ def test_an_environment_with_a_window_can_be_copied() -> None:
         require_same("pickle", snapshot(team), snapshot(pickled))
     finally:
         team.close()
+
+
+@pytest.mark.parametrize("kind", ["continuous", "discrete"])
+@pytest.mark.parametrize("scenario", SCENARIOS)
+def test_robots_stand_in_free_voxels_of_the_workspace(scenario: str, kind: str) -> None:
+    """Whatever robots try, and where drives end at edges and corners of voxels, too."""
+    team = parallel_env(scenario, robots=2, action={"kind": kind}, decision_period_s=None, max_cycles=800)
+    rng = np.random.default_rng(0)
+    team.reset(seed=0)
+    world, stopped = team.missions.worlds[0], set()
+    assert world is not None
+    while team.agents:
+        infos = team.step(team_actions(team, rng))[4]
+        for agent, info in infos.items():
+            view = team.view(agent)
+            voxel = view.scenario.grid.voxel_of(view.pose[:3])
+            assert ((voxel >= 0) & (voxel < world.grid.shape)).all(), (
+                f"{view.pose} is outside: {info['move_end']}"
+            )
+            assert not world.occupied[tuple(voxel)], f"{view.pose} is in something solid: {info['move_end']}"
+            stopped.add(info["move_end"])
+    assert {"ARRIVED", "WALL"} <= stopped

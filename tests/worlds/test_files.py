@@ -119,7 +119,6 @@ def test_broken_files_are_refused(tmp_path, kind):
     "missing",
     [
         pytest.param(1, marks=pytest.mark.xfail(reason="defect 4: the last byte is not missed")),
-        2,
         40,
         300,
     ],

@@ -1,0 +1,383 @@
+"""The conformance test holds for every scenario, and fails where the contract is broken."""
+
+from __future__ import annotations
+
+import itertools
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from entropy_explore_env import SCENARIOS, EntropyExploreEnv, EntropyExploreVectorEnv, Missions, SettingError
+from entropy_explore_env.config import Grid, with_settings
+from entropy_explore_env.envs import conformance
+from entropy_explore_env.envs.checks import ActionChecker
+from entropy_explore_env.envs.conformance import (
+    ConformanceError,
+    Task,
+    check_conformance,
+    leaves,
+    require_same,
+)
+
+BOX = SCENARIOS["box-7x11x5"]
+PARTS = {"patch": True, "overview": True, "action_mask": True}
+CASES = [
+    pytest.param(scenario, robots, kind, id=f"{scenario}-{robots}-{kind}")
+    for (scenario, robots), kind in zip(
+        itertools.product(SCENARIOS, (1, 2, 5)), itertools.cycle(("continuous", "discrete")), strict=False
+    )
+]
+
+
+@pytest.mark.parametrize(("scenario", "robots", "kind"), CASES)
+def test_scenarios_conform(scenario: str, robots: int, kind: str) -> None:
+    said: list[str] = []
+    check_conformance(
+        scenario,
+        robots=robots,
+        steps=40,
+        seed=robots,
+        action={"kind": kind},
+        observation=PARTS,
+        report=said.append,
+    )
+    assert len(said) == len(conformance.CHECKS) == 9
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        {"decision_period_s": None, "time_limit_s": 25.0, "observation": {"flat": True}},
+        {
+            "channel": {"loss_probability": 0.3, "delay_s": 2.0, "i_min_bits": 0.0},
+            "sensor": {"range_noise_m": 0.1},
+        },
+        {"robots": 9, "robot": {"body_radius_m": 0.24}, "reward": {"kind": "team", "cost_per_s": 0.001}},
+        {"robot": {"motion": "planar", "reach_m": float("inf")}, "channel": {"range_m": 1.5}},
+        {"grid": Grid((9, 6, 1), 0.5), "world": "furnished", "ending": {"sigma_end": 3.0, "whose": "all"}},
+    ],
+)
+def test_scenarios_of_one_s_own_conform(settings: dict[str, Any]) -> None:
+    check_conformance(with_settings(BOX, settings), steps=None if "time_limit_s" in settings else 40, seed=3)
+
+
+def test_bad_settings_are_refused() -> None:
+    with pytest.raises(SettingError, match=r"Scenario\.speed"):
+        check_conformance(BOX, speed=3)
+    with pytest.raises(SettingError, match="seed"):
+        check_conformance(BOX, seed=-1)
+    with pytest.raises(SettingError, match="max_cycles"):
+        check_conformance(BOX, steps=0)
+
+
+def task(kind: str = "continuous", **settings: Any) -> Task:
+    observation = {"observation": {"action_mask": True}}
+    return Task(
+        with_settings(
+            BOX, {"robots": 3, "max_cycles": 30, "action": {"kind": kind}, **observation, **settings}
+        ),
+        0,
+    )
+
+
+def test_every_check_holds_for_the_tasks_below() -> None:
+    for check in conformance.CHECKS:
+        check(task("discrete"))
+        check(task())
+
+
+# Broken environments, and the check that has to find each of them. What is replaced, by what:
+# the first argument of a fault is what was there before.
+
+Fault = Callable[..., Any]
+
+
+def same_arrays(before: Fault, env: EntropyExploreEnv) -> Any:
+    fresh = before(env)
+    kept = env.__dict__.setdefault("kept", fresh)
+    for agent in fresh:
+        for name in fresh[agent]:
+            kept[agent][name][...] = fresh[agent][name]
+    return {agent: dict(kept[agent]) for agent in fresh}
+
+
+def same_dicts(before: Fault, env: EntropyExploreEnv) -> Any:
+    fresh = before(env)
+    kept = env.__dict__.setdefault("kept", fresh)
+    kept.update(fresh)
+    return kept
+
+
+def one_info_for_all(before: Fault, env: EntropyExploreEnv) -> Any:
+    return dict.fromkeys(env.agents, next(iter(before(env).values())))
+
+
+def views_of_the_state(before: Fault, env: EntropyExploreEnv) -> Any:
+    rows = env.missions.observations[0]
+    return {agent: env.missions.layout.split(row) for agent, row in zip(env.agents, rows, strict=True)}
+
+
+def nan_at_the_end(before: Fault, env: EntropyExploreEnv) -> Any:
+    found = before(env)
+    if env.missions.state.missions["cycles"][0] == 30:
+        found["robot_2"]["self"][4] = np.nan
+    return found
+
+
+def float64(before: Fault, env: EntropyExploreEnv) -> Any:
+    return {
+        agent: {name: part.astype(np.float64) for name, part in parts.items()}
+        for agent, parts in before(env).items()
+    }
+
+
+def no_seed(before: Fault, missions: Missions, mission: int, seed: int | None = None) -> None:
+    before(missions, mission, None)
+
+
+def one_seed(before: Fault, missions: Missions, mission: int, seed: int | None = None) -> None:
+    before(missions, mission, 0 if seed is not None else None)
+
+
+def hash_of_text(before: Fault, missions: Missions, mission: int, seed: int | None = None) -> None:
+    before(missions, mission, None if seed is None else seed + hash("a text") % 1000)
+
+
+def number_of_missions(before: Fault, missions: Missions, mission: int, seed: int | None = None) -> None:
+    before(missions, mission, None if seed is None else seed + missions.count)
+
+
+def same_episode_again(before: Fault, missions: Missions, mission: int, seed: int | None = None) -> None:
+    before(missions, mission, missions.seeds[mission] if seed is None else seed)
+
+
+def shared_copy(before: Fault, missions: Missions) -> Any:
+    kept = before(missions)
+    return {**kept, "state": None, "stash": _stash(missions.state)}
+
+
+_STASHED: list[Any] = []
+
+
+def _stash(state: Any) -> int:
+    _STASHED.append(state)
+    return len(_STASHED) - 1
+
+
+def from_stash(before: Fault, missions: Missions, kept: dict[str, Any]) -> None:
+    before(missions, {**kept, "state": _STASHED[kept["stash"]] if "stash" in kept else kept["state"]})
+
+
+def lost_stream(before: Fault, missions: Missions, kept: dict[str, Any]) -> None:
+    before(missions, kept)
+    missions.state.robots["sensor_chance"][:] = 1
+
+
+def busy_robots_listen(before: Fault, missions: Missions, boxes: np.ndarray, numbers: np.ndarray) -> Any:
+    found = before(missions, boxes, numbers)
+    missions.state.robots["reward"] += 1e-9 * (boxes.sum(axis=(1, 2)) + numbers.sum(axis=1))[:, None]
+    return found
+
+
+def steps_before_reset(before: Fault, env: EntropyExploreEnv, actions: Any) -> Any:
+    if env.missions.episodes[0] < 0:
+        return {}, {}, {}, {}, {}
+    return before(env, actions)
+
+
+def counts_before_checking(before: Fault, env: EntropyExploreEnv, actions: Any) -> Any:
+    env.missions.state.missions["letters"] += 1
+    try:
+        found = before(env, actions)
+    finally:
+        pass
+    env.missions.state.missions["letters"] -= 1
+    return found
+
+
+def steps_after_the_end(before: Fault, env: EntropyExploreVectorEnv, actions: Any) -> Any:
+    env.missions.state.missions["end"] = 0
+    return before(env, actions)
+
+
+def clips(before: Fault, checker: ActionChecker, actions: Any) -> Any:
+    limited = [
+        (a, np.clip(x, -1, 1) if isinstance(x, np.ndarray) and x.dtype.kind == "f" else x) for a, x in actions
+    ]
+    return before(checker, limited)
+
+
+def clips_table(before: Fault, checker: ActionChecker, table: Any, *sizes: int) -> Any:
+    return before(
+        checker,
+        np.clip(table, -1, 1) if isinstance(table, np.ndarray) and table.dtype.kind == "f" else table,
+        *sizes,
+    )
+
+
+def names_nobody(before: Fault, checker: ActionChecker, actions: Any) -> Any:
+    return before(checker, [("somebody", action) for _, action in actions])
+
+
+def new_space(before: Fault, env: EntropyExploreEnv, agent: str) -> Any:
+    return env.missions.layout.space()
+
+
+def rewards_of_strangers(before: Fault, env: EntropyExploreEnv, actions: Any) -> Any:
+    found = before(env, actions)
+    return found[0], {**found[1], "robot_9": 0.0}, *found[2:]
+
+
+def infinite_reward(before: Fault, env: EntropyExploreEnv, actions: Any) -> Any:
+    found = before(env, actions)
+    return found[0], dict.fromkeys(found[1], float("inf")), *found[2:]
+
+
+def shuffled_missions(before: Fault, env: EntropyExploreVectorEnv) -> Any:
+    return {name: part[::-1].copy() for name, part in before(env).items()}
+
+
+def same_batch(before: Fault, env: EntropyExploreVectorEnv) -> Any:
+    fresh = before(env)
+    kept = env.__dict__.setdefault("kept", fresh)
+    for name, part in fresh.items():
+        kept[name][...] = part
+    return dict(kept)
+
+
+def threads_matter(before: Fault, missions: Missions, boxes: np.ndarray, numbers: np.ndarray) -> Any:
+    found = before(missions, boxes, numbers)
+    found[-1] += 1e-7 * (missions.threads - 1)
+    return found
+
+
+FAULTS: list[tuple[Any, str, Fault, str, str]] = [
+    (EntropyExploreEnv, "_observations", same_arrays, "check_fresh", "observations"),
+    (EntropyExploreEnv, "_observations", same_dicts, "check_fresh", "observations"),
+    (EntropyExploreEnv, "_infos", same_dicts, "check_fresh", "infos"),
+    (EntropyExploreEnv, "_infos", one_info_for_all, "check_fresh", "same object"),
+    (EntropyExploreEnv, "_observations", views_of_the_state, "check_fresh", "observations"),
+    (EntropyExploreEnv, "_observations", nan_at_the_end, "check_spaces", "step 30"),
+    (EntropyExploreEnv, "_observations", float64, "check_spaces", "step 0"),
+    (EntropyExploreEnv, "observation_space", new_space, "check_spaces", "other objects"),
+    (EntropyExploreEnv, "step", rewards_of_strangers, "check_spaces", "step 1"),
+    (EntropyExploreEnv, "step", infinite_reward, "check_spaces", "inf"),
+    (Missions, "reset", no_seed, "check_repeatable", "step 0"),
+    (Missions, "reset", one_seed, "check_repeatable", "begin alike"),
+    (Missions, "reset", one_seed, "check_batches", "mission 1"),
+    (Missions, "reset", hash_of_text, "check_processes", "process 1"),
+    (Missions, "reset", number_of_missions, "check_batches", "batch of one"),
+    (EntropyExploreVectorEnv, "_observations", shuffled_missions, "check_batches", "observations"),
+    (Missions, "step", threads_matter, "check_batches", "two threads"),
+    (Missions, "__getstate__", shared_copy, "check_copies", "the original"),
+    (Missions, "__setstate__", lost_stream, "check_copies", "pickled copy"),
+    (EntropyExploreVectorEnv, "_observations", same_batch, "check_fresh", "vector call"),
+    (Missions, "step", busy_robots_listen, "check_busy", "other actions"),
+    (EntropyExploreEnv, "step", steps_before_reset, "check_call_order", "step before reset"),
+    (EntropyExploreEnv, "step", counts_before_checking, "check_call_order", "letters"),
+    (EntropyExploreVectorEnv, "step", steps_after_the_end, "check_call_order", "after the end"),
+    (EntropyExploreEnv, "step", counts_before_checking, "check_bad_actions", "letters"),
+    (ActionChecker, "batch", clips, "check_bad_actions", "accepted"),
+    (ActionChecker, "table", clips_table, "check_bad_actions", "vector"),
+    (ActionChecker, "batch", names_nobody, "check_bad_actions", "not named"),
+]
+
+
+@pytest.mark.parametrize(
+    ("place", "name", "fault", "check", "said"), FAULTS, ids=lambda value: getattr(value, "__name__", None)
+)
+def test_faults_are_found(
+    monkeypatch: pytest.MonkeyPatch, place: Any, name: str, fault: Fault, check: str, said: str
+) -> None:
+    if fault is shared_copy:
+        monkeypatch.setattr(Missions, "__setstate__", _wrapped(from_stash, Missions.__setstate__))
+    monkeypatch.setattr(place, name, _wrapped(fault, getattr(place, name)))
+    noise = {"sensor": {"range_noise_m": 0.05}} if fault is lost_stream else {}
+    with pytest.raises(ConformanceError) as caught:
+        getattr(conformance, check)(task(**noise))
+    assert said in str(caught.value)
+
+
+def _wrapped(fault: Fault, before: Fault) -> Fault:
+    return lambda *given, **named: fault(before, *given, **named)
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "where"),
+    [
+        ({"a": 1.0}, {"a": np.nextafter(1.0, 2.0)}, "a"),
+        ({"a": 1.0}, {"a": 1}, "a"),
+        ({"a": 0.0}, {"a": -0.0}, "a"),
+        ({"a": True}, {"a": 1}, "a"),
+        ({"a": 1, "b": 2}, {"b": 2, "a": 1}, "another order"),
+        ({"a": 1}, {"a": 1, "b": None}, "b: nothing"),
+        ([1, [2, {"c": 3}]], [1, [2, {"c": 4}]], "1 › 1 › c: int 3, then int 4"),
+        (np.zeros((2, 3)), np.zeros((3, 2)), "(2, 3)"),
+        (np.zeros(3, np.float32), np.zeros(3), "<f4"),
+        (np.array([[0, 1], [2, 3]]), np.array([[0, 1], [9, 3]]), "at (1, 0) np.int64(2), then np.int64(9)"),
+        (np.array([0.0, 0.0]), np.array([0.0, -0.0]), "at (1,)"),
+        (np.array([{"a": 1}, None]), np.array([{"a": 2}, None]), "0 › a"),
+        ((1, 2), [1, 2], "tuple, then list"),
+    ],
+)
+def test_differences_are_found_and_named(first: object, second: object, where: str) -> None:
+    with pytest.raises(ConformanceError) as caught:
+        require_same("what", leaves(first), leaves(second))
+    assert where in str(caught.value)
+
+
+def test_nan_is_the_same_as_nan_and_bytes_between_fields_mean_nothing() -> None:
+    kind = np.dtype([("a", "?"), ("b", "f8")], align=True)
+    first, second = np.zeros(2, kind), np.full(16 * 2, 255, np.uint8).view(kind)
+    second["a"], second["b"] = first["a"], first["b"]
+    require_same("padding", leaves(first), leaves(second))
+    require_same("NaN", leaves([np.nan, np.array([np.nan])]), leaves([np.nan, np.array([np.nan])]))
+
+
+def command(*arguments: str) -> subprocess.CompletedProcess[str]:
+    path = os.pathsep.join(part or os.curdir for part in sys.path)
+    return subprocess.run(
+        [sys.executable, "-m", "entropy_explore_env.envs.conformance", *arguments],
+        capture_output=True,
+        text=True,
+        env={**os.environ, "PYTHONPATH": path},
+        check=False,
+    )
+
+
+def test_the_command_says_what_it_checked() -> None:
+    done = command("box-7x11x5", "--robots", "2", "--steps", "12", "--seed", "5")
+    assert done.returncode == 0, done.stdout + done.stderr
+    lines = done.stdout.splitlines()
+    assert [line.split(":")[0] for line in lines] == [check.__name__ for check in conformance.CHECKS]
+    assert not done.stderr
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [("nowhere",), ("room", "--robots", "0"), ("room", "--steps", "0"), ("room", "--seed", "-1"), ()],
+)
+def test_the_command_refuses_bad_input_in_words(
+    arguments: tuple[str, ...], capsys: pytest.CaptureFixture[str]
+) -> None:
+    try:
+        status = conformance.main(list(arguments))
+    except SystemExit as leaving:  # argparse, for a missing argument
+        status = leaving.code
+    assert status == 2
+    said = capsys.readouterr()
+    assert not said.out and said.err.strip()
+    assert "Traceback" not in said.err
+
+
+def test_the_command_fails_where_the_contract_is_broken(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(Missions, "reset", _wrapped(no_seed, Missions.reset))
+    assert conformance.main(["box-7x11x5", "--steps", "5"]) == 1
+    assert "does not hold: check_repeatable" in capsys.readouterr().out

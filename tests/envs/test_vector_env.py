@@ -1,0 +1,385 @@
+"""Many missions at once: as Gymnasium's own vector environment would play them, in every autoreset mode."""
+
+from __future__ import annotations
+
+import copy
+import pickle
+from typing import Any
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.vector import AutoresetMode, SyncVectorEnv
+from gymnasium.vector.utils import batch_space
+
+from entropy_explore_env import (
+    SCENARIOS,
+    ActionError,
+    CallOrderError,
+    EntropyExploreVectorEnv,
+    SettingError,
+    SingleRobotEnv,
+    WorldError,
+    environment_id,
+    parallel_env,
+)
+from entropy_explore_env.envs.conformance import leaves, require_apart, require_same, snapshot
+
+BOX = "box-7x11x5"
+KINDS = ("continuous", "discrete")
+UNEVEN: dict[str, Any] = {"decision_period_s": None, "time_limit_s": 20.0}
+"""Steps last as long as drives do, so that missions end at different steps."""
+ROBOT_INFOS = ("deciding", "entropy_bits", "own_bits", "received_bits", "reward_robots")
+
+
+def some_actions(env: EntropyExploreVectorEnv, steps: int, seed: int = 0) -> list[Any]:
+    env.action_space.seed(seed)
+    return [env.action_space.sample() for _ in range(steps)]
+
+
+def parts_of(observations: Any) -> dict[str, np.ndarray]:
+    return observations if isinstance(observations, dict) else {"flat": observations}
+
+
+@pytest.mark.parametrize("scenario", SCENARIOS)
+def test_gymnasium_makes_many_missions_by_id(scenario: str) -> None:
+    env = gymnasium.make_vec(environment_id(scenario), num_envs=6, max_cycles=9)
+    assert isinstance(env, EntropyExploreVectorEnv)
+    assert env.num_envs == 6 and env.spec is not None and env.spec.id == environment_id(scenario)
+    assert env.metadata["autoreset_mode"] is AutoresetMode.NEXT_STEP
+    single = gymnasium.make(environment_id(scenario))
+    assert env.single_observation_space == single.observation_space
+    assert env.single_action_space == single.action_space
+    assert env.action_space == batch_space(single.action_space, 6)
+    assert env.observation_space == batch_space(single.observation_space, 6)
+    assert env.observation_space.contains(env.reset(seed=0)[0])
+    env.close()
+    env.close()
+
+
+@pytest.mark.parametrize("mode", [*AutoresetMode, *(mode.value for mode in AutoresetMode)])
+def test_metadata_name_the_autoreset_mode(mode: AutoresetMode | str) -> None:
+    env = gymnasium.make_vec(environment_id(BOX), num_envs=2, autoreset_mode=mode)
+    assert env.metadata["autoreset_mode"] is AutoresetMode(mode)
+    default = EntropyExploreVectorEnv(BOX, 2)
+    assert default.metadata["autoreset_mode"] is AutoresetMode.NEXT_STEP
+
+
+@pytest.mark.parametrize("flat", [False, True])
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("mode", [AutoresetMode.NEXT_STEP, AutoresetMode.SAME_STEP])
+def test_plays_as_gymnasium_s_own_vector_environment_does(mode: AutoresetMode, kind: str, flat: bool) -> None:
+    """Seeds, observations, rewards, ends, final observations: the same bits, over several episodes."""
+    settings = {"action": {"kind": kind}, "observation": {"flat": flat, "action_mask": True}, **UNEVEN}
+    ours = EntropyExploreVectorEnv(BOX, 5, robots=1, threads=2, autoreset_mode=mode, **settings)
+    theirs = SyncVectorEnv([lambda: SingleRobotEnv(BOX, **settings)] * 5, autoreset_mode=mode)
+    first, reference = ours.reset(seed=11), theirs.reset(seed=11)
+    require_same("reset", leaves(dict(parts_of(reference[0]))), leaves(dict(parts_of(first[0]))))
+    ends = []
+    for step, actions in enumerate(some_actions(ours, 60)):
+        found, expected = ours.step(actions), theirs.step(actions)
+        for mine, other in zip(found[:4], expected[:4], strict=True):
+            mine, other = (dict(x) if isinstance(x, dict) else x for x in (mine, other))
+            require_same(f"step {step}", leaves(other), leaves(mine))
+        assert_infos_agree(expected[4], found[4])
+        ends.append(found[2] | found[3])
+    assert 3 <= np.sum(ends, axis=0).min()
+    assert any(0 < sum(row) < 5 for row in ends)
+
+
+def assert_infos_agree(expected: dict[str, Any], found: dict[str, Any]) -> None:
+    """Ours have an axis for robots; what one robot is told is the same."""
+    assert found["_time_s"].dtype == np.bool_ and found["_time_s"].all()
+    np.testing.assert_array_equal(found["time_s"], expected["time_s"])
+    for name in ("deciding", "entropy_bits", "own_bits", "received_bits"):
+        np.testing.assert_array_equal(found[name][:, 0], expected[name])
+    assert ("final_obs" in found) == ("final_obs" in expected)
+    if "final_obs" in expected:
+        mask = expected["_final_obs"]
+        np.testing.assert_array_equal(found["_final_obs"], mask)
+        np.testing.assert_array_equal(found["_final_info"], mask)
+        for mine, other in zip(found["final_obs"], expected["final_obs"], strict=True):
+            assert (mine is None) == (other is None)
+            if other is not None:
+                require_same("final_obs", leaves(other), leaves(mine))
+        for name in ("time_s", "entropy_bits"):
+            mine = found["final_info"][name].reshape(len(mask))
+            np.testing.assert_array_equal(mine[mask], expected["final_info"][name][mask])
+            np.testing.assert_array_equal(found["final_info"][f"_{name}"], mask)
+
+
+@pytest.mark.parametrize("robots", [1, 3])
+def test_the_step_after_the_end_starts_a_mission_and_ignores_its_actions(robots: int) -> None:
+    envs = [EntropyExploreVectorEnv(BOX, 4, robots=robots, **UNEVEN) for _ in range(2)]
+    begun = [env.reset(seed=2) for env in envs]
+    over = np.zeros(4, bool)
+    restarts = 0
+    for actions in some_actions(envs[0], 40):
+        other = actions.copy()
+        other[over] *= -0.5
+        results = [env.step(given) for env, given in zip(envs, (actions, other), strict=True)]
+        require_same("other actions", leaves(results[0]), leaves(results[1]))
+        _, rewards, terminations, truncations, infos = results[0]
+        if over.any():
+            restarts += 1
+            assert not rewards[over].any() and not infos["reward_robots"][over].any()
+            assert not (terminations | truncations)[over].any()
+            assert not infos["time_s"][over].any() and infos["deciding"][over].all()
+            np.testing.assert_array_equal(infos["entropy_bits"][over], begun[0][1]["entropy_bits"][over])
+        assert rewards[~over].all()
+        over = terminations | truncations
+    assert restarts >= 3
+
+
+def test_the_same_step_starts_the_next_mission_and_keeps_what_came_last() -> None:
+    same = EntropyExploreVectorEnv(BOX, 4, robots=2, autoreset_mode="SameStep", **UNEVEN)
+    later = EntropyExploreVectorEnv(BOX, 4, robots=2, **UNEVEN)
+    same.reset(seed=0)
+    later.reset(seed=0)
+    ended = 0
+    returned: dict[str, Any] = {}
+    for step, actions in enumerate(some_actions(same, 80)):
+        found = returned[f"step {step}"] = same.step(actions)
+        if not ended:
+            expected = later.step(actions)
+        over = found[2] | found[3]
+        if not over.any():
+            assert "final_obs" not in found[4] and "final_info" not in found[4]
+            continue
+        if not ended:  # from here on the two modes drift apart
+            require_same("rewards and ends", leaves(expected[1:4]), leaves(found[1:4]))
+            for e in np.flatnonzero(over):
+                last = {name: part[e] for name, part in expected[0].items()}
+                require_same("final_obs", leaves(last), leaves(found[4]["final_obs"][e]))
+                for name in ("time_s", "end", *ROBOT_INFOS):
+                    np.testing.assert_array_equal(expected[4][name][e], found[4]["final_info"][name][e])
+            following = later.step(actions)
+            for name, part in following[0].items():
+                np.testing.assert_array_equal(part[over], found[0][name][over])
+        ended += int(over.sum())
+        assert [observation is not None for observation in found[4]["final_obs"]] == over.tolist()
+        assert not found[4]["time_s"][over].any() and (found[4]["final_info"]["time_s"][over] == 20.0).all()
+        np.testing.assert_array_equal(found[1], found[4]["reward_robots"].mean(axis=1))
+        for observation in found[4]["final_obs"][over]:
+            assert same.single_observation_space.contains(observation)
+    assert ended > 8
+    require_apart(returned)
+
+
+def test_without_autoreset_missions_wait_for_a_reset_mask() -> None:
+    env = EntropyExploreVectorEnv(BOX, 4, robots=2, autoreset_mode=AutoresetMode.DISABLED, **UNEVEN)
+    env.reset(seed=0)
+    alone = [parallel_env(BOX, robots=2, **UNEVEN) for _ in range(4)]
+    for mission, team in enumerate(alone):
+        team.reset(seed=mission)
+    resets = 0
+    for actions in some_actions(env, 40):
+        _, rewards, terminations, truncations, _ = env.step(actions)
+        for mission, team in enumerate(alone):
+            expected = team.step(dict(zip(team.agents, actions[mission], strict=True)))
+            assert rewards[mission] == pytest.approx(np.mean(list(expected[1].values())), rel=1e-12)
+            assert terminations[mission] == all(expected[2].values())
+            assert truncations[mission] == all(expected[3].values())
+        over = terminations | truncations
+        if over.any():
+            before = snapshot(env)
+            with pytest.raises(CallOrderError, match=str(int(np.flatnonzero(over)[0]))):
+                env.step(actions)
+            require_same("refused", before, snapshot(env))
+            was = {name: part.copy() for name, part in env.missions.state._asdict().items()}
+            observations, _ = env.reset(options={"reset_mask": over})
+            resets += 1
+            for name, part in env.missions.state._asdict().items():
+                require_same(f"not reset › {name}", leaves(was[name][~over]), leaves(part[~over]))
+            for mission in np.flatnonzero(over):
+                expected, _ = alone[mission].reset()
+                for name, part in observations.items():
+                    row = np.stack([observation[name] for observation in expected.values()])
+                    np.testing.assert_array_equal(part[mission], row)
+    assert resets >= 4
+
+
+def test_a_reset_mask_takes_seeds_for_its_missions_alone() -> None:
+    env = EntropyExploreVectorEnv(BOX, 3)
+    first = env.reset(seed=[5, 6, 7])[0]
+    env.step(some_actions(env, 1)[0])
+    again = env.reset(seed=[7, None, None], options={"reset_mask": np.array([True, False, False])})[0]
+    np.testing.assert_array_equal(again["self"][0], first["self"][2])
+    assert (again["self"][1] != first["self"][1]).any()
+    assert env.missions.seeds == [7, 6, 7] and env.missions.episodes == [0, 0, 0]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_team_has_an_axis_of_its_own(kind: str) -> None:
+    env = EntropyExploreVectorEnv(BOX, 3, robots=4, action={"kind": kind}, observation={"action_mask": True})
+    observations, infos = env.reset(seed=0)
+    team = parallel_env(BOX, robots=4, action={"kind": kind}, observation={"action_mask": True})
+    space = team.observation_space("robot_0")
+    assert isinstance(space, gymnasium.spaces.Dict)
+    for name, part in space.items():
+        assert observations[name].shape == (3, 4, *(part.shape or ()))
+        assert observations[name].dtype == part.dtype
+    actions = some_actions(env, 1)[0]
+    assert actions.shape == ((3, 4) if kind == "discrete" else (3, 4, 5))
+    observations, rewards, terminations, truncations, infos = env.step(actions)
+    assert env.observation_space.contains(observations)
+    assert (rewards.shape, rewards.dtype) == ((3,), np.float64)
+    assert terminations.shape == truncations.shape == (3,)
+    assert terminations.dtype == truncations.dtype == np.bool_
+    np.testing.assert_allclose(rewards, infos["reward_robots"].mean(axis=1), rtol=1e-15)
+    for name in ROBOT_INFOS:
+        assert infos[name].shape == (3, 4), name
+    for name in ("time_s", "end"):
+        assert infos[name].shape == (3,), name
+    masks = {name: value for name, value in infos.items() if name.startswith("_")}
+    assert set(masks) == {f"_{name}" for name in infos if not name.startswith("_")}
+    assert all(mask.dtype == np.bool_ and mask.shape == (3,) and mask.all() for mask in masks.values())
+
+
+@pytest.mark.parametrize("robots", [1, 3])
+def test_infos_hold_the_masks_of_discrete_actions(robots: int) -> None:
+    settings = {"action": {"kind": "discrete"}, "observation": {"action_mask": True}}
+    env = EntropyExploreVectorEnv(BOX, 2, robots=robots, **settings)
+    observations, infos = env.reset(seed=0)
+    mask = infos["action_mask"]
+    assert mask.dtype == np.int8
+    np.testing.assert_array_equal(mask.reshape(-1), observations["action_mask"].reshape(-1))
+
+
+@pytest.mark.parametrize("threads", [2, 3, None])
+def test_threads_make_no_difference(threads: int | None) -> None:
+    settings = {"robots": 2, "channel": {"loss_probability": 0.3, "i_min_bits": 0.0}, **UNEVEN}
+    one = EntropyExploreVectorEnv(BOX, 9, threads=1, **settings)
+    more = EntropyExploreVectorEnv(BOX, 9, threads=threads, **settings)
+    require_same("reset", leaves(one.reset(seed=0)), leaves(more.reset(seed=0)))
+    for step, actions in enumerate(some_actions(one, 30)):
+        require_same(f"step {step}", leaves(one.step(actions)), leaves(more.step(actions)))
+    more.close()
+    require_same("closed", leaves(one.step(actions)), leaves(more.step(actions)))
+    more.close()
+
+
+@pytest.mark.parametrize("robots", [2, 9])
+def test_missions_do_not_depend_on_how_many_there_are(robots: int) -> None:
+    many, one = (EntropyExploreVectorEnv(BOX, count, robots=robots) for count in (7, 1))
+    many.reset(seed=0)
+    one.reset(seed=4)
+    for actions in some_actions(many, 25):
+        found, alone = many.step(actions), one.step(actions[4:5])
+        for name, part in found[0].items():
+            np.testing.assert_array_equal(part[4:5], alone[0][name])
+        for whole, single in zip(found[1:4], alone[1:4], strict=True):
+            require_same("rewards and ends", leaves(single), leaves(whole[4:5]))
+
+
+def test_copies_in_mid_episode_go_on_alike_and_apart() -> None:
+    env = EntropyExploreVectorEnv(BOX, 4, threads=2, channel={"delay_s": 3.0, "i_min_bits": 0.0}, **UNEVEN)
+    env.reset(seed=0)
+    actions = some_actions(env, 40)
+    for given in actions[:12]:
+        env.step(given)
+    copies = [copy.deepcopy(env), pickle.loads(pickle.dumps(env))]
+    rest = leaves([env.step(given) for given in actions[12:]])
+    for copied in copies:
+        require_same("copy", rest, leaves([copied.step(given) for given in actions[12:]]))
+        copied.close()
+    env.close()
+
+
+@pytest.mark.parametrize(
+    "seed", [[1, 2], [1, -1], -1, 0.5, "12", True, [0, True], [0, 0.5], np.array([0.0, 1.0])]
+)
+def test_bad_seeds_are_refused_and_change_nothing(seed: Any) -> None:
+    env = EntropyExploreVectorEnv(BOX, 2 if seed != [1, 2] else 3)
+    env.reset(seed=0)
+    before = snapshot(env)
+    with pytest.raises(SettingError, match="seed"):
+        env.reset(seed=seed)
+    require_same("bad seed", before, snapshot(env))
+
+
+@pytest.mark.parametrize(
+    "mask", [None, [1, 0], np.array([True]), np.zeros(2, bool), np.ones((2, 1), bool), "10"]
+)
+def test_bad_reset_masks_are_refused_and_change_nothing(mask: Any) -> None:
+    env = EntropyExploreVectorEnv(BOX, 2)
+    env.reset(seed=0)
+    before = snapshot(env)
+    with pytest.raises(SettingError, match="reset_mask"):
+        env.reset(options={"reset_mask": mask})
+    require_same("bad mask", before, snapshot(env))
+
+
+@pytest.mark.parametrize(
+    "settings", [{"num_envs": 0}, {"num_envs": 2.0}, {"threads": 0}, {"autoreset_mode": "never"}]
+)
+def test_bad_settings_are_named(settings: dict[str, Any]) -> None:
+    with pytest.raises(SettingError) as caught:
+        EntropyExploreVectorEnv(BOX, **settings)
+    assert next(iter(settings)) in str(caught.value)
+    with pytest.raises(SettingError, match=r"Scenario\.speed"):
+        gymnasium.make_vec(environment_id(BOX), num_envs=2, speed=3)
+
+
+def test_calls_before_reset_are_refused() -> None:
+    env = EntropyExploreVectorEnv(BOX, 2, render_mode="rgb_array")
+    actions = some_actions(env, 1)[0]
+    with pytest.raises(CallOrderError, match="before reset"):
+        env.step(actions)
+    env.reset(seed=0, options={"reset_mask": np.array([True, False])})
+    with pytest.raises(CallOrderError, match="before reset"):
+        env.step(actions)
+    env.reset(seed=0)
+    env.step(actions)
+
+
+def test_too_many_robots_are_refused_before_anything_changes() -> None:
+    env = EntropyExploreVectorEnv(BOX, 2, robots=7 * 11 * 5 + 1)
+    before = snapshot(env)
+    with pytest.raises(WorldError, match="robots"):
+        env.reset(seed=0)
+    require_same("refused", before, snapshot(env))
+
+
+@pytest.mark.parametrize("spoil", [np.nan, np.inf, 1.01])
+def test_bad_actions_are_refused_and_change_nothing(spoil: float) -> None:
+    env = EntropyExploreVectorEnv(BOX, 3, threads=2)
+    env.reset(seed=0)
+    actions = some_actions(env, 1)[0]
+    actions[2, 1, 4] = spoil
+    before = snapshot(env)
+    with pytest.raises(ActionError, match="actions"):
+        env.step(actions)
+    require_same("bad actions", before, snapshot(env))
+
+
+@pytest.mark.parametrize("mode", [AutoresetMode.NEXT_STEP, AutoresetMode.SAME_STEP])
+def test_gymnasium_s_vector_wrappers_count_episodes(mode: AutoresetMode) -> None:
+    env = gymnasium.make_vec(environment_id(BOX), num_envs=3, autoreset_mode=mode, max_cycles=5)
+    counted = gymnasium.wrappers.vector.RecordEpisodeStatistics(env)
+    counted.reset(seed=0)
+    total, lengths = np.zeros(3), []
+    for actions in some_actions(env, 17):  # type: ignore[arg-type]
+        _, rewards, terminations, truncations, infos = counted.step(actions)
+        total += rewards
+        if (terminations | truncations).any():
+            np.testing.assert_allclose(infos["episode"]["r"], total)
+            lengths.append(infos["episode"]["l"].tolist())
+            total[:] = 0.0
+    assert lengths == [[5, 5, 5]] * (2 if mode is AutoresetMode.NEXT_STEP else 3)
+
+
+def test_pictures_and_windows_show_the_first_mission() -> None:
+    env = gymnasium.make_vec(environment_id(BOX), num_envs=2, render_mode="rgb_array")
+    alone = gymnasium.make(environment_id(BOX), render_mode="rgb_array")
+    env.reset(seed=0)
+    alone.reset(seed=0)
+    picture = env.render()
+    assert isinstance(picture, np.ndarray) and picture.shape == (480, 640, 3) and picture.dtype == np.uint8
+    np.testing.assert_array_equal(picture, alone.render())  # type: ignore[arg-type]
+    pygame = pytest.importorskip("pygame")
+    window = EntropyExploreVectorEnv(BOX, 2, render_mode="human")
+    window.reset(seed=0)
+    assert window.render() is None and pygame.display.get_surface() is not None
+    window.close()
+    assert pygame.display.get_surface() is None
