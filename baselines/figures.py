@@ -10,7 +10,6 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from entropy_explore_env.config import Grid
-from entropy_explore_env.missions.missions import Missions
 from entropy_explore_env.reports.glyphs import robot_colour
 from entropy_explore_env.reports.painting import entropy_share
 from entropy_explore_env.reports.recording import Recorder
@@ -37,7 +36,7 @@ def mission_picture(recorder: Recorder, title: str, strategy: str) -> bytes:
     Returns:
         A PNG file.
     """
-    missions: Missions = recorder.missions
+    missions = recorder.missions
     robots = missions.scenario.robots
     with mpl.rc_context({"font.size": 9, "axes.spines.top": False, "axes.spines.right": False}):
         figure = Figure(figsize=(11, 7.2), layout="constrained")

@@ -24,11 +24,11 @@ from baselines.strategies import make_strategy
 from entropy_explore_env.config import Channel, Ending, RangeSensor, Robot, Scenario, with_settings
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.errors import SettingError
+from entropy_explore_env.reports.animation import animate
 from entropy_explore_env.reports.metrics import mission_figures
 from entropy_explore_env.reports.painting import Painter, remaining_share
 from entropy_explore_env.reports.recording import Recorder, write_atomically
-from entropy_explore_env.reports.rendering import animate
-from entropy_explore_env.scenarios import find_scenario
+from entropy_explore_env.scenarios import ROOM, SCENARIOS, find_scenario
 
 _GIF_FRAMES = 50
 _GIF_FRAME_S = 0.1
@@ -63,12 +63,13 @@ class Args:
 
 def main(words: Sequence[str]) -> int:
     """Run the command."""
-    named = words[0] if words and not words[0].startswith("-") else "room"
-    args = parse(Args, words, default=_defaults(find_scenario(named)), description=__doc__)
+    args = parse(Args, words, default=_defaults(_named_scenario(words)), description=__doc__)
     make_strategy(args.strategy)
     scenario = _scenario(args)
     if args.seed < 0:
         raise SettingError("seed", args.seed, "a whole number ≥ 0")
+    if args.out is not None:
+        _make_folder(args.out)
     env = EntropyExploreEnv(scenario)
     started = time.perf_counter()
     log = _run(env, args)
@@ -86,6 +87,14 @@ def main(words: Sequence[str]) -> int:
     else:
         _print_table(figures, args.out)
     return 0
+
+
+def _named_scenario(words: Sequence[str]) -> Scenario:
+    """The scenario that the words name: its settings are the options' defaults."""
+    for before, word in zip(["", *words], words, strict=False):
+        if word in SCENARIOS and (before in ("", "--json") or not before.startswith("-")):
+            return SCENARIOS[word]
+    return ROOM
 
 
 def _defaults(scenario: Scenario) -> Args:
@@ -112,6 +121,14 @@ def _scenario(args: Args) -> Scenario:
     if args.voxel_size_m is not None:
         settings["grid"] = {"voxel_size_m": args.voxel_size_m}
     return with_settings(base, settings)
+
+
+def _make_folder(folder: Path) -> None:
+    """Make the folder for results, before a mission is run for nothing."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise SettingError("out", str(folder), f"a folder that can be made ({error.strerror})") from None
 
 
 class _Log:
@@ -152,26 +169,23 @@ def _run(env: EntropyExploreEnv, args: Args) -> _Log:
         TimeElapsedColumn(),
     )
     logs: list[_Log] = []
-    with Progress(*columns, console=Console(file=sys.stderr), transient=True, disable=args.json) as progress:
-        task = progress.add_task(
-            f"{args.scenario}, {args.strategy}", total=1.0, left=1.0, time_s=0.0, shared=0
-        )
+    progress = Progress(*columns, console=Console(file=sys.stderr), transient=True, disable=args.json)
+    task = progress.add_task(f"{args.scenario}, {args.strategy}", total=1.0, left=1.0, time_s=0.0, shared=0)
 
-        def after_step(env: EntropyExploreEnv) -> None:
-            if not logs:
-                logs.append(_Log(env, args.out is not None))
-            logs[0].note(env)
-            left = float(remaining_share(env.missions, 0).min())
-            robots = env.missions.state.robots[0]
-            progress.update(
-                task,
-                completed=1.0 - max(left, 0.0),
-                left=max(left, 0.0),
-                time_s=logs[0].recorder.latest_s,
-                shared=int(robots["measurements_sent"].sum()),
-            )
+    def after_step(env: EntropyExploreEnv) -> None:
+        if not logs:
+            progress.start()
+            logs.append(_Log(env, args.out is not None))
+        logs[0].note(env)
+        left = max(float(remaining_share(env.missions, 0).min()), 0.0)
+        sent = int(env.missions.state.robots[0]["measurements_sent"].sum())
+        progress.update(task, completed=1.0 - left, left=left, time_s=logs[0].recorder.latest_s, shared=sent)
 
+    try:
         run_mission(env, make_strategy(args.strategy), args.seed, after_step)
+    finally:
+        if logs:
+            progress.stop()
     return logs[0]
 
 

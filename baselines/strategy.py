@@ -57,16 +57,14 @@ def random_viewpoint(view: RobotView, rng: np.random.Generator) -> np.ndarray:
     high = low + grid.size_m
     axes = 2 if view.scenario.planar else 3
     viewpoint = view.pose.copy()
+    here = view.pose[:axes]
+    if math.isinf(reach_m):  # actions reach from the centre of the first voxel to that of the last
+        low, high = low + 0.5 * grid.voxel_size_m, high - 0.5 * grid.voxel_size_m
+    lowest, highest = np.maximum(low[:axes], here - reach_m), np.minimum(high[:axes], here + reach_m)
     for _ in range(_DRAWS):
-        place = view.pose[:3].copy()
-        if math.isinf(reach_m):
-            place[:axes] = rng.uniform(low[:axes], high[:axes])
-            viewpoint[:3] = place
-            break
-        step = rng.uniform(-reach_m, reach_m, axes)
-        place[:axes] += step
-        if (step**2).sum() <= reach_m**2 and (place > low).all() and (place < high).all():
-            viewpoint[:3] = place
+        place = rng.uniform(lowest, highest)
+        if ((place - here) ** 2).sum() <= reach_m**2:
+            viewpoint[:axes] = place
             break
     viewpoint[3] = rng.uniform(-math.pi, math.pi)
     viewpoint[4] = 0.0 if view.scenario.planar else math.asin(rng.uniform(-1.0, 1.0))

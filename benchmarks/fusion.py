@@ -69,7 +69,7 @@ def measure_room(grid: Grid, sensor: RangeSensor, scans: int, seed: int = 0) -> 
     return Measurements(positions, ends)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(nogil=True, error_model="numpy")  # a cached copy would outlive changes of the functions it calls
 def fuse_measurements(
     scan: Scan,
     numbers: np.void,
@@ -87,7 +87,8 @@ def fuse_measurements(
         grid: ((X, Y, Z) voxels, voxel edge in metres, (3,) origin in metres).
         positions_m: (S, 3) float64.
         ends_m: (S, R, 3) float64.
-        mean, precision: (V,) float32 belief, changed in place.
+        mean: (V,) float32, expected coverage; changed in place.
+        precision: (V,) float32, 1/σ²; changed in place.
 
     Returns:
         How many voxels the rays crossed.
@@ -115,15 +116,21 @@ def fuse_measurements(
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def fuse_floor(
-    crossed: np.ndarray, ends: np.ndarray, gain: float, mean: np.ndarray, precision: np.ndarray, passes: int
+    crossed: np.ndarray,
+    ends: np.ndarray,
+    gain: np.float32,
+    mean: np.ndarray,
+    precision: np.ndarray,
+    passes: int,
 ) -> float:
     """The least that fusion has to do: two adds, one division and one product a voxel, nothing else.
 
     Args:
         crossed: (N,) int32 voxels of one scan's rays, one after the other.
         ends: (R,) int64, where each ray's voxels end in `crossed`.
-        gain: float32 precision that is added.
-        mean, precision: (V,) float32, changed in place.
+        gain: Precision that is added.
+        mean: (V,) float32, changed in place.
+        precision: (V,) float32, changed in place.
         passes: How often; all but the first find everything in cache.
 
     Returns:

@@ -17,7 +17,6 @@ from dataclasses import dataclass
 _COMPARE = {"≥": operator.ge, "≤": operator.le, "<": operator.lt, "=": operator.eq}
 
 
-
 @dataclass(frozen=True)
 class Taken:
     """Seconds that some work took: of this thread's processor time, and by the wall clock."""
@@ -98,7 +97,7 @@ class Row:
 
 
 def interleave(jobs: Mapping[str, Job], rounds: int) -> dict[str, list[Taken]]:
-    """Let the jobs take turns: A B A B …
+    """Let the jobs take turns: A B A B.
 
     Returns:
         For each job what it took in every round.
@@ -132,4 +131,3 @@ def alone(job: str, values: Iterable[float], unit: str, goal: Goal) -> Row:
     """The row of a job without a peer; the goal is about the median itself."""
     value = float(statistics.median(values))
     return Row(job, None, value, None, unit, None, goal.text, goal.holds(value))
-

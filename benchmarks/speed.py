@@ -35,6 +35,7 @@ JOBS: tuple[tuple[str, Callable[[Effort], list[Row]]], ...] = (
 )
 """What is measured, in this order, and what people read while they wait."""
 
+_BUSY = 0.5
 _PACKAGES = ("numpy", "numba", "octomap-python", "mpe2", "pettingzoo", "gymnasium")
 
 
@@ -59,6 +60,7 @@ def main(words: Sequence[str]) -> int:
         raise SettingError("out", str(args.out), "a file in a folder that exists")
     load_octomap()
     load_spread()
+    _warn_if_busy()
     rows: list[Row] = []
     for number, (title, job) in enumerate(JOBS, start=1):
         print(f"[{number}/{len(JOBS)}] {title} …", file=sys.stderr, flush=True)
@@ -71,6 +73,12 @@ def main(words: Sequence[str]) -> int:
     else:
         print_table(about, rows)
     return GOAL_MISSED if args.strict and any(row.holds is False for row in rows) else 0
+
+
+def _warn_if_busy() -> None:
+    """Two threads need two processors that nobody else uses."""
+    if hasattr(os, "getloadavg") and os.getloadavg()[0] > _BUSY:
+        print("warning: other work runs here, which makes two threads and starts look slow", file=sys.stderr)
 
 
 def _parent_exists(path: Path) -> bool:

@@ -239,20 +239,21 @@ def compiled_share(effort: Effort) -> list[Row]:
     team, batch = SingleTeam(ENDLESS), Batch(LOOPED, 1)
     steps, few = effort.steps, effort.batch_steps
     rows = []
+    many = f"VectorEnv.step, {LOOPED} missions"
     for name, missions, run in (
         ("ParallelEnv.step", team.env.missions, lambda n: team.run(n, turns(steps, 1, n)[:, 0])),
-        (f"VectorEnv.step, {LOOPED} missions", batch.env.missions, lambda n: batch.run(turns(few, LOOPED, n))),
+        (many, batch.env.missions, lambda n: batch.run(turns(few, LOOPED, n))),
     ):
         inside, whole = [], []
         for number in range(effort.long_rounds):
             watch = Stopwatch(missions.step)
-            missions.step = watch
+            missions.step = watch  # type: ignore[method-assign,assignment]
             taken = run(number)
             del missions.step
             calls = watch.cpu_s[_WARMING_STEPS:]
             inside.append(1e6 * sum(calls) / len(calls))
             whole.append(1e6 * taken.cpu_s / len(calls))
-        rows.append(compared(f"Missions.step, the compiled call of {name}", "the whole step", inside, whole, "µs"))
+        rows.append(compared(f"the compiled call in {name}", "the whole step", inside, whole, "µs"))
     return rows
 
 

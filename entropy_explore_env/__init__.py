@@ -9,10 +9,16 @@ Importing registers, for every scenario (room → Room-v0), `gymnasium.make`, `g
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import gymnasium
 import pettingzoo
 
-from entropy_explore_env.config import (
+from entropy_explore_env.compilation import forget_stale_kernels
+
+forget_stale_kernels(Path(__file__).parent)
+
+from entropy_explore_env.config import (  # noqa: E402 - kernels are imported from here on
     Action,
     Channel,
     Ending,
@@ -24,10 +30,10 @@ from entropy_explore_env.config import (
     Scenario,
     with_settings,
 )
-from entropy_explore_env.envs.parallel_env import EntropyExploreEnv, env, parallel_env
-from entropy_explore_env.envs.single_env import SingleRobotEnv
-from entropy_explore_env.envs.vector_env import EntropyExploreVectorEnv
-from entropy_explore_env.errors import (
+from entropy_explore_env.envs.parallel_env import EntropyExploreEnv, env, parallel_env  # noqa: E402
+from entropy_explore_env.envs.single_env import SingleRobotEnv  # noqa: E402
+from entropy_explore_env.envs.vector_env import EntropyExploreVectorEnv  # noqa: E402
+from entropy_explore_env.errors import (  # noqa: E402
     ActionError,
     CallOrderError,
     EntropyExploreError,
@@ -35,14 +41,14 @@ from entropy_explore_env.errors import (
     SettingError,
     WorldError,
 )
-from entropy_explore_env.missions.missions import Missions
-from entropy_explore_env.missions.state import MissionEnd
-from entropy_explore_env.missions.view import RobotView
-from entropy_explore_env.robots.channel import Delivery
-from entropy_explore_env.robots.motion import MoveEnd
-from entropy_explore_env.scenarios import SCENARIOS, find_scenario
-from entropy_explore_env.worlds.files import load_octomap
-from entropy_explore_env.worlds.world import World
+from entropy_explore_env.missions.missions import Missions  # noqa: E402
+from entropy_explore_env.missions.state import MissionEnd  # noqa: E402
+from entropy_explore_env.missions.view import RobotView  # noqa: E402
+from entropy_explore_env.robots.channel import Delivery  # noqa: E402
+from entropy_explore_env.robots.motion import MoveEnd  # noqa: E402
+from entropy_explore_env.scenarios import SCENARIOS, find_scenario  # noqa: E402
+from entropy_explore_env.worlds.files import load_octomap  # noqa: E402
+from entropy_explore_env.worlds.world import World  # noqa: E402
 
 __version__ = "0.1.0"
 

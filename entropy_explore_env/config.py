@@ -4,14 +4,23 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, Literal, TypeVar, get_args
+from typing import Any, Literal, TypeVar
 
 import numpy as np
 
 from entropy_explore_env.errors import SettingError
+from entropy_explore_env.validation import (
+    check,
+    check_choice,
+    check_count,
+    check_counts,
+    check_kind,
+    check_not_negative,
+    check_positive,
+)
 
 BITS_OF_UNIT_GAUSSIAN = 0.5 * math.log2(2.0 * math.pi * math.e)
 """Differential entropy of N(0, 1) in bits: Rocha04, eq. 15 at σ = 1."""
@@ -25,56 +34,6 @@ Settings = TypeVar("Settings")
 def gaussian_entropy_bits(sigma: float) -> float:
     """Differential entropy of a Gaussian in bits, log2 √(2πe) + log2 σ (Rocha04, eq. 15)."""
     return BITS_OF_UNIT_GAUSSIAN + math.log2(sigma)
-
-
-def _check(settings: object, name: str, allowed: str, accepts: Callable[[Any], bool]) -> None:
-    """Raise a SettingError unless the field is a number that `accepts` takes; NaN never is."""
-    value = getattr(settings, name)
-    number = isinstance(value, int | float | np.integer | np.floating) and not isinstance(value, bool)
-    if not number or math.isnan(value) or not accepts(value):
-        raise SettingError(f"{type(settings).__name__}.{name}", value, allowed)
-
-
-def _check_positive(settings: object, *names: str, finite: bool = True) -> None:
-    allowed = "a number > 0" + ("" if finite else ", or inf")
-    for name in names:
-        _check(settings, name, allowed, lambda v: v > 0 and (math.isfinite(v) or not finite))
-
-
-def _check_not_negative(settings: object, *names: str) -> None:
-    for name in names:
-        _check(settings, name, "a finite number ≥ 0", lambda v: v >= 0 and math.isfinite(v))
-
-
-def _check_count(settings: object, name: str, least: int, most: int) -> None:
-    value = getattr(settings, name)
-    whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
-    if not whole or not least <= value <= most:
-        raise SettingError(
-            f"{type(settings).__name__}.{name}", value, f"a whole number from {least} to {most}"
-        )
-
-
-def _check_counts(settings: object, name: str, least: int, most: int) -> None:
-    value = getattr(settings, name)
-    whole = isinstance(value, tuple) and len(value) == 3
-    if not whole or not all(
-        isinstance(n, int | np.integer) and not isinstance(n, bool) and least <= n <= most for n in value
-    ):
-        allowed = f"three whole numbers (x, y, z), each from {least} to {most}"
-        raise SettingError(f"{type(settings).__name__}.{name}", value, allowed)
-
-
-def _check_choice(settings: object, name: str, choices: object) -> None:
-    value, members = getattr(settings, name), get_args(choices)
-    if value not in members:
-        raise SettingError(f"{type(settings).__name__}.{name}", value, "one of " + ", ".join(members))
-
-
-def _check_kind(settings: object, name: str, kind: type) -> None:
-    value = getattr(settings, name)
-    if not isinstance(value, kind):
-        raise SettingError(f"{type(settings).__name__}.{name}", value, f"a {kind.__name__}")
 
 
 @dataclass(frozen=True)
@@ -93,10 +52,10 @@ class Grid:
 
     def __post_init__(self) -> None:
         """Check every field."""
-        _check_counts(self, "shape", 1, MAX_VOXELS)
+        check_counts(self, "shape", 1, MAX_VOXELS)
         if math.prod(self.shape) > MAX_VOXELS:
             raise SettingError("Grid.shape", self.shape, f"at most {MAX_VOXELS} voxels in all")
-        _check_positive(self, "voxel_size_m")
+        check_positive(self, "voxel_size_m")
         finite = isinstance(self.origin_m, tuple) and len(self.origin_m) == 3
         if not finite or not all(isinstance(v, int | float) and math.isfinite(v) for v in self.origin_m):
             raise SettingError("Grid.origin_m", self.origin_m, "three finite numbers (x, y, z)")
@@ -150,10 +109,10 @@ class Robot:
 
     def __post_init__(self) -> None:
         """Check every field."""
-        _check_choice(self, "motion", Literal["free", "planar"])
-        _check_positive(self, "max_speed_m_s", "acceleration_m_s2")
-        _check_positive(self, "reach_m", "turn_rate_rad_s", finite=False)
-        _check_not_negative(self, "body_radius_m", "sensor_height_m")
+        check_choice(self, "motion", Literal["free", "planar"])
+        check_positive(self, "max_speed_m_s", "acceleration_m_s2")
+        check_positive(self, "reach_m", "turn_rate_rad_s", finite=False)
+        check_not_negative(self, "body_radius_m", "sensor_height_m")
 
 
 @dataclass(frozen=True)
@@ -193,11 +152,11 @@ class RangeSensor:
             )
         ):
             raise SettingError("RangeSensor.field_of_view_rad", view, "(yaw in [0, 2π], pitch in [0, π])")
-        _check_positive(self, "angular_step_rad", "sigma_min", "scan_time_s")
-        _check_positive(self, "max_range_m", finite=False)
-        _check_not_negative(self, "sigma_slope_per_m", "range_noise_m")
-        _check(self, "sigma_min", "a number from 1e-4 to 1e4", lambda v: 1e-4 <= v <= 1e4)
-        _check_count(self, "voxels_behind", 0, 1000)
+        check_positive(self, "angular_step_rad", "sigma_min", "scan_time_s")
+        check_positive(self, "max_range_m", finite=False)
+        check_not_negative(self, "sigma_slope_per_m", "range_noise_m")
+        check(self, "sigma_min", "a number from 1e-4 to 1e4", lambda v: 1e-4 <= v <= 1e4)
+        check_count(self, "voxels_behind", 0, 1000)
         if self.rays > 1_000_000:
             raise SettingError(
                 "RangeSensor.angular_step_rad", self.angular_step_rad, "at most 1,000,000 rays"
@@ -246,12 +205,12 @@ class Channel:
 
     def __post_init__(self) -> None:
         """Check every field."""
-        _check_count(self, "burst", 0, 1_000_000)
-        _check_not_negative(self, "i_min_bits")
-        _check_positive(self, "range_m", finite=False)
-        _check(self, "loss_probability", "a number from 0 to 1", lambda v: 0 <= v <= 1)
-        _check(self, "delay_s", "a number from 0 to 3600", lambda v: 0 <= v <= 3600)
-        _check_kind(self, "announcements", bool)
+        check_count(self, "burst", 0, 1_000_000)
+        check_not_negative(self, "i_min_bits")
+        check_positive(self, "range_m", finite=False)
+        check(self, "loss_probability", "a number from 0 to 1", lambda v: 0 <= v <= 1)
+        check(self, "delay_s", "a number from 0 to 3600", lambda v: 0 <= v <= 3600)
+        check_kind(self, "announcements", bool)
 
 
 @dataclass(frozen=True)
@@ -275,11 +234,11 @@ class Ending:
 
     def __post_init__(self) -> None:
         """Check every field."""
-        _check(self, "sigma_end", "a number from 1e-4 to 1e4", lambda v: 1e-4 <= v <= 1e4)
-        _check_choice(self, "whose", Literal["any", "all"])
-        _check_positive(self, "time_limit_s", finite=False)
+        check(self, "sigma_end", "a number from 1e-4 to 1e4", lambda v: 1e-4 <= v <= 1e4)
+        check_choice(self, "whose", Literal["any", "all"])
+        check_positive(self, "time_limit_s", finite=False)
         if self.max_cycles is not None:
-            _check_count(self, "max_cycles", 1, 2**62)
+            check_count(self, "max_cycles", 1, 2**62)
 
 
 @dataclass(frozen=True)
@@ -297,8 +256,8 @@ class Reward:
 
     def __post_init__(self) -> None:
         """Check every field."""
-        _check_choice(self, "kind", Literal["individual", "team"])
-        _check_not_negative(self, "cost_per_s")
+        check_choice(self, "kind", Literal["individual", "team"])
+        check_not_negative(self, "cost_per_s")
 
 
 @dataclass(frozen=True)
@@ -317,9 +276,9 @@ class Action:
 
     def __post_init__(self) -> None:
         """Check every field."""
-        _check_choice(self, "kind", Literal["continuous", "discrete"])
-        _check_count(self, "yaws", 1, 360)
-        _check_count(self, "pitches", 1, 90)
+        check_choice(self, "kind", Literal["continuous", "discrete"])
+        check_count(self, "yaws", 1, 360)
+        check_count(self, "pitches", 1, 90)
 
 
 @dataclass(frozen=True)
@@ -357,15 +316,15 @@ class Observation:
     def __post_init__(self) -> None:
         """Check every field."""
         for name in ("panorama", "own", "team", "patch", "overview", "action_mask", "flat"):
-            _check_kind(self, name, bool)
+            check_kind(self, name, bool)
         if self.panorama_yaws is not None:
-            _check_count(self, "panorama_yaws", 1, 360)
-        _check_count(self, "panorama_pitches", 1, 90)
-        _check_choice(self, "panorama_utility", Literal["bits", "log2"])
-        _check_counts(self, "patch_shape", 1, 255)
+            check_count(self, "panorama_yaws", 1, 360)
+        check_count(self, "panorama_pitches", 1, 90)
+        check_choice(self, "panorama_utility", Literal["bits", "log2"])
+        check_counts(self, "patch_shape", 1, 255)
         if not all(n % 2 for n in self.patch_shape):
             raise SettingError("Observation.patch_shape", self.patch_shape, "odd numbers only")
-        _check_counts(self, "overview_shape", 1, 64)
+        check_counts(self, "overview_shape", 1, 64)
 
 
 @dataclass(frozen=True)
@@ -398,11 +357,11 @@ class Scenario:
     def __post_init__(self) -> None:
         """Check every field, and that the parts fit each other."""
         for name, kind in (("name", str), ("world", str), ("grid", Grid), *_PARTS):
-            _check_kind(self, name, kind)
-        _check_count(self, "robots", 1, 1000)
-        _check(self, "sigma_prior", "a number from 1e-3 to 1e4", lambda v: 1e-3 <= v <= 1e4)
+            check_kind(self, name, kind)
+        check_count(self, "robots", 1, 1000)
+        check(self, "sigma_prior", "a number from 1e-3 to 1e4", lambda v: 1e-3 <= v <= 1e4)
         if self.decision_period_s is not None:
-            _check_positive(self, "decision_period_s")
+            check_positive(self, "decision_period_s")
         if self.ending.sigma_end >= self.sigma_prior:
             raise SettingError(
                 "Ending.sigma_end", self.ending.sigma_end, f"below sigma_prior = {self.sigma_prior}"
@@ -455,9 +414,10 @@ def with_settings(scenario: Scenario, settings: Mapping[str, Any]) -> Scenario:
         if name in changes:
             ending = changes.get("ending", {})
             shortcut = {name: changes.pop(name)}
-            changes["ending"] = (
-                {**ending, **shortcut} if isinstance(ending, Mapping) else _replaced(ending, shortcut)
-            )
+            if not isinstance(ending, Mapping | Ending):
+                raise SettingError("Scenario.ending", ending, "an Ending, or a mapping of its fields")
+            merged = {**ending, **shortcut} if isinstance(ending, Mapping) else _replaced(ending, shortcut)
+            changes["ending"] = merged
     return _replaced(scenario, changes)
 
 

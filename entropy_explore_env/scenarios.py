@@ -46,6 +46,6 @@ def find_scenario(scenario: str | Scenario) -> Scenario:
     """
     if isinstance(scenario, Scenario):
         return scenario
-    if scenario not in SCENARIOS:
+    if not isinstance(scenario, str) or scenario not in SCENARIOS:
         raise SettingError("scenario", scenario, "one of " + ", ".join(SCENARIOS))
     return SCENARIOS[scenario]

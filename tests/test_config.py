@@ -97,7 +97,15 @@ REFUSED = {
     (Observation, "own"): SWITCH,
     (Observation, "team"): SWITCH,
     (Observation, "patch"): SWITCH,
-    (Observation, "patch_shape"): ((11, 11), [11, 11, 5], (10, 11, 5), (11, 11, 257), (11.0, 11, 5), 11, None),
+    (Observation, "patch_shape"): (
+        (11, 11),
+        [11, 11, 5],
+        (10, 11, 5),
+        (11, 11, 257),
+        (11.0, 11, 5),
+        11,
+        None,
+    ),
     (Observation, "overview"): SWITCH,
     (Observation, "overview_shape"): ((8, 8), [8, 8, 4], (0, 8, 4), (65, 8, 4), (8.0, 8, 4), None),
     (Observation, "action_mask"): SWITCH,
@@ -144,9 +152,7 @@ def test_a_setting_that_is_not_allowed_is_refused(kind, name, value):
 
 def test_every_setting_is_in_the_list():
     fields = {
-        (kind, field.name)
-        for kind in {kind for kind, _ in REFUSED}
-        for field in dataclasses.fields(kind)
+        (kind, field.name) for kind in {kind for kind, _ in REFUSED} for field in dataclasses.fields(kind)
     }
     assert fields == set(REFUSED)
 
@@ -258,9 +264,7 @@ def test_scenarios_are_frozen_and_found_by_name(scenario):
         "",
         None,
         3,
-        pytest.param(
-            ["room"], marks=pytest.mark.xfail(reason="defect 5: a TypeError", raises=TypeError)
-        ),
+        pytest.param(["room"], marks=pytest.mark.xfail(reason="defect 5: a TypeError", raises=TypeError)),
     ],
 )
 def test_a_scenario_that_nobody_knows(name):

@@ -23,15 +23,28 @@ LAYERS = (
     ("worlds",),
     ("scenarios",),
     ("config", "randomness"),
+    ("validation",),
+    ("validation",),
     ("errors",),
 )
 """From the top down: a layer may import those below it."""
 SIBLINGS = {
     "belief": ("raycast", "coverage_map", "fields", "visibility", "planning"),
     "robots": ("range_sensor", "motion", "channel"),
-    "missions": ("rules", "state", "reward", "action", "observation", "tick", "missions", "view"),
+    "missions": (
+        "rules",
+        "state",
+        "reward",
+        "action",
+        "poses",
+        "messages",
+        "observation",
+        "tick",
+        "missions",
+        "view",
+    ),
     "worlds": ("world", "procedural", "octomap_reader", "files", "load"),
-    "reports": ("metrics", "recording", "glyphs", "rendering", "painting"),
+    "reports": ("metrics", "recording", "glyphs", "rendering", "animation", "painting"),
 }
 """Inside a folder a file may import those that stand before it."""
 STRATEGIES_SEE = (
@@ -185,7 +198,9 @@ def test_the_library_imports_nothing_heavy_and_none_of_what_stands_on_it():
 def test_importing_the_library_loads_nothing_heavy():
     """Nor what only some people need."""
     script = "import sys, entropy_explore_env; print(*sys.modules)"
-    done = subprocess.run([sys.executable, "-c", script], cwd=ROOT, capture_output=True, text=True, check=True)
+    done = subprocess.run(
+        [sys.executable, "-c", script], cwd=ROOT, capture_output=True, text=True, check=True
+    )
     loaded = {name.split(".")[0] for name in done.stdout.split()}
     unwanted = {*HEAVY, "pygame", "PIL", "octomap", "tyro", "rich", "tensorboard", "pandas"}
     assert not loaded & unwanted
@@ -218,7 +233,11 @@ def test_strategies_never_import_the_truth(folder):
 def test_strategies_never_reach_the_truth_through_the_public_names(folder):
     for file in files_of(folder):
         for node in ast.walk(ast.parse(file.read_text())):
-            if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name) and node.value.id == LIBRARY:
+            if (
+                isinstance(node, ast.Attribute)
+                and isinstance(node.value, ast.Name)
+                and node.value.id == LIBRARY
+            ):
                 assert node.attr not in (*TRUTH, "missions", "worlds"), f"{file}:{node.lineno}"
 
 

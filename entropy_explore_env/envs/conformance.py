@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import argparse
 import copy
+import functools
 import itertools
 import math
 import os
@@ -64,7 +65,7 @@ class Task:
     scenario: Scenario
     seed: int
 
-    @property
+    @functools.cached_property
     def choices(self) -> int:
         """Number of discrete actions."""
         rules = rules_of(self.scenario)

@@ -8,8 +8,8 @@ import numpy as np
 
 from entropy_explore_env.missions.action import write_mask
 from entropy_explore_env.missions.missions import Missions
+from entropy_explore_env.missions.poses import grid_position, pose_at
 from entropy_explore_env.missions.state import MissionEnd
-from entropy_explore_env.missions.tick import grid_position, pose_at
 from entropy_explore_env.robots.motion import MoveEnd
 
 _MOVE_ENDS = [end.name for end in MoveEnd]

@@ -72,7 +72,7 @@ class Missions:
 
     def _new_scan(self) -> Scan:
         sensor = self.scenario.sensor
-        return new_scan(self.scenario.grid, sensor, sensor.rays, self.scenario.robots)
+        return new_scan(self.grid, sensor, sensor.rays, self.scenario.robots, self.scenario.robot.reach_m)
 
     @property
     def grid(self) -> Grid:

@@ -123,7 +123,7 @@ class MissionState(NamedTuple):
     heard: np.ndarray
     """(E, A, A) HEARD: what robot a heard from b."""
     scan_range_m: np.ndarray
-    """(E, A, R) float64 distances of the latest scan."""
+    """(E, A, R) float64 distances of the latest scan; 0 where nothing was measured."""
     scan_returned: np.ndarray
     """(E, A, R) int8, a Return each."""
     scan_utility_bits: np.ndarray
@@ -133,7 +133,7 @@ class MissionState(NamedTuple):
     mail_to: np.ndarray
     """(E, Q, A) bool: who will hear them."""
     mail_rays: np.ndarray
-    """(E, Q, B, 5) float64: direction (3), distance in metres, Return."""
+    """(E, Q, B, 5) float64: direction (3), distance in grid units, Return."""
 
 
 def new_state(scenario: Scenario, missions: int) -> MissionState:

@@ -12,8 +12,8 @@ import numpy as np
 from entropy_explore_env.config import Scenario
 from entropy_explore_env.missions.action import encode_viewpoint
 from entropy_explore_env.missions.missions import Missions
+from entropy_explore_env.missions.poses import pose_at
 from entropy_explore_env.missions.rules import Rules
-from entropy_explore_env.missions.tick import pose_at
 from entropy_explore_env.robots.motion import MoveEnd
 
 
@@ -23,7 +23,7 @@ class ScanView:
 
     Attributes:
         pose: (5,) where it was taken: x, y, z, yaw, pitch.
-        range_m: (R,) measured distances.
+        range_m: (R,) measured distances; 0 where nothing was measured.
         returned: (R,) int8, a `Return` each: nothing, free up to the range, hit.
         utility_bits: (R,) what each ray brought to the robot's own map.
     """

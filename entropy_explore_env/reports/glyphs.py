@@ -357,34 +357,3 @@ def draw_axes(paper: np.ndarray, box: Box, unit: int) -> None:
         write(paper, label, box.left - 4 * unit - text_width(label, unit), y - 3 * unit, INK, unit)
     Box(box.left, box.top, unit, box.height).of(paper)[:] = INK
     write(paper, "0", box.left, box.top + box.height + 4 * unit, INK, unit)
-
-
-COLOUR_CODES = 1 << 15
-"""Colours are counted to 5 bits a channel: no eye sees the difference, and ours fit into one palette."""
-
-
-def colour_codes(picture: np.ndarray) -> np.ndarray:
-    """(H, W) uint16: the upper 5 bits of red, green and blue of a picture (H, W, 3) uint8."""
-    red, green, blue = np.moveaxis((picture >> 3).astype(np.uint16), -1, 0)
-    return red << 10 | green << 5 | blue
-
-
-def shared_palette(usage: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The 256 most used colours.
-
-    Args:
-        usage: (32768,) int64, how often each colour code occurs.
-
-    Returns:
-        (256, 3) uint8 the palette, and (32768,) uint8 the place in it of each code's nearest colour.
-    """
-    used = np.flatnonzero(usage)
-    kept = used[np.argsort(-usage[used], kind="stable")][:256]
-    levels = np.stack([used >> 10, used >> 5 & 31, used & 31], axis=1).astype(np.int32)
-    chosen = np.stack([kept >> 10, kept >> 5 & 31, kept & 31], axis=1).astype(np.int32)
-    distances = sum((levels[:, None, c] - chosen[None, :, c]) ** 2 for c in range(3))
-    nearest = np.zeros(COLOUR_CODES, dtype=np.uint8)
-    nearest[used] = np.argmin(distances, axis=1)
-    palette = np.zeros((256, 3), dtype=np.uint8)
-    palette[: len(kept)] = chosen << 3 | chosen >> 2
-    return palette, nearest

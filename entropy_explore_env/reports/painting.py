@@ -6,8 +6,9 @@ import numpy as np
 
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.missions.missions import Missions
-from entropy_explore_env.missions.tick import pose_at
-from entropy_explore_env.reports.rendering import Frame, Window, draw_frame
+from entropy_explore_env.missions.poses import pose_at
+from entropy_explore_env.reports.animation import Window
+from entropy_explore_env.reports.rendering import Frame, draw_frame
 
 RENDER_MODES = ("human", "rgb_array")
 FRAMES_PER_S = 10

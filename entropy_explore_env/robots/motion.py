@@ -87,13 +87,18 @@ def free_way(blocked, size, start, direction, length, crossed, entered):
     """
     if length <= 0.0:
         return 0.0, _ARRIVED
+    # A little farther: who stands on a face stands in the voxel behind it, which must be free, too.
     at, n, end = cast_ray(
-        blocked, STOP_AT_COVERED, size, start, direction, length, False, 0, crossed, entered
+        blocked, STOP_AT_COVERED, size, start, direction, length + _TOUCH, False, 0, crossed, entered
     )
     if end == OPEN:
         return length, _ARRIVED
-    middle = 0.5 * (entered[n - 1] + at)
-    return (0.0 if n == 1 else middle), (_OBSTACLE if end == OBSTACLE else _WALL)
+    last = n - 1
+    while last > 0 and at - entered[last] <= _TOUCH:  # a voxel that the line meets at its edge only
+        at = entered[last]
+        last -= 1
+    middle = 0.5 * (entered[last] + at) if last > 0 else 0.0
+    return middle, (_OBSTACLE if end == OBSTACLE else _WALL)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

@@ -37,12 +37,15 @@ class Return(enum.IntEnum):
 
 
 _NOTHING, _FREE, _HIT = int(Return.NOTHING), int(Return.FREE), int(Return.HIT)
+_NEAREST = 1e-3
+"""Noise makes no measurement shorter than this, in voxel edges."""
 
 
 RAY = np.dtype(
     [
         ("direction", "f8", (3,)),  # unit vector, map frame
-        ("range_m", "f8"),  # measured distance
+        ("length", "f8"),  # measured distance in grid units
+        ("range_m", "f8"),  # the same in metres; 0 if nothing was measured
         ("returned", "i8"),  # a Return
         ("measured", "f8"),  # precision of the measured coverage
         ("free", "i8"),  # leading voxels that measure coverage 0
@@ -78,6 +81,10 @@ class Scan(NamedTuple):
     """(R, L) float32 measured coverage, from index `free` on."""
     entered: np.ndarray
     """(L,) float64 distance at which the latest ray entered its voxels."""
+    way: np.ndarray
+    """(W,) int32 voxels on the longest drive."""
+    way_entered: np.ndarray
+    """(W,) float64 distance at which a drive enters them."""
     order: np.ndarray
     """(R,) int64 rays in the order in which they are fused or sent."""
     bodies: np.ndarray
@@ -110,16 +117,19 @@ def _offsets(samples: int, step_rad: float) -> np.ndarray:
     return (np.arange(samples) - (samples - 1) / 2.0) * step_rad
 
 
-def new_scan(grid: Grid, sensor: RangeSensor, rays: int, robots: int) -> Scan:
-    """Working space for up to `rays` rays in a workspace."""
+def new_scan(grid: Grid, sensor: RangeSensor, rays: int, robots: int, reach_m: float = 0.0) -> Scan:
+    """Working space for up to `rays` rays in a workspace, and for drives of at most `reach_m`."""
     length = sensor.max_range_m / grid.voxel_size_m
     longest = longest_crossing(*grid.shape, length, sensor.voxels_behind)
+    farthest = longest_crossing(*grid.shape, reach_m / grid.voxel_size_m, 0)
     return Scan(
         rays=np.zeros(rays, RAY),
         utility=np.zeros(rays),
         crossed=np.zeros((rays, longest), np.int32),
         coverage=np.zeros((rays, longest), np.float32),
         entered=np.zeros(longest),
+        way=np.zeros(farthest, np.int32),
+        way_entered=np.zeros(farthest),
         order=np.zeros(rays, np.int64),
         bodies=np.zeros((robots, 4)),
     )
@@ -188,7 +198,7 @@ def trace_measurement(scan, index, numbers, size, voxel_size_m, start, coverage)
     """Voxels and measured coverage of a measurement whose distance is known.
 
     Args:
-        scan: Holds direction, distance and Return of the ray; its crossing is filled in.
+        scan: Holds direction, length and Return of the ray; the rest is filled in.
         index: Which ray.
         numbers: SENSOR_NUMBERS.
         size: (X, Y, Z) voxels.
@@ -197,23 +207,24 @@ def trace_measurement(scan, index, numbers, size, voxel_size_m, start, coverage)
         coverage: (V,) float32, any map of the workspace; it does not matter what it holds.
     """
     ray = scan.rays[index]
+    ray.range_m = ray.length * voxel_size_m
     _, ray.voxels, _ = cast_ray(
         coverage,
         NEVER_STOP,
         size,
         start,
         ray.direction,
-        ray.range_m / voxel_size_m,
+        ray.length,
         ray.returned == _HIT,
         numbers.voxels_behind,
         scan.crossed[index],
         scan.entered,
     )
-    weigh_measurement(scan, index, numbers, size, voxel_size_m, start)
+    weigh_measurement(scan, index, numbers, size, start)
 
 
 @njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
-def weigh_measurement(scan, index, numbers, size, voxel_size_m, start):
+def weigh_measurement(scan, index, numbers, size, start):
     """Measured coverage (eq. 4) and its precision (eq. 5) for a ray whose crossing is filled in."""
     ray = scan.rays[index]
     ray.measured = measurement_precision(ray.range_m, numbers.sigma_min, numbers.sigma_slope_per_m)
@@ -221,7 +232,7 @@ def weigh_measurement(scan, index, numbers, size, voxel_size_m, start):
     if ray.returned == _HIT:
         ray.free = measured_coverage(
             start,
-            ray.range_m / voxel_size_m,
+            ray.length,
             size,
             scan.crossed[index],
             scan.entered,
@@ -263,15 +274,17 @@ def take_scan(scan, model, truth, size, voxel_size_m, start, yaw, pitch, bodies,
             scan.crossed[index],
             scan.entered,
         )
+        ray.length = length
         ray.range_m = length * voxel_size_m
         error = numbers.noise_m * draw_gaussian(chance) if numbers.noise_m > 0.0 else 0.0
         ray.returned = _FREE if end == OPEN else _HIT
         if bodies > 0 and body_distance(start, ray.direction, scan.bodies, bodies) < length:
             ray.returned = _NOTHING
+            ray.range_m = 0.0
         elif end == OPEN or error == 0.0:
-            weigh_measurement(scan, index, numbers, size, voxel_size_m, start)
+            weigh_measurement(scan, index, numbers, size, start)
         else:
-            ray.range_m = min(max(ray.range_m + error, 1e-3 * voxel_size_m), numbers.max_range_m)
+            ray.length = min(max(length + error / voxel_size_m, _NEAREST), reach)
             trace_measurement(scan, index, numbers, size, voxel_size_m, start, truth)
 
 

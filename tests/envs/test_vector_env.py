@@ -37,8 +37,9 @@ def some_actions(env: EntropyExploreVectorEnv, steps: int, seed: int = 0) -> lis
     return [env.action_space.sample() for _ in range(steps)]
 
 
-def parts_of(observations: Any) -> dict[str, np.ndarray]:
-    return observations if isinstance(observations, dict) else {"flat": observations}
+def in_order(value: Any) -> Any:
+    """Gymnasium's vector environment sorts the parts of an observation by name."""
+    return dict(sorted(value.items())) if isinstance(value, dict) else value
 
 
 @pytest.mark.parametrize("scenario", SCENARIOS)
@@ -74,13 +75,12 @@ def test_plays_as_gymnasium_s_own_vector_environment_does(mode: AutoresetMode, k
     ours = EntropyExploreVectorEnv(BOX, 5, robots=1, threads=2, autoreset_mode=mode, **settings)
     theirs = SyncVectorEnv([lambda: SingleRobotEnv(BOX, **settings)] * 5, autoreset_mode=mode)
     first, reference = ours.reset(seed=11), theirs.reset(seed=11)
-    require_same("reset", leaves(dict(parts_of(reference[0]))), leaves(dict(parts_of(first[0]))))
+    require_same("reset", leaves(in_order(reference[0])), leaves(in_order(first[0])))
     ends = []
     for step, actions in enumerate(some_actions(ours, 60)):
         found, expected = ours.step(actions), theirs.step(actions)
         for mine, other in zip(found[:4], expected[:4], strict=True):
-            mine, other = (dict(x) if isinstance(x, dict) else x for x in (mine, other))
-            require_same(f"step {step}", leaves(other), leaves(mine))
+            require_same(f"step {step}", leaves(in_order(other)), leaves(in_order(mine)))
         assert_infos_agree(expected[4], found[4])
         ends.append(found[2] | found[3])
     assert 3 <= np.sum(ends, axis=0).min()
@@ -101,7 +101,7 @@ def assert_infos_agree(expected: dict[str, Any], found: dict[str, Any]) -> None:
         for mine, other in zip(found["final_obs"], expected["final_obs"], strict=True):
             assert (mine is None) == (other is None)
             if other is not None:
-                require_same("final_obs", leaves(other), leaves(mine))
+                require_same("final_obs", leaves(in_order(other)), leaves(in_order(mine)))
         for name in ("time_s", "entropy_bits"):
             mine = found["final_info"][name].reshape(len(mask))
             np.testing.assert_array_equal(mine[mask], expected["final_info"][name][mask])
@@ -113,7 +113,7 @@ def test_the_step_after_the_end_starts_a_mission_and_ignores_its_actions(robots:
     envs = [EntropyExploreVectorEnv(BOX, 4, robots=robots, **UNEVEN) for _ in range(2)]
     begun = [env.reset(seed=2) for env in envs]
     over = np.zeros(4, bool)
-    restarts = 0
+    restarts, gained = 0, np.zeros(4)
     for actions in some_actions(envs[0], 40):
         other = actions.copy()
         other[over] *= -0.5
@@ -126,9 +126,9 @@ def test_the_step_after_the_end_starts_a_mission_and_ignores_its_actions(robots:
             assert not (terminations | truncations)[over].any()
             assert not infos["time_s"][over].any() and infos["deciding"][over].all()
             np.testing.assert_array_equal(infos["entropy_bits"][over], begun[0][1]["entropy_bits"][over])
-        assert rewards[~over].all()
+        gained += rewards
         over = terminations | truncations
-    assert restarts >= 3
+    assert restarts >= 3 and gained.all()
 
 
 def test_the_same_step_starts_the_next_mission_and_keeps_what_came_last() -> None:
@@ -287,10 +287,10 @@ def test_copies_in_mid_episode_go_on_alike_and_apart() -> None:
 
 
 @pytest.mark.parametrize(
-    "seed", [[1, 2], [1, -1], -1, 0.5, "12", True, [0, True], [0, 0.5], np.array([0.0, 1.0])]
+    "seed", [[1], [1, 2, 3], [1, -1], -1, 0.5, "12", True, [0, True], [0, 0.5], np.array([0.0, 1.0])]
 )
 def test_bad_seeds_are_refused_and_change_nothing(seed: Any) -> None:
-    env = EntropyExploreVectorEnv(BOX, 2 if seed != [1, 2] else 3)
+    env = EntropyExploreVectorEnv(BOX, 2)
     env.reset(seed=0)
     before = snapshot(env)
     with pytest.raises(SettingError, match="seed"):
@@ -366,7 +366,7 @@ def test_gymnasium_s_vector_wrappers_count_episodes(mode: AutoresetMode) -> None
             np.testing.assert_allclose(infos["episode"]["r"], total)
             lengths.append(infos["episode"]["l"].tolist())
             total[:] = 0.0
-    assert lengths == [[5, 5, 5]] * (2 if mode is AutoresetMode.NEXT_STEP else 3)
+    assert lengths == [[5, 5, 5]] * 3
 
 
 def test_pictures_and_windows_show_the_first_mission() -> None:

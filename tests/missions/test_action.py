@@ -54,7 +54,9 @@ def test_continuous_actions_hold_a_viewpoint_up_to_rounding(seed, motion, reach_
         axes = slice(0, 2 if planar else 3)
         wanted[axes] = np.clip(wanted[:3], low + half, low + ODD_GRID.size_m - half)[axes]
     wanted[3] = rng.choice([rng.uniform(-math.pi, math.pi), -math.pi, math.pi, 0.0])
-    wanted[4] = 0.0 if planar else rng.choice([rng.uniform(-math.pi / 2, math.pi / 2), math.pi / 2, -math.pi / 2])
+    wanted[4] = (
+        0.0 if planar else rng.choice([rng.uniform(-math.pi / 2, math.pi / 2), math.pi / 2, -math.pi / 2])
+    )
     action = encode_viewpoint(rules, pose, wanted)
     assert action_space(scenario).contains(action)
     got = decode(rules, pose, action)
@@ -94,7 +96,11 @@ def test_with_infinite_reach_an_action_is_a_place_from_the_first_voxel_s_centre_
     for grid in (ODD_GRID, Grid((7, 1, 5), 0.25)):
         rules = rules_of(free_box(grid=grid, robot={"reach_m": math.inf}))
         pose = np.array([0.0, 1.0, 3.0, 0.0, 0.0])
-        for box, share in (((-1, -1, -1), (0, 0, 0)), ((1, 1, 1), (1, 1, 1)), ((0, 0.5, -0.5), (0.5, 0.75, 0.25))):
+        for box, share in (
+            ((-1, -1, -1), (0, 0, 0)),
+            ((1, 1, 1), (1, 1, 1)),
+            ((0, 0.5, -0.5), (0.5, 0.75, 0.25)),
+        ):
             got = decode(rules, pose, np.array([*box, 0.5, -0.5]))
             expected = grid.centre_of(np.array(share) * (np.array(grid.shape) - 1))
             np.testing.assert_allclose(got[:3], expected)
@@ -104,11 +110,17 @@ def test_with_infinite_reach_an_action_is_a_place_from_the_first_voxel_s_centre_
 
 
 @pytest.mark.parametrize("motion", ["free", "planar"])
-@pytest.mark.parametrize("grid", [ODD_GRID, Grid((7, 11, 5), 0.25, (-0.125, -0.125, -0.125)), Grid((9, 6, 1), 0.1)])
+@pytest.mark.parametrize(
+    "grid", [ODD_GRID, Grid((7, 11, 5), 0.25, (-0.125, -0.125, -0.125)), Grid((9, 6, 1), 0.1)]
+)
 def test_discrete_actions_hold_every_centre_within_reach_and_every_gaze_exactly(grid, motion):
     scenario = free_box(
         grid=grid,
-        robot={"motion": motion, "reach_m": 2 * grid.voxel_size_m, "sensor_height_m": 0.5 * grid.voxel_size_m},
+        robot={
+            "motion": motion,
+            "reach_m": 2 * grid.voxel_size_m,
+            "sensor_height_m": 0.5 * grid.voxel_size_m,
+        },
         action={"kind": "discrete", "yaws": 5, "pitches": 2},
         observation={"panorama": False},
     )

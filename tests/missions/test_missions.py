@@ -14,7 +14,7 @@ from entropy_explore_env.config import Grid, gaussian_entropy_bits, with_setting
 from entropy_explore_env.errors import CallOrderError, SettingError, WorldError
 from entropy_explore_env.missions.missions import Missions
 from entropy_explore_env.missions.state import MissionEnd
-from entropy_explore_env.missions.tick import pose_at
+from entropy_explore_env.missions.poses import pose_at
 from entropy_explore_env.robots.range_sensor import Return
 from entropy_explore_env.scenarios import ROOM, ROOM_FURNISHED
 from tests.reference import rocha04
@@ -66,7 +66,10 @@ class SlowMission:
     def scan(self, robot, time_s):
         """What a robot that stands at its goal measures: rays' ends, voxels and lengths."""
         pose, sensor = self.missions.state.robots[0, robot]["goal"], self.scenario.sensor
-        start, radius = self.grid_units(pose[:3]), self.scenario.robot.body_radius_m / self.numbers.voxel_size_m
+        start, radius = (
+            self.grid_units(pose[:3]),
+            self.scenario.robot.body_radius_m / self.numbers.voxel_size_m,
+        )
         mates = [self.where(mate, time_s) for mate in range(self.scenario.robots) if mate != robot]
         rays = []
         for gaze in self.gazes(pose):

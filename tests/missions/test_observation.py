@@ -217,7 +217,9 @@ def test_panorama_is_what_the_paper_s_equations_promise(mission):
             direction, longest = rocha04.gaze(*gaze), sensor.max_range_m / edge
             if not rocha04.is_generic(start, direction, size, longest, margin=1e-4):
                 continue
-            ray = rocha04.trace(lambda v: mean[v] > 0.5, start, direction, size, longest, sensor.voxels_behind)
+            ray = rocha04.trace(
+                lambda v, mean=mean: mean[v] > 0.5, start, direction, size, longest, sensor.voxels_behind
+            )
             numbers = rocha04.Sensor(edge, sensor.sigma_min, sensor.sigma_slope_per_m)
             beliefs = as_reference(mean, precision)
             promised = rocha04.integrate(beliefs, ray.voxels, start, ray.length * edge, True, numbers)
@@ -244,7 +246,9 @@ def test_panorama_is_what_a_scan_there_would_bring_if_the_belief_were_the_truth(
     for robot, part in enumerate(parts):
         start = (pose_of(missions, robot)[:3] - grid.origin_m) / grid.voxel_size_m
         truth = missions.mean[0, robot].ravel().copy()
-        for gaze, bits, range_m in zip(panorama_gazes(missions), *part["panorama"].astype(float), strict=True):
+        for gaze, bits, range_m in zip(
+            panorama_gazes(missions), *part["panorama"].astype(float), strict=True
+        ):
             mean, precision = truth.copy(), missions.precision[0, robot].ravel().copy()
             take_scan(
                 scan, model, truth, grid.shape, grid.voxel_size_m, start, *gaze, 0, np.zeros(1, np.uint64)

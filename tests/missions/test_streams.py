@@ -109,7 +109,8 @@ def traces(missions, steps):
 
 
 @pytest.mark.parametrize(
-    "channel", [{"loss_probability": 0.5}, {"range_m": 1.0}, {"delay_s": 0.8}, {"burst": 0}, {"announcements": False}]
+    "channel",
+    [{"loss_probability": 0.5}, {"range_m": 1.0}, {"delay_s": 0.8}, {"burst": 0}, {"announcements": False}],
 )
 def test_the_channel_changes_neither_world_nor_starts_nor_range_noise(channel):
     noisy = {"world": "furnished", "robots": 3, "sensor": {"range_noise_m": 0.05}}

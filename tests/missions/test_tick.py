@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from entropy_explore_env.config import Grid
-from entropy_explore_env.missions.tick import pose_at
+from entropy_explore_env.missions.poses import pose_at
 from entropy_explore_env.missions.view import view_of
 from entropy_explore_env.robots.motion import MoveEnd
 from entropy_explore_env.robots.range_sensor import Return
@@ -22,7 +22,9 @@ ONE_RAY = {"field_of_view_rad": (0.0, 0.0)}
 def toward(missions, *viewpoints):
     """One step in which the robots are sent to viewpoints (x, y, z, yaw, pitch)."""
     views = [view_of(missions, 0, robot) for robot in range(missions.scenario.robots)]
-    boxes = [view.action_for(np.asarray(wanted, float)) for view, wanted in zip(views, viewpoints, strict=True)]
+    boxes = [
+        view.action_for(np.asarray(wanted, float)) for view, wanted in zip(views, viewpoints, strict=True)
+    ]
     missions.step(np.array([boxes], np.float64), np.zeros((1, len(boxes)), np.int64))
     return missions.state.robots[0]
 
@@ -91,9 +93,7 @@ def test_bodies_of_no_size_block_nobody_and_hide_nothing():
     missions = started(free_box(robot={"body_radius_m": 0.0}, sensor=ONE_RAY))
     put(missions, 0, (1.75, 1.25, 1.25, math.pi / 2, 0.0))
     put(missions, 1, (1.75, 2.25, 1.25, math.pi / 2, 0.0))
-    robots = toward(
-        missions, (1.75, 2.25, 1.25, math.pi / 2, 0.0), (1.75, 2.25, 1.25, math.pi / 2, 0.0)
-    )
+    robots = toward(missions, (1.75, 2.25, 1.25, math.pi / 2, 0.0), (1.75, 2.25, 1.25, math.pi / 2, 0.0))
     wander(missions, 1, 0)
     assert robots["blocked_moves"].tolist()[0] == 0
     assert (missions.state.scan_returned[0] == Return.HIT).all()
@@ -226,9 +226,9 @@ def settled(channel, world, sensor, edge_m):
     rng, received = np.random.default_rng(5), []
     for step in range(12):
         views = [view_of(missions, 0, robot) for robot in range(2)]
-        wanted = [view.pose + [*rng.uniform(-0.5, 0.5, 3), 0.0, 0.0] for view in views]
+        wanted = [view.pose + np.array([*rng.uniform(-0.5, 0.5, 3), 0.0, 0.0]) for view in views]
         if step == 6:
-            wanted = [view.pose + [0.0, 0.0, 0.0, 2.0, 0.0] for view in views]
+            wanted = [view.pose + np.array([0.0, 0.0, 0.0, 2.0, 0.0]) for view in views]
         toward(missions, *wanted)
         received.append(missions.state.robots[0]["measurements_received"].sum())
     return missions, received

@@ -7,6 +7,7 @@ shared with the library. Grid units (voxel edges) unless a name ends in `_m`.
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable, Iterable, Sequence
 from typing import NamedTuple
@@ -55,9 +56,9 @@ def pieces_of(start: Vector, direction: Vector, size: Voxel) -> list[Piece]:
         crossings = [(plane - at) / along for plane in range(cells + 1)]
         cuts += [cut for cut in crossings if cut > 0.0]
         leaves = min(leaves, max(crossings))
-    cuts = sorted(cut for cut in cuts if cut < leaves) + [leaves]
+    cuts = [*sorted(cut for cut in cuts if cut < leaves), leaves]
     pieces = []
-    for entered, left in zip(cuts[:-1], cuts[1:], strict=True):
+    for entered, left in itertools.pairwise(cuts):
         if left - entered < LEAST_CHORD:
             continue
         middle = 0.5 * (entered + left)
@@ -119,7 +120,7 @@ def is_generic(start: Vector, direction: Vector, size: Voxel, longest: float, ma
     )
     faces = all(
         sum(abs(first - second) for first, second in zip(one.voxel, other.voxel, strict=True)) == 1
-        for one, other in zip(pieces[:-1], pieces[1:], strict=True)
+        for one, other in itertools.pairwise(pieces)
     )
     return inside and steady and faces
 
@@ -320,7 +321,7 @@ def choose(
     """All candidates, the best first: eqs. 33-34, or 38-40 where the motion plane's axes are given."""
     choices = []
     for voxel in candidates(position, reach, size):
-        slope = entropy_gradient(lambda l: beliefs[l][1], voxel, 1.0)
+        slope = entropy_gradient(lambda place: beliefs[place][1], voxel, 1.0)
         weight = 1.0
         if axes is not None:
             slope, weight = on_plane(slope, axes), reachability(position, voxel, axes)

@@ -67,9 +67,7 @@ def random_belief(size: rocha04.Voxel, seed: int) -> tuple[np.ndarray, np.ndarra
 def as_reference(mean: np.ndarray, precision: np.ndarray) -> dict[rocha04.Voxel, rocha04.Belief]:
     """The same belief as voxel → (μ, σ)."""
     sigma = precision.astype(np.float64) ** -0.5
-    return {
-        (x, y, z): (float(mean[x, y, z]), float(sigma[x, y, z])) for x, y, z in np.ndindex(*mean.shape)
-    }
+    return {(x, y, z): (float(mean[x, y, z]), float(sigma[x, y, z])) for x, y, z in np.ndindex(*mean.shape)}
 
 
 def as_arrays(
@@ -112,9 +110,7 @@ def random_actions(missions: Missions, rng: np.random.Generator) -> tuple[np.nda
     return boxes, numbers
 
 
-def wander(
-    missions: Missions, steps: int, seed: int, after: Callable[[int], None] | None = None
-) -> None:
+def wander(missions: Missions, steps: int, seed: int, after: Callable[[int], None] | None = None) -> None:
     """Step with random actions, and call `after(step)` after each."""
     rng = np.random.default_rng(seed)
     for step in range(steps):

@@ -20,7 +20,8 @@ from entropy_explore_env.reports.glyphs import (
     text_width,
     write,
 )
-from entropy_explore_env.reports.rendering import Frame, View, Window, animate, draw_frame, lay_out
+from entropy_explore_env.reports.animation import Window, animate
+from entropy_explore_env.reports.rendering import Frame, View, draw_frame, lay_out
 
 SHAPE = (7, 11, 5)
 VOXEL_M = 0.5

@@ -125,7 +125,9 @@ def test_a_scan_is_what_the_reference_measures(size, seed, voxel_size_m, max_ran
         assert voxels_on(scan, index) == flat_index(theirs.voxels, size)
         sigma = rocha04.measured_sigma(theirs.length * voxel_size_m, 0.05, 0.02)
         assert ray["measured"] == pytest.approx(sigma**-2, rel=1e-9)
-        coverage = np.where(np.arange(ray["voxels"]) < ray["free"], 0.0, scan.coverage[index, : ray["voxels"]])
+        coverage = np.where(
+            np.arange(ray["voxels"]) < ray["free"], 0.0, scan.coverage[index, : ray["voxels"]]
+        )
         centres = [rocha04.centre_distance(start, voxel) for voxel in theirs.voxels]
         means = [rocha04.measured_mean(away, theirs.length, 1.0) for away in centres]
         free = theirs.end == rocha04.OPEN
@@ -171,10 +173,14 @@ def test_the_first_body_on_a_ray(seed, count):
     rng = np.random.default_rng(seed)
     start, bodies = rng.uniform(0, 5, 3), np.zeros((4, 4))
     bodies[:count, :3] = rng.uniform(0, 8, (count, 3))
-    bodies[:count, 3] = np.minimum(rng.uniform(0.2, 2.0, count), 0.9 * np.linalg.norm(bodies[:count, :3] - start, axis=1))
+    bodies[:count, 3] = np.minimum(
+        rng.uniform(0.2, 2.0, count), 0.9 * np.linalg.norm(bodies[:count, :3] - start, axis=1)
+    )
     for direction in rng.normal(size=(8, 3)):
         direction /= np.linalg.norm(direction)
-        expected = min(rocha04.distance_to_ball(start, direction, body[:3], body[3]) for body in bodies[:count])
+        expected = min(
+            rocha04.distance_to_ball(start, direction, body[:3], body[3]) for body in bodies[:count]
+        )
         assert body_distance(start, direction, bodies, count) == pytest.approx(expected, rel=1e-7, abs=1e-7)
 
 
@@ -189,7 +195,8 @@ def test_a_body_that_a_ray_hits_is_in_view(seed):
     for offset in rng.normal(size=(20, 3)) * 2:
         body = np.array([*(start + offset), rng.uniform(0.01, 1.0)])
         hit = any(
-            rocha04.distance_to_ball(start, ray["direction"], body[:3], body[3]) < math.inf for ray in scan.rays
+            rocha04.distance_to_ball(start, ray["direction"], body[:3], body[3]) < math.inf
+            for ray in scan.rays
         )
         assert in_view(model, yaw, pitch, start, body) or not hit
 
@@ -298,13 +305,13 @@ def test_a_noisy_measurement_says_what_its_noisy_distance_says(seed):
     ],
 )
 def test_a_measurement_retold_influences_the_voxels_that_it_influenced_first(voxel_size_m):
-    """As a delayed message does: only direction, distance and Return are told."""
+    """As a delayed message does: only direction, length and Return are told."""
     sensor = RangeSensor((2 * math.pi, math.pi / 2), math.pi / 36)
     truth, start = random_cover(SIZE, 0.1, 1), np.array([3.4, 5.3, 2.6])
     scan = scan_of(truth, start, 0.3, 0.1, sensor, voxel_size_m)
     grid = Grid(SIZE, voxel_size_m)
     told = new_scan(grid, sensor, sensor.rays, 1)
-    for name in ("direction", "range_m", "returned"):
+    for name in ("direction", "length", "returned"):
         told.rays[name] = scan.rays[name]
     numbers = sensor_model(sensor).numbers[0]
     for index in range(sensor.rays):

@@ -47,7 +47,7 @@ def test_a_workspace_too_small_for_furniture_is_refused_or_furnished(shape):
         try:
             world = furnished(Grid(shape, 0.5), rng(seed))
         except WorldError as error:
-            assert error.field == "Grid.shape"  # noqa: PT017
+            assert error.field == "Grid.shape"
         else:
             assert world.occupied.any()
             assert not world.occupied.all()

@@ -148,14 +148,13 @@ def test_planar_robots_start_in_their_plane():
 
 def test_layouts_of_other_bodies_are_other_layouts():
     world = world_of(divided_room())
-    small, large = (
-        world.layout(free_box(grid=world.grid, robot={"body_radius_m": r})) for r in (0.1, 0.3)
-    )
+    small, large = (world.layout(free_box(grid=world.grid, robot={"body_radius_m": r})) for r in (0.1, 0.3))
     assert len(large.starts) < len(small.starts)
 
 
 @pytest.mark.parametrize(
-    "occupied", [np.zeros((7, 11, 4), bool), np.zeros(SIZE, np.int8), np.ones(SIZE, bool), np.zeros(385, bool)]
+    "occupied",
+    [np.zeros((7, 11, 4), bool), np.zeros(SIZE, np.int8), np.ones(SIZE, bool), np.zeros(385, bool)],
 )
 def test_worlds_that_are_none_are_refused(occupied):
     with pytest.raises(WorldError, match=r"World\.occupied = .*: allowed is") as raised:

@@ -1,0 +1,146 @@
+"""Pictures one after the other: in a window, or as an animated GIF."""
+
+from __future__ import annotations
+
+import io
+import os
+import zlib
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from entropy_explore_env.errors import MissingExtraError, SettingError
+from entropy_explore_env.reports.recording import write_atomically
+
+COLOUR_CODES = 1 << 15
+"""Colours are counted to 5 bits a channel: no eye sees the difference, and ours fit into one palette."""
+
+
+def colour_codes(picture: np.ndarray) -> np.ndarray:
+    """(H, W) uint16: the upper 5 bits of red, green and blue of a picture (H, W, 3) uint8."""
+    red, green, blue = np.moveaxis((picture >> 3).astype(np.uint16), -1, 0)
+    return red << 10 | green << 5 | blue
+
+
+def shared_palette(usage: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The 256 most used colours.
+
+    Args:
+        usage: (32768,) int64, how often each colour code occurs.
+
+    Returns:
+        (256, 3) uint8 the palette, and (32768,) uint8 the place in it of each code's nearest colour.
+    """
+    used = np.flatnonzero(usage)
+    kept = used[np.argsort(-usage[used], kind="stable")][:256]
+    levels = np.stack([used >> 10, used >> 5 & 31, used & 31], axis=1).astype(np.int32)
+    chosen = np.stack([kept >> 10, kept >> 5 & 31, kept & 31], axis=1).astype(np.int32)
+    distances = sum((levels[:, None, c] - chosen[None, :, c]) ** 2 for c in range(3))
+    nearest = np.zeros(COLOUR_CODES, dtype=np.uint8)
+    nearest[used] = np.argmin(distances, axis=1)
+    palette = np.zeros((256, 3), dtype=np.uint8)
+    palette[: len(kept)] = chosen << 3 | chosen >> 2
+    return palette, nearest
+
+
+class Window:
+    """Shows pictures on the screen, with pygame-ce.
+
+    Once a person closes the window, later pictures are not shown.
+    """
+
+    def __init__(self, title: str = "entropy_explore_env", frames_per_s: float | None = 30.0) -> None:
+        """Open nothing yet.
+
+        Args:
+            title: Of the window.
+            frames_per_s: `show` waits so that there are at most so many; None = it never waits.
+
+        Raises:
+            MissingExtraError: pygame-ce is not installed.
+        """
+        os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")
+        try:
+            import pygame
+        except ImportError as error:
+            raise MissingExtraError("pygame-ce", "render") from error
+        self._pygame: Any = pygame
+        self._title = title
+        self._frames_per_s = frames_per_s
+        self._screen: Any = None
+        self._clock: Any = None
+        self.dismissed = False
+
+    def show(self, rgb: np.ndarray) -> None:
+        """Show a picture (H, W, 3) uint8 at once; the window takes its size."""
+        if self.dismissed:
+            return
+        pygame, size = self._pygame, (rgb.shape[1], rgb.shape[0])
+        if self._screen is None or self._screen.get_size() != size:
+            pygame.display.init()
+            pygame.display.set_caption(self._title)
+            self._screen = pygame.display.set_mode(size)
+            self._clock = self._clock or pygame.time.Clock()
+        self._screen.blit(pygame.image.frombuffer(np.ascontiguousarray(rgb), size, "RGB"), (0, 0))
+        pygame.display.flip()
+        if any(event.type == pygame.QUIT for event in pygame.event.get()):
+            self.close()
+            self.dismissed = True
+        elif self._frames_per_s is not None:
+            self._clock.tick(self._frames_per_s)
+
+    def close(self) -> None:
+        """Close the window; without one, do nothing."""
+        if self._screen is not None:
+            self._screen = None
+            self._pygame.display.quit()
+
+
+def animate(frames: Iterable[np.ndarray], path: Path, frame_s: float) -> None:
+    """Write pictures as an animated GIF that repeats for ever; the file appears only when complete.
+
+    All pictures share one palette of 256 colours, made from all of them, so that colours do not
+    flicker. GIF counts time in 1/100 s; pictures that equal the one before only make it last longer.
+
+    Args:
+        frames: (H, W, 3) uint8 each, all of one size.
+        path: The file; what it held before is replaced.
+        frame_s: Seconds that each picture is shown, at least 0.02.
+
+    Raises:
+        SettingError: There are no pictures, or of different sizes, or their time is too short.
+        MissingExtraError: Pillow is not installed.
+    """
+    try:
+        from PIL import Image
+    except ImportError as error:
+        raise MissingExtraError("pillow", "baselines") from error
+    if not frame_s >= 0.02:
+        raise SettingError("frame_s", frame_s, "at least 0.02 s")
+    packed, usage = [], np.zeros(COLOUR_CODES, dtype=np.int64)
+    shape: tuple[int, ...] = ()
+    for picture in frames:
+        shape = shape or picture.shape
+        if picture.shape != shape:
+            raise SettingError("frames", picture.shape, f"pictures of one shape, {shape}")
+        codes = colour_codes(picture)
+        usage += np.bincount(codes.ravel(), minlength=COLOUR_CODES)
+        packed.append(zlib.compress(codes.tobytes(), 1))
+    if not packed:
+        raise SettingError("frames", "none", "at least one picture")
+    palette, nearest = shared_palette(usage)
+
+    def pictures() -> Iterator[Image.Image]:
+        for data in packed:
+            codes = np.frombuffer(zlib.decompress(data), dtype=np.uint16).reshape(shape[:2])
+            image = Image.fromarray(nearest[codes])
+            image.putpalette(palette.tobytes())
+            yield image
+
+    animation = pictures()
+    options = {"append_images": animation, "duration": round(1000 * frame_s), "loop": 0, "optimize": False}
+    buffer = io.BytesIO()
+    next(animation).save(buffer, format="GIF", save_all=True, **options)
+    write_atomically(path, buffer.getvalue())

@@ -1,0 +1,102 @@
+"""The form of every command: arguments, one line for an error, exit codes, one JSON object."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+from baselines.command import BAD_INPUT, INTERRUPTED, UsageError, parse, print_json, run_command
+from entropy_explore_env.errors import CallOrderError, MissingExtraError, SettingError, WorldError
+
+
+@dataclass
+class Args:
+    """Do something."""
+
+    number: int = 3
+    """How many."""
+    folder: Path | None = None
+    """Where."""
+    loud: bool = False
+    """Whether to shout."""
+
+
+def test_words_become_arguments():
+    assert parse(Args, []) == Args()
+    assert parse(Args, ["--number", "5", "--folder", "a/b", "--loud"]) == Args(5, Path("a/b"), True)
+    assert parse(Args, ["--loud"], default=Args(7)) == Args(7, None, True)
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--number", "many"], "--number"),
+        (["--number"], "--number"),
+        (["--nmber", "3"], "--nmber"),
+        (["stray"], "stray"),
+        (["--loud", "yes"], "yes"),
+    ],
+)
+def test_words_that_do_not_fit_are_named_in_one_line_and_print_nothing(words, said, capsys):
+    with pytest.raises(UsageError) as error:
+        parse(Args, words)
+    assert said in str(error.value) and "\n" not in str(error.value)
+    assert not set(str(error.value)) & set("│╭╮╰╯─")
+    assert capsys.readouterr() == ("", "")
+
+
+def test_help_goes_to_standard_output_and_ends_well(capsys):
+    with pytest.raises(SystemExit) as stop:
+        run_command(lambda words: 0 if parse(Args, words) else 1, ["--help"])
+    out, err = capsys.readouterr()
+    assert stop.value.code in (0, None) and err == ""
+    assert "How many." in out and "--number" in out
+
+
+@pytest.mark.parametrize(
+    ("error", "code", "line"),
+    [
+        (SettingError("speed", -1, "a number > 0"), BAD_INPUT, "error: speed = -1: allowed is a number > 0"),
+        (WorldError("world", "x", "another"), BAD_INPUT, "error: world = 'x': allowed is another"),
+        (CallOrderError("not\n  yet"), BAD_INPUT, "error: not yet"),
+        (FileNotFoundError(2, "No such file", "a.bt"), BAD_INPUT, "error: [Errno 2] No such file: 'a.bt'"),
+        (KeyboardInterrupt(), INTERRUPTED, "interrupted"),
+    ],
+)
+def test_an_error_becomes_one_line_on_standard_error_and_a_code(error, code, line, capsys):
+    def main(words):
+        raise error
+
+    assert run_command(main, []) == code
+    assert capsys.readouterr() == ("", line + "\n")
+
+
+def test_a_package_that_is_missing_is_named_with_its_extra(capsys, monkeypatch):
+    monkeypatch.setitem(__import__("sys").modules, "tyro", None)
+    assert run_command(lambda words: 0 if parse(Args, words) else 1, []) == BAD_INPUT
+    out, err = capsys.readouterr()
+    assert out == "" and err.count("\n") == 1 and "entropy_explore_env[baselines]" in err
+    assert isinstance(MissingExtraError("tyro", "baselines"), ImportError)
+
+
+def test_our_mistakes_are_not_taken_for_bad_input():
+    with pytest.raises(ZeroDivisionError):
+        run_command(lambda words: 1 // len(words), [])
+
+
+def test_the_code_is_that_of_the_command_and_the_words_those_of_the_process(monkeypatch):
+    monkeypatch.setattr("sys.argv", ["command", "a", "b"])
+    assert run_command(lambda words: len(words)) == 2
+    assert run_command(lambda words: len(words), ["x"]) == 1
+
+
+def test_json_is_one_object_that_any_reader_takes(capsys):
+    print_json({"a": [1.5, None, True], "b": "σ"})
+    out, err = capsys.readouterr()
+    assert json.loads(out) == {"a": [1.5, None, True], "b": "σ"} and err == ""
+    with pytest.raises(ValueError, match="JSON"):
+        print_json({"a": float("nan")})
+    assert capsys.readouterr().out == ""
