@@ -223,11 +223,7 @@ def test_short_names_of_the_ending():
         ({"channel": 3}, "Scenario.channel"),
         ({"grid": {"shape": [7, 11, 5]}}, "Grid.shape"),
         ({"agents": ()}, "Scenario.agents"),
-        pytest.param(
-            {"ending": 5, "max_cycles": 3},
-            "Scenario.ending",
-            marks=pytest.mark.xfail(reason="defect 5: a TypeError", raises=TypeError),
-        ),
+        ({"ending": 5, "max_cycles": 3}, "Scenario.ending"),
     ],
 )
 def test_unknown_names_and_nested_values_that_are_not_allowed(settings, field):
@@ -264,7 +260,7 @@ def test_scenarios_are_frozen_and_found_by_name(scenario):
         "",
         None,
         3,
-        pytest.param(["room"], marks=pytest.mark.xfail(reason="defect 5: a TypeError", raises=TypeError)),
+        ["room"],
     ],
 )
 def test_a_scenario_that_nobody_knows(name):

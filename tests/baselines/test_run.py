@@ -108,11 +108,23 @@ def test_what_is_not_said_is_the_scenario_s_own(figures):
     assert without_clock(figures(*said.split())) == without_clock(figures())
 
 
-@pytest.mark.xfail(reason="defect: options before the scenario: it is run with the settings of `room`")
-@pytest.mark.parametrize("words", [["--json", "box-7x11x5"], ["--strategy", "random", "box-7x11x5", "--json"]])
-def test_options_may_stand_before_the_scenario(words, command):
-    moved = ["box-7x11x5", *(word for word in words if word != "box-7x11x5")]
-    assert without_clock(json.loads(command(*words).out)) == without_clock(json.loads(command(*moved).out))
+ROOM_S_SETTINGS = pytest.mark.xfail(reason="defect: it is run with the settings of `room`")
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        "--json",
+        "--strategy random --json",
+        "--strategy random --seed 3 --json",
+        pytest.param("--json --seed=3", marks=ROOM_S_SETTINGS),
+        pytest.param("--json --channel.no-announcements", marks=ROOM_S_SETTINGS),
+        pytest.param("--no-json --json --no-json --json --robots=1", marks=ROOM_S_SETTINGS),
+    ],
+)
+def test_options_may_stand_before_the_scenario(options, command):
+    before, after = ([*options.split(), "box-7x11x5"], ["box-7x11x5", *options.split()])
+    assert without_clock(json.loads(command(*before).out)) == without_clock(json.loads(command(*after).out))
 
 
 def test_channel_options_change_the_result(figures):
@@ -279,7 +291,6 @@ def check_refused(ran: Ran, said: list[str]) -> None:
     assert "Traceback" not in ran.err and all(word in ran.err for word in said)
 
 
-@pytest.mark.xfail(reason="defect: the progress bar leaves an empty line before the error")
 def test_too_many_robots_are_one_line_also_under_a_progress_bar(command):
     check_refused(command("box-7x11x5", "--robots", "900"), ["robots", "900"])
 
@@ -302,7 +313,6 @@ def test_a_folder_that_cannot_be_made_is_refused(command, tmp_path, monkeypatch)
     assert (tmp_path / "taken").read_text() == "mine"
 
 
-@pytest.mark.xfail(reason="defect: --out is tried when the mission is over, and the error does not name it")
 def test_a_folder_that_cannot_be_made_is_refused_before_the_mission(command, tmp_path, monkeypatch):
     def must_not_run(*_: object) -> None:
         raise AssertionError("the mission ran")
@@ -323,7 +333,7 @@ def test_an_interrupted_mission_prints_and_writes_nothing(command, tmp_path, mon
     monkeypatch.setattr(run, "run_mission", interrupted)
     ran = command("box-7x11x5", "--json", "--out", str(tmp_path / "out"))
     assert ran == (130, "", "interrupted\n")
-    assert not (tmp_path / "out").exists()
+    assert [path for path in tmp_path.rglob("*") if path.is_file()] == []
 
 
 @pytest.mark.parametrize("done", [0, 1, 2])
@@ -393,7 +403,7 @@ def test_an_interrupted_process_ends_with_130_and_leaves_nothing(tmp_path):
         out, err = started.communicate(timeout=60)
     assert (started.returncode, out) == (130, "")
     assert err.endswith("interrupted\n") and "Traceback" not in shown + err
-    assert not (tmp_path / "out").exists()
+    assert [path for path in tmp_path.rglob("*") if path.is_file()] == []
 
 
 @pytest.mark.xfail(reason="defect: interrupted while it imports, it ends by the signal, with a traceback")

@@ -117,7 +117,6 @@ def test_a_teammate_between_a_robot_and_the_wall_leaves_no_measurement():
     assert known.tolist() == [(3 * 11 + y) * 5 + 2 for y in range(7, 11)]
 
 
-@pytest.mark.xfail(reason="defect 3: the distance behind a teammate's body is left in scan_range_m")
 def test_what_stands_behind_a_teammate_cannot_be_read_off_a_scan():
     seen = []
     for wall in (9, 10):
@@ -241,12 +240,7 @@ def settled(channel, world, sensor, edge_m):
         ("empty", {"max_range_m": 1.0}, 0.4),
         ("furnished", {"range_noise_m": 0.1}, 0.4),
         ("furnished", None, 0.5),
-        pytest.param(
-            "furnished",
-            {"field_of_view_rad": (6.0, 1.0)},
-            0.4,
-            marks=pytest.mark.xfail(reason="defect 2: a hit is retold behind its face"),
-        ),
+        ("furnished", {"field_of_view_rad": (6.0, 1.0)}, 0.4),
     ],
 )
 def test_delayed_messages_bring_what_immediate_ones_bring_but_later(world, sensor, edge_m):

@@ -120,7 +120,6 @@ def test_drives_by_hand():
     assert drive(blocked, (5.5, 5.5, 2.5), east, 1.0) == (1.0, MoveEnd.ARRIVED)  # out of a solid voxel
 
 
-@pytest.mark.xfail(reason="defect 1: free_way lets a drive end exactly on the face of a solid voxel")
 def test_a_drive_that_would_end_on_the_face_of_a_solid_voxel_stops_before_it():
     """The face x = 5 belongs to voxel 5: whoever stands there stands in it."""
     blocked = np.zeros(SIZE, np.float32)
@@ -129,12 +128,32 @@ def test_a_drive_that_would_end_on_the_face_of_a_solid_voxel_stops_before_it():
     assert (way, end) == (3.0, MoveEnd.OBSTACLE)
 
 
-@pytest.mark.xfail(reason="defect 1: free_way lets a drive end exactly on the upper boundary")
 def test_a_drive_that_would_end_on_the_upper_boundary_stops_before_it():
     """The boundary x = 7 belongs to voxel 7, which there is not."""
     way, end = drive(np.zeros(SIZE, np.float32), (1.5, 5.5, 2.5), (1.0, 0.0, 0.0), 5.5)
     assert way < 5.5
     assert end is MoveEnd.WALL
+
+
+@drawn(300)
+@given(seeds, st.sampled_from([SIZE, (3, 8, 6), (9, 6, 1)]), st.sampled_from([0.05, 0.2, 0.4]))
+def test_wherever_a_drive_ends_the_body_fits(seed, size, share):
+    """Between multiples of a quarter: along faces, through edges and corners, up to the boundary."""
+    rng = np.random.default_rng(seed)
+    blocked = random_cover(size, share, seed)
+    for _ in range(10):
+        start, target = rng.integers(0, 4 * np.array(size), (2, 3)) / 4
+        target = target + rng.integers(0, 2, 3) * 0.25  # may be the upper boundary, or beyond it
+        length = math.dist(start, target)
+        if length == 0.0 or blocked[tuple(start.astype(int))] > 0.5:
+            continue
+        direction = (target - start) / length
+        way, end = drive(blocked, start, direction, length)
+        place = target if end is MoveEnd.ARRIVED else start + way * direction
+        voxel = np.floor(place).astype(int)
+        assert 0.0 <= way <= length
+        assert ((voxel >= 0) & (voxel < size)).all(), (start, target)
+        assert blocked[tuple(voxel)] < 0.5, (start, target)
 
 
 def distance_to_segment(points, begin, finish):

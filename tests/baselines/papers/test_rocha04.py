@@ -1,0 +1,370 @@
+"""`python -m baselines.papers.rocha04`: cells, claims, report and command."""
+
+from __future__ import annotations
+
+import copy
+import csv
+import json
+import math
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from baselines import experiment
+from baselines.command import run_command
+from baselines.experiment import Claim, Record, mission_record
+from baselines.mission import scripted
+from baselines.papers import rocha04, rocha04_cells
+from baselines.papers.rocha04_cells import BURSTS, CHANGES, I_MINS, TEAMS, team_id
+from baselines.papers.rocha04_cells import experiment as cells_of
+from baselines.papers.rocha04_claims import all_claims
+from entropy_explore_env.config import with_settings
+from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
+from entropy_explore_env.scenarios import BOX, ROOM
+
+CLAIM = ("id", "claim", "paper", "ours", "low", "high", "holds")
+FIGURES = [f"figure-{number}" for number in range(3, 9)]
+
+
+# --- the cells
+
+
+def test_the_cells_are_the_paper_s():
+    cells = {cell.id: cell for cell in cells_of(30, 100, changes=True)}
+    assert len(cells) == 2 + 3 * (9 + 1) + len(CHANGES)
+    assert len({cell.digest for cell in cells.values()}) == len(cells)
+    for name in ("single", "single-random"):
+        assert cells[name].scenario.robots == 1 and cells[name].seeds == 100
+    for robots in TEAMS:
+        for burst in BURSTS:
+            for i_min_bits in I_MINS:
+                cell = cells[team_id(robots, burst, i_min_bits)]
+                channel = cell.scenario.channel
+                assert (cell.scenario.robots, channel.burst, channel.i_min_bits) == (robots, burst, i_min_bits)
+                assert (cell.strategy, cell.seeds) == ("gradient", 30)
+        assert cells[f"team-{robots}-random"].strategy == "random"
+    assert (TEAMS, BURSTS, sorted(I_MINS)) == ((2, 3, 4), (32, 64, 128), [0.0291, 0.3219, 0.6215])
+    assert all(team_id(1, burst, 0.3219) == "single" for burst in BURSTS)
+    room = with_settings(ROOM, {"robots": 1})
+    assert cells["single"].scenario == room
+    for name in CHANGES:
+        assert (cells[f"change-{name}"].scenario, cells[f"change-{name}"].strategy) != (room, "gradient")
+    assert len(cells_of(30, 100, changes=False)) == len(cells) - len(CHANGES)
+
+
+# --- the claims, on records that are as the paper says
+
+
+def as_the_paper_says(starts: int = 12) -> dict[str, list[Record]]:
+    """Missions in which every claim of the paper holds, and in which random walks are slower."""
+    rng = np.random.default_rng(0)
+    luck = rng.uniform(0.9, 1.1, starts)
+    room = cells_of(starts, starts, changes=True)
+    start = 28_577 * (0.5 * math.log2(2 * math.pi * math.e) + math.log2(30.0))
+    threshold = 28_577 * (0.5 * math.log2(2 * math.pi * math.e) + math.log2(0.03))
+    records: dict[str, list[Record]] = {}
+    for cell in room:
+        robots, channel = cell.scenario.robots, cell.scenario.channel
+        gain = 1.0 if robots == 1 else 1.2 + 0.002 * channel.burst - 0.05 * channel.i_min_bits
+        factor = (1.5 if cell.strategy == "random" else 1.0) / (robots * gain if robots > 1 else 1.0)
+        scans = round(1211 * factor)
+        batch = min(channel.burst, 128) if robots > 1 else 0
+        late = batch if channel.i_min_bits < 0.1 else batch // 2
+        sent = [batch] * (3 * scans // 4) + [late] * (scans - 3 * scans // 4)
+        records[cell.id] = [
+            {
+                "seed": seed,
+                "finished": True,
+                "t_mission_s": 2142.0 * factor * luck[seed],
+                "half_s": 2142.0 * factor * luck[seed] / (7.452 * rng.uniform(0.95, 1.05)),
+                "scans": round(1211 * factor * luck[seed]),
+                "measurements": 128 * round(1211 * factor * luck[seed]),
+                "entropy_start_bits": start,
+                "entropy_threshold_bits": threshold,
+                "sent_by_scan": sent,
+            }
+            for seed in range(starts)
+        ]
+    return records
+
+
+PAPER = as_the_paper_says()
+STANDARD_PAIR = team_id(2, 64, 0.3219)
+
+
+def claims_of(records: dict[str, list[Record]]) -> dict[str, Claim]:
+    claims = all_claims(records)
+    assert len({claim.id for claim in claims}) == len(claims)
+    return {claim.id: claim for claim in claims}
+
+
+def test_every_claim_holds_of_records_that_are_as_the_paper_says():
+    claims = claims_of(PAPER)
+    assert [claim.id for claim in claims.values() if not claim.holds] == []
+    named = {"H0", "H_th", "batch", "single-t_mission", "single-k_max", "single-halves", "never-binds"}
+    named |= {f"team-size-{burst}-{i_min_bits}" for burst in BURSTS for i_min_bits in I_MINS}
+    named |= {f"burst-32-64-{i_min_bits}" for i_min_bits in I_MINS} | {f"slope-{burst}" for burst in BURSTS}
+    named |= {f"i-min-0.6215-0.3219-{burst}" for burst in BURSTS}
+    named |= {"binds-late-0.6215", "binds-late-0.3219", "random-1", "random-2", "random-3", "random-4"}
+    assert named <= set(claims)
+    for claim in claims.values():
+        assert json.loads(json.dumps(claim.row(), allow_nan=False)) == claim.row()
+        assert isinstance(claim.holds, bool) and claim.claim
+        assert (claim.low is None) == (claim.high is None)
+        if claim.low is not None and claim.high is not None and not isinstance(claim.ours, str):
+            assert claim.ours is not None and claim.low <= claim.ours <= claim.high
+
+
+def test_our_figures_stand_beside_the_paper_s():
+    claims = claims_of(PAPER)
+    times = [record["t_mission_s"] for record in PAPER["single"]]
+    assert claims["single-t_mission"].ours == pytest.approx(np.mean(times))
+    assert (claims["single-t_mission"].paper, claims["single-k_max"].paper) == (2142.0, 1211.0)
+    four = [record["t_mission_s"] for record in PAPER[team_id(4, 128, 0.0291)]]
+    assert claims["team-size-128-0.0291"].ours == pytest.approx(np.mean(four) / np.mean(times))
+    walk = [record["t_mission_s"] for record in PAPER["single-random"]]
+    assert claims["random-1"].ours == pytest.approx(np.mean(times) / np.mean(walk))
+    assert [claims[f"slope-{burst}"].ours for burst in BURSTS] == list(BURSTS)
+    # the last quarter of the batches is half as large as the burst, the first is full
+    assert claims["binds-late-0.6215"].ours == pytest.approx(1.0, abs=0.02)
+
+
+def scaled(cell: str, factor: float) -> Callable[[dict[str, list[Record]]], None]:
+    def change(records: dict[str, list[Record]]) -> None:
+        for record in records[cell]:
+            record["t_mission_s"] *= factor
+
+    return change
+
+
+def set_first(cell: str, name: str, value: object) -> Callable[[dict[str, list[Record]]], None]:
+    def change(records: dict[str, list[Record]]) -> None:
+        records[cell][0][name] = value
+
+    return change
+
+
+def emptied_early(records: dict[str, list[Record]]) -> None:
+    """Batches are small from the beginning on."""
+    for record in records[team_id(2, 64, 0.6215)]:
+        record["sent_by_scan"] = [20] * len(record["sent_by_scan"])
+
+
+@pytest.mark.parametrize(
+    ("change", "fallen"),
+    [
+        (set_first("single", "entropy_start_bits", 1.9e5), {"H0"}),
+        (set_first("single", "entropy_threshold_bits", -86_067.0), {"H_th"}),
+        (set_first("single", "measurements", 7), {"batch"}),
+        (scaled("single", 1.3), {"single-t_mission"}),
+        (scaled("single-random", 0.4), {"random-1"}),
+        (scaled("team-3-random", 0.4), {"random-3"}),
+        (emptied_early, {"binds-late-0.6215"}),
+        (set_first(team_id(2, 64, 0.0291), "sent_by_scan", [64, 64, 64, 64, 64, 63, 64, 64]), {"never-binds"}),
+    ],
+)
+def test_a_claim_falls_that_the_records_contradict(change, fallen):
+    records = copy.deepcopy(PAPER)
+    change(records)
+    lost = {claim.id for claim in claims_of(records).values() if not claim.holds}
+    assert fallen <= lost
+    assert {name for name in lost if not name.startswith(("single-", "plane-"))} <= fallen
+
+
+def test_teams_that_are_no_faster_than_one_robot_are_seen():
+    records = copy.deepcopy(PAPER)
+    scaled(team_id(4, 64, 0.3219), 10.0)(records)
+    lost = {claim.id for claim in claims_of(records).values() if not claim.holds}
+    assert "team-size-64-0.3219" in lost and "team-size-32-0.3219" not in lost
+    assert {"burst-32-64-0.3219", "random-4"} <= lost and "burst-64-128-0.3219" not in lost
+    assert "i-min-0.6215-0.3219-64" in lost and "i-min-0.3219-0.0291-64" not in lost
+
+
+def test_a_small_sample_s_interval_decides_for_the_single_robot():
+    """The paper's 2142 s holds if 10 of our starts could have given it: ± 1.96 σ/√10."""
+    for mean_s, holds in ((2142.0 - 60.0, True), (2142.0 - 160.0, False)):
+        records = copy.deepcopy(PAPER)
+        spread = np.tile([-200.0, 200.0], 6)  # σ = 200 s, so ± 124 s
+        for record, off in zip(records["single"], spread, strict=True):
+            record["t_mission_s"] = mean_s + off
+        assert claims_of(records)["single-t_mission"].holds == holds
+
+
+def test_the_exact_claims_hold_in_the_real_room():
+    """H(0), H_th and 128 measurements a batch, in one start's mission."""
+    env = EntropyExploreEnv(scripted(with_settings(ROOM, {"robots": 1})))
+    mission = mission_record(env, "gradient", 0)
+    records = {cell.id: [mission, mission] for cell in cells_of(2, 2, changes=False)}
+    claims = claims_of(records)
+    for name in ("H0", "H_th", "batch"):
+        assert claims[name].holds, claims[name]
+    assert claims["H0"].ours == pytest.approx(1.987e5, rel=1e-3)
+    assert claims["H_th"].ours == pytest.approx(-8.6068e4, rel=1e-5)
+    assert mission["finished"] and mission["measurements"] == 128 * mission["scans"]
+    assert claims["team-size-64-0.3219"].ours == 1.0 and not claims["team-size-64-0.3219"].holds
+
+
+# --- the command, from end to end, in a tiny box
+
+
+@pytest.fixture(scope="module")
+def tiny(tmp_path_factory):
+    """All cells in the tiny box, two starts each; the words that go on with them."""
+    folder = tmp_path_factory.mktemp("rocha04")
+    scenario = with_settings(BOX, {"ending": {"sigma_end": 1.0}, "time_limit_s": 200.0})
+    words = ["--starts", "2", "--jobs", "2", "--runs", str(folder / "runs"), "--out", str(folder / "out")]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(rocha04_cells, "ROOM", scenario)
+        patch.setattr(rocha04, "_QUICK_STARTS", 2)
+        patch.setattr(rocha04, "_QUICK_SINGLE_STARTS", 2)
+        yield folder, words
+
+
+def ran(words: list[str], capsys) -> tuple[int, str, str]:
+    code = run_command(rocha04.main, words)
+    return (code, *capsys.readouterr())
+
+
+def test_json_is_one_object_with_the_claims(tiny, capsys):
+    folder, words = tiny
+    code, out, err = ran([*words, "--json", "--strict"], capsys)
+    assert (code, err) == (1, "")  # not the paper's room: its H(0) does not hold
+    printed = json.loads(out, parse_constant=pytest.fail)
+    assert list(printed) == ["paper", "claims", "wall_s"]
+    assert printed["paper"] == "Rocha04" and printed["wall_s"] > 0.0
+    assert all(tuple(claim) == CLAIM and isinstance(claim["holds"], bool) for claim in printed["claims"])
+    by_id = {claim["id"]: claim for claim in printed["claims"]}
+    assert len(by_id) == len(printed["claims"]) > 30
+    assert not by_id["H0"]["holds"] and by_id["H0"]["ours"] == pytest.approx(2677.3, abs=0.1)
+    assert [path for path in folder.rglob(".*")] == []
+    assert len(list((folder / "runs").rglob("seed-*.json"))) == 2 * len(cells_of(2, 2, changes=True))
+    check_report(folder / "out", quick=False)
+
+
+def check_report(folder: Path, quick: bool) -> None:
+    assert sorted(path.name for path in folder.iterdir()) == ["rocha04", "rocha04.md"]
+    beside = folder / "rocha04"
+    wanted = [*(f"{name}.{kind}" for name in FIGURES for kind in ("png", "csv")), "table-1.csv", "table-2.csv"]
+    assert sorted(path.name for path in beside.iterdir()) == sorted(wanted)
+    for name in FIGURES:
+        with Image.open(beside / f"{name}.png") as picture:
+            picture.load()
+            assert picture.format == "PNG" and min(picture.size) > 300
+    for path in beside.glob("*.csv"):
+        head, *rows = csv.reader(path.read_text().splitlines())
+        assert rows and len(set(head)) == len(head)
+        assert all(len(row) == len(head) for row in rows)
+    report = (folder / "rocha04.md").read_text()
+    linked = re.findall(r"\]\(([^)]+)\)", report)
+    assert sorted(linked) == sorted(f"rocha04/{name}.png" for name in FIGURES)
+    assert "## Claims" in report and "nan" not in report.split()
+    assert ("One thing changed" in report) != quick
+    assert ("--quick" in report) == quick
+
+
+def rows_of(path: Path) -> list[dict[str, str]]:
+    with path.open() as file:
+        return list(csv.DictReader(file))
+
+
+def test_it_goes_on_where_it_was_and_prints_a_table(tiny, capsys, monkeypatch):
+    folder, words = tiny
+    first = {path: path.read_bytes() for path in (folder / "out").rglob("*") if path.is_file()}
+    assert first, "the test above has run the missions"
+
+    def no_pool(*_: object, **__: object) -> None:
+        raise AssertionError("a process was started")
+
+    monkeypatch.setattr(experiment, "ProcessPoolExecutor", no_pool)
+    monkeypatch.setenv("COLUMNS", "200")
+    code, out, err = ran(words, capsys)
+    assert code == 0
+    assert "H(0) in bits" in out and "95 % interval" in out
+    assert "written" in err and "H(0)" not in err
+    second = {path: path.read_bytes() for path in (folder / "out").rglob("*") if path.is_file()}
+    assert {path.name for path in first if first[path] != second[path]} == set()
+
+
+def test_the_tables_hold_the_records_numbers(tiny):
+    folder, _ = tiny
+    beside = folder / "out" / "rocha04"
+
+    def kept(cell: str) -> list[Record]:
+        return [json.loads(path.read_text())["record"] for path in sorted((folder / "runs" / cell).iterdir())]
+
+    for name, line, cells in (
+        ("figure-5", "burst 32", [team_id(robots, 32, 0.3219) for robots in (1, 2, 3, 4)]),
+        ("figure-6", "I_min 0.0291", [team_id(robots, 64, 0.0291) for robots in (1, 2, 3, 4)]),
+    ):
+        rows = [row for row in rows_of(beside / f"{name}.csv") if row["line"] == line]
+        assert [int(row["robots"]) for row in rows] == [1, 2, 3, 4]
+        for row, cell in zip(rows, cells, strict=True):
+            mean = np.mean([record["t_mission_s"] for record in kept(cell)])
+            assert float(row["mean_s"]) == pytest.approx(mean, abs=0.01)
+            assert float(row["low_s"]) <= float(row["mean_s"]) <= float(row["high_s"])
+    series = rows_of(beside / "figure-3.csv")
+    ends = [record["t_mission_s"] for record in kept("single")]
+    assert float(series[-1]["time_s"]) == pytest.approx(max(ends), abs=1e-3)  # of two, the median is the second
+    shared = [row for row in rows_of(beside / "figure-7.csv") if row["line"] == "burst 128"]
+    assert int(shared[0]["shared_measurements"]) == 0 < int(shared[-1]["shared_measurements"])
+    table = {row["parameter"]: row["ours"] for row in rows_of(beside / "table-1.csv")}
+    assert (table["voxels"], table["search radius (m)"], table["prior sigma"]) == ("41x41x17", "0.5", "30.0")
+
+
+def test_quick_leaves_out_the_changes(tiny, capsys, monkeypatch):
+    folder, words = tiny
+    monkeypatch.setattr(experiment, "ProcessPoolExecutor", None)  # the missions are there
+    code, out, err = ran([*words, "--out", str(folder / "quick"), "--quick", "--json"], capsys)
+    assert (code, err) == (0, "")
+    ids = {claim["id"] for claim in json.loads(out)["claims"]}
+    assert {"H0", "single-t_mission", "team-size-64-0.3219"} <= ids
+    check_report(folder / "quick", quick=True)
+
+
+@pytest.mark.parametrize(("holds", "code"), [(True, 0), (False, 1)])
+def test_strict_asks_whether_all_claims_hold(holds, code, tiny, capsys, monkeypatch, tmp_path):
+    _, words = tiny
+    claims = [Claim("a", "is", 1.0, 1.0, None, None, True), Claim("b", "is", 1.0, 2.0, 1.0, 3.0, holds)]
+    monkeypatch.setattr(rocha04, "all_claims", lambda records: claims)
+    monkeypatch.setattr(rocha04, "write_report", lambda *_: tmp_path / "report.md")
+    assert ran([*words, "--strict", "--json"], capsys)[0] == code
+    assert ran([*words, "--json"], capsys)[0] == 0
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--starts", "0"], ["starts", "0"]),
+        (["--jobs", "-1"], ["jobs", "-1"]),
+        (["--starts", "many"], ["--starts", "many"]),
+        (["--frobnicate"], ["--frobnicate"]),
+        (["room"], ["room"]),
+    ],
+)
+def test_bad_input_is_one_line_and_code_2(words, said, capsys):
+    code, out, err = ran(words, capsys)
+    assert (code, out) == (2, "")
+    assert err.startswith("error: ") and err.count("\n") == 1 and all(word in err for word in said)
+
+
+def test_an_interrupted_experiment_ends_with_130(capsys, monkeypatch, tmp_path):
+    def interrupted(*_: object, **__: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(rocha04, "run_cells", interrupted)
+    assert ran(["--runs", str(tmp_path), "--out", str(tmp_path)], capsys) == (130, "", "interrupted\n")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_folder_that_cannot_be_made_is_refused_before_the_missions(tiny, capsys, monkeypatch, tmp_path):
+    def must_not_run(*_: object, **__: object) -> None:
+        raise AssertionError("the missions ran")
+
+    monkeypatch.setattr(rocha04, "run_cells", must_not_run)
+    (tmp_path / "taken").write_text("mine")
+    code, out, err = ran(["--out", str(tmp_path / "taken"), "--json"], capsys)
+    assert (code, out) == (2, "") and err.count("\n") == 1 and "out" in err and "taken" in err
