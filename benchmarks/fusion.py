@@ -103,9 +103,10 @@ def fuse_measurements(
             for axis in range(3):
                 ray.direction[axis] = ends_m[i, index, axis] - positions_m[i, axis]
                 squared += ray.direction[axis] * ray.direction[axis]
-            ray.range_m = math.sqrt(squared)
+            range_m = math.sqrt(squared)
             for axis in range(3):
-                ray.direction[axis] /= ray.range_m
+                ray.direction[axis] /= range_m
+            ray.length = range_m / voxel_size_m
             ray.returned = _HIT
             trace_measurement(scan, index, numbers, size, voxel_size_m, start, mean)
             voxels += ray.voxels

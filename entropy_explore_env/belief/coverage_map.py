@@ -15,10 +15,10 @@ from entropy_explore_env.config import BITS_OF_UNIT_GAUSSIAN
 PRIOR_MEAN = 0.5
 """Expected coverage of a voxel that nobody has measured: no preference."""
 
-_FOLD_EVERY = 16
-"""Precision ratios that are multiplied before their log is taken.
+_FOLD_BELOW = 1e-250
+"""A product of shares is folded into bits, by its log, before it could leave a float64.
 
-Settings keep a ratio below 1e16 = 2^53, so 16 of them stay inside a float64's 2^1022.
+Settings keep a share above 1e-16, so that a product that is not yet below stays above 1e-266.
 """
 
 _EDGE = 0.5 + 0.8660254037844387
@@ -104,18 +104,26 @@ def fuse_ray(mean, precision, crossed, coverage, free, n, measured):
         Utility in bits, ≥ 0.
     """
     gain, bits, shrink = np.float32(measured), 0.0, 1.0
-    for i in range(n):
+    for i in range(free):
         voxel = np.uint32(crossed[i])
         before = precision[voxel]
         after = before + gain
         share = before / after
         precision[voxel] = after
-        if i < free:
-            mean[voxel] = mean[voxel] * share
-        else:
-            mean[voxel] = coverage[i] + (mean[voxel] - coverage[i]) * share
+        mean[voxel] = mean[voxel] * share
         shrink *= share
-        if i % _FOLD_EVERY == _FOLD_EVERY - 1:
+        if shrink < _FOLD_BELOW:
+            bits -= math.log2(shrink)
+            shrink = 1.0
+    for i in range(free, n):
+        voxel = np.uint32(crossed[i])
+        before = precision[voxel]
+        after = before + gain
+        share = before / after
+        precision[voxel] = after
+        mean[voxel] = coverage[i] + (mean[voxel] - coverage[i]) * share
+        shrink *= share
+        if shrink < _FOLD_BELOW:
             bits -= math.log2(shrink)
             shrink = 1.0
     return 0.5 * (bits - math.log2(shrink))
@@ -134,7 +142,7 @@ def expected_utility(precision, crossed, n, measured):
     bits, growth, gain = 0.0, 1.0, np.float32(measured)
     for i in range(n):
         growth *= np.float32(1.0) + gain / precision[np.uint32(crossed[i])]
-        if i % _FOLD_EVERY == _FOLD_EVERY - 1:
+        if growth > 1.0 / _FOLD_BELOW:
             bits += math.log2(growth)
             growth = 1.0
     return 0.5 * (bits + math.log2(growth))

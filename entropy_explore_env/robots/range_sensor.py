@@ -193,7 +193,25 @@ def body_distance(start, direction, bodies, count):
     return nearest
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+def weigh_measurement(scan, index, numbers, size, start):
+    """Measured coverage (eq. 4) and its precision (eq. 5) for a ray whose crossing is filled in."""
+    ray = scan.rays[index]
+    ray.measured = measurement_precision(ray.range_m, numbers.sigma_min, numbers.sigma_slope_per_m)
+    ray.free = ray.voxels
+    if ray.returned == _HIT:
+        ray.free = measured_coverage(
+            start,
+            ray.length,
+            size,
+            scan.crossed[index],
+            scan.entered,
+            ray.voxels,
+            scan.coverage[index],
+        )
+
+
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 def trace_measurement(scan, index, numbers, size, voxel_size_m, start, coverage):
     """Voxels and measured coverage of a measurement whose distance is known.
 
@@ -221,24 +239,6 @@ def trace_measurement(scan, index, numbers, size, voxel_size_m, start, coverage)
         scan.entered,
     )
     weigh_measurement(scan, index, numbers, size, start)
-
-
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
-def weigh_measurement(scan, index, numbers, size, start):
-    """Measured coverage (eq. 4) and its precision (eq. 5) for a ray whose crossing is filled in."""
-    ray = scan.rays[index]
-    ray.measured = measurement_precision(ray.range_m, numbers.sigma_min, numbers.sigma_slope_per_m)
-    ray.free = ray.voxels
-    if ray.returned == _HIT:
-        ray.free = measured_coverage(
-            start,
-            ray.length,
-            size,
-            scan.crossed[index],
-            scan.entered,
-            ray.voxels,
-            scan.coverage[index],
-        )
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

@@ -47,7 +47,9 @@ def record_file(folder: Path, cell: str, seed: int) -> Path:
 
 def stamps(folder: Path) -> dict[Path, tuple[int, int]]:
     """File → its number on the disk and when it was written: other numbers mean that it is another."""
-    return {path: (path.stat().st_ino, path.stat().st_mtime_ns) for path in folder.rglob("*") if path.is_file()}
+    return {
+        path: (path.stat().st_ino, path.stat().st_mtime_ns) for path in folder.rglob("*") if path.is_file()
+    }
 
 
 @pytest.fixture(scope="module")
@@ -119,7 +121,9 @@ def test_a_finished_experiment_starts_no_process(finished, monkeypatch, capsys):
         run_cells(changed, folder, 2, "test", quiet=True)
 
 
-@pytest.mark.xfail(reason="defect: a file of JSON that is no record of ours stops the experiment with a traceback")
+@pytest.mark.xfail(
+    reason="defect: a file of JSON that is no record of ours stops the experiment with a traceback"
+)
 @pytest.mark.parametrize("content", ["[]", "null", "3", '{"digest": "DIGEST"}'])
 def test_json_that_is_no_record_counts_as_missing(content, tmp_path):
     path = record_file(tmp_path, "walk", 0)
@@ -339,6 +343,9 @@ def test_a_claim_is_a_row_of_json():
 
 def test_tables():
     assert csv_table({"a": [1, 2], "b": ["x", 0.5]}) == "a,b\n1,x\n2,0.5\n"
-    with pytest.raises(ValueError, match="shorter|longer"):
+    with pytest.raises(ValueError, match=r"shorter|longer"):
         csv_table({"a": [1, 2], "b": [3]})
-    assert markdown_table(["a", "b"], [[1, "x"], [2, 0.5]]) == "| a | b |\n| --- | --- |\n| 1 | x |\n| 2 | 0.5 |\n"
+    assert (
+        markdown_table(["a", "b"], [[1, "x"], [2, 0.5]])
+        == "| a | b |\n| --- | --- |\n| 1 | x |\n| 2 | 0.5 |\n"
+    )

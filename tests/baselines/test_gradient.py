@@ -17,7 +17,17 @@ from entropy_explore_env.config import Grid
 from entropy_explore_env.missions.view import RobotView, read_only, view_of
 from entropy_explore_env.robots.motion import MoveEnd
 from tests.reference import rocha04
-from tests.reference.scenes import SHAPES, as_reference, drawn, free_box, put, random_belief, seeds, started, wander
+from tests.reference.scenes import (
+    SHAPES,
+    as_reference,
+    drawn,
+    free_box,
+    put,
+    random_belief,
+    seeds,
+    started,
+    wander,
+)
 
 SIZE = (7, 11, 5)
 MIDDLE = (3.5, 5.5, 2.5)
@@ -95,7 +105,9 @@ def test_the_choice_is_that_of_the_equations_up_to_the_edge_of_reach(size, seed,
     assert rocha04.gaze(*found[1]) == pytest.approx(choice.gaze, abs=2e-4)
 
 
-@pytest.mark.parametrize("offset", [(2, 0, 0), (-2, 0, 0), (0, 2, 0), (0, -2, 0), (0, 0, 2), (0, 0, -2), (1, -2, 2)])
+@pytest.mark.parametrize(
+    "offset", [(2, 0, 0), (-2, 0, 0), (0, 2, 0), (0, -2, 0), (0, 0, 2), (0, 0, -2), (1, -2, 2)]
+)
 def test_a_voxel_at_the_edge_of_reach_is_a_candidate_and_one_beyond_is_not(offset):
     target = tuple(int(at + step) for at, step in zip(MIDDLE, offset, strict=True))
     field, away = peak(target), math.hypot(*offset)

@@ -68,7 +68,10 @@ def test_strategies_start_from_the_same_poses_whatever_they_draw():
         env = EntropyExploreEnv(scripted(BOX), time_limit_s=5.0)
         poses: list[list[float]] = []
         run_mission(
-            env, make_strategy(name), 8, lambda env, poses=poses: poses.append(env.view("robot_1").pose.tolist())
+            env,
+            make_strategy(name),
+            8,
+            lambda env, poses=poses: poses.append(env.view("robot_1").pose.tolist()),
         )
         starts.append(poses)
     assert starts[0][0] == starts[1][0] and starts[0][-1] != starts[1][-1]

@@ -275,6 +275,7 @@ FAULTS: list[tuple[Any, str, Fault, str, str]] = [
     (EntropyExploreEnv, "step", infinite_reward, "check_spaces", "inf"),
     (Missions, "reset", no_seed, "check_repeatable", "step 0"),
     (Missions, "reset", one_seed, "check_repeatable", "begin alike"),
+    (Missions, "reset", same_episode_again, "check_repeatable", "begin alike"),
     (Missions, "reset", hash_of_text, "check_processes", "process 1"),
     (Missions, "reset", number_of_missions, "check_batches", "batch of one"),
     (EntropyExploreVectorEnv, "_observations", shuffled_missions, "check_batches", "observations"),

@@ -1,0 +1,232 @@
+"""From missions to pictures: what is shown, of which moment, and that nothing is done unasked."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from entropy_explore_env.config import Grid
+from entropy_explore_env.errors import SettingError
+from entropy_explore_env.missions.missions import Missions
+from entropy_explore_env.reports import painting
+from entropy_explore_env.reports.painting import (
+    RENDER_MODES,
+    Painter,
+    check_render_mode,
+    entropy_share,
+    remaining_share,
+)
+from entropy_explore_env.reports.rendering import Frame, draw_frame
+from tests.reference.scenes import free_box, random_actions, started
+
+FLAT = {"grid": Grid((13, 9, 1), 0.5, (-3.0, 1.0, 0.0)), "world": "furnished"}
+SCENES = [pytest.param({}, id="box"), pytest.param(FLAT, id="flat")]
+
+
+def watch(missions: Missions, painter: Painter, steps: int) -> None:
+    """Watch the moment and some steps."""
+    rng = np.random.default_rng(0)
+    for step in range(steps + 1):
+        if step:
+            missions.step(*random_actions(missions, rng))
+        painter.watch(missions)
+
+
+@pytest.fixture
+def frames(monkeypatch):
+    """The frames that were drawn."""
+    drawn: list[Frame] = []
+
+    def draw(frame: Frame) -> np.ndarray:
+        drawn.append(frame)
+        return draw_frame(frame)
+
+    monkeypatch.setattr(painting, "draw_frame", draw)
+    return drawn
+
+
+# --- shares
+
+
+def test_a_voxel_s_share_runs_from_the_prior_to_sigma_end():
+    """h is linear in log σ: from σ = 30 to 0.03 a tenth of it each factor of 10^0.3."""
+    missions = started(free_box(robots=2), missions=2)
+    assert (entropy_share(missions, 1, 1) == 1.0).all()
+    sigma = {
+        (0, 0, 0): 30.0,
+        (1, 0, 0): 0.03,
+        (6, 10, 4): 30.0 * 10**-1.5,
+        (2, 3, 4): 0.003,
+        (3, 3, 3): 300.0,
+    }
+    for voxel, value in sigma.items():
+        missions.precision[1, 1][voxel] = value**-2
+    share = entropy_share(missions, 1, 1)
+    assert share.shape == (7, 11, 5)
+    expected = (1.0, 0.0, 0.5, 0.0, 1.0)
+    assert [share[voxel] for voxel in sigma] == pytest.approx(expected, abs=1e-5)
+    assert (entropy_share(missions, 1, 0) == 1.0).all() and (entropy_share(missions, 0, 1) == 1.0).all()
+
+
+def test_what_remains_runs_from_one_to_nought():
+    missions = started(free_box(robots=3), missions=2)
+    assert remaining_share(missions, 0).tolist() == [1.0, 1.0, 1.0]
+    clock = missions.state.missions[1]
+    clock["entropy_start_bits"], clock["entropy_end_bits"] = 1000.0, -200.0
+    missions.state.robots[1]["entropy_bits"] = [1000.0, 400.0, -200.0]
+    assert remaining_share(missions, 1).tolist() == pytest.approx([1.0, 0.5, 0.0])
+
+
+# --- pictures
+
+
+@pytest.mark.parametrize("changes", SCENES)
+def test_a_picture_of_each_moment(changes):
+    missions = started(free_box(robots=2, **changes), seed=3)
+    painter, pictures, rng = Painter("rgb_array"), [], np.random.default_rng(0)
+    for _ in range(4):
+        painter.watch(missions)
+        before = [array.tobytes() for array in missions.state]
+        picture = painter.picture(missions)
+        assert picture is not None
+        assert (picture.shape, picture.dtype) == ((480, 640, 3), np.uint8)
+        again = painter.picture(missions)
+        assert again is not picture
+        np.testing.assert_array_equal(picture, again)
+        assert [array.tobytes() for array in missions.state] == before
+        pictures.append(picture)
+        missions.step(*random_actions(missions, rng))
+    assert len({picture.tobytes() for picture in pictures}) == 4
+
+
+@pytest.mark.parametrize("changes", SCENES)
+def test_a_picture_shows_the_first_mission_as_robot_0_knows_it(changes, frames):
+    missions = started(free_box(robots=3, **changes), seed=3, missions=2)
+    painter = Painter("rgb_array")
+    rng, times, shares, goals = np.random.default_rng(0), [], [], []
+    for _ in range(6):
+        missions.step(*random_actions(missions, rng))
+        painter.watch(missions)
+        times.append(float(missions.state.missions[0]["time_s"]))
+        shares.append(remaining_share(missions, 0))
+        goals.append(missions.state.robots[0]["goal"][:, :3].copy())
+    painter.paint(missions)
+    (frame,) = frames
+    robots, grid = missions.state.robots[0], missions.grid
+    np.testing.assert_array_equal(frame.entropy_share, entropy_share(missions, 0, 0))
+    np.testing.assert_array_equal(frame.coverage, missions.mean[0, 0])
+    assert frame.voxel_size_m == grid.voxel_size_m and frame.origin_m.tolist() == list(grid.origin_m)
+    np.testing.assert_array_equal(frame.targets_m, robots["target"][:, :3])
+    assert frame.curve_s.tolist() == times
+    np.testing.assert_array_equal(frame.curve_share, shares)
+    here = robots["deciding"]
+    np.testing.assert_allclose(frame.positions_m[here], robots["goal"][here, :3])
+    np.testing.assert_allclose(frame.gazes_rad[here], robots["goal"][here, 3:])
+    assert here.any() and len(frame.paths_m) == 3
+    for robot, path in enumerate(frame.paths_m):
+        np.testing.assert_array_equal(path[:-1], [goal[robot] for goal in goals])
+        np.testing.assert_array_equal(path[-1], frame.positions_m[robot])
+    assert "box-7x11x5" in frame.title and "robot_0" in frame.title
+    said = " ".join(frame.status)
+    assert f"time {times[-1]:,.0f} s" in said and f"scans {robots['scans'].sum():,}" in said
+    assert f"shared {robots['measurements_sent'].sum():,}" in said
+
+
+def test_a_robot_under_way_is_drawn_where_it_is(frames):
+    """From rest at 1 m/s² for 0.5 s: an eighth of a metre on its way along x."""
+    robot = {"max_speed_m_s": 1.0, "acceleration_m_s2": 1.0, "turn_rate_rad_s": math.inf}
+    missions = started(free_box(robots=1, decision_period_s=0.5, robot=robot), seed=3)
+    for field in ("origin", "goal", "target", "scan_pose"):
+        missions.state.robots[0, 0][field] = (0.75, 2.75, 1.25, 0.0, 0.0)
+    missions.step(np.array([[[1.0, 0.0, 0.0, 0.0, 0.0]]]), np.zeros((1, 1), np.int64))
+    Painter("rgb_array").paint(missions)
+    (frame,) = frames
+    assert frame.positions_m[0] == pytest.approx((0.875, 2.75, 1.25))
+    assert frame.targets_m[0] == pytest.approx((1.75, 2.75, 1.25))
+
+
+@pytest.mark.parametrize("steps", [0, 5])
+@pytest.mark.parametrize("changes", SCENES)
+def test_a_painter_forgets_at_a_reset(changes, steps, frames):
+    """Also when nothing had happened yet."""
+    missions = started(free_box(robots=2, **changes), seed=3)
+    painter = Painter("rgb_array")
+    watch(missions, painter, steps)
+    missions.reset(0, 8)
+    painter.watch(missions)
+    fresh = Painter("rgb_array")
+    fresh.watch(missions)
+    np.testing.assert_array_equal(painter.paint(missions), fresh.paint(missions))
+    assert frames[0].curve_s.tolist() == [0.0]
+    assert [len(path) for path in frames[0].paths_m] == [2, 2]
+
+
+def test_it_can_paint_what_it_has_not_watched():
+    missions = started(free_box(robots=2), seed=3)
+    assert Painter("rgb_array").paint(missions).shape == (480, 640, 3)
+
+
+# --- modes
+
+
+def test_without_a_mode_nothing_is_done(monkeypatch):
+    def must_not(*_: object, **__: object) -> None:
+        raise AssertionError("something was painted")
+
+    for name in ("draw_frame", "Window", "remaining_share", "entropy_share"):
+        monkeypatch.setattr(painting, name, must_not)
+    missions = started(free_box(robots=2), seed=3)
+    painter = Painter(None)
+    watch(missions, painter, 3)
+    assert painter.picture(missions) is None
+    painter.close()
+
+
+class FakeWindow:
+    """Notes what it is shown."""
+
+    made: list[FakeWindow]
+
+    def __init__(self, **_: object) -> None:
+        self.shown: list[np.ndarray] = []
+        self.closed = 0
+        FakeWindow.made.append(self)
+
+    def show(self, rgb: np.ndarray) -> None:
+        self.shown.append(rgb)
+
+    def close(self) -> None:
+        self.closed += 1
+
+
+def test_a_human_sees_every_moment_at_once_in_one_window(monkeypatch):
+    FakeWindow.made = []
+    monkeypatch.setattr(painting, "Window", FakeWindow)
+    missions = started(free_box(robots=2), seed=3)
+    painter = Painter("human")
+    assert FakeWindow.made == []
+    watch(missions, painter, 3)
+    (window,) = FakeWindow.made
+    assert len(window.shown) == 4 and all(picture.shape == (480, 640, 3) for picture in window.shown)
+    assert painter.picture(missions) is None
+    painter.close()
+    painter.close()
+    assert window.closed == 1
+    painter.watch(missions)
+    assert len(FakeWindow.made) == 2
+
+
+def test_pictures_are_made_only_when_asked_for(frames):
+    missions = started(free_box(robots=2), seed=3)
+    watch(missions, Painter("rgb_array"), 5)
+    assert frames == []
+
+
+def test_modes_are_checked():
+    for mode in (None, *RENDER_MODES):
+        check_render_mode(mode)
+    for mode in ("ansi", "", "RGB_ARRAY"):
+        with pytest.raises(SettingError, match=r"render_mode.*human"):
+            check_render_mode(mode)
