@@ -13,9 +13,10 @@ import json
 import re
 import sys
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import Any, TypeVar
 
-from entropy_explore_env.errors import EntropyExploreError, MissingExtraError
+from entropy_explore_env.errors import EntropyExploreError, MissingExtraError, SettingError
 
 Arguments = TypeVar("Arguments")
 
@@ -85,6 +86,18 @@ def run_command(main: Callable[[Sequence[str]], int], words: Sequence[str] | Non
     except KeyboardInterrupt:
         print("interrupted", file=sys.stderr)
         return INTERRUPTED
+
+
+def make_folder(option: str, folder: Path) -> None:
+    """Make the folder that an option names, before anything is computed for nothing.
+
+    Raises:
+        SettingError: It cannot be made.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise SettingError(option, str(folder), f"a folder that can be made ({error.strerror})") from None
 
 
 def print_json(results: dict[str, Any]) -> None:

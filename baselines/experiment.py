@@ -180,7 +180,8 @@ def _read(folder: Path, cell: Cell, seed: int) -> Record | None:
         content = json.loads(_path(folder, cell, seed).read_text())
     except (OSError, ValueError):
         return None
-    return content["record"] if content.get("digest") == cell.digest else None
+    ours = isinstance(content, dict) and content.get("digest") == cell.digest
+    return content.get("record") if ours else None
 
 
 @dataclass(frozen=True)

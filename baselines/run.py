@@ -18,7 +18,7 @@ from typing import Annotated, Any
 import numpy as np
 import tyro
 
-from baselines.command import parse, print_json, run_command
+from baselines.command import make_folder, parse, print_json, run_command
 from baselines.mission import run_mission, scripted
 from baselines.strategies import make_strategy
 from entropy_explore_env.config import Channel, Ending, RangeSensor, Robot, Scenario, with_settings
@@ -30,6 +30,8 @@ from entropy_explore_env.reports.painting import Painter, remaining_share
 from entropy_explore_env.reports.recording import Recorder, write_atomically
 from entropy_explore_env.scenarios import ROOM, SCENARIOS, find_scenario
 
+_FLAGS = ("--json", "--no-json", "--channel.announcements", "--channel.no-announcements")
+"""Options without a value of their own."""
 _GIF_FRAMES = 50
 _GIF_FRAME_S = 0.1
 _SERIES_POINTS = 500
@@ -69,7 +71,7 @@ def main(words: Sequence[str]) -> int:
     if args.seed < 0:
         raise SettingError("seed", args.seed, "a whole number ≥ 0")
     if args.out is not None:
-        _make_folder(args.out)
+        make_folder("out", args.out)
     env = EntropyExploreEnv(scenario)
     started = time.perf_counter()
     log = _run(env, args)
@@ -92,7 +94,8 @@ def main(words: Sequence[str]) -> int:
 def _named_scenario(words: Sequence[str]) -> Scenario:
     """The scenario that the words name: its settings are the options' defaults."""
     for before, word in zip(["", *words], words, strict=False):
-        if word in SCENARIOS and (before in ("", "--json") or not before.startswith("-")):
+        takes_it = before.startswith("-") and before not in _FLAGS and "=" not in before
+        if word in SCENARIOS and not takes_it:
             return SCENARIOS[word]
     return ROOM
 
@@ -121,14 +124,6 @@ def _scenario(args: Args) -> Scenario:
     if args.voxel_size_m is not None:
         settings["grid"] = {"voxel_size_m": args.voxel_size_m}
     return with_settings(base, settings)
-
-
-def _make_folder(folder: Path) -> None:
-    """Make the folder for results, before a mission is run for nothing."""
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise SettingError("out", str(folder), f"a folder that can be made ({error.strerror})") from None
 
 
 class _Log:

@@ -38,3 +38,8 @@ class MissingExtraError(EntropyExploreError, ImportError):
     def __init__(self, package: str, extra: str) -> None:
         """Name the package that is missing and the extra that brings it."""
         super().__init__(f"{package} is not installed: pip install 'entropy_explore_env[{extra}]'")
+        self.package, self.extra = package, extra
+
+    def __reduce__(self) -> tuple[type, tuple[str, str]]:
+        """Survive the way back from a worker process."""
+        return type(self), (self.package, self.extra)

@@ -14,7 +14,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from baselines.command import parse, print_json, run_command
+from baselines.command import make_folder, parse, print_json, run_command
 from baselines.experiment import run_cells
 from baselines.papers.rocha04_cells import experiment
 from baselines.papers.rocha04_claims import all_claims
@@ -50,6 +50,8 @@ def main(words: Sequence[str]) -> int:
     for name, value in (("starts", args.starts), ("jobs", args.jobs)):
         if value is not None and value < 1:
             raise SettingError(name, value, "a whole number ≥ 1")
+    make_folder("out", args.out)
+    make_folder("runs", args.runs)
     started = time.perf_counter()
     starts, single_starts = (
         (_QUICK_STARTS, _QUICK_SINGLE_STARTS) if args.quick else (args.starts, args.starts)

@@ -121,9 +121,6 @@ def test_a_finished_experiment_starts_no_process(finished, monkeypatch, capsys):
         run_cells(changed, folder, 2, "test", quiet=True)
 
 
-@pytest.mark.xfail(
-    reason="defect: a file of JSON that is no record of ours stops the experiment with a traceback"
-)
 @pytest.mark.parametrize("content", ["[]", "null", "3", '{"digest": "DIGEST"}'])
 def test_json_that_is_no_record_counts_as_missing(content, tmp_path):
     path = record_file(tmp_path, "walk", 0)
@@ -155,7 +152,6 @@ def test_an_error_in_a_process_comes_back_by_its_name(tmp_path):
         run_cells(crowd, tmp_path, 1, "test", quiet=True)
 
 
-@pytest.mark.xfail(reason="defect: it cannot be unpickled: its arguments are not kept")
 def test_an_error_of_a_missing_package_comes_back_too():
     error = pickle.loads(pickle.dumps(MissingExtraError("octomap-python", "worlds")))
     assert isinstance(error, MissingExtraError) and "worlds" in str(error)

@@ -108,18 +108,15 @@ def test_what_is_not_said_is_the_scenario_s_own(figures):
     assert without_clock(figures(*said.split())) == without_clock(figures())
 
 
-ROOM_S_SETTINGS = pytest.mark.xfail(reason="defect: it is run with the settings of `room`")
-
-
 @pytest.mark.parametrize(
     "options",
     [
         "--json",
         "--strategy random",
         "--json --strategy random --seed 3",
-        pytest.param("--seed=3", marks=ROOM_S_SETTINGS),
-        pytest.param("--channel.no-announcements", marks=ROOM_S_SETTINGS),
-        pytest.param("--no-json", marks=ROOM_S_SETTINGS),
+        "--seed=3",
+        "--channel.no-announcements",
+        "--no-json",
     ],
 )
 def test_options_may_stand_before_the_scenario(options, command):
@@ -409,24 +406,6 @@ def test_an_interrupted_process_ends_with_130_and_leaves_nothing(tmp_path):
     assert (started.returncode, out) == (130, "")
     assert err.endswith("interrupted\n") and "Traceback" not in shown + err
     assert [path for path in tmp_path.rglob("*") if path.is_file()] == []
-
-
-@pytest.mark.xfail(reason="defect: interrupted while it imports, it ends by the signal, with a traceback")
-def test_a_process_that_is_interrupted_while_it_imports_ends_with_130_too():
-    script = (
-        "import os, runpy, signal, sys\n"
-        "class Interrupt:\n"
-        "    def find_spec(self, name, path=None, target=None):\n"
-        "        if name == 'numba':\n"
-        "            os.kill(os.getpid(), signal.SIGINT)\n"
-        "sys.meta_path.insert(0, Interrupt())\n"
-        "sys.argv = ['run', 'box-7x11x5', '--json']\n"
-        "runpy.run_module('baselines.run', run_name='__main__')\n"
-    )
-    done = subprocess.run(
-        [sys.executable, "-c", script], cwd=ROOT, capture_output=True, text=True, timeout=60
-    )
-    assert (done.returncode, done.stdout, done.stderr) == (130, "", "interrupted\n")
 
 
 def test_the_mission_s_end_is_said_by_its_name():

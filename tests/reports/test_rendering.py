@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from entropy_explore_env.errors import MissingExtraError, SettingError
+from entropy_explore_env.reports.animation import Window, animate
 from entropy_explore_env.reports.glyphs import (
     COLOURS,
     ROBOT_COLOURS,
@@ -20,7 +21,6 @@ from entropy_explore_env.reports.glyphs import (
     text_width,
     write,
 )
-from entropy_explore_env.reports.animation import Window, animate
 from entropy_explore_env.reports.rendering import Frame, View, draw_frame, lay_out
 
 SHAPE = (7, 11, 5)
