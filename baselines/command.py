@@ -10,13 +10,29 @@ from __future__ import annotations
 import contextlib
 import io
 import json
+import os
 import re
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from entropy_explore_env.errors import EntropyExploreError, MissingExtraError, SettingError
+
+if TYPE_CHECKING:
+    from tyro.conf import Positional
+else:
+    try:
+        from tyro.conf import Positional
+    except ImportError:  # `parse` says what is missing
+
+        class Positional:
+            """Stands in for tyro's."""
+
+            def __class_getitem__(cls, kind: type) -> type:
+                """The kind itself."""
+                return kind
+
 
 Arguments = TypeVar("Arguments")
 
@@ -79,6 +95,12 @@ def run_command(main: Callable[[Sequence[str]], int], words: Sequence[str] | Non
         return main(sys.argv[1:] if words is None else words)
     except EntropyExploreError as error:
         print("error: " + " ".join(str(error).split()), file=sys.stderr)
+        return BAD_INPUT
+    except BrokenPipeError:  # whoever read our output has seen enough
+        sys.stdout = Path(os.devnull).open("w")
+        return 0
+    except ModuleNotFoundError as error:
+        print(f"error: {error}: pip install 'entropy_explore_env[baselines]'", file=sys.stderr)
         return BAD_INPUT
     except OSError as error:
         print(f"error: {error}", file=sys.stderr)

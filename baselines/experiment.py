@@ -13,11 +13,13 @@ import sys
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from dataclasses import asdict, dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+import entropy_explore_env
 from baselines.mission import run_mission, scripted
 from baselines.strategies import make_strategy
 from entropy_explore_env.config import Scenario
@@ -25,14 +27,22 @@ from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.reports.metrics import mission_figures
 from entropy_explore_env.reports.recording import Recorder, write_atomically
 
-RECORD_VERSION = 1
-"""Raised when records or results change, so that old files are not taken for new ones."""
 _SERIES_POINTS = 200
 _MISSIONS_A_TASK = 5
 _RESAMPLES = 9999
 _CONFIDENCE = 0.95
 
 Record = dict[str, Any]
+
+
+@lru_cache(maxsize=1)
+def _sources_digest() -> str:
+    """Of the code that missions come from: records of other code are not taken for ours."""
+    hasher = hashlib.sha256()
+    library = Path(entropy_explore_env.__file__).parent
+    for source in [*sorted(library.rglob("*.py")), *sorted(Path(__file__).parent.glob("*.py"))]:
+        hasher.update(source.read_bytes())
+    return hasher.hexdigest()
 
 
 @dataclass(frozen=True)
@@ -54,7 +64,9 @@ class Cell:
     @property
     def digest(self) -> str:
         """Of all that decides the results."""
-        described = repr((RECORD_VERSION, scripted(self.scenario), self.strategy))
+        world = Path(self.scenario.world)
+        content = hashlib.sha256(world.read_bytes()).hexdigest() if world.is_file() else ""
+        described = repr((_sources_digest(), content, scripted(self.scenario), self.strategy))
         return hashlib.sha256(described.encode()).hexdigest()[:16]
 
 

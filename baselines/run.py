@@ -13,12 +13,11 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 import numpy as np
-import tyro
 
-from baselines.command import make_folder, parse, print_json, run_command
+from baselines.command import Positional, make_folder, parse, print_json, run_command
 from baselines.mission import run_mission, scripted
 from baselines.strategies import make_strategy
 from entropy_explore_env.config import Channel, Ending, RangeSensor, Robot, Scenario, with_settings
@@ -28,10 +27,8 @@ from entropy_explore_env.reports.animation import animate
 from entropy_explore_env.reports.metrics import mission_figures
 from entropy_explore_env.reports.painting import Painter, remaining_share
 from entropy_explore_env.reports.recording import Recorder, write_atomically
-from entropy_explore_env.scenarios import ROOM, SCENARIOS, find_scenario
+from entropy_explore_env.scenarios import ROOM, find_scenario
 
-_FLAGS = ("--json", "--no-json", "--channel.announcements", "--channel.no-announcements")
-"""Options without a value of their own."""
 _GIF_FRAMES = 50
 _GIF_FRAME_S = 0.1
 _SERIES_POINTS = 500
@@ -41,10 +38,10 @@ _SERIES_POINTS = 500
 class Args:
     """Run a mission of a strategy and show it."""
 
-    scenario: Annotated[str, tyro.conf.Positional] = "room"
+    scenario: Positional[str] = "room"
     """A named scenario: room, room-furnished, box-7x11x5."""
     strategy: str = "gradient"
-    """How robots choose viewpoints: random, gradient."""
+    """How robots choose viewpoints: random, gradient, gradient-plane."""
     robots: int = 3
     """Team size."""
     seed: int = 0
@@ -65,7 +62,8 @@ class Args:
 
 def main(words: Sequence[str]) -> int:
     """Run the command."""
-    args = parse(Args, words, default=_defaults(_named_scenario(words)), description=__doc__)
+    named = parse(Args, words, default=_defaults(ROOM), description=__doc__).scenario
+    args = parse(Args, words, default=_defaults(find_scenario(named)), description=__doc__)
     make_strategy(args.strategy)
     scenario = _scenario(args)
     if args.seed < 0:
@@ -89,15 +87,6 @@ def main(words: Sequence[str]) -> int:
     else:
         _print_table(figures, args.out)
     return 0
-
-
-def _named_scenario(words: Sequence[str]) -> Scenario:
-    """The scenario that the words name: its settings are the options' defaults."""
-    for before, word in zip(["", *words], words, strict=False):
-        takes_it = before.startswith("-") and before not in _FLAGS and "=" not in before
-        if word in SCENARIOS and not takes_it:
-            return SCENARIOS[word]
-    return ROOM
 
 
 def _defaults(scenario: Scenario) -> Args:

@@ -21,6 +21,7 @@ from baselines.papers.rocha04_claims import all_claims
 from baselines.papers.rocha04_report import print_claims, write_report
 from entropy_explore_env.errors import SettingError
 
+_STARTS = 100
 _QUICK_STARTS, _QUICK_SINGLE_STARTS = 10, 30
 
 
@@ -34,8 +35,8 @@ class Args:
     """Folder for the report, its figures and tables."""
     runs: Path = Path("results/rocha04-runs")
     """Folder that keeps the missions."""
-    starts: int = 100
-    """Missions a cell in the full run; paired: the same seeds in every cell."""
+    starts: int | None = None
+    """Missions a cell, the same seeds in every cell; default: 100, with --quick 10 (one robot: 30)."""
     jobs: int | None = None
     """Processes; default: one a processor."""
     json: bool = False
@@ -53,14 +54,14 @@ def main(words: Sequence[str]) -> int:
     make_folder("out", args.out)
     make_folder("runs", args.runs)
     started = time.perf_counter()
-    starts, single_starts = (
-        (_QUICK_STARTS, _QUICK_SINGLE_STARTS) if args.quick else (args.starts, args.starts)
-    )
+    starts = args.starts or (_QUICK_STARTS if args.quick else _STARTS)
+    single_starts = args.starts or (_QUICK_SINGLE_STARTS if args.quick else _STARTS)
     cells = experiment(starts, single_starts, changes=not args.quick)
-    jobs = args.jobs or len(os.sched_getaffinity(0))
+    jobs = args.jobs or os.cpu_count() or 1
     records = run_cells(cells, args.runs, jobs, "Rocha04", quiet=args.json)
     claims = all_claims(records)
-    report = write_report(args.out, records, claims, args.quick)
+    command = f"python -m baselines.papers.rocha04{' --quick' if args.quick else ''} --out {args.out}"
+    report = write_report(args.out, records, claims, command)
     if args.json:
         wall_s = round(time.perf_counter() - started, 1)
         print_json({"paper": "Rocha04", "claims": [claim.row() for claim in claims], "wall_s": wall_s})

@@ -31,7 +31,7 @@ STYLE: Any = {"font.size": 9, "axes.spines.top": False, "axes.spines.right": Fal
 _PAPER_SINGLE = {"t_mission_s": 2142.0, "half_s": 254.9, "end_s": 1899.5}
 
 
-def write_report(folder: Path, records: Records, claims: Sequence[Claim], quick: bool) -> Path:
+def write_report(folder: Path, records: Records, claims: Sequence[Claim], command: str) -> Path:
     """Write `rocha04.md` and, in a folder `rocha04` beside it, its figures and tables.
 
     Returns:
@@ -52,7 +52,7 @@ def write_report(folder: Path, records: Records, claims: Sequence[Claim], quick:
             write_atomically(beside / f"{name}.csv", csv_table(table))
     write_atomically(beside / "table-1.csv", csv_table(_table_1(ROOM)))
     write_atomically(beside / "table-2.csv", csv_table(_table_2()))
-    text = _text(records, claims, quick)
+    text = _text(records, claims, command)
     write_atomically(folder / "rocha04.md", text)
     return folder / "rocha04.md"
 
@@ -244,10 +244,9 @@ def _table_2() -> dict[str, list[object]]:
     return {"parameter": names, "values": sets}
 
 
-def _text(records: Records, claims: Sequence[Claim], quick: bool) -> str:
+def _text(records: Records, claims: Sequence[Claim], command: str) -> str:
     """The report."""
     single, team = len(records["single"]), len(records[team_id(2, *STANDARD)])
-    option = " --quick" if quick else ""
     capped = sum(not record["finished"] for cell in records.values() for record in cell)
     held = sum(claim.holds for claim in claims)
     rows = [
@@ -257,7 +256,7 @@ def _text(records: Records, claims: Sequence[Claim], quick: bool) -> str:
     figures = "\n".join(f"![Figure {n}](rocha04/figure-{n}.png)" for n in range(3, 9))
     parts = [
         "# Rocha, Dias and Carvalho 2004, reproduced",
-        f"Written by `python -m baselines.papers.rocha04{option} --out docs/results`: {single} starts of one "
+        f"Written by `{command}`: {single} starts of one "
         f"robot, {team} of each team, seeds 0, 1, …, the same in every cell. Intervals are 95 % bootstrap "
         f"intervals over missions; {capped} missions were cut off by the time limit, and count with it. "
         "Tables 1-2 and the figures' numbers lie as CSV "
@@ -267,7 +266,7 @@ def _text(records: Records, claims: Sequence[Claim], quick: bool) -> str:
         "## One robot",
         _single_table(records),
     ]
-    if not quick:
+    if "change-plane" in records:
         parts += ["## One thing changed at a time", _changes_text(records), _reading(records)]
     parts += ["## Figures", figures]
     return "\n\n".join(part.strip() for part in parts) + "\n"

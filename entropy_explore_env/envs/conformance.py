@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import argparse
 import copy
-import functools
 import itertools
 import math
 import os
@@ -20,165 +19,39 @@ import subprocess
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from entropy_explore_env.config import Scenario, with_settings
+from entropy_explore_env.envs.episodes import (
+    EPISODES,
+    OTHER_ACTIONS,
+    PARTS,
+    ConformanceError,
+    Leaves,
+    Task,
+    by_agent,
+    finish,
+    leaves,
+    named,
+    play,
+    require_same,
+    snapshot,
+    story,
+    walk,
+)
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.envs.vector_env import EntropyExploreVectorEnv
 from entropy_explore_env.errors import ActionError, CallOrderError, EntropyExploreError
-from entropy_explore_env.missions.missions import Missions
-from entropy_explore_env.missions.rules import rules_of
 from entropy_explore_env.missions.state import MissionEnd
 from entropy_explore_env.randomness import check_seed
 from entropy_explore_env.scenarios import find_scenario
 from entropy_explore_env.worlds.load import with_world
 
-EPISODES = 2
-"""So many episodes in a row are compared: the one of a seed, and those that follow it."""
 BATCH = 8
-_OTHER = 1
-"""The kind of actions that are not the episode's own."""
 _CHILD = "from entropy_explore_env.envs.conformance import answer_parent; answer_parent()"
-_PARTS = ("observations", "rewards", "terminations", "truncations", "infos")
 _ROBOT_INFOS = ("deciding", "entropy_bits", "own_bits", "received_bits")
-
-Leaves = dict[str, tuple[Any, ...]]
-"""Place ("episode 1, step 17 › rewards › robot_0") → type and value of what was there, down to the bit."""
-
-
-class ConformanceError(AssertionError):
-    """The contract is broken; the message says what differed, where, and at which step."""
-
-
-@dataclass(frozen=True)
-class Task:
-    """What is checked, and the actions that are taken.
-
-    Attributes:
-        scenario: With the grid of its world's file, if it has one.
-        seed: Of mission 0; mission e takes seed + e.
-    """
-
-    scenario: Scenario
-    seed: int
-
-    @functools.cached_property
-    def choices(self) -> int:
-        """Number of discrete actions."""
-        rules = rules_of(self.scenario)
-        return len(rules.moves) * len(rules.gazes)
-
-    def actions(self, mission: int, episode: int, step: int, kind: int = 0) -> np.ndarray:
-        """A team's actions, (A, N) float32 or (A,) int64; another `kind` gives other ones."""
-        rng = np.random.default_rng([self.seed + mission, episode, step, kind])
-        if self.scenario.action.kind == "discrete":
-            return rng.integers(0, self.choices, self.scenario.robots)
-        shape = (self.scenario.robots, 3 if self.scenario.planar else 5)
-        return rng.uniform(-1.0, 1.0, shape).astype(np.float32)
-
-    def table(self, missions: int, episode: int, step: int) -> np.ndarray:
-        """Actions of many missions as a VectorEnv takes them: no axis A for one robot."""
-        actions = np.stack([self.actions(mission, episode, step) for mission in range(missions)])
-        return actions[:, 0] if self.scenario.robots == 1 else actions
-
-
-def parts_of(value: object) -> dict[Any, Any] | None:
-    """What a container holds, by key, number or field; None if it is none."""
-    if isinstance(value, Mapping):
-        return dict(value)
-    if isinstance(value, np.ndarray) and value.dtype.names:  # bytes between fields mean nothing
-        return {name: value[name] for name in value.dtype.names}
-    if isinstance(value, list | tuple) or (isinstance(value, np.ndarray) and value.dtype == object):
-        return dict(enumerate(value))
-    return None
-
-
-def walk(value: object, where: str = "") -> Iterator[tuple[str, Any]]:
-    """A value and, if it is a container, all that is in it, with their places."""
-    yield where, value
-    for key, part in (parts_of(value) or {}).items():
-        yield from walk(part, f"{where} › {key}" if where else str(key))
-
-
-def leaves(value: object, where: str = "") -> Leaves:
-    """What a value is made of, as something that nobody can change any more."""
-    found: Leaves = {}
-    for place, part in walk(value, where):
-        kind = type(part).__name__
-        if parts_of(part) is not None:
-            found[place] = (kind,)
-        elif isinstance(part, np.ndarray):
-            found[place] = (kind, part.dtype.str, part.shape, part.tobytes())
-        else:
-            found[place] = (kind, repr(part))
-    return found
-
-
-def require_same(what: str, first: Leaves, second: Leaves) -> None:
-    """Raise a ConformanceError at the first place where two results differ."""
-    for where in {**first, **second}:
-        one, two = first.get(where, ("nothing",)), second.get(where, ("nothing",))
-        if one != two:
-            raise ConformanceError(f"{what} › {where}: {_difference(one, two)}")
-    if list(first) != list(second):
-        raise ConformanceError(f"{what}: the same keys in another order")
-
-
-def _difference(one: tuple[Any, ...], two: tuple[Any, ...]) -> str:
-    """The first entry that differs in arrays of one kind, else both values."""
-    if len(one) < 4 or one[:3] != two[:3]:
-        return ", then ".join(" ".join(map(str, leaf[:3])) for leaf in (one, two))
-    first, second = (np.frombuffer(leaf[3], leaf[1]).reshape(leaf[2]) for leaf in (one, two))
-    unequal = np.asarray([a.tobytes() != b.tobytes() for a, b in zip(first.flat, second.flat, strict=True)])
-    place = tuple(int(i) for i in np.unravel_index(int(unequal.argmax()), one[2]))
-    return f"at {place} {first[place]!r}, then {second[place]!r}"
-
-
-def snapshot(env: EntropyExploreEnv | EntropyExploreVectorEnv) -> Leaves:
-    """All that a call may change."""
-    missions: Missions = env.missions
-    kept = {"seeds": missions.seeds, "episodes": missions.episodes, "observations": missions.observations}
-    agents = env.agents if isinstance(env, EntropyExploreEnv) else []
-    return leaves({**missions.state._asdict(), **kept, "agents": agents})
-
-
-def play(env: EntropyExploreEnv, task: Task, mission: int = 0) -> Iterator[tuple[str, dict[str, Any]]]:
-    """Play whole episodes after a reset with the mission's seed; yields what was returned, by moment."""
-    for episode in range(EPISODES):
-        yield f"episode {episode}, step 0", named(env, env.reset(None if episode else task.seed + mission))
-        yield from finish(env, task, mission, episode)
-
-
-def finish(
-    env: EntropyExploreEnv, task: Task, mission: int, episode: int, step: int = 0
-) -> Iterator[tuple[str, dict[str, Any]]]:
-    """Play an episode to its end; `step` steps of it have been taken."""
-    while env.agents:
-        step += 1
-        result = env.step(by_agent(env, task.actions(mission, episode, step)))
-        yield f"episode {episode}, step {step}", named(env, result)
-
-
-def story(moments: Iterator[tuple[str, dict[str, Any]]]) -> Leaves:
-    """The leaves of a play, taken moment by moment."""
-    found: Leaves = {}
-    for moment, parts in moments:
-        found |= leaves(parts, moment)
-    return found
-
-
-def named(env: EntropyExploreEnv, result: tuple[Any, ...]) -> dict[str, Any]:
-    """What reset or step returned, by name, and the state."""
-    names = _PARTS if len(result) == 5 else (_PARTS[0], _PARTS[-1])
-    return {**dict(zip(names, result, strict=True)), "state": env.state()}
-
-
-def by_agent(env: EntropyExploreEnv, actions: np.ndarray) -> dict[str, Any]:
-    """A team's actions as a ParallelEnv takes them."""
-    return dict(zip(env.possible_agents, actions, strict=True))
 
 
 def check_spaces(task: Task) -> None:
@@ -187,7 +60,7 @@ def check_spaces(task: Task) -> None:
     agents = env.possible_agents
     spaces = [env.state_space, *map(env.observation_space, agents), *map(env.action_space, agents)]
     for where, moment in play(env, task):
-        if any(list(moment[name]) != agents for name in _PARTS if name in moment):
+        if any(list(moment[name]) != agents for name in PARTS if name in moment):
             raise ConformanceError(f"{where}: not everything is given for all of {agents}")
         seen = [moment["state"], *moment["observations"].values()]
         for name, space, value in zip(["state", *agents], spaces, seen, strict=False):
@@ -295,7 +168,7 @@ def row_of_team(moment: dict[str, Any]) -> dict[str, Any]:
     """A ParallelEnv's moment as `row_of` has it."""
     infos, observations = (list(moment[name].values()) for name in ("infos", "observations"))
     rewards = list(moment.get("rewards", dict.fromkeys(moment["infos"], 0.0)).values())
-    ends = [float(all(moment[name].values())) if name in moment else 0.0 for name in _PARTS[2:4]]
+    ends = [float(all(moment[name].values())) if name in moment else 0.0 for name in PARTS[2:4]]
     robots = [parts if isinstance(parts, dict) else {"flat": parts} for parts in observations]
     return {
         "observations": {name: np.stack([parts[name] for parts in robots]).ravel() for name in robots[0]},
@@ -317,7 +190,7 @@ def check_copies(task: Task) -> None:
     pickled, copied, other = pickle.loads(pickle.dumps(env)), copy.deepcopy(env), copy.deepcopy(env)
     before = snapshot(env)
     while other.agents:
-        other.step(by_agent(other, task.actions(0, 0, half + 1, _OTHER)))
+        other.step(by_agent(other, task.actions(0, 0, half + 1, OTHER_ACTIONS)))
     other.reset(task.seed + 1)
     require_same("the original, before and after its copy is used", before, snapshot(env))
     rest = [story(_rest(each, task, half)) for each in (env, pickled, copied)]
@@ -369,7 +242,7 @@ def check_busy(task: Task) -> None:
     infos = env.reset(task.seed)[1]
     other.reset(task.seed)
     for step in itertools.count(1):
-        actions, others = (by_agent(env, task.actions(0, 0, step, kind)) for kind in (0, _OTHER))
+        actions, others = (by_agent(env, task.actions(0, 0, step, kind)) for kind in (0, OTHER_ACTIONS))
         mixed = {agent: (actions if infos[agent]["deciding"] else others)[agent] for agent in actions}
         result = env.step(actions)
         require_same(f"step {step}, other actions", *map(leaves, (result, other.step(mixed))))

@@ -58,7 +58,7 @@ class Missions:
                 raise SettingError(name, value, "a whole number ≥ 1")
         self.scenario = scenario
         self.count = int(count)
-        self.threads = min(self.count, threads or len(os.sched_getaffinity(0)))
+        self.threads = min(self.count, threads or os.cpu_count() or 1)
         self.rules = rules_of(scenario)
         self.layout = ObservationLayout(scenario)
         self._parts = observation_rules(scenario, self.layout)

@@ -117,6 +117,7 @@ def test_what_is_not_said_is_the_scenario_s_own(figures):
         "--seed=3",
         "--channel.no-announcements",
         "--no-json",
+        "--channel.no_announcements",
     ],
 )
 def test_options_may_stand_before_the_scenario(options, command):
