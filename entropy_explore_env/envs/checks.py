@@ -77,11 +77,13 @@ class ActionChecker:
         if given.shape != shape or not np.issubdtype(given.dtype, kind):
             raise ActionError("actions", f"{given.dtype} {given.shape}", f"{wanted} of shape {shape}")
         if self._discrete:
-            if ((given < 0) | (given >= self._count)).any():
-                raise ActionError("actions", given.tolist(), f"whole numbers from 0 to {self._count - 1}")
+            outside = (given < 0) | (given >= self._count)
+            if outside.any():
+                raise ActionError("actions", given[outside][0], f"whole numbers from 0 to {self._count - 1}")
             return np.zeros((missions, robots, 1)), given.reshape(missions, robots).astype(np.int64)
-        if not (np.abs(given) <= 1.0 + _ROUNDING).all():
-            raise ActionError("actions", "an array with other numbers", "finite numbers from -1 to 1")
+        inside = np.abs(given) <= 1.0 + _ROUNDING
+        if not inside.all():
+            raise ActionError("actions", given[~inside][0], "finite numbers from -1 to 1")
         boxes = np.ascontiguousarray(given.reshape(missions, robots, self.width), np.float64)
         return boxes, np.zeros((missions, robots), np.int64)
 

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 from gymnasium import spaces
 from pettingzoo import AECEnv, ParallelEnv
-from pettingzoo.utils import OrderEnforcingWrapper, parallel_to_aec
+from pettingzoo.utils import OrderEnforcingWrapper
+from pettingzoo.utils.conversions import parallel_to_aec_wrapper
 
 from entropy_explore_env.config import Scenario, with_settings
 from entropy_explore_env.envs.checks import ActionChecker
@@ -79,7 +80,13 @@ class EntropyExploreEnv(ParallelEnv[str, Any, Any]):
         return self.missions.layout.flat_space(self.scenario.robots)
 
     def state(self) -> np.ndarray:
-        """What all robots observe, one after the other: (A·F,) float32, for centralised critics."""
+        """What all robots observe, one after the other: (A·F,) float32, for centralised critics.
+
+        Raises:
+            CallOrderError: There was no reset yet.
+        """
+        if self.missions.episodes[0] < 0:
+            raise CallOrderError("state before reset: call reset() first")
         return self.missions.observations[0].flatten()
 
     def view(self, agent: str) -> RobotView:
@@ -154,6 +161,10 @@ class EntropyExploreEnv(ParallelEnv[str, Any, Any]):
         self._painter.watch(self.missions)
         return observations, rewards, terminations, truncations, infos
 
+    def check_action(self, agent: str, action: Any) -> None:  # noqa: ANN401 - whatever was given
+        """Raise an ActionError unless the agent can take this action."""
+        self._checker.one(agent, action)
+
     def _in_order(self, actions: Mapping[str, Any]) -> list[tuple[str, Any]]:
         """The actions in the order of the robots, if there is one for each."""
         if not self.agents:
@@ -191,8 +202,18 @@ def parallel_env(
     return EntropyExploreEnv(scenario, render_mode, **settings)
 
 
+class TurnTakingEnv(parallel_to_aec_wrapper[str, Any, Any]):
+    """The AEC form; a bad action is refused when it is given, not when the last robot has acted."""
+
+    def step(self, action: Any) -> None:  # noqa: ANN401 - PettingZoo's signature
+        """Take the action of the robot whose turn it is; see `EntropyExploreEnv.step`."""
+        if action is not None and isinstance(self.env, EntropyExploreEnv):
+            self.env.check_action(self.agent_selection, action)
+        super().step(action)
+
+
 def env(
     scenario: str | Scenario = "room", render_mode: str | None = None, **settings: object
 ) -> AECEnv[str, Any, Any]:
     """The same as an AECEnv: robots act in turn, and the step is taken when all have."""
-    return OrderEnforcingWrapper(parallel_to_aec(parallel_env(scenario, render_mode, **settings)))
+    return OrderEnforcingWrapper(TurnTakingEnv(parallel_env(scenario, render_mode, **settings)))

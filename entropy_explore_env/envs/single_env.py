@@ -15,6 +15,7 @@ from entropy_explore_env.missions.action import action_space
 from entropy_explore_env.missions.missions import Missions
 from entropy_explore_env.missions.state import MissionEnd
 from entropy_explore_env.missions.view import RobotView, view_of
+from entropy_explore_env.randomness import check_seed
 from entropy_explore_env.reports.painting import FRAMES_PER_S, RENDER_MODES, Painter, check_render_mode
 from entropy_explore_env.scenarios import find_scenario
 from entropy_explore_env.worlds.load import with_world
@@ -55,7 +56,7 @@ class SingleRobotEnv(gymnasium.Env[Any, Any]):
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Any, dict[str, Any]]:
         """Start a mission; see `EntropyExploreEnv.reset`."""
-        super().reset(seed=seed)
+        super().reset(seed=None if seed is None else check_seed(seed))
         del options
         self.missions.reset(0, seed)
         self._painter.watch(self.missions)

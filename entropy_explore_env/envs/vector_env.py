@@ -11,10 +11,12 @@ from gymnasium.vector.utils import batch_space
 
 from entropy_explore_env.config import Scenario, with_settings
 from entropy_explore_env.envs.checks import ActionChecker
+from entropy_explore_env.envs.infos import action_mask
 from entropy_explore_env.errors import CallOrderError, SettingError
 from entropy_explore_env.missions.action import action_space
 from entropy_explore_env.missions.missions import Missions
 from entropy_explore_env.missions.state import MissionEnd
+from entropy_explore_env.randomness import check_seed
 from entropy_explore_env.reports.painting import FRAMES_PER_S, RENDER_MODES, Painter, check_render_mode
 from entropy_explore_env.scenarios import find_scenario
 from entropy_explore_env.worlds.load import with_world
@@ -30,7 +32,8 @@ class EntropyExploreVectorEnv(VectorEnv[Any, Any, Any]):
     mission, (E,), is the mean of its robots' rewards.
 
     Infos, each with a mask `_name` (E,) as Gymnasium has it: `deciding`, `entropy_bits`, `own_bits`,
-    `received_bits` and `reward_robots`, (E, A); `time_s` and `end` (code of a MissionEnd), (E,).
+    `received_bits` and `reward_robots`, (E, A); `time_s` and `end` (code of a MissionEnd), (E,);
+    `action_mask`, (E, A, N), where actions are discrete.
     `final_obs` and `final_info` where autoreset is SAME_STEP.
     """
 
@@ -60,6 +63,8 @@ class EntropyExploreVectorEnv(VectorEnv[Any, Any, Any]):
             WorldError: The world's file cannot be used.
         """
         check_render_mode(render_mode)
+        if isinstance(num_envs, bool) or not isinstance(num_envs, int | np.integer) or num_envs < 1:
+            raise SettingError("num_envs", num_envs, "a whole number ≥ 1")
         try:
             self.autoreset_mode = AutoresetMode(autoreset_mode)
         except ValueError:
@@ -110,11 +115,11 @@ class EntropyExploreVectorEnv(VectorEnv[Any, Any, Any]):
 
     def _seeds(self, seed: int | list[int | None] | None) -> list[int | None]:
         if seed is None or isinstance(seed, int | np.integer):
-            return [None if seed is None else int(seed) + mission for mission in range(self.num_envs)]
-        seeds = list(seed)
-        if len(seeds) != self.num_envs:
-            raise SettingError("seed", seed, f"a whole number, or {self.num_envs} of them")
-        return seeds
+            first = None if seed is None else check_seed(seed)
+            return [None if first is None else first + mission for mission in range(self.num_envs)]
+        if not isinstance(seed, list | tuple | np.ndarray) or len(seed) != self.num_envs:
+            raise SettingError("seed", seed, f"a whole number ≥ 0, or {self.num_envs} of them")
+        return [None if one is None else check_seed(one) for one in seed]
 
     def step(self, actions: object) -> tuple[Any, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
         """Advance all missions by one step.
@@ -184,6 +189,12 @@ class EntropyExploreVectorEnv(VectorEnv[Any, Any, Any]):
         for name in ("deciding", "entropy_bits", "own_bits", "received_bits"):
             infos[name] = robots[name].copy()
         infos["reward_robots"] = robots["reward"].copy()
+        if self.scenario.action.kind == "discrete":
+            masks = [
+                [action_mask(self.missions, e, a) for a in range(self.scenario.robots)]
+                for e in range(self.num_envs)
+            ]
+            infos["action_mask"] = np.asarray(masks)
         infos.update({f"_{name}": np.ones(self.num_envs, bool) for name in list(infos)})
         return infos
 

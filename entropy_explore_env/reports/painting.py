@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from entropy_explore_env.errors import SettingError
+from entropy_explore_env.errors import CallOrderError, SettingError
 from entropy_explore_env.missions.missions import Missions
 from entropy_explore_env.missions.poses import pose_at
 from entropy_explore_env.reports.animation import Window
@@ -61,8 +61,20 @@ class Painter:
             self._window.show(self.paint(missions))
 
     def picture(self, missions: Missions) -> np.ndarray | None:
-        """The picture of this moment for `rgb_array`, (480, 640, 3) uint8; else None."""
-        return self.paint(missions) if self._mode == "rgb_array" else None
+        """The picture of this moment for `rgb_array`, (480, 640, 3) uint8; else None.
+
+        Raises:
+            CallOrderError: The first mission was not reset yet.
+        """
+        if self._mode != "rgb_array":
+            return None
+        if missions.episodes[0] < 0:
+            raise CallOrderError("render before reset: call reset() first")
+        return self.paint(missions)
+
+    def __getstate__(self) -> dict[str, object]:
+        """All but the window, which cannot be copied; a copy opens its own."""
+        return {**self.__dict__, "_window": None}
 
     def paint(self, missions: Missions) -> np.ndarray:
         """Draw this moment of the first mission: the belief of robot_0, and the whole team.
