@@ -112,6 +112,7 @@ class Robot:
         check_choice(self, "motion", Literal["free", "planar"])
         check_positive(self, "max_speed_m_s", "acceleration_m_s2")
         check_positive(self, "reach_m", "turn_rate_rad_s", finite=False)
+        check(self, "reach_m", "a number from 0 to 1e6, or inf", lambda v: v <= 1e6 or v == math.inf)
         check_not_negative(self, "body_radius_m", "sensor_height_m")
 
 

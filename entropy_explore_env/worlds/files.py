@@ -23,7 +23,7 @@ _FREE_AT_LEAST = 0.5
 _OCCUPIED_BELOW = 0.25
 
 
-def load_octomap(path: Path, voxel_size_m: float | None = None) -> World:
+def load_octomap(path: Path | str, voxel_size_m: float | None = None) -> World:
     """The world in an OctoMap binary tree (`.bt`), its voxels resampled.
 
     Unknown space counts as solid. Where voxels are resampled, one is free if at least half of it is
@@ -41,8 +41,10 @@ def load_octomap(path: Path, voxel_size_m: float | None = None) -> World:
         SettingError: The voxel size is not a number > 0.
         MissingExtraError: octomap-python is not installed.
     """
-    if voxel_size_m is not None and not (math.isfinite(voxel_size_m) and voxel_size_m > 0):
+    number = isinstance(voxel_size_m, int | float) and math.isfinite(voxel_size_m)
+    if voxel_size_m is not None and not (number and voxel_size_m > 0):
         raise SettingError("voxel_size_m", voxel_size_m, "a number > 0")
+    path = Path(path)
     labels, edge_m, origin_m = _read_octomap(path)
     free, occupied = labels == 0, labels == 1
     if voxel_size_m is None or abs(voxel_size_m - edge_m) < 1e-9:

@@ -50,6 +50,8 @@ class World:
         radius = body_radius_m / self.grid.voxel_size_m
         if radius <= 0.5 + 1e-9:
             return self.occupied
+        if 2.0 * radius > max(self.grid.shape):
+            return np.ones(self.grid.shape, bool)
         height = 0 if self.grid.flat else math.ceil(radius - 0.5)
         reach = math.ceil(radius - 0.5)
         offsets = np.ogrid[-reach : reach + 1, -reach : reach + 1, -height : height + 1]
