@@ -84,11 +84,11 @@ def _slice(figure: Figure, axes: Axes, recorder: Recorder, entropy: bool) -> Non
         axes.plot(way[:, 0], way[:, 1], color=colour, linewidth=0.9)
         axes.plot(*way[0, :2], marker="o", color=colour, markersize=5, markeredgecolor="white")
         axes.plot(*way[-1, :2], marker="s", color=colour, markersize=5, markeredgecolor="white")
-    what = "entropy left" if entropy else "coverage (blue: unknown)"
+    what = "entropy left" if entropy else "coverage"
     height = f" at z = {grid.centre_of(np.array([0, 0, layer]))[2]:.2f} m" if not grid.flat else ""
     axes.set(xlabel="x (m)", ylabel="y (m)")
     axes.set_title(f"robot_0's map{height}: {what}", loc="left")
-    figure.colorbar(image, ax=axes, shrink=0.7)
+    figure.colorbar(image, ax=axes, shrink=0.7, label="" if entropy else "coverage; blue: unknown")
 
 
 def _busiest_layer(places_m: np.ndarray, grid: Grid) -> int:
