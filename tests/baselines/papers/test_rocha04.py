@@ -160,7 +160,10 @@ def test_a_finished_experiment_is_not_run_again_and_says_the_same(
     assert code == 0
     assert "H(0) in bits" in out and "95 % interval" in out
     assert "written" in err and "H(0)" not in err
-    assert contents(tmp_path) == contents(tiny.folder / "out")
+    before, here = str(tiny.folder / "out").encode(), str(tmp_path).encode()  # the report names its command
+    assert contents(tmp_path) == {
+        name: content.replace(before, here) for name, content in contents(tiny.folder / "out").items()
+    }
 
 
 def test_the_tables_hold_the_records_numbers(tiny):
