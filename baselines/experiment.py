@@ -13,7 +13,7 @@ import sys
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from dataclasses import asdict, dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -61,9 +61,9 @@ class Cell:
     strategy: str
     seeds: int
 
-    @property
+    @cached_property
     def digest(self) -> str:
-        """Of all that decides the results."""
+        """Of all that decides the results; worked out once, since it reads sources and world files."""
         world = Path(self.scenario.world)
         content = hashlib.sha256(world.read_bytes()).hexdigest() if world.is_file() else ""
         described = repr((_sources_digest(), content, scripted(self.scenario), self.strategy))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+from typing import Any
 
 import matplotlib as mpl
 import numpy as np
@@ -16,6 +17,10 @@ from entropy_explore_env.reports.recording import Recorder
 
 COLOURS = tuple(tuple(level / 255 for level in robot_colour(robot)) for robot in range(8))
 """Of the robots, as in every other picture; colour-blind people can tell them apart."""
+
+
+STYLE: Any = {"font.size": 9, "axes.spines.top": False, "axes.spines.right": False}
+"""Of all figures: matplotlib's settings."""
 
 
 def png(figure: Figure, dots_per_inch: int = 110) -> bytes:
@@ -38,7 +43,7 @@ def mission_picture(recorder: Recorder, title: str, strategy: str) -> bytes:
     """
     missions = recorder.missions
     robots = missions.scenario.robots
-    with mpl.rc_context({"font.size": 9, "axes.spines.top": False, "axes.spines.right": False}):
+    with mpl.rc_context(STYLE):
         figure = Figure(figsize=(11, 7.2), layout="constrained")
         curves, shared, above, covered = figure.subplots(2, 2).ravel()
         for robot in range(robots):

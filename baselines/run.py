@@ -20,6 +20,7 @@ import numpy as np
 from baselines.command import Positional, make_folder, parse, print_json, run_command
 from baselines.mission import run_mission, scripted
 from baselines.strategies import make_strategy
+from baselines.strategy import Strategy
 from entropy_explore_env.config import Channel, Ending, RangeSensor, Robot, Scenario, with_settings
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.errors import SettingError
@@ -64,7 +65,7 @@ def main(words: Sequence[str]) -> int:
     """Run the command."""
     named = parse(Args, words, default=_defaults(ROOM), description=__doc__).scenario
     args = parse(Args, words, default=_defaults(find_scenario(named)), description=__doc__)
-    make_strategy(args.strategy)
+    strategy = make_strategy(args.strategy)
     scenario = _scenario(args)
     if args.seed < 0:
         raise SettingError("seed", args.seed, "a whole number ≥ 0")
@@ -72,7 +73,7 @@ def main(words: Sequence[str]) -> int:
         make_folder("out", args.out)
     env = EntropyExploreEnv(scenario)
     started = time.perf_counter()
-    log = _run(env, args)
+    log = _run(env, strategy, args)
     figures = mission_figures(env.missions, 0)
     figures = {
         "scenario": figures.pop("scenario"),
@@ -138,7 +139,7 @@ class _Log:
             self._every_s *= 2.0
 
 
-def _run(env: EntropyExploreEnv, args: Args) -> _Log:
+def _run(env: EntropyExploreEnv, strategy: Strategy, args: Args) -> _Log:
     """Run the mission under a progress bar."""
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
@@ -166,7 +167,7 @@ def _run(env: EntropyExploreEnv, args: Args) -> _Log:
         progress.update(task, completed=1.0 - left, left=left, time_s=logs[0].recorder.latest_s, shared=sent)
 
     try:
-        run_mission(env, make_strategy(args.strategy), args.seed, after_step)
+        run_mission(env, strategy, args.seed, after_step)
     finally:
         if logs:
             progress.stop()

@@ -19,6 +19,7 @@ from baselines.papers.rocha04_cells import BURSTS, I_MINS, STANDARD, TEAMS, team
 Records = dict[str, list[Record]]
 
 PAPER_STARTS = 10
+PAPER_T_MISSION_S = 2142.0
 RAYS = 128
 
 
@@ -66,7 +67,7 @@ def _single_claims(single: list[Record], name: str, who: str) -> list[Claim]:
         return []
     claims = []
     for figure, field, paper in (
-        ("t_mission", "t_mission_s", 2142.0),
+        ("t_mission", "t_mission_s", PAPER_T_MISSION_S),
         ("k_max", "scans", 1211.0),
         ("measurements", "measurements", 155136.0),
     ):

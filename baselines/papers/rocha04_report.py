@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import matplotlib as mpl
 import numpy as np
@@ -20,15 +19,12 @@ from baselines.experiment import (
     ratio_interval,
     small_mean_range,
 )
-from baselines.figures import COLOURS, png
+from baselines.figures import COLOURS, STYLE, png
 from baselines.papers.rocha04_cells import BURSTS, CHANGES, I_MINS, STANDARD, TEAMS, team_id
-from baselines.papers.rocha04_claims import PAPER_STARTS, Records, times
+from baselines.papers.rocha04_claims import PAPER_STARTS, PAPER_T_MISSION_S, Records, times
 from entropy_explore_env.config import Scenario
 from entropy_explore_env.reports.recording import write_atomically
 from entropy_explore_env.scenarios import ROOM
-
-STYLE: Any = {"font.size": 9, "axes.spines.top": False, "axes.spines.right": False}
-_PAPER_SINGLE = {"t_mission_s": 2142.0, "half_s": 254.9, "end_s": 1899.5}
 
 
 def write_report(folder: Path, records: Records, claims: Sequence[Claim], command: str) -> Path:
@@ -63,13 +59,9 @@ def print_claims(claims: Sequence[Claim]) -> None:
     from rich.table import Table
 
     table = Table(title="Rocha04", title_justify="left")
-    for head, justify in (
-        ("claim", "left"),
-        ("paper", "right"),
-        ("ours", "right"),
-        ("95 % interval", "right"),
-    ):
-        table.add_column(head, justify="right" if justify == "right" else "left")
+    table.add_column("claim")
+    for head in ("paper", "ours", "95 % interval"):
+        table.add_column(head, justify="right")
     table.add_column("holds")
     for claim in claims:
         holds = "[green]yes[/green]" if claim.holds else "[red]no[/red]"
@@ -182,7 +174,7 @@ def _figure_time(records: Records, what: str) -> tuple[Figure, dict[str, list[ob
         for robots in (1, *TEAMS)
     ]
     axes.plot([1, *TEAMS], walks, ":", marker="x", color="0.4", label="random walk, burst 64, I_min 0.3219")
-    axes.plot([1], [_PAPER_SINGLE["t_mission_s"]], "k*", label="the paper's mean of 10 starts")
+    axes.plot([1], [PAPER_T_MISSION_S], "k*", label="the paper's mean of 10 starts")
     axes.set(
         xlabel="robots",
         ylabel="mission time (s)",

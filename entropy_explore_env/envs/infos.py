@@ -4,11 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
-
-from entropy_explore_env.missions.action import write_mask
 from entropy_explore_env.missions.missions import Missions
-from entropy_explore_env.missions.poses import grid_position, pose_at
 from entropy_explore_env.missions.state import MissionEnd
 from entropy_explore_env.robots.motion import MoveEnd
 
@@ -46,15 +42,6 @@ def robot_infos(missions: Missions, mission: int) -> list[dict[str, Any]]:
         )
     ]
     if missions.scenario.action.kind == "discrete":
-        for robot, info in enumerate(infos):
-            info["action_mask"] = action_mask(missions, mission, robot)
+        for info, mask in zip(infos, missions.action_masks()[mission], strict=True):
+            info["action_mask"] = mask
     return infos
-
-
-def action_mask(missions: Missions, mission: int, robot: int) -> np.ndarray:
-    """(N,) int8: 1 for each discrete action that makes sense by the robot's own belief."""
-    rules, state = missions.rules, missions.state
-    mask = np.empty(len(rules.moves) * len(rules.gazes), np.int8)
-    pose = pose_at(rules.numbers[0], state.robots[mission, robot], state.missions[mission]["time_s"])
-    write_mask(rules, grid_position(rules.numbers[0], pose), state.mean[mission, robot], mask)
-    return mask

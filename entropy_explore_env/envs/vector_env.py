@@ -11,7 +11,6 @@ from gymnasium.vector.utils import batch_space
 
 from entropy_explore_env.config import Scenario, with_settings
 from entropy_explore_env.envs.checks import ActionChecker
-from entropy_explore_env.envs.infos import action_mask
 from entropy_explore_env.errors import CallOrderError, SettingError
 from entropy_explore_env.missions.action import action_space
 from entropy_explore_env.missions.missions import Missions
@@ -190,11 +189,7 @@ class EntropyExploreVectorEnv(VectorEnv[Any, Any, Any]):
             infos[name] = robots[name].copy()
         infos["reward_robots"] = robots["reward"].copy()
         if self.scenario.action.kind == "discrete":
-            masks = [
-                [action_mask(self.missions, e, a) for a in range(self.scenario.robots)]
-                for e in range(self.num_envs)
-            ]
-            infos["action_mask"] = np.asarray(masks)
+            infos["action_mask"] = self.missions.action_masks()
         infos.update({f"_{name}": np.ones(self.num_envs, bool) for name in list(infos)})
         return infos
 

@@ -13,7 +13,7 @@ from entropy_explore_env.errors import CallOrderError, SettingError, WorldError
 from entropy_explore_env.missions.observation import ObservationLayout, observation_rules
 from entropy_explore_env.missions.rules import rules_of
 from entropy_explore_env.missions.state import MissionEnd, MissionState, new_state
-from entropy_explore_env.missions.tick import observe_mission, step_missions
+from entropy_explore_env.missions.tick import mask_missions, observe_mission, step_missions
 from entropy_explore_env.randomness import Stream, check_seed, generator, splitmix_states
 from entropy_explore_env.robots.range_sensor import Scan, new_scan
 from entropy_explore_env.worlds.load import make_world
@@ -191,6 +191,13 @@ class Missions:
 
         for done in [self._pool.submit(work, thread) for thread in range(self.threads)]:
             done.result()
+
+    def action_masks(self) -> np.ndarray:
+        """(E, A, N) int8: 1 for each discrete action that makes sense by the robot's own belief."""
+        actions = len(self.rules.moves) * len(self.rules.gazes)
+        masks = np.empty((self.count, self.scenario.robots, actions), np.int8)
+        mask_missions(self.rules, self.state, masks)
+        return masks
 
     def over(self, mission: int) -> MissionEnd:
         """Why the mission is over, or MissionEnd.RUNNING."""

@@ -10,7 +10,7 @@ import math
 
 from numba import njit
 
-from entropy_explore_env.missions.action import decode_action
+from entropy_explore_env.missions.action import decode_action, write_mask
 from entropy_explore_env.missions.messages import announce, next_letter, open_letter, send
 from entropy_explore_env.missions.observation import observe_robot
 from entropy_explore_env.missions.poses import copy_numbers, grid_position, pose_at
@@ -64,6 +64,16 @@ def observe_mission(rules, parts, state, scan, mission, out):
     for robot in range(state.robots.shape[1]):
         pose = pose_at(rules.numbers[0], state.robots[mission, robot], state.missions[mission].time_s)
         observe_robot(rules, parts, state, scan, mission, robot, pose, out[robot])
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def mask_missions(rules, state, out):
+    """Fill (E, A, N) int8, the masks of all robots' discrete actions."""
+    numbers = rules.numbers[0]
+    for mission in range(out.shape[0]):
+        for robot in range(out.shape[1]):
+            pose = pose_at(numbers, state.robots[mission, robot], state.missions[mission].time_s)
+            write_mask(rules, grid_position(numbers, pose), state.mean[mission, robot], out[mission, robot])
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
