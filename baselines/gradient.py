@@ -6,10 +6,10 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from numba import njit
 
 from baselines.strategy import random_viewpoint
 from entropy_explore_env.belief.fields import entropy_gradient
+from entropy_explore_env.compilation import kernel
 from entropy_explore_env.config import Scenario
 from entropy_explore_env.missions.view import RobotView
 from entropy_explore_env.robots.motion import MoveEnd
@@ -60,7 +60,7 @@ class GradientStrategy:
         return viewpoint
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def steepest_viewpoint(
     mean: np.ndarray,
     precision: np.ndarray,
@@ -123,13 +123,13 @@ def steepest_viewpoint(
     return found
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def _span(position: float, reach: float, size: int) -> tuple[int, int]:
     """First and one past the last index along an axis whose voxel may be within reach."""
     return max(math.floor(position - reach), 0), min(math.floor(position + reach) + 1, size)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def _on_plane(
     vector: tuple[float, float, float], ahead: tuple[float, float, float], left: tuple[float, float, float]
 ) -> tuple[float, float, float]:

@@ -15,6 +15,7 @@ from numba import njit
 from benchmarks.peers import OctoMapTree
 from benchmarks.rows import Effort, Goal, Row, compared, interleave, timed
 from entropy_explore_env.belief.coverage_map import PRIOR_MEAN, measurement_precision
+from entropy_explore_env.compilation import kernel
 from entropy_explore_env.config import Grid, RangeSensor
 from entropy_explore_env.robots.range_sensor import (
     Return,
@@ -115,7 +116,7 @@ def fuse_measurements(
     return voxels
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def fuse_floor(
     crossed: np.ndarray,
     ends: np.ndarray,

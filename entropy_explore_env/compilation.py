@@ -1,4 +1,4 @@
-"""Compiled code on disk: forgotten as soon as any source file that it may come from has changed.
+"""How kernels are compiled, and when compiled code on disk is forgotten.
 
 Numba compiles a kernel anew when its own file changes, but not when a kernel that it calls changes in
 another file: after an update, or an edit, old and new code would mix without a word.
@@ -8,6 +8,21 @@ from __future__ import annotations
 
 import hashlib
 from pathlib import Path
+from typing import Any
+
+from numba import njit
+
+_OPTIONS: dict[str, Any] = {"cache": True, "nogil": True, "error_model": "numpy"}
+
+kernel = njit(**_OPTIONS)
+"""Compiled once and kept on disk; other threads run meanwhile; a division by zero gives inf or nan."""
+lean_kernel = njit(**_OPTIONS, _nrt=False)
+"""A kernel that makes no array and so counts no references: each row that it slices would cost a count.
+
+Numba refuses to compile one that does make an array.
+"""
+inlined_kernel = njit(**_OPTIONS, _nrt=False, forceinline=True)
+"""A lean kernel for what happens once a ray: it becomes part of each kernel that calls it."""
 
 
 def forget_stale_kernels(folder: Path, *others: Path) -> None:

@@ -27,6 +27,8 @@ BITS_OF_UNIT_GAUSSIAN = 0.5 * math.log2(2.0 * math.pi * math.e)
 
 MAX_VOXELS = 2**31 - 1
 """Voxels are numbered by 32-bit integers."""
+MAX_VOXELS_ALONG_AXIS = 2**20
+"""Rays measure their way in 64-bit integers."""
 
 Settings = TypeVar("Settings")
 
@@ -52,7 +54,7 @@ class Grid:
 
     def __post_init__(self) -> None:
         """Check every field."""
-        check_counts(self, "shape", 1, MAX_VOXELS)
+        check_counts(self, "shape", 1, MAX_VOXELS_ALONG_AXIS)
         if math.prod(self.shape) > MAX_VOXELS:
             raise SettingError("Grid.shape", self.shape, f"at most {MAX_VOXELS} voxels in all")
         check_positive(self, "voxel_size_m")

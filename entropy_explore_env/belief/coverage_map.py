@@ -8,8 +8,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
+from entropy_explore_env.compilation import inlined_kernel
 from entropy_explore_env.config import BITS_OF_UNIT_GAUSSIAN
 
 PRIOR_MEAN = 0.5
@@ -38,14 +38,14 @@ def map_entropy_bits(precision: np.ndarray) -> np.ndarray:
     return BITS_OF_UNIT_GAUSSIAN * math.prod(precision.shape[-3:]) - 0.5 * logs
 
 
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+@inlined_kernel
 def measurement_precision(range_m, sigma_min, sigma_slope_per_m):
     """Precision of the coverage that one ray measures, 1/σ(d)² with σ(d) = σ_min + ζ·d (eq. 5)."""
     sigma = sigma_min + sigma_slope_per_m * range_m
     return 1.0 / (sigma * sigma)
 
 
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+@inlined_kernel
 def measured_coverage(start, length, size, crossed, entered, n, coverage):
     """Coverage that a hit at `length` says of the voxels on its ray (Rocha04, eq. 4).
 
@@ -82,7 +82,7 @@ def measured_coverage(start, length, size, crossed, entered, n, coverage):
     return first
 
 
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+@inlined_kernel
 def fuse_ray(mean, precision, crossed, coverage, free, n, measured):
     """Fuse one range measurement into the voxels that its ray crosses.
 
@@ -129,7 +129,7 @@ def fuse_ray(mean, precision, crossed, coverage, free, n, measured):
     return 0.5 * (bits - math.log2(shrink))
 
 
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+@inlined_kernel
 def expected_utility(precision, crossed, n, measured):
     """Utility in bits that a ray over these voxels would bring; nothing is changed (eq. 27).
 

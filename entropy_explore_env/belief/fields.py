@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
+from entropy_explore_env.compilation import inlined_kernel
 
 
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+@inlined_kernel
 def entropy_gradient(precision, i, j, k, voxel_size_m):
     """Backward difference of the voxel entropy (Rocha04, eq. 30).
 

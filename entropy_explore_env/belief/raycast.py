@@ -1,7 +1,8 @@
 """Voxels crossed by a ray: exact traversal in grid units (Amanatides & Woo 1987).
 
 Grid units: voxel (i, j, k) is the cube [i, i+1) × [j, j+1) × [k, k+1); lengths are in voxel edges.
-Voxels are numbered in C order, z fastest.
+Voxels are numbered in C order, z fastest. Along a ray, distances are whole numbers of ticks: sums of
+whole numbers are exact, and the processor compares and selects them without a guess.
 """
 
 from __future__ import annotations
@@ -9,7 +10,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
+
+from entropy_explore_env.compilation import inlined_kernel, lean_kernel
 
 OPEN = 0
 """The ray reached its length without meeting anything."""
@@ -20,11 +22,18 @@ WALL = 2
 
 STOP_AT_COVERED = 0.5
 """Rays stop in front of voxels with more coverage than this: in the truth and in beliefs alike."""
-NEVER_STOP = 2.0
+NEVER_STOP = math.inf
 """No coverage is above this: the ray goes its whole length."""
 
+TICKS = 2.0**40
+"""Ticks in a voxel edge: the resolution of distances along a ray."""
+_EDGES = 1.0 / TICKS
+_FAR = 2.0**21
+"""Farther than any workspace is long, in voxel edges: a face that no ray reaches."""
+_FAR_TICKS = 2**61
 
-@njit(cache=True, nogil=True, error_model="numpy")
+
+@lean_kernel
 def longest_crossing(size_x, size_y, size_z, length, voxels_behind):
     """Most voxels that a ray can cross: the scratch space that `cast_ray` needs.
 
@@ -41,36 +50,51 @@ def longest_crossing(size_x, size_y, size_z, length, voxels_behind):
     return within + voxels_behind + 1
 
 
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+@inlined_kernel
 def _axis(position, direction, size):
     """Start of the traversal along one axis.
 
     Returns:
-        Voxel index, step (-1, 0, 1), steps left inside, distance to the first face and between faces.
+        Voxel index, step (-1, 0, 1), ticks to the first face, between faces, and to the last face.
     """
     index = min(max(int(position), 0), size - 1)  # inside: no need to call floor, which is slow
-    if direction > 0.0:
-        gap = 1.0 / direction
-        return index, 1, size - 1 - index, (index + 1 - position) * gap, gap
-    if direction < 0.0:
-        gap = -1.0 / direction
-        return index, -1, index, (position - index) * gap, gap
-    return index, 0, 0, math.inf, math.inf
+    if direction == 0.0:
+        return index, 0, _FAR_TICKS, _FAR_TICKS, _FAR_TICKS
+    ahead = direction > 0.0
+    edge = 1.0 / abs(direction)
+    face = _ticks((index + 1 - position if ahead else position - index) * edge)
+    gap = _ticks(edge)
+    left = size - 1 - index if ahead else index
+    last = face + left * gap if left * edge < _FAR else _FAR_TICKS
+    return index, 1 if ahead else -1, face, gap, last
 
 
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
-def _next_voxel(
-    voxel, step_x, left_x, face_x, gap_x, step_y, left_y, face_y, gap_y, step_z, left_z, face_z, gap_z
-):
-    """Cross the nearest face, x before y before z where the ray meets an edge."""
-    if face_z < min(face_x, face_y):
-        return face_z, voxel + step_z, left_x, face_x, left_y, face_y, left_z - 1, face_z + gap_z
-    if face_x <= face_y:
-        return face_x, voxel + step_x, left_x - 1, face_x + gap_x, left_y, face_y, left_z, face_z
-    return face_y, voxel + step_y, left_x, face_x, left_y - 1, face_y + gap_y, left_z, face_z
+@inlined_kernel
+def _ticks(length):
+    """A distance in voxel edges as a whole number of ticks."""
+    return int(min(length, _FAR) * TICKS + 0.5)
 
 
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+@inlined_kernel
+def _next_voxel(voxel, step_x, face_x, gap_x, step_y, face_y, gap_y, step_z, face_z, gap_z):
+    """Cross the nearest face, x before y before z where the ray meets an edge.
+
+    Nothing but selects: which face comes next is as good as random, and a wrong guess costs more.
+    """
+    by_x = face_x <= face_y
+    nearest = face_x if by_x else face_y
+    by_z = face_z < nearest
+    step = step_x if by_x else step_y
+    return (
+        voxel + (step_z if by_z else step),
+        face_z if by_z else nearest,
+        face_x + (gap_x if by_x & (not by_z) else 0),
+        face_y + (gap_y if (not by_x) & (not by_z) else 0),
+        face_z + (gap_z if by_z else 0),
+    )
+
+
+@inlined_kernel
 def cast_ray(coverage, stop_above, size, start, direction, length, hit_at_length, behind, crossed, entered):
     """Walk along a ray, and note the voxels that it crosses, until something ends it.
 
@@ -96,47 +120,40 @@ def cast_ray(coverage, stop_above, size, start, direction, length, hit_at_length
         OBSTACLE or WALL.
     """
     size_x, size_y, size_z = size
-    ix, step_x, left_x, face_x, gap_x = _axis(start[0], direction[0], size_x)
-    iy, step_y, left_y, face_y, gap_y = _axis(start[1], direction[1], size_y)
-    iz, step_z, left_z, face_z, gap_z = _axis(start[2], direction[2], size_z)
+    ix, step_x, face_x, gap_x, last_x = _axis(start[0], direction[0], size_x)
+    iy, step_y, face_y, gap_y, last_y = _axis(start[1], direction[1], size_y)
+    iz, step_z, face_z, gap_z, last_z = _axis(start[2], direction[2], size_z)
     voxel = (ix * size_y + iy) * size_z + iz
     step_x *= size_y * size_z
     step_y *= size_z
-    at, n, end = 0.0, 0, WALL
-    while at < length:
-        if coverage[np.uint64(voxel)] > stop_above and n > 0:
+    leaves = min(last_x, last_y, last_z)
+    stops = _ticks(length)
+    until = min(leaves, stops)
+    crossed[0], entered[0] = voxel, 0.0
+    n, end = 1, WALL
+    while True:
+        voxel, at, face_x, face_y, face_z = _next_voxel(
+            voxel, step_x, face_x, gap_x, step_y, face_y, gap_y, step_z, face_z, gap_z
+        )
+        if at >= until:
+            break
+        if coverage[np.uint64(voxel)] > stop_above:
             end = OBSTACLE
             break
-        crossed[n] = voxel
-        entered[n] = at
+        crossed[np.uint32(n)] = voxel
+        entered[np.uint32(n)] = at * _EDGES
         n += 1
-        at, voxel, left_x, face_x, left_y, face_y, left_z, face_z = _next_voxel(
-            voxel, step_x, left_x, face_x, gap_x, step_y, left_y, face_y, gap_y, step_z, left_z, face_z, gap_z
-        )
-        if left_x < 0 or left_y < 0 or left_z < 0:
-            break
-    if end != OBSTACLE and at >= length:
-        at, end = length, OBSTACLE if hit_at_length else OPEN
+    reached = at * _EDGES
+    if end == WALL and at >= stops:
+        reached, end = length, OBSTACLE if hit_at_length else OPEN
     if end == OBSTACLE:
         for _ in range(behind):
-            if min(left_x, left_y, left_z) < 0:
+            if at >= leaves:
                 break
-            crossed[n] = voxel
-            entered[n] = at
+            crossed[np.uint32(n)] = voxel
+            entered[np.uint32(n)] = reached
             n += 1
-            _, voxel, left_x, face_x, left_y, face_y, left_z, face_z = _next_voxel(
-                voxel,
-                step_x,
-                left_x,
-                face_x,
-                gap_x,
-                step_y,
-                left_y,
-                face_y,
-                gap_y,
-                step_z,
-                left_z,
-                face_z,
-                gap_z,
+            voxel, at, face_x, face_y, face_z = _next_voxel(
+                voxel, step_x, face_x, gap_x, step_y, face_y, gap_y, step_z, face_z, gap_z
             )
-    return at, n, end
+    return reached, n, end

@@ -17,9 +17,9 @@ import math
 
 import numpy as np
 from gymnasium import spaces
-from numba import njit
 
 from entropy_explore_env.belief.raycast import STOP_AT_COVERED
+from entropy_explore_env.compilation import kernel
 from entropy_explore_env.config import Scenario
 from entropy_explore_env.errors import ActionError
 from entropy_explore_env.missions.rules import Rules, rules_of
@@ -36,7 +36,7 @@ def action_space(scenario: Scenario) -> spaces.Box | spaces.Discrete:
     return spaces.Discrete(len(rules.moves) * len(rules.gazes))
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def decode_action(rules, pose, box, number, viewpoint):
     """Turn an action into a viewpoint.
 
@@ -77,7 +77,7 @@ def decode_action(rules, pose, box, number, viewpoint):
                 viewpoint[axis] = pose[axis] + (viewpoint[axis] - pose[axis]) * settings.reach_m / length
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def write_mask(rules, start, mean, out):
     """Mark the discrete actions that make sense by the robot's own belief.
 

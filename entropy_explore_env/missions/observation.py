@@ -30,10 +30,10 @@ from typing import NamedTuple
 
 import numpy as np
 from gymnasium import spaces
-from numba import njit
 
 from entropy_explore_env.belief.coverage_map import expected_utility, measurement_precision
 from entropy_explore_env.belief.raycast import OPEN, STOP_AT_COVERED, cast_ray, longest_crossing
+from entropy_explore_env.compilation import kernel, lean_kernel
 from entropy_explore_env.config import Scenario
 from entropy_explore_env.missions.action import write_mask
 from entropy_explore_env.missions.rules import Rules, rules_of
@@ -178,7 +178,7 @@ def observation_rules(scenario: Scenario, layout: ObservationLayout) -> Observat
     )
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@lean_kernel
 def observe_panorama(rules, start, mean, precision, scan, out):
     """Fill (2·D,): what rays around the robot would bring, cast like a scan through its own belief.
 
@@ -214,7 +214,7 @@ def observe_panorama(rules, start, mean, precision, scan, out):
         out[directions + ray] = range_m
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@lean_kernel
 def observe_self(numbers, pose, time_s, entropy_bits, deciding, out):
     """Fill (10,): the robot's pose, the time, the entropy left and whether it decides."""
     for axis in range(3):
@@ -230,7 +230,7 @@ def observe_self(numbers, pose, time_s, entropy_bits, deciding, out):
     out[9] = 1.0 if deciding else 0.0
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@lean_kernel
 def observe_team(numbers, robot, pose, time_s, heard, out):
     """Fill ((A-1)·13,): where teammates were last heard, and what they announced.
 
@@ -270,14 +270,14 @@ def observe_team(numbers, robot, pose, time_s, heard, out):
             row[11], row[12] = min(news.announced[5] / diagonal, 1.0), news.announced[6] / math.pi
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@lean_kernel
 def normalised_entropy(numbers, precision):
     """1 at the prior, 0 at the voxel entropy that ends a mission, clipped in between."""
     span = math.log2(numbers.end_precision / numbers.prior_precision)
     return min(max(math.log2(numbers.end_precision / precision) / span, 0.0), 1.0)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@lean_kernel
 def observe_patch(numbers, shape, robot, start, mean, precision, heard, out):
     """Fill (4·x·y·z,): the belief around the robot's voxel; outside the workspace it is covered."""
     size_x, size_y, size_z = numbers.size[0], numbers.size[1], numbers.size[2]
@@ -306,7 +306,7 @@ def observe_patch(numbers, shape, robot, start, mean, precision, heard, out):
                 out[3 * cells + (x * shape[1] + y) * shape[2] + z] = 1.0
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@lean_kernel
 def observe_overview(numbers, shape, mean, precision, out):
     """Fill (2·x·y·z,): normalised entropy and expected coverage, averaged over blocks of voxels."""
     size_x, size_y, size_z = numbers.size[0], numbers.size[1], numbers.size[2]
@@ -331,7 +331,7 @@ def observe_overview(numbers, shape, mean, precision, out):
                 out[cells + cell] = covered / voxels
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def observe_robot(rules, parts, state, scan, mission, robot, pose, out):
     """Fill one robot's flat observation.
 

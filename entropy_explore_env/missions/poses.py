@@ -5,19 +5,19 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
+from entropy_explore_env.compilation import kernel
 from entropy_explore_env.robots.motion import driven_share, turning_time
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def copy_numbers(source, target, count):
     """Copy the first `count` numbers; a loop compiles ten times as fast as an array assignment."""
     for i in range(count):
         target[i] = source[i]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def grid_position(numbers, pose):
     """(3,) float64 position in grid units."""
     position = np.empty(3)
@@ -26,7 +26,7 @@ def grid_position(numbers, pose):
     return position
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def pose_at(numbers, robot, time_s):
     """(5,) float64 pose of a robot at a time between its departure and its next one."""
     origin, goal = robot.origin, robot.goal

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from numba import njit
+from entropy_explore_env.compilation import kernel
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def reward_robots(robots, bits_to_gain, team, cost):
     """Reward one mission's robots for one step.
 

@@ -8,8 +8,7 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
-
+from entropy_explore_env.compilation import kernel
 from entropy_explore_env.missions.action import decode_action, write_mask
 from entropy_explore_env.missions.messages import announce, next_letter, open_letter, send
 from entropy_explore_env.missions.observation import observe_robot
@@ -37,7 +36,7 @@ _ARRIVED, _TEAMMATE = MoveEnd.ARRIVED.code, MoveEnd.TEAMMATE.code
 _NOTHING = int(Return.NOTHING)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def step_missions(rules, parts, state, scan, boxes, numbers, first, last, out):
     """Advance the missions `first` … `last` - 1 by one step; those that are over stand still.
 
@@ -58,7 +57,7 @@ def step_missions(rules, parts, state, scan, boxes, numbers, first, last, out):
         observe_mission(rules, parts, state, scan, mission, out[mission])
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def observe_mission(rules, parts, state, scan, mission, out):
     """Fill (A, F) float32, the observations of a mission's robots."""
     for robot in range(state.robots.shape[1]):
@@ -66,7 +65,7 @@ def observe_mission(rules, parts, state, scan, mission, out):
         observe_robot(rules, parts, state, scan, mission, robot, pose, out[robot])
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def mask_missions(rules, state, out):
     """Fill (E, A, N) int8, the masks of all robots' discrete actions."""
     numbers = rules.numbers[0]
@@ -76,7 +75,7 @@ def mask_missions(rules, state, out):
             write_mask(rules, grid_position(numbers, pose), state.mean[mission, robot], out[mission, robot])
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def step_mission(rules, state, scan, mission, boxes, numbers):
     """One step of one mission: what happens between two observations."""
     clock, robots = state.missions[mission], state.robots[mission]
@@ -97,7 +96,7 @@ def step_mission(rules, state, scan, mission, boxes, numbers):
     reward_robots(robots, bits_to_gain, rules.numbers[0].team_reward, cost)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def depart(numbers, blocked, robots, index, time_s, scan):
     """Commit a robot to its target: how far it will get, why no farther, and when it has scanned."""
     robot = robots[index]
@@ -139,7 +138,7 @@ def depart(numbers, blocked, robots, index, time_s, scan):
     robot.ready_s = time_s + max(drive_s, turn_s) + numbers.scan_time_s
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def advance(rules, state, scan, mission):
     """Work off the events up to the end of the step, the time limit or the mission's end."""
     clock, robots, mail = state.missions[mission], state.robots[mission], state.mail[mission]
@@ -167,7 +166,7 @@ def advance(rules, state, scan, mission):
             clock.end = _TIME_UP
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def next_robot(robots):
     """(robot, time) of the next robot that has driven and scanned; time inf if all decide."""
     soonest, ready_s = 0, math.inf
@@ -177,7 +176,7 @@ def next_robot(robots):
     return soonest, ready_s
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def mapped(robots, entropy_end_bits, all_maps):
     """Whether one robot's map, or all maps, passed the threshold (Rocha04, eq. 41)."""
     passed = 0
@@ -187,7 +186,7 @@ def mapped(robots, entropy_end_bits, all_maps):
     return passed == len(robots) if all_maps else passed > 0
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def scan_and_share(rules, state, scan, mission, index):
     """A robot measures from where its drive ended, fuses, and sends what is most useful."""
     numbers, robot = rules.numbers[0], state.robots[mission, index]
@@ -230,7 +229,7 @@ def scan_and_share(rules, state, scan, mission, index):
             send(rules, state, scan, mission, index, count)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def place_bodies(rules, robots, index, time_s, start, bodies):
     """Put the teammates' bodies that the robot may see, in grid units, into `bodies`; returns how many."""
     numbers, goal, count = rules.numbers[0], robots[index].goal, 0

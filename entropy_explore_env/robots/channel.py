@@ -10,9 +10,7 @@ from __future__ import annotations
 
 import enum
 
-import numpy as np
-from numba import njit
-
+from entropy_explore_env.compilation import kernel
 from entropy_explore_env.randomness import draw_uniform
 
 BITS_PER_MEASUREMENT = 96
@@ -36,7 +34,7 @@ class Delivery(enum.Enum):
 _HEARD, _OUT_OF_RANGE, _LOST = (delivery.code for delivery in Delivery)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def select_measurements(utility, burst, i_min_bits, order):
     """Choose the measurements that a robot sends (Rocha04, eq. 43), the most useful first.
 
@@ -52,15 +50,21 @@ def select_measurements(utility, burst, i_min_bits, order):
     Returns:
         How many were chosen.
     """
-    ranked = np.argsort(-utility, kind="mergesort")  # stable: equal utilities stay in ray order
-    chosen = 0
-    while chosen < min(burst, len(utility)) and utility[ranked[chosen]] >= i_min_bits:
-        order[chosen] = ranked[chosen]
-        chosen += 1
+    most, chosen = min(burst, len(utility)), 0
+    for ray in range(len(utility)):
+        bits = utility[ray]
+        if bits < i_min_bits or most == 0 or (chosen == most and bits <= utility[order[most - 1]]):
+            continue
+        chosen = min(chosen + 1, most)
+        place = chosen - 1
+        while place > 0 and bits > utility[order[place - 1]]:
+            order[place] = order[place - 1]
+            place -= 1
+        order[place] = ray
     return chosen
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def deliver(apart_m, range_m, loss_probability, chance):
     """Whether a message reaches a teammate: the code of a Delivery.
 

@@ -10,9 +10,8 @@ from __future__ import annotations
 import enum
 import math
 
-from numba import njit
-
 from entropy_explore_env.belief.raycast import OBSTACLE, OPEN, STOP_AT_COVERED, cast_ray
+from entropy_explore_env.compilation import kernel
 
 
 class MoveEnd(enum.Enum):
@@ -35,7 +34,7 @@ _TOUCH = 1e-6
 _HALVINGS = 60
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def driving_time(length_m, max_speed_m_s, acceleration_m_s2):
     """Seconds from rest to rest: 2√(L/a) below L = v²/a, else L/v + v/a."""
     if length_m < max_speed_m_s * max_speed_m_s / acceleration_m_s2:
@@ -43,7 +42,7 @@ def driving_time(length_m, max_speed_m_s, acceleration_m_s2):
     return length_m / max_speed_m_s + max_speed_m_s / acceleration_m_s2
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def driven_share(elapsed_s, length_m, max_speed_m_s, acceleration_m_s2):
     """Share in [0, 1] of a drive that is behind the robot `elapsed_s` after its start."""
     duration = driving_time(length_m, max_speed_m_s, acceleration_m_s2)
@@ -60,7 +59,7 @@ def driven_share(elapsed_s, length_m, max_speed_m_s, acceleration_m_s2):
     return min(max(way / length_m, 0.0), 1.0)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def turning_time(yaw, pitch, new_yaw, new_pitch, turn_rate_rad_s):
     """Seconds to turn the gaze, yaw and pitch at once, each the short way round."""
     turn = abs(new_yaw - yaw) % (2.0 * math.pi)
@@ -68,7 +67,7 @@ def turning_time(yaw, pitch, new_yaw, new_pitch, turn_rate_rad_s):
     return max(turn, abs(new_pitch - pitch)) / turn_rate_rad_s
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def free_way(blocked, size, start, direction, length, crossed, entered):
     """How far a body can drive on a line before something solid.
 
@@ -101,7 +100,7 @@ def free_way(blocked, size, start, direction, length, crossed, entered):
     return middle, (_OBSTACLE if end == OBSTACLE else _WALL)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def _gap(start, direction, way, begin, finish):
     """Distance between the point `way` along a line and the segment from `begin` to `finish`."""
     along, length = 0.0, 0.0
@@ -117,7 +116,7 @@ def _gap(start, direction, way, begin, finish):
     return math.sqrt(gap)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel
 def way_to_teammate(start, direction, way, begin, finish, touching):
     """How far a body can drive before it touches a teammate or the tube that it still sweeps.
 

@@ -11,7 +11,6 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from entropy_explore_env.belief.coverage_map import fuse_ray, measured_coverage, measurement_precision
 from entropy_explore_env.belief.raycast import (
@@ -21,6 +20,7 @@ from entropy_explore_env.belief.raycast import (
     cast_ray,
     longest_crossing,
 )
+from entropy_explore_env.compilation import inlined_kernel, lean_kernel
 from entropy_explore_env.config import Grid, RangeSensor
 from entropy_explore_env.randomness import draw_gaussian
 
@@ -135,7 +135,7 @@ def new_scan(grid: Grid, sensor: RangeSensor, rays: int, robots: int, reach_m: f
     )
 
 
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+@inlined_kernel
 def point_rays(model, yaw, pitch, rays):
     """Direct the (R,) rays of a bundle around a gaze, column by column, top row first."""
     rows = len(model.pitch_offsets)
@@ -154,7 +154,7 @@ def point_rays(model, yaw, pitch, rays):
             direction[0], direction[1], direction[2] = along * level, across * level, -down
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@lean_kernel
 def in_view(model, yaw, pitch, start, body):
     """Whether a body may be hit by a ray of the bundle around a gaze; True rather too often.
 
@@ -177,7 +177,7 @@ def in_view(model, yaw, pitch, start, body):
     return widest >= math.pi or ahead >= distance * math.cos(widest) - 1e-9
 
 
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+@inlined_kernel
 def body_distance(start, direction, bodies, count):
     """Distance in grid units to the first of `count` balls (x, y, z, radius) on a ray; inf if none."""
     nearest = math.inf
@@ -193,7 +193,7 @@ def body_distance(start, direction, bodies, count):
     return nearest
 
 
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+@inlined_kernel
 def weigh_measurement(scan, index, numbers, size, start):
     """Measured coverage (eq. 4) and its precision (eq. 5) for a ray whose crossing is filled in."""
     ray = scan.rays[index]
@@ -211,7 +211,7 @@ def weigh_measurement(scan, index, numbers, size, start):
         )
 
 
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+@inlined_kernel
 def trace_measurement(scan, index, numbers, size, voxel_size_m, start, coverage):
     """Voxels and measured coverage of a measurement whose distance is known.
 
@@ -241,7 +241,7 @@ def trace_measurement(scan, index, numbers, size, voxel_size_m, start, coverage)
     weigh_measurement(scan, index, numbers, size, start)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@lean_kernel
 def take_scan(scan, model, truth, size, voxel_size_m, start, yaw, pitch, bodies, chance):
     """Cast the bundle through the true world: what the sensor measures.
 
@@ -288,7 +288,7 @@ def take_scan(scan, model, truth, size, voxel_size_m, start, yaw, pitch, bodies,
             trace_measurement(scan, index, numbers, size, voxel_size_m, start, truth)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@lean_kernel
 def fuse_scan(scan, count, mean, precision):
     """Fuse measurements into a belief, ray by ray (Rocha04, eqs. 17-18, 27 and 29).
 
@@ -314,7 +314,7 @@ def fuse_scan(scan, count, mean, precision):
     return total
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@lean_kernel
 def visibility_parameters(rays, yaw, pitch):
     """Depth and half-angle of what a scan saw (RochaMI, eq. 4).
 
