@@ -70,7 +70,9 @@ def measure_room(grid: Grid, sensor: RangeSensor, scans: int, seed: int = 0) -> 
     return Measurements(positions, ends)
 
 
-@njit(nogil=True, error_model="numpy")  # a cached copy would outlive changes of the functions it calls
+@njit(
+    nogil=True, error_model="numpy", _nrt=False
+)  # a cached copy would outlive changes of the functions it calls
 def fuse_measurements(
     scan: Scan,
     numbers: np.void,
@@ -95,18 +97,19 @@ def fuse_measurements(
         How many voxels the rays crossed.
     """
     size, voxel_size_m, origin_m = grid
-    start, voxels = np.empty(3), 0
+    voxels = 0
     for i in range(len(positions_m)):
-        for axis in range(3):
-            start[axis] = (positions_m[i, axis] - origin_m[axis]) / voxel_size_m
+        here = positions_m[i]
+        start = (
+            (here[0] - origin_m[0]) / voxel_size_m,
+            (here[1] - origin_m[1]) / voxel_size_m,
+            (here[2] - origin_m[2]) / voxel_size_m,
+        )
         for index in range(ends_m.shape[1]):
-            ray, squared = scan.rays[index], 0.0
-            for axis in range(3):
-                ray.direction[axis] = ends_m[i, index, axis] - positions_m[i, axis]
-                squared += ray.direction[axis] * ray.direction[axis]
-            range_m = math.sqrt(squared)
-            for axis in range(3):
-                ray.direction[axis] /= range_m
+            ray, end = scan.rays[index], ends_m[i, index]
+            x, y, z = end[0] - here[0], end[1] - here[1], end[2] - here[2]
+            range_m = math.sqrt(x * x + y * y + z * z)
+            ray.direction[0], ray.direction[1], ray.direction[2] = x / range_m, y / range_m, z / range_m
             ray.length = range_m / voxel_size_m
             ray.returned = _HIT
             trace_measurement(scan, index, numbers, size, voxel_size_m, start, mean)

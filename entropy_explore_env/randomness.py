@@ -11,7 +11,7 @@ import math
 
 import numpy as np
 
-from entropy_explore_env.compilation import kernel
+from entropy_explore_env.compilation import lean_kernel
 from entropy_explore_env.errors import SettingError
 
 
@@ -53,7 +53,7 @@ def check_seed(seed: object) -> int:
     return int(seed)
 
 
-@kernel
+@lean_kernel
 def draw_uniform(state):
     """A uniform number in [0, 1) from SplitMix64; `state`, (1,) uint64, is advanced in place."""
     mixed = state[0] + np.uint64(0x9E3779B97F4A7C15)
@@ -64,7 +64,7 @@ def draw_uniform(state):
     return np.float64(mixed >> np.uint64(11)) * (1.0 / 9007199254740992.0)
 
 
-@kernel
+@lean_kernel
 def draw_gaussian(state):
     """A standard normal number (Box & Muller 1958); two uniform draws from `state`."""
     radius = math.sqrt(-2.0 * math.log(1.0 - draw_uniform(state)))

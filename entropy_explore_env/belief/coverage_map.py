@@ -9,6 +9,7 @@ import math
 
 import numpy as np
 
+from entropy_explore_env.belief.raycast import TICKS
 from entropy_explore_env.compilation import inlined_kernel
 from entropy_explore_env.config import BITS_OF_UNIT_GAUSSIAN
 
@@ -55,11 +56,11 @@ def measured_coverage(start, length, size, crossed, entered, n, coverage):
     0; only those near it are worked out.
 
     Args:
-        start: (3,) float64, the sensor in grid units.
+        start: (x, y, z), the sensor in grid units.
         length: Measured distance in voxel edges.
         size: (X, Y, Z) voxels.
         crossed: (L,) int32, voxels of the ray; `n` of them, in order.
-        entered: (L,) float64, distance at which each was entered.
+        entered: (L,) int64, ticks at which each was entered.
         n: Crossed voxels.
         coverage: (L,) float32, filled from the returned index on.
 
@@ -68,8 +69,8 @@ def measured_coverage(start, length, size, crossed, entered, n, coverage):
     """
     size_y, size_z = size[1], size[2]
     per_y, per_z = 1.0 / size_y, 1.0 / size_z
-    first = n
-    while first > 0 and (first == n or entered[first] > length - _EDGE):
+    first, near = n, int((length - _EDGE) * TICKS)
+    while first > 0 and (first == n or entered[first] > near):
         first -= 1
         # (v + ½)/Z is at least ½/Z away from a whole number: its floor is exact, and no division.
         column = int((crossed[first] + 0.5) * per_z)

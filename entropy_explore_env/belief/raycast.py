@@ -107,13 +107,13 @@ def cast_ray(coverage, stop_above, size, start, direction, length, hit_at_length
         coverage: (V,) float32, the truth or a belief's mean.
         stop_above: Coverage that stops the ray; NEVER_STOP to fuse a measurement that is known.
         size: (X, Y, Z) voxels.
-        start: (3,) float64 start in grid units, inside the workspace.
+        start: (x, y, z) in grid units, inside the workspace.
         direction: (3,) float64 unit vector.
         length: Longest way in voxel edges, > 0; inf allowed.
         hit_at_length: Whether the ray's length is a measured hit rather than the end of its range.
         behind: Voxels to note behind an obstacle.
         crossed: (L,) int32, filled with the crossed voxels in order (see `longest_crossing`).
-        entered: (L,) float64, filled with the distance at which each was entered (the end, behind it).
+        entered: (L,) int64, filled with the ticks at which each was entered (those of the end, behind it).
 
     Returns:
         (length, n, end): distance to the end in voxel edges, number of crossed voxels, and OPEN,
@@ -129,7 +129,7 @@ def cast_ray(coverage, stop_above, size, start, direction, length, hit_at_length
     leaves = min(last_x, last_y, last_z)
     stops = _ticks(length)
     until = min(leaves, stops)
-    crossed[0], entered[0] = voxel, 0.0
+    crossed[0], entered[0] = voxel, 0
     n, end = 1, WALL
     while True:
         voxel, at, face_x, face_y, face_z = _next_voxel(
@@ -141,9 +141,9 @@ def cast_ray(coverage, stop_above, size, start, direction, length, hit_at_length
             end = OBSTACLE
             break
         crossed[np.uint32(n)] = voxel
-        entered[np.uint32(n)] = at * _EDGES
+        entered[np.uint32(n)] = at
         n += 1
-    reached = at * _EDGES
+    reached, ends = at * _EDGES, min(at, stops)
     if end == WALL and at >= stops:
         reached, end = length, OBSTACLE if hit_at_length else OPEN
     if end == OBSTACLE:
@@ -151,7 +151,7 @@ def cast_ray(coverage, stop_above, size, start, direction, length, hit_at_length
             if at >= leaves:
                 break
             crossed[np.uint32(n)] = voxel
-            entered[np.uint32(n)] = reached
+            entered[np.uint32(n)] = ends
             n += 1
             voxel, at, face_x, face_y, face_z = _next_voxel(
                 voxel, step_x, face_x, gap_x, step_y, face_y, gap_y, step_z, face_z, gap_z

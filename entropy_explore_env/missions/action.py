@@ -19,7 +19,7 @@ import numpy as np
 from gymnasium import spaces
 
 from entropy_explore_env.belief.raycast import STOP_AT_COVERED
-from entropy_explore_env.compilation import kernel
+from entropy_explore_env.compilation import lean_kernel
 from entropy_explore_env.config import Scenario
 from entropy_explore_env.errors import ActionError
 from entropy_explore_env.missions.rules import Rules, rules_of
@@ -36,7 +36,7 @@ def action_space(scenario: Scenario) -> spaces.Box | spaces.Discrete:
     return spaces.Discrete(len(rules.moves) * len(rules.gazes))
 
 
-@kernel
+@lean_kernel
 def decode_action(rules, pose, box, number, viewpoint):
     """Turn an action into a viewpoint.
 
@@ -77,7 +77,7 @@ def decode_action(rules, pose, box, number, viewpoint):
                 viewpoint[axis] = pose[axis] + (viewpoint[axis] - pose[axis]) * settings.reach_m / length
 
 
-@kernel
+@lean_kernel
 def write_mask(rules, start, mean, out):
     """Mark the discrete actions that make sense by the robot's own belief.
 
@@ -86,7 +86,7 @@ def write_mask(rules, start, mean, out):
 
     Args:
         rules: The scenario.
-        start: (3,) float64, the robot in grid units.
+        start: (x, y, z), the robot in grid units.
         mean: (V,) float32, its expected coverage.
         out: (K·D,) filled with 0 and 1.
     """

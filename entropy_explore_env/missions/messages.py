@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from entropy_explore_env.compilation import kernel
+from entropy_explore_env.compilation import lean_kernel
 from entropy_explore_env.missions.poses import copy_numbers, grid_position, pose_at
 from entropy_explore_env.robots.channel import (
     BITS_PER_ANNOUNCEMENT,
@@ -22,7 +22,7 @@ _ANNOUNCEMENT = np.int64(-1)
 """In place of a number of measurements. A NumPy integer, so that `send` compiles for one type."""
 
 
-@kernel
+@lean_kernel
 def hear_batch(state, scan, mission, index, count):
     """Fuse received measurements as if the robot had taken them itself (Rocha04, sect. 5)."""
     bits = fuse_scan(scan, count, state.mean[mission, index], state.precision[mission, index])
@@ -30,7 +30,7 @@ def hear_batch(state, scan, mission, index, count):
     state.robots[mission, index].received_bits += bits
 
 
-@kernel
+@lean_kernel
 def note_message(robot, heard, position, sent_s, count):
     """Count a message that a robot hears, and note where its sender was."""
     robot.messages_received += 1
@@ -42,7 +42,7 @@ def note_message(robot, heard, position, sent_s, count):
         heard.announced_s = sent_s
 
 
-@kernel
+@lean_kernel
 def write_announcement(robot, announced):
     """Fill (7,): the viewpoint that a robot chose, and r̂ and α̂ of its latest scan."""
     copy_numbers(robot.target, announced, 5)
@@ -50,7 +50,7 @@ def write_announcement(robot, announced):
     announced[6] = robot.half_angle_rad
 
 
-@kernel
+@lean_kernel
 def message_bits(count):
     """What a message costs: a batch of `count` measurements, or an announcement (count = -1)."""
     if count < 0:
@@ -58,7 +58,7 @@ def message_bits(count):
     return BITS_PER_BATCH + count * BITS_PER_MEASUREMENT
 
 
-@kernel
+@lean_kernel
 def post_letter(numbers, state, scan, mission, index, count):
     """Put a message into a free place of the mail; returns the place."""
     clock, robot, mail = state.missions[mission], state.robots[mission, index], state.mail[mission]
@@ -84,7 +84,7 @@ def post_letter(numbers, state, scan, mission, index, count):
     return place
 
 
-@kernel
+@lean_kernel
 def send(rules, state, scan, mission, index, count):
     """Broadcast a batch of `count` measurements (`scan.order`), or an announcement (count = -1)."""
     numbers, clock, robot = rules.numbers[0], state.missions[mission], state.robots[mission, index]
@@ -120,14 +120,14 @@ def send(rules, state, scan, mission, index, count):
                 hear_batch(state, scan, mission, mate, count)
 
 
-@kernel
+@lean_kernel
 def announce(rules, state, scan, mission, robot):
     """Tell the teammates the chosen viewpoint with r̂ and α̂ (RochaMI)."""
     if state.robots.shape[1] > 1 and rules.numbers[0].announcements:
         send(rules, state, scan, mission, robot, _ANNOUNCEMENT)
 
 
-@kernel
+@lean_kernel
 def open_letter(rules, state, scan, mission, place):
     """A message arrives: its hearers fuse it, or note what it announces; its place is free again."""
     numbers, letter = rules.numbers[0], state.mail[mission, place]
@@ -153,7 +153,7 @@ def open_letter(rules, state, scan, mission, place):
                 hear_batch(state, scan, mission, robot, letter.count)
 
 
-@kernel
+@lean_kernel
 def next_letter(mail):
     """(place, time) of the next message that arrives, the earlier sent first; time inf if none."""
     soonest, due_s = 0, math.inf

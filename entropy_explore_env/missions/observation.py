@@ -33,9 +33,10 @@ from gymnasium import spaces
 
 from entropy_explore_env.belief.coverage_map import expected_utility, measurement_precision
 from entropy_explore_env.belief.raycast import OPEN, STOP_AT_COVERED, cast_ray, longest_crossing
-from entropy_explore_env.compilation import kernel, lean_kernel
+from entropy_explore_env.compilation import lean_kernel
 from entropy_explore_env.config import Scenario
 from entropy_explore_env.missions.action import write_mask
+from entropy_explore_env.missions.poses import grid_position
 from entropy_explore_env.missions.rules import Rules, rules_of
 
 OWN_NUMBERS = 10
@@ -184,7 +185,7 @@ def observe_panorama(rules, start, mean, precision, scan, out):
 
     Args:
         rules: The scenario.
-        start: (3,) float64, the robot in grid units.
+        start: (x, y, z), the robot in grid units.
         mean: (V,) float32, its expected coverage.
         precision: (V,) float32, 1/σ² of it.
         scan: Scratch space.
@@ -331,7 +332,7 @@ def observe_overview(numbers, shape, mean, precision, out):
                 out[cells + cell] = covered / voxels
 
 
-@kernel
+@lean_kernel
 def observe_robot(rules, parts, state, scan, mission, robot, pose, out):
     """Fill one robot's flat observation.
 
@@ -342,14 +343,12 @@ def observe_robot(rules, parts, state, scan, mission, robot, pose, out):
         scan: Scratch space.
         mission: Which mission.
         robot: Whose observation.
-        pose: (5,) float64, where it is now.
+        pose: (x, y, z, yaw, pitch), where it is now.
         out: (F,) float32, filled in.
     """
     numbers, own = rules.numbers[0], state.robots[mission, robot]
     mean, precision = state.mean[mission, robot], state.precision[mission, robot]
-    start = np.empty(3)
-    for axis in range(3):
-        start[axis] = (pose[axis] - numbers.origin_m[axis]) / numbers.voxel_size_m
+    start = grid_position(numbers, pose)
     time_s, heard = state.missions[mission].time_s, state.heard[mission, robot]
     if parts.panorama >= 0:
         observe_panorama(rules, start, mean, precision, scan, out[parts.panorama :])

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from entropy_explore_env.compilation import kernel
+from entropy_explore_env.compilation import lean_kernel
 
 
-@kernel
+@lean_kernel
 def reward_robots(robots, bits_to_gain, team, cost):
     """Reward one mission's robots for one step.
 

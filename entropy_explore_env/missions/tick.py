@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 
-from entropy_explore_env.compilation import kernel
+from entropy_explore_env.compilation import lean_kernel
 from entropy_explore_env.missions.action import decode_action, write_mask
 from entropy_explore_env.missions.messages import announce, next_letter, open_letter, send
 from entropy_explore_env.missions.observation import observe_robot
@@ -36,7 +36,7 @@ _ARRIVED, _TEAMMATE = MoveEnd.ARRIVED.code, MoveEnd.TEAMMATE.code
 _NOTHING = int(Return.NOTHING)
 
 
-@kernel
+@lean_kernel
 def step_missions(rules, parts, state, scan, boxes, numbers, first, last, out):
     """Advance the missions `first` … `last` - 1 by one step; those that are over stand still.
 
@@ -57,7 +57,7 @@ def step_missions(rules, parts, state, scan, boxes, numbers, first, last, out):
         observe_mission(rules, parts, state, scan, mission, out[mission])
 
 
-@kernel
+@lean_kernel
 def observe_mission(rules, parts, state, scan, mission, out):
     """Fill (A, F) float32, the observations of a mission's robots."""
     for robot in range(state.robots.shape[1]):
@@ -65,7 +65,7 @@ def observe_mission(rules, parts, state, scan, mission, out):
         observe_robot(rules, parts, state, scan, mission, robot, pose, out[robot])
 
 
-@kernel
+@lean_kernel
 def mask_missions(rules, state, out):
     """Fill (E, A, N) int8, the masks of all robots' discrete actions."""
     numbers = rules.numbers[0]
@@ -75,7 +75,7 @@ def mask_missions(rules, state, out):
             write_mask(rules, grid_position(numbers, pose), state.mean[mission, robot], out[mission, robot])
 
 
-@kernel
+@lean_kernel
 def step_mission(rules, state, scan, mission, boxes, numbers):
     """One step of one mission: what happens between two observations."""
     clock, robots = state.missions[mission], state.robots[mission]
@@ -96,7 +96,7 @@ def step_mission(rules, state, scan, mission, boxes, numbers):
     reward_robots(robots, bits_to_gain, rules.numbers[0].team_reward, cost)
 
 
-@kernel
+@lean_kernel
 def depart(numbers, blocked, robots, index, time_s, scan):
     """Commit a robot to its target: how far it will get, why no farther, and when it has scanned."""
     robot = robots[index]
@@ -106,24 +106,20 @@ def depart(numbers, blocked, robots, index, time_s, scan):
     robot.depart_s = time_s
     robot.deciding = False
     start = grid_position(numbers, origin)
-    direction = grid_position(numbers, goal)
-    length = 0.0
-    for axis in range(3):
-        direction[axis] -= start[axis]
-        length += direction[axis] * direction[axis]
-    length = math.sqrt(length)
+    finish = grid_position(numbers, goal)
+    x, y, z = finish[0] - start[0], finish[1] - start[1], finish[2] - start[2]
+    length = math.sqrt(x * x + y * y + z * z)
     way, code = 0.0, _ARRIVED
     if length > 0.0:
-        for axis in range(3):
-            direction[axis] /= length
+        direction = (x / length, y / length, z / length)
         size = (numbers.size[0], numbers.size[1], numbers.size[2])
-        way, code = free_way(blocked, size, start, direction, length, scan.way, scan.way_entered)
+        way, code = free_way(blocked, size, start, finish, direction, length, scan.way, scan.way_entered)
         for mate in range(len(robots)):
             if mate != index and numbers.body_radius_m > 0.0:
                 begin = grid_position(numbers, pose_at(numbers, robots[mate], time_s))
-                finish = grid_position(numbers, robots[mate].goal)
+                stop = grid_position(numbers, robots[mate].goal)
                 touching = 2.0 * numbers.body_radius_m / numbers.voxel_size_m
-                clear = way_to_teammate(start, direction, way, begin, finish, touching)
+                clear = way_to_teammate(start, direction, way, begin, stop, touching)
                 if clear < way:
                     way, code = clear, _TEAMMATE
         if code != _ARRIVED:
@@ -138,7 +134,7 @@ def depart(numbers, blocked, robots, index, time_s, scan):
     robot.ready_s = time_s + max(drive_s, turn_s) + numbers.scan_time_s
 
 
-@kernel
+@lean_kernel
 def advance(rules, state, scan, mission):
     """Work off the events up to the end of the step, the time limit or the mission's end."""
     clock, robots, mail = state.missions[mission], state.robots[mission], state.mail[mission]
@@ -166,7 +162,7 @@ def advance(rules, state, scan, mission):
             clock.end = _TIME_UP
 
 
-@kernel
+@lean_kernel
 def next_robot(robots):
     """(robot, time) of the next robot that has driven and scanned; time inf if all decide."""
     soonest, ready_s = 0, math.inf
@@ -176,7 +172,7 @@ def next_robot(robots):
     return soonest, ready_s
 
 
-@kernel
+@lean_kernel
 def mapped(robots, entropy_end_bits, all_maps):
     """Whether one robot's map, or all maps, passed the threshold (Rocha04, eq. 41)."""
     passed = 0
@@ -186,7 +182,7 @@ def mapped(robots, entropy_end_bits, all_maps):
     return passed == len(robots) if all_maps else passed > 0
 
 
-@kernel
+@lean_kernel
 def scan_and_share(rules, state, scan, mission, index):
     """A robot measures from where its drive ended, fuses, and sends what is most useful."""
     numbers, robot = rules.numbers[0], state.robots[mission, index]
@@ -229,7 +225,7 @@ def scan_and_share(rules, state, scan, mission, index):
             send(rules, state, scan, mission, index, count)
 
 
-@kernel
+@lean_kernel
 def place_bodies(rules, robots, index, time_s, start, bodies):
     """Put the teammates' bodies that the robot may see, in grid units, into `bodies`; returns how many."""
     numbers, goal, count = rules.numbers[0], robots[index].goal, 0

@@ -107,7 +107,7 @@ def view_of(missions: Missions, mission: int, robot: int) -> RobotView:
         scenario=missions.scenario,
         time_s=time_s,
         deciding=bool(own["deciding"]),
-        pose=pose_at(rules.numbers[0], own, time_s),
+        pose=np.array(pose_at(rules.numbers[0], own, time_s)),
         mean=read_only(state.mean[here].reshape(shape)),
         precision=read_only(state.precision[here].reshape(shape)),
         entropy_bits=float(own["entropy_bits"]),

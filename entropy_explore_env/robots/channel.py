@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import enum
 
-from entropy_explore_env.compilation import kernel
+from entropy_explore_env.compilation import lean_kernel
 from entropy_explore_env.randomness import draw_uniform
 
 BITS_PER_MEASUREMENT = 96
@@ -34,7 +34,7 @@ class Delivery(enum.Enum):
 _HEARD, _OUT_OF_RANGE, _LOST = (delivery.code for delivery in Delivery)
 
 
-@kernel
+@lean_kernel
 def select_measurements(utility, burst, i_min_bits, order):
     """Choose the measurements that a robot sends (Rocha04, eq. 43), the most useful first.
 
@@ -64,7 +64,7 @@ def select_measurements(utility, burst, i_min_bits, order):
     return chosen
 
 
-@kernel
+@lean_kernel
 def deliver(apart_m, range_m, loss_probability, chance):
     """Whether a message reaches a teammate: the code of a Delivery.
 

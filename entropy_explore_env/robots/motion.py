@@ -10,8 +10,8 @@ from __future__ import annotations
 import enum
 import math
 
-from entropy_explore_env.belief.raycast import OBSTACLE, OPEN, STOP_AT_COVERED, cast_ray
-from entropy_explore_env.compilation import kernel
+from entropy_explore_env.belief.raycast import OBSTACLE, OPEN, STOP_AT_COVERED, TICKS, cast_ray
+from entropy_explore_env.compilation import lean_kernel
 
 
 class MoveEnd(enum.Enum):
@@ -34,7 +34,7 @@ _TOUCH = 1e-6
 _HALVINGS = 60
 
 
-@kernel
+@lean_kernel
 def driving_time(length_m, max_speed_m_s, acceleration_m_s2):
     """Seconds from rest to rest: 2√(L/a) below L = v²/a, else L/v + v/a."""
     if length_m < max_speed_m_s * max_speed_m_s / acceleration_m_s2:
@@ -42,7 +42,7 @@ def driving_time(length_m, max_speed_m_s, acceleration_m_s2):
     return length_m / max_speed_m_s + max_speed_m_s / acceleration_m_s2
 
 
-@kernel
+@lean_kernel
 def driven_share(elapsed_s, length_m, max_speed_m_s, acceleration_m_s2):
     """Share in [0, 1] of a drive that is behind the robot `elapsed_s` after its start."""
     duration = driving_time(length_m, max_speed_m_s, acceleration_m_s2)
@@ -59,7 +59,7 @@ def driven_share(elapsed_s, length_m, max_speed_m_s, acceleration_m_s2):
     return min(max(way / length_m, 0.0), 1.0)
 
 
-@kernel
+@lean_kernel
 def turning_time(yaw, pitch, new_yaw, new_pitch, turn_rate_rad_s):
     """Seconds to turn the gaze, yaw and pitch at once, each the short way round."""
     turn = abs(new_yaw - yaw) % (2.0 * math.pi)
@@ -67,18 +67,19 @@ def turning_time(yaw, pitch, new_yaw, new_pitch, turn_rate_rad_s):
     return max(turn, abs(new_pitch - pitch)) / turn_rate_rad_s
 
 
-@kernel
-def free_way(blocked, size, start, direction, length, crossed, entered):
+@lean_kernel
+def free_way(blocked, size, start, finish, direction, length, crossed, entered):
     """How far a body can drive on a line before something solid.
 
     Args:
         blocked: (V,) float32, above ½ where the body does not fit.
         size: (X, Y, Z) voxels.
-        start: (3,) float64 in grid units.
-        direction: (3,) float64 unit vector.
-        length: Wanted way in grid units.
+        start: (x, y, z) in grid units.
+        finish: (x, y, z), where the drive is to end.
+        direction: (x, y, z), a unit vector from start to finish.
+        length: Way between them.
         crossed: (L,) int32 scratch space of `cast_ray`.
-        entered: (L,) float64, likewise.
+        entered: (L,) int64, likewise.
 
     Returns:
         (way, code): the way in grid units (to the middle of the last voxel's crossing, if blocked)
@@ -86,21 +87,26 @@ def free_way(blocked, size, start, direction, length, crossed, entered):
     """
     if length <= 0.0:
         return 0.0, _ARRIVED
-    # A little farther: who stands on a face stands in the voxel behind it, which must be free, too.
+    # A little farther, and the last voxel by itself: who stands on a face or an edge stands in the
+    # voxel above it, through which the line need not go, and which must be free, too.
     at, n, end = cast_ray(
         blocked, STOP_AT_COVERED, size, start, direction, length + _TOUCH, False, 0, crossed, entered
     )
     if end == OPEN:
-        return length, _ARRIVED
+        x, y, z = min(int(finish[0]), size[0] - 1), min(int(finish[1]), size[1] - 1), int(finish[2])
+        voxel = (x * size[1] + y) * size[2] + min(z, size[2] - 1)
+        if voxel == crossed[0] or blocked[voxel] <= STOP_AT_COVERED:
+            return length, _ARRIVED
+        at, end = length, OBSTACLE
     last = n - 1
-    while last > 0 and at - entered[last] <= _TOUCH:  # a voxel that the line meets at its edge only
-        at = entered[last]
+    while last > 0 and at - entered[last] / TICKS <= _TOUCH:  # a voxel that the line meets at its edge only
+        at = entered[last] / TICKS
         last -= 1
-    middle = 0.5 * (entered[last] + at) if last > 0 else 0.0
+    middle = 0.5 * (entered[last] / TICKS + at) if last > 0 else 0.0
     return middle, (_OBSTACLE if end == OBSTACLE else _WALL)
 
 
-@kernel
+@lean_kernel
 def _gap(start, direction, way, begin, finish):
     """Distance between the point `way` along a line and the segment from `begin` to `finish`."""
     along, length = 0.0, 0.0
@@ -116,7 +122,7 @@ def _gap(start, direction, way, begin, finish):
     return math.sqrt(gap)
 
 
-@kernel
+@lean_kernel
 def way_to_teammate(start, direction, way, begin, finish, touching):
     """How far a body can drive before it touches a teammate or the tube that it still sweeps.
 
@@ -126,11 +132,11 @@ def way_to_teammate(start, direction, way, begin, finish, touching):
     the nearest place and, before it, the first contact.
 
     Args:
-        start: (3,) float64 in grid units.
-        direction: (3,) float64 unit vector.
+        start: (x, y, z) in grid units.
+        direction: (x, y, z), a unit vector.
         way: Wanted way in grid units.
-        begin: (3,) float64, where the teammate is.
-        finish: (3,) float64, where its drive ends.
+        begin: (x, y, z), where the teammate is.
+        finish: (x, y, z), where its drive ends.
         touching: Sum of the two radii.
 
     Returns:

@@ -80,11 +80,11 @@ class Scan(NamedTuple):
     coverage: np.ndarray
     """(R, L) float32 measured coverage, from index `free` on."""
     entered: np.ndarray
-    """(L,) float64 distance at which the latest ray entered its voxels."""
+    """(L,) int64 ticks at which the latest ray entered its voxels."""
     way: np.ndarray
     """(W,) int32 voxels on the longest drive."""
     way_entered: np.ndarray
-    """(W,) float64 distance at which a drive enters them."""
+    """(W,) int64 ticks at which a drive enters them."""
     order: np.ndarray
     """(R,) int64 rays in the order in which they are fused or sent."""
     bodies: np.ndarray
@@ -127,9 +127,9 @@ def new_scan(grid: Grid, sensor: RangeSensor, rays: int, robots: int, reach_m: f
         utility=np.zeros(rays),
         crossed=np.zeros((rays, longest), np.int32),
         coverage=np.zeros((rays, longest), np.float32),
-        entered=np.zeros(longest),
+        entered=np.zeros(longest, np.int64),
         way=np.zeros(farthest, np.int32),
-        way_entered=np.zeros(farthest),
+        way_entered=np.zeros(farthest, np.int64),
         order=np.zeros(rays, np.int64),
         bodies=np.zeros((robots, 4)),
     )
@@ -164,7 +164,7 @@ def in_view(model, yaw, pitch, start, body):
         model: The SensorModel.
         yaw: Of the gaze, radians.
         pitch: Of the gaze, radians.
-        start: (3,) float64 the sensor in grid units.
+        start: (x, y, z), the sensor in grid units.
         body: (4,) float64 centre and radius in grid units.
     """
     x, y, z = body[0] - start[0], body[1] - start[1], body[2] - start[2]
@@ -221,7 +221,7 @@ def trace_measurement(scan, index, numbers, size, voxel_size_m, start, coverage)
         numbers: SENSOR_NUMBERS.
         size: (X, Y, Z) voxels.
         voxel_size_m: Edge of a voxel.
-        start: (3,) float64 position of the sensor in grid units.
+        start: (x, y, z), the sensor in grid units.
         coverage: (V,) float32, any map of the workspace; it does not matter what it holds.
     """
     ray = scan.rays[index]
@@ -251,7 +251,7 @@ def take_scan(scan, model, truth, size, voxel_size_m, start, yaw, pitch, bodies,
         truth: (V,) float32 true coverage.
         size: (X, Y, Z) voxels.
         voxel_size_m: Edge of a voxel.
-        start: (3,) float64 position of the sensor in grid units.
+        start: (x, y, z), the sensor in grid units.
         yaw: Of the gaze, radians.
         pitch: Of the gaze, radians, downwards.
         bodies: How many of `scan.bodies` stand in the way.

@@ -14,6 +14,7 @@ from entropy_explore_env.belief.raycast import (
     OBSTACLE,
     OPEN,
     STOP_AT_COVERED,
+    TICKS,
     WALL,
     cast_ray,
     longest_crossing,
@@ -35,7 +36,7 @@ def cast(cover, start, direction, length=math.inf, behind=0, hit_at_length=False
         cover.ravel(), stop, size, start, direction, float(length), hit_at_length, behind, crossed, entered
     )
     assert (crossed[n:] == -1).all()
-    return rocha04.Trace(way, crossed[:n].tolist(), ENDS[end]), entered[:n]
+    return rocha04.Trace(way, crossed[:n].tolist(), ENDS[end]), entered[:n] / TICKS
 
 
 @drawn(400)

@@ -85,7 +85,7 @@ def ray_space(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Scratch space of a ray, filled with what must not be taken for a result."""
     places = longest_crossing(*size, length, behind)
-    return np.full(places, -1, np.int32), np.full(places, np.nan)
+    return np.full(places, -1, np.int32), np.full(places, -1, np.int64)
 
 
 def free_box(**changes: Any) -> Scenario:

@@ -77,13 +77,15 @@ def test_turning_goes_the_short_way_round(yaw, new_yaw, pitch, new_pitch, turn):
     assert turning_time(yaw, pitch, new_yaw, new_pitch, math.inf) == 0.0
 
 
-def drive(blocked, start, direction, length):
+def drive(blocked, start, direction, length, finish=None):
     crossed, entered = ray_space(blocked.shape)
+    start, direction = np.asarray(start, np.float64), np.asarray(direction, np.float64)
     way, code = free_way(
         blocked.ravel(),
         blocked.shape,
-        np.asarray(start, np.float64),
-        np.asarray(direction, np.float64),
+        start,
+        start + length * direction if finish is None else finish,
+        direction,
         float(length),
         crossed,
         entered,
@@ -148,7 +150,7 @@ def test_wherever_a_drive_ends_the_body_fits(seed, size, share):
         if length == 0.0 or blocked[tuple(start.astype(int))] > 0.5:
             continue
         direction = (target - start) / length
-        way, end = drive(blocked, start, direction, length)
+        way, end = drive(blocked, start, direction, length, target)
         place = target if end is MoveEnd.ARRIVED else start + way * direction
         voxel = np.floor(place).astype(int)
         assert 0.0 <= way <= length
