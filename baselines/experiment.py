@@ -168,7 +168,7 @@ def mission_record(env: EntropyExploreEnv, strategy: str, seed: int) -> Record:
     best = recorder.entropy_bits.min(axis=1)
     middle = 0.5 * (figures["entropy_start_bits"] + figures["entropy_threshold_bits"])
     halved = np.flatnonzero(best <= middle)
-    rows = np.unique(np.linspace(0, len(best) - 1, _SERIES_POINTS).round().astype(int))
+    rows = recorder.spread(_SERIES_POINTS)
     single = np.flatnonzero(np.diff(recorder.scans) == 1)
     return {
         **figures,

@@ -179,8 +179,7 @@ def _write(folder: Path, figures: dict[str, Any], scenario: Scenario, log: _Log)
     from baselines.figures import mission_picture
 
     recorder = log.recorder
-    every = max(1, len(recorder.time_s) // _SERIES_POINTS)
-    rows = np.unique(np.append(np.arange(0, len(recorder.time_s), every), len(recorder.time_s) - 1))
+    rows = recorder.spread(_SERIES_POINTS)
     series = {
         "time_s": recorder.time_s[rows].tolist(),
         "entropy_bits": recorder.entropy_bits[rows].tolist(),

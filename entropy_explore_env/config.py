@@ -20,6 +20,7 @@ from entropy_explore_env.validation import (
     check_kind,
     check_not_negative,
     check_positive,
+    is_number,
 )
 
 BITS_OF_UNIT_GAUSSIAN = 0.5 * math.log2(2.0 * math.pi * math.e)
@@ -27,6 +28,8 @@ BITS_OF_UNIT_GAUSSIAN = 0.5 * math.log2(2.0 * math.pi * math.e)
 
 MAX_VOXELS = 2**31 - 1
 """Voxels are numbered by 32-bit integers."""
+MAX_IN_FLIGHT = 2**24
+"""Measurements of delayed messages that may be under way at once."""
 MAX_VOXELS_ALONG_AXIS = 2**20
 """Rays measure their way in 64-bit integers."""
 
@@ -59,7 +62,7 @@ class Grid:
             raise SettingError("Grid.shape", self.shape, f"at most {MAX_VOXELS} voxels in all")
         check_positive(self, "voxel_size_m")
         finite = isinstance(self.origin_m, tuple) and len(self.origin_m) == 3
-        if not finite or not all(isinstance(v, int | float) and math.isfinite(v) for v in self.origin_m):
+        if not finite or not all(is_number(v) and math.isfinite(v) for v in self.origin_m):
             raise SettingError("Grid.origin_m", self.origin_m, "three finite numbers (x, y, z)")
 
     @property
@@ -149,13 +152,11 @@ class RangeSensor:
         if (
             not isinstance(view, tuple)
             or len(view) != 2
-            or not all(
-                isinstance(v, int | float) and 0 <= v <= limit + 1e-9
-                for v, limit in zip(view, limits, strict=True)
-            )
+            or not all(is_number(v) and 0 <= v <= limit + 1e-9 for v, limit in zip(view, limits, strict=True))
         ):
             raise SettingError("RangeSensor.field_of_view_rad", view, "(yaw in [0, 2π], pitch in [0, π])")
-        check_positive(self, "angular_step_rad", "sigma_min", "scan_time_s")
+        check_positive(self, "scan_time_s")
+        check(self, "angular_step_rad", "a finite number ≥ 1e-6", lambda v: 1e-6 <= v < math.inf)
         check_positive(self, "max_range_m", finite=False)
         check_not_negative(self, "sigma_slope_per_m", "range_noise_m")
         check(self, "sigma_min", "a number from 1e-4 to 1e4", lambda v: 1e-4 <= v <= 1e4)
@@ -377,6 +378,18 @@ class Scenario:
         if self.planar and not self.grid.flat and self.robot.sensor_height_m >= self.grid.size_m[2]:
             allowed = f"below the workspace's height ({self.grid.size_m[2]} m)"
             raise SettingError("Robot.sensor_height_m", self.robot.sensor_height_m, allowed)
+
+        if self.mail_places * max(min(self.channel.burst, self.sensor.rays), 1) > MAX_IN_FLIGHT:
+            allowed = f"so short that at most {MAX_IN_FLIGHT} measurements are under way at once"
+            raise SettingError("Channel.delay_s", self.channel.delay_s, allowed)
+
+    @property
+    def mail_places(self) -> int:
+        """Messages that can be under way at once: two a scan and robot, while the delay lasts."""
+        if self.channel.delay_s == 0.0 or self.robots == 1:
+            return 0
+        scans = math.floor(min(self.channel.delay_s / self.sensor.scan_time_s, 1e9)) + 2
+        return 2 * scans * self.robots
 
     @property
     def planar(self) -> bool:

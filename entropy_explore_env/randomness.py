@@ -13,6 +13,7 @@ import numpy as np
 
 from entropy_explore_env.compilation import lean_kernel
 from entropy_explore_env.errors import SettingError
+from entropy_explore_env.validation import is_whole
 
 
 class Stream(enum.IntEnum):
@@ -48,7 +49,7 @@ def check_seed(seed: object) -> int:
     """
     if seed is None:
         return int(np.random.SeedSequence().generate_state(1, np.uint64)[0])
-    if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
+    if not is_whole(seed, 0):
         raise SettingError("seed", seed, "a whole number ≥ 0, or None")
     return int(seed)
 

@@ -4,18 +4,34 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Any, get_args
+from typing import Any, TypeGuard, get_args
 
 import numpy as np
 
 from entropy_explore_env.errors import SettingError
 
 
+def is_number(value: object) -> TypeGuard[float]:
+    """Whether it is a number that a float64 can hold; NaN and booleans are none, ±inf is one."""
+    if isinstance(value, bool) or not isinstance(value, int | float | np.integer | np.floating):
+        return False
+    try:
+        return not math.isnan(float(value))
+    except OverflowError:
+        return False
+
+
+def is_whole(value: object, least: int, most: int | None = None) -> TypeGuard[int]:
+    """Whether it is a whole number in a range; booleans are none."""
+    if isinstance(value, bool) or not isinstance(value, int | np.integer):
+        return False
+    return bool(least <= value and (most is None or value <= most))
+
+
 def check(settings: object, name: str, allowed: str, accepts: Callable[[Any], bool]) -> None:
     """Raise a SettingError unless the field is a number that `accepts` takes; NaN never is."""
     value = getattr(settings, name)
-    number = isinstance(value, int | float | np.integer | np.floating) and not isinstance(value, bool)
-    if not number or math.isnan(value) or not accepts(value):
+    if not is_number(value) or not accepts(value):
         raise SettingError(f"{type(settings).__name__}.{name}", value, allowed)
 
 
@@ -35,8 +51,7 @@ def check_not_negative(settings: object, *names: str) -> None:
 def check_count(settings: object, name: str, least: int, most: int) -> None:
     """The field is a whole number in a range."""
     value = getattr(settings, name)
-    whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
-    if not whole or not least <= value <= most:
+    if not is_whole(value, least, most):
         raise SettingError(
             f"{type(settings).__name__}.{name}", value, f"a whole number from {least} to {most}"
         )
@@ -45,10 +60,7 @@ def check_count(settings: object, name: str, least: int, most: int) -> None:
 def check_counts(settings: object, name: str, least: int, most: int) -> None:
     """The field is three whole numbers, each in a range."""
     value = getattr(settings, name)
-    whole = isinstance(value, tuple) and len(value) == 3
-    if not whole or not all(
-        isinstance(n, int | np.integer) and not isinstance(n, bool) and least <= n <= most for n in value
-    ):
+    if not isinstance(value, tuple) or len(value) != 3 or not all(is_whole(n, least, most) for n in value):
         allowed = f"three whole numbers (x, y, z), each from {least} to {most}"
         raise SettingError(f"{type(settings).__name__}.{name}", value, allowed)
 
@@ -56,7 +68,7 @@ def check_counts(settings: object, name: str, least: int, most: int) -> None:
 def check_choice(settings: object, name: str, choices: object) -> None:
     """The field is one of the values of a Literal."""
     value, members = getattr(settings, name), get_args(choices)
-    if value not in members:
+    if not isinstance(value, str) or value not in members:
         raise SettingError(f"{type(settings).__name__}.{name}", value, "one of " + ", ".join(members))
 
 

@@ -26,7 +26,7 @@ from entropy_explore_env.errors import EntropyExploreError, SettingError
 from entropy_explore_env.scenarios import BOX, ROOM, SCENARIOS, find_scenario
 
 NAN, INF = math.nan, math.inf
-NO_NUMBERS = ("1", None, True, [1.0], NAN)
+NO_NUMBERS = ("1", None, True, [1.0], NAN, 10**400)
 """Never a number > 0, nor one of another range."""
 POSITIVE = (*NO_NUMBERS, 0.0, -1.0)
 NOT_NEGATIVE = (*NO_NUMBERS, -1e-9, INF)
@@ -48,7 +48,15 @@ REFUSED = {
         (2048, 2048, 2048),
     ),
     (Grid, "voxel_size_m"): (*POSITIVE, INF),
-    (Grid, "origin_m"): ((0.0, 0.0), [0.0, 0.0, 0.0], (0.0, NAN, 0.0), (0.0, INF, 0.0), None, (0, "0", 0)),
+    (Grid, "origin_m"): (
+        (0.0, 0.0),
+        [0.0, 0.0, 0.0],
+        (0.0, NAN, 0.0),
+        (0.0, INF, 0.0),
+        None,
+        (0, "0", 0),
+        (0, True, 0),
+    ),
     (Robot, "motion"): KIND,
     (Robot, "reach_m"): POSITIVE,
     (Robot, "max_speed_m_s"): (*POSITIVE, INF),
@@ -66,9 +74,10 @@ REFUSED = {
         (7.0, 0.5),
         (0.5, 3.2),
         ("0.5", 0.5),
+        (True, 0.5),
         None,
     ),
-    (RangeSensor, "angular_step_rad"): (*POSITIVE, INF, 1e-5),
+    (RangeSensor, "angular_step_rad"): (*POSITIVE, INF, 1e-5, 1e-320),
     (RangeSensor, "max_range_m"): POSITIVE,
     (RangeSensor, "sigma_min"): (*POSITIVE, INF, 0.9e-4, 1.1e4),
     (RangeSensor, "sigma_slope_per_m"): NOT_NEGATIVE,
@@ -187,6 +196,7 @@ def test_settings_that_do_not_fit_each_other_are_refused():
         ({**discrete, "robot": {"reach_m": INF}}, "Action.kind"),
         ({**discrete, "robot": {"reach_m": 0.49}}, "Robot.reach_m"),
         ({"robot": {"motion": "planar", "sensor_height_m": 2.5}}, "Robot.sensor_height_m"),
+        ({"channel": {"delay_s": 3600.0}, "sensor": {"scan_time_s": 1e-4}}, "Channel.delay_s"),
     ):
         assert refusal(lambda changes=settings: with_settings(BOX, changes)).field == field
     assert with_settings(BOX, {**discrete, "robot": {"reach_m": 0.5}}).action.kind == "discrete"

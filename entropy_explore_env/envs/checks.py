@@ -9,6 +9,7 @@ import numpy as np
 from gymnasium import spaces
 
 from entropy_explore_env.errors import ActionError
+from entropy_explore_env.validation import is_whole
 
 _ROUNDING = 1e-6
 
@@ -89,8 +90,7 @@ class ActionChecker:
 
     def _number(self, agent: str, action: object) -> int:
         number: Any = action.item() if isinstance(action, np.ndarray) and action.shape == () else action
-        whole = isinstance(number, int | np.integer) and not isinstance(number, bool)
-        if not whole or not 0 <= number < self._count:
+        if not is_whole(number, 0, self._count - 1):
             raise ActionError(f"actions[{agent}]", action, f"a whole number from 0 to {self._count - 1}")
         return int(number)
 

@@ -158,8 +158,11 @@ def row_of(result: tuple[Any, ...], mission: int) -> dict[str, Any]:
     return {
         "observations": {name: part[mission].ravel() for name, part in parts.items()},
         "reward, terminated, truncated": ends,
-        "infos": {name: infos[name][mission].tolist() for name in ("time_s", *_ROBOT_INFOS)},
-        "reward_robots": infos["reward_robots"][mission].tolist(),
+        "infos": {
+            "time_s": infos["time_s"][mission].tolist(),
+            **{name: np.ravel(infos[name][mission]).tolist() for name in _ROBOT_INFOS},
+        },
+        "reward_robots": np.ravel(infos["reward_robots"][mission]).tolist(),
         "end": list(MissionEnd)[infos["end"][mission]].name,
     }
 

@@ -68,11 +68,11 @@ class EntropyExploreEnv(ParallelEnv[str, Any, Any]):
 
     def observation_space(self, agent: str) -> spaces.Space:
         """The agent's observation space, the same object on every call."""
-        return self._observation_spaces[agent]
+        return self._observation_spaces[self._checked(agent)]
 
     def action_space(self, agent: str) -> spaces.Space:
         """The agent's action space, the same object on every call."""
-        return self._action_spaces[agent]
+        return self._action_spaces[self._checked(agent)]
 
     @functools.cached_property
     def state_space(self) -> spaces.Box:
@@ -98,9 +98,12 @@ class EntropyExploreEnv(ParallelEnv[str, Any, Any]):
         """
         if self.missions.episodes[0] < 0:
             raise CallOrderError("view before reset: call reset() first")
+        return view_of(self.missions, 0, self.possible_agents.index(self._checked(agent)))
+
+    def _checked(self, agent: str) -> str:
         if agent not in self._action_spaces:
             raise SettingError("agent", agent, "one of " + ", ".join(self.possible_agents))
-        return view_of(self.missions, 0, self.possible_agents.index(agent))
+        return agent
 
     def deciding_agents(self) -> list[str]:
         """The robots whose actions count in the next step, by number."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -18,6 +19,7 @@ from entropy_explore_env.missions.state import MissionEnd
 from entropy_explore_env.randomness import check_seed
 from entropy_explore_env.reports.painting import FRAMES_PER_S, RENDER_MODES, Painter, check_render_mode
 from entropy_explore_env.scenarios import find_scenario
+from entropy_explore_env.validation import is_whole
 from entropy_explore_env.worlds.load import with_world
 
 _RUNNING, _MAPPED = MissionEnd.RUNNING.code, MissionEnd.MAPPED.code
@@ -62,7 +64,7 @@ class EntropyExploreVectorEnv(VectorEnv[Any, Any, Any]):
             WorldError: The world's file cannot be used.
         """
         check_render_mode(render_mode)
-        if isinstance(num_envs, bool) or not isinstance(num_envs, int | np.integer) or num_envs < 1:
+        if not is_whole(num_envs, 1):
             raise SettingError("num_envs", num_envs, "a whole number ≥ 1")
         try:
             self.autoreset_mode = AutoresetMode(autoreset_mode)
@@ -103,12 +105,14 @@ class EntropyExploreVectorEnv(VectorEnv[Any, Any, Any]):
             SettingError: The seeds or the mask do not fit.
             WorldError: A world has too little room for the team.
         """
+        if options is not None and not isinstance(options, Mapping):
+            raise SettingError("options", options, "a dict, or None")
         mask = np.asarray((options or {}).get("reset_mask", np.ones(self.num_envs, bool)))
         if mask.shape != (self.num_envs,) or mask.dtype != np.bool_ or not mask.any():
             raise SettingError("reset_mask", mask, f"a bool array of shape ({self.num_envs},), not all False")
         seeds = self._seeds(seed)
-        for mission in np.flatnonzero(mask):
-            self.missions.reset(int(mission), seeds[mission])
+        chosen = np.flatnonzero(mask).tolist()
+        self.missions.reset_some(chosen, [seeds[mission] for mission in chosen])
         self._painter.watch(self.missions)
         return self._observations(), self._infos()
 
@@ -161,8 +165,9 @@ class EntropyExploreVectorEnv(VectorEnv[Any, Any, Any]):
         mask = np.zeros(self.num_envs, bool)
         mask[ended] = True
         last_observations = np.empty(self.num_envs, object)
+        observations = self._of_robots(self.missions.observations.copy())
         for mission in ended:
-            last_observations[mission] = self._split(self.missions.observations[mission].copy())
+            last_observations[mission] = self.missions.layout.split(observations[mission])
             self.missions.reset(int(mission))
         final = {name: mask.copy() if name.startswith("_") else value for name, value in last.items()}
         infos = self._infos()
@@ -175,21 +180,21 @@ class EntropyExploreVectorEnv(VectorEnv[Any, Any, Any]):
             "_final_info": mask,
         }
 
-    def _split(self, rows: np.ndarray) -> np.ndarray | dict[str, np.ndarray]:
-        """An observation from rows (..., A, F); one robot has no axis of its own."""
-        return self.missions.layout.split(rows[..., 0, :] if self.scenario.robots == 1 else rows)
+    def _of_robots(self, values: np.ndarray) -> np.ndarray:
+        """Values (E, A, ...) of the robots; one robot has no axis of its own."""
+        return values[:, 0] if self.scenario.robots == 1 else values
 
     def _observations(self) -> np.ndarray | dict[str, np.ndarray]:
-        return self._split(self.missions.observations.copy())
+        return self.missions.layout.split(self._of_robots(self.missions.observations.copy()))
 
     def _infos(self) -> dict[str, Any]:
         clocks, robots = self.missions.state.missions, self.missions.state.robots
         infos: dict[str, Any] = {name: clocks[name].copy() for name in ("time_s", "end")}
         for name in ("deciding", "entropy_bits", "own_bits", "received_bits"):
-            infos[name] = robots[name].copy()
-        infos["reward_robots"] = robots["reward"].copy()
+            infos[name] = self._of_robots(robots[name]).copy()
+        infos["reward_robots"] = self._of_robots(robots["reward"]).copy()
         if self.scenario.action.kind == "discrete":
-            infos["action_mask"] = self.missions.action_masks()
+            infos["action_mask"] = self._of_robots(self.missions.action_masks())
         infos.update({f"_{name}": np.ones(self.num_envs, bool) for name in list(infos)})
         return infos
 

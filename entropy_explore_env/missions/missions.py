@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
@@ -16,6 +17,7 @@ from entropy_explore_env.missions.state import MissionEnd, MissionState, new_sta
 from entropy_explore_env.missions.tick import mask_missions, observe_mission, step_missions
 from entropy_explore_env.randomness import Stream, check_seed, generator, splitmix_states
 from entropy_explore_env.robots.range_sensor import Scan, new_scan
+from entropy_explore_env.validation import is_whole
 from entropy_explore_env.worlds.load import make_world
 from entropy_explore_env.worlds.world import World
 
@@ -54,7 +56,7 @@ class Missions:
             WorldError: The world's file cannot be used.
         """
         for name, value in (("missions", count), ("threads", 1 if threads is None else threads)):
-            if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < 1:
+            if not is_whole(value, 1):
                 raise SettingError(name, value, "a whole number ≥ 1")
         self.scenario = scenario
         self.count = int(count)
@@ -98,15 +100,30 @@ class Missions:
 
         Raises:
             SettingError: The seed is not a whole number ≥ 0.
-            WorldError: The world has too little room for the team.
+            WorldError: The world has too little room for the team. Nothing has changed then.
         """
+        self.reset_some([mission], [seed])
+
+    def reset_some(self, missions: Iterable[int], seeds: Sequence[int | None]) -> None:
+        """Start some missions anew: all of them, or none if one cannot be; see `reset`."""
+        drawn = [self._draw(mission, seed) for mission, seed in zip(missions, seeds, strict=True)]
+        for start in drawn:
+            self._begin(*start)
+
+    def _draw(self, mission: int, seed: int | None) -> tuple[int, int, int, World, np.ndarray]:
+        """Mission, seed, episode, world and (A, 5) start poses; nothing changes."""
         if seed is not None or self.episodes[mission] < 0:
             number, episode = check_seed(seed), 0
         else:
             number, episode = self.seeds[mission], self.episodes[mission] + 1
         world = make_world(self.scenario, generator(number, episode, Stream.WORLD))
+        starts = world.layout(self.scenario).starts
+        poses = start_poses(self.scenario, world, starts, generator(number, episode, Stream.STARTS))
+        return mission, number, episode, world, poses
+
+    def _begin(self, mission: int, number: int, episode: int, world: World, poses: np.ndarray) -> None:
+        """Put the mission into its world, with beliefs at the prior, and observe."""
         layout = world.layout(self.scenario)
-        poses = start_poses(self.scenario, world, layout.starts, generator(number, episode, Stream.STARTS))
         self.seeds[mission], self.episodes[mission] = number, episode
         state = self.state
         if world is not self.worlds[mission]:

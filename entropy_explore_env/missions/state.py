@@ -9,7 +9,6 @@ or viewpoint is (x, y, z, yaw, pitch).
 from __future__ import annotations
 
 import enum
-import math
 from typing import NamedTuple
 
 import numpy as np
@@ -139,7 +138,7 @@ class MissionState(NamedTuple):
 def new_state(scenario: Scenario, missions: int) -> MissionState:
     """Arrays for E missions of a scenario, not yet reset."""
     e, a, r = missions, scenario.robots, scenario.sensor.rays
-    v, q, b = scenario.grid.voxels, mail_places(scenario), min(scenario.channel.burst, r)
+    v, q, b = scenario.grid.voxels, scenario.mail_places, min(scenario.channel.burst, r)
     truth = np.zeros((e, v), np.float32)
     small_body = scenario.robot.body_radius_m <= 0.5 * scenario.grid.voxel_size_m + 1e-9
     return MissionState(
@@ -157,11 +156,3 @@ def new_state(scenario: Scenario, missions: int) -> MissionState:
         mail_to=np.zeros((e, q, a), np.bool_),
         mail_rays=np.zeros((e, q, b if q else 0, 5)),
     )
-
-
-def mail_places(scenario: Scenario) -> int:
-    """Messages that can be in flight at once: two a scan and robot, while the delay lasts."""
-    if scenario.channel.delay_s == 0.0 or scenario.robots == 1:
-        return 0
-    scans = math.floor(scenario.channel.delay_s / scenario.sensor.scan_time_s) + 2
-    return 2 * scans * scenario.robots

@@ -58,6 +58,10 @@ class Recorder:
         self._sent.append(int(robots["measurements_sent"].sum()))
         self._places.append(robots["scan_pose"][:, :3].copy())
 
+    def spread(self, points: int) -> np.ndarray:
+        """(≤ points,) int64 which moments to keep of a long series: the ends, and evenly in between."""
+        return np.unique(np.linspace(0, len(self._times) - 1, points).round().astype(np.int64))
+
     @property
     def latest_s(self) -> float:
         """The time noted last."""

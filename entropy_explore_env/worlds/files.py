@@ -15,6 +15,7 @@ from scipy import sparse
 
 from entropy_explore_env.config import MAX_VOXELS, Grid
 from entropy_explore_env.errors import MissingExtraError, SettingError, WorldError
+from entropy_explore_env.validation import is_number
 from entropy_explore_env.worlds.world import World
 
 MAX_FILE_BYTES = 256 << 20
@@ -41,8 +42,7 @@ def load_octomap(path: Path | str, voxel_size_m: float | None = None) -> World:
         SettingError: The voxel size is not a number > 0.
         MissingExtraError: octomap-python is not installed.
     """
-    number = isinstance(voxel_size_m, int | float) and math.isfinite(voxel_size_m)
-    if voxel_size_m is not None and not (number and voxel_size_m > 0):
+    if voxel_size_m is not None and not (is_number(voxel_size_m) and 0 < voxel_size_m < math.inf):
         raise SettingError("voxel_size_m", voxel_size_m, "a number > 0")
     path = Path(path)
     labels, edge_m, origin_m = _read_octomap(path)

@@ -235,8 +235,9 @@ def test_view_wants_a_reset_and_a_robot_of_the_team() -> None:
     with pytest.raises(CallOrderError, match="before reset"):
         team.view("robot_0")
     team.reset(seed=0)
-    with pytest.raises(SettingError, match="robot_0, robot_1"):
-        team.view("robot_2")
+    for asked in (team.view, team.observation_space, team.action_space):
+        with pytest.raises(SettingError, match="robot_0, robot_1"):
+            asked("robot_2")
 
 
 @pytest.mark.parametrize("scenario", SCENARIOS)

@@ -24,6 +24,7 @@ from entropy_explore_env import (
     parallel_env,
 )
 from entropy_explore_env.envs.conformance import leaves, require_apart, require_same, snapshot
+from entropy_explore_env.missions import missions
 
 BOX = "box-7x11x5"
 KINDS = ("continuous", "discrete")
@@ -88,11 +89,11 @@ def test_plays_as_gymnasium_s_own_vector_environment_does(mode: AutoresetMode, k
 
 
 def assert_infos_agree(expected: dict[str, Any], found: dict[str, Any]) -> None:
-    """Ours have an axis for robots; what one robot is told is the same."""
+    """What one robot is told is the same, in the same shape."""
     assert found["_time_s"].dtype == np.bool_ and found["_time_s"].all()
     np.testing.assert_array_equal(found["time_s"], expected["time_s"])
     for name in ("deciding", "entropy_bits", "own_bits", "received_bits"):
-        np.testing.assert_array_equal(found[name][:, 0], expected[name])
+        np.testing.assert_array_equal(found[name], expected[name])
     assert ("final_obs" in found) == ("final_obs" in expected)
     if "final_obs" in expected:
         mask = expected["_final_obs"]
@@ -103,7 +104,7 @@ def assert_infos_agree(expected: dict[str, Any], found: dict[str, Any]) -> None:
             if other is not None:
                 require_same("final_obs", leaves(in_order(other)), leaves(in_order(mine)))
         for name in ("time_s", "entropy_bits"):
-            mine = found["final_info"][name].reshape(len(mask))
+            mine = found["final_info"][name]
             np.testing.assert_array_equal(mine[mask], expected["final_info"][name][mask])
             np.testing.assert_array_equal(found["final_info"][f"_{name}"], mask)
 
@@ -339,6 +340,30 @@ def test_too_many_robots_are_refused_before_anything_changes() -> None:
     with pytest.raises(WorldError, match="robots"):
         env.reset(seed=0)
     require_same("refused", before, snapshot(env))
+
+
+def test_a_world_without_room_leaves_the_other_missions_as_they_were(monkeypatch: pytest.MonkeyPatch) -> None:
+    env = EntropyExploreVectorEnv("box-7x11x5", 3, robots=2)
+    env.reset(seed=0)
+    env.step(some_actions(env, 1)[0])
+    before, drawn = snapshot(env), []
+
+    def full_at_last(*given: Any) -> np.ndarray:
+        drawn.append(given)
+        if len(drawn) == 3:
+            raise WorldError("Scenario.robots", 2, "fewer")
+        return real(*given)
+
+    real = missions.start_poses
+    monkeypatch.setattr(missions, "start_poses", full_at_last)
+    with pytest.raises(WorldError):
+        env.reset(seed=5)
+    require_same("refused", before, snapshot(env))
+
+
+def test_options_that_are_no_dict_are_refused() -> None:
+    with pytest.raises(SettingError, match="options"):
+        EntropyExploreVectorEnv(BOX, 2).reset(options=3)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("spoil", [np.nan, np.inf, 1.01])
