@@ -22,11 +22,16 @@ class World:
         grid: Its voxels.
         occupied: (X, Y, Z) bool, read-only; whether a voxel is solid.
         name: Where it came from.
+        ceiling: (X, Y) int32, read-only, or None: in each column the first layer that is closed to
+            robots, though not to rays (an exposure surface over terrain); Z = none.
+        yaw_rad: How the grid's frame is turned against the frame of the file that it came from.
     """
 
     grid: Grid
     occupied: np.ndarray
     name: str
+    ceiling: np.ndarray | None = None
+    yaw_rad: float = 0.0
 
     def __post_init__(self) -> None:
         """Check the array and make it read-only."""
@@ -36,6 +41,11 @@ class World:
         if self.occupied.all():
             raise WorldError("World.occupied", self.name, "at least one free voxel")
         self.occupied.setflags(write=False)
+        if self.ceiling is not None:
+            if self.ceiling.shape != self.grid.shape[:2] or self.ceiling.dtype != np.int32:
+                found = f"{self.ceiling.shape} {self.ceiling.dtype}"
+                raise WorldError("World.ceiling", found, f"{self.grid.shape[:2]} int32")
+            self.ceiling.setflags(write=False)
 
     def body_blocked(self, body_radius_m: float) -> np.ndarray:
         """Where the centre of a ball-shaped body cannot be, judged at voxel centres.
@@ -45,11 +55,15 @@ class World:
 
         Returns:
             (X, Y, Z) bool: in the voxel's centre the body would touch a solid voxel or leave the
-            workspace. With a radius of at most half a voxel these are the solid voxels.
+            workspace, or reach above the ceiling. With a radius of at most half a voxel these are
+            the solid voxels, and those from the ceiling on.
         """
         radius = body_radius_m / self.grid.voxel_size_m
+        closed = self.occupied
+        if self.ceiling is not None:
+            closed = closed | (np.arange(self.grid.shape[2]) >= self.ceiling[:, :, None])
         if radius <= 0.5 + 1e-9:
-            return self.occupied
+            return closed
         if 2.0 * radius > max(self.grid.shape):
             return np.ones(self.grid.shape, bool)
         height = 0 if self.grid.flat else math.ceil(radius - 0.5)
@@ -57,9 +71,7 @@ class World:
         offsets = np.ogrid[-reach : reach + 1, -reach : reach + 1, -height : height + 1]
         gaps = [np.maximum(np.abs(axis) - 0.5, 0.0) for axis in offsets]
         ball = gaps[0] ** 2 + gaps[1] ** 2 + gaps[2] ** 2 < radius**2 - 1e-9
-        walled = np.pad(
-            self.occupied, [(reach, reach), (reach, reach), (height, height)], constant_values=True
-        )
+        walled = np.pad(closed, [(reach, reach), (reach, reach), (height, height)], constant_values=True)
         swollen = ndimage.binary_dilation(walled, ball)
         inside = tuple(
             slice(pad, pad + n) for pad, n in zip((reach, reach, height), self.grid.shape, strict=True)
