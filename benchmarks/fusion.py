@@ -10,12 +10,11 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from benchmarks.peers import OctoMapTree
 from benchmarks.rows import Effort, Goal, Row, compared, interleave, timed
 from entropy_explore_env.belief.coverage_map import PRIOR_MEAN, measurement_precision
-from entropy_explore_env.compilation import kernel
+from entropy_explore_env.compilation import lean_kernel
 from entropy_explore_env.config import Grid, RangeSensor
 from entropy_explore_env.robots.range_sensor import (
     Return,
@@ -70,9 +69,7 @@ def measure_room(grid: Grid, sensor: RangeSensor, scans: int, seed: int = 0) -> 
     return Measurements(positions, ends)
 
 
-@njit(
-    nogil=True, error_model="numpy", _nrt=False
-)  # a cached copy would outlive changes of the functions it calls
+@lean_kernel
 def fuse_measurements(
     scan: Scan,
     numbers: np.void,
@@ -119,7 +116,7 @@ def fuse_measurements(
     return voxels
 
 
-@kernel
+@lean_kernel
 def fuse_floor(
     crossed: np.ndarray,
     ends: np.ndarray,

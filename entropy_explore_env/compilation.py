@@ -13,15 +13,16 @@ from typing import Any
 from numba import njit
 
 _OPTIONS: dict[str, Any] = {"cache": True, "nogil": True, "error_model": "numpy"}
+_LEAN_OPTIONS: dict[str, Any] = {**_OPTIONS, "_nrt": False}
 
 kernel = njit(**_OPTIONS)
 """Compiled once and kept on disk; other threads run meanwhile; a division by zero gives inf or nan."""
-lean_kernel = njit(**_OPTIONS, _nrt=False)
+lean_kernel = njit(**_LEAN_OPTIONS)
 """A kernel that makes no array and so counts no references: each row that it slices would cost a count.
 
 Numba refuses to compile one that does make an array.
 """
-inlined_kernel = njit(**_OPTIONS, _nrt=False, forceinline=True)
+inlined_kernel = njit(**_LEAN_OPTIONS, forceinline=True)
 """A lean kernel for what happens once a ray: it becomes part of each kernel that calls it."""
 
 
