@@ -125,13 +125,13 @@ class Missions:
         """Put the mission into its world, with beliefs at the prior, and observe."""
         layout = world.layout(self.scenario)
         self.seeds[mission], self.episodes[mission] = number, episode
-        if layout.blocked is not world.occupied and self.state.blocked is self.state.truth:
+        if world.ceiling is not None and self.state.blocked is self.state.truth:
             self.state = self.state._replace(blocked=self.state.truth.copy())
         state = self.state
         if world is not self.worlds[mission]:
             self.worlds[mission] = world
             state.truth[mission] = world.occupied.ravel()
-            state.blocked[mission] = layout.blocked.ravel()
+            state.blocked[mission] = layout.barriers.ravel()
         for array in state[4:]:
             array[mission] = np.zeros((), array.dtype)
         state.mean[mission] = PRIOR_MEAN

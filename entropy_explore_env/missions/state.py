@@ -110,7 +110,7 @@ class MissionState(NamedTuple):
     truth: np.ndarray
     """(E, V) float32 true coverage, 0 or 1."""
     blocked: np.ndarray
-    """(E, V) float32, 1 where a body does not fit; `truth` itself for small bodies without a ceiling."""
+    """(E, V) float32, a Barrier each; `truth` itself for small bodies where there is no ceiling."""
     mean: np.ndarray
     """(E, A, V) float32 expected coverage by each robot's belief."""
     precision: np.ndarray

@@ -19,6 +19,8 @@ class MoveEnd(enum.Enum):
 
     ARRIVED = "The robot reached its viewpoint."
     OBSTACLE = "A solid voxel was in the way: the robot stands in the last voxel in which its body fits."
+    GROUND = "The terrain was in the way: the robot stands in the last voxel in which its body fits."
+    CEILING = "The ceiling was in the way: the robot stands in the last voxel below it on its way."
     WALL = "The workspace ends there: the robot stands in its last voxel on the way."
     TEAMMATE = "A teammate's body, or the way that it still has to drive, was in the way."
 
@@ -28,7 +30,9 @@ class MoveEnd(enum.Enum):
         return list(MoveEnd).index(self)
 
 
-_ARRIVED, _OBSTACLE, _WALL, _TEAMMATE = (end.code for end in MoveEnd)
+_ARRIVED, _OBSTACLE, _GROUND, _CEILING, _WALL, _TEAMMATE = (end.code for end in MoveEnd)
+_ENDS_AT = (_ARRIVED, _OBSTACLE, _GROUND, _CEILING)
+"""How a drive ends at each Barrier."""
 _TOUCH = 1e-6
 """Bodies stop this far apart, in voxel edges, so that rounding cannot make them overlap."""
 _HALVINGS = 60
@@ -72,7 +76,7 @@ def free_way(blocked, size, start, finish, direction, length, crossed, entered):
     """How far a body can drive on a line before something solid.
 
     Args:
-        blocked: (V,) float32, above ½ where the body does not fit.
+        blocked: (V,) float32, a Barrier each: above ½ the body does not fit.
         size: (X, Y, Z) voxels.
         start: (x, y, z) in grid units.
         finish: (x, y, z), where the drive is to end.
@@ -90,20 +94,24 @@ def free_way(blocked, size, start, finish, direction, length, crossed, entered):
     # A little farther, and the last voxel by itself: who stands on a face or an edge stands in the
     # voxel above it, through which the line need not go, and which must be free, too.
     at, n, end = cast_ray(
-        blocked, STOP_AT_COVERED, size, start, direction, length + _TOUCH, False, 0, crossed, entered
+        blocked, STOP_AT_COVERED, size, start, direction, length + _TOUCH, False, 1, crossed, entered
     )
-    if end == OPEN:
+    code = _WALL
+    if end == OBSTACLE:
+        n -= 1
+        code = _ENDS_AT[int(blocked[crossed[n]])]
+    elif end == OPEN:
         x, y, z = min(int(finish[0]), size[0] - 1), min(int(finish[1]), size[1] - 1), int(finish[2])
         voxel = (x * size[1] + y) * size[2] + min(z, size[2] - 1)
         if voxel == crossed[0] or blocked[voxel] <= STOP_AT_COVERED:
             return length, _ARRIVED
-        at, end = length, OBSTACLE
+        at, code = length, _ENDS_AT[int(blocked[voxel])]
     last = n - 1
     while last > 0 and at - entered[last] / TICKS <= _TOUCH:  # a voxel that the line meets at its edge only
         at = entered[last] / TICKS
         last -= 1
     middle = 0.5 * (entered[last] / TICKS + at) if last > 0 else 0.0
-    return middle, (_OBSTACLE if end == OBSTACLE else _WALL)
+    return middle, code
 
 
 @lean_kernel

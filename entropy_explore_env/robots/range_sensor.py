@@ -121,7 +121,7 @@ def new_scan(grid: Grid, sensor: RangeSensor, rays: int, robots: int, reach_m: f
     """Working space for up to `rays` rays in a workspace, and for drives of at most `reach_m`."""
     length = sensor.max_range_m / grid.voxel_size_m
     longest = longest_crossing(*grid.shape, length, sensor.voxels_behind)
-    farthest = longest_crossing(*grid.shape, reach_m / grid.voxel_size_m, 0)
+    farthest = longest_crossing(*grid.shape, reach_m / grid.voxel_size_m, 1)
     return Scan(
         rays=np.zeros(rays, RAY),
         utility=np.zeros(rays),

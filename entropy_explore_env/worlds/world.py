@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import enum
 import math
 from dataclasses import dataclass
 from functools import cached_property
@@ -12,6 +13,19 @@ from scipy import ndimage
 
 from entropy_explore_env.config import Grid, Scenario
 from entropy_explore_env.errors import WorldError
+
+
+class Barrier(enum.IntEnum):
+    """Why a body cannot be in a voxel."""
+
+    NONE = 0
+    """It can."""
+    SOLID = 1
+    """It would touch something solid, or leave the workspace."""
+    GROUND = 2
+    """It would touch what is solid in a world with a ceiling: the terrain."""
+    CEILING = 3
+    """It would reach above the ceiling."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,31 +61,39 @@ class World:
                 raise WorldError("World.ceiling", found, f"{self.grid.shape[:2]} int32")
             self.ceiling.setflags(write=False)
 
-    def body_blocked(self, body_radius_m: float) -> np.ndarray:
+    def barriers(self, body_radius_m: float) -> np.ndarray:
         """Where the centre of a ball-shaped body cannot be, judged at voxel centres.
 
         Args:
             body_radius_m: Radius of the body in metres.
 
         Returns:
-            (X, Y, Z) bool: in the voxel's centre the body would touch a solid voxel or leave the
-            workspace, or reach above the ceiling. With a radius of at most half a voxel these are
-            the solid voxels, and those from the ceiling on.
+            (X, Y, Z) uint8, a Barrier each. With a radius of at most half a voxel they are the solid
+            voxels, and those from the ceiling on. A body that meets several things meets the ground
+            first, then the ceiling, then the boundary.
         """
+        solid = self._touching(self.occupied, body_radius_m, boundary=True)
+        if self.ceiling is None:
+            return solid.view(np.uint8)
+        barriers = solid.astype(np.uint8)
+        above = np.arange(self.grid.shape[2]) >= self.ceiling[:, :, None]
+        barriers[self._touching(above, body_radius_m, boundary=False)] = Barrier.CEILING
+        barriers[self._touching(self.occupied, body_radius_m, boundary=False)] = Barrier.GROUND
+        return barriers
+
+    def _touching(self, closed: np.ndarray, body_radius_m: float, boundary: bool) -> np.ndarray:
+        """(X, Y, Z) bool: a body in the voxel's centre meets a closed voxel, or leaves the workspace."""
         radius = body_radius_m / self.grid.voxel_size_m
-        closed = self.occupied
-        if self.ceiling is not None:
-            closed = closed | (np.arange(self.grid.shape[2]) >= self.ceiling[:, :, None])
         if radius <= 0.5 + 1e-9:
             return closed
         if 2.0 * radius > max(self.grid.shape):
-            return np.ones(self.grid.shape, bool)
+            return np.full(self.grid.shape, boundary or closed.any())
         height = 0 if self.grid.flat else math.ceil(radius - 0.5)
         reach = math.ceil(radius - 0.5)
         offsets = np.ogrid[-reach : reach + 1, -reach : reach + 1, -height : height + 1]
         gaps = [np.maximum(np.abs(axis) - 0.5, 0.0) for axis in offsets]
         ball = gaps[0] ** 2 + gaps[1] ** 2 + gaps[2] ** 2 < radius**2 - 1e-9
-        walled = np.pad(closed, [(reach, reach), (reach, reach), (height, height)], constant_values=True)
+        walled = np.pad(closed, [(reach, reach), (reach, reach), (height, height)], constant_values=boundary)
         swollen = ndimage.binary_dilation(walled, ball)
         inside = tuple(
             slice(pad, pad + n) for pad, n in zip((reach, reach, height), self.grid.shape, strict=True)
@@ -95,11 +117,10 @@ class World:
         return self._layouts[key]
 
     def _laid_out(self, body_radius_m: float, height: int | None, voxels_behind: int) -> Layout:
-        blocked = self.body_blocked(body_radius_m)
-        room = ~blocked
+        barriers = self.barriers(body_radius_m)
+        room = barriers == Barrier.NONE
         if height is not None:
-            room = np.zeros_like(blocked)
-            room[:, :, height] = ~blocked[:, :, height]
+            room[:, :, :height] = room[:, :, height + 1 :] = False
         starts = _largest_component(room)
         if not starts.any():
             allowed = f"a world with room for a body of radius {body_radius_m} m"
@@ -108,7 +129,7 @@ class World:
         seen = np.isin(labels, np.unique(labels[starts]))
         if voxels_behind:
             seen |= ndimage.binary_dilation(seen, iterations=voxels_behind) & self.occupied
-        return Layout(blocked, np.flatnonzero(starts), int(seen.sum()))
+        return Layout(barriers, np.flatnonzero(starts), int(seen.sum()))
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,13 +137,13 @@ class Layout:
     """What a kind of robot can do in a world.
 
     Attributes:
-        blocked: (X, Y, Z) bool, voxels in which its body does not fit.
+        barriers: (X, Y, Z) uint8, a Barrier each: whether its body fits into the voxel, or why not.
         starts: (N,) flat indices of the voxels where it may start: the largest connected part.
         visible_voxels: How many voxels can be seen from there at all: the free space that hangs
             together with it, and the skin of the solid voxels around.
     """
 
-    blocked: np.ndarray
+    barriers: np.ndarray
     starts: np.ndarray
     visible_voxels: int
 

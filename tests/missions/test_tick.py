@@ -8,10 +8,12 @@ import numpy as np
 import pytest
 
 from entropy_explore_env.config import Grid
+from entropy_explore_env.missions import missions as missions_module
 from entropy_explore_env.missions.poses import pose_at
 from entropy_explore_env.missions.view import view_of
 from entropy_explore_env.robots.motion import MoveEnd
 from entropy_explore_env.robots.range_sensor import Return
+from entropy_explore_env.worlds.world import World
 from tests.reference import rocha04
 from tests.reference.scenes import build, free_box, put, random_actions, started, wander
 
@@ -76,6 +78,26 @@ def test_a_robot_stops_before_what_is_solid_and_says_why():
     assert list(MoveEnd)[robots["move_end"][0]] is MoveEnd.WALL
     assert robots["goal"][0, 0] == pytest.approx(0.25)  # the middle of voxel 0
     assert robots["blocked_moves"][0] == 2
+
+
+def test_a_robot_stays_between_ground_and_ceiling_and_says_which_of_them_stopped_it(monkeypatch):
+    """Ground up to z = 0.5; closed to robots, not to rays, from z = 2 on."""
+    ground = np.zeros((7, 11, 5), bool)
+    ground[:, :, 0] = True
+    world = World(Grid((7, 11, 5), 0.5), ground, "plain", ceiling=np.full((7, 11), 4, np.int32))
+    monkeypatch.setattr(missions_module, "make_world", lambda *_: world)
+    missions = started(free_box(robots=1))
+    put(missions, 0, (1.75, 2.75, 1.25, 0.0, 0.0))
+    robots = toward(missions, (1.75, 2.75, 2.2, 0.0, 0.0))
+    assert list(MoveEnd)[robots["move_end"][0]] is MoveEnd.CEILING
+    assert robots["goal"][0, 2] == pytest.approx(1.75)
+    robots = toward(missions, (1.75, 2.75, 1.2, 0.0, 0.0))
+    robots = toward(missions, (1.75, 2.75, 0.3, 0.0, math.pi / 2))
+    assert list(MoveEnd)[robots["move_end"][0]] is MoveEnd.GROUND
+    assert robots["goal"][0, 2] == pytest.approx(0.75)
+    assert missions.state.scan_range_m[0, 0] == pytest.approx(0.25, rel=0.05)  # rays end on the ground …
+    robots = toward(missions, (1.75, 2.75, 0.75, 0.0, -math.pi / 2))
+    assert missions.state.scan_range_m[0, 0] == pytest.approx(1.75, rel=0.05)  # … and pass the ceiling
 
 
 def test_a_robot_stops_before_a_teammate_and_before_the_way_that_it_still_drives():

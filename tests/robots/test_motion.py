@@ -78,7 +78,7 @@ def test_turning_goes_the_short_way_round(yaw, new_yaw, pitch, new_pitch, turn):
 
 
 def drive(blocked, start, direction, length, finish=None):
-    crossed, entered = ray_space(blocked.shape)
+    crossed, entered = ray_space(blocked.shape, behind=1)
     start, direction = np.asarray(start, np.float64), np.asarray(direction, np.float64)
     way, code = free_way(
         blocked.ravel(),

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from entropy_explore_env.config import Grid
 from entropy_explore_env.errors import WorldError
-from entropy_explore_env.worlds.world import World, plane_index
+from entropy_explore_env.worlds.world import Barrier, World, plane_index
 from tests.reference.scenes import drawn, free_box, random_cover, seeds
 
 SIZE = (7, 11, 5)
@@ -66,7 +66,7 @@ def body_hits(occupied, voxel, radius):
 )
 def test_a_body_fits_where_it_meets_nothing_solid(seed, size, body_radius_m):
     occupied = random_cover(size, 0.06, seed) > 0.5
-    blocked = world_of(occupied).body_blocked(body_radius_m)
+    blocked = world_of(occupied).barriers(body_radius_m) > 0
     expected = np.zeros(size, bool)
     for voxel in np.ndindex(*size):
         expected[voxel] = body_hits(occupied, voxel, body_radius_m / 0.5)
@@ -80,7 +80,7 @@ def test_starts_are_the_largest_part_and_all_that_hangs_together_with_it_is_visi
 ):
     occupied = random_cover(size, 0.35, seed) > 0.5
     world = world_of(occupied)
-    room = ~world.body_blocked(body_radius_m)
+    room = world.barriers(body_radius_m) == Barrier.NONE
     scenario = free_box(
         grid=world.grid, robot={"body_radius_m": body_radius_m}, sensor={"voxels_behind": behind}
     )
@@ -144,6 +144,43 @@ def test_planar_robots_start_in_their_plane():
     assert len(starts) == 4 * 11 - 9
     assert plane_index(free_box()) is None
     assert plane_index(free_box(grid=Grid((9, 6, 1), 0.5))) == 0
+
+
+def terrain() -> World:
+    """Ground up to layer 0, at x = 3 up to layer 2; closed from layer 4 on, over x = 5 from layer 2 on."""
+    occupied = np.zeros(SIZE, bool)
+    occupied[:, :, 0] = True
+    occupied[3, :, :3] = True
+    ceiling = np.full(SIZE[:2], 4, np.int32)
+    ceiling[5] = 2
+    return World(Grid(SIZE, 0.5), occupied, "terrain", ceiling=ceiling)
+
+
+def test_between_ground_and_ceiling():
+    world = terrain()
+    columns = {
+        0: [Barrier.GROUND, Barrier.NONE, Barrier.NONE, Barrier.NONE, Barrier.CEILING],
+        3: [Barrier.GROUND, Barrier.GROUND, Barrier.GROUND, Barrier.NONE, Barrier.CEILING],
+        5: [Barrier.GROUND, Barrier.NONE, Barrier.CEILING, Barrier.CEILING, Barrier.CEILING],
+    }
+    small, large = world.barriers(0.1), world.barriers(0.3)  # 0.6 voxels: it meets the next ones
+    for x, column in columns.items():
+        assert small[x, 4].tolist() == column
+    assert large[1, 4].tolist() == [2, 2, 0, 3, 3]
+    assert large[5, 4].tolist() == [2, 2, 3, 3, 3]
+    assert large[4, 4].tolist() == [2, 2, 2, 3, 3]  # beside the ridge; over it, beside the low ceiling
+    layout = world.layout(free_box(grid=world.grid))
+    assert len(layout.starts) == (small == Barrier.NONE).sum() == 11 * (5 * 3 + 1 + 1)
+    # Rays go above the ceiling: all free voxels can be seen, and the skin of the ground.
+    skin = 11 * (7 + 1)  # the top of each column, and the ridge below its top
+    assert layout.visible_voxels == (~world.occupied).sum() + skin
+
+
+@pytest.mark.parametrize("ceiling", [np.full((7, 11), 3), np.full((7, 5), 3, np.int32), np.zeros((7, 11))])
+def test_ceilings_that_are_none_are_refused(ceiling):
+    with pytest.raises(WorldError) as raised:
+        World(Grid(SIZE, 0.5), np.zeros(SIZE, bool), "bad", ceiling=ceiling)
+    assert raised.value.field == "World.ceiling"
 
 
 def test_layouts_of_other_bodies_are_other_layouts():
