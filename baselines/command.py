@@ -39,6 +39,8 @@ Arguments = TypeVar("Arguments")
 BAD_INPUT = 2
 INTERRUPTED = 130
 _FRAME = re.compile(r"[─-╿]+")
+_TITLE = re.compile(r"^(Unrecognized options|Invalid choice|Value error|Parsing error|Required options) ")
+"""What stands on the parser's frame; the message says it again."""
 
 
 def parse(
@@ -67,11 +69,17 @@ def parse(
     try:
         with contextlib.redirect_stderr(complaint):
             start = kind() if default is None else default
-            return tyro.cli(kind, args=list(words), description=description, default=start)
+            return tyro.cli(kind, prog=_program(), args=list(words), description=description, default=start)
     except SystemExit as stop:
         if stop.code in (0, None):
             raise
         raise UsageError(_one_line(complaint.getvalue())) from None
+
+
+def _program() -> str:
+    """How the command was started, as one types it."""
+    module = getattr(sys.modules["__main__"], "__spec__", None)
+    return Path(sys.argv[0]).name if module is None else f"python -m {module.name}"
 
 
 class UsageError(EntropyExploreError):
@@ -81,6 +89,7 @@ class UsageError(EntropyExploreError):
 def _one_line(complaint: str) -> str:
     """The parser's framed message as one line."""
     words = " ".join(_FRAME.sub(" ", complaint).split())
+    words = _TITLE.sub("", words)
     return words.split(" For full helptext")[0] or "the arguments do not fit; see --help"
 
 
@@ -104,6 +113,9 @@ def run_command(main: Callable[[Sequence[str]], int], words: Sequence[str] | Non
         return BAD_INPUT
     except OSError as error:
         print(f"error: {error}", file=sys.stderr)
+        return BAD_INPUT
+    except MemoryError as error:
+        print(f"error: not enough memory: {error}", file=sys.stderr)
         return BAD_INPUT
     except KeyboardInterrupt:
         print("interrupted", file=sys.stderr)

@@ -170,10 +170,17 @@ def mission_record(env: EntropyExploreEnv, strategy: str, seed: int) -> Record:
     halved = np.flatnonzero(best <= middle)
     rows = recorder.spread(_SERIES_POINTS)
     single = np.flatnonzero(np.diff(recorder.scans) == 1)
+    scanned = np.diff(recorder.robot_scans, axis=0)[single].argmax(axis=1)
+    places = recorder.places_m[1:]
+    apart_m = np.linalg.norm(places[:, :, None] - places[:, None], axis=-1).sum() / max(
+        len(places) * places.shape[1] * (places.shape[1] - 1), 1
+    )
     return {
         **figures,
         "half_s": float(recorder.time_s[halved[0]]) if len(halved) else None,
         "sent_by_scan": np.diff(recorder.shared)[single].tolist(),
+        "depth_by_scan_m": np.round(recorder.depths_m[1:][single, scanned], 3).tolist(),
+        "apart_m": round(float(apart_m), 3),
         "series": {
             "time_s": np.round(recorder.time_s[rows], 3).tolist(),
             "entropy_bits": np.round(best[rows], 1).tolist(),

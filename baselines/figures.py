@@ -53,17 +53,19 @@ def mission_picture(recorder: Recorder, title: str, strategy: str) -> bytes:
                 recorder.entropy_bits[:, robot] / 1000,
                 where="post",
                 color=colour,
+                linewidth=1.0 + 0.8 * (robots - 1 - robot),  # equal maps: all of the curves can be seen
                 label=f"robot_{robot}",
             )
         threshold = float(missions.state.missions[0]["entropy_end_bits"]) / 1000
         curves.axhline(threshold, color="0.4", linewidth=1, linestyle="--", label="threshold")
         curves.set(xlabel="simulated time (s)", ylabel="entropy of the map (1000 bits)", title="Entropy")
         curves.legend(frameon=False, fontsize=8)
-        shared.step(recorder.time_s, recorder.shared, where="post", color="0.2")
+        alone = robots == 1  # it shares with nobody
+        shared.step(recorder.time_s, recorder.scans if alone else recorder.shared, where="post", color="0.2")
         shared.set(
             xlabel="simulated time (s)",
-            ylabel="measurements sent by the team",
-            title="Shared measurements, cumulative",
+            ylabel="scans" if alone else "measurements sent by the team",
+            title="Scans, cumulative" if alone else "Shared measurements, cumulative",
         )
         _slice(figure, above, recorder, entropy=True)
         _slice(figure, covered, recorder, entropy=False)
@@ -87,13 +89,15 @@ def _slice(figure: Figure, axes: Axes, recorder: Recorder, entropy: bool) -> Non
     for robot in range(missions.scenario.robots):
         way, colour = recorder.places_m[:, robot], COLOURS[robot % len(COLOURS)]
         axes.plot(way[:, 0], way[:, 1], color=colour, linewidth=0.9)
-        axes.plot(*way[0, :2], marker="o", color=colour, markersize=5, markeredgecolor="white")
-        axes.plot(*way[-1, :2], marker="s", color=colour, markersize=5, markeredgecolor="white")
-    what = "entropy left" if entropy else "coverage"
-    height = f" at z = {grid.centre_of(np.array([0, 0, layer]))[2]:.2f} m" if not grid.flat else ""
+        edge = "white" if entropy else "black"
+        axes.plot(*way[0, :2], marker="o", color=colour, markersize=5, markeredgecolor=edge)
+        axes.plot(*way[-1, :2], marker="s", color=colour, markersize=5, markeredgecolor=edge)
+    height_m = grid.centre_of(np.array([0, 0, layer]))[2]
+    height = "" if grid.flat else f"z = {height_m:.2f} m; ways at all heights, "
     axes.set(xlabel="x (m)", ylabel="y (m)")
-    axes.set_title(f"robot_0's map{height}: {what}", loc="left")
-    figure.colorbar(image, ax=axes, shrink=0.7, label="" if entropy else "coverage; blue: unknown")
+    axes.set_title(f"What robot_0 knows\n{height}○ start, □ end", fontsize=8)
+    label = "share of the entropy left" if entropy else "coverage; blue: unknown"
+    figure.colorbar(image, ax=axes, shrink=0.7, label=label)
 
 
 def _busiest_layer(places_m: np.ndarray, grid: Grid) -> int:

@@ -127,7 +127,8 @@ def compared(
     )
 
 
-def alone(job: str, values: Iterable[float], unit: str, goal: Goal) -> Row:
+def alone(job: str, values: Iterable[float], unit: str, goal: Goal | None = None) -> Row:
     """The row of a job without a peer; the goal is about the median itself."""
     value = float(statistics.median(values))
-    return Row(job, None, value, None, unit, None, goal.text, goal.holds(value))
+    holds = None if goal is None else goal.holds(value)
+    return Row(job, None, value, None, unit, None, None if goal is None else goal.text, holds)

@@ -30,6 +30,8 @@ MAX_VOXELS = 2**31 - 1
 """Voxels are numbered by 32-bit integers."""
 MAX_IN_FLIGHT = 2**24
 """Measurements of delayed messages that may be under way at once."""
+MAX_ACTIONS = 2**20
+"""Discrete actions, counted with those in the corners beyond reach."""
 MAX_VOXELS_ALONG_AXIS = 2**20
 """Rays measure their way in 64-bit integers."""
 
@@ -60,10 +62,12 @@ class Grid:
         check_counts(self, "shape", 1, MAX_VOXELS_ALONG_AXIS)
         if math.prod(self.shape) > MAX_VOXELS:
             raise SettingError("Grid.shape", self.shape, f"at most {MAX_VOXELS} voxels in all")
-        check_positive(self, "voxel_size_m")
+        check(self, "voxel_size_m", "a number from 1e-6 to 1e6", lambda v: 1e-6 <= v <= 1e6)
         finite = isinstance(self.origin_m, tuple) and len(self.origin_m) == 3
-        if not finite or not all(is_number(v) and math.isfinite(v) for v in self.origin_m):
-            raise SettingError("Grid.origin_m", self.origin_m, "three finite numbers (x, y, z)")
+        if not finite or not all(is_number(v) and abs(v) <= 1e9 for v in self.origin_m):
+            raise SettingError(
+                "Grid.origin_m", self.origin_m, "a tuple of three numbers (x, y, z) from -1e9 to 1e9"
+            )
 
     @property
     def voxels(self) -> int:
@@ -154,7 +158,9 @@ class RangeSensor:
             or len(view) != 2
             or not all(is_number(v) and 0 <= v <= limit + 1e-9 for v, limit in zip(view, limits, strict=True))
         ):
-            raise SettingError("RangeSensor.field_of_view_rad", view, "(yaw in [0, 2π], pitch in [0, π])")
+            raise SettingError(
+                "RangeSensor.field_of_view_rad", view, "a tuple (yaw in [0, 2π], pitch in [0, π])"
+            )
         check_positive(self, "scan_time_s")
         check(self, "angular_step_rad", "a finite number ≥ 1e-6", lambda v: 1e-6 <= v < math.inf)
         check_positive(self, "max_range_m", finite=False)
@@ -337,7 +343,8 @@ class Scenario:
 
     Attributes:
         name: What people call it.
-        grid: Size and resolution of the workspace; a world from a file brings its own.
+        grid: Size and resolution of the workspace; a world from a file brings its own. In a world
+            one voxel high robots look level and the sensor's field of view has no pitch.
         world: How the truth is made: `empty`, `furnished`, or the path of a world file.
         robots: Team size A.
         sigma_prior: Standard deviation of coverage before any measurement; the mean is ½.
@@ -359,9 +366,12 @@ class Scenario:
     observation: Observation = field(default_factory=Observation)
 
     def __post_init__(self) -> None:
-        """Check every field, and that the parts fit each other."""
+        """Check every field, and that the parts fit each other; level the sensor in a 2-D world."""
         for name, kind in (("name", str), ("world", str), ("grid", Grid), *_PARTS):
             check_kind(self, name, kind)
+        if self.grid.flat and self.sensor.field_of_view_rad[1] > 0.0:
+            level = (self.sensor.field_of_view_rad[0], 0.0)
+            object.__setattr__(self, "sensor", dataclasses.replace(self.sensor, field_of_view_rad=level))
         check_count(self, "robots", 1, 1000)
         check(self, "sigma_prior", "a number from 1e-3 to 1e4", lambda v: 1e-3 <= v <= 1e4)
         if self.decision_period_s is not None:
@@ -375,7 +385,14 @@ class Scenario:
         if self.action.kind == "discrete" and self.robot.reach_m < self.grid.voxel_size_m:
             allowed = f"at least a voxel ({self.grid.voxel_size_m} m) for discrete actions"
             raise SettingError("Robot.reach_m", self.robot.reach_m, allowed)
-        if self.planar and not self.grid.flat and self.robot.sensor_height_m >= self.grid.size_m[2]:
+        if self.action.kind == "discrete":
+            steps = math.floor(self.robot.reach_m / self.grid.voxel_size_m + 1e-9)
+            moves = math.prod(2 * min(steps, n - 1) + 1 for n in self.grid.shape)
+            if moves * self.action.yaws * self.action.pitches > MAX_ACTIONS:
+                allowed = f"so short that there are at most {MAX_ACTIONS} discrete actions"
+                raise SettingError("Robot.reach_m", self.robot.reach_m, allowed)
+        layers = int(self.robot.sensor_height_m / self.grid.voxel_size_m)
+        if self.planar and not self.grid.flat and layers >= self.grid.shape[2]:
             allowed = f"below the workspace's height ({self.grid.size_m[2]} m)"
             raise SettingError("Robot.sensor_height_m", self.robot.sensor_height_m, allowed)
 

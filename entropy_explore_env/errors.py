@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+_LONGEST_VALUE = 200
+"""A message shows so many characters of a value."""
+
 
 class EntropyExploreError(ValueError):
     """Anything that the caller asked for and cannot have; the message is one line."""
@@ -12,7 +15,10 @@ class SettingError(EntropyExploreError):
 
     def __init__(self, field: str, value: object, allowed: str) -> None:
         """Name the field, show the value, say what is allowed."""
-        super().__init__(f"{field} = {value!r}: allowed is {allowed}")
+        shown = " ".join(repr(value).split())
+        if len(shown) > _LONGEST_VALUE:
+            shown = shown[:_LONGEST_VALUE] + " …"
+        super().__init__(f"{field} = {shown}: allowed is {allowed}")
         self.field, self.value, self.allowed = field, value, allowed
 
     def __reduce__(self) -> tuple[type, tuple[str, object, str]]:

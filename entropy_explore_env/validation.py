@@ -61,7 +61,7 @@ def check_counts(settings: object, name: str, least: int, most: int) -> None:
     """The field is three whole numbers, each in a range."""
     value = getattr(settings, name)
     if not isinstance(value, tuple) or len(value) != 3 or not all(is_whole(n, least, most) for n in value):
-        allowed = f"three whole numbers (x, y, z), each from {least} to {most}"
+        allowed = f"a tuple of three whole numbers (x, y, z), each from {least} to {most}"
         raise SettingError(f"{type(settings).__name__}.{name}", value, allowed)
 
 

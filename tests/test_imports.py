@@ -43,6 +43,15 @@ SIBLINGS = {
         "view",
     ),
     "worlds": ("world", "procedural", "octomap_reader", "files", "load"),
+    "envs": (
+        "checks",
+        "infos",
+        "parallel_env",
+        "single_env",
+        "vector_env",
+        "episodes",
+        "conformance",
+    ),
     "reports": ("metrics", "recording", "glyphs", "rendering", "animation", "painting"),
 }
 """Inside a folder a file may import those that stand before it."""
@@ -150,7 +159,7 @@ def complaint(each: Import) -> str | None:
     importer, imported = inside.with_suffix("").parts[0], top(module)
     if importer != imported:
         return None if layer_of(importer) < layer_of(imported) else f"{each}, which lies above"
-    if importer in SIBLINGS:
+    if len(inside.parts) > 1:
         order = SIBLINGS[importer]
         if order.index(module.split(".")[1]) >= order.index(inside.stem):
             return f"{each}, which stands below it"

@@ -18,7 +18,6 @@ from baselines.command import make_folder, parse, print_json, run_command
 from baselines.experiment import run_cells
 from baselines.papers.rocha04_cells import experiment
 from baselines.papers.rocha04_claims import all_claims
-from baselines.papers.rocha04_report import print_claims, write_report
 from entropy_explore_env.errors import SettingError
 
 _STARTS = 100
@@ -48,6 +47,8 @@ class Args:
 def main(words: Sequence[str]) -> int:
     """Run the command."""
     args = parse(Args, words, description=__doc__)
+    from baselines.papers.rocha04_report import print_claims, write_report  # matplotlib: after the help
+
     for name, value in (("starts", args.starts), ("jobs", args.jobs)):
         if value is not None and value < 1:
             raise SettingError(name, value, "a whole number ≥ 1")
@@ -60,7 +61,8 @@ def main(words: Sequence[str]) -> int:
     jobs = args.jobs or os.cpu_count() or 1
     records = run_cells(cells, args.runs, jobs, "Rocha04", quiet=args.json)
     claims = all_claims(records)
-    command = f"python -m baselines.papers.rocha04{' --quick' if args.quick else ''} --out {args.out}"
+    given = " --quick" * args.quick + (f" --starts {args.starts}" if args.starts else "")
+    command = f"python -m baselines.papers.rocha04{given} --out {args.out}"
     report = write_report(args.out, records, claims, command)
     if args.json:
         wall_s = round(time.perf_counter() - started, 1)

@@ -14,6 +14,8 @@ BURSTS = (32, 64, 128)
 I_MINS = (0.6215, 0.3219, 0.0291)
 STANDARD = (64, 0.3219)
 """burst and I_min of figure 4."""
+RIVALS = ("random", "gradient-plane")
+"""What stands beside eqs. 33-34 for every team size: a random walk, and the motion-plane rule."""
 
 CHANGES: dict[str, tuple[str, dict[str, Any], str]] = {
     "scan-0": ("scan time 0.001 s instead of 0.5 s", {"sensor": {"scan_time_s": 0.001}}, "gradient"),
@@ -26,7 +28,6 @@ CHANGES: dict[str, tuple[str, dict[str, Any], str]] = {
     "behind-0": ("rays update nothing behind the hit", {"sensor": {"voxels_behind": 0}}, "gradient"),
     "reach-1": ("search radius ξ of one voxel, 0.25 m", {"robot": {"reach_m": 0.25}}, "gradient"),
     "reach-4": ("search radius ξ of 1 m", {"robot": {"reach_m": 1.0}}, "gradient"),
-    "plane": ("motion plane, eqs. 38-40, instead of eqs. 33-34", {}, "gradient-plane"),
     "furnished": ("boxes on the floor (the worlds of room-furnished)", {"world": "furnished"}, "gradient"),
     "plane-scan-0": (
         "motion plane and scan time 0.001 s (two changes)",
@@ -42,6 +43,11 @@ def team_id(robots: int, burst: int, i_min_bits: float) -> str:
     return "single" if robots == 1 else f"team-{robots}-burst-{burst}-imin-{i_min_bits}"
 
 
+def rival_id(robots: int, strategy: str) -> str:
+    """Name of the cell in which another strategy stands beside `team_id(robots, *STANDARD)`."""
+    return f"single-{strategy}" if robots == 1 else f"team-{robots}-{strategy}"
+
+
 def experiment(starts: int, single_starts: int, changes: bool) -> list[Cell]:
     """All cells.
 
@@ -53,14 +59,15 @@ def experiment(starts: int, single_starts: int, changes: bool) -> list[Cell]:
     single = with_settings(ROOM, {"robots": 1})
     cells = [
         Cell("single", single, "gradient", single_starts),
-        Cell("single-random", single, "random", single_starts),
+        *(Cell(f"single-{strategy}", single, strategy, single_starts) for strategy in RIVALS),
     ]
     for robots in TEAMS:
         for burst in BURSTS:
             for i_min_bits in I_MINS:
                 scenario = _team(robots, burst, i_min_bits)
                 cells.append(Cell(team_id(robots, burst, i_min_bits), scenario, "gradient", starts))
-        cells.append(Cell(f"team-{robots}-random", _team(robots, *STANDARD), "random", starts))
+        for strategy in RIVALS:
+            cells.append(Cell(f"team-{robots}-{strategy}", _team(robots, *STANDARD), strategy, starts))
     if changes:
         for name, (_, settings, strategy) in CHANGES.items():
             cells.append(Cell(f"change-{name}", with_settings(single, settings), strategy, single_starts))

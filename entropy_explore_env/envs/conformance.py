@@ -12,6 +12,7 @@ from __future__ import annotations
 import argparse
 import copy
 import itertools
+import json
 import math
 import os
 import pickle
@@ -19,7 +20,7 @@ import subprocess
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 
@@ -363,26 +364,48 @@ def check_conformance(
         report(f"{check.__name__}: {(check.__doc__ or '').strip()}")
 
 
+class _Parser(argparse.ArgumentParser):
+    """Refuses in one line, as all commands do."""
+
+    def error(self, message: str) -> NoReturn:
+        """Say what does not fit, and leave with 2."""
+        self.exit(2, f"error: {message}\n")
+
+
 def main(arguments: list[str] | None = None) -> int:
     """The command; returns its exit status: 0 all holds, 1 something does not, 2 bad input."""
-    parser = argparse.ArgumentParser("python -m entropy_explore_env.envs.conformance")
+    parser = _Parser("python -m entropy_explore_env.envs.conformance")
     parser.add_argument("scenario", metavar="SCENARIO", help="name of a scenario")
+    parser.add_argument("--world", help="a world file in place of the scenario's world")
     parser.add_argument("--robots", type=int, help="team size; default: the scenario's")
     parser.add_argument("--steps", type=int, default=100, help="an episode is cut off after so many")
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--json", action="store_true", help="print one JSON object and nothing else")
     given = parser.parse_args(arguments)
-    settings = {} if given.robots is None else {"robots": given.robots}
+    settings = {name: value for name in ("robots", "world") if (value := getattr(given, name)) is not None}
+    held: list[str] = []
+
+    def report(line: str) -> None:
+        held.append(line)
+        if not given.json:
+            print(line)
+
+    broken = None
     try:
-        check_conformance(given.scenario, steps=given.steps, seed=given.seed, report=print, **settings)
+        check_conformance(given.scenario, steps=given.steps, seed=given.seed, report=report, **settings)
     except ConformanceError as error:
-        print(f"does not hold: {error}")
-        return 1
+        broken = str(error)
     except EntropyExploreError as error:
         print(f"error: {error}", file=sys.stderr)
         return 2
     except KeyboardInterrupt:
+        print("interrupted", file=sys.stderr)
         return 130
-    return 0
+    if given.json:
+        print(json.dumps({"scenario": given.scenario, "held": held, "broken": broken}))
+    elif broken is not None:
+        print(f"does not hold: {broken}")
+    return 0 if broken is None else 1
 
 
 if __name__ == "__main__":

@@ -101,12 +101,18 @@ class EntropyExploreEnv(ParallelEnv[str, Any, Any]):
         return view_of(self.missions, 0, self.possible_agents.index(self._checked(agent)))
 
     def _checked(self, agent: str) -> str:
-        if agent not in self._action_spaces:
+        if not isinstance(agent, str) or agent not in self._action_spaces:
             raise SettingError("agent", agent, "one of " + ", ".join(self.possible_agents))
         return agent
 
     def deciding_agents(self) -> list[str]:
-        """The robots whose actions count in the next step, by number."""
+        """The robots whose actions count in the next step, by number.
+
+        Raises:
+            CallOrderError: There was no reset yet.
+        """
+        if self.missions.episodes[0] < 0:
+            raise CallOrderError("deciding_agents before reset: call reset() first")
         deciding = self.missions.state.robots[0]["deciding"].tolist()
         return [agent for agent, decides in zip(self.agents, deciding, strict=False) if decides]
 
@@ -201,17 +207,46 @@ class EntropyExploreEnv(ParallelEnv[str, Any, Any]):
 def parallel_env(
     scenario: str | Scenario = "room", render_mode: str | None = None, **settings: object
 ) -> EntropyExploreEnv:
-    """A team's mission as a ParallelEnv: see `EntropyExploreEnv`."""
+    """A team's mission as a ParallelEnv: see `EntropyExploreEnv`.
+
+    Args:
+        scenario: A scenario's name (`entropy_explore_env.SCENARIOS`), or a Scenario.
+        render_mode: None, `rgb_array` or `human`.
+        **settings: Fields of the Scenario to change: `robots`, `world` (a recipe or a file),
+            `decision_period_s`, `max_cycles`, `time_limit_s`, and its parts `grid`, `robot`, `sensor`,
+            `channel` (`{"burst": 32, "i_min_bits": 0.3}`), `ending`, `reward`, `action`, `observation`,
+            each a mapping of some of its fields or a whole object: see `help` of Scenario, Channel, …
+    """
     return EntropyExploreEnv(scenario, render_mode, **settings)
 
 
-class TurnTakingEnv(parallel_to_aec_wrapper[str, Any, Any]):
+class TurnTakingEnv(OrderEnforcingWrapper[str, Any, Any]):
     """The AEC form; a bad action is refused when it is given, not when the last robot has acted."""
 
+    def __init__(self, team: EntropyExploreEnv) -> None:
+        """Let the robots of a team act in turn."""
+        super().__init__(parallel_to_aec_wrapper(team))
+        self._team = team
+
+    def view(self, agent: str) -> RobotView:
+        """What a robot knows; see `EntropyExploreEnv.view`."""
+        return self._team.view(agent)
+
     def step(self, action: Any) -> None:  # noqa: ANN401 - PettingZoo's signature
-        """Take the action of the robot whose turn it is; see `EntropyExploreEnv.step`."""
-        if action is not None and isinstance(self.env, EntropyExploreEnv):
-            self.env.check_action(self.agent_selection, action)
+        """Take the action of the robot whose turn it is; see `EntropyExploreEnv.step`.
+
+        Raises:
+            CallOrderError: There was no reset, or the mission is over for all robots.
+            ActionError: The action is not allowed; once the mission is over, None alone is.
+        """
+        if self._team.missions.episodes[0] < 0 or not self.agents:
+            late = "after the mission's end" if self._team.missions.episodes[0] >= 0 else "before reset"
+            raise CallOrderError(f"step {late}: call reset() first")
+        agent = self.agent_selection
+        if not (self.terminations[agent] or self.truncations[agent]):
+            self._team.check_action(agent, action)
+        elif action is not None:
+            raise ActionError(f"actions[{agent}]", action, "None after the mission's end")
         super().step(action)
 
 
@@ -219,4 +254,4 @@ def env(
     scenario: str | Scenario = "room", render_mode: str | None = None, **settings: object
 ) -> AECEnv[str, Any, Any]:
     """The same as an AECEnv: robots act in turn, and the step is taken when all have."""
-    return OrderEnforcingWrapper(TurnTakingEnv(parallel_env(scenario, render_mode, **settings)))
+    return TurnTakingEnv(parallel_env(scenario, render_mode, **settings))

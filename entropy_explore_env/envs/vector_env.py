@@ -87,7 +87,8 @@ class EntropyExploreVectorEnv(VectorEnv[Any, Any, Any]):
         self.single_observation_space = observation if robots == 1 else batch_space(observation, robots)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
         self.observation_space: spaces.Space = batch_space(self.single_observation_space, self.num_envs)
-        self._painter = Painter(render_mode)
+        painted = self.num_envs if render_mode == "rgb_array" else 1
+        self._painters = [Painter(render_mode, mission) for mission in range(painted)]
 
     def reset(
         self, *, seed: int | list[int | None] | None = None, options: dict[str, Any] | None = None
@@ -107,13 +108,21 @@ class EntropyExploreVectorEnv(VectorEnv[Any, Any, Any]):
         """
         if options is not None and not isinstance(options, Mapping):
             raise SettingError("options", options, "a dict, or None")
-        mask = np.asarray((options or {}).get("reset_mask", np.ones(self.num_envs, bool)))
+        for name in options or ():
+            if name != "reset_mask":
+                raise SettingError("options", name, "nothing but reset_mask")
+        given = (options or {}).get("reset_mask", np.ones(self.num_envs, bool))
+        mask = given if isinstance(given, np.ndarray) else np.zeros(0)
         if mask.shape != (self.num_envs,) or mask.dtype != np.bool_ or not mask.any():
-            raise SettingError("reset_mask", mask, f"a bool array of shape ({self.num_envs},), not all False")
+            allowed = f"a bool array of shape ({self.num_envs},), not all False"
+            raise SettingError("reset_mask", given, allowed)
         seeds = self._seeds(seed)
+        if min(self.missions.episodes) < 0 and not mask.all():
+            raise CallOrderError("reset_mask before the first reset: reset all missions once")
         chosen = np.flatnonzero(mask).tolist()
         self.missions.reset_some(chosen, [seeds[mission] for mission in chosen])
-        self._painter.watch(self.missions)
+        for painter in self._painters:
+            painter.watch(self.missions)
         return self._observations(), self._infos()
 
     def _seeds(self, seed: int | list[int | None] | None) -> list[int | None]:
@@ -147,17 +156,18 @@ class EntropyExploreVectorEnv(VectorEnv[Any, Any, Any]):
             raise CallOrderError(
                 f"step after the end of missions {over.tolist()}: reset them with a reset_mask"
             )
+        drawn = self.missions.draw(over.tolist(), [None] * len(over))
         self.missions.step(boxes, numbers)
         rewards = robots["reward"].mean(axis=1)
         rewards[over] = 0.0
-        for mission in over:
-            self.missions.reset(int(mission))
+        self.missions.begin(drawn)
         terminations, truncations = clocks["end"] == _MAPPED, clocks["end"] > _MAPPED
         infos = self._infos()
         ended = np.flatnonzero(terminations | truncations)
         if len(ended) and self.autoreset_mode is AutoresetMode.SAME_STEP:
             infos = self._reset_within(ended, infos)
-        self._painter.watch(self.missions)
+        for painter in self._painters:
+            painter.watch(self.missions)
         return self._observations(), rewards, terminations, truncations, infos
 
     def _reset_within(self, ended: np.ndarray, last: dict[str, Any]) -> dict[str, Any]:
@@ -168,7 +178,7 @@ class EntropyExploreVectorEnv(VectorEnv[Any, Any, Any]):
         observations = self._of_robots(self.missions.observations.copy())
         for mission in ended:
             last_observations[mission] = self.missions.layout.split(observations[mission])
-            self.missions.reset(int(mission))
+        self.missions.reset_some(ended.tolist(), [None] * len(ended))
         final = {name: mask.copy() if name.startswith("_") else value for name, value in last.items()}
         infos = self._infos()
         infos["reward_robots"] = last["reward_robots"]
@@ -199,11 +209,17 @@ class EntropyExploreVectorEnv(VectorEnv[Any, Any, Any]):
         return infos
 
     def render(self) -> Any:  # noqa: ANN401 - Gymnasium's signature
-        """The picture of the first mission, (480, 640, 3) uint8 for `rgb_array`."""
-        return self._painter.picture(self.missions)
+        """For `rgb_array` a picture of each mission, E of (480, 640, 3) uint8; `human` shows the first.
+
+        Ways and curves are those of the missions since their reset.
+        """
+        if self.render_mode != "rgb_array":
+            return None
+        return tuple(painter.picture(self.missions) for painter in self._painters)
 
     def close_extras(self, **kwargs: object) -> None:
         """End the threads and close the window."""
         del kwargs
-        self._painter.close()
+        for painter in self._painters:
+            painter.close()
         self.missions.close()

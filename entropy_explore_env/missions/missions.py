@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from typing import TypeAlias
 
 import numpy as np
 
@@ -13,12 +14,12 @@ from entropy_explore_env.config import Grid, Scenario, gaussian_entropy_bits
 from entropy_explore_env.errors import CallOrderError, SettingError, WorldError
 from entropy_explore_env.missions.observation import ObservationLayout, observation_rules
 from entropy_explore_env.missions.rules import rules_of
-from entropy_explore_env.missions.state import MissionEnd, MissionState, new_state
+from entropy_explore_env.missions.state import MissionEnd, MissionState, check_memory, new_state
 from entropy_explore_env.missions.tick import mask_missions, observe_mission, step_missions
 from entropy_explore_env.randomness import Stream, check_seed, generator, splitmix_states
 from entropy_explore_env.robots.range_sensor import Scan, new_scan
 from entropy_explore_env.validation import is_whole
-from entropy_explore_env.worlds.load import make_world
+from entropy_explore_env.worlds.load import make_world, with_world
 from entropy_explore_env.worlds.world import World
 
 _CHUNKS_PER_THREAD = 4
@@ -26,6 +27,8 @@ _CHUNKS_PER_THREAD = 4
 _ENDS = list(MissionEnd)
 _PLACING_ATTEMPTS = 64
 """Random places tried for a robot before all are."""
+Start: TypeAlias = tuple[int, int, int, World, np.ndarray]
+"""Mission, seed, episode, world and (A, 5) start poses."""
 
 
 class Missions:
@@ -52,12 +55,14 @@ class Missions:
             threads: Threads that share the missions; None = one a processor.
 
         Raises:
-            SettingError: A count is not a whole number ≥ 1.
+            SettingError: A count is not a whole number ≥ 1, or all maps do not fit into memory.
             WorldError: The world's file cannot be used.
         """
         for name, value in (("missions", count), ("threads", 1 if threads is None else threads)):
             if not is_whole(value, 1):
                 raise SettingError(name, value, "a whole number ≥ 1")
+        scenario = with_world(scenario)
+        check_memory(scenario, int(count))
         self.scenario = scenario
         self.count = int(count)
         self.threads = min(self.count, threads or os.cpu_count() or 1)
@@ -106,12 +111,18 @@ class Missions:
 
     def reset_some(self, missions: Iterable[int], seeds: Sequence[int | None]) -> None:
         """Start some missions anew: all of them, or none if one cannot be; see `reset`."""
-        drawn = [self._draw(mission, seed) for mission, seed in zip(missions, seeds, strict=True)]
+        self.begin(self.draw(missions, seeds))
+
+    def draw(self, missions: Iterable[int], seeds: Sequence[int | None]) -> list[Start]:
+        """What missions would start with after a reset; nothing changes. See `reset`."""
+        return [self._draw(mission, seed) for mission, seed in zip(missions, seeds, strict=True)]
+
+    def begin(self, drawn: Iterable[Start]) -> None:
+        """Start missions with what was drawn for them."""
         for start in drawn:
             self._begin(*start)
 
-    def _draw(self, mission: int, seed: int | None) -> tuple[int, int, int, World, np.ndarray]:
-        """Mission, seed, episode, world and (A, 5) start poses; nothing changes."""
+    def _draw(self, mission: int, seed: int | None) -> Start:
         if seed is not None or self.episodes[mission] < 0:
             number, episode = check_seed(seed), 0
         else:

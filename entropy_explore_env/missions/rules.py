@@ -120,9 +120,11 @@ def discrete_moves(scenario: Scenario) -> np.ndarray:
     if scenario.action.kind != "discrete":
         return np.zeros((1, 3), np.int64)
     reach = scenario.robot.reach_m / scenario.grid.voxel_size_m + 1e-9
-    steps = np.arange(-math.floor(reach), math.floor(reach) + 1)
-    heights = np.zeros(1, np.int64) if plane_index(scenario) is not None else steps
-    offsets = np.stack(np.meshgrid(steps, steps, heights, indexing="ij"), axis=-1).reshape(-1, 3)
+    farthest = [min(math.floor(reach), n - 1) for n in scenario.grid.shape]
+    if plane_index(scenario) is not None:
+        farthest[2] = 0
+    steps = [np.arange(-most, most + 1) for most in farthest]
+    offsets = np.stack(np.meshgrid(*steps, indexing="ij"), axis=-1).reshape(-1, 3)
     lengths = np.sqrt((offsets**2).sum(axis=1))
     offsets, lengths = offsets[lengths <= reach], lengths[lengths <= reach]
     return np.ascontiguousarray(offsets[np.argsort(lengths, kind="stable")], np.int64)

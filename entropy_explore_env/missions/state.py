@@ -9,11 +9,13 @@ or viewpoint is (x, y, z, yaw, pitch).
 from __future__ import annotations
 
 import enum
+import os
 from typing import NamedTuple
 
 import numpy as np
 
 from entropy_explore_env.config import Scenario
+from entropy_explore_env.errors import SettingError
 
 
 class MissionEnd(enum.Enum):
@@ -133,6 +135,19 @@ class MissionState(NamedTuple):
     """(E, Q, A) bool: who will hear them."""
     mail_rays: np.ndarray
     """(E, Q, B, 5) float64: direction (3), distance in grid units, Return."""
+
+
+def check_memory(scenario: Scenario, missions: int) -> None:
+    """Raise a SettingError where the arrays of so many missions are larger than the memory there is."""
+    rays = scenario.sensor.rays * sum(scenario.grid.shape) * 8
+    needed = missions * (scenario.grid.voxels * (4 + 8 * scenario.robots)) + rays
+    try:
+        there_is = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    except (AttributeError, ValueError, OSError):  # not every system says
+        return
+    if needed > there_is:
+        size = f"{missions} × {scenario.robots} maps of {scenario.grid.voxels} voxels, {needed >> 30} GiB"
+        raise SettingError("missions, robots, voxels", size, f"what fits into {there_is >> 30} GiB of memory")
 
 
 def new_state(scenario: Scenario, missions: int) -> MissionState:

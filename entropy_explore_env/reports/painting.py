@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 
 from entropy_explore_env.errors import CallOrderError, SettingError
@@ -9,6 +11,7 @@ from entropy_explore_env.missions.missions import Missions
 from entropy_explore_env.missions.poses import pose_at
 from entropy_explore_env.reports.animation import Window
 from entropy_explore_env.reports.rendering import Frame, draw_frame
+from entropy_explore_env.worlds.procedural import RECIPES
 
 RENDER_MODES = ("human", "rgb_array")
 FRAMES_PER_S = 10
@@ -34,13 +37,20 @@ def remaining_share(missions: Missions, mission: int) -> np.ndarray:
     return (missions.state.robots[mission]["entropy_bits"] - end) / (start - end)
 
 
-class Painter:
-    """Follows the first of some missions and makes pictures of it; idle without a render mode."""
+def world_name(missions: Missions) -> str:
+    """What the world of the missions is called: the scenario's name, or that of the world's file."""
+    world = missions.scenario.world
+    return missions.scenario.name if world in RECIPES else Path(world).stem
 
-    def __init__(self, render_mode: str | None) -> None:
-        """Take the mode: None, `human` or `rgb_array`."""
-        self._mode = render_mode
+
+class Painter:
+    """Follows one of some missions and makes pictures of it; idle without a render mode."""
+
+    def __init__(self, render_mode: str | None, number: int = 0) -> None:
+        """Take the mode (None, `human` or `rgb_array`) and which mission to follow."""
+        self._mode, self._number = render_mode, number
         self._window: Window | None = None
+        self._mission: tuple[int, int] | None = None
         self._times: list[float] = []
         self._shares: list[np.ndarray] = []
         self._places: list[np.ndarray] = []
@@ -49,12 +59,15 @@ class Painter:
         """Note the moment after a reset or a step; a `human` sees it at once."""
         if self._mode is None:
             return
-        time_s = float(missions.state.missions[0]["time_s"])
-        if self._times and time_s <= self._times[-1]:
+        time_s = float(missions.state.missions[self._number]["time_s"])
+        mission = (missions.seeds[self._number], missions.episodes[self._number])
+        if mission != self._mission or time_s == 0.0:
+            self._mission = mission
             self._times, self._shares, self._places = [], [], []
-        self._times.append(time_s)
-        self._shares.append(remaining_share(missions, 0))
-        self._places.append(missions.state.robots[0]["goal"][:, :3].copy())
+        if not self._times or time_s > self._times[-1]:  # else it stands still: others were reset
+            self._times.append(time_s)
+            self._shares.append(remaining_share(missions, self._number))
+            self._places.append(missions.state.robots[self._number]["goal"][:, :3].copy())
         if self._mode == "human":
             if self._window is None:
                 self._window = Window(frames_per_s=float(FRAMES_PER_S))
@@ -64,11 +77,11 @@ class Painter:
         """The picture of this moment for `rgb_array`, (480, 640, 3) uint8; else None.
 
         Raises:
-            CallOrderError: The first mission was not reset yet.
+            CallOrderError: The mission was not reset yet.
         """
         if self._mode != "rgb_array":
             return None
-        if missions.episodes[0] < 0:
+        if missions.episodes[self._number] < 0:
             raise CallOrderError("render before reset: call reset() first")
         return self.paint(missions)
 
@@ -77,7 +90,7 @@ class Painter:
         return {**self.__dict__, "_window": None}
 
     def paint(self, missions: Missions) -> np.ndarray:
-        """Draw this moment of the first mission: the belief of robot_0, and the whole team.
+        """Draw this moment of the mission: the belief of robot_0, and the whole team.
 
         Args:
             missions: Has to be watched, for the curves and the ways behind the robots.
@@ -85,21 +98,21 @@ class Painter:
         Returns:
             (480, 640, 3) uint8.
         """
-        robots = missions.state.robots[0]
-        time_s = float(missions.state.missions[0]["time_s"])
+        robots = missions.state.robots[self._number]
+        time_s = float(missions.state.missions[self._number]["time_s"])
         poses = np.stack([pose_at(missions.rules.numbers[0], robot, time_s) for robot in robots])
         places = np.stack([*self._places, poses[:, :3]]) if self._places else poses[None, :, :3]
         shares = np.stack(self._shares) if self._shares else np.zeros((0, len(robots)))
         status = (
             f"time {time_s:,.0f} s",
-            f"entropy left {remaining_share(missions, 0).min():.1%}",
+            f"entropy left {max(remaining_share(missions, self._number).min(), 0.0):.1%}",
             f"scans {robots['scans'].sum():,}",
             f"shared {robots['measurements_sent'].sum():,}",
             f"driven {robots['distance_m'].sum():,.1f} m",
         )
         frame = Frame(
-            entropy_share=entropy_share(missions, 0, 0),
-            coverage=missions.mean[0, 0],
+            entropy_share=entropy_share(missions, self._number, 0),
+            coverage=missions.mean[self._number, 0],
             voxel_size_m=missions.grid.voxel_size_m,
             origin_m=np.asarray(missions.grid.origin_m),
             positions_m=poses[:, :3],
@@ -108,7 +121,7 @@ class Painter:
             paths_m=[places[:, robot] for robot in range(len(robots))],
             curve_s=np.asarray(self._times),
             curve_share=shares,
-            title=f"{missions.scenario.name}: what robot_0 knows",
+            title=f"{world_name(missions)}: what robot_0 knows",
             status=status,
         )
         return draw_frame(frame)

@@ -46,8 +46,10 @@ class Recorder:
         self._times: list[float] = []
         self._entropies: list[np.ndarray] = []
         self._scans: list[int] = []
+        self._robot_scans: list[np.ndarray] = []
         self._sent: list[int] = []
         self._places: list[np.ndarray] = []
+        self._depths: list[np.ndarray] = []
 
     def note(self) -> None:
         """Note this moment."""
@@ -55,8 +57,10 @@ class Recorder:
         self._times.append(float(self.missions.state.missions[0]["time_s"]))
         self._entropies.append(robots["entropy_bits"].copy())
         self._scans.append(int(robots["scans"].sum()))
+        self._robot_scans.append(robots["scans"].copy())
         self._sent.append(int(robots["measurements_sent"].sum()))
         self._places.append(robots["scan_pose"][:, :3].copy())
+        self._depths.append(robots["depth_m"].copy())
 
     def spread(self, points: int) -> np.ndarray:
         """(≤ points,) int64 which moments to keep of a long series: the ends, and evenly in between."""
@@ -86,6 +90,16 @@ class Recorder:
     def shared(self) -> np.ndarray:
         """(T,) int64 measurements that the team has sent so far."""
         return np.asarray(self._sent)
+
+    @property
+    def robot_scans(self) -> np.ndarray:
+        """(T, A) int64 scans of each robot so far."""
+        return np.stack(self._robot_scans)
+
+    @property
+    def depths_m(self) -> np.ndarray:
+        """(T, A) float64 mean measured distance of each robot's latest scan."""
+        return np.stack(self._depths)
 
     @property
     def places_m(self) -> np.ndarray:

@@ -231,7 +231,8 @@ def test_bursts_that_are_not_full_are_no_measurement():
 
 
 def test_first_step_of_a_fresh_process(monkeypatch):
-    assert startup.first_step() > 0.0
+    whole, imported, stepped = startup.first_step()
+    assert 0.0 < imported < whole and 0.0 < stepped < whole - imported
     monkeypatch.setattr(startup, "_FIRST_STEP", "raise ValueError('no such room')")
     with pytest.raises(RuntimeError, match="no such room"):
         startup.first_step()

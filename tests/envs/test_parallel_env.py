@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pettingzoo
+import pygame
 import pytest
 from pettingzoo import AECEnv
 
@@ -300,6 +301,8 @@ def test_without_any_seed_missions_differ() -> None:
 def test_state_and_picture_want_a_reset() -> None:
     team = parallel_env(BOX, render_mode="rgb_array")
     with pytest.raises(CallOrderError):
+        team.deciding_agents()
+    with pytest.raises(CallOrderError):
         team.render()
     with pytest.raises(CallOrderError):
         team.state()
@@ -308,9 +311,28 @@ def test_state_and_picture_want_a_reset() -> None:
 def test_bad_actions_of_robots_that_take_turns_are_refused_at_once() -> None:
     turns = env(BOX, robots=2)
     turns.reset(seed=0)
-    with pytest.raises((ActionError, AssertionError)):
-        turns.step(np.full(5, np.nan, np.float32))
-    assert turns.agent_selection == "robot_0"
+    for bad in (np.full(5, np.nan, np.float32), None, np.zeros(4, np.float32)):
+        with pytest.raises(ActionError, match="robot_0"):
+            turns.step(bad)
+        assert turns.agent_selection == "robot_0"
+    assert turns.view("robot_1").robot == 1
+
+
+def test_turns_out_of_order_are_refused() -> None:
+    turns = env(BOX, robots=2, max_cycles=1)
+    action = np.zeros(5, np.float32)
+    with pytest.raises(CallOrderError, match="before reset"):
+        turns.step(action)
+    turns.reset(seed=0)
+    turns.step(action)
+    turns.step(action)
+    assert turns.truncations == {"robot_0": True, "robot_1": True}
+    with pytest.raises(ActionError, match="None after the mission's end"):
+        turns.step(action)
+    turns.step(None)
+    turns.step(None)
+    with pytest.raises(CallOrderError, match="after the mission's end"):
+        turns.step(None)
 
 
 @pytest.mark.parametrize("scenario", SCENARIOS)
@@ -329,7 +351,6 @@ def test_pictures(scenario: str) -> None:
 
 
 def test_a_window_shows_every_step() -> None:
-    pygame = pytest.importorskip("pygame")
     team = parallel_env(BOX, render_mode="human", max_cycles=3)
     assert len(played(team)) == 3
     assert team.render() is None
@@ -341,7 +362,6 @@ def test_a_window_shows_every_step() -> None:
 
 
 def test_an_environment_with_a_window_can_be_copied() -> None:
-    pytest.importorskip("pygame")
     team = parallel_env(BOX, render_mode="human", max_cycles=3)
     team.reset(seed=0)
     try:

@@ -9,6 +9,7 @@ from typing import Any
 
 import gymnasium
 import numpy as np
+import pygame
 import pytest
 
 from entropy_explore_env import (
@@ -151,7 +152,6 @@ def test_pictures_and_windows() -> None:
     picture = env.render()
     assert isinstance(picture, np.ndarray) and picture.shape == (480, 640, 3) and picture.dtype == np.uint8
     env.close()
-    pygame = pytest.importorskip("pygame")
     window = gymnasium.make(environment_id(BOX), render_mode="human")
     window.reset(seed=0)
     window.step(window.action_space.sample())

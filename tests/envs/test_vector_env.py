@@ -8,6 +8,7 @@ from typing import Any
 
 import gymnasium
 import numpy as np
+import pygame
 import pytest
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
 from gymnasium.vector.utils import batch_space
@@ -327,9 +328,9 @@ def test_calls_before_reset_are_refused() -> None:
     actions = some_actions(env, 1)[0]
     with pytest.raises(CallOrderError, match="before reset"):
         env.step(actions)
-    env.reset(seed=0, options={"reset_mask": np.array([True, False])})
-    with pytest.raises(CallOrderError, match="before reset"):
-        env.step(actions)
+    with pytest.raises(CallOrderError, match="first reset"):
+        env.reset(seed=0, options={"reset_mask": np.array([True, False])})
+    assert env.missions.episodes == [-1, -1]
     env.reset(seed=0)
     env.step(actions)
 
@@ -366,6 +367,48 @@ def test_options_that_are_no_dict_are_refused() -> None:
         EntropyExploreVectorEnv(BOX, 2).reset(options=3)  # type: ignore[arg-type]
 
 
+def test_a_reset_of_other_missions_leaves_the_picture_of_the_first() -> None:
+    env = EntropyExploreVectorEnv(BOX, 2, render_mode="rgb_array")
+    env.reset(seed=0)
+    for actions in some_actions(env, 5):
+        env.step(actions)
+    before = env.render()
+    env.reset(options={"reset_mask": np.array([False, True])})
+    after = env.render()
+    np.testing.assert_array_equal(after[0], before[0])
+    assert (after[1] != before[1]).any()
+
+
+@pytest.mark.parametrize("starts", AutoresetMode)
+def test_where_missions_start_anew_all_do_or_none(
+    starts: AutoresetMode, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    env = EntropyExploreVectorEnv("box-7x11x5", 3, autoreset_mode=starts, max_cycles=2)
+    env.reset(seed=0)
+    actions = some_actions(env, 3)
+    env.step(actions[0])
+    if starts is AutoresetMode.NEXT_STEP:
+        env.step(actions[1])
+    before, real, drawn = snapshot(env), missions.start_poses, []
+
+    def full_at_last(*given: Any) -> np.ndarray:
+        drawn.append(given)
+        if len(drawn) == 3:
+            raise WorldError("Scenario.robots", 2, "fewer")
+        return real(*given)
+
+    monkeypatch.setattr(missions, "start_poses", full_at_last)
+    if starts is AutoresetMode.DISABLED:
+        env.step(actions[1])
+        assert not drawn
+        return
+    with pytest.raises(WorldError):
+        env.step(actions[2])
+    assert env.missions.episodes == [0, 0, 0]
+    if starts is AutoresetMode.NEXT_STEP:
+        require_same("refused", before, snapshot(env))
+
+
 @pytest.mark.parametrize("spoil", [np.nan, np.inf, 1.01])
 def test_bad_actions_are_refused_and_change_nothing(spoil: float) -> None:
     env = EntropyExploreVectorEnv(BOX, 3, threads=2)
@@ -394,15 +437,16 @@ def test_gymnasium_s_vector_wrappers_count_episodes(mode: AutoresetMode) -> None
     assert lengths == [[5, 5, 5]] * 3
 
 
-def test_pictures_and_windows_show_the_first_mission() -> None:
+def test_each_mission_has_a_picture_and_the_window_shows_the_first() -> None:
     env = gymnasium.make_vec(environment_id(BOX), num_envs=2, render_mode="rgb_array")
     alone = gymnasium.make(environment_id(BOX), render_mode="rgb_array")
     env.reset(seed=0)
     alone.reset(seed=0)
-    picture = env.render()
-    assert isinstance(picture, np.ndarray) and picture.shape == (480, 640, 3) and picture.dtype == np.uint8
-    np.testing.assert_array_equal(picture, alone.render())  # type: ignore[arg-type]
-    pygame = pytest.importorskip("pygame")
+    pictures = env.render()
+    assert isinstance(pictures, tuple) and len(pictures) == 2
+    assert all(picture.shape == (480, 640, 3) and picture.dtype == np.uint8 for picture in pictures)
+    np.testing.assert_array_equal(pictures[0], alone.render())  # type: ignore[arg-type]
+    assert (pictures[0] != pictures[1]).any()
     window = EntropyExploreVectorEnv(BOX, 2, render_mode="human")
     window.reset(seed=0)
     assert window.render() is None and pygame.display.get_surface() is not None

@@ -7,7 +7,9 @@ import sys
 from pathlib import Path
 
 import numpy as np
+import pygame
 import pytest
+from PIL import Image
 
 from entropy_explore_env.errors import MissingExtraError, SettingError
 from entropy_explore_env.reports.animation import Window, animate
@@ -269,7 +271,6 @@ def test_a_line_has_no_gaps() -> None:
 
 
 def test_window_shows_pictures_and_a_person_can_close_it(monkeypatch: pytest.MonkeyPatch) -> None:
-    pygame = pytest.importorskip("pygame")
     monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
     window = Window(frames_per_s=None)
     window.close()
@@ -290,7 +291,6 @@ def test_window_shows_pictures_and_a_person_can_close_it(monkeypatch: pytest.Mon
 
 
 def test_window_holds_its_frame_rate(monkeypatch: pytest.MonkeyPatch) -> None:
-    pygame = pytest.importorskip("pygame")
     monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
     window, picture = Window(frames_per_s=50.0), np.zeros((40, 60, 3), np.uint8)
     window.show(picture)
@@ -319,11 +319,10 @@ def explored(share: float) -> np.ndarray:
 
 
 def test_animation_has_every_picture_and_one_palette(tmp_path: Path) -> None:
-    image = pytest.importorskip("PIL.Image")
     pictures, path = [explored(share) for share in np.linspace(0, 1, 6)], tmp_path / "mission.gif"
     animate(iter(pictures), path, 0.05)
     assert [entry.name for entry in tmp_path.iterdir()] == ["mission.gif"]
-    with image.open(path) as animation:
+    with Image.open(path) as animation:
         assert animation.n_frames == 6 and animation.size == (640, 480)
         assert animation.info["loop"] == 0
         for nth, picture in enumerate(pictures):
@@ -334,15 +333,13 @@ def test_animation_has_every_picture_and_one_palette(tmp_path: Path) -> None:
 
 
 def test_animation_of_more_colours_than_a_palette_holds(tmp_path: Path) -> None:
-    image = pytest.importorskip("PIL.Image")
     picture = np.random.default_rng(3).integers(0, 256, (50, 70, 3), dtype=np.uint8)
     animate([picture, picture[::-1]], tmp_path / "noise.gif", 0.02)
-    with image.open(tmp_path / "noise.gif") as animation:
+    with Image.open(tmp_path / "noise.gif") as animation:
         assert animation.n_frames == 2
 
 
 def test_an_animation_that_fails_leaves_the_old_file(tmp_path: Path) -> None:
-    pytest.importorskip("PIL")
     path = tmp_path / "mission.gif"
     path.write_bytes(b"old")
     picture = np.zeros((4, 6, 3), np.uint8)

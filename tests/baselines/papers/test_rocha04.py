@@ -17,8 +17,8 @@ from PIL import Image
 from baselines import experiment
 from baselines.command import run_command
 from baselines.experiment import Claim, Record
-from baselines.papers import rocha04, rocha04_cells
-from baselines.papers.rocha04_cells import BURSTS, CHANGES, I_MINS, TEAMS, team_id
+from baselines.papers import rocha04, rocha04_cells, rocha04_report
+from baselines.papers.rocha04_cells import BURSTS, CHANGES, I_MINS, RIVALS, TEAMS, team_id
 from baselines.papers.rocha04_cells import experiment as cells_of
 from entropy_explore_env.config import with_settings
 from entropy_explore_env.scenarios import BOX, ROOM
@@ -32,7 +32,7 @@ FIGURES = [f"figure-{number}" for number in range(3, 9)]
 
 def test_the_cells_are_the_paper_s():
     cells = {cell.id: cell for cell in cells_of(30, 100, changes=True)}
-    assert len(cells) == 2 + 3 * (9 + 1) + len(CHANGES)
+    assert len(cells) == 1 + 3 * 9 + 4 * len(RIVALS) + len(CHANGES)
     assert len({cell.digest for cell in cells.values()}) == len(cells)
     for name in ("single", "single-random"):
         assert cells[name].scenario.robots == 1 and cells[name].seeds == 100
@@ -207,7 +207,7 @@ def test_quick_leaves_out_the_changes(tiny, no_process, capsys, tmp_path):
 def test_strict_asks_whether_all_claims_hold(holds, code, tiny, no_process, capsys, monkeypatch, tmp_path):
     claims = [Claim("a", "is", 1.0, 1.0, None, None, True), Claim("b", "is", 1.0, 2.0, 1.0, 3.0, holds)]
     monkeypatch.setattr(rocha04, "all_claims", lambda records: claims)
-    monkeypatch.setattr(rocha04, "write_report", lambda *_: tmp_path / "report.md")
+    monkeypatch.setattr(rocha04_report, "write_report", lambda *_: tmp_path / "report.md")
     assert ran([*tiny.words, "--strict", "--json"], capsys)[0] == code
     assert ran([*tiny.words, "--json"], capsys)[0] == 0
 
