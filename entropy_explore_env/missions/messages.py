@@ -31,13 +31,13 @@ def hear_batch(state, scan, mission, index, count):
 
 
 @lean_kernel
-def note_message(robot, heard, position, sent_s, count):
+def note_message(robot, heard, pose, sent_s, count):
     """Count a message that a robot hears, and note where its sender was."""
     robot.messages_received += 1
     robot.measurements_received += max(count, 0)
     robot.bits_received += message_bits(count)
     heard.heard_s = sent_s
-    copy_numbers(position, heard.position, 3)
+    copy_numbers(pose, heard.pose, 5)
     if count < 0:
         heard.announced_s = sent_s
 
@@ -74,7 +74,7 @@ def post_letter(numbers, state, scan, mission, index, count):
     letter.count = count
     for mate in range(state.robots.shape[1]):
         state.mail_to[mission, place, mate] = False
-    copy_numbers(robot.origin if count < 0 else robot.goal, letter.position, 3)
+    copy_numbers(robot.origin if count < 0 else robot.goal, letter.pose, 5)
     write_announcement(robot, letter.announced)
     for i in range(count):
         ray, mailed = scan.rays[scan.order[i]], state.mail_rays[mission, place, i]
@@ -133,7 +133,7 @@ def open_letter(rules, state, scan, mission, place):
     numbers, letter = rules.numbers[0], state.mail[mission, place]
     letter.due_s = math.inf
     size = (numbers.size[0], numbers.size[1], numbers.size[2])
-    start = grid_position(numbers, letter.position)
+    start = grid_position(numbers, letter.pose)
     for i in range(letter.count):
         ray, mailed = scan.rays[i], state.mail_rays[mission, place, i]
         scan.order[i] = i
@@ -146,7 +146,7 @@ def open_letter(rules, state, scan, mission, place):
     for robot in range(state.robots.shape[1]):
         if state.mail_to[mission, place, robot]:
             heard = state.heard[mission, robot, letter.sender]
-            note_message(state.robots[mission, robot], heard, letter.position, letter.sent_s, letter.count)
+            note_message(state.robots[mission, robot], heard, letter.pose, letter.sent_s, letter.count)
             if letter.count < 0:
                 copy_numbers(letter.announced, heard.announced, 7)
             else:

@@ -8,10 +8,11 @@ Parts, in this order, each only if the scenario's settings ask for it (D directi
     self      (10,)        position in the workspace, -1…1 (x, y, z); cos and sin of yaw, cos and
                            sin of pitch; share of the time limit gone (0 without one); share of
                            the map's entropy left, counting every voxel; 1 while it decides
-    team      (A-1, 13)    per teammate, in the order of their numbers: 1 if ever heard; where it
-                           was, relative, in workspace sizes (3); seconds since then as s/(s + 60);
-                           1 if an announcement was heard; its viewpoint, relative (3); cos and sin
-                           of the viewpoint's yaw; r̂ in workspace diagonals; α̂/π; zeros if unheard
+    team      (A-1, 19)    per teammate, in the order of their numbers: 1 if ever heard; where it
+                           was, relative, in workspace sizes (3); cos and sin of its yaw and of its
+                           pitch (4); seconds since then as s/(s + 60); 1 if an announcement was
+                           heard; its viewpoint in the same way (7); r̂ in workspace diagonals; α̂/π;
+                           zeros if unheard
     patch     (4, x, y, z) belief around the robot: expected coverage, normalised entropy, 1
                            outside the workspace, 1 where a teammate was last heard
     overview  (2, x, y, z) the whole belief, averaged over blocks: normalised entropy, expected
@@ -40,7 +41,7 @@ from entropy_explore_env.missions.poses import grid_position
 from entropy_explore_env.missions.rules import Rules, rules_of
 
 OWN_NUMBERS = 10
-TEAMMATE_NUMBERS = 13
+TEAMMATE_NUMBERS = 19
 PATCH_CHANNELS = 4
 OVERVIEW_CHANNELS = 2
 _HALF_LIFE_S = 60.0
@@ -233,7 +234,7 @@ def observe_self(numbers, pose, time_s, entropy_bits, deciding, out):
 
 @lean_kernel
 def observe_team(numbers, robot, pose, time_s, heard, out):
-    """Fill ((A-1)·13,): where teammates were last heard, and what they announced.
+    """Fill ((A-1)·19,): where teammates were last heard, and what they announced.
 
     Args:
         numbers: NUMBERS of the scenario.
@@ -256,19 +257,24 @@ def observe_team(numbers, robot, pose, time_s, heard, out):
         news = heard[mate]
         row = out[place : place + TEAMMATE_NUMBERS]
         place += TEAMMATE_NUMBERS
-        for axis in range(3):
-            extent = numbers.size[axis] * numbers.voxel_size_m
-            if news.heard_s >= 0.0:
-                row[1 + axis] = min(max((news.position[axis] - pose[axis]) / extent, -1.0), 1.0)
-            if news.announced_s >= 0.0:
-                row[6 + axis] = min(max((news.announced[axis] - pose[axis]) / extent, -1.0), 1.0)
         if news.heard_s >= 0.0:
             age = time_s - news.heard_s
-            row[0], row[4] = 1.0, age / (age + _HALF_LIFE_S)
+            row[0], row[8] = 1.0, age / (age + _HALF_LIFE_S)
+            write_relative(numbers, pose, news.pose, row[1:])
         if news.announced_s >= 0.0:
-            row[5] = 1.0
-            row[9], row[10] = math.cos(news.announced[3]), math.sin(news.announced[3])
-            row[11], row[12] = min(news.announced[5] / diagonal, 1.0), news.announced[6] / math.pi
+            row[9] = 1.0
+            write_relative(numbers, pose, news.announced, row[10:])
+            row[17], row[18] = min(news.announced[5] / diagonal, 1.0), news.announced[6] / math.pi
+
+
+@lean_kernel
+def write_relative(numbers, pose, other, out):
+    """Fill (7,): another pose's place, relative, in workspace sizes; cos and sin of its yaw and pitch."""
+    for axis in range(3):
+        extent = numbers.size[axis] * numbers.voxel_size_m
+        out[axis] = min(max((other[axis] - pose[axis]) / extent, -1.0), 1.0)
+    out[3], out[4] = math.cos(other[3]), math.sin(other[3])
+    out[5], out[6] = math.cos(other[4]), math.sin(other[4])
 
 
 @lean_kernel
@@ -299,7 +305,7 @@ def observe_patch(numbers, shape, robot, start, mean, precision, heard, out):
                 out[3 * cells + cell] = 0.0
     for mate in range(len(heard)):
         if mate != robot and heard[mate].heard_s >= 0.0:
-            there, low = heard[mate].position, numbers.origin_m
+            there, low = heard[mate].pose, numbers.origin_m
             x = math.floor((there[0] - low[0]) / numbers.voxel_size_m) - corner_x
             y = math.floor((there[1] - low[1]) / numbers.voxel_size_m) - corner_y
             z = math.floor((there[2] - low[2]) / numbers.voxel_size_m) - corner_z

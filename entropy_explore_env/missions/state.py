@@ -85,7 +85,7 @@ COUNTED = ROBOT.names[ROBOT.names.index("distance_m") :] if ROBOT.names else ()
 HEARD = np.dtype(
     [
         ("heard_s", "f8"),  # when the last message that arrived was sent; -1 = none did
-        ("position", "f8", (3,)),  # where its sender was
+        ("pose", "f8", (5,)),  # where its sender was
         ("announced_s", "f8"),  # when the last announcement that arrived was sent; -1 = none did
         ("announced", "f8", (7,)),  # its viewpoint, r̂ and α̂
     ],
@@ -99,7 +99,7 @@ LETTER = np.dtype(
         ("serial", "i8"),  # order of sending
         ("sender", "i8"),
         ("count", "i8"),  # measurements in it; -1 = an announcement
-        ("position", "f8", (3,)),  # where the sender was
+        ("pose", "f8", (5,)),  # where the sender was
         ("announced", "f8", (7,)),
     ],
     align=True,

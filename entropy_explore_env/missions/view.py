@@ -40,7 +40,7 @@ class TeammateView:
 
     Attributes:
         heard_s: When the last message was sent that reached the robot.
-        position_m: (3,) where the teammate was then.
+        pose: (5,) where the teammate was then: x, y, z, yaw, pitch.
         announced_s: When the last announcement was sent that reached the robot.
         viewpoint: (5,) the viewpoint that it announced: x, y, z, yaw, pitch.
         depth_m: r̂, mean measured distance of the teammate's latest scan then.
@@ -48,7 +48,7 @@ class TeammateView:
     """
 
     heard_s: float
-    position_m: np.ndarray
+    pose: np.ndarray
     announced_s: float
     viewpoint: np.ndarray
     depth_m: float
@@ -130,7 +130,7 @@ def _teammate(heard: np.void) -> TeammateView:
     announced = heard["announced"].copy()
     return TeammateView(
         heard_s=float(heard["heard_s"]),
-        position_m=heard["position"].copy(),
+        pose=heard["pose"].copy(),
         announced_s=float(heard["announced_s"]),
         viewpoint=announced[:5],
         depth_m=float(announced[5]),

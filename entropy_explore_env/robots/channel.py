@@ -1,9 +1,9 @@
 """The channel: which measurements of a scan are worth sending (Rocha04, eq. 43), and what it costs.
 
-One measurement is a 3-D vector from the sensor to what it saw, three 32-bit numbers: 96 bits. A
-batch opens with the sensor's position, 96 bits. An announcement is a viewpoint (position, yaw,
-pitch) with r̂ and α̂ (RochaMI), seven 32-bit numbers: 224 bits. A broadcast is charged once to its
-sender and once to each teammate that hears it.
+One measurement is a 3-D vector from the sensor to what it saw, three 32-bit numbers: 96 bits. Every
+message opens with its sender's pose, five numbers: 160 bits. An announcement adds a viewpoint
+(position, yaw, pitch) with r̂ and α̂ (RochaMI), seven numbers: 384 bits in all. A broadcast is charged
+once to its sender and once to each teammate that hears it.
 """
 
 from __future__ import annotations
@@ -14,8 +14,8 @@ from entropy_explore_env.compilation import lean_kernel
 from entropy_explore_env.randomness import draw_uniform
 
 BITS_PER_MEASUREMENT = 96
-BITS_PER_BATCH = 96
-BITS_PER_ANNOUNCEMENT = 224
+BITS_PER_BATCH = 160
+BITS_PER_ANNOUNCEMENT = 384
 
 
 class Delivery(enum.Enum):

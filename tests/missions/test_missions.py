@@ -272,7 +272,7 @@ class Watch:
             self.batches += sent > 0
             self.announcements += self.robots["deciding"] & self.channel.announcements
         assert (robots["messages_sent"] == self.batches + self.announcements).all()
-        cost = 96 * robots["measurements_sent"] + 96 * self.batches + 224 * self.announcements
+        cost = 96 * robots["measurements_sent"] + 160 * self.batches + 384 * self.announcements
         assert (robots["bits_sent"] == cost).all()
         self.receiving(robots)
 

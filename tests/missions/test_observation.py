@@ -116,6 +116,12 @@ def test_self(mission):
         assert part["self"] == pytest.approx(expected, abs=2e-5)
 
 
+def relative(other, pose, size_m):
+    """Seven numbers: the place in workspace sizes, and the gaze."""
+    gaze = (f(angle) for angle in other[3:5] for f in (math.cos, math.sin))
+    return [*np.clip((other[:3] - pose[:3]) / size_m, -1, 1), *gaze]
+
+
 def test_team(mission):
     missions, parts = mission
     grid, heard = missions.grid, missions.state.heard[0]
@@ -123,21 +129,20 @@ def test_team(mission):
     for robot, part in enumerate(parts):
         pose = pose_of(missions, robot)
         mates = [mate for mate in range(len(parts)) if mate != robot]
-        assert part["team"].shape == (len(mates), 13)
+        assert part["team"].shape == (len(mates), 19)
         for row, mate in zip(part["team"], mates, strict=True):
-            news, expected = heard[robot, mate], np.zeros(13)
+            news, expected = heard[robot, mate], np.zeros(19)
             if news["heard_s"] >= 0:
                 some = True
                 age = missions.state.missions[0]["time_s"] - news["heard_s"]
-                expected[0], expected[4] = 1, age / (age + 60)
-                expected[1:4] = np.clip((news["position"] - pose[:3]) / grid.size_m, -1, 1)
+                expected[0], expected[8] = 1, age / (age + 60)
+                expected[1:8] = relative(news["pose"], pose, grid.size_m)
             if news["announced_s"] >= 0:
                 told = news["announced"]
-                expected[5] = 1
-                expected[6:9] = np.clip((told[:3] - pose[:3]) / grid.size_m, -1, 1)
-                expected[9:11] = math.cos(told[3]), math.sin(told[3])
-                expected[11] = min(told[5] / np.linalg.norm(grid.size_m), 1)
-                expected[12] = told[6] / math.pi
+                expected[9] = 1
+                expected[10:17] = relative(told, pose, grid.size_m)
+                expected[17] = min(told[5] / np.linalg.norm(grid.size_m), 1)
+                expected[18] = told[6] / math.pi
             assert row == pytest.approx(expected, abs=2e-5)
     assert some is (missions.scenario.channel.loss_probability == 0.0)
 
@@ -161,7 +166,7 @@ def test_patch(mission):
                 outside_seen = True
             for mate in range(len(parts)):
                 if mate != robot and heard[robot, mate]["heard_s"] >= 0:
-                    there = missions.grid.voxel_of(heard[robot, mate]["position"])
+                    there = missions.grid.voxel_of(heard[robot, mate]["pose"][:3])
                     expected[(3, *cell)] = max(expected[(3, *cell)], float((there == voxel).all()))
         np.testing.assert_allclose(part["patch"], expected, atol=1e-5)
         centre = tuple(n // 2 for n in shape)

@@ -210,7 +210,7 @@ def test_what_is_heard_of_a_teammate():
     heard = view_of(missions, 0, 1).teammates[0]
     assert (heard.announced_s, heard.heard_s) == (0.0, pytest.approx(1.5))  # then its batch came
     assert heard.viewpoint == pytest.approx(chosen, abs=1e-6)
-    assert heard.position_m == pytest.approx(chosen[:3], abs=1e-6)
+    assert heard.pose == pytest.approx(chosen, abs=1e-6)
     assert (heard.depth_m, heard.half_angle_rad) == (0.0, 0.0)  # it had not scanned yet
     toward(missions, chosen, chosen)
     heard, own = view_of(missions, 0, 1).teammates[0], missions.state.robots[0, 0]
@@ -281,7 +281,7 @@ def test_delayed_messages_bring_what_immediate_ones_bring_but_later(world, senso
     np.testing.assert_allclose(
         late.state.robots["entropy_bits"], soon.state.robots["entropy_bits"], rtol=0, atol=1e-2
     )
-    for field in ("heard_s", "position", "announced_s", "announced"):
+    for field in ("heard_s", "pose", "announced_s", "announced"):
         np.testing.assert_array_equal(late.state.heard[field], soon.state.heard[field])
 
 

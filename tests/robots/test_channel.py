@@ -99,4 +99,4 @@ def test_a_loss_probability_of_1_loses_everything(seed):
 
 
 def test_what_messages_cost():
-    assert (BITS_PER_MEASUREMENT, BITS_PER_BATCH, BITS_PER_ANNOUNCEMENT) == (96, 96, 224)
+    assert (BITS_PER_MEASUREMENT, BITS_PER_BATCH, BITS_PER_ANNOUNCEMENT) == (96, 160, 384)
