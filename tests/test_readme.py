@@ -37,5 +37,28 @@ def test_commands_exist():
         assert path.with_suffix(".py").exists() or (path / "__main__.py").exists()
 
 
+def rows_of(text: str) -> list[str]:
+    """The rows of all Markdown tables, without their heads' rules."""
+    return [line for line in text.splitlines() if line.startswith("| ") and not line.startswith("| ---")]
+
+
+@pytest.mark.parametrize(
+    ("heading", "report", "rows"), [("Rocha04, reproduced", "rocha04", 10), ("Speed", "speed", 15)]
+)
+def test_tables_are_those_of_the_reports(heading, report, rows):
+    section = README.split(f"## {heading}\n")[1].split("\n## ")[0]
+    written = set(rows_of((ROOT / "docs" / "results" / f"{report}.md").read_text(encoding="utf-8")))
+    shown = rows_of(section)
+    assert len(shown) >= rows
+    assert [row for row in shown if row not in written] == []
+
+
+def test_the_list_of_rooms_names_every_file():
+    rooms = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
+    listed = set(re.findall(r"^ +(\w+)\.py ", rooms, flags=re.MULTILINE))
+    library = {path.stem for path in (ROOT / "entropy_explore_env").rglob("*.py")} - {"__init__", "__main__"}
+    assert listed == library
+
+
 def test_no_placeholder_is_left():
     assert "RESULTS_" not in README
