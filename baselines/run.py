@@ -76,7 +76,7 @@ def main(words: Sequence[str]) -> int:
     env = EntropyExploreEnv(scenario)
     started = time.perf_counter()
     log = _run(env, strategy, args)
-    figures = mission_figures(env.missions, 0)
+    figures = mission_figures(env.missions, 0, floor=True)
     figures = {
         "scenario": figures.pop("scenario"),
         "strategy": args.strategy,
@@ -106,7 +106,7 @@ def _defaults(scenario: Scenario) -> Args:
 def _scenario(args: Args) -> Scenario:
     """The scenario with the command line's settings."""
     base = scripted(find_scenario(args.scenario))
-    settings: dict[str, Any] = {
+    settings: dict[str, Any] = {"scored": True} | {
         name: getattr(args, name) for name in ("robots", "robot", "sensor", "channel", "ending")
     }
     if args.world is not None:
@@ -209,9 +209,18 @@ _ROWS: tuple[tuple[str, str, Callable[[Any], str]], ...] = (
     ("finished", "finished", lambda v: "yes" if v else "no"),
     ("ended because", "end_reason", str),
     ("mission time", "t_mission_s", lambda v: f"{v:,.1f} s"),
+    ("half, 90 %, 99 % of the bits after", "reached", str),
     ("scans", "scans", lambda v: f"{v:,}"),
+    ("scans over the floor", "scans_over_floor", lambda v: f"{v:.2f}"),
     ("measurements", "measurements", lambda v: f"{v:,}"),
     ("shared measurements", "shared_measurements", lambda v: f"{v:,}"),
+    ("bits sent", "bits_sent", lambda v: f"{v:,}"),
+    ("bits gained per bit sent", "bits_gained_per_bit_sent", lambda v: f"{v:.3f}"),
+    ("measurements below I_min", "overlap", lambda v: f"{v:.0%}"),
+    ("explored by the team", "explored", lambda v: f"{v:.1%}"),
+    ("map error, mean", "error", lambda v: f"{v:.4f}"),
+    ("voxels on the wrong side of ½", "wrong", lambda v: f"{v:.2%}"),
+    ("imbalance between robots", "balance", lambda v: f"{v:.2f}"),
     ("entropy at first", "entropy_start_bits", lambda v: f"{v:,.0f} bits"),
     ("entropy at the end", "entropy_end_bits", lambda v: f"{v:,.0f} bits"),
     ("driven", "distance_m", lambda v: f"{v:,.1f} m"),
@@ -235,8 +244,12 @@ def _print_table(figures: dict[str, Any], folder: Path | None) -> None:
     table = Table(show_header=False)
     table.add_column(style="dim")
     table.add_column(justify="right")
+    marks = (figures["t50_s"], figures["t90_s"], figures["t99_s"])
+    reached = ", ".join("-" if mark is None else f"{mark:,.0f}" for mark in marks)
+    values = {**figures, **figures["joint"], "reached": reached + " s"}
     for label, name, shown in _ROWS:
-        table.add_row(label, shown(figures[name]))
+        if values[name] is not None:
+            table.add_row(label, shown(values[name]))
     console = Console()
     console.print(table)
     if folder is not None:

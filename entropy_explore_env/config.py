@@ -349,6 +349,8 @@ class Scenario:
         robots: Team size A.
         sigma_prior: Standard deviation of coverage before any measurement; the mean is ½.
         decision_period_s: A step lasts this long; None = until the next robot has to decide.
+        scored: Whether the team's joint map, of everything measured, is kept and compared with the
+            truth: for figures only, nobody acts on it. It costs one more map a mission.
     """
 
     name: str
@@ -357,6 +359,7 @@ class Scenario:
     robots: int = 3
     sigma_prior: float = 30.0
     decision_period_s: float | None = 1.0
+    scored: bool = False
     robot: Robot = field(default_factory=Robot)
     sensor: RangeSensor = field(default_factory=RangeSensor)
     channel: Channel = field(default_factory=Channel)
@@ -376,6 +379,7 @@ class Scenario:
         check(self, "sigma_prior", "a number from 1e-3 to 1e4", lambda v: 1e-3 <= v <= 1e4)
         if self.decision_period_s is not None:
             check_positive(self, "decision_period_s")
+        check_kind(self, "scored", bool)
         if self.ending.sigma_end >= self.sigma_prior:
             raise SettingError(
                 "Ending.sigma_end", self.ending.sigma_end, f"below sigma_prior = {self.sigma_prior}"

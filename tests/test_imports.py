@@ -37,6 +37,7 @@ SIBLINGS = {
         "action",
         "poses",
         "messages",
+        "scoring",
         "observation",
         "tick",
         "missions",

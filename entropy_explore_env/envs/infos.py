@@ -6,6 +6,7 @@ from typing import Any
 
 from entropy_explore_env.missions.missions import Missions
 from entropy_explore_env.missions.state import MissionEnd
+from entropy_explore_env.reports.metrics import mission_figures
 from entropy_explore_env.robots.motion import MoveEnd
 
 _MOVE_ENDS = [end.name for end in MoveEnd]
@@ -17,7 +18,8 @@ def robot_infos(missions: Missions, mission: int) -> list[dict[str, Any]]:
 
     Keys: `deciding` (whether its next action counts), `time_s`, `entropy_bits`, `own_bits` and
     `received_bits` (taken from its map in this step), `move_end` and `end` (names of a MoveEnd and
-    a MissionEnd), and `action_mask` where actions are discrete.
+    a MissionEnd), and `action_mask` where actions are discrete; when the mission is over, `figures`:
+    those of `mission_figures`.
     """
     clock = missions.state.missions[mission]
     robots = missions.state.robots[mission]
@@ -44,4 +46,7 @@ def robot_infos(missions: Missions, mission: int) -> list[dict[str, Any]]:
     if missions.scenario.action.kind == "discrete":
         for info, mask in zip(infos, missions.action_masks()[mission], strict=True):
             info["action_mask"] = mask
+    if clock["end"]:
+        for info in infos:
+            info["figures"] = mission_figures(missions, mission)
     return infos

@@ -17,6 +17,7 @@ from entropy_explore_env.missions.action import action_space
 from entropy_explore_env.missions.missions import Missions
 from entropy_explore_env.missions.state import MissionEnd
 from entropy_explore_env.randomness import check_seed
+from entropy_explore_env.reports.metrics import mission_figures
 from entropy_explore_env.reports.painting import FRAMES_PER_S, RENDER_MODES, Painter, check_render_mode
 from entropy_explore_env.scenarios import find_scenario
 from entropy_explore_env.validation import is_whole
@@ -206,6 +207,11 @@ class EntropyExploreVectorEnv(VectorEnv[Any, Any, Any]):
         if self.scenario.action.kind == "discrete":
             infos["action_mask"] = self._of_robots(self.missions.action_masks())
         infos.update({f"_{name}": np.ones(self.num_envs, bool) for name in list(infos)})
+        over = clocks["end"] != _RUNNING
+        if over.any():
+            infos["figures"], infos["_figures"] = np.empty(self.num_envs, object), over
+            for mission in np.flatnonzero(over):
+                infos["figures"][mission] = mission_figures(self.missions, int(mission))
         return infos
 
     def render(self) -> Any:  # noqa: ANN401 - Gymnasium's signature

@@ -28,6 +28,7 @@ def hear_batch(state, scan, mission, index, count):
     bits = fuse_scan(scan, count, state.mean[mission, index], state.precision[mission, index])
     state.robots[mission, index].entropy_bits -= bits
     state.robots[mission, index].received_bits += bits
+    state.robots[mission, index].heard_bits += bits
 
 
 @lean_kernel

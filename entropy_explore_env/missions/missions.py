@@ -147,6 +147,11 @@ class Missions:
             array[mission] = np.zeros((), array.dtype)
         state.mean[mission] = PRIOR_MEAN
         state.precision[mission] = self.rules.numbers["prior_precision"][0]
+        if self.scenario.scored:
+            state.joint_mean[mission] = PRIOR_MEAN
+            state.joint_precision[mission] = self.rules.numbers["prior_precision"][0]
+            state.visible[mission] = layout.visible.ravel()
+        state.missions[mission]["reached_s"] = -1.0
         self._set_entropies(mission, layout.visible_voxels)
         robots = state.robots[mission]
         for field in ("origin", "goal", "target", "scan_pose"):
@@ -166,7 +171,7 @@ class Missions:
         known_bits = gaussian_entropy_bits(self.scenario.ending.sigma_end)
         hidden = self.grid.voxels - visible_voxels
         clock = self.state.missions[mission]
-        clock["entropy_start_bits"] = self.grid.voxels * voxel_bits
+        clock["entropy_start_bits"] = clock["joint_bits"] = self.grid.voxels * voxel_bits
         clock["entropy_end_bits"] = visible_voxels * known_bits + hidden * voxel_bits
         self.state.robots[mission]["entropy_bits"] = clock["entropy_start_bits"]
 

@@ -39,6 +39,7 @@ NUMBERS = np.dtype(
         ("team_reward", "?"),
         ("cost_per_s", "f8"),
         ("panorama_log", "?"),
+        ("scored", "?"),
     ],
     align=True,
 )
@@ -90,6 +91,7 @@ def rules_of(scenario: Scenario) -> Rules:
         "max_cycles": _NEVER if ending.max_cycles is None else ending.max_cycles,
         "team_reward": scenario.reward.kind == "team",
         "cost_per_s": scenario.reward.cost_per_s,
+        "scored": scenario.scored,
         "panorama_log": scenario.observation.panorama_utility == "log2",
     }
     numbers = np.zeros(1, NUMBERS)

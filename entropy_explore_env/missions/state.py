@@ -40,9 +40,19 @@ MISSION = np.dtype(
         ("cycles", "i8"),  # steps so far
         ("end", "i8"),  # code of a MissionEnd
         ("letters", "i8"),  # delayed messages sent so far
+        ("reached_s", "f8", (4,)),  # when the best map had lost each of PROGRESS; -1 = not yet
+        # of the joint map, where the scenario is scored
+        ("joint_bits", "f8"),  # its entropy
+        ("explored", "i8"),  # voxels measured at all
+        ("explored_visible", "i8"),  # of those that can be seen from where robots can be
+        ("error", "f8"),  # sum of |expected - true coverage| over explored voxels
+        ("wrong", "i8"),  # explored voxels on the wrong side of ½
     ],
     align=True,
 )
+
+PROGRESS = (0.5, 0.9, 0.99, 1.0)
+"""Shares of the bits that the mission asks for, at which the time is taken."""
 
 ROBOT = np.dtype(
     [
@@ -66,6 +76,9 @@ ROBOT = np.dtype(
         ("distance_m", "f8"),
         ("scans", "i8"),
         ("measurements", "i8"),
+        ("redundant", "i8"),  # measurements that brought less than I_min to its own map
+        ("gained_bits", "f8"),  # taken from its map by its own scans
+        ("heard_bits", "f8"),  # taken from its map by teammates' measurements
         ("blocked_moves", "i8"),
         ("messages_sent", "i8"),
         ("measurements_sent", "i8"),
@@ -117,6 +130,12 @@ class MissionState(NamedTuple):
     """(E, A, V) float32 expected coverage by each robot's belief."""
     precision: np.ndarray
     """(E, A, V) float32 1/σ² of coverage by each robot's belief."""
+    joint_mean: np.ndarray
+    """(E, V) float32, the mean of the joint map; (E, 0) where the scenario is not scored."""
+    joint_precision: np.ndarray
+    """(E, V) float32, its 1/σ²."""
+    visible: np.ndarray
+    """(E, V) bool, what can be seen from where robots can be."""
     missions: np.ndarray
     """(E,) MISSION."""
     robots: np.ndarray
@@ -140,7 +159,8 @@ class MissionState(NamedTuple):
 def check_memory(scenario: Scenario, missions: int) -> None:
     """Raise a SettingError where the arrays of so many missions are larger than the memory there is."""
     rays = scenario.sensor.rays * sum(scenario.grid.shape) * 8
-    needed = missions * (scenario.grid.voxels * (4 + 8 * scenario.robots)) + rays
+    maps = scenario.robots + scenario.scored
+    needed = missions * scenario.grid.voxels * (4 + 8 * maps) + rays
     try:
         there_is = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
     except (AttributeError, ValueError, OSError):  # not every system says
@@ -154,13 +174,16 @@ def new_state(scenario: Scenario, missions: int) -> MissionState:
     """Arrays for E missions of a scenario, not yet reset."""
     e, a, r = missions, scenario.robots, scenario.sensor.rays
     v, q, b = scenario.grid.voxels, scenario.mail_places, min(scenario.channel.burst, r)
-    truth = np.zeros((e, v), np.float32)
+    truth, scored = np.zeros((e, v), np.float32), v if scenario.scored else 0
     small_body = scenario.robot.body_radius_m <= 0.5 * scenario.grid.voxel_size_m + 1e-9
     return MissionState(
         truth=truth,
         blocked=truth if small_body else np.zeros((e, v), np.float32),
         mean=np.zeros((e, a, v), np.float32),
         precision=np.zeros((e, a, v), np.float32),
+        joint_mean=np.zeros((e, scored), np.float32),
+        joint_precision=np.zeros((e, scored), np.float32),
+        visible=np.zeros((e, scored), np.bool_),
         missions=np.zeros(e, MISSION),
         robots=np.zeros((e, a), ROBOT),
         heard=np.zeros((e, a, a), HEARD),

@@ -14,6 +14,7 @@ from entropy_explore_env.missions.messages import announce, next_letter, open_le
 from entropy_explore_env.missions.observation import observe_robot
 from entropy_explore_env.missions.poses import copy_numbers, grid_position, pose_at
 from entropy_explore_env.missions.reward import reward_robots
+from entropy_explore_env.missions.scoring import note_progress, score_scan
 from entropy_explore_env.missions.state import MissionEnd
 from entropy_explore_env.robots.channel import select_measurements
 from entropy_explore_env.robots.motion import (
@@ -154,6 +155,7 @@ def advance(rules, state, scan, mission):
             clock.time_s = ready_s
             scan_and_share(rules, state, scan, mission, robot)
             robots[robot].deciding = True
+        note_progress(clock, robots)
         if mapped(robots, clock.entropy_end_bits, rules.numbers[0].all_maps):
             clock.end = _MAPPED
     if clock.end == _RUNNING:
@@ -209,6 +211,7 @@ def scan_and_share(rules, state, scan, mission, index):
     bits = fuse_scan(scan, len(scan.order), state.mean[mission, index], state.precision[mission, index])
     robot.entropy_bits -= bits
     robot.own_bits += bits
+    robot.gained_bits += bits
     robot.depth_m, robot.half_angle_rad, measurements = visibility_parameters(scan.rays, goal[3], goal[4])
     robot.scans += 1
     robot.measurements += measurements
@@ -219,6 +222,10 @@ def scan_and_share(rules, state, scan, mission, index):
         state.scan_utility_bits[mission, index, ray] = scan.utility[ray]
         if scan.rays[ray].returned == _NOTHING:
             scan.utility[ray] = -1.0
+        elif scan.utility[ray] < numbers.i_min_bits:
+            robot.redundant += 1
+    if numbers.scored:
+        score_scan(state, scan, mission, numbers.prior_precision)
     if state.robots.shape[1] > 1 and numbers.burst > 0:
         count = select_measurements(scan.utility, numbers.burst, numbers.i_min_bits, scan.order)
         if count > 0:

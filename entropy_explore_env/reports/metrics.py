@@ -1,31 +1,50 @@
-"""Figures of one mission, as every table and every JSON object shows them."""
+"""Figures of one mission, as every table, every record and every JSON object shows them."""
 
 from __future__ import annotations
 
+import math
+from functools import lru_cache
 from typing import Any
 
+import numpy as np
+
+from entropy_explore_env.config import Scenario
 from entropy_explore_env.missions.missions import Missions
 from entropy_explore_env.missions.state import COUNTED, MissionEnd
+from entropy_explore_env.robots.range_sensor import Return, new_scan, sensor_model, take_scan
+from entropy_explore_env.worlds.world import World
+
+_FLOOR_SCANS = 256
+_STEEPEST_RAD = math.pi / 4
 
 
-def mission_figures(missions: Missions, mission: int) -> dict[str, Any]:
+def mission_figures(missions: Missions, mission: int, floor: bool = False) -> dict[str, Any]:
     """What a mission came to.
 
-    Entropies are those of the best-informed robot's map; counts are sums over the team.
+    Entropies are those of the best-informed robot's map unless they say otherwise; counts are sums over
+    the team; what cannot be said is None.
 
     Args:
         missions: The missions.
         mission: Which.
+        floor: Whether `scans_over_floor` is wanted; the floor takes some milliseconds a world.
 
     Returns:
-        `scenario`, `world`, `robots`, `seed`, `finished`, `end_reason`, `t_mission_s`, `scans`,
-        `measurements`, `shared_measurements`, `bits_sent`, `bits_received`, `messages_lost`,
-        `entropy_start_bits`, `entropy_threshold_bits`, `entropy_end_bits`, `distance_m`,
-        `blocked_moves`, and `per_robot`: a list of the robots' own counts.
+        `scenario`, `world`, `robots`, `seed`, `finished`, `end_reason`; `t_mission_s`, and `t50_s`, `t90_s`,
+        `t99_s`: when the best map had lost that share of the bits that the mission asks for; `scans`, and
+        `scans_over_floor`: over `information_floor`; `measurements`, `shared_measurements`, `overlap`:
+        the share of measurements that brought their own robot less than I_min; `bits_sent`,
+        `bits_received`, `bits_gained_per_bit_sent`: taken from teammates' maps over sent;
+        `messages_lost`; `entropy_start_bits`, `entropy_threshold_bits`, `entropy_end_bits`,
+        `entropy_mean_bits` over the team; `balance`: the coefficient of variation of the bits that the
+        robots gained themselves; `distance_m`, `blocked_moves`; `per_robot`: a list of the robots' own
+        counts. Of a scored scenario also `joint`: see `joint_figures`.
     """
     clock, robots = missions.state.missions[mission], missions.state.robots[mission]
-    end = missions.over(mission)
-    world = missions.worlds[mission]
+    end, world = missions.over(mission), missions.worlds[mission]
+    scans, sent = int(robots["scans"].sum()), int(robots["bits_sent"].sum())
+    measurements, gained = int(robots["measurements"].sum()), robots["gained_bits"]
+    least = information_floor(missions.scenario, world) if floor and world is not None else None
     return {
         "scenario": missions.scenario.name,
         "world": missions.scenario.world if world is None else world.name,
@@ -34,16 +53,76 @@ def mission_figures(missions: Missions, mission: int) -> dict[str, Any]:
         "finished": end is MissionEnd.MAPPED,
         "end_reason": end.name,
         "t_mission_s": float(clock["time_s"]),
-        "scans": int(robots["scans"].sum()),
-        "measurements": int(robots["measurements"].sum()),
+        **{f"t{mark}_s": _reached(clock, place) for place, mark in enumerate((50, 90, 99))},
+        "scans": scans,
+        "scans_over_floor": None if least is None else scans / least,
+        "measurements": measurements,
         "shared_measurements": int(robots["measurements_sent"].sum()),
-        "bits_sent": int(robots["bits_sent"].sum()),
+        "overlap": int(robots["redundant"].sum()) / measurements if measurements else None,
+        "bits_sent": sent,
         "bits_received": int(robots["bits_received"].sum()),
+        "bits_gained_per_bit_sent": float(robots["heard_bits"].sum()) / sent if sent else None,
         "messages_lost": int(robots["messages_lost"].sum()),
         "entropy_start_bits": float(clock["entropy_start_bits"]),
         "entropy_threshold_bits": float(clock["entropy_end_bits"]),
         "entropy_end_bits": float(robots["entropy_bits"].min()),
+        "entropy_mean_bits": float(robots["entropy_bits"].mean()),
+        "balance": float(gained.std() / gained.mean()) if gained.any() else None,
         "distance_m": float(robots["distance_m"].sum()),
         "blocked_moves": int(robots["blocked_moves"].sum()),
+        **({"joint": joint_figures(missions, mission)} if missions.scenario.scored else {}),
         "per_robot": [{name: robot[name].item() for name in COUNTED} for robot in robots],
     }
+
+
+def _reached(clock: np.void, place: int) -> float | None:
+    """Time at which a share of PROGRESS was reached."""
+    time_s = float(clock["reached_s"][place])
+    return None if time_s < 0.0 else time_s
+
+
+def joint_figures(missions: Missions, mission: int) -> dict[str, float | int | None]:
+    """The map that fuses everything measured, against the truth.
+
+    Returns:
+        `entropy_bits`; `explored`: share of the voxels that can be seen from where robots can be that were
+        measured at all; `error`: mean |expected - true coverage| over the measured voxels; `wrong`: share of
+        them on the wrong side of ½; None where nothing was measured.
+    """
+    clock = missions.state.missions[mission]
+    explored, visible = int(clock["explored"]), int(missions.state.visible[mission].sum())
+    return {
+        "entropy_bits": float(clock["joint_bits"]),
+        "explored": int(clock["explored_visible"]) / visible,
+        "error": float(clock["error"]) / explored if explored else None,
+        "wrong": int(clock["wrong"]) / explored if explored else None,
+    }
+
+
+@lru_cache(maxsize=8)
+def information_floor(scenario: Scenario, world: World) -> float:
+    """Fewer scans than this cannot map the world: what voxels need over what a scan brings.
+
+    A voxel needs 1/σ_end² - 1/σ_prior² of precision; a ray brings 1/σ(d)² to each voxel that it crosses
+    (Rocha04, eqs. 5 and 17). What a scan can bring is the best of 256 scans from random places where robots
+    may start, in random directions up to 45° up or down; seeing a voxel more often than it needs, which no
+    team can avoid, does not count.
+
+    Args:
+        scenario: The task.
+        world: The true world.
+    """
+    rng, grid, sensor = np.random.default_rng(0), world.grid, scenario.sensor
+    layout, model = world.layout(scenario), sensor_model(scenario.sensor)
+    scan, chance = new_scan(grid, sensor, sensor.rays, 1), np.zeros(1, np.uint64)
+    truth, brought = world.occupied.ravel().astype(np.float32), 0.0
+    voxels = np.stack(np.unravel_index(rng.choice(layout.starts, _FLOOR_SCANS), grid.shape), axis=-1)
+    steepest = 0.0 if scenario.planar else _STEEPEST_RAD
+    for voxel in voxels + 0.5:
+        start, yaw = tuple(voxel.tolist()), rng.uniform(-math.pi, math.pi)
+        pitch = rng.uniform(-steepest, steepest)
+        take_scan(scan, model, truth, grid.shape, grid.voxel_size_m, start, yaw, pitch, 0, chance)
+        measured = scan.rays["returned"] != int(Return.NOTHING)
+        brought = max(brought, float((scan.rays["voxels"] * scan.rays["measured"])[measured].sum()))
+    needed = scenario.ending.sigma_end**-2 - scenario.sigma_prior**-2
+    return max(layout.visible_voxels * needed / brought, 1.0)

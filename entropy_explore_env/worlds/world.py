@@ -129,7 +129,7 @@ class World:
         seen = np.isin(labels, np.unique(labels[starts]))
         if voxels_behind:
             seen |= ndimage.binary_dilation(seen, iterations=voxels_behind) & self.occupied
-        return Layout(barriers, np.flatnonzero(starts), int(seen.sum()))
+        return Layout(barriers, np.flatnonzero(starts), seen)
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,13 +139,18 @@ class Layout:
     Attributes:
         barriers: (X, Y, Z) uint8, a Barrier each: whether its body fits into the voxel, or why not.
         starts: (N,) flat indices of the voxels where it may start: the largest connected part.
-        visible_voxels: How many voxels can be seen from there at all: the free space that hangs
+        visible: (X, Y, Z) bool, which voxels can be seen from there at all: the free space that hangs
             together with it, and the skin of the solid voxels around.
     """
 
     barriers: np.ndarray
     starts: np.ndarray
-    visible_voxels: int
+    visible: np.ndarray
+
+    @cached_property
+    def visible_voxels(self) -> int:
+        """How many voxels can be seen at all."""
+        return int(self.visible.sum())
 
 
 def plane_index(scenario: Scenario) -> int | None:

@@ -7,8 +7,10 @@ import json
 import numpy as np
 import pytest
 
+from entropy_explore_env.config import with_settings
 from entropy_explore_env.missions.state import COUNTED, MissionEnd
-from entropy_explore_env.reports.metrics import mission_figures
+from entropy_explore_env.reports.metrics import information_floor, joint_figures, mission_figures
+from entropy_explore_env.scenarios import ROOM
 from tests.reference.scenes import free_box, started, wander
 
 SUMS = {
@@ -81,9 +83,64 @@ def test_figures_of_a_real_mission_are_plain_numbers_of_json():
     assert json.loads(json.dumps(figures, allow_nan=False)) == figures
     kinds = {name: type(value) for name, value in figures.items()}
     assert all(kinds[name] is (float if name == "distance_m" else int) for name in SUMS)
-    assert all(kinds[name] is float for name in kinds if name.endswith(("_bits", "_s")))
+    maybe = {name for name, value in figures.items() if value is None}
+    assert maybe <= {"t50_s", "t90_s", "t99_s", "scans_over_floor"}
+    assert all(kinds[name] is float for name in kinds if name.endswith(("_bits", "_s")) and name not in maybe)
     assert kinds["finished"] is bool and kinds["seed"] is int
     robots = missions.state.robots[0]
     for figure, count in SUMS.items():
         assert figures[figure] == pytest.approx(np.sum(robots[count]))
     assert figures["scans"] > 20 and figures["shared_measurements"] > 0
+
+
+def test_shares_and_spreads_by_hand():
+    missions = filled()
+    robots, clock = missions.state.robots[1], missions.state.missions[1]
+    robots["measurements"], robots["redundant"] = [100, 200, 300], [10, 20, 30]
+    robots["bits_sent"], robots["heard_bits"] = [1000, 0, 1000], [100.0, 200.0, 300.0]
+    robots["gained_bits"] = [1.0, 2.0, 3.0]
+    clock["reached_s"] = [3.5, 7.0, -1.0, -1.0]
+    figures = mission_figures(missions, 1)
+    assert (figures["overlap"], figures["bits_gained_per_bit_sent"]) == (0.1, 0.3)
+    assert figures["balance"] == pytest.approx(np.sqrt(2 / 3) / 2)
+    assert (figures["t50_s"], figures["t90_s"], figures["t99_s"]) == (3.5, 7.0, None)
+    assert figures["entropy_mean_bits"] == pytest.approx((512.25 + 256.5 + 1024.0) / 3)
+    assert "joint" not in figures and figures["scans_over_floor"] is None
+
+
+def test_what_cannot_be_said_is_none():
+    figures = mission_figures(started(free_box(robots=1)), 0)
+    for name in ("overlap", "bits_gained_per_bit_sent", "balance", "t50_s"):
+        assert figures[name] is None
+
+
+def test_joint_figures_by_hand():
+    missions = started(free_box(scored=True), seed=1)
+    clock = missions.state.missions[0]
+    assert joint_figures(missions, 0)["error"] is joint_figures(missions, 0)["wrong"] is None
+    clock["joint_bits"], clock["explored"], clock["explored_visible"] = -7.5, 40, 30
+    clock["error"], clock["wrong"] = 2.0, 10
+    visible = missions.state.visible[0].sum()
+    assert visible == 385
+    expected = {"entropy_bits": -7.5, "explored": 30 / 385, "error": 0.05, "wrong": 0.25}
+    assert mission_figures(missions, 0)["joint"] == expected
+
+
+def test_the_floor_of_the_paper_s_room():
+    """About 80 scans, 76 to 97 by how far rays reach: 28,577 voxels of 1/0.03² over what a scan brings."""
+    missions = started(ROOM)
+    floor = information_floor(ROOM, missions.worlds[0])
+    assert 70.0 < floor < 100.0
+    missions.state.robots[0]["scans"] = [100, 50, 10]
+    assert mission_figures(missions, 0, floor=True)["scans_over_floor"] == pytest.approx(160 / floor)
+    halved = with_settings(ROOM, {"ending": {"sigma_end": 0.03 * np.sqrt(2)}})
+    assert information_floor(halved, missions.worlds[0]) == pytest.approx(floor / 2, rel=1e-4)
+
+
+def test_one_robot_does_not_beat_the_floor():
+    """No mission ends in fewer scans than the floor of its world."""
+    for seed in range(5):
+        missions = started(free_box(robots=1, ending={"sigma_end": 0.1}), seed=seed)
+        wander(missions, 3000, seed)
+        assert missions.over(0) is MissionEnd.MAPPED
+        assert mission_figures(missions, 0, floor=True)["scans_over_floor"] >= 1.0

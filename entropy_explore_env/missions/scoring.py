@@ -1,0 +1,66 @@
+"""How far a mission has come, measured as it goes: times on the way, and the joint map against the truth.
+
+The joint map fuses every measurement that any robot takes, at once and without loss. Nobody acts on it;
+it is kept where the scenario is scored. Voxels are weighed as rays cross them, never all of them.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from entropy_explore_env.belief.coverage_map import fuse_ray
+from entropy_explore_env.compilation import inlined_kernel, lean_kernel
+from entropy_explore_env.missions.state import PROGRESS
+from entropy_explore_env.robots.range_sensor import Return
+
+_NOTHING = int(Return.NOTHING)
+
+
+@lean_kernel
+def note_progress(clock, robots):
+    """Take the time when the best map has lost each of PROGRESS of the bits that the mission asks for."""
+    best = robots[0].entropy_bits
+    for robot in robots:
+        best = min(best, robot.entropy_bits)
+    gained, asked = clock.entropy_start_bits - best, clock.entropy_start_bits - clock.entropy_end_bits
+    for mark in range(len(PROGRESS)):
+        if clock.reached_s[mark] < 0.0 and gained >= PROGRESS[mark] * asked:
+            clock.reached_s[mark] = clock.time_s
+
+
+@lean_kernel
+def score_scan(state, scan, mission, prior_precision):
+    """Fuse a scan into the joint map, and carry its entropy, coverage and errors (see MISSION).
+
+    Args:
+        state: The MissionState of a scored scenario.
+        scan: With crossings and weights filled in.
+        mission: Which mission.
+        prior_precision: 1/σ² of a voxel that nobody has measured.
+    """
+    clock, truth, visible = state.missions[mission], state.truth[mission], state.visible[mission]
+    mean, precision = state.joint_mean[mission], state.joint_precision[mission]
+    prior = np.float32(prior_precision)
+    for index in range(len(scan.rays)):
+        ray, crossed = scan.rays[index], scan.crossed[index]
+        if ray.returned == _NOTHING:
+            continue
+        weigh_voxels(clock, truth, visible, mean, precision, prior, crossed, ray.voxels, -1)
+        clock.joint_bits -= fuse_ray(
+            mean, precision, crossed, scan.coverage[index], ray.free, ray.voxels, ray.measured
+        )
+        weigh_voxels(clock, truth, visible, mean, precision, prior, crossed, ray.voxels, 1)
+
+
+@inlined_kernel
+def weigh_voxels(clock, truth, visible, mean, precision, prior, crossed, n, sign):
+    """Add (sign 1) or take away (-1) what `n` voxels contribute to the figures of the joint map."""
+    for i in range(n):
+        voxel = np.uint32(crossed[i])
+        if precision[voxel] > prior:
+            clock.explored += sign
+            clock.error += sign * abs(np.float64(mean[voxel]) - np.float64(truth[voxel]))
+            if visible[voxel]:
+                clock.explored_visible += sign
+            if (mean[voxel] > 0.5) != (truth[voxel] > 0.5):
+                clock.wrong += sign
