@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from entropy_explore_env import SCENARIOS, EntropyExploreEnv, RobotView, parallel_env
+from entropy_explore_env import EntropyExploreEnv, RobotView, parallel_env
 from entropy_explore_env.config import Grid
+from tests.reference.scenes import SMALL
 
 BOX = "box-7x11x5"
 DISCRETE = {"kind": "discrete", "yaws": 5, "pitches": 3}
@@ -45,7 +46,7 @@ def sampled(
 
 @pytest.mark.parametrize("flat", [False, True])
 @pytest.mark.parametrize("robots", [1, 3])
-@pytest.mark.parametrize("scenario", SCENARIOS)
+@pytest.mark.parametrize("scenario", SMALL)
 def test_masks_of_infos_and_observations_are_what_the_definition_says(
     scenario: str, robots: int, flat: bool
 ) -> None:
