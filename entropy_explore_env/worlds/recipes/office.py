@@ -27,7 +27,7 @@ _ROOM_M = 4.0
 _BLOCK_M = 2 * _ROOM_M + CORRIDOR_M
 _WING_M = 18.0
 """Length of a row of rooms between two cross corridors, about."""
-_SHORTEST_M = 6.0
+_LEAST_M = (8.0, 6.0)
 _AREA_A_PIECE_M2 = 5.0
 
 
@@ -44,7 +44,7 @@ def office(grid: Grid, rng: np.random.Generator) -> World:
     Raises:
         WorldError: The grid is too small.
     """
-    require_size(grid, "an office", _SHORTEST_M + 2.0, _SHORTEST_M)
+    require_size(grid, "an office", *_LEAST_M)
     plan = office_plan((grid.shape[0], grid.shape[1]), grid.voxel_size_m, rng)
     occupied = extruded(grid, plan.solid, plan.doors)
     if not grid.flat:

@@ -31,7 +31,8 @@ def terrain(grid: Grid, rng: np.random.Generator) -> World:
     all free space.
 
     Args:
-        grid: The workspace, in 3-D, at least 6 × 6 m and 3 m higher than a body and its way.
+        grid: The workspace, in 3-D, at least 6 × 6 m, and high enough for 4 m of air, two
+            layers of ground and a relief of one.
         rng: Draws the ground.
 
     Returns:
