@@ -7,7 +7,7 @@ import numpy as np
 import pettingzoo
 import pytest
 
-from entropy_explore_env import SCENARIOS, environment_id, parallel_env
+from entropy_explore_env import SCENARIOS, EntropyExploreEnv, environment_id, parallel_env
 from entropy_explore_env.worlds.recipes.catalogue import RECIPES
 from tests.reference.scenes import SMALL
 
@@ -23,10 +23,12 @@ def test_small_scenarios_are_scenarios_and_every_recipe_has_one():
 @pytest.mark.parametrize("name", LARGE)
 def test_teams_start_and_gather_bits(name):
     env = pettingzoo.make("parallel", environment_id(name), max_cycles=25)
+    assert isinstance(env, EntropyExploreEnv)
     observations, _ = env.reset(seed=1)
     scenario, world = env.scenario, env.missions.worlds[0]
     assert world.name == scenario.world
-    starts = env.missions.layout and world.layout(scenario)
+    assert world is not None
+    layout = world.layout(scenario)
     rng, infos, gained = np.random.default_rng(0), {}, 0.0
     while env.agents:
         actions = {agent: rng.uniform(-1, 1, env.action_space(agent).shape) for agent in env.agents}
@@ -38,7 +40,7 @@ def test_teams_start_and_gather_bits(name):
     assert len(infos) == scenario.robots and gained > 0.0
     for agent in infos:
         place = tuple(scenario.grid.voxel_of(env.view(agent).pose[:3]))
-        assert not starts.blocked[place], f"{agent} is where its body does not fit"
+        assert not layout.blocked[place], f"{agent} is where its body does not fit"
 
 
 @pytest.mark.parametrize("name", LARGE)

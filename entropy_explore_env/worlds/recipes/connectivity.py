@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import cast
+
 import numpy as np
 from scipy import ndimage
 
@@ -62,7 +64,9 @@ def cut_gates(
         voxel_size_m: Edge of a voxel.
         rng: Draws the places.
     """
-    away, nearest = ndimage.distance_transform_edt(~other, return_indices=True)
+    away, nearest = cast(
+        "tuple[np.ndarray, np.ndarray]", ndimage.distance_transform_edt(~other, return_indices=True)
+    )
     far = np.where(one, away, np.inf)
     candidates = np.argwhere(far <= far.min() + 0.5 / voxel_size_m)
     half = passage_voxels(width_m, voxel_size_m) // 2

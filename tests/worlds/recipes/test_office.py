@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
-from entropy_explore_env.config import Grid
 from entropy_explore_env.scenarios import OFFICE, OFFICE_3D
 from entropy_explore_env.worlds.recipes.office import office, office_plan
 from entropy_explore_env.worlds.world import World
@@ -69,4 +68,3 @@ def test_an_office_of_coarse_voxels_has_doors_that_a_body_passes():
         plan = office_plan((41, 33), 0.5, np.random.default_rng(seed))
         for door in plan.doors:
             assert sorted((door.extent(0), door.extent(1))) == [1, 3]
-    assert Grid((41, 33, 1), 0.5).size_m[0] == 20.5

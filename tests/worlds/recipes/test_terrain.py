@@ -54,13 +54,15 @@ def test_robots_stay_below_the_exposure_surface():
     missions = Missions(TERRAIN, 1)
     missions.reset(0, seed=1)
     world = missions.worlds[0]
+    assert world is not None and world.ceiling is not None
+    occupied, ceiling = world.occupied, world.ceiling
     edge_m = TERRAIN.grid.voxel_size_m
 
     def check(step):
         for pose in missions.state.robots[0]["scan_pose"]:
             x, y, z = TERRAIN.grid.voxel_of(pose[:3])
-            assert world.occupied[x, y].sum() <= z < world.ceiling[x, y], f"step {step}"
-            assert pose[2] < world.ceiling[x, y] * edge_m
+            assert occupied[x, y].sum() <= z < ceiling[x, y], f"step {step}"
+            assert pose[2] < ceiling[x, y] * edge_m
 
     check(-1)
     wander(missions, 25, 0, check)
