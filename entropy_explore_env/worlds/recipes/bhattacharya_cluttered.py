@@ -7,6 +7,7 @@ in the lower left", from which four robots begin, and unreachable regions. Cells
 from __future__ import annotations
 
 import numpy as np
+from scipy import ndimage
 
 from entropy_explore_env.config import Grid
 from entropy_explore_env.worlds.recipes.connectivity import fill_pockets
@@ -20,6 +21,8 @@ _LARGEST_ROOM_M = 18.0
 _RADII_M = (0.4, 1.6)
 _SHARE = 0.08
 _TRIES = 20
+_FREE_BEFORE_DOORS_M = 1.0
+"""Beyond the way through: no obstacle can reach from wall to wall around a door in a corner."""
 
 
 def bhattacharya_cluttered(grid: Grid, rng: np.random.Generator) -> World:
@@ -38,7 +41,9 @@ def bhattacharya_cluttered(grid: Grid, rng: np.random.Generator) -> World:
     require_size(grid, "rooms full of clutter", 20.0, 16.0)
     plan = bare_plan(grid.shape, grid.voxel_size_m, _WALL_M)
     _split(plan, plan.whole, rng)
-    strew(plan.solid, plan.clear, _RADII_M, _SHARE, grid.voxel_size_m, rng)
+    around = 2 * voxels(_FREE_BEFORE_DOORS_M, grid.voxel_size_m) + 1
+    closed = ndimage.maximum_filter(plan.clear, around)
+    strew(plan.solid, closed, _RADII_M, _SHARE, grid.voxel_size_m, rng)
     occupied = extruded(grid, fill_pockets(plan.solid, grid.voxel_size_m))
     return World(grid, occupied, "bhattacharya-cluttered")
 

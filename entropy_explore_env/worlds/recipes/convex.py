@@ -49,13 +49,14 @@ def strew(
         in_vain += 1
         longest = rng.uniform(*radii_m) / voxel_size_m
         centre = rng.uniform(0.0, solid.shape)
+        middle = int(centre[0]), int(centre[1])
+        if solid[middle] or numbers[middle]:
+            continue
         normals, offsets = _polygon(longest, rng)
         reach = longest + clearance + 1.0
         low = np.maximum(np.floor(centre - reach), 0).astype(int)
         high = np.minimum(np.ceil(centre + reach), solid.shape).astype(int)
         window = (slice(low[0], high[0]), slice(low[1], high[1]))
-        if solid[int(centre[0]), int(centre[1])] or numbers[int(centre[0]), int(centre[1])]:
-            continue
         x, y = (np.arange(low[i], high[i]) + 0.5 - centre[i] for i in (0, 1))
         outside = np.full((len(x), len(y)), -np.inf)
         for normal, offset in zip(normals, offsets, strict=True):

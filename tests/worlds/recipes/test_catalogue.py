@@ -32,7 +32,7 @@ FREE_SHARE = {
     "occlusions": (0.85, 0.9),
     "lab": (0.88, 0.98),
     "bhattacharya-office": (0.94, 0.98),
-    "bhattacharya-cluttered": (0.83, 0.9),
+    "bhattacharya-cluttered": (0.85, 0.88),
 }
 OTHER_GRIDS = {
     "office": [
