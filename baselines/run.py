@@ -42,7 +42,7 @@ class Args:
     """Run a mission of a strategy and show it."""
 
     scenario: Positional[str] = "room"
-    """A named scenario: room, room-furnished, box-7x11x5."""
+    """A named scenario: room, office, cave, … (the README lists them)."""
     strategy: str = "gradient"
     """How robots choose viewpoints: random, gradient, gradient-plane."""
     robots: int = 3

@@ -345,7 +345,10 @@ class Scenario:
         name: What people call it.
         grid: Size and resolution of the workspace; a world from a file brings its own. In a world
             one voxel high robots look level and the sensor's field of view has no pitch.
-        world: How the truth is made: `empty`, `furnished`, or the path of a world file.
+        world: How the truth is made: the name of a recipe (`empty`, `furnished`, `office`, … in
+            worlds/recipes), or the path of a world file.
+        split: Which worlds a recipe makes: `train`, `validation` and `test` have none in common
+            (worlds/splits.py). Files, and recipes without chance, are one world in all of them.
         robots: Team size A.
         sigma_prior: Standard deviation of coverage before any measurement; the mean is ½.
         decision_period_s: A step lasts this long; None = until the next robot has to decide.
@@ -356,6 +359,7 @@ class Scenario:
     name: str
     grid: Grid
     world: str = "empty"
+    split: Literal["train", "validation", "test"] = "train"
     robots: int = 3
     sigma_prior: float = 30.0
     decision_period_s: float | None = 1.0
@@ -375,6 +379,7 @@ class Scenario:
         if self.grid.flat and self.sensor.field_of_view_rad[1] > 0.0:
             level = (self.sensor.field_of_view_rad[0], 0.0)
             object.__setattr__(self, "sensor", dataclasses.replace(self.sensor, field_of_view_rad=level))
+        check_choice(self, "split", Literal["train", "validation", "test"])
         check_count(self, "robots", 1, 1000)
         check(self, "sigma_prior", "a number from 1e-3 to 1e4", lambda v: 1e-3 <= v <= 1e4)
         if self.decision_period_s is not None:

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from types import MappingProxyType
 
-from entropy_explore_env.config import Channel, Grid, RangeSensor, Robot, Scenario
+from entropy_explore_env.config import Channel, Ending, Grid, RangeSensor, Robot, Scenario
 from entropy_explore_env.errors import SettingError
 
 _ROOM_GRID = Grid((41, 41, 17), 0.25, (-0.125, -0.125, -0.125))
@@ -34,7 +35,154 @@ BOX = Scenario(
 )
 """A tiny box of 3.5 × 5.5 × 2.5 m with no two edges equal, for tests and examples."""
 
-SCENARIOS = MappingProxyType({scenario.name: scenario for scenario in (ROOM, ROOM_FURNISHED, BOX)})
+_LIDAR = RangeSensor((2 * math.pi, 0.0), math.pi / 90, max_range_m=8.0)
+"""A planar scanner, 180 rays all around, for the 2-D worlds whose papers do not give one."""
+_WHEELED = Robot(
+    motion="planar",
+    reach_m=2.0,
+    max_speed_m_s=0.5,
+    acceleration_m_s2=0.5,
+    body_radius_m=0.3,
+    sensor_height_m=0.3,
+)
+"""A ground robot of a Pioneer 3-DX's size, which Sawhney explores with."""
+
+OFFICE = Scenario(
+    name="office",
+    grid=Grid((240, 180, 1), 0.1),
+    world="office",
+    robot=_WHEELED,
+    sensor=_LIDAR,
+    ending=Ending(time_limit_s=3600.0),
+)
+"""24 × 18 m of rooms and corridors, 2-D."""
+
+OFFICE_3D = Scenario(
+    name="office-3d",
+    grid=Grid((96, 72, 10), 0.25),
+    world="office",
+    robot=Robot(reach_m=1.5, max_speed_m_s=0.5, acceleration_m_s2=0.5, body_radius_m=0.3),
+    sensor=RangeSensor((math.pi / 2, math.pi / 3), math.pi / 60, max_range_m=6.0),
+    ending=Ending(time_limit_s=7200.0),
+)
+"""24 × 18 × 2.5 m with furniture, for flying robots with depth cameras."""
+
+CORRIDOR = Scenario(
+    name="corridor",
+    grid=Grid((300, 200, 1), 0.1),
+    world="corridor",
+    robot=_WHEELED,
+    sensor=_LIDAR,
+    ending=Ending(time_limit_s=3600.0),
+)
+"""30 × 20 m of corridors, 2-D."""
+
+CLUTTERED = Scenario(
+    name="cluttered",
+    grid=Grid((200, 160, 1), 0.1),
+    world="cluttered",
+    robot=_WHEELED,
+    sensor=_LIDAR,
+    ending=Ending(time_limit_s=3600.0),
+)
+"""20 × 16 m of convex obstacles, 2-D."""
+
+HYBRID = Scenario(
+    name="hybrid",
+    grid=Grid((320, 240, 1), 0.1),
+    world="hybrid",
+    robot=_WHEELED,
+    sensor=_LIDAR,
+    ending=Ending(time_limit_s=7200.0),
+)
+"""32 × 24 m: office, corridors and clutter side by side, 2-D."""
+
+CAVE = Scenario(
+    name="cave",
+    grid=Grid((80, 60, 25), 0.4),
+    world="cave",
+    robot=Robot(reach_m=2.0, max_speed_m_s=1.0, acceleration_m_s2=1.0, body_radius_m=0.3),
+    sensor=RangeSensor((math.pi / 2, math.pi / 3), math.pi / 60, max_range_m=10.0),
+    ending=Ending(time_limit_s=7200.0),
+)
+"""32 × 24 × 10 m of halls and tunnels, for flying robots with depth cameras."""
+
+TERRAIN = Scenario(
+    name="terrain",
+    grid=Grid((96, 72, 24), 1.0),
+    world="terrain",
+    robot=Robot(reach_m=6.0, max_speed_m_s=3.0, acceleration_m_s2=2.0, body_radius_m=0.3),
+    sensor=RangeSensor((math.pi / 2, math.pi / 2), math.pi / 45, max_range_m=20.0),
+    ending=Ending(time_limit_s=3600.0),
+)
+"""96 × 72 m of hills up to 18 m high, for UAVs that stay below the exposure surface (Sawhney)."""
+
+OCCLUSIONS = Scenario(
+    name="occlusions",
+    grid=Grid((200, 200, 1), 0.5),
+    world="occlusions",
+    robots=1,
+    robot=Robot(motion="planar", reach_m=5.0, max_speed_m_s=1.0, acceleration_m_s2=1.0, body_radius_m=0.3),
+    sensor=RangeSensor((math.pi / 2, 0.0), math.pi / 180, max_range_m=15.0),
+    ending=Ending(time_limit_s=10_000.0),
+)
+"""Sujan's 100 × 100 m with convex occlusions, one robot with a view of 90° and 15 m. Cells of 0.5 m, speed
+and reach are ours; with two robots the paper takes 75° and 10 m."""
+
+LAB = Scenario(
+    name="lab",
+    grid=Grid((50, 46, 20), 0.1),
+    world="lab",
+    robots=2,
+    robot=Robot(motion="planar", body_radius_m=0.2, sensor_height_m=0.45),
+    sensor=RangeSensor((math.pi / 4, math.pi / 6), math.pi / 90, max_range_m=4.0),
+)
+"""RochaMI's laboratory: 23 m², ε = 0.1 m, two ground robots with stereo vision. The paper gives neither
+height nor field of view: 2 m, and 45° × 30° up to 4 m, are ours, as is the Scout's radius of 0.2 m."""
+
+BHATTACHARYA_OFFICE = Scenario(
+    name="bhattacharya-office",
+    grid=Grid((170, 200, 1), 0.1),
+    world="bhattacharya-office",
+    robots=5,
+    robot=_WHEELED,
+    sensor=_LIDAR,
+    ending=Ending(time_limit_s=3600.0),
+)
+"""Bhattacharya's office of 170 × 200 cells with five robots; metres, robots and sensor are ours."""
+
+BHATTACHARYA_CLUTTERED = Scenario(
+    name="bhattacharya-cluttered",
+    grid=Grid((1000, 783, 1), 0.1),
+    world="bhattacharya-cluttered",
+    robots=4,
+    robot=dataclasses.replace(_WHEELED, reach_m=4.0, max_speed_m_s=1.0),
+    sensor=dataclasses.replace(_LIDAR, max_range_m=15.0),
+    ending=Ending(time_limit_s=20_000.0),
+)
+"""Bhattacharya's 1000 × 783 cells with four robots; metres, robots and sensor are ours."""
+
+SCENARIOS = MappingProxyType(
+    {
+        scenario.name: scenario
+        for scenario in (
+            ROOM,
+            ROOM_FURNISHED,
+            BOX,
+            OFFICE,
+            OFFICE_3D,
+            CORRIDOR,
+            CLUTTERED,
+            HYBRID,
+            CAVE,
+            TERRAIN,
+            OCCLUSIONS,
+            LAB,
+            BHATTACHARYA_OFFICE,
+            BHATTACHARYA_CLUTTERED,
+        )
+    }
+)
 """Name → Scenario."""
 
 

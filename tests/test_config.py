@@ -57,6 +57,7 @@ REFUSED = {
         (0, "0", 0),
         (0, True, 0),
     ),
+    (Scenario, "split"): (None, 1, "Train", "holdout", "", NAN, []),
     (Robot, "motion"): KIND,
     (Robot, "reach_m"): POSITIVE,
     (Robot, "max_speed_m_s"): (*POSITIVE, INF),

@@ -43,7 +43,27 @@ SIBLINGS = {
         "missions",
         "view",
     ),
-    "worlds": ("world", "procedural", "octomap_reader", "files", "load"),
+    "worlds": ("world", "splits", "recipes", "octomap_reader", "files", "load"),
+    "worlds/recipes": (
+        "plan",
+        "connectivity",
+        "convex",
+        "fractal",
+        "furniture",
+        "empty",
+        "furnished",
+        "office",
+        "corridor",
+        "cluttered",
+        "hybrid",
+        "cave",
+        "terrain",
+        "occlusions",
+        "lab",
+        "bhattacharya_office",
+        "bhattacharya_cluttered",
+        "catalogue",
+    ),
     "envs": (
         "checks",
         "infos",
@@ -55,7 +75,7 @@ SIBLINGS = {
     ),
     "reports": ("metrics", "recording", "glyphs", "rendering", "animation", "painting"),
 }
-"""Inside a folder a file may import those that stand before it."""
+"""Inside a folder a file, or a folder, may import those that stand before it."""
 STRATEGIES_SEE = (
     "envs",
     "missions.view",
@@ -146,8 +166,12 @@ def test_every_folder_and_file_of_the_library_has_its_place():
         if (path.suffix == ".py" and path.stem != "__init__") or (path / "__init__.py").exists():
             layer_of(path.stem)
     for folder, order in SIBLINGS.items():
-        files = {path.stem for path in (ROOT / LIBRARY / folder).glob("*.py")} - {"__init__"}
-        assert files <= set(order), f"{folder} has files without a place: {files - set(order)}"
+        here = ROOT / LIBRARY / folder
+        found = {path.stem for path in here.glob("*.py")} - {"__init__"}
+        found |= {path.parent.name for path in here.glob("*/__init__.py")}
+        assert found <= set(order), f"{folder} has files without a place: {found - set(order)}"
+    folders = {path.parent.relative_to(ROOT / LIBRARY) for path in (ROOT / LIBRARY).glob("*/*/__init__.py")}
+    assert {str(path) for path in folders} <= set(SIBLINGS)
 
 
 def complaint(each: Import) -> str | None:
@@ -160,11 +184,20 @@ def complaint(each: Import) -> str | None:
     importer, imported = inside.with_suffix("").parts[0], top(module)
     if importer != imported:
         return None if layer_of(importer) < layer_of(imported) else f"{each}, which lies above"
-    if len(inside.parts) > 1:
-        order = SIBLINGS[importer]
-        if order.index(module.split(".")[1]) >= order.index(inside.stem):
-            return f"{each}, which stands below it"
-    return None
+    return (
+        None
+        if stands_above(module.split("."), list(inside.with_suffix("").parts))
+        else (f"{each}, which stands below it")
+    )
+
+
+def stands_above(imported: list[str], importer: list[str]) -> bool:
+    """Whether siblings stand in their order, in the first folder in which the two paths part."""
+    for depth in range(1, min(len(imported), len(importer))):
+        order = SIBLINGS.get("/".join(importer[:depth]))
+        if imported[depth] != importer[depth]:
+            return order is None or order.index(imported[depth]) < order.index(importer[depth])
+    return imported[0] not in SIBLINGS
 
 
 def test_the_library_imports_only_what_lies_below():
@@ -179,6 +212,14 @@ def test_the_library_imports_only_what_lies_below():
         ("belief/raycast.py", "belief.coverage_map.fuse_ray", "which stands below it"),
         ("belief/raycast.py", "robots.motion.MoveEnd", "which lies above"),
         ("worlds/world.py", "belief.raycast.cast_ray", "which lies above"),
+        ("worlds/world.py", "worlds.recipes.plan.Plan", "which stands below it"),
+        ("worlds/recipes/plan.py", "worlds.load.make_world", "which stands below it"),
+        ("worlds/recipes/plan.py", "worlds.recipes.office.office", "which stands below it"),
+        ("worlds/recipes/plan.py", "worlds.recipes.plan.Plan", "which stands below it"),
+        ("worlds/recipes/__init__.py", "worlds.recipes.plan", "one sentence"),
+        ("worlds/recipes/office.py", "worlds.recipes.plan.Plan", None),
+        ("worlds/recipes/office.py", "worlds.world.World", None),
+        ("worlds/load.py", "worlds.recipes.catalogue.RECIPES", None),
         ("reports/metrics.py", "envs.parallel_env.env", "which lies above"),
         ("config.py", "scenarios.ROOM", "which lies above"),
         ("belief/__init__.py", "belief.raycast", "one sentence"),

@@ -11,7 +11,7 @@ from entropy_explore_env.missions.missions import Missions
 from entropy_explore_env.missions.poses import pose_at
 from entropy_explore_env.reports.animation import Window
 from entropy_explore_env.reports.rendering import Frame, draw_frame
-from entropy_explore_env.worlds.procedural import RECIPES
+from entropy_explore_env.worlds.recipes.catalogue import RECIPES
 
 RENDER_MODES = ("human", "rgb_array")
 FRAMES_PER_S = 10

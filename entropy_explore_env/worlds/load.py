@@ -1,4 +1,4 @@
-"""From a scenario to its world: a recipe drawn from a random generator, or a file."""
+"""From a scenario to its world: made by a recipe from a world number of the split, or read from a file."""
 
 from __future__ import annotations
 
@@ -10,8 +10,11 @@ import numpy as np
 
 from entropy_explore_env.config import Scenario
 from entropy_explore_env.errors import SettingError
+from entropy_explore_env.validation import is_whole
 from entropy_explore_env.worlds.files import load_octomap
-from entropy_explore_env.worlds.procedural import RECIPES, empty
+from entropy_explore_env.worlds.recipes.catalogue import RECIPES
+from entropy_explore_env.worlds.recipes.empty import empty
+from entropy_explore_env.worlds.splits import draw_world_number, world_generator
 from entropy_explore_env.worlds.world import World
 
 
@@ -22,7 +25,7 @@ def make_world(scenario: Scenario, rng: np.random.Generator) -> World:
 
     Args:
         scenario: Its `world` names a recipe or a file.
-        rng: The stream of worlds.
+        rng: The stream of worlds; recipes with chance take one draw of it, the world number.
 
     Raises:
         SettingError: Neither a recipe nor a file has this name.
@@ -31,8 +34,26 @@ def make_world(scenario: Scenario, rng: np.random.Generator) -> World:
     if scenario.world == "empty":
         return _empty_world(scenario)
     if scenario.world in RECIPES:
-        return RECIPES[scenario.world](scenario.grid, rng)
+        return world_with_number(scenario, draw_world_number(scenario.split, rng))
     return world_from_file(Path(scenario.world), scenario.grid.voxel_size_m)
+
+
+def world_with_number(scenario: Scenario, number: int) -> World:
+    """The world that a recipe makes from a world number.
+
+    Args:
+        scenario: Its `world` names a recipe, its `grid` the workspace; nothing else matters.
+        number: See worlds/splits.py.
+
+    Raises:
+        SettingError: No recipe has this name, or the number is not a whole number ≥ 0.
+        WorldError: The grid is too small for the recipe.
+    """
+    if scenario.world not in RECIPES:
+        raise SettingError("Scenario.world", scenario.world, "a recipe: " + ", ".join(RECIPES))
+    if not is_whole(number, 0):
+        raise SettingError("number", number, "a whole number ≥ 0")
+    return RECIPES[scenario.world](scenario.grid, world_generator(number))
 
 
 @lru_cache(maxsize=8)

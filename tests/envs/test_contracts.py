@@ -20,7 +20,8 @@ from pettingzoo.test import (
 )
 
 import entropy_explore_env
-from entropy_explore_env import SCENARIOS, env, environment_id, parallel_env
+from entropy_explore_env import env, environment_id, parallel_env
+from tests.reference.scenes import SMALL
 
 PARTS: dict[str, dict[str, Any]] = {
     "nothing": {"panorama": False, "own": False, "team": False},
@@ -32,11 +33,11 @@ PARTS: dict[str, dict[str, Any]] = {
 KINDS = ("continuous", "discrete")
 TEAMS = [
     pytest.param(scenario, robots, kind, id=f"{scenario}-{robots}-{kind}")
-    for scenario, robots, kind in itertools.product(SCENARIOS, range(1, 6), KINDS)
+    for scenario, robots, kind in itertools.product(SMALL, range(1, 6), KINDS)
 ]
 SINGLES = [
     pytest.param(scenario, kind, parts, id=f"{scenario}-{kind}-{parts}")
-    for scenario, kind, parts in itertools.product(SCENARIOS, KINDS, PARTS)
+    for scenario, kind, parts in itertools.product(SMALL, KINDS, PARTS)
     if parts != "nothing"  # Gymnasium does not allow an empty observation space
 ]
 
@@ -90,7 +91,7 @@ def test_pettingzoo_max_cycles_of_the_package() -> None:
 
 
 @pytest.mark.parametrize("robots", range(1, 6))
-@pytest.mark.parametrize("scenario", SCENARIOS)
+@pytest.mark.parametrize("scenario", SMALL)
 def test_pettingzoo_rendering(scenario: str, robots: int) -> None:
     shapes = []
 
@@ -126,7 +127,7 @@ def test_gymnasium_passive_checker_has_nothing_to_say(scenario: str, kind: str, 
 
 
 @pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize("scenario", SCENARIOS)
+@pytest.mark.parametrize("scenario", SMALL)
 def test_stable_baselines3_check_env(scenario: str, kind: str) -> None:
     from stable_baselines3.common import env_checker  # slow to import: brings torch
 

@@ -13,7 +13,6 @@ import pygame
 import pytest
 
 from entropy_explore_env import (
-    SCENARIOS,
     ActionError,
     CallOrderError,
     SettingError,
@@ -23,6 +22,7 @@ from entropy_explore_env import (
     parallel_env,
 )
 from entropy_explore_env.envs.conformance import leaves, require_same
+from tests.reference.scenes import SMALL
 
 BOX = "box-7x11x5"
 KINDS = ("continuous", "discrete")
@@ -33,7 +33,7 @@ def random_actions(env: gymnasium.Env[Any, Any], count: int, seed: int = 0) -> l
     return [env.action_space.sample() for _ in range(count)]
 
 
-@pytest.mark.parametrize("scenario", SCENARIOS)
+@pytest.mark.parametrize("scenario", SMALL)
 def test_gymnasium_makes_a_robot_that_waits_for_nobody(scenario: str) -> None:
     env = gymnasium.make(environment_id(scenario), max_cycles=20)
     assert isinstance(env.unwrapped, SingleRobotEnv)
@@ -48,7 +48,7 @@ def test_gymnasium_makes_a_robot_that_waits_for_nobody(scenario: str) -> None:
 
 @pytest.mark.parametrize("period", [None, 1.0])
 @pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize("scenario", SCENARIOS)
+@pytest.mark.parametrize("scenario", SMALL)
 def test_plays_the_same_as_a_team_of_one(scenario: str, kind: str, period: float | None) -> None:
     settings = {
         "action": {"kind": kind},

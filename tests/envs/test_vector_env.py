@@ -14,7 +14,6 @@ from gymnasium.vector import AutoresetMode, SyncVectorEnv
 from gymnasium.vector.utils import batch_space
 
 from entropy_explore_env import (
-    SCENARIOS,
     ActionError,
     CallOrderError,
     EntropyExploreVectorEnv,
@@ -26,6 +25,7 @@ from entropy_explore_env import (
 )
 from entropy_explore_env.envs.conformance import leaves, require_apart, require_same, snapshot
 from entropy_explore_env.missions import missions
+from tests.reference.scenes import SMALL
 
 BOX = "box-7x11x5"
 KINDS = ("continuous", "discrete")
@@ -44,7 +44,7 @@ def in_order(value: Any) -> Any:
     return dict(sorted(value.items())) if isinstance(value, dict) else value
 
 
-@pytest.mark.parametrize("scenario", SCENARIOS)
+@pytest.mark.parametrize("scenario", SMALL)
 def test_gymnasium_makes_many_missions_by_id(scenario: str) -> None:
     env = gymnasium.make_vec(environment_id(scenario), num_envs=6, max_cycles=9)
     assert isinstance(env, EntropyExploreVectorEnv)

@@ -242,6 +242,7 @@ def settled(channel, world, sensor, edge_m):
         "channel": {"i_min_bits": 0.0, "burst": 1000, **channel},
         "sensor": {"angular_step_rad": math.pi / 24, **(sensor or {})},
         "grid": Grid((7, 11, 5), edge_m),
+        "ending": {"sigma_end": 1e-3},  # not before all is heard
     }
     missions = started(free_box(**settings), seed=3)
     rng, received = np.random.default_rng(5), []

@@ -19,6 +19,9 @@ from entropy_explore_env.missions.missions import Missions
 from entropy_explore_env.scenarios import BOX
 from tests.reference import rocha04
 
+SMALL = ("room", "room-furnished", "box-7x11x5")
+"""Scenarios that tests walk through for whole episodes, with teams and actions of all kinds: small enough for
+seconds a test. The others are walked through for a few steps, in tests/test_scenarios.py."""
 SHAPES = ((7, 11, 5), (3, 8, 6), (9, 6, 1), (13, 2, 4), (1, 10, 3))
 
 

@@ -1,4 +1,4 @@
-"""Worlds made from a recipe and a random generator."""
+"""A room with boxes on its floor, 0.5-2 m wide."""
 
 from __future__ import annotations
 
@@ -15,14 +15,11 @@ _FURNITURE_SHARE = 0.08
 """Share of the floor plan that furniture covers, about."""
 
 
-def empty(grid: Grid, rng: np.random.Generator) -> World:
-    """A workspace with nothing in it but its walls; nothing is drawn."""
-    del rng
-    return World(grid, np.zeros(grid.shape, bool), "empty")
-
-
 def furnished(grid: Grid, rng: np.random.Generator) -> World:
-    """A room with boxes on its floor, against each other or alone; its free space hangs together.
+    """A room with boxes on its floor, against each other or alone.
+
+    Its free space is connected, and with it that of bodies up to half a voxel in radius; larger ones may
+    find parts of it closed, and start in the largest.
 
     Args:
         grid: The workspace.
@@ -55,7 +52,3 @@ def _boxes(grid: Grid, rng: np.random.Generator) -> np.ndarray:
         ]
         occupied[corner[0] : corner[0] + edges[0], corner[1] : corner[1] + edges[1], : edges[2]] = True
     return occupied
-
-
-RECIPES = {"empty": empty, "furnished": furnished}
-"""Name of a recipe → World from a grid and a generator."""

@@ -1,0 +1,1 @@
+"""Worlds made from recipes: each takes a grid and a random generator."""

@@ -1,0 +1,41 @@
+"""The recipes by name."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
+
+import numpy as np
+
+from entropy_explore_env.config import Grid
+from entropy_explore_env.worlds.recipes.bhattacharya_cluttered import bhattacharya_cluttered
+from entropy_explore_env.worlds.recipes.bhattacharya_office import bhattacharya_office
+from entropy_explore_env.worlds.recipes.cave import cave
+from entropy_explore_env.worlds.recipes.cluttered import cluttered
+from entropy_explore_env.worlds.recipes.corridor import corridor
+from entropy_explore_env.worlds.recipes.empty import empty
+from entropy_explore_env.worlds.recipes.furnished import furnished
+from entropy_explore_env.worlds.recipes.hybrid import hybrid
+from entropy_explore_env.worlds.recipes.lab import lab
+from entropy_explore_env.worlds.recipes.occlusions import occlusions
+from entropy_explore_env.worlds.recipes.office import office
+from entropy_explore_env.worlds.recipes.terrain import terrain
+from entropy_explore_env.worlds.world import World
+
+RECIPES: Mapping[str, Callable[[Grid, np.random.Generator], World]] = MappingProxyType(
+    {
+        "empty": empty,
+        "furnished": furnished,
+        "office": office,
+        "corridor": corridor,
+        "cluttered": cluttered,
+        "hybrid": hybrid,
+        "cave": cave,
+        "terrain": terrain,
+        "occlusions": occlusions,
+        "lab": lab,
+        "bhattacharya-office": bhattacharya_office,
+        "bhattacharya-cluttered": bhattacharya_cluttered,
+    }
+)
+"""Name of a recipe → World from a grid and a generator."""

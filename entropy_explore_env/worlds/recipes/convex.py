@@ -1,0 +1,86 @@
+"""Convex obstacles strewn over a floor plan, so far apart that a body passes between each two."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from entropy_explore_env.worlds.recipes.plan import BODY_RADIUS_M
+
+_TRIES_IN_VAIN = 60
+"""So many places in a row that are taken, and the plan counts as full."""
+
+
+def clearance_voxels(voxel_size_m: float) -> float:
+    """Distance of solid voxels' centres that leaves a body a way, along any direction."""
+    return 2.0 * BODY_RADIUS_M / voxel_size_m + 2.5
+
+
+def strew(
+    solid: np.ndarray,
+    closed: np.ndarray,
+    radii_m: tuple[float, float],
+    share: float,
+    voxel_size_m: float,
+    rng: np.random.Generator,
+) -> np.ndarray:
+    """Put convex polygons on a plan until they cover a share of it, or no place is found.
+
+    Each polygon has 3-8 corners on an ellipse, one semi-axis from `radii_m`, the other half as long or
+    longer. Polygons keep the clearance from each other, not from what is solid before: they may lean
+    on walls.
+
+    Args:
+        solid: (X, Y) bool; changed in place.
+        closed: (X, Y) bool, where no polygon may be.
+        radii_m: Least and largest semi-axis.
+        share: Of the free area, at least 0 and below about 0.3.
+        voxel_size_m: Edge of a voxel.
+        rng: Draws the polygons.
+
+    Returns:
+        (X, Y) int32: number of the polygon, from 1; 0 elsewhere.
+    """
+    numbers = np.zeros(solid.shape, np.int32)
+    wanted, covered, in_vain = share * (~solid).sum(), 0, 0
+    clearance = clearance_voxels(voxel_size_m)
+    while covered < wanted and in_vain < _TRIES_IN_VAIN:
+        in_vain += 1
+        longest = rng.uniform(*radii_m) / voxel_size_m
+        centre = rng.uniform(0.0, solid.shape)
+        middle = int(centre[0]), int(centre[1])
+        if solid[middle] or numbers[middle]:
+            continue
+        normals, offsets = _polygon(longest, rng)
+        reach = longest + clearance + 1.0
+        low = np.maximum(np.floor(centre - reach), 0).astype(int)
+        high = np.minimum(np.ceil(centre + reach), solid.shape).astype(int)
+        window = (slice(low[0], high[0]), slice(low[1], high[1]))
+        x, y = (np.arange(low[i], high[i]) + 0.5 - centre[i] for i in (0, 1))
+        outside = np.full((len(x), len(y)), -np.inf)
+        for normal, offset in zip(normals, offsets, strict=True):
+            np.maximum(outside, normal[0] * x[:, None] + normal[1] * y - offset, out=outside)
+        inside = outside <= 0.0
+        if numbers[window][outside <= clearance].any() or closed[window][inside].any():
+            continue
+        inside &= ~solid[window]
+        if inside.any():
+            numbers[window][inside] = numbers.max() + 1
+            covered, in_vain = covered + int(inside.sum()), 0
+    solid |= numbers > 0
+    return numbers
+
+
+def _polygon(longest: float, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+    """Outward normals (N, 2) and offsets (N,) of the edges: normal · point ≤ offset inside."""
+    corners = int(rng.integers(3, 9))
+    angles = (np.arange(corners) + rng.uniform(0.0, 0.7, corners)) * (2.0 * math.pi / corners)
+    turn, flat = rng.uniform(0.0, math.pi), rng.uniform(0.5, 1.0)
+    points = longest * np.stack([np.cos(angles), flat * np.sin(angles)], axis=1)
+    cos, sin = math.cos(turn), math.sin(turn)
+    points = np.stack([points[:, 0] * cos - points[:, 1] * sin, points[:, 0] * sin + points[:, 1] * cos], 1)
+    edges = np.roll(points, -1, axis=0) - points
+    normals = np.stack([edges[:, 1], -edges[:, 0]], axis=1)
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    return normals, (normals * points).sum(axis=1)

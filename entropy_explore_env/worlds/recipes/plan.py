@@ -1,0 +1,194 @@
+"""Floor plans in voxels: rectangles, walls, rooms in a row, doors; lengths are given in metres.
+
+A plan is the lower layer of an indoor world. Doors and corridors let a body of `BODY_RADIUS_M` pass; on
+a grid so coarse that this takes more than their width in metres they are that much wider.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+
+from entropy_explore_env.config import Grid
+from entropy_explore_env.errors import WorldError
+
+BODY_RADIUS_M = 0.3
+"""The body for which recipes promise connected free space."""
+DOOR_M = 0.9
+DOOR_HEIGHT_M = 2.1
+WALL_M = 0.1
+_CONNECTING_DOORS = 0.2
+"""Share of neighbouring rooms with a door between them."""
+
+
+class Rectangle(NamedTuple):
+    """Voxels from `low` up to, but not with, `high`: (x, y) each."""
+
+    low: tuple[int, int]
+    high: tuple[int, int]
+
+    @property
+    def window(self) -> tuple[slice, slice]:
+        """Its voxels in an array (X, Y, …)."""
+        return slice(self.low[0], self.high[0]), slice(self.low[1], self.high[1])
+
+    def extent(self, axis: int) -> int:
+        """Voxels along an axis."""
+        return self.high[axis] - self.low[axis]
+
+    def within(self, axis: int, low: int, high: int) -> Rectangle:
+        """The same, but for its extent along one axis."""
+        lows, highs = list(self.low), list(self.high)
+        lows[axis], highs[axis] = low, high
+        return Rectangle((lows[0], lows[1]), (highs[0], highs[1]))
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A floor plan under construction.
+
+    Attributes:
+        solid: (X, Y) bool, walls and obstacles.
+        clear: (X, Y) bool, ways through doors, where nothing may be put.
+        voxel_size_m: Edge of a voxel.
+        wall_m: Thickness of walls.
+        rooms: Insides of rooms.
+        doors: Openings in walls.
+    """
+
+    solid: np.ndarray
+    clear: np.ndarray
+    voxel_size_m: float
+    wall_m: float
+    rooms: list[Rectangle] = field(default_factory=list)
+    doors: list[Rectangle] = field(default_factory=list)
+
+    @property
+    def whole(self) -> Rectangle:
+        """All its voxels."""
+        return Rectangle((0, 0), (self.solid.shape[0], self.solid.shape[1]))
+
+    @property
+    def wall(self) -> int:
+        """Voxels across a wall."""
+        return voxels(self.wall_m, self.voxel_size_m)
+
+    def put_wall(self, where: Rectangle) -> None:
+        """Make a rectangle solid."""
+        self.solid[where.window] = True
+
+    def cut_door(self, wall: Rectangle, axis: int, rng: np.random.Generator) -> None:
+        """Open a door somewhere in a piece of wall that runs along an axis.
+
+        The way through is kept clear as far as the door is wide, on both sides.
+        """
+        width = min(passage_voxels(DOOR_M, self.voxel_size_m), wall.extent(axis))
+        start = int(rng.integers(wall.low[axis], wall.high[axis] - width + 1))
+        door = wall.within(axis, start, start + width)
+        across = 1 - axis
+        way = door.within(across, max(0, door.low[across] - width), door.high[across] + width)
+        self.solid[door.window] = False
+        self.clear[way.window] = True
+        self.doors.append(door)
+
+
+def bare_plan(shape: tuple[int, ...], voxel_size_m: float, wall_m: float = WALL_M) -> Plan:
+    """A plan (X, Y) without anything in it."""
+    return Plan(np.zeros(shape[:2], bool), np.zeros(shape[:2], bool), voxel_size_m, wall_m)
+
+
+def voxels(length_m: float, voxel_size_m: float) -> int:
+    """A length in whole voxels, at least one."""
+    return max(1, round(length_m / voxel_size_m))
+
+
+def passage_voxels(width_m: float, voxel_size_m: float, body_radius_m: float = BODY_RADIUS_M) -> int:
+    """Voxels across a passage: at least its width, and at least what the body needs between two walls."""
+    needed = 2 * max(0, math.ceil(body_radius_m / voxel_size_m - 0.5 - 1e-9)) + 1
+    return max(math.ceil(width_m / voxel_size_m - 1e-9), needed)
+
+
+def require_size(grid: Grid, kind: str, *edges_m: float) -> None:
+    """A workspace at least so long along its edges, the longest first, and high enough for a body.
+
+    Raises:
+        WorldError: It is smaller.
+    """
+    found = sorted(grid.size_m[:2], reverse=True)
+    low = not grid.flat and grid.shape[2] < passage_voxels(0.0, grid.voxel_size_m)
+    if low or any(have < want - 1e-9 for have, want in zip(found, edges_m, strict=True)):
+        room = " × ".join(f"{edge:g}" for edge in edges_m)
+        high = f", 2-D or {2 * BODY_RADIUS_M:g} m high" if low else ""
+        raise WorldError("Grid.shape", grid.shape, f"at least {room} m for {kind}{high}")
+
+
+def divided(low: int, high: int, part: float, gap: int, rng: np.random.Generator) -> list[tuple[int, int]]:
+    """An interval cut into parts of about the same length, a gap between each two.
+
+    Args:
+        low: First voxel.
+        high: Voxel after the last.
+        part: Wanted length of a part.
+        gap: Voxels between two parts.
+        rng: Moves each cut by up to a fifth of a part.
+
+    Returns:
+        The parts, (low, high) each.
+    """
+    count = max(1, round((high - low + gap) / (part + gap)))
+    length = (high - low + gap) / count
+    cuts = [low + round((i + rng.uniform(-0.2, 0.2)) * length) for i in range(1, count)]
+    lows = [low, *cuts]
+    return list(zip(lows, [cut - gap for cut in [*cuts, high + gap]], strict=True))
+
+
+def put_rooms(
+    plan: Plan, band: Rectangle, axis: int, doors_high: bool, room_m: float, rng: np.random.Generator
+) -> None:
+    """Rooms side by side in a band beside a corridor, each with a door to it, some with one between them.
+
+    Args:
+        plan: Changed in place.
+        band: Where; with the wall between the rooms and the corridor.
+        axis: The corridor's direction.
+        doors_high: Whether the corridor is at the band's high side.
+        room_m: About the width of a room.
+        rng: Draws walls and doors.
+    """
+    across, wall = 1 - axis, plan.wall
+    low, high = band.low[across], band.high[across]
+    edge = band.within(across, high - wall, high) if doors_high else band.within(across, low, low + wall)
+    inside = band.within(across, low, high - wall) if doors_high else band.within(across, low + wall, high)
+    plan.put_wall(edge)
+    parts = divided(band.low[axis], band.high[axis], room_m / plan.voxel_size_m, wall, rng)
+    for number, (start, end) in enumerate(parts):
+        plan.rooms.append(inside.within(axis, start, end))
+        plan.cut_door(edge.within(axis, start, end), axis, rng)
+        if number + 1 < len(parts):
+            between = inside.within(axis, end, end + wall)
+            plan.put_wall(between)
+            if rng.random() < _CONNECTING_DOORS:
+                plan.cut_door(between, across, rng)
+
+
+def extruded(grid: Grid, solid: np.ndarray, doors: Sequence[Rectangle] = ()) -> np.ndarray:
+    """A plan raised to the height of the grid; above doors, from `DOOR_HEIGHT_M` on, there is wall.
+
+    Args:
+        grid: The workspace.
+        solid: (X, Y) bool.
+        doors: Openings.
+
+    Returns:
+        (X, Y, Z) bool.
+    """
+    occupied = np.repeat(solid[:, :, None], grid.shape[2], axis=2)
+    if not grid.flat:
+        top = passage_voxels(DOOR_HEIGHT_M, grid.voxel_size_m)
+        for door in doors:
+            occupied[(*door.window, slice(top, None))] = True
+    return occupied

@@ -1,0 +1,63 @@
+"""The scenarios that are too large for whole episodes: each is made by its id, starts and steps."""
+
+from __future__ import annotations
+
+import gymnasium
+import numpy as np
+import pettingzoo
+import pytest
+
+from entropy_explore_env import SCENARIOS, EntropyExploreEnv, environment_id, parallel_env
+from entropy_explore_env.worlds.recipes.catalogue import RECIPES
+from tests.reference.scenes import SMALL
+
+LARGE = [name for name in SCENARIOS if name not in SMALL]
+
+
+def test_small_scenarios_are_scenarios_and_every_recipe_has_one():
+    assert set(SMALL) < set(SCENARIOS)
+    assert {scenario.world for scenario in SCENARIOS.values()} == set(RECIPES)
+    assert all(name == scenario.name for name, scenario in SCENARIOS.items())
+
+
+@pytest.mark.parametrize("name", LARGE)
+def test_teams_start_and_gather_bits(name):
+    env = pettingzoo.make("parallel", environment_id(name), max_cycles=25)
+    assert isinstance(env, EntropyExploreEnv)
+    observations, _ = env.reset(seed=1)
+    scenario, world = env.scenario, env.missions.worlds[0]
+    assert world.name == scenario.world
+    assert world is not None
+    layout = world.layout(scenario)
+    rng, infos, gained = np.random.default_rng(0), {}, 0.0
+    while env.agents:
+        actions = {agent: rng.uniform(-1, 1, env.action_space(agent).shape) for agent in env.agents}
+        actions = {agent: action.astype(np.float32) for agent, action in actions.items()}
+        observations, *_, infos = env.step(actions)
+        for agent, observation in observations.items():
+            assert env.observation_space(agent).contains(observation)
+        gained += sum(info["own_bits"] for info in infos.values())
+    assert len(infos) == scenario.robots and gained > 0.0
+    for agent in infos:
+        place = tuple(scenario.grid.voxel_of(env.view(agent).pose[:3]))
+        assert not layout.blocked[place], f"{agent} is where its body does not fit"
+
+
+@pytest.mark.parametrize("name", LARGE)
+def test_one_robot_chooses_discrete_actions_under_gymnasium(name):
+    env = gymnasium.make(environment_id(name), action={"kind": "discrete"}, max_cycles=4)
+    _, info = env.reset(seed=2)
+    env.action_space.seed(0)
+    for _ in range(4):
+        *_, truncated, info = env.step(env.action_space.sample(mask=info["action_mask"]))
+    assert truncated
+    env.close()
+
+
+def test_splits_reach_the_environment():
+    seen = set()
+    for split in ("train", "validation", "test"):
+        env = parallel_env("bhattacharya-office", split=split)
+        env.reset(seed=0)
+        seen.add(env.missions.worlds[0].occupied.tobytes())
+    assert len(seen) == 3
