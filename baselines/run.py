@@ -27,8 +27,9 @@ from entropy_explore_env.errors import SettingError
 from entropy_explore_env.reports.animation import animate
 from entropy_explore_env.reports.metrics import mission_figures
 from entropy_explore_env.reports.painting import Painter, remaining_share
-from entropy_explore_env.reports.recording import Recorder, write_atomically
+from entropy_explore_env.reports.recording import Recorder
 from entropy_explore_env.scenarios import ROOM, find_scenario
+from entropy_explore_env.writing import write_atomically
 
 _GIF_FRAMES = 50
 _GIF_FRAME_S = 0.1

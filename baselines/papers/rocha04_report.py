@@ -23,8 +23,8 @@ from baselines.figures import COLOURS, STYLE, png
 from baselines.papers.rocha04_cells import BURSTS, CHANGES, I_MINS, STANDARD, TEAMS, team_id
 from baselines.papers.rocha04_claims import PAPER_STARTS, PAPER_T_MISSION_S, Records, times
 from entropy_explore_env.config import Scenario
-from entropy_explore_env.reports.recording import write_atomically
 from entropy_explore_env.scenarios import ROOM
+from entropy_explore_env.writing import write_atomically
 
 
 def write_report(folder: Path, records: Records, claims: Sequence[Claim], command: str) -> Path:
