@@ -36,6 +36,7 @@ NEEDS = (("yaml", "pyyaml"), ("PIL.Image", "pillow"))
 MAX_YAML_BYTES = 1 << 16
 MODES = ("trinary", "scale", "raw")
 _HALF_PERCENT = 50.0
+_MAX_DEPTH = 4
 
 
 def read(path: Path, options: Options) -> Voxels:
@@ -91,9 +92,11 @@ def _about(path: Path) -> dict[str, Any]:
     data = content(path)
     if len(data) > MAX_YAML_BYTES:
         raise RefusedError(f"a YAML of at most {MAX_YAML_BYTES} bytes")
+    depth = 0
     for event in yaml.parse(data, Loader=yaml.SafeLoader):
-        if isinstance(event, yaml.AliasEvent) or getattr(event, "tag", None):
-            raise RefusedError("a YAML without aliases and tags")
+        depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
+        if isinstance(event, yaml.AliasEvent) or getattr(event, "tag", None) or depth > _MAX_DEPTH:
+            raise RefusedError("a YAML without aliases and tags, and of little depth")
     about = yaml.safe_load(data)
     if not isinstance(about, dict):
         raise RefusedError("a YAML of map_server")
