@@ -62,8 +62,13 @@ def opened(path: Path) -> Any:  # noqa: ANN401 - Pillow is not imported at the t
     return picture.convert("L") if picture.mode == "1" else picture
 
 
-def shades_of(picture: Any) -> tuple[np.ndarray, np.ndarray]:  # noqa: ANN401
-    """Mean of each pixel's colours and its opacity, both (rows, columns) float32 in [0, 255]."""
+def shades_of(picture: Any, with_opacity: bool = False) -> tuple[np.ndarray, np.ndarray]:  # noqa: ANN401
+    """Mean of each pixel's colours and its opacity, both (rows, columns) float32 in [0, 255].
+
+    Args:
+        picture: From `opened`.
+        with_opacity: Where the image has opacities, the mean is over them too.
+    """
     pixels = np.asarray(picture)
     if pixels.ndim == 2:
         deep = picture.mode.startswith("I")
@@ -75,6 +80,8 @@ def shades_of(picture: Any) -> tuple[np.ndarray, np.ndarray]:  # noqa: ANN401
     for channel in range(colours):
         shades += pixels[:, :, channel]
     opacity = pixels[:, :, -1].astype(np.float32) if transparent else np.broadcast_to(_WHITE, shades.shape)
+    if transparent and with_opacity:
+        return (shades + opacity) / np.float32(colours + 1), opacity
     return shades / np.float32(colours), opacity
 
 

@@ -54,7 +54,7 @@ def read(path: Path, options: Options) -> Voxels:
     if not isinstance(negate, bool | int) or negate not in (0, 1):
         raise RefusedError("a map whose negate is 0 or 1")
     x, y, yaw = _origin(about)
-    shades, opacity = shades_of(opened(_image(path, about)))
+    shades, opacity = shades_of(opened(_image(path, about)), with_opacity=mode == "trinary")
     labels = labels_of(shades, opacity, mode, bool(negate), free, occupied)
     return Voxels(from_rows(labels)[:, :, None], resolution, (x, y, 0.0), yaw)
 

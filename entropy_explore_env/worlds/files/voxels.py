@@ -19,7 +19,7 @@ from entropy_explore_env.errors import SettingError
 UNKNOWN, FREE, SOLID = -1, 0, 1
 """Labels of voxels."""
 MAX_FILE_BYTES = 256 << 20
-MAX_FILE_VOXELS = 200_000_000
+MAX_FILE_VOXELS = 130_000_000
 """Voxels of one file, at its own resolution or at the one asked for."""
 
 
