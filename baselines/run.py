@@ -49,7 +49,7 @@ class Args:
     seed: int = 0
     """Of the world, the starts and every other draw."""
     world: str | None = None
-    """An OctoMap file (*.bt) in place of the scenario's world."""
+    """A world file in place of the scenario's world; entropy_explore_env.worlds lists the kinds."""
     voxel_size_m: float | None = None
     """Resample the world file's voxels to this size; default: the scenario's."""
     out: Path | None = None

@@ -60,16 +60,10 @@ def points(count=60):
 
 
 def pcd(encoding):
-    import pypcd4
+    from pypcd4.pypcd4 import Encoding, PointCloud
 
-    cloud = pypcd4.PointCloud.from_xyz_points(points())
     buffer = io.BytesIO()
-    cloud._save_as_fileobj(buffer, pypcd4.Encoding(encoding)) if hasattr(cloud, "_save_as_fileobj") else None
-    if not buffer.getvalue():
-        with tempfile.TemporaryDirectory() as folder:
-            path = Path(folder) / "cloud.pcd"
-            cloud.save(path, pypcd4.Encoding(encoding))
-            return path.read_bytes()
+    PointCloud.from_xyz_points(points()).save(buffer, Encoding(encoding))
     return buffer.getvalue()
 
 

@@ -36,7 +36,7 @@ def read(path: Path, options: Options) -> Voxels:
     import trimesh
 
     kind = path.suffix.lower()[1:]
-    extra = {"skip_materials": True} if kind in ("obj", "glb") else {}
+    extra: dict[str, Any] = {"skip_materials": True} if kind in ("obj", "glb") else {}
     scene = trimesh.load_scene(io.BytesIO(content(path)), file_type=kind, **extra)
     mesh = scene.to_mesh()
     if len(mesh.faces) == 0:
