@@ -25,7 +25,8 @@ from baselines.strategies import make_strategy
 from entropy_explore_env.config import Scenario
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.reports.metrics import mission_figures
-from entropy_explore_env.reports.recording import Recorder, write_atomically
+from entropy_explore_env.reports.recording import Recorder
+from entropy_explore_env.writing import write_atomically
 
 _SERIES_POINTS = 200
 _MISSIONS_A_TASK = 5

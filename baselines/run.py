@@ -27,8 +27,9 @@ from entropy_explore_env.errors import SettingError
 from entropy_explore_env.reports.animation import animate
 from entropy_explore_env.reports.metrics import mission_figures
 from entropy_explore_env.reports.painting import Painter, remaining_share
-from entropy_explore_env.reports.recording import Recorder, write_atomically
+from entropy_explore_env.reports.recording import Recorder
 from entropy_explore_env.scenarios import ROOM, find_scenario
+from entropy_explore_env.writing import write_atomically
 
 _GIF_FRAMES = 50
 _GIF_FRAME_S = 0.1
@@ -50,7 +51,7 @@ class Args:
     seed: int = 0
     """Of the world, the starts and every other draw."""
     world: str | None = None
-    """An OctoMap file (*.bt) in place of the scenario's world."""
+    """A world file in place of the scenario's world; entropy_explore_env.worlds lists the kinds."""
     voxel_size_m: float | None = None
     """Resample the world file's voxels to this size; default: the scenario's."""
     out: Path | None = None

@@ -23,7 +23,7 @@ from benchmarks.rows import FULL, QUICK, Effort, Row
 from benchmarks.startup import startup_rows
 from benchmarks.stepping import profile_rows, spread_rows, vector_rows
 from entropy_explore_env.errors import SettingError
-from entropy_explore_env.reports.recording import write_atomically
+from entropy_explore_env.writing import write_atomically
 
 GOAL_MISSED = 1
 JOBS: tuple[tuple[str, Callable[[Effort], list[Row]]], ...] = (

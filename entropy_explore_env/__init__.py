@@ -47,7 +47,7 @@ from entropy_explore_env.missions.view import RobotView  # noqa: E402
 from entropy_explore_env.robots.channel import Delivery  # noqa: E402
 from entropy_explore_env.robots.motion import MoveEnd  # noqa: E402
 from entropy_explore_env.scenarios import SCENARIOS, find_scenario  # noqa: E402
-from entropy_explore_env.worlds.files import load_octomap  # noqa: E402
+from entropy_explore_env.worlds.load import load_octomap, load_world, save_world  # noqa: E402
 from entropy_explore_env.worlds.world import World  # noqa: E402
 
 __version__ = "0.1.0"
@@ -81,7 +81,9 @@ __all__ = [
     "env",
     "find_scenario",
     "load_octomap",
+    "load_world",
     "parallel_env",
+    "save_world",
     "with_settings",
 ]
 

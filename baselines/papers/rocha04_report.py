@@ -22,8 +22,8 @@ from baselines.papers.rocha04_cells import BURSTS, CHANGES, I_MINS, RIVALS, STAN
 from baselines.papers.rocha04_claims import PAPER_STARTS, Records, times
 from baselines.papers.rocha04_figures import figure_3, figure_4, figure_shared, figure_time
 from entropy_explore_env.config import Scenario
-from entropy_explore_env.reports.recording import write_atomically
 from entropy_explore_env.scenarios import ROOM
+from entropy_explore_env.writing import write_atomically
 
 _NEAR_M = 1.0
 """A scan whose mean distance is shorter looks at a wall nearby."""

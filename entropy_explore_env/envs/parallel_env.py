@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 from gymnasium import spaces
-from pettingzoo import AECEnv, ParallelEnv
+from pettingzoo import ParallelEnv
 from pettingzoo.utils import OrderEnforcingWrapper
 from pettingzoo.utils.conversions import parallel_to_aec_wrapper
 
@@ -252,6 +252,6 @@ class TurnTakingEnv(OrderEnforcingWrapper[str, Any, Any]):
 
 def env(
     scenario: str | Scenario = "room", render_mode: str | None = None, **settings: object
-) -> AECEnv[str, Any, Any]:
+) -> TurnTakingEnv:
     """The same as an AECEnv: robots act in turn, and the step is taken when all have."""
     return TurnTakingEnv(parallel_env(scenario, render_mode, **settings))

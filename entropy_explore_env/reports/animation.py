@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from entropy_explore_env.errors import MissingExtraError, SettingError
-from entropy_explore_env.reports.recording import write_atomically
+from entropy_explore_env.writing import write_atomically
 
 COLOUR_CODES = 1 << 15
 """Colours are counted to 5 bits a channel: no eye sees the difference, and ours fit into one palette."""

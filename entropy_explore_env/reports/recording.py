@@ -1,36 +1,10 @@
-"""A mission as it went: time series noted step by step, and files that are whole or not there."""
+"""A mission as it went: time series noted step by step."""
 
 from __future__ import annotations
-
-import os
-import tempfile
-from pathlib import Path
 
 import numpy as np
 
 from entropy_explore_env.missions.missions import Missions
-
-
-def write_atomically(path: Path, content: bytes | str) -> None:
-    """Write a file so that it is there whole or not at all: temporary file, fsync, rename.
-
-    Args:
-        path: Where; its folder is made if it is missing.
-        content: What; text is written as UTF-8.
-    """
-    path.parent.mkdir(parents=True, exist_ok=True)
-    data = content.encode() if isinstance(content, str) else content
-    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-    try:
-        with os.fdopen(handle, "wb") as file:
-            file.write(data)
-            file.flush()
-            os.fsync(file.fileno())
-        Path(temporary).chmod(0o644)
-        Path(temporary).replace(path)
-    except BaseException:
-        Path(temporary).unlink(missing_ok=True)
-        raise
 
 
 class Recorder:

@@ -3,19 +3,170 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from functools import lru_cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from entropy_explore_env.config import Scenario
-from entropy_explore_env.errors import SettingError
-from entropy_explore_env.validation import is_whole
-from entropy_explore_env.worlds.files import load_octomap
+from entropy_explore_env.config import Grid, Scenario
+from entropy_explore_env.errors import SettingError, WorldError
+from entropy_explore_env.validation import is_number, is_whole
+from entropy_explore_env.worlds.files.archives import saved
+from entropy_explore_env.worlds.files.jacksboro import NAME as JACKSBORO
+from entropy_explore_env.worlds.files.process import Format, read_apart
+from entropy_explore_env.worlds.files.resampling import extruded, resampled
+from entropy_explore_env.worlds.files.voxels import MAX_FILE_VOXELS, RefusedError, Voxels
 from entropy_explore_env.worlds.recipes.catalogue import RECIPES
 from entropy_explore_env.worlds.recipes.empty import empty
 from entropy_explore_env.worlds.splits import draw_world_number, world_generator
 from entropy_explore_env.worlds.world import World
+from entropy_explore_env.writing import write_atomically
+
+_OCTOMAP = Format("octomap_tree", "OctoMap tree")
+_MAP_SERVER = Format("map_server", "YAML of map_server with its image")
+_IMAGE = Format("images", "PNG or PGM image")
+_GEOTIFF = Format("geotiff", "GeoTIFF height map")
+_MESH = Format("meshes", "mesh")
+_JACKSBORO = Format("jacksboro", "elevation model")
+FORMATS = {
+    ".bt": _OCTOMAP,
+    ".ot": _OCTOMAP,
+    ".yaml": _MAP_SERVER,
+    ".yml": _MAP_SERVER,
+    ".png": _IMAGE,
+    ".pgm": _IMAGE,
+    ".pcd": Format("point_clouds", "PCD point cloud"),
+    ".ply": _MESH,
+    ".obj": _MESH,
+    ".stl": _MESH,
+    ".glb": _MESH,
+    ".npz": Format("archives", "NumPy archive with a world or a height map"),
+    ".tif": _GEOTIFF,
+    ".tiff": _GEOTIFF,
+}
+"""How a file is read, by its suffix, whatever its case."""
+
+
+def load_world(
+    path: Path | str,
+    voxel_size_m: float | None = None,
+    height_m: float | None = None,
+    *,
+    resolution_m: float | None = None,
+    negate: bool | None = None,
+    elevation_step_m: float | None = None,
+    clearance_m: float | None = None,
+    ceiling_m: float | None = None,
+    fill: bool | None = None,
+    read_limit_s: float | None = None,
+) -> World:
+    """The world in a file; its voxels lie in the file's frame, in metres. Unknown space is solid.
+
+    By suffix: OctoMap (`.bt`, `.ot`), map_server (`.yaml`, `.yml`), plans as images and 16-bit height maps
+    (`.png`, `.pgm`), point clouds (`.pcd`, `.ply`), meshes (`.obj`, `.stl`, `.glb`, `.ply`), height maps
+    (`.npz`, `.tif`, `.tiff`), worlds of `save_world` (`.npz`); and matplotlib's elevation model by the name
+    `jacksboro`. What each means is said in its file in `worlds/files`. A setting that means nothing for a
+    file is refused.
+
+    Args:
+        path: The file, or `jacksboro`.
+        voxel_size_m: Edge of the voxels wanted; None = the file's own, which clouds and meshes do not have.
+            Where voxels are resampled, one is free if at least half of it is known to be free and less than
+            a quarter of it is occupied, so that thin walls stay.
+        height_m: Plans are extruded to this height; None = they stay 2-D.
+        resolution_m: Edge of an image's pixel (None = 0.05); spacing of a height map that does not say it.
+        negate: Images: what is bright is solid.
+        elevation_step_m: 16-bit images: height of one count; None = 1.
+        clearance_m: Height maps: sky above the highest ground (None = 5 voxels, or up to the ceiling);
+            meshes: free space around them (None = none).
+        ceiling_m: Height maps: the exposure surface above the ground (World.ceiling); None = none.
+        fill: Meshes: make solid what the surface shuts in; None = yes.
+        read_limit_s: Seconds of computing that reading may take; None = 1.5, and 20 more for each MiB.
+
+    Raises:
+        WorldError: The file is missing, too large, broken, of no known kind or has no free space.
+        SettingError: A setting is out of its range, missing, or means nothing for this file.
+        MissingExtraError: The package that reads this format is not installed.
+    """
+    options = {
+        "voxel_size_m": voxel_size_m,
+        "resolution_m": resolution_m,
+        "negate": negate,
+        "elevation_step_m": elevation_step_m,
+        "clearance_m": clearance_m,
+        "ceiling_m": ceiling_m,
+        "fill": fill,
+    }
+    _check({**options, "height_m": height_m, "read_limit_s": read_limit_s})
+    if str(path) == JACKSBORO:
+        return _world(read_apart(_JACKSBORO, JACKSBORO, options, read_limit_s), JACKSBORO, options, height_m)
+    path = Path(path)
+    form = FORMATS.get(path.suffix.lower())
+    if form is None:
+        raise WorldError("world file", str(path), "a file of one of the kinds " + " ".join(FORMATS))
+    return _world(read_apart(form, path.absolute(), options, read_limit_s), str(path), options, height_m)
+
+
+def load_octomap(path: Path | str, voxel_size_m: float | None = None) -> World:
+    """The world in an OctoMap tree, whatever its suffix; see `load_world`."""
+    _check({"voxel_size_m": voxel_size_m})
+    options = {"voxel_size_m": voxel_size_m}
+    return _world(read_apart(_OCTOMAP, Path(path).absolute(), options), str(path), options, None)
+
+
+def save_world(world: World, path: Path) -> None:
+    """Write a world to an `.npz` that `load_world` gives back without loss.
+
+    Raises:
+        OSError: The file cannot be written.
+    """
+    voxels = Voxels(
+        world.occupied.view(np.int8),
+        world.grid.voxel_size_m,
+        world.grid.origin_m,
+        world.yaw_rad,
+        world.ceiling,
+        world.name,
+    )
+    write_atomically(path, saved(voxels))
+
+
+def _check(options: dict[str, Any]) -> None:
+    """Numbers are > 0 and finite, flags are flags."""
+    for name, value in options.items():
+        if value is None:
+            continue
+        if name in ("negate", "fill"):
+            if not isinstance(value, bool):
+                raise SettingError(name, value, "True or False")
+        elif not is_number(value) or not 0 < value < math.inf:
+            raise SettingError(name, value, "a number > 0")
+        else:
+            options[name] = float(value)
+
+
+def _world(voxels: Voxels, path: str, options: dict[str, Any], height_m: float | None) -> World:
+    """The world of a file's voxels, resampled and extruded."""
+    size_m = options["voxel_size_m"] or voxels.voxel_size_m
+    try:
+        solid, ceiling = resampled(voxels, size_m)
+    except RefusedError as error:
+        raise WorldError("voxel_size_m", size_m, str(error)) from None
+    if solid.all():
+        raise WorldError("world file", path, "a map with free space at this voxel size")
+    if height_m is not None:
+        if solid.shape[2] != 1:
+            raise SettingError("height_m", height_m, "None: the file's world is 3-D already")
+        layers = round(height_m / size_m)
+        most = MAX_FILE_VOXELS // solid.size
+        if not 2 <= layers <= most:
+            raise SettingError("height_m", height_m, f"from 2 to {most} voxels of {size_m} m")
+        solid = extruded(solid, layers)
+    shape = (int(solid.shape[0]), int(solid.shape[1]), int(solid.shape[2]))
+    grid = Grid(shape, float(size_m), voxels.origin_m)
+    return World(grid, solid, voxels.name or Path(path).stem, ceiling, voxels.yaw_rad)
 
 
 def make_world(scenario: Scenario, rng: np.random.Generator) -> World:
@@ -65,22 +216,24 @@ def world_from_file(path: Path, voxel_size_m: float) -> World:
     """The world in a file, its voxels resampled; kept, so that many missions read it once.
 
     Args:
-        path: An OctoMap binary tree, `.bt`.
+        path: As for `load_world`.
         voxel_size_m: Edge of the voxels wanted.
 
     Raises:
         SettingError: The file's kind is not known.
         WorldError: It cannot be read.
     """
-    if path.suffix != ".bt":
-        known = "a recipe (" + ", ".join(RECIPES) + ") or an OctoMap file (*.bt)"
-        raise SettingError("Scenario.world", str(path), known)
-    return _octomap(path.resolve(), voxel_size_m)
+    if str(path) != JACKSBORO and path.suffix.lower() not in FORMATS:
+        files = ", ".join(f"*{suffix}" for suffix in FORMATS)
+        raise SettingError(
+            "Scenario.world", str(path), f"a recipe ({', '.join(RECIPES)}) or a file ({files})"
+        )
+    return _kept_world(path if str(path) == JACKSBORO else path.resolve(), voxel_size_m)
 
 
 @lru_cache(maxsize=4)
-def _octomap(path: Path, voxel_size_m: float) -> World:
-    return load_octomap(path, voxel_size_m)
+def _kept_world(path: Path, voxel_size_m: float) -> World:
+    return load_world(path, voxel_size_m)
 
 
 def with_world(scenario: Scenario) -> Scenario:

@@ -372,9 +372,9 @@ def test_a_reset_of_other_missions_leaves_the_picture_of_the_first() -> None:
     env.reset(seed=0)
     for actions in some_actions(env, 5):
         env.step(actions)
-    before = env.render()
+    before: Any = env.render()
     env.reset(options={"reset_mask": np.array([False, True])})
-    after = env.render()
+    after: Any = env.render()
     np.testing.assert_array_equal(after[0], before[0])
     assert (after[1] != before[1]).any()
 
@@ -442,7 +442,7 @@ def test_each_mission_has_a_picture_and_the_window_shows_the_first() -> None:
     alone = gymnasium.make(environment_id(BOX), render_mode="rgb_array")
     env.reset(seed=0)
     alone.reset(seed=0)
-    pictures = env.render()
+    pictures: Any = env.render()
     assert isinstance(pictures, tuple) and len(pictures) == 2
     assert all(picture.shape == (480, 640, 3) and picture.dtype == np.uint8 for picture in pictures)
     np.testing.assert_array_equal(pictures[0], alone.render())  # type: ignore[arg-type]

@@ -1,76 +1,102 @@
-"""Which world a scenario asks for: made by a recipe, from a world number, or read from a file."""
+"""Which file is read how: suffixes, settings, and every real world at hand."""
 
 from __future__ import annotations
+
+import math
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+import entropy_explore_env
 from entropy_explore_env.errors import SettingError, WorldError
-from entropy_explore_env.missions.missions import Missions
-from entropy_explore_env.randomness import Stream, generator
-from entropy_explore_env.scenarios import BOX, ROOM_FURNISHED
-from entropy_explore_env.worlds.load import make_world, with_world, world_from_file, world_with_number
-from entropy_explore_env.worlds.splits import draw_world_number
+from entropy_explore_env.worlds.files.process import kept_reader
+from entropy_explore_env.worlds.load import FORMATS, load_world, with_world, world_from_file
 from tests.reference.scenes import free_box
+from tests.worlds.samples import npz, pgm, plan, samples
+
+REAL = Path(__file__).parents[2].parent / "shared" / "worlds"
+FILES = sorted(path for path in REAL.rglob("*") if path.suffix in FORMATS) if REAL.exists() else []
 
 
-def rng(seed, episode=0):
-    return generator(seed, episode, Stream.WORLD)
+@pytest.mark.parametrize("loader", samples())
+def test_every_kind_of_file_is_a_world(tmp_path, loader):
+    with kept_reader():
+        for sample in samples()[loader]:
+            for name, data in sample.files.items():
+                (tmp_path / name).write_bytes(data)
+            path = tmp_path / next(iter(sample.files))
+            world = load_world(path, **sample.options)
+            assert 0 < world.occupied.mean() < 1
+            assert not world.occupied.flags.writeable
+            loud = path.with_suffix(path.suffix.upper())
+            path.rename(loud)
+            np.testing.assert_array_equal(load_world(str(loud), **sample.options).occupied, world.occupied)
 
 
-def test_seed_and_episode_determine_the_world_by_its_number():
-    worlds = {}
-    for seed, episode in ((5, 0), (5, 1), (6, 0)):
-        first, second = (make_world(ROOM_FURNISHED, rng(seed, episode)) for _ in range(2))
-        np.testing.assert_array_equal(first.occupied, second.occupied)
-        assert first.grid == ROOM_FURNISHED.grid
-        numbered = world_with_number(ROOM_FURNISHED, draw_world_number("train", rng(seed, episode)))
-        np.testing.assert_array_equal(first.occupied, numbered.occupied)
-        worlds[first.occupied.tobytes()] = seed, episode
-    assert len(worlds) == 3
+def test_public_names():
+    assert entropy_explore_env.load_world is load_world
+    assert {"load_world", "save_world", "load_octomap"} <= set(entropy_explore_env.__all__)
 
 
-def test_missions_of_one_seed_are_in_one_world_and_those_of_another_split_are_not():
-    def occupied(split):
-        missions = Missions(free_box(world="furnished", split=split), 2)
-        missions.reset(0, seed=3)
-        missions.reset(1, seed=3)
-        missions.reset(1)
-        return [world.occupied.tobytes() for world in missions.worlds]
-
-    assert occupied("test") == occupied("test")
-    first, second = occupied("test")
-    assert first != second
-    assert len({first, second, *occupied("train"), *occupied("validation")}) == 6
+@pytest.mark.parametrize("name", ["castle", "castle.docx", "castle.las", "castle.bt.zip", ""])
+def test_a_suffix_that_nobody_knows_is_refused(name):
+    with pytest.raises(WorldError, match=r"\.bt \.ot \.yaml"):
+        load_world(name)
 
 
-def test_an_empty_world_is_shared_by_all_missions():
-    assert make_world(BOX, rng(0)) is make_world(BOX, rng(1))
-    assert make_world(BOX, rng(0)).grid == BOX.grid
+@pytest.mark.parametrize(
+    ("setting", "value"),
+    [
+        ("voxel_size_m", 0.0),
+        ("voxel_size_m", "1"),
+        ("height_m", -1.0),
+        ("resolution_m", math.nan),
+        ("ceiling_m", math.inf),
+        ("clearance_m", 0),
+        ("read_limit_s", True),
+        ("negate", 1),
+        ("fill", "no"),
+    ],
+)
+def test_settings_out_of_range_are_refused_before_anything_is_read(setting, value):
+    with pytest.raises(SettingError, match=rf"{setting} = .*: allowed is (a number > 0|True or False)"):
+        load_world("nowhere.png", **{setting: value})
 
 
-@pytest.mark.parametrize("name", ["castle", "castle.obj", "", "octomap"])
-def test_a_world_that_nobody_knows_is_refused(name):
-    scenario = free_box(world=name)
-    for ask in (lambda: make_world(scenario, rng(0)), lambda: with_world(scenario)):
-        with pytest.raises(SettingError, match=r"Scenario\.world = .*empty, furnished.*\.bt"):
-            ask()
-    with pytest.raises(SettingError, match=r"Scenario\.world = .*a recipe: empty, furnished"):
-        world_with_number(scenario, 0)
+def test_settings_that_mean_nothing_for_a_file_are_refused(tmp_path):
+    path = tmp_path / "plan.pgm"
+    path.write_bytes(pgm(plan()))
+    with pytest.raises(
+        SettingError, match=r"ceiling_m = 2\.0: allowed is None: it means nothing for PNG or PGM"
+    ):
+        load_world(path, ceiling_m=2.0)
+    hills = tmp_path / "hills.npz"
+    hills.write_bytes(npz(elevation=np.arange(12.0).reshape(3, 4)))
+    with pytest.raises(SettingError, match=r"height_m = 3\.0: allowed is None: the file's world is 3-D"):
+        load_world(hills, resolution_m=1.0, height_m=3.0)
 
 
-@pytest.mark.parametrize("number", [-1, 0.5, None, True, "7"])
-def test_a_world_number_that_is_none_is_refused(number):
-    with pytest.raises(SettingError, match=r"number = .*whole number"):
-        world_with_number(ROOM_FURNISHED, number)
+def test_a_scenario_takes_any_file_and_keeps_its_voxel_size(tmp_path):
+    path = tmp_path / "plan.pgm"
+    path.write_bytes(pgm(np.full((40, 60), 255, np.uint8)))  # 3 × 2 m
+    scenario = with_world(free_box(world=str(path)))
+    assert scenario.grid.voxel_size_m == 0.5
+    assert scenario.grid.shape == (6, 4, 1)
+    assert world_from_file(path, 0.5) is world_from_file(path, 0.5)  # read once
 
 
-def test_a_world_file_that_is_missing(tmp_path):
-    path = tmp_path / "nowhere.bt"
-    with pytest.raises(WorldError, match="allowed is a file that exists") as raised:
-        world_from_file(path, 0.5)
-    assert str(path) in str(raised.value)
-
-
-def test_a_recipe_leaves_the_scenario_s_grid_alone():
-    assert with_world(ROOM_FURNISHED) is ROOM_FURNISHED
+@pytest.mark.skipif(not FILES, reason=f"{REAL} is not here: it is no part of the project")
+def test_every_real_world_loads():
+    with kept_reader():
+        worlds = {path.name: load_world(path) for path in FILES}
+    assert len(worlds) == 18
+    assert worlds["warehouse.yaml"].grid.shape == (1006, 1674, 1)
+    assert worlds["warehouse.yaml"].grid.origin_m == (-15.1, -25.0, 0.0)
+    assert worlds["depot.yaml"].grid.voxel_size_m == 0.05
+    assert worlds["geb079.bt"].grid.shape == (487, 187, 39)
+    # floor of the dungeon, and the yellow start, are free; rock is not: counted in the image
+    assert (~worlds["1.png"].occupied).sum() == 65024 + 256
+    # (255 - 205)/255 = 0.196 is below depot's free_thresh: what was never seen is free there
+    assert worlds["depot.yaml"].occupied.sum() == 5947
+    assert (~worlds["tb3_sandbox.yaml"].occupied).sum() == 7903

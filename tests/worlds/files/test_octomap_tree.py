@@ -1,4 +1,4 @@
-"""Worlds from files: small OctoMaps of known voxels, broken files, a real corridor."""
+"""OctoMaps: small ones of known voxels, broken files, a real corridor."""
 
 from __future__ import annotations
 
@@ -11,9 +11,8 @@ import pytest
 from entropy_explore_env.errors import SettingError, WorldError
 from entropy_explore_env.missions.missions import Missions
 from entropy_explore_env.scenarios import BOX
-from entropy_explore_env.worlds import files
-from entropy_explore_env.worlds.files import load_octomap
-from entropy_explore_env.worlds.load import make_world, with_world
+from entropy_explore_env.worlds.files import process
+from entropy_explore_env.worlds.load import load_octomap, make_world, with_world
 from tests.reference.scenes import free_box, wander
 
 octomap = pytest.importorskip("octomap", reason="octomap-python is not installed")
@@ -23,7 +22,7 @@ SHAPE = (7, 11, 5)
 EDGE_M = 0.2
 LOW = np.array([-4, 3, -2])
 """Lower corner of the written voxels, in voxels from the map's origin."""
-CORRIDOR = Path(__file__).parents[2].parent / "shared" / "worlds" / "octomap" / "geb079.bt"
+CORRIDOR = Path(__file__).parents[3].parent / "shared" / "worlds" / "octomap" / "geb079.bt"
 
 
 def write(path, labels, edge_m=EDGE_M, low=LOW):
@@ -131,7 +130,7 @@ def test_missing_files_and_folders_are_refused(tmp_path):
 
 def test_files_too_large_are_refused_unread(tmp_path, monkeypatch):
     path = write(tmp_path / "room.bt", some_labels())
-    monkeypatch.setattr(files, "MAX_FILE_BYTES", 100)
+    monkeypatch.setattr(process, "MAX_FILE_BYTES", 100)
     assert "MiB" in refused(path).allowed
 
 

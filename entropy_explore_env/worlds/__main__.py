@@ -1,0 +1,148 @@
+"""List, draw and convert worlds: `python -m entropy_explore_env.worlds list | show | convert`.
+
+    list [FOLDER]                      scenarios and names, or the files of a folder that can be read
+    show NAME_OR_FILE --out world.png  a picture with metres
+    convert IN OUT.npz                 a world that loads fast and without loss
+
+Results go to standard output, errors in one line to standard error. Exit codes: 0 done, 2 bad input, 130
+interrupted.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NoReturn
+
+from entropy_explore_env.config import with_settings
+from entropy_explore_env.errors import EntropyExploreError, SettingError
+from entropy_explore_env.randomness import Stream, check_seed, generator
+from entropy_explore_env.scenarios import SCENARIOS
+from entropy_explore_env.worlds.files.jacksboro import NAME as JACKSBORO
+from entropy_explore_env.worlds.load import FORMATS, load_world, make_world, save_world
+from entropy_explore_env.worlds.pictures import picture
+from entropy_explore_env.worlds.recipes.catalogue import RECIPES
+from entropy_explore_env.worlds.world import World
+from entropy_explore_env.writing import write_atomically
+
+BAD_INPUT = 2
+INTERRUPTED = 130
+_METRES = {
+    "voxel-size-m": "edge of the voxels; default: the file's own",
+    "height-m": "extrude a plan to this height",
+    "resolution-m": "edge of an image's pixel, or spacing of a height map that does not say it",
+    "elevation-step-m": "height of one count of a 16-bit image",
+    "clearance-m": "free space above a height map, or around a mesh",
+    "ceiling-m": "height of the exposure surface above the ground of a height map",
+    "read-limit-s": "seconds of computing that reading may take",
+}
+"""Options of `load_world` that are numbers."""
+
+
+class _Parser(argparse.ArgumentParser):
+    """Says what is wrong in one line."""
+
+    def error(self, message: str) -> NoReturn:
+        raise SettingError("command", " ".join(sys.argv[1:]), f"what --help shows ({message})")
+
+
+def main(words: Sequence[str]) -> int:
+    """Run the command; the exit code."""
+    args = _parser().parse_args(words)
+    if args.command == "list":
+        _list(args.folder)
+        return 0
+    target: Path = args.out
+    suffix = ".png" if args.command == "show" else ".npz"
+    if target.suffix.lower() != suffix or target.is_dir():
+        raise SettingError("out", str(target), f"a file whose name ends in {suffix}")
+    world = _world(args)
+    if args.command == "show":
+        write_atomically(target, picture(world))
+    else:
+        save_world(world, target)
+    print(f"{target}: {_about(world)}")
+    return 0
+
+
+def _parser() -> argparse.ArgumentParser:
+    kind = argparse.RawDescriptionHelpFormatter
+    parser = _Parser(prog="python -m entropy_explore_env.worlds", description=__doc__, formatter_class=kind)
+    commands = parser.add_subparsers(dest="command", required=True)
+    listing = commands.add_parser("list", help="recipes, names and files")
+    listing.add_argument("folder", nargs="?", type=Path, help="list the files in it, and in folders in it")
+    show = commands.add_parser("show", help="draw a world")
+    show.add_argument("source", metavar="NAME_OR_FILE")
+    show.add_argument("--out", type=Path, required=True, help="a PNG")
+    convert = commands.add_parser("convert", help="save a world as .npz")
+    convert.add_argument("source", metavar="IN")
+    convert.add_argument("out", type=Path, metavar="OUT.npz")
+    for command in (show, convert):
+        for name, text in _METRES.items():
+            command.add_argument(f"--{name}", type=float, help=text)
+        command.add_argument("--negate", action="store_true", default=None, help="images: bright is solid")
+        command.add_argument("--hollow", action="store_true", help="meshes: do not fill what they shut in")
+        command.add_argument("--seed", type=int, default=0, help="scenarios: of the mission in this world")
+        command.add_argument("--split", default="train", help="scenarios: train, validation or test")
+    return parser
+
+
+def _list(folder: Path | None) -> None:
+    """Print what can be shown, a line each."""
+    if folder is None:
+        for name, scenario in SCENARIOS.items():
+            recipe = RECIPES[scenario.world]
+            print(f"{name}\tscenario\t{(recipe.__doc__ or '').splitlines()[0]}")
+        print(f"{JACKSBORO}\televation model\tcomes with matplotlib")
+        for suffix, form in FORMATS.items():
+            print(f"*{suffix}\tfile\t{form.kind}")
+        return
+    if not folder.is_dir():
+        raise SettingError("folder", str(folder), "a folder that exists")
+    for path in sorted(folder.rglob("*")):
+        form = FORMATS.get(path.suffix.lower())
+        if form is not None and path.is_file():
+            print(f"{path}\tfile\t{form.kind}")
+
+
+def _world(args: argparse.Namespace) -> World:
+    """The world that a name or a file stands for."""
+    given = {name.replace("-", "_"): getattr(args, name.replace("-", "_")) for name in _METRES}
+    if args.hollow:
+        given["fill"] = False
+    if args.negate:
+        given["negate"] = True
+    if args.source not in SCENARIOS:
+        return load_world(args.source, **given)
+    for name, value in given.items():
+        if value is not None:
+            raise SettingError(name, value, "not given for a scenario")
+    scenario = with_settings(SCENARIOS[args.source], {"split": args.split})
+    return make_world(scenario, generator(check_seed(args.seed), 0, Stream.WORLD))
+
+
+def _about(world: World) -> str:
+    x, y, z = world.grid.shape
+    free = 1.0 - float(world.occupied.mean())
+    return f"{x} × {y} × {z} voxels of {world.grid.voxel_size_m:.6g} m, {free:.1%} free"
+
+
+def run(words: Sequence[str] | None = None) -> int:
+    """The command as a process runs it: errors become one line and an exit code."""
+    try:
+        return main(sys.argv[1:] if words is None else words)
+    except EntropyExploreError as error:
+        print("error: " + " ".join(str(error).split()), file=sys.stderr)
+        return BAD_INPUT
+    except OSError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return BAD_INPUT
+    except KeyboardInterrupt:
+        print("interrupted", file=sys.stderr)
+        return INTERRUPTED
+
+
+if __name__ == "__main__":
+    sys.exit(run())

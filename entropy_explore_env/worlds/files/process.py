@@ -1,0 +1,228 @@
+"""Files are read in a process of their own, so that a broken one can only break that process.
+
+Most readers are other people's; a hostile file may crash them, keep them busy or make them eat memory. The
+process (`worker`) reads one file after another and is started anew when it has died; each file has limits in
+seconds of computing and in bytes. Usually it lives for one file; `kept_reader` keeps it for many.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import math
+import os
+import signal
+import subprocess
+import sys
+import threading
+from collections.abc import Iterator, Mapping
+from contextvars import ContextVar
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from entropy_explore_env.errors import MissingExtraError, SettingError, WorldError
+from entropy_explore_env.worlds.files.voxels import MAX_FILE_BYTES, MAX_FILE_VOXELS, Voxels
+
+MEMORY_BYTES = 384 << 20
+"""What a reader may take on top of the process's own 120 MiB at most; larger files get some more."""
+CPU_S = 1.5
+CPU_S_PER_MIB = 20.0
+"""Seconds of computing that a file may take, and more for each MiB of it."""
+_MEMORY_PER_BYTE = 16
+_PATIENCE = 10.0
+"""Seconds on the clock, in seconds of computing, after which a process that waits is given up."""
+_START_S = 60.0
+_HEADER_BYTES = 1 << 16
+_BOOT = """
+import json, sys, types
+sys.path[:], folder = json.loads(sys.argv[1])
+sys.dont_write_bytecode = True
+package = types.ModuleType("entropy_explore_env")  # in place of its __init__, which imports far more
+package.__path__ = [folder]
+sys.modules["entropy_explore_env"] = package
+from entropy_explore_env.worlds.files.worker import serve
+serve()
+"""
+
+
+class Format(NamedTuple):
+    """A kind of file: the module that reads it, and what it is called in errors."""
+
+    reader: str
+    kind: str
+
+
+class ReaderProcess:
+    """A process that reads files; started when it is first needed, and again after it has died.
+
+    Attributes:
+        cost: Of the latest answer, or None if the process died: `cpu_s`, seconds of computing since its
+            start, and `peak_kib`, the most memory that it has held.
+    """
+
+    def __init__(self) -> None:
+        """Nothing runs yet."""
+        self._process: subprocess.Popen[bytes] | None = None
+        self.cost: dict[str, float] | None = None
+
+    def read(
+        self, form: Format, path: Path | str, options: Mapping[str, Any], cpu_s: float | None = None
+    ) -> Voxels:
+        """The voxels in a file.
+
+        Args:
+            form: Which reader.
+            path: The file.
+            options: Settings for the reader; None = not given.
+            cpu_s: Seconds of computing allowed; None = by the file's size.
+
+        Raises:
+            WorldError: The file is missing, too large, broken, or takes too long.
+            SettingError: A setting is missing or means nothing for this format.
+            MissingExtraError: The package that reads it is not installed.
+        """
+        size = _size(path)
+        allowed_s = CPU_S + CPU_S_PER_MIB * size / (1 << 20) if cpu_s is None else cpu_s
+        request = {
+            "reader": form.reader,
+            "kind": form.kind,
+            "path": str(path),
+            "options": dict(options),
+            "cpu_s": allowed_s,
+            "memory_bytes": MEMORY_BYTES + _MEMORY_PER_BYTE * size,
+        }
+        process = self._running()
+        timer = threading.Timer(_START_S + _PATIENCE * allowed_s, process.kill)
+        timer.start()
+        try:
+            answer = _ask(process, request)
+        except BaseException:
+            self.close()
+            raise
+        finally:
+            timer.cancel()
+        if answer is None:
+            raise WorldError("world file", str(path), self._cause_of_death(form, allowed_s))
+        header, arrays = answer
+        self.cost = {"cpu_s": header["cpu_s"], "peak_kib": header["peak_kib"]}
+        _raise_error(header, form, path)
+        x, y, z = header["origin_m"]
+        ceiling = arrays[1] if len(arrays) > 1 else None
+        return Voxels(
+            arrays[0], header["voxel_size_m"], (x, y, z), header["yaw_rad"], ceiling, header["name"]
+        )
+
+    def close(self) -> None:
+        """End the process."""
+        process, self._process = self._process, None
+        if process is not None:
+            process.kill()
+            process.wait()
+            for pipe in (process.stdin, process.stdout):
+                with contextlib.suppress(OSError):
+                    pipe.close()  # type: ignore[union-attr]
+
+    def _running(self) -> subprocess.Popen[bytes]:
+        if self._process is None or self._process.poll() is not None:
+            self.close()
+            package = Path(__file__).parents[2]
+            about = json.dumps([[entry for entry in sys.path if entry], str(package)])
+            self._process = subprocess.Popen(
+                [sys.executable, "-I", "-c", _BOOT, about],
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.DEVNULL,
+                env={**os.environ, "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"},
+            )
+        return self._process
+
+    def _cause_of_death(self, form: Format, allowed_s: float) -> str:
+        """What a file would have to be for the process to live on."""
+        assert self._process is not None
+        code = self._process.wait()
+        self.close()
+        self.cost = None
+        slow = code in (-getattr(signal, "SIGPROF", 27), -getattr(signal, "SIGKILL", 9))
+        if slow:
+            return f"a file that is read within {allowed_s:.3g} s of computing (read_limit_s allows more)"
+        return f"a whole {form.kind}"
+
+
+def _size(path: Path | str) -> int:
+    """Bytes of a file, 0 for a name that is none.
+
+    Raises:
+        WorldError: It is missing or too large.
+    """
+    if isinstance(path, str):
+        return 0
+    if not path.is_file():
+        raise WorldError("world file", str(path), "a file that exists")
+    size = path.stat().st_size
+    if size > MAX_FILE_BYTES:
+        raise WorldError("world file", str(path), f"at most {MAX_FILE_BYTES >> 20} MiB")
+    return size
+
+
+def _ask(
+    process: subprocess.Popen[bytes], request: dict[str, Any]
+) -> tuple[dict[str, Any], list[np.ndarray]] | None:
+    """Header and arrays of the answer; None if the process died."""
+    assert process.stdin is not None and process.stdout is not None
+    try:
+        process.stdin.write(json.dumps(request).encode() + b"\n")
+        process.stdin.flush()
+    except OSError:
+        return None
+    line = process.stdout.readline(_HEADER_BYTES)
+    if not line.endswith(b"\n"):
+        process.kill()
+        return None
+    header, arrays = json.loads(line), []
+    for shape, dtype in zip(header.get("shapes", ()), (np.int8, np.int32), strict=False):
+        if math.prod(shape) > MAX_FILE_VOXELS:
+            process.kill()
+            return None
+        array = np.empty(shape, dtype)
+        if process.stdout.readinto(memoryview(array).cast("B")) != array.nbytes:  # type: ignore[attr-defined]
+            return None
+        arrays.append(array)
+    return header, arrays
+
+
+def _raise_error(header: dict[str, Any], form: Format, path: Path | str) -> None:
+    """Raise the error that an answer holds, if it holds one."""
+    if "refused" in header:
+        raise WorldError("world file", str(path), header["refused"] or f"a whole {form.kind}")
+    if "missing" in header:
+        raise MissingExtraError(*header["missing"])
+    if "setting" in header:
+        raise SettingError(*header["setting"])
+
+
+_KEPT: ContextVar[ReaderProcess | None] = ContextVar("_KEPT", default=None)
+
+
+@contextlib.contextmanager
+def kept_reader() -> Iterator[ReaderProcess]:
+    """Read all files inside this block in one process, which spares its start; yields that process."""
+    reader = ReaderProcess()
+    token = _KEPT.set(reader)
+    try:
+        yield reader
+    finally:
+        _KEPT.reset(token)
+        reader.close()
+
+
+def read_apart(
+    form: Format, path: Path | str, options: Mapping[str, Any], cpu_s: float | None = None
+) -> Voxels:
+    """As ReaderProcess.read, in the process that is kept or else in one for this file."""
+    kept = _KEPT.get()
+    if kept is not None:
+        return kept.read(form, path, options, cpu_s)
+    with kept_reader() as reader:
+        return reader.read(form, path, options, cpu_s)

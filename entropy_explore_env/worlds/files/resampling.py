@@ -1,0 +1,103 @@
+"""Voxels of another size, and plans extruded: which new voxels are solid, by volume. Thin walls stay."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from entropy_explore_env.compilation import lean_kernel
+from entropy_explore_env.worlds.files.voxels import FREE, SOLID, Voxels, checked_shape
+
+FREE_AT_LEAST = 0.5
+OCCUPIED_BELOW = 0.25
+_ROUNDING = 1e-9
+
+
+def resampled(voxels: Voxels, voxel_size_m: float | None) -> tuple[np.ndarray, np.ndarray | None]:
+    """Which voxels of a wanted size are solid, and the ceiling counted in them.
+
+    At the file's own size, all that is not known to be free is solid. Otherwise a voxel is free if at least
+    half of it is known to be free and less than a quarter of it is occupied. A plan stays one voxel high.
+
+    Args:
+        voxels: A file's content.
+        voxel_size_m: The size; None = the file's own.
+
+    Returns:
+        (X′, Y′, Z′) bool solid, and (X′, Y′) int32 ceiling or None: the lowest over each column, whole
+        voxels.
+
+    Raises:
+        RefusedError: Too many voxels.
+    """
+    if voxel_size_m is None or abs(voxel_size_m - voxels.voxel_size_m) < 1e-9 * voxels.voxel_size_m:
+        return voxels.labels != FREE, voxels.ceiling
+    scale = voxel_size_m / voxels.voxel_size_m
+    old = voxels.labels.shape
+    plan = old[2] == 1
+    extents = [n / scale for n in old]
+    shape = checked_shape([*extents[:2], 1.0 if plan else extents[2]])
+    solid = np.empty(shape, np.bool_)
+    _pool(np.ascontiguousarray(voxels.labels), (scale, scale, 1.0 if plan else scale), solid)
+    if voxels.ceiling is None:
+        return solid, None
+    ceiling = np.empty(shape[:2], np.int32)
+    _lower(voxels.ceiling, scale, old[2], shape[2], ceiling)
+    return solid, ceiling
+
+
+@lean_kernel
+def _pool(labels, scale, solid):
+    """Judge new voxels by the volumes of the old ones that they overlap.
+
+    Args:
+        labels: (X, Y, Z) int8.
+        scale: Edges of a new voxel in old ones, along x, y and z.
+        solid: (X′, Y′, Z′) bool; filled.
+    """
+    volume = scale[0] * scale[1] * scale[2]
+    for i in range(solid.shape[0]):
+        x_low, x_high = i * scale[0], (i + 1) * scale[0]
+        for j in range(solid.shape[1]):
+            y_low, y_high = j * scale[1], (j + 1) * scale[1]
+            for k in range(solid.shape[2]):
+                z_low, z_high = k * scale[2], (k + 1) * scale[2]
+                free, occupied = 0.0, 0.0
+                for x in range(int(x_low), min(labels.shape[0], math.ceil(x_high))):
+                    across = min(x_high, x + 1.0) - max(x_low, float(x))
+                    for y in range(int(y_low), min(labels.shape[1], math.ceil(y_high))):
+                        area = across * (min(y_high, y + 1.0) - max(y_low, float(y)))
+                        for z in range(int(z_low), min(labels.shape[2], math.ceil(z_high))):
+                            part = area * (min(z_high, z + 1.0) - max(z_low, float(z)))
+                            if labels[x, y, z] == FREE:
+                                free += part
+                            elif labels[x, y, z] == SOLID:
+                                occupied += part
+                is_free = free >= (FREE_AT_LEAST - _ROUNDING) * volume
+                solid[i, j, k] = not is_free or occupied >= (OCCUPIED_BELOW - _ROUNDING) * volume
+
+
+@lean_kernel
+def _lower(ceiling, scale, none, new_none, lowered):
+    """The lowest ceiling over each new column, in whole new voxels.
+
+    Args:
+        ceiling: (X, Y) int32 first closed layer; `none` = all are open.
+        scale: Edge of a new voxel in old ones.
+        none: Layers of the old voxels.
+        new_none: Layers of the new ones.
+        lowered: (X′, Y′) int32; filled.
+    """
+    for i in range(lowered.shape[0]):
+        for j in range(lowered.shape[1]):
+            lowest = none
+            for x in range(int(i * scale), min(ceiling.shape[0], math.ceil((i + 1) * scale))):
+                for y in range(int(j * scale), min(ceiling.shape[1], math.ceil((j + 1) * scale))):
+                    lowest = min(lowest, ceiling[x, y])
+            lowered[i, j] = new_none if lowest == none else int(lowest / scale + _ROUNDING)
+
+
+def extruded(plan: np.ndarray, layers: int) -> np.ndarray:
+    """(X, Y, layers) bool, contiguous: a plan (X, Y, 1) so many layers high."""
+    return np.repeat(plan, layers, axis=2)

@@ -1,0 +1,107 @@
+"""What a reader hands back: labelled voxels, metres and radians, in the frame of the file.
+
+The readers beside this file run in a process of their own (`worker`); they import little, to start fast.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from entropy_explore_env.config import MAX_VOXELS_ALONG_AXIS
+from entropy_explore_env.errors import SettingError
+
+UNKNOWN, FREE, SOLID = -1, 0, 1
+"""Labels of voxels."""
+MAX_FILE_BYTES = 256 << 20
+MAX_FILE_VOXELS = 130_000_000
+"""Voxels of one file, at its own resolution or at the one asked for."""
+
+
+class RefusedError(Exception):
+    """A reader cannot use the file; the message says what is allowed."""
+
+
+@dataclass(frozen=True, eq=False)
+class Voxels:
+    """A file's content.
+
+    Attributes:
+        labels: (X, Y, Z) int8: UNKNOWN, FREE or SOLID; Z = 1 is a 2-D plan.
+        voxel_size_m: Edge of a voxel.
+        origin_m: Lower corner of voxel (0, 0, 0) in the file's frame.
+        yaw_rad: How the voxels' axes are turned against the file's frame, about `origin_m`.
+        ceiling: (X, Y) int32 first closed layer of each column, or None.
+        name: Of the world, where the file says so.
+    """
+
+    labels: np.ndarray
+    voxel_size_m: float
+    origin_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    yaw_rad: float = 0.0
+    ceiling: np.ndarray | None = None
+    name: str | None = None
+
+
+class Options:
+    """Settings for a reader; those that it never asks for are refused, not ignored."""
+
+    def __init__(self, given: Mapping[str, Any]) -> None:
+        """Take those that are not None."""
+        self._given = {name: value for name, value in given.items() if value is not None}
+        self._asked = {"voxel_size_m"}  # every file can be resampled
+
+    def get(self, name: str) -> Any:  # noqa: ANN401 - numbers and flags
+        """Its value; None = not given."""
+        self._asked.add(name)
+        return self._given.get(name)
+
+    def need(self, name: str, kind: str) -> float:
+        """Its value.
+
+        Raises:
+            SettingError: It is not given.
+        """
+        value = self.get(name)
+        if value is None:
+            raise SettingError(name, None, f"a number > 0: {kind} does not say it")
+        return float(value)
+
+    def refuse_unused(self, kind: str) -> None:
+        """Raise a SettingError for the first setting that the reader had no use for."""
+        for name, value in self._given.items():
+            if name not in self._asked:
+                raise SettingError(name, value, f"None: it means nothing for {kind}")
+
+
+def content(path: Path) -> bytes:
+    """All bytes of a file that a reader needs beside its own.
+
+    Raises:
+        RefusedError: It is no file or too large.
+    """
+    if not path.is_file():
+        raise RefusedError(f"a map whose file {path.name} exists")
+    if path.stat().st_size > MAX_FILE_BYTES:
+        raise RefusedError(f"a map whose file {path.name} has at most {MAX_FILE_BYTES >> 20} MiB")
+    return path.read_bytes()
+
+
+def checked_shape(extent: Sequence[float] | np.ndarray) -> tuple[int, int, int]:
+    """Whole voxels that cover an extent (3,), in voxels; refused before anything is made of that size.
+
+    Raises:
+        RefusedError: It is not finite, or too many voxels.
+    """
+    edges = [float(edge) for edge in extent]
+    if not all(math.isfinite(edge) and 0 <= edge <= MAX_VOXELS_ALONG_AXIS for edge in edges):
+        raise RefusedError(f"a map of at most {MAX_VOXELS_ALONG_AXIS} voxels along each axis")
+    x, y, z = (max(1, math.ceil(edge - 1e-6)) for edge in edges)
+    if x * y * z > MAX_FILE_VOXELS:
+        raise RefusedError(f"a map whose box holds at most {MAX_FILE_VOXELS} voxels at this voxel size")
+    return x, y, z

@@ -1,0 +1,110 @@
+"""The process that files are read in: answers one request after another until its input ends.
+
+A request is a line of JSON: reader, path, options, `cpu_s` and `memory_bytes`. The answer is a line of JSON
+with the numbers of a Voxels, or with the error to raise, and after it the bytes of its arrays. A reader that
+needs more time is ended by the system's timer, one that needs more memory by its limit; a broken file can
+break this process only, which can write no file. What it imports is small: not the package's own `__init__`
+(`process` says how).
+"""
+
+from __future__ import annotations
+
+import importlib
+import json
+import math
+import os
+import resource
+import signal
+import sys
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import numpy as np
+
+from entropy_explore_env.errors import MissingExtraError, SettingError
+from entropy_explore_env.worlds.files.voxels import Options, RefusedError, Voxels
+
+_READERS = "entropy_explore_env.worlds.files."
+
+
+def serve() -> None:
+    """Answer requests on standard input; what a reader prints itself goes nowhere."""
+    answers = os.fdopen(os.dup(1), "wb")
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, 1)
+    for limit in (resource.RLIMIT_FSIZE, resource.RLIMIT_CORE):
+        resource.setrlimit(limit, (0, resource.getrlimit(limit)[1]))
+    for line in sys.stdin.buffer:
+        _send(answers, *_answer(json.loads(line)))
+
+
+def _answer(request: dict[str, Any]) -> tuple[dict[str, Any], list[np.ndarray]]:
+    """Header and arrays of the answer to a request."""
+    try:
+        reader = importlib.import_module(_READERS + request["reader"])
+        for module, package in reader.NEEDS:
+            _import(module, package)
+        voxels = _read(reader, request)
+    except RefusedError as error:
+        return {"refused": str(error)}, []
+    except MissingExtraError as error:
+        return {"missing": [error.package, error.extra]}, []
+    except SettingError as error:
+        return {"setting": [error.field, error.value, error.allowed]}, []
+    except MemoryError:
+        return {"refused": f"a file that is read within {request['memory_bytes'] >> 20} MiB"}, []
+    except Exception:  # readers raise whatever a broken file leads them to
+        return {"refused": None}, []
+    arrays = [voxels.labels] if voxels.ceiling is None else [voxels.labels, voxels.ceiling]
+    header = {
+        "shapes": [list(array.shape) for array in arrays],
+        "voxel_size_m": voxels.voxel_size_m,
+        "origin_m": voxels.origin_m,
+        "yaw_rad": voxels.yaw_rad,
+        "name": voxels.name,
+    }
+    return header, arrays
+
+
+def _import(module: str, package: str) -> None:
+    """Import what a reader stands on, before its time counts."""
+    try:
+        importlib.import_module(module)
+    except ImportError:
+        extra = "baselines" if package == "matplotlib" else "worlds"
+        raise MissingExtraError(package, extra) from None
+
+
+def _read(reader: Any, request: dict[str, Any]) -> Voxels:  # noqa: ANN401 - a module
+    options = Options(request["options"])
+    _limit_memory(request["memory_bytes"])
+    signal.setitimer(signal.ITIMER_PROF, request["cpu_s"])  # its signal ends the process
+    try:
+        voxels = reader.read(Path(request["path"]), options)
+        options.refuse_unused(request["kind"])
+        numbers = (voxels.voxel_size_m, *voxels.origin_m, voxels.yaw_rad)
+        if not all(math.isfinite(number) for number in numbers):
+            raise RefusedError("a map whose place and size are finite")
+        return voxels
+    finally:
+        signal.setitimer(signal.ITIMER_PROF, 0.0)
+
+
+def _limit_memory(more_bytes: int) -> None:
+    """Let this process grow by so much beyond what it has now; where the system does not tell, not at all."""
+    try:
+        pages = int(Path("/proc/self/statm").read_text().split()[0])
+    except OSError:
+        return
+    now = pages * resource.getpagesize()
+    resource.setrlimit(resource.RLIMIT_AS, (now + more_bytes, resource.getrlimit(resource.RLIMIT_AS)[1]))
+
+
+def _send(answers: BinaryIO, header: dict[str, Any], arrays: list[np.ndarray]) -> None:
+    """One answer, with what it cost so far."""
+    usage = resource.getrusage(resource.RUSAGE_SELF)
+    header |= {"cpu_s": usage.ru_utime + usage.ru_stime, "peak_kib": usage.ru_maxrss}
+    answers.write(json.dumps(header).encode() + b"\n")
+    for array in arrays:
+        answers.write(np.ascontiguousarray(array).data)
+    answers.flush()

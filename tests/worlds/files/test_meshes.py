@@ -1,0 +1,88 @@
+"""Meshes: boxes whose voxels are known, solid or hollow, in every format."""
+
+from __future__ import annotations
+
+import io
+
+import numpy as np
+import pytest
+
+from entropy_explore_env.errors import SettingError, WorldError
+from entropy_explore_env.worlds.load import load_world
+
+trimesh = pytest.importorskip("trimesh", reason="trimesh is not installed")
+
+BOXES = (((0, 0, 0), (2, 3, 1)), ((5, 1, 0), (6, 4, 4)))
+
+
+def write(folder, kind, boxes=BOXES, upright=True):
+    """Boxes; a GLB has y up, so what is z for us is its y, and its z points to -y."""
+    mesh = trimesh.util.concatenate([trimesh.creation.box(bounds=box) for box in boxes])
+    if kind == "glb" and upright:
+        x, y, z = np.array(mesh.vertices).T
+        mesh = trimesh.Trimesh(np.column_stack((x, z, -y)), mesh.faces)
+    data = mesh.export(file_type="stl_ascii" if kind == "ascii.stl" else kind)
+    path = folder / f"boxes.{kind}"
+    path.write_bytes(data.encode() if isinstance(data, str) else data)
+    return path
+
+
+@pytest.mark.parametrize("kind", ["obj", "stl", "ascii.stl", "glb", "ply"])
+@pytest.mark.parametrize("voxel_m", [0.5, 0.25])
+def test_boxes_are_solid_where_they_are(tmp_path, kind, voxel_m):
+    world = load_world(write(tmp_path, kind), voxel_m)
+    solid = np.zeros((int(6 / voxel_m), int(4 / voxel_m), int(4 / voxel_m)), bool)
+    for low, high in BOXES:
+        solid[tuple(slice(int(a / voxel_m), int(b / voxel_m)) for a, b in zip(low, high, strict=True))] = True
+    assert world.grid.origin_m == pytest.approx((0.0, 0.0, 0.0))
+    np.testing.assert_array_equal(world.occupied, solid)
+
+
+def test_a_hollow_box_keeps_its_inside(tmp_path):
+    path = write(tmp_path, "stl", [((0, 0, 0), (3.5, 5.5, 2.5))])
+    with pytest.raises(WorldError, match="free space"):
+        load_world(path, 0.5)
+    world = load_world(path, 0.5, fill=False)
+    assert world.grid.shape == (7, 11, 5)
+    assert not world.occupied[1:-1, 1:-1, 1:-1].any()
+    assert (~world.occupied).sum() == 5 * 9 * 3
+
+
+def test_clearance_is_free_space_around(tmp_path):
+    world = load_world(write(tmp_path, "stl", [((0, 0, 0), (3.5, 5.5, 2.5))]), 0.5, clearance_m=0.7)
+    assert world.grid.shape == (11, 15, 9)
+    assert world.grid.origin_m == (-1.0, -1.0, -1.0)
+    assert world.occupied[2:-2, 2:-2, 2:-2].all()
+    assert world.occupied.sum() == 7 * 11 * 5
+
+
+def test_settings_and_sizes(tmp_path):
+    path = write(tmp_path, "obj")
+    with pytest.raises(SettingError, match="voxel_size_m = None"):
+        load_world(path)
+    with pytest.raises(SettingError, match=r"ceiling_m = 1\.0: allowed is None: it means nothing for mesh"):
+        load_world(path, 0.5, ceiling_m=1.0)
+    with pytest.raises(WorldError, match="at most"):
+        load_world(path, 1e-3)
+
+
+def test_what_lies_beside_an_obj_is_not_read(tmp_path):
+    """A material library that is a pipe would be waited for."""
+    import os
+
+    path = write(tmp_path, "obj")
+    os.mkfifo(tmp_path / "pipe.mtl")
+    path.write_bytes(b"mtllib pipe.mtl\nmtllib /dev/zero\n" + path.read_bytes())
+    assert load_world(path, 0.5).grid.shape == (12, 8, 8)
+
+
+def test_a_file_without_faces_is_refused(tmp_path):
+    path = tmp_path / "empty.obj"
+    path.write_bytes(b"v 0 0 0\nv 1 0 0\n")
+    with pytest.raises(WorldError, match=r"a (whole mesh|mesh with faces)"):
+        load_world(path, 0.5)
+
+
+def test_trimesh_reads_from_memory_only(tmp_path):
+    scene = trimesh.load_scene(io.BytesIO(write(tmp_path, "stl").read_bytes()), file_type="stl")
+    assert len(scene.to_mesh().faces) == 24

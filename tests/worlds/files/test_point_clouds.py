@@ -1,0 +1,68 @@
+"""Point clouds in all encodings: the voxels that their points lie in."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from entropy_explore_env.errors import SettingError, WorldError
+from entropy_explore_env.worlds.load import load_world
+from tests.worlds.samples import pcd, ply, points
+
+
+def expected(voxel_m):
+    """Corner and voxels, counted point by point."""
+    voxels = {tuple(np.floor(np.float64(p) / voxel_m).astype(int).tolist()) for p in points()}
+    low = np.min(list(voxels), axis=0)
+    return low * voxel_m, {tuple((np.array(v) - low).tolist()) for v in voxels}
+
+
+@pytest.mark.parametrize(
+    ("name", "data"),
+    [(f"{each}.pcd", lambda each=each: pcd(each)) for each in ("ascii", "binary", "binary_compressed")]
+    + [("binary.PLY", lambda: ply(True)), ("ascii.ply", lambda: ply(False))],
+)
+@pytest.mark.parametrize("voxel_m", [0.7, 1.3])
+def test_a_voxel_is_solid_if_a_point_lies_in_it(tmp_path, name, data, voxel_m):
+    (tmp_path / name).write_bytes(data())
+    world = load_world(tmp_path / name, voxel_m)
+    corner, voxels = expected(voxel_m)
+    assert world.grid.origin_m == pytest.approx(tuple(corner))
+    assert {tuple(v) for v in np.argwhere(world.occupied).tolist()} == voxels
+    assert world.grid.voxel_size_m == voxel_m
+
+
+def by_hand(*rows, count=None):
+    head = "VERSION 0.7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\n"
+    number = len(rows) if count is None else count
+    head += f"WIDTH {number}\nHEIGHT 1\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS {number}\nDATA ascii\n"
+    return (head + "\n".join(rows) + "\n").encode()
+
+
+def test_points_that_are_not_finite_are_none(tmp_path):
+    path = tmp_path / "cloud.pcd"
+    path.write_bytes(by_hand("-0.25 0.25 0.25", "nan nan nan", "2.75 1.25 0.75"))
+    world = load_world(path, 0.5)
+    assert world.grid.shape == (7, 3, 2)
+    assert world.grid.origin_m == (-0.5, 0.0, 0.0)
+    assert np.argwhere(world.occupied).tolist() == [[0, 0, 0], [6, 2, 1]]
+
+
+def test_a_cloud_needs_a_voxel_size_that_gives_a_box_of_reason(tmp_path):
+    path = tmp_path / "cloud.pcd"
+    path.write_bytes(by_hand("0 0 0", "900 900 900"))
+    with pytest.raises(SettingError, match="voxel_size_m = None"):
+        load_world(path)
+    with pytest.raises(WorldError, match="at most 130000000 voxels"):
+        load_world(path, 0.5)
+    path.write_bytes(by_hand("0 0 0", "1e30 0 0"))
+    with pytest.raises(WorldError, match="along each axis"):
+        load_world(path, 0.5)
+
+
+@pytest.mark.parametrize("count", [0, 10**6, 10**12, -1])
+def test_a_header_that_promises_too_many_points_is_refused(tmp_path, count):
+    path = tmp_path / "cloud.pcd"
+    path.write_bytes(by_hand("0 0 0", "1 1 1", count=count))
+    with pytest.raises(WorldError, match="as many points as its header says"):
+        load_world(path, 0.5)

@@ -1,0 +1,95 @@
+"""The process that files are read in: limits, crashes, and life after them."""
+
+from __future__ import annotations
+
+import os
+import signal
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from entropy_explore_env.errors import WorldError
+from entropy_explore_env.worlds.files import process
+from entropy_explore_env.worlds.files.process import Format, ReaderProcess, kept_reader
+from entropy_explore_env.worlds.load import load_world
+from tests.worlds.samples import mesh, pgm, plan
+
+IMAGE = Format("images", "PNG or PGM image")
+
+
+@pytest.fixture
+def picture(tmp_path):
+    path = tmp_path / "plan.pgm"
+    path.write_bytes(pgm(plan()))
+    return path
+
+
+def test_a_process_that_died_is_started_anew(picture):
+    reader = ReaderProcess()
+    first = reader.read(IMAGE, picture, {})
+    number = reader._process.pid
+    assert reader.read(IMAGE, picture, {}).labels.shape == first.labels.shape
+    assert reader._process.pid == number  # one process, many files
+    os.kill(number, signal.SIGKILL)
+    reader._process.wait()
+    np.testing.assert_array_equal(reader.read(IMAGE, picture, {}).labels, first.labels)
+    assert reader._process.pid != number
+    reader.close()
+    assert reader._process is None
+
+
+def test_what_takes_too_long_is_ended_and_says_so(tmp_path):
+    path = tmp_path / "box.stl"
+    path.write_bytes(mesh("stl"))
+    start = time.perf_counter()
+    with kept_reader() as reader:
+        with pytest.raises(WorldError, match=r"read within 0\.2 s of computing"):
+            load_world(path, 0.05, read_limit_s=0.2)
+        assert time.perf_counter() - start < 20.0
+        assert reader.cost is None
+        assert load_world(path, 0.5).grid.shape == (14, 10, 8)
+
+
+def test_what_takes_too_much_memory_is_refused_and_the_process_lives(tmp_path, monkeypatch):
+    monkeypatch.setattr(process, "MEMORY_BYTES", 8 << 20)
+    path = tmp_path / "plan.pgm"
+    path.write_bytes(pgm(plan(3000, 1000)))
+    monkeypatch.setattr(process, "_MEMORY_PER_BYTE", 0)
+    with kept_reader() as reader:
+        with pytest.raises(WorldError, match="read within 8 MiB"):
+            load_world(path)
+        number = reader._process.pid
+        path.write_bytes(pgm(plan()))
+        assert load_world(path).grid.shape == (11, 7, 1)
+        assert reader._process.pid == number
+
+
+def test_without_a_kept_process_each_file_has_its_own(picture, monkeypatch):
+    started = []
+
+    class Noted(ReaderProcess):
+        def _running(self):
+            running = super()._running()
+            started.append(running)
+            return running
+
+    monkeypatch.setattr(process, "ReaderProcess", Noted)
+    token = process._KEPT.set(None)
+    for _ in range(2):
+        load_world(picture)
+    process._KEPT.reset(token)
+    assert len({each.pid for each in started}) == 2
+    assert all(each.poll() is not None for each in started)
+
+
+def test_a_process_can_write_no_file_and_imports_little(picture):
+    with kept_reader() as reader:
+        load_world(picture)
+        about = Path(f"/proc/{reader._process.pid}")
+        if not about.exists():
+            pytest.skip("this system has no /proc")
+        maps, limits = (about / "maps").read_text(), (about / "limits").read_text()
+    assert "llvmlite" not in maps and "numpy" in maps
+    assert [line.split()[3] for line in limits.splitlines() if line.startswith("Max file size")] == ["0"]

@@ -1,0 +1,346 @@
+"""Broken and hostile files of every kind, made from seeds, and what the loaders make of them.
+
+A mutated file must give a World or a named error within 2 s of computing and 512 MiB, run nothing and read
+nothing outside its folder. `python -m tests.worlds.fuzz --files 10000 --out docs/results/fuzz.md` runs so
+many files a loader and writes the table.
+"""
+
+from __future__ import annotations
+
+import argparse
+import io
+import re
+import resource
+import struct
+import sys
+import tempfile
+import time
+import zipfile
+import zlib
+from collections import Counter
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from entropy_explore_env.errors import SettingError
+from entropy_explore_env.worlds.files.process import CPU_S, ReaderProcess, kept_reader
+from entropy_explore_env.worlds.load import load_world
+from entropy_explore_env.writing import write_atomically
+from tests.worlds.samples import Sample, glb_of_json, samples
+
+MOST_S, MOST_MIB = 2.0, 512
+_SIZES = (b"0", b"-1", b"65536", b"2147483647", b"4294967295", b"99999999999999999999", b"1e308", b"nan")
+
+
+def truncated(data: bytes, rng: np.random.Generator) -> bytes:
+    return data[: int(rng.integers(0, len(data)))]
+
+
+def flipped(data: bytes, rng: np.random.Generator) -> bytes:
+    """One to eight bits."""
+    changed = bytearray(data)
+    for _ in range(int(rng.integers(1, 9))):
+        changed[int(rng.integers(len(data)))] ^= 1 << int(rng.integers(8))
+    return bytes(changed)
+
+
+def noise(data: bytes, rng: np.random.Generator) -> bytes:
+    start, length = int(rng.integers(len(data))), int(rng.integers(1, 65))
+    return data[:start] + rng.bytes(length) + data[start + length :]
+
+
+def absurd_text(data: bytes, rng: np.random.Generator) -> bytes:
+    """A number in the text becomes an absurd one."""
+    numbers = list(re.finditer(rb"-?\d+(\.\d+)?", data[:2048]))
+    if not numbers:
+        return flipped(data, rng)
+    one = numbers[int(rng.integers(len(numbers)))]
+    return data[: one.start()] + _SIZES[int(rng.integers(len(_SIZES)))] + data[one.end() :]
+
+
+def absurd_binary(data: bytes, rng: np.random.Generator) -> bytes:
+    """Four bytes become a large number, in either order, or a float that is none."""
+    values = (0xFFFFFFFF, 0x7FFFFFFF, 0x80000000, 1 << 24, 1 << 16, 0x7FC00000, 0x7F000000, 0)
+    start = int(rng.integers(max(1, min(len(data), 4096) - 4)))
+    word = struct.pack(("<I", ">I")[int(rng.integers(2))], values[int(rng.integers(len(values)))])
+    return data[:start] + word + data[start + 4 :]
+
+
+def doubled(data: bytes, rng: np.random.Generator) -> bytes:
+    """A piece of the file a few hundred times."""
+    start = int(rng.integers(len(data)))
+    piece = data[start : start + int(rng.integers(1, 200))]
+    return data[:start] + piece * int(rng.integers(2, 400)) + data[start:]
+
+
+def nested(data: bytes, rng: np.random.Generator) -> bytes:
+    """An archive with the file in it, in an archive, in an archive."""
+    for _ in range(int(rng.integers(1, 4))):
+        buffer = io.BytesIO()
+        with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
+            archive.writestr("elevation.npy" if rng.random() < 0.5 else "../../elevation.npy", data)
+        data = buffer.getvalue()
+    return data
+
+
+def repaired_png(data: bytes, rng: np.random.Generator) -> bytes:
+    """Changed chunks of a PNG with right checksums; a header of absurd size; a bomb of zeros."""
+    if not data.startswith(b"\x89PNG"):
+        return flipped(data, rng)
+    chunks, at = [], 8
+    while at + 12 <= len(data):
+        length = int.from_bytes(data[at : at + 4], "big")
+        chunks.append([data[at + 4 : at + 8], data[at + 8 : at + 8 + length]])
+        at += 12 + length
+    which = int(rng.integers(4))
+    if which == 0:
+        edges = [int(2 ** rng.uniform(0, 31)) for _ in range(2)]
+        chunks[0][1] = struct.pack(">II", *edges) + chunks[0][1][8:]
+    elif which == 1:
+        chunks[0][1] = struct.pack(">II", 5000, 5000) + chunks[0][1][8:]
+        chunks[1][1] = zlib.compress(b"\0" * (5001 * 5000), 9)
+    elif which == 2:
+        chunks.insert(1, [b"zTXt", b"a\0\0" + zlib.compress(b"\0" * (1 << 26), 9)])
+    else:
+        chunk = chunks[int(rng.integers(len(chunks)))]
+        chunk[1] = flipped(chunk[1], rng) if chunk[1] else chunk[1]
+    body = [struct.pack(">I", len(c)) + k + c + struct.pack(">I", zlib.crc32(k + c)) for k, c in chunks]
+    return data[:8] + b"".join(body)
+
+
+def repaired_zip(data: bytes, rng: np.random.Generator) -> bytes:
+    """Changed arrays in a sound archive; a bomb of zeros; a pickle that would write a file."""
+    if not data.startswith(b"PK"):
+        return noise(data, rng)
+    which = int(rng.integers(4))
+    with zipfile.ZipFile(io.BytesIO(data)) as archive:
+        members = {name: archive.read(name) for name in archive.namelist()}
+    names = list(members)
+    name = names[int(rng.integers(len(names)))]
+    if which == 0:
+        shape = tuple(int(2 ** rng.uniform(0, 40)) for _ in range(2))
+        text = f"{{'descr': '<f8', 'fortran_order': False, 'shape': {shape}, }}".ljust(117).encode() + b"\n"
+        members[name] = b"\x93NUMPY\x01\x00" + struct.pack("<H", len(text)) + text + b"\0" * 64
+    elif which == 1:
+        edge = 20000
+        text = f"{{'descr': '|u1', 'fortran_order': False, 'shape': ({edge}, {edge}), }}".encode()
+        text = text.ljust(117) + b"\n"
+        members[name] = b"\x93NUMPY\x01\x00" + struct.pack("<H", len(text)) + text + bytes(edge * edge // 16)
+    elif which == 2:
+        order = np.array(_Pickled(), dtype=object)
+        buffer = io.BytesIO()
+        np.save(buffer, order, allow_pickle=True)
+        members[name] = buffer.getvalue()
+    else:
+        members[name] = flipped(members[name], rng)
+    buffer = io.BytesIO()
+    with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
+        for each, content in members.items():
+            archive.writestr(each, content)
+    return buffer.getvalue()
+
+
+class _Pickled:
+    """Unpickled, it would leave a file beside the map."""
+
+    def __reduce__(self) -> tuple:
+        return (exec, ("open('executed', 'w').close()",))
+
+
+def hostile_yaml(data: bytes, rng: np.random.Generator) -> bytes:
+    """Tags that would run code, aliases that would grow, images that lie elsewhere, deep nesting."""
+    if b"image:" not in data[:4096]:
+        return absurd_text(data, rng)
+    bomb = b"a: &a [x, x, x, x, x, x, x, x, x]\n"
+    for one, next_one in zip(b"abcdefghi", b"bcdefghij", strict=True):
+        bomb += (
+            bytes([next_one]) + b": &" + bytes([next_one]) + b" [" + b", ".join([b"*%c" % one] * 9) + b"]\n"
+        )
+    texts = (
+        re.sub(rb"image: .*", b"image: !!python/object/apply:os.system ['touch executed']", data),
+        re.sub(rb"image: .*", b"image: !!python/object/new:os.system [touch executed]", data),
+        b"!!python/name:os.system\n" + data,
+        bomb + data,
+        bomb + re.sub(rb"resolution: .*", b"resolution: *j", data),
+        b"<<: [{a: 1}, {b: 2}]\n" + data,
+        re.sub(rb"image: .*", b"image: ../outside.pgm", data),
+        re.sub(rb"image: .*", b"image: sub/../../outside.pgm", data),
+        re.sub(rb"image: .*", b"image: link.pgm", data),
+        re.sub(rb"image: .*", b"image: linked/outside.pgm", data),
+        re.sub(rb"image: .*", b"image: /etc/passwd", data),
+        re.sub(rb"image: .*", b"image: /dev/zero", data),
+        re.sub(rb"image: .*", b"image: map.yaml", data),
+        re.sub(rb"image: .*", b"image: .", data),
+        re.sub(rb"image: .*", b'image: "plan.pgm\\0.png"', data),
+        re.sub(rb"origin: .*", b"origin: " + b"[" * 3000, data),
+        re.sub(rb"resolution: .*", b"resolution: " + b"9" * 5000, data),
+        re.sub(rb"resolution: .*", b"resolution: 1e-300", data),
+        re.sub(rb"mode: .*", (b"mode: raw", b"mode: scale", b"mode: [1]")[int(rng.integers(3))], data),
+    )
+    return texts[int(rng.integers(len(texts)))]
+
+
+def hostile_glb(data: bytes, rng: np.random.Generator) -> bytes:
+    """References to files elsewhere, meshes repeated without end, accessors of absurd size."""
+    if not data.startswith(b"glTF"):
+        return absurd_binary(data, rng)
+    which = int(rng.integers(3))
+    views = [{"buffer": 0, "byteOffset": 0, "byteLength": 36}]
+    part = {"attributes": {"POSITION": 0}, "mode": 4}
+    count = (3, 1 << 31, 1 << 40)[which]
+    about = {
+        "asset": {"version": "2.0"},
+        "buffers": [{"byteLength": 36, **({"uri": "../outside.pgm"} if rng.random() < 0.5 else {})}],
+        "bufferViews": views,
+        "accessors": [{"bufferView": 0, "componentType": 5126, "count": count, "type": "VEC3"}],
+        "meshes": [{"primitives": [part]}],
+        "nodes": [{"children": [i + 1] * 8, "mesh": 0} for i in range(12)] + [{"mesh": 0}],
+        "scenes": [{"nodes": [0]}],
+    }
+    return glb_of_json(about, np.random.default_rng(0).random(9).astype("<f4").tobytes())
+
+
+MUTATORS: tuple[Callable[[bytes, np.random.Generator], bytes], ...] = (
+    truncated,
+    flipped,
+    noise,
+    absurd_text,
+    absurd_binary,
+    doubled,
+    nested,
+    repaired_png,
+    repaired_zip,
+    hostile_yaml,
+    hostile_glb,
+)
+
+
+def mutants(sources: list[Sample], count: int, seed: int) -> Iterator[tuple[str, Sample]]:
+    """So many changed samples, each with its mutator's name; the same for the same seed."""
+    for number in range(count):
+        rng = np.random.default_rng([seed, number])
+        source = sources[number % len(sources)]
+        mutate = MUTATORS[int(rng.integers(len(MUTATORS)))]
+        first = next(iter(source.files))
+        target = first
+        if len(source.files) > 1 and mutate is not hostile_yaml and rng.random() < 0.5:
+            target = list(source.files)[1]
+        changed = mutate(source.files[target], rng)
+        if rng.random() < 0.2:
+            changed = flipped(changed, rng) if changed else changed
+        yield mutate.__name__, Sample({**source.files, target: changed}, source.options)
+
+
+@dataclass
+class Outcome:
+    """What became of the files of one loader."""
+
+    files: int = 0
+    loaded: int = 0
+    killed: int = 0
+    most_s: float = 0.0
+    most_mib: float = 0.0
+    wrong: list[str] = field(default_factory=list)
+    causes: Counter = field(default_factory=Counter)
+
+
+def fuzz(sources: list[Sample], count: int, seed: int, folder: Path) -> Outcome:
+    """Load so many mutants in an empty folder; what is wrong is said, file by file."""
+    inside = folder / "maps"
+    (inside / "sub").mkdir(parents=True)
+    secret = folder / "outside.pgm"
+    secret.write_bytes(b"P5\n3 2\n255\n" + b"\xfe" * 6)  # 3 × 2 and all free: no mutant of ours
+    (inside / "link.pgm").symlink_to(secret)
+    (inside / "linked").symlink_to(folder)
+    found = Outcome()
+    with kept_reader() as reader:
+        for number, (mutator, sample) in enumerate(mutants(sources, count, seed)):
+            for name, data in sample.files.items():
+                (inside / name).write_bytes(data)
+            complaint = _load(inside / next(iter(sample.files)), sample, reader, found)
+            if (inside / "executed").exists() or Path("executed").exists():
+                complaint = "ran code"
+            if complaint:
+                found.wrong.append(f"seed [{seed}, {number}] {mutator}: {complaint}")
+    found.most_mib = max(found.most_mib, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024)
+    return found
+
+
+def _load(path: Path, sample: Sample, reader: ReaderProcess, found: Outcome) -> str:
+    """What is wrong with how one file was treated; "" = nothing."""
+    found.files += 1
+    before = reader.cost["cpu_s"] if reader.cost else 0.0
+    reader.cost, start = None, time.process_time()
+    complaint = ""
+    try:
+        world = load_world(path, **sample.options)
+        found.loaded += 1
+        if world.grid.shape == (3, 2, 1):
+            complaint = "read a file outside"
+    except SettingError as error:
+        found.causes[error.allowed] += 1
+        if "\n" in str(error) or len(str(error)) > 1000:
+            complaint = "an error of more than a line"
+    except Exception as error:
+        complaint = f"{type(error).__name__}: {error}"
+    spent = time.process_time() - start
+    if reader.cost is None:
+        found.killed += 1
+        spent += CPU_S
+    else:
+        after = reader.cost["cpu_s"]
+        spent += after - before if after >= before else after
+        peak = reader.cost["peak_kib"] / 1024  # of the process's life: a file is blamed if it raised it
+        if peak > max(MOST_MIB, found.most_mib):
+            complaint = complaint or f"{peak:.0f} MiB"
+        found.most_mib = max(found.most_mib, peak)
+    found.most_s = max(found.most_s, spent)
+    return complaint or (f"{spent:.2f} s" if spent > MOST_S else "")
+
+
+def table(outcomes: dict[str, Outcome], count: int) -> str:
+    """The results as Markdown."""
+    lines = [
+        "# Broken and hostile files",
+        "",
+        f"`python -m tests.worlds.fuzz --files {count}`: mutants of small files of every kind, from",
+        f"seeds. Each must give a world or a named error within {MOST_S:g} s of computing and {MOST_MIB}",
+        "MiB, run nothing and read nothing outside its folder. Ended: the reading process died and was",
+        "started anew, and an error was raised.",
+        "",
+        "| loader | files | loaded | refused | of these ended | most s | most MiB | wrong |",
+        "| --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: |",
+    ]
+    for name, o in outcomes.items():
+        cells = (o.files, o.loaded, o.files - o.loaded, o.killed, f"{o.most_s:.2f}", f"{o.most_mib:.0f}")
+        lines.append(f"| {name} | " + " | ".join(str(cell) for cell in (*cells, len(o.wrong))) + " |")
+    return "\n".join(lines) + "\n"
+
+
+def main() -> int:
+    """Run the command; 1 if anything is wrong."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--files", type=int, default=500, help="mutants a loader")
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--loader", help="one loader only")
+    parser.add_argument("--out", type=Path, help="a Markdown file for the table")
+    args = parser.parse_args()
+    outcomes: dict[str, Outcome] = {}
+    for number, (name, sources) in enumerate(samples().items()):
+        if args.loader in (None, name):
+            start = time.perf_counter()
+            with tempfile.TemporaryDirectory() as folder:
+                outcomes[name] = fuzz(sources, args.files, args.seed + number, Path(folder))
+            print(f"{name}: {time.perf_counter() - start:.0f} s", file=sys.stderr, flush=True)
+            print("\n".join(outcomes[name].wrong[:20]), file=sys.stderr)
+    text = table(outcomes, args.files)
+    print(text)
+    if args.out is not None:
+        write_atomically(args.out, text)
+    return int(any(o.wrong for o in outcomes.values()))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,160 @@
+"""A small file of every kind, as bytes, written with independent writers or by hand."""
+
+from __future__ import annotations
+
+import io
+import json
+import struct
+import tempfile
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+SHAPE = (7, 11, 5)
+YAML = b"image: plan.pgm\nresolution: 0.1\norigin: [-1.0, 2.0, 0.5]\nnegate: 0\n"
+YAML += b"occupied_thresh: 0.65\nfree_thresh: 0.196\nmode: trinary\n"
+
+
+class Sample(NamedTuple):
+    """A file and what lies beside it: name → bytes; the first is the one to load, with these options."""
+
+    files: dict[str, bytes]
+    options: dict[str, Any]
+
+
+def plan(rows=7, columns=11, seed=0):
+    """(rows, columns) uint8 shades of a plan: black walls, white floor, grey unknown."""
+    shades = np.random.default_rng(seed).choice([0, 205, 254, 254, 254], (rows, columns))
+    return shades.astype(np.uint8)
+
+
+def pgm(shades):
+    return b"P5\n%d %d\n255\n" % (shades.shape[1], shades.shape[0]) + shades.tobytes()
+
+
+def png(pixels):
+    from PIL import Image
+
+    buffer = io.BytesIO()
+    Image.fromarray(pixels).save(buffer, "PNG")
+    return buffer.getvalue()
+
+
+def octomap_bytes(suffix):
+    import octomap
+
+    tree = octomap.OcTree(0.2)
+    labels = np.random.default_rng(0).choice([-1, 0, 0, 1], SHAPE)
+    for voxel in np.argwhere(labels >= 0):
+        tree.updateNode((voxel + 0.5) * 0.2, bool(labels[tuple(voxel)] == 1))
+    tree.updateInnerOccupancy()
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / f"map{suffix}"
+        assert (tree.writeBinary if suffix == ".bt" else tree.write)(str(path).encode())
+        return path.read_bytes()
+
+
+def points(count=60):
+    return np.random.default_rng(1).uniform(0.0, SHAPE, (count, 3)).astype(np.float32)
+
+
+def pcd(encoding):
+    from pypcd4.pypcd4 import Encoding, PointCloud
+
+    buffer = io.BytesIO()
+    PointCloud.from_xyz_points(points()).save(buffer, Encoding(encoding))
+    return buffer.getvalue()
+
+
+def ply(binary):
+    """Points only, by hand."""
+    some = points()
+    form = b"binary_little_endian" if binary else b"ascii"
+    head = b"ply\nformat %s 1.0\nelement vertex %d\n" % (form, len(some))
+    head += b"property float x\nproperty float y\nproperty float z\nend_header\n"
+    return head + (some.tobytes() if binary else b"".join(b"%g %g %g\n" % tuple(p) for p in some.tolist()))
+
+
+def mesh(kind):
+    import trimesh
+
+    box = trimesh.creation.box(bounds=[[0, 0, 0], [2, 3, 1]])
+    ramp = trimesh.Trimesh(
+        [[4, 0, 0], [7, 0, 0], [4, 5, 0], [4, 0, 4]], [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]]
+    )
+    written = trimesh.util.concatenate([box, ramp]).export(file_type=kind)
+    return written.encode() if isinstance(written, str) else written
+
+
+def heights(rows=11, columns=7):
+    """(rows, columns) float32 metres."""
+    return np.random.default_rng(2).uniform(10.0, 14.0, (rows, columns)).astype(np.float32)
+
+
+def npz(**arrays):
+    buffer = io.BytesIO()
+    np.savez_compressed(buffer, **arrays)
+    return buffer.getvalue()
+
+
+def geotiff(samples, scale=(1.0, 1.0, 0.0), tie=(0.0, 0.0, 0.0, 100.0, 200.0, 0.0), model=1, **more):
+    import tifffile
+
+    keys = (1, 1, 0, 1, 1024, 0, 1, model)
+    tags = [(33550, "d", 3, scale, True), (33922, "d", 6, tie, True), (34735, "H", len(keys), keys, True)]
+    tags += more.pop("tags", [])
+    buffer = io.BytesIO()
+    tifffile.imwrite(buffer, samples, extratags=tags, metadata=None, **more)
+    return buffer.getvalue()
+
+
+def saved_world():
+    from entropy_explore_env.config import Grid
+    from entropy_explore_env.worlds.load import save_world
+    from entropy_explore_env.worlds.world import World
+
+    occupied = np.random.default_rng(3).random(SHAPE) < 0.3
+    ceiling = np.random.default_rng(4).integers(1, 6, SHAPE[:2]).astype(np.int32)
+    world = World(Grid(SHAPE, 0.3, (1.0, -2.0, 0.1)), occupied, "lab", ceiling, 0.7)
+    with tempfile.TemporaryDirectory() as folder:
+        save_world(world, Path(folder) / "lab.npz")
+        return (Path(folder) / "lab.npz").read_bytes()
+
+
+def glb_of_json(gltf, blob=b""):
+    """A GLB with this JSON, for what no writer would write."""
+    text = json.dumps(gltf).encode()
+    text += b" " * (-len(text) % 4)
+    body = struct.pack("<II", len(text), 0x4E4F534A) + text + struct.pack("<II", len(blob), 0x004E4942) + blob
+    return struct.pack("<III", 0x46546C67, 2, 12 + len(body)) + body
+
+
+def samples() -> dict[str, list[Sample]]:
+    """By loader: files of every kind that it reads."""
+    cell = {"voxel_size_m": 0.5}
+    deep = (plan().astype(np.uint16) * 200).astype(np.uint16)
+    return {
+        "octomap": [Sample({f"map{suffix}": octomap_bytes(suffix)}, {}) for suffix in (".bt", ".ot")],
+        "map_server": [
+            Sample({"map.yaml": YAML, "plan.pgm": pgm(plan())}, {}),
+            Sample({"map.yaml": YAML.replace(b"pgm", b"png"), "plan.png": png(plan())}, {}),
+        ],
+        "image": [Sample({"plan.png": png(plan())}, {}), Sample({"plan.pgm": pgm(plan())}, {})],
+        "height png": [Sample({"hills.png": png(deep)}, {"resolution_m": 1.0, "elevation_step_m": 0.001})],
+        "pcd": [Sample({"cloud.pcd": pcd(each)}, cell) for each in ("ascii", "binary", "binary_compressed")],
+        "ply": [
+            Sample({"cloud.ply": ply(True)}, cell),
+            Sample({"cloud.ply": ply(False)}, cell),
+            Sample({"box.ply": mesh("ply")}, cell),
+        ],
+        "obj": [Sample({"box.obj": mesh("obj")}, cell)],
+        "stl": [Sample({"box.stl": mesh("stl")}, cell), Sample({"box.stl": mesh("stl_ascii")}, cell)],
+        "glb": [Sample({"box.glb": mesh("glb")}, cell)],
+        "height npz": [Sample({"hills.npz": npz(elevation=heights(), spacing_m=np.float64(0.5))}, {})],
+        "geotiff": [
+            Sample({"hills.tif": geotiff(heights())}, {}),
+            Sample({"hills.tif": geotiff(heights(), compression="zlib")}, {}),
+        ],
+        "world npz": [Sample({"lab.npz": saved_world()}, {})],
+    }

@@ -1,0 +1,64 @@
+"""Pictures of worlds: what is solid is where it belongs, with a scale in metres."""
+
+from __future__ import annotations
+
+import io
+
+import numpy as np
+import pytest
+
+from entropy_explore_env.config import Grid
+from entropy_explore_env.worlds.pictures import _FREE, _SOLID, _stretch, picture
+from entropy_explore_env.worlds.world import World
+
+Image = pytest.importorskip("PIL.Image", reason="pillow is not installed")
+
+
+def drawn(occupied, edge=0.5, origin=(10.0, -20.0, 3.0), name="hall"):
+    data = picture(World(Grid(occupied.shape, edge, origin), occupied, name))
+    image = Image.open(io.BytesIO(data))
+    assert image.format == "PNG"
+    return np.asarray(image.convert("RGB")).astype(int)
+
+
+def is_colour(pixels, colour):
+    return (np.abs(pixels - np.array(colour)) <= 2).all(axis=-1)
+
+
+def test_a_plan_has_x_to_the_right_and_y_up():
+    occupied = np.zeros((7, 11, 1), bool)
+    occupied[6, 0] = True  # lower right
+    pixels = drawn(occupied)
+    rows, columns = np.nonzero(is_colour(pixels, _SOLID))
+    free_rows, free_columns = np.nonzero(is_colour(pixels, _FREE))
+    edge = 880 / 11
+    assert len(rows) == pytest.approx(edge * edge, rel=0.05)
+    assert columns.min() == pytest.approx(free_columns.max() - edge, abs=3)
+    assert rows.max() == pytest.approx(free_rows.max(), abs=3)
+    assert rows.min() == pytest.approx(free_rows.max() - edge, abs=3)
+
+
+@pytest.mark.parametrize("roofed", [False, True])
+def test_a_3_d_world_is_drawn_from_above_and_from_the_side(roofed):
+    occupied = np.zeros((7, 11, 5), bool)
+    occupied[2, 3, :3] = True
+    occupied[:, :, 4] |= roofed
+    tall = drawn(occupied)
+    without = drawn(np.zeros((7, 11, 5), bool) | (occupied & (np.arange(5) == 4)))
+    assert tall.shape == without.shape
+    assert tall.shape[0] > 880 + 880 * 5 / 11
+    changed = np.nonzero((tall != without).any(axis=-1))
+    # the same columns in both views: x = 2 of 7, at 80 pixels a voxel
+    assert (changed[1].min() >= 0) and changed[0].max() > 64 + 880
+
+
+def test_long_names_and_sizes_from_a_millimetre_to_a_hundred_kilometres_fit():
+    occupied = np.zeros((13, 4, 3), bool)
+    for edge in (1e-3, 0.05, 7.0, 8000.0):
+        pixels = drawn(occupied, edge, name="a very long name of a world " * 8)
+        assert pixels.shape[1] <= 1008
+        assert is_colour(pixels[:, -4:], (255, 255, 255)).all()  # nothing runs over the edge
+
+
+def test_low_worlds_are_stretched():
+    assert [_stretch(height) for height in (880.0, 60.0, 59.0, 6.0)] == [1, 1, 2, 10]
