@@ -13,7 +13,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from entropy_explore_env.belief.raycast import STOP_AT_COVERED
+from entropy_explore_env.compilation import inlined_kernel
 from entropy_explore_env.errors import SettingError
+
+IMPASSABLE, FREE, UNKNOWN = 0, 1, 2
+"""What can be done in a voxel."""
 
 KNOWN_RATIO = 2.0
 """A voxel is known once its precision is this many times the prior one: half a bit was learnt of it."""
@@ -97,9 +102,7 @@ def new_lattice(shape: tuple[int, int, int], body_radius: float = 0.0, layer: in
     body = _touched(shape, body_radius, layer)
     reaches = max((max(offset) for offset in body), default=0)
     numbers = np.array([shape[1] * shape[2], shape[2], 1], np.int64)
-    steps = [
-        s for s in itertools.product((-1, 0, 1), repeat=3) if any(s) and (layer is None or s[2] == 0)
-    ]
+    steps = [s for s in itertools.product((-1, 0, 1), repeat=3) if any(s) and (layer is None or s[2] == 0)]
     steps.sort(key=lambda s: sum(map(abs, s)))
     moves, ball = np.zeros(len(steps), MOVE), list(body)
     for move, step in zip(moves, steps, strict=True):
@@ -185,3 +188,40 @@ def _numbered(field: np.ndarray) -> np.ndarray:
     flat = np.ascontiguousarray(field, np.float32).reshape(-1).view()
     flat.setflags(write=False)
     return flat
+
+
+@inlined_kernel
+def place_of(lattice, voxel):
+    """(x, y, z) of a voxel by its number: (v + ½)/Z is never near a whole number, so no division."""
+    column = int((voxel + 0.5) * (1.0 / lattice.size[2]))
+    row = int((column + 0.5) * (1.0 / lattice.size[1]))
+    return row, column - row * lattice.size[1], voxel - column * lattice.size[2]
+
+
+@inlined_kernel
+def look_at(lattice, costs, voxel, x, y, z, first, last):
+    """What can be done in a voxel: impassable, free or unknown.
+
+    Args:
+        lattice: The steps.
+        costs: The belief, or the rates.
+        voxel: Its number.
+        x: Its place.
+        y: Likewise.
+        z: Likewise.
+        first: The body's voxels in `lattice.ball` that have to be looked at, from here …
+        last: … to one before here.
+    """
+    if len(costs.rates) > 0:
+        return FREE if costs.rates[voxel] < math.inf else IMPASSABLE
+    if costs.mean[voxel] > STOP_AT_COVERED:
+        return IMPASSABLE
+    size, margin = lattice.size, lattice.margin
+    if x < margin[0] or y < margin[1] or z < margin[2]:
+        return IMPASSABLE
+    if x >= size[0] - margin[0] or y >= size[1] - margin[1] or z >= size[2] - margin[2]:
+        return IMPASSABLE
+    for i in range(first, last):
+        if costs.mean[voxel + lattice.ball[i]] > STOP_AT_COVERED:
+            return IMPASSABLE
+    return UNKNOWN if costs.precision[voxel] < costs.known_precision else FREE

@@ -20,16 +20,25 @@ from entropy_explore_env.belief.bucket_queue import (
     queue_full,
     take,
 )
-from entropy_explore_env.belief.lattice import DIAGONALS, Costs, Lattice
+from entropy_explore_env.belief.lattice import (
+    DIAGONALS,
+    FREE,
+    IMPASSABLE,
+    UNKNOWN,
+    Costs,
+    Lattice,
+    look_at,
+    place_of,
+)
 from entropy_explore_env.belief.raycast import STOP_AT_COVERED
 from entropy_explore_env.compilation import inlined_kernel, lean_kernel
 from entropy_explore_env.errors import SettingError
+from entropy_explore_env.validation import is_whole
 
 UNREACHED = -1
 """Cell of a voxel that no source reaches."""
 
 # A voxel's mark: bits 0-1 what can be done in it, then flags, the step that led to it, the search.
-_IMPASSABLE, _FREE, _UNKNOWN = 0, 1, 2
 _KIND = 3
 _OPEN = 4
 """It waits in the queue."""
@@ -47,7 +56,6 @@ _PER_STEP_TO_GOAL = 4.0
 
 _SQRT2, _SQRT3 = DIAGONALS[1], DIAGONALS[2]
 _NOWHERE = -1
-_NO_CELLS = np.zeros(0, np.int32)
 
 
 class Search(NamedTuple):
@@ -79,62 +87,31 @@ def new_search(voxels: int) -> Search:
 
 
 @inlined_kernel
-def place_of(lattice, voxel):
-    """(x, y, z) of a voxel by its number: (v + ½)/Z is never near a whole number, so no division."""
-    column = int((voxel + 0.5) * (1.0 / lattice.size[2]))
-    row = int((column + 0.5) * (1.0 / lattice.size[1]))
-    return row, column - row * lattice.size[1], voxel - column * lattice.size[2]
-
-
-@inlined_kernel
-def _look(lattice, costs, voxel, x, y, z, first, last):
-    """What can be done in a voxel: impassable, free or unknown.
-
-    Args:
-        lattice: The steps.
-        costs: The belief, or the rates.
-        voxel: Its number.
-        x: Its place.
-        y: Likewise.
-        z: Likewise.
-        first: The body's voxels in `lattice.ball` that have to be looked at, from here …
-        last: … to one before here.
-    """
-    if len(costs.rates) > 0:
-        return _FREE if costs.rates[voxel] < math.inf else _IMPASSABLE
-    if costs.mean[voxel] > STOP_AT_COVERED:
-        return _IMPASSABLE
-    size, margin = lattice.size, lattice.margin
-    if x < margin[0] or y < margin[1] or z < margin[2]:
-        return _IMPASSABLE
-    if x >= size[0] - margin[0] or y >= size[1] - margin[1] or z >= size[2] - margin[2]:
-        return _IMPASSABLE
-    for i in range(first, last):
-        if costs.mean[voxel + lattice.ball[i]] > STOP_AT_COVERED:
-            return _IMPASSABLE
-    return _UNKNOWN if costs.precision[voxel] < costs.known_precision else _FREE
-
-
-@inlined_kernel
 def mark_of(search, lattice, costs, voxel, x, y, z):
     """Mark of a voxel in this search; looks at the voxel if that was not done."""
     mark, number = np.int64(search.mark[voxel]), search.searches[0]
     if mark >> _SEARCH_SHIFT != number:
-        kind = _look(lattice, costs, voxel, x, y, z, 0, len(lattice.touched))
+        kind = look_at(lattice, costs, voxel, x, y, z, 0, len(lattice.touched))
         mark = number << _SEARCH_SHIFT | kind
         search.mark[voxel] = np.uint32(mark)
     return mark
 
 
 @inlined_kernel
+def is_passable(mark):
+    """Whether the voxel of a mark can be entered."""
+    return mark & _KIND != IMPASSABLE
+
+
+@inlined_kernel
 def rate_of(costs, voxel, mark):
     """Cost of a voxel edge of way through a voxel; the least rate in a start that is impassable."""
     kind = mark & _KIND
-    if kind == _IMPASSABLE:
+    if kind == IMPASSABLE:
         return costs.least_rate
     if len(costs.rates) > 0:
         return np.float64(costs.rates[voxel])
-    return costs.unknown_cost if kind == _UNKNOWN else 1.0
+    return costs.unknown_cost if kind == UNKNOWN else 1.0
 
 
 @inlined_kernel
@@ -157,8 +134,8 @@ def _let_leave(search, lattice, costs, voxel):
             near = (i * size[1] + j) * size[2] + k
             if near != voxel and (lattice.layer < 0 or k == lattice.layer):
                 mark = mark_of(search, lattice, costs, near, i, j, k)
-                if mark & _KIND == _IMPASSABLE and costs.mean[near] <= STOP_AT_COVERED:
-                    kind = _UNKNOWN if costs.precision[near] < costs.known_precision else _FREE
+                if mark & _KIND == IMPASSABLE and costs.mean[near] <= STOP_AT_COVERED:
+                    kind = UNKNOWN if costs.precision[near] < costs.known_precision else FREE
                     search.mark[near] = np.uint32(number << _SEARCH_SHIFT | _TIGHT | kind)
 
 
@@ -173,7 +150,7 @@ def _begin(search, lattice, costs, sources, cells):
     for source in sources:
         x, y, z = place_of(lattice, source)
         mark = mark_of(search, lattice, costs, source, x, y, z)
-        if (mark & _KIND == _IMPASSABLE or mark & _TIGHT) and len(lattice.touched) > 0:
+        if (mark & _KIND == IMPASSABLE or mark & _TIGHT) and len(lattice.touched) > 0:
             _let_leave(search, lattice, costs, source)
     for index in range(len(sources)):
         source = sources[index]
@@ -191,7 +168,7 @@ def _passable_moves(search, lattice, costs, voxel, x, y, z):
     """Bits, by code of a move, of the neighbours that can be entered at all."""
     size, number, marks = lattice.size, search.searches[0], search.mark
     mark = np.int64(marks[voxel])
-    fits = mark & _KIND != _IMPASSABLE and not mark & _TIGHT
+    fits = mark & _KIND != IMPASSABLE and not mark & _TIGHT
     inner = 0 < x < size[0] - 1 and 0 < y < size[1] - 1 and (lattice.layer >= 0 or 0 < z < size[2] - 1)
     passable = 0
     for move in lattice.moves:
@@ -202,9 +179,9 @@ def _passable_moves(search, lattice, costs, voxel, x, y, z):
             if mark >> _SEARCH_SHIFT != number:
                 # Where the body fits here, only what it newly touches has to be looked at.
                 first, last = (move.first, move.last) if fits else (0, len(lattice.touched))
-                mark = number << _SEARCH_SHIFT | _look(lattice, costs, near, i, j, k, first, last)
+                mark = number << _SEARCH_SHIFT | look_at(lattice, costs, near, i, j, k, first, last)
                 marks[near] = np.uint32(mark)
-            if mark & _KIND != _IMPASSABLE:
+            if mark & _KIND != IMPASSABLE:
                 passable |= 1 << move.code
     return passable
 
@@ -234,14 +211,14 @@ def search_ways(search, lattice, costs, sources, goal, reach, cells):
     _begin(search, lattice, costs, sources, cells)
     marks, cost, queue, number = search.mark, search.cost, search.queue, search.searches[0]
     limit = np.nextafter(reach, math.inf)
-    per_cost = _NARROWER ** -1 / costs.least_rate
+    per_cost = _NARROWER**-1 / costs.least_rate
     goal_x, goal_y, goal_z = 0, 0, 0
     if goal != _NOWHERE:
         goal_x, goal_y, goal_z = place_of(lattice, goal)
         mark = mark_of(search, lattice, costs, goal, goal_x, goal_y, goal_z)
         if mark & _STEP != 0:
             return 0.0
-        if mark & _KIND == _IMPASSABLE:
+        if mark & _KIND == IMPASSABLE:
             return math.inf
         per_cost *= _PER_STEP_TO_GOAL
     while True:
@@ -273,11 +250,8 @@ def search_ways(search, lattice, costs, sources, goal, reach, cells):
             before = math.inf
             if mark & _STEP:
                 before = cost[near]
-                if there > before or (there == before and len(cells) == 0):
+                if there > before or (there == before and (len(cells) == 0 or cells[voxel] >= cells[near])):
                     continue
-                if there == before:
-                    if cells[voxel] >= cells[near]:
-                        continue
             left = 0.0
             if goal != _NOWHERE:
                 step = move.step
@@ -354,3 +328,89 @@ def collect(search, out):
     """Fill (V,) float64 with the costs of the latest search; inf = not reached."""
     for voxel in range(len(out)):
         out[voxel] = cost_to(search, voxel)
+
+
+class Geodesics(NamedTuple):
+    """Costs of ways to all voxels, from the nearest source each."""
+
+    cost: np.ndarray
+    """(X, Y, Z) float64; inf = not reached."""
+    cell: np.ndarray
+    """(X, Y, Z) int32, index of that source, the first of equals; UNREACHED = none: geodesic Voronoi cells."""
+
+
+def geodesics(
+    search: Search, lattice: Lattice, costs: Costs, sources: np.ndarray, reach: float = math.inf
+) -> Geodesics:
+    """Costs of the ways from the nearest of S sources to all voxels, and which source that is.
+
+    Args:
+        search: Working space; a single voxel is asked by `cost_to`, its way by `way_to`.
+        lattice: The steps.
+        costs: The belief, or the rates.
+        sources: (S,) voxels by number, S ≥ 1.
+        reach: Voxels at a larger cost are not reached.
+
+    Raises:
+        SettingError: A source is no voxel of the lattice, or `reach` is no number ≥ 0.
+    """
+    numbers = np.atleast_1d(np.asarray(sources)).astype(np.int32)
+    if len(numbers) == 0:
+        raise SettingError("sources", (), "at least one voxel")
+    for source in numbers.tolist():
+        _check_voxel(lattice, "sources", source)
+    _check_fit(search, lattice, costs, reach)
+    cell = np.full(lattice.size, UNREACHED, np.int32)
+    cost = np.empty(lattice.size, np.float64)
+    search_ways(search, lattice, costs, numbers, _NOWHERE, float(reach), cell.reshape(-1))
+    collect(search, cost.reshape(-1))
+    return Geodesics(cost, cell)
+
+
+def shortest_way(
+    search: Search, lattice: Lattice, costs: Costs, start: int, goal: int, reach: float = math.inf
+) -> tuple[float, np.ndarray]:
+    """The cheapest way from a voxel to another.
+
+    Args:
+        search: Working space.
+        lattice: The steps.
+        costs: The belief, or the rates.
+        start: Number of a voxel; may be impassable.
+        goal: Likewise; reached only if it is passable, or the start.
+        reach: Ways at a larger cost are not found.
+
+    Returns:
+        Its cost, and (N,) int32 the voxels from start to goal; (inf, none) if there is no way.
+
+    Raises:
+        SettingError: Start or goal is no voxel of the lattice, or `reach` is no number ≥ 0.
+    """
+    _check_voxel(lattice, "start", start)
+    _check_voxel(lattice, "goal", goal)
+    _check_fit(search, lattice, costs, reach)
+    cost = search_ways(
+        search, lattice, costs, np.array([start], np.int32), int(goal), float(reach), np.zeros(0, np.int32)
+    )
+    way = np.empty(way_to(search, lattice, int(goal), np.empty(0, np.int32)), np.int32)
+    way_to(search, lattice, int(goal), way)
+    return float(cost), way
+
+
+def _check_voxel(lattice: Lattice, field: str, voxel: int) -> None:
+    voxels = math.prod(lattice.size)
+    if not is_whole(voxel, 0, voxels - 1):
+        raise SettingError(field, voxel, f"the number of a voxel, from 0 to {voxels - 1}")
+    if lattice.layer >= 0 and voxel % lattice.size[2] != lattice.layer:
+        raise SettingError(field, voxel, f"a voxel of layer {lattice.layer}")
+
+
+def _check_fit(search: Search, lattice: Lattice, costs: Costs, reach: float) -> None:
+    voxels = math.prod(lattice.size)
+    if len(search.mark) != voxels:
+        raise SettingError("search", len(search.mark), f"working space for {voxels} voxels")
+    field = len(costs.rates) or len(costs.mean)
+    if field != voxels or (len(costs.rates) == 0 and len(costs.precision) != voxels):
+        raise SettingError("costs", field, f"a field of {voxels} voxels")
+    if not reach >= 0.0:
+        raise SettingError("reach", reach, "a number ≥ 0, or inf")
