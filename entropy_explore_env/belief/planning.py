@@ -336,7 +336,7 @@ class Geodesics(NamedTuple):
     cost: np.ndarray
     """(X, Y, Z) float64; inf = not reached."""
     cell: np.ndarray
-    """(X, Y, Z) int32, index of that source, the first of equals; UNREACHED = none: geodesic Voronoi cells."""
+    """(X, Y, Z) int32, index of that source, the first of equals; UNREACHED = none: Voronoi cells."""
 
 
 def geodesics(

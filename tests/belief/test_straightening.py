@@ -27,7 +27,7 @@ def sight(rates, start, finish):
     return cost_of_sight(search, lattice, costs, tuple(map(float, start)), tuple(map(float, finish)))
 
 
-def sampled(rates, start, finish, samples=4000):
+def sampled(rates, start, finish, samples=2000):
     """The same by points on the line; the start's voxel does not block."""
     share = (np.arange(samples) + 0.5) / samples
     points = np.asarray(start) + share[:, None] * (np.asarray(finish) - np.asarray(start))
@@ -42,7 +42,7 @@ def centre(voxel, shape):
     return np.array(np.unravel_index(int(voxel), shape)) + 0.5
 
 
-@drawn(80)
+@drawn(60)
 @given(st.sampled_from(SHAPES), seeds, st.sampled_from([0.0, 0.08]))
 def test_a_line_of_sight_costs_what_it_crosses(shape, seed, walls):
     rng = np.random.default_rng(seed)
@@ -113,19 +113,19 @@ def pulled(mean, precision, start, goal, radius=0.0, layer=None, unknown_cost=1.
     return cost, way, points, legs
 
 
-@drawn(80)
+@drawn(50)
 @given(
     st.sampled_from([*SHAPES, (31, 17, 1)]),
     seeds,
     st.sampled_from([0.0, 0.8, 1.3]),
     st.sampled_from([1.0, 3.0]),
 )
-def test_a_pulled_way_is_free_and_no_dearer_and_turns_at_voxels_of_the_way(shape, seed, radius, unknown_cost):
+def test_a_pulled_way_is_free_and_no_dearer_and_turns_on_the_way(shape, seed, radius, unknown_cost):
     rng = np.random.default_rng(seed)
     mean = random_cover(shape, 0.1 if radius == 0.0 else 0.03, seed)
     precision = rng.choice([1e-3, 50.0], shape).astype(np.float32)
     start, goal = rng.integers(0, mean.size, 2).tolist()
-    shift = rng.uniform(-0.45, 0.45, (2, 3))
+    shift = rng.uniform(-0.45, 0.45, (2, 3)) * (1.0, 1.0, shape[2] > 1)
     ends = tuple(centre(voxel, shape) + by for voxel, by in zip((start, goal), shift, strict=True))
     for given_ends in (None, ends):
         cost, way, points, legs = pulled(mean, precision, start, goal, radius, None, unknown_cost, given_ends)
