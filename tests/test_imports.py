@@ -28,7 +28,16 @@ LAYERS = (
 )
 """From the top down: a layer may import those below it."""
 SIBLINGS = {
-    "belief": ("raycast", "coverage_map", "fields", "visibility", "planning"),
+    "belief": (
+        "raycast",
+        "coverage_map",
+        "fields",
+        "visibility",
+        "bucket_queue",
+        "lattice",
+        "planning",
+        "straightening",
+    ),
     "robots": ("range_sensor", "motion", "channel"),
     "missions": (
         "rules",
