@@ -126,6 +126,7 @@ REFUSED = {
     (Scenario, "robots"): (*COUNT, 0, 1001),
     (Scenario, "sigma_prior"): (*POSITIVE, INF, 0.9e-3, 1.1e4),
     (Scenario, "decision_period_s"): ("1", True, [1.0], NAN, 0.0, -1.0, INF),
+    (Scenario, "scored"): SWITCH,
     (Scenario, "robot"): (None, Channel(), "free"),
     (Scenario, "sensor"): (None, Robot()),
     (Scenario, "channel"): (None, Robot()),

@@ -83,7 +83,7 @@ def new_lattice(shape: tuple[int, int, int], body_radius: float = 0.0, layer: in
     """Steps of a ball-shaped body in a workspace.
 
     A diagonal step needs every voxel that it squeezes past to be passable. The body fits where it
-    touches no covered voxel, as in `World.body_blocked`; the boundary of the workspace counts as
+    touches no covered voxel, as in `World.barriers`; the boundary of the workspace counts as
     covered, but not above and below a body that stays in its layer.
 
     Args:

@@ -29,7 +29,7 @@ def body_room(occupied: np.ndarray, voxel_size_m: float) -> np.ndarray:
         return np.zeros_like(occupied)
     shape = (occupied.shape[0], occupied.shape[1], occupied.shape[2] if occupied.ndim == 3 else 1)
     world = World(Grid(shape, voxel_size_m), occupied.reshape(shape).copy(), "under construction")
-    return ~world.body_blocked(BODY_RADIUS_M).reshape(occupied.shape)
+    return (world.barriers(BODY_RADIUS_M) == 0).reshape(occupied.shape)
 
 
 def largest_part(room: np.ndarray) -> np.ndarray:
