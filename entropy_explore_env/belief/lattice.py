@@ -114,7 +114,7 @@ def new_lattice(shape: tuple[int, int, int], body_radius: float = 0.0, layer: in
         move["first"], move["last"] = len(ball), len(ball) + len(fresh)
         ball += fresh
     return Lattice(
-        tuple(shape),
+        (int(shape[0]), int(shape[1]), int(shape[2])),
         -1 if layer is None else layer,
         moves,
         np.array([np.dot(numbers, offset) for offset in ball], np.int64),

@@ -199,6 +199,6 @@ def straightened(
         (M, 3) float64 grid units: points to drive to, without the start.
     """
     waypoints = np.empty((len(way) + 2, 3))
-    ends = [np.asarray(point, np.float64) for point in (start, finish)]
-    filled = pull_straight(search, lattice, costs, way, len(way), *ends, waypoints)
+    first, last = np.asarray(start, np.float64), np.asarray(finish, np.float64)
+    filled = pull_straight(search, lattice, costs, way, len(way), first, last, waypoints)
     return waypoints[:filled].copy()

@@ -160,8 +160,8 @@ def test_unknown_space_is_not_cut_across_where_that_is_dearer():
     start, goal = flat_index([(0, 3, 0), (8, 3, 0)], FLAT)
     assert len(pulled(mean, precision, start, goal, unknown_cost=1.0)[2]) == 2
     points = pulled(mean, precision, start, goal, unknown_cost=8.0)[2]
-    assert len(points) == 4
-    assert (points[1:-1, 1] == 4.5).all()
+    assert points is not None and len(points) == 4
+    assert points is not None and (points[1:-1, 1] == 4.5).all()
 
 
 def test_planar_bodies_keep_the_height_of_their_start():
@@ -170,8 +170,8 @@ def test_planar_bodies_keep_the_height_of_their_start():
     start, goal = flat_index([(0, 0, 2), (6, 0, 2)], SIZE)
     ends = (np.array([0.4, 0.6, 2.2]), np.array([6.5, 0.5, 2.2]))
     points = pulled(mean, precision, start, goal, layer=2, ends=ends)[2]
-    assert len(points) > 2
-    assert (points[:, 2] == 2.2).all()
+    assert points is not None and len(points) > 2
+    assert points is not None and (points[:, 2] == 2.2).all()
 
 
 def test_who_stands_at_the_goal_need_not_drive():
