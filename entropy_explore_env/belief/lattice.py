@@ -37,7 +37,10 @@ MOVE = np.dtype(
         ("code", "i8"),  # 9 (x + 1) + 3 (y + 1) + z + 1
         ("offset", "i8"),  # what is added to the voxel's number
         ("length", "f8"),
-        ("needs", "i8"),  # bits by code: the voxel that is entered and those that are squeezed past
+        (
+            "needs",
+            "i8",
+        ),  # bits by number of a move: the voxel that is entered and those that are squeezed past
         ("first", "i8"),  # of `ball`: what the body touches after the step and did not before
         ("last", "i8"),
     ],
@@ -110,7 +113,7 @@ def new_lattice(shape: tuple[int, int, int], body_radius: float = 0.0, layer: in
         passed = [s for s in itertools.product(*({0, axis} for axis in step)) if any(s)]
         move["step"], move["code"], move["offset"] = step, _code(step), np.dot(numbers, step)
         move["length"] = DIAGONALS[sum(map(abs, step)) - 1]
-        move["needs"] = sum(1 << _code(s) for s in passed)
+        move["needs"] = sum(1 << steps.index(s) for s in passed)
         move["first"], move["last"] = len(ball), len(ball) + len(fresh)
         ball += fresh
     return Lattice(

@@ -16,10 +16,10 @@ from entropy_explore_env.belief.lattice import KNOWN_RATIO, belief_costs, new_la
 from entropy_explore_env.belief.planning import (
     UNREACHED,
     geodesics,
-    new_search,
     search_ways,
     shortest_way,
 )
+from entropy_explore_env.belief.search_space import new_search
 from entropy_explore_env.config import Grid
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.worlds.world import World
