@@ -161,14 +161,17 @@ def _step_on(search, lattice, costs, voxel, at, passable, goal, place, limit, pe
             continue
         near = voxel + move.offset
         mark = np.int64(marks[near])
+        if goal == _NOWHERE and mark & STEP and not mark & OPEN:
+            continue  # its bucket was worked off: final, since no step is shorter than a bucket
         there = here + 0.5 * move.length * (rate + rate_of(costs, near, mark))
         before = math.inf
         if mark & STEP:
             before = cost[near]
             if there > before or (there == before and (len(cells) == 0 or cells[voxel] >= cells[near])):
                 continue
-        left, step = 0.0, move.step
+        left = 0.0
         if goal != _NOWHERE:
+            step = move.step
             left = costs.least_rate * _to_goal((at[0] + step[0], at[1] + step[1], at[2] + step[2]), place)
         if there + left >= limit:
             continue
@@ -194,10 +197,12 @@ def _step_on(search, lattice, costs, voxel, at, passable, goal, place, limit, pe
 def search_ways(search, lattice, costs, sources, goal, reach, cells):
     """Find the cheapest ways from the nearest of several sources to a goal, or to all voxels.
 
-    A voxel whose way is found to be cheaper after it was worked off is worked off again, so that the
-    result does not hang on the width of the buckets. With a goal only what is on the found way is
-    final. Sources may be impassable: a start inside a covered voxel may be left, and counts with the
-    least rate. Of sources at the same cost the first one has the voxel.
+    Without a goal no step is shorter than a bucket is wide: who is worked off is final. With one, keys
+    are costs plus the length still to go at the least rate, and a voxel to which a cheaper way is found
+    later is worked off again; only what is on the found way is final.
+
+    Sources may be impassable: a start inside a covered voxel may be left, and counts with the least
+    rate. Of sources at the same cost the first one has the voxel.
 
     Args:
         search: Filled in; read it by `cost_to`, `way_to` and `collect`.
