@@ -139,9 +139,12 @@ def _passable_moves(search, lattice, costs, voxel, x, y, z):
         if fresh >> k & 1:
             move = moves[k]
             near, step = voxel + move.offset, move.step
-            first, last = (move.first, move.last) if fits else (0, len(lattice.touched))
-            kind = look_at(lattice, costs, near, x + step[0], y + step[1], z + step[2], first, last)
-            marks[near] = np.uint32(number << SEARCH_SHIFT | kind)
+            at = (x + step[0], y + step[1], z + step[2])
+            if fits and lattice.together == 1:
+                kind = look_at(lattice, costs, near, at[0], at[1], at[2], move.first, move.last)
+                marks[near] = np.uint32(number << SEARCH_SHIFT | kind)
+            else:
+                kind = mark_of(search, lattice, costs, near, at[0], at[1], at[2]) & KIND
             passable = passable & ~(1 << k) | np.int64(kind != IMPASSABLE) << k
         k += 1
     return passable

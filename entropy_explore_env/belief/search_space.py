@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from entropy_explore_env.belief.bucket_queue import BucketQueue, new_queue
-from entropy_explore_env.belief.lattice import IMPASSABLE, UNKNOWN, look_at
+from entropy_explore_env.belief.lattice import IMPASSABLE, UNKNOWN, look_along, look_at
 from entropy_explore_env.compilation import inlined_kernel, lean_kernel
 
 # A voxel's mark: bits 0-1 what can be done in it, then flags, the step that led to it, the search.
@@ -55,12 +55,18 @@ def new_search(voxels: int) -> Search:
 
 @inlined_kernel
 def mark_of(search, lattice, costs, voxel, x, y, z):
-    """Mark of a voxel in this search; looks at the voxel if that was not done."""
+    """Mark of a voxel in this search; looks at it, and at some beside it, if that was not done."""
     mark, number = np.int64(search.mark[voxel]), search.searches[0]
     if mark >> SEARCH_SHIFT != number:
-        kind = look_at(lattice, costs, voxel, x, y, z, 0, len(lattice.touched))
-        mark = number << SEARCH_SHIFT | kind
-        search.mark[voxel] = np.uint32(mark)
+        if lattice.together > 1:
+            first = voxel & -lattice.together
+            last = min(first + lattice.together, len(search.mark))
+            look_along(costs, first, last, number << SEARCH_SHIFT, search.mark)
+            mark = np.int64(search.mark[voxel])
+        else:
+            kind = look_at(lattice, costs, voxel, x, y, z, 0, len(lattice.touched))
+            mark = number << SEARCH_SHIFT | kind
+            search.mark[voxel] = np.uint32(mark)
     return mark
 
 
