@@ -35,6 +35,7 @@ SIBLINGS = {
         "visibility",
         "bucket_queue",
         "lattice",
+        "search_space",
         "planning",
         "straightening",
     ),

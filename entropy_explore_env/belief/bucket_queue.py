@@ -45,7 +45,8 @@ class BucketQueue(NamedTuple):
 
 def new_queue(entries: int) -> BucketQueue:
     """A queue with room for this many entries; the memory is taken when it is used."""
-    blocks = entries // _ENTRIES + 1 + BUCKETS + 1  # one block a bucket is partly filled; one is spare
+    # One block a bucket is partly filled, one is taken out, one is spare.
+    blocks = entries // _ENTRIES + 1 + BUCKETS + 2
     return BucketQueue(
         np.empty((blocks, _ENTRIES + 1), np.int32), np.empty((BUCKETS, 2), np.int32), np.zeros(1, _NUMBERS)
     )
@@ -89,24 +90,32 @@ def put(queue, bucket, voxel):
 
 
 @inlined_kernel
-def take(queue):
-    """Take out the voxel that came last into the first bucket that is not empty; -1 = the queue is empty."""
-    numbers, heads, blocks = queue.numbers[0], queue.heads, queue.blocks
+def take_block(queue):
+    """Take the block that came last out of the first bucket that is not empty, which becomes the current.
+
+    Returns:
+        (block, count): its voxels are `blocks[block, 1 … count]`; give it back by `free_block` when
+        they are worked off. Block -1 = the queue is empty.
+    """
+    numbers, heads, current = queue.numbers[0], queue.heads, queue.numbers[0].current
     if numbers.waiting == 0:
-        return _NONE
-    while heads[numbers.current & _RING, 0] == _NONE:
-        numbers.current += 1
-    place = numbers.current & _RING
-    block, count = heads[place, 0], heads[place, 1]
-    voxel = blocks[block, count]
-    heads[place, 1] = count - 1
-    if count == 1:
-        heads[place, 0] = blocks[block, 0]
-        heads[place, 1] = _ENTRIES
-        blocks[block, 0] = numbers.freed
-        numbers.freed = block
-    numbers.waiting -= 1
-    return voxel
+        return np.int64(_NONE), np.int64(0)
+    while heads[current & _RING, 0] == _NONE:
+        current += 1
+    numbers.current = current
+    place = current & _RING
+    block, count = np.int64(heads[place, 0]), np.int64(heads[place, 1])
+    heads[place, 0] = queue.blocks[block, 0]
+    heads[place, 1] = _ENTRIES
+    numbers.waiting -= count
+    return block, count
+
+
+@inlined_kernel
+def free_block(queue, block):
+    """Let a block that was taken out serve again."""
+    queue.blocks[block, 0] = queue.numbers[0].freed
+    queue.numbers[0].freed = block
 
 
 @lean_kernel

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from entropy_explore_env.belief.raycast import STOP_AT_COVERED
-from entropy_explore_env.compilation import inlined_kernel
+from entropy_explore_env.compilation import inlined_kernel, lean_kernel
 from entropy_explore_env.errors import SettingError
 
 IMPASSABLE, FREE, UNKNOWN = 0, 1, 2
@@ -22,6 +22,9 @@ IMPASSABLE, FREE, UNKNOWN = 0, 1, 2
 
 KNOWN_RATIO = 2.0
 """A voxel is known once its precision is this many times the prior one: half a bit was learnt of it."""
+
+MOST_RATE = 1e6
+"""Rates are at most this many times the least one: a search works off a bucket for each least step."""
 
 _GRAIN = 2.0**-30
 DIAGONALS = (1.0, round(math.sqrt(2.0) / _GRAIN) * _GRAIN, round(math.sqrt(3.0) / _GRAIN) * _GRAIN)
@@ -31,13 +34,19 @@ So ways of equal length are equal, and ties do not hang on rounding.
 """
 _SQRT2, _SQRT3 = DIAGONALS[1], DIAGONALS[2]
 
+_TOGETHER = 32
+"""So many voxels are looked at in little more time than one, and most will be needed soon."""
+
 MOVE = np.dtype(
     [
         ("step", "i8", (3,)),  # -1, 0 or 1 along x, y and z
         ("code", "i8"),  # 9 (x + 1) + 3 (y + 1) + z + 1
         ("offset", "i8"),  # what is added to the voxel's number
         ("length", "f8"),
-        ("needs", "i8"),  # bits by code: the voxel that is entered and those that are squeezed past
+        (
+            "needs",
+            "i8",
+        ),  # bits by number of a move: the voxel that is entered and those that are squeezed past
         ("first", "i8"),  # of `ball`: what the body touches after the step and did not before
         ("last", "i8"),
     ],
@@ -58,6 +67,8 @@ class Lattice(NamedTuple):
     """(K,) int64, number offsets of voxels that the body touches: all of them first, then by move."""
     touched: np.ndarray
     """(B, 3) int64, the same for the whole body by axis; empty if it touches its own voxel only."""
+    together: int
+    """How many voxels, one after the other by number, are looked at together: a power of two."""
     margin: tuple[int, int, int]
     """Layers at either end of each axis that are too near to the boundary."""
 
@@ -110,7 +121,7 @@ def new_lattice(shape: tuple[int, int, int], body_radius: float = 0.0, layer: in
         passed = [s for s in itertools.product(*({0, axis} for axis in step)) if any(s)]
         move["step"], move["code"], move["offset"] = step, _code(step), np.dot(numbers, step)
         move["length"] = DIAGONALS[sum(map(abs, step)) - 1]
-        move["needs"] = sum(1 << _code(s) for s in passed)
+        move["needs"] = sum(1 << steps.index(s) for s in passed)
         move["first"], move["last"] = len(ball), len(ball) + len(fresh)
         ball += fresh
     return Lattice(
@@ -119,6 +130,7 @@ def new_lattice(shape: tuple[int, int, int], body_radius: float = 0.0, layer: in
         moves,
         np.array([np.dot(numbers, offset) for offset in ball], np.int64),
         np.array(list(body), np.int64).reshape(len(body), 3),
+        _TOGETHER if not body and (layer is None or shape[2] == 1) else 1,
         (reaches, reaches, reaches if layer is None else 0),
     )
 
@@ -157,10 +169,10 @@ def belief_costs(
         unknown_cost: What a voxel edge of way through unknown voxels costs.
 
     Raises:
-        SettingError: The cost is no finite number ≥ 1.
+        SettingError: The cost is no number from 1 to MOST_RATE.
     """
-    if not (1.0 <= unknown_cost < math.inf):
-        raise SettingError("unknown_cost", unknown_cost, "a finite number ≥ 1")
+    if not (1.0 <= unknown_cost <= MOST_RATE):
+        raise SettingError("unknown_cost", unknown_cost, f"a number from 1 to {MOST_RATE:g}")
     flat = _numbered(mean)
     return Costs(
         flat, _numbered(precision), KNOWN_RATIO * float(prior_precision), float(unknown_cost), flat[:0], 1.0
@@ -174,12 +186,15 @@ def rate_costs(rates: np.ndarray) -> Costs:
         rates: (X, Y, Z) or (V,) float32, > 0, what a voxel edge of way costs; inf = impassable.
 
     Raises:
-        SettingError: A rate is not above 0.
+        SettingError: A rate is not above 0, or finite and over MOST_RATE times the least one.
     """
     flat = _numbered(rates)
     least = float(flat.min(initial=np.inf))
     if not least > 0.0:  # NaN is not either
         raise SettingError("rates", least, "rates > 0; inf = impassable")
+    most = float(flat.max(initial=0.0, where=np.isfinite(flat)))
+    if most > MOST_RATE * least:
+        raise SettingError("rates", most, f"finite rates of at most {MOST_RATE:g} times the least, {least:g}")
     return Costs(flat[:0], flat[:0], 0.0, 1.0, flat, least if math.isfinite(least) else 1.0)
 
 
@@ -225,3 +240,18 @@ def look_at(lattice, costs, voxel, x, y, z, first, last):
         if costs.mean[voxel + lattice.ball[i]] > STOP_AT_COVERED:
             return IMPASSABLE
     return UNKNOWN if costs.precision[voxel] < costs.known_precision else FREE
+
+
+@lean_kernel
+def look_along(costs, first, last, number, marks):
+    """Fill in the marks of voxels `first` … `last` - 1: what can be done in each, added to a number.
+
+    For bodies that touch their own voxel only.
+    """
+    if len(costs.rates) > 0:
+        for voxel in range(first, last):
+            marks[voxel] = np.uint32(number + (FREE if costs.rates[voxel] < math.inf else IMPASSABLE))
+        return
+    for voxel in range(first, last):
+        kind = UNKNOWN if costs.precision[voxel] < costs.known_precision else FREE
+        marks[voxel] = np.uint32(number + (IMPASSABLE if costs.mean[voxel] > STOP_AT_COVERED else kind))

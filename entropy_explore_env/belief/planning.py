@@ -12,13 +12,12 @@ from typing import NamedTuple
 import numpy as np
 
 from entropy_explore_env.belief.bucket_queue import (
-    BucketQueue,
     clear_queue,
+    free_block,
     keep_entries,
-    new_queue,
     put,
     queue_full,
-    take,
+    take_block,
 )
 from entropy_explore_env.belief.lattice import (
     DIAGONALS,
@@ -31,6 +30,22 @@ from entropy_explore_env.belief.lattice import (
     place_of,
 )
 from entropy_explore_env.belief.raycast import STOP_AT_COVERED
+from entropy_explore_env.belief.search_space import (
+    KIND,
+    NO_STEP,
+    OPEN,
+    SEARCH_SHIFT,
+    SEARCHES,
+    STEP,
+    STEP_SHIFT,
+    TIGHT,
+    Search,
+    collect,
+    cost_to,
+    mark_of,
+    rate_of,
+    way_to,
+)
 from entropy_explore_env.compilation import inlined_kernel, lean_kernel
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.validation import is_whole
@@ -38,17 +53,6 @@ from entropy_explore_env.validation import is_whole
 UNREACHED = -1
 """Cell of a voxel that no source reaches."""
 
-# A voxel's mark: bits 0-1 what can be done in it, then flags, the step that led to it, the search.
-_KIND = 3
-_OPEN = 4
-"""It waits in the queue."""
-_TIGHT = 8
-"""The body does not fit, but touches the voxel from the start: it may leave through it."""
-_STEP_SHIFT, _STEP = 4, 31 << 4
-"""Code of the step that led to the voxel, plus 1; 0 = not reached."""
-_SEARCH_SHIFT = 9
-_SEARCHES = 2**23 - 1
-_NO_STEP = 13
 _NARROWER = 1.0 - 2.0**-20
 """Buckets are so much narrower than the least step that rounding puts no two ends of a step into one."""
 _PER_STEP_TO_GOAL = 4.0
@@ -56,68 +60,14 @@ _PER_STEP_TO_GOAL = 4.0
 
 _SQRT2, _SQRT3 = DIAGONALS[1], DIAGONALS[2]
 _NOWHERE = -1
-
-
-class Search(NamedTuple):
-    """Working space and result of a search, for one search at a time.
-
-    The memory of V voxels is taken where a search comes to: 12 bytes a voxel, and the queue's.
-    """
-
-    cost: np.ndarray
-    """(V,) float64, cost of reaching a voxel, where `mark` says that it was reached.
-
-    Not float32: its rounding would grow with every step, beyond 1e-6 of the cost.
-    """
-    mark: np.ndarray
-    """(V,) uint32: see the constants above; of an earlier search where its number is another."""
-    queue: BucketQueue
-    searches: np.ndarray
-    """(1,) int64, number of the latest search."""
-
-
-def new_search(voxels: int) -> Search:
-    """Working space for worlds of this many voxels; nothing is written yet."""
-    return Search(
-        np.empty(voxels, np.float64),
-        np.zeros(voxels, np.uint32),
-        new_queue(voxels + voxels // 8),
-        np.zeros(1, np.int64),
-    )
+_IN_LAYER = 8
+"""Moves of a search in one layer."""
 
 
 @inlined_kernel
-def mark_of(search, lattice, costs, voxel, x, y, z):
-    """Mark of a voxel in this search; looks at the voxel if that was not done."""
-    mark, number = np.int64(search.mark[voxel]), search.searches[0]
-    if mark >> _SEARCH_SHIFT != number:
-        kind = look_at(lattice, costs, voxel, x, y, z, 0, len(lattice.touched))
-        mark = number << _SEARCH_SHIFT | kind
-        search.mark[voxel] = np.uint32(mark)
-    return mark
-
-
-@inlined_kernel
-def is_passable(mark):
-    """Whether the voxel of a mark can be entered."""
-    return mark & _KIND != IMPASSABLE
-
-
-@inlined_kernel
-def rate_of(costs, voxel, mark):
-    """Cost of a voxel edge of way through a voxel; the least rate in a start that is impassable."""
-    kind = mark & _KIND
-    if kind == IMPASSABLE:
-        return costs.least_rate
-    if len(costs.rates) > 0:
-        return np.float64(costs.rates[voxel])
-    return costs.unknown_cost if kind == UNKNOWN else 1.0
-
-
-@inlined_kernel
-def _to_goal(x, y, z, goal_x, goal_y, goal_z):
-    """Length of the shortest way by steps if nothing is in it: √3 a space diagonal, √2 a plane one."""
-    x, y, z = abs(goal_x - x), abs(goal_y - y), abs(goal_z - z)
+def _to_goal(voxel, goal):
+    """Length of the shortest way by steps from (x, y, z) to another voxel if nothing is between."""
+    x, y, z = abs(goal[0] - voxel[0]), abs(goal[1] - voxel[1]), abs(goal[2] - voxel[2])
     longest, shortest = max(x, y, z), min(x, y, z)
     middle = x + y + z - longest - shortest
     return (longest - middle) + _SQRT2 * (middle - shortest) + _SQRT3 * shortest
@@ -134,30 +84,30 @@ def _let_leave(search, lattice, costs, voxel):
             near = (i * size[1] + j) * size[2] + k
             if near != voxel and (lattice.layer < 0 or k == lattice.layer):
                 mark = mark_of(search, lattice, costs, near, i, j, k)
-                if mark & _KIND == IMPASSABLE and costs.mean[near] <= STOP_AT_COVERED:
+                if mark & KIND == IMPASSABLE and costs.mean[near] <= STOP_AT_COVERED:
                     kind = UNKNOWN if costs.precision[near] < costs.known_precision else FREE
-                    search.mark[near] = np.uint32(number << _SEARCH_SHIFT | _TIGHT | kind)
+                    search.mark[near] = np.uint32(number << SEARCH_SHIFT | TIGHT | kind)
 
 
 @lean_kernel
 def _begin(search, lattice, costs, sources, cells):
     """Forget the search before, and put the sources into the queue."""
     search.searches[0] += 1
-    if search.searches[0] > _SEARCHES:  # once in millions of searches
+    if search.searches[0] > SEARCHES:  # once in millions of searches
         search.mark[:] = 0
         search.searches[0] = 1
     clear_queue(search.queue)
     for source in sources:
         x, y, z = place_of(lattice, source)
         mark = mark_of(search, lattice, costs, source, x, y, z)
-        if (mark & _KIND == IMPASSABLE or mark & _TIGHT) and len(lattice.touched) > 0:
+        if (mark & KIND == IMPASSABLE or mark & TIGHT) and len(lattice.touched) > 0:
             _let_leave(search, lattice, costs, source)
     for index in range(len(sources)):
         source = sources[index]
         mark = np.int64(search.mark[source])
-        if mark & _STEP == 0:
+        if mark & STEP == 0:
             search.cost[source] = 0.0
-            search.mark[source] = np.uint32(mark | _OPEN | (_NO_STEP + 1) << _STEP_SHIFT)
+            search.mark[source] = np.uint32(mark | OPEN | (NO_STEP + 1) << STEP_SHIFT)
             if len(cells) > 0:
                 cells[source] = index
             put(search.queue, 0, source)
@@ -165,35 +115,97 @@ def _begin(search, lattice, costs, sources, cells):
 
 @inlined_kernel
 def _passable_moves(search, lattice, costs, voxel, x, y, z):
-    """Bits, by code of a move, of the neighbours that can be entered at all."""
-    size, number, marks = lattice.size, search.searches[0], search.mark
-    mark = np.int64(marks[voxel])
-    fits = mark & _KIND != IMPASSABLE and not mark & _TIGHT
-    inner = 0 < x < size[0] - 1 and 0 < y < size[1] - 1 and (lattice.layer >= 0 or 0 < z < size[2] - 1)
-    passable = 0
-    for move in lattice.moves:
-        i, j, k = x + move.step[0], y + move.step[1], z + move.step[2]
-        if inner or (0 <= i < size[0] and 0 <= j < size[1] and 0 <= k < size[2]):
-            near = voxel + move.offset
-            mark = np.int64(marks[near])
-            if mark >> _SEARCH_SHIFT != number:
-                # Where the body fits here, only what it newly touches has to be looked at.
-                first, last = (move.first, move.last) if fits else (0, len(lattice.touched))
-                mark = number << _SEARCH_SHIFT | look_at(lattice, costs, near, i, j, k, first, last)
-                marks[near] = np.uint32(mark)
-            if mark & _KIND != IMPASSABLE:
-                passable |= 1 << move.code
+    """Bits, by number of a move, of the neighbours that can be entered; looks at those not looked at yet."""
+    size, moves, marks, number = lattice.size, lattice.moves, search.mark, search.searches[0]
+    passable, fresh = 0, 0
+    inner = 0 < x < size[0] - 1 and 0 < y < size[1] - 1 and lattice.layer >= 0
+    if inner and len(moves) == _IN_LAYER:
+        for k in range(_IN_LAYER):  # a number that the compiler knows: no loop, and no branch
+            mark = np.int64(marks[voxel + moves[k].offset])
+            passable |= np.int64(mark & KIND != IMPASSABLE) << k
+            fresh |= np.int64(mark >> SEARCH_SHIFT != number) << k
+    else:
+        for k in range(len(moves)):
+            step = moves[k].step
+            at = (x + step[0], y + step[1], z + step[2])
+            if 0 <= at[0] < size[0] and 0 <= at[1] < size[1] and 0 <= at[2] < size[2]:
+                mark = np.int64(marks[voxel + moves[k].offset])
+                passable |= np.int64(mark & KIND != IMPASSABLE) << k
+                fresh |= np.int64(mark >> SEARCH_SHIFT != number) << k
+    mark, k = np.int64(marks[voxel]), 0
+    # Where the body fits here, only what it newly touches has to be looked at.
+    fits = mark & KIND != IMPASSABLE and not mark & TIGHT
+    while fresh >> k:
+        if fresh >> k & 1:
+            move = moves[k]
+            near, step = voxel + move.offset, move.step
+            at = (x + step[0], y + step[1], z + step[2])
+            if fits and lattice.together == 1:
+                kind = look_at(lattice, costs, near, at[0], at[1], at[2], move.first, move.last)
+                marks[near] = np.uint32(number << SEARCH_SHIFT | kind)
+            else:
+                kind = mark_of(search, lattice, costs, near, at[0], at[1], at[2]) & KIND
+            passable = passable & ~(1 << k) | np.int64(kind != IMPASSABLE) << k
+        k += 1
     return passable
+
+
+@inlined_kernel
+def _step_on(search, lattice, costs, voxel, at, passable, goal, place, limit, per_cost, cells):
+    """Reach the neighbours of a voxel, at (x, y, z), through it where that is cheaper.
+
+    Returns:
+        The limit of costs that are wanted: less if the goal was reached.
+    """
+    marks, cost, number = search.mark, search.cost, search.searches[0]
+    here, rate = cost[voxel], rate_of(costs, voxel, np.int64(marks[voxel]))
+    for move in lattice.moves:
+        if passable & move.needs != move.needs:
+            continue
+        near = voxel + move.offset
+        mark = np.int64(marks[near])
+        if goal == _NOWHERE and mark & STEP and not mark & OPEN:
+            continue  # its bucket was worked off: final, since no step is shorter than a bucket
+        there = here + 0.5 * move.length * (rate + rate_of(costs, near, mark))
+        before = math.inf
+        if mark & STEP:
+            before = cost[near]
+            if there > before or (there == before and (len(cells) == 0 or cells[voxel] >= cells[near])):
+                continue
+        left = 0.0
+        if goal != _NOWHERE:
+            step = move.step
+            left = costs.least_rate * _to_goal((at[0] + step[0], at[1] + step[1], at[2] + step[2]), place)
+        if there + left >= limit:
+            continue
+        cost[near] = there
+        if len(cells) > 0:
+            cells[near] = cells[voxel]
+        opened = mark & OPEN
+        mark = number << SEARCH_SHIFT | (move.code + 1) << STEP_SHIFT | mark & (KIND | TIGHT)
+        if near == goal:
+            marks[near] = np.uint32(mark)
+            limit = there
+            continue
+        marks[near] = np.uint32(mark | OPEN)
+        bucket = int((there + left) * per_cost)
+        if not opened or bucket < int((before + left) * per_cost):
+            put(search.queue, bucket, near)
+            if queue_full(search.queue):
+                keep_entries(search.queue, marks, OPEN)
+    return limit
 
 
 @lean_kernel
 def search_ways(search, lattice, costs, sources, goal, reach, cells):
     """Find the cheapest ways from the nearest of several sources to a goal, or to all voxels.
 
-    A voxel whose way is found to be cheaper after it was worked off is worked off again, so that the
-    result does not hang on the width of the buckets. With a goal only what is on the found way is
-    final. Sources may be impassable: a start inside a covered voxel may be left, and counts with the
-    least rate. Of sources at the same cost the first one has the voxel.
+    Without a goal no step is shorter than a bucket is wide: who is worked off is final. With one, keys
+    are costs plus the length still to go at the least rate, and a voxel to which a cheaper way is found
+    later is worked off again; only what is on the found way is final.
+
+    Sources may be impassable: a start inside a covered voxel may be left, and counts with the least
+    rate. Of sources at the same cost the first one has the voxel.
 
     Args:
         search: Filled in; read it by `cost_to`, `way_to` and `collect`.
@@ -209,125 +221,44 @@ def search_ways(search, lattice, costs, sources, goal, reach, cells):
         Cost of the goal, inf = not reached within `reach`; without a goal 0.
     """
     _begin(search, lattice, costs, sources, cells)
-    marks, cost, queue, number = search.mark, search.cost, search.queue, search.searches[0]
+    marks, cost, queue = search.mark, search.cost, search.queue
     limit = np.nextafter(reach, math.inf)
     per_cost = _NARROWER**-1 / costs.least_rate
-    goal_x, goal_y, goal_z = 0, 0, 0
+    place = (0, 0, 0)
     if goal != _NOWHERE:
-        goal_x, goal_y, goal_z = place_of(lattice, goal)
-        mark = mark_of(search, lattice, costs, goal, goal_x, goal_y, goal_z)
-        if mark & _STEP != 0:
+        place = place_of(lattice, goal)
+        mark = mark_of(search, lattice, costs, goal, place[0], place[1], place[2])
+        if mark & STEP != 0:
             return 0.0
-        if mark & _KIND == IMPASSABLE:
+        if mark & KIND == IMPASSABLE:
             return math.inf
         per_cost *= _PER_STEP_TO_GOAL
     while True:
-        voxel = take(queue)
-        if voxel == _NOWHERE or queue.numbers[0].current > limit * per_cost:
+        block, count = take_block(queue)
+        if block == _NOWHERE or queue.numbers[0].current > limit * per_cost:
             break
-        mark = np.int64(marks[voxel])
-        if not mark & _OPEN:
-            continue
-        x, y, z = place_of(lattice, voxel)
-        here = cost[voxel]
-        ahead = here
-        if goal != _NOWHERE:
-            ahead += costs.least_rate * _to_goal(x, y, z, goal_x, goal_y, goal_z)
-        if int(ahead * per_cost) > queue.numbers[0].current:  # it was too far ahead for the ring
-            put(queue, int(ahead * per_cost), voxel)
-            continue
-        marks[voxel] = np.uint32(mark ^ _OPEN)
-        if ahead >= limit:
-            continue
-        rate = rate_of(costs, voxel, mark)
-        passable = _passable_moves(search, lattice, costs, voxel, x, y, z)
-        for move in lattice.moves:
-            if passable & move.needs != move.needs:
+        for entry in range(count, 0, -1):
+            voxel = np.int64(queue.blocks[block, entry])
+            mark = np.int64(marks[voxel])
+            if not mark & OPEN:
                 continue
-            near = voxel + move.offset
-            mark = np.int64(marks[near])
-            there = here + 0.5 * move.length * (rate + rate_of(costs, near, mark))
-            before = math.inf
-            if mark & _STEP:
-                before = cost[near]
-                if there > before or (there == before and (len(cells) == 0 or cells[voxel] >= cells[near])):
-                    continue
-            left = 0.0
+            x, y, z = place_of(lattice, voxel)
+            here = cost[voxel]
+            ahead = here
             if goal != _NOWHERE:
-                step = move.step
-                left = costs.least_rate * _to_goal(
-                    x + step[0], y + step[1], z + step[2], goal_x, goal_y, goal_z
-                )
-            if there + left >= limit:
+                ahead += costs.least_rate * _to_goal((x, y, z), place)
+            if int(ahead * per_cost) > queue.numbers[0].current:  # it was too far ahead for the ring
+                put(queue, int(ahead * per_cost), voxel)
                 continue
-            cost[near] = there
-            if len(cells) > 0:
-                cells[near] = cells[voxel]
-            opened = mark & _OPEN
-            mark = number << _SEARCH_SHIFT | (move.code + 1) << _STEP_SHIFT | mark & (_KIND | _TIGHT)
-            if near == goal:
-                marks[near] = np.uint32(mark)
-                limit = there
+            marks[voxel] = np.uint32(mark ^ OPEN)
+            if ahead >= limit:
                 continue
-            marks[near] = np.uint32(mark | _OPEN)
-            bucket = int((there + left) * per_cost)
-            if not opened or bucket < int((before + left) * per_cost):
-                put(queue, bucket, near)
-                if queue_full(queue):
-                    keep_entries(queue, marks, _OPEN)
+            passable = _passable_moves(search, lattice, costs, voxel, x, y, z)
+            limit = _step_on(
+                search, lattice, costs, voxel, (x, y, z), passable, goal, place, limit, per_cost, cells
+            )
+        free_block(queue, block)
     return cost_to(search, goal) if goal != _NOWHERE else 0.0
-
-
-@inlined_kernel
-def cost_to(search, voxel):
-    """Cost of a voxel in the latest search; inf = not reached."""
-    mark = np.int64(search.mark[voxel])
-    reached = mark >> _SEARCH_SHIFT == search.searches[0] and mark & _STEP != 0
-    return search.cost[voxel] if reached else math.inf
-
-
-@inlined_kernel
-def _before(search, lattice, voxel):
-    """The voxel from which a reached one was reached; -1 = it is a source."""
-    code = ((np.int64(search.mark[voxel]) & _STEP) >> _STEP_SHIFT) - 1
-    if code == _NO_STEP:
-        return _NOWHERE
-    column = (code // 9 - 1) * lattice.size[1] + code // 3 % 3 - 1
-    return voxel - column * lattice.size[2] - code % 3 + 1
-
-
-@lean_kernel
-def way_to(search, lattice, voxel, way):
-    """The way from its source to a voxel.
-
-    Args:
-        search: The latest search.
-        lattice: Its steps.
-        voxel: Where the way ends.
-        way: (N,) int32, filled with the voxels from the source on, both ends with it, if they fit.
-
-    Returns:
-        How many voxels there are; 0 = the voxel was not reached. More than N: nothing was filled in.
-    """
-    if math.isinf(cost_to(search, voxel)):
-        return 0
-    count, at = 1, voxel
-    while _before(search, lattice, at) != _NOWHERE:
-        at = _before(search, lattice, at)
-        count += 1
-    if count <= len(way):
-        at = voxel
-        for index in range(count - 1, -1, -1):
-            way[index] = at
-            at = _before(search, lattice, at)
-    return count
-
-
-@lean_kernel
-def collect(search, out):
-    """Fill (V,) float64 with the costs of the latest search; inf = not reached."""
-    for voxel in range(len(out)):
-        out[voxel] = cost_to(search, voxel)
 
 
 class Geodesics(NamedTuple):

@@ -14,7 +14,7 @@ import math
 import numpy as np
 
 from entropy_explore_env.belief.lattice import Costs, Lattice
-from entropy_explore_env.belief.planning import Search, cost_to, is_passable, mark_of, rate_of
+from entropy_explore_env.belief.search_space import Search, cost_to, is_passable, mark_of, rate_of
 from entropy_explore_env.compilation import inlined_kernel, lean_kernel
 
 _SLACK = 1e-9

@@ -11,7 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from entropy_explore_env.belief.lattice import belief_costs, new_lattice, rate_costs
-from entropy_explore_env.belief.planning import new_search, shortest_way
+from entropy_explore_env.belief.planning import shortest_way
+from entropy_explore_env.belief.search_space import new_search
 from entropy_explore_env.belief.straightening import cost_of_sight, straightened
 from tests.reference.scenes import SHAPES, drawn, flat_index, random_cover, seeds
 
