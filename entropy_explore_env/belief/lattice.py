@@ -113,15 +113,17 @@ def new_lattice(shape: tuple[int, int, int], body_radius: float = 0.0, layer: in
     body = _touched(shape, body_radius, layer)
     reaches = max((max(offset) for offset in body), default=0)
     numbers = np.array([shape[1] * shape[2], shape[2], 1], np.int64)
-    steps = [s for s in itertools.product((-1, 0, 1), repeat=3) if any(s) and (layer is None or s[2] == 0)]
+    steps: list[tuple[int, ...]] = [
+        s for s in itertools.product((-1, 0, 1), repeat=3) if any(s) and (layer is None or s[2] == 0)
+    ]
     steps.sort(key=lambda s: sum(map(abs, s)))
     moves, ball = np.zeros(len(steps), MOVE), list(body)
     for move, step in zip(moves, steps, strict=True):
         fresh = [o for o in body if tuple(np.add(o, step).tolist()) not in body]
-        passed = [s for s in itertools.product(*({0, axis} for axis in step)) if any(s)]
+        sides = itertools.product(*({0, axis} for axis in step))
         move["step"], move["code"], move["offset"] = step, _code(step), np.dot(numbers, step)
         move["length"] = DIAGONALS[sum(map(abs, step)) - 1]
-        move["needs"] = sum(1 << steps.index(s) for s in passed)
+        move["needs"] = sum(1 << steps.index((x, y, z)) for x, y, z in sides if x or y or z)
         move["first"], move["last"] = len(ball), len(ball) + len(fresh)
         ball += fresh
     return Lattice(
