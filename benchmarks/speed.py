@@ -19,9 +19,11 @@ from typing import Any
 from baselines.command import parse, print_json, run_command
 from benchmarks.fusion import fusion_rows
 from benchmarks.peers import load_octomap, load_spread
+from benchmarks.planning import planning_rows
 from benchmarks.rows import FULL, QUICK, Effort, Row
 from benchmarks.startup import startup_rows
 from benchmarks.stepping import profile_rows, spread_rows, vector_rows
+from benchmarks.world_size import size_rows
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.writing import write_atomically
 
@@ -31,6 +33,8 @@ JOBS: tuple[tuple[str, Callable[[Effort], list[Row]]], ...] = (
     ("ParallelEnv beside mpe2 simple_spread", spread_rows),
     ("VectorEnv beside the ParallelEnv, on one and two threads", vector_rows),
     ("where a step's time goes", profile_rows),
+    ("shortest ways beside SciPy", planning_rows),
+    ("steps in worlds of different sizes", size_rows),
     ("first steps of fresh processes", startup_rows),
 )
 """What is measured, in this order, and what people read while they wait."""

@@ -31,6 +31,7 @@ SIBLINGS = {
     "belief": (
         "raycast",
         "coverage_map",
+        "pooling",
         "fields",
         "visibility",
         "bucket_queue",

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from entropy_explore_env.belief.pooling import fuse_pooled_ray
 from entropy_explore_env.compilation import lean_kernel
 from entropy_explore_env.missions.poses import copy_numbers, grid_position, pose_at
 from entropy_explore_env.robots.channel import (
@@ -15,17 +16,47 @@ from entropy_explore_env.robots.channel import (
     Delivery,
     deliver,
 )
-from entropy_explore_env.robots.range_sensor import fuse_scan, trace_measurement
+from entropy_explore_env.robots.range_sensor import Return, fuse_scan, trace_measurement
 
+_NOTHING = int(Return.NOTHING)
 _HEARD, _OUT_OF_RANGE, _LOST = (delivery.code for delivery in Delivery)
 _ANNOUNCEMENT = np.int64(-1)
 """In place of a number of measurements. A NumPy integer, so that `send` compiles for one type."""
 
 
 @lean_kernel
-def hear_batch(state, scan, mission, index, count):
+def fuse_measurements(rules, state, scan, mission, index, count):
+    """Fuse `count` measurements of `scan.order` into a robot's belief; returns the bits of `fuse_scan`."""
+    mean, precision = state.mean[mission, index], state.precision[mission, index]
+    if len(rules.cells.voxels) == 0:
+        return fuse_scan(scan, count, mean, precision)
+    ends = (rules.numbers[0].prior_precision, rules.numbers[0].end_precision)
+    total = 0.0
+    for i in range(count):
+        place = scan.order[i]
+        ray = scan.rays[place]
+        scan.utility[place] = 0.0
+        if ray.returned != _NOTHING:
+            scan.utility[place] = fuse_pooled_ray(
+                rules.cells,
+                state.pooled[mission, index],
+                ends,
+                mean,
+                precision,
+                scan.crossed[place],
+                scan.coverage[place],
+                ray.free,
+                ray.voxels,
+                ray.measured,
+            )
+            total += scan.utility[place]
+    return total
+
+
+@lean_kernel
+def hear_batch(rules, state, scan, mission, index, count):
     """Fuse received measurements as if the robot had taken them itself (Rocha04, sect. 5)."""
-    bits = fuse_scan(scan, count, state.mean[mission, index], state.precision[mission, index])
+    bits = fuse_measurements(rules, state, scan, mission, index, count)
     state.robots[mission, index].entropy_bits -= bits
     state.robots[mission, index].received_bits += bits
     state.robots[mission, index].heard_bits += bits
@@ -118,7 +149,7 @@ def send(rules, state, scan, mission, index, count):
             if count < 0:
                 write_announcement(robot, heard.announced)
             else:
-                hear_batch(state, scan, mission, mate, count)
+                hear_batch(rules, state, scan, mission, mate, count)
 
 
 @lean_kernel
@@ -151,7 +182,7 @@ def open_letter(rules, state, scan, mission, place):
             if letter.count < 0:
                 copy_numbers(letter.announced, heard.announced, 7)
             else:
-                hear_batch(state, scan, mission, robot, letter.count)
+                hear_batch(rules, state, scan, mission, robot, letter.count)
 
 
 @lean_kernel

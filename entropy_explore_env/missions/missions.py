@@ -10,6 +10,7 @@ from typing import TypeAlias
 import numpy as np
 
 from entropy_explore_env.belief.coverage_map import PRIOR_MEAN, map_entropy_bits
+from entropy_explore_env.belief.pooling import fresh_sums
 from entropy_explore_env.config import Grid, Scenario, gaussian_entropy_bits
 from entropy_explore_env.errors import CallOrderError, SettingError, WorldError
 from entropy_explore_env.missions.observation import ObservationLayout, observation_rules
@@ -69,7 +70,7 @@ class Missions:
         self.rules = rules_of(scenario)
         self.layout = ObservationLayout(scenario)
         self._parts = observation_rules(scenario, self.layout)
-        self.state: MissionState = new_state(scenario, self.count)
+        self.state: MissionState = new_state(scenario, self.count, self.rules.cells)
         self.worlds: list[World | None] = [None] * self.count
         self.seeds = [0] * self.count
         self.episodes = [-1] * self.count
@@ -147,6 +148,7 @@ class Missions:
             array[mission] = np.zeros((), array.dtype)
         state.mean[mission] = PRIOR_MEAN
         state.precision[mission] = self.rules.numbers["prior_precision"][0]
+        state.pooled[mission] = fresh_sums(self.rules.cells)
         if self.scenario.scored:
             state.joint_mean[mission] = PRIOR_MEAN
             state.joint_precision[mission] = self.rules.numbers["prior_precision"][0]

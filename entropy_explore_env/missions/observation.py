@@ -33,12 +33,13 @@ import numpy as np
 from gymnasium import spaces
 
 from entropy_explore_env.belief.coverage_map import expected_utility, measurement_precision
+from entropy_explore_env.belief.pooling import normalised_entropy
 from entropy_explore_env.belief.raycast import OPEN, STOP_AT_COVERED, cast_ray, longest_crossing
 from entropy_explore_env.compilation import lean_kernel
 from entropy_explore_env.config import Scenario
 from entropy_explore_env.missions.action import write_mask
 from entropy_explore_env.missions.poses import grid_position
-from entropy_explore_env.missions.rules import Rules, rules_of
+from entropy_explore_env.missions.rules import Rules, overview_shape, rules_of
 
 OWN_NUMBERS = 10
 TEAMMATE_NUMBERS = 19
@@ -128,8 +129,8 @@ def _parts(scenario: Scenario) -> dict[str, Part]:
         limits["team"] = ((scenario.robots - 1, TEAMMATE_NUMBERS), -1.0, one)
     if settings.patch:
         limits["patch"] = ((PATCH_CHANNELS, *settings.patch_shape), 0.0, one)
-    if settings.overview:
-        limits["overview"] = ((OVERVIEW_CHANNELS, *overview_shape(scenario)), 0.0, one)
+    if (cells := overview_shape(scenario)) is not None:
+        limits["overview"] = ((OVERVIEW_CHANNELS, *cells), 0.0, one)
     if settings.action_mask and scenario.action.kind == "discrete":
         limits["action_mask"] = ((len(rules.moves) * len(rules.gazes),), 0.0, one)
     parts, start = {}, 0
@@ -148,14 +149,6 @@ def _most_utility_bits(scenario: Scenario, rules: Rules) -> float:
     return voxels * 0.5 * math.log2(1.0 + precision / float(rules.numbers[0]["prior_precision"]))
 
 
-def overview_shape(scenario: Scenario) -> tuple[int, int, int]:
-    """Cells of the overview: as set, but no more than there are voxels along an axis."""
-    cells = [
-        min(n, size) for n, size in zip(scenario.observation.overview_shape, scenario.grid.shape, strict=True)
-    ]
-    return cells[0], cells[1], cells[2]
-
-
 class ObservationRules(NamedTuple):
     """The layout for compiled code: where each part begins, -1 if it is left out."""
 
@@ -166,7 +159,6 @@ class ObservationRules(NamedTuple):
     overview: int
     action_mask: int
     patch_shape: tuple[int, int, int]
-    overview_shape: tuple[int, int, int]
 
 
 def observation_rules(scenario: Scenario, layout: ObservationLayout) -> ObservationRules:
@@ -176,7 +168,6 @@ def observation_rules(scenario: Scenario, layout: ObservationLayout) -> Observat
     return ObservationRules(
         *(begin.get(name, -1) for name in ("panorama", "self", "team", "patch", "overview", "action_mask")),
         patch_shape=(int(patch[0]), int(patch[1]), int(patch[2])),
-        overview_shape=overview_shape(scenario),
     )
 
 
@@ -278,16 +269,10 @@ def write_relative(numbers, pose, other, out):
 
 
 @lean_kernel
-def normalised_entropy(numbers, precision):
-    """1 at the prior, 0 at the voxel entropy that ends a mission, clipped in between."""
-    span = math.log2(numbers.end_precision / numbers.prior_precision)
-    return min(max(math.log2(numbers.end_precision / precision) / span, 0.0), 1.0)
-
-
-@lean_kernel
 def observe_patch(numbers, shape, robot, start, mean, precision, heard, out):
     """Fill (4·x·y·z,): the belief around the robot's voxel; outside the workspace it is covered."""
     size_x, size_y, size_z = numbers.size[0], numbers.size[1], numbers.size[2]
+    prior, end = numbers.prior_precision, numbers.end_precision
     cells = shape[0] * shape[1] * shape[2]
     corner_x = math.floor(start[0]) - shape[0] // 2
     corner_y = math.floor(start[1]) - shape[1] // 2
@@ -300,7 +285,7 @@ def observe_patch(numbers, shape, robot, start, mean, precision, heard, out):
                 inside = 0 <= x < size_x and 0 <= y < size_y and 0 <= z < size_z
                 voxel = (x * size_y + y) * size_z + z if inside else 0
                 out[cell] = mean[voxel] if inside else 1.0
-                out[cells + cell] = normalised_entropy(numbers, precision[voxel]) if inside else 0.0
+                out[cells + cell] = normalised_entropy(prior, end, precision[voxel]) if inside else 0.0
                 out[2 * cells + cell] = 0.0 if inside else 1.0
                 out[3 * cells + cell] = 0.0
     for mate in range(len(heard)):
@@ -314,28 +299,12 @@ def observe_patch(numbers, shape, robot, start, mean, precision, heard, out):
 
 
 @lean_kernel
-def observe_overview(numbers, shape, mean, precision, out):
-    """Fill (2·x·y·z,): normalised entropy and expected coverage, averaged over blocks of voxels."""
-    size_x, size_y, size_z = numbers.size[0], numbers.size[1], numbers.size[2]
-    cells = shape[0] * shape[1] * shape[2]
-    for i in range(shape[0]):
-        low_x, high_x = i * size_x // shape[0], (i + 1) * size_x // shape[0]
-        for j in range(shape[1]):
-            low_y, high_y = j * size_y // shape[1], (j + 1) * size_y // shape[1]
-            for k in range(shape[2]):
-                low_z, high_z = k * size_z // shape[2], (k + 1) * size_z // shape[2]
-                entropy, covered = 0.0, 0.0
-                for x in range(low_x, high_x):
-                    for y in range(low_y, high_y):
-                        for voxel in range(
-                            (x * size_y + y) * size_z + low_z, (x * size_y + y) * size_z + high_z
-                        ):
-                            entropy += normalised_entropy(numbers, precision[voxel])
-                            covered += mean[voxel]
-                cell = (i * shape[1] + j) * shape[2] + k
-                voxels = (high_x - low_x) * (high_y - low_y) * (high_z - low_z)
-                out[cell] = entropy / voxels
-                out[cells + cell] = covered / voxels
+def observe_overview(cells, sums, out):
+    """Fill (2·C,): normalised entropy and expected coverage, averaged over each cell."""
+    count = len(cells.voxels)
+    for cell in range(count):
+        out[cell] = min(max(sums[0, cell] / cells.voxels[cell], 0.0), 1.0)
+        out[count + cell] = min(max(sums[1, cell] / cells.voxels[cell], 0.0), 1.0)
 
 
 @lean_kernel
@@ -365,6 +334,6 @@ def observe_robot(rules, parts, state, scan, mission, robot, pose, out):
     if parts.patch >= 0:
         observe_patch(numbers, parts.patch_shape, robot, start, mean, precision, heard, out[parts.patch :])
     if parts.overview >= 0:
-        observe_overview(numbers, parts.overview_shape, mean, precision, out[parts.overview :])
+        observe_overview(rules.cells, state.pooled[mission, robot], out[parts.overview :])
     if parts.action_mask >= 0:
         write_mask(rules, start, mean, out[parts.action_mask :])

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from entropy_explore_env.belief.pooling import Cells, new_cells
 from entropy_explore_env.config import Observation, Scenario
 from entropy_explore_env.robots.range_sensor import SensorModel, sensor_model
 from entropy_explore_env.worlds.world import plane_index
@@ -58,6 +59,8 @@ class Rules(NamedTuple):
     """(K, 3) int64, discrete moves in voxels."""
     gazes: np.ndarray
     """(D, 2) float64, discrete gazes: yaw, pitch."""
+    cells: Cells
+    """Of the overview; none without it."""
     panorama: np.ndarray
     """(D, 3) float64 unit vectors of the panorama's rays; D = 0 without it."""
 
@@ -102,8 +105,17 @@ def rules_of(scenario: Scenario) -> Rules:
         sensor=sensor_model(scenario.sensor),
         moves=discrete_moves(scenario),
         gazes=gaze_set(scenario.action.yaws, 1 if scenario.planar else scenario.action.pitches),
+        cells=new_cells(scenario.grid.shape, overview_shape(scenario)),
         panorama=panorama_directions(scenario),
     )
+
+
+def overview_shape(scenario: Scenario) -> tuple[int, int, int] | None:
+    """Cells of the overview: as set, but no more than there are voxels along an axis; None without it."""
+    if not scenario.observation.overview:
+        return None
+    x, y, z = scenario.observation.overview_shape
+    return min(x, scenario.grid.shape[0]), min(y, scenario.grid.shape[1]), min(z, scenario.grid.shape[2])
 
 
 def gaze_set(yaws: int, pitches: int) -> np.ndarray:

@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from entropy_explore_env.belief.pooling import Cells
 from entropy_explore_env.config import Scenario
 from entropy_explore_env.errors import SettingError
 
@@ -130,6 +131,8 @@ class MissionState(NamedTuple):
     """(E, A, V) float32 expected coverage by each robot's belief."""
     precision: np.ndarray
     """(E, A, V) float32 1/σ² of coverage by each robot's belief."""
+    pooled: np.ndarray
+    """(E, A, 2, C) float64 sums over the cells of the overview: see belief/pooling.py."""
     joint_mean: np.ndarray
     """(E, V) float32, the mean of the joint map; (E, 0) where the scenario is not scored."""
     joint_precision: np.ndarray
@@ -170,8 +173,8 @@ def check_memory(scenario: Scenario, missions: int) -> None:
         raise SettingError("missions, robots, voxels", size, f"what fits into {there_is >> 30} GiB of memory")
 
 
-def new_state(scenario: Scenario, missions: int) -> MissionState:
-    """Arrays for E missions of a scenario, not yet reset."""
+def new_state(scenario: Scenario, missions: int, cells: Cells) -> MissionState:
+    """Arrays for E missions of a scenario, not yet reset; beliefs are pooled to the cells."""
     e, a, r = missions, scenario.robots, scenario.sensor.rays
     v, q, b = scenario.grid.voxels, scenario.mail_places, min(scenario.channel.burst, r)
     truth, scored = np.zeros((e, v), np.float32), v if scenario.scored else 0
@@ -181,6 +184,7 @@ def new_state(scenario: Scenario, missions: int) -> MissionState:
         blocked=truth if small_body else np.zeros((e, v), np.float32),
         mean=np.zeros((e, a, v), np.float32),
         precision=np.zeros((e, a, v), np.float32),
+        pooled=np.zeros((e, a, 2, len(cells.voxels))),
         joint_mean=np.zeros((e, scored), np.float32),
         joint_precision=np.zeros((e, scored), np.float32),
         visible=np.zeros((e, scored), np.bool_),

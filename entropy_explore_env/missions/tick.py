@@ -10,7 +10,7 @@ import math
 
 from entropy_explore_env.compilation import lean_kernel
 from entropy_explore_env.missions.action import decode_action, write_mask
-from entropy_explore_env.missions.messages import announce, next_letter, open_letter, send
+from entropy_explore_env.missions.messages import announce, fuse_measurements, next_letter, open_letter, send
 from entropy_explore_env.missions.observation import observe_robot
 from entropy_explore_env.missions.poses import copy_numbers, grid_position, pose_at
 from entropy_explore_env.missions.reward import reward_robots
@@ -26,7 +26,6 @@ from entropy_explore_env.robots.motion import (
 )
 from entropy_explore_env.robots.range_sensor import (
     Return,
-    fuse_scan,
     in_view,
     take_scan,
     visibility_parameters,
@@ -208,7 +207,7 @@ def scan_and_share(rules, state, scan, mission, index):
     )
     for ray in range(len(scan.order)):
         scan.order[ray] = ray
-    bits = fuse_scan(scan, len(scan.order), state.mean[mission, index], state.precision[mission, index])
+    bits = fuse_measurements(rules, state, scan, mission, index, len(scan.order))
     robot.entropy_bits -= bits
     robot.own_bits += bits
     robot.gained_bits += bits
