@@ -36,7 +36,8 @@ def new_cells(size: tuple[int, int, int], shape: tuple[int, int, int] | None) ->
         shape: Cells along each axis, at most the voxels.
     """
     if shape is None:
-        return Cells(size, *(np.zeros(0, np.int64) for _ in range(3)), np.zeros(0))
+        nothing = np.zeros(0, np.int64)
+        return Cells(size, nothing, nothing, nothing, np.zeros(0))
     # Voxel v lies in cell i where i·V // C <= v < (i + 1)·V // C.
     axes = [((np.arange(v) + 1) * c - 1) // v for v, c in zip(size, shape, strict=True)]
     counts = [np.bincount(axis, minlength=c) for axis, c in zip(axes, shape, strict=True)]
