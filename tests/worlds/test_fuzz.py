@@ -1,4 +1,4 @@
-"""Broken and hostile files, 60 of each loader: `python -m tests.worlds.fuzz` runs as many as one likes."""
+"""Broken and hostile files, 500 of each loader: `python -m tests.worlds.fuzz` runs as many as one likes."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import pytest
 from tests.worlds.fuzz import MUTATORS, Outcome, fuzz, mutants, table
 from tests.worlds.samples import samples
 
-FILES = 60
+FILES = 500
 """A loader; 500 take minutes, most of them to start the reader again after it crashed."""
 
 

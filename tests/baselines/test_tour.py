@@ -1,0 +1,67 @@
+"""A folder of worlds is explored file by file, and the table says how far."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from baselines import tour
+from baselines.command import run_command
+from entropy_explore_env.config import Grid
+from entropy_explore_env.worlds.load import save_world
+from entropy_explore_env.worlds.world import World
+from tests.worlds.samples import pgm
+
+SHORT = ["--time-limit-s", "20", "--strategy", "random"]
+
+
+@pytest.fixture
+def folder(tmp_path):
+    """A plan with its YAML, an image without one, and a hut; the first image is no world of its own."""
+    plan = np.full((30, 44), 254, np.uint8)
+    plan[10:20, 15:18] = 0
+    (tmp_path / "floor.pgm").write_bytes(pgm(plan))
+    (tmp_path / "floor.yaml").write_text(
+        "image: floor.pgm\nresolution: 0.1\norigin: [0.0, 0.0, 0.0]\nnegate: 0\n"
+        "occupied_thresh: 0.65\nfree_thresh: 0.196\n"
+    )
+    below = tmp_path / "below"
+    below.mkdir()
+    (below / "bare.pgm").write_bytes(pgm(plan))
+    solid = np.zeros((9, 12, 7), bool)
+    solid[4, 5] = True
+    save_world(World(Grid(solid.shape, 0.25), solid, "hut"), tmp_path / "hut.npz")
+    (tmp_path / "notes.txt").write_text("no world")
+    return tmp_path
+
+
+def test_every_world_of_the_folder_has_a_row(folder, capsys):
+    out = folder / "table.md"
+    assert run_command(tour.main, [str(folder), *SHORT, "--out", str(out)]) == 0
+    said = capsys.readouterr()
+    rows = [line.split(" | ") for line in said.out.splitlines()[2:]]
+    assert [row[0].strip("| ") for row in rows] == ["bare.pgm", "floor.yaml", "hut.npz"]
+    assert [row[1] for row in rows] == ["22 × 15", "44 × 30", "9 × 12 × 7"]
+    assert {row[3] for row in rows} <= {"MAPPED", "TIME_UP"}
+    assert "3 of 3: hut.npz" in said.err
+    assert all(line in out.read_text() for line in said.out.splitlines())
+
+
+def test_results_as_one_object(folder, capsys):
+    assert run_command(tour.main, [str(folder), *SHORT, "--json"]) == 0
+    said = capsys.readouterr()
+    worlds = json.loads(said.out)["worlds"]
+    assert [world["world"] for world in worlds] == ["bare.pgm", "floor.yaml", "hut.npz"]
+    assert all(0.0 < world["explored"] <= 1.0 and world["scans"] > 0 for world in worlds)
+    assert said.err == ""
+
+
+@pytest.mark.parametrize(
+    "words", [["nowhere"], ["{}"], ["{}", "--strategy", "magic"], ["{}", "--robots", "0"]]
+)
+def test_bad_input_is_one_line(words, tmp_path, capsys):
+    assert run_command(tour.main, [word.format(tmp_path) for word in words]) == 2
+    said = capsys.readouterr()
+    assert not said.out and said.err.startswith("error: ") and said.err.count("\n") == 1
