@@ -7,6 +7,7 @@ from functools import partial
 from types import MappingProxyType
 
 from baselines.gradient import GradientStrategy
+from baselines.information_rate import InformationRate, Weighing
 from baselines.random_walk import RandomWalk
 from baselines.strategy import Strategy
 from entropy_explore_env.errors import SettingError
@@ -16,6 +17,8 @@ STRATEGIES: MappingProxyType[str, Callable[[], Strategy]] = MappingProxyType(
         "random": RandomWalk,
         "gradient": GradientStrategy,
         "gradient-plane": partial(GradientStrategy, motion_plane=True),
+        "information-rate": InformationRate,
+        "information-per-scan": partial(InformationRate, Weighing(per_scan=True, candidates=120)),
     }
 )
 """Name → a function that makes the strategy."""

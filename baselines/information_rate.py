@@ -1,0 +1,408 @@
+"""The strategy `information-rate`: the viewpoint whose scan is expected to bring most bits per second.
+
+Ours, not a paper's: viewpoints are drawn within reach, half of them turns on the spot, and each is weighed by
+the bits that its scan should take from the robot's own map (belief/visibility.py) per second of driving,
+turning and scanning. Where nothing nearby is worth much, the robot travels to an uncertain place farther
+away, along the shortest way by its belief, scanning at each stop. What teammates have announced that they
+will see is left to them.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from entropy_explore_env.belief.lattice import belief_costs, new_lattice
+from entropy_explore_env.belief.planning import search_ways
+from entropy_explore_env.belief.raycast import OPEN, STOP_AT_COVERED, cast_ray, longest_crossing
+from entropy_explore_env.belief.search_space import cost_to, new_search, way_to
+from entropy_explore_env.belief.straightening import straightened
+from entropy_explore_env.belief.visibility import CONE, SIGHT, cone_of, expected_scan_bits
+from entropy_explore_env.compilation import lean_kernel
+from entropy_explore_env.config import Scenario
+from entropy_explore_env.missions.view import RobotView
+from entropy_explore_env.robots.motion import driving_time, turning_time
+
+_KNOWN = 2.0
+"""A voxel with less than this many times the prior's precision is unknown."""
+
+
+_KEPT = 3
+"""Viewpoints around which others are drawn."""
+_PATIENCE = 4
+"""Decisions that a robot stays where it is after it has found nothing better elsewhere."""
+_LOTS, _GAZES = 32, 4
+"""Random voxels for each uncertain place that is weighed, and gazes there."""
+
+
+@dataclass(frozen=True)
+class Weighing:
+    """How viewpoints are drawn and weighed.
+
+    Attributes:
+        per_scan: Bits per scan instead of bits per second.
+        candidates: Viewpoints that are drawn for a decision; half of them turn on the spot.
+        thinning: Of the columns and rows of the sensor's rays every so many-th is imagined.
+        refinements: How often viewpoints around the best ones are drawn, a quarter as many each time.
+        blocking: Probability that an unknown voxel stops a ray.
+        poor: A best viewpoint with less than this share of the best ever expected makes the robot look
+            farther away.
+        places: Uncertain places farther away that are weighed then.
+        unknown_cost: What a metre of way through unknown space costs, in metres of known space.
+    """
+
+    per_scan: bool = False
+    candidates: int = 80
+    refinements: int = 3
+    thinning: int = 2
+    blocking: float = 0.02
+    poor: float = 0.1
+    places: int = 12
+    unknown_cost: float = 2.0
+
+
+@dataclass
+class _Journey:
+    """What a robot remembers from one decision to the next."""
+
+    best_bits: float = 0.0
+    patience: int = 0
+    """Decisions until it looks farther away again."""
+    stops: list[np.ndarray] = field(default_factory=list)
+    """Places (3,) in grid units that are still ahead."""
+
+
+class InformationRate:
+    """Chooses viewpoints by expected bits per second, or per scan."""
+
+    def __init__(self, weighing: Weighing | None = None) -> None:
+        """Take the settings."""
+        self.weighing = weighing or Weighing()
+
+    def reset(self, scenario: Scenario, rng: np.random.Generator) -> None:
+        """A new mission begins."""
+        grid, sensor = scenario.grid, scenario.sensor
+        self._rng, self._journeys = rng, [_Journey() for _ in range(scenario.robots)]
+        edge = grid.voxel_size_m
+        longest = longest_crossing(*grid.shape, sensor.max_range_m / edge, sensor.voxels_behind + 1)
+        self._scratch = (
+            np.zeros(grid.voxels, np.float32),
+            np.zeros(grid.voxels, np.int32),
+            np.zeros(longest + sum(grid.shape), np.int32),
+            np.zeros(longest + sum(grid.shape), np.int64),
+        )
+        sight = np.zeros(1, SIGHT)
+        for name in ("max_range_m", "sigma_min", "sigma_slope_per_m", "voxels_behind"):
+            sight[name] = getattr(sensor, name)
+        sight["known"], sight["blocking"] = _KNOWN / scenario.sigma_prior**2, self.weighing.blocking
+        self._sight = sight
+        step = sensor.angular_step_rad
+        columns, rows = (max(n // self.weighing.thinning, 1) for n in (sensor.columns, sensor.rows))
+        self._yaws = (np.arange(columns) - (columns - 1) / 2.0) * step * sensor.columns / columns
+        self._pitches = (np.arange(rows) - (rows - 1) / 2.0) * step * sensor.rows / rows
+        sight["rays"] = sensor.rays / (columns * rows)
+        self._search = new_search(grid.voxels)
+        layer = int(scenario.robot.sensor_height_m / edge) if scenario.planar and not grid.flat else None
+        self._lattice = new_lattice(grid.shape, scenario.robot.body_radius_m / edge, layer)
+
+    def choose(self, views: Sequence[RobotView]) -> list[np.ndarray]:
+        """The viewpoint of each view, by its own belief and what it has heard."""
+        return [self._choose(view) for view in views]
+
+    def _choose(self, view: RobotView) -> np.ndarray:
+        journey = self._journeys[view.robot]
+        here, low, edge = (
+            view.pose.copy(),
+            np.asarray(view.scenario.grid.origin_m),
+            view.scenario.grid.voxel_size_m,
+        )
+        here[:3] = (here[:3] - low) / edge
+        cones = self._cones(view)
+        if journey.stops and not _in_sight(view, here[:3], journey.stops[0], self._scratch):
+            journey.stops = []
+        drawn = self._drawn(view, here, journey.stops[0] if journey.stops else None)
+        bits, seconds = self._weighed(view, here, drawn, cones)
+        for _ in range(self.weighing.refinements):
+            worth = bits if self.weighing.per_scan or journey.stops else bits / seconds
+            best = np.argsort(worth)[-_KEPT:]
+            near = self._nearby(view, here, drawn[best], moving=not journey.stops)
+            near_bits, near_seconds = self._weighed(view, here, near, cones)
+            drawn = np.concatenate([drawn[best], near])
+            bits = np.concatenate([bits[best], near_bits])
+            seconds = np.concatenate([seconds[best], near_seconds])
+        best = int(np.argmax(bits if self.weighing.per_scan or journey.stops else bits / seconds))
+        if journey.stops:
+            journey.stops.pop(0)
+        else:
+            journey.best_bits = max(journey.best_bits, float(bits[best]))
+            journey.patience -= 1
+            if bits[best] < self.weighing.poor * journey.best_bits and journey.patience <= 0:
+                rate = bits[best] / (1.0 if self.weighing.per_scan else seconds[best])
+                journey.stops = self._way_to_somewhere_better(view, here, cones, float(rate))
+                if journey.stops:
+                    return self._choose(view)
+                journey.patience = _PATIENCE
+        viewpoint = drawn[best]
+        viewpoint[:3] = low + viewpoint[:3] * edge
+        return viewpoint
+
+    def _cones(self, view: RobotView) -> np.ndarray:
+        """(M,) CONE of what teammates have announced, in grid units."""
+        grid = view.scenario.grid
+        heard = [mate for mate in view.teammates.values() if mate.announced_s >= 0.0 and mate.depth_m > 0.0]
+        cones = np.zeros(len(heard), CONE)
+        for place, mate in enumerate(heard):
+            viewpoint = mate.viewpoint.copy()
+            viewpoint[:3] = (viewpoint[:3] - np.asarray(grid.origin_m)) / grid.voxel_size_m
+            cones[place] = cone_of(viewpoint, mate.depth_m / grid.voxel_size_m, mate.half_angle_rad)
+        return cones
+
+    def _drawn(self, view: RobotView, here: np.ndarray, stop: np.ndarray | None) -> np.ndarray:
+        """(K, 5) viewpoints in grid units: half on the spot, half within reach; or all at a stop."""
+        count, planar, rng = self.weighing.candidates, view.scenario.planar, self._rng
+        drawn = np.tile(here, (count, 1))
+        drawn[:, 3] = rng.uniform(-math.pi, math.pi, count)
+        drawn[:, 4] = 0.0 if planar else np.arcsin(rng.uniform(-1.0, 1.0, count))
+        if stop is not None:
+            drawn[:, :3] = stop
+            return drawn
+        grid, axes, moved = view.scenario.grid, 2 if planar else 3, count // 2
+        reach = min(view.scenario.robot.reach_m / grid.voxel_size_m, 0.25 * float(max(grid.shape)))
+        way = rng.normal(size=(moved, axes))
+        way *= (reach * rng.uniform(size=moved) ** (1 / axes) / np.linalg.norm(way, axis=1))[:, None]
+        inside = np.asarray(grid.shape[:axes]) - 0.5
+        drawn[:moved, :axes] = np.clip(here[:axes] + way, 0.5, inside)
+        return drawn
+
+    def _nearby(self, view: RobotView, here: np.ndarray, best: np.ndarray, moving: bool) -> np.ndarray:
+        """(N, 5) viewpoints around the best ones, in grid units; their gazes stray by half the view."""
+        planar, rng, grid = view.scenario.planar, self._rng, view.scenario.grid
+        near = best.repeat(max(self.weighing.candidates // (4 * len(best)), 1), axis=0)
+        spread = 0.5 * max(float(np.ptp(self._yaws)), float(np.ptp(self._pitches)), 0.1)
+        near[:, 3] += spread * rng.normal(size=len(near))
+        near[:, 3] = (near[:, 3] + math.pi) % (2.0 * math.pi) - math.pi
+        if not planar:
+            tilted = near[:, 4] + spread * rng.normal(size=len(near))
+            near[:, 4] = np.clip(tilted, -0.5 * math.pi, 0.5 * math.pi)
+        if moving:
+            axes = 2 if planar else 3
+            reach = min(view.scenario.robot.reach_m / grid.voxel_size_m, 0.25 * float(max(grid.shape)))
+            way = near[:, :axes] - here[:axes]
+            away = np.linalg.norm(way, axis=1) > 0.0  # turns on the spot stay turns on the spot
+            way[away] += 0.25 * reach * rng.normal(size=(int(away.sum()), axes))
+            length = np.maximum(np.linalg.norm(way, axis=1) / reach, 1.0)
+            inside = np.asarray(grid.shape[:axes]) - 0.5
+            near[:, :axes] = np.clip(here[:axes] + way / length[:, None], 0.5, inside)
+        return near
+
+    def _weighed(
+        self,
+        view: RobotView,
+        here: np.ndarray,
+        drawn: np.ndarray,
+        cones: np.ndarray,
+        anywhere: bool = False,
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """(K,) expected bits and seconds of each viewpoint; 0 bits where the straight way is not free.
+
+        With `anywhere` the way does not matter.
+        """
+        scenario, robot = view.scenario, view.scenario.robot
+        limits = (
+            robot.max_speed_m_s,
+            robot.acceleration_m_s2,
+            robot.turn_rate_rad_s,
+            scenario.sensor.scan_time_s,
+            robot.body_radius_m / scenario.grid.voxel_size_m,
+        )
+        bits, seconds = np.zeros(len(drawn)), np.zeros(len(drawn))
+        weigh_viewpoints(
+            view.mean.reshape(-1),
+            view.precision.reshape(-1),
+            scenario.grid.shape,
+            scenario.grid.voxel_size_m,
+            here,
+            drawn,
+            self._yaws,
+            self._pitches,
+            self._sight,
+            cones,
+            limits,
+            anywhere,
+            self._scratch,
+            bits,
+            seconds,
+        )
+        return bits, seconds
+
+    def _way_to_somewhere_better(
+        self, view: RobotView, here: np.ndarray, cones: np.ndarray, rate: float
+    ) -> list[np.ndarray]:
+        """Stops on the way to the uncertain place that is worth most, if it is worth more than staying.
+
+        Ways are sought only if there is a place that would be worth it on the straight line.
+        """
+        grid, scenario = view.scenario.grid, view.scenario
+        reach = min(scenario.robot.reach_m / grid.voxel_size_m, float(sum(grid.shape)))
+        limits = scenario.robot.max_speed_m_s, scenario.robot.acceleration_m_s2
+        hop_s = driving_time(reach * grid.voxel_size_m, *limits) + scenario.sensor.scan_time_s
+        each = 1.0 if self.weighing.per_scan else hop_s
+        drawn = self._drawn_voxels(view, here)
+        places = self._places(view, here, drawn)
+        bits, _ = self._weighed(view, places[0], places, cones, anywhere=True)
+        straight = np.linalg.norm(places[:, :3] - here[:3], axis=1)
+        if (bits / (np.maximum(straight / reach, 1.0) * each)).max() <= rate:
+            return []
+        costs = belief_costs(view.mean, view.precision, scenario.sigma_prior**-2, self.weighing.unknown_cost)
+        start = np.ravel_multi_index(tuple(here[:3].astype(int)), grid.shape)
+        nobody = np.zeros(0, np.int32)
+        search_ways(self._search, self._lattice, costs, np.array([start], np.int32), -1, math.inf, nobody)
+        cost = np.array([cost_to(self._search, int(voxel)) for voxel in drawn])
+        reached = np.isfinite(cost) & (cost > 0.0)
+        if not reached.any():
+            return []
+        places = self._places(view, here, drawn[reached])
+        bits, _ = self._weighed(view, places[0], places, cones, anywhere=True)
+        goals = np.ravel_multi_index(tuple(places[:, :3].astype(int).T), grid.shape)
+        cost = np.array([cost_to(self._search, int(goal)) for goal in goals])
+        worth = bits / (np.maximum(cost / reach, 1.0) * each)
+        best = int(np.argmax(worth))
+        if worth[best] <= rate:
+            return []
+        way = np.empty(way_to(self._search, self._lattice, int(goals[best]), nobody), np.int32)
+        way_to(self._search, self._lattice, int(goals[best]), way)
+        points = straightened(
+            self._search, self._lattice, costs, way, here[:3].copy(), places[best, :3].copy()
+        )
+        return _stops(here[:3], points, reach)
+
+    def _drawn_voxels(self, view: RobotView, here: np.ndarray) -> np.ndarray:
+        """(N,) random voxels that are not believed covered; of a planar robot's layer."""
+        grid = view.scenario.grid
+        drawn = self._rng.integers(0, grid.voxels, _LOTS * self.weighing.places)
+        if view.scenario.planar:
+            drawn += int(here[2]) - drawn % grid.shape[2]
+        free = drawn[view.mean.reshape(-1)[drawn] <= STOP_AT_COVERED]
+        return free if len(free) else drawn
+
+    def _places(self, view: RobotView, here: np.ndarray, voxels: np.ndarray) -> np.ndarray:
+        """(K, 5) viewpoints in grid units at the least known of some voxels, a few gazes each."""
+        least = np.argsort(view.precision.reshape(-1)[voxels], kind="stable")[: self.weighing.places]
+        places = np.stack(np.unravel_index(voxels[least], view.scenario.grid.shape), axis=-1) + 0.5
+        viewpoints = np.repeat(np.concatenate([places, np.zeros((len(places), 2))], axis=1), _GAZES, axis=0)
+        viewpoints[:, 3] = self._rng.uniform(-math.pi, math.pi, len(viewpoints))
+        if view.scenario.planar:
+            viewpoints[:, 2] = here[2]
+        return viewpoints
+
+
+def _stops(start: np.ndarray, points: np.ndarray, reach: float) -> list[np.ndarray]:
+    """Places along a polyline, none farther than `reach` from the one before."""
+    stops, at = [], start
+    for point in points:
+        hops = max(1, math.ceil(float(np.linalg.norm(point - at)) / (reach * (1.0 - 1e-6))))
+        stops += [at + (point - at) * (hop + 1) / hops for hop in range(hops)]
+        at = point
+    return stops
+
+
+def _in_sight(view: RobotView, here: np.ndarray, there: np.ndarray, scratch: tuple[np.ndarray, ...]) -> bool:
+    """Whether the straight way to a place is free by the belief."""
+    way = there - here
+    length = float(np.linalg.norm(way))
+    if length < 1e-9:
+        return True
+    mean, size = view.mean.reshape(-1), view.scenario.grid.shape
+    x, y, z = (way / length).tolist()
+    radius = view.scenario.robot.body_radius_m / view.scenario.grid.voxel_size_m
+    return bool(free_by_belief(mean, size, here, (x, y, z), length, radius, scratch))
+
+
+@lean_kernel
+def free_by_belief(
+    mean: np.ndarray,
+    size: tuple[int, int, int],
+    start: np.ndarray,
+    direction: tuple[float, float, float],
+    length: float,
+    radius: float,
+    scratch: tuple[np.ndarray, ...],
+) -> bool:
+    """Whether a ball-shaped body meets nothing believed covered on a straight way, and no boundary.
+
+    Looked at along the way of its centre and, for bodies larger than half a voxel, of four points at
+    its sides.
+    """
+    crossed, entered = scratch[2], scratch[3]
+    x, y, z = direction
+    level = math.sqrt(x * x + y * y)
+    side = (-y / level, x / level, 0.0) if level > 1e-9 else (1.0, 0.0, 0.0)
+    over = (y * side[2] - z * side[1], z * side[0] - x * side[2], x * side[1] - y * side[0])
+    wide = radius > 0.5 + 1e-9
+    for point in range(5 if wide else 1):
+        by_side = radius * (1.0 if point == 1 else -1.0 if point == 2 else 0.0)
+        by_over = radius * (1.0 if point == 3 else -1.0 if point == 4 else 0.0)
+        if point > 2 and size[2] == 1:
+            continue
+        begin = (
+            start[0] + by_side * side[0] + by_over * over[0],
+            start[1] + by_side * side[1] + by_over * over[1],
+            start[2] + by_side * side[2] + by_over * over[2],
+        )
+        for axis in range(3):
+            if not 0.0 <= begin[axis] <= size[axis]:
+                return False
+        way = length + (radius if wide and point == 0 else 0.0)
+        _, _, end = cast_ray(mean, STOP_AT_COVERED, size, begin, direction, way, False, 0, crossed, entered)
+        if end != OPEN:
+            return False
+    return True
+
+
+@lean_kernel
+def weigh_viewpoints(
+    mean: np.ndarray,
+    precision: np.ndarray,
+    size: tuple[int, int, int],
+    voxel_size_m: float,
+    here: np.ndarray,
+    drawn: np.ndarray,
+    yaw_offsets: np.ndarray,
+    pitch_offsets: np.ndarray,
+    sight: np.ndarray,
+    cones: np.ndarray,
+    limits: tuple[float, float, float, float, float],
+    anywhere: bool,
+    scratch: tuple[np.ndarray, ...],
+    bits: np.ndarray,
+    seconds: np.ndarray,
+) -> None:
+    """Fill (K,) expected bits of a scan at each of (K, 5) viewpoints, and the seconds until it is taken."""
+    max_speed_m_s, acceleration_m_s2, turn_rate_rad_s, scan_time_s, radius = limits
+    for k in range(len(drawn)):
+        viewpoint = drawn[k]
+        x, y, z = viewpoint[0] - here[0], viewpoint[1] - here[1], viewpoint[2] - here[2]
+        length = math.sqrt(x * x + y * y + z * z)
+        drive_s = driving_time(length * voxel_size_m, max_speed_m_s, acceleration_m_s2)
+        turn_s = turning_time(here[3], here[4], viewpoint[3], viewpoint[4], turn_rate_rad_s)
+        seconds[k] = max(drive_s, turn_s) + scan_time_s
+        bits[k] = 0.0
+        if length > 1e-9 and not anywhere:
+            direction = (x / length, y / length, z / length)
+            if not free_by_belief(mean, size, here, direction, length, radius, scratch):
+                continue
+        bits[k] = expected_scan_bits(
+            mean,
+            precision,
+            size,
+            voxel_size_m,
+            viewpoint,
+            yaw_offsets,
+            pitch_offsets,
+            sight[0],
+            cones,
+            scratch,
+        )
