@@ -21,10 +21,10 @@ LAYERS = (
     ("robots",),
     ("belief",),
     ("worlds",),
-    ("scenarios",),
+    ("scenarios", "settings_json"),
     ("config", "randomness"),
     ("validation",),
-    ("errors", "compilation", "writing"),
+    ("errors", "compilation", "writing", "version"),
 )
 """From the top down: a layer may import those below it."""
 SIBLINGS = {
@@ -97,7 +97,17 @@ SIBLINGS = {
         "episodes",
         "conformance",
     ),
-    "reports": ("metrics", "recording", "glyphs", "rendering", "animation", "painting"),
+    "reports": (
+        "metrics",
+        "recording",
+        "mission_record",
+        "glyphs",
+        "projection",
+        "rendering",
+        "animation",
+        "painting",
+        "rerun_view",
+    ),
 }
 """Inside a folder a file, or a folder, may import those that stand before it."""
 STRATEGIES_SEE = (
@@ -108,6 +118,7 @@ STRATEGIES_SEE = (
     "robots.motion",
     "config",
     "scenarios",
+    "settings_json",
     "reports",
     "errors",
     "compilation",
