@@ -27,7 +27,9 @@ def progress_bar(title: str, hidden: bool) -> Iterator[Callable[[EntropyExploreE
         ),
         TimeElapsedColumn(),
     )
-    progress = Progress(*columns, console=Console(file=sys.stderr), transient=True, disable=hidden)
+    console = Console(file=sys.stderr)
+    hidden = hidden or not console.is_terminal
+    progress = Progress(*columns, console=console, transient=True, disable=hidden)
     task = progress.add_task(title, total=1.0, left=1.0, time_s=0.0, shared=0)
 
     started = False

@@ -123,6 +123,7 @@ STRATEGIES_SEE = (
     "errors",
     "compilation",
     "writing",
+    "version",
 )
 """What `baselines` and `training` may import of the library; robots.motion for why a drive ended."""
 TRUTH = ("Missions", "World", "load_octomap", "load_world", "save_world")
@@ -292,7 +293,7 @@ def test_importing_the_library_loads_nothing_heavy():
         [sys.executable, "-c", script], cwd=ROOT, capture_output=True, text=True, check=True
     )
     loaded = {name.split(".")[0] for name in done.stdout.split()}
-    unwanted = {*HEAVY, "pygame", "PIL", "octomap", "tyro", "rich", "tensorboard", "pandas"}
+    unwanted = {*HEAVY, "pygame", "PIL", "av", "rerun", "octomap", "tyro", "rich", "tensorboard", "pandas"}
     assert not loaded & unwanted
     assert "pettingzoo" in loaded
 
