@@ -22,8 +22,8 @@ from entropy_explore_env.errors import MissingExtraError
 from entropy_explore_env.missions.missions import Missions
 from entropy_explore_env.reports.glyphs import COLOURS, robot_colour
 from entropy_explore_env.reports.painting import entropy_share, remaining_share, world_name
+from entropy_explore_env.reports.projection import KNOWN_BELOW
 from entropy_explore_env.reports.recording import poses_now
-from entropy_explore_env.reports.rendering import KNOWN_BELOW
 from entropy_explore_env.robots.channel import select_measurements
 from entropy_explore_env.robots.range_sensor import Return, sensor_model
 
