@@ -275,7 +275,8 @@ def draw_frame(frame: Frame, width: int = 640, height: int = 480) -> np.ndarray:
     seen = projections(np.asarray(frame.entropy_share, np.float32), np.asarray(frame.coverage, np.float32))
     for view in layout.views:
         _draw_map(image, view, seen[view.up - 1])
-        _draw_robots(image, view, frame, unit)
+    for up in (1, 2):
+        _draw_robots(image, [view for view in layout.views if view.up == up], frame, unit)
     _draw_curves(image, layout.curves, frame, unit)
     return image
 
@@ -308,28 +309,37 @@ def _pooled(values: np.ndarray, view: View, pool: np.ufunc) -> np.ndarray:
     return values
 
 
-def _draw_robots(image: np.ndarray, view: View, frame: Frame, unit: int) -> None:
-    """Ways so far, chosen viewpoints, then the robots with their gazes, each in its robot's colour."""
-    canvas = view.of(image)
+def _draw_robots(image: np.ndarray, views: list[View], frame: Frame, unit: int) -> None:
+    """Ways so far, chosen viewpoints, then the robots with their gazes, each in its robot's colour.
+
+    The views are of one size and direction: what is drawn has the same pixels in each.
+    """
+    if not views:
+        return
+    view, canvases = views[0], [view.of(image) for view in views]
     origin = np.asarray(frame.origin_m, dtype=np.float64)
     size = np.array(np.shape(frame.entropy_share)) * frame.voxel_size_m
 
     def placed(points_m: np.ndarray) -> np.ndarray:
         return view.place(np.reshape(points_m, (-1, 3)), origin, size) - (view.left, view.top)
 
+    def draw(points: np.ndarray, nib: np.ndarray, robot: int, edge: bool) -> None:
+        pixels = line_pixels(points)
+        for canvas in canvases:
+            (stamp if edge else paint)(canvas, pixels, nib, robot_colour(robot))
+
     for robot, path_m in enumerate(frame.paths_m):
-        paint(canvas, line_pixels(placed(path_m)), square(unit), robot_colour(robot))
+        draw(placed(path_m), square(unit), robot, edge=False)
     for robot, target in enumerate(placed(frame.targets_m)):
-        stamp(canvas, line_pixels(target[None]), disc(4.0 * unit, 2.5 * unit), robot_colour(robot))
+        draw(target[None], disc(4.0 * unit, 2.5 * unit), robot, edge=True)
     yaw, pitch = np.asarray(frame.gazes_rad, dtype=np.float64).T
     level, rise = (1.0, np.sin(yaw)) if view.up == 1 else (np.cos(pitch), -np.sin(pitch))
     ticks = 11.0 * unit * np.stack([np.cos(yaw) * level, -rise], axis=1)
     whole = np.minimum(5.0 * unit, (np.array([view.width, view.height]) - 1) / 2.0)
     inside = np.clip(placed(frame.positions_m), whole, (view.width - 1, view.height - 1) - whole)
     for robot, position in enumerate(inside):
-        tick = line_pixels(np.stack([position, position + ticks[robot]]))
-        stamp(canvas, tick, square(2 * unit), robot_colour(robot))
-        stamp(canvas, line_pixels(position[None]), disc(4.0 * unit), robot_colour(robot))
+        draw(np.stack([position, position + ticks[robot]]), square(2 * unit), robot, edge=True)
+        draw(position[None], disc(4.0 * unit), robot, edge=True)
 
 
 def _draw_curves(image: np.ndarray, box: Box, frame: Frame, unit: int) -> None:

@@ -60,12 +60,11 @@ class RerunView:
             import rerun
         except ImportError as error:
             raise MissingExtraError("rerun-sdk", "viewer") from error
-        self.path, self._missions, self._rr = path, missions, rerun
+        rr: Any = rerun  # its names come from modules that type checkers do not follow
+        self.path, self._missions, self._rr = path, missions, rr
         name = f"{world_name(missions)}, seed {missions.seeds[0]}"
-        together: Any = rerun.ChunkBatcherConfig(flush_tick=3600.0, flush_num_bytes=1 << 22)
-        self._stream = rerun.RecordingStream(
-            "entropy_explore_env", recording_id=name, batcher_config=together
-        )
+        together = rr.ChunkBatcherConfig(flush_tick=3600.0, flush_num_bytes=1 << 22)
+        self._stream = rr.RecordingStream("entropy_explore_env", recording_id=name, batcher_config=together)
         handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
         os.close(handle)
         self._temporary: Path | None = Path(temporary)
@@ -206,7 +205,7 @@ class _Cells:
             part = tuple(slice(first, first + _BLOCK) for first in corner * _BLOCK)
             if differs[part].mean() >= least:
                 self._levels[part], self._covered[part] = levels[part], covered[part]
-                cells = np.stack(np.indices(levels[part].shape), axis=-1).reshape(-1, 3) + corner * _BLOCK
+                cells = np.argwhere(np.ones(levels[part].shape, np.bool_)) + corner * _BLOCK
                 name = "_".join(map(str, corner))
                 blocks.append((name, cells, levels[part].ravel().astype(np.int64), covered[part].ravel()))
         return blocks
