@@ -34,11 +34,12 @@ class Wanted:
     """Which files a person asked for.
 
     Attributes:
-        out: Folder for mission.json, mission.png, mission.gif and mission.npz.
+        out: Folder for mission.json, mission.png and mission.gif, and for mission.npz where it is `recorded`.
         gif: An animated GIF.
         mp4: A video.
         record: A mission record, an `.npz`.
         rerun: A recording for Rerun's viewer, an `.rrd`.
+        recorded: Whether the folder gets a record, too; a replay has one already.
     """
 
     out: Path | None = None
@@ -46,6 +47,7 @@ class Wanted:
     mp4: Path | None = None
     record: Path | None = None
     rerun: Path | None = None
+    recorded: bool = True
 
     def prepare(self) -> None:
         """Make the folders and find the packages, before anything is computed for nothing.
@@ -135,7 +137,8 @@ class MissionLog:
         if wanted.mp4 is not None:
             write_video(self._films["mp4"].pictures(_VIDEO_LAST), wanted.mp4, _VIDEO_FRAMES_PER_S)
             written.append(wanted.mp4)
-        for file in (wanted.out and wanted.out / "mission.npz", wanted.record):
+        kept = wanted.out / "mission.npz" if wanted.out is not None and wanted.recorded else None
+        for file in (kept, wanted.record):
             if file is not None:
                 save_record(self.commands.record(figures["strategy"]), file)
                 written.append(file)

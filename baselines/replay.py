@@ -35,7 +35,7 @@ class Args:
     world: str | None = None
     """Where the world's file lies now, if it was moved."""
     out: Path | None = None
-    """Folder for mission.json, mission.png, mission.gif and mission.npz."""
+    """Folder for mission.json, mission.png and mission.gif."""
     gif: Path | None = None
     """File for an animated GIF of the mission."""
     mp4: Path | None = None
@@ -52,7 +52,7 @@ def main(words: Sequence[str]) -> int:
     record = load_record(args.record)
     if args.world is not None:
         record = replace(record, scenario=replace(record.scenario, world=args.world))
-    wanted = Wanted(args.out, args.gif, args.mp4, None, args.rerun)
+    wanted = Wanted(args.out, args.gif, args.mp4, None, args.rerun, recorded=False)
     wanted.prepare()
     started = time.perf_counter()
     title = f"{record.scenario.name}, replayed"
