@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from typing import Any
 
 import numpy as np
 
@@ -24,6 +25,7 @@ def run_mission(
     strategy: Strategy,
     seed: int,
     after_step: Callable[[EntropyExploreEnv], None] | None = None,
+    before_step: Callable[[Mapping[str, Any]], None] | None = None,
 ) -> None:
     """Reset the environment and let a strategy act until the mission is over.
 
@@ -32,6 +34,7 @@ def run_mission(
         strategy: Chooses the viewpoints.
         seed: Of the mission.
         after_step: Called after the reset and after every step.
+        before_step: Called with the actions before every step.
     """
     env.reset(seed=seed)
     strategy.reset(env.scenario, env.strategy_generator())
@@ -42,6 +45,8 @@ def run_mission(
         views = [env.view(agent) for agent in env.deciding_agents()]
         for view, viewpoint in zip(views, strategy.choose(views), strict=True):
             actions[env.agents[view.robot]] = view.action_for(viewpoint)
+        if before_step is not None:
+            before_step(actions)
         env.step(actions)
         if after_step is not None:
             after_step(env)

@@ -38,6 +38,7 @@ from entropy_explore_env.errors import (  # noqa: E402
     CallOrderError,
     EntropyExploreError,
     MissingExtraError,
+    RecordError,
     SettingError,
     WorldError,
 )
@@ -47,10 +48,11 @@ from entropy_explore_env.missions.view import RobotView  # noqa: E402
 from entropy_explore_env.robots.channel import Delivery  # noqa: E402
 from entropy_explore_env.robots.motion import MoveEnd  # noqa: E402
 from entropy_explore_env.scenarios import SCENARIOS, find_scenario  # noqa: E402
+from entropy_explore_env.version import VERSION  # noqa: E402
 from entropy_explore_env.worlds.load import load_octomap, load_world, save_world  # noqa: E402
 from entropy_explore_env.worlds.world import World  # noqa: E402
 
-__version__ = "0.1.0"
+__version__ = VERSION
 
 __all__ = [
     "SCENARIOS",
@@ -70,6 +72,7 @@ __all__ = [
     "MoveEnd",
     "Observation",
     "RangeSensor",
+    "RecordError",
     "Reward",
     "Robot",
     "RobotView",

@@ -34,6 +34,10 @@ class WorldError(SettingError):
     """A world cannot be used: a file that is missing or broken, or no room for the robots."""
 
 
+class RecordError(SettingError):
+    """A mission record cannot be used: missing, broken, changed by hand or of another format."""
+
+
 class CallOrderError(EntropyExploreError):
     """A call came at the wrong time: `step` before `reset`, or after the mission's end."""
 

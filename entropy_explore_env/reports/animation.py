@@ -1,4 +1,4 @@
-"""Pictures one after the other: in a window, or as an animated GIF."""
+"""Pictures one after the other: in a window, as an animated GIF, or as a video."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from entropy_explore_env.errors import MissingExtraError, SettingError
+from entropy_explore_env.validation import is_whole
 from entropy_explore_env.writing import write_atomically
 
 COLOUR_CODES = 1 << 15
@@ -43,6 +44,47 @@ def shared_palette(usage: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     palette = np.zeros((256, 3), dtype=np.uint8)
     palette[: len(kept)] = chosen << 3 | chosen >> 2
     return palette, nearest
+
+
+class Film:
+    """Pictures spread evenly over a mission, however long it becomes; kept compressed."""
+
+    def __init__(self, most: int) -> None:
+        """Keep at most `most` pictures (≥ 2), at least half as many where there were so many moments."""
+        self._most = most
+        self._kept: list[tuple[float, bytes]] = []
+        self._shape: tuple[int, ...] = ()
+        self._every_s, self._due_s = 0.1, 0.0
+
+    def due(self, time_s: float) -> bool:
+        """Whether a picture of this moment is wanted."""
+        return time_s >= self._due_s
+
+    def add(self, time_s: float, picture: np.ndarray) -> None:
+        """Keep a picture (H, W, 3) uint8; of too many, every other one is dropped."""
+        self._shape = picture.shape
+        self._kept.append((time_s, zlib.compress(picture.tobytes(), 1)))
+        while len(self._kept) > self._most:
+            self._every_s *= 2.0
+            last_s, kept = -np.inf, []
+            for moment in self._kept:
+                if moment[0] >= last_s + 0.999 * self._every_s or moment is self._kept[-1]:
+                    kept.append(moment)
+                    last_s = moment[0]
+            self._kept = kept
+        self._due_s = time_s + self._every_s
+
+    def __len__(self) -> int:
+        return len(self._kept)
+
+    def pictures(self, last: int) -> Iterator[np.ndarray]:
+        """The pictures in order, each (H, W, 3) uint8; the last one as often as `last` says."""
+        picture = np.zeros(0, np.uint8)
+        for _, packed in self._kept:
+            picture = np.frombuffer(zlib.decompress(packed), np.uint8).reshape(self._shape)
+            yield picture
+        for _ in range(last - 1):
+            yield picture
 
 
 class Window:
@@ -143,4 +185,46 @@ def animate(frames: Iterable[np.ndarray], path: Path, frame_s: float) -> None:
     options = {"append_images": animation, "duration": round(1000 * frame_s), "loop": 0, "optimize": False}
     buffer = io.BytesIO()
     next(animation).save(buffer, format="GIF", save_all=True, **options)
+    write_atomically(path, buffer.getvalue())
+
+
+def write_video(frames: Iterable[np.ndarray], path: Path, frames_per_s: int) -> None:
+    """Write pictures as an MP4: H.264 where the machine's PyAV can, MPEG-4 otherwise.
+
+    The same pictures give the same file. It appears only when complete.
+
+    Args:
+        frames: (H, W, 3) uint8 each, all of one size; an odd row or column at the end is left out.
+        path: The file; what it held before is replaced.
+        frames_per_s: From 1 to 240.
+
+    Raises:
+        SettingError: There are no pictures, or of different sizes, or too many a second.
+        MissingExtraError: PyAV is not installed.
+    """
+    try:
+        import av
+    except ImportError as error:
+        raise MissingExtraError("av", "viewer") from error
+    if not is_whole(frames_per_s, 1, 240):
+        raise SettingError("frames_per_s", frames_per_s, "a whole number from 1 to 240")
+    buffer, shape = io.BytesIO(), (0, 0, 3)
+    stream: Any = None
+    with av.open(buffer, "w", format="mp4") as video:
+        for picture in frames:
+            if stream is None:
+                shape = picture.shape
+                codec = "libx264" if "libx264" in av.codecs_available else "mpeg4"
+                stream = video.add_stream(codec, rate=frames_per_s)
+                stream.height, stream.width = shape[0] - shape[0] % 2, shape[1] - shape[1] % 2
+                stream.pix_fmt = "yuv420p"
+                stream.thread_count = 1  # more of them cut the picture into slices: another file
+                stream.options = {"crf": "18", "preset": "medium"} if codec == "libx264" else {"qscale": "3"}
+            if picture.shape != shape:
+                raise SettingError("frames", picture.shape, f"pictures of one shape, {shape}")
+            even = np.ascontiguousarray(picture[: stream.height, : stream.width])
+            video.mux(stream.encode(av.VideoFrame.from_ndarray(even, format="rgb24")))
+        if stream is None:
+            raise SettingError("frames", "none", "at least one picture")
+        video.mux(stream.encode())
     write_atomically(path, buffer.getvalue())

@@ -8,8 +8,9 @@ import numpy as np
 
 from entropy_explore_env.errors import CallOrderError, SettingError
 from entropy_explore_env.missions.missions import Missions
-from entropy_explore_env.missions.poses import pose_at
 from entropy_explore_env.reports.animation import Window
+from entropy_explore_env.reports.projection import shares_left
+from entropy_explore_env.reports.recording import poses_now
 from entropy_explore_env.reports.rendering import Frame, draw_frame
 from entropy_explore_env.worlds.recipes.catalogue import RECIPES
 
@@ -25,9 +26,8 @@ def check_render_mode(render_mode: str | None) -> None:
 
 def entropy_share(missions: Missions, mission: int, robot: int) -> np.ndarray:
     """(X, Y, Z) float32: how much of each voxel's entropy is left, 1 at the prior, 0 at σ_end."""
-    known, prior = (missions.rules.numbers[name][0] for name in ("end_precision", "prior_precision"))
-    share = np.log2(missions.precision[mission, robot] / known) / np.log2(prior / known)
-    return np.clip(share, 0.0, 1.0)
+    known, prior = (float(missions.rules.numbers[name][0]) for name in ("end_precision", "prior_precision"))
+    return shares_left(missions.precision[mission, robot], prior, known)
 
 
 def remaining_share(missions: Missions, mission: int) -> np.ndarray:
@@ -100,7 +100,7 @@ class Painter:
         """
         robots = missions.state.robots[self._number]
         time_s = float(missions.state.missions[self._number]["time_s"])
-        poses = np.stack([pose_at(missions.rules.numbers[0], robot, time_s) for robot in robots])
+        poses = poses_now(missions, self._number)
         places = np.stack([*self._places, poses[:, :3]]) if self._places else poses[None, :, :3]
         shares = np.stack(self._shares) if self._shares else np.zeros((0, len(robots)))
         status = (

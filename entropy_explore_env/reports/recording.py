@@ -5,6 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from entropy_explore_env.missions.missions import Missions
+from entropy_explore_env.missions.poses import pose_at
+
+
+def poses_now(missions: Missions, mission: int) -> np.ndarray:
+    """(A, 5) float64 where the robots of a mission are, under way or not: x, y, z, yaw, pitch."""
+    time_s = float(missions.state.missions[mission]["time_s"])
+    numbers, robots = missions.rules.numbers[0], missions.state.robots[mission]
+    return np.stack([np.array(pose_at(numbers, robot, time_s)) for robot in robots])
 
 
 class Recorder:
@@ -23,6 +31,7 @@ class Recorder:
         self._robot_scans: list[np.ndarray] = []
         self._sent: list[int] = []
         self._places: list[np.ndarray] = []
+        self._poses: list[np.ndarray] = []
         self._depths: list[np.ndarray] = []
 
     def note(self) -> None:
@@ -34,6 +43,7 @@ class Recorder:
         self._robot_scans.append(robots["scans"].copy())
         self._sent.append(int(robots["measurements_sent"].sum()))
         self._places.append(robots["scan_pose"][:, :3].copy())
+        self._poses.append(poses_now(self.missions, 0))
         self._depths.append(robots["depth_m"].copy())
 
     def spread(self, points: int) -> np.ndarray:
@@ -79,3 +89,8 @@ class Recorder:
     def places_m(self) -> np.ndarray:
         """(T, A, 3) float64 where each robot took its latest scan."""
         return np.stack(self._places)
+
+    @property
+    def poses(self) -> np.ndarray:
+        """(T, A, 5) float64 where each robot was: x, y, z, yaw, pitch."""
+        return np.stack(self._poses)

@@ -1,6 +1,7 @@
 """One moment of a mission as a picture: maps of entropy and coverage, robots, entropy curves.
 
-Maps keep the proportions of the workspace: x to the right, y (from above) or z (from the side) up.
+Maps keep the proportions of the workspace: x to the right, y (from above) or z (from the side) up. Only
+side views that would be a few pixels high are drawn higher, and say so; 2-D worlds have none.
 """
 
 from __future__ import annotations
@@ -33,9 +34,7 @@ from entropy_explore_env.reports.glyphs import (
     text_width,
     write,
 )
-
-KNOWN_BELOW = 0.9
-"""A voxel with less than this share of its entropy left counts as known."""
+from entropy_explore_env.reports.projection import Projection, projections
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,11 +97,13 @@ class View(Box):
 
     quantity: Literal["entropy", "coverage"] = "entropy"
     up: Literal[1, 2] = 1
+    stretch: float = 1.0
 
     @property
     def title(self) -> str:
-        """What it shows."""
-        return f"{self.quantity}, from {'above' if self.up == 1 else 'the side'}"
+        """What it shows, and how many times too high it is."""
+        heights = f", heights × {self.stretch:.1f}" if self.stretch > 1.0 else ""
+        return f"{self.quantity}, from {'above' if self.up == 1 else 'the side'}{heights}"
 
     def place(self, points_m: np.ndarray, origin_m: np.ndarray, size_m: np.ndarray) -> np.ndarray:
         """Where points (N, 3) of the map frame, metres, lie in the picture: (N, 2) float64, x and y."""
@@ -135,6 +136,9 @@ _MARGIN, _HEADER, _GAP, _KEY = 8, 30, 8, 14
 
 _COLUMN, _SIDE, _BELOW = 196, 150, 110
 """In units: least width of a map's key, least width of a panel beside the maps, least height below."""
+
+_LEAST_SIDE = 16
+"""In units: side views are at least so high."""
 
 _STATUS_LINES = 8
 """At most so many are shown."""
@@ -195,6 +199,9 @@ def _arranged(
     column = (room_x - (columns - 1) * 2 * gap) // columns
     around = stacks * (len(ups) * (LINE_HEIGHT * unit + gap) + _KEY * unit)
     scale = min(column / shape[0], (room_y - around) / (stacks * sum(shape[up] for up in ups)))
+    side = _LEAST_SIDE * unit
+    if len(ups) == 2 and scale * shape[2] < side:
+        scale = min(column / shape[0], ((room_y - around) / stacks - side) / shape[1], side / shape[2])
     map_width = max(1, round(scale * shape[0]))
     if column < _COLUMN * unit:
         scale = 0.0
@@ -206,8 +213,9 @@ def _arranged(
         left = margin + (stack * (column + 2 * gap) if columns == 2 else 0)
         top = _HEADER * unit if columns == 2 else top
         for up in ups:
-            map_height = max(1, round(scale * shape[up]))
-            views.append(View(left, top + LINE_HEIGHT * unit, map_width, map_height, quantity, up))
+            stretch = max(1.0, side / (scale * shape[2])) if up == 2 and scale > 0.0 else 1.0
+            map_height = max(1, round(stretch * scale * shape[up]))
+            views.append(View(left, top + LINE_HEIGHT * unit, map_width, map_height, quantity, up, stretch))
             top += LINE_HEIGHT * unit + map_height + gap
         top += _KEY * unit
     if below == 0:
@@ -236,8 +244,9 @@ def _panel_boxes(panel: Box, robots: int, lines: int, unit: int) -> tuple[Box, B
 def draw_frame(frame: Frame, width: int = 640, height: int = 480) -> np.ndarray:
     """Draw one moment of a mission.
 
-    The entropy maps show means along the line of sight; the coverage maps the most covered of the
-    known voxels (those with less than KNOWN_BELOW of their entropy left), so that thin walls stay.
+    What the maps show of the line of sight is said in reports/projection.py. Where cells share a pixel,
+    the most covered one shows, so that thin walls stay. Ways and gazes end at a map's edge; a robot close
+    to it is drawn whole.
 
     Args:
         frame: What to show; not changed.
@@ -263,23 +272,21 @@ def draw_frame(frame: Frame, width: int = 640, height: int = 480) -> np.ndarray:
     for i, line in enumerate(status):
         box = layout.status
         write(image, shortened(line, box.width, unit), box.left, box.top + i * LINE_HEIGHT * unit, INK, unit)
+    seen = projections(np.asarray(frame.entropy_share, np.float32), np.asarray(frame.coverage, np.float32))
     for view in layout.views:
-        _draw_map(image, view, frame)
-        _draw_robots(image, view, frame, unit)
+        _draw_map(image, view, seen[view.up - 1])
+    for up in (1, 2):
+        _draw_robots(image, [view for view in layout.views if view.up == up], frame, unit)
     _draw_curves(image, layout.curves, frame, unit)
     return image
 
 
-def _draw_map(image: np.ndarray, view: View, frame: Frame) -> None:
-    """Fill a map's rectangle with its quantity, seen along the axis that is left over."""
-    sight = 3 - view.up
+def _draw_map(image: np.ndarray, view: View, seen: Projection) -> None:
+    """Fill a map's rectangle with its quantity."""
     if view.quantity == "entropy":
-        seen = np.asarray(frame.entropy_share).mean(axis=sight, dtype=np.float64)
-        levels = np.clip(_pooled(seen, view, np.add), 0.0, 1.0) * 255.0
+        levels = np.clip(_pooled(seen.entropy, view, np.add), 0.0, 1.0) * 255.0
     else:
-        known = np.asarray(frame.entropy_share) < KNOWN_BELOW
-        seen = np.where(known, frame.coverage, np.float32(-1.0)).max(axis=sight)
-        pooled = _pooled(seen, view, np.maximum)
+        pooled = _pooled(seen.coverage, view, np.maximum)
         levels = np.where(pooled < 0.0, UNKNOWN_LEVEL, np.minimum(pooled, 1.0) * (UNKNOWN_LEVEL - 1))
     levels = np.rint(levels).astype(np.uint8)
     columns, rows = (
@@ -302,27 +309,37 @@ def _pooled(values: np.ndarray, view: View, pool: np.ufunc) -> np.ndarray:
     return values
 
 
-def _draw_robots(image: np.ndarray, view: View, frame: Frame, unit: int) -> None:
-    """Ways so far, chosen viewpoints, then the robots with their gazes, each in its robot's colour."""
-    window = view.grown(5 * unit)
-    canvas = window.of(image)
+def _draw_robots(image: np.ndarray, views: list[View], frame: Frame, unit: int) -> None:
+    """Ways so far, chosen viewpoints, then the robots with their gazes, each in its robot's colour.
+
+    The views are of one size and direction: what is drawn has the same pixels in each.
+    """
+    if not views:
+        return
+    view, canvases = views[0], [view.of(image) for view in views]
     origin = np.asarray(frame.origin_m, dtype=np.float64)
     size = np.array(np.shape(frame.entropy_share)) * frame.voxel_size_m
 
     def placed(points_m: np.ndarray) -> np.ndarray:
-        return view.place(np.reshape(points_m, (-1, 3)), origin, size) - (window.left, window.top)
+        return view.place(np.reshape(points_m, (-1, 3)), origin, size) - (view.left, view.top)
+
+    def draw(points: np.ndarray, nib: np.ndarray, robot: int, edge: bool) -> None:
+        pixels = line_pixels(points)
+        for canvas in canvases:
+            (stamp if edge else paint)(canvas, pixels, nib, robot_colour(robot))
 
     for robot, path_m in enumerate(frame.paths_m):
-        paint(canvas, line_pixels(placed(path_m)), square(unit), robot_colour(robot))
+        draw(placed(path_m), square(unit), robot, edge=False)
     for robot, target in enumerate(placed(frame.targets_m)):
-        stamp(canvas, line_pixels(target[None]), disc(4.0 * unit, 2.5 * unit), robot_colour(robot))
+        draw(target[None], disc(4.0 * unit, 2.5 * unit), robot, edge=True)
     yaw, pitch = np.asarray(frame.gazes_rad, dtype=np.float64).T
     level, rise = (1.0, np.sin(yaw)) if view.up == 1 else (np.cos(pitch), -np.sin(pitch))
     ticks = 11.0 * unit * np.stack([np.cos(yaw) * level, -rise], axis=1)
-    for robot, position in enumerate(placed(frame.positions_m)):
-        tick = line_pixels(np.stack([position, position + ticks[robot]]))
-        stamp(canvas, tick, square(2 * unit), robot_colour(robot))
-        stamp(canvas, line_pixels(position[None]), disc(4.0 * unit), robot_colour(robot))
+    whole = np.minimum(5.0 * unit, (np.array([view.width, view.height]) - 1) / 2.0)
+    inside = np.clip(placed(frame.positions_m), whole, (view.width - 1, view.height - 1) - whole)
+    for robot, position in enumerate(inside):
+        draw(np.stack([position, position + ticks[robot]]), square(2 * unit), robot, edge=True)
+        draw(position[None], disc(4.0 * unit), robot, edge=True)
 
 
 def _draw_curves(image: np.ndarray, box: Box, frame: Frame, unit: int) -> None:

@@ -10,6 +10,7 @@ from typing import cast
 
 import numpy as np
 from scipy import ndimage
+from scipy.spatial import ConvexHull
 
 from entropy_explore_env.config import Grid, Scenario
 from entropy_explore_env.errors import WorldError
@@ -101,7 +102,7 @@ class World:
         return swollen[inside]
 
     @cached_property
-    def _layouts(self) -> dict[tuple[float, int | None, int], Layout]:
+    def _layouts(self) -> dict[tuple[float, int | None, int, tuple[float, float, float] | None], Layout]:
         return {}
 
     def layout(self, scenario: Scenario) -> Layout:
@@ -111,12 +112,22 @@ class World:
             WorldError: No voxel has room for a robot.
         """
         height = plane_index(scenario)
-        key = (scenario.robot.body_radius_m, height, scenario.sensor.voxels_behind)
+        sensor, level = scenario.sensor, None
+        if height is not None and not scenario.grid.flat:
+            steepest = 0.5 * (sensor.rows - 1) * sensor.angular_step_rad
+            level = scenario.robot.sensor_height_m, steepest, sensor.max_range_m
+        key = (scenario.robot.body_radius_m, height, sensor.voxels_behind, level)
         if key not in self._layouts:
             self._layouts[key] = self._laid_out(*key)
         return self._layouts[key]
 
-    def _laid_out(self, body_radius_m: float, height: int | None, voxels_behind: int) -> Layout:
+    def _laid_out(
+        self,
+        body_radius_m: float,
+        height: int | None,
+        voxels_behind: int,
+        level: tuple[float, float, float] | None,
+    ) -> Layout:
         barriers = self.barriers(body_radius_m)
         room = barriers == Barrier.NONE
         if height is not None:
@@ -129,7 +140,45 @@ class World:
         seen = np.isin(labels, np.unique(labels[starts]))
         if voxels_behind:
             seen |= ndimage.binary_dilation(seen, iterations=voxels_behind) & self.occupied
+        if level is not None:
+            seen &= self._within_view(starts.any(axis=2), *level)
         return Layout(barriers, np.flatnonzero(starts), seen)
+
+    def _within_view(
+        self, floor: np.ndarray, sensor_height_m: float, steepest_rad: float, max_range_m: float
+    ) -> np.ndarray:
+        """Which voxels a sensor that looks level can have in its field of view, obstacles left aside.
+
+        A voxel that is dz above or below the sensor is in view from |dz|/tan φ away, φ the steepest ray: it
+        is seen if some place is so far away, and some no farther than the range. Robots' places hang
+        together, so one of them is both.
+
+        Args:
+            floor: (X, Y) bool, where robots can be.
+            sensor_height_m: Above the workspace's floor.
+            steepest_rad: Largest angle of a ray above the horizon.
+            max_range_m: Of the sensor.
+
+        Returns:
+            (X, Y, Z) bool.
+        """
+        edge_m = self.grid.voxel_size_m
+        places = np.argwhere(floor)
+        corners = places[ConvexHull(places).vertices] if _spans_plane(places) else places
+        x, y = np.indices(self.grid.shape[:2])
+        farthest = np.zeros(self.grid.shape[:2])
+        for i, j in corners:
+            np.maximum(farthest, np.hypot(x - i, y - j), out=farthest)
+        nearest = ndimage.distance_transform_edt(~floor)
+        rises = np.abs((np.arange(self.grid.shape[2]) + 0.5) * edge_m - sensor_height_m) - 0.5 * edge_m
+        needed = np.maximum(rises, 0.0) / max(math.tan(steepest_rad), 1e-9) / edge_m
+        reach = max_range_m / edge_m
+        return (farthest[:, :, None] >= needed) & (np.maximum(nearest[:, :, None], needed) <= reach)
+
+
+def _spans_plane(places: np.ndarray) -> bool:
+    """Whether (N, 2) points do not lie on one line."""
+    return len(places) > 2 and int(np.linalg.matrix_rank(places - places[0])) == 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,7 +189,8 @@ class Layout:
         barriers: (X, Y, Z) uint8, a Barrier each: whether its body fits into the voxel, or why not.
         starts: (N,) flat indices of the voxels where it may start: the largest connected part.
         visible: (X, Y, Z) bool, which voxels can be seen from there at all: the free space that hangs
-            together with it, and the skin of the solid voxels around.
+            together with it, and the skin of the solid voxels around; for robots that look level only
+            what their sensor's field of view can hold.
     """
 
     barriers: np.ndarray

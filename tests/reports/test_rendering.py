@@ -349,3 +349,41 @@ def test_an_animation_that_fails_leaves_the_old_file(tmp_path: Path) -> None:
             animate(frames, path, frame_s)
     assert path.read_bytes() == b"old"
     assert [entry.name for entry in tmp_path.iterdir()] == ["mission.gif"]
+
+
+def test_nothing_of_a_robot_leaves_the_map() -> None:
+    """Robots in all corners, looking and going outwards; paths and targets beyond the workspace."""
+    size = np.array(SHAPE) * VOXEL_M
+    corners = ORIGIN_M + size * np.array([[x, y, x] for x in (0, 1) for y in (0, 1)])
+    outwards = np.array([[np.arctan2(2 * y - 1, 2 * x - 1), 0.5 - x] for x in (0, 1) for y in (0, 1)])
+    nobody = dataclasses.replace(frame_of(robots=4), positions_m=np.full((4, 3), np.nan))
+    frame = dataclasses.replace(
+        frame_of(robots=4),
+        positions_m=corners,
+        gazes_rad=outwards,
+        targets_m=corners + (corners - ORIGIN_M - size / 2) * 0.1,
+        paths_m=[np.stack([corner, corner * 3 - 2 * ORIGIN_M - size]) for corner in corners],
+    )
+    empty, full = draw_frame(nobody), draw_frame(frame)
+    for view in views_of(frame).values():
+        inside = view.of(full)
+        for robot in range(4) if view.up == 1 else (1, 3):  # from the side two hide the others
+            drawn = (inside == ROBOT_COLOURS[robot]).all(axis=-1).sum()
+            assert drawn > 45, "a whole disc has 49 pixels"
+        view.of(empty)[:] = view.of(full)[:] = 0
+    np.testing.assert_array_equal(empty, full)
+
+
+def test_thin_side_views_are_drawn_higher_and_say_so() -> None:
+    frame = frame_of((300, 200, 4), robots=1)
+    views = views_of(frame)
+    above, side = views["entropy", 1], views["entropy", 2]
+    voxel_px = above.width / 300
+    assert above.height == pytest.approx(200 * voxel_px, abs=1) and above.stretch == 1.0
+    assert side.height == 16 and side.stretch == pytest.approx(16 / (4 * voxel_px), rel=0.01)
+    assert side.title == f"entropy, from the side, heights × {side.stretch:.1f}"
+    assert "×" not in above.title and "×" not in views_of(frame_of())["entropy", 2].title
+    frame.entropy_share[:, :, 3] = 0.0
+    picture = side.of(draw_frame(dataclasses.replace(frame, positions_m=np.full((1, 3), np.nan))))
+    assert (picture[:4] == COLOURS["entropy"][0]).all() and (picture[4:] == COLOURS["entropy"][255]).all()
+    assert side.left + side.width <= 640 and max(v.top + v.height for v in views.values()) < 480

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from entropy_explore_env.config import Grid
+from entropy_explore_env.config import Grid, with_settings
 from entropy_explore_env.errors import WorldError
 from entropy_explore_env.worlds.world import Barrier, World, plane_index
 from tests.reference.scenes import drawn, free_box, random_cover, seeds
@@ -181,6 +181,33 @@ def test_ceilings_that_are_none_are_refused(ceiling):
     with pytest.raises(WorldError) as raised:
         World(Grid(SIZE, 0.5), np.zeros(SIZE, bool), "bad", ceiling=ceiling)
     assert raised.value.field == "World.ceiling"
+
+
+def test_robots_that_look_level_see_what_their_field_of_view_can_hold():
+    """Sensor at 1.25 m, the middle of layer 2; rays up to 26.565°: tan = ½."""
+    world = world_of(np.zeros(SIZE, bool))
+    steep = math.atan(0.5)
+    sensor = {"field_of_view_rad": (1.0, 2 * steep), "angular_step_rad": 2 * steep}
+    level = free_box(
+        grid=world.grid,
+        robot={"motion": "planar", "sensor_height_m": 1.25, "body_radius_m": 0.1},
+        sensor=sensor,
+    )
+    assert level.sensor.rows == 2
+    visible = world.layout(level).visible
+    assert visible[:, :, 1:4].all()
+    # Layers 0 and 4 lie 0.75 m off, so 1.5 m = 3 voxels away: every column has a place that far off.
+    assert visible.all()
+    near = with_settings(level, {"sensor": {"max_range_m": 1.4}})
+    assert world.layout(near).visible[:, :, 1:4].all() and not world.layout(near).visible[:, :, [0, 4]].any()
+    flatter = with_settings(
+        level, {"sensor": {"field_of_view_rad": (1.0, 2 * math.atan(0.1)), "angular_step_rad": 0.1993}}
+    )
+    expected = np.zeros(SIZE, bool)
+    expected[:, :, 1:4] = True  # layers 1 and 3 begin 0.25 m off: 2.5 m = 5 voxels; layers 0 and 4 15 voxels
+    seen = world.layout(flatter).visible
+    assert (seen <= expected).all() and seen[:, :, 2].all()
+    assert seen[:, 0, 1].all() and not seen[:, :, 0].any()
 
 
 def test_layouts_of_other_bodies_are_other_layouts():

@@ -57,14 +57,19 @@ def saved(world: Voxels) -> bytes:
 
 def read(path: Path, options: Options) -> Voxels:
     """A saved world, or the voxels of a height map."""
-    entries = _entries(content(path))
+    entries = arrays(content(path))
     if "format" in entries:
         return _world(entries)
     return _height_map(entries, options)
 
 
-def _entries(data: bytes) -> dict[str, np.ndarray]:
-    """The arrays of an archive, each no larger than what its header and the archive agree on."""
+def arrays(data: bytes) -> dict[str, np.ndarray]:
+    """The arrays of an archive, each no larger than what its header and the archive agree on.
+
+    Raises:
+        RefusedError: They are too many or too large, or hold objects. A broken archive raises whatever
+            zipfile and NumPy raise.
+    """
     with zipfile.ZipFile(io.BytesIO(data)) as archive:
         members = archive.infolist()
         if len(members) > MAX_MEMBERS or sum(each.file_size for each in members) > MAX_MEMBER_BYTES:

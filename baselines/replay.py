@@ -1,0 +1,115 @@
+"""Run a recorded mission again, bit for bit: `python -m baselines.replay mission.npz --out results/again`.
+
+Takes the record that `baselines.run --record FILE` (or `--out`) wrote, gives the environment the same
+commands, compares the state at the end with the record's digest, and draws the mission anew. Exit code 1
+where the end differs: another version of the library, or another machine's arithmetic.
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from baselines.command import Positional, parse, print_json, run_command
+from baselines.mission_log import MissionLog, Wanted
+from baselines.terminal import print_table, progress_bar
+from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
+from entropy_explore_env.reports.metrics import mission_figures
+from entropy_explore_env.reports.mission_record import MissionRecord, check_world, load_record, state_digest
+from entropy_explore_env.version import VERSION
+
+_DIFFERS = 1
+
+
+@dataclass
+class Args:
+    """Run a recorded mission again and compare its end."""
+
+    record: Positional[Path] = Path("mission.npz")
+    """A mission record, mission.npz."""
+    world: str | None = None
+    """Where the world's file lies now, if it was moved."""
+    out: Path | None = None
+    """Folder for mission.json, mission.png and mission.gif."""
+    gif: Path | None = None
+    """File for an animated GIF of the mission."""
+    mp4: Path | None = None
+    """File for a video of the mission (extra viewer)."""
+    rerun: Path | None = None
+    """File for a recording, an .rrd that Rerun's viewer opens (extra viewer)."""
+    json: bool = False
+    """Print one JSON object and nothing else."""
+
+
+def main(words: Sequence[str]) -> int:
+    """Run the command."""
+    args = parse(Args, words, description=__doc__)
+    record = load_record(args.record)
+    if args.world is not None:
+        record = replace(record, scenario=replace(record.scenario, world=args.world))
+    wanted = Wanted(args.out, args.gif, args.mp4, None, args.rerun, recorded=False)
+    wanted.prepare()
+    started = time.perf_counter()
+    title = f"{record.scenario.name}, replayed"
+    with MissionLog(wanted) as log, progress_bar(title, hidden=args.json) as show:
+        env = _replayed(record, log, show)
+        same = state_digest(env.missions, 0) == record.digest
+        figures = mission_figures(env.missions, 0, floor=True)
+        figures = {
+            "scenario": figures.pop("scenario"),
+            "strategy": record.strategy,
+            **figures,
+            "replayed": {"same": same, "recorded_by": record.library, "replayed_by": VERSION},
+            "wall_s": round(time.perf_counter() - started, 3),
+        }
+        written = log.write(figures)
+    if args.json:
+        print_json(figures)
+    else:
+        print_table(figures, written)
+    if not same:
+        versions = f"recorded by version {record.library}, replayed by {VERSION}"
+        print(f"the end state differs from the record's: {versions}", file=sys.stderr)
+        return _DIFFERS
+    if not args.json:
+        print("replayed bit for bit: the end state is the record's")
+    return 0
+
+
+def _replayed(
+    record: MissionRecord, log: MissionLog, show: Callable[[EntropyExploreEnv], None]
+) -> EntropyExploreEnv:
+    """The environment after the commands of the record, or after the mission's end if that came earlier."""
+    env = EntropyExploreEnv(record.scenario)
+    env.reset(seed=record.seed)
+    for _ in range(record.episode):
+        env.reset()
+    check_world(record, env.missions)
+    log.note(env)
+    show(env)
+    for commands in record.commands:
+        if not env.agents:
+            break
+        actions = {
+            agent: _action(env, agent, command) for agent, command in zip(env.agents, commands, strict=True)
+        }
+        log.command(actions)
+        env.step(actions)
+        log.note(env)
+        show(env)
+    return env
+
+
+def _action(env: EntropyExploreEnv, agent: str, command: np.ndarray) -> np.ndarray:
+    """A recorded command as the agent's action; what filled it up is cut off."""
+    shape = env.action_space(agent).shape
+    return command[: shape[0]] if shape else command
+
+
+if __name__ == "__main__":
+    raise SystemExit(run_command(main))

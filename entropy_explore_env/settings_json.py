@@ -1,0 +1,118 @@
+"""Settings as JSON and back, without loss: every number exact, infinity as the text "inf"."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import math
+import types
+import typing
+from collections.abc import Mapping
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from entropy_explore_env.config import Scenario
+from entropy_explore_env.errors import SettingError
+
+INFINITY = "inf"
+"""JSON has no infinity; where a number belongs, this text stands for it."""
+
+
+def settings_of(scenario: Scenario) -> dict[str, Any]:
+    """A scenario's settings as what JSON holds: objects, lists, texts, numbers, true, false and null.
+
+    `scenario_of` gives the same scenario back, also after `json.dumps` and `json.loads`.
+    """
+    return _encoded(scenario)
+
+
+def scenario_of(settings: Mapping[str, Any]) -> Scenario:
+    """The scenario with these settings.
+
+    Args:
+        settings: As `settings_of` gives them. What is missing has its default, if it has one.
+
+    Raises:
+        SettingError: A setting is unknown, missing, of the wrong kind or out of its range.
+    """
+    return _decoded(Scenario, settings, "settings")
+
+
+def settings_json(scenario: Scenario) -> str:
+    """A scenario's settings as the text of one JSON object."""
+    return json.dumps(settings_of(scenario), allow_nan=False)
+
+
+def scenario_from_json(text: str) -> Scenario:
+    """The scenario that `settings_json` wrote.
+
+    Raises:
+        SettingError: The text is not JSON, or see `scenario_of`.
+    """
+    try:
+        settings = json.loads(text)
+    except (ValueError, RecursionError):
+        raise SettingError("settings", text, "the text of a JSON object") from None
+    return scenario_of(settings)
+
+
+def _encoded(value: Any) -> Any:  # noqa: ANN401 - whatever a setting may be
+    if dataclasses.is_dataclass(value):
+        return {field.name: _encoded(getattr(value, field.name)) for field in dataclasses.fields(value)}
+    if isinstance(value, tuple):
+        return [_encoded(each) for each in value]
+    if isinstance(value, np.generic):
+        return _encoded(value.item())
+    return INFINITY if isinstance(value, float) and value == math.inf else value
+
+
+def _decoded(hint: Any, value: Any, name: str) -> Any:  # noqa: ANN401 - whatever a setting may be
+    """The value of a setting whose annotation is `hint`; the settings check themselves what it must be."""
+    if typing.get_origin(hint) in (typing.Union, types.UnionType):
+        return _decoded(_member(hint, value), value, name)
+    if dataclasses.is_dataclass(hint):
+        return _part(typing.cast(type, hint), value, name)
+    if typing.get_origin(hint) is tuple and isinstance(value, list):
+        kinds = typing.get_args(hint)
+        repeated = len(kinds) == 2 and kinds[1] is Ellipsis
+        if not repeated and len(kinds) != len(value):
+            raise SettingError(name, value, f"a list of {len(kinds)}")
+        return tuple(
+            _decoded(kinds[0] if repeated else kinds[place], each, f"{name}[{place}]")
+            for place, each in enumerate(value)
+        )
+    return math.inf if hint is float and value == INFINITY else value
+
+
+def _member(hint: Any, value: Any) -> Any:  # noqa: ANN401 - of a union: the kind that the value is of
+    for member in typing.get_args(hint):
+        is_part, is_tuple = dataclasses.is_dataclass(member), typing.get_origin(member) is tuple
+        if isinstance(value, Mapping) if is_part else isinstance(value, list) if is_tuple else False:
+            return member
+    return float if value == INFINITY and float in typing.get_args(hint) else None
+
+
+def _part(kind: type, value: Any, name: str) -> Any:  # noqa: ANN401 - an object of the kind
+    """A dataclass from an object of its fields."""
+    hints = _hints(kind)
+    if not isinstance(value, Mapping):
+        raise SettingError(name, value, f"an object with the fields of {kind.__name__}")
+    for field, given in value.items():
+        if field not in hints:
+            raise SettingError(f"{kind.__name__}.{field}", given, "one of the fields " + ", ".join(hints))
+    for field in dataclasses.fields(kind):
+        needed = field.default is dataclasses.MISSING and field.default_factory is dataclasses.MISSING
+        if needed and field.name not in value:
+            raise SettingError(f"{kind.__name__}.{field.name}", "missing", "given")
+    return kind(
+        **{field: _decoded(hints[field], given, f"{kind.__name__}.{field}") for field, given in value.items()}
+    )
+
+
+@lru_cache(maxsize=32)
+def _hints(kind: type) -> dict[str, Any]:
+    """Field name → its annotation, evaluated."""
+    hints = typing.get_type_hints(kind)
+    return {field.name: hints[field.name] for field in dataclasses.fields(kind)}

@@ -1,0 +1,306 @@
+"""Mission records: what is in them, that they come back exactly, and that bad ones are refused."""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import io
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given as drawing
+from hypothesis import strategies as st
+
+from entropy_explore_env.errors import CallOrderError, RecordError, WorldError
+from entropy_explore_env.missions.missions import Missions
+from entropy_explore_env.reports.mission_record import (
+    CommandRecorder,
+    MissionRecord,
+    check_world,
+    load_record,
+    save_record,
+    state_digest,
+    world_digest,
+)
+from entropy_explore_env.version import VERSION
+from entropy_explore_env.worlds.load import save_world
+from tests.reference.scenes import drawn, free_box, random_actions, started, wander
+
+
+def recorded(steps: int = 12, seed: int = 5, **changes) -> tuple[MissionRecord, Missions]:
+    """A mission of random actions, and its record."""
+    missions = started(free_box(**changes), seed=seed)
+    recorder, rng = CommandRecorder(missions), np.random.default_rng(1)
+    recorder.note()
+    for _ in range(steps):
+        boxes, numbers = random_actions(missions, rng)
+        given = numbers[0] if missions.rules.numbers[0]["discrete"] else boxes[0].astype(np.float32)
+        recorder.command(dict(zip(missions.scenario.agents, given, strict=True)))
+        missions.step(boxes, numbers)
+        recorder.note()
+    return recorder.record("chance"), missions
+
+
+def saved(record: MissionRecord, folder: Path) -> Path:
+    save_record(record, folder / "mission.npz")
+    return folder / "mission.npz"
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [{}, {"robots": 1}, {"action": {"kind": "discrete"}}, {"scored": True, "channel": {"delay_s": 2.0}}],
+)
+def test_a_record_comes_back_exactly_and_its_commands_lead_to_the_same_state(changes, tmp_path):
+    record, missions = recorded(**changes)
+    back = load_record(saved(record, tmp_path))
+    for field in dataclasses.fields(MissionRecord):
+        written, read = getattr(record, field.name), getattr(back, field.name)
+        if isinstance(written, np.ndarray):
+            assert written.dtype == read.dtype
+            np.testing.assert_array_equal(written, read)
+        else:
+            assert written == read and type(written) is type(read)
+    again = started(back.scenario, seed=back.seed)
+    robots, continuous = back.scenario.robots, back.commands.ndim == 3
+    for commands in back.commands:
+        boxes = commands[None].astype(np.float64) if continuous else np.zeros((1, robots, 1))
+        again.step(boxes, np.zeros((1, robots), np.int64) if continuous else commands[None])
+    assert state_digest(again, 0) == back.digest == state_digest(missions, 0)
+    assert (back.strategy, back.library, back.seed) == ("chance", VERSION, 5)
+    assert back.commands.dtype == (np.float32 if continuous else np.int64)
+
+
+def test_the_same_mission_gives_the_same_file(tmp_path):
+    (tmp_path / "again").mkdir()
+    first, again = (saved(recorded()[0], folder).read_bytes() for folder in (tmp_path, tmp_path / "again"))
+    assert first == again
+
+
+def test_seeds_of_any_length_and_later_episodes(tmp_path):
+    missions = started(free_box(), seed=2**130 + 7)
+    missions.reset(0)
+    record = load_record(saved(CommandRecorder(missions).record(), tmp_path))
+    assert (record.seed, record.episode, record.commands.shape) == (2**130 + 7, 1, (0, 2))
+
+
+def test_scan_times_are_those_of_the_state():
+    """Robots rest until they decide: in steps of a second each scan ends when its robot was ready."""
+    missions = started(free_box(robots=2, decision_period_s=1.0), seed=3)
+    recorder, rng, expected = CommandRecorder(missions), np.random.default_rng(1), []
+    for _ in range(20):
+        boxes, numbers = random_actions(missions, rng)
+        recorder.command(dict(zip(missions.scenario.agents, boxes[0], strict=True)))
+        before = missions.state.robots[0]["scans"].copy()
+        missions.step(boxes, numbers)
+        recorder.note()
+        robots = missions.state.robots[0]
+        expected += [(robots[a]["ready_s"], a) for a in range(2) if robots[a]["scans"] > before[a]]
+    record = recorder.record()
+    assert list(zip(record.scan_s, record.scan_robot, strict=True)) == expected
+    assert len(expected) == missions.state.robots[0]["scans"].sum() > 5
+    whole = np.mod(record.scan_s, 1.0)
+    assert (whole != 0.0).any() and (record.scan_s <= 20.0).all()
+
+
+def test_actions_of_other_lengths_are_filled_up_and_float64_stays():
+    missions = started(free_box(robots=2), seed=3)
+    recorder = CommandRecorder(missions)
+    recorder.command({"robot_1": np.array([1 / 3, 0.5, 0.25]), "robot_0": np.ones(5, np.float32)})
+    commands = recorder.record().commands
+    assert commands.dtype == np.float64
+    assert commands.tolist() == [[[1.0] * 5, [1 / 3, 0.5, 0.25, 0.0, 0.0]]]
+
+
+def test_a_recorder_keeps_copies():
+    missions, action = started(free_box(robots=1), seed=3), np.ones(5)
+    recorder = CommandRecorder(missions)
+    recorder.command({"robot_0": action})
+    action[:] = 0.0
+    assert recorder.record().commands.tolist() == [[[1.0] * 5]]
+
+
+def test_before_a_reset_there_is_nothing_to_record():
+    missions = Missions(free_box())
+    with pytest.raises(CallOrderError):
+        CommandRecorder(missions).record()
+    with pytest.raises(CallOrderError):
+        world_digest(missions, 0)
+
+
+# --- digests
+
+
+def test_a_digest_sees_every_array_and_field():
+    missions = started(free_box(robots=2, scored=True, channel={"delay_s": 1.0}), seed=3, missions=2)
+    before, other = state_digest(missions, 0), state_digest(missions, 1)
+    assert before != other
+    seen = 0
+    for name, array in zip(missions.state._fields, missions.state, strict=True):
+        for field in array.dtype.names or (None,):
+            part = array[0] if field is None else array[0][field]
+            if name == "blocked" or np.size(part) == 0:
+                continue
+            kept = array.copy()
+            flat = array[0].reshape(-1) if field is None else array[0:1][field].reshape(-1)
+            target = flat[-1:] if field is None else None
+            if target is not None:
+                target[...] = ~target if target.dtype == bool else target + 1
+            else:
+                whole = array[field]
+                whole[0] = ~whole[0] if whole.dtype == bool else whole[0] + 1
+                if np.isinf(whole[0]).any():
+                    whole[0] = 0.0
+            assert state_digest(missions, 0) != before, (name, field)
+            array[...] = kept
+            assert state_digest(missions, 0) == before
+            seen += 1
+    assert seen > 50 and state_digest(missions, 1) == other
+
+
+def test_a_digest_by_hand():
+    from entropy_explore_env.reports import mission_record
+
+    text = b"a <f8 (2,)\n" + np.array([1.0, 2.0]).tobytes() + b"b |b1 ()\n\x01"
+    parts = {"a": np.array([1.0, 2.0]), "b": np.array(True)}
+    assert mission_record._sha256(parts) == hashlib.sha256(text).hexdigest()
+
+
+def test_another_world_in_the_file_is_refused(tmp_path):
+    missions = started(free_box(world="furnished"), seed=1)
+    path = tmp_path / "room.npz"
+    save_world(missions.worlds[0], path)
+    there = started(free_box(world=str(path)), seed=1)
+    record = CommandRecorder(there).record()
+    assert record.world_digest == world_digest(missions, 0)
+    check_world(record, there)
+    other = started(free_box(world="furnished"), seed=2)
+    with pytest.raises(WorldError, match=r"room\.npz"):
+        check_world(record, other)
+    check_world(CommandRecorder(missions).record(), other)  # a recipe: the version may make others
+
+
+# --- bad files
+
+
+@pytest.fixture(scope="module")
+def file(tmp_path_factory) -> bytes:
+    return saved(recorded()[0], tmp_path_factory.mktemp("record")).read_bytes()
+
+
+def refused(data: bytes, folder: Path, said: str = "mission record") -> None:
+    path = folder / "bad.npz"
+    path.write_bytes(data)
+    with pytest.raises(RecordError, match=said) as caught:
+        load_record(path)
+    assert str(path) in str(caught.value) and "\n" not in str(caught.value)
+
+
+def entries_of(data: bytes) -> dict[str, np.ndarray]:
+    with np.load(io.BytesIO(data)) as archive:
+        return dict(archive)
+
+
+def packed(entries: dict) -> bytes:
+    buffer = io.BytesIO()
+    np.savez_compressed(buffer, **entries)
+    return buffer.getvalue()
+
+
+@drawn(80)
+@drawing(share=st.floats(0.0, 1.0))
+def test_truncated_files_are_refused(share, file, tmp_path_factory):
+    refused(file[: int(share * (len(file) - 1))], tmp_path_factory.getbasetemp())
+
+
+@drawn(150)
+@drawing(place=st.integers(0, 10**9), bit=st.integers(0, 7))
+def test_a_flipped_bit_is_refused_or_changes_nothing(place, bit, file, tmp_path_factory):
+    """Zip archives hold dates and attributes that nobody reads."""
+    data = bytearray(file)
+    data[place % len(data)] ^= 1 << bit
+    path = tmp_path_factory.getbasetemp() / "flipped.npz"
+    path.write_bytes(bytes(data))
+    try:
+        record = load_record(path)
+    except RecordError:
+        return
+    original = entries_of(file)
+    assert record.digest == str(original["digest"])
+    np.testing.assert_array_equal(record.commands, original["commands"])
+
+
+@pytest.mark.parametrize(
+    "name", ["library", "settings", "seed", "episode", "strategy", "commands", "scan_s", "digest"]
+)
+def test_what_was_changed_by_hand_is_refused(name, file, tmp_path):
+    entries = entries_of(file)
+    value = entries[name]
+    entries[name] = np.asarray(str(value) + "0") if value.dtype.kind == "U" else value + 1
+    refused(packed(entries), tmp_path, "changed or damaged")
+
+
+def forged(file: bytes, **changes: object) -> bytes:
+    """The record with other entries, its checksum made to fit."""
+    from entropy_explore_env.reports import mission_record
+
+    entries = {**entries_of(file), **{name: np.asarray(value) for name, value in changes.items()}}
+    entries = {name: value for name, value in entries.items() if value.dtype != object or value.shape}
+    return packed({**entries, "checksum": np.asarray(mission_record._checksum(entries))})
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"version": np.int64(2)}, "format version 1"),
+        ({"format": "another"}, "as --record writes it"),
+        ({"commands": np.zeros((3, 7, 5), np.float32)}, "fit each other"),
+        ({"commands": np.zeros((3, 2), np.float32)}, "fit each other"),
+        ({"commands": np.zeros(3)}, "fit each other"),
+        ({"scan_robot": np.zeros(2, np.int64)}, "fit each other"),
+        ({"digest": "z" * 64}, "fit each other"),
+        ({"seed": "-1"}, "fit each other"),
+        ({"episode": np.int64(-1)}, "fit each other"),
+        ({"settings": "{}"}, "settings are allowed"),
+        ({"settings": "["}, "settings are allowed"),
+        ({"more": np.zeros(3)}, "changed or damaged"),
+    ],
+)
+def test_forged_records_are_refused(changes, said, file, tmp_path):
+    assert load_record_bytes(forged(file), tmp_path).strategy == "chance"
+    refused(forged(file, **changes), tmp_path, said)
+
+
+def load_record_bytes(data: bytes, folder: Path) -> MissionRecord:
+    (folder / "good.npz").write_bytes(data)
+    return load_record(folder / "good.npz")
+
+
+def test_pickled_objects_are_never_loaded(file, tmp_path):
+    class Bomb:
+        def __reduce__(self):
+            return (pytest.fail, ("code was executed",))
+
+    entries = entries_of(file)
+    refused(packed({**entries, "commands": np.array([Bomb()], dtype=object)}), tmp_path)
+
+
+def test_other_files_are_refused(tmp_path):
+    refused(b"", tmp_path)
+    refused(b"a text", tmp_path)
+    refused(packed({"elevation": np.zeros((3, 4))}), tmp_path, "as --record writes it")
+    for path in (tmp_path, tmp_path / "missing.npz"):
+        with pytest.raises(RecordError, match="mission record"):
+            load_record(path)
+    bomb = io.BytesIO()
+    with zipfile.ZipFile(bomb, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("commands.npy", bytes(300 << 20))
+    refused(bomb.getvalue(), tmp_path, "at most")
+
+
+def test_missions_after_their_end_are_recorded_as_they_ended():
+    missions = started(free_box(ending={"time_limit_s": 5.0}), seed=3)
+    recorder = CommandRecorder(missions)
+    wander(missions, 30, 0, lambda _: recorder.note())
+    assert (recorder.record().scan_s <= 5.0).all() and len(recorder.record().scan_s) > 2

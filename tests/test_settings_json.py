@@ -1,0 +1,143 @@
+"""Settings as JSON: what comes back is what was written, to the last bit."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from entropy_explore_env import settings_json as module
+from entropy_explore_env.config import Grid, Scenario, with_settings
+from entropy_explore_env.errors import SettingError
+from entropy_explore_env.scenarios import BOX, ROOM, SCENARIOS
+from entropy_explore_env.settings_json import scenario_from_json, scenario_of, settings_json, settings_of
+from tests.reference.scenes import drawn
+
+RANGES = st.floats(1e-3, 1e6) | st.just(math.inf)
+
+
+@pytest.mark.parametrize("name", SCENARIOS)
+def test_named_scenarios_come_back_as_they_were(name):
+    scenario = SCENARIOS[name]
+    text = settings_json(scenario)
+    back = scenario_from_json(text)
+    assert back == scenario and hash(back) == hash(scenario)
+    assert settings_json(back) == text
+    assert kinds(back) == kinds(scenario)
+    json.loads(text, parse_constant=pytest.fail)
+
+
+def kinds(settings: object) -> list:
+    """Types of all settings, from the outside in: a list in place of a tuple would show."""
+    if dataclasses.is_dataclass(settings):
+        return [kinds(getattr(settings, field.name)) for field in dataclasses.fields(settings)]
+    return [type(settings), *([kinds(each) for each in settings] if isinstance(settings, tuple) else [])]
+
+
+@drawn(60)
+@given(
+    size=st.floats(1e-6, 1e6),
+    origin=st.tuples(*[st.floats(-1e9, 1e9)] * 3),
+    reach=RANGES,
+    limit=RANGES,
+    period=st.none() | st.floats(1e-9, 1e9),
+    cycles=st.none() | st.integers(1, 2**62),
+)
+def test_numbers_are_exact(size, origin, reach, limit, period, cycles):
+    grid = Grid((7, 11, 5), size, origin)
+    changes = {
+        "grid": grid,
+        "decision_period_s": period,
+        "robot": {"reach_m": reach, "motion": "free"},
+        "ending": {"max_cycles": cycles, "time_limit_s": limit},
+    }
+    scenario = with_settings(BOX, changes)
+    assert scenario_from_json(settings_json(scenario)) == scenario
+
+
+def test_what_json_lacks_by_hand():
+    settings = settings_of(ROOM)
+    assert settings["sensor"]["max_range_m"] == settings["channel"]["range_m"] == "inf"
+    assert settings["grid"] == {"shape": [41, 41, 17], "voxel_size_m": 0.25, "origin_m": [-0.125] * 3}
+    assert settings["ending"]["max_cycles"] is None and settings["robots"] == 3
+
+
+def test_a_text_that_says_inf_stays_a_text():
+    scenario = dataclasses.replace(BOX, name="inf", world="inf")
+    assert scenario_from_json(settings_json(scenario)) == scenario
+
+
+def test_numbers_of_numpy_become_plain_ones_of_the_same_value():
+    channel = dataclasses.replace(BOX.channel, burst=np.int64(7), i_min_bits=np.float32(0.1))
+    back = scenario_from_json(settings_json(dataclasses.replace(BOX, channel=channel)))
+    assert (type(back.channel.burst), back.channel.burst) == (int, 7)
+    assert back.channel.i_min_bits == float(np.float32(0.1)) != 0.1
+
+
+def test_what_is_missing_has_its_default_if_it_has_one():
+    grid = {"shape": [7, 11, 5], "voxel_size_m": 0.5}
+    assert scenario_of({"name": "mine", "grid": grid}) == Scenario("mine", Grid((7, 11, 5), 0.5))
+    with pytest.raises(SettingError, match=r"Scenario\.grid"):
+        scenario_of({"name": "mine"})
+
+
+def changed(path: str, value: object) -> dict:
+    settings = json.loads(settings_json(BOX))
+    *folders, last = path.split(".")
+    inside = settings
+    for folder in folders:
+        inside = inside[folder]
+    inside[last] = value
+    return settings
+
+
+@pytest.mark.parametrize(
+    ("path", "value", "named"),
+    [
+        ("wings", 2, "Scenario.wings"),
+        ("channel.wings", 2, "Channel.wings"),
+        ("channel", [1, 2], "Scenario.channel"),
+        ("channel", None, "Scenario.channel"),
+        ("channel.burst", "8", "Channel.burst"),
+        ("channel.burst", "inf", "Channel.burst"),
+        ("channel.burst", {"a": 1}, "Channel.burst"),
+        ("channel.loss_probability", "inf", "Channel.loss_probability"),
+        ("grid.shape", [7, 11], "Grid.shape"),
+        ("grid.shape", 7, "Grid.shape"),
+        ("grid.shape", [7, 11, "inf"], "Grid.shape"),
+        ("grid.origin_m", ["inf", 0.0, 0.0], "Grid.origin_m"),
+        ("robot.reach_m", "-inf", "Robot.reach_m"),
+        ("ending.max_cycles", "inf", "Ending.max_cycles"),
+        ("decision_period_s", {}, "decision_period_s"),
+        ("name", 3, "Scenario.name"),
+    ],
+)
+def test_what_is_wrong_is_named(path, value, named):
+    with pytest.raises(SettingError, match=named.replace(".", r"\.")):
+        scenario_of(changed(path, value))
+
+
+@pytest.mark.parametrize("text", ["", "{", "[]", "3", "null", '"inf"', "[" * 100_000])
+def test_what_is_no_object_of_json_is_refused(text):
+    with pytest.raises(SettingError, match="settings"):
+        scenario_from_json(text)
+
+
+def test_lists_of_parts_come_back_as_tuples():
+    """Settings that are a part, or one part a robot."""
+
+    @dataclasses.dataclass(frozen=True)
+    class Team:
+        robots: Grid | tuple[Grid, ...]
+        most: float | None = None
+
+    module._hints.cache_clear()
+    Team.__annotations__ = {"robots": Grid | tuple[Grid, ...], "most": float | None}
+    two = Team((Grid((7, 11, 5), 0.5), Grid((1, 2, 3), 0.1)), math.inf)
+    for team in (two, Team(Grid((7, 11, 5), 0.5))):
+        assert module._decoded(Team, json.loads(json.dumps(module._encoded(team))), "team") == team
