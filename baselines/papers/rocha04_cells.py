@@ -14,8 +14,8 @@ BURSTS = (32, 64, 128)
 I_MINS = (0.6215, 0.3219, 0.0291)
 STANDARD = (64, 0.3219)
 """burst and I_min of figure 4."""
-RIVALS = ("random", "gradient-plane")
-"""What stands beside eqs. 33-34 for every team size: a random walk, and the motion-plane rule."""
+RIVALS = ("random", "gradient-plane", "information-rate")
+"""What stands beside eqs. 33-34 for every team size: a random walk, the motion-plane rule, and ours."""
 
 CHANGES: dict[str, tuple[str, dict[str, Any], str]] = {
     "scan-0": ("scan time 0.001 s instead of 0.5 s", {"sensor": {"scan_time_s": 0.001}}, "gradient"),

@@ -11,6 +11,13 @@ from baselines.papers.rocha04_cells import BURSTS, I_MINS, RIVALS, STANDARD, TEA
 from baselines.papers.rocha04_claims import PAPER_T_MISSION_S, Records, times
 
 
+_LABELS = {
+    "random": "random walk",
+    "gradient-plane": "motion plane",
+    "information-rate": "information-rate (ours)",
+}
+
+
 def _middle(cell: list[Record]) -> Record:
     """The mission with the median time of a cell."""
     return sorted(cell, key=lambda record: (record["t_mission_s"], record["seed"]))[len(cell) // 2]
@@ -99,7 +106,7 @@ def figure_time(records: Records, what: str) -> tuple[Figure, dict[str, list[obj
         table["robots"] += [1, *TEAMS]
         for name, column in (("mean_s", mean), ("low_s", low), ("high_s", high)):
             table[name] += column.round(2).tolist()
-    for rival, marker, shift in zip(RIVALS, "xd", (-0.1, 0.1), strict=True):
+    for rival, marker, shift in zip(RIVALS, "xd^", (-0.1, 0.1, 0.15), strict=True):
         points = [mean_interval(times(records, rival_id(robots, rival))) for robots in (1, *TEAMS)]
         mean, low, high = (np.asarray(column) for column in zip(*points, strict=True))
         axes.errorbar(
@@ -109,8 +116,8 @@ def figure_time(records: Records, what: str) -> tuple[Figure, dict[str, list[obj
             linestyle=":",
             marker=marker,
             capsize=3,
-            color="0.4" if rival == "random" else "0.65",
-            label={"random": "random walk", "gradient-plane": "motion plane"}[rival] + ", 64, 0.3219",
+            color={"random": "0.4", "gradient-plane": "0.65"}.get(rival, "0.1"),
+            label=f"{_LABELS[rival]}, 64, 0.3219",
         )
     axes.plot([1], [PAPER_T_MISSION_S], "k*", label="the paper's mean of 10 starts")
     axes.set(
