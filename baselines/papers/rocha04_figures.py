@@ -10,7 +10,6 @@ from baselines.figures import COLOURS
 from baselines.papers.rocha04_cells import BURSTS, I_MINS, RIVALS, STANDARD, TEAMS, rival_id, team_id
 from baselines.papers.rocha04_claims import PAPER_T_MISSION_S, Records, times
 
-
 _LABELS = {
     "random": "random walk",
     "gradient-plane": "motion plane",
