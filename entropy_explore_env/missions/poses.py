@@ -23,20 +23,61 @@ def grid_position(numbers, pose):
 
 
 @lean_kernel
+def way_point(robot, number):
+    """(x, y, z) of a point on a drive: 0 its origin, then its corners, then its goal."""
+    if number > robot.corners:
+        return robot.goal[0], robot.goal[1], robot.goal[2]
+    if number > 0:
+        return robot.way[number - 1, 0], robot.way[number - 1, 1], robot.way[number - 1, 2]
+    return robot.origin[0], robot.origin[1], robot.origin[2]
+
+
+@lean_kernel
+def distance_between(a, b):
+    """Distance between two points (x, y, z)."""
+    return math.sqrt((b[0] - a[0]) ** 2 + (b[1] - a[1]) ** 2 + (b[2] - a[2]) ** 2)
+
+
+@lean_kernel
+def place_at(numbers, robot, elapsed_s):
+    """(x, y, z, corners): where a robot is under way, and how many corners it has passed.
+
+    Found from the end of the way, which is so met exactly.
+    """
+    share = driven_share(elapsed_s, robot.way_m, numbers.max_speed_m_s, numbers.acceleration_m_s2)
+    left, passed = 1.0 - share, robot.corners  # in shares of the whole way
+    begin, end = way_point(robot, passed), way_point(robot, passed + 1)
+    leg_m = distance_between(begin, end)
+    while passed > 0 and left * robot.way_m > leg_m:
+        left -= leg_m / robot.way_m
+        passed -= 1
+        begin, end = way_point(robot, passed), begin
+        leg_m = distance_between(begin, end)
+    left = min(left * (robot.way_m / leg_m), 1.0) if leg_m > 0.0 else 0.0
+    return (
+        end[0] - left * (end[0] - begin[0]),
+        end[1] - left * (end[1] - begin[1]),
+        end[2] - left * (end[2] - begin[2]),
+        passed,
+    )
+
+
+@lean_kernel
+def corners_passed(numbers, robot, time_s):
+    """How many corners of its drive a robot has passed at a time: see `pose_at`."""
+    if time_s >= robot.ready_s - numbers.scan_time_s:
+        return robot.corners
+    return place_at(numbers, robot, time_s - robot.depart_s)[3]
+
+
+@lean_kernel
 def pose_at(numbers, robot, time_s):
     """Pose (x, y, z, yaw, pitch) of a robot at a time between its departure and its next one."""
     origin, goal = robot.origin, robot.goal
-    elapsed = time_s - robot.depart_s
     if time_s >= robot.ready_s - numbers.scan_time_s:
         return goal[0], goal[1], goal[2], goal[3], goal[4]
-    length = math.sqrt((goal[0] - origin[0]) ** 2 + (goal[1] - origin[1]) ** 2 + (goal[2] - origin[2]) ** 2)
-    share = driven_share(elapsed, length, numbers.max_speed_m_s, numbers.acceleration_m_s2)
-    left = 1.0 - share  # exactly the goal in the end
-    x, y, z = (
-        goal[0] - left * (goal[0] - origin[0]),
-        goal[1] - left * (goal[1] - origin[1]),
-        goal[2] - left * (goal[2] - origin[2]),
-    )
+    elapsed = time_s - robot.depart_s
+    x, y, z, _ = place_at(numbers, robot, elapsed)
     yaw, pitch = goal[3], goal[4]
     turn = turning_time(origin[3], origin[4], goal[3], goal[4], numbers.turn_rate_rad_s)
     if elapsed < turn:

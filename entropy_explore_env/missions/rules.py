@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from entropy_explore_env.config import Observation, Scenario
+from entropy_explore_env.robots.navigator import lattice_of
 from entropy_explore_env.robots.range_sensor import SensorModel, sensor_model
 from entropy_explore_env.worlds.world import plane_index
 
@@ -26,6 +27,7 @@ NUMBERS = np.dtype(
         ("turn_rate_rad_s", "f8"),
         ("body_radius_m", "f8"),
         ("scan_time_s", "f8"),
+        ("scan_every_m", "f8"),
         ("burst", "i8"),
         ("i_min_bits", "f8"),
         ("channel_range_m", "f8"),
@@ -56,6 +58,8 @@ class Rules(NamedTuple):
     sensor: SensorModel
     moves: np.ndarray
     """(K, 3) int64, discrete moves in voxels."""
+    ball: np.ndarray
+    """(B, 3) int64, voxels that a body touches, by axis; empty where that is its own, or nobody plans."""
     gazes: np.ndarray
     """(D, 2) float64, discrete gazes: yaw, pitch."""
     panorama: np.ndarray
@@ -79,6 +83,7 @@ def rules_of(scenario: Scenario) -> Rules:
         "turn_rate_rad_s": robot.turn_rate_rad_s,
         "body_radius_m": robot.body_radius_m,
         "scan_time_s": scenario.sensor.scan_time_s,
+        "scan_every_m": scenario.sensor.scan_every_m,
         "burst": min(channel.burst, scenario.sensor.rays),
         "i_min_bits": channel.i_min_bits,
         "channel_range_m": channel.range_m,
@@ -101,6 +106,7 @@ def rules_of(scenario: Scenario) -> Rules:
         numbers=numbers,
         sensor=sensor_model(scenario.sensor),
         moves=discrete_moves(scenario),
+        ball=lattice_of(scenario).touched if robot.navigator == "planned" else np.zeros((0, 3), np.int64),
         gazes=gaze_set(scenario.action.yaws, 1 if scenario.planar else scenario.action.pitches),
         panorama=panorama_directions(scenario),
     )
