@@ -28,8 +28,8 @@ from entropy_explore_env.robots.motion import (
 
 _ARRIVED, _TEAMMATE = MoveEnd.ARRIVED.code, MoveEnd.TEAMMATE.code
 _CORNERS, _SEEN = MoveEnd.CORNERS.code, MoveEnd.SEEN.code
-_ROUNDING = 1e-9
-"""A scan under way that is nearer to the end of the way than this share is left to the arrival."""
+_ROUNDING = 1e-6
+"""Of float32 actions, as a share: a scan under way so near to the end of the way is left to the arrival."""
 
 
 @lean_kernel
