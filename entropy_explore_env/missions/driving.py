@@ -5,15 +5,12 @@ Map frame, metres, seconds; barriers and bodies are met in grid units (see `moti
 
 from __future__ import annotations
 
-import math
-
 from entropy_explore_env.compilation import lean_kernel
 from entropy_explore_env.missions.poses import (
     copy_numbers,
-    corners_passed,
     distance_between,
     grid_position,
-    pose_at,
+    place_at,
     way_point,
 )
 from entropy_explore_env.robots.motion import (
@@ -76,11 +73,14 @@ def drive_leg(numbers, blocked, robots, index, time_s, scan):
     """
     goal, begin = robots[index].goal, way_point(robots[index], robots[index].corners)
     start, finish = grid_position(numbers, begin), grid_position(numbers, goal)
-    x, y, z = finish[0] - start[0], finish[1] - start[1], finish[2] - start[2]
-    length = math.sqrt(x * x + y * y + z * z)
+    length = distance_between(start, finish)
     if length <= 0.0:
         return 0.0, _ARRIVED
-    direction = (x / length, y / length, z / length)
+    direction = (
+        (finish[0] - start[0]) / length,
+        (finish[1] - start[1]) / length,
+        (finish[2] - start[2]) / length,
+    )
     size = (numbers.size[0], numbers.size[1], numbers.size[2])
     way, code = free_way(blocked, size, start, finish, direction, length, scan.way, scan.way_entered)
     if numbers.body_radius_m > 0.0:
@@ -99,8 +99,9 @@ def drive_leg(numbers, blocked, robots, index, time_s, scan):
 def way_to_tube(numbers, start, direction, way, mate, time_s):
     """How far a body can drive on a line, at most `way`, before the tube that a teammate still sweeps."""
     touching = 2.0 * numbers.body_radius_m / numbers.voxel_size_m
-    begin = grid_position(numbers, pose_at(numbers, mate, time_s))
-    for point in range(corners_passed(numbers, mate, time_s), mate.corners + 1):
+    x, y, z, passed = place_at(numbers, mate, time_s)
+    begin = grid_position(numbers, (x, y, z))
+    for point in range(passed, mate.corners + 1):
         stop = grid_position(numbers, way_point(mate, point + 1))
         way = way_to_teammate(start, direction, way, begin, stop, touching)
         begin = stop
@@ -118,22 +119,29 @@ def plan_scan(numbers, robot):
 
 
 @lean_kernel
-def drive_on(rules, mean, robot, time_s, scan):
-    """After a scan under way: end the drive if the rest of its way is believed blocked.
+def drive_on(numbers, ball, mean, robot, time_s, scan):
+    """After a scan under way: end the drive if the rest of its planned way is believed blocked.
 
     Args:
-        rules: The scenario.
+        numbers: NUMBERS.
+        ball: (B, 3) int64, what a body touches; None where nobody plans: then nothing here is compiled
+            but the next scan.
         mean: (V,) float32, the robot's expected coverage.
         robot: Its ROBOT.
         time_s: When it scanned.
         scan: Working space.
     """
-    numbers = rules.numbers[0]
     robot.way_scans += 1
-    passed = corners_passed(numbers, robot, time_s)
-    if not rest_blocked(rules, mean, robot, passed, scan):
-        plan_scan(numbers, robot)
-        return
+    plan_scan(numbers, robot)
+    if ball is not None:
+        passed = place_at(numbers, robot, time_s)[3]
+        if rest_blocked(numbers, ball, mean, robot, passed, scan):
+            end_drive(numbers, robot, passed, time_s)
+
+
+@lean_kernel
+def end_drive(numbers, robot, passed, time_s):
+    """Let a drive end where the robot has just scanned, behind so many corners; it decides anew."""
     driven_m = robot.way_scans * numbers.scan_every_m
     robot.distance_m -= robot.way_m - driven_m
     copy_numbers(robot.scan_pose, robot.goal, 5)
@@ -145,15 +153,14 @@ def drive_on(rules, mean, robot, time_s, scan):
 
 
 @lean_kernel
-def rest_blocked(rules, mean, robot, passed, scan):
+def rest_blocked(numbers, ball, mean, robot, passed, scan):
     """Whether something is believed in the way from where a robot scanned to the end of its planned way."""
-    numbers = rules.numbers[0]
     size = (numbers.size[0], numbers.size[1], numbers.size[2])
     radius, start = numbers.body_radius_m / numbers.voxel_size_m, grid_position(numbers, robot.scan_pose)
     for point in range(passed, robot.waypoints):
         to = robot.way[point, 0], robot.way[point, 1], robot.way[point, 2]
         finish = grid_position(numbers, to)
-        if line_believed_blocked(mean, size, rules.ball, radius, start, finish, scan.way, scan.way_entered):
+        if line_believed_blocked(mean, size, ball, radius, start, finish, scan.way, scan.way_entered):
             return True
         start = finish
     return False

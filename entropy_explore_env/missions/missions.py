@@ -220,6 +220,7 @@ class Missions:
             self._parts,
             self.state,
             self._scans[thread],
+            self._navigators[thread].lattice.touched if self._navigators else None,
             boxes,
             numbers,
             first,

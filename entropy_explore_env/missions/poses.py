@@ -39,20 +39,21 @@ def distance_between(a, b):
 
 
 @lean_kernel
-def place_at(numbers, robot, elapsed_s):
-    """(x, y, z, corners): where a robot is under way, and how many corners it has passed.
-
-    Found from the end of the way, which is so met exactly.
-    """
-    share = driven_share(elapsed_s, robot.way_m, numbers.max_speed_m_s, numbers.acceleration_m_s2)
-    left, passed = 1.0 - share, robot.corners  # in shares of the whole way
-    begin, end = way_point(robot, passed), way_point(robot, passed + 1)
-    leg_m = distance_between(begin, end)
-    while passed > 0 and left * robot.way_m > leg_m:
-        left -= leg_m / robot.way_m
-        passed -= 1
-        begin, end = way_point(robot, passed), begin
+def place_at(numbers, robot, time_s):
+    """(x, y, z, corners): where a robot is at a time as in `pose_at`, and how many corners it has passed."""
+    end, passed = way_point(robot, robot.corners + 1), robot.corners
+    if time_s >= robot.ready_s - numbers.scan_time_s:
+        return end[0], end[1], end[2], passed
+    elapsed_s = time_s - robot.depart_s
+    left = 1.0 - driven_share(elapsed_s, robot.way_m, numbers.max_speed_m_s, numbers.acceleration_m_s2)
+    while True:  # from the end of the way, which is so met exactly; `left` is a share of the whole way
+        begin = way_point(robot, passed)
         leg_m = distance_between(begin, end)
+        if passed == 0 or left * robot.way_m <= leg_m:
+            break
+        left -= leg_m / robot.way_m
+        end = begin
+        passed -= 1
     left = min(left * (robot.way_m / leg_m), 1.0) if leg_m > 0.0 else 0.0
     return (
         end[0] - left * (end[0] - begin[0]),
@@ -63,26 +64,15 @@ def place_at(numbers, robot, elapsed_s):
 
 
 @lean_kernel
-def corners_passed(numbers, robot, time_s):
-    """How many corners of its drive a robot has passed at a time: see `pose_at`."""
-    if time_s >= robot.ready_s - numbers.scan_time_s:
-        return robot.corners
-    return place_at(numbers, robot, time_s - robot.depart_s)[3]
-
-
-@lean_kernel
 def pose_at(numbers, robot, time_s):
     """Pose (x, y, z, yaw, pitch) of a robot at a time between its departure and its next one."""
     origin, goal = robot.origin, robot.goal
-    if time_s >= robot.ready_s - numbers.scan_time_s:
-        return goal[0], goal[1], goal[2], goal[3], goal[4]
-    elapsed = time_s - robot.depart_s
-    x, y, z, _ = place_at(numbers, robot, elapsed)
-    yaw, pitch = goal[3], goal[4]
-    turn = turning_time(origin[3], origin[4], goal[3], goal[4], numbers.turn_rate_rad_s)
-    if elapsed < turn:
+    x, y, z, _ = place_at(numbers, robot, time_s)
+    yaw, pitch, elapsed_s = goal[3], goal[4], time_s - robot.depart_s
+    turn_s = turning_time(origin[3], origin[4], goal[3], goal[4], numbers.turn_rate_rad_s)
+    if elapsed_s < turn_s and time_s < robot.ready_s - numbers.scan_time_s:
         short_way = (goal[3] - origin[3] + math.pi) % (2.0 * math.pi) - math.pi
-        most = elapsed * numbers.turn_rate_rad_s
+        most = elapsed_s * numbers.turn_rate_rad_s
         yaw = origin[3] + min(max(short_way, -most), most)
         pitch = origin[4] + min(max(goal[4] - origin[4], -most), most)
     return x, y, z, yaw, pitch

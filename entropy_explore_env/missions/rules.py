@@ -8,7 +8,6 @@ from typing import NamedTuple
 import numpy as np
 
 from entropy_explore_env.config import Observation, Scenario
-from entropy_explore_env.robots.navigator import lattice_of
 from entropy_explore_env.robots.range_sensor import SensorModel, sensor_model
 from entropy_explore_env.worlds.world import plane_index
 
@@ -58,8 +57,6 @@ class Rules(NamedTuple):
     sensor: SensorModel
     moves: np.ndarray
     """(K, 3) int64, discrete moves in voxels."""
-    ball: np.ndarray
-    """(B, 3) int64, voxels that a body touches, by axis; empty where that is its own, or nobody plans."""
     gazes: np.ndarray
     """(D, 2) float64, discrete gazes: yaw, pitch."""
     panorama: np.ndarray
@@ -106,7 +103,6 @@ def rules_of(scenario: Scenario) -> Rules:
         numbers=numbers,
         sensor=sensor_model(scenario.sensor),
         moves=discrete_moves(scenario),
-        ball=lattice_of(scenario).touched if robot.navigator == "planned" else np.zeros((0, 3), np.int64),
         gazes=gaze_set(scenario.action.yaws, 1 if scenario.planar else scenario.action.pitches),
         panorama=panorama_directions(scenario),
     )

@@ -31,7 +31,7 @@ _NOTHING = int(Return.NOTHING)
 
 
 @lean_kernel
-def step_missions(rules, parts, state, scan, boxes, numbers, first, last, out):
+def step_missions(rules, parts, state, scan, ball, boxes, numbers, first, last, out):
     """Advance the missions `first` … `last` - 1 by one step; those that are over stand still.
 
     Args:
@@ -39,6 +39,7 @@ def step_missions(rules, parts, state, scan, boxes, numbers, first, last, out):
         parts: Its ObservationRules.
         state: The MissionState of E missions, changed in place.
         scan: Scratch space, not shared with another thread.
+        ball: (B, 3) int64, voxels that a body touches, by axis; None where robots do not plan.
         boxes: (E, A, N) float64 continuous actions.
         numbers: (E, A) int64 discrete actions.
         first: The first mission.
@@ -47,7 +48,7 @@ def step_missions(rules, parts, state, scan, boxes, numbers, first, last, out):
     """
     for mission in range(first, last):
         if state.missions[mission].end == _RUNNING:
-            step_mission(rules, state, scan, mission, boxes[mission], numbers[mission])
+            step_mission(rules, state, scan, ball, mission, boxes[mission], numbers[mission])
         observe_mission(rules, parts, state, scan, mission, out[mission])
 
 
@@ -70,7 +71,7 @@ def mask_missions(rules, state, out):
 
 
 @lean_kernel
-def step_mission(rules, state, scan, mission, boxes, numbers):
+def step_mission(rules, state, scan, ball, mission, boxes, numbers):
     """One step of one mission: what happens between two observations."""
     clock, robots = state.missions[mission], state.robots[mission]
     before_s = clock.time_s
@@ -81,7 +82,7 @@ def step_mission(rules, state, scan, mission, boxes, numbers):
             decode_action(rules, robots[robot].goal, boxes[robot], numbers[robot], robots[robot].target)
             depart(rules.numbers[0], state.blocked[mission], robots, robot, clock.time_s, scan)
             announce(rules, state, scan, mission, robot)
-    advance(rules, state, scan, mission)
+    advance(rules, state, scan, ball, mission)
     clock.cycles += 1
     if clock.end == _RUNNING and clock.cycles >= rules.numbers[0].max_cycles:
         clock.end = _CYCLES_UP
@@ -91,12 +92,14 @@ def step_mission(rules, state, scan, mission, boxes, numbers):
 
 
 @lean_kernel
-def advance(rules, state, scan, mission):
+def advance(rules, state, scan, ball, mission):
     """Work off the events up to the end of the step, the time limit or the mission's end."""
     clock, robots, mail = state.missions[mission], state.robots[mission], state.mail[mission]
     target_s = clock.time_s + rules.numbers[0].period_s
     if math.isinf(target_s):
-        target_s = next_arrival_s(robots)
+        for robot in robots:
+            if not robot.deciding:
+                target_s = min(target_s, robot.ready_s)
     stop_s = min(target_s, rules.numbers[0].time_limit_s)
     while clock.end == _RUNNING:
         letter, due_s = next_letter(mail)
@@ -112,7 +115,8 @@ def advance(rules, state, scan, mission):
             if scan_s >= robots[robot].ready_s:
                 robots[robot].deciding = True
             else:
-                drive_on(rules, state.mean[mission, robot], robots[robot], scan_s, scan)
+                mean = state.mean[mission, robot]
+                drive_on(rules.numbers[0], ball, mean, robots[robot], scan_s, scan)
                 if robots[robot].deciding and math.isinf(rules.numbers[0].period_s):
                     stop_s = scan_s
         note_progress(clock, robots)
@@ -122,16 +126,6 @@ def advance(rules, state, scan, mission):
         clock.time_s = max(clock.time_s, stop_s)
         if stop_s >= rules.numbers[0].time_limit_s:
             clock.end = _TIME_UP
-
-
-@lean_kernel
-def next_arrival_s(robots):
-    """When the next robot will have driven and scanned; inf if all decide."""
-    ready_s = math.inf
-    for robot in robots:
-        if not robot.deciding:
-            ready_s = min(ready_s, robot.ready_s)
-    return ready_s
 
 
 @lean_kernel

@@ -12,7 +12,7 @@ import numpy as np
 from entropy_explore_env.config import Scenario
 from entropy_explore_env.missions.action import encode_viewpoint
 from entropy_explore_env.missions.missions import Missions
-from entropy_explore_env.missions.poses import corners_passed, pose_at
+from entropy_explore_env.missions.poses import place_at, pose_at
 from entropy_explore_env.missions.rules import Rules
 from entropy_explore_env.robots.motion import MoveEnd
 
@@ -136,7 +136,8 @@ def _way_ahead(missions: Missions, own: np.void, time_s: float) -> np.ndarray:
         return np.zeros((0, 3))
     if own["waypoints"] == 0:
         return own["target"][None, :3].copy()
-    return own["way"][corners_passed(missions.rules.numbers[0], own, time_s) : own["waypoints"]].copy()
+    passed = place_at(missions.rules.numbers[0], own, time_s)[3]
+    return own["way"][passed : own["waypoints"]].copy()
 
 
 def _teammate(heard: np.void) -> TeammateView:

@@ -9,7 +9,7 @@ import pytest
 
 from entropy_explore_env.config import Grid
 from entropy_explore_env.missions import missions as missions_module
-from entropy_explore_env.missions.poses import corners_passed, pose_at
+from entropy_explore_env.missions.poses import place_at, pose_at
 from entropy_explore_env.missions.view import view_of
 from entropy_explore_env.robots.motion import MoveEnd
 from entropy_explore_env.worlds.world import World
@@ -98,7 +98,7 @@ def test_a_way_around_a_wall_is_driven_without_stopping_at_its_corners():
     for time_s, (place, passed) in places.items():
         assert pose_at(numbers, robot, time_s)[:2] == pytest.approx(place, abs=1e-6), time_s
         if passed is not None:
-            assert corners_passed(numbers, robot, time_s) == passed, time_s
+            assert place_at(numbers, robot, time_s)[3] == passed, time_s
 
 
 def test_scans_under_way_are_taken_after_so_many_metres_and_counted():
