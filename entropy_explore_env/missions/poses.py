@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from entropy_explore_env.compilation import lean_kernel
+from entropy_explore_env.compilation import inlined_kernel, lean_kernel
 from entropy_explore_env.robots.motion import driven_share, turning_time
 
 
@@ -22,7 +22,7 @@ def grid_position(numbers, pose):
     return (pose[0] - low[0]) / edge, (pose[1] - low[1]) / edge, (pose[2] - low[2]) / edge
 
 
-@lean_kernel
+@inlined_kernel
 def way_point(robot, number):
     """(x, y, z) of a point on a drive: 0 its origin, then its corners, then its goal."""
     if number > robot.corners:
@@ -32,7 +32,7 @@ def way_point(robot, number):
     return robot.origin[0], robot.origin[1], robot.origin[2]
 
 
-@lean_kernel
+@inlined_kernel
 def distance_between(a, b):
     """Distance between two points (x, y, z)."""
     return math.sqrt((b[0] - a[0]) ** 2 + (b[1] - a[1]) ** 2 + (b[2] - a[2]) ** 2)

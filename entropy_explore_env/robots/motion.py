@@ -90,12 +90,6 @@ def turning_time(yaw, pitch, new_yaw, new_pitch, turn_rate_rad_s):
 
 
 @lean_kernel
-def cross_until_covered(coverage, size, start, direction, length, crossed, entered):
-    """`cast_ray` up to the first covered voxel, which is noted, too; compiled once for all drives."""
-    return cast_ray(coverage, STOP_AT_COVERED, size, start, direction, length, False, 1, crossed, entered)
-
-
-@lean_kernel
 def line_believed_blocked(mean, size, ball, radius, start, finish, crossed, entered):
     """Whether a body that drives on a line would touch something that is believed covered.
 
@@ -117,7 +111,7 @@ def line_believed_blocked(mean, size, ball, radius, start, finish, crossed, ente
     if length <= 0.0:
         return False
     direction = (x / length, y / length, z / length)
-    _, n, end = cross_until_covered(mean, size, start, direction, length, crossed, entered)
+    _, n, end = cast_ray(mean, STOP_AT_COVERED, size, start, direction, length, False, 0, crossed, entered)
     if end == OBSTACLE:
         return True
     leaving = 0.0
@@ -159,7 +153,9 @@ def free_way(blocked, size, start, finish, direction, length, crossed, entered):
         return 0.0, _ARRIVED
     # A little farther, and the last voxel by itself: who stands on a face or an edge stands in the
     # voxel above it, through which the line need not go, and which must be free, too.
-    at, n, end = cross_until_covered(blocked, size, start, direction, length + _TOUCH, crossed, entered)
+    at, n, end = cast_ray(
+        blocked, STOP_AT_COVERED, size, start, direction, length + _TOUCH, False, 1, crossed, entered
+    )
     code = _WALL
     if end == OBSTACLE:
         n -= 1
