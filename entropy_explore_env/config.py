@@ -96,10 +96,14 @@ class Grid:
 
 @dataclass(frozen=True)
 class Robot:
-    """How a robot moves: a straight line from rest to rest (Rocha04, table 1).
+    """How a robot moves: from rest to rest, straight (Rocha04, table 1) or on a planned way.
 
     Attributes:
         motion: `free` flies anywhere; `planar` keeps the height of its sensor and looks level.
+        navigator: `straight` drives straight to the viewpoint; `planned` takes the cheapest way through
+            the robot's own belief, without stopping at its corners.
+        unknown_cost: Planned ways: what a metre through unknown voxels costs, in metres through
+            known ones; ≥ 1.
         reach_m: Largest displacement of one decision (ξ of Rocha04, eq. 32); inf = the workspace.
         max_speed_m_s: Top speed.
         acceleration_m_s2: Of speeding up and of braking.
@@ -109,6 +113,8 @@ class Robot:
     """
 
     motion: Literal["free", "planar"] = "free"
+    navigator: Literal["straight", "planned"] = "straight"
+    unknown_cost: float = 2.0
     reach_m: float = 0.5
     max_speed_m_s: float = 0.25
     acceleration_m_s2: float = 0.25
@@ -119,6 +125,8 @@ class Robot:
     def __post_init__(self) -> None:
         """Check every field."""
         check_choice(self, "motion", Literal["free", "planar"])
+        check_choice(self, "navigator", Literal["straight", "planned"])
+        check(self, "unknown_cost", "a number from 1 to 1e6", lambda v: 1.0 <= v <= 1e6)
         check_positive(self, "max_speed_m_s", "acceleration_m_s2")
         check_positive(self, "reach_m", "turn_rate_rad_s", finite=False)
         check(self, "reach_m", "a number from 0 to 1e6, or inf", lambda v: v <= 1e6 or v == math.inf)
@@ -138,6 +146,8 @@ class RangeSensor:
         range_noise_m: Standard deviation of the measured distance.
         voxels_behind: Voxels behind the hit that a ray still updates (as covered: eq. 4).
         scan_time_s: A scan takes this long, standing still.
+        scan_every_m: A scan is also taken under way, whenever so much of the way is driven: the robot
+            drives on, and the scan takes no time. inf = only on arrival.
     """
 
     field_of_view_rad: tuple[float, float] = (math.pi / 6, math.pi / 12)
@@ -148,6 +158,7 @@ class RangeSensor:
     range_noise_m: float = 0.0
     voxels_behind: int = 1
     scan_time_s: float = 0.5
+    scan_every_m: float = math.inf
 
     def __post_init__(self) -> None:
         """Check every field."""
@@ -162,6 +173,7 @@ class RangeSensor:
                 "RangeSensor.field_of_view_rad", view, "a tuple (yaw in [0, 2π], pitch in [0, π])"
             )
         check_positive(self, "scan_time_s")
+        check(self, "scan_every_m", "a number ≥ 1e-3, or inf", lambda v: v >= 1e-3)
         check(self, "angular_step_rad", "a finite number ≥ 1e-6", lambda v: 1e-6 <= v < math.inf)
         check_positive(self, "max_range_m", finite=False)
         check_not_negative(self, "sigma_slope_per_m", "range_noise_m")
@@ -411,10 +423,14 @@ class Scenario:
 
     @property
     def mail_places(self) -> int:
-        """Messages that can be under way at once: two a scan and robot, while the delay lasts."""
+        """Messages that can be under way at once: two a scan and robot, while the delay lasts.
+
+        Between two scans a robot stands still for the latter or drives to it, at most at top speed.
+        """
         if self.channel.delay_s == 0.0 or self.robots == 1:
             return 0
-        scans = math.floor(min(self.channel.delay_s / self.sensor.scan_time_s, 1e9)) + 2
+        apart_s = min(self.sensor.scan_time_s, self.sensor.scan_every_m / self.robot.max_speed_m_s)
+        scans = math.floor(min(self.channel.delay_s / apart_s, 1e9)) + 2
         return 2 * scans * self.robots
 
     @property

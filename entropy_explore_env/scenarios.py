@@ -39,13 +39,15 @@ _LIDAR = RangeSensor((2 * math.pi, 0.0), math.pi / 90, max_range_m=8.0)
 """A planar scanner, 180 rays all around, for the 2-D worlds whose papers do not give one."""
 _WHEELED = Robot(
     motion="planar",
-    reach_m=2.0,
+    navigator="planned",
+    reach_m=5.0,
     max_speed_m_s=0.5,
     acceleration_m_s2=0.5,
     body_radius_m=0.3,
     sensor_height_m=0.3,
 )
-"""A ground robot of a Pioneer 3-DX's size, which Sawhney explores with."""
+"""A ground robot of a Pioneer 3-DX's size, which Sawhney explores with. Its reach leads from a room into
+the next one; `reach_m=math.inf` is for strategies that choose goals in the whole workspace."""
 
 OFFICE = Scenario(
     name="office",
@@ -61,7 +63,9 @@ OFFICE_3D = Scenario(
     name="office-3d",
     grid=Grid((96, 72, 10), 0.25),
     world="office",
-    robot=Robot(reach_m=1.5, max_speed_m_s=0.5, acceleration_m_s2=0.5, body_radius_m=0.3),
+    robot=Robot(
+        navigator="planned", reach_m=3.0, max_speed_m_s=0.5, acceleration_m_s2=0.5, body_radius_m=0.3
+    ),
     sensor=RangeSensor((math.pi / 2, math.pi / 3), math.pi / 60, max_range_m=6.0),
     ending=Ending(time_limit_s=7200.0),
 )
@@ -101,7 +105,9 @@ CAVE = Scenario(
     name="cave",
     grid=Grid((80, 60, 25), 0.4),
     world="cave",
-    robot=Robot(reach_m=2.0, max_speed_m_s=1.0, acceleration_m_s2=1.0, body_radius_m=0.3),
+    robot=Robot(
+        navigator="planned", reach_m=4.0, max_speed_m_s=1.0, acceleration_m_s2=1.0, body_radius_m=0.3
+    ),
     sensor=RangeSensor((math.pi / 2, math.pi / 3), math.pi / 60, max_range_m=10.0),
     ending=Ending(time_limit_s=7200.0),
 )
@@ -122,7 +128,14 @@ OCCLUSIONS = Scenario(
     grid=Grid((200, 200, 1), 0.5),
     world="occlusions",
     robots=1,
-    robot=Robot(motion="planar", reach_m=5.0, max_speed_m_s=1.0, acceleration_m_s2=1.0, body_radius_m=0.3),
+    robot=Robot(
+        motion="planar",
+        navigator="planned",
+        reach_m=15.0,
+        max_speed_m_s=1.0,
+        acceleration_m_s2=1.0,
+        body_radius_m=0.3,
+    ),
     sensor=RangeSensor((math.pi / 2, 0.0), math.pi / 180, max_range_m=15.0),
     ending=Ending(time_limit_s=10_000.0),
 )
@@ -134,7 +147,7 @@ LAB = Scenario(
     grid=Grid((50, 46, 20), 0.1),
     world="lab",
     robots=2,
-    robot=Robot(motion="planar", body_radius_m=0.2, sensor_height_m=0.45),
+    robot=Robot(motion="planar", navigator="planned", reach_m=1.0, body_radius_m=0.2, sensor_height_m=0.45),
     sensor=RangeSensor((math.pi / 4, math.pi / 6), math.pi / 90, max_range_m=4.0),
 )
 """RochaMI's laboratory: 23 m², ε = 0.1 m, two ground robots with stereo vision. The paper gives neither
@@ -156,7 +169,7 @@ BHATTACHARYA_CLUTTERED = Scenario(
     grid=Grid((1000, 783, 1), 0.1),
     world="bhattacharya-cluttered",
     robots=4,
-    robot=dataclasses.replace(_WHEELED, reach_m=4.0, max_speed_m_s=1.0),
+    robot=dataclasses.replace(_WHEELED, max_speed_m_s=1.0),
     sensor=dataclasses.replace(_LIDAR, max_range_m=15.0),
     ending=Ending(time_limit_s=20_000.0),
 )

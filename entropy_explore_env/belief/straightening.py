@@ -153,13 +153,14 @@ def pull_straight(search, lattice, costs, way, count, start, finish, waypoints):
         count: How many.
         start: (3,) float64 in grid units, in the first voxel.
         finish: (3,) float64, in the last voxel.
-        waypoints: (N + 2, 3) float64, filled in; the last one that counts is `finish`.
+        waypoints: (M, 3) float64, filled in; `finish` is the last one. With fewer than N + 2 places
+            there may be no room for all: then the first M.
 
     Returns:
         How many waypoints there are, without the start; 0 = the start is the finish.
     """
     here, last, filled = 0, count + 1, 0
-    while here < last:
+    while here < last and filled < len(waypoints):
         good, beyond, step = here + 1, last + 1, 2
         while good < last and beyond > last:
             trial = min(here + step, last)

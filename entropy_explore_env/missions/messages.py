@@ -106,7 +106,7 @@ def post_letter(numbers, state, scan, mission, index, count):
     letter.count = count
     for mate in range(state.robots.shape[1]):
         state.mail_to[mission, place, mate] = False
-    copy_numbers(robot.origin if count < 0 else robot.goal, letter.pose, 5)
+    copy_numbers(robot.origin if count < 0 else robot.scan_pose, letter.pose, 5)
     write_announcement(robot, letter.announced)
     for i in range(count):
         ray, mailed = scan.rays[scan.order[i]], state.mail_rays[mission, place, i]
@@ -120,7 +120,7 @@ def post_letter(numbers, state, scan, mission, index, count):
 def send(rules, state, scan, mission, index, count):
     """Broadcast a batch of `count` measurements (`scan.order`), or an announcement (count = -1)."""
     numbers, clock, robot = rules.numbers[0], state.missions[mission], state.robots[mission, index]
-    here = robot.origin if count < 0 else robot.goal
+    here = robot.origin if count < 0 else robot.scan_pose
     robot.messages_sent += 1
     robot.measurements_sent += max(count, 0)
     robot.bits_sent += message_bits(count)

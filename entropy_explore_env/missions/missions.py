@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -13,11 +14,13 @@ from entropy_explore_env.belief.coverage_map import PRIOR_MEAN, map_entropy_bits
 from entropy_explore_env.belief.pooling import fresh_sums
 from entropy_explore_env.config import Grid, Scenario, gaussian_entropy_bits
 from entropy_explore_env.errors import CallOrderError, SettingError, WorldError
+from entropy_explore_env.missions.navigation import plan_missions
 from entropy_explore_env.missions.observation import ObservationLayout, observation_rules
 from entropy_explore_env.missions.rules import rules_of
 from entropy_explore_env.missions.state import MissionEnd, MissionState, check_memory, new_state
 from entropy_explore_env.missions.tick import mask_missions, observe_mission, step_missions
 from entropy_explore_env.randomness import Stream, check_seed, generator, splitmix_states
+from entropy_explore_env.robots.navigator import Navigator, new_navigator
 from entropy_explore_env.robots.range_sensor import Scan, new_scan
 from entropy_explore_env.validation import is_whole
 from entropy_explore_env.worlds.load import make_world, with_world
@@ -75,12 +78,21 @@ class Missions:
         self.seeds = [0] * self.count
         self.episodes = [-1] * self.count
         self.observations = np.zeros((self.count, scenario.robots, self.layout.size), np.float32)
-        self._scans = [self._new_scan() for _ in range(self.threads)]
+        self._make_working_space()
         self._pool: ThreadPoolExecutor | None = None
 
-    def _new_scan(self) -> Scan:
-        sensor = self.scenario.sensor
-        return new_scan(self.grid, sensor, sensor.rays, self.scenario.robots, self.scenario.robot.reach_m)
+    def _make_working_space(self) -> None:
+        """A scan a thread and, where robots plan, a navigator; what they hold is nobody's state."""
+        sensor, robot = self.scenario.sensor, self.scenario.robot
+        planned = robot.navigator == "planned"
+        longest_m = math.inf if planned else robot.reach_m
+        self._scans: list[Scan] = [
+            new_scan(self.grid, sensor, sensor.rays, self.scenario.robots, longest_m)
+            for _ in range(self.threads)
+        ]
+        self._navigators: list[Navigator] = [
+            new_navigator(self.scenario) for _ in range(self.threads if planned else 0)
+        ]
 
     @property
     def grid(self) -> Grid:
@@ -203,11 +215,14 @@ class Missions:
         return self.observations
 
     def _step_range(self, thread: int, first: int, last: int, boxes: np.ndarray, numbers: np.ndarray) -> None:
+        if self._navigators:
+            plan_missions(self.rules, self.state, self._navigators[thread], boxes, numbers, first, last)
         step_missions(
             self.rules,
             self._parts,
             self.state,
             self._scans[thread],
+            self._navigators[thread].lattice.touched if self._navigators else None,
             boxes,
             numbers,
             first,
@@ -249,13 +264,13 @@ class Missions:
     def __getstate__(self) -> dict[str, object]:
         """All but the threads and their scratch space."""
         kept = dict(self.__dict__)
-        del kept["_pool"], kept["_scans"]
+        del kept["_pool"], kept["_scans"], kept["_navigators"]
         return kept
 
     def __setstate__(self, kept: dict[str, object]) -> None:
         """Take the arrays back and make new scratch space."""
         self.__dict__.update(kept)
-        self._scans = [self._new_scan() for _ in range(self.threads)]
+        self._make_working_space()
         self._pool = None
 
 

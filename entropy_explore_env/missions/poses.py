@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from entropy_explore_env.compilation import lean_kernel
+from entropy_explore_env.compilation import inlined_kernel, lean_kernel
 from entropy_explore_env.robots.motion import driven_share, turning_time
 
 
@@ -22,26 +22,57 @@ def grid_position(numbers, pose):
     return (pose[0] - low[0]) / edge, (pose[1] - low[1]) / edge, (pose[2] - low[2]) / edge
 
 
+@inlined_kernel
+def way_point(robot, number):
+    """(x, y, z) of a point on a drive: 0 its origin, then its corners, then its goal."""
+    if number > robot.corners:
+        return robot.goal[0], robot.goal[1], robot.goal[2]
+    if number > 0:
+        return robot.way[number - 1, 0], robot.way[number - 1, 1], robot.way[number - 1, 2]
+    return robot.origin[0], robot.origin[1], robot.origin[2]
+
+
+@inlined_kernel
+def distance_between(a, b):
+    """Distance between two points (x, y, z)."""
+    return math.sqrt((b[0] - a[0]) ** 2 + (b[1] - a[1]) ** 2 + (b[2] - a[2]) ** 2)
+
+
+@lean_kernel
+def place_at(numbers, robot, time_s):
+    """(x, y, z, corners): where a robot is at a time as in `pose_at`, and how many corners it has passed."""
+    end, passed = way_point(robot, robot.corners + 1), robot.corners
+    if time_s >= robot.ready_s - numbers.scan_time_s:
+        return end[0], end[1], end[2], passed
+    elapsed_s = time_s - robot.depart_s
+    left = 1.0 - driven_share(elapsed_s, robot.way_m, numbers.max_speed_m_s, numbers.acceleration_m_s2)
+    while True:  # from the end of the way, which is so met exactly; `left` is a share of the whole way
+        begin = way_point(robot, passed)
+        leg_m = distance_between(begin, end)
+        if passed == 0 or left * robot.way_m <= leg_m:
+            break
+        left -= leg_m / robot.way_m
+        end = begin
+        passed -= 1
+    left = min(left * (robot.way_m / leg_m), 1.0) if leg_m > 0.0 else 0.0
+    return (
+        end[0] - left * (end[0] - begin[0]),
+        end[1] - left * (end[1] - begin[1]),
+        end[2] - left * (end[2] - begin[2]),
+        passed,
+    )
+
+
 @lean_kernel
 def pose_at(numbers, robot, time_s):
     """Pose (x, y, z, yaw, pitch) of a robot at a time between its departure and its next one."""
     origin, goal = robot.origin, robot.goal
-    elapsed = time_s - robot.depart_s
-    if time_s >= robot.ready_s - numbers.scan_time_s:
-        return goal[0], goal[1], goal[2], goal[3], goal[4]
-    length = math.sqrt((goal[0] - origin[0]) ** 2 + (goal[1] - origin[1]) ** 2 + (goal[2] - origin[2]) ** 2)
-    share = driven_share(elapsed, length, numbers.max_speed_m_s, numbers.acceleration_m_s2)
-    left = 1.0 - share  # exactly the goal in the end
-    x, y, z = (
-        goal[0] - left * (goal[0] - origin[0]),
-        goal[1] - left * (goal[1] - origin[1]),
-        goal[2] - left * (goal[2] - origin[2]),
-    )
-    yaw, pitch = goal[3], goal[4]
-    turn = turning_time(origin[3], origin[4], goal[3], goal[4], numbers.turn_rate_rad_s)
-    if elapsed < turn:
+    x, y, z, _ = place_at(numbers, robot, time_s)
+    yaw, pitch, elapsed_s = goal[3], goal[4], time_s - robot.depart_s
+    turn_s = turning_time(origin[3], origin[4], goal[3], goal[4], numbers.turn_rate_rad_s)
+    if elapsed_s < turn_s and time_s < robot.ready_s - numbers.scan_time_s:
         short_way = (goal[3] - origin[3] + math.pi) % (2.0 * math.pi) - math.pi
-        most = elapsed * numbers.turn_rate_rad_s
+        most = elapsed_s * numbers.turn_rate_rad_s
         yaw = origin[3] + min(max(short_way, -most), most)
         pitch = origin[4] + min(max(goal[4] - origin[4], -most), most)
     return x, y, z, yaw, pitch

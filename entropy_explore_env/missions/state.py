@@ -55,6 +55,9 @@ MISSION = np.dtype(
 PROGRESS = (0.5, 0.9, 0.99, 1.0)
 """Shares of the bits that the mission asks for, at which the time is taken."""
 
+WAYPOINTS = 32
+"""Most points that a planned way leads to, one after the other."""
+
 ROBOT = np.dtype(
     [
         ("entropy_bits", "f8"),  # of its map, carried by H -= I (Rocha04, eq. 29)
@@ -63,7 +66,14 @@ ROBOT = np.dtype(
         ("goal", "f8", (5,)),  # pose at which it ends, or ended
         ("target", "f8", (5,)),  # viewpoint that was chosen, whether or not the drive ends there
         ("scan_pose", "f8", (5,)),  # pose of the latest scan
+        ("way", "f8", (WAYPOINTS, 3)),  # points to which it meant to drive straight, one after the other
+        ("waypoints", "i8"),  # how many there are; 0 = straight to the target
+        ("way_end", "i8"),  # code of a MoveEnd: how the drive ends if nothing stops it; ways only
+        ("corners", "i8"),  # how many of the points the drive passes before its goal
+        ("way_m", "f8"),  # length of the drive
         ("depart_s", "f8"),  # start of the drive
+        ("next_scan_s", "f8"),  # when it scans next: under way, or at `ready_s`
+        ("way_scans", "i8"),  # scans that it took under way in this drive
         ("ready_s", "f8"),  # end of the scan after it
         ("move_end", "i8"),  # code of a MoveEnd of the latest drive
         ("depth_m", "f8"),  # r̂ of the latest scan (RochaMI, eq. 4)

@@ -10,6 +10,7 @@ import math
 
 from entropy_explore_env.compilation import lean_kernel
 from entropy_explore_env.missions.action import decode_action, write_mask
+from entropy_explore_env.missions.driving import depart, drive_on
 from entropy_explore_env.missions.messages import announce, fuse_measurements, next_letter, open_letter, send
 from entropy_explore_env.missions.observation import observe_robot
 from entropy_explore_env.missions.poses import copy_numbers, grid_position, pose_at
@@ -17,13 +18,6 @@ from entropy_explore_env.missions.reward import reward_robots
 from entropy_explore_env.missions.scoring import note_progress, score_scan
 from entropy_explore_env.missions.state import MissionEnd
 from entropy_explore_env.robots.channel import select_measurements
-from entropy_explore_env.robots.motion import (
-    MoveEnd,
-    driving_time,
-    free_way,
-    turning_time,
-    way_to_teammate,
-)
 from entropy_explore_env.robots.range_sensor import (
     Return,
     in_view,
@@ -32,12 +26,11 @@ from entropy_explore_env.robots.range_sensor import (
 )
 
 _RUNNING, _MAPPED, _TIME_UP, _CYCLES_UP = (end.code for end in MissionEnd)
-_ARRIVED, _TEAMMATE = MoveEnd.ARRIVED.code, MoveEnd.TEAMMATE.code
 _NOTHING = int(Return.NOTHING)
 
 
 @lean_kernel
-def step_missions(rules, parts, state, scan, boxes, numbers, first, last, out):
+def step_missions(rules, parts, state, scan, ball, boxes, numbers, first, last, out):
     """Advance the missions `first` … `last` - 1 by one step; those that are over stand still.
 
     Args:
@@ -45,6 +38,7 @@ def step_missions(rules, parts, state, scan, boxes, numbers, first, last, out):
         parts: Its ObservationRules.
         state: The MissionState of E missions, changed in place.
         scan: Scratch space, not shared with another thread.
+        ball: (B, 3) int64, voxels that a body touches, by axis; None where robots do not plan.
         boxes: (E, A, N) float64 continuous actions.
         numbers: (E, A) int64 discrete actions.
         first: The first mission.
@@ -53,7 +47,7 @@ def step_missions(rules, parts, state, scan, boxes, numbers, first, last, out):
     """
     for mission in range(first, last):
         if state.missions[mission].end == _RUNNING:
-            step_mission(rules, state, scan, mission, boxes[mission], numbers[mission])
+            step_mission(rules, state, scan, ball, mission, boxes[mission], numbers[mission])
         observe_mission(rules, parts, state, scan, mission, out[mission])
 
 
@@ -76,7 +70,7 @@ def mask_missions(rules, state, out):
 
 
 @lean_kernel
-def step_mission(rules, state, scan, mission, boxes, numbers):
+def step_mission(rules, state, scan, ball, mission, boxes, numbers):
     """One step of one mission: what happens between two observations."""
     clock, robots = state.missions[mission], state.robots[mission]
     before_s = clock.time_s
@@ -87,7 +81,7 @@ def step_mission(rules, state, scan, mission, boxes, numbers):
             decode_action(rules, robots[robot].goal, boxes[robot], numbers[robot], robots[robot].target)
             depart(rules.numbers[0], state.blocked[mission], robots, robot, clock.time_s, scan)
             announce(rules, state, scan, mission, robot)
-    advance(rules, state, scan, mission)
+    advance(rules, state, scan, ball, mission)
     clock.cycles += 1
     if clock.end == _RUNNING and clock.cycles >= rules.numbers[0].max_cycles:
         clock.end = _CYCLES_UP
@@ -97,63 +91,33 @@ def step_mission(rules, state, scan, mission, boxes, numbers):
 
 
 @lean_kernel
-def depart(numbers, blocked, robots, index, time_s, scan):
-    """Commit a robot to its target: how far it will get, why no farther, and when it has scanned."""
-    robot = robots[index]
-    origin, goal = robot.origin, robot.goal
-    copy_numbers(goal, origin, 5)
-    copy_numbers(robot.target, goal, 5)
-    robot.depart_s = time_s
-    robot.deciding = False
-    start = grid_position(numbers, origin)
-    finish = grid_position(numbers, goal)
-    x, y, z = finish[0] - start[0], finish[1] - start[1], finish[2] - start[2]
-    length = math.sqrt(x * x + y * y + z * z)
-    way, code = 0.0, _ARRIVED
-    if length > 0.0:
-        direction = (x / length, y / length, z / length)
-        size = (numbers.size[0], numbers.size[1], numbers.size[2])
-        way, code = free_way(blocked, size, start, finish, direction, length, scan.way, scan.way_entered)
-        for mate in range(len(robots)):
-            if mate != index and numbers.body_radius_m > 0.0:
-                begin = grid_position(numbers, pose_at(numbers, robots[mate], time_s))
-                stop = grid_position(numbers, robots[mate].goal)
-                touching = 2.0 * numbers.body_radius_m / numbers.voxel_size_m
-                clear = way_to_teammate(start, direction, way, begin, stop, touching)
-                if clear < way:
-                    way, code = clear, _TEAMMATE
-        if code != _ARRIVED:
-            for axis in range(3):
-                goal[axis] = origin[axis] + direction[axis] * way * numbers.voxel_size_m
-            robot.blocked_moves += 1
-    robot.move_end = code
-    way_m = way * numbers.voxel_size_m
-    robot.distance_m += way_m
-    drive_s = driving_time(way_m, numbers.max_speed_m_s, numbers.acceleration_m_s2)
-    turn_s = turning_time(origin[3], origin[4], goal[3], goal[4], numbers.turn_rate_rad_s)
-    robot.ready_s = time_s + max(drive_s, turn_s) + numbers.scan_time_s
-
-
-@lean_kernel
-def advance(rules, state, scan, mission):
+def advance(rules, state, scan, ball, mission):
     """Work off the events up to the end of the step, the time limit or the mission's end."""
     clock, robots, mail = state.missions[mission], state.robots[mission], state.mail[mission]
     target_s = clock.time_s + rules.numbers[0].period_s
     if math.isinf(target_s):
-        target_s = next_robot(robots)[1]
+        for robot in robots:
+            if not robot.deciding:
+                target_s = min(target_s, robot.ready_s)
     stop_s = min(target_s, rules.numbers[0].time_limit_s)
     while clock.end == _RUNNING:
         letter, due_s = next_letter(mail)
-        robot, ready_s = next_robot(robots)
-        if min(due_s, ready_s) > stop_s:
+        robot, scan_s = next_scan(robots)
+        if min(due_s, scan_s) > stop_s:
             break
-        if due_s <= ready_s:
+        if due_s <= scan_s:
             clock.time_s = max(clock.time_s, due_s)
             open_letter(rules, state, scan, mission, letter)
         else:
-            clock.time_s = ready_s
+            clock.time_s = scan_s
             scan_and_share(rules, state, scan, mission, robot)
-            robots[robot].deciding = True
+            if scan_s >= robots[robot].ready_s:
+                robots[robot].deciding = True
+            else:
+                mean = state.mean[mission, robot]
+                drive_on(rules.numbers[0], ball, mean, robots[robot], scan_s, scan)
+                if robots[robot].deciding and math.isinf(rules.numbers[0].period_s):
+                    stop_s = scan_s
         note_progress(clock, robots)
         if mapped(robots, clock.entropy_end_bits, rules.numbers[0].all_maps):
             clock.end = _MAPPED
@@ -164,13 +128,13 @@ def advance(rules, state, scan, mission):
 
 
 @lean_kernel
-def next_robot(robots):
-    """(robot, time) of the next robot that has driven and scanned; time inf if all decide."""
-    soonest, ready_s = 0, math.inf
+def next_scan(robots):
+    """(robot, time) of the next robot that scans, under way or where its drive ended; inf if all decide."""
+    soonest, scan_s = 0, math.inf
     for robot in range(len(robots)):
-        if not robots[robot].deciding and robots[robot].ready_s < ready_s:
-            soonest, ready_s = robot, robots[robot].ready_s
-    return soonest, ready_s
+        if not robots[robot].deciding and robots[robot].next_scan_s < scan_s:
+            soonest, scan_s = robot, robots[robot].next_scan_s
+    return soonest, scan_s
 
 
 @lean_kernel
@@ -185,14 +149,13 @@ def mapped(robots, entropy_end_bits, all_maps):
 
 @lean_kernel
 def scan_and_share(rules, state, scan, mission, index):
-    """A robot measures from where its drive ended, fuses, and sends what is most useful."""
+    """A robot measures from where it is, fuses, and sends what is most useful."""
     numbers, robot = rules.numbers[0], state.robots[mission, index]
-    goal = robot.goal
+    time_s = state.missions[mission].time_s
+    pose = pose_at(numbers, robot, time_s)
     size = (numbers.size[0], numbers.size[1], numbers.size[2])
-    start = grid_position(numbers, goal)
-    bodies = place_bodies(
-        rules, state.robots[mission], index, state.missions[mission].time_s, start, scan.bodies
-    )
+    start = grid_position(numbers, pose)
+    bodies = place_bodies(rules, state.robots[mission], index, time_s, pose, start, scan.bodies)
     take_scan(
         scan,
         rules.sensor,
@@ -200,8 +163,8 @@ def scan_and_share(rules, state, scan, mission, index):
         size,
         numbers.voxel_size_m,
         start,
-        goal[3],
-        goal[4],
+        pose[3],
+        pose[4],
         bodies,
         robot.sensor_chance,
     )
@@ -211,10 +174,11 @@ def scan_and_share(rules, state, scan, mission, index):
     robot.entropy_bits -= bits
     robot.own_bits += bits
     robot.gained_bits += bits
-    robot.depth_m, robot.half_angle_rad, measurements = visibility_parameters(scan.rays, goal[3], goal[4])
+    robot.depth_m, robot.half_angle_rad, measurements = visibility_parameters(scan.rays, pose[3], pose[4])
     robot.scans += 1
     robot.measurements += measurements
-    copy_numbers(goal, robot.scan_pose, 5)
+    for i in range(5):
+        robot.scan_pose[i] = pose[i]
     for ray in range(len(scan.rays)):
         state.scan_range_m[mission, index, ray] = scan.rays[ray].range_m
         state.scan_returned[mission, index, ray] = scan.rays[ray].returned
@@ -232,14 +196,14 @@ def scan_and_share(rules, state, scan, mission, index):
 
 
 @lean_kernel
-def place_bodies(rules, robots, index, time_s, start, bodies):
+def place_bodies(rules, robots, index, time_s, pose, start, bodies):
     """Put the teammates' bodies that the robot may see, in grid units, into `bodies`; returns how many."""
-    numbers, goal, count = rules.numbers[0], robots[index].goal, 0
+    numbers, count = rules.numbers[0], 0
     if numbers.body_radius_m > 0.0:
         for mate in range(len(robots)):
             if mate != index:
                 copy_numbers(grid_position(numbers, pose_at(numbers, robots[mate], time_s)), bodies[count], 3)
                 bodies[count, 3] = numbers.body_radius_m / numbers.voxel_size_m
-                if in_view(rules.sensor, goal[3], goal[4], start, bodies[count]):
+                if in_view(rules.sensor, pose[3], pose[4], start, bodies[count]):
                     count += 1
     return count

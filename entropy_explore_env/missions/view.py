@@ -12,7 +12,7 @@ import numpy as np
 from entropy_explore_env.config import Scenario
 from entropy_explore_env.missions.action import encode_viewpoint
 from entropy_explore_env.missions.missions import Missions
-from entropy_explore_env.missions.poses import pose_at
+from entropy_explore_env.missions.poses import place_at, pose_at
 from entropy_explore_env.missions.rules import Rules
 from entropy_explore_env.robots.motion import MoveEnd
 
@@ -70,6 +70,8 @@ class RobotView:
         entropy_bits: Entropy of its map.
         move_end: Why its latest drive ended where it did.
         target: (5,) the viewpoint that it chose last.
+        way: (N, 3) points to which it still means to drive straight, one after the other; none while
+            it chooses. Where it plans it is its plan, at whose end the target need not be.
         depth_m, half_angle_rad: r̂ and α̂ of its latest scan.
         scan: Its latest scan.
         teammates: Robot number → what it heard of it.
@@ -85,6 +87,7 @@ class RobotView:
     entropy_bits: float
     move_end: MoveEnd
     target: np.ndarray
+    way: np.ndarray
     depth_m: float
     half_angle_rad: float
     scan: ScanView
@@ -113,6 +116,7 @@ def view_of(missions: Missions, mission: int, robot: int) -> RobotView:
         entropy_bits=float(own["entropy_bits"]),
         move_end=list(MoveEnd)[own["move_end"]],
         target=own["target"].copy(),
+        way=_way_ahead(missions, own, time_s),
         depth_m=float(own["depth_m"]),
         half_angle_rad=float(own["half_angle_rad"]),
         scan=ScanView(
@@ -124,6 +128,16 @@ def view_of(missions: Missions, mission: int, robot: int) -> RobotView:
         teammates={mate: _teammate(heard[mate]) for mate in range(len(heard)) if mate != robot},
         rules=rules,
     )
+
+
+def _way_ahead(missions: Missions, own: np.void, time_s: float) -> np.ndarray:
+    """(N, 3) where a robot means to drive, whatever will stop it."""
+    if own["deciding"]:
+        return np.zeros((0, 3))
+    if own["waypoints"] == 0:
+        return own["target"][None, :3].copy()
+    passed = place_at(missions.rules.numbers[0], own, time_s)[3]
+    return own["way"][passed : own["waypoints"]].copy()
 
 
 def _teammate(heard: np.void) -> TeammateView:

@@ -1,7 +1,8 @@
-"""Motion: a straight drive from rest to rest, stopped short by obstacles and teammates' bodies.
+"""Motion: a drive from rest to rest, stopped short by obstacles and teammates' bodies.
 
-Lengths in metres where the name says so, else in grid units (voxel edges); times in seconds.
-A drive that has begun is never changed: every robot owns the tube that its body sweeps until it
+Its way is a straight line, or a polyline that is driven without stopping at its corners. Lengths in
+metres where the name says so, else in grid units (voxel edges); times in seconds. A drive that has
+begun is never changed, but may end early: every robot owns the tube that its body sweeps until it
 arrives, and others stop before it. So bodies never overlap, whatever the timing.
 """
 
@@ -23,6 +24,9 @@ class MoveEnd(enum.Enum):
     CEILING = "The ceiling was in the way: the robot stands in the last voxel below it on its way."
     WALL = "The workspace ends there: the robot stands in its last voxel on the way."
     TEAMMATE = "A teammate's body, or the way that it still has to drive, was in the way."
+    NO_WAY = "No way to the viewpoint was known: the robot stands as near to it as it knew to get."
+    CORNERS = "The way had more corners than a drive may have: the robot stands at the last of them."
+    SEEN = "A scan under way showed that the rest of the way is blocked: the robot stands where it was."
 
     @property
     def code(self) -> int:
@@ -30,7 +34,8 @@ class MoveEnd(enum.Enum):
         return list(MoveEnd).index(self)
 
 
-_ARRIVED, _OBSTACLE, _GROUND, _CEILING, _WALL, _TEAMMATE = (end.code for end in MoveEnd)
+_ARRIVED, _WALL = MoveEnd.ARRIVED.code, MoveEnd.WALL.code
+_OBSTACLE, _GROUND, _CEILING = MoveEnd.OBSTACLE.code, MoveEnd.GROUND.code, MoveEnd.CEILING.code
 _ENDS_AT = (_ARRIVED, _OBSTACLE, _GROUND, _CEILING)
 """How a drive ends at each Barrier."""
 _TOUCH = 1e-6
@@ -64,11 +69,66 @@ def driven_share(elapsed_s, length_m, max_speed_m_s, acceleration_m_s2):
 
 
 @lean_kernel
+def time_of_way(way_m, length_m, max_speed_m_s, acceleration_m_s2):
+    """Seconds from the start of a drive until `way_m` of its length are driven: see `driven_share`."""
+    duration = driving_time(length_m, max_speed_m_s, acceleration_m_s2)
+    ramp = min(max_speed_m_s / acceleration_m_s2, duration / 2.0)
+    ramp_m = 0.5 * acceleration_m_s2 * ramp * ramp
+    if way_m <= ramp_m:
+        return math.sqrt(2.0 * way_m / acceleration_m_s2)
+    if way_m >= length_m - ramp_m:
+        return duration - math.sqrt(2.0 * max(length_m - way_m, 0.0) / acceleration_m_s2)
+    return ramp + (way_m - ramp_m) / max_speed_m_s
+
+
+@lean_kernel
 def turning_time(yaw, pitch, new_yaw, new_pitch, turn_rate_rad_s):
     """Seconds to turn the gaze, yaw and pitch at once, each the short way round."""
     turn = abs(new_yaw - yaw) % (2.0 * math.pi)
     turn = min(turn, 2.0 * math.pi - turn)
     return max(turn, abs(new_pitch - pitch)) / turn_rate_rad_s
+
+
+@lean_kernel
+def line_believed_blocked(mean, size, ball, radius, start, finish, crossed, entered):
+    """Whether a body that drives on a line would touch something that is believed covered.
+
+    The voxel in which it is does not count, nor does what it touches from there keep it from leaving:
+    voxels that the body reaches into already count as free if they are not covered themselves.
+
+    Args:
+        mean: (V,) float32 expected coverage.
+        size: (X, Y, Z) voxels.
+        ball: (B, 3) int64, voxels that a body touches, by axis; empty = its own.
+        radius: Of the body, in grid units.
+        start: (x, y, z) in grid units.
+        finish: (x, y, z), likewise.
+        crossed: (L,) int32 scratch space of `cast_ray`.
+        entered: (L,) int64, likewise.
+    """
+    x, y, z = finish[0] - start[0], finish[1] - start[1], finish[2] - start[2]
+    length = math.sqrt(x * x + y * y + z * z)
+    if length <= 0.0:
+        return False
+    direction = (x / length, y / length, z / length)
+    _, n, end = cast_ray(mean, STOP_AT_COVERED, size, start, direction, length, False, 0, crossed, entered)
+    if end == OBSTACLE:
+        return True
+    leaving = 0.0
+    for step in range(n):
+        if step > 0 and entered[step] < leaving:
+            continue
+        touches, voxel = False, crossed[step]
+        for offset in ball:
+            i = voxel // (size[1] * size[2]) + offset[0]
+            j, k = voxel // size[2] % size[1] + offset[1], voxel % size[2] + offset[2]
+            if 0 <= i < size[0] and 0 <= j < size[1] and 0 <= k < size[2]:
+                touches = touches or mean[(i * size[1] + j) * size[2] + k] > STOP_AT_COVERED
+        if touches and step > 0:
+            return True
+        if touches:
+            leaving = radius * TICKS
+    return False
 
 
 @lean_kernel
@@ -151,6 +211,8 @@ def way_to_teammate(start, direction, way, begin, finish, touching):
         The way in grid units, at most `way`.
     """
     apart = touching + _TOUCH
+    if _gap(start, direction, 0.5 * way, begin, finish) - 0.5 * way > apart + _TOUCH:
+        return way  # no point of the line is nearer than that
     low, high = 0.0, way
     for _ in range(_HALVINGS):
         third = (high - low) / 3.0

@@ -1,0 +1,54 @@
+"""Where robots with a navigator plan their ways: before a step, apart from it.
+
+So planning is compiled only where somebody plans.
+"""
+
+from __future__ import annotations
+
+from entropy_explore_env.compilation import lean_kernel
+from entropy_explore_env.missions.action import decode_action
+from entropy_explore_env.missions.poses import grid_position
+from entropy_explore_env.missions.state import MissionEnd
+from entropy_explore_env.robots.motion import MoveEnd
+from entropy_explore_env.robots.navigator import find_way
+
+_RUNNING = MissionEnd.RUNNING.code
+_ARRIVED = MoveEnd.ARRIVED.code
+
+
+@lean_kernel
+def plan_missions(rules, state, navigator, boxes, numbers, first, last):
+    """Plan the ways of the robots that decide, each through its own belief.
+
+    Args:
+        rules: The scenario.
+        state: The MissionState of E missions; targets and ways are filled in.
+        navigator: Working space, not shared with another thread.
+        boxes: (E, A, N) float64 continuous actions.
+        numbers: (E, A) int64 discrete actions.
+        first: The first mission.
+        last: One past the last.
+    """
+    for mission in range(first, last):
+        if state.missions[mission].end == _RUNNING:
+            for index in range(state.robots.shape[1]):
+                robot = state.robots[mission, index]
+                if robot.deciding:
+                    decode_action(
+                        rules, robot.goal, boxes[mission, index], numbers[mission, index], robot.target
+                    )
+                    mean, precision = state.mean[mission, index], state.precision[mission, index]
+                    plan_way(rules.numbers[0], navigator, mean, precision, robot)
+
+
+@lean_kernel
+def plan_way(numbers, navigator, mean, precision, robot):
+    """Write a robot's way to its target: waypoints in metres, and how it ends if nothing stops it."""
+    start, goal = grid_position(numbers, robot.goal), grid_position(numbers, robot.target)
+    robot.waypoints, robot.way_end = find_way(navigator, mean, precision, start, goal, robot.way)
+    for point in range(robot.waypoints):
+        for axis in range(3):
+            robot.way[point, axis] = numbers.origin_m[axis] + robot.way[point, axis] * numbers.voxel_size_m
+    if robot.way_end == _ARRIVED:  # not up to rounding
+        for axis in range(3):
+            robot.way[robot.waypoints - 1, axis] = robot.target[axis]

@@ -1,0 +1,191 @@
+"""The navigator: waypoints through a belief by hand, and that planned drives meet nothing that is known."""
+
+from __future__ import annotations
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy import ndimage
+
+from entropy_explore_env.config import Grid
+from entropy_explore_env.robots.motion import (
+    MoveEnd,
+    driven_share,
+    driving_time,
+    line_believed_blocked,
+    time_of_way,
+)
+from entropy_explore_env.robots.navigator import find_way, lattice_of, new_navigator
+from entropy_explore_env.worlds.world import World
+from tests.reference.scenes import drawn, free_box, ray_space, seeds
+
+FLAT = Grid((7, 11, 1), 0.5)
+PRIOR, KNOWN = np.float32(30.0**-2), np.float32(1e4)
+
+
+def planner(grid=FLAT, **robot):
+    return free_box(robots=1, grid=grid, robot={"navigator": "planned", "reach_m": math.inf, **robot})
+
+
+def plan(scenario, solid, start, goal, known=None, places=32):
+    """Waypoints (N, 3) and the end of a plan through what is known, (X, Y, Z) bool; None = all."""
+    mean = solid.astype(np.float32).ravel()
+    precision = np.full(mean.shape, KNOWN) if known is None else np.where(known.ravel(), KNOWN, PRIOR)
+    points = np.full((places, 3), np.nan)
+    count, code = find_way(new_navigator(scenario), mean, precision, start, goal, points)
+    assert np.isnan(points[count:]).all()
+    return points[:count], list(MoveEnd)[code]
+
+
+def wall(open_from=9, shape=FLAT.shape):
+    solid = np.zeros(shape, bool)
+    solid[3, :open_from] = True
+    return solid
+
+
+def test_through_known_free_space_it_is_one_line():
+    points, end = plan(planner(), wall(), (1.2, 1.7, 0.5), (2.9, 10.1, 0.5))
+    assert (points.tolist(), end) == ([[2.9, 10.1, 0.5]], MoveEnd.ARRIVED)
+    points, end = plan(planner(), wall(), (1.2, 1.7, 0.5), (1.2, 1.7, 0.5))
+    assert (points.tolist(), end) == ([[1.2, 1.7, 0.5]], MoveEnd.ARRIVED)
+
+
+def test_around_a_wall():
+    points, end = plan(planner(), wall(), (1.5, 1.5, 0.5), (5.2, 1.9, 0.5))
+    assert (points.tolist(), end) == ([[2.5, 9.5, 0.5], [4.5, 9.5, 0.5], [5.2, 1.9, 0.5]], MoveEnd.ARRIVED)
+
+
+def test_a_way_with_more_corners_than_places_ends_at_the_last_of_them():
+    points, end = plan(planner(), wall(), (1.5, 1.5, 0.5), (5.5, 1.5, 0.5), places=2)
+    assert (points.tolist(), end) == ([[2.5, 9.5, 0.5], [4.5, 9.5, 0.5]], MoveEnd.CORNERS)
+
+
+@pytest.mark.parametrize(("cost", "corners"), [(1.0, 0), (3.0, 0), (6.0, 2)])
+def test_unknown_space_is_passed_where_the_way_around_costs_more(cost, corners):
+    """Two unknown columns on the line of four edges cost 2·cost + 2; around them it is about 10."""
+    known = np.ones(FLAT.shape, bool)
+    known[3, :6] = False
+    known[2, :6] = False
+    points, end = plan(
+        planner(unknown_cost=cost), np.zeros(FLAT.shape, bool), (1.5, 1.5, 0.5), (5.5, 1.5, 0.5), known
+    )
+    assert end is MoveEnd.ARRIVED
+    assert (points[:, 1].max() > 5.0) == (corners > 0)
+
+
+@pytest.mark.parametrize(
+    ("goal", "nearest"),
+    [
+        ((3.5, 4.2, 0.5), (2.5, 4.5, 0.5)),  # in the wall: of both sides the first
+        ((5.5, 4.5, 0.5), (2.5, 4.5, 0.5)),  # behind it
+        ((-0.7, 4.5, 0.5), (0.5, 4.5, 0.5)),  # outside
+        ((1.5, 13.0, 0.5), (1.5, 10.5, 0.5)),
+    ],
+)
+def test_where_no_way_is_known_it_leads_to_the_nearest_place(goal, nearest):
+    points, end = plan(planner(), wall(open_from=11), (1.5, 1.5, 0.5), goal)
+    assert end is MoveEnd.NO_WAY
+    assert points[-1].tolist() == list(nearest)
+
+
+def test_who_cannot_get_nearer_stays_where_it_is():
+    points, end = plan(planner(), wall(open_from=11), (2.7, 4.6, 0.5), (5.5, 4.5, 0.5))
+    assert (points.tolist(), end) == ([[2.7, 4.6, 0.5]], MoveEnd.NO_WAY)
+
+
+def test_planar_robots_keep_their_height_and_may_pass_under_what_is_above_them():
+    grid, solid = Grid((7, 11, 5), 0.5), np.zeros((7, 11, 5), bool)
+    solid[3, :9, 1:3] = True
+    solid[5, 5, 4] = True
+    scenario = planner(grid, motion="planar", sensor_height_m=0.8)
+    points, end = plan(scenario, solid, (1.5, 5.5, 1.6), (5.5, 5.5, 1.6))
+    assert end is MoveEnd.ARRIVED
+    assert (points[:, 2] == 1.6).all()
+    assert points[:, 1].max() == 9.5
+    flying, _ = plan(planner(grid), solid, (1.5, 5.5, 1.5), (5.5, 5.5, 1.5))
+    assert flying[:, 2].max() > 3.0 or flying[:, 2].min() < 1.0
+
+
+def test_a_body_keeps_away_from_walls():
+    """A gap of two voxels is too narrow for a body of 0.4 m, which touches the wall from either row."""
+    for radius, end in ((0.2, MoveEnd.ARRIVED), (0.4, MoveEnd.NO_WAY)):
+        _, found = plan(planner(body_radius_m=radius), wall(), (1.5, 1.5, 0.5), (5.5, 1.5, 0.5))
+        assert found is end
+
+
+@drawn(150)
+@given(seeds, st.sampled_from([(7, 11, 1), (7, 11, 5)]), st.sampled_from([0.2, 0.3, 0.55]))
+def test_who_knows_the_world_meets_nothing_and_gets_wherever_a_way_leads(seed, shape, radius):
+    """Random worlds, known by heart: a plan is driven to its end, through voxels in which the body fits."""
+    rng = np.random.default_rng(seed)
+    scenario = planner(Grid(shape, 0.5), body_radius_m=radius)
+    occupied = rng.random(shape) < rng.choice([0.05, 0.2, 0.4])
+    occupied[tuple(n // 2 for n in shape)] = False
+    room = World(scenario.grid, occupied, "random").barriers(radius) == 0
+    if not room.any():
+        return
+    free = np.argwhere(room)
+    here, there = free[rng.integers(len(free), size=2)]
+    start, goal = here + 0.5, there + rng.uniform(0.02, 0.98, 3)
+    if scenario.planar:
+        goal[2] = 0.5
+    points, end = plan(scenario, occupied, tuple(start), tuple(goal))
+    parts, _ = ndimage.label(room)
+    connected = parts[tuple(here)] == parts[tuple(there)]
+    assert (end is MoveEnd.ARRIVED) == connected
+    corners = np.vstack([start, points])
+    crossed, entered = ray_space(shape)
+    for begin, finish in itertools.pairwise(corners):
+        for share in np.linspace(0.0, 1.0, 41):
+            place = np.minimum((begin + share * (finish - begin)).astype(int), np.array(shape) - 1)
+            assert room[tuple(place)]
+        assert not line_believed_blocked(
+            occupied.ravel().astype(np.float32),
+            shape,
+            lattice_of(scenario).touched,
+            radius / 0.5,
+            tuple(begin),
+            tuple(finish),
+            crossed,
+            entered,
+        )
+    if not connected:
+        reached = np.argwhere(parts == parts[tuple(here)])
+        nearest = ((reached - there) ** 2).sum(axis=1).min()
+        assert ((np.floor(points[-1]) - there) ** 2).sum() == nearest
+
+
+def test_what_lies_within_the_body_s_reach_blocks_a_line():
+    """A body of 1.2 edges on a line along y through x = 3: covered voxels one and two columns beside it."""
+    size = (7, 11, 1)
+    crossed, entered = ray_space(size)
+    ball = lattice_of(planner(body_radius_m=0.6)).touched
+
+    def blocked(covered, begin_y):
+        mean = np.full(size, 0.5, np.float32)
+        mean[covered] = 0.51
+        return line_believed_blocked(
+            mean.ravel(), size, ball, 1.2, (3.5, begin_y, 0.5), (3.5, 8.5, 0.5), crossed, entered
+        )
+
+    assert blocked((3, 6, 0), 1.5)
+    assert blocked((4, 6, 0), 1.5)
+    assert not blocked((5, 6, 0), 1.5)
+    assert not blocked((3, 1, 0), 1.5)  # it stands in there
+    assert blocked((3, 9, 0), 1.5)  # the body's front at the end
+    assert not blocked((3, 10, 0), 1.5)
+    assert not blocked((4, 1, 0), 1.5)  # it touches that already, and leaves
+    assert blocked((4, 2, 0), 1.5)  # that, too, but it would touch it still where it touched nothing
+    assert blocked((3, 2, 0), 1.5)  # not through it
+
+
+@drawn(100)
+@given(st.floats(1e-3, 50.0), st.floats(0.0, 1.0), st.floats(0.1, 3.0), st.floats(0.1, 3.0))
+def test_the_time_of_a_place_on_the_way_is_when_the_robot_is_there(length, share, speed, acceleration):
+    time_s = time_of_way(share * length, length, speed, acceleration)
+    assert 0.0 <= time_s <= driving_time(length, speed, acceleration) + 1e-9
+    assert driven_share(time_s, length, speed, acceleration) == pytest.approx(share, abs=1e-6)
