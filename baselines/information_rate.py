@@ -266,7 +266,7 @@ class InformationRate:
             return []
         places = self._places(view, here, drawn[reached])
         bits, _ = self._weighed(view, places[0], places, cones, anywhere=True)
-        goals = np.ravel_multi_index(tuple(places[:, :3].astype(int).T), grid.shape)
+        goals = np.asarray(np.ravel_multi_index(tuple(places[:, :3].astype(int).T), grid.shape))
         cost = np.array([cost_to(self._search, int(goal)) for goal in goals])
         worth = bits / (np.maximum(cost / reach, 1.0) * each)
         best = int(np.argmax(worth))

@@ -42,14 +42,14 @@ SIGHT = np.dtype(
 _FOLD_ABOVE = 1e250
 
 
-def cone_of(viewpoint: np.ndarray, radius: float, half_angle_rad: float) -> np.void:
-    """A CONE from a viewpoint (5,): x, y, z in grid units, yaw, pitch; radius in voxel edges."""
+def cone_of(viewpoint: np.ndarray, radius: float, half_angle_rad: float) -> np.ndarray:
+    """() CONE from a viewpoint (5,): x, y, z in grid units, yaw, pitch; radius in voxel edges."""
     cone = np.zeros((), CONE)
     yaw, pitch = float(viewpoint[3]), float(viewpoint[4])
     cone["apex"] = viewpoint[:3]
     cone["gaze"] = math.cos(yaw) * math.cos(pitch), math.sin(yaw) * math.cos(pitch), -math.sin(pitch)
     cone["radius"], cone["cosine"] = radius, math.cos(half_angle_rad)
-    return cone[()]
+    return cone
 
 
 @inlined_kernel

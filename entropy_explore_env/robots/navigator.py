@@ -12,13 +12,13 @@ from typing import NamedTuple
 import numpy as np
 
 from entropy_explore_env.belief.lattice import KNOWN_RATIO, Costs, Lattice, new_lattice, place_of
-from entropy_explore_env.belief.planning import (
+from entropy_explore_env.belief.planning import search_ways
+from entropy_explore_env.belief.search_space import (
     Search,
     cost_to,
     is_passable,
     mark_of,
     new_search,
-    search_ways,
     way_to,
 )
 from entropy_explore_env.belief.straightening import cost_of_sight, pull_straight

@@ -141,7 +141,7 @@ class World:
         if voxels_behind:
             seen |= ndimage.binary_dilation(seen, iterations=voxels_behind) & self.occupied
         if level is not None:
-            seen &= self._within_view(starts.any(axis=2), *level)
+            seen &= self._within_view(np.any(starts, axis=2), *level)
         return Layout(barriers, np.flatnonzero(starts), seen)
 
     def _within_view(
@@ -169,7 +169,7 @@ class World:
         farthest = np.zeros(self.grid.shape[:2])
         for i, j in corners:
             np.maximum(farthest, np.hypot(x - i, y - j), out=farthest)
-        nearest = ndimage.distance_transform_edt(~floor)
+        nearest = np.asarray(ndimage.distance_transform_edt(~floor))
         rises = np.abs((np.arange(self.grid.shape[2]) + 0.5) * edge_m - sensor_height_m) - 0.5 * edge_m
         needed = np.maximum(rises, 0.0) / max(math.tan(steepest_rad), 1e-9) / edge_m
         reach = max_range_m / edge_m
