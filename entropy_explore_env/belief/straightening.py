@@ -18,6 +18,8 @@ from entropy_explore_env.belief.search_space import Search, cost_to, is_passable
 from entropy_explore_env.compilation import inlined_kernel, lean_kernel
 
 _SLACK = 1e-9
+_START, _FIRST = np.int64(0), np.int64(1)
+"""Stops by number. NumPy integers, so that what takes one compiles for one type."""
 
 
 @inlined_kernel
@@ -115,7 +117,7 @@ def _cost_along(search, lattice, costs, way, count, start, finish, number):
     """Cost of the way from the start up to a stop."""
     if number == 0:
         return 0.0
-    first = _stop(lattice, way, count, start, finish, 1)
+    first = _stop(lattice, way, count, start, finish, _FIRST)
     mark = np.int64(search.mark[way[0]])
     cost = _distance((start[0], start[1], start[2]), first) * rate_of(costs, way[0], mark)
     cost += cost_to(search, way[min(number, count) - 1]) - cost_to(search, way[0])
@@ -159,7 +161,7 @@ def pull_straight(search, lattice, costs, way, count, start, finish, waypoints):
     Returns:
         How many waypoints there are, without the start; 0 = the start is the finish.
     """
-    here, last, filled = 0, count + 1, 0
+    here, last, filled = _START, count + 1, 0
     while here < last and filled < len(waypoints):
         good, beyond, step = here + 1, last + 1, 2
         while good < last and beyond > last:

@@ -29,6 +29,8 @@ from entropy_explore_env.worlds.world import plane_index
 
 _ARRIVED, _NO_WAY, _CORNERS = MoveEnd.ARRIVED.code, MoveEnd.NO_WAY.code, MoveEnd.CORNERS.code
 _SLACK = 1e-9
+_PASSABLE, _REACHED = np.int64(0), np.int64(1)
+"""Which voxels `_nearest` may choose. NumPy integers, so that it compiles for one type."""
 
 
 class Navigator(NamedTuple):
@@ -82,7 +84,7 @@ def _voxel_at(lattice, position):
 
 
 @lean_kernel
-def _nearest(search, lattice, costs, goal, start, reached):
+def _nearest(search, lattice, costs, goal, start, choice):
     """The voxel nearest to a goal of those that the latest search reached, or of all passable ones.
 
     Looked for in growing shells around the goal; of equals the first. The start is one, whatever it is.
@@ -103,7 +105,7 @@ def _nearest(search, lattice, costs, goal, start, reached):
                     if apart >= nearest:
                         continue
                     voxel = (i * size[1] + j) * size[2] + k
-                    if reached:
+                    if choice == _REACHED:
                         found = not math.isinf(cost_to(search, voxel))
                     else:
                         found = is_passable(mark_of(search, lattice, costs, voxel, i, j, k))
@@ -122,11 +124,11 @@ def _search_way(navigator, costs, source, goal):
         return goal
     x, y, z = place_of(lattice, goal)
     if not is_passable(mark_of(search, lattice, costs, goal, x, y, z)):  # then nothing was searched
-        near = _nearest(search, lattice, costs, goal, source, False)
+        near = _nearest(search, lattice, costs, goal, source, _PASSABLE)
         cost = search_ways(search, lattice, costs, navigator.source, near, math.inf, navigator.no_cells)
         if not math.isinf(cost):
             return near
-    return _nearest(search, lattice, costs, goal, source, True)
+    return _nearest(search, lattice, costs, goal, source, _REACHED)
 
 
 @lean_kernel
@@ -157,7 +159,14 @@ def find_way(navigator, mean, precision, start, goal, waypoints):
     navigator.source[0] = source
     if inside:  # straight through known free space there is nothing to search
         search_ways(search, lattice, costs, navigator.source, source, 0.0, navigator.no_cells)
-        if cost_of_sight(search, lattice, costs, begin, finish) <= math.sqrt(length) * (1.0 + _SLACK):
+        sight = cost_of_sight(
+            search,
+            lattice,
+            costs,
+            (begin[0], begin[1], begin[2]),  # tuples, for which it is compiled anyway
+            (finish[0], finish[1], finish[2]),
+        )
+        if sight <= math.sqrt(length) * (1.0 + _SLACK):
             for axis in range(3):
                 waypoints[0, axis] = finish[axis]
             return 1, _ARRIVED
