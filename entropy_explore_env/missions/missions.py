@@ -15,10 +15,10 @@ from entropy_explore_env.belief.pooling import fresh_sums
 from entropy_explore_env.config import Grid, Scenario, gaussian_entropy_bits
 from entropy_explore_env.errors import CallOrderError, SettingError, WorldError
 from entropy_explore_env.missions.navigation import plan_missions
-from entropy_explore_env.missions.observation import ObservationLayout, observation_rules
+from entropy_explore_env.missions.observation import ObservationLayout, observation_rules, observe_mission
 from entropy_explore_env.missions.rules import rules_of
 from entropy_explore_env.missions.state import MissionEnd, MissionState, check_memory, new_state
-from entropy_explore_env.missions.tick import mask_missions, observe_mission, step_missions
+from entropy_explore_env.missions.tick import mask_missions, step_missions
 from entropy_explore_env.randomness import Stream, check_seed, generator, splitmix_states
 from entropy_explore_env.robots.navigator import Navigator, new_navigator
 from entropy_explore_env.robots.range_sensor import Scan, new_scan

@@ -38,7 +38,7 @@ from entropy_explore_env.belief.raycast import OPEN, STOP_AT_COVERED, cast_ray, 
 from entropy_explore_env.compilation import lean_kernel
 from entropy_explore_env.config import Scenario
 from entropy_explore_env.missions.action import write_mask
-from entropy_explore_env.missions.poses import grid_position
+from entropy_explore_env.missions.poses import grid_position, pose_at
 from entropy_explore_env.missions.rules import Rules, overview_shape, rules_of
 
 OWN_NUMBERS = 10
@@ -308,8 +308,8 @@ def observe_overview(cells, sums, out):
 
 
 @lean_kernel
-def observe_robot(rules, parts, state, scan, mission, robot, pose, out):
-    """Fill one robot's flat observation.
+def observe_mission(rules, parts, state, scan, mission, out):
+    """Fill the flat observations of a mission's robots, each from where it is now.
 
     Args:
         rules: The scenario.
@@ -317,23 +317,25 @@ def observe_robot(rules, parts, state, scan, mission, robot, pose, out):
         state: The MissionState.
         scan: Scratch space.
         mission: Which mission.
-        robot: Whose observation.
-        pose: (x, y, z, yaw, pitch), where it is now.
-        out: (F,) float32, filled in.
+        out: (A, F) float32, filled in.
     """
-    numbers, own = rules.numbers[0], state.robots[mission, robot]
-    mean, precision = state.mean[mission, robot], state.precision[mission, robot]
-    start = grid_position(numbers, pose)
-    time_s, heard = state.missions[mission].time_s, state.heard[mission, robot]
-    if parts.panorama >= 0:
-        observe_panorama(rules, start, mean, precision, scan, out[parts.panorama :])
-    if parts.own >= 0:
-        observe_self(numbers, pose, time_s, own.entropy_bits, own.deciding, out[parts.own :])
-    if parts.team >= 0:
-        observe_team(numbers, robot, pose, time_s, heard, out[parts.team :])
-    if parts.patch >= 0:
-        observe_patch(numbers, parts.patch_shape, robot, start, mean, precision, heard, out[parts.patch :])
-    if parts.overview >= 0:
-        observe_overview(rules.cells, state.pooled[mission, robot], out[parts.overview :])
-    if parts.action_mask >= 0:
-        write_mask(rules, start, mean, out[parts.action_mask :])
+    numbers, time_s = rules.numbers[0], state.missions[mission].time_s
+    for robot in range(state.robots.shape[1]):
+        own, heard, row = state.robots[mission, robot], state.heard[mission, robot], out[robot]
+        mean, precision = state.mean[mission, robot], state.precision[mission, robot]
+        pose = pose_at(numbers, own, time_s)
+        start = grid_position(numbers, pose)
+        if parts.panorama >= 0:
+            observe_panorama(rules, start, mean, precision, scan, row[parts.panorama :])
+        if parts.own >= 0:
+            observe_self(numbers, pose, time_s, own.entropy_bits, own.deciding, row[parts.own :])
+        if parts.team >= 0:
+            observe_team(numbers, robot, pose, time_s, heard, row[parts.team :])
+        if parts.patch >= 0:
+            observe_patch(
+                numbers, parts.patch_shape, robot, start, mean, precision, heard, row[parts.patch :]
+            )
+        if parts.overview >= 0:
+            observe_overview(rules.cells, state.pooled[mission, robot], row[parts.overview :])
+        if parts.action_mask >= 0:
+            write_mask(rules, start, mean, row[parts.action_mask :])

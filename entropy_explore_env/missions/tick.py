@@ -12,7 +12,7 @@ from entropy_explore_env.compilation import lean_kernel
 from entropy_explore_env.missions.action import decode_action, write_mask
 from entropy_explore_env.missions.driving import depart, drive_on
 from entropy_explore_env.missions.messages import announce, fuse_measurements, next_letter, open_letter, send
-from entropy_explore_env.missions.observation import observe_robot
+from entropy_explore_env.missions.observation import observe_mission
 from entropy_explore_env.missions.poses import copy_numbers, grid_position, pose_at
 from entropy_explore_env.missions.reward import reward_robots
 from entropy_explore_env.missions.scoring import note_progress, score_scan
@@ -46,17 +46,13 @@ def step_missions(rules, parts, state, scan, ball, boxes, numbers, first, last, 
         out: (E, A, F) float32 observations, filled in.
     """
     for mission in range(first, last):
-        if state.missions[mission].end == _RUNNING:
-            step_mission(rules, state, scan, ball, mission, boxes[mission], numbers[mission])
+        clock = state.missions[mission]
+        if clock.end == _RUNNING:
+            before_s = clock.time_s
+            send_off(rules, state, scan, mission, boxes[mission], numbers[mission])
+            advance(rules, state, scan, ball, mission)
+            settle(rules, clock, state.robots[mission], before_s)
         observe_mission(rules, parts, state, scan, mission, out[mission])
-
-
-@lean_kernel
-def observe_mission(rules, parts, state, scan, mission, out):
-    """Fill (A, F) float32, the observations of a mission's robots."""
-    for robot in range(state.robots.shape[1]):
-        pose = pose_at(rules.numbers[0], state.robots[mission, robot], state.missions[mission].time_s)
-        observe_robot(rules, parts, state, scan, mission, robot, pose, out[robot])
 
 
 @lean_kernel
@@ -70,18 +66,21 @@ def mask_missions(rules, state, out):
 
 
 @lean_kernel
-def step_mission(rules, state, scan, ball, mission, boxes, numbers):
-    """One step of one mission: what happens between two observations."""
-    clock, robots = state.missions[mission], state.robots[mission]
-    before_s = clock.time_s
+def send_off(rules, state, scan, mission, boxes, numbers):
+    """Let the robots that decide choose, announce and depart, one after the other."""
+    robots, time_s = state.robots[mission], state.missions[mission].time_s
     for robot in range(len(robots)):
         robots[robot].own_bits = 0.0
         robots[robot].received_bits = 0.0
         if robots[robot].deciding:
             decode_action(rules, robots[robot].goal, boxes[robot], numbers[robot], robots[robot].target)
-            depart(rules.numbers[0], state.blocked[mission], robots, robot, clock.time_s, scan)
+            depart(rules.numbers[0], state.blocked[mission], robots, robot, time_s, scan)
             announce(rules, state, scan, mission, robot)
-    advance(rules, state, scan, ball, mission)
+
+
+@lean_kernel
+def settle(rules, clock, robots, before_s):
+    """Count the step, and reward the robots for it."""
     clock.cycles += 1
     if clock.end == _RUNNING and clock.cycles >= rules.numbers[0].max_cycles:
         clock.end = _CYCLES_UP
