@@ -16,7 +16,7 @@ from entropy_explore_env.compilation import inlined_kernel, lean_kernel
 
 
 class Cells(NamedTuple):
-    """Which voxels lie in which of C cells; C = 0 where nothing is pooled."""
+    """Which voxels lie in which of C cells."""
 
     size: tuple[int, int, int]
     """(X, Y, Z) voxels."""
@@ -28,16 +28,13 @@ class Cells(NamedTuple):
     """(C,) float64, how many voxels a cell has."""
 
 
-def new_cells(size: tuple[int, int, int], shape: tuple[int, int, int] | None) -> Cells:
-    """Cells that cut each axis into as equal parts as whole voxels allow; none if `shape` is None.
+def new_cells(size: tuple[int, int, int], shape: tuple[int, int, int]) -> Cells:
+    """Cells that cut each axis into as equal parts as whole voxels allow.
 
     Args:
         size: (X, Y, Z) voxels.
         shape: Cells along each axis, at most the voxels.
     """
-    if shape is None:
-        nothing = np.zeros(0, np.int64)
-        return Cells(size, nothing, nothing, nothing, np.zeros(0))
     # Voxel v lies in cell i where i·V // C <= v < (i + 1)·V // C.
     axes = [((np.arange(v) + 1) * c - 1) // v for v, c in zip(size, shape, strict=True)]
     counts = [np.bincount(axis, minlength=c) for axis, c in zip(axes, shape, strict=True)]

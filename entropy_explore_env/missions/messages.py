@@ -25,10 +25,10 @@ _ANNOUNCEMENT = np.int64(-1)
 
 
 @lean_kernel
-def fuse_measurements(rules, state, scan, mission, index, count):
+def fuse_measurements(rules, cells, state, scan, mission, index, count):
     """Fuse `count` measurements of `scan.order` into a robot's belief; returns the bits of `fuse_scan`."""
     mean, precision = state.mean[mission, index], state.precision[mission, index]
-    if len(rules.cells.voxels) == 0:
+    if cells is None:  # known while compiling: nothing of the rest is compiled
         return fuse_scan(scan, count, mean, precision)
     ends = (rules.numbers[0].prior_precision, rules.numbers[0].end_precision)
     total = 0.0
@@ -38,7 +38,7 @@ def fuse_measurements(rules, state, scan, mission, index, count):
         scan.utility[place] = 0.0
         if ray.returned != _NOTHING:
             scan.utility[place] = fuse_pooled_ray(
-                rules.cells,
+                cells,
                 state.pooled[mission, index],
                 ends,
                 mean,
@@ -56,7 +56,7 @@ def fuse_measurements(rules, state, scan, mission, index, count):
 @lean_kernel
 def hear_batch(rules, state, scan, mission, index, count):
     """Fuse received measurements as if the robot had taken them itself (Rocha04, sect. 5)."""
-    bits = fuse_measurements(rules, state, scan, mission, index, count)
+    bits = fuse_measurements(rules, rules.cells, state, scan, mission, index, count)
     state.robots[mission, index].entropy_bits -= bits
     state.robots[mission, index].received_bits += bits
     state.robots[mission, index].heard_bits += bits

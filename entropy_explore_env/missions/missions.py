@@ -160,7 +160,8 @@ class Missions:
             array[mission] = np.zeros((), array.dtype)
         state.mean[mission] = PRIOR_MEAN
         state.precision[mission] = self.rules.numbers["prior_precision"][0]
-        state.pooled[mission] = fresh_sums(self.rules.cells)
+        if self.rules.cells is not None:
+            state.pooled[mission] = fresh_sums(self.rules.cells)
         if self.scenario.scored:
             state.joint_mean[mission] = PRIOR_MEAN
             state.joint_precision[mission] = self.rules.numbers["prior_precision"][0]

@@ -300,7 +300,9 @@ def observe_patch(numbers, shape, robot, start, mean, precision, heard, out):
 
 @lean_kernel
 def observe_overview(cells, sums, out):
-    """Fill (2·C,): normalised entropy and expected coverage, averaged over each cell."""
+    """Fill (2·C,): normalised entropy and expected coverage, averaged over each cell; nothing for None."""
+    if cells is None:  # known while compiling
+        return
     count = len(cells.voxels)
     for cell in range(count):
         out[cell] = min(max(sums[0, cell] / cells.voxels[cell], 0.0), 1.0)

@@ -60,8 +60,8 @@ class Rules(NamedTuple):
     """(K, 3) int64, discrete moves in voxels."""
     gazes: np.ndarray
     """(D, 2) float64, discrete gazes: yaw, pitch."""
-    cells: Cells
-    """Of the overview; none without it."""
+    cells: Cells | None
+    """Of the overview; None without it."""
     panorama: np.ndarray
     """(D, 3) float64 unit vectors of the panorama's rays; D = 0 without it."""
 
@@ -107,7 +107,7 @@ def rules_of(scenario: Scenario) -> Rules:
         sensor=sensor_model(scenario.sensor),
         moves=discrete_moves(scenario),
         gazes=gaze_set(scenario.action.yaws, 1 if scenario.planar else scenario.action.pitches),
-        cells=new_cells(scenario.grid.shape, overview_shape(scenario)),
+        cells=None if (shape := overview_shape(scenario)) is None else new_cells(scenario.grid.shape, shape),
         panorama=panorama_directions(scenario),
     )
 

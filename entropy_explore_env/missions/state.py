@@ -183,7 +183,7 @@ def check_memory(scenario: Scenario, missions: int) -> None:
         raise SettingError("missions, robots, voxels", size, f"what fits into {there_is >> 30} GiB of memory")
 
 
-def new_state(scenario: Scenario, missions: int, cells: Cells) -> MissionState:
+def new_state(scenario: Scenario, missions: int, cells: Cells | None) -> MissionState:
     """Arrays for E missions of a scenario, not yet reset; beliefs are pooled to the cells."""
     e, a, r = missions, scenario.robots, scenario.sensor.rays
     v, q, b = scenario.grid.voxels, scenario.mail_places, min(scenario.channel.burst, r)
@@ -194,7 +194,7 @@ def new_state(scenario: Scenario, missions: int, cells: Cells) -> MissionState:
         blocked=truth if small_body else np.zeros((e, v), np.float32),
         mean=np.zeros((e, a, v), np.float32),
         precision=np.zeros((e, a, v), np.float32),
-        pooled=np.zeros((e, a, 2, len(cells.voxels))),
+        pooled=np.zeros((e, a, 2, 0 if cells is None else len(cells.voxels))),
         joint_mean=np.zeros((e, scored), np.float32),
         joint_precision=np.zeros((e, scored), np.float32),
         visible=np.zeros((e, scored), np.bool_),

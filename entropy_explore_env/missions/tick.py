@@ -169,7 +169,7 @@ def scan_and_share(rules, state, scan, mission, index):
     )
     for ray in range(len(scan.order)):
         scan.order[ray] = ray
-    bits = fuse_measurements(rules, state, scan, mission, index, len(scan.order))
+    bits = fuse_measurements(rules, rules.cells, state, scan, mission, index, len(scan.order))
     robot.entropy_bits -= bits
     robot.own_bits += bits
     robot.gained_bits += bits

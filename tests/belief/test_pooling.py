@@ -25,9 +25,8 @@ def test_cells_cut_each_axis_into_nearly_equal_parts():
     assert fresh_sums(cells).tolist() == [cells.voxels.tolist(), (0.5 * cells.voxels).tolist()]
 
 
-def test_as_many_cells_as_voxels_and_none_at_all():
+def test_as_many_cells_as_voxels():
     assert (new_cells(SIZE, SIZE).voxels == 1.0).all()
-    assert new_cells(SIZE, None).voxels.size == new_cells(SIZE, None).x.size == 0
 
 
 def test_normalised_entropy_at_its_ends():
