@@ -91,8 +91,10 @@ def message_bits(count):
 
 
 @lean_kernel
-def post_letter(numbers, state, scan, mission, index, count):
-    """Put a message into a free place of the mail; returns the place."""
+def post_letter(delayed, numbers, state, scan, mission, index, count):
+    """Put a message into a free place of the mail; returns the place. There is none if `delayed` is None."""
+    if delayed is None:
+        return -1
     clock, robot, mail = state.missions[mission], state.robots[mission, index], state.mail[mission]
     place = 0
     while not math.isinf(mail[place].due_s):
@@ -141,7 +143,7 @@ def send(rules, state, scan, mission, index, count):
             robot.messages_out_of_range += 1
         elif numbers.delay_s > 0.0:
             if letter < 0:
-                letter = post_letter(numbers, state, scan, mission, index, count)
+                letter = post_letter(rules.delayed, numbers, state, scan, mission, index, count)
             state.mail_to[mission, letter, mate] = True
         else:
             heard = state.heard[mission, mate, index]
@@ -160,8 +162,10 @@ def announce(rules, state, scan, mission, robot):
 
 
 @lean_kernel
-def open_letter(rules, state, scan, mission, place):
+def open_letter(delayed, rules, state, scan, mission, place):
     """A message arrives: its hearers fuse it, or note what it announces; its place is free again."""
+    if delayed is None:
+        return
     numbers, letter = rules.numbers[0], state.mail[mission, place]
     letter.due_s = math.inf
     size = (numbers.size[0], numbers.size[1], numbers.size[2])

@@ -60,6 +60,8 @@ class Rules(NamedTuple):
     """(K, 3) int64, discrete moves in voxels."""
     gazes: np.ndarray
     """(D, 2) float64, discrete gazes: yaw, pitch."""
+    delayed: int | None
+    """None where messages arrive at once: then nothing of the mail is compiled."""
     cells: Cells | None
     """Of the overview; None without it."""
     panorama: np.ndarray
@@ -107,6 +109,7 @@ def rules_of(scenario: Scenario) -> Rules:
         sensor=sensor_model(scenario.sensor),
         moves=discrete_moves(scenario),
         gazes=gaze_set(scenario.action.yaws, 1 if scenario.planar else scenario.action.pitches),
+        delayed=1 if channel.delay_s > 0.0 else None,
         cells=None if (shape := overview_shape(scenario)) is None else new_cells(scenario.grid.shape, shape),
         panorama=panorama_directions(scenario),
     )

@@ -106,7 +106,7 @@ def advance(rules, state, scan, ball, mission):
             break
         if due_s <= scan_s:
             clock.time_s = max(clock.time_s, due_s)
-            open_letter(rules, state, scan, mission, letter)
+            open_letter(rules.delayed, rules, state, scan, mission, letter)
         else:
             clock.time_s = scan_s
             scan_and_share(rules, state, scan, mission, robot)
