@@ -15,20 +15,16 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from entropy_explore_env.belief.lattice import belief_costs, new_lattice
+from entropy_explore_env.belief.lattice import KNOWN_RATIO, belief_costs, new_lattice
 from entropy_explore_env.belief.planning import search_ways
 from entropy_explore_env.belief.raycast import OPEN, STOP_AT_COVERED, cast_ray, longest_crossing
 from entropy_explore_env.belief.search_space import cost_to, new_search, way_to
 from entropy_explore_env.belief.straightening import straightened
 from entropy_explore_env.belief.visibility import CONE, SIGHT, cone_of, expected_scan_bits
 from entropy_explore_env.compilation import lean_kernel
-from entropy_explore_env.config import Scenario
+from entropy_explore_env.config import Scenario, centred_angles
 from entropy_explore_env.missions.view import RobotView
 from entropy_explore_env.robots.motion import driving_time, turning_time
-
-_KNOWN = 2.0
-"""A voxel with less than this many times the prior's precision is unknown."""
-
 
 _KEPT = 3
 """Viewpoints around which others are drawn."""
@@ -97,16 +93,15 @@ class InformationRate:
         sight = np.zeros(1, SIGHT)
         for name in ("max_range_m", "sigma_min", "sigma_slope_per_m", "voxels_behind"):
             sight[name] = getattr(sensor, name)
-        sight["known"], sight["blocking"] = _KNOWN / scenario.sigma_prior**2, self.weighing.blocking
+        sight["known"], sight["blocking"] = KNOWN_RATIO / scenario.sigma_prior**2, self.weighing.blocking
         self._sight = sight
         step = sensor.angular_step_rad
         columns, rows = (max(n // self.weighing.thinning, 1) for n in (sensor.columns, sensor.rows))
-        self._yaws = (np.arange(columns) - (columns - 1) / 2.0) * step * sensor.columns / columns
-        self._pitches = (np.arange(rows) - (rows - 1) / 2.0) * step * sensor.rows / rows
+        self._yaws = centred_angles(columns, step) * sensor.columns / columns
+        self._pitches = centred_angles(rows, step) * sensor.rows / rows
         sight["rays"] = sensor.rays / (columns * rows)
         self._search = new_search(grid.voxels)
-        layer = int(scenario.robot.sensor_height_m / edge) if scenario.planar and not grid.flat else None
-        self._lattice = new_lattice(grid.shape, scenario.robot.body_radius_m / edge, layer)
+        self._lattice = new_lattice(grid.shape, scenario.robot.body_radius_m / edge, scenario.layer)
 
     def choose(self, views: Sequence[RobotView]) -> list[np.ndarray]:
         """The viewpoint of each view, by its own belief and what it has heard."""
@@ -114,50 +109,46 @@ class InformationRate:
 
     def _choose(self, view: RobotView) -> np.ndarray:
         journey = self._journeys[view.robot]
-        here, low, edge = (
-            view.pose.copy(),
-            np.asarray(view.scenario.grid.origin_m),
-            view.scenario.grid.voxel_size_m,
-        )
-        here[:3] = (here[:3] - low) / edge
+        here = _in_grid_units(view, view.pose)
         cones = self._cones(view)
         if journey.stops and not _in_sight(view, here[:3], journey.stops[0], self._scratch):
             journey.stops = []
         drawn = self._drawn(view, here, journey.stops[0] if journey.stops else None)
         bits, seconds = self._weighed(view, here, drawn, cones)
         for _ in range(self.weighing.refinements):
-            worth = bits if self.weighing.per_scan or journey.stops else bits / seconds
-            best = np.argsort(worth)[-_KEPT:]
+            best = np.argsort(self._worth(journey, bits, seconds))[-_KEPT:]
             near = self._nearby(view, here, drawn[best], moving=not journey.stops)
             near_bits, near_seconds = self._weighed(view, here, near, cones)
             drawn = np.concatenate([drawn[best], near])
             bits = np.concatenate([bits[best], near_bits])
             seconds = np.concatenate([seconds[best], near_seconds])
-        best = int(np.argmax(bits if self.weighing.per_scan or journey.stops else bits / seconds))
+        best = int(np.argmax(self._worth(journey, bits, seconds)))
         if journey.stops:
             journey.stops.pop(0)
         else:
             journey.best_bits = max(journey.best_bits, float(bits[best]))
             journey.patience -= 1
             if bits[best] < self.weighing.poor * journey.best_bits and journey.patience <= 0:
-                rate = bits[best] / (1.0 if self.weighing.per_scan else seconds[best])
-                journey.stops = self._way_to_somewhere_better(view, here, cones, float(rate))
+                rate = float(self._worth(journey, bits, seconds)[best])
+                journey.stops = self._way_to_somewhere_better(view, here, cones, rate)
                 if journey.stops:
                     return self._choose(view)
                 journey.patience = _PATIENCE
-        viewpoint = drawn[best]
-        viewpoint[:3] = low + viewpoint[:3] * edge
+        viewpoint, grid = drawn[best], view.scenario.grid
+        viewpoint[:3] = np.asarray(grid.origin_m) + viewpoint[:3] * grid.voxel_size_m
         return viewpoint
+
+    def _worth(self, journey: _Journey, bits: np.ndarray, seconds: np.ndarray) -> np.ndarray:
+        """(K,) what viewpoints are worth: bits per second, or bits where all take as long or time is free."""
+        return bits if self.weighing.per_scan or journey.stops else bits / seconds
 
     def _cones(self, view: RobotView) -> np.ndarray:
         """(M,) CONE of what teammates have announced, in grid units."""
-        grid = view.scenario.grid
         heard = [mate for mate in view.teammates.values() if mate.announced_s >= 0.0 and mate.depth_m > 0.0]
         cones = np.zeros(len(heard), CONE)
         for place, mate in enumerate(heard):
-            viewpoint = mate.viewpoint.copy()
-            viewpoint[:3] = (viewpoint[:3] - np.asarray(grid.origin_m)) / grid.voxel_size_m
-            cones[place] = cone_of(viewpoint, mate.depth_m / grid.voxel_size_m, mate.half_angle_rad)
+            depth = mate.depth_m / view.scenario.grid.voxel_size_m
+            cones[place] = cone_of(_in_grid_units(view, mate.viewpoint), depth, mate.half_angle_rad)
         return cones
 
     def _drawn(self, view: RobotView, here: np.ndarray, stop: np.ndarray | None) -> np.ndarray:
@@ -169,17 +160,15 @@ class InformationRate:
         if stop is not None:
             drawn[:, :3] = stop
             return drawn
-        grid, axes, moved = view.scenario.grid, 2 if planar else 3, count // 2
-        reach = min(view.scenario.robot.reach_m / grid.voxel_size_m, 0.25 * float(max(grid.shape)))
+        (axes, reach, inside), moved = _nearby_space(view), count // 2
         way = rng.normal(size=(moved, axes))
         way *= (reach * rng.uniform(size=moved) ** (1 / axes) / np.linalg.norm(way, axis=1))[:, None]
-        inside = np.asarray(grid.shape[:axes]) - 0.5
         drawn[:moved, :axes] = np.clip(here[:axes] + way, 0.5, inside)
         return drawn
 
     def _nearby(self, view: RobotView, here: np.ndarray, best: np.ndarray, moving: bool) -> np.ndarray:
         """(N, 5) viewpoints around the best ones, in grid units; their gazes stray by half the view."""
-        planar, rng, grid = view.scenario.planar, self._rng, view.scenario.grid
+        planar, rng = view.scenario.planar, self._rng
         near = best.repeat(max(self.weighing.candidates // (4 * len(best)), 1), axis=0)
         spread = 0.5 * max(float(np.ptp(self._yaws)), float(np.ptp(self._pitches)), 0.1)
         near[:, 3] += spread * rng.normal(size=len(near))
@@ -188,13 +177,11 @@ class InformationRate:
             tilted = near[:, 4] + spread * rng.normal(size=len(near))
             near[:, 4] = np.clip(tilted, -0.5 * math.pi, 0.5 * math.pi)
         if moving:
-            axes = 2 if planar else 3
-            reach = min(view.scenario.robot.reach_m / grid.voxel_size_m, 0.25 * float(max(grid.shape)))
+            axes, reach, inside = _nearby_space(view)
             way = near[:, :axes] - here[:axes]
             away = np.linalg.norm(way, axis=1) > 0.0  # turns on the spot stay turns on the spot
             way[away] += 0.25 * reach * rng.normal(size=(int(away.sum()), axes))
             length = np.maximum(np.linalg.norm(way, axis=1) / reach, 1.0)
-            inside = np.asarray(grid.shape[:axes]) - 0.5
             near[:, :axes] = np.clip(here[:axes] + way / length[:, None], 0.5, inside)
         return near
 
@@ -297,6 +284,20 @@ class InformationRate:
         if view.scenario.planar:
             viewpoints[:, 2] = here[2]
         return viewpoints
+
+
+def _in_grid_units(view: RobotView, viewpoint: np.ndarray) -> np.ndarray:
+    """(5,) a viewpoint with its place in grid units."""
+    grid, converted = view.scenario.grid, viewpoint.copy()
+    converted[:3] = (converted[:3] - np.asarray(grid.origin_m)) / grid.voxel_size_m
+    return converted
+
+
+def _nearby_space(view: RobotView) -> tuple[int, float, np.ndarray]:
+    """Axes along which viewpoints are drawn, how far off, and the last place along each, in grid units."""
+    grid, axes = view.scenario.grid, 2 if view.scenario.planar else 3
+    reach = min(view.scenario.robot.reach_m / grid.voxel_size_m, 0.25 * float(max(grid.shape)))
+    return axes, reach, np.asarray(grid.shape[:axes]) - 0.5
 
 
 def _stops(start: np.ndarray, points: np.ndarray, reach: float) -> list[np.ndarray]:

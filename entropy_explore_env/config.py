@@ -205,6 +205,11 @@ class RangeSensor:
         return max(steps, 1) if full_turn else steps + 1
 
 
+def centred_angles(samples: int, step_rad: float) -> np.ndarray:
+    """(samples,) float64 angles around a gaze, in its middle, `step_rad` apart."""
+    return (np.arange(samples) - (samples - 1) / 2.0) * step_rad
+
+
 @dataclass(frozen=True)
 class Channel:
     """What robots tell each other: the most useful measurements of a scan (Rocha04, eqs. 42-43).
@@ -412,8 +417,7 @@ class Scenario:
             if moves * self.action.yaws * self.action.pitches > MAX_ACTIONS:
                 allowed = f"so short that there are at most {MAX_ACTIONS} discrete actions"
                 raise SettingError("Robot.reach_m", self.robot.reach_m, allowed)
-        layers = int(self.robot.sensor_height_m / self.grid.voxel_size_m)
-        if self.planar and not self.grid.flat and layers >= self.grid.shape[2]:
+        if self.layer is not None and self.layer >= self.grid.shape[2]:
             allowed = f"below the workspace's height ({self.grid.size_m[2]} m)"
             raise SettingError("Robot.sensor_height_m", self.robot.sensor_height_m, allowed)
 
@@ -437,6 +441,13 @@ class Scenario:
     def planar(self) -> bool:
         """Whether robots stay in a plane and look level: planar robots, and any robot in 2-D."""
         return self.robot.motion == "planar" or self.grid.flat
+
+    @property
+    def layer(self) -> int | None:
+        """Voxel layer in which planar robots and their sensors stay; None for flying robots."""
+        if self.grid.flat:
+            return 0
+        return int(self.robot.sensor_height_m / self.grid.voxel_size_m) if self.planar else None
 
     @cached_property
     def agents(self) -> tuple[str, ...]:

@@ -10,7 +10,6 @@ import numpy as np
 from entropy_explore_env.belief.pooling import Cells, new_cells
 from entropy_explore_env.config import Observation, Scenario
 from entropy_explore_env.robots.range_sensor import SensorModel, sensor_model
-from entropy_explore_env.worlds.world import plane_index
 
 NUMBERS = np.dtype(
     [
@@ -140,7 +139,7 @@ def discrete_moves(scenario: Scenario) -> np.ndarray:
         return np.zeros((1, 3), np.int64)
     reach = scenario.robot.reach_m / scenario.grid.voxel_size_m + 1e-9
     farthest = [min(math.floor(reach), n - 1) for n in scenario.grid.shape]
-    if plane_index(scenario) is not None:
+    if scenario.layer is not None:
         farthest[2] = 0
     steps = [np.arange(-most, most + 1) for most in farthest]
     offsets = np.stack(np.meshgrid(*steps, indexing="ij"), axis=-1).reshape(-1, 3)

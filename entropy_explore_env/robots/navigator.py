@@ -25,7 +25,6 @@ from entropy_explore_env.belief.straightening import cost_of_sight, pull_straigh
 from entropy_explore_env.compilation import lean_kernel
 from entropy_explore_env.config import Scenario
 from entropy_explore_env.robots.motion import MoveEnd
-from entropy_explore_env.worlds.world import plane_index
 
 _ARRIVED, _NO_WAY, _CORNERS = MoveEnd.ARRIVED.code, MoveEnd.NO_WAY.code, MoveEnd.CORNERS.code
 _SLACK = 1e-9
@@ -53,7 +52,7 @@ class Navigator(NamedTuple):
 def lattice_of(scenario: Scenario) -> Lattice:
     """Steps of the scenario's robots between voxel centres."""
     radius = scenario.robot.body_radius_m / scenario.grid.voxel_size_m
-    return new_lattice(scenario.grid.shape, radius, plane_index(scenario))
+    return new_lattice(scenario.grid.shape, radius, scenario.layer)
 
 
 def new_navigator(scenario: Scenario) -> Navigator:

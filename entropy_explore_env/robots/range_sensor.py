@@ -21,7 +21,7 @@ from entropy_explore_env.belief.raycast import (
     longest_crossing,
 )
 from entropy_explore_env.compilation import inlined_kernel, lean_kernel
-from entropy_explore_env.config import Grid, RangeSensor
+from entropy_explore_env.config import Grid, RangeSensor, centred_angles
 from entropy_explore_env.randomness import draw_gaussian
 
 
@@ -109,12 +109,7 @@ def sensor_model(sensor: RangeSensor) -> SensorModel:
     numbers["sigma_min"], numbers["sigma_slope_per_m"] = sensor.sigma_min, sensor.sigma_slope_per_m
     numbers["voxels_behind"] = sensor.voxels_behind
     step = sensor.angular_step_rad
-    return SensorModel(_offsets(sensor.columns, step), _offsets(sensor.rows, step), numbers)
-
-
-def _offsets(samples: int, step_rad: float) -> np.ndarray:
-    """Angles around the gaze, in its middle, `step_rad` apart."""
-    return (np.arange(samples) - (samples - 1) / 2.0) * step_rad
+    return SensorModel(centred_angles(sensor.columns, step), centred_angles(sensor.rows, step), numbers)
 
 
 def new_scan(grid: Grid, sensor: RangeSensor, rays: int, robots: int, reach_m: float = 0.0) -> Scan:

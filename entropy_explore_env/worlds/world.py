@@ -111,7 +111,7 @@ class World:
         Raises:
             WorldError: No voxel has room for a robot.
         """
-        height = plane_index(scenario)
+        height = scenario.layer
         sensor, level = scenario.sensor, None
         if height is not None and not scenario.grid.flat:
             steepest = 0.5 * (sensor.rows - 1) * sensor.angular_step_rad
@@ -201,15 +201,6 @@ class Layout:
     def visible_voxels(self) -> int:
         """How many voxels can be seen at all."""
         return int(self.visible.sum())
-
-
-def plane_index(scenario: Scenario) -> int | None:
-    """Voxel layer of a planar robot's sensor; None for a free-flying robot."""
-    if scenario.grid.flat:
-        return 0
-    if scenario.robot.motion == "free":
-        return None
-    return int(scenario.robot.sensor_height_m / scenario.grid.voxel_size_m)
 
 
 def connected_parts(room: np.ndarray) -> tuple[np.ndarray, int]:

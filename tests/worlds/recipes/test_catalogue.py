@@ -12,7 +12,6 @@ from entropy_explore_env.config import Grid
 from entropy_explore_env.errors import WorldError
 from entropy_explore_env.scenarios import SCENARIOS
 from entropy_explore_env.worlds.recipes.catalogue import RECIPES
-from entropy_explore_env.worlds.world import plane_index
 
 BODY_M = 0.3
 NATURAL = {name: scenario for name, scenario in SCENARIOS.items() if scenario.world in RECIPES}
@@ -79,7 +78,7 @@ def require_connected(world, what):
 def test_robots_of_its_scenario_can_go_wherever_they_fit(name):
     scenario = NATURAL[name]
     low, high = FREE_SHARE[name]
-    plane = plane_index(scenario)
+    plane = scenario.layer
     hashes = set()
     for seed in range(SEEDS.get(name, 50)):
         world = RECIPES[scenario.world](scenario.grid, np.random.default_rng(seed))
