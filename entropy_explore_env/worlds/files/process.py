@@ -25,8 +25,8 @@ import numpy as np
 from entropy_explore_env.errors import MissingExtraError, SettingError, WorldError
 from entropy_explore_env.worlds.files.voxels import MAX_FILE_BYTES, MAX_FILE_VOXELS, Voxels
 
-MEMORY_BYTES = 384 << 20
-"""What a reader may take on top of the process's own 120 MiB at most; larger files get some more."""
+MEMORY_BYTES = 448 << 20
+"""What the process may hold, its own 80 to 140 MiB among it; larger files get some more."""
 CPU_S = 1.5
 CPU_S_PER_MIB = 20.0
 """Seconds of computing that a file may take, and more for each MiB of it."""

@@ -90,14 +90,15 @@ def _read(reader: Any, request: dict[str, Any]) -> Voxels:  # noqa: ANN401 - a m
         signal.setitimer(signal.ITIMER_PROF, 0.0)
 
 
-def _limit_memory(more_bytes: int) -> None:
-    """Let this process grow by so much beyond what it has now; where the system does not tell, not at all."""
+def _limit_memory(most_bytes: int) -> None:
+    """Let this process hold no more than so much; where the system does not tell what it holds, any amount."""
     try:
-        pages = int(Path("/proc/self/statm").read_text().split()[0])
+        mapped, resident = (int(pages) for pages in Path("/proc/self/statm").read_text().split()[:2])
     except OSError:
         return
-    now = pages * resource.getpagesize()
-    resource.setrlimit(resource.RLIMIT_AS, (now + more_bytes, resource.getrlimit(resource.RLIMIT_AS)[1]))
+    page = resource.getpagesize()  # what is mapped but not resident was never asked for: libraries
+    most = mapped * page + max(most_bytes - resident * page, 0)
+    resource.setrlimit(resource.RLIMIT_AS, (most, resource.getrlimit(resource.RLIMIT_AS)[1]))
 
 
 def _peak_kib() -> int:
