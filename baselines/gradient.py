@@ -37,25 +37,25 @@ class GradientStrategy:
     def reset(self, scenario: Scenario, rng: np.random.Generator) -> None:
         """A new mission begins."""
         self._rng = rng
-        self._projected = scenario.planar if self._motion_plane is None else self._motion_plane
 
     def choose(self, views: Sequence[RobotView]) -> list[np.ndarray]:
         """The viewpoint of each view by its own belief."""
         return [self._choose(view) for view in views]
 
     def _choose(self, view: RobotView) -> np.ndarray:
-        grid, robot = view.scenario.grid, view.scenario.robot
+        grid, robot = view.scenario.grid, view.kind.robot
+        projected = view.planar if self._motion_plane is None else self._motion_plane
         stuck = view.move_end is not MoveEnd.ARRIVED
         position = (view.pose[:3] - np.asarray(grid.origin_m)) / grid.voxel_size_m
         reach = min(robot.reach_m / grid.voxel_size_m, float(sum(grid.shape)))
         viewpoint = view.pose.copy()
         found = not stuck and steepest_viewpoint(
-            view.mean, view.precision, position, view.pose[3], view.pose[4], reach, self._projected, viewpoint
+            view.mean, view.precision, position, view.pose[3], view.pose[4], reach, projected, viewpoint
         )
         if not found:
             return random_viewpoint(view, self._rng)
         viewpoint[:3] = np.asarray(grid.origin_m) + viewpoint[:3] * grid.voxel_size_m
-        if view.scenario.planar:
+        if view.planar:
             viewpoint[2], viewpoint[4] = view.pose[2], 0.0
         return viewpoint
 

@@ -12,17 +12,18 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 
-from entropy_explore_env.belief.lattice import KNOWN_RATIO, belief_costs, new_lattice
+from entropy_explore_env.belief.lattice import KNOWN_RATIO, Lattice, belief_costs, new_lattice
 from entropy_explore_env.belief.planning import search_ways
 from entropy_explore_env.belief.raycast import OPEN, STOP_AT_COVERED, cast_ray, longest_crossing
 from entropy_explore_env.belief.search_space import cost_to, new_search, way_to
 from entropy_explore_env.belief.straightening import straightened
 from entropy_explore_env.belief.visibility import CONE, SIGHT, cone_of, expected_scan_bits
 from entropy_explore_env.compilation import lean_kernel
-from entropy_explore_env.config import Scenario, centred_angles
+from entropy_explore_env.config import RobotKind, Scenario, centred_angles
 from entropy_explore_env.missions.view import RobotView
 from entropy_explore_env.robots.motion import driving_time, turning_time
 
@@ -71,6 +72,20 @@ class _Journey:
     """Places (3,) in grid units that are still ahead."""
 
 
+class _Build(NamedTuple):
+    """What a kind of robot is, for kernels."""
+
+    yaws: np.ndarray
+    """(columns,) radians from the gaze: rays that stand for the sensor's."""
+    pitches: np.ndarray
+    """(rows,) likewise."""
+    sight: np.ndarray
+    """(1,) SIGHT."""
+    lattice: Lattice
+    crossing: int
+    """Voxels that its rays cross at most."""
+
+
 class InformationRate:
     """Chooses viewpoints by expected bits per second, or per scan."""
 
@@ -80,28 +95,37 @@ class InformationRate:
 
     def reset(self, scenario: Scenario, rng: np.random.Generator) -> None:
         """A new mission begins."""
-        grid, sensor = scenario.grid, scenario.sensor
+        grid = scenario.grid
         self._rng, self._journeys = rng, [_Journey() for _ in range(scenario.robots)]
-        edge = grid.voxel_size_m
-        longest = longest_crossing(*grid.shape, sensor.max_range_m / edge, sensor.voxels_behind + 1)
+        self._builds = [self._build(scenario, kind) for kind in scenario.kinds]
+        longest = max(build.crossing for build in self._builds)
         self._scratch = (
             np.zeros(grid.voxels, np.float32),
             np.zeros(grid.voxels, np.int32),
             np.zeros(longest + sum(grid.shape), np.int32),
             np.zeros(longest + sum(grid.shape), np.int64),
         )
-        sight = np.zeros(1, SIGHT)
+        self._search = new_search(grid.voxels)
+
+    def _build(self, scenario: Scenario, kind: RobotKind) -> _Build:
+        """What kernels need of a kind of robot."""
+        grid, sensor, sight = scenario.grid, kind.sensor, np.zeros(1, SIGHT)
         for name in ("max_range_m", "sigma_min", "sigma_slope_per_m", "voxels_behind"):
             sight[name] = getattr(sensor, name)
         sight["known"], sight["blocking"] = KNOWN_RATIO / scenario.sigma_prior**2, self.weighing.blocking
-        self._sight = sight
-        step = sensor.angular_step_rad
+        step, edge = sensor.angular_step_rad, grid.voxel_size_m
         columns, rows = (max(n // self.weighing.thinning, 1) for n in (sensor.columns, sensor.rows))
-        self._yaws = centred_angles(columns, step) * sensor.columns / columns
-        self._pitches = centred_angles(rows, step) * sensor.rows / rows
         sight["rays"] = sensor.rays / (columns * rows)
-        self._search = new_search(grid.voxels)
-        self._lattice = new_lattice(grid.shape, scenario.robot.body_radius_m / edge, scenario.layer)
+        return _Build(
+            yaws=centred_angles(columns, step) * sensor.columns / columns,
+            pitches=centred_angles(rows, step) * sensor.rows / rows,
+            sight=sight,
+            lattice=new_lattice(grid.shape, kind.robot.body_radius_m / edge, scenario.layer_of(kind.robot)),
+            crossing=longest_crossing(*grid.shape, sensor.max_range_m / edge, sensor.voxels_behind + 1),
+        )
+
+    def _build_of(self, view: RobotView) -> _Build:
+        return self._builds[view.robot % len(self._builds)]
 
     def choose(self, views: Sequence[RobotView]) -> list[np.ndarray]:
         """The viewpoint of each view, by its own belief and what it has heard."""
@@ -153,7 +177,7 @@ class InformationRate:
 
     def _drawn(self, view: RobotView, here: np.ndarray, stop: np.ndarray | None) -> np.ndarray:
         """(K, 5) viewpoints in grid units: half on the spot, half within reach; or all at a stop."""
-        count, planar, rng = self.weighing.candidates, view.scenario.planar, self._rng
+        count, planar, rng = self.weighing.candidates, view.planar, self._rng
         drawn = np.tile(here, (count, 1))
         drawn[:, 3] = rng.uniform(-math.pi, math.pi, count)
         drawn[:, 4] = 0.0 if planar else np.arcsin(rng.uniform(-1.0, 1.0, count))
@@ -168,9 +192,9 @@ class InformationRate:
 
     def _nearby(self, view: RobotView, here: np.ndarray, best: np.ndarray, moving: bool) -> np.ndarray:
         """(N, 5) viewpoints around the best ones, in grid units; their gazes stray by half the view."""
-        planar, rng = view.scenario.planar, self._rng
+        planar, rng, build = view.planar, self._rng, self._build_of(view)
         near = best.repeat(max(self.weighing.candidates // (4 * len(best)), 1), axis=0)
-        spread = 0.5 * max(float(np.ptp(self._yaws)), float(np.ptp(self._pitches)), 0.1)
+        spread = 0.5 * max(float(np.ptp(build.yaws)), float(np.ptp(build.pitches)), 0.1)
         near[:, 3] += spread * rng.normal(size=len(near))
         near[:, 3] = (near[:, 3] + math.pi) % (2.0 * math.pi) - math.pi
         if not planar:
@@ -197,12 +221,12 @@ class InformationRate:
 
         With `anywhere` the way does not matter.
         """
-        scenario, robot = view.scenario, view.scenario.robot
+        scenario, robot, build = view.scenario, view.kind.robot, self._build_of(view)
         limits = (
             robot.max_speed_m_s,
             robot.acceleration_m_s2,
             robot.turn_rate_rad_s,
-            scenario.sensor.scan_time_s,
+            view.kind.sensor.scan_time_s,
             robot.body_radius_m / scenario.grid.voxel_size_m,
         )
         bits, seconds = np.zeros(len(drawn)), np.zeros(len(drawn))
@@ -213,9 +237,9 @@ class InformationRate:
             scenario.grid.voxel_size_m,
             here,
             drawn,
-            self._yaws,
-            self._pitches,
-            self._sight,
+            build.yaws,
+            build.pitches,
+            build.sight,
             cones,
             limits,
             anywhere,
@@ -232,10 +256,10 @@ class InformationRate:
 
         Ways are sought only if there is a place that would be worth it on the straight line.
         """
-        grid, scenario = view.scenario.grid, view.scenario
-        reach = min(scenario.robot.reach_m / grid.voxel_size_m, float(sum(grid.shape)))
-        limits = scenario.robot.max_speed_m_s, scenario.robot.acceleration_m_s2
-        hop_s = driving_time(reach * grid.voxel_size_m, *limits) + scenario.sensor.scan_time_s
+        grid, robot, lattice = view.scenario.grid, view.kind.robot, self._build_of(view).lattice
+        reach = min(robot.reach_m / grid.voxel_size_m, float(sum(grid.shape)))
+        limits = robot.max_speed_m_s, robot.acceleration_m_s2
+        hop_s = driving_time(reach * grid.voxel_size_m, *limits) + view.kind.sensor.scan_time_s
         each = 1.0 if self.weighing.per_scan else hop_s
         drawn = self._drawn_voxels(view, here)
         places = self._places(view, here, drawn)
@@ -243,10 +267,11 @@ class InformationRate:
         straight = np.linalg.norm(places[:, :3] - here[:3], axis=1)
         if (bits / (np.maximum(straight / reach, 1.0) * each)).max() <= rate:
             return []
-        costs = belief_costs(view.mean, view.precision, scenario.sigma_prior**-2, self.weighing.unknown_cost)
+        prior = view.scenario.sigma_prior**-2
+        costs = belief_costs(view.mean, view.precision, prior, self.weighing.unknown_cost)
         start = np.ravel_multi_index(tuple(here[:3].astype(int)), grid.shape)
         nobody = np.zeros(0, np.int32)
-        search_ways(self._search, self._lattice, costs, np.array([start], np.int32), -1, math.inf, nobody)
+        search_ways(self._search, lattice, costs, np.array([start], np.int32), -1, math.inf, nobody)
         cost = np.array([cost_to(self._search, int(voxel)) for voxel in drawn])
         reached = np.isfinite(cost) & (cost > 0.0)
         if not reached.any():
@@ -259,18 +284,16 @@ class InformationRate:
         best = int(np.argmax(worth))
         if worth[best] <= rate:
             return []
-        way = np.empty(way_to(self._search, self._lattice, int(goals[best]), nobody), np.int32)
-        way_to(self._search, self._lattice, int(goals[best]), way)
-        points = straightened(
-            self._search, self._lattice, costs, way, here[:3].copy(), places[best, :3].copy()
-        )
+        way = np.empty(way_to(self._search, lattice, int(goals[best]), nobody), np.int32)
+        way_to(self._search, lattice, int(goals[best]), way)
+        points = straightened(self._search, lattice, costs, way, here[:3].copy(), places[best, :3].copy())
         return _stops(here[:3], points, reach)
 
     def _drawn_voxels(self, view: RobotView, here: np.ndarray) -> np.ndarray:
         """(N,) random voxels that are not believed covered; of a planar robot's layer."""
         grid = view.scenario.grid
         drawn = self._rng.integers(0, grid.voxels, _LOTS * self.weighing.places)
-        if view.scenario.planar:
+        if view.planar:
             drawn += int(here[2]) - drawn % grid.shape[2]
         free = drawn[view.mean.reshape(-1)[drawn] <= STOP_AT_COVERED]
         return free if len(free) else drawn
@@ -281,7 +304,7 @@ class InformationRate:
         places = np.stack(np.unravel_index(voxels[least], view.scenario.grid.shape), axis=-1) + 0.5
         viewpoints = np.repeat(np.concatenate([places, np.zeros((len(places), 2))], axis=1), _GAZES, axis=0)
         viewpoints[:, 3] = self._rng.uniform(-math.pi, math.pi, len(viewpoints))
-        if view.scenario.planar:
+        if view.planar:
             viewpoints[:, 2] = here[2]
         return viewpoints
 
@@ -295,8 +318,8 @@ def _in_grid_units(view: RobotView, viewpoint: np.ndarray) -> np.ndarray:
 
 def _nearby_space(view: RobotView) -> tuple[int, float, np.ndarray]:
     """Axes along which viewpoints are drawn, how far off, and the last place along each, in grid units."""
-    grid, axes = view.scenario.grid, 2 if view.scenario.planar else 3
-    reach = min(view.scenario.robot.reach_m / grid.voxel_size_m, 0.25 * float(max(grid.shape)))
+    grid, axes = view.scenario.grid, 2 if view.planar else 3
+    reach = min(view.kind.robot.reach_m / grid.voxel_size_m, 0.25 * float(max(grid.shape)))
     return axes, reach, np.asarray(grid.shape[:axes]) - 0.5
 
 
@@ -318,7 +341,7 @@ def _in_sight(view: RobotView, here: np.ndarray, there: np.ndarray, scratch: tup
         return True
     mean, size = view.mean.reshape(-1), view.scenario.grid.shape
     x, y, z = (way / length).tolist()
-    radius = view.scenario.robot.body_radius_m / view.scenario.grid.voxel_size_m
+    radius = view.kind.robot.body_radius_m / view.scenario.grid.voxel_size_m
     return bool(free_by_belief(mean, size, here, (x, y, z), length, radius, scratch))
 
 

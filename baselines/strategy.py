@@ -52,10 +52,10 @@ def random_viewpoint(view: RobotView, rng: np.random.Generator) -> np.ndarray:
     Returns:
         (5,) viewpoint.
     """
-    grid, reach_m = view.scenario.grid, view.scenario.robot.reach_m
+    grid, reach_m = view.scenario.grid, view.kind.robot.reach_m
     low = np.asarray(grid.origin_m)
     high = low + grid.size_m
-    axes = 2 if view.scenario.planar else 3
+    axes = 2 if view.planar else 3
     viewpoint = view.pose.copy()
     here = view.pose[:axes]
     if math.isinf(reach_m):  # actions reach from the centre of the first voxel to that of the last
@@ -67,5 +67,5 @@ def random_viewpoint(view: RobotView, rng: np.random.Generator) -> np.ndarray:
             viewpoint[:axes] = place
             break
     viewpoint[3] = rng.uniform(-math.pi, math.pi)
-    viewpoint[4] = 0.0 if view.scenario.planar else math.asin(rng.uniform(-1.0, 1.0))
+    viewpoint[4] = 0.0 if view.planar else math.asin(rng.uniform(-1.0, 1.0))
     return viewpoint

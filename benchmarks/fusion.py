@@ -59,7 +59,7 @@ def measure_room(grid: Grid, sensor: RangeSensor, scans: int, seed: int = 0) -> 
     yaws = rng.uniform(-math.pi, math.pi, scans)
     pitches = rng.uniform(-_STEEPEST_RAD, _STEEPEST_RAD, scans)
     truth, model, chance = np.zeros(grid.voxels, np.float32), sensor_model(sensor), np.zeros(1, np.uint64)
-    scan = new_scan(grid, sensor, sensor.rays, 1)
+    scan = new_scan(grid, [sensor], sensor.rays, 1)
     positions = np.asarray(grid.origin_m) + starts * grid.voxel_size_m
     ends = np.zeros((scans, sensor.rays, 3))
     for i in range(scans):
@@ -161,7 +161,7 @@ class Fusion:
     def __init__(self, grid: Grid, sensor: RangeSensor, measurements: Measurements) -> None:
         """Start at the prior; one pass warms the map, the caches and the compiler."""
         self.measurements = measurements
-        self.scan = new_scan(grid, sensor, sensor.rays, 1)
+        self.scan = new_scan(grid, [sensor], sensor.rays, 1)
         self.mean = np.full(grid.voxels, PRIOR_MEAN, np.float32)
         self.precision = np.full(grid.voxels, ROOM.sigma_prior**-2, np.float32)
         self._numbers = sensor_model(sensor).numbers[0]

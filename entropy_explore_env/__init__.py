@@ -27,6 +27,7 @@ from entropy_explore_env.config import (  # noqa: E402 - kernels are imported fr
     RangeSensor,
     Reward,
     Robot,
+    RobotKind,
     Scenario,
     with_settings,
 )
@@ -75,6 +76,7 @@ __all__ = [
     "RecordError",
     "Reward",
     "Robot",
+    "RobotKind",
     "RobotView",
     "Scenario",
     "SettingError",

@@ -205,6 +205,19 @@ class RangeSensor:
         return max(steps, 1) if full_turn else steps + 1
 
 
+@dataclass(frozen=True)
+class RobotKind:
+    """One kind of robot of a mixed team: how it moves and what it senses."""
+
+    robot: Robot = field(default_factory=Robot)
+    sensor: RangeSensor = field(default_factory=RangeSensor)
+
+    def __post_init__(self) -> None:
+        """Check every field."""
+        check_kind(self, "robot", Robot)
+        check_kind(self, "sensor", RangeSensor)
+
+
 def centred_angles(samples: int, step_rad: float) -> np.ndarray:
     """(samples,) float64 angles around a gaze, in its middle, `step_rad` apart."""
     return (np.arange(samples) - (samples - 1) / 2.0) * step_rad
@@ -367,6 +380,10 @@ class Scenario:
         split: Which worlds a recipe makes: `train`, `validation` and `test` have none in common
             (worlds/splits.py). Files, and recipes without chance, are one world in all of them.
         robots: Team size A.
+        robot, sensor: How robots move and what they sense.
+        others: Further kinds of robots, for a mixed team: of K kinds in all, the first being `robot` with
+            `sensor`, robot a is of kind a mod K. All share one form of action and observation
+            (missions/action.py, missions/observation.py).
         sigma_prior: Standard deviation of coverage before any measurement; the mean is ½.
         decision_period_s: A step lasts this long; None = until the next robot has to decide.
         scored: Whether the team's joint map, of everything measured, is kept and compared with the
@@ -383,6 +400,7 @@ class Scenario:
     scored: bool = False
     robot: Robot = field(default_factory=Robot)
     sensor: RangeSensor = field(default_factory=RangeSensor)
+    others: tuple[RobotKind, ...] = ()
     channel: Channel = field(default_factory=Channel)
     ending: Ending = field(default_factory=Ending)
     reward: Reward = field(default_factory=Reward)
@@ -393,9 +411,12 @@ class Scenario:
         """Check every field, and that the parts fit each other; level the sensor in a 2-D world."""
         for name, kind in (("name", str), ("world", str), ("grid", Grid), *_PARTS):
             check_kind(self, name, kind)
-        if self.grid.flat and self.sensor.field_of_view_rad[1] > 0.0:
-            level = (self.sensor.field_of_view_rad[0], 0.0)
-            object.__setattr__(self, "sensor", dataclasses.replace(self.sensor, field_of_view_rad=level))
+        if not isinstance(self.others, tuple) or not all(isinstance(o, RobotKind) for o in self.others):
+            raise SettingError("Scenario.others", self.others, "a tuple of RobotKind")
+        if self.grid.flat:
+            object.__setattr__(self, "sensor", _level(self.sensor))
+            others = tuple(RobotKind(kind.robot, _level(kind.sensor)) for kind in self.others)
+            object.__setattr__(self, "others", others)
         check_choice(self, "split", Literal["train", "validation", "test"])
         check_count(self, "robots", 1, 1000)
         check(self, "sigma_prior", "a number from 1e-3 to 1e4", lambda v: 1e-3 <= v <= 1e4)
@@ -406,24 +427,40 @@ class Scenario:
             raise SettingError(
                 "Ending.sigma_end", self.ending.sigma_end, f"below sigma_prior = {self.sigma_prior}"
             )
-        if self.action.kind == "discrete" and not math.isfinite(self.robot.reach_m):
-            raise SettingError("Action.kind", "discrete", "continuous where Robot.reach_m is inf")
-        if self.action.kind == "discrete" and self.robot.reach_m < self.grid.voxel_size_m:
-            allowed = f"at least a voxel ({self.grid.voxel_size_m} m) for discrete actions"
-            raise SettingError("Robot.reach_m", self.robot.reach_m, allowed)
-        if self.action.kind == "discrete":
-            steps = math.floor(self.robot.reach_m / self.grid.voxel_size_m + 1e-9)
-            moves = math.prod(2 * min(steps, n - 1) + 1 for n in self.grid.shape)
-            if moves * self.action.yaws * self.action.pitches > MAX_ACTIONS:
-                allowed = f"so short that there are at most {MAX_ACTIONS} discrete actions"
-                raise SettingError("Robot.reach_m", self.robot.reach_m, allowed)
-        if self.layer is not None and self.layer >= self.grid.shape[2]:
-            allowed = f"below the workspace's height ({self.grid.size_m[2]} m)"
-            raise SettingError("Robot.sensor_height_m", self.robot.sensor_height_m, allowed)
-
-        if self.mail_places * max(min(self.channel.burst, self.sensor.rays), 1) > MAX_IN_FLIGHT:
+        for kind in self.kinds:
+            self._check_kind(kind.robot)
+        rays = max(kind.sensor.rays for kind in self.kinds)
+        if self.mail_places * max(min(self.channel.burst, rays), 1) > MAX_IN_FLIGHT:
             allowed = f"so short that at most {MAX_IN_FLIGHT} measurements are under way at once"
             raise SettingError("Channel.delay_s", self.channel.delay_s, allowed)
+
+    def _check_kind(self, robot: Robot) -> None:
+        """Check that a kind of robot fits the grid and the actions."""
+        if self.action.kind == "discrete" and not math.isfinite(robot.reach_m):
+            raise SettingError("Action.kind", "discrete", "continuous where Robot.reach_m is inf")
+        if self.action.kind == "discrete" and robot.reach_m < self.grid.voxel_size_m:
+            allowed = f"at least a voxel ({self.grid.voxel_size_m} m) for discrete actions"
+            raise SettingError("Robot.reach_m", robot.reach_m, allowed)
+        if self.action.kind == "discrete":
+            steps = math.floor(robot.reach_m / self.grid.voxel_size_m + 1e-9)
+            axes = self.grid.shape[:2] if self.planar else self.grid.shape
+            moves = math.prod(2 * min(steps, n - 1) + 1 for n in axes)
+            if moves * self.action.yaws * self.action.pitches > MAX_ACTIONS:
+                allowed = f"so short that there are at most {MAX_ACTIONS} discrete actions"
+                raise SettingError("Robot.reach_m", robot.reach_m, allowed)
+        layer = self.layer_of(robot)
+        if layer is not None and layer >= self.grid.shape[2]:
+            allowed = f"below the workspace's height ({self.grid.size_m[2]} m)"
+            raise SettingError("Robot.sensor_height_m", robot.sensor_height_m, allowed)
+
+    @cached_property
+    def kinds(self) -> tuple[RobotKind, ...]:
+        """The K kinds of robots in the team."""
+        return (RobotKind(self.robot, self.sensor), *self.others)[: self.robots]
+
+    def kind_of(self, robot: int) -> RobotKind:
+        """What a robot of the team, by its number, is."""
+        return self.kinds[robot % len(self.kinds)]
 
     @property
     def mail_places(self) -> int:
@@ -433,26 +470,37 @@ class Scenario:
         """
         if self.channel.delay_s == 0.0 or self.robots == 1:
             return 0
-        apart_s = min(self.sensor.scan_time_s, self.sensor.scan_every_m / self.robot.max_speed_m_s)
+        apart_s = min(
+            min(kind.sensor.scan_time_s, kind.sensor.scan_every_m / kind.robot.max_speed_m_s)
+            for kind in self.kinds
+        )
         scans = math.floor(min(self.channel.delay_s / apart_s, 1e9)) + 2
         return 2 * scans * self.robots
 
     @property
     def planar(self) -> bool:
-        """Whether robots stay in a plane and look level: planar robots, and any robot in 2-D."""
-        return self.robot.motion == "planar" or self.grid.flat
+        """Whether the whole team stays in planes and looks level."""
+        return all(self.layer_of(kind.robot) is not None for kind in self.kinds)
 
-    @property
-    def layer(self) -> int | None:
-        """Voxel layer in which planar robots and their sensors stay; None for flying robots."""
+    def layer_of(self, robot: Robot) -> int | None:
+        """Voxel layer in which a kind of robot and its sensor stay, looking level; None if it flies.
+
+        Planar robots have one, and in 2-D worlds any robot.
+        """
         if self.grid.flat:
             return 0
-        return int(self.robot.sensor_height_m / self.grid.voxel_size_m) if self.planar else None
+        planar = robot.motion == "planar"
+        return int(robot.sensor_height_m / self.grid.voxel_size_m) if planar else None
 
     @cached_property
     def agents(self) -> tuple[str, ...]:
         """Names of the robots: robot_0, robot_1 and so on."""
         return tuple(f"robot_{a}" for a in range(self.robots))
+
+
+def _level(sensor: RangeSensor) -> RangeSensor:
+    """The sensor without pitch."""
+    return dataclasses.replace(sensor, field_of_view_rad=(sensor.field_of_view_rad[0], 0.0))
 
 
 _PARTS: tuple[tuple[str, type], ...] = (

@@ -6,7 +6,7 @@ import dataclasses
 import math
 from types import MappingProxyType
 
-from entropy_explore_env.config import Channel, Ending, Grid, RangeSensor, Robot, Scenario
+from entropy_explore_env.config import Channel, Ending, Grid, RangeSensor, Robot, RobotKind, Scenario
 from entropy_explore_env.errors import SettingError
 
 _ROOM_GRID = Grid((41, 41, 17), 0.25, (-0.125, -0.125, -0.125))
@@ -70,6 +70,16 @@ OFFICE_3D = Scenario(
     ending=Ending(time_limit_s=7200.0),
 )
 """24 × 18 × 2.5 m with furniture, for flying robots with depth cameras."""
+
+OFFICE_MIXED = dataclasses.replace(
+    OFFICE_3D,
+    name="office-mixed",
+    robot=dataclasses.replace(_WHEELED, reach_m=OFFICE_3D.robot.reach_m),
+    sensor=RangeSensor((2 * math.pi, math.pi / 6), math.pi / 60, max_range_m=8.0),
+    others=(RobotKind(OFFICE_3D.robot, OFFICE_3D.sensor),),
+)
+"""The same office for mixed teams: ground robots with a scanner, 120 × 11 rays all around, take turns with
+the flying ones."""
 
 CORRIDOR = Scenario(
     name="corridor",
@@ -184,6 +194,7 @@ SCENARIOS = MappingProxyType(
             BOX,
             OFFICE,
             OFFICE_3D,
+            OFFICE_MIXED,
             CORRIDOR,
             CLUTTERED,
             HYBRID,

@@ -19,6 +19,7 @@ from entropy_explore_env.config import (
     RangeSensor,
     Reward,
     Robot,
+    RobotKind,
     Scenario,
     with_settings,
 )
@@ -132,6 +133,9 @@ REFUSED = {
     (Scenario, "scored"): SWITCH,
     (Scenario, "robot"): (None, Channel(), "free"),
     (Scenario, "sensor"): (None, Robot()),
+    (Scenario, "others"): (None, [], 1, (Robot(),), (None,)),
+    (RobotKind, "robot"): (None, Channel(), "free"),
+    (RobotKind, "sensor"): (None, Robot()),
     (Scenario, "channel"): (None, Robot()),
     (Scenario, "ending"): (None, Robot()),
     (Scenario, "reward"): (None, Robot(), "team"),

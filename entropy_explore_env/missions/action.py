@@ -9,6 +9,9 @@ centre of the first voxel and 1 that of the last.
 
 Discrete: number m·D + g means move m of `discrete_moves` (a voxel offset from the robot's voxel, to
 that voxel's centre) and gaze g of the D in `gaze_set`.
+
+All robots of a team have the same actions. Where only some fly, the numbers for height and pitch mean
+nothing to the others; a discrete move beyond a robot's own reach is shortened to it.
 """
 
 from __future__ import annotations
@@ -37,17 +40,18 @@ def action_space(scenario: Scenario) -> spaces.Box | spaces.Discrete:
 
 
 @lean_kernel
-def decode_action(rules, pose, box, number, viewpoint):
+def decode_action(rules, robot, pose, box, number, viewpoint):
     """Turn an action into a viewpoint.
 
     Args:
         rules: The scenario.
-        pose: (5,) float64, the robot's pose.
+        robot: The robot's number.
+        pose: (5,) float64, its pose.
         box: (N,) float64 continuous action; not read where actions are discrete.
         number: Discrete action; not read where they are continuous.
         viewpoint: (5,) float64, filled in; within reach of the pose.
     """
-    settings = rules.numbers[0]
+    settings = rules.numbers[robot]
     axes = 2 if settings.planar else 3
     for i in range(5):
         viewpoint[i] = pose[i]
@@ -56,7 +60,7 @@ def decode_action(rules, pose, box, number, viewpoint):
         for axis in range(axes):
             voxel = math.floor((pose[axis] - settings.origin_m[axis]) / settings.voxel_size_m) + move[axis]
             viewpoint[axis] = settings.origin_m[axis] + (voxel + 0.5) * settings.voxel_size_m
-        viewpoint[3], viewpoint[4] = gaze[0], gaze[1]
+        viewpoint[3], viewpoint[4] = gaze[0], 0.0 if settings.planar else gaze[1]
     else:
         for axis in range(axes):
             if math.isinf(settings.reach_m):
@@ -65,8 +69,8 @@ def decode_action(rules, pose, box, number, viewpoint):
                 viewpoint[axis] = settings.origin_m[axis] + voxels * settings.voxel_size_m
             else:
                 viewpoint[axis] = pose[axis] + box[axis] * settings.reach_m
-        viewpoint[3] = box[axes] * math.pi
-        viewpoint[4] = 0.0 if settings.planar else box[axes + 1] * math.pi / 2.0
+        viewpoint[3] = box[settings.action_axes] * math.pi
+        viewpoint[4] = 0.0 if settings.planar else box[settings.action_axes + 1] * math.pi / 2.0
     if not math.isinf(settings.reach_m):
         length = 0.0
         for axis in range(axes):
@@ -78,19 +82,21 @@ def decode_action(rules, pose, box, number, viewpoint):
 
 
 @lean_kernel
-def write_mask(rules, start, mean, out):
+def write_mask(rules, robot, start, mean, out):
     """Mark the discrete actions that make sense by the robot's own belief.
 
     A move makes sense if it ends inside the workspace, within reach, in a voxel that is not
-    believed covered; to stay always does.
+    believed covered; to stay always does. Planar robots have no use for moves up and down, nor for more
+    than one of the gazes of a yaw.
 
     Args:
         rules: The scenario.
+        robot: The robot's number.
         start: (x, y, z), the robot in grid units.
         mean: (V,) float32, its expected coverage.
         out: (K·D,) filled with 0 and 1.
     """
-    settings, gazes = rules.numbers[0], len(rules.gazes)
+    settings, gazes = rules.numbers[robot], len(rules.gazes)
     for move in range(len(rules.moves)):
         inside, voxel, apart = True, 0, 0.0
         for axis in range(3):
@@ -100,12 +106,16 @@ def write_mask(rules, start, mean, out):
             if axis < 2 or not settings.planar:
                 apart += (index + 0.5 - start[axis]) ** 2
         near = math.sqrt(apart) * settings.voxel_size_m <= settings.reach_m * (1.0 + _ROUNDING)
+        near = near and not (settings.planar and rules.moves[move, 2] != 0)
         sensible = move == 0 or (inside and near and mean[voxel] <= STOP_AT_COVERED)
         for gaze in range(gazes):
-            out[move * gazes + gaze] = 1 if sensible else 0
+            level = gaze % settings.pitches == (settings.pitches - 1) // 2
+            out[move * gazes + gaze] = 1 if sensible and (level or not settings.planar) else 0
 
 
-def encode_viewpoint(rules: Rules, pose: np.ndarray, viewpoint: np.ndarray) -> np.ndarray | np.int64:
+def encode_viewpoint(
+    rules: Rules, pose: np.ndarray, viewpoint: np.ndarray, robot: int = 0
+) -> np.ndarray | np.int64:
     """The action that sends a robot to a viewpoint.
 
     Continuous actions hold it up to float32 rounding; a place beyond the reach is pulled onto it.
@@ -116,6 +126,7 @@ def encode_viewpoint(rules: Rules, pose: np.ndarray, viewpoint: np.ndarray) -> n
         rules: The scenario.
         pose: (5,) the robot's pose.
         viewpoint: (5,) x, y, z, yaw, pitch.
+        robot: Its number.
 
     Returns:
         (N,) float32, or an int64.
@@ -126,17 +137,25 @@ def encode_viewpoint(rules: Rules, pose: np.ndarray, viewpoint: np.ndarray) -> n
     wanted = np.asarray(viewpoint, dtype=np.float64)
     if wanted.shape != (5,) or not np.isfinite(wanted).all():
         raise ActionError("viewpoint", viewpoint, "five finite numbers (x, y, z, yaw, pitch)")
-    settings = rules.numbers[0]
+    settings = rules.numbers[robot]
     axes = 2 if settings["planar"] else 3
     if not settings["discrete"]:
         return _encoded_box(settings, pose, wanted, axes)
     corner = np.floor((pose[:axes] - settings["origin_m"][:axes]) / settings["voxel_size_m"])
-    ends = settings["origin_m"][:axes] + (corner + rules.moves[:, :axes] + 0.5) * settings["voxel_size_m"]
+    lengths = np.linalg.norm(rules.moves, axis=1) * settings["voxel_size_m"]  # the nearest come first
+    moves = rules.moves[lengths <= settings["reach_m"] + 1e-9 * settings["voxel_size_m"], :axes]
+    ends = settings["origin_m"][:axes] + (corner + moves + 0.5) * settings["voxel_size_m"]
     move = int(np.argmin(((ends - wanted[:axes]) ** 2).sum(axis=1)))
-    yaw, pitch = rules.gazes[:, 0], rules.gazes[:, 1]
-    toward = math.cos(wanted[4])
-    alike = np.cos(pitch) * toward * np.cos(yaw - wanted[3]) + np.sin(pitch) * math.sin(wanted[4])
-    return np.int64(move * len(rules.gazes) + int(np.argmax(alike)))
+    pitches = settings["pitches"]
+    if settings["planar"]:
+        yaws = rules.gazes[::pitches, 0]
+        gaze = int(np.argmax(np.cos(yaws - wanted[3]))) * pitches + (pitches - 1) // 2
+    else:
+        yaw, pitch = rules.gazes[:, 0], rules.gazes[:, 1]
+        toward = math.cos(wanted[4])
+        alike = np.cos(pitch) * toward * np.cos(yaw - wanted[3]) + np.sin(pitch) * math.sin(wanted[4])
+        gaze = int(np.argmax(alike))
+    return np.int64(move * len(rules.gazes) + gaze)
 
 
 def _encoded_box(settings: np.void, pose: np.ndarray, wanted: np.ndarray, axes: int) -> np.ndarray:
@@ -152,5 +171,8 @@ def _encoded_box(settings: np.void, pose: np.ndarray, wanted: np.ndarray, axes: 
         if length > 1.0:
             move = move / length
     yaw = (wanted[3] + math.pi) % (2.0 * math.pi) - math.pi
-    gaze = [yaw / math.pi] if settings["planar"] else [yaw / math.pi, wanted[4] / (math.pi / 2.0)]
-    return np.clip(np.concatenate([move, gaze]), -1.0, 1.0).astype(np.float32)
+    action = np.zeros(3 if settings["action_axes"] == 2 else 5)
+    action[:axes], action[settings["action_axes"]] = move, yaw / math.pi
+    if not settings["planar"]:
+        action[4] = wanted[4] / (math.pi / 2.0)
+    return np.clip(action, -1.0, 1.0).astype(np.float32)

@@ -30,9 +30,18 @@ _ROUNDING = 1e-6
 
 
 @lean_kernel
-def depart(numbers, blocked, robots, index, time_s, scan):
-    """Commit a robot to its target: how far it will get, why no farther, and when it has scanned."""
-    robot = robots[index]
+def depart(team, blocked, robots, index, time_s, scan):
+    """Commit a robot to its target: how far it will get, why no farther, and when it has scanned.
+
+    Args:
+        team: (A,) NUMBERS.
+        blocked: (V,) float32, a Barrier each, for its body.
+        robots: (A,) ROBOT.
+        index: Which robot.
+        time_s: When it departs.
+        scan: Working space.
+    """
+    numbers, robot = team[index], robots[index]
     origin, goal = robot.origin, robot.goal
     copy_numbers(goal, origin, 5)
     copy_numbers(robot.target, goal, 5)
@@ -45,7 +54,7 @@ def depart(numbers, blocked, robots, index, time_s, scan):
         if robot.waypoints > 0:
             for axis in range(3):
                 goal[axis] = robot.way[leg, axis]
-        driven, code = drive_leg(numbers, blocked, robots, index, time_s, scan)
+        driven, code = drive_leg(team, blocked, robots, index, time_s, scan)
         way += driven
         robot.way_m += distance_between(way_point(robot, leg), way_point(robot, leg + 1))
         if code != _ARRIVED:
@@ -65,12 +74,13 @@ def depart(numbers, blocked, robots, index, time_s, scan):
 
 
 @lean_kernel
-def drive_leg(numbers, blocked, robots, index, time_s, scan):
+def drive_leg(team, blocked, robots, index, time_s, scan):
     """Drive from a robot's last corner straight to its goal, drawn nearer if something is in the way.
 
     Returns:
         (way, code): the way in grid units, and the code of a MoveEnd.
     """
+    numbers = team[index]
     goal, begin = robots[index].goal, way_point(robots[index], robots[index].corners)
     start, finish = grid_position(numbers, begin), grid_position(numbers, goal)
     length = distance_between(start, finish)
@@ -83,12 +93,12 @@ def drive_leg(numbers, blocked, robots, index, time_s, scan):
     )
     size = (numbers.size[0], numbers.size[1], numbers.size[2])
     way, code = free_way(blocked, size, start, finish, direction, length, scan.way, scan.way_entered)
-    if numbers.body_radius_m > 0.0:
-        for mate in range(len(robots)):
-            if mate != index:
-                clear = way_to_tube(numbers, start, direction, way, robots[mate], time_s)
-                if clear < way:
-                    way, code = clear, _TEAMMATE
+    for mate in range(len(robots)):
+        if mate != index and team[mate].body_radius_m > 0.0:
+            touching = (numbers.body_radius_m + team[mate].body_radius_m) / numbers.voxel_size_m
+            clear = way_to_tube(team[mate], touching, start, direction, way, robots[mate], time_s)
+            if clear < way:
+                way, code = clear, _TEAMMATE
     if code != _ARRIVED:
         for axis in range(3):
             goal[axis] = begin[axis] + direction[axis] * way * numbers.voxel_size_m
@@ -96,9 +106,18 @@ def drive_leg(numbers, blocked, robots, index, time_s, scan):
 
 
 @lean_kernel
-def way_to_tube(numbers, start, direction, way, mate, time_s):
-    """How far a body can drive on a line, at most `way`, before the tube that a teammate still sweeps."""
-    touching = 2.0 * numbers.body_radius_m / numbers.voxel_size_m
+def way_to_tube(numbers, touching, start, direction, way, mate, time_s):
+    """How far a body can drive on a line, at most `way`, before the tube that a teammate still sweeps.
+
+    Args:
+        numbers: NUMBERS of the teammate.
+        touching: Sum of the two radii in grid units.
+        start: (x, y, z), where the line begins, in grid units.
+        direction: (x, y, z), its unit vector.
+        way: In grid units.
+        mate: ROBOT of the teammate.
+        time_s: When the body departs.
+    """
     x, y, z, passed = place_at(numbers, mate, time_s)
     begin = grid_position(numbers, (x, y, z))
     for point in range(passed, mate.corners + 1):
@@ -119,13 +138,13 @@ def plan_scan(numbers, robot):
 
 
 @lean_kernel
-def drive_on(numbers, ball, mean, robot, time_s, scan):
+def drive_on(numbers, balls, mean, robot, time_s, scan):
     """After a scan under way: end the drive if the rest of its planned way is believed blocked.
 
     Args:
         numbers: NUMBERS.
-        ball: (B, 3) int64, what a body touches; None where nobody plans: then nothing here is compiled
-            but the next scan.
+        balls: (K, B, 3) int64, what bodies of each kind touch; None where nobody plans: then nothing
+            here is compiled but the next scan.
         mean: (V,) float32, the robot's expected coverage.
         robot: Its ROBOT.
         time_s: When it scanned.
@@ -133,9 +152,9 @@ def drive_on(numbers, ball, mean, robot, time_s, scan):
     """
     robot.way_scans += 1
     plan_scan(numbers, robot)
-    if ball is not None:
+    if balls is not None:
         passed = place_at(numbers, robot, time_s)[3]
-        if rest_blocked(numbers, ball, mean, robot, passed, scan):
+        if rest_blocked(numbers, balls[numbers.kind], mean, robot, passed, scan):
             end_drive(numbers, robot, passed, time_s)
 
 

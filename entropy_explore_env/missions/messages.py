@@ -132,7 +132,7 @@ def send(rules, state, scan, mission, index, count):
             continue
         apart_m = 0.0
         if not math.isinf(numbers.channel_range_m):
-            there = pose_at(numbers, state.robots[mission, mate], clock.time_s)
+            there = pose_at(rules.numbers[mate], state.robots[mission, mate], clock.time_s)
             apart_m = math.sqrt(
                 (here[0] - there[0]) ** 2 + (here[1] - there[1]) ** 2 + (here[2] - there[2]) ** 2
             )
@@ -169,16 +169,14 @@ def open_letter(delayed, rules, state, scan, mission, place):
     numbers, letter = rules.numbers[0], state.mail[mission, place]
     letter.due_s = math.inf
     size = (numbers.size[0], numbers.size[1], numbers.size[2])
-    start = grid_position(numbers, letter.pose)
+    start, sensor = grid_position(numbers, letter.pose), rules.sensors.numbers[letter.sender]
     for i in range(letter.count):
         ray, mailed = scan.rays[i], state.mail_rays[mission, place, i]
         scan.order[i] = i
         copy_numbers(mailed, ray.direction, 3)
         ray.length = mailed[3]
         ray.returned = int(mailed[4])
-        trace_measurement(
-            scan, i, rules.sensor.numbers[0], size, numbers.voxel_size_m, start, state.truth[mission]
-        )
+        trace_measurement(scan, i, sensor, size, numbers.voxel_size_m, start, state.truth[mission])
     for robot in range(state.robots.shape[1]):
         if state.mail_to[mission, place, robot]:
             heard = state.heard[mission, robot, letter.sender]

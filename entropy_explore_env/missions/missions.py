@@ -20,7 +20,7 @@ from entropy_explore_env.missions.rules import rules_of
 from entropy_explore_env.missions.state import MissionEnd, MissionState, check_memory, new_state
 from entropy_explore_env.missions.tick import mask_missions, step_missions
 from entropy_explore_env.randomness import Stream, check_seed, generator, splitmix_states
-from entropy_explore_env.robots.navigator import Navigator, new_navigator
+from entropy_explore_env.robots.navigator import new_navigators, touched_voxels
 from entropy_explore_env.robots.range_sensor import Scan, new_scan
 from entropy_explore_env.validation import is_whole
 from entropy_explore_env.worlds.load import make_world, with_world
@@ -82,17 +82,17 @@ class Missions:
         self._pool: ThreadPoolExecutor | None = None
 
     def _make_working_space(self) -> None:
-        """A scan a thread and, where robots plan, a navigator; what they hold is nobody's state."""
-        sensor, robot = self.scenario.sensor, self.scenario.robot
-        planned = robot.navigator == "planned"
-        longest_m = math.inf if planned else robot.reach_m
+        """A scan a thread and, where robots plan, navigators; what they hold is nobody's state."""
+        kinds = self.scenario.kinds
+        sensors, robots = [kind.sensor for kind in kinds], [kind.robot for kind in kinds]
+        rays = max(sensor.rays for sensor in sensors)
+        longest_m = max(math.inf if robot.navigator == "planned" else robot.reach_m for robot in robots)
         self._scans: list[Scan] = [
-            new_scan(self.grid, sensor, sensor.rays, self.scenario.robots, longest_m)
-            for _ in range(self.threads)
+            new_scan(self.grid, sensors, rays, self.scenario.robots, longest_m) for _ in range(self.threads)
         ]
-        self._navigators: list[Navigator] = [
-            new_navigator(self.scenario) for _ in range(self.threads if planned else 0)
-        ]
+        self._navigators = [new_navigators(self.scenario) for _ in range(self.threads)]
+        planning = self._navigators[0]
+        self._balls = touched_voxels(planning, len(kinds)) if planning else None
 
     @property
     def grid(self) -> Grid:
@@ -141,13 +141,11 @@ class Missions:
         else:
             number, episode = self.seeds[mission], self.episodes[mission] + 1
         world = make_world(self.scenario, generator(number, episode, Stream.WORLD))
-        starts = world.layout(self.scenario).starts
-        poses = start_poses(self.scenario, world, starts, generator(number, episode, Stream.STARTS))
+        poses = start_poses(self.scenario, world, generator(number, episode, Stream.STARTS))
         return mission, number, episode, world, poses
 
     def _begin(self, mission: int, number: int, episode: int, world: World, poses: np.ndarray) -> None:
         """Put the mission into its world, with beliefs at the prior, and observe."""
-        layout = world.layout(self.scenario)
         self.seeds[mission], self.episodes[mission] = number, episode
         if world.ceiling is not None and self.state.blocked is self.state.truth:
             self.state = self.state._replace(blocked=self.state.truth.copy())
@@ -155,7 +153,7 @@ class Missions:
         if world is not self.worlds[mission]:
             self.worlds[mission] = world
             state.truth[mission] = world.occupied.ravel()
-            state.blocked[mission] = layout.barriers.ravel()
+            self._set_barriers(mission, world)
         for array in state[4:]:
             array[mission] = np.zeros((), array.dtype)
         state.mean[mission] = PRIOR_MEAN
@@ -165,9 +163,9 @@ class Missions:
         if self.scenario.scored:
             state.joint_mean[mission] = PRIOR_MEAN
             state.joint_precision[mission] = self.rules.numbers["prior_precision"][0]
-            state.visible[mission] = layout.visible.ravel()
+            state.visible[mission] = world.visible(self.scenario).ravel()
         state.missions[mission]["reached_s"] = -1.0
-        self._set_entropies(mission, layout.visible_voxels)
+        self._set_entropies(mission, world.visible_voxels(self.scenario))
         robots = state.robots[mission]
         for field in ("origin", "goal", "target", "scan_pose"):
             robots[field] = poses
@@ -178,6 +176,13 @@ class Missions:
         state.mail[mission]["due_s"] = np.inf
         out = self.observations[mission]
         observe_mission(self.rules, self._parts, state, self._scans[0], mission, out)
+
+    def _set_barriers(self, mission: int, world: World) -> None:
+        """What is in the way of the team's bodies."""
+        for robot in range(min(len(self.scenario.kinds), self.scenario.robots)):
+            numbers, kind = self.rules.numbers[robot], self.scenario.kind_of(robot)
+            row = mission * numbers["radii"] + numbers["barriers"]
+            self.state.blocked[row] = world.layout(self.scenario, kind).barriers.ravel()
 
     def _set_entropies(self, mission: int, visible_voxels: int) -> None:
         """H(0) by eq. 25, and H_th: voxels that can be seen at σ_end, the others at the prior."""
@@ -216,14 +221,14 @@ class Missions:
         return self.observations
 
     def _step_range(self, thread: int, first: int, last: int, boxes: np.ndarray, numbers: np.ndarray) -> None:
-        if self._navigators:
-            plan_missions(self.rules, self.state, self._navigators[thread], boxes, numbers, first, last)
+        for kind, navigator in self._navigators[thread].items():
+            plan_missions(self.rules, self.state, navigator, kind, boxes, numbers, first, last)
         step_missions(
             self.rules,
             self._parts,
             self.state,
             self._scans[thread],
-            self._navigators[thread].lattice.touched if self._navigators else None,
+            self._balls,
             boxes,
             numbers,
             first,
@@ -265,7 +270,7 @@ class Missions:
     def __getstate__(self) -> dict[str, object]:
         """All but the threads and their scratch space."""
         kept = dict(self.__dict__)
-        del kept["_pool"], kept["_scans"], kept["_navigators"]
+        del kept["_pool"], kept["_scans"], kept["_navigators"], kept["_balls"]
         return kept
 
     def __setstate__(self, kept: dict[str, object]) -> None:
@@ -275,7 +280,7 @@ class Missions:
         self._pool = None
 
 
-def start_poses(scenario: Scenario, world: World, starts: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+def start_poses(scenario: Scenario, world: World, rng: np.random.Generator) -> np.ndarray:
     """Draw where robots start: voxel centres with room, apart from each other, any yaw, level.
 
     Robots are placed one after the other, so a smaller team starts like the first of a larger one.
@@ -283,7 +288,6 @@ def start_poses(scenario: Scenario, world: World, starts: np.ndarray, rng: np.ra
     Args:
         scenario: The task.
         world: The true world.
-        starts: (N,) flat indices of voxels where a robot may start.
         rng: The stream of starts.
 
     Returns:
@@ -293,23 +297,26 @@ def start_poses(scenario: Scenario, world: World, starts: np.ndarray, rng: np.ra
         WorldError: The bodies find no room.
     """
     grid = world.grid
-    apart_m = 2.0 * scenario.robot.body_radius_m + 1e-3 * grid.voxel_size_m
+    radii_m = np.array([scenario.kind_of(robot).robot.body_radius_m for robot in range(scenario.robots)])
     poses = np.zeros((scenario.robots, 5))
     for robot in range(scenario.robots):
+        starts = world.layout(scenario, scenario.kind_of(robot)).starts
+        apart_m = radii_m[robot] + radii_m[:robot] + 1e-3 * grid.voxel_size_m
         tried = starts[rng.integers(len(starts), size=_PLACING_ATTEMPTS)]
         place = _first_apart(grid, tried, poses[:robot, :3], apart_m)
         if place is None:
             place = _first_apart(grid, rng.permutation(starts), poses[:robot, :3], apart_m)
         if place is None:
-            allowed = f"at most {robot}, for whose bodies, {apart_m:.3g} m apart, the world has room"
+            nearest_m = float(apart_m.min()) if robot else 0.0
+            allowed = f"at most {robot}, for whose bodies, {nearest_m:.3g} m apart, the world has room"
             raise WorldError("Scenario.robots", scenario.robots, allowed)
         poses[robot, :3] = place
         poses[robot, 3] = rng.uniform(-np.pi, np.pi)
     return poses
 
 
-def _first_apart(grid: Grid, tried: np.ndarray, taken: np.ndarray, apart_m: float) -> np.ndarray | None:
-    """(3,) centre of the first of the voxels (N,) that is far enough from those taken (K, 3)."""
+def _first_apart(grid: Grid, tried: np.ndarray, taken: np.ndarray, apart_m: np.ndarray) -> np.ndarray | None:
+    """(3,) centre of the first of the voxels (N,) that is as far as (K,) asks from those taken (K, 3)."""
     centres = grid.centre_of(np.stack(np.unravel_index(tried, grid.shape), axis=-1))
     gaps = np.sqrt(((centres[:, None] - taken) ** 2).sum(axis=-1))
     clear = np.flatnonzero((gaps >= apart_m).all(axis=1))

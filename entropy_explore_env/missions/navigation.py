@@ -17,13 +17,14 @@ _ARRIVED = MoveEnd.ARRIVED.code
 
 
 @lean_kernel
-def plan_missions(rules, state, navigator, boxes, numbers, first, last):
-    """Plan the ways of the robots that decide, each through its own belief.
+def plan_missions(rules, state, navigator, kind, boxes, numbers, first, last):
+    """Plan the ways of the robots of one kind that decide, each through its own belief.
 
     Args:
         rules: The scenario.
         state: The MissionState of E missions; targets and ways are filled in.
-        navigator: Working space, not shared with another thread.
+        navigator: Working space for this kind, not shared with another thread.
+        kind: Its number.
         boxes: (E, A, N) float64 continuous actions.
         numbers: (E, A) int64 discrete actions.
         first: The first mission.
@@ -33,12 +34,12 @@ def plan_missions(rules, state, navigator, boxes, numbers, first, last):
         if state.missions[mission].end == _RUNNING:
             for index in range(state.robots.shape[1]):
                 robot = state.robots[mission, index]
-                if robot.deciding:
-                    decode_action(
-                        rules, robot.goal, boxes[mission, index], numbers[mission, index], robot.target
-                    )
+                own = rules.numbers[index]
+                if robot.deciding and own.kind == kind:
+                    box, number = boxes[mission, index], numbers[mission, index]
+                    decode_action(rules, index, robot.goal, box, number, robot.target)
                     mean, precision = state.mean[mission, index], state.precision[mission, index]
-                    plan_way(rules.numbers[0], navigator, mean, precision, robot)
+                    plan_way(own, navigator, mean, precision, robot)
 
 
 @lean_kernel

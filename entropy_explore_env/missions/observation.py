@@ -5,9 +5,10 @@ Parts, in this order, each only if the scenario's settings ask for it (D directi
     panorama  (2, D)       utility in bits that a ray would bring by the robot's own belief (or
                            log2(1 + bits)), and the metres that it would go before something
                            believed covered; directions in the order of `gaze_set`
-    self      (10,)        position in the workspace, -1…1 (x, y, z); cos and sin of yaw, cos and
+    self      (10 + K,)    position in the workspace, -1…1 (x, y, z); cos and sin of yaw, cos and
                            sin of pitch; share of the time limit gone (0 without one); share of
-                           the map's entropy left, counting every voxel; 1 while it decides
+                           the map's entropy left, counting every voxel; 1 while it decides; in
+                           teams of K > 1 kinds of robots 1 for its kind, 0 for the others
     team      (A-1, 19)    per teammate, in the order of their numbers: 1 if ever heard; where it
                            was, relative, in workspace sizes (3); cos and sin of its yaw and of its
                            pitch (4); seconds since then as s/(s + 60); 1 if an announcement was
@@ -118,13 +119,17 @@ def _parts(scenario: Scenario) -> dict[str, Part]:
     one = np.ones(1)
     if settings.panorama:
         most = _most_utility_bits(scenario, rules)
-        farthest = min(scenario.sensor.max_range_m, float(np.linalg.norm(scenario.grid.size_m)))
+        farthest = min(
+            max(kind.sensor.max_range_m for kind in scenario.kinds),
+            float(np.linalg.norm(scenario.grid.size_m)),
+        )
         high = np.asarray(
             [[math.log2(1 + most) if rules.numbers[0]["panorama_log"] else most], [farthest]]
         ) * (1 + 1e-6)
         limits["panorama"] = ((2, len(rules.panorama)), 0.0, high)
     if settings.own:
-        limits["self"] = ((OWN_NUMBERS,), -1.0, one)
+        kinds = len(scenario.kinds)
+        limits["self"] = ((OWN_NUMBERS + (kinds if kinds > 1 else 0),), -1.0, one)
     if settings.team and scenario.robots > 1:
         limits["team"] = ((scenario.robots - 1, TEAMMATE_NUMBERS), -1.0, one)
     if settings.patch:
@@ -143,10 +148,12 @@ def _parts(scenario: Scenario) -> dict[str, Part]:
 
 def _most_utility_bits(scenario: Scenario, rules: Rules) -> float:
     """More than any ray can bring: the longest one, over voxels that nobody has measured."""
-    length = scenario.sensor.max_range_m / scenario.grid.voxel_size_m
-    voxels = longest_crossing(*scenario.grid.shape, length, scenario.sensor.voxels_behind)
-    precision = 1.0 / scenario.sensor.sigma_min**2
-    return voxels * 0.5 * math.log2(1.0 + precision / float(rules.numbers[0]["prior_precision"]))
+    most, prior = 0.0, float(rules.numbers[0]["prior_precision"])
+    for kind in scenario.kinds:
+        length = kind.sensor.max_range_m / scenario.grid.voxel_size_m
+        voxels = longest_crossing(*scenario.grid.shape, length, kind.sensor.voxels_behind)
+        most = max(most, voxels * 0.5 * math.log2(1.0 + 1.0 / kind.sensor.sigma_min**2 / prior))
+    return most
 
 
 class ObservationRules(NamedTuple):
@@ -159,6 +166,8 @@ class ObservationRules(NamedTuple):
     overview: int
     action_mask: int
     patch_shape: tuple[int, int, int]
+    kinds: int
+    """K, of robots; 0 if all are alike."""
 
 
 def observation_rules(scenario: Scenario, layout: ObservationLayout) -> ObservationRules:
@@ -168,15 +177,17 @@ def observation_rules(scenario: Scenario, layout: ObservationLayout) -> Observat
     return ObservationRules(
         *(begin.get(name, -1) for name in ("panorama", "self", "team", "patch", "overview", "action_mask")),
         patch_shape=(int(patch[0]), int(patch[1]), int(patch[2])),
+        kinds=len(scenario.kinds) if len(scenario.kinds) > 1 else 0,
     )
 
 
 @lean_kernel
-def observe_panorama(rules, start, mean, precision, scan, out):
+def observe_panorama(rules, robot, start, mean, precision, scan, out):
     """Fill (2·D,): what rays around the robot would bring, cast like a scan through its own belief.
 
     Args:
         rules: The scenario.
+        robot: Whose sensor.
         start: (x, y, z), the robot in grid units.
         mean: (V,) float32, its expected coverage.
         precision: (V,) float32, 1/σ² of it.
@@ -184,7 +195,7 @@ def observe_panorama(rules, start, mean, precision, scan, out):
         out: (2·D,) float32, filled in.
     """
     directions = len(rules.panorama)
-    numbers, sensor = rules.numbers[0], rules.sensor.numbers[0]
+    numbers, sensor = rules.numbers[robot], rules.sensors.numbers[robot]
     size = (numbers.size[0], numbers.size[1], numbers.size[2])
     reach = sensor.max_range_m / numbers.voxel_size_m
     for ray in range(directions):
@@ -208,8 +219,8 @@ def observe_panorama(rules, start, mean, precision, scan, out):
 
 
 @lean_kernel
-def observe_self(numbers, pose, time_s, entropy_bits, deciding, out):
-    """Fill (10,): the robot's pose, the time, the entropy left and whether it decides."""
+def observe_self(numbers, kinds, pose, time_s, entropy_bits, deciding, out):
+    """Fill (10 + K,): the robot's pose, the time, the entropy left, whether it decides, and its kind."""
     for axis in range(3):
         extent = numbers.size[axis] * numbers.voxel_size_m
         out[axis] = min(max(2.0 * (pose[axis] - numbers.origin_m[axis]) / extent - 1.0, -1.0), 1.0)
@@ -221,6 +232,8 @@ def observe_self(numbers, pose, time_s, entropy_bits, deciding, out):
     span = 0.5 * voxels * math.log2(numbers.end_precision / numbers.prior_precision)
     out[8] = min(max((entropy_bits - known) / span, 0.0), 1.0)
     out[9] = 1.0 if deciding else 0.0
+    for kind in range(kinds):
+        out[OWN_NUMBERS + kind] = 1.0 if kind == numbers.kind else 0.0
 
 
 @lean_kernel
@@ -321,16 +334,17 @@ def observe_mission(rules, parts, state, scan, mission, out):
         mission: Which mission.
         out: (A, F) float32, filled in.
     """
-    numbers, time_s = rules.numbers[0], state.missions[mission].time_s
+    time_s = state.missions[mission].time_s
     for robot in range(state.robots.shape[1]):
+        numbers = rules.numbers[robot]
         own, heard, row = state.robots[mission, robot], state.heard[mission, robot], out[robot]
         mean, precision = state.mean[mission, robot], state.precision[mission, robot]
         pose = pose_at(numbers, own, time_s)
         start = grid_position(numbers, pose)
         if parts.panorama >= 0:
-            observe_panorama(rules, start, mean, precision, scan, row[parts.panorama :])
+            observe_panorama(rules, robot, start, mean, precision, scan, row[parts.panorama :])
         if parts.own >= 0:
-            observe_self(numbers, pose, time_s, own.entropy_bits, own.deciding, row[parts.own :])
+            observe_self(numbers, parts.kinds, pose, time_s, own.entropy_bits, own.deciding, row[parts.own :])
         if parts.team >= 0:
             observe_team(numbers, robot, pose, time_s, heard, row[parts.team :])
         if parts.patch >= 0:
@@ -340,4 +354,4 @@ def observe_mission(rules, parts, state, scan, mission, out):
         if parts.overview >= 0:
             observe_overview(rules.cells, state.pooled[mission, robot], row[parts.overview :])
         if parts.action_mask >= 0:
-            write_mask(rules, start, mean, row[parts.action_mask :])
+            write_mask(rules, robot, start, mean, row[parts.action_mask :])

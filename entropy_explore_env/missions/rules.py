@@ -8,8 +8,8 @@ from typing import NamedTuple
 import numpy as np
 
 from entropy_explore_env.belief.pooling import Cells, new_cells
-from entropy_explore_env.config import Observation, Scenario
-from entropy_explore_env.robots.range_sensor import SensorModel, sensor_model
+from entropy_explore_env.config import Observation, Robot, Scenario
+from entropy_explore_env.robots.range_sensor import TeamSensors, team_sensors
 
 NUMBERS = np.dtype(
     [
@@ -18,8 +18,13 @@ NUMBERS = np.dtype(
         ("origin_m", "f8", (3,)),  # lower corner of voxel (0, 0, 0)
         ("prior_precision", "f8"),
         ("end_precision", "f8"),
-        ("planar", "?"),
         ("discrete", "?"),
+        ("action_axes", "i8"),  # places in an action that say where to go: 2 if the whole team is planar
+        ("pitches", "i8"),  # of discrete gazes
+        # of the robot
+        ("kind", "i8"),  # the number of its kind
+        ("barriers", "i8"),  # the number of its radius among `barrier_radii_m`
+        ("planar", "?"),
         ("reach_m", "f8"),
         ("max_speed_m_s", "f8"),
         ("acceleration_m_s2", "f8"),
@@ -27,6 +32,9 @@ NUMBERS = np.dtype(
         ("body_radius_m", "f8"),
         ("scan_time_s", "f8"),
         ("scan_every_m", "f8"),
+        ("rays", "i8"),  # R of its sensor
+        # of all
+        ("radii", "i8"),  # of `barrier_radii_m`
         ("burst", "i8"),
         ("i_min_bits", "f8"),
         ("channel_range_m", "f8"),
@@ -44,7 +52,7 @@ NUMBERS = np.dtype(
     ],
     align=True,
 )
-"""The numbers of a scenario, in the units of `config`; inf stands for "never" and "all"."""
+"""The numbers of a scenario for one of its robots, in the units of `config`; inf means "never" or "all"."""
 
 _NEVER = 2**62
 
@@ -53,8 +61,8 @@ class Rules(NamedTuple):
     """A scenario for compiled code; D gazes or directions."""
 
     numbers: np.ndarray
-    """(1,) NUMBERS."""
-    sensor: SensorModel
+    """(A,) NUMBERS; what is not the robot's own is the same in all."""
+    sensors: TeamSensors
     moves: np.ndarray
     """(K, 3) int64, discrete moves in voxels."""
     gazes: np.ndarray
@@ -69,23 +77,19 @@ class Rules(NamedTuple):
 
 def rules_of(scenario: Scenario) -> Rules:
     """The rules of a scenario."""
-    ending, robot, channel = scenario.ending, scenario.robot, scenario.channel
-    values = {
+    ending, channel = scenario.ending, scenario.channel
+    radii = barrier_radii_m(scenario)
+    shared = {
         "size": scenario.grid.shape,
         "voxel_size_m": scenario.grid.voxel_size_m,
         "origin_m": scenario.grid.origin_m,
         "prior_precision": np.float32(scenario.sigma_prior**-2),
         "end_precision": ending.sigma_end**-2,
-        "planar": scenario.planar,
         "discrete": scenario.action.kind == "discrete",
-        "reach_m": robot.reach_m,
-        "max_speed_m_s": robot.max_speed_m_s,
-        "acceleration_m_s2": robot.acceleration_m_s2,
-        "turn_rate_rad_s": robot.turn_rate_rad_s,
-        "body_radius_m": robot.body_radius_m,
-        "scan_time_s": scenario.sensor.scan_time_s,
-        "scan_every_m": scenario.sensor.scan_every_m,
-        "burst": min(channel.burst, scenario.sensor.rays),
+        "action_axes": 2 if scenario.planar else 3,
+        "pitches": 1 if scenario.planar else scenario.action.pitches,
+        "radii": len(radii),
+        "burst": min(channel.burst, max(kind.sensor.rays for kind in scenario.kinds)),
         "i_min_bits": channel.i_min_bits,
         "channel_range_m": channel.range_m,
         "loss_probability": channel.loss_probability,
@@ -100,18 +104,38 @@ def rules_of(scenario: Scenario) -> Rules:
         "scored": scenario.scored,
         "panorama_log": scenario.observation.panorama_utility == "log2",
     }
-    numbers = np.zeros(1, NUMBERS)
-    for name in numbers.dtype.names or ():
-        numbers[name] = values[name]
+    numbers = np.zeros(scenario.robots, NUMBERS)
+    for name, value in shared.items():
+        numbers[name] = value
+    for number in range(scenario.robots):
+        robot, sensor = scenario.kind_of(number).robot, scenario.kind_of(number).sensor
+        own = numbers[number]
+        own["kind"] = number % len(scenario.kinds)
+        own["barriers"] = radii.index(_barrier_radius_m(scenario, robot))
+        own["planar"] = scenario.layer_of(robot) is not None
+        for name in ("reach_m", "max_speed_m_s", "acceleration_m_s2", "turn_rate_rad_s", "body_radius_m"):
+            own[name] = getattr(robot, name)
+        for name in ("scan_time_s", "scan_every_m", "rays"):
+            own[name] = getattr(sensor, name)
     return Rules(
         numbers=numbers,
-        sensor=sensor_model(scenario.sensor),
+        sensors=team_sensors([scenario.kind_of(number).sensor for number in range(scenario.robots)]),
         moves=discrete_moves(scenario),
         gazes=gaze_set(scenario.action.yaws, 1 if scenario.planar else scenario.action.pitches),
         delayed=1 if channel.delay_s > 0.0 else None,
         cells=None if (shape := overview_shape(scenario)) is None else new_cells(scenario.grid.shape, shape),
         panorama=panorama_directions(scenario),
     )
+
+
+def barrier_radii_m(scenario: Scenario) -> list[float]:
+    """The radii of the team's bodies that meet different barriers, each once; 0 = only the voxel it is in."""
+    return list(dict.fromkeys(_barrier_radius_m(scenario, kind.robot) for kind in scenario.kinds))
+
+
+def _barrier_radius_m(scenario: Scenario, robot: Robot) -> float:
+    small = robot.body_radius_m <= 0.5 * scenario.grid.voxel_size_m + 1e-9
+    return 0.0 if small else robot.body_radius_m
 
 
 def overview_shape(scenario: Scenario) -> tuple[int, int, int] | None:
@@ -133,13 +157,15 @@ def gaze_set(yaws: int, pitches: int) -> np.ndarray:
 def discrete_moves(scenario: Scenario) -> np.ndarray:
     """(K, 3) int64 voxel offsets within reach, the nearest first; the first is to stay.
 
-    Planar robots have none that change height. (1, 3) zeros where actions are not discrete.
+    The reach is the longest one of the team; a team of planar robots has none that change height. (1, 3)
+    zeros where actions are not discrete.
     """
     if scenario.action.kind != "discrete":
         return np.zeros((1, 3), np.int64)
-    reach = scenario.robot.reach_m / scenario.grid.voxel_size_m + 1e-9
+    reach_m = max(kind.robot.reach_m for kind in scenario.kinds)
+    reach = reach_m / scenario.grid.voxel_size_m + 1e-9
     farthest = [min(math.floor(reach), n - 1) for n in scenario.grid.shape]
-    if scenario.layer is not None:
+    if scenario.planar:
         farthest[2] = 0
     steps = [np.arange(-most, most + 1) for most in farthest]
     offsets = np.stack(np.meshgrid(*steps, indexing="ij"), axis=-1).reshape(-1, 3)

@@ -17,6 +17,7 @@ import numpy as np
 from entropy_explore_env.belief.pooling import Cells
 from entropy_explore_env.config import Scenario
 from entropy_explore_env.errors import SettingError
+from entropy_explore_env.missions.rules import barrier_radii_m
 
 
 class MissionEnd(enum.Enum):
@@ -136,7 +137,8 @@ class MissionState(NamedTuple):
     truth: np.ndarray
     """(E, V) float32 true coverage, 0 or 1."""
     blocked: np.ndarray
-    """(E, V) float32, a Barrier each; `truth` itself for small bodies where there is no ceiling."""
+    """(E·N, V) float32, a Barrier each for the N radii of bodies that meet different ones, mission by
+    mission; `truth` itself where all are small and there is no ceiling."""
     mean: np.ndarray
     """(E, A, V) float32 expected coverage by each robot's belief."""
     precision: np.ndarray
@@ -171,7 +173,7 @@ class MissionState(NamedTuple):
 
 def check_memory(scenario: Scenario, missions: int) -> None:
     """Raise a SettingError where the arrays of so many missions are larger than the memory there is."""
-    rays = scenario.sensor.rays * sum(scenario.grid.shape) * 8
+    rays = max(kind.sensor.rays for kind in scenario.kinds) * sum(scenario.grid.shape) * 8
     maps = scenario.robots + scenario.scored
     needed = missions * scenario.grid.voxels * (4 + 8 * maps) + rays
     try:
@@ -185,13 +187,13 @@ def check_memory(scenario: Scenario, missions: int) -> None:
 
 def new_state(scenario: Scenario, missions: int, cells: Cells | None) -> MissionState:
     """Arrays for E missions of a scenario, not yet reset; beliefs are pooled to the cells."""
-    e, a, r = missions, scenario.robots, scenario.sensor.rays
+    e, a, r = missions, scenario.robots, max(kind.sensor.rays for kind in scenario.kinds)
     v, q, b = scenario.grid.voxels, scenario.mail_places, min(scenario.channel.burst, r)
     truth, scored = np.zeros((e, v), np.float32), v if scenario.scored else 0
-    small_body = scenario.robot.body_radius_m <= 0.5 * scenario.grid.voxel_size_m + 1e-9
+    radii = barrier_radii_m(scenario)
     return MissionState(
         truth=truth,
-        blocked=truth if small_body else np.zeros((e, v), np.float32),
+        blocked=truth if radii == [0.0] else np.zeros((e * len(radii), v), np.float32),
         mean=np.zeros((e, a, v), np.float32),
         precision=np.zeros((e, a, v), np.float32),
         pooled=np.zeros((e, a, 2, 0 if cells is None else len(cells.voxels))),

@@ -20,7 +20,9 @@ from entropy_explore_env.missions.state import MissionEnd
 from entropy_explore_env.robots.channel import select_measurements
 from entropy_explore_env.robots.range_sensor import (
     Return,
+    first_rays,
     in_view,
+    sensor_of,
     take_scan,
     visibility_parameters,
 )
@@ -30,7 +32,7 @@ _NOTHING = int(Return.NOTHING)
 
 
 @lean_kernel
-def step_missions(rules, parts, state, scan, ball, boxes, numbers, first, last, out):
+def step_missions(rules, parts, state, scan, balls, boxes, numbers, first, last, out):
     """Advance the missions `first` … `last` - 1 by one step; those that are over stand still.
 
     Args:
@@ -38,7 +40,8 @@ def step_missions(rules, parts, state, scan, ball, boxes, numbers, first, last, 
         parts: Its ObservationRules.
         state: The MissionState of E missions, changed in place.
         scan: Scratch space, not shared with another thread.
-        ball: (B, 3) int64, voxels that a body touches, by axis; None where robots do not plan.
+        balls: (K, B, 3) int64, voxels that bodies of each kind of robot touch, by axis; None where no
+            robots plan.
         boxes: (E, A, N) float64 continuous actions.
         numbers: (E, A) int64 discrete actions.
         first: The first mission.
@@ -50,7 +53,7 @@ def step_missions(rules, parts, state, scan, ball, boxes, numbers, first, last, 
         if clock.end == _RUNNING:
             before_s = clock.time_s
             send_off(rules, state, scan, mission, boxes[mission], numbers[mission])
-            advance(rules, state, scan, ball, mission)
+            advance(rules, state, scan, balls, mission)
             settle(rules, clock, state.robots[mission], before_s)
         observe_mission(rules, parts, state, scan, mission, out[mission])
 
@@ -58,11 +61,12 @@ def step_missions(rules, parts, state, scan, ball, boxes, numbers, first, last, 
 @lean_kernel
 def mask_missions(rules, state, out):
     """Fill (E, A, N) int8, the masks of all robots' discrete actions."""
-    numbers = rules.numbers[0]
     for mission in range(out.shape[0]):
         for robot in range(out.shape[1]):
+            numbers = rules.numbers[robot]
             pose = pose_at(numbers, state.robots[mission, robot], state.missions[mission].time_s)
-            write_mask(rules, grid_position(numbers, pose), state.mean[mission, robot], out[mission, robot])
+            start, mean = grid_position(numbers, pose), state.mean[mission, robot]
+            write_mask(rules, robot, start, mean, out[mission, robot])
 
 
 @lean_kernel
@@ -73,8 +77,12 @@ def send_off(rules, state, scan, mission, boxes, numbers):
         robots[robot].own_bits = 0.0
         robots[robot].received_bits = 0.0
         if robots[robot].deciding:
-            decode_action(rules, robots[robot].goal, boxes[robot], numbers[robot], robots[robot].target)
-            depart(rules.numbers[0], state.blocked[mission], robots, robot, time_s, scan)
+            decode_action(
+                rules, robot, robots[robot].goal, boxes[robot], numbers[robot], robots[robot].target
+            )
+            own = rules.numbers[robot]
+            blocked = state.blocked[mission * own.radii + own.barriers]
+            depart(rules.numbers, blocked, robots, robot, time_s, scan)
             announce(rules, state, scan, mission, robot)
 
 
@@ -90,7 +98,7 @@ def settle(rules, clock, robots, before_s):
 
 
 @lean_kernel
-def advance(rules, state, scan, ball, mission):
+def advance(rules, state, scan, balls, mission):
     """Work off the events up to the end of the step, the time limit or the mission's end."""
     clock, robots, mail = state.missions[mission], state.robots[mission], state.mail[mission]
     target_s = clock.time_s + rules.numbers[0].period_s
@@ -114,7 +122,7 @@ def advance(rules, state, scan, ball, mission):
                 robots[robot].deciding = True
             else:
                 mean = state.mean[mission, robot]
-                drive_on(rules.numbers[0], ball, mean, robots[robot], scan_s, scan)
+                drive_on(rules.numbers[robot], balls, mean, robots[robot], scan_s, scan)
                 if robots[robot].deciding and math.isinf(rules.numbers[0].period_s):
                     stop_s = scan_s
         note_progress(clock, robots)
@@ -147,17 +155,18 @@ def mapped(robots, entropy_end_bits, all_maps):
 
 
 @lean_kernel
-def scan_and_share(rules, state, scan, mission, index):
+def scan_and_share(rules, state, team_scan, mission, index):
     """A robot measures from where it is, fuses, and sends what is most useful."""
-    numbers, robot = rules.numbers[0], state.robots[mission, index]
+    numbers, robot = rules.numbers[index], state.robots[mission, index]
+    scan, sensor = first_rays(team_scan, numbers.rays), sensor_of(rules.sensors, index)
     time_s = state.missions[mission].time_s
     pose = pose_at(numbers, robot, time_s)
     size = (numbers.size[0], numbers.size[1], numbers.size[2])
     start = grid_position(numbers, pose)
-    bodies = place_bodies(rules, state.robots[mission], index, time_s, pose, start, scan.bodies)
+    bodies = place_bodies(rules, sensor, state.robots[mission], index, time_s, pose, start, scan.bodies)
     take_scan(
         scan,
-        rules.sensor,
+        sensor,
         state.truth[mission],
         size,
         numbers.voxel_size_m,
@@ -195,14 +204,14 @@ def scan_and_share(rules, state, scan, mission, index):
 
 
 @lean_kernel
-def place_bodies(rules, robots, index, time_s, pose, start, bodies):
+def place_bodies(rules, sensor, robots, index, time_s, pose, start, bodies):
     """Put the teammates' bodies that the robot may see, in grid units, into `bodies`; returns how many."""
-    numbers, count = rules.numbers[0], 0
-    if numbers.body_radius_m > 0.0:
-        for mate in range(len(robots)):
-            if mate != index:
-                copy_numbers(grid_position(numbers, pose_at(numbers, robots[mate], time_s)), bodies[count], 3)
-                bodies[count, 3] = numbers.body_radius_m / numbers.voxel_size_m
-                if in_view(rules.sensor, pose[3], pose[4], start, bodies[count]):
-                    count += 1
+    count = 0
+    for mate in range(len(robots)):
+        numbers = rules.numbers[mate]
+        if mate != index and numbers.body_radius_m > 0.0:
+            copy_numbers(grid_position(numbers, pose_at(numbers, robots[mate], time_s)), bodies[count], 3)
+            bodies[count, 3] = numbers.body_radius_m / numbers.voxel_size_m
+            if in_view(sensor, pose[3], pose[4], start, bodies[count]):
+                count += 1
     return count

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from entropy_explore_env.config import Scenario
+from entropy_explore_env.config import RobotKind, Scenario
 from entropy_explore_env.missions.action import encode_viewpoint
 from entropy_explore_env.missions.missions import Missions
 from entropy_explore_env.missions.poses import place_at, pose_at
@@ -96,7 +96,17 @@ class RobotView:
 
     def action_for(self, viewpoint: np.ndarray) -> np.ndarray | np.int64:
         """The action that sends the robot to a viewpoint (5,): see `encode_viewpoint`."""
-        return encode_viewpoint(self.rules, self.pose, viewpoint)
+        return encode_viewpoint(self.rules, self.pose, viewpoint, self.robot)
+
+    @property
+    def kind(self) -> RobotKind:
+        """How it moves and what it senses."""
+        return self.scenario.kind_of(self.robot)
+
+    @property
+    def planar(self) -> bool:
+        """Whether it stays in its plane and looks level."""
+        return self.scenario.layer_of(self.kind.robot) is not None
 
 
 def view_of(missions: Missions, mission: int, robot: int) -> RobotView:
@@ -104,39 +114,39 @@ def view_of(missions: Missions, mission: int, robot: int) -> RobotView:
     state, rules, shape = missions.state, missions.rules, missions.grid.shape
     time_s = float(state.missions[mission]["time_s"])
     own, here = state.robots[mission, robot], (mission, robot)
-    heard = state.heard[here]
+    heard, rays = state.heard[here], int(rules.numbers[robot]["rays"])
     return RobotView(
         robot=robot,
         scenario=missions.scenario,
         time_s=time_s,
         deciding=bool(own["deciding"]),
-        pose=np.array(pose_at(rules.numbers[0], own, time_s)),
+        pose=np.array(pose_at(rules.numbers[robot], own, time_s)),
         mean=read_only(state.mean[here].reshape(shape)),
         precision=read_only(state.precision[here].reshape(shape)),
         entropy_bits=float(own["entropy_bits"]),
         move_end=list(MoveEnd)[own["move_end"]],
         target=own["target"].copy(),
-        way=_way_ahead(missions, own, time_s),
+        way=_way_ahead(rules.numbers[robot], own, time_s),
         depth_m=float(own["depth_m"]),
         half_angle_rad=float(own["half_angle_rad"]),
         scan=ScanView(
             own["scan_pose"].copy(),
-            read_only(state.scan_range_m[here]),
-            read_only(state.scan_returned[here]),
-            read_only(state.scan_utility_bits[here]),
+            read_only(state.scan_range_m[here][:rays]),
+            read_only(state.scan_returned[here][:rays]),
+            read_only(state.scan_utility_bits[here][:rays]),
         ),
         teammates={mate: _teammate(heard[mate]) for mate in range(len(heard)) if mate != robot},
         rules=rules,
     )
 
 
-def _way_ahead(missions: Missions, own: np.void, time_s: float) -> np.ndarray:
+def _way_ahead(numbers: np.void, own: np.void, time_s: float) -> np.ndarray:
     """(N, 3) where a robot means to drive, whatever will stop it."""
     if own["deciding"]:
         return np.zeros((0, 3))
     if own["waypoints"] == 0:
         return own["target"][None, :3].copy()
-    passed = place_at(missions.rules.numbers[0], own, time_s)[3]
+    passed = place_at(numbers, own, time_s)[3]
     return own["way"][passed : own["waypoints"]].copy()
 
 

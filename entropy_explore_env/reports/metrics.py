@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from entropy_explore_env.config import Scenario
+from entropy_explore_env.config import RobotKind, Scenario
 from entropy_explore_env.missions.missions import Missions
 from entropy_explore_env.missions.state import COUNTED, MissionEnd
 from entropy_explore_env.robots.range_sensor import Return, new_scan, sensor_model, take_scan
@@ -112,17 +112,23 @@ def information_floor(scenario: Scenario, world: World) -> float:
         scenario: The task.
         world: The true world.
     """
-    rng, grid, sensor = np.random.default_rng(0), world.grid, scenario.sensor
-    layout, model = world.layout(scenario), sensor_model(scenario.sensor)
-    scan, chance = new_scan(grid, sensor, sensor.rays, 1), np.zeros(1, np.uint64)
+    brought = max(_most_brought(scenario, kind, world) for kind in scenario.kinds)
+    needed = scenario.ending.sigma_end**-2 - scenario.sigma_prior**-2
+    return max(world.visible_voxels(scenario) * needed / brought, 1.0)
+
+
+def _most_brought(scenario: Scenario, kind: RobotKind, world: World) -> float:
+    """Precision, over all voxels, that the best of some scans of a kind of robot brings."""
+    rng, grid, sensor = np.random.default_rng(0), world.grid, kind.sensor
+    layout, model = world.layout(scenario, kind), sensor_model(sensor)
+    scan, chance = new_scan(grid, [sensor], sensor.rays, 1), np.zeros(1, np.uint64)
     truth, brought = world.occupied.ravel().astype(np.float32), 0.0
     voxels = np.stack(np.unravel_index(rng.choice(layout.starts, _FLOOR_SCANS), grid.shape), axis=-1)
-    steepest = 0.0 if scenario.planar else _STEEPEST_RAD
+    steepest = _STEEPEST_RAD if scenario.layer_of(kind.robot) is None else 0.0
     for voxel in voxels + 0.5:
         start, yaw = tuple(voxel.tolist()), rng.uniform(-math.pi, math.pi)
         pitch = rng.uniform(-steepest, steepest)
         take_scan(scan, model, truth, grid.shape, grid.voxel_size_m, start, yaw, pitch, 0, chance)
         measured = scan.rays["returned"] != int(Return.NOTHING)
         brought = max(brought, float((scan.rays["voxels"] * scan.rays["measured"])[measured].sum()))
-    needed = scenario.ending.sigma_end**-2 - scenario.sigma_prior**-2
-    return max(layout.visible_voxels * needed / brought, 1.0)
+    return brought

@@ -11,8 +11,8 @@ from entropy_explore_env.missions.poses import pose_at
 def poses_now(missions: Missions, mission: int) -> np.ndarray:
     """(A, 5) float64 where the robots of a mission are, under way or not: x, y, z, yaw, pitch."""
     time_s = float(missions.state.missions[mission]["time_s"])
-    numbers, robots = missions.rules.numbers[0], missions.state.robots[mission]
-    return np.stack([np.array(pose_at(numbers, robot, time_s)) for robot in robots])
+    numbers, robots = missions.rules.numbers, missions.state.robots[mission]
+    return np.stack([np.array(pose_at(numbers[a], robot, time_s)) for a, robot in enumerate(robots)])
 
 
 class Recorder:

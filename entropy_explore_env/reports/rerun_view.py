@@ -132,8 +132,9 @@ class RerunView:
         edges = rr.Boxes3D(centers=[centre], half_sizes=[half], colors=[(120, 120, 120)])
         self._stream.log("world", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
         self._stream.log("world/workspace", edges, static=True)
-        radius = max(missions.scenario.robot.body_radius_m, 0.25 * grid.voxel_size_m)
         for robot in range(robots):
+            body_m = missions.scenario.kind_of(robot).robot.body_radius_m
+            radius = max(body_m, 0.25 * grid.voxel_size_m)
             colour = robot_colour(robot)
             body = rr.Points3D([(0.0, 0.0, 0.0)], radii=[radius], colors=[colour])
             self._stream.log(f"world/robots/robot_{robot}/body", body, static=True)
@@ -154,7 +155,7 @@ class RerunView:
     def _log_scan(self, robot: int) -> None:
         """What a robot's latest scan could see, and which of its rays were sent."""
         rr, missions, colour = self._rr, self._missions, robot_colour(robot)
-        own, sensor = missions.state.robots[0, robot], missions.scenario.sensor
+        own, sensor = missions.state.robots[0, robot], missions.scenario.kind_of(robot).sensor
         pose, depth_m = own["scan_pose"], max(float(own["depth_m"]), missions.grid.voxel_size_m)
         cone = [pose[:3] + depth_m * edge for edge in cone_edges(sensor, pose[3], pose[4])]
         self._stream.log(f"world/cones/robot_{robot}", rr.LineStrips3D(cone, colors=[colour]))
@@ -247,15 +248,16 @@ def cone_edges(sensor: RangeSensor, yaw: float, pitch: float) -> list[np.ndarray
 def shared_ends_m(missions: Missions, robot: int) -> np.ndarray:
     """(N, 3) float64 where those measurements of a robot's latest scan end that it sent, best first."""
     scenario, state = missions.scenario, missions.state
-    own, model = state.robots[0, robot], sensor_model(scenario.sensor)
-    measured = state.scan_returned[0, robot] != int(Return.NOTHING)
-    utility = np.where(measured, state.scan_utility_bits[0, robot], -1.0)
+    own, sensor = state.robots[0, robot], scenario.kind_of(robot).sensor
+    model = sensor_model(sensor)
+    measured = state.scan_returned[0, robot, : sensor.rays] != int(Return.NOTHING)
+    utility = np.where(measured, state.scan_utility_bits[0, robot, : sensor.rays], -1.0)
     order = np.zeros(len(utility), np.int64)
-    burst = min(scenario.channel.burst, scenario.sensor.rays)
+    burst = min(scenario.channel.burst, sensor.rays)
     chosen = order[: select_measurements(utility, burst, scenario.channel.i_min_bits, order)]
     yaws = np.repeat(own["scan_pose"][3] + model.yaw_offsets, len(model.pitch_offsets))
     pitches = np.tile(own["scan_pose"][4] + model.pitch_offsets, len(model.yaw_offsets))
-    rays = np.stack(_gazes(yaws, pitches), axis=-1) * state.scan_range_m[0, robot][:, None]
+    rays = np.stack(_gazes(yaws, pitches), axis=-1) * state.scan_range_m[0, robot, : sensor.rays][:, None]
     return own["scan_pose"][:3] + rays[chosen]
 
 

@@ -7,6 +7,7 @@ known it leads as near to the goal as one is known to lead.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -23,7 +24,7 @@ from entropy_explore_env.belief.search_space import (
 )
 from entropy_explore_env.belief.straightening import cost_of_sight, pull_straight
 from entropy_explore_env.compilation import lean_kernel
-from entropy_explore_env.config import Scenario
+from entropy_explore_env.config import Robot, Scenario
 from entropy_explore_env.robots.motion import MoveEnd
 
 _ARRIVED, _NO_WAY, _CORNERS = MoveEnd.ARRIVED.code, MoveEnd.NO_WAY.code, MoveEnd.CORNERS.code
@@ -49,20 +50,46 @@ class Navigator(NamedTuple):
     """(2, 3) float64, start and finish of the way."""
 
 
-def lattice_of(scenario: Scenario) -> Lattice:
-    """Steps of the scenario's robots between voxel centres."""
-    radius = scenario.robot.body_radius_m / scenario.grid.voxel_size_m
-    return new_lattice(scenario.grid.shape, radius, scenario.layer)
+def lattice_of(scenario: Scenario, robot: Robot) -> Lattice:
+    """Steps of a kind of robot between voxel centres."""
+    radius = robot.body_radius_m / scenario.grid.voxel_size_m
+    return new_lattice(scenario.grid.shape, radius, scenario.layer_of(robot))
 
 
-def new_navigator(scenario: Scenario) -> Navigator:
-    """Working space for the plans of the scenario's robots."""
+def new_navigators(scenario: Scenario) -> dict[int, Navigator]:
+    """Working space for the plans of each kind of robot that plans, by its number.
+
+    They share all that is as large as the map, so they may not be used at once.
+    """
+    planning = {n: kind.robot for n, kind in enumerate(scenario.kinds) if kind.robot.navigator == "planned"}
+    navigators: dict[int, Navigator] = {}
+    first: Navigator | None = None
+    for number, robot in planning.items():
+        if first is None:
+            first = navigators[number] = new_navigator(scenario, robot)
+        else:
+            lattice, cost = lattice_of(scenario, robot), float(robot.unknown_cost)
+            navigators[number] = first._replace(lattice=lattice, unknown_cost=cost)
+    return navigators
+
+
+def touched_voxels(navigators: Mapping[int, Navigator], kinds: int) -> np.ndarray:
+    """(K, B, 3) int64, what bodies of each kind touch, by axis; their own voxel fills up."""
+    touched = {kind: navigator.lattice.touched for kind, navigator in navigators.items()}
+    balls = np.zeros((kinds, max(len(each) for each in touched.values()), 3), np.int64)
+    for kind, each in touched.items():
+        balls[kind, : len(each)] = each
+    return balls
+
+
+def new_navigator(scenario: Scenario, robot: Robot) -> Navigator:
+    """Working space for the plans of one kind of robot."""
     prior_precision = float(np.float32(scenario.sigma_prior**-2))
     return Navigator(
         search=new_search(scenario.grid.voxels),
-        lattice=lattice_of(scenario),
+        lattice=lattice_of(scenario, robot),
         known_precision=KNOWN_RATIO * prior_precision,
-        unknown_cost=float(scenario.robot.unknown_cost),
+        unknown_cost=float(robot.unknown_cost),
         source=np.zeros(1, np.int32),
         no_cells=np.zeros(0, np.int32),
         way=np.empty(scenario.grid.voxels, np.int32),

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import enum
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -62,6 +63,8 @@ SENSOR_NUMBERS = np.dtype(
         ("sigma_min", "f8"),
         ("sigma_slope_per_m", "f8"),
         ("voxels_behind", "i8"),
+        ("columns", "i8"),
+        ("rows", "i8"),
     ],
     align=True,
 )
@@ -102,20 +105,74 @@ class SensorModel(NamedTuple):
     """(1,) SENSOR_NUMBERS."""
 
 
+class TeamSensors(NamedTuple):
+    """The RangeSensors of A robots for compiled code, padded to the largest one."""
+
+    yaw_offsets: np.ndarray
+    """(A, columns) float64, relative to the gaze."""
+    pitch_offsets: np.ndarray
+    """(A, rows) float64."""
+    numbers: np.ndarray
+    """(A,) SENSOR_NUMBERS."""
+
+
 def sensor_model(sensor: RangeSensor) -> SensorModel:
     """What compiled code needs of the sensor's settings."""
     numbers = np.zeros(1, SENSOR_NUMBERS)
     numbers["max_range_m"], numbers["noise_m"] = sensor.max_range_m, sensor.range_noise_m
     numbers["sigma_min"], numbers["sigma_slope_per_m"] = sensor.sigma_min, sensor.sigma_slope_per_m
     numbers["voxels_behind"] = sensor.voxels_behind
+    numbers["columns"], numbers["rows"] = sensor.columns, sensor.rows
     step = sensor.angular_step_rad
     return SensorModel(centred_angles(sensor.columns, step), centred_angles(sensor.rows, step), numbers)
 
 
-def new_scan(grid: Grid, sensor: RangeSensor, rays: int, robots: int, reach_m: float = 0.0) -> Scan:
-    """Working space for up to `rays` rays in a workspace, and for drives of at most `reach_m`."""
-    length = sensor.max_range_m / grid.voxel_size_m
-    longest = longest_crossing(*grid.shape, length, sensor.voxels_behind)
+def team_sensors(sensors: Sequence[RangeSensor]) -> TeamSensors:
+    """What compiled code needs of the sensors of a team, robot by robot."""
+    models = [sensor_model(sensor) for sensor in sensors]
+    columns, rows = (max(len(model[axis]) for model in models) for axis in (0, 1))
+    yaws, pitches = np.zeros((len(models), columns)), np.zeros((len(models), rows))
+    for robot, model in enumerate(models):
+        yaws[robot, : len(model.yaw_offsets)] = model.yaw_offsets
+        pitches[robot, : len(model.pitch_offsets)] = model.pitch_offsets
+    return TeamSensors(yaws, pitches, np.concatenate([model.numbers for model in models]))
+
+
+@inlined_kernel
+def sensor_of(sensors, robot):
+    """The SensorModel of one robot of a team."""
+    numbers = sensors.numbers[robot]
+    return SensorModel(
+        sensors.yaw_offsets[robot, : numbers.columns],
+        sensors.pitch_offsets[robot, : numbers.rows],
+        sensors.numbers[robot : robot + 1],
+    )
+
+
+@inlined_kernel
+def first_rays(scan, count):
+    """The working space of a scan of so many rays."""
+    return Scan(
+        scan.rays[:count],
+        scan.utility[:count],
+        scan.crossed,
+        scan.coverage,
+        scan.entered,
+        scan.way,
+        scan.way_entered,
+        scan.order[:count],
+        scan.bodies,
+    )
+
+
+def new_scan(
+    grid: Grid, sensors: Sequence[RangeSensor], rays: int, robots: int, reach_m: float = 0.0
+) -> Scan:
+    """Working space for up to `rays` rays of any of the sensors, and for drives of at most `reach_m`."""
+    longest = max(
+        longest_crossing(*grid.shape, sensor.max_range_m / grid.voxel_size_m, sensor.voxels_behind)
+        for sensor in sensors
+    )
     farthest = longest_crossing(*grid.shape, reach_m / grid.voxel_size_m, 1)
     return Scan(
         rays=np.zeros(rays, RAY),

@@ -12,7 +12,7 @@ import numpy as np
 from scipy import ndimage
 from scipy.spatial import ConvexHull
 
-from entropy_explore_env.config import Grid, Scenario
+from entropy_explore_env.config import Grid, RobotKind, Scenario
 from entropy_explore_env.errors import WorldError
 
 
@@ -105,21 +105,36 @@ class World:
     def _layouts(self) -> dict[tuple[float, int | None, int, tuple[float, float, float] | None], Layout]:
         return {}
 
-    def layout(self, scenario: Scenario) -> Layout:
-        """Where robots of this scenario can start and go, and what they can see; worked out once.
+    def layout(self, scenario: Scenario, kind: RobotKind | None = None) -> Layout:
+        """Where robots of a scenario can start and go, and what they can see; worked out once.
+
+        Args:
+            scenario: The task.
+            kind: Of the robots; None = the first.
 
         Raises:
             WorldError: No voxel has room for a robot.
         """
-        height = scenario.layer
-        sensor, level = scenario.sensor, None
+        robot, sensor = (scenario.robot, scenario.sensor) if kind is None else (kind.robot, kind.sensor)
+        height, level = scenario.layer_of(robot), None
         if height is not None and not scenario.grid.flat:
             steepest = 0.5 * (sensor.rows - 1) * sensor.angular_step_rad
-            level = scenario.robot.sensor_height_m, steepest, sensor.max_range_m
-        key = (scenario.robot.body_radius_m, height, sensor.voxels_behind, level)
+            level = robot.sensor_height_m, steepest, sensor.max_range_m
+        key = (robot.body_radius_m, height, sensor.voxels_behind, level)
         if key not in self._layouts:
             self._layouts[key] = self._laid_out(*key)
         return self._layouts[key]
+
+    def visible(self, scenario: Scenario) -> np.ndarray:
+        """(X, Y, Z) bool, which voxels some robot of the team can see at all."""
+        first, *others = (self.layout(scenario, kind).visible for kind in scenario.kinds)
+        return np.logical_or.reduce([first, *others]) if others else first
+
+    def visible_voxels(self, scenario: Scenario) -> int:
+        """How many voxels some robot of the team can see at all."""
+        if len(scenario.kinds) == 1:
+            return self.layout(scenario).visible_voxels
+        return int(self.visible(scenario).sum())
 
     def _laid_out(
         self,

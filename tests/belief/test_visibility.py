@@ -82,7 +82,7 @@ def test_a_scan_brings_what_was_expected_where_the_belief_is_right_about_obstacl
     start = rng.uniform(0.5, np.array(SIZE) - 0.5)
     viewpoint = (*start, yaw, pitch)
     hoped = expected(truth, precision, viewpoint, sight(sensor=sensor), sensor=sensor)
-    scan = new_scan(Grid(SIZE, 0.5), sensor, sensor.rays, 1)
+    scan = new_scan(Grid(SIZE, 0.5), [sensor], sensor.rays, 1)
     chance = np.zeros(1, np.uint64)
     take_scan(scan, sensor_model(sensor), truth.ravel(), SIZE, 0.5, tuple(start), yaw, pitch, 0, chance)
     scan.order[:] = np.arange(sensor.rays)

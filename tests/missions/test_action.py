@@ -25,9 +25,9 @@ def decode(rules, pose, action):
     viewpoint = np.full(5, np.nan)
     pose = np.asarray(pose, np.float64)
     if np.ndim(action) == 0:
-        decode_action(rules, pose, np.zeros(5), int(action), viewpoint)
+        decode_action(rules, 0, pose, np.zeros(5), int(action), viewpoint)
     else:
-        decode_action(rules, pose, np.asarray(action).astype(np.float64), 0, viewpoint)
+        decode_action(rules, 0, pose, np.asarray(action).astype(np.float64), 0, viewpoint)
     return viewpoint
 
 
@@ -208,7 +208,7 @@ def test_the_mask_marks_moves_to_voxels_inside_within_reach_and_not_believed_cov
     mean = rng.choice(np.array([0.0, 0.5, 0.51, 1.0], np.float32), grid.shape)
     start = np.array([rng.uniform(0, n) for n in grid.shape])
     mask = np.full(len(rules.moves) * gazes, 7, np.float32)
-    write_mask(rules, start, mean.ravel(), mask)
+    write_mask(rules, 0, start, mean.ravel(), mask)
     pose = np.array([*start * 0.5, 0.0, 0.0])
     for move, marks in enumerate(mask.reshape(-1, gazes)):
         voxel = np.floor(start).astype(int) + rules.moves[move]

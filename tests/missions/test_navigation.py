@@ -114,7 +114,8 @@ def test_threads_batches_and_pickling_change_nothing():
 def test_the_memory_of_plans_is_not_pickled_and_taken_only_where_robots_plan():
     missions = started(WANDERERS)
     assert "_navigators" not in missions.__getstate__()
-    assert not started(with_settings(WANDERERS, {"robot": {"navigator": "straight"}}))._navigators
+    straight = started(with_settings(WANDERERS, {"robot": {"navigator": "straight"}}))
+    assert not straight._navigators[0] and straight._balls is None
 
 
 def test_messages_of_scans_under_way_find_room_in_the_mail():

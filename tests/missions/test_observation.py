@@ -247,7 +247,7 @@ def test_panorama_is_what_a_scan_there_would_bring_if_the_belief_were_the_truth(
         settings.sigma_slope_per_m,
         voxels_behind=settings.voxels_behind,
     )
-    model, scan = sensor_model(one_ray), new_scan(grid, one_ray, 1, 1)
+    model, scan = sensor_model(one_ray), new_scan(grid, [one_ray], 1, 1)
     for robot, part in enumerate(parts):
         start = (pose_of(missions, robot)[:3] - grid.origin_m) / grid.voxel_size_m
         truth = missions.mean[0, robot].ravel().copy()

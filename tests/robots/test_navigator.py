@@ -36,7 +36,7 @@ def plan(scenario, solid, start, goal, known=None, places=32):
     mean = solid.astype(np.float32).ravel()
     precision = np.full(mean.shape, KNOWN) if known is None else np.where(known.ravel(), KNOWN, PRIOR)
     points = np.full((places, 3), np.nan)
-    count, code = find_way(new_navigator(scenario), mean, precision, start, goal, points)
+    count, code = find_way(new_navigator(scenario, scenario.robot), mean, precision, start, goal, points)
     assert np.isnan(points[count:]).all()
     return points[:count], list(MoveEnd)[code]
 
@@ -146,7 +146,7 @@ def test_who_knows_the_world_meets_nothing_and_gets_wherever_a_way_leads(seed, s
         assert not line_believed_blocked(
             occupied.ravel().astype(np.float32),
             shape,
-            lattice_of(scenario).touched,
+            lattice_of(scenario, scenario.robot).touched,
             radius / 0.5,
             tuple(begin),
             tuple(finish),
@@ -163,7 +163,8 @@ def test_what_lies_within_the_body_s_reach_blocks_a_line():
     """A body of 1.2 edges on a line along y through x = 3: covered voxels one and two columns beside it."""
     size = (7, 11, 1)
     crossed, entered = ray_space(size)
-    ball = lattice_of(planner(body_radius_m=0.6)).touched
+    wide = planner(body_radius_m=0.6)
+    ball = lattice_of(wide, wide.robot).touched
 
     def blocked(covered, begin_y):
         mean = np.full(size, 0.5, np.float32)

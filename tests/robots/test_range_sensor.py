@@ -31,7 +31,7 @@ COARSE = RangeSensor((math.pi / 2, math.pi / 3), math.pi / 12)
 def scan_of(truth, start, yaw=0.0, pitch=0.0, sensor=COARSE, voxel_size_m=0.5, bodies=(), seed=1):
     """What a sensor measures in a world; start and bodies in grid units."""
     grid = Grid(truth.shape, voxel_size_m)
-    scan = new_scan(grid, sensor, sensor.rays, 1 + len(bodies))
+    scan = new_scan(grid, [sensor], sensor.rays, 1 + len(bodies))
     scan.bodies[: len(bodies)] = bodies if len(bodies) else 0.0
     take_scan(
         scan,
@@ -298,7 +298,7 @@ def test_a_measurement_retold_influences_the_voxels_that_it_influenced_first(vox
     truth, start = random_cover(SIZE, 0.1, 1), np.array([3.4, 5.3, 2.6])
     scan = scan_of(truth, start, 0.3, 0.1, sensor, voxel_size_m)
     grid = Grid(SIZE, voxel_size_m)
-    told = new_scan(grid, sensor, sensor.rays, 1)
+    told = new_scan(grid, [sensor], sensor.rays, 1)
     for name in ("direction", "length", "returned"):
         told.rays[name] = scan.rays[name]
     numbers = sensor_model(sensor).numbers[0]

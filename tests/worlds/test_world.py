@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from entropy_explore_env.config import Grid, with_settings
+from entropy_explore_env.config import Grid, Robot, with_settings
 from entropy_explore_env.errors import WorldError
 from entropy_explore_env.worlds.world import Barrier, World
 from tests.reference.scenes import drawn, free_box, random_cover, seeds
@@ -138,12 +138,12 @@ def test_a_divided_room_by_hand():
 def test_planar_robots_start_in_their_plane():
     world = world_of(divided_room())
     planar = free_box(grid=world.grid, robot={"motion": "planar", "sensor_height_m": 1.2})
-    assert planar.layer == 2
+    assert planar.layer_of(planar.robot) == 2
     starts = np.stack(np.unravel_index(world.layout(planar).starts, SIZE), axis=-1)
     assert (starts[:, 2] == 2).all()
     assert len(starts) == 4 * 11 - 9
-    assert free_box().layer is None
-    assert free_box(grid=Grid((9, 6, 1), 0.5)).layer == 0
+    assert free_box().layer_of(Robot()) is None
+    assert free_box(grid=Grid((9, 6, 1), 0.5)).layer_of(Robot()) == 0
 
 
 def terrain() -> World:

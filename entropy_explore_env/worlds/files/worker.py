@@ -91,7 +91,7 @@ def _read(reader: Any, request: dict[str, Any]) -> Voxels:  # noqa: ANN401 - a m
 
 
 def _limit_memory(most_bytes: int) -> None:
-    """Let this process hold no more than so much; where the system does not tell what it holds, any amount."""
+    """Let this process hold no more than so much; any amount where the system does not tell what it holds."""
     try:
         mapped, resident = (int(pages) for pages in Path("/proc/self/statm").read_text().split()[:2])
     except OSError:

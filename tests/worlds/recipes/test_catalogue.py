@@ -23,6 +23,7 @@ FREE_SHARE = {
     "room-furnished": (0.9, 0.99),
     "office": (0.94, 0.98),
     "office-3d": (0.84, 0.92),
+    "office-mixed": (0.7, 0.92),
     "corridor": (0.2, 0.55),
     "cluttered": (0.82, 0.9),
     "hybrid": (0.5, 0.85),
@@ -78,7 +79,7 @@ def require_connected(world, what):
 def test_robots_of_its_scenario_can_go_wherever_they_fit(name):
     scenario = NATURAL[name]
     low, high = FREE_SHARE[name]
-    plane = scenario.layer
+    plane = scenario.layer_of(scenario.robot)
     hashes = set()
     for seed in range(SEEDS.get(name, 50)):
         world = RECIPES[scenario.world](scenario.grid, np.random.default_rng(seed))
