@@ -1,7 +1,7 @@
 """Shortest ways: geodesic Voronoi cells beside SciPy's Dijkstra, and plans across a large floor.
 
 Both sides get the same steps at the same costs. SciPy's graph is made before the clock starts; ours
-is the belief itself.
+is the field of rates, or the belief, itself.
 """
 
 from __future__ import annotations
@@ -14,10 +14,10 @@ from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 
 from benchmarks.rows import Effort, Goal, Row, alone, compared, interleave, timed
+from entropy_explore_env.belief.geodesic_cells import new_tessellation, tessellate
 from entropy_explore_env.belief.lattice import belief_costs, new_lattice
 from entropy_explore_env.belief.planning import search_ways
-from entropy_explore_env.belief.search_space import cost_to, new_search
-from entropy_explore_env.compilation import kernel
+from entropy_explore_env.belief.search_space import new_search
 
 MAP = (1000, 783, 1)
 """The cluttered map of Bhattacharya, 1000 × 783."""
@@ -75,24 +75,10 @@ class Search:
         parts = new_search(self.covered.size), lattice, belief_costs(*belief, _PRIOR)
         object.__setattr__(self, "_parts", parts)
 
-    def cells(self, sources: np.ndarray, cells: np.ndarray) -> None:
-        """Fill (V,) int32 with the nearest source of each voxel."""
-        search_ways(*self._parts, sources, -1, math.inf, cells)  # type: ignore[attr-defined]
-
     def cost(self, start: int, goal: int) -> float:
         """Cost of a way."""
         sources = np.array([start], np.int32)
         return search_ways(*self._parts, sources, goal, math.inf, _NO_CELLS)  # type: ignore[attr-defined]
-
-    def costs(self, voxels: np.ndarray) -> np.ndarray:
-        """Costs of voxels by the latest search."""
-        return _costs(self._parts[0], voxels)  # type: ignore[attr-defined]
-
-
-@kernel
-def _costs(search: object, voxels: np.ndarray) -> np.ndarray:
-    """Costs of (N,) voxels by a search, (N,) float64."""
-    return np.array([cost_to(search, voxel) for voxel in voxels])
 
 
 def planning_rows(effort: Effort) -> list[Row]:
@@ -105,15 +91,15 @@ def voronoi_row(shape: tuple[int, int, int], effort: Effort) -> Row:
     covered = cluttered(shape, _MAP_SHARE)
     free = np.flatnonzero(~covered)
     sources = np.random.default_rng(1).choice(free, SOURCES, replace=False).astype(np.int32)
-    graph, ours = step_graph(covered), Search(covered)
-    cells = np.full(covered.size, -1, np.int32)
-    ours.cells(sources, cells)
+    graph, ours = step_graph(covered), new_tessellation(shape)
+    rates = np.where(covered, np.inf, 1.0).astype(np.float32)
+    tessellate(ours, rates, sources)
     theirs = dijkstra(graph, indices=sources, min_only=True)
-    if not np.allclose(ours.costs(np.arange(covered.size)), theirs, rtol=1e-6):
+    if not np.allclose(ours.costs.ravel(), theirs, rtol=1e-6):
         raise RuntimeError("our costs are not SciPy's")
     taken = interleave(
         {
-            "ours": lambda _: timed(lambda: ours.cells(sources, cells)),
+            "ours": lambda _: timed(lambda: tessellate(ours, rates, sources)),
             "scipy": lambda _: timed(lambda: dijkstra(graph, indices=sources, min_only=True)),
         },
         effort.long_rounds,
