@@ -39,6 +39,7 @@ SIBLINGS = {
         "search_space",
         "planning",
         "straightening",
+        "geodesic_cells",
     ),
     "robots": ("range_sensor", "motion", "navigator", "channel"),
     "missions": (
