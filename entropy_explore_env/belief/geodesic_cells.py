@@ -134,7 +134,7 @@ def _moves_in_space(strides: tuple[int, int, int]) -> np.ndarray:
 
     The axes come first, so that the first moves are those that others need.
     """
-    moves = [move for move in itertools.product((-1, 0, 1), repeat=3) if any(move)]
+    moves: list[tuple[int, ...]] = [m for m in itertools.product((-1, 0, 1), repeat=3) if any(m)]
     moves.sort(key=lambda move: sum(map(abs, move)))
     rows = []
     for move in moves:
