@@ -51,7 +51,7 @@ def main(words: Sequence[str]) -> int:
     args = parse(Args, words, description=__doc__)
     record = load_record(args.record)
     if args.world is not None:
-        record = replace(record, scenario=replace(record.scenario, world=args.world))
+        record = replace(record, scenario=replace(record.scenario, world=args.world), world=None)
     wanted = Wanted(args.out, args.gif, args.mp4, None, args.rerun, recorded=False)
     wanted.prepare()
     started = time.perf_counter()
@@ -85,7 +85,8 @@ def _replayed(
     record: MissionRecord, log: MissionLog, show: Callable[[EntropyExploreEnv], None]
 ) -> EntropyExploreEnv:
     """The environment after the commands of the record, or after the mission's end if that came earlier."""
-    env = EntropyExploreEnv(record.scenario)
+    world = {} if record.world is None else {"world": record.world}
+    env = EntropyExploreEnv(record.scenario, **world)
     env.reset(seed=record.seed)
     for _ in range(record.episode):
         env.reset()

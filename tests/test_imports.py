@@ -57,7 +57,7 @@ SIBLINGS = {
         "missions",
         "view",
     ),
-    "worlds": ("world", "splits", "recipes", "files", "load", "pictures", "__main__"),
+    "worlds": ("world", "splits", "recipes", "files", "load", "given", "pictures", "__main__"),
     "worlds/recipes": (
         "plan",
         "connectivity",

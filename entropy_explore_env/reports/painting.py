@@ -12,6 +12,7 @@ from entropy_explore_env.reports.animation import Window
 from entropy_explore_env.reports.projection import shares_left
 from entropy_explore_env.reports.recording import poses_now
 from entropy_explore_env.reports.rendering import Frame, draw_frame
+from entropy_explore_env.worlds.given import GIVEN
 from entropy_explore_env.worlds.recipes.catalogue import RECIPES
 
 RENDER_MODES = ("human", "rgb_array")
@@ -37,10 +38,12 @@ def remaining_share(missions: Missions, mission: int) -> np.ndarray:
     return (missions.state.robots[mission]["entropy_bits"] - end) / (start - end)
 
 
-def world_name(missions: Missions) -> str:
-    """What the world of the missions is called: the scenario's name, or that of the world's file."""
-    world = missions.scenario.world
-    return missions.scenario.name if world in RECIPES else Path(world).stem
+def world_name(missions: Missions, mission: int) -> str:
+    """What a mission's world is called: the scenario's name, or that of the world's file or of the World."""
+    name, world = missions.scenario.world, missions.worlds[mission]
+    if name == GIVEN and world is not None:
+        return world.name
+    return missions.scenario.name if name in RECIPES else Path(name).stem
 
 
 class Painter:
@@ -121,7 +124,7 @@ class Painter:
             paths_m=[places[:, robot] for robot in range(len(robots))],
             curve_s=np.asarray(self._times),
             curve_share=shares,
-            title=f"{world_name(missions)}: what robot_0 knows",
+            title=f"{world_name(missions, self._number)}: what robot_0 knows",
             status=status,
         )
         return draw_frame(frame)

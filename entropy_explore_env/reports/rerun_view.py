@@ -62,7 +62,7 @@ class RerunView:
             raise MissingExtraError("rerun-sdk", "viewer") from error
         rr: Any = rerun  # its names come from modules that type checkers do not follow
         self.path, self._missions, self._rr = path, missions, rr
-        name = f"{world_name(missions)}, seed {missions.seeds[0]}"
+        name = f"{world_name(missions, 0)}, seed {missions.seeds[0]}"
         together = rr.ChunkBatcherConfig(flush_tick=3600.0, flush_num_bytes=1 << 22)
         self._stream = rr.RecordingStream("entropy_explore_env", recording_id=name, batcher_config=together)
         handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")

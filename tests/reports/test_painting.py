@@ -19,6 +19,7 @@ from entropy_explore_env.reports.painting import (
     remaining_share,
 )
 from entropy_explore_env.reports.rendering import Frame, draw_frame
+from entropy_explore_env.worlds.world import World
 from tests.reference.scenes import free_box, random_actions, started
 
 FLAT = {"grid": Grid((13, 9, 1), 0.5, (-3.0, 1.0, 0.0)), "world": "furnished"}
@@ -132,6 +133,18 @@ def test_a_picture_shows_the_first_mission_as_robot_0_knows_it(changes, frames):
     said = " ".join(frame.status)
     assert f"time {times[-1]:,.0f} s" in said and f"scans {robots['scans'].sum():,}" in said
     assert f"shared {robots['measurements_sent'].sum():,}" in said
+
+
+def test_pictures_name_the_world_of_their_own_mission(frames):
+    grid = Grid((9, 12, 7), 0.5)
+    given = [World(grid, np.zeros(grid.shape, bool), name) for name in ("kitchen", "cellar")]
+    missions = Missions(free_box(robots=2), 2, given=given)
+    missions.reset_some(range(2), [4, 5])
+    for number in range(2):
+        painter = Painter("rgb_array", number)
+        painter.watch(missions)
+        painter.paint(missions)
+    assert [frame.title.split(":")[0] for frame in frames] == ["kitchen", "cellar"]
 
 
 def test_a_robot_under_way_is_drawn_where_it_is(frames):
