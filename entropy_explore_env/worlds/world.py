@@ -162,6 +162,8 @@ class World:
         starts = _largest_component(room)
         if not starts.any():
             allowed = f"a world with room for a body of radius {body_radius_m} m"
+            if height is not None and not self.grid.flat:
+                allowed += f" in layer {height}, where planar robots stay"
             raise WorldError("world", self.name, allowed)
         labels, _ = connected_parts(~self.occupied)
         seen = np.isin(labels, np.unique(labels[starts]))
