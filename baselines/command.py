@@ -20,10 +20,10 @@ from typing import TYPE_CHECKING, Any, TypeVar
 from entropy_explore_env.errors import EntropyExploreError, MissingExtraError, SettingError
 
 if TYPE_CHECKING:
-    from tyro.conf import Positional
+    from tyro.conf import OmitArgPrefixes, Positional
 else:
     try:
-        from tyro.conf import Positional
+        from tyro.conf import OmitArgPrefixes, Positional
     except ImportError:  # `parse` says what is missing
 
         class Positional:
@@ -33,7 +33,9 @@ else:
                 """The kind itself."""
                 return kind
 
+        OmitArgPrefixes = Positional
 
+__all__ = ["OmitArgPrefixes", "Positional"]  # for the commands
 Arguments = TypeVar("Arguments")
 
 BAD_INPUT = 2

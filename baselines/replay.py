@@ -71,7 +71,7 @@ def main(words: Sequence[str]) -> int:
     if args.json:
         print_json(figures)
     else:
-        print_table(figures, written)
+        print_table(figures, written, env.scenario)
     if not same:
         versions = f"recorded by version {record.library}, replayed by {VERSION}"
         print(f"the end state differs from the record's: {versions}", file=sys.stderr)

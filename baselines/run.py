@@ -12,14 +12,14 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
-from baselines.command import Positional, parse, print_json, run_command
+from baselines.command import OmitArgPrefixes, Positional, parse, print_json, run_command
 from baselines.mission import run_mission, scripted
 from baselines.mission_log import MissionLog, Wanted
 from baselines.strategies import make_strategy
 from baselines.terminal import print_table, progress_bar
-from entropy_explore_env.config import Channel, Ending, RangeSensor, Robot, Scenario, with_settings
+from baselines.world_file import Reading, world_settings
+from entropy_explore_env.config import Channel, Ending, RangeSensor, Robot, Scenario
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.reports.metrics import mission_figures
@@ -42,6 +42,7 @@ class Args:
     """A world file in place of the scenario's world; entropy_explore_env.worlds lists the kinds."""
     voxel_size_m: float | None = None
     """Resample the world file's voxels to this size; default: the scenario's."""
+    world_file: OmitArgPrefixes[Reading] = dataclasses.field(default_factory=Reading)
     out: Path | None = None
     """Folder for mission.json, mission.png, mission.gif and mission.npz."""
     gif: Path | None = None
@@ -65,12 +66,11 @@ def main(words: Sequence[str]) -> int:
     named = parse(Args, words, default=_defaults(ROOM), description=__doc__).scenario
     args = parse(Args, words, default=_defaults(find_scenario(named)), description=__doc__)
     strategy = make_strategy(args.strategy)
-    scenario = _scenario(args)
     if args.seed < 0:
         raise SettingError("seed", args.seed, "a whole number ≥ 0")
+    env = _env(args)
     wanted = Wanted(args.out, args.gif, args.mp4, args.record, args.rerun)
     wanted.prepare()
-    env = EntropyExploreEnv(scenario)
     started = time.perf_counter()
     title = f"{args.scenario}, {args.strategy}"
     with MissionLog(wanted) as log, progress_bar(title, hidden=args.json) as show:
@@ -91,7 +91,7 @@ def main(words: Sequence[str]) -> int:
     if args.json:
         print_json(figures)
     else:
-        print_table(figures, written)
+        print_table(figures, written, env.scenario)
     return 0
 
 
@@ -106,19 +106,11 @@ def _defaults(scenario: Scenario) -> Args:
     )
 
 
-def _scenario(args: Args) -> Scenario:
-    """The scenario with the command line's settings."""
-    base = scripted(find_scenario(args.scenario))
-    settings: dict[str, Any] = {"scored": True} | {
-        name: getattr(args, name) for name in ("robots", "robot", "sensor", "channel", "ending")
-    }
-    if args.world is not None:
-        settings["world"] = args.world
-    elif args.voxel_size_m is not None:
-        raise SettingError("voxel_size_m", args.voxel_size_m, "given together with --world only")
-    if args.voxel_size_m is not None:
-        settings["grid"] = {"voxel_size_m": args.voxel_size_m}
-    return with_settings(base, settings)
+def _env(args: Args) -> EntropyExploreEnv:
+    """The scenario with the command line's settings, in its world or in the file's."""
+    settings = {name: getattr(args, name) for name in ("robots", "robot", "sensor", "channel", "ending")}
+    world = world_settings(args.world, args.voxel_size_m, args.world_file)
+    return EntropyExploreEnv(scripted(find_scenario(args.scenario)), scored=True, **settings, **world)
 
 
 if __name__ == "__main__":

@@ -8,8 +8,10 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from entropy_explore_env.config import Scenario, with_settings
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.reports.painting import remaining_share
+from entropy_explore_env.scenarios import SCENARIOS
 
 
 @contextmanager
@@ -72,7 +74,7 @@ _ROWS: tuple[tuple[str, str, Callable[[Any], str]], ...] = (
     ("entropy at the end", "entropy_end_bits", lambda v: f"{v:,.0f} bits"),
     ("driven", "distance_m", lambda v: f"{v:,.1f} m"),
     ("blocked moves", "blocked_moves", lambda v: f"{v:,}"),
-    ("computed in (with compiling and drawing)", "wall_s", lambda v: f"{v:,.2f} s"),
+    ("computed, compiled and drawn in", "wall_s", lambda v: f"{v:,.2f} s"),
 )
 
 
@@ -82,7 +84,19 @@ def named(figures: dict[str, Any]) -> str:
     return figures["scenario"] if same else f"{figures['scenario']} ({figures['world']})"
 
 
-def print_table(figures: dict[str, Any], written: list[Path]) -> None:
+def _setting(scenario: Scenario) -> Iterator[tuple[str, str]]:
+    """Where a mission took place and whose robots were there: rows of the table."""
+    grid = scenario.grid
+    yield "world", f"{' × '.join(map(str, grid.shape))} voxels of {grid.voxel_size_m:g} m"
+    yield "its size", f"{' × '.join(f'{edge_m:.4g}' for edge_m in grid.size_m)} m"
+    named = SCENARIOS.get(scenario.name)
+    if named is not None:
+        usual = with_settings(named, {"grid": grid})  # in a 2-D world the sensor is level
+        changed = (usual.robot, usual.sensor) != (scenario.robot, scenario.sensor)
+        yield "robots and sensor", f"those of {named.name}" + (", changed" if changed else "")
+
+
+def print_table(figures: dict[str, Any], written: list[Path], scenario: Scenario) -> None:
     """Print what a mission came to, and the files that were written."""
     from rich.console import Console
     from rich.table import Table
@@ -95,6 +109,8 @@ def print_table(figures: dict[str, Any], written: list[Path]) -> None:
     marks = (figures["t50_s"], figures["t90_s"], figures["t99_s"])
     reached = ", ".join("-" if mark is None else f"{mark:,.0f}" for mark in marks)
     values = {**figures, **figures.get("joint", {}), "reached": reached + " s"}
+    for label, shown in _setting(scenario):
+        table.add_row(label, shown)
     for label, name, shown in _ROWS:
         if values.get(name) is not None:
             table.add_row(label, shown(values[name]))
