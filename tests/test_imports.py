@@ -23,7 +23,7 @@ LAYERS = (
     ("worlds",),
     ("scenarios", "settings_json"),
     ("config", "randomness"),
-    ("validation",),
+    ("validation", "command"),
     ("errors", "compilation", "writing", "version"),
 )
 """From the top down: a layer may import those below it."""
@@ -126,6 +126,7 @@ STRATEGIES_SEE = (
     "settings_json",
     "reports",
     "errors",
+    "command",
     "compilation",
     "writing",
     "version",

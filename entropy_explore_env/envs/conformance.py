@@ -9,7 +9,6 @@ order, and the same bits in every array and number.
 
 from __future__ import annotations
 
-import argparse
 import copy
 import itertools
 import json
@@ -18,12 +17,13 @@ import os
 import pickle
 import subprocess
 import sys
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from typing import Any, NoReturn
+from typing import Any
 
 import numpy as np
 
+from entropy_explore_env.command import LineParser, run_command
 from entropy_explore_env.config import Scenario
 from entropy_explore_env.envs.episodes import (
     EPISODES,
@@ -365,24 +365,16 @@ def check_conformance(
         report(f"{check.__name__}: {(check.__doc__ or '').strip()}")
 
 
-class _Parser(argparse.ArgumentParser):
-    """Refuses in one line, as all commands do."""
-
-    def error(self, message: str) -> NoReturn:
-        """Say what does not fit, and leave with 2."""
-        self.exit(2, f"error: {message}\n")
-
-
-def main(arguments: list[str] | None = None) -> int:
-    """The command; returns its exit status: 0 all holds, 1 something does not, 2 bad input."""
-    parser = _Parser("python -m entropy_explore_env.envs.conformance")
+def main(words: Sequence[str]) -> int:
+    """The command; returns its exit code: 0 all holds, 1 something does not."""
+    parser = LineParser("python -m entropy_explore_env.envs.conformance")
     parser.add_argument("scenario", metavar="SCENARIO", help="name of a scenario")
     parser.add_argument("--world", help="a world file in place of the scenario's world")
     parser.add_argument("--robots", type=int, help="team size; default: the scenario's")
     parser.add_argument("--steps", type=int, default=100, help="an episode is cut off after so many")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--json", action="store_true", help="print one JSON object and nothing else")
-    given = parser.parse_args(arguments)
+    given = parser.parse_args(words)
     settings = {name: value for name in ("robots", "world") if (value := getattr(given, name)) is not None}
     held: list[str] = []
 
@@ -396,12 +388,6 @@ def main(arguments: list[str] | None = None) -> int:
         check_conformance(given.scenario, steps=given.steps, seed=given.seed, report=report, **settings)
     except ConformanceError as error:
         broken = str(error)
-    except EntropyExploreError as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 2
-    except KeyboardInterrupt:
-        print("interrupted", file=sys.stderr)
-        return 130
     if given.json:
         print(json.dumps({"scenario": given.scenario, "held": held, "broken": broken}))
     elif broken is not None:
@@ -410,4 +396,4 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(run_command(main))
