@@ -68,7 +68,14 @@ def parse(
     try:
         with contextlib.redirect_stderr(complaint):
             start = kind() if default is None else default
-            return tyro.cli(kind, prog=_program(), args=list(words), description=description, default=start)
+            return tyro.cli(
+                kind,
+                prog=_program(),
+                args=list(words),
+                description=description,
+                default=start,
+                config=(tyro.conf.DisallowNone,),  # options that are not given are None: nobody types it
+            )
     except SystemExit as stop:
         if stop.code in (0, None):
             raise

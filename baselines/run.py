@@ -8,21 +8,19 @@ series), `mission.png` (curves and maps), `mission.gif` (the mission as it went)
 from __future__ import annotations
 
 import dataclasses
-import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from baselines.command import OmitArgPrefixes, Positional, parse, print_json, run_command
+from baselines.command import OmitArgPrefixes, Positional, parse, run_command
 from baselines.mission import run_mission, scripted
-from baselines.mission_log import MissionLog, Wanted
+from baselines.mission_log import MissionLog, Outputs, Wanted, show_results
 from baselines.strategies import make_strategy
-from baselines.terminal import print_table, progress_bar
+from baselines.terminal import progress_bar
 from baselines.world_file import Reading, world_settings
 from entropy_explore_env.config import Channel, Ending, RangeSensor, Robot, Scenario
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.errors import SettingError
-from entropy_explore_env.reports.metrics import mission_figures
 from entropy_explore_env.scenarios import ROOM, find_scenario
 
 
@@ -45,16 +43,9 @@ class Args:
     world_file: OmitArgPrefixes[Reading] = dataclasses.field(default_factory=Reading)
     out: Path | None = None
     """Folder for mission.json, mission.png, mission.gif and mission.npz."""
-    gif: Path | None = None
-    """File for an animated GIF of the mission."""
-    mp4: Path | None = None
-    """File for a video of the mission (extra viewer)."""
     record: Path | None = None
     """File for the mission's record, an .npz that baselines.replay runs again."""
-    rerun: Path | None = None
-    """File for a recording, an .rrd that Rerun's viewer opens (extra viewer)."""
-    json: bool = False
-    """Print one JSON object and nothing else."""
+    output: OmitArgPrefixes[Outputs] = dataclasses.field(default_factory=Outputs)
     robot: Robot = dataclasses.field(default_factory=Robot)
     sensor: RangeSensor = dataclasses.field(default_factory=RangeSensor)
     channel: Channel = dataclasses.field(default_factory=Channel)
@@ -69,29 +60,18 @@ def main(words: Sequence[str]) -> int:
     if args.seed < 0:
         raise SettingError("seed", args.seed, "a whole number ≥ 0")
     env = _env(args)
-    wanted = Wanted(args.out, args.gif, args.mp4, args.record, args.rerun)
+    wanted = Wanted(args.output, args.out, args.record)
     wanted.prepare()
-    started = time.perf_counter()
     title = f"{args.scenario}, {args.strategy}"
-    with MissionLog(wanted) as log, progress_bar(title, hidden=args.json) as show:
+    with MissionLog(wanted) as log, progress_bar(title, hidden=args.output.json) as show:
 
         def after_step(env: EntropyExploreEnv) -> None:
             log.note(env)
             show(env)
 
         run_mission(env, strategy, args.seed, after_step, log.command)
-        figures = mission_figures(env.missions, 0, floor=True)
-        figures = {
-            "scenario": figures.pop("scenario"),
-            "strategy": args.strategy,
-            **figures,
-            "wall_s": round(time.perf_counter() - started, 3),
-        }
-        written = log.write(figures)
-    if args.json:
-        print_json(figures)
-    else:
-        print_table(figures, written, env.scenario)
+        figures, written = log.finish(args.strategy)
+    show_results(env, figures, written, args.output.json)
     return 0
 
 
