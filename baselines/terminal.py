@@ -54,6 +54,7 @@ def progress_bar(title: str, hidden: bool) -> Iterator[Callable[[EntropyExploreE
             progress.stop()
 
 
+_OF_TEAMS = ("shared_measurements", "bits_sent", "balance")
 _ROWS: tuple[tuple[str, str, Callable[[Any], str]], ...] = (
     ("finished", "finished", lambda v: "yes" if v else "no"),
     ("ended because", "end_reason", str),
@@ -87,8 +88,9 @@ def named(figures: dict[str, Any]) -> str:
 def _setting(scenario: Scenario) -> Iterator[tuple[str, str]]:
     """Where a mission took place and whose robots were there: rows of the table."""
     grid = scenario.grid
-    yield "world", f"{' × '.join(map(str, grid.shape))} voxels of {grid.voxel_size_m:g} m"
-    yield "its size", f"{' × '.join(f'{edge_m:.4g}' for edge_m in grid.size_m)} m"
+    axes = 2 if grid.flat else 3
+    yield "world", f"{' × '.join(map(str, grid.shape[:axes]))} voxels of {grid.voxel_size_m:.4g} m"
+    yield "its size", f"{' × '.join(f'{edge_m:.4g}' for edge_m in grid.size_m[:axes])} m"
     named = SCENARIOS.get(scenario.name)
     if named is not None:
         usual = with_settings(named, {"grid": grid})  # in a 2-D world the sensor is level
@@ -112,7 +114,11 @@ def print_table(figures: dict[str, Any], written: list[Path], scenario: Scenario
     for label, shown in _setting(scenario):
         table.add_row(label, shown)
     for label, name, shown in _ROWS:
-        if values.get(name) is not None:
+        alone = figures["robots"] == 1 and name in _OF_TEAMS
+        unfinished = (
+            name == "scans_over_floor" and not figures["finished"]
+        )  # the floor is that of a whole map
+        if values.get(name) is not None and not alone and not unfinished:
             table.add_row(label, shown(values[name]))
     console = Console()
     console.print(table)

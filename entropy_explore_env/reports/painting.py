@@ -10,7 +10,7 @@ from entropy_explore_env.errors import CallOrderError, SettingError
 from entropy_explore_env.missions.missions import Missions
 from entropy_explore_env.reports.animation import Window
 from entropy_explore_env.reports.projection import shares_left
-from entropy_explore_env.reports.recording import poses_now
+from entropy_explore_env.reports.recording import Ways, poses_now
 from entropy_explore_env.reports.rendering import Frame, draw_frame
 from entropy_explore_env.worlds.given import GIVEN
 from entropy_explore_env.worlds.recipes.catalogue import RECIPES
@@ -56,7 +56,7 @@ class Painter:
         self._mission: tuple[int, int] | None = None
         self._times: list[float] = []
         self._shares: list[np.ndarray] = []
-        self._places: list[np.ndarray] = []
+        self._ways = Ways(0)
 
     def watch(self, missions: Missions) -> None:
         """Note the moment after a reset or a step; a `human` sees it at once."""
@@ -66,11 +66,12 @@ class Painter:
         mission = (missions.seeds[self._number], missions.episodes[self._number])
         if mission != self._mission or time_s == 0.0:
             self._mission = mission
-            self._times, self._shares, self._places = [], [], []
+            self._times, self._shares = [], []
+            self._ways = Ways(missions.scenario.robots, self._number)
         if not self._times or time_s > self._times[-1]:  # else it stands still: others were reset
             self._times.append(time_s)
             self._shares.append(remaining_share(missions, self._number))
-            self._places.append(missions.state.robots[self._number]["goal"][:, :3].copy())
+            self._ways.note(missions)
         if self._mode == "human":
             if self._window is None:
                 self._window = Window(frames_per_s=float(FRAMES_PER_S))
@@ -104,7 +105,6 @@ class Painter:
         robots = missions.state.robots[self._number]
         time_s = float(missions.state.missions[self._number]["time_s"])
         poses = poses_now(missions, self._number)
-        places = np.stack([*self._places, poses[:, :3]]) if self._places else poses[None, :, :3]
         shares = np.stack(self._shares) if self._shares else np.zeros((0, len(robots)))
         status = (
             f"time {time_s:,.0f} s",
@@ -121,7 +121,7 @@ class Painter:
             positions_m=poses[:, :3],
             gazes_rad=poses[:, 3:],
             targets_m=robots["target"][:, :3],
-            paths_m=[places[:, robot] for robot in range(len(robots))],
+            paths_m=self._ways.so_far(missions) if self._times else [],
             curve_s=np.asarray(self._times),
             curve_share=shares,
             title=f"{world_name(missions, self._number)}: what robot_0 knows",

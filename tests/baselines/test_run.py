@@ -230,8 +230,16 @@ def test_the_table_says_whose_robots_explore_a_loaded_world(floor, command):
     ):
         lines = command(scenario, *words, *more).out.splitlines()
         assert any("robots and sensor" in line and f" {said} " in line for line in lines)
-        assert any(" 60 × 50 × 1 voxels of 0.1 m " in line for line in lines)
-        assert any(" 6 × 5 × 0.1 m " in line for line in lines)
+        assert any(" 60 × 50 voxels of 0.1 m " in line for line in lines)
+        assert any(" 6 × 5 m " in line for line in lines)
+
+
+def test_the_table_leaves_out_what_means_nothing(command):
+    """Sharing, where there is one robot; how many scans more than for a whole map, where there is none."""
+    team, alone = ("shared measurements", "bits sent", "imbalance between robots"), ("--robots", "1")
+    short, whole, single = (command("box-7x11x5", *words).out for words in (SHORT, (), alone))
+    assert all(label in whole and label not in single for label in team)
+    assert "scans over the floor" in whole and "scans over the floor" not in short
 
 
 @pytest.mark.parametrize(
