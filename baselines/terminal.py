@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -90,12 +91,15 @@ def _setting(scenario: Scenario) -> Iterator[tuple[str, str]]:
     grid = scenario.grid
     axes = 2 if grid.flat else 3
     yield "world", f"{' × '.join(map(str, grid.shape[:axes]))} voxels of {grid.voxel_size_m:.4g} m"
-    yield "its size", f"{' × '.join(f'{edge_m:.4g}' for edge_m in grid.size_m[:axes])} m"
+    edges = (f"{edge_m:.4g}" if edge_m < 1000 else f"{edge_m:,.0f}" for edge_m in grid.size_m[:axes])
+    yield "its size", f"{' × '.join(edges)} m"
     named = SCENARIOS.get(scenario.name)
     if named is not None:
         usual = with_settings(named, {"grid": grid})  # in a 2-D world the sensor is level
         changed = (usual.robot, usual.sensor) != (scenario.robot, scenario.sensor)
         yield "robots and sensor", f"those of {named.name}" + (", changed" if changed else "")
+    range_m = scenario.sensor.max_range_m
+    yield "sensor's range", "the whole world" if range_m == math.inf else f"{range_m:g} m"
 
 
 def print_table(figures: dict[str, Any], written: list[Path], scenario: Scenario) -> None:
@@ -110,7 +114,8 @@ def print_table(figures: dict[str, Any], written: list[Path], scenario: Scenario
     table.add_column(justify="right")
     marks = (figures["t50_s"], figures["t90_s"], figures["t99_s"])
     reached = ", ".join("-" if mark is None else f"{mark:,.0f}" for mark in marks)
-    values = {**figures, **figures.get("joint", {}), "reached": reached + " s"}
+    none = all(mark is None for mark in marks)
+    values = {**figures, **figures.get("joint", {}), "reached": "-" if none else reached + " s"}
     for label, shown in _setting(scenario):
         table.add_row(label, shown)
     for label, name, shown in _ROWS:

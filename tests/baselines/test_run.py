@@ -222,13 +222,14 @@ def test_a_file_without_options_stays_a_setting_of_the_scenario(floor, command, 
 
 def test_the_table_says_whose_robots_explore_a_loaded_world(floor, command):
     words = ("--world", str(floor), "--resolution-m", "0.1", "--voxel-size-m", "0.1", *SHORT)
-    for scenario, more, said in (
-        ("office", (), "those of office"),
-        ("room", (), "those of room"),
-        ("room", ("--robot.max-speed-m-s", "0.5"), "those of room, changed"),
-        ("room", ("--sensor.max-range-m", "2"), "those of room, changed"),
+    for scenario, more, said, range_said in (
+        ("office", (), "those of office", "8 m"),
+        ("room", (), "those of room", "the whole world"),
+        ("room", ("--robot.max-speed-m-s", "0.5"), "those of room, changed", "the whole world"),
+        ("room", ("--sensor.max-range-m", "2.5"), "those of room, changed", "2.5 m"),
     ):
         lines = command(scenario, *words, *more).out.splitlines()
+        assert any("sensor's range" in line and f" {range_said} " in line for line in lines)
         assert any("robots and sensor" in line and f" {said} " in line for line in lines)
         assert any(" 60 × 50 voxels of 0.1 m " in line for line in lines)
         assert any(" 6 × 5 m " in line for line in lines)
