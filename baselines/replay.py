@@ -11,6 +11,7 @@ import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -65,7 +66,7 @@ def _replayed(
     record: MissionRecord, log: MissionLog, show: Callable[[EntropyExploreEnv], None]
 ) -> EntropyExploreEnv:
     """The environment after the commands of the record, or after the mission's end if that came earlier."""
-    world = {} if record.world is None else {"world": record.world}
+    world: dict[str, Any] = {} if record.world is None else {"world": record.world}
     env = EntropyExploreEnv(record.scenario, **world)
     env.reset(seed=record.seed)
     for _ in range(record.episode):

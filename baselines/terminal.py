@@ -95,11 +95,13 @@ def _setting(scenario: Scenario) -> Iterator[tuple[str, str]]:
     yield "its size", f"{' × '.join(edges)} m"
     named = SCENARIOS.get(scenario.name)
     if named is not None:
-        usual = with_settings(named, {"grid": grid})  # in a 2-D world the sensor is level
-        changed = (usual.robot, usual.sensor) != (scenario.robot, scenario.sensor)
+        there = with_settings(named, {"grid": grid})  # in a 2-D world the sensor is level
+        usual = (there.robot, there.sensor, there.others)
+        changed = usual != (scenario.robot, scenario.sensor, scenario.others)
         yield "robots and sensor", f"those of {named.name}" + (", changed" if changed else "")
-    range_m = scenario.sensor.max_range_m
-    yield "sensor's range", "the whole world" if range_m == math.inf else f"{range_m:g} m"
+    ranges = {kind.sensor.max_range_m: None for kind in scenario.kinds}  # in order, each once
+    said = ("the whole world" if range_m == math.inf else f"{range_m:g} m" for range_m in ranges)
+    yield "sensor's range", ", ".join(said)
 
 
 def print_table(figures: dict[str, Any], written: list[Path], scenario: Scenario) -> None:
@@ -120,10 +122,8 @@ def print_table(figures: dict[str, Any], written: list[Path], scenario: Scenario
         table.add_row(label, shown)
     for label, name, shown in _ROWS:
         alone = figures["robots"] == 1 and name in _OF_TEAMS
-        unfinished = (
-            name == "scans_over_floor" and not figures["finished"]
-        )  # the floor is that of a whole map
-        if values.get(name) is not None and not alone and not unfinished:
+        partial = name == "scans_over_floor" and not figures["finished"]  # the floor is a whole map's
+        if values.get(name) is not None and not alone and not partial:
             table.add_row(label, shown(values[name]))
     console = Console()
     console.print(table)

@@ -35,13 +35,13 @@ class Ways:
     def note(self, missions: Missions) -> None:
         """Note what was passed up to this moment."""
         time_s = float(missions.state.missions[self._mission]["time_s"])
-        numbers, robots = missions.rules.numbers[0], missions.state.robots[self._mission]
+        numbers, robots = missions.rules.numbers, missions.state.robots[self._mission]
         for number, robot in enumerate(robots):
             points = self.passed_m[number]
             if robot["depart_s"] != self._departed_s[number]:
                 points += [*self._ahead[number], robot["origin"][:3].copy()]
                 self._departed_s[number], self._behind[number] = float(robot["depart_s"]), 0
-            passed = int(place_at(numbers, robot, time_s)[3])
+            passed = int(place_at(numbers[number], robot, time_s)[3])
             points += list(robot["way"][self._behind[number] : passed].copy())
             self._ahead[number] = robot["way"][passed : robot["corners"]].copy()
             self._behind[number] = passed

@@ -63,13 +63,14 @@ def checked_worlds(given: object) -> tuple[World, ...]:
         SettingError: It is something else.
         WorldError: They differ in their grids.
     """
-    worlds = given if isinstance(given, list | tuple) else (given,)
-    if not worlds or not all(isinstance(world, World) for world in worlds):
+    several = given if isinstance(given, list | tuple) else (given,)
+    worlds = tuple(world for world in several if isinstance(world, World))
+    if not worlds or len(worlds) < len(several):
         raise SettingError("world", given, _ALLOWED)
     for number, world in enumerate(worlds):
         if world.grid != worlds[0].grid:
             raise WorldError(f"world[{number}].grid", world.grid, f"that of the first, {worlds[0].grid}")
-    return tuple(worlds)
+    return worlds
 
 
 def world_in_turn(given: Sequence[World], seed: int, episode: int) -> World:

@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 
+from entropy_explore_env.config import Robot, RobotKind
 from entropy_explore_env.reports.recording import Recorder, Ways, poses_now
 from tests.reference.scenes import free_box, random_actions, started
 
@@ -74,6 +75,7 @@ def test_a_recorder_follows_the_first_mission_only():
 
 WANDERERS = {
     "straight": {},
+    "mixed": {"others": (RobotKind(Robot(reach_m=2.0, max_speed_m_s=1.5, acceleration_m_s2=2.0)),)},
     "planned": {
         "world": "furnished",
         "robot": {"navigator": "planned", "reach_m": math.inf, "body_radius_m": 0.2},

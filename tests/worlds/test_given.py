@@ -52,10 +52,11 @@ def test_recipes_and_files_stay_with_the_scenario(tmp_path):
 
 
 def test_a_scenario_that_fits_the_world_alone_is_taken():
-    """The box is 3.5 m high: a sensor above it fits the tower that is given."""
+    """The box is 2.5 m high: a sensor far above it fits the tower that is given."""
     tower = World(Grid((9, 12, 40), 0.5), np.zeros((9, 12, 40), bool), "tower")
     robot = {"motion": "planar", "sensor_height_m": 15.0}
-    assert with_given_worlds(free_box(), {"world": tower, "robot": robot})[0].layer == 30
+    scenario = with_given_worlds(free_box(), {"world": tower, "robot": robot})[0]
+    assert scenario.layer_of(scenario.robot) == 30
     with pytest.raises(SettingError, match="sensor_height_m"):
         with_given_worlds(free_box(), {"world": WORLDS[0], "robot": robot})
 
