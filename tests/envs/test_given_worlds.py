@@ -28,7 +28,7 @@ def hut(row: int) -> eee.World:
 HUT, OTHER = hut(4), hut(6)
 
 
-def single() -> eee.SingleRobotEnv:
+def single() -> gymnasium.Env:
     return gymnasium.make(ROOM, world=HUT).unwrapped
 
 
