@@ -1,8 +1,7 @@
-"""The form that all commands share: arguments from a dataclass, results out, progress and errors aside.
+"""The form of the commands here: arguments from a dataclass, results out, progress and errors aside.
 
-Results go to standard output (with `--json` exactly one JSON object), progress to standard error.
-Exit codes: 0 done, 1 a claim or goal does not hold where `--strict` asked, 2 bad input, 130
-interrupted.
+Results go to standard output (with `--json` exactly one JSON object), progress to standard error. Exit codes
+are those of `entropy_explore_env.command`; 1: a claim or goal does not hold where `--strict` asked.
 """
 
 from __future__ import annotations
@@ -10,20 +9,21 @@ from __future__ import annotations
 import contextlib
 import io
 import json
-import os
 import re
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from entropy_explore_env.errors import EntropyExploreError, MissingExtraError, SettingError
+from entropy_explore_env import command
+from entropy_explore_env.command import UsageError
+from entropy_explore_env.errors import MissingExtraError, SettingError
 
 if TYPE_CHECKING:
-    from tyro.conf import Positional
+    from tyro.conf import OmitArgPrefixes, Positional
 else:
     try:
-        from tyro.conf import Positional
+        from tyro.conf import OmitArgPrefixes, Positional
     except ImportError:  # `parse` says what is missing
 
         class Positional:
@@ -33,11 +33,10 @@ else:
                 """The kind itself."""
                 return kind
 
+        OmitArgPrefixes = Positional
 
 Arguments = TypeVar("Arguments")
 
-BAD_INPUT = 2
-INTERRUPTED = 130
 _FRAME = re.compile(r"[─-╿]+")
 _TITLE = re.compile(r"^(Unrecognized options|Invalid choice|Value error|Parsing error|Required options) ")
 """What stands on the parser's frame; the message says it again."""
@@ -69,7 +68,14 @@ def parse(
     try:
         with contextlib.redirect_stderr(complaint):
             start = kind() if default is None else default
-            return tyro.cli(kind, prog=_program(), args=list(words), description=description, default=start)
+            return tyro.cli(
+                kind,
+                prog=_program(),
+                args=list(words),
+                description=description,
+                default=start,
+                config=(tyro.conf.DisallowNone,),  # options that are not given are None: nobody types it
+            )
     except SystemExit as stop:
         if stop.code in (0, None):
             raise
@@ -82,10 +88,6 @@ def _program() -> str:
     return Path(sys.argv[0]).name if module is None else f"python -m {module.name}"
 
 
-class UsageError(EntropyExploreError):
-    """The words of a command line do not fit its options."""
-
-
 def _one_line(complaint: str) -> str:
     """The parser's framed message as one line."""
     words = " ".join(_FRAME.sub(" ", complaint).split())
@@ -94,32 +96,20 @@ def _one_line(complaint: str) -> str:
 
 
 def run_command(main: Callable[[Sequence[str]], int], words: Sequence[str] | None = None) -> int:
-    """Run a command's main function; its errors become one line on standard error and an exit code.
+    """Run a command's main function as `entropy_explore_env.command` does; a missing package is bad input.
 
     Args:
         main: Takes the words of the command line, returns an exit code.
         words: None = those of the process.
     """
-    try:
-        return main(sys.argv[1:] if words is None else words)
-    except EntropyExploreError as error:
-        print("error: " + " ".join(str(error).split()), file=sys.stderr)
-        return BAD_INPUT
-    except BrokenPipeError:  # whoever read our output has seen enough
-        sys.stdout = Path(os.devnull).open("w")
-        return 0
-    except ModuleNotFoundError as error:
-        print(f"error: {error}: pip install 'entropy_explore_env[baselines]'", file=sys.stderr)
-        return BAD_INPUT
-    except OSError as error:
-        print(f"error: {error}", file=sys.stderr)
-        return BAD_INPUT
-    except MemoryError as error:
-        print(f"error: not enough memory: {error}", file=sys.stderr)
-        return BAD_INPUT
-    except KeyboardInterrupt:
-        print("interrupted", file=sys.stderr)
-        return INTERRUPTED
+
+    def with_extras(words: Sequence[str]) -> int:
+        try:
+            return main(words)
+        except ModuleNotFoundError as error:
+            raise UsageError(f"{error}: pip install 'entropy_explore_env[baselines]'") from None
+
+    return command.run_command(with_extras, words)
 
 
 def make_folder(option: str, folder: Path) -> None:

@@ -86,8 +86,8 @@ def _slice(figure: Figure, axes: Axes, recorder: Recorder, entropy: bool) -> Non
     low, size = np.asarray(grid.origin_m), grid.size_m
     extent = (low[0], low[0] + size[0], low[1], low[1] + size[1])
     image = axes.imshow(shown.T, origin="lower", extent=extent, cmap=colours, vmin=0, vmax=1, aspect="equal")
-    for robot in range(missions.scenario.robots):
-        way, colour = recorder.places_m[:, robot], COLOURS[robot % len(COLOURS)]
+    for robot, way in enumerate(recorder.ways_m):
+        colour = COLOURS[robot % len(COLOURS)]
         axes.plot(way[:, 0], way[:, 1], color=colour, linewidth=0.9)
         edge = "white" if entropy else "black"
         axes.plot(*way[0, :2], marker="o", color=colour, markersize=5, markeredgecolor=edge)

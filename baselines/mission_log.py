@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import json
+import time
 from collections.abc import Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass
@@ -11,11 +12,12 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any
 
-from baselines.command import make_folder
-from baselines.terminal import named
+from baselines.command import make_folder, print_json
+from baselines.terminal import named, print_table
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.errors import MissingExtraError, SettingError
 from entropy_explore_env.reports.animation import Film, animate, write_video
+from entropy_explore_env.reports.metrics import mission_figures
 from entropy_explore_env.reports.mission_record import CommandRecorder, save_record
 from entropy_explore_env.reports.painting import Painter
 from entropy_explore_env.reports.recording import Recorder
@@ -29,24 +31,34 @@ _VIDEO_PICTURES, _VIDEO_FRAMES_PER_S, _VIDEO_LAST = 600, 25, 50
 _SERIES_POINTS = 500
 
 
+@dataclass
+class Outputs:
+    """Files of any mission that is run or replayed, and the form of its results."""
+
+    gif: Path | None = None
+    """File for an animated GIF of the mission."""
+    mp4: Path | None = None
+    """File for a video of the mission (extra viewer)."""
+    rerun: Path | None = None
+    """File for a recording, an .rrd that Rerun's viewer opens (extra viewer)."""
+    json: bool = False
+    """Print one JSON object and nothing else."""
+
+
 @dataclass(frozen=True)
 class Wanted:
     """Which files a person asked for.
 
     Attributes:
+        outputs: Those that each have an option.
         out: Folder for mission.json, mission.png and mission.gif, and for mission.npz where it is `recorded`.
-        gif: An animated GIF.
-        mp4: A video.
         record: A mission record, an `.npz`.
-        rerun: A recording for Rerun's viewer, an `.rrd`.
         recorded: Whether the folder gets a record, too; a replay has one already.
     """
 
+    outputs: Outputs
     out: Path | None = None
-    gif: Path | None = None
-    mp4: Path | None = None
     record: Path | None = None
-    rerun: Path | None = None
     recorded: bool = True
 
     def prepare(self) -> None:
@@ -56,13 +68,14 @@ class Wanted:
             SettingError: A file or folder cannot be made.
             MissingExtraError: A package is not installed.
         """
-        for package, module, file in (("av", "av", self.mp4), ("rerun-sdk", "rerun", self.rerun)):
+        mp4, rerun = self.outputs.mp4, self.outputs.rerun
+        for package, module, file in (("av", "av", mp4), ("rerun-sdk", "rerun", rerun)):
             if file is not None and importlib.util.find_spec(module) is None:
                 raise MissingExtraError(package, "viewer")
         if self.out is not None:
             make_folder("out", self.out)
-        for option in ("gif", "mp4", "record", "rerun"):
-            file = getattr(self, option)
+        files = {"gif": self.outputs.gif, "mp4": mp4, "record": self.record, "rerun": rerun}
+        for option, file in files.items():
             if file is not None:
                 make_folder(option, file.parent)
                 if file.is_dir():
@@ -74,10 +87,15 @@ class MissionLog:
 
     def __init__(self, wanted: Wanted) -> None:
         """Take which files are wanted; `note` starts when the mission has been reset."""
-        self._wanted = wanted
+        self._wanted, self._began = wanted, time.perf_counter()
         self._painter = Painter("rgb_array")
-        self._gifs = [file for file in (wanted.out and wanted.out / "mission.gif", wanted.gif) if file]
-        films = {"gif": _GIF_PICTURES if self._gifs else 0, "mp4": _VIDEO_PICTURES if wanted.mp4 else 0}
+        self._gifs = [
+            file for file in (wanted.out and wanted.out / "mission.gif", wanted.outputs.gif) if file
+        ]
+        films = {
+            "gif": _GIF_PICTURES if self._gifs else 0,
+            "mp4": _VIDEO_PICTURES if wanted.outputs.mp4 else 0,
+        }
         self._films = {kind: Film(most) for kind, most in films.items() if most}
         self._rerun: RerunView | None = None
         self._stack = ExitStack()
@@ -93,8 +111,8 @@ class MissionLog:
 
     def _start(self, env: EntropyExploreEnv) -> None:
         self.recorder, self.commands = Recorder(env.missions), CommandRecorder(env.missions)
-        if self._wanted.rerun is not None:
-            self._rerun = self._stack.enter_context(RerunView(env.missions, self._wanted.rerun))
+        if self._wanted.outputs.rerun is not None:
+            self._rerun = self._stack.enter_context(RerunView(env.missions, self._wanted.outputs.rerun))
         self._started = True
 
     def command(self, actions: Mapping[str, Any]) -> None:
@@ -119,24 +137,36 @@ class MissionLog:
             if picture is not None:
                 film.add(time_s, picture)
 
-    def write(self, figures: dict[str, Any]) -> list[Path]:
-        """Write the files, each whole or not at all.
+    def finish(self, strategy: str, **more: Any) -> tuple[dict[str, Any], list[Path]]:  # noqa: ANN401 - JSON
+        """Sum the mission up and write the files, each whole or not at all.
 
         Args:
-            figures: Of the mission, with its `strategy`.
+            strategy: Who chose the commands.
+            **more: Further figures.
 
         Returns:
-            What was written.
+            The figures, and what was written.
         """
+        figures = mission_figures(self.recorder.missions, 0, floor=True)
+        figures = {
+            "scenario": figures.pop("scenario"),
+            "strategy": strategy,
+            **figures,
+            **more,
+            "wall_s": round(time.perf_counter() - self._began, 3),
+        }
+        return figures, self._write(figures)
+
+    def _write(self, figures: dict[str, Any]) -> list[Path]:
         wanted, written = self._wanted, []
         if wanted.out is not None:
             written += self._write_folder(wanted.out, figures)
         for file in self._gifs:
             animate(self._films["gif"].pictures(_GIF_LAST), file, _GIF_FRAME_S)
             written.append(file)
-        if wanted.mp4 is not None:
-            write_video(self._films["mp4"].pictures(_VIDEO_LAST), wanted.mp4, _VIDEO_FRAMES_PER_S)
-            written.append(wanted.mp4)
+        if wanted.outputs.mp4 is not None:
+            write_video(self._films["mp4"].pictures(_VIDEO_LAST), wanted.outputs.mp4, _VIDEO_FRAMES_PER_S)
+            written.append(wanted.outputs.mp4)
         kept = wanted.out / "mission.npz" if wanted.out is not None and wanted.recorded else None
         for file in (kept, wanted.record):
             if file is not None:
@@ -164,3 +194,11 @@ class MissionLog:
         picture = mission_picture(recorder, named(figures), figures["strategy"])
         write_atomically(folder / "mission.png", picture)
         return [folder / "mission.json", folder / "mission.png"]
+
+
+def show_results(env: EntropyExploreEnv, figures: dict[str, Any], written: list[Path], as_json: bool) -> None:
+    """Print what a mission came to: one JSON object, or a table and the files that were written."""
+    if as_json:
+        print_json(figures)
+    else:
+        print_table(figures, written, env.scenario)

@@ -8,18 +8,17 @@ where the end differs: another version of the library, or another machine's arit
 from __future__ import annotations
 
 import sys
-import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from baselines.command import Positional, parse, print_json, run_command
-from baselines.mission_log import MissionLog, Wanted
-from baselines.terminal import print_table, progress_bar
+from baselines.command import OmitArgPrefixes, Positional, parse, run_command
+from baselines.mission_log import MissionLog, Outputs, Wanted, show_results
+from baselines.terminal import progress_bar
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
-from entropy_explore_env.reports.metrics import mission_figures
 from entropy_explore_env.reports.mission_record import MissionRecord, check_world, load_record, state_digest
 from entropy_explore_env.version import VERSION
 
@@ -36,14 +35,7 @@ class Args:
     """Where the world's file lies now, if it was moved."""
     out: Path | None = None
     """Folder for mission.json, mission.png and mission.gif."""
-    gif: Path | None = None
-    """File for an animated GIF of the mission."""
-    mp4: Path | None = None
-    """File for a video of the mission (extra viewer)."""
-    rerun: Path | None = None
-    """File for a recording, an .rrd that Rerun's viewer opens (extra viewer)."""
-    json: bool = False
-    """Print one JSON object and nothing else."""
+    output: OmitArgPrefixes[Outputs] = field(default_factory=Outputs)
 
 
 def main(words: Sequence[str]) -> int:
@@ -51,32 +43,21 @@ def main(words: Sequence[str]) -> int:
     args = parse(Args, words, description=__doc__)
     record = load_record(args.record)
     if args.world is not None:
-        record = replace(record, scenario=replace(record.scenario, world=args.world))
-    wanted = Wanted(args.out, args.gif, args.mp4, None, args.rerun, recorded=False)
+        record = replace(record, scenario=replace(record.scenario, world=args.world), world=None)
+    wanted = Wanted(args.output, args.out, recorded=False)
     wanted.prepare()
-    started = time.perf_counter()
     title = f"{record.scenario.name}, replayed"
-    with MissionLog(wanted) as log, progress_bar(title, hidden=args.json) as show:
+    with MissionLog(wanted) as log, progress_bar(title, hidden=args.output.json) as show:
         env = _replayed(record, log, show)
         same = state_digest(env.missions, 0) == record.digest
-        figures = mission_figures(env.missions, 0, floor=True)
-        figures = {
-            "scenario": figures.pop("scenario"),
-            "strategy": record.strategy,
-            **figures,
-            "replayed": {"same": same, "recorded_by": record.library, "replayed_by": VERSION},
-            "wall_s": round(time.perf_counter() - started, 3),
-        }
-        written = log.write(figures)
-    if args.json:
-        print_json(figures)
-    else:
-        print_table(figures, written)
+        replayed = {"same": same, "recorded_by": record.library, "replayed_by": VERSION}
+        figures, written = log.finish(record.strategy, replayed=replayed)
+    show_results(env, figures, written, args.output.json)
     if not same:
         versions = f"recorded by version {record.library}, replayed by {VERSION}"
         print(f"the end state differs from the record's: {versions}", file=sys.stderr)
         return _DIFFERS
-    if not args.json:
+    if not args.output.json:
         print("replayed bit for bit: the end state is the record's")
     return 0
 
@@ -85,7 +66,8 @@ def _replayed(
     record: MissionRecord, log: MissionLog, show: Callable[[EntropyExploreEnv], None]
 ) -> EntropyExploreEnv:
     """The environment after the commands of the record, or after the mission's end if that came earlier."""
-    env = EntropyExploreEnv(record.scenario)
+    world: dict[str, Any] = {} if record.world is None else {"world": record.world}
+    env = EntropyExploreEnv(record.scenario, **world)
     env.reset(seed=record.seed)
     for _ in range(record.episode):
         env.reset()

@@ -8,21 +8,19 @@ series), `mission.png` (curves and maps), `mission.gif` (the mission as it went)
 from __future__ import annotations
 
 import dataclasses
-import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
-from baselines.command import Positional, parse, print_json, run_command
+from baselines.command import OmitArgPrefixes, Positional, parse, run_command
 from baselines.mission import run_mission, scripted
-from baselines.mission_log import MissionLog, Wanted
+from baselines.mission_log import MissionLog, Outputs, Wanted, show_results
 from baselines.strategies import make_strategy
-from baselines.terminal import print_table, progress_bar
-from entropy_explore_env.config import Channel, Ending, RangeSensor, Robot, Scenario, with_settings
+from baselines.terminal import progress_bar
+from baselines.world_file import Reading, world_settings
+from entropy_explore_env.config import Channel, Ending, RangeSensor, Robot, Scenario
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.errors import SettingError
-from entropy_explore_env.reports.metrics import mission_figures
 from entropy_explore_env.scenarios import ROOM, find_scenario
 
 
@@ -42,18 +40,12 @@ class Args:
     """A world file in place of the scenario's world; entropy_explore_env.worlds lists the kinds."""
     voxel_size_m: float | None = None
     """Resample the world file's voxels to this size; default: the scenario's."""
+    world_file: OmitArgPrefixes[Reading] = dataclasses.field(default_factory=Reading)
     out: Path | None = None
     """Folder for mission.json, mission.png, mission.gif and mission.npz."""
-    gif: Path | None = None
-    """File for an animated GIF of the mission."""
-    mp4: Path | None = None
-    """File for a video of the mission (extra viewer)."""
     record: Path | None = None
     """File for the mission's record, an .npz that baselines.replay runs again."""
-    rerun: Path | None = None
-    """File for a recording, an .rrd that Rerun's viewer opens (extra viewer)."""
-    json: bool = False
-    """Print one JSON object and nothing else."""
+    output: OmitArgPrefixes[Outputs] = dataclasses.field(default_factory=Outputs)
     robot: Robot = dataclasses.field(default_factory=Robot)
     sensor: RangeSensor = dataclasses.field(default_factory=RangeSensor)
     channel: Channel = dataclasses.field(default_factory=Channel)
@@ -65,33 +57,21 @@ def main(words: Sequence[str]) -> int:
     named = parse(Args, words, default=_defaults(ROOM), description=__doc__).scenario
     args = parse(Args, words, default=_defaults(find_scenario(named)), description=__doc__)
     strategy = make_strategy(args.strategy)
-    scenario = _scenario(args)
     if args.seed < 0:
         raise SettingError("seed", args.seed, "a whole number ≥ 0")
-    wanted = Wanted(args.out, args.gif, args.mp4, args.record, args.rerun)
+    env = _env(args)
+    wanted = Wanted(args.output, args.out, args.record)
     wanted.prepare()
-    env = EntropyExploreEnv(scenario)
-    started = time.perf_counter()
     title = f"{args.scenario}, {args.strategy}"
-    with MissionLog(wanted) as log, progress_bar(title, hidden=args.json) as show:
+    with MissionLog(wanted) as log, progress_bar(title, hidden=args.output.json) as show:
 
         def after_step(env: EntropyExploreEnv) -> None:
             log.note(env)
             show(env)
 
         run_mission(env, strategy, args.seed, after_step, log.command)
-        figures = mission_figures(env.missions, 0, floor=True)
-        figures = {
-            "scenario": figures.pop("scenario"),
-            "strategy": args.strategy,
-            **figures,
-            "wall_s": round(time.perf_counter() - started, 3),
-        }
-        written = log.write(figures)
-    if args.json:
-        print_json(figures)
-    else:
-        print_table(figures, written)
+        figures, written = log.finish(args.strategy)
+    show_results(env, figures, written, args.output.json)
     return 0
 
 
@@ -106,19 +86,11 @@ def _defaults(scenario: Scenario) -> Args:
     )
 
 
-def _scenario(args: Args) -> Scenario:
-    """The scenario with the command line's settings."""
-    base = scripted(find_scenario(args.scenario))
-    settings: dict[str, Any] = {"scored": True} | {
-        name: getattr(args, name) for name in ("robots", "robot", "sensor", "channel", "ending")
-    }
-    if args.world is not None:
-        settings["world"] = args.world
-    elif args.voxel_size_m is not None:
-        raise SettingError("voxel_size_m", args.voxel_size_m, "given together with --world only")
-    if args.voxel_size_m is not None:
-        settings["grid"] = {"voxel_size_m": args.voxel_size_m}
-    return with_settings(base, settings)
+def _env(args: Args) -> EntropyExploreEnv:
+    """The scenario with the command line's settings, in its world or in the file's."""
+    settings = {name: getattr(args, name) for name in ("robots", "robot", "sensor", "channel", "ending")}
+    world = world_settings(args.world, args.voxel_size_m, args.world_file)
+    return EntropyExploreEnv(scripted(find_scenario(args.scenario)), scored=True, **settings, **world)
 
 
 if __name__ == "__main__":

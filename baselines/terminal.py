@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import math
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from entropy_explore_env.config import Scenario, with_settings
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.reports.painting import remaining_share
+from entropy_explore_env.scenarios import SCENARIOS
 
 
 @contextmanager
@@ -52,6 +55,7 @@ def progress_bar(title: str, hidden: bool) -> Iterator[Callable[[EntropyExploreE
             progress.stop()
 
 
+_OF_TEAMS = ("shared_measurements", "bits_sent", "balance")
 _ROWS: tuple[tuple[str, str, Callable[[Any], str]], ...] = (
     ("finished", "finished", lambda v: "yes" if v else "no"),
     ("ended because", "end_reason", str),
@@ -72,7 +76,7 @@ _ROWS: tuple[tuple[str, str, Callable[[Any], str]], ...] = (
     ("entropy at the end", "entropy_end_bits", lambda v: f"{v:,.0f} bits"),
     ("driven", "distance_m", lambda v: f"{v:,.1f} m"),
     ("blocked moves", "blocked_moves", lambda v: f"{v:,}"),
-    ("computed in (with compiling and drawing)", "wall_s", lambda v: f"{v:,.2f} s"),
+    ("computed, compiled and drawn in", "wall_s", lambda v: f"{v:,.2f} s"),
 )
 
 
@@ -82,7 +86,25 @@ def named(figures: dict[str, Any]) -> str:
     return figures["scenario"] if same else f"{figures['scenario']} ({figures['world']})"
 
 
-def print_table(figures: dict[str, Any], written: list[Path]) -> None:
+def _setting(scenario: Scenario) -> Iterator[tuple[str, str]]:
+    """Where a mission took place and whose robots were there: rows of the table."""
+    grid = scenario.grid
+    axes = 2 if grid.flat else 3
+    yield "world", f"{' × '.join(map(str, grid.shape[:axes]))} voxels of {grid.voxel_size_m:.4g} m"
+    edges = (f"{edge_m:.4g}" if edge_m < 1000 else f"{edge_m:,.0f}" for edge_m in grid.size_m[:axes])
+    yield "its size", f"{' × '.join(edges)} m"
+    named = SCENARIOS.get(scenario.name)
+    if named is not None:
+        there = with_settings(named, {"grid": grid})  # in a 2-D world the sensor is level
+        usual = (there.robot, there.sensor, there.others)
+        changed = usual != (scenario.robot, scenario.sensor, scenario.others)
+        yield "robots and sensor", f"those of {named.name}" + (", changed" if changed else "")
+    ranges = {kind.sensor.max_range_m: None for kind in scenario.kinds}  # in order, each once
+    said = ("the whole world" if range_m == math.inf else f"{range_m:g} m" for range_m in ranges)
+    yield "sensor's range", ", ".join(said)
+
+
+def print_table(figures: dict[str, Any], written: list[Path], scenario: Scenario) -> None:
     """Print what a mission came to, and the files that were written."""
     from rich.console import Console
     from rich.table import Table
@@ -94,9 +116,14 @@ def print_table(figures: dict[str, Any], written: list[Path]) -> None:
     table.add_column(justify="right")
     marks = (figures["t50_s"], figures["t90_s"], figures["t99_s"])
     reached = ", ".join("-" if mark is None else f"{mark:,.0f}" for mark in marks)
-    values = {**figures, **figures.get("joint", {}), "reached": reached + " s"}
+    none = all(mark is None for mark in marks)
+    values = {**figures, **figures.get("joint", {}), "reached": "-" if none else reached + " s"}
+    for label, shown in _setting(scenario):
+        table.add_row(label, shown)
     for label, name, shown in _ROWS:
-        if values.get(name) is not None:
+        alone = figures["robots"] == 1 and name in _OF_TEAMS
+        partial = name == "scans_over_floor" and not figures["finished"]  # the floor is a whole map's
+        if values.get(name) is not None and not alone and not partial:
             table.add_row(label, shown(values[name]))
     console = Console()
     console.print(table)

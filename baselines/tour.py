@@ -6,7 +6,6 @@ A mission ends when the map is known or its time is up; the table says which, an
 
 from __future__ import annotations
 
-import dataclasses
 import math
 import sys
 import time
@@ -19,13 +18,15 @@ from baselines.command import Positional, parse, print_json, run_command
 from baselines.experiment import markdown_table
 from baselines.mission import run_mission, scripted
 from baselines.strategies import make_strategy
-from entropy_explore_env.config import Scenario, with_settings
+from baselines.world_file import Reading, world_settings
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
-from entropy_explore_env.errors import SettingError
+from entropy_explore_env.errors import SettingError, WorldError
 from entropy_explore_env.reports.metrics import mission_figures
 from entropy_explore_env.scenarios import find_scenario
 from entropy_explore_env.writing import write_atomically
 
+_IMAGES = (".png", ".pgm")
+_PLANS = (".yaml", ".yml", *_IMAGES)
 _SUFFIXES = tuple(".bt .ot .yaml .yml .png .pgm .pcd .ply .obj .stl .glb .npz .tif .tiff".split())
 
 
@@ -45,6 +46,10 @@ class Args:
     """Edge of the voxels of plans, one voxel high."""
     voxel_size_m: float = 0.25
     """Edge of the voxels of all other worlds."""
+    resolution_m: float | None = None
+    """Edge of a pixel of the images that have no YAML; default: 0.05."""
+    negate: bool = False
+    """In the images that have no YAML bright is solid."""
     time_limit_s: float = 600.0
     """Simulated time after which a mission is cut off."""
     out: Path | None = None
@@ -61,10 +66,12 @@ def main(words: Sequence[str]) -> int:
     rows = []
     for number, path in enumerate(files):
         if not args.json:
-            print(f"{number + 1} of {len(files)}: {path.name}", file=sys.stderr)
+            print(f"{number + 1} of {len(files)}: {path.name}", file=sys.stderr, flush=True)
         rows.append(explore(path, args))
     if args.out is not None:
         given = f"{args.folder.name} --strategy {args.strategy} --robots {args.robots}"
+        given += "" if args.resolution_m is None else f" --resolution-m {args.resolution_m:g}"
+        given += " --negate" if args.negate else ""
         about = f"Made by `python -m baselines.tour {given}`, seed {args.seed}; missions are cut off after "
         about += f"{args.time_limit_s:g} s."
         write_atomically(args.out, f"# Worlds explored\n\n{about}\n\n{table(rows)}\n")
@@ -82,35 +89,37 @@ def world_files(folder: Path) -> list[Path]:
         SettingError: There are none.
     """
     found = sorted(path for path in folder.rglob("*") if path.suffix.lower() in _SUFFIXES)
-    named = {path.with_suffix("") for path in found if path.suffix.lower() in (".yaml", ".yml")}
-    files = [p for p in found if p.suffix.lower() not in (".pgm", ".png") or p.with_suffix("") not in named]
+    named = {path.with_suffix("") for path in found if path.suffix.lower() in _PLANS[:2]}
+    files = [p for p in found if p.suffix.lower() not in _IMAGES or p.with_suffix("") not in named]
     if not files:
         raise SettingError("folder", str(folder), "a folder with world files: " + " ".join(_SUFFIXES))
     return files
 
 
-def scenario_for(path: Path, args: Args) -> Scenario:
-    """Ground robots for plans, flying ones for everything else."""
-    plan = path.suffix.lower() in (".yaml", ".yml", ".png", ".pgm")
-    base = scripted(find_scenario("office" if plan else "room"))
+def env_for(path: Path, args: Args) -> EntropyExploreEnv:
+    """Ground robots for plans, flying ones for everything else.
+
+    Raises:
+        WorldError: The file cannot be used.
+    """
+    plan = path.suffix.lower() in _PLANS
+    scenario = scripted(find_scenario("office" if plan else "room"))
     edge_m = args.plan_voxel_size_m if plan else args.voxel_size_m
-    return with_settings(
-        base,
-        {
-            "world": str(path),
-            "grid": dataclasses.replace(base.grid, voxel_size_m=edge_m),
-            "robots": args.robots,
-            "scored": True,
-            "time_limit_s": args.time_limit_s,
-        },
+    reading = Reading(resolution_m=args.resolution_m, negate=args.negate)
+    world = world_settings(str(path), edge_m, reading if path.suffix.lower() in _IMAGES else Reading())
+    return EntropyExploreEnv(
+        scenario, robots=args.robots, scored=True, time_limit_s=args.time_limit_s, **world
     )
 
 
 def explore(path: Path, args: Args) -> dict[str, Any]:
-    """One mission in one world: what a row of the table says."""
-    env = EntropyExploreEnv(scenario_for(path, args))
-    started = time.perf_counter()
-    run_mission(env, make_strategy(args.strategy), args.seed)
+    """One mission in one world: what a row of the table says; `refused` where there is no mission."""
+    try:
+        env = env_for(path, args)
+        started = time.perf_counter()
+        run_mission(env, make_strategy(args.strategy), args.seed)
+    except WorldError as error:
+        return {"world": path.name, "refused": str(error)}
     figures = mission_figures(env.missions, 0)
     shape = env.scenario.grid.shape
     return {
@@ -124,7 +133,7 @@ def explore(path: Path, args: Args) -> dict[str, Any]:
 
 
 def table(rows: list[dict[str, Any]]) -> str:
-    """The rows in Markdown."""
+    """The rows in Markdown, and why worlds were refused."""
     head = [
         "world",
         "voxels",
@@ -148,9 +157,12 @@ def table(rows: list[dict[str, Any]]) -> str:
             "-" if row["error"] is None or math.isnan(row["error"]) else f"{row['error']:.3f}",
             f"{row['wall_s']:.1f}",
         ]
+        if "refused" not in row
+        else [row["world"], "-", "-", "refused", *["-"] * 5]
         for row in rows
     ]
-    return markdown_table(head, shown)
+    reasons = "".join(f"\nRefused: {row['refused']}\n" for row in rows if "refused" in row)
+    return markdown_table(head, shown) + reasons
 
 
 if __name__ == "__main__":

@@ -489,8 +489,8 @@ class Scenario:
         """
         if self.grid.flat:
             return 0
-        planar = robot.motion == "planar"
-        return int(robot.sensor_height_m / self.grid.voxel_size_m) if planar else None
+        layers = robot.sensor_height_m / self.grid.voxel_size_m
+        return int(layers + 1e-9) if robot.motion == "planar" else None  # 0.3 / 0.1 is 3
 
     @cached_property
     def agents(self) -> tuple[str, ...]:

@@ -23,7 +23,7 @@ LAYERS = (
     ("worlds",),
     ("scenarios", "settings_json"),
     ("config", "randomness"),
-    ("validation",),
+    ("validation", "command"),
     ("errors", "compilation", "writing", "version"),
 )
 """From the top down: a layer may import those below it."""
@@ -57,7 +57,7 @@ SIBLINGS = {
         "missions",
         "view",
     ),
-    "worlds": ("world", "splits", "recipes", "files", "load", "pictures", "__main__"),
+    "worlds": ("world", "splits", "recipes", "files", "load", "given", "pictures", "__main__"),
     "worlds/recipes": (
         "plan",
         "connectivity",
@@ -126,6 +126,7 @@ STRATEGIES_SEE = (
     "settings_json",
     "reports",
     "errors",
+    "command",
     "compilation",
     "writing",
     "version",

@@ -9,7 +9,6 @@ order, and the same bits in every array and number.
 
 from __future__ import annotations
 
-import argparse
 import copy
 import itertools
 import json
@@ -18,13 +17,14 @@ import os
 import pickle
 import subprocess
 import sys
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from typing import Any, NoReturn
+from typing import Any
 
 import numpy as np
 
-from entropy_explore_env.config import Scenario, with_settings
+from entropy_explore_env.command import LineParser, run_command
+from entropy_explore_env.config import Scenario
 from entropy_explore_env.envs.episodes import (
     EPISODES,
     OTHER_ACTIONS,
@@ -48,6 +48,7 @@ from entropy_explore_env.errors import ActionError, CallOrderError, EntropyExplo
 from entropy_explore_env.missions.state import MissionEnd
 from entropy_explore_env.randomness import check_seed
 from entropy_explore_env.scenarios import find_scenario
+from entropy_explore_env.worlds.given import with_given_worlds
 from entropy_explore_env.worlds.load import with_world
 
 BATCH = 8
@@ -57,7 +58,7 @@ _ROBOT_INFOS = ("deciding", "entropy_bits", "own_bits", "received_bits")
 
 def check_spaces(task: Task) -> None:
     """Every observation lies in its space, spaces stay the same objects, rewards are finite."""
-    env = EntropyExploreEnv(task.scenario)
+    env = task.env()
     agents = env.possible_agents
     spaces = [env.state_space, *map(env.observation_space, agents), *map(env.action_space, agents)]
     for where, moment in play(env, task):
@@ -77,9 +78,9 @@ def check_spaces(task: Task) -> None:
 
 def check_repeatable(task: Task) -> None:
     """A seed gives the same episodes in a second environment, and again; other episodes start elsewhere."""
-    env = EntropyExploreEnv(task.scenario)
+    env = task.env()
     first = story(play(env, task))
-    require_same("second environment", first, story(play(EntropyExploreEnv(task.scenario), task)))
+    require_same("second environment", first, story(play(task.env(), task)))
     require_same("second time", first, story(play(env, task)))
     starts = {}
     for name, seed in (("the seed", task.seed), ("its next episode", None), ("the next seed", task.seed + 1)):
@@ -93,7 +94,7 @@ def check_processes(task: Task) -> None:
     """Two fresh processes play the same episodes as this one."""
     with ThreadPoolExecutor(2) as pool:
         answers = [pool.submit(_ask_child, task, hash_seed) for hash_seed in ("1", "2")]
-        here = story(play(EntropyExploreEnv(task.scenario), task))
+        here = story(play(task.env(), task))
     for number, answer in enumerate(answers, 1):
         require_same(f"process {number}", here, answer.result())
 
@@ -102,7 +103,7 @@ def _ask_child(task: Task, hash_seed: str) -> Leaves:
     """The story of the task as a fresh process plays it; it imports from where this one does."""
     path = os.pathsep.join(part or os.curdir for part in sys.path)
     variables = {**os.environ, "PYTHONPATH": path, "PYTHONHASHSEED": hash_seed}
-    question = pickle.dumps((task.scenario, task.seed))
+    question = pickle.dumps((task.scenario, task.seed, task.given))
     child = subprocess.run(
         [sys.executable, "-c", _CHILD], input=question, capture_output=True, env=variables, check=False
     )
@@ -115,7 +116,7 @@ def _ask_child(task: Task, hash_seed: str) -> Leaves:
 def answer_parent() -> None:
     """Play the task that comes in and put the story out: what a child of `check_processes` does."""
     task = Task(*pickle.load(sys.stdin.buffer))
-    sys.stdout.buffer.write(pickle.dumps(story(play(EntropyExploreEnv(task.scenario), task))))
+    sys.stdout.buffer.write(pickle.dumps(story(play(task.env(), task))))
 
 
 def check_batches(task: Task) -> None:
@@ -124,14 +125,14 @@ def check_batches(task: Task) -> None:
     require_same(f"batch of {BATCH}, two threads", calls, play_batch(task, BATCH, threads=2)[0])
     require_same("batch of one", missions[0], play_batch(task, 1, threads=1)[1][0])
     for mission, found in enumerate(missions):
-        moments = play(EntropyExploreEnv(task.scenario), task, mission)
+        moments = play(task.env(), task, mission)
         alone = story((where, row_of_team(moment)) for where, moment in moments)
         require_same(f"ParallelEnv, then mission {mission} of {BATCH}", alone, found)
 
 
 def play_batch(task: Task, missions: int, threads: int) -> tuple[Leaves, list[Leaves]]:
     """Play a VectorEnv until every mission has ended its episodes; all calls, and each mission's story."""
-    env = EntropyExploreVectorEnv(task.scenario, missions, threads=threads)
+    env = task.vector_env(missions, threads=threads)
     episode, step, over = [0] * missions, [0] * missions, np.zeros(missions, bool)
     result: tuple[Any, ...] = env.reset(seed=task.seed)
     calls = leaves(result, "call 0")
@@ -185,9 +186,9 @@ def row_of_team(moment: dict[str, Any]) -> dict[str, Any]:
 
 def check_copies(task: Task) -> None:
     """A pickled and a deep copy, taken in mid-episode, go on alike and apart from the original."""
-    first = [moment for moment, _ in play(EntropyExploreEnv(task.scenario), task) if "episode 0" in moment]
+    first = [moment for moment, _ in play(task.env(), task) if "episode 0" in moment]
     half = len(first) // 2
-    env = EntropyExploreEnv(task.scenario)
+    env = task.env()
     env.reset(task.seed)
     for step in range(1, half + 1):
         env.step(by_agent(env, task.actions(0, 0, step)))
@@ -211,9 +212,9 @@ def _rest(env: EntropyExploreEnv, task: Task, step: int) -> Iterator[tuple[str, 
 
 def check_fresh(task: Task) -> None:
     """What a call returns is new, shares no memory with other calls, and is not changed by them."""
-    returned = dict(play(EntropyExploreEnv(task.scenario), task))
-    then = {where: leaves(parts) for where, parts in play(EntropyExploreEnv(task.scenario), task)}
-    batch = EntropyExploreVectorEnv(task.scenario, 2)
+    returned = dict(play(task.env(), task))
+    then = {where: leaves(parts) for where, parts in play(task.env(), task)}
+    batch = task.vector_env(2)
     returned["vector call 0"] = {"all": batch.reset(seed=task.seed)}
     for call in range(1, len(then)):
         then[f"vector call {call - 1}"] = leaves(returned[f"vector call {call - 1}"])
@@ -242,7 +243,7 @@ def require_apart(returned: Mapping[str, object]) -> None:
 
 def check_busy(task: Task) -> None:
     """What busy robots are told to do makes no difference."""
-    env, other = EntropyExploreEnv(task.scenario), EntropyExploreEnv(task.scenario)
+    env, other = task.env(), task.env()
     infos = env.reset(task.seed)[1]
     other.reset(task.seed)
     for step in itertools.count(1):
@@ -257,14 +258,14 @@ def check_busy(task: Task) -> None:
 
 def check_call_order(task: Task) -> None:
     """Calls before reset and after the end raise a CallOrderError and change nothing."""
-    env, batch = EntropyExploreEnv(task.scenario), EntropyExploreVectorEnv(task.scenario, 2)
+    env, batch = task.env(), task.vector_env(2)
     actions, table = by_agent(env, task.actions(0, 0, 1)), task.table(2, 0, 1)
     require_refused("step before reset", env, CallOrderError, lambda: env.step(actions))
     require_refused("view before reset", env, CallOrderError, lambda: env.view("robot_0"))
     require_refused("vector step before reset", batch, CallOrderError, lambda: batch.step(table))
     story(play(env, task))
     require_refused("step after the end", env, CallOrderError, lambda: env.step(actions))
-    never = EntropyExploreVectorEnv(task.scenario, 2, autoreset_mode="Disabled")
+    never = task.vector_env(2, autoreset_mode="Disabled")
     never.reset(seed=task.seed)
     while not any(np.logical_or(*never.step(table)[2:4])):
         pass
@@ -273,7 +274,7 @@ def check_call_order(task: Task) -> None:
 
 def check_bad_actions(task: Task) -> None:
     """A bad action raises an ActionError with field, value and what is allowed, and changes nothing."""
-    env = EntropyExploreEnv(task.scenario)
+    env = task.env()
     env.reset(task.seed)
     good = by_agent(env, task.actions(0, 0, 1))
     fewer, one = dict(list(good.items())[:-1]), good["robot_0"]
@@ -287,7 +288,7 @@ def check_bad_actions(task: Task) -> None:
             refusal = require_refused(f"{name}, {agent}", env, ActionError, lambda team=team: env.step(team))
             if f"actions[{agent}]" not in refusal:
                 raise ConformanceError(f"{name}, {agent}: not named in {refusal!r}")
-    batch = EntropyExploreVectorEnv(task.scenario, 2)
+    batch = task.vector_env(2)
     batch.reset(seed=task.seed)
     for name, wrong in bad_actions(task, task.table(2, 0, 1)).items():
         require_refused(f"vector, {name}", batch, ActionError, lambda wrong=wrong: batch.step(wrong))
@@ -346,7 +347,7 @@ def check_conformance(
         steps: Episodes are cut off after so many; None = where the scenario ends them.
         seed: Of mission 0; mission e of a batch takes seed + e.
         report: Is told each check that holds.
-        **settings: Fields of the Scenario to change: see `config.with_settings`.
+        **settings: As for `EntropyExploreEnv`.
 
     Raises:
         ConformanceError: The contract is broken.
@@ -354,8 +355,8 @@ def check_conformance(
         WorldError: The world cannot be used.
     """
     limit = {} if steps is None else {"max_cycles": steps}
-    changed = with_settings(find_scenario(scenario), {**settings, **limit})
-    task = Task(with_world(changed), check_seed(seed))
+    asked, given = with_given_worlds(find_scenario(scenario), {**settings, **limit})
+    task = Task(asked if given else with_world(asked), check_seed(seed), given)
     for check in CHECKS:
         try:
             check(task)
@@ -364,24 +365,16 @@ def check_conformance(
         report(f"{check.__name__}: {(check.__doc__ or '').strip()}")
 
 
-class _Parser(argparse.ArgumentParser):
-    """Refuses in one line, as all commands do."""
-
-    def error(self, message: str) -> NoReturn:
-        """Say what does not fit, and leave with 2."""
-        self.exit(2, f"error: {message}\n")
-
-
-def main(arguments: list[str] | None = None) -> int:
-    """The command; returns its exit status: 0 all holds, 1 something does not, 2 bad input."""
-    parser = _Parser("python -m entropy_explore_env.envs.conformance")
+def main(words: Sequence[str]) -> int:
+    """The command; returns its exit code: 0 all holds, 1 something does not."""
+    parser = LineParser("python -m entropy_explore_env.envs.conformance")
     parser.add_argument("scenario", metavar="SCENARIO", help="name of a scenario")
     parser.add_argument("--world", help="a world file in place of the scenario's world")
     parser.add_argument("--robots", type=int, help="team size; default: the scenario's")
     parser.add_argument("--steps", type=int, default=100, help="an episode is cut off after so many")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--json", action="store_true", help="print one JSON object and nothing else")
-    given = parser.parse_args(arguments)
+    given = parser.parse_args(words)
     settings = {name: value for name in ("robots", "world") if (value := getattr(given, name)) is not None}
     held: list[str] = []
 
@@ -395,12 +388,6 @@ def main(arguments: list[str] | None = None) -> int:
         check_conformance(given.scenario, steps=given.steps, seed=given.seed, report=report, **settings)
     except ConformanceError as error:
         broken = str(error)
-    except EntropyExploreError as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 2
-    except KeyboardInterrupt:
-        print("interrupted", file=sys.stderr)
-        return 130
     if given.json:
         print(json.dumps({"scenario": given.scenario, "held": held, "broken": broken}))
     elif broken is not None:
@@ -409,4 +396,4 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(run_command(main))

@@ -14,6 +14,7 @@ from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.envs.vector_env import EntropyExploreVectorEnv
 from entropy_explore_env.missions.missions import Missions
 from entropy_explore_env.missions.rules import rules_of
+from entropy_explore_env.worlds.world import World
 
 EPISODES = 2
 """So many episodes in a row are compared: the one of a seed, and those that follow it."""
@@ -36,10 +37,24 @@ class Task:
     Attributes:
         scenario: With the grid of its world's file, if it has one.
         seed: Of mission 0; mission e takes seed + e.
+        given: Worlds given as objects, in place of the scenario's.
     """
 
     scenario: Scenario
     seed: int
+    given: tuple[World, ...] = ()
+
+    def env(self) -> EntropyExploreEnv:
+        """A new environment for the task."""
+        return EntropyExploreEnv(self.scenario, **self._world)
+
+    def vector_env(self, missions: int, **how: Any) -> EntropyExploreVectorEnv:  # noqa: ANN401 - as the class's
+        """A new environment for so many missions."""
+        return EntropyExploreVectorEnv(self.scenario, missions, **how, **self._world)
+
+    @property
+    def _world(self) -> dict[str, Any]:
+        return {"world": self.given} if self.given else {}
 
     @functools.cached_property
     def choices(self) -> int:

@@ -12,7 +12,7 @@ from pettingzoo import ParallelEnv
 from pettingzoo.utils import OrderEnforcingWrapper
 from pettingzoo.utils.conversions import parallel_to_aec_wrapper
 
-from entropy_explore_env.config import Scenario, with_settings
+from entropy_explore_env.config import Scenario
 from entropy_explore_env.envs.checks import ActionChecker
 from entropy_explore_env.envs.infos import robot_infos
 from entropy_explore_env.errors import ActionError, CallOrderError, SettingError
@@ -22,7 +22,7 @@ from entropy_explore_env.missions.state import MissionEnd
 from entropy_explore_env.missions.view import RobotView, view_of
 from entropy_explore_env.reports.painting import FRAMES_PER_S, RENDER_MODES, Painter, check_render_mode
 from entropy_explore_env.scenarios import find_scenario
-from entropy_explore_env.worlds.load import with_world
+from entropy_explore_env.worlds.given import with_given_worlds
 
 
 class EntropyExploreEnv(ParallelEnv[str, Any, Any]):
@@ -49,15 +49,17 @@ class EntropyExploreEnv(ParallelEnv[str, Any, Any]):
         Args:
             scenario: A scenario's name, or a Scenario.
             render_mode: None, "human" or "rgb_array".
-            **settings: Fields of the Scenario to change: see `config.with_settings`.
+            **settings: Fields of the Scenario to change; `world` may also be a World, a sequence of
+                them, or a mapping of a file's `path` and options: see `worlds.given`.
 
         Raises:
             SettingError: A setting is unknown or out of its range.
-            WorldError: The world's file cannot be used.
+            WorldError: The world cannot be used.
         """
         check_render_mode(render_mode)
-        self.scenario = with_world(with_settings(find_scenario(scenario), settings))
-        self.missions = Missions(self.scenario)
+        asked, given = with_given_worlds(find_scenario(scenario), settings)
+        self.missions = Missions(asked, given=given)
+        self.scenario = self.missions.scenario
         self.render_mode = render_mode
         self.possible_agents = list(self.scenario.agents)
         self.agents: list[str] = []
@@ -212,7 +214,8 @@ def parallel_env(
     Args:
         scenario: A scenario's name (`entropy_explore_env.SCENARIOS`), or a Scenario.
         render_mode: None, `rgb_array` or `human`.
-        **settings: Fields of the Scenario to change: `robots`, `world` (a recipe or a file),
+        **settings: Fields of the Scenario to change: `robots`, `world` (a recipe, a file, a World, or
+            several Worlds dealt to missions in turn: see `worlds.given`),
             `decision_period_s`, `max_cycles`, `time_limit_s`, and its parts `grid`, `robot`, `sensor`,
             `channel` (`{"burst": 32, "i_min_bits": 0.3}`), `ending`, `reward`, `action`, `observation`,
             each a mapping of some of its fields or a whole object: see `help` of Scenario, Channel, …

@@ -7,7 +7,7 @@ from typing import Any
 import gymnasium
 import numpy as np
 
-from entropy_explore_env.config import Scenario, with_settings
+from entropy_explore_env.config import Scenario
 from entropy_explore_env.envs.checks import ActionChecker
 from entropy_explore_env.envs.infos import robot_infos
 from entropy_explore_env.errors import CallOrderError, SettingError
@@ -18,7 +18,7 @@ from entropy_explore_env.missions.view import RobotView, view_of
 from entropy_explore_env.randomness import check_seed
 from entropy_explore_env.reports.painting import FRAMES_PER_S, RENDER_MODES, Painter, check_render_mode
 from entropy_explore_env.scenarios import find_scenario
-from entropy_explore_env.worlds.load import with_world
+from entropy_explore_env.worlds.given import with_given_worlds
 
 
 class SingleRobotEnv(gymnasium.Env[Any, Any]):
@@ -34,17 +34,19 @@ class SingleRobotEnv(gymnasium.Env[Any, Any]):
         Args:
             scenario: A scenario's name, or a Scenario; its team size is set to 1.
             render_mode: None, "human" or "rgb_array".
-            **settings: Fields of the Scenario to change: see `config.with_settings`.
+            **settings: Fields of the Scenario to change; `world` may also be a World, a sequence of
+                them, or a mapping of a file's `path` and options: see `worlds.given`.
 
         Raises:
             SettingError: A setting is unknown or out of its range, or `robots` is not 1.
-            WorldError: The world's file cannot be used.
+            WorldError: The world cannot be used.
         """
         check_render_mode(render_mode)
         if settings.get("robots", 1) != 1:
             raise SettingError("robots", settings["robots"], "1; parallel_env() takes a team")
-        self.scenario = with_world(with_settings(find_scenario(scenario), {**settings, "robots": 1}))
-        self.missions = Missions(self.scenario)
+        asked, given = with_given_worlds(find_scenario(scenario), {**settings, "robots": 1})
+        self.missions = Missions(asked, given=given)
+        self.scenario = self.missions.scenario
         self.render_mode = render_mode
         space = action_space(self.scenario)
         self.action_space = space

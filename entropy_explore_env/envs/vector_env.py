@@ -10,7 +10,7 @@ from gymnasium import spaces
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
-from entropy_explore_env.config import Scenario, with_settings
+from entropy_explore_env.config import Scenario
 from entropy_explore_env.envs.checks import ActionChecker
 from entropy_explore_env.errors import CallOrderError, SettingError
 from entropy_explore_env.missions.action import action_space
@@ -21,7 +21,7 @@ from entropy_explore_env.reports.metrics import mission_figures
 from entropy_explore_env.reports.painting import FRAMES_PER_S, RENDER_MODES, Painter, check_render_mode
 from entropy_explore_env.scenarios import find_scenario
 from entropy_explore_env.validation import is_whole
-from entropy_explore_env.worlds.load import with_world
+from entropy_explore_env.worlds.given import with_given_worlds
 
 _RUNNING, _MAPPED = MissionEnd.RUNNING.code, MissionEnd.MAPPED.code
 
@@ -58,11 +58,12 @@ class EntropyExploreVectorEnv(VectorEnv[Any, Any, Any]):
             autoreset_mode: When a mission that is over starts anew: with the next step (its action
                 is ignored), within the same step, or never.
             render_mode: None, "human" or "rgb_array", of the first mission.
-            **settings: Fields of the Scenario to change: see `config.with_settings`.
+            **settings: Fields of the Scenario to change; `world` may also be a World, a sequence of
+                them, or a mapping of a file's `path` and options: see `worlds.given`.
 
         Raises:
             SettingError: A setting is unknown or out of its range.
-            WorldError: The world's file cannot be used.
+            WorldError: The world cannot be used.
         """
         check_render_mode(render_mode)
         if not is_whole(num_envs, 1):
@@ -72,8 +73,9 @@ class EntropyExploreVectorEnv(VectorEnv[Any, Any, Any]):
         except ValueError:
             allowed = "one of " + ", ".join(mode.value for mode in AutoresetMode)
             raise SettingError("autoreset_mode", autoreset_mode, allowed) from None
-        self.scenario = with_world(with_settings(find_scenario(scenario), settings))
-        self.missions = Missions(self.scenario, num_envs, threads)
+        asked, given = with_given_worlds(find_scenario(scenario), settings)
+        self.missions = Missions(asked, num_envs, threads, given)
+        self.scenario = self.missions.scenario
         self.num_envs = self.missions.count
         self.metadata = {
             "autoreset_mode": self.autoreset_mode,

@@ -23,6 +23,7 @@ from entropy_explore_env.randomness import Stream, check_seed, generator, splitm
 from entropy_explore_env.robots.navigator import new_navigators, touched_voxels
 from entropy_explore_env.robots.range_sensor import Scan, new_scan
 from entropy_explore_env.validation import is_whole
+from entropy_explore_env.worlds.given import checked_worlds, in_given_worlds, world_in_turn
 from entropy_explore_env.worlds.load import make_world, with_world
 from entropy_explore_env.worlds.world import World
 
@@ -42,7 +43,8 @@ class Missions:
     the number of threads, or on what other missions do.
 
     Attributes:
-        scenario: The task, its grid taken over from the world file if there is one.
+        scenario: The task, its grid taken over from the world's file, or from the worlds given.
+        given: Worlds to be in, in place of the scenario's; none where it has a recipe or a file.
         count: Number of missions E.
         state: All that changes, as arrays.
         worlds: The true world of each mission; None before its first reset.
@@ -50,24 +52,28 @@ class Missions:
         observations: (E, A, F) float32 of the latest step or reset.
     """
 
-    def __init__(self, scenario: Scenario, count: int = 1, threads: int | None = 1) -> None:
+    def __init__(
+        self, scenario: Scenario, count: int = 1, threads: int | None = 1, given: Sequence[World] = ()
+    ) -> None:
         """Make room for the missions; `reset` starts them.
 
         Args:
             scenario: The task.
             count: Number of missions E.
             threads: Threads that share the missions; None = one a processor.
+            given: Worlds to be in, of one grid, whatever the split: a mission of seed s starts in number
+                s mod N of them, and goes on to the next one with each episode.
 
         Raises:
             SettingError: A count is not a whole number ≥ 1, or all maps do not fit into memory.
-            WorldError: The world's file cannot be used.
+            WorldError: The world's file cannot be used, or the given ones differ in their grids.
         """
         for name, value in (("missions", count), ("threads", 1 if threads is None else threads)):
             if not is_whole(value, 1):
                 raise SettingError(name, value, "a whole number ≥ 1")
-        scenario = with_world(scenario)
+        scenario = in_given_worlds(scenario, given) if given else with_world(scenario)
         check_memory(scenario, int(count))
-        self.scenario = scenario
+        self.scenario, self.given = scenario, checked_worlds(given) if given else ()
         self.count = int(count)
         self.threads = min(self.count, threads or os.cpu_count() or 1)
         self.rules = rules_of(scenario)
@@ -140,7 +146,10 @@ class Missions:
             number, episode = check_seed(seed), 0
         else:
             number, episode = self.seeds[mission], self.episodes[mission] + 1
-        world = make_world(self.scenario, generator(number, episode, Stream.WORLD))
+        if self.given:
+            world = world_in_turn(self.given, number, episode)
+        else:
+            world = make_world(self.scenario, generator(number, episode, Stream.WORLD))
         poses = start_poses(self.scenario, world, generator(number, episode, Stream.STARTS))
         return mission, number, episode, world, poses
 

@@ -3,7 +3,8 @@
 An `.npz` without pickled objects. Its entries are `format` ("entropy_explore_env mission"), `version` (1),
 `library` (its version), `settings` (JSON, `settings_json`), `seed` (decimal digits), `episode`, `strategy`,
 `commands` ((T, A, N) floating-point or (T, A) whole numbers, exactly as given), `scan_s` and `scan_robot`
-(S,), `digest` and `world_digest` (SHA-256), and `checksum` (SHA-256 of all other entries).
+(S,), `digest` and `world_digest` (SHA-256), and `checksum` (SHA-256 of all other entries). Where the world
+was given as an object, `version` is 2 and there is also `world`: the bytes that `save_world` writes.
 """
 
 from __future__ import annotations
@@ -24,11 +25,14 @@ from entropy_explore_env.missions.missions import Missions
 from entropy_explore_env.settings_json import scenario_from_json, settings_json
 from entropy_explore_env.version import VERSION
 from entropy_explore_env.worlds.files.archives import arrays
-from entropy_explore_env.worlds.files.voxels import RefusedError
+from entropy_explore_env.worlds.files.voxels import MAX_FILE_VOXELS, RefusedError
+from entropy_explore_env.worlds.given import GIVEN
+from entropy_explore_env.worlds.load import world_bytes, world_from_bytes
 from entropy_explore_env.worlds.recipes.catalogue import RECIPES
+from entropy_explore_env.worlds.world import World
 from entropy_explore_env.writing import write_atomically
 
-FORMAT, FORMAT_VERSION = "entropy_explore_env mission", 1
+FORMAT, FORMAT_VERSION, VERSION_WITH_WORLD = "entropy_explore_env mission", 1, 2
 MAX_FILE_BYTES = 1 << 30
 _LONGEST_TEXT = 1 << 20
 _TEXTS = ("format", "library", "settings", "seed", "strategy", "digest", "world_digest", "checksum")
@@ -51,6 +55,7 @@ class MissionRecord:
         world_digest: Of the true world: see `world_digest`.
         strategy: Who chose the commands; for people.
         library: Version of the library that ran the mission.
+        world: The true world, where it was given as an object; None = the scenario says where it comes from.
     """
 
     scenario: Scenario
@@ -63,6 +68,7 @@ class MissionRecord:
     world_digest: str
     strategy: str = ""
     library: str = VERSION
+    world: World | None = None
 
 
 class CommandRecorder:
@@ -109,6 +115,7 @@ class CommandRecorder:
             digest=state_digest(missions, 0),
             world_digest=world_digest(missions, 0),
             strategy=strategy,
+            world=missions.worlds[0] if missions.given else None,
         )
 
     def _table(self) -> np.ndarray:
@@ -151,7 +158,7 @@ def world_digest(missions: Missions, mission: int) -> str:
 def check_world(record: MissionRecord, missions: Missions) -> None:
     """Raise a WorldError where a record's world comes from a file that now holds another world."""
     world = record.scenario.world
-    if world not in RECIPES and world_digest(missions, 0) != record.world_digest:
+    if world not in (*RECIPES, GIVEN) and world_digest(missions, 0) != record.world_digest:
         raise WorldError("Scenario.world", world, "the file of the recorded mission, unchanged")
 
 
@@ -167,11 +174,12 @@ def save_record(record: MissionRecord, path: Path) -> None:
     """Write a record to an `.npz`; the file appears only when complete.
 
     Raises:
+        RecordError: The world is too large for a file.
         OSError: The file cannot be written.
     """
     entries = {
         "format": np.asarray(FORMAT),
-        "version": np.int64(FORMAT_VERSION),
+        "version": np.int64(FORMAT_VERSION if record.world is None else VERSION_WITH_WORLD),
         "library": np.asarray(record.library),
         "settings": np.asarray(settings_json(record.scenario)),
         "seed": np.asarray(str(record.seed)),
@@ -183,6 +191,10 @@ def save_record(record: MissionRecord, path: Path) -> None:
         "digest": np.asarray(record.digest),
         "world_digest": np.asarray(record.world_digest),
     }
+    if record.world is not None:
+        if record.world.grid.voxels > MAX_FILE_VOXELS:
+            raise RecordError("world", record.world, f"one of at most {MAX_FILE_VOXELS} voxels in a record")
+        entries["world"] = np.frombuffer(world_bytes(record.world), np.uint8)
     buffer = io.BytesIO()
     np.savez_compressed(buffer, **entries, checksum=np.asarray(_checksum(entries)))
     write_atomically(path, buffer.getvalue())
@@ -219,9 +231,13 @@ def _checked(entries: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
     """The entries, all there, of this format, as they were written."""
     if str(entries.get("format")) != FORMAT:
         raise RefusedError("a mission record, as --record writes it")
-    if int(entries["version"]) != FORMAT_VERSION:
-        raise RefusedError(f"a mission record of format version {FORMAT_VERSION}")
-    if set(entries) != {*_TEXTS, *_NUMBERS} or _checksum(entries) != str(entries["checksum"]):
+    versions = {FORMAT_VERSION: (), VERSION_WITH_WORLD: ("world",)}
+    version = int(entries["version"])
+    if version not in versions:
+        raise RefusedError(f"a mission record of format version {' or '.join(map(str, versions))}")
+    if set(entries) != {*_TEXTS, *_NUMBERS, *versions[version]} or _checksum(entries) != str(
+        entries["checksum"]
+    ):
         raise RefusedError("a mission record as it was written: this one was changed or damaged")
     return entries
 
@@ -234,6 +250,7 @@ def _record(entries: dict[str, np.ndarray]) -> MissionRecord:
     scans, team = len(scan_s), scenario.robots
     kinds = {2: "i", 3: "f"}
     digests = (texts["digest"], texts["world_digest"])
+    world = world_from_bytes(entries["world"].tobytes()) if "world" in entries else None
     if (
         commands.dtype.kind != kinds.get(commands.ndim)
         or commands.shape[1] != team
@@ -243,6 +260,8 @@ def _record(entries: dict[str, np.ndarray]) -> MissionRecord:
         or not re.fullmatch("[0-9]{1,4000}", texts["seed"])
         or len(texts["strategy"]) > _LONGEST_TEXT
         or not 0 <= int(entries["episode"]) < 1_000_000
+        or (scenario.world == GIVEN) != (world is not None)
+        or (world is not None and world.grid != scenario.grid)
     ):
         raise RefusedError("a mission record whose entries fit each other")
     return MissionRecord(
@@ -255,4 +274,5 @@ def _record(entries: dict[str, np.ndarray]) -> MissionRecord:
         *digests,
         strategy=texts["strategy"],
         library=texts["library"],
+        world=world,
     )

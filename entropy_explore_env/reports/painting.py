@@ -10,8 +10,9 @@ from entropy_explore_env.errors import CallOrderError, SettingError
 from entropy_explore_env.missions.missions import Missions
 from entropy_explore_env.reports.animation import Window
 from entropy_explore_env.reports.projection import shares_left
-from entropy_explore_env.reports.recording import poses_now
+from entropy_explore_env.reports.recording import Ways, poses_now
 from entropy_explore_env.reports.rendering import Frame, draw_frame
+from entropy_explore_env.worlds.given import GIVEN
 from entropy_explore_env.worlds.recipes.catalogue import RECIPES
 
 RENDER_MODES = ("human", "rgb_array")
@@ -37,10 +38,12 @@ def remaining_share(missions: Missions, mission: int) -> np.ndarray:
     return (missions.state.robots[mission]["entropy_bits"] - end) / (start - end)
 
 
-def world_name(missions: Missions) -> str:
-    """What the world of the missions is called: the scenario's name, or that of the world's file."""
-    world = missions.scenario.world
-    return missions.scenario.name if world in RECIPES else Path(world).stem
+def world_name(missions: Missions, mission: int) -> str:
+    """What a mission's world is called: the scenario's name, or that of the world's file or of the World."""
+    name, world = missions.scenario.world, missions.worlds[mission]
+    if name == GIVEN and world is not None:
+        return world.name
+    return missions.scenario.name if name in RECIPES else Path(name).stem
 
 
 class Painter:
@@ -53,7 +56,7 @@ class Painter:
         self._mission: tuple[int, int] | None = None
         self._times: list[float] = []
         self._shares: list[np.ndarray] = []
-        self._places: list[np.ndarray] = []
+        self._ways = Ways(0)
 
     def watch(self, missions: Missions) -> None:
         """Note the moment after a reset or a step; a `human` sees it at once."""
@@ -63,11 +66,12 @@ class Painter:
         mission = (missions.seeds[self._number], missions.episodes[self._number])
         if mission != self._mission or time_s == 0.0:
             self._mission = mission
-            self._times, self._shares, self._places = [], [], []
+            self._times, self._shares = [], []
+            self._ways = Ways(missions.scenario.robots, self._number)
         if not self._times or time_s > self._times[-1]:  # else it stands still: others were reset
             self._times.append(time_s)
             self._shares.append(remaining_share(missions, self._number))
-            self._places.append(missions.state.robots[self._number]["goal"][:, :3].copy())
+            self._ways.note(missions)
         if self._mode == "human":
             if self._window is None:
                 self._window = Window(frames_per_s=float(FRAMES_PER_S))
@@ -101,7 +105,6 @@ class Painter:
         robots = missions.state.robots[self._number]
         time_s = float(missions.state.missions[self._number]["time_s"])
         poses = poses_now(missions, self._number)
-        places = np.stack([*self._places, poses[:, :3]]) if self._places else poses[None, :, :3]
         shares = np.stack(self._shares) if self._shares else np.zeros((0, len(robots)))
         status = (
             f"time {time_s:,.0f} s",
@@ -118,10 +121,10 @@ class Painter:
             positions_m=poses[:, :3],
             gazes_rad=poses[:, 3:],
             targets_m=robots["target"][:, :3],
-            paths_m=[places[:, robot] for robot in range(len(robots))],
+            paths_m=self._ways.so_far(missions) if self._times else [],
             curve_s=np.asarray(self._times),
             curve_share=shares,
-            title=f"{world_name(missions)}: what robot_0 knows",
+            title=f"{world_name(missions, self._number)}: what robot_0 knows",
             status=status,
         )
         return draw_frame(frame)

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from entropy_explore_env.missions.missions import Missions
-from entropy_explore_env.missions.poses import pose_at
+from entropy_explore_env.missions.poses import place_at, pose_at
 
 
 def poses_now(missions: Missions, mission: int) -> np.ndarray:
@@ -13,6 +15,41 @@ def poses_now(missions: Missions, mission: int) -> np.ndarray:
     time_s = float(missions.state.missions[mission]["time_s"])
     numbers, robots = missions.rules.numbers, missions.state.robots[mission]
     return np.stack([np.array(pose_at(numbers[a], robot, time_s)) for a, robot in enumerate(robots)])
+
+
+class Ways:
+    """The ways that the robots of a mission drive, corner by corner; to be noted after every step.
+
+    Attributes:
+        passed_m: For each robot the points (3,) that it has passed: where drives began, and their corners.
+    """
+
+    def __init__(self, robots: int, mission: int = 0) -> None:
+        """Follow so many robots of a mission; nothing is noted yet."""
+        self._mission = mission
+        self.passed_m: list[list[np.ndarray]] = [[] for _ in range(robots)]
+        self._departed_s = [-math.inf] * robots
+        self._behind = [0] * robots
+        self._ahead: list[np.ndarray] = [np.zeros((0, 3))] * robots
+
+    def note(self, missions: Missions) -> None:
+        """Note what was passed up to this moment."""
+        time_s = float(missions.state.missions[self._mission]["time_s"])
+        numbers, robots = missions.rules.numbers, missions.state.robots[self._mission]
+        for number, robot in enumerate(robots):
+            points = self.passed_m[number]
+            if robot["depart_s"] != self._departed_s[number]:
+                points += [*self._ahead[number], robot["origin"][:3].copy()]
+                self._departed_s[number], self._behind[number] = float(robot["depart_s"]), 0
+            passed = int(place_at(numbers[number], robot, time_s)[3])
+            points += list(robot["way"][self._behind[number] : passed].copy())
+            self._ahead[number] = robot["way"][passed : robot["corners"]].copy()
+            self._behind[number] = passed
+
+    def so_far(self, missions: Missions) -> list[np.ndarray]:
+        """For each robot (N, 3) float64: the way to where it is now."""
+        here = poses_now(missions, self._mission)[:, :3]
+        return [np.stack([*points, place]) for points, place in zip(self.passed_m, here, strict=True)]
 
 
 class Recorder:
@@ -33,6 +70,7 @@ class Recorder:
         self._places: list[np.ndarray] = []
         self._poses: list[np.ndarray] = []
         self._depths: list[np.ndarray] = []
+        self._ways = Ways(missions.scenario.robots)
 
     def note(self) -> None:
         """Note this moment."""
@@ -45,6 +83,7 @@ class Recorder:
         self._places.append(robots["scan_pose"][:, :3].copy())
         self._poses.append(poses_now(self.missions, 0))
         self._depths.append(robots["depth_m"].copy())
+        self._ways.note(self.missions)
 
     def spread(self, points: int) -> np.ndarray:
         """(≤ points,) int64 which moments to keep of a long series: the ends, and evenly in between."""
@@ -89,6 +128,11 @@ class Recorder:
     def places_m(self) -> np.ndarray:
         """(T, A, 3) float64 where each robot took its latest scan."""
         return np.stack(self._places)
+
+    @property
+    def ways_m(self) -> list[np.ndarray]:
+        """For each robot (N, 3) float64: the way that it drove, corner by corner."""
+        return self._ways.so_far(self.missions)
 
     @property
     def poses(self) -> np.ndarray:

@@ -23,7 +23,7 @@ from entropy_explore_env.missions.missions import Missions
 from entropy_explore_env.reports.glyphs import COLOURS, robot_colour
 from entropy_explore_env.reports.painting import entropy_share, remaining_share, world_name
 from entropy_explore_env.reports.projection import KNOWN_BELOW
-from entropy_explore_env.reports.recording import poses_now
+from entropy_explore_env.reports.recording import Ways, poses_now
 from entropy_explore_env.robots.channel import select_measurements
 from entropy_explore_env.robots.range_sensor import Return, sensor_model
 
@@ -62,7 +62,7 @@ class RerunView:
             raise MissingExtraError("rerun-sdk", "viewer") from error
         rr: Any = rerun  # its names come from modules that type checkers do not follow
         self.path, self._missions, self._rr = path, missions, rr
-        name = f"{world_name(missions)}, seed {missions.seeds[0]}"
+        name = f"{world_name(missions, 0)}, seed {missions.seeds[0]}"
         together = rr.ChunkBatcherConfig(flush_tick=3600.0, flush_num_bytes=1 << 22)
         self._stream = rr.RecordingStream("entropy_explore_env", recording_id=name, batcher_config=together)
         handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
@@ -76,7 +76,8 @@ class RerunView:
         robots = missions.scenario.robots
         self._scans = np.zeros(robots, np.int64)
         self._sent = np.zeros(robots, np.int64)
-        self._ways: list[list[np.ndarray]] = [[] for _ in range(robots)]
+        self._ways, self._passed = Ways(robots), [0] * robots
+        self._paths: list[list[np.ndarray]] = [[] for _ in range(robots)]
         self._log_static()
 
     def __enter__(self) -> RerunView:
@@ -108,11 +109,14 @@ class RerunView:
         self._stream.set_time(TIMELINE, duration=time_s)
         poses, left = poses_now(missions, 0), remaining_share(missions, 0)
         robots = missions.state.robots[0]
+        self._ways.note(missions)
         for robot, (x, y, z, yaw, pitch) in enumerate(poses.tolist()):
             quaternion = rr.Quaternion(xyzw=_turned(yaw, pitch))
             pose = rr.Transform3D(translation=(x, y, z), quaternion=quaternion)
             self._stream.log(f"world/robots/robot_{robot}", pose)
-            self._log_way(robot, poses[robot, :3])
+            for place_m in [*self._ways.passed_m[robot][self._passed[robot] :], poses[robot, :3]]:
+                self._log_way(robot, place_m)
+            self._passed[robot] = len(self._ways.passed_m[robot])
             self._stream.log(f"entropy_left/robot_{robot}", rr.Scalars(float(left[robot])))
         sent = int(robots["measurements_sent"].sum())
         self._stream.log("shared_measurements", rr.Scalars(float(sent)))
@@ -143,7 +147,7 @@ class RerunView:
 
     def _log_way(self, robot: int, place_m: np.ndarray) -> None:
         """Add a point to a robot's path, and write the part of the path that it belongs to."""
-        way = self._ways[robot]
+        way = self._paths[robot]
         if way and np.array_equal(way[-1], place_m):
             return
         way.append(place_m.copy())

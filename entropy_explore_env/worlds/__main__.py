@@ -14,10 +14,10 @@ import argparse
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import NoReturn
 
+from entropy_explore_env.command import LineParser, run_command
 from entropy_explore_env.config import with_settings
-from entropy_explore_env.errors import EntropyExploreError, SettingError
+from entropy_explore_env.errors import SettingError
 from entropy_explore_env.randomness import Stream, check_seed, generator
 from entropy_explore_env.scenarios import SCENARIOS
 from entropy_explore_env.worlds.files.jacksboro import NAME as JACKSBORO
@@ -27,8 +27,6 @@ from entropy_explore_env.worlds.recipes.catalogue import RECIPES
 from entropy_explore_env.worlds.world import World
 from entropy_explore_env.writing import write_atomically
 
-BAD_INPUT = 2
-INTERRUPTED = 130
 _METRES = {
     "voxel-size-m": "edge of the voxels; default: the file's own",
     "height-m": "extrude a plan to this height",
@@ -39,13 +37,6 @@ _METRES = {
     "read-limit-s": "seconds of computing that reading may take",
 }
 """Options of `load_world` that are numbers."""
-
-
-class _Parser(argparse.ArgumentParser):
-    """Says what is wrong in one line."""
-
-    def error(self, message: str) -> NoReturn:
-        raise SettingError("command", " ".join(sys.argv[1:]), f"what --help shows ({message})")
 
 
 def main(words: Sequence[str]) -> int:
@@ -69,7 +60,9 @@ def main(words: Sequence[str]) -> int:
 
 def _parser() -> argparse.ArgumentParser:
     kind = argparse.RawDescriptionHelpFormatter
-    parser = _Parser(prog="python -m entropy_explore_env.worlds", description=__doc__, formatter_class=kind)
+    parser = LineParser(
+        prog="python -m entropy_explore_env.worlds", description=__doc__, formatter_class=kind
+    )
     commands = parser.add_subparsers(dest="command", required=True)
     listing = commands.add_parser("list", help="recipes, names and files")
     listing.add_argument("folder", nargs="?", type=Path, help="list the files in it, and in folders in it")
@@ -129,20 +122,5 @@ def _about(world: World) -> str:
     return f"{x} × {y} × {z} voxels of {world.grid.voxel_size_m:.6g} m, {free:.1%} free"
 
 
-def run(words: Sequence[str] | None = None) -> int:
-    """The command as a process runs it: errors become one line and an exit code."""
-    try:
-        return main(sys.argv[1:] if words is None else words)
-    except EntropyExploreError as error:
-        print("error: " + " ".join(str(error).split()), file=sys.stderr)
-        return BAD_INPUT
-    except OSError as error:
-        print(f"error: {error}", file=sys.stderr)
-        return BAD_INPUT
-    except KeyboardInterrupt:
-        print("interrupted", file=sys.stderr)
-        return INTERRUPTED
-
-
 if __name__ == "__main__":
-    sys.exit(run())
+    sys.exit(run_command(main))

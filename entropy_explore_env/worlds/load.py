@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import inspect
 import math
 from functools import lru_cache
 from pathlib import Path
@@ -13,7 +14,7 @@ import numpy as np
 from entropy_explore_env.config import Grid, Scenario
 from entropy_explore_env.errors import SettingError, WorldError
 from entropy_explore_env.validation import is_number, is_whole
-from entropy_explore_env.worlds.files.archives import saved
+from entropy_explore_env.worlds.files.archives import restored, saved
 from entropy_explore_env.worlds.files.jacksboro import NAME as JACKSBORO
 from entropy_explore_env.worlds.files.process import Format, read_apart
 from entropy_explore_env.worlds.files.resampling import extruded, resampled
@@ -109,6 +110,10 @@ def load_world(
     return _world(read_apart(form, path.absolute(), options, read_limit_s), str(path), options, height_m)
 
 
+LOADING = tuple(inspect.signature(load_world).parameters)[1:]
+"""Options of `load_world`."""
+
+
 def load_octomap(path: Path | str, voxel_size_m: float | None = None) -> World:
     """The world in an OctoMap tree, whatever its suffix; see `load_world`."""
     _check({"voxel_size_m": voxel_size_m})
@@ -122,6 +127,11 @@ def save_world(world: World, path: Path) -> None:
     Raises:
         OSError: The file cannot be written.
     """
+    write_atomically(path, world_bytes(world))
+
+
+def world_bytes(world: World) -> bytes:
+    """What `save_world` writes."""
     voxels = Voxels(
         world.occupied.view(np.int8),
         world.grid.voxel_size_m,
@@ -130,7 +140,16 @@ def save_world(world: World, path: Path) -> None:
         world.ceiling,
         world.name,
     )
-    write_atomically(path, saved(voxels))
+    return saved(voxels)
+
+
+def world_from_bytes(data: bytes) -> World:
+    """The world that `world_bytes` wrote. Nothing in it is executed.
+
+    Raises:
+        RefusedError: It is no saved world. A broken archive raises whatever zipfile and NumPy raise.
+    """
+    return _world(restored(data), "", {"voxel_size_m": None}, None)
 
 
 def _check(options: dict[str, Any]) -> None:
@@ -212,28 +231,33 @@ def _empty_world(scenario: Scenario) -> World:
     return empty(scenario.grid, np.random.default_rng(0))
 
 
-def world_from_file(path: Path, voxel_size_m: float) -> World:
+def world_from_file(path: Path, voxel_size_m: float, **options: Any) -> World:  # noqa: ANN401 - as load_world's
     """The world in a file, its voxels resampled; kept, so that many missions read it once.
 
     Args:
         path: As for `load_world`.
         voxel_size_m: Edge of the voxels wanted.
+        **options: Others of `load_world`.
 
     Raises:
-        SettingError: The file's kind is not known.
+        SettingError: The file's kind is not known, or an option is unknown or not allowed.
         WorldError: It cannot be read.
     """
     if str(path) != JACKSBORO and path.suffix.lower() not in FORMATS:
         files = ", ".join(f"*{suffix}" for suffix in FORMATS)
-        raise SettingError(
-            "Scenario.world", str(path), f"a recipe ({', '.join(RECIPES)}) or a file ({files})"
-        )
-    return _kept_world(path if str(path) == JACKSBORO else path.resolve(), voxel_size_m)
+        allowed = f"a recipe ({', '.join(RECIPES)}), a file ({files}) or, to an environment, a World"
+        raise SettingError("Scenario.world", str(path), allowed)
+    for name, value in options.items():
+        if name not in LOADING:
+            raise SettingError(name, value, "one of the options " + ", ".join(LOADING))
+    _check(options)
+    path = path if str(path) == JACKSBORO else path.resolve()
+    return _kept_world(path, voxel_size_m, tuple(sorted(options.items())))
 
 
 @lru_cache(maxsize=4)
-def _kept_world(path: Path, voxel_size_m: float) -> World:
-    return load_world(path, voxel_size_m)
+def _kept_world(path: Path, voxel_size_m: float, options: tuple[tuple[str, Any], ...] = ()) -> World:
+    return load_world(path, voxel_size_m, **dict(options))
 
 
 def with_world(scenario: Scenario) -> Scenario:

@@ -109,8 +109,10 @@ def _views(world: World) -> list[tuple[str, np.ndarray, tuple[float, float]]]:
 
 
 def _metres(value: float) -> str:
-    """A length with two decimals at most, or two digits where it is smaller."""
-    return f"{value:.2g}" if 0 < abs(value) < 1 else f"{round(float(value), 2):.12g}"
+    """A length in four digits at most, or two where it is smaller than a metre; whole metres from 1000 m."""
+    if 0 < abs(value) < 1:
+        return f"{value:.2g}"
+    return f"{value:.4g}" if abs(value) < 1000 else f"{value:.0f}"
 
 
 def _stretch(height: float) -> int:

@@ -29,7 +29,7 @@ class Barrier(enum.IntEnum):
     """It would reach above the ceiling."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class World:
     """A true world. The boundary of the grid is a wall.
 
@@ -49,7 +49,11 @@ class World:
     yaw_rad: float = 0.0
 
     def __post_init__(self) -> None:
-        """Check the array and make it read-only."""
+        """Check the arrays and make them read-only."""
+        kinds = {"grid": (Grid, "a Grid"), "occupied": (np.ndarray, "a NumPy array"), "name": (str, "a text")}
+        for name, (kind, allowed) in kinds.items():
+            if not isinstance(getattr(self, name), kind):
+                raise WorldError(f"World.{name}", getattr(self, name), allowed)
         if self.occupied.shape != self.grid.shape or self.occupied.dtype != np.bool_:
             found = f"{self.occupied.shape} {self.occupied.dtype}"
             raise WorldError("World.occupied", found, f"{self.grid.shape} bool")
@@ -60,7 +64,15 @@ class World:
             if self.ceiling.shape != self.grid.shape[:2] or self.ceiling.dtype != np.int32:
                 found = f"{self.ceiling.shape} {self.ceiling.dtype}"
                 raise WorldError("World.ceiling", found, f"{self.grid.shape[:2]} int32")
+            if self.ceiling.min() < 0 or self.ceiling.max() > self.grid.shape[2]:
+                found = f"{self.ceiling.min()} … {self.ceiling.max()}"
+                raise WorldError("World.ceiling", found, f"layers from 0 to {self.grid.shape[2]}")
             self.ceiling.setflags(write=False)
+
+    def __repr__(self) -> str:
+        """Its name and voxels, not their content."""
+        x, y, z = self.grid.shape
+        return f"World({self.name!r}, {x} × {y} × {z} voxels of {self.grid.voxel_size_m:g} m)"
 
     def barriers(self, body_radius_m: float) -> np.ndarray:
         """Where the centre of a ball-shaped body cannot be, judged at voxel centres.
@@ -150,6 +162,8 @@ class World:
         starts = _largest_component(room)
         if not starts.any():
             allowed = f"a world with room for a body of radius {body_radius_m} m"
+            if height is not None and not self.grid.flat:
+                allowed += f" in layer {height}, where planar robots stay"
             raise WorldError("world", self.name, allowed)
         labels, _ = connected_parts(~self.occupied)
         seen = np.isin(labels, np.unique(labels[starts]))

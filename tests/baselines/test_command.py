@@ -8,8 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from baselines.command import BAD_INPUT, INTERRUPTED, UsageError, parse, print_json, run_command
-from entropy_explore_env.errors import CallOrderError, MissingExtraError, SettingError, WorldError
+from baselines.command import parse, print_json, run_command
+from entropy_explore_env.command import BAD_INPUT, UsageError
+from entropy_explore_env.errors import MissingExtraError
 
 
 @dataclass
@@ -56,41 +57,12 @@ def test_help_goes_to_standard_output_and_ends_well(capsys):
     assert "How many." in out and "--number" in out
 
 
-@pytest.mark.parametrize(
-    ("error", "code", "line"),
-    [
-        (SettingError("speed", -1, "a number > 0"), BAD_INPUT, "error: speed = -1: allowed is a number > 0"),
-        (WorldError("world", "x", "another"), BAD_INPUT, "error: world = 'x': allowed is another"),
-        (CallOrderError("not\n  yet"), BAD_INPUT, "error: not yet"),
-        (FileNotFoundError(2, "No such file", "a.bt"), BAD_INPUT, "error: [Errno 2] No such file: 'a.bt'"),
-        (KeyboardInterrupt(), INTERRUPTED, "interrupted"),
-    ],
-)
-def test_an_error_becomes_one_line_on_standard_error_and_a_code(error, code, line, capsys):
-    def main(words):
-        raise error
-
-    assert run_command(main, []) == code
-    assert capsys.readouterr() == ("", line + "\n")
-
-
 def test_a_package_that_is_missing_is_named_with_its_extra(capsys, monkeypatch):
     monkeypatch.setitem(__import__("sys").modules, "tyro", None)
     assert run_command(lambda words: 0 if parse(Args, words) else 1, []) == BAD_INPUT
     out, err = capsys.readouterr()
     assert out == "" and err.count("\n") == 1 and "entropy_explore_env[baselines]" in err
     assert isinstance(MissingExtraError("tyro", "baselines"), ImportError)
-
-
-def test_our_mistakes_are_not_taken_for_bad_input():
-    with pytest.raises(ZeroDivisionError):
-        run_command(lambda words: 1 // len(words), [])
-
-
-def test_the_code_is_that_of_the_command_and_the_words_those_of_the_process(monkeypatch):
-    monkeypatch.setattr("sys.argv", ["command", "a", "b"])
-    assert run_command(lambda words: len(words)) == 2
-    assert run_command(lambda words: len(words), ["x"]) == 1
 
 
 def test_json_is_one_object_that_any_reader_takes(capsys):

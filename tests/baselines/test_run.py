@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import os
 import signal
@@ -15,15 +16,19 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from baselines import mission_log, run
+from baselines import mission_log, replay, run
 from baselines.command import run_command
 from baselines.mission import run_mission, scripted
 from baselines.strategies import make_strategy
+from baselines.world_file import Reading
 from entropy_explore_env.config import with_settings
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.missions.state import MissionEnd
 from entropy_explore_env.reports.metrics import mission_figures
+from entropy_explore_env.reports.mission_record import load_record
 from entropy_explore_env.scenarios import BOX
+from entropy_explore_env.worlds.load import LOADING
+from tests.worlds.samples import pgm
 
 ROOT = Path(__file__).parents[2]
 NAMED = (
@@ -174,6 +179,99 @@ def test_a_world_file_takes_the_place_of_the_scenario_s_world(command, tmp_path)
     assert fine["entropy_start_bits"] == pytest.approx(8 * 12 * 6 * voxel_bits, rel=1e-6)
     coarse = command(*words)  # at the scenario's 0.5 m: half of each outer voxel is solid, nothing is free
     assert coarse.code in (0, 2) and coarse.err.count("\n") == (coarse.code == 2)
+
+
+@pytest.fixture
+def floor(tmp_path):
+    """A plan of 6 × 5 m with a pillar, at 0.1 m a pixel."""
+    shades = np.full((50, 60), 254, np.uint8)
+    shades[20:30, 15:18] = 0
+    path = tmp_path / "floor.pgm"
+    path.write_bytes(pgm(shades))
+    return path
+
+
+def test_a_world_file_is_read_as_asked_and_replayed_from_the_record(floor, command, capsys, tmp_path):
+    record = tmp_path / "r.npz"
+    words = [
+        "room",
+        "--world",
+        str(floor),
+        "--resolution-m",
+        "0.1",
+        "--height-m",
+        "2",
+        "--robots",
+        "2",
+        *SHORT,
+    ]
+    ran = json.loads(command(*words, "--voxel-size-m", "0.2", "--record", str(record), "--json").out)
+    assert (ran["scenario"], ran["world"]) == ("room", "floor")
+    kept = load_record(record)
+    assert kept.scenario.grid.shape == (30, 25, 10) and kept.world.occupied[8, 12].all()
+    floor.unlink()  # the record holds the world
+    assert run_command(replay.main, [str(record), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["replayed"]["same"] is True
+
+
+def test_a_file_without_options_stays_a_setting_of_the_scenario(floor, command, tmp_path):
+    record = tmp_path / "r.npz"
+    assert command("office", "--world", str(floor), "--record", str(record), "--json", *SHORT).code == 0
+    assert load_record(record).scenario.world == str(floor) and load_record(record).world is None
+
+
+def test_the_table_says_whose_robots_explore_a_loaded_world(floor, command):
+    words = ("--world", str(floor), "--resolution-m", "0.1", "--voxel-size-m", "0.1", *SHORT)
+    for scenario, more, said, range_said in (
+        ("office", (), "those of office", "8 m"),
+        ("room", (), "those of room", "the whole world"),
+        ("room", ("--robot.max-speed-m-s", "0.5"), "those of room, changed", "the whole world"),
+        ("room", ("--sensor.max-range-m", "2.5"), "those of room, changed", "2.5 m"),
+    ):
+        lines = command(scenario, *words, *more).out.splitlines()
+        assert any("sensor's range" in line and f" {range_said} " in line for line in lines)
+        assert any("robots and sensor" in line and f" {said} " in line for line in lines)
+        assert any(" 60 × 50 voxels of 0.1 m " in line for line in lines)
+        assert any(" 6 × 5 m " in line for line in lines)
+
+
+def test_the_table_leaves_out_what_means_nothing(command):
+    """Sharing, where there is one robot; how many scans more than for a whole map, where there is none."""
+    team, alone = ("shared measurements", "bits sent", "imbalance between robots"), ("--robots", "1")
+    short, whole, single = (command("box-7x11x5", *words).out for words in (SHORT, (), alone))
+    assert all(label in whole and label not in single for label in team)
+    assert "scans over the floor" in whole and "scans over the floor" not in short
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--height-m", "2"], ["height_m", "--world"]),
+        (["--negate"], ["negate", "--world"]),
+        (["--hollow"], ["hollow", "--world"]),
+        (["--world", "FLOOR", "--ceiling-m", "2"], ["ceiling_m", "means nothing"]),
+        (["--world", "FLOOR", "--height-m", "-2"], ["height_m", "a number > 0"]),
+        (["--world", "FLOOR", "--height-m", "tall"], ["--height-m"]),
+        (["--world", "office", "--height-m", "2"], ["a file"]),
+    ],
+)
+def test_options_that_a_world_does_not_take_are_refused(words, said, floor, command, tmp_path):
+    given = [word.replace("FLOOR", str(floor)) for word in words]
+    ran = command("room", *given, "--out", str(tmp_path / "out"))
+    assert ran.code == 2 and ran.err.count("\n") == 1 and all(word in ran.err for word in said)
+    assert not (tmp_path / "out").exists()
+
+
+def test_every_option_of_load_world_is_an_option_of_the_command():
+    options = {field.name for field in dataclasses.fields(Reading)}
+    assert options - {"hollow"} | {"fill", "voxel_size_m"} == set(LOADING)
+    asked = Reading(1.0, 2.0, True, 3.0, 4.0, 5.0, True, 6.0).options()
+    assert (
+        asked.pop("fill") is False
+        and asked.pop("negate") is True
+        and set(asked.values()) == {1, 2, 3, 4, 5, 6}
+    )
+    assert Reading().options() == {}
 
 
 # --- files

@@ -10,7 +10,7 @@ import pytest
 from baselines import tour
 from baselines.command import run_command
 from entropy_explore_env.config import Grid
-from entropy_explore_env.worlds.load import save_world
+from entropy_explore_env.worlds.load import FORMATS, save_world
 from entropy_explore_env.worlds.world import World
 from tests.worlds.samples import pgm
 
@@ -56,6 +56,34 @@ def test_results_as_one_object(folder, capsys):
     assert [world["world"] for world in worlds] == ["bare.pgm", "floor.yaml", "hut.npz"]
     assert all(0.0 < world["explored"] <= 1.0 and world["scans"] > 0 for world in worlds)
     assert said.err == ""
+
+
+def test_a_world_that_cannot_be_used_is_a_row_and_the_others_are_explored(folder, capsys):
+    (folder / "below" / "broken.bt").write_bytes(b"no tree")
+    assert run_command(tour.main, [str(folder), *SHORT]) == 0
+    said = capsys.readouterr().out
+    rows = [line.split(" | ") for line in said.splitlines() if line.startswith("| ")][2:]
+    assert [row[0].strip("| ") for row in rows if row[3] == "refused"] == ["broken.bt"]
+    assert len(rows) == 4 and "\nRefused: world file = " in said
+    assert run_command(tour.main, [str(folder), *SHORT, "--json"]) == 0
+    refused = [row for row in json.loads(capsys.readouterr().out)["worlds"] if "refused" in row]
+    assert [row["world"] for row in refused] == ["broken.bt"] and "\n" not in refused[0]["refused"]
+
+
+def test_images_are_read_as_asked_and_files_that_say_it_themselves_are_not(folder, capsys):
+    words = [str(folder), *SHORT, "--json", "--resolution-m", "0.1", "--negate"]
+    assert run_command(tour.main, words) == 0
+    rows = {row["world"]: row for row in json.loads(capsys.readouterr().out)["worlds"]}
+    assert rows["floor.yaml"]["voxels"] == "44 × 30" and rows["floor.yaml"]["scans"] > 0
+    assert "room for a body" in rows["bare.pgm"]["refused"]  # what is dark is 3 pixels wide
+    assert run_command(tour.main, words[:-1]) == 0
+    rows = {row["world"]: row for row in json.loads(capsys.readouterr().out)["worlds"]}
+    assert rows["bare.pgm"]["voxels"] == "44 × 30"
+
+
+def test_files_of_every_kind_are_looked_for():
+    assert tuple(FORMATS) == tour._SUFFIXES
+    assert set(tour._PLANS) < set(FORMATS)
 
 
 @pytest.mark.parametrize(

@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 from entropy_explore_env import SCENARIOS, EntropyExploreEnv, EntropyExploreVectorEnv, Missions, SettingError
+from entropy_explore_env.command import BAD_INPUT, run_command
 from entropy_explore_env.config import Grid, with_settings
 from entropy_explore_env.envs import conformance
 from entropy_explore_env.envs.checks import ActionChecker
@@ -382,11 +383,7 @@ def test_the_command_says_what_it_checked() -> None:
 def test_the_command_refuses_bad_input_in_words(
     arguments: tuple[str, ...], capsys: pytest.CaptureFixture[str]
 ) -> None:
-    try:
-        status = conformance.main(list(arguments))
-    except SystemExit as leaving:  # argparse, for a missing argument
-        status = leaving.code
-    assert status == 2
+    assert run_command(conformance.main, arguments) == BAD_INPUT
     said = capsys.readouterr()
     assert not said.out
     assert len(said.err.splitlines()) == 1 and said.err.startswith("error: ")

@@ -13,6 +13,7 @@ import pytest
 from hypothesis import given as drawing
 from hypothesis import strategies as st
 
+from entropy_explore_env.config import Grid
 from entropy_explore_env.errors import CallOrderError, RecordError, WorldError
 from entropy_explore_env.missions.missions import Missions
 from entropy_explore_env.reports.mission_record import (
@@ -24,8 +25,10 @@ from entropy_explore_env.reports.mission_record import (
     state_digest,
     world_digest,
 )
+from entropy_explore_env.settings_json import settings_json
 from entropy_explore_env.version import VERSION
-from entropy_explore_env.worlds.load import save_world
+from entropy_explore_env.worlds.load import save_world, world_bytes
+from entropy_explore_env.worlds.world import World
 from tests.reference.scenes import drawn, free_box, random_actions, started, wander
 
 
@@ -181,6 +184,76 @@ def test_another_world_in_the_file_is_refused(tmp_path):
     check_world(CommandRecorder(missions).record(), other)  # a recipe: the version may make others
 
 
+# --- worlds given as objects
+
+
+def in_hut(**changes) -> tuple[MissionRecord, World]:
+    """The record of the second episode in one of two given worlds, and that world."""
+    solid = np.zeros((9, 12, 7), bool)
+    solid[4, 2:-2] = True
+    ceiling = np.full((9, 12), 6, np.int32)
+    hut = World(Grid(solid.shape, 0.5), solid, "hut", ceiling, 0.25)
+    missions = Missions(free_box(robots=2, **changes), given=(World(hut.grid, ~solid, "block"), hut))
+    missions.reset(0, 4)
+    missions.reset(0)
+    recorder = CommandRecorder(missions)
+    wander(missions, 12, 0)
+    return recorder.record("chance"), hut
+
+
+def test_a_record_holds_the_world_that_was_given(tmp_path):
+    record, hut = in_hut()
+    assert record.world is hut and record.episode == 1
+    back = load_record(saved(record, tmp_path))
+    assert (back.world.grid, back.world.name, back.world.yaw_rad) == (hut.grid, "hut", 0.25)
+    np.testing.assert_array_equal(back.world.occupied, hut.occupied)
+    np.testing.assert_array_equal(back.world.ceiling, hut.ceiling)
+    again = Missions(back.scenario, given=(back.world,))
+    again.reset(0, back.seed)
+    again.reset(0)
+    assert world_digest(again, 0) == back.world_digest
+    check_world(back, again)
+    wander(again, 12, 0)
+    assert state_digest(again, 0) == back.digest
+
+
+def test_records_without_such_a_world_are_of_the_first_format(file, tmp_path):
+    assert int(entries_of(file)["version"]) == 1 and "world" not in entries_of(file)
+    assert load_record_bytes(file, tmp_path).world is None
+
+
+def test_a_world_too_large_for_a_record_is_refused(tmp_path, monkeypatch):
+    monkeypatch.setattr("entropy_explore_env.reports.mission_record.MAX_FILE_VOXELS", 700)
+    with pytest.raises(RecordError, match=r"'hut'.*at most 700 voxels"):
+        save_record(in_hut()[0], tmp_path / "r.npz")
+    assert not list(tmp_path.iterdir())
+
+
+def other_world() -> np.ndarray:
+    """A saved world of another grid."""
+    world = World(Grid((9, 12, 7), 0.25), np.zeros((9, 12, 7), bool), "other")
+    return np.frombuffer(world_bytes(world), np.uint8)
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "said"),
+    [
+        ("world", np.zeros(9, np.uint8), "a whole .npz"),
+        ("world", np.zeros(0, np.uint8), "a whole .npz"),
+        ("world", other_world(), "fit each other"),
+        (
+            "settings",
+            settings_json(free_box(robots=2)),
+            "fit each other",
+        ),  # a scenario with a world of its own
+    ],
+)
+def test_forged_worlds_are_refused(name, value, said, tmp_path):
+    data = saved(in_hut()[0], tmp_path).read_bytes()
+    assert load_record_bytes(forged(data), tmp_path).world.name == "hut"
+    refused(forged(data, **{name: value}), tmp_path, said)
+
+
 # --- bad files
 
 
@@ -253,7 +326,8 @@ def forged(file: bytes, **changes: object) -> bytes:
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
-        ({"version": np.int64(2)}, "format version 1"),
+        ({"version": np.int64(3)}, "format version 1 or 2"),
+        ({"version": np.int64(2)}, "changed or damaged"),
         ({"format": "another"}, "as --record writes it"),
         ({"commands": np.zeros((3, 7, 5), np.float32)}, "fit each other"),
         ({"commands": np.zeros((3, 2), np.float32)}, "fit each other"),

@@ -18,7 +18,9 @@ from entropy_explore_env.reports.painting import (
     entropy_share,
     remaining_share,
 )
+from entropy_explore_env.reports.recording import poses_now
 from entropy_explore_env.reports.rendering import Frame, draw_frame
+from entropy_explore_env.worlds.world import World
 from tests.reference.scenes import free_box, random_actions, started
 
 FLAT = {"grid": Grid((13, 9, 1), 0.5, (-3.0, 1.0, 0.0)), "world": "furnished"}
@@ -105,13 +107,12 @@ def test_a_picture_of_each_moment(changes):
 def test_a_picture_shows_the_first_mission_as_robot_0_knows_it(changes, frames):
     missions = started(free_box(robots=3, **changes), seed=3, missions=2)
     painter = Painter("rgb_array")
-    rng, times, shares, goals = np.random.default_rng(0), [], [], []
+    rng, times, shares, starts = np.random.default_rng(0), [], [], poses_now(missions, 0)[:, :3]
     for _ in range(6):
         missions.step(*random_actions(missions, rng))
         painter.watch(missions)
         times.append(float(missions.state.missions[0]["time_s"]))
         shares.append(remaining_share(missions, 0))
-        goals.append(missions.state.robots[0]["goal"][:, :3].copy())
     painter.paint(missions)
     (frame,) = frames
     robots, grid = missions.state.robots[0], missions.grid
@@ -126,12 +127,26 @@ def test_a_picture_shows_the_first_mission_as_robot_0_knows_it(changes, frames):
     np.testing.assert_allclose(frame.gazes_rad[here], robots["goal"][here, 3:])
     assert here.any() and len(frame.paths_m) == 3
     for robot, path in enumerate(frame.paths_m):
-        np.testing.assert_array_equal(path[:-1], [goal[robot] for goal in goals])
+        np.testing.assert_array_equal(path[0], starts[robot])
         np.testing.assert_array_equal(path[-1], frame.positions_m[robot])
+        driven_m = np.linalg.norm(np.diff(path, axis=0), axis=1).sum()
+        assert 0.0 < driven_m <= robots["distance_m"][robot] + 1e-9
     assert "box-7x11x5" in frame.title and "robot_0" in frame.title
     said = " ".join(frame.status)
     assert f"time {times[-1]:,.0f} s" in said and f"scans {robots['scans'].sum():,}" in said
     assert f"shared {robots['measurements_sent'].sum():,}" in said
+
+
+def test_pictures_name_the_world_of_their_own_mission(frames):
+    grid = Grid((9, 12, 7), 0.5)
+    given = [World(grid, np.zeros(grid.shape, bool), name) for name in ("kitchen", "cellar")]
+    missions = Missions(free_box(robots=2), 2, given=given)
+    missions.reset_some(range(2), [4, 5])
+    for number in range(2):
+        painter = Painter("rgb_array", number)
+        painter.watch(missions)
+        painter.paint(missions)
+    assert [frame.title.split(":")[0] for frame in frames] == ["kitchen", "cellar"]
 
 
 def test_a_robot_under_way_is_drawn_where_it_is(frames):

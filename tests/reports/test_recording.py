@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
-import numpy as np
+import math
 
-from entropy_explore_env.reports.recording import Recorder
+import numpy as np
+import pytest
+
+from entropy_explore_env.config import Robot, RobotKind
+from entropy_explore_env.reports.recording import Recorder, Ways, poses_now
 from tests.reference.scenes import free_box, random_actions, started
 
 
@@ -67,3 +71,45 @@ def test_a_recorder_follows_the_first_mission_only():
         alone.note()
     np.testing.assert_array_equal(recorder.entropy_bits, alone.entropy_bits)
     np.testing.assert_array_equal(recorder.places_m, alone.places_m)
+
+
+WANDERERS = {
+    "straight": {},
+    "mixed": {"others": (RobotKind(Robot(reach_m=2.0, max_speed_m_s=1.5, acceleration_m_s2=2.0)),)},
+    "planned": {
+        "world": "furnished",
+        "robot": {"navigator": "planned", "reach_m": math.inf, "body_radius_m": 0.2},
+        "sensor": {"scan_every_m": 0.4, "field_of_view_rad": (2.0, 0.5)},
+    },
+}
+
+
+@pytest.mark.parametrize("period_s", [None, 0.3, 5.0])
+@pytest.mark.parametrize("kind", WANDERERS)
+def test_ways_are_those_that_were_driven(kind, period_s):
+    """As long as the odometer says whenever a robot stands, through free space only, corners and all."""
+    missions = started(
+        free_box(robots=3, decision_period_s=period_s, ending={"sigma_end": 1e-3}, **WANDERERS[kind]), seed=6
+    )
+    ways, stood, drives, rng = Ways(3), 0, set(), np.random.default_rng(2)
+    ways.note(missions)
+    for _ in range(60):
+        missions.step(*random_actions(missions, rng))
+        ways.note(missions)
+        robots = missions.state.robots[0]
+        drives |= set(enumerate(robots["depart_s"].tolist())) | {(robot, 0.0) for robot in range(3)}
+        for robot, way in enumerate(ways.so_far(missions)):
+            driven_m = np.linalg.norm(np.diff(way, axis=0), axis=1).sum()
+            if robots["deciding"][robot]:
+                assert driven_m == pytest.approx(robots["distance_m"][robot], abs=1e-9)
+                stood += 1
+            else:
+                assert driven_m <= robots["distance_m"][robot] + 1e-9
+    assert stood > 15
+    truth = missions.worlds[0].occupied
+    for robot, way in enumerate(ways.so_far(missions)):
+        np.testing.assert_array_equal(way[-1], poses_now(missions, 0)[robot, :3])
+        shares = np.linspace(0.0, 1.0, 50)[:, None, None]
+        between = way[:-1] + shares * (way[1:] - way[:-1])
+        assert not truth[tuple(np.moveaxis(missions.grid.voxel_of(between), -1, 0))].any()
+    assert (sum(map(len, ways.passed_m)) > len(drives)) == (kind == "planned")  # corners

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from entropy_explore_env.config import Grid
-from entropy_explore_env.worlds.pictures import _FREE, _SOLID, _stretch, picture
+from entropy_explore_env.worlds.pictures import _FREE, _SOLID, _metres, _stretch, picture
 from entropy_explore_env.worlds.world import World
 
 Image = pytest.importorskip("PIL.Image", reason="pillow is not installed")
@@ -58,6 +58,12 @@ def test_long_names_and_sizes_from_a_millimetre_to_a_hundred_kilometres_fit():
         pixels = drawn(occupied, edge, name="a very long name of a world " * 8)
         assert pixels.shape[1] <= 1008
         assert is_colour(pixels[:, -4:], (255, 255, 255)).all()  # nothing runs over the edge
+
+
+def test_lengths_are_not_said_more_exactly_than_anybody_reads():
+    lengths = {0.05: "0.05", 0.08333: "0.083", 0.0: "0", 38.96: "38.96", 74.4012: "74.4", -20.0: "-20"}
+    lengths |= {999.96: "1000", 1339.22: "1339", 29983.67: "29984", 12.0: "12"}
+    assert [_metres(length) for length in lengths] == list(lengths.values())
 
 
 def test_low_worlds_are_stretched():

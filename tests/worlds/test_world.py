@@ -144,6 +144,31 @@ def test_planar_robots_start_in_their_plane():
     assert len(starts) == 4 * 11 - 9
     assert free_box().layer_of(Robot()) is None
     assert free_box(grid=Grid((9, 6, 1), 0.5)).layer_of(Robot()) == 0
+    on_edge = Robot(motion="planar", sensor_height_m=0.3)
+    assert free_box(grid=Grid((9, 6, 5), 0.1)).layer_of(on_edge) == 3  # 0.3 / 0.1 is less in binary
+    low = free_box(grid=world.grid, robot={"motion": "planar", "sensor_height_m": 0.2, "body_radius_m": 0.4})
+    with pytest.raises(WorldError, match="in layer 0, where planar robots stay"):
+        world.layout(low)
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"grid": SIZE}, r"World\.grid"),
+        ({"occupied": [[[False]]]}, "a NumPy array"),
+        ({"occupied": np.zeros(SIZE, np.uint8)}, r"\(7, 11, 5\) bool"),
+        ({"occupied": np.zeros((11, 7, 5), bool)}, r"\(7, 11, 5\) bool"),
+        ({"occupied": np.ones(SIZE, bool)}, "free voxel"),
+        ({"name": None}, r"World\.name"),
+        ({"ceiling": np.full(SIZE[:2], 6, np.int32)}, "layers from 0 to 5"),
+        ({"ceiling": np.full(SIZE[:2], -1, np.int32)}, "layers from 0 to 5"),
+        ({"ceiling": np.zeros(SIZE[:2])}, "int32"),
+    ],
+)
+def test_what_is_no_world_is_refused(changes, said):
+    whole = {"grid": Grid(SIZE, 0.5), "occupied": np.zeros(SIZE, bool), "name": "by hand"}
+    with pytest.raises(WorldError, match=said):
+        World(**{**whole, **changes})
 
 
 def terrain() -> World:

@@ -63,6 +63,18 @@ def read(path: Path, options: Options) -> Voxels:
     return _height_map(entries, options)
 
 
+def restored(data: bytes) -> Voxels:
+    """The world whose archive `saved` made.
+
+    Raises:
+        RefusedError: As for `arrays`, or it holds no saved world.
+    """
+    entries = arrays(data)
+    if "format" not in entries:
+        raise RefusedError("a saved world")
+    return _world(entries)
+
+
 def arrays(data: bytes) -> dict[str, np.ndarray]:
     """The arrays of an archive, each no larger than what its header and the archive agree on.
 

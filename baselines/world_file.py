@@ -1,0 +1,65 @@
+"""A world file on a command line: how it is read, as the library's `load_world` has it."""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+from typing import Any
+
+from entropy_explore_env.errors import SettingError
+
+
+@dataclass
+class Reading:
+    """How a world file is read; refused where it means nothing for the file. Metres, seconds."""
+
+    height_m: float | None = None
+    """Extrude a plan to this height."""
+    resolution_m: float | None = None
+    """Edge of an image's pixel, or spacing of a height map that does not say it."""
+    negate: bool = False
+    """Images: bright is solid."""
+    elevation_step_m: float | None = None
+    """Height of one count of a 16-bit image."""
+    clearance_m: float | None = None
+    """Free space above a height map, or around a mesh."""
+    ceiling_m: float | None = None
+    """Height of the exposure surface above the ground of a height map."""
+    hollow: bool = False
+    """Meshes: do not fill what they shut in."""
+    read_limit_s: float | None = None
+    """Seconds of computing that reading may take."""
+
+    def asked(self) -> dict[str, Any]:
+        """What was asked for."""
+        fields = dataclasses.asdict(self)
+        return {name: value for name, value in fields.items() if value is not None and value is not False}
+
+    def options(self) -> dict[str, Any]:
+        """The same by the names of `load_world`."""
+        options = self.asked()
+        if options.pop("hollow", False):
+            options["fill"] = False
+        return options
+
+
+def world_settings(world: str | None, voxel_size_m: float | None, reading: Reading) -> dict[str, Any]:
+    """Settings of an environment in a world file.
+
+    Args:
+        world: The file; None = the scenario's own world.
+        voxel_size_m: Edge of the voxels wanted; None = the scenario's.
+        reading: How it is read. Where nothing is asked for, the file stays a setting of the scenario, which
+            a mission record refers to; else the record holds the world.
+
+    Raises:
+        SettingError: Something is asked for and there is no file.
+    """
+    size = {} if voxel_size_m is None else {"voxel_size_m": voxel_size_m}
+    if world is None:
+        for name, value in (size | reading.asked()).items():
+            raise SettingError(name, value, "given together with --world only")
+        return {}
+    if reading.asked():
+        return {"world": {"path": world, **size, **reading.options()}}
+    return {"world": world, **({"grid": size} if size else {})}

@@ -1,0 +1,56 @@
+"""The form that all commands share: errors are one line on standard error, exit codes the same.
+
+Exit codes: 0 done, 1 what the command checks does not hold, 2 bad input, 130 interrupted.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import NoReturn
+
+from entropy_explore_env.errors import EntropyExploreError
+
+BAD_INPUT = 2
+INTERRUPTED = 130
+
+
+class UsageError(EntropyExploreError):
+    """The words of a command line do not fit its options."""
+
+
+class LineParser(argparse.ArgumentParser):
+    """Says in one line what does not fit."""
+
+    def error(self, message: str) -> NoReturn:
+        """Raise a UsageError, for `run_command` to print."""
+        raise UsageError(f"{message}; see --help")
+
+
+def run_command(main: Callable[[Sequence[str]], int], words: Sequence[str] | None = None) -> int:
+    """Run a command's main function; its errors become one line on standard error and an exit code.
+
+    Args:
+        main: Takes the words of the command line, returns an exit code.
+        words: None = those of the process.
+    """
+    try:
+        return main(sys.argv[1:] if words is None else words)
+    except EntropyExploreError as error:
+        print("error: " + " ".join(str(error).split()), file=sys.stderr)
+        return BAD_INPUT
+    except BrokenPipeError:  # whoever read our output has seen enough
+        sys.stdout = Path(os.devnull).open("w")
+        return 0
+    except OSError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return BAD_INPUT
+    except MemoryError as error:
+        print(f"error: not enough memory: {error}", file=sys.stderr)
+        return BAD_INPUT
+    except KeyboardInterrupt:
+        print("interrupted", file=sys.stderr)
+        return INTERRUPTED

@@ -1,0 +1,120 @@
+"""A World object straight into every environment, in two lines."""
+
+from __future__ import annotations
+
+import copy
+import pickle
+
+import gymnasium
+import numpy as np
+import pettingzoo
+import pytest
+
+import entropy_explore_env as eee
+from entropy_explore_env.envs.conformance import check_conformance
+from entropy_explore_env.envs.episodes import require_same, snapshot
+
+ROOM = "entropy_explore_env/Room-v0"
+SHAPE = (9, 12, 7)
+
+
+def hut(row: int) -> eee.World:
+    """A room with a wall."""
+    solid = np.zeros(SHAPE, bool)
+    solid[row, 2:-2] = True
+    return eee.World(eee.Grid(SHAPE, 0.4), solid, f"hut {row}")
+
+
+HUT, OTHER = hut(4), hut(6)
+
+
+def single() -> gymnasium.Env:
+    return gymnasium.make(ROOM, world=HUT).unwrapped
+
+
+MAKERS = {
+    "parallel_env": lambda: eee.parallel_env("room", robots=2, world=HUT),
+    "EntropyExploreEnv": lambda: eee.EntropyExploreEnv("office-3d", world=HUT),
+    "pettingzoo parallel": lambda: pettingzoo.make("parallel", ROOM, world=HUT),
+    "env": lambda: eee.env("room", world=HUT).unwrapped,
+    "pettingzoo aec": lambda: pettingzoo.make("aec", ROOM, world=HUT).unwrapped,
+    "SingleRobotEnv": lambda: eee.SingleRobotEnv("room", world=HUT),
+    "gymnasium": single,
+    "vector": lambda: eee.EntropyExploreVectorEnv("room", 3, world=HUT),
+    "gymnasium vector": lambda: gymnasium.make_vec(ROOM, num_envs=3, world=HUT),
+}
+
+
+@pytest.mark.parametrize("make", MAKERS.values(), ids=MAKERS)
+def test_the_missions_of_every_environment_are_in_the_world(make):
+    env = make()
+    env.reset(seed=1)
+    assert env.scenario.grid == HUT.grid == env.missions.grid
+    for world, truth in zip(env.missions.worlds, env.missions.state.truth, strict=True):
+        assert world.name == "hut 4"
+        np.testing.assert_array_equal(truth.reshape(SHAPE), HUT.occupied)
+    env.close()
+
+
+def test_worlds_are_dealt_to_missions_and_to_episodes():
+    vector = eee.EntropyExploreVectorEnv("room", 4, world=[HUT, OTHER], robots=2)
+    vector.reset(seed=0)
+    assert [world.name for world in vector.missions.worlds] == ["hut 4", "hut 6", "hut 4", "hut 6"]
+    vector.reset()
+    assert [world.name for world in vector.missions.worlds] == ["hut 6", "hut 4", "hut 6", "hut 4"]
+    team = eee.parallel_env("room", world=[HUT, OTHER], robots=2)
+    team.reset(seed=0)
+    assert team.missions.worlds[0] is HUT
+    team.reset()
+    assert team.missions.worlds[0] is OTHER
+
+
+def test_the_mission_of_a_seed_is_the_same_in_a_batch_and_alone():
+    vector = eee.EntropyExploreVectorEnv("room", 3, world=[HUT, OTHER], robots=2)
+    vector.reset(seed=4)
+    team = eee.parallel_env("room", world=[HUT, OTHER], robots=2, decision_period_s=1.0)
+    for mission in range(3):
+        team.reset(seed=4 + mission)
+        assert team.missions.state.robots[0].tobytes() == vector.missions.state.robots[mission].tobytes()
+        assert team.missions.state.truth[0].tobytes() == vector.missions.state.truth[mission].tobytes()
+
+
+@pytest.mark.parametrize("copied", [copy.deepcopy, lambda env: pickle.loads(pickle.dumps(env))])
+def test_copies_go_on_in_their_worlds(copied):
+    env = eee.parallel_env("room", world=[HUT, OTHER], robots=2)
+    env.reset(seed=3)
+    other = copied(env)
+    for _ in range(2):
+        while env.agents:
+            actions = {agent: np.full(5, 0.4, np.float32) for agent in env.agents}
+            env.step(actions)
+            other.step(actions)
+            if env.missions.state.missions[0]["time_s"] > 20:
+                break
+        require_same("original, then copy", snapshot(env), snapshot(other))
+        env.reset()
+        other.reset()
+    assert other.missions.worlds[0].name == env.missions.worlds[0].name == "hut 6"
+
+
+def test_a_scenario_in_given_worlds_keeps_the_contract():
+    check_conformance("box-7x11x5", world=[HUT, OTHER], robots=2, steps=8)
+
+
+@pytest.mark.parametrize("scenario", ["room", "office", "terrain"])
+def test_a_team_that_finds_no_room_is_refused_as_in_any_world(scenario):
+    env = eee.parallel_env(scenario, world=HUT, robot={"body_radius_m": 9.0})
+    with pytest.raises(eee.WorldError, match="hut 4"):
+        env.reset(seed=0)
+
+
+def test_the_scenario_of_a_given_world_makes_no_other_by_itself():
+    env = eee.parallel_env("room", world=HUT)
+    with pytest.raises(eee.SettingError, match="'given'"):
+        eee.parallel_env(env.scenario)
+    again = eee.parallel_env(env.scenario, world=HUT)
+    assert again.scenario == env.scenario
+
+
+def test_a_world_says_what_it_is_in_a_line():
+    assert repr(HUT) == "World('hut 4', 9 × 12 × 7 voxels of 0.4 m)"

@@ -1,0 +1,68 @@
+"""How commands end: one line for an error, exit codes; the library's and those of the checkout alike."""
+
+from __future__ import annotations
+
+import sys
+
+import pytest
+
+from baselines import command as checkout
+from entropy_explore_env import command
+from entropy_explore_env.command import BAD_INPUT, INTERRUPTED, LineParser, UsageError
+from entropy_explore_env.errors import CallOrderError, SettingError, WorldError
+
+
+@pytest.fixture(params=[command.run_command, checkout.run_command], ids=["library", "checkout"])
+def run(request):
+    return request.param
+
+
+@pytest.mark.parametrize(
+    ("error", "code", "line"),
+    [
+        (SettingError("speed", -1, "a number > 0"), BAD_INPUT, "error: speed = -1: allowed is a number > 0"),
+        (WorldError("world", "x", "another"), BAD_INPUT, "error: world = 'x': allowed is another"),
+        (CallOrderError("not\n  yet"), BAD_INPUT, "error: not yet"),
+        (FileNotFoundError(2, "No such file", "a.bt"), BAD_INPUT, "error: [Errno 2] No such file: 'a.bt'"),
+        (MemoryError("8 EiB"), BAD_INPUT, "error: not enough memory: 8 EiB"),
+        (KeyboardInterrupt(), INTERRUPTED, "interrupted"),
+    ],
+)
+def test_an_error_becomes_one_line_on_standard_error_and_a_code(run, error, code, line, capsys):
+    def main(words):
+        raise error
+
+    assert run(main, []) == code
+    assert capsys.readouterr() == ("", line + "\n")
+
+
+def test_our_mistakes_are_not_taken_for_bad_input(run):
+    with pytest.raises(ZeroDivisionError):
+        run(lambda words: 1 // len(words), [])
+
+
+def test_the_code_is_that_of_the_command_and_the_words_those_of_the_process(run, monkeypatch):
+    monkeypatch.setattr("sys.argv", ["command", "a", "b"])
+    assert run(lambda words: len(words)) == 2
+    assert run(lambda words: len(words), ["x"]) == 1
+
+
+def test_a_reader_that_has_seen_enough_is_no_error(run, capsys, monkeypatch):
+    def main(words):
+        raise BrokenPipeError
+
+    monkeypatch.setattr(sys, "stdout", sys.stdout)  # it is replaced
+    before = sys.stdout
+    assert run(main, []) == 0 and sys.stdout is not before
+    sys.stdout.close()
+    assert capsys.readouterr().err == ""
+
+
+@pytest.mark.parametrize("words", [[], ["--number", "many"], ["stray"], ["--number", "3", "--wings"]])
+def test_words_that_do_not_fit_are_one_line(words, capsys):
+    parser = LineParser("count")
+    parser.add_argument("--number", type=int, required=True)
+    with pytest.raises(UsageError) as error:
+        parser.parse_args(words)
+    assert "\n" not in str(error.value) and "--help" in str(error.value)
+    assert capsys.readouterr() == ("", "")

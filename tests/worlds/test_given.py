@@ -1,0 +1,165 @@
+"""Worlds given as objects: they bring their grid, are dealt in turn, and what is no world is refused."""
+
+from __future__ import annotations
+
+import dataclasses
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from entropy_explore_env.config import Grid
+from entropy_explore_env.errors import EntropyExploreError, SettingError, WorldError
+from entropy_explore_env.missions.missions import Missions
+from entropy_explore_env.worlds.given import GIVEN, in_given_worlds, with_given_worlds, world_in_turn
+from entropy_explore_env.worlds.load import load_world, save_world, world_bytes, world_from_bytes
+from entropy_explore_env.worlds.recipes.catalogue import RECIPES
+from entropy_explore_env.worlds.world import World
+from tests.reference.scenes import free_box, wander
+from tests.worlds.samples import pgm, plan
+
+SHAPE = (9, 12, 7)
+GRID = Grid(SHAPE, 0.4, (-1.0, 2.0, 0.5))
+
+
+def walled(row: int, name: str = "walled", grid: Grid = GRID) -> World:
+    """A box with a wall across it."""
+    solid = np.zeros(grid.shape, bool)
+    solid[row, 2:-2] = True
+    return World(grid, solid, name)
+
+
+WORLDS = tuple(walled(row, f"wall {row}") for row in (2, 4, 6))
+
+
+def test_the_grid_is_the_world_s_and_all_else_the_scenario_s():
+    scenario, given = with_given_worlds(
+        free_box(robots=2), {"world": WORLDS[0], "split": "test", "robots": 3}
+    )
+    assert given == WORLDS[:1] and given[0] is WORLDS[0]
+    assert (scenario.grid, scenario.world, scenario.robots, scenario.split) == (GRID, GIVEN, 3, "test")
+    assert dataclasses.replace(scenario, grid=free_box().grid, world="empty") == free_box(
+        robots=3, split="test"
+    )
+    assert GIVEN not in RECIPES
+
+
+def test_recipes_and_files_stay_with_the_scenario(tmp_path):
+    assert with_given_worlds(free_box(), {"world": "furnished"}) == (free_box(world="furnished"), ())
+    assert with_given_worlds(free_box(), {"robots": 1}) == (free_box(robots=1), ())
+    assert with_given_worlds(free_box(), {"world": tmp_path / "a.bt"})[0].world == str(tmp_path / "a.bt")
+
+
+def test_a_scenario_that_fits_the_world_alone_is_taken():
+    """The box is 2.5 m high: a sensor far above it fits the tower that is given."""
+    tower = World(Grid((9, 12, 40), 0.5), np.zeros((9, 12, 40), bool), "tower")
+    robot = {"motion": "planar", "sensor_height_m": 15.0}
+    scenario = with_given_worlds(free_box(), {"world": tower, "robot": robot})[0]
+    assert scenario.layer_of(scenario.robot) == 30
+    with pytest.raises(SettingError, match="sensor_height_m"):
+        with_given_worlds(free_box(), {"world": WORLDS[0], "robot": robot})
+
+
+def test_missions_are_dealt_worlds_by_their_seeds_and_episodes():
+    missions = Missions(free_box(robots=1), 4, given=WORLDS)
+    missions.reset_some(range(4), [5, 6, 7, 8])
+    assert [world.name for world in missions.worlds] == ["wall 6", "wall 2", "wall 4", "wall 6"]
+    np.testing.assert_array_equal(
+        missions.state.truth.reshape(4, *SHAPE), [world.occupied for world in missions.worlds]
+    )
+    missions.reset(1)
+    missions.reset(2, 2**100)  # 2^100 = 1 mod 3
+    assert [world.name for world in missions.worlds] == ["wall 6", "wall 4", "wall 4", "wall 6"]
+    np.testing.assert_array_equal(missions.state.truth[1].reshape(SHAPE), WORLDS[1].occupied)
+
+
+def test_every_world_is_dealt_as_often_as_any_other():
+    for seed in (0, 41):
+        dealt = [world_in_turn(WORLDS, seed, episode).name for episode in range(6)]
+        assert sorted(dealt) == sorted([world.name for world in WORLDS] * 2)
+        assert {world_in_turn(WORLDS, seed + k, 0).name for k in range(3)} == {w.name for w in WORLDS}
+
+
+@pytest.mark.parametrize("split", ["train", "validation", "test"])
+def test_a_given_world_is_the_same_mission_as_its_file_in_every_split(split, tmp_path):
+    save_world(WORLDS[1], tmp_path / "world.npz")
+    box = free_box(split=split, robots=2)
+    scenario, given = with_given_worlds(box, {"world": WORLDS[1]})
+    file = {"world": str(tmp_path / "world.npz"), "grid": {"voxel_size_m": 0.4}}
+    missions = Missions(scenario, given=given), Missions(with_given_worlds(box, file)[0])
+    for each in missions:
+        each.reset(0, 3)
+        wander(each, 15, 1)
+    first, second = missions
+    assert first.grid == second.grid
+    for name, one, two in zip(first.state._fields, first.state, second.state, strict=True):
+        assert one.tobytes() == two.tobytes(), name
+
+
+def test_a_mapping_loads_a_file_with_its_options(tmp_path):
+    (tmp_path / "plan.pgm").write_bytes(pgm(plan()))
+    asked = {"path": tmp_path / "plan.pgm", "negate": True, "resolution_m": 0.1, "height_m": 0.5}
+    scenario, given = with_given_worlds(free_box(grid=Grid((4, 5, 3), 0.1)), {"world": asked})
+    expected = load_world(tmp_path / "plan.pgm", 0.1, height_m=0.5, negate=True, resolution_m=0.1)
+    assert scenario.grid == expected.grid and expected.grid.shape == (11, 7, 5)
+    np.testing.assert_array_equal(given[0].occupied, expected.occupied)
+    assert given[0].occupied.any() and not given[0].occupied.all()
+    again = with_given_worlds(free_box(grid=Grid((4, 5, 3), 0.1)), {"world": asked})[1]
+    assert again[0] is given[0]  # read once
+    finer = with_given_worlds(free_box(), {"world": {**asked, "voxel_size_m": 0.05}})[0]
+    assert finer.grid.shape == (22, 14, 10)
+
+
+@pytest.mark.parametrize(
+    ("settings", "said"),
+    [
+        ({"world": 3}, "world = 3"),
+        ({"world": []}, "a list of Worlds"),
+        ({"world": [WORLDS[0], "office"]}, "a list of Worlds"),
+        ({"world": [WORLDS[0], walled(2, grid=Grid(SHAPE, 0.5))]}, r"world\[1\]\.grid"),
+        ({"world": WORLDS[0], "grid": {"voxel_size_m": 0.1}}, "brings its own"),
+        ({"world": WORLDS[0], "robots": 0}, "Scenario.robots"),
+        ({"world": {}}, "`path`"),
+        ({"world": {"path": 3}}, "`path`"),
+        ({"world": {"path": "nowhere.pgm"}}, "nowhere.pgm"),
+        ({"world": {"path": "office"}}, "a recipe"),
+        ({"world": {"path": "a.pgm", "wings": 2}}, "wings"),
+        ({"world": {"path": "a.pgm", "height_m": [2.0]}}, "height_m"),
+        ({"world": {"path": "a.pgm", "negate": "yes"}}, "negate"),
+        ({"world": {"path": "a.pgm", "voxel_size_m": "fine"}}, "voxel_size_m"),
+    ],
+)
+def test_what_is_no_world_is_refused_in_one_line(settings, said):
+    with pytest.raises(EntropyExploreError, match=said) as caught:
+        with_given_worlds(free_box(), settings)
+    assert "\n" not in str(caught.value) and len(str(caught.value)) < 600
+
+
+def test_missions_check_the_worlds_that_they_are_given():
+    with pytest.raises(SettingError, match="a list of Worlds"):
+        Missions(free_box(), given=("office",))
+    with pytest.raises(WorldError, match=r"world\[1\]"):
+        in_given_worlds(free_box(), [WORLDS[0], walled(2, grid=Grid(SHAPE, 0.5))])
+    with pytest.raises(SettingError, match="to an environment, a World"):
+        Missions(in_given_worlds(free_box(), WORLDS))  # its worlds are not there any more
+
+
+def test_a_world_as_bytes_comes_back_whole():
+    ceiling = np.full(SHAPE[:2], 4, np.int32)
+    ceiling[0, 0] = 7
+    world = World(GRID, WORLDS[0].occupied.copy(), "σ and more", ceiling, 0.25)
+    back = world_from_bytes(world_bytes(world))
+    assert (back.grid, back.name, back.yaw_rad) == (world.grid, world.name, world.yaw_rad)
+    np.testing.assert_array_equal(back.occupied, world.occupied)
+    np.testing.assert_array_equal(back.ceiling, ceiling)
+
+
+def test_paths_of_the_same_file_are_read_once(tmp_path, monkeypatch):
+    (tmp_path / "plan.pgm").write_bytes(pgm(plan()))
+    monkeypatch.chdir(tmp_path)
+    near, far = ({"path": p} for p in ("plan.pgm", Path("..") / tmp_path.name / "plan.pgm"))
+    first, second = (with_given_worlds(free_box(), {"world": asked})[1][0] for asked in (near, far))
+    assert first is second
+    shutil.copy("plan.pgm", "other.pgm")
+    assert with_given_worlds(free_box(), {"world": {"path": "other.pgm"}})[1][0] is not first
