@@ -6,22 +6,26 @@ file, written whole or not at all, so that an experiment goes on where it was st
 
 from __future__ import annotations
 
+import csv
 import hashlib
+import io
 import json
-import multiprocessing
+import math
+import re
 import sys
-from collections.abc import Iterator, Mapping, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import cached_property, lru_cache
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
-import entropy_explore_env
+from baselines import mission
 from baselines.mission import run_mission, scripted
+from baselines.sources import sources_digest
 from baselines.strategies import make_strategy
+from baselines.workers import Failure, run_each
 from entropy_explore_env.config import Scenario
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.reports.metrics import mission_figures
@@ -29,130 +33,16 @@ from entropy_explore_env.reports.recording import Recorder
 from entropy_explore_env.writing import write_atomically
 
 _SERIES_POINTS = 200
-_MISSIONS_A_TASK = 5
+_PACE_PERIOD_S = 600.0
+"""The bar's time left is reckoned from so much of the past: single missions differ a lot."""
+_LONGEST_REASON = 200
+_ADDRESS = re.compile(r" at 0x[0-9a-fA-F]+")
+"""Where an object lies: another place in every process."""
 _RESAMPLES = 9999
 _CONFIDENCE = 0.95
 
 Record = dict[str, Any]
-
-
-@lru_cache(maxsize=1)
-def _sources_digest() -> str:
-    """Of the code that missions come from: records of other code are not taken for ours."""
-    hasher = hashlib.sha256()
-    library = Path(entropy_explore_env.__file__).parent
-    for source in [*sorted(library.rglob("*.py")), *sorted(Path(__file__).parent.glob("*.py"))]:
-        hasher.update(source.read_bytes())
-    return hasher.hexdigest()
-
-
-@dataclass(frozen=True)
-class Cell:
-    """One point of an experiment.
-
-    Attributes:
-        id: Its name, also that of its folder.
-        scenario: The task.
-        strategy: Name of the strategy.
-        seeds: Number of missions; their seeds are 0, 1, …, the same in every cell (paired).
-    """
-
-    id: str
-    scenario: Scenario
-    strategy: str
-    seeds: int
-
-    @cached_property
-    def digest(self) -> str:
-        """Of all that decides the results; worked out once, since it reads sources and world files."""
-        world = Path(self.scenario.world)
-        content = hashlib.sha256(world.read_bytes()).hexdigest() if world.is_file() else ""
-        described = repr((_sources_digest(), content, scripted(self.scenario), self.strategy))
-        return hashlib.sha256(described.encode()).hexdigest()[:16]
-
-
-def run_cells(
-    cells: Sequence[Cell], folder: Path, jobs: int, title: str, quiet: bool
-) -> dict[str, list[Record]]:
-    """Run what is missing of an experiment, under a progress bar.
-
-    Args:
-        cells: The points.
-        folder: For one file a mission.
-        jobs: Processes.
-        title: Of the progress bar.
-        quiet: Show no bar.
-
-    Returns:
-        Cell id → records by seed. A record holds the figures of `mission_figures`, and
-        `series`, `sent_by_scan` and `half_s` (see `mission_record`).
-    """
-    records: dict[str, dict[int, Record]] = {cell.id: {} for cell in cells}
-    todo: list[tuple[Cell, list[int]]] = []
-    for cell in cells:
-        missing = []
-        for seed in range(cell.seeds):
-            record = _read(folder, cell, seed)
-            if record is None:
-                missing.append(seed)
-            else:
-                records[cell.id][seed] = record
-        todo += [(cell, missing[i : i + _MISSIONS_A_TASK]) for i in range(0, len(missing), _MISSIONS_A_TASK)]
-    done = sum(len(found) for found in records.values())
-    for cell, seed, record in _progressing(_run_tasks(todo, folder, jobs), cells, done, title, quiet):
-        records[cell.id][seed] = record
-    return {cell.id: [records[cell.id][seed] for seed in range(cell.seeds)] for cell in cells}
-
-
-def _progressing(
-    results: Iterator[tuple[Cell, int, Record]], cells: Sequence[Cell], done: int, title: str, quiet: bool
-) -> Iterator[tuple[Cell, int, Record]]:
-    """Pass results on under a progress bar on standard error."""
-    from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
-
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=Console(file=sys.stderr), disable=quiet) as progress:
-        task = progress.add_task(title, total=sum(cell.seeds for cell in cells), completed=done)
-        for result in results:
-            progress.advance(task)
-            yield result
-
-
-def _run_tasks(
-    todo: Sequence[tuple[Cell, list[int]]], folder: Path, jobs: int
-) -> Iterator[tuple[Cell, int, Record]]:
-    """Run tasks in processes and yield their records as they come."""
-    if not todo:
-        return
-    context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(min(jobs, len(todo)), mp_context=context) as pool:
-        waiting: dict[Future[list[Record]], tuple[Cell, list[int]]] = {
-            pool.submit(_run_task, cell, seeds, folder): (cell, seeds) for cell, seeds in todo
-        }
-        try:
-            while waiting:
-                finished, _ = wait(waiting, return_when=FIRST_COMPLETED)
-                for future in finished:
-                    cell, seeds = waiting.pop(future)
-                    yield from (
-                        (cell, seed, record) for seed, record in zip(seeds, future.result(), strict=True)
-                    )
-        finally:
-            for future in waiting:
-                future.cancel()
-
-
-def _run_task(cell: Cell, seeds: Sequence[int], folder: Path) -> list[Record]:
-    """Run missions of one cell in this process; each leaves its file."""
-    env = EntropyExploreEnv(scripted(cell.scenario))
-    records = []
-    for seed in seeds:
-        record = mission_record(env, cell.strategy, seed)
-        content = json.dumps({"digest": cell.digest, "record": record}, allow_nan=False)
-        write_atomically(_path(folder, cell, seed), content)
-        records.append(record)
-    return records
+Item = TypeVar("Item")
 
 
 def mission_record(env: EntropyExploreEnv, strategy: str, seed: int) -> Record:
@@ -190,18 +80,150 @@ def mission_record(env: EntropyExploreEnv, strategy: str, seed: int) -> Record:
     }
 
 
+@dataclass(frozen=True)
+class Cell:
+    """One point of an experiment.
+
+    Attributes:
+        id: Its name, also that of its folder; slashes make folders in folders.
+        scenario: The task.
+        strategy: Name of the strategy.
+        seeds: Number of missions; their seeds are 0, 1, …, the same in every cell (paired).
+        record: Runs a mission with a strategy and a seed, and says what is kept of it.
+    """
+
+    id: str
+    scenario: Scenario
+    strategy: str
+    seeds: int
+    record: Callable[[EntropyExploreEnv, str, int], Record] = mission_record
+
+    @cached_property
+    def digest(self) -> str:
+        """Of all that decides the results; worked out once, since it reads sources and world files."""
+        modules = (sys.modules[name] for name in {__name__, self.record.__module__})
+        sources = sources_digest(self.strategy, mission, *modules)
+        world = Path(self.scenario.world)
+        content = hashlib.sha256(world.read_bytes()).hexdigest() if world.is_file() else ""
+        described = repr((sources, content, scripted(self.scenario), self.strategy))
+        return hashlib.sha256(described.encode()).hexdigest()[:16]
+
+
+def run_cells(
+    cells: Sequence[Cell],
+    folder: Path,
+    jobs: int,
+    title: str,
+    quiet: bool,
+    limit_s: float = math.inf,
+    keep_failures: bool = False,
+) -> dict[str, list[Record]]:
+    """Run what is missing of an experiment, under a progress bar.
+
+    Args:
+        cells: The points.
+        folder: For one file a mission.
+        jobs: Processes; with one, missions run in this process.
+        title: Of the progress bar.
+        quiet: Show no bar.
+        limit_s: Of every mission, on the clock; see `workers.run_each`.
+        keep_failures: A mission that fails leaves the record of `failed_record`; else its error is raised.
+
+    Returns:
+        Cell id → records by seed; see `mission_record` for what one holds.
+    """
+    records: dict[str, dict[int, Record]] = {cell.id: {} for cell in cells}
+    todo: list[tuple[Cell, int]] = []
+    # all cells grow together: so the bar's time left means something from the first round on
+    for seed in range(max((cell.seeds for cell in cells), default=0)):
+        for cell in cells:
+            record = _read(folder, cell, seed, limit_s) if seed < cell.seeds else None
+            if record is not None:
+                records[cell.id][seed] = record
+            elif seed < cell.seeds:
+                todo.append((cell, seed))
+    done = sum(len(found) for found in records.values())
+    results = run_each(_run_one, todo, jobs, limit_s)
+    for (cell, seed), outcome in _progressing(results, done, done + len(todo), title, quiet):
+        if isinstance(outcome, Failure):
+            if not keep_failures:
+                outcome.throw()
+            record = failed_record(outcome, limit_s)
+        else:
+            record = outcome
+        _write(folder, cell, seed, record)
+        records[cell.id][seed] = record
+    return {cell.id: [records[cell.id][seed] for seed in range(cell.seeds)] for cell in cells}
+
+
+def _progressing(results: Iterator[Item], done: int, total: int, title: str, quiet: bool) -> Iterator[Item]:
+    """Pass results on under a progress bar on standard error."""
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    console = Console(file=sys.stderr)
+    with Progress(*columns, console=console, disable=quiet, speed_estimate_period=_PACE_PERIOD_S) as progress:
+        task = progress.add_task(title, total=total, completed=done)
+        for result in results:
+            progress.advance(task)
+            yield result
+
+
+def _run_one(task: tuple[Cell, int]) -> Record:
+    """Run a mission of a cell in this process."""
+    cell, seed = task
+    try:
+        return cell.record(_environment(scripted(cell.scenario)), cell.strategy, seed)
+    except BaseException:
+        _environment.cache_clear()  # it stopped in the middle of something
+        raise
+
+
+@lru_cache(maxsize=1)
+def _environment(scenario: Scenario) -> EntropyExploreEnv:
+    """Kept for the next mission."""
+    return EntropyExploreEnv(scenario)
+
+
+def failed_record(failure: Failure, limit_s: float) -> Record:
+    """What is kept of a mission that failed.
+
+    Returns:
+        `failed`, the reason; and `limit_s` of a mission that ran past it, which a longer limit runs again.
+    """
+    reason = _ADDRESS.sub(" at 0x…", failure.reason)
+    reason = reason if len(reason) <= _LONGEST_REASON else reason[:_LONGEST_REASON] + " …"
+    return {"failed": reason, "limit_s": limit_s if failure.late else None}
+
+
 def _path(folder: Path, cell: Cell, seed: int) -> Path:
     return folder / cell.id / f"seed-{seed}.json"
 
 
-def _read(folder: Path, cell: Cell, seed: int) -> Record | None:
-    """A mission's record if it was run with the same settings before."""
+def _write(folder: Path, cell: Cell, seed: int, record: Record) -> None:
+    content = {"digest": cell.digest, "checksum": _checksum(record), "record": record}
+    write_atomically(_path(folder, cell, seed), json.dumps(content, allow_nan=False))
+
+
+def _checksum(record: object) -> str:
+    """Of a record, so that one that was changed by hand is run again."""
+    return hashlib.sha256(json.dumps(record).encode()).hexdigest()[:16]
+
+
+def _read(folder: Path, cell: Cell, seed: int, limit_s: float = math.inf) -> Record | None:
+    """A mission's record if it was run with the same settings before, and not ended by a shorter limit."""
     try:
         content = json.loads(_path(folder, cell, seed).read_text())
     except (OSError, ValueError):
         return None
-    ours = isinstance(content, dict) and content.get("digest") == cell.digest
-    return content.get("record") if ours else None
+    if not isinstance(content, dict) or content.get("digest") != cell.digest:
+        return None
+    record = content.get("record")
+    if not isinstance(record, dict) or content.get("checksum") != _checksum(record):
+        return None
+    ended_after_s = record.get("limit_s")
+    return None if ended_after_s is not None and ended_after_s < limit_s else record
 
 
 @dataclass(frozen=True)
@@ -278,5 +300,6 @@ def markdown_table(head: Sequence[str], rows: Sequence[Sequence[object]]) -> str
 
 def csv_table(columns: Mapping[str, Sequence[object]]) -> str:
     """Columns of equal length as CSV."""
-    rows = zip(*columns.values(), strict=True)
-    return "\n".join(",".join(str(cell) for cell in row) for row in [tuple(columns), *rows]) + "\n"
+    text = io.StringIO()
+    csv.writer(text, lineterminator="\n").writerows([tuple(columns), *zip(*columns.values(), strict=True)])
+    return text.getvalue()

@@ -96,13 +96,18 @@ def world_files(folder: Path) -> list[Path]:
     return files
 
 
+def is_plan(path: Path) -> bool:
+    """Whether a file is a floor plan, which ground robots explore."""
+    return path.suffix.lower() in _PLANS
+
+
 def env_for(path: Path, args: Args) -> EntropyExploreEnv:
     """Ground robots for plans, flying ones for everything else.
 
     Raises:
         WorldError: The file cannot be used.
     """
-    plan = path.suffix.lower() in _PLANS
+    plan = is_plan(path)
     scenario = scripted(find_scenario("office" if plan else "room"))
     edge_m = args.plan_voxel_size_m if plan else args.voxel_size_m
     reading = Reading(resolution_m=args.resolution_m, negate=args.negate)

@@ -1,0 +1,138 @@
+"""Strategies head to head: `python -m baselines.benchmark --scenarios room,office --seeds 30 --out DIR`.
+
+Runs every strategy in every scenario and team size on the same seeds, and writes a page with tables and
+figures. Missions are kept, a file each: whatever was stopped goes on where it was and ends with the same page,
+byte for byte. A mission that raises an error or runs past its limit is a row with the reason.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import shlex
+import sys
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from baselines.command import make_folder, parse, print_json, run_command
+from baselines.experiment import run_cells
+from baselines.head_to_head.cells import Entrants, chosen_scenarios, chosen_strategies
+from entropy_explore_env.errors import SettingError
+from entropy_explore_env.scenarios import SCENARIOS
+
+_SCENARIOS = "room,room-furnished,lab,office,cave"
+_MOST_ROBOTS = 1000
+
+
+@dataclass
+class Args:
+    """Run strategies head to head."""
+
+    scenarios: str | None = None
+    """Names and world files, commas between; default: room,room-furnished,lab,office,cave."""
+    strategies: str = "all"
+    """Names, commas between; random is always added, as the yardstick."""
+    robots: str | None = None
+    """Team sizes, commas between; default: 1,2,4."""
+    seeds: int | None = None
+    """Missions of every strategy in every scenario and team size; default: 30."""
+    quick: bool = False
+    """What is not given shrinks: scenarios room,office, team sizes 1,2, 5 seeds."""
+    world_scenario: str | None = None
+    """Whose robots and sensors explore world files; default: office for plans, room for other worlds."""
+    time_limit_s: float | None = None
+    """Simulated time after which missions are cut off; default: each scenario's own."""
+    wall_limit_s: float = 600.0
+    """Time on the clock after which a mission is ended, and counts as failed."""
+    jobs: int | None = None
+    """Processes; default: one a processor."""
+    out: Path = Path("results/head-to-head")
+    """Folder for head-to-head.md and, in head-to-head, its tables and figures."""
+    runs: Path | None = None
+    """Folder that keeps the missions; default: runs in --out."""
+    json: bool = False
+    """Print one JSON object and nothing else."""
+
+
+def main(words: Sequence[str]) -> int:
+    """Run the command."""
+    args = parse(Args, words, description=__doc__)
+    entrants = _entrants(args)
+    from baselines.head_to_head.page import write_page  # matplotlib: after the help
+    from baselines.head_to_head.summary import printed_results, show_results
+    from baselines.head_to_head.table import Results
+
+    runs = args.runs or args.out / "runs"
+    make_folder("out", args.out)
+    make_folder("runs", runs)
+    started = time.perf_counter()
+    records = run_cells(
+        entrants.cells(),
+        runs,
+        args.jobs or os.cpu_count() or 1,
+        "head to head",
+        quiet=args.json,
+        limit_s=args.wall_limit_s,
+        keep_failures=True,
+    )
+    results = Results(entrants, records)
+    page = write_page(args.out, results, _command(args, entrants))
+    if args.json:
+        print_json({**printed_results(results), "wall_s": round(time.perf_counter() - started, 1)})
+    else:
+        show_results(results)
+        print(f"written: {page}, its tables and figures beside it", file=sys.stderr)
+    return 0
+
+
+def _entrants(args: Args) -> Entrants:
+    """What takes part.
+
+    Raises:
+        SettingError: An option has a value that is not allowed.
+    """
+    seeds = args.seeds if args.seeds is not None else (5 if args.quick else 30)
+    for name, value in (("seeds", seeds), ("jobs", args.jobs)):
+        if value is not None and value < 1:
+            raise SettingError(name, value, "a whole number ≥ 1")
+    for name, limit_s in (("time_limit_s", args.time_limit_s), ("wall_limit_s", args.wall_limit_s)):
+        if limit_s is not None and not 0.0 < limit_s < math.inf:
+            raise SettingError(name, limit_s, "a number > 0")
+    if args.world_scenario is not None and args.world_scenario not in SCENARIOS:
+        raise SettingError("world_scenario", args.world_scenario, "one of " + ", ".join(SCENARIOS))
+    robots = _team_sizes(args.robots if args.robots is not None else ("1,2" if args.quick else "1,2,4"))
+    strategies = chosen_strategies(args.strategies)
+    wanted = args.scenarios if args.scenarios is not None else ("room,office" if args.quick else _SCENARIOS)
+    scenarios = chosen_scenarios(wanted, args.world_scenario, args.time_limit_s)
+    return Entrants(scenarios, strategies, robots, seeds)
+
+
+def _team_sizes(words: str) -> tuple[int, ...]:
+    sizes = tuple(int(word) for word in words.split(",") if word.isascii() and word.isdigit())
+    distinct = len(set(sizes)) == len(sizes) == len(words.split(","))
+    if not distinct or not all(1 <= size <= _MOST_ROBOTS for size in sizes):
+        raise SettingError(
+            "robots", words, f"different whole numbers from 1 to {_MOST_ROBOTS}, commas between"
+        )
+    return sizes
+
+
+def _command(args: Args, entrants: Entrants) -> str:
+    """What makes the same page again, wherever the world files lie."""
+    scenarios = args.scenarios or ",".join(entrants.scenarios)
+    given = {
+        "scenarios": ",".join(Path(word).name for word in scenarios.split(",")),
+        "strategies": args.strategies,
+        "robots": ",".join(map(str, entrants.robots)),
+        "seeds": str(entrants.seeds),
+        "world-scenario": args.world_scenario,
+        "time-limit-s": None if args.time_limit_s is None else f"{args.time_limit_s:g}",
+    }
+    options = (f"--{name} {shlex.quote(value)}" for name, value in given.items() if value is not None)
+    return "python -m baselines.benchmark " + " ".join(options)
+
+
+if __name__ == "__main__":
+    raise SystemExit(run_command(main))

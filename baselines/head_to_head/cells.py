@@ -1,0 +1,151 @@
+"""What runs head to head: every strategy in every scenario and team size, on the same seeds."""
+
+from __future__ import annotations
+
+import dataclasses
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from baselines.experiment import Cell, Record
+from baselines.mission import run_mission, scripted
+from baselines.strategies import STRATEGIES, make_strategy
+from baselines.strategy import Strategy
+from baselines.tour import is_plan
+from entropy_explore_env.config import Scenario, with_settings
+from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
+from entropy_explore_env.errors import SettingError
+from entropy_explore_env.missions.view import RobotView
+from entropy_explore_env.reports.metrics import mission_figures
+from entropy_explore_env.scenarios import SCENARIOS, find_scenario
+
+YARDSTICK = "random"
+"""The strategy that every other one is measured by; it is always part of the table."""
+
+
+@dataclass(frozen=True)
+class Entrants:
+    """The experiment.
+
+    Attributes:
+        scenarios: Name → the task, with one robot.
+        strategies: Names, `random` first.
+        robots: Team sizes.
+        seeds: Missions of every strategy in every scenario and team size.
+    """
+
+    scenarios: dict[str, Scenario]
+    strategies: tuple[str, ...]
+    robots: tuple[int, ...]
+    seeds: int
+
+    def cell_id(self, scenario: str, robots: int, strategy: str) -> str:
+        """Name of a cell."""
+        return f"{scenario}/robots-{robots}/{strategy}"
+
+    def cells(self) -> list[Cell]:
+        """All cells: strategies of one scenario and team size beside each other."""
+        return [
+            Cell(
+                self.cell_id(name, robots, strategy),
+                with_settings(scenario, {"robots": robots}),
+                strategy,
+                self.seeds,
+                timed_record,
+            )
+            for name, scenario in self.scenarios.items()
+            for robots in self.robots
+            for strategy in self.strategies
+        ]
+
+
+def chosen_strategies(words: str) -> tuple[str, ...]:
+    """Strategies from names with commas between them; `all` = every one.
+
+    Raises:
+        SettingError: None has such a name.
+    """
+    names = list(STRATEGIES) if words == "all" else words.split(",")
+    for name in names:
+        make_strategy(name)
+    return tuple(dict.fromkeys([YARDSTICK, *names]))
+
+
+def chosen_scenarios(
+    words: str, world_scenario: str | None, time_limit_s: float | None
+) -> dict[str, Scenario]:
+    """Scenarios from names and paths of world files with commas between them.
+
+    Args:
+        words: Names and paths.
+        world_scenario: Whose robots, sensors and voxel size explore the files; None = those of `office` for
+            plans, of `room` for other worlds.
+        time_limit_s: Of all missions; None = those of the scenarios.
+
+    Returns:
+        Name → scenario, scored, one robot; the name of a file is that of its scenario, without suffix.
+
+    Raises:
+        SettingError: A name is unknown or given twice, or a file cannot be used.
+    """
+    chosen: dict[str, Scenario] = {}
+    for word in words.split(","):
+        if word in SCENARIOS:
+            name, scenario = word, SCENARIOS[word]
+        else:
+            name, scenario = Path(word).stem, _file_scenario(word, world_scenario)
+        if name in chosen:
+            raise SettingError("scenarios", words, f"each name once, not {name} twice")
+        settings = {"scored": True, "robots": 1}
+        if time_limit_s is not None:
+            settings["time_limit_s"] = time_limit_s
+        scenario = with_settings(scenario, settings)
+        env = EntropyExploreEnv(scripted(scenario))  # a file that cannot be used is refused here
+        chosen[name] = dataclasses.replace(scenario, grid=env.scenario.grid)
+    return chosen
+
+
+def _file_scenario(word: str, world_scenario: str | None) -> Scenario:
+    path = Path(word)
+    if not path.is_file():
+        raise SettingError("scenarios", word, "names out of " + ", ".join(SCENARIOS) + ", or world files")
+    base = find_scenario(world_scenario or ("office" if is_plan(path) else "room"))
+    return dataclasses.replace(base, name=path.stem, world=word)
+
+
+class _Timed:
+    """A strategy with a stopwatch."""
+
+    def __init__(self, strategy: Strategy) -> None:
+        self._strategy = strategy
+        self.decisions_ms: list[float] = []
+
+    def reset(self, scenario: Scenario, rng: np.random.Generator) -> None:
+        """A new mission begins."""
+        self._strategy.reset(scenario, rng)
+
+    def choose(self, views: Sequence[RobotView]) -> list[np.ndarray]:
+        """What the strategy chooses, and how long a view took it."""
+        started = time.perf_counter()
+        chosen = self._strategy.choose(views)
+        self.decisions_ms.append(1e3 * (time.perf_counter() - started) / max(len(views), 1))
+        return chosen
+
+
+def timed_record(env: EntropyExploreEnv, strategy: str, seed: int) -> Record:
+    """Run a mission and keep its figures, and what it cost on the clock.
+
+    Returns:
+        `mission_figures` with `scans_over_floor`, without those of single robots; and `clock`: `decision_ms`,
+        the time that the strategy took for one robot (median over decisions), and `mission_s`.
+    """
+    timed, started = _Timed(make_strategy(strategy)), time.perf_counter()
+    run_mission(env, timed, seed)
+    mission_s = time.perf_counter() - started
+    figures = mission_figures(env.missions, 0, floor=True)
+    del figures["per_robot"]
+    decision_ms = float(np.median(timed.decisions_ms))
+    return {**figures, "clock": {"decision_ms": round(decision_ms, 4), "mission_s": round(mission_s, 4)}}
