@@ -101,8 +101,7 @@ class Cell:
     @cached_property
     def digest(self) -> str:
         """Of all that decides the results; worked out once, since it reads sources and world files."""
-        modules = (sys.modules[name] for name in {__name__, self.record.__module__})
-        sources = sources_digest(self.strategy, mission, *modules)
+        sources = sources_digest(self.strategy, mission, sys.modules[self.record.__module__])
         world = Path(self.scenario.world)
         content = hashlib.sha256(world.read_bytes()).hexdigest() if world.is_file() else ""
         described = repr((sources, content, scripted(self.scenario), self.strategy))

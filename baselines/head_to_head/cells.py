@@ -3,23 +3,17 @@
 from __future__ import annotations
 
 import dataclasses
-import time
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-
-from baselines.experiment import Cell, Record
-from baselines.mission import run_mission, scripted
+from baselines.experiment import Cell
+from baselines.head_to_head.record import timed_record
+from baselines.mission import scripted
 from baselines.strategies import STRATEGIES, make_strategy
-from baselines.strategy import Strategy
 from baselines.tour import is_plan
 from entropy_explore_env.config import Scenario, with_settings
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.errors import SettingError
-from entropy_explore_env.missions.view import RobotView
-from entropy_explore_env.reports.metrics import mission_figures
 from entropy_explore_env.scenarios import SCENARIOS, find_scenario
 
 YARDSTICK = "random"
@@ -114,38 +108,3 @@ def _file_scenario(word: str, world_scenario: str | None) -> Scenario:
         raise SettingError("scenarios", word, "names out of " + ", ".join(SCENARIOS) + ", or world files")
     base = find_scenario(world_scenario or ("office" if is_plan(path) else "room"))
     return dataclasses.replace(base, name=path.stem, world=word)
-
-
-class _Timed:
-    """A strategy with a stopwatch."""
-
-    def __init__(self, strategy: Strategy) -> None:
-        self._strategy = strategy
-        self.decisions_ms: list[float] = []
-
-    def reset(self, scenario: Scenario, rng: np.random.Generator) -> None:
-        """A new mission begins."""
-        self._strategy.reset(scenario, rng)
-
-    def choose(self, views: Sequence[RobotView]) -> list[np.ndarray]:
-        """What the strategy chooses, and how long a view took it."""
-        started = time.perf_counter()
-        chosen = self._strategy.choose(views)
-        self.decisions_ms.append(1e3 * (time.perf_counter() - started) / max(len(views), 1))
-        return chosen
-
-
-def timed_record(env: EntropyExploreEnv, strategy: str, seed: int) -> Record:
-    """Run a mission and keep its figures, and what it cost on the clock.
-
-    Returns:
-        `mission_figures` with `scans_over_floor`, without those of single robots; and `clock`: `decision_ms`,
-        the time that the strategy took for one robot (median over decisions), and `mission_s`.
-    """
-    timed, started = _Timed(make_strategy(strategy)), time.perf_counter()
-    run_mission(env, timed, seed)
-    mission_s = time.perf_counter() - started
-    figures = mission_figures(env.missions, 0, floor=True)
-    del figures["per_robot"]
-    decision_ms = float(np.median(timed.decisions_ms))
-    return {**figures, "clock": {"decision_ms": round(decision_ms, 4), "mission_s": round(mission_s, 4)}}

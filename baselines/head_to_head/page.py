@@ -100,25 +100,25 @@ def _parts(results: Results, scenarios: list[Row], overall: list[Row], command: 
     return [*parts, _FILES]
 
 
-_READING = f"""- A mission's time ends when the best map of the team reaches the entropy that the scenario asks
-  for. A mission that the time limit cuts off, or that fails, counts with the limit.
-- Relative time: over the time of `{YARDSTICK}` with the same seed; below 1 is faster. Where the walk itself is cut
-  off, the true ratio is smaller.
-- Figures are interquartile means, of the middle half of the missions; scans and what stands behind them over
-  missions that did not fail. Intervals (…) hold 95 %: a bootstrap over seeds, within each scenario.
-- Faster than: the probability that a mission beats one of the other strategy in the same scenario, ties ½, mean
-  over scenarios. The measures are those of Agarwal et al., *Deep Reinforcement Learning at the Edge of the
-  Statistical Precipice* (NeurIPS 2021).
-- 50 / 90 / 99 %: when the best map had lost that share of the bits asked for. Scans over floor: the team's scans
-  over the fewest that could map the world. Overlap: share of measurements that brought their own robot less
-  than I_min. Balance: coefficient of variation of the bits that the robots gained."""
+_READING = f"""- A mission's time ends when the best map of the team reaches the entropy that the scenario
+  asks for. A mission that the time limit cuts off, or that fails, counts with the limit.
+- Relative time: over the time of `{YARDSTICK}` with the same seed; below 1 is faster. Where the walk
+  itself is cut off, the true ratio is smaller.
+- Figures are interquartile means, of the middle half of the missions; scans and what stands right of them
+  over missions that did not fail. Intervals (…) hold 95 %: a bootstrap over seeds, within each scenario.
+- Faster than: the probability that a mission beats one of the other strategy in the same scenario, ties
+  ½, mean over scenarios. The measures are those of Agarwal et al., *Deep Reinforcement Learning at the
+  Edge of the Statistical Precipice* (NeurIPS 2021).
+- 50 / 90 / 99 %: when the best map had lost that share of the bits asked for. Scans over floor: the
+  team's scans over the fewest that could map the world. Overlap: share of measurements that brought their
+  own robot less than I_min. Balance: coefficient of variation of the bits that the robots gained."""
 
 _FILES = f"""## Files
 
 [`overall.csv`]({BESIDE}/overall.csv), [`scenarios.csv`]({BESIDE}/scenarios.csv),
 [`missions.csv`]({BESIDE}/missions.csv) (a line a mission), [`profiles.csv`]({BESIDE}/profiles.csv), and
-[`timing.csv`]({BESIDE}/timing.csv): milliseconds a decision and seconds a mission on the clock of the machine.
-The last alone differs from run to run."""
+[`timing.csv`]({BESIDE}/timing.csv): milliseconds a decision and seconds a mission on the clock; it alone
+differs from run to run."""
 
 
 def _overall_table(rows: list[Row]) -> str:

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from baselines.head_to_head.cells import YARDSTICK
 from baselines.head_to_head.page import ranged
 from baselines.head_to_head.table import (
     RIVALS,
@@ -35,14 +36,20 @@ def show_results(results: Results) -> None:
     from rich.table import Table
 
     names = ", ".join(results.entrants.scenarios)
-    table = Table(title=f"{names}; {results.entrants.seeds} seeds", title_justify="left", box=box.SIMPLE_HEAD)
+    table = Table(
+        title=f"{names}; {results.entrants.seeds} seeds; relative time: over {YARDSTICK}'s",
+        title_justify="left",
+        box=box.SIMPLE_HEAD,
+        padding=0,
+        pad_edge=False,
+    )
     table.add_column("robots", justify="right")
     table.add_column("strategy", no_wrap=True)
     rows = overall_rows(results)
     rivals = [rival for rival in RIVALS if f"faster_than_{rival}" in rows[0]]
     table.add_column("mapped", justify="right")
     table.add_column("relative time", justify="right", no_wrap=True)
-    for head in (*(f"faster than {rival}" for rival in rivals), "ms a decision"):
+    for head in (*(f"beats\n{rival}" for rival in rivals), "ms a\ndecision"):
         table.add_column(head, justify="right")
     clocks = clock_rows(results)
     last = None

@@ -12,11 +12,12 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from baselines import experiment
+from baselines import experiment, workers
 from baselines.experiment import (
     Cell,
     Claim,
     csv_table,
+    failed_record,
     markdown_table,
     mean_interval,
     median_interval,
@@ -35,7 +36,6 @@ from entropy_explore_env.scenarios import BOX
 
 SHORT = with_settings(BOX, {"time_limit_s": 30.0})
 CELLS = (Cell("walk", SHORT, "random", 7), Cell("steep", SHORT, "gradient", 2))
-"""Seven missions are more than one task of a process."""
 
 
 # --- running
@@ -100,13 +100,14 @@ def test_a_stopped_experiment_runs_exactly_what_is_missing(finished, tmp_path):
         assert record_file(folder, cell, seed).read_bytes() == record_file(source, cell, seed).read_bytes()
 
 
-def test_a_finished_experiment_starts_no_process(finished, monkeypatch, capsys):
+def test_a_finished_experiment_runs_nothing(finished, monkeypatch, capsys):
     folder, records = finished
 
-    def no_pool(*_: object, **__: object) -> None:
-        raise AssertionError("a process was started")
+    def nothing_to_do(_: object, tasks: list, *__: object) -> list:
+        assert not tasks, "missions were run"
+        return []
 
-    monkeypatch.setattr(experiment, "ProcessPoolExecutor", no_pool)
+    monkeypatch.setattr(experiment, "run_each", nothing_to_do)
     before = stamps(folder)
     assert run_cells(CELLS, folder, 2, "test", quiet=True) == records
     assert capsys.readouterr() == ("", "")
@@ -117,7 +118,7 @@ def test_a_finished_experiment_starts_no_process(finished, monkeypatch, capsys):
     assert fewer == {"walk": records["walk"][:3]}
     assert stamps(folder) == before
     changed = [dataclasses.replace(CELLS[0], strategy="gradient")]
-    with pytest.raises(AssertionError, match="process"):
+    with pytest.raises(AssertionError, match="missions were run"):
         run_cells(changed, folder, 2, "test", quiet=True)
 
 
@@ -129,27 +130,93 @@ def test_json_that_is_no_record_counts_as_missing(content, tmp_path):
     assert experiment._read(tmp_path, CELLS[0], 0) is None
 
 
-def test_a_mission_leaves_its_file_before_the_next_begins(tmp_path, monkeypatch):
+def test_a_mission_leaves_its_file_before_the_next_begins(tmp_path):
     """So an interruption costs one mission."""
-    really, seen = experiment.mission_record, []
+    seen = []
 
     def record(env, strategy, seed):
         seen.append(sorted(path.name for path in tmp_path.rglob("*.json")))
         if seed == 2:
             raise KeyboardInterrupt
-        return really(env, strategy, seed)
+        return mission_record(env, strategy, seed)
 
-    monkeypatch.setattr(experiment, "mission_record", record)
     with pytest.raises(KeyboardInterrupt):
-        experiment._run_task(CELLS[0], [0, 1, 2, 3], tmp_path)
+        run_cells([dataclasses.replace(CELLS[0], record=record)], tmp_path, 1, "test", quiet=True)
     assert seen == [[], ["seed-0.json"], ["seed-0.json", "seed-1.json"]]
     assert len(list(tmp_path.rglob("*"))) == 3  # the cell's folder and two files
 
 
+def test_missions_of_all_cells_take_turns(tmp_path):
+    """So the time left is told from all of them."""
+    order = []
+
+    def record(env, strategy, seed):
+        order.append((strategy, seed))
+        return {}
+
+    cells = [dataclasses.replace(cell, record=record) for cell in CELLS]
+    run_cells(cells, tmp_path, 1, "test", quiet=True)
+    assert order[:5] == [("random", 0), ("gradient", 0), ("random", 1), ("gradient", 1), ("random", 2)]
+    assert len(order) == 9
+
+
+def test_a_record_changed_by_hand_is_run_again(finished, tmp_path):
+    folder, records = finished
+    path = record_file(tmp_path, "walk", 0)
+    path.parent.mkdir()
+    content = json.loads(record_file(folder, "walk", 0).read_text())
+    path.write_text(json.dumps(content))
+    assert experiment._read(tmp_path, CELLS[0], 0) == records["walk"][0]
+    content["record"]["scans"] -= 1
+    path.write_text(json.dumps(content))
+    assert experiment._read(tmp_path, CELLS[0], 0) is None
+
+
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_failures_are_records_where_they_are_kept(jobs, tmp_path):
+    crowd = Cell("crowd", with_settings(SHORT, {"robots": 900}), "random", 2)
+    few = dataclasses.replace(CELLS[0], seeds=2)
+    records = run_cells([crowd, few], tmp_path, jobs, "test", quiet=True, keep_failures=True)
+    for record in records["crowd"]:
+        assert record["failed"].startswith("WorldError: ") and "900" in record["failed"]
+        assert record["limit_s"] is None
+    assert [record["seed"] for record in records["walk"]] == [0, 1]
+    assert experiment._read(tmp_path, crowd, 1) == records["crowd"][1]
+
+
+def test_a_mission_ended_by_its_limit_is_run_again_under_a_longer_one_only(tmp_path):
+    asked = []
+
+    def record(env, strategy, seed):
+        asked.append(seed)
+        while len(asked) < 2:  # late the first time
+            pass
+        return {"seed": seed}
+
+    cell = dataclasses.replace(CELLS[0], record=record, seeds=1)
+
+    def run(limit_s):
+        return run_cells([cell], tmp_path, 1, "test", True, limit_s, keep_failures=True)["walk"][0]
+
+    late = {"failed": "ran past 0.3 s on the clock", "limit_s": 0.3}
+    assert run(0.3) == late
+    assert run(0.3) == run(0.2) == late and asked == [0]
+    assert run(0.4) == {"seed": 0} and asked == [0, 0]
+    assert run(0.1) == {"seed": 0} and asked == [0, 0]
+
+
+def test_reasons_are_short_and_the_same_in_every_process():
+    failure = workers.Failure("TypeError: <Plan object at 0x7f12ab> " + "x" * 500)
+    reason = failed_record(failure, 9.0)["failed"]
+    assert reason.startswith("TypeError: <Plan object at 0x…> xxx") and len(reason) < 210
+    assert failed_record(workers.Failure("late", late=True), 9.0) == {"failed": "late", "limit_s": 9.0}
+
+
 def test_an_error_in_a_process_comes_back_by_its_name(tmp_path):
     crowd = [Cell("crowd", with_settings(SHORT, {"robots": 900}), "random", 1)]
-    with pytest.raises(WorldError, match="900"):
-        run_cells(crowd, tmp_path, 1, "test", quiet=True)
+    for jobs in (1, 2):
+        with pytest.raises(WorldError, match="900"):
+            run_cells(crowd, tmp_path, jobs, "test", quiet=True)
 
 
 def test_an_error_of_a_missing_package_comes_back_too():
@@ -339,6 +406,7 @@ def test_a_claim_is_a_row_of_json():
 
 def test_tables():
     assert csv_table({"a": [1, 2], "b": ["x", 0.5]}) == "a,b\n1,x\n2,0.5\n"
+    assert csv_table({"a": ['x, "y"']}) == 'a\n"x, ""y"""\n'
     with pytest.raises(ValueError, match=r"shorter|longer"):
         csv_table({"a": [1, 2], "b": [3]})
     assert (

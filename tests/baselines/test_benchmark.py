@@ -1,0 +1,460 @@
+"""`python -m baselines.benchmark`: rows, page, failures; whatever was killed ends with the same bytes."""
+
+from __future__ import annotations
+
+import csv
+import dataclasses
+import json
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+from scipy import stats
+
+from baselines import benchmark, experiment, strategies
+from baselines.command import run_command
+from baselines.head_to_head import cells as head_to_head_cells
+from baselines.head_to_head.cells import Entrants, chosen_scenarios, chosen_strategies
+from baselines.head_to_head.page import write_page
+from baselines.head_to_head.record import timed_record
+from baselines.head_to_head.table import Results, failed_rows, mission_rows, overall_rows, scenario_rows
+from baselines.mission import run_mission, scripted
+from baselines.random_walk import RandomWalk
+from baselines.strategies import make_strategy
+from entropy_explore_env.config import with_settings
+from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
+from entropy_explore_env.reports.metrics import mission_figures
+from entropy_explore_env.scenarios import BOX, LAB
+
+ROOT = Path(__file__).parents[2]
+TINY = ("--scenarios", "box-7x11x5", "--robots", "1,2", "--time-limit-s", "60")
+PAIR = (*TINY, "--strategies", "gradient", "--seeds", "6", "--jobs", "1")
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    """All that the command wrote but missions and the clock; what a kill left of half files is nobody's."""
+    return {
+        str(path.relative_to(folder)): path.read_bytes()
+        for path in sorted(folder.rglob("*"))
+        if path.is_file() and "runs" not in path.parts and path.name[0] != "." and path.name != "timing.csv"
+    }
+
+
+def rows_of(path: Path) -> list[dict[str, str]]:
+    with path.open() as file:
+        return list(csv.DictReader(file))
+
+
+@pytest.fixture(scope="module")
+def pair(tmp_path_factory):
+    """A small experiment as a user runs it, in a process of its own."""
+    folder = tmp_path_factory.mktemp("pair")
+    words = [sys.executable, "-m", "baselines.benchmark", *PAIR, "--out", str(folder)]
+    ran = subprocess.run(words, cwd=ROOT, capture_output=True, text=True, check=True)
+    return folder, ran
+
+
+# --- what a user gets
+
+
+def test_the_command_leaves_page_tables_figures_and_a_file_a_mission(pair):
+    folder, ran = pair
+    assert "beats" in ran.stdout and "gradient" in ran.stdout
+    assert "24/24" in ran.stderr and "head-to-head.md" in ran.stderr
+    assert set(contents(folder)) == {"head-to-head.md"} | {
+        f"head-to-head/{name}"
+        for name in (
+            "overall.csv",
+            "scenarios.csv",
+            "missions.csv",
+            "profiles.csv",
+            "profiles.png",
+            "times.png",
+        )
+    }
+    missions = sorted(str(path.relative_to(folder / "runs")) for path in folder.rglob("seed-*.json"))
+    assert missions == sorted(
+        f"box-7x11x5/robots-{robots}/{strategy}/seed-{seed}.json"
+        for robots in (1, 2)
+        for strategy in ("random", "gradient")
+        for seed in range(6)
+    )
+    for name in ("profiles", "times"):
+        with Image.open(folder / "head-to-head" / f"{name}.png") as picture:
+            assert picture.width > 400 and len(np.unique(np.asarray(picture.convert("L")))) > 30
+
+
+def test_the_page_says_what_made_it_and_every_row(pair):
+    page = (pair[0] / "head-to-head.md").read_text()
+    command = (
+        "python -m baselines.benchmark --scenarios box-7x11x5 --strategies gradient --robots 1,2 --seeds 6"
+    )
+    assert f"`{command} --time-limit-s 60`" in page
+    assert "Agarwal" in page and "## box-7x11x5" in page and "time limit 60 s" in page
+    table = [line for line in page.splitlines() if line.startswith(("| 1 |", "| 2 |"))]
+    assert len(table) == 8 and all(
+        f"`{name}`" in line for line, name in zip(table, ["random", "gradient"] * 4, strict=True)
+    )
+    assert "nan" not in page and "None" not in page and "failed" not in page.split("##", 1)[1]
+
+
+def test_figures_are_those_of_the_missions(pair):
+    folder, _ = pair
+    env = EntropyExploreEnv(scripted(with_settings(BOX, {"scored": True, "time_limit_s": 60.0, "robots": 2})))
+    for seed in (0, 5):
+        run_mission(env, make_strategy("gradient"), seed)
+        figures = mission_figures(env.missions, 0, floor=True)
+        path = folder / "runs" / "box-7x11x5" / "robots-2" / "gradient" / f"seed-{seed}.json"
+        record = json.loads(path.read_text())["record"]
+        assert record.pop("clock").keys() == {"decision_ms", "mission_s"}
+        assert {name: figures[name] for name in record} == record and "joint" in record
+        row = next(
+            row
+            for row in rows_of(folder / "head-to-head" / "missions.csv")
+            if (row["robots"], row["strategy"], row["seed"]) == ("2", "gradient", str(seed))
+        )
+        assert float(row["t_mission_s"]) == pytest.approx(figures["t_mission_s"], rel=1e-5)
+        assert float(row["explored"]) == pytest.approx(figures["joint"]["explored"], rel=1e-5)
+        assert row["end_reason"] == figures["end_reason"]
+
+
+def test_the_tables_are_made_of_the_missions(pair):
+    folder, _ = pair
+    missions = rows_of(folder / "head-to-head" / "missions.csv")
+
+    def times(strategy, robots):
+        found = [row for row in missions if (row["strategy"], row["robots"]) == (strategy, str(robots))]
+        return np.asarray([min(float(row["t_mission_s"]), 60.0) for row in found])
+
+    rows = {
+        (row["strategy"], int(row["robots"])): row for row in rows_of(folder / "head-to-head" / "overall.csv")
+    }
+    for robots in (1, 2):
+        ours, walk = times("gradient", robots), times("random", robots)
+        row = rows["gradient", robots]
+        relative = stats.trim_mean(ours / walk, 0.25)
+        assert float(row["relative_time"]) == pytest.approx(relative, rel=1e-4)
+        assert float(row["relative_time_low"]) <= relative <= float(row["relative_time_high"])
+        wins = stats.mannwhitneyu(walk, ours, method="asymptotic").statistic / 36
+        assert float(row["faster_than_random"]) == pytest.approx(wins, rel=1e-4)
+        assert row["faster_than_gradient"] == "" and rows["random", robots]["faster_than_random"] == ""
+        assert float(rows["random", robots]["relative_time"]) == 1.0
+
+
+def test_a_finished_experiment_says_the_same_again_without_a_mission(pair, capsys, monkeypatch):
+    folder, _ = pair
+    before = contents(folder)
+
+    def nothing_to_do(_: object, tasks: list, *__: object) -> list:
+        assert not tasks, "missions were run"
+        return []
+
+    monkeypatch.setattr(experiment, "run_each", nothing_to_do)
+    assert run_command(benchmark.main, [*PAIR, "--out", str(folder), "--json"]) == 0
+    said = capsys.readouterr()
+    results = json.loads(said.out, parse_constant=pytest.fail)
+    assert said.err == "" and contents(folder) == before
+    assert [len(results[name]) for name in ("overall", "scenarios", "failed", "timing")] == [4, 4, 0, 4]
+
+
+def test_two_processes_write_the_same_bytes(pair, tmp_path, capsys):
+    words = [*PAIR[:-1], "2", "--out", str(tmp_path), "--runs", str(tmp_path / "runs")]
+    assert run_command(benchmark.main, words) == 0
+    assert contents(tmp_path) == contents(pair[0])
+
+
+KILLER = """
+import os, random, signal, sys, time
+from pathlib import Path
+from baselines import benchmark
+from baselines.command import run_command
+import baselines.head_to_head.page, baselines.head_to_head.summary, baselines.workers
+from tests.baselines.test_benchmark import PAIR
+
+folder, kills = Path(sys.argv[1]), int(sys.argv[2])
+moments, done = random.Random(0), []
+for kill in range(kills):
+    started, before = time.monotonic(), len(list(folder.rglob("seed-*.json")))
+    child = os.fork()
+    if child == 0:
+        os._exit(run_command(benchmark.main, [*PAIR, "--out", str(folder)]))
+    if kill % 2:  # after a mission, or any time
+        while len(list(folder.rglob("seed-*.json"))) == before and time.monotonic() < started + 3:
+            time.sleep(0.0005)
+        time.sleep(moments.uniform(0.0, 0.03))
+    else:
+        time.sleep(moments.uniform(0.0, 0.3) if kill < kills - 4 else moments.uniform(0.3, 2.0))
+    os.kill(child, signal.SIGKILL)
+    _, status = os.waitpid(child, 0)
+    done.append((os.WIFSIGNALED(status), len(list(folder.rglob("seed-*.json")))))
+print(done)
+"""
+"""Starts the command and kills it at random moments, many times; forks share the import."""
+
+
+def test_killed_twenty_times_it_ends_with_the_same_bytes(pair, tmp_path):
+    words = [sys.executable, "-c", KILLER, str(tmp_path), "20"]
+    ran = subprocess.run(words, cwd=ROOT, capture_output=True, text=True, check=True)
+    killed = eval(ran.stdout.splitlines()[-1])
+    counts = [count for _, count in killed]
+    assert sum(by_signal for by_signal, _ in killed) >= 15  # the rest had finished before
+    assert counts == sorted(counts) and len(set(counts)) >= 5  # it went on, and was not done at once
+    words = [sys.executable, "-m", "baselines.benchmark", *PAIR, "--out", str(tmp_path)]
+    subprocess.run(words, cwd=ROOT, capture_output=True, check=True)
+    assert contents(tmp_path) == contents(pair[0])
+
+
+# --- missions that fail
+
+
+class Raises(RandomWalk):
+    """In the middle of some missions."""
+
+    def choose(self, views):
+        if views[0].time_s > 5.0 and len(views[0].scenario.agents) == 2:
+            raise ValueError("no | way\nat <all>")
+        return super().choose(views)
+
+
+class Sleeps(RandomWalk):
+    """Longer than anybody waits."""
+
+    def choose(self, views):
+        time.sleep(60.0)
+        return super().choose(views)
+
+
+@pytest.fixture
+def entered(monkeypatch):
+    """Two strategies that fail, beside the random walk."""
+    named = {"random": RandomWalk, "raises": Raises, "sleeps": Sleeps}
+    monkeypatch.setattr(strategies, "STRATEGIES", named)
+    monkeypatch.setattr(head_to_head_cells, "STRATEGIES", named)
+
+
+FAILING = (*TINY, "--seeds", "2", "--jobs", "1", "--wall-limit-s", "0.5")
+
+
+def test_a_mission_that_fails_is_a_row_with_its_reason(entered, tmp_path, capsys):
+    assert run_command(benchmark.main, [*FAILING, "--out", str(tmp_path)]) == 0
+    said = capsys.readouterr()
+    assert "failed: sleeps, box-7x11x5, robots 1, seeds 0, 1: ran past 0.5 s on the clock" in said.out
+    page = (tmp_path / "head-to-head.md").read_text()
+    failed = page.split("## Missions that failed")[1]
+    assert r"| box-7x11x5 | 2 | `raises` | 0, 1 | ValueError: no \| way at \<all\> |" in failed
+    assert failed.count("`sleeps` | 0, 1 | ran past 0.5 s on the clock |") == 2
+    assert "| 1 | `raises` | 0 of 2 |" in page and "| 2 | `raises` | 0 of 2, 2 failed |" in page
+    rows = rows_of(tmp_path / "head-to-head" / "scenarios.csv")
+    assert [row["failed"] for row in rows] == ["0", "0", "2", "0", "2", "2"]
+    slept = next(row for row in rows if row["strategy"] == "sleeps")
+    assert (slept["failed"], slept["mapped"], float(slept["time_s"]), slept["scans"]) == ("2", "0", 60.0, "")
+    ends = [row["end_reason"] for row in rows_of(tmp_path / "head-to-head" / "missions.csv")]
+    assert ends.count("FAILED") == 6
+
+
+def test_what_failed_stays_unless_the_limit_grows(entered, tmp_path, capsys):
+    assert run_command(benchmark.main, [*FAILING, "--out", str(tmp_path)]) == 0
+    before, started = contents(tmp_path), time.monotonic()
+    assert run_command(benchmark.main, [*FAILING, "--out", str(tmp_path)]) == 0
+    assert contents(tmp_path) == before
+    assert time.monotonic() - started < 2.0 + 4 * 0.5  # nobody slept again
+    capsys.readouterr()
+    words = [*FAILING[:-1], "0.6", "--out", str(tmp_path), "--json"]
+    assert run_command(benchmark.main, words) == 0
+    reasons = {row["reason"] for row in json.loads(capsys.readouterr().out)["failed"]}
+    assert reasons == {"ran past 0.6 s on the clock", "ValueError: no | way at <all>"}
+
+
+def test_a_world_without_room_for_the_team_is_a_row_for_all(tmp_path, capsys):
+    words = ["--scenarios", "box-7x11x5", "--robots", "1,900", "--seeds", "1", "--jobs", "1"]
+    words += ["--strategies", "random", "--time-limit-s", "20", "--out", str(tmp_path), "--json"]
+    assert run_command(benchmark.main, words) == 0
+    failed = json.loads(capsys.readouterr().out)["failed"]
+    assert len(failed) == 1 and failed[0]["robots"] == 900 and "WorldError" in failed[0]["reason"]
+
+
+# --- rows from missions worked out by hand
+
+
+def results_of(times: dict[str, list[list[float | str | None]]]) -> Results:
+    """Strategy → scenario → seed: seconds; None = cut off at 100 s; a word = failed for this reason."""
+    names = [f"world-{number}" for number in range(len(times["random"]))]
+    limited = with_settings(BOX, {"time_limit_s": 100.0})
+    scenarios = {name: dataclasses.replace(limited, name=name) for name in names}
+    entrants = Entrants(scenarios, tuple(times), (1,), len(times["random"][0]))
+    records = {}
+    for strategy, worlds in times.items():
+        for name, seconds in zip(names, worlds, strict=True):
+            records[entrants.cell_id(name, 1, strategy)] = [
+                {"failed": time_s, "limit_s": None}
+                if isinstance(time_s, str)
+                else {
+                    "world": name,
+                    "finished": time_s is not None,
+                    "end_reason": "TIME_UP" if time_s is None else "MAPPED",
+                    "t_mission_s": 100.0 if time_s is None else time_s,
+                    "t90_s": None if time_s is None else time_s / 2,
+                    "scans": 7,
+                    "clock": {"decision_ms": 1.0, "mission_s": 2.0},
+                }
+                for time_s in seconds
+            ]
+    return Results(entrants, records)
+
+
+BY_HAND = {
+    "random": [[50.0, 40.0], [None, 80.0]],
+    "gradient": [[25.0, 50.0], [20.0, None]],
+    "odd": [[10.0, "Oops"], [30.0, None]],
+}
+
+
+def test_rows_of_scenarios_worked_out_by_hand():
+    rows = {(row["scenario"], row["strategy"]): row for row in scenario_rows(results_of(BY_HAND))}
+    walk, gradient, odd = (rows["world-0", name] for name in BY_HAND)
+    assert (walk["mapped"], walk["cut_off"], walk["failed"], walk["time_s"]) == (2, 0, 0, 45.0)
+    assert (odd["mapped"], odd["cut_off"], odd["failed"], odd["time_s"]) == (1, 0, 1, 55.0)
+    assert gradient["relative_time"] == (25 / 50 + 50 / 40) / 2
+    assert odd["relative_time"] == (10 / 50 + 100 / 40) / 2
+    assert odd["t90_s"] == (5.0 + 100.0) / 2 and odd["scans"] == 7.0 and odd["overlap"] is None
+    assert rows["world-1", "random"]["cut_off"] == 1
+    assert rows["world-1", "random"]["time_s"] == 90.0
+
+
+def test_the_overall_rows_worked_out_by_hand():
+    rows = {row["strategy"]: row for row in overall_rows(results_of(BY_HAND))}
+    # gradient over random: 0.5, 1.25, 0.2, 1.25; without the lowest and the highest quarter
+    assert rows["gradient"]["relative_time"] == (0.5 + 1.25) / 2
+    assert rows["random"]["relative_time"] == 1.0 and rows["odd"]["mapped"] == 0.5
+    # pairs of world-0, 25 and 50 against 50 and 40: two faster, one equal; of world-1, 20 and 100 against
+    # 100 and 80: the same
+    assert rows["gradient"]["faster_than_random"] == ((2 + 0.5) / 4 + (2 + 0.5) / 4) / 2
+    assert rows["odd"]["faster_than_gradient"] == ((2 + 0) / 4 + (1 + 0.5) / 4) / 2
+    assert rows["random"]["faster_than_random"] is None
+    assert 0.0 <= rows["odd"]["faster_than_random_low"] <= rows["odd"]["faster_than_random"]
+
+
+def test_a_profile_never_counts_what_was_not_mapped():
+    results = results_of(BY_HAND)
+    share = results.profile(1, "odd", np.array([0.1, 0.2, 0.3, 1e9])).share
+    assert share.tolist() == [0.0, 0.25, 0.5, 0.5]  # 10/50 and 30/100
+    assert results.profile(1, "random", np.array([0.99, 1.0])).share.tolist() == [0.0, 0.75]
+
+
+def test_failures_of_one_reason_share_a_row():
+    times = {"random": [["Oops", "Oops", 3.0, "Ouch"]], "odd": [[1.0, 2.0, "Oops", 4.0]]}
+    rows = [(row["strategy"], row["reason"], row["seeds"]) for row in failed_rows(results_of(times))]
+    assert rows == [("random", "Oops", [0, 1]), ("random", "Ouch", [3]), ("odd", "Oops", [2])]
+    ends = [row["end_reason"] for row in mission_rows(results_of(times))]
+    assert ends == ["FAILED", "FAILED", "MAPPED", "FAILED", "MAPPED", "MAPPED", "FAILED", "MAPPED"]
+
+
+def test_a_page_where_all_failed_is_a_page(tmp_path):
+    page = write_page(tmp_path, results_of({"random": [["Oops", "Oops"]]}), "the command")
+    text = page.read_text()
+    assert "| 1 | `random` | 0% | 1.00 (1.00 … 1.00)" in text and "0 of 2, 2 failed" in text
+
+
+# --- what takes part
+
+
+def test_random_is_always_there_and_first():
+    assert chosen_strategies("gradient,random") == ("random", "gradient")
+    assert set(chosen_strategies("all")) == set(strategies.STRATEGIES)
+    assert chosen_strategies("information-rate,gradient")[1:] == ("information-rate", "gradient")
+
+
+def test_scenarios_are_names_and_files(tmp_path):
+    from entropy_explore_env.config import Grid
+    from entropy_explore_env.worlds.load import save_world
+    from entropy_explore_env.worlds.world import World
+
+    solid = np.zeros((9, 12, 7), bool)
+    solid[4, 5] = True
+    save_world(World(Grid(solid.shape, 0.25), solid, "hut"), tmp_path / "hut.npz")
+    chosen = chosen_scenarios(f"lab,{tmp_path / 'hut.npz'}", None, None)
+    assert list(chosen) == ["lab", "hut"] and all(one.scored and one.robots == 1 for one in chosen.values())
+    assert chosen["lab"].ending == LAB.ending and chosen["lab"].grid == LAB.grid
+    assert chosen["hut"].grid.shape == (9, 12, 7) and chosen["hut"].robot.reach_m == 0.5  # those of the room
+    chosen = chosen_scenarios(str(tmp_path / "hut.npz"), "cave", 77.0)
+    assert chosen["hut"].robot.navigator == "planned" and chosen["hut"].ending.time_limit_s == 77.0
+    assert chosen["hut"].grid.voxel_size_m == 0.4 and chosen["hut"].name == "hut"
+
+
+def test_the_page_of_a_file_does_not_say_where_it_lies(tmp_path, capsys):
+    image = Image.fromarray(np.full((30, 44), 254, np.uint8))
+    path = tmp_path / "a plan.png"
+    image.save(path)
+    words = ["--scenarios", str(path), "--strategies", "random", "--robots", "1", "--seeds", "1"]
+    words += ["--jobs", "1", "--time-limit-s", "20", "--out", str(tmp_path / "out"), "--json"]
+    assert run_command(benchmark.main, words) == 0
+    page = (tmp_path / "out" / "head-to-head.md").read_text()
+    assert "--scenarios 'a plan.png'" in page and "World file `a plan.png`, " in page
+    assert str(tmp_path) not in page and "ground robots" in page
+
+
+def test_what_a_record_says_of_the_clock_is_its_own(monkeypatch):
+    ticks = iter(range(10**6))
+    monkeypatch.setattr("baselines.head_to_head.record.time.perf_counter", lambda: float(next(ticks)))
+    env = EntropyExploreEnv(scripted(with_settings(BOX, {"scored": True, "robots": 1, "time_limit_s": 9.0})))
+    record = timed_record(env, "random", 0)
+    assert record["clock"]["decision_ms"] == 1000.0  # a tick a decision
+    assert record["clock"]["mission_s"] >= 2 * 3 and "per_robot" not in record
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["--scenarios", "rooom"],
+        ["--scenarios", "room,room"],
+        ["--scenarios", "nowhere.bt"],
+        ["--scenarios", "pyproject.toml"],
+        ["--scenarios", ""],
+        ["--strategies", "magic"],
+        ["--strategies", "random,"],
+        ["--robots", "0"],
+        ["--robots", "2,2"],
+        ["--robots", "two"],
+        ["--robots", "1,"],
+        ["--robots", "-1"],
+        ["--seeds", "0"],
+        ["--jobs", "0"],
+        ["--time-limit-s", "0"],
+        ["--time-limit-s", "inf"],
+        ["--wall-limit-s", "nan"],
+        ["--world-scenario", "moon"],
+        ["--out", "pyproject.toml/below"],
+        ["--magic"],
+    ],
+)
+def test_bad_input_is_one_line_before_anything_runs(words, tmp_path, capsys, monkeypatch):
+    def must_not_run(*_: object, **__: object) -> None:
+        raise AssertionError("missions were run")
+
+    monkeypatch.setattr(benchmark, "run_cells", must_not_run)
+    monkeypatch.chdir(ROOT)
+    given = words if "--out" in words else [*words, "--out", str(tmp_path / "out")]
+    assert run_command(benchmark.main, ["--quick", *given]) == 2
+    said = capsys.readouterr()
+    assert not said.out and said.err.startswith("error: ") and said.err.count("\n") == 1
+    assert not (tmp_path / "out").exists()
+
+
+def test_quick_shrinks_what_is_not_given(monkeypatch, tmp_path):
+    asked = []
+
+    def seen(cells, *_: object, **__: object) -> None:
+        asked.extend(cells)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(benchmark, "run_cells", seen)
+    words = ["--quick", "--robots", "3", "--out", str(tmp_path), "--strategies", "random"]
+    assert run_command(benchmark.main, words) == 130
+    assert [(cell.id, cell.seeds, cell.scenario.robots) for cell in asked] == [
+        ("room/robots-3/random", 5, 3),
+        ("office/robots-3/random", 5, 3),
+    ]

@@ -1,0 +1,67 @@
+"""Which code a strategy's results belong to."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import pytest
+
+from baselines import gradient, mission, random_walk, sources, strategies
+from baselines.gradient import GradientStrategy
+from baselines.information_rate import InformationRate, Weighing
+from baselines.random_walk import RandomWalk
+from baselines.sources import imported, sources_digest
+
+
+@pytest.fixture
+def entered(monkeypatch):
+    """Puts strategies in the place of all others."""
+
+    def enter(**named):
+        monkeypatch.setattr(strategies, "STRATEGIES", named)
+
+    return enter
+
+
+def test_what_a_strategy_imports_is_found_however_far_away():
+    assert imported("baselines.random_walk") == {"baselines.random_walk", "baselines.strategy"}
+    assert {"baselines.gradient", "baselines.information_rate", "baselines.strategy"} <= imported(
+        "baselines.strategies"
+    )
+
+
+def test_a_new_strategy_leaves_the_digest_of_another_as_it_is(entered):
+    entered(walk=RandomWalk)
+    before = sources_digest("walk")
+    entered(walk=RandomWalk, other=GradientStrategy)
+    assert sources_digest("walk") == before == sources_digest("walk")
+    assert len({before, sources_digest("walk", mission), sources_digest("other")}) == 3
+
+
+def test_settings_of_a_strategy_are_part_of_its_digest(entered):
+    entered(
+        a=GradientStrategy,
+        b=partial(GradientStrategy, motion_plane=True),
+        c=partial(GradientStrategy, motion_plane=False),
+        d=partial(InformationRate, Weighing(candidates=80)),
+        e=partial(InformationRate, Weighing(candidates=81)),
+    )
+    assert len({sources_digest(name) for name in "abcde"}) == 5
+
+
+def test_code_of_the_strategy_and_of_the_library_counts(entered, monkeypatch, tmp_path):
+    entered(walk=RandomWalk)
+    before = sources_digest("walk")
+    changed = tmp_path / "random_walk.py"
+    changed.write_text("# another walk\n")
+    files = sources._file_of
+    with monkeypatch.context() as patch:
+        patch.setattr(
+            sources, "_file_of", lambda name: changed if name == random_walk.__name__ else files(name)
+        )
+        assert sources_digest("walk") != before
+    with monkeypatch.context() as patch:
+        patch.setattr(sources, "_file_of", lambda name: changed if name == gradient.__name__ else files(name))
+        assert sources_digest("walk") == before
+    monkeypatch.setattr(sources, "_library_digest", lambda: b"another library")
+    assert sources_digest("walk") != before
