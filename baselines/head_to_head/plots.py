@@ -63,6 +63,9 @@ def time_figure(results: Results, rows: list[Row]) -> Figure:
     teams = results.entrants.robots
     apart = 0.8 / len(strategies)
     for name, axes in zip(scenarios, panels, strict=False):
+        limit_s = results.entrants.scenarios[name].ending.time_limit_s
+        lowest_s = min(row["time_s_low"] for row in rows if row["scenario"] == name)
+        axes.set_ylim(lowest_s / 1.4, limit_s * 1.4)
         axes.set_yscale("log")
         for place, strategy in enumerate(strategies):
             found = [row for row in rows if (row["scenario"], row["strategy"]) == (name, strategy)]
@@ -81,10 +84,8 @@ def time_figure(results: Results, rows: list[Row]) -> Figure:
                 linewidth=1.4,
                 label=strategy,
             )
-        limit_s = results.entrants.scenarios[name].ending.time_limit_s
-        lowest_s = min(row["time_s_low"] for row in rows if row["scenario"] == name)
         axes.axhline(limit_s, color="0.5", linestyle="--", linewidth=1, zorder=0)
-        axes.set(title=name, xlim=(-0.5, len(teams) - 0.5), ylim=(lowest_s / 1.4, limit_s * 1.4))
+        axes.set(title=name, xlim=(-0.5, len(teams) - 0.5))
         axes.set_xticks(range(len(teams)), [_team(robots) for robots in teams])
         axes.tick_params(axis="x", length=0)
         axes.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
