@@ -1,8 +1,8 @@
 """Measures across scenarios, with intervals: interquartile mean, probability of improvement, profile.
 
 Definitions of Agarwal, Schwarzer, Castro, Courville and Bellemare, *Deep Reinforcement Learning at the Edge
-of the Statistical Precipice* (NeurIPS 2021); its package rliable would bring pandas, statsmodels and seaborn
-along, and draws the missions of two strategies apart, although ours share their seeds.
+of the Statistical Precipice* (NeurIPS 2021). Its package rliable 1.2 cannot be imported beside pandas 3, and
+draws the missions of two strategies apart, although ours share their seeds.
 
 Scores are times: smaller is better. Letters: S scenarios, N seeds, T thresholds, B resamples. Intervals hold
 95 %: percentiles of a bootstrap that draws seeds with replacement within every scenario (stratified), the
