@@ -94,13 +94,13 @@ def test_the_alarm_is_off_after_a_task():
 
 
 def test_a_process_that_hangs_or_ends_is_replaced(monkeypatch):
-    monkeypatch.setattr(workers, "_GRACE_S", 3.0)
+    monkeypatch.setattr(workers, "_GRACE_S", 10.0)  # a busy machine takes seconds to start a process
     tasks = [("hang", 0), ("die", 7), ("kill", int(signal.SIGSEGV)), ("kill", int(signal.SIGKILL)), *SQUARES]
     started = time.monotonic()
-    found = outcomes(tasks, 2, 0.3)
-    assert time.monotonic() - started < 30.0
+    found = outcomes(tasks, 2, 1.0)
+    assert time.monotonic() - started < 50.0  # not the minute for which one hangs
     assert all(found[task] == task[1] ** 2 for task in SQUARES)
-    assert found["hang", 0] == Failure("ran past 0.3 s on the clock", late=True)
+    assert found["hang", 0] == Failure("ran past 1 s on the clock", late=True)
     assert found["die", 7].reason == "its process ended with exit code 7"
     assert found["kill", int(signal.SIGSEGV)].reason == "its process was ended by SIGSEGV"
     assert found["kill", int(signal.SIGKILL)].reason == "its process was ended by SIGKILL"
