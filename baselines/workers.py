@@ -9,6 +9,7 @@ import contextlib
 import dataclasses
 import math
 import multiprocessing
+import os
 import pickle
 import signal
 import threading
@@ -170,9 +171,18 @@ def _ending(code: int | None) -> str:
 def _serve(connection: Connection, work: Callable[[Any], Any], limit_s: float) -> None:
     """Do tasks until nobody gives any more: what a worker's process runs."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the process that started this one ends it
+    threading.Thread(target=_leave_with_parent, daemon=True).start()
     with contextlib.suppress(EOFError, BrokenPipeError):
         while True:
             connection.send(_portable(_attempt(work, connection.recv(), limit_s)))
+
+
+def _leave_with_parent() -> None:
+    """End this process, whatever it is at, once the one that started it is gone: killed, for instance."""
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(1)
 
 
 def _portable(outcome: Any) -> Any:  # noqa: ANN401 - whatever the work returns

@@ -6,14 +6,18 @@ import ctypes
 import multiprocessing
 import os
 import signal
+import subprocess
 import sys
 import time
+from pathlib import Path
 
 import pytest
 
 from baselines import workers
 from baselines.workers import Failure, run_each
 from entropy_explore_env.errors import SettingError
+
+ROOT = Path(__file__).parents[2]
 
 
 class ParticularError(Exception):
@@ -113,6 +117,45 @@ def test_who_stops_asking_leaves_no_process_behind():
     assert multiprocessing.active_children() != []
     results.close()
     assert multiprocessing.active_children() == []
+
+
+ORPHANED = """
+import multiprocessing, os, signal, sys
+sys.path.insert(0, "tests/baselines")
+from test_workers import work
+from baselines.workers import run_each
+
+if __name__ == "__main__":
+    results = run_each(work, [("square", 1), ("swallow", 0), ("swallow", 1)], 2)
+    next(results)
+    print(*(child.pid for child in multiprocessing.active_children()), flush=True)
+    os.kill(os.getpid(), signal.SIGKILL)
+"""
+
+
+@pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="looks processes up in /proc")
+def test_nobody_works_on_for_a_command_that_was_killed(tmp_path):
+    script = tmp_path / "orphaned.py"
+    script.write_text(ORPHANED)
+    words = [sys.executable, str(script)]
+    ran = subprocess.run(
+        words, cwd=ROOT, env={**os.environ, "PYTHONPATH": "."}, capture_output=True, text=True
+    )
+    assert ran.returncode == -signal.SIGKILL
+    children = [int(word) for word in ran.stdout.split()]
+    assert len(children) == 2
+    until = time.monotonic() + 30.0
+    while any(map(works, children)) and time.monotonic() < until:
+        time.sleep(0.05)
+    assert not any(map(works, children))
+
+
+def works(process: int) -> bool:
+    """Whether a process is there and no zombie."""
+    try:
+        return Path(f"/proc/{process}/stat").read_text().rsplit(")", 1)[1].split()[0] != "Z"
+    except OSError:
+        return False
 
 
 def test_an_interruption_goes_through():
