@@ -16,7 +16,7 @@ import threading
 import time
 import traceback
 from collections import deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
 from dataclasses import dataclass
 from multiprocessing.connection import Connection, wait
 from multiprocessing.context import SpawnProcess
@@ -59,7 +59,7 @@ class _LateError(BaseException):
 
 def run_each(
     work: Callable[[Task], Result], tasks: Sequence[Task], jobs: int, limit_s: float = math.inf
-) -> Iterator[tuple[Task, Result | Failure]]:
+) -> Generator[tuple[Task, Result | Failure], None, None]:
     """Do the work for every task, and yield results as they come.
 
     With one job the work is done in this process. Its limit is an alarm there, which rings between
@@ -136,7 +136,7 @@ class _Worker:
         self.process.start()
         theirs.close()
 
-    def give(self, task: object) -> None:
+    def give(self, task: Any) -> None:  # noqa: ANN401 - the work's
         """Let it do a task."""
         self.task = task
         self.due = time.monotonic() + self.limit_s + _GRACE_S
@@ -197,7 +197,7 @@ def _portable(outcome: Any) -> Any:  # noqa: ANN401 - whatever the work returns
 
 def _run_in_processes(
     work: Callable[[Any], Any], tasks: Sequence[Task], jobs: int, limit_s: float
-) -> Iterator[tuple[Task, Any]]:
+) -> Generator[tuple[Task, Any], None, None]:
     """Yield every task with its outcome as they come; a process that ends is replaced."""
     queue = deque(tasks)
     busy: list[_Worker] = []
