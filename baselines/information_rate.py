@@ -155,9 +155,9 @@ class InformationRate:
             if bits[best] < self.weighing.poor * journey.best_bits and journey.patience <= 0:
                 rate = float(self._worth(journey, bits, seconds)[best])
                 journey.stops = self._way_to_somewhere_better(view, here, cones, rate)
-                if journey.stops:
+                if journey.stops and _in_sight(view, here[:3], journey.stops[0], self._scratch):
                     return self._choose(view)
-                journey.patience = _PATIENCE
+                journey.stops, journey.patience = [], _PATIENCE
         viewpoint, grid = drawn[best], view.scenario.grid
         viewpoint[:3] = np.asarray(grid.origin_m) + viewpoint[:3] * grid.voxel_size_m
         return viewpoint

@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 
+from baselines import information_rate
 from baselines.information_rate import InformationRate, Weighing, _stops, free_by_belief
 from baselines.mission import run_mission, scripted
 from entropy_explore_env.config import with_settings
@@ -100,3 +101,23 @@ def test_what_a_teammate_announced_is_left_to_it():
     (cone,) = strategy._cones(view_of(missions, 0, 0))
     assert cone["apex"] == pytest.approx((3.5, 5.5, 2.5))
     assert (cone["radius"], cone["cosine"]) == pytest.approx((4.0, math.cos(math.pi / 4)))
+
+
+def test_a_way_whose_first_stop_is_out_of_sight_is_not_taken(monkeypatch):
+    """Once it was looked for again and again."""
+    monkeypatch.setattr(information_rate, "_in_sight", lambda *_: False)
+    env = EntropyExploreEnv(scripted(with_settings(ROOM, {"robots": 1})))
+    env.reset(seed=0)
+    strategy = InformationRate()
+    strategy.reset(env.scenario, env.strategy_generator())
+    asked = []
+
+    def way(*_):
+        asked.append(1)
+        return [np.array([3.5, 3.5, 3.5, 0.0, 0.0])]
+
+    monkeypatch.setattr(strategy, "_way_to_somewhere_better", way)
+    strategy._journeys[0].best_bits, strategy._journeys[0].patience = 1e9, 0
+    (viewpoint,) = strategy.choose([env.view("robot_0")])
+    assert asked == [1] and np.isfinite(viewpoint).all()
+    assert strategy._journeys[0].stops == [] and strategy._journeys[0].patience > 0
