@@ -189,11 +189,12 @@ def failed_record(failure: Failure, limit_s: float) -> Record:
     """What is kept of a mission that failed.
 
     Returns:
-        `failed`, the reason; and `limit_s` of a mission that ran past it, which a longer limit runs again.
+        `failed`, the reason; `trace`, where it was; and `limit_s` of a mission that ran past it, which a
+        longer limit runs again.
     """
     reason = _ADDRESS.sub(" at 0x…", failure.reason)
     reason = reason if len(reason) <= _LONGEST_REASON else reason[:_LONGEST_REASON] + " …"
-    return {"failed": reason, "limit_s": limit_s if failure.late else None}
+    return {"failed": reason, "trace": failure.trace, "limit_s": limit_s if failure.late else None}
 
 
 def _path(folder: Path, cell: Cell, seed: int) -> Path:

@@ -12,6 +12,7 @@ from baselines.figures import STYLE, png
 from baselines.head_to_head.cells import YARDSTICK
 from baselines.head_to_head.plots import profile_figure, time_figure
 from baselines.head_to_head.table import (
+    MARKS,
     RIVALS,
     Results,
     Row,
@@ -146,7 +147,7 @@ def _scenario_table(rows: list[Row]) -> str:
             f"{row['mapped']} of {row['missions']}" + (f", {row['failed']} failed" if row["failed"] else ""),
             ranged(row, "time_s", ",.0f"),
             ranged(row, "relative_time", ".2f"),
-            " / ".join(f"{row[mark]:,.0f}" for mark in ("t50_s", "t90_s", "t99_s")),
+            " / ".join(_reached(row, mark) for mark in MARKS),
             *(
                 "-" if row[figure] is None else f"{row[figure]:{form}}"
                 for figure, (_, form) in _FIGURES.items()
@@ -156,6 +157,11 @@ def _scenario_table(rows: list[Row]) -> str:
     ]
     head = ["robots", "strategy", "mapped", "time (s)", "relative time", "50 / 90 / 99 % (s)"]
     return markdown_table([*head, *(label for label, _ in _FIGURES.values())], shown)
+
+
+def _reached(row: Row, mark: str) -> str:
+    """When a share of the bits was there; what the middle half of the missions never reached has no time."""
+    return "-" if row[mark] >= row["time_limit_s"] else f"{row[mark]:,.0f}"
 
 
 _FIGURES = {

@@ -24,9 +24,9 @@ _THRESHOLDS = 2.0 ** (np.arange(-6 * 24, 4 * 24 + 1) / 24)
 def profile_figure(results: Results) -> tuple[Figure, list[Row]]:
     """Share of missions mapped within a multiple of the random walk's time; a panel a team size."""
     teams = results.entrants.robots
-    across = min(len(teams), 2)
+    across = len(teams) if len(teams) < 4 else math.ceil(len(teams) / 2)
     down = math.ceil(len(teams) / across)
-    figure = Figure(figsize=(4.9 * across, 3.1 * down + 0.6), layout="constrained")
+    figure = Figure(figsize=(3.4 * max(across, 2) + 0.6, 3.1 * down + 0.6), layout="constrained")
     panels = figure.subplots(down, across, sharex=True, sharey=True, squeeze=False).ravel()
     table: list[Row] = []
     for robots, axes in zip(teams, panels, strict=False):
@@ -45,6 +45,7 @@ def profile_figure(results: Results) -> tuple[Figure, list[Row]]:
         axes.set(xscale="log", ylim=(-0.02, 1.02), title=_team(robots))
         axes.set_xticks([1 / 64, 1 / 16, 1 / 4, 1, 4, 16], ["1/64", "1/16", "1/4", "1", "4", "16"])
         axes.xaxis.set_minor_locator(NullLocator())
+        axes.tick_params(labelbottom=True)  # also where no panel stands below
         axes.grid(axis="y", color="0.9", linewidth=0.8)
     _hide(panels[len(teams) :])
     figure.supxlabel(f"mission time over that of {YARDSTICK} with the same seed", fontsize=9)

@@ -109,6 +109,7 @@ def scenario_rows(results: Results) -> list[Row]:
                 "robots": robots,
                 "strategy": strategy,
                 "missions": len(cell),
+                "time_limit_s": results.entrants.scenarios[name].ending.time_limit_s,
                 "mapped": mapped,
                 "cut_off": len(cell) - mapped - failed,
                 "failed": failed,
