@@ -10,7 +10,7 @@ import hashlib
 import json
 import multiprocessing
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from dataclasses import asdict, dataclass
 from functools import cached_property, lru_cache
@@ -22,6 +22,7 @@ import numpy as np
 import entropy_explore_env
 from baselines.mission import run_mission, scripted
 from baselines.strategies import make_strategy
+from baselines.strategy import Strategy
 from entropy_explore_env.config import Scenario
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.reports.metrics import mission_figures
@@ -55,12 +56,14 @@ class Cell:
         scenario: The task.
         strategy: Name of the strategy.
         seeds: Number of missions; their seeds are 0, 1, …, the same in every cell (paired).
+        record: Runs a mission with a strategy and a seed, and says what is kept; None = `mission_record`.
     """
 
     id: str
     scenario: Scenario
     strategy: str
     seeds: int
+    record: Callable[[EntropyExploreEnv, str, int], Record] | None = None
 
     @cached_property
     def digest(self) -> str:
@@ -68,6 +71,9 @@ class Cell:
         world = Path(self.scenario.world)
         content = hashlib.sha256(world.read_bytes()).hexdigest() if world.is_file() else ""
         described = repr((_sources_digest(), content, scripted(self.scenario), self.strategy))
+        if self.record is not None:
+            made_by = sys.modules[self.record.__module__].__file__ or ""
+            described += repr(self.record) + hashlib.sha256(Path(made_by).read_bytes()).hexdigest()
         return hashlib.sha256(described.encode()).hexdigest()[:16]
 
 
@@ -148,7 +154,7 @@ def _run_task(cell: Cell, seeds: Sequence[int], folder: Path) -> list[Record]:
     env = EntropyExploreEnv(scripted(cell.scenario))
     records = []
     for seed in seeds:
-        record = mission_record(env, cell.strategy, seed)
+        record = (cell.record or mission_record)(env, cell.strategy, seed)
         content = json.dumps({"digest": cell.digest, "record": record}, allow_nan=False)
         write_atomically(_path(folder, cell, seed), content)
         records.append(record)
@@ -163,8 +169,24 @@ def mission_record(env: EntropyExploreEnv, strategy: str, seed: int) -> Record:
         `sent_by_scan`, measurements sent after each of the team's scans; and `series`: time,
         entropy of the best map and measurements sent so far at up to 200 moments.
     """
+    return record_mission(env, make_strategy(strategy), seed)
+
+
+def record_mission(
+    env: EntropyExploreEnv,
+    strategy: Strategy,
+    seed: int,
+    after_step: Callable[[EntropyExploreEnv], None] | None = None,
+) -> Record:
+    """`mission_record` of a strategy that is there; `after_step` is called after the reset and every step."""
     recorder = Recorder(env.missions)
-    run_mission(env, make_strategy(strategy), seed, lambda _: recorder.note())
+
+    def note(env: EntropyExploreEnv) -> None:
+        recorder.note()
+        if after_step is not None:
+            after_step(env)
+
+    run_mission(env, strategy, seed, note)
     figures = mission_figures(env.missions, 0)
     best = recorder.entropy_bits.min(axis=1)
     middle = 0.5 * (figures["entropy_start_bits"] + figures["entropy_threshold_bits"])
