@@ -125,6 +125,7 @@ STRATEGIES_SEE = (
     "settings_json",
     "reports",
     "errors",
+    "validation",
     "compilation",
     "writing",
     "version",
