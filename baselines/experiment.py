@@ -14,7 +14,7 @@ import math
 import re
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, is_dataclass
 from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import Any, TypeVar
@@ -25,6 +25,7 @@ from baselines import mission
 from baselines.mission import run_mission, scripted
 from baselines.sources import sources_digest
 from baselines.strategies import make_strategy
+from baselines.strategy import Strategy
 from baselines.workers import Failure, run_each
 from entropy_explore_env.config import Scenario
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
@@ -53,8 +54,24 @@ def mission_record(env: EntropyExploreEnv, strategy: str, seed: int) -> Record:
         `sent_by_scan`, measurements sent after each of the team's scans; and `series`: time,
         entropy of the best map and measurements sent so far at up to 200 moments.
     """
+    return record_mission(env, make_strategy(strategy), seed)
+
+
+def record_mission(
+    env: EntropyExploreEnv,
+    strategy: Strategy,
+    seed: int,
+    after_step: Callable[[EntropyExploreEnv], None] | None = None,
+) -> Record:
+    """`mission_record` of a strategy that is there; `after_step` is called after the reset and every step."""
     recorder = Recorder(env.missions)
-    run_mission(env, make_strategy(strategy), seed, lambda _: recorder.note())
+
+    def note(env: EntropyExploreEnv) -> None:
+        recorder.note()
+        if after_step is not None:
+            after_step(env)
+
+    run_mission(env, strategy, seed, note)
     figures = mission_figures(env.missions, 0)
     best = recorder.entropy_bits.min(axis=1)
     middle = 0.5 * (figures["entropy_start_bits"] + figures["entropy_threshold_bits"])
@@ -89,7 +106,8 @@ class Cell:
         scenario: The task.
         strategy: Name of the strategy.
         seeds: Number of missions; their seeds are 0, 1, …, the same in every cell (paired).
-        record: Runs a mission with a strategy and a seed, and says what is kept of it.
+        record: Runs a mission with a strategy and a seed, and says what is kept of it: a function, or a
+            dataclass with settings of its own.
     """
 
     id: str
@@ -104,7 +122,8 @@ class Cell:
         sources = sources_digest(self.strategy, mission, sys.modules[self.record.__module__])
         world = Path(self.scenario.world)
         content = hashlib.sha256(world.read_bytes()).hexdigest() if world.is_file() else ""
-        described = repr((sources, content, scripted(self.scenario), self.strategy))
+        kept = repr(self.record) if is_dataclass(self.record) else self.record.__name__  # no address in it
+        described = repr((sources, content, scripted(self.scenario), self.strategy, kept))
         return hashlib.sha256(described.encode()).hexdigest()[:16]
 
 
