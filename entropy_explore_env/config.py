@@ -110,6 +110,10 @@ class Robot:
         turn_rate_rad_s: Of yaw and pitch, while driving; inf = at once.
         body_radius_m: The body is a ball; 0 = a point that blocks nobody.
         sensor_height_m: Planar robots: height of the sensor above the workspace's floor.
+        when_blocked: After a drive that a teammate cut short (MoveEnd.TEAMMATE), who may move on: `wander`
+            decides anew at once, and our strategies then wander; `wait` stands still first. Either way
+            the robot scans where it stopped, as after every drive, before that.
+        blocked_wait_s: `wait`: from the end of that scan until it decides; nothing else ends the wait.
     """
 
     motion: Literal["free", "planar"] = "free"
@@ -121,6 +125,8 @@ class Robot:
     turn_rate_rad_s: float = math.pi / 2
     body_radius_m: float = 0.1
     sensor_height_m: float = 0.5
+    when_blocked: Literal["wander", "wait"] = "wander"
+    blocked_wait_s: float = 5.0
 
     def __post_init__(self) -> None:
         """Check every field."""
@@ -131,6 +137,8 @@ class Robot:
         check_positive(self, "reach_m", "turn_rate_rad_s", finite=False)
         check(self, "reach_m", "a number from 0 to 1e6, or inf", lambda v: v <= 1e6 or v == math.inf)
         check_not_negative(self, "body_radius_m", "sensor_height_m")
+        check_choice(self, "when_blocked", Literal["wander", "wait"])
+        check_positive(self, "blocked_wait_s")
 
 
 @dataclass(frozen=True)
@@ -229,7 +237,10 @@ class Channel:
 
     Attributes:
         burst: Most measurements of one batch; 0 shares none.
-        i_min_bits: Least utility of a measurement that is worth sending.
+        i_min_bits: I_min, the least utility of a measurement that is worth sending.
+        i_min_fill: None keeps I_min. A number lets each robot steer its own, from i_min_bits on, so that
+            on average over its scans so many bursts of measurements reach it (Rocha04, sect. 5.1.1).
+        i_min_gain: How much a scan with no such measurement, or with twice as many, changes ln I_min.
         range_m: Farthest teammate that hears; inf = all.
         loss_probability: Of a message on its way to one teammate.
         delay_s: From sending to hearing.
@@ -238,6 +249,8 @@ class Channel:
 
     burst: int = 64
     i_min_bits: float = 0.3219
+    i_min_fill: float | None = None
+    i_min_gain: float = 0.1
     range_m: float = math.inf
     loss_probability: float = 0.0
     delay_s: float = 0.0
@@ -247,6 +260,10 @@ class Channel:
         """Check every field."""
         check_count(self, "burst", 0, 1_000_000)
         check_not_negative(self, "i_min_bits")
+        if self.i_min_fill is not None:
+            check(self, "i_min_fill", "None, or a number above 0 up to 1", lambda v: 0 < v <= 1)
+            check(self, "i_min_bits", "above 0 where I_min is steered", lambda v: v > 0)
+        check(self, "i_min_gain", "a number above 0 up to 1", lambda v: 0 < v <= 1)
         check_positive(self, "range_m", finite=False)
         check(self, "loss_probability", "a number from 0 to 1", lambda v: 0 <= v <= 1)
         check(self, "delay_s", "a number from 0 to 3600", lambda v: 0 <= v <= 3600)
@@ -384,6 +401,7 @@ class Scenario:
         others: Further kinds of robots, for a mixed team: of K kinds in all, the first being `robot` with
             `sensor`, robot a is of kind a mod K. All share one form of action and observation
             (missions/action.py, missions/observation.py).
+        start_radius_m: Robots start at most so far from where the first one does; inf = anywhere.
         sigma_prior: Standard deviation of coverage before any measurement; the mean is ½.
         decision_period_s: A step lasts this long; None = until the next robot has to decide.
         scored: Whether the team's joint map, of everything measured, is kept and compared with the
@@ -395,6 +413,7 @@ class Scenario:
     world: str = "empty"
     split: Literal["train", "validation", "test"] = "train"
     robots: int = 3
+    start_radius_m: float = math.inf
     sigma_prior: float = 30.0
     decision_period_s: float | None = 1.0
     scored: bool = False
@@ -419,6 +438,7 @@ class Scenario:
             object.__setattr__(self, "others", others)
         check_choice(self, "split", Literal["train", "validation", "test"])
         check_count(self, "robots", 1, 1000)
+        check_positive(self, "start_radius_m", finite=False)
         check(self, "sigma_prior", "a number from 1e-3 to 1e4", lambda v: 1e-3 <= v <= 1e4)
         if self.decision_period_s is not None:
             check_positive(self, "decision_period_s")

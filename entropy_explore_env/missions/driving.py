@@ -5,6 +5,8 @@ Map frame, metres, seconds; barriers and bodies are met in grid units (see `moti
 
 from __future__ import annotations
 
+import math
+
 from entropy_explore_env.compilation import lean_kernel
 from entropy_explore_env.missions.poses import (
     copy_numbers,
@@ -47,6 +49,7 @@ def depart(team, blocked, robots, index, time_s, scan):
     copy_numbers(robot.target, goal, 5)
     robot.depart_s = time_s
     robot.deciding = False
+    robot.waiting = False
     robot.way_m = 0.0
     way, code = 0.0, _ARRIVED
     for leg in range(max(robot.waypoints, 1)):
@@ -71,6 +74,29 @@ def depart(team, blocked, robots, index, time_s, scan):
     robot.ready_s = time_s + max(drive_s, turn_s) + numbers.scan_time_s
     robot.way_scans = 0
     plan_scan(numbers, robot)
+
+
+@lean_kernel
+def stop(numbers, robot, time_s):
+    """After the scan where its drive ended a robot decides anew; behind a teammate it may wait before."""
+    robot.waiting = numbers.blocked_wait_s > 0.0 and robot.move_end == _TEAMMATE
+    robot.deciding = not robot.waiting
+    robot.ready_s = time_s + numbers.blocked_wait_s if robot.waiting else time_s
+    robot.next_scan_s = robot.ready_s
+
+
+@lean_kernel
+def next_decision(team, robots):
+    """When the next robot decides: now, after the scan where its drive ends, or when it has waited.
+
+    A drive that something under way may still end is taken to end where it was meant to.
+    """
+    soonest = math.inf
+    for index in range(len(robots)):
+        robot = robots[index]
+        waits = robot.move_end == _TEAMMATE and not robot.waiting
+        soonest = min(soonest, robot.ready_s + (team[index].blocked_wait_s if waits else 0.0))
+    return soonest
 
 
 @lean_kernel

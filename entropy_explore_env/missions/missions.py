@@ -179,6 +179,7 @@ class Missions:
         for field in ("origin", "goal", "target", "scan_pose"):
             robots[field] = poses
         robots["deciding"] = True
+        robots["i_min_bits"] = robots["next_i_min_bits"] = self.scenario.channel.i_min_bits
         robots["sensor_chance"][:, 0] = splitmix_states(number, episode, Stream.SENSOR, len(robots))
         robots["channel_chance"][:, 0] = splitmix_states(number, episode, Stream.CHANNEL, len(robots))
         state.heard[mission]["heard_s"] = state.heard[mission]["announced_s"] = -1.0
@@ -292,7 +293,8 @@ class Missions:
 def start_poses(scenario: Scenario, world: World, rng: np.random.Generator) -> np.ndarray:
     """Draw where robots start: voxel centres with room, apart from each other, any yaw, level.
 
-    Robots are placed one after the other, so a smaller team starts like the first of a larger one.
+    Robots are placed one after the other, so a smaller team starts like the first of a larger one;
+    where the scenario says so, near the first one.
 
     Args:
         scenario: The task.
@@ -310,6 +312,9 @@ def start_poses(scenario: Scenario, world: World, rng: np.random.Generator) -> n
     poses = np.zeros((scenario.robots, 5))
     for robot in range(scenario.robots):
         starts = world.layout(scenario, scenario.kind_of(robot)).starts
+        if robot > 0 and scenario.start_radius_m < np.inf:
+            centres = grid.centre_of(np.stack(np.unravel_index(starts, grid.shape), axis=-1))
+            starts = starts[np.linalg.norm(centres - poses[0, :3], axis=1) <= scenario.start_radius_m]
         apart_m = radii_m[robot] + radii_m[:robot] + 1e-3 * grid.voxel_size_m
         tried = starts[rng.integers(len(starts), size=_PLACING_ATTEMPTS)]
         place = _first_apart(grid, tried, poses[:robot, :3], apart_m)

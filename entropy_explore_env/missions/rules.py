@@ -30,6 +30,7 @@ NUMBERS = np.dtype(
         ("acceleration_m_s2", "f8"),
         ("turn_rate_rad_s", "f8"),
         ("body_radius_m", "f8"),
+        ("blocked_wait_s", "f8"),  # 0 = a blocked robot decides anew at once
         ("scan_time_s", "f8"),
         ("scan_every_m", "f8"),
         ("rays", "i8"),  # R of its sensor
@@ -37,6 +38,8 @@ NUMBERS = np.dtype(
         ("radii", "i8"),  # of `barrier_radii_m`
         ("burst", "i8"),
         ("i_min_bits", "f8"),
+        ("i_min_fill", "f8"),  # 0 = I_min stays as it is
+        ("i_min_gain", "f8"),
         ("channel_range_m", "f8"),
         ("loss_probability", "f8"),
         ("delay_s", "f8"),
@@ -91,6 +94,8 @@ def rules_of(scenario: Scenario) -> Rules:
         "radii": len(radii),
         "burst": min(channel.burst, max(kind.sensor.rays for kind in scenario.kinds)),
         "i_min_bits": channel.i_min_bits,
+        "i_min_fill": channel.i_min_fill or 0.0,
+        "i_min_gain": channel.i_min_gain,
         "channel_range_m": channel.range_m,
         "loss_probability": channel.loss_probability,
         "delay_s": channel.delay_s,
@@ -115,6 +120,7 @@ def rules_of(scenario: Scenario) -> Rules:
         own["planar"] = scenario.layer_of(robot) is not None
         for name in ("reach_m", "max_speed_m_s", "acceleration_m_s2", "turn_rate_rad_s", "body_radius_m"):
             own[name] = getattr(robot, name)
+        own["blocked_wait_s"] = robot.blocked_wait_s if robot.when_blocked == "wait" else 0.0
         for name in ("scan_time_s", "scan_every_m", "rays"):
             own[name] = getattr(sensor, name)
     return Rules(

@@ -63,6 +63,7 @@ ROBOT = np.dtype(
     [
         ("entropy_bits", "f8"),  # of its map, carried by H -= I (Rocha04, eq. 29)
         ("deciding", "?"),  # whether it chooses a viewpoint in the next step
+        ("waiting", "?"),  # whether it stands still, or stood still until it decides, since a blocked drive
         ("origin", "f8", (5,)),  # pose at which the latest drive began
         ("goal", "f8", (5,)),  # pose at which it ends, or ended
         ("target", "f8", (5,)),  # viewpoint that was chosen, whether or not the drive ends there
@@ -75,10 +76,12 @@ ROBOT = np.dtype(
         ("depart_s", "f8"),  # start of the drive
         ("next_scan_s", "f8"),  # when it scans next: under way, or at `ready_s`
         ("way_scans", "i8"),  # scans that it took under way in this drive
-        ("ready_s", "f8"),  # end of the scan after it
+        ("ready_s", "f8"),  # end of the scan after it; of the wait, while it is waiting
         ("move_end", "i8"),  # code of a MoveEnd of the latest drive
         ("depth_m", "f8"),  # r̂ of the latest scan (RochaMI, eq. 4)
         ("half_angle_rad", "f8"),  # α̂ of it
+        ("i_min_bits", "f8"),  # least utility that it sent of its latest scan
+        ("next_i_min_bits", "f8"),  # that it will send of its next one
         ("own_bits", "f8"),  # taken from its map by its own scans in the latest step
         ("received_bits", "f8"),  # taken from its map by teammates' measurements in the latest step
         ("reward", "f8"),  # of the latest step
@@ -88,7 +91,7 @@ ROBOT = np.dtype(
         ("distance_m", "f8"),
         ("scans", "i8"),
         ("measurements", "i8"),
-        ("redundant", "i8"),  # measurements that brought less than I_min to its own map
+        ("redundant", "i8"),  # measurements that brought less than its I_min to its own map
         ("gained_bits", "f8"),  # taken from its map by its own scans
         ("heard_bits", "f8"),  # taken from its map by teammates' measurements
         ("blocked_moves", "i8"),

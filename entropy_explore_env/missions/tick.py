@@ -10,14 +10,14 @@ import math
 
 from entropy_explore_env.compilation import lean_kernel
 from entropy_explore_env.missions.action import decode_action, write_mask
-from entropy_explore_env.missions.driving import depart, drive_on
+from entropy_explore_env.missions.driving import depart, drive_on, next_decision, stop
 from entropy_explore_env.missions.messages import announce, fuse_measurements, next_letter, open_letter, send
 from entropy_explore_env.missions.observation import observe_mission
 from entropy_explore_env.missions.poses import copy_numbers, grid_position, pose_at
 from entropy_explore_env.missions.reward import reward_robots
 from entropy_explore_env.missions.scoring import note_progress, score_scan
 from entropy_explore_env.missions.state import MissionEnd
-from entropy_explore_env.robots.channel import select_measurements
+from entropy_explore_env.robots.channel import select_measurements, steered_i_min
 from entropy_explore_env.robots.range_sensor import (
     Return,
     first_rays,
@@ -103,9 +103,7 @@ def advance(rules, state, scan, balls, mission):
     clock, robots, mail = state.missions[mission], state.robots[mission], state.mail[mission]
     target_s = clock.time_s + rules.numbers[0].period_s
     if math.isinf(target_s):
-        for robot in robots:
-            if not robot.deciding:
-                target_s = min(target_s, robot.ready_s)
+        target_s = next_decision(rules.numbers, robots)
     stop_s = min(target_s, rules.numbers[0].time_limit_s)
     while clock.end == _RUNNING:
         letter, due_s = next_letter(mail)
@@ -117,14 +115,17 @@ def advance(rules, state, scan, balls, mission):
             open_letter(rules.delayed, rules, state, scan, mission, letter)
         else:
             clock.time_s = scan_s
-            scan_and_share(rules, state, scan, mission, robot)
-            if scan_s >= robots[robot].ready_s:
+            if robots[robot].waiting:
                 robots[robot].deciding = True
             else:
-                mean = state.mean[mission, robot]
-                drive_on(rules.numbers[robot], balls, mean, robots[robot], scan_s, scan)
-                if robots[robot].deciding and math.isinf(rules.numbers[0].period_s):
-                    stop_s = scan_s
+                scan_and_share(rules, state, scan, mission, robot)
+                if scan_s >= robots[robot].ready_s:
+                    stop(rules.numbers[robot], robots[robot], scan_s)
+                else:
+                    mean = state.mean[mission, robot]
+                    drive_on(rules.numbers[robot], balls, mean, robots[robot], scan_s, scan)
+                    if math.isinf(rules.numbers[0].period_s):
+                        stop_s = min(next_decision(rules.numbers, robots), rules.numbers[0].time_limit_s)
         note_progress(clock, robots)
         if mapped(robots, clock.entropy_end_bits, rules.numbers[0].all_maps):
             clock.end = _MAPPED
@@ -136,7 +137,7 @@ def advance(rules, state, scan, balls, mission):
 
 @lean_kernel
 def next_scan(robots):
-    """(robot, time) of the next robot that scans, under way or where its drive ended; inf if all decide."""
+    """(robot, time) of the next that scans, under way or at its stop, or has waited; inf if all decide."""
     soonest, scan_s = 0, math.inf
     for robot in range(len(robots)):
         if not robots[robot].deciding and robots[robot].next_scan_s < scan_s:
@@ -185,6 +186,7 @@ def scan_and_share(rules, state, team_scan, mission, index):
     robot.depth_m, robot.half_angle_rad, measurements = visibility_parameters(scan.rays, pose[3], pose[4])
     robot.scans += 1
     robot.measurements += measurements
+    robot.i_min_bits = robot.next_i_min_bits
     for i in range(5):
         robot.scan_pose[i] = pose[i]
     for ray in range(len(scan.rays)):
@@ -193,12 +195,16 @@ def scan_and_share(rules, state, team_scan, mission, index):
         state.scan_utility_bits[mission, index, ray] = scan.utility[ray]
         if scan.rays[ray].returned == _NOTHING:
             scan.utility[ray] = -1.0
-        elif scan.utility[ray] < numbers.i_min_bits:
+        elif scan.utility[ray] < robot.i_min_bits:
             robot.redundant += 1
     if numbers.scored:
         score_scan(state, scan, mission, numbers.prior_precision)
     if state.robots.shape[1] > 1 and numbers.burst > 0:
-        count = select_measurements(scan.utility, numbers.burst, numbers.i_min_bits, scan.order)
+        count = select_measurements(scan.utility, numbers.burst, robot.i_min_bits, scan.order)
+        if numbers.i_min_fill > 0.0:
+            robot.next_i_min_bits = steered_i_min(
+                robot.i_min_bits, scan.utility, numbers.burst, numbers.i_min_fill, numbers.i_min_gain
+            )
         if count > 0:
             send(rules, state, scan, mission, index, count)
 

@@ -258,7 +258,7 @@ def shared_ends_m(missions: Missions, robot: int) -> np.ndarray:
     utility = np.where(measured, state.scan_utility_bits[0, robot, : sensor.rays], -1.0)
     order = np.zeros(len(utility), np.int64)
     burst = min(scenario.channel.burst, sensor.rays)
-    chosen = order[: select_measurements(utility, burst, scenario.channel.i_min_bits, order)]
+    chosen = order[: select_measurements(utility, burst, float(own["i_min_bits"]), order)]
     yaws = np.repeat(own["scan_pose"][3] + model.yaw_offsets, len(model.pitch_offsets))
     pitches = np.tile(own["scan_pose"][4] + model.pitch_offsets, len(model.yaw_offsets))
     rays = np.stack(_gazes(yaws, pitches), axis=-1) * state.scan_range_m[0, robot, : sensor.rays][:, None]

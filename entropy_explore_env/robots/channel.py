@@ -9,6 +9,7 @@ once to its sender and once to each teammate that hears it.
 from __future__ import annotations
 
 import enum
+import math
 
 from entropy_explore_env.compilation import lean_kernel
 from entropy_explore_env.randomness import draw_uniform
@@ -16,6 +17,8 @@ from entropy_explore_env.randomness import draw_uniform
 BITS_PER_MEASUREMENT = 96
 BITS_PER_BATCH = 160
 BITS_PER_ANNOUNCEMENT = 384
+_LEAST_I_MIN_BITS = 1e-6
+"""So low that it forbids nothing, and so high that it is back within some dozen scans."""
 
 
 class Delivery(enum.Enum):
@@ -62,6 +65,31 @@ def select_measurements(utility, burst, i_min_bits, order):
             place -= 1
         order[place] = ray
     return chosen
+
+
+@lean_kernel
+def steered_i_min(i_min_bits, utility, burst, fill, gain):
+    """I_min after a scan, so that a share of the burst is filled with what is most useful over time.
+
+        ln I_min ← ln I_min + gain · (min(m / (fill · burst), 2) - 1)
+
+    with m the measurements of the scan that reach I_min: it rests where fill · burst of them do on
+    average, so that rich scans fill the burst and poor ones send little, and falls as the map becomes
+    known (what Rocha04, sect. 5.1.1, leaves to further work).
+
+    Args:
+        i_min_bits: I_min at the scan, > 0.
+        utility: (R,) float64 bits of each ray; negative for a ray that measured nothing.
+        burst: Most measurements of a batch, ≥ 1.
+        fill: Share of it, above 0.
+        gain: Most change of ln I_min.
+    """
+    reached = 0
+    for bits in utility:
+        if bits >= i_min_bits:
+            reached += 1
+    excess = min(reached / (fill * burst), 2.0) - 1.0
+    return max(i_min_bits * math.exp(gain * excess), _LEAST_I_MIN_BITS)
 
 
 @lean_kernel

@@ -440,6 +440,18 @@ def test_starts_are_voxel_centres_with_room_apart_from_each_other():
     assert len(seen) == 20
 
 
+def test_robots_start_near_the_first_one_where_the_scenario_says_so():
+    for seed in range(20):
+        near, anywhere = (
+            started(free_box(robots=4, start_radius_m=radius_m), seed=seed) for radius_m in (0.8, math.inf)
+        )
+        places = near.state.robots[0]["goal"][:, :3]
+        assert np.linalg.norm(places - places[0], axis=1).max() <= 0.8
+        assert (near.state.robots[0]["goal"][0] == anywhere.state.robots[0]["goal"][0]).all()
+    with pytest.raises(WorldError, match=r"Scenario\.robots = 4: allowed is at most"):
+        started(free_box(robots=4, start_radius_m=0.3, robot={"body_radius_m": 0.2}))
+
+
 def test_more_robots_than_there_is_room_for_are_refused_before_anything_changes():
     crowd = free_box(robots=60, robot={"body_radius_m": 0.6}, observation=NO_PARTS)
     missions = Missions(crowd)

@@ -240,6 +240,14 @@ def select(utility: Sequence[float], burst: int, i_min: float) -> list[int]:
     return [ray for ray in ranked if utility[ray] >= i_min][:burst]
 
 
+def steered(i_min: float, utility: Sequence[float], burst: int, fill: float, gain: float) -> float:
+    """I_min after a scan, steered towards the value that `fill * burst` measurements a scan reach."""
+    wanted = fill * burst
+    reached = len([bits for bits in utility if bits >= i_min])
+    log = math.log(i_min) + gain * (min(reached, 2.0 * wanted) / wanted - 1.0)
+    return max(math.exp(log), 1e-6)
+
+
 # --- The gradient strategy (eqs. 30-40)
 
 

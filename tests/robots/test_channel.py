@@ -16,6 +16,7 @@ from entropy_explore_env.robots.channel import (
     Delivery,
     deliver,
     select_measurements,
+    steered_i_min,
 )
 from tests.reference import rocha04
 from tests.reference.scenes import drawn, seeds
@@ -46,6 +47,37 @@ def test_the_selection_fulfils_equation_43_and_is_that_of_the_reference(utility,
 @given(st.integers(1, 30), st.integers(0, 35))
 def test_of_equal_measurements_the_first_are_sent(rays, burst):
     assert select([0.5] * rays, burst, 0.5) == list(range(min(rays, burst)))
+
+
+@drawn(200)
+@given(
+    utilities,
+    st.integers(1, 45),
+    st.floats(1e-6, 5.0),
+    st.floats(0.01, 1.0),
+    st.floats(0.01, 1.0),
+)
+def test_i_min_is_steered_like_the_reference(utility, burst, i_min, fill, gain):
+    steered = steered_i_min(i_min, np.asarray(utility, np.float64), burst, fill, gain)
+    assert steered == pytest.approx(rocha04.steered(i_min, utility, burst, fill, gain), rel=1e-12)
+
+
+def test_i_min_by_hand():
+    utility = np.array([0.5, 2.0, 0.1, 2.0, -1.0])
+    assert steered_i_min(0.4, utility, 3, 1.0, 0.2) == 0.4  # three reach it: as it should be
+    assert steered_i_min(1.0, utility, 4, 1.0, 0.2) == pytest.approx(math.exp(-0.1))  # two of four
+    assert steered_i_min(1.0, utility, 4, 0.25, 0.2) == pytest.approx(math.exp(0.2))  # two, and one wanted
+    assert steered_i_min(0.1, utility, 1, 1.0, 0.2) == pytest.approx(0.1 * math.exp(0.2))  # four: no more
+    assert steered_i_min(3.0, utility, 4, 0.25, 0.2) == pytest.approx(3.0 * math.exp(-0.2))
+    assert steered_i_min(1e-6, -np.ones(5), 4, 1.0, 1.0) == 1e-6  # nothing measured: not below the least
+
+
+def test_i_min_settles_where_so_many_measurements_reach_it():
+    """Utilities spread evenly from 0 to 1: 16 of 64 reach ¾."""
+    i_min, utility = 3.0, (np.arange(64) + 0.5) / 64
+    for _ in range(400):
+        i_min = steered_i_min(i_min, utility, 32, 0.5, 0.1)
+    assert i_min == pytest.approx(0.75, abs=0.02)
 
 
 def test_selections_by_hand():
