@@ -10,11 +10,29 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from entropy_explore_env.belief.raycast import longest_crossing
-from entropy_explore_env.belief.visibility import CONE, SIGHT, cone_of, expected_scan_bits, in_cones
+from entropy_explore_env.belief.visibility import (
+    CONE,
+    SIGHT,
+    cone_of,
+    expected_scan_bits,
+    in_cones,
+    mark_cone,
+    marked_bits,
+    visible_bits,
+)
 from entropy_explore_env.compilation import lean_kernel
 from entropy_explore_env.config import Grid, RangeSensor
 from entropy_explore_env.robots.range_sensor import fuse_scan, new_scan, sensor_model, take_scan
-from tests.reference.scenes import drawn, random_cover, seeds
+from tests.reference import rochami
+from tests.reference.scenes import (
+    as_reference,
+    drawn,
+    flat_index,
+    random_belief,
+    random_cover,
+    ray_space,
+    seeds,
+)
 
 SIZE = (7, 11, 5)
 NOBODY = np.zeros(0, CONE)
@@ -150,3 +168,101 @@ def test_a_cone_is_a_ball_cut_by_an_angle(seed, half_angle):
     angle = math.acos(np.clip(way @ cones[0]["gaze"] / distance, -1.0, 1.0))
     if abs(angle - half_angle) > 1e-6 and abs(distance - radius) > 1e-9:
         assert inside(cones, *point) == (distance < radius and angle < half_angle)
+
+
+# --- What cones cover (RochaMI, eqs. 5 and 7-10)
+
+KNOWN = 0.05**-2
+
+
+def covered(cones, belief, occluded=False, size=SIZE):
+    """H(C⁰), I(C⁰; T⁰), H(T⁰), H(T) and the marks of all cones, the first of which is the robot's own."""
+    mean, precision = belief[0].ravel(), belief[1].ravel()
+    space = ray_space(size, behind=1)
+    sight = (mean, *space) if occluded else None
+    mine = np.array([cone_of(np.array([*c.apex, c.yaw, c.pitch]), c.radius, c.half_angle) for c in cones])
+    marks = np.zeros(mean.size, np.uint8)
+    for cone in mine[1:]:
+        mark_cone(cone, size, sight, marks)
+    team = marked_bits(precision, KNOWN, marks)
+    own, shared = visible_bits(mine[0], size, precision, KNOWN, sight, marks)
+    mark_cone(mine[0], size, sight, marks)
+    return own, shared, team, marked_bits(precision, KNOWN, marks), marks
+
+
+def random_cone(rng, size=SIZE):
+    wide = rng.choice([rng.uniform(0.05, math.pi / 2), math.pi / 2, rng.uniform(0.05, math.pi), 0.0])
+    return rochami.Cone(
+        rng.uniform(-1.0, np.array(size) + 1.0),
+        rng.uniform(-math.pi, math.pi),
+        rng.choice([0.0, math.pi / 2, -math.pi / 2, rng.uniform(-1.5, 1.5)]),
+        rng.choice([rng.uniform(0.0, 3.0), rng.uniform(0.0, 12.0)]),
+        wide,
+    )
+
+
+def on_a_face(cone, voxel, margin=1e-6):
+    """Whether rounding decides whether a voxel's centre is in a cone."""
+    bigger, smaller = (
+        cone._replace(radius=cone.radius + sign * margin, half_angle=cone.half_angle + sign * margin)
+        for sign in (1, -1)
+    )
+    return rochami.inside(bigger, voxel) != rochami.inside(smaller, voxel)
+
+
+@drawn(250)
+@given(seeds)
+def test_a_cone_marks_the_voxels_of_the_reference(seed):
+    rng = np.random.default_rng(seed)
+    size = SIZE if seed % 3 else (9, 6, 1)
+    belief = random_belief(size, seed)
+    cone = random_cone(rng, size)
+    marks = covered([cone], belief, size=size)[-1]
+    for number, voxel in enumerate(np.ndindex(*size)):
+        if not on_a_face(cone, voxel):
+            assert marks[number] == rochami.inside(cone, voxel), (cone, voxel)
+
+
+@drawn(60)
+@given(seeds, st.integers(1, 4), st.booleans())
+def test_entropies_and_mutual_information_are_those_of_the_reference(seed, teammates, occluded):
+    rng = np.random.default_rng(seed)
+    belief = random_belief(SIZE, seed)
+    belief[0][:] = random_cover(SIZE, 0.15, seed)
+    cones = [random_cone(rng) for _ in range(1 + teammates)]
+    inner = [c._replace(apex=rng.uniform(0.1, np.array(SIZE) - 0.1)) for c in cones]
+    beliefs = as_reference(*belief)
+    if any(on_a_face(cone, voxel) for cone in inner for voxel in beliefs):
+        return
+    seen = [rochami.visible(cone, beliefs, SIZE, occluded) for cone in inner]
+    others = set().union(*seen[1:])
+    own, shared, team, everybody, _ = covered(inner, belief, occluded)
+    sigma = KNOWN**-0.5
+    assert own == pytest.approx(rochami.covered_bits(seen[0], beliefs, sigma), rel=1e-6, abs=1e-9)
+    assert shared == pytest.approx(rochami.covered_bits(seen[0] & others, beliefs, sigma), rel=1e-6, abs=1e-9)
+    assert team == pytest.approx(rochami.covered_bits(others, beliefs, sigma), rel=1e-6, abs=1e-9)
+    assert everybody == pytest.approx(own + team - shared, rel=1e-6, abs=1e-9)  # eq. 10
+    assert 0.0 <= shared <= min(own, team) + 1e-9
+
+
+def test_overlap_of_known_voxels_is_not_attractive():
+    """Voxels better known than σ_known have a negative differential entropy; the overlap counts 0."""
+    belief = np.zeros(SIZE, np.float32), np.full(SIZE, 4.0 * KNOWN, np.float32)
+    cone = rochami.Cone((3.5, 5.5, 2.5), 0.3, 0.1, 4.0, 0.8)
+    assert covered([cone, cone], belief)[:4] == (0.0, 0.0, 0.0, 0.0)
+    belief[1][3, 5, 2] = KNOWN / 16.0  # its own voxel: ½ log2 16 = 2 bits
+    assert covered([cone, cone], belief)[:4] == pytest.approx((2.0, 2.0, 2.0, 2.0))
+    away = cone._replace(yaw=0.3 + math.pi, pitch=-0.1, apex=(6.5, 9.5, 2.5))
+    assert covered([cone, away], belief)[:4] == pytest.approx((2.0, 0.0, 0.0, 2.0))
+
+
+def test_what_stands_in_front_hides_what_is_behind_but_not_itself():
+    belief = np.zeros(SIZE, np.float32), np.full(SIZE, KNOWN / 4.0, np.float32)  # a bit each
+    cone = rochami.Cone((1.5, 5.5, 2.5), 0.0, 0.0, 10.0, 0.05)
+    ahead = flat_index([(x, 5, 2) for x in range(1, 7)], SIZE)
+    own, *_, marks = covered([cone], belief)
+    assert own == pytest.approx(6.0) and np.flatnonzero(marks).tolist() == ahead
+    belief[0][4, 5, 2] = 0.6
+    assert covered([cone], belief)[0] == pytest.approx(6.0)  # the paper's cone does not care
+    own, *_, marks = covered([cone], belief, occluded=True)
+    assert own == pytest.approx(4.0) and np.flatnonzero(marks).tolist() == ahead[:4]
