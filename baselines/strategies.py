@@ -8,6 +8,7 @@ from types import MappingProxyType
 
 from baselines.gradient import GradientStrategy
 from baselines.information_rate import InformationRate, Weighing
+from baselines.mutual_information import Coordination, MutualInformation
 from baselines.random_walk import RandomWalk
 from baselines.strategy import Strategy
 from entropy_explore_env.errors import SettingError
@@ -17,6 +18,8 @@ STRATEGIES: MappingProxyType[str, Callable[[], Strategy]] = MappingProxyType(
         "random": RandomWalk,
         "gradient": GradientStrategy,
         "gradient-plane": partial(GradientStrategy, motion_plane=True),
+        "mutual-information": MutualInformation,
+        "ground-gradient": partial(MutualInformation, Coordination(coordinated=False)),
         "information-rate": InformationRate,
         "information-per-scan": partial(InformationRate, Weighing(per_scan=True, candidates=120)),
     }

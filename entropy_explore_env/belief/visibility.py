@@ -75,7 +75,7 @@ def in_cones(cones, x, y, z):
 
 
 @inlined_kernel
-def _in_cone(cone, dx, dy, dz):
+def in_cone(cone, dx, dy, dz):
     """Whether a point, relative to the apex, lies in a CONE: see `in_cones`."""
     squared = dx * dx + dy * dy + dz * dz
     along = dx * cone.gaze[0] + dy * cone.gaze[1] + dz * cone.gaze[2]
@@ -87,8 +87,8 @@ def _column_span(cone, dx, dy, layers):
     """First and one past the last layer of a column of voxels in which centres may lie in a cone.
 
     The column stands at (dx, dy) from the apex. Up to α = 90° a cone is convex and what is in it lies between
-    two heights, the roots of (A + gz)² = cos²α (dx² + dy² + z²), looked at once more for rounding; beyond, they
-    are those of the ball, and whether a centre is inside is for `_in_cone` to say.
+    two heights, the roots of (A + gz)² = cos²α (dx² + dy² + z²), checked for rounding; beyond, they are those
+    of the ball, and whether a centre is inside is for `in_cone` to say.
     """
     flat = dx * dx + dy * dy
     high = cone.radius * cone.radius - flat
@@ -115,9 +115,9 @@ def _column_span(cone, dx, dy, layers):
     last = math.floor(cone.apex[2] + high - 0.5) + 2
     first, last = max(first, 0), min(last, layers)
     if cone.cosine >= 0.0:
-        while first < last and not _in_cone(cone, dx, dy, first + 0.5 - cone.apex[2]):
+        while first < last and not in_cone(cone, dx, dy, first + 0.5 - cone.apex[2]):
             first += 1
-        while first < last and not _in_cone(cone, dx, dy, last - 0.5 - cone.apex[2]):
+        while first < last and not in_cone(cone, dx, dy, last - 0.5 - cone.apex[2]):
             last -= 1
     return first, last
 
@@ -141,7 +141,7 @@ def _seen(cone, size, i, j, k, sight):
 def _visible(cone, size, i, j, k, sight):
     """Whether a voxel of a column's span is visible."""
     dx, dy, dz = i + 0.5 - cone.apex[0], j + 0.5 - cone.apex[1], k + 0.5 - cone.apex[2]
-    return (cone.cosine >= 0.0 or _in_cone(cone, dx, dy, dz)) and _seen(cone, size, i, j, k, sight)
+    return (cone.cosine >= 0.0 or in_cone(cone, dx, dy, dz)) and _seen(cone, size, i, j, k, sight)
 
 
 @inlined_kernel

@@ -316,7 +316,7 @@ def start_poses(scenario: Scenario, world: World, rng: np.random.Generator) -> n
             centres = grid.centre_of(np.stack(np.unravel_index(starts, grid.shape), axis=-1))
             starts = starts[np.linalg.norm(centres - poses[0, :3], axis=1) <= scenario.start_radius_m]
         apart_m = radii_m[robot] + radii_m[:robot] + 1e-3 * grid.voxel_size_m
-        tried = starts[rng.integers(len(starts), size=_PLACING_ATTEMPTS)]
+        tried = starts[rng.integers(len(starts), size=_PLACING_ATTEMPTS)] if len(starts) else starts
         place = _first_apart(grid, tried, poses[:robot, :3], apart_m)
         if place is None:
             place = _first_apart(grid, rng.permutation(starts), poses[:robot, :3], apart_m)

@@ -1,0 +1,134 @@
+"""The strategy `mutual-information` against the slow reference of eq. 13."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from baselines.candidates import CANDIDATE, FACTORS, MATE, best_candidate, steep_voxels
+from entropy_explore_env.belief.visibility import CONE, cone_of, mark_cone
+from tests.reference import rochami
+from tests.reference.scenes import as_reference, drawn, random_belief, ray_space, seeds
+
+SIZE = (7, 11, 5)
+NO_BALL = np.zeros((0, 3), np.int64)
+OUR_BALL = np.zeros((1, 3), np.int64)
+"""A body that touches only the voxel it is in."""
+
+
+def ours(belief, position, radius, cone, mates, weights, planar, ranked=None):
+    """Candidates, and which is the best."""
+    mean, precision = belief
+    candidates = np.zeros(mean.size, CANDIDATE)
+    layer = int(position[2]) if planar else -1
+    known = weights.sigma_known**-2
+    count = steep_voxels(precision, known, np.asarray(position), radius, layer, candidates)
+    candidates = candidates[:count]
+    marks = np.zeros(mean.size, np.uint8)
+    heard = np.zeros(len(mates), MATE)
+    for place, mate in enumerate(mates):
+        heard[place]["begin"], heard[place]["end"] = mate.begin, mate.end
+        heard[place]["touching"] = weights.touching
+        if mate.cone is not None:
+            c = mate.cone
+            mark_cone(_cone(c.apex, c.yaw, c.pitch, c.radius, c.half_angle), SIZE, None, marks)
+    if count == 0:
+        return candidates, -1
+    factors = np.zeros(1, FACTORS)
+    factors["distance_cost"], factors["scale_bits"] = weights.kappa, weights.scale_bits
+    factors["interference"], factors["static_reach"] = weights.interference, True
+    factors["known_precision"] = known
+    most = candidates["steepness"] / candidates["steepness"].max()
+    most = most - weights.kappa * candidates["distance"] / radius
+    order = np.argsort(-most, kind="stable") if ranked is None else ranked(most)
+    own = _cone((0.0, 0.0, 0.0), 0.0, 0.0, *cone)
+    best = best_candidate(
+        candidates,
+        order,
+        (mean.ravel(), precision.ravel(), SIZE),
+        (np.asarray(position), radius, 0.0, OUR_BALL),
+        heard,
+        own,
+        None,
+        marks,
+        ray_space(SIZE, behind=1),
+        factors[0],
+    )
+    return candidates, best
+
+
+def _cone(apex, yaw, pitch, radius, half_angle):
+    cones = np.zeros(1, CONE)
+    cones[0] = cone_of(np.array([*apex, yaw, pitch]), radius, half_angle)
+    return cones[0]
+
+
+@drawn(150)
+@given(seeds, st.booleans(), st.integers(0, 3), st.sampled_from([0.0, 0.2, 1.0]))
+def test_the_choice_is_the_best_of_equation_13(seed, planar, teammates, kappa):
+    rng = np.random.default_rng(seed)
+    mean, precision = random_belief(SIZE, seed)
+    mean[:] = np.where(rng.random(SIZE) < 0.15, 0.9, 0.5 * rng.random(SIZE))
+    position = rng.uniform(0.3, np.array(SIZE) - 0.3)
+    beliefs = as_reference(mean, precision)
+    mates = [
+        rochami.Mate(
+            rng.uniform(0, SIZE),
+            end := rng.uniform(0, SIZE),
+            rochami.Cone(
+                end,
+                rng.uniform(-3, 3),
+                0.0 if planar else rng.uniform(-1, 1),
+                rng.uniform(1, 5),
+                rng.uniform(0.2, 1.5),
+            ),
+        )
+        for _ in range(teammates)
+    ]
+    cone = (rng.uniform(1.0, 5.0), rng.uniform(0.2, 1.5))
+    weights = rochami.Weights(kappa, 40.0, 0.5, 0.05, 0.6)
+    radius = rng.uniform(1.0, 4.0)
+    values = rochami.values(beliefs, SIZE, position, radius, cone, mates, weights, planar)
+    candidates, best = ours((mean, precision), position, radius, cone, mates, weights, planar)
+    if best < 0:
+        assert not values
+        return
+    chosen = candidates[best]
+    voxel = tuple(int(x) for x in chosen["place"])
+    assert values[voxel] == pytest.approx(max(values.values()), abs=1e-6)
+    slope = rochami.bounded_gradient(beliefs, voxel, 0.05, planar)
+    gaze = np.array(rochami.rocha04.gaze(chosen["yaw"], chosen["pitch"]))
+    assert gaze * math.hypot(*slope) == pytest.approx(slope, abs=1e-5)  # eq. 11
+
+
+def test_which_is_looked_at_first_does_not_matter():
+    """Candidates in any order that begins with what could be worth most give one value."""
+    belief = random_belief(SIZE, 5)
+    belief[0][:] *= 0.5
+    weights = rochami.Weights(0.1, 30.0, 0.5, 0.05, 0.5)
+    mate = rochami.Mate((5.5, 8.5, 2.5), (5.5, 8.5, 2.5), rochami.Cone((5.5, 8.5, 2.5), -2.0, 0.0, 6.0, 0.7))
+    args = (belief, (2.4, 5.6, 2.5), 3.0, (4.0, 0.5), [mate], weights, True)
+    first = ours(*args)
+    flipped = ours(
+        *args, ranked=lambda most: np.argsort(-most[::-1], kind="stable")[::1] * -1 + len(most) - 1
+    )
+    assert first[1] == flipped[1] >= 0
+
+
+def test_an_overlap_with_unknown_space_repels_and_one_with_known_space_does_not():
+    """Two frontiers, equally steep, one ahead of a teammate that looks at it."""
+    mean, precision = np.full(SIZE, 0.1, np.float32), np.full(SIZE, 400.0, np.float32)
+    precision[:, 9:] = precision[:, :2] = 1e-2
+    sees = rochami.Cone((3.5, 5.5, 2.5), math.pi / 2, 0.0, 6.0, 0.8)
+    far = (-50.0, -50.0, 2.5)
+    weights = rochami.Weights(0.0, 5.0, 1.0, 0.05, 0.0)
+    for yaw, side in ((math.pi / 2, 1), (-math.pi / 2, 9)):
+        mate = rochami.Mate(far, far, sees._replace(yaw=yaw))
+        candidates, best = ours(
+            (mean, precision), (3.5, 5.5, 2.5), 6.0, (3.0, 0.5), [mate], weights, planar=True
+        )
+        assert abs(int(candidates[best]["place"][1]) - side) <= 1
