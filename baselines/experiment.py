@@ -25,6 +25,7 @@ from baselines import mission
 from baselines.mission import run_mission, scripted
 from baselines.sources import sources_digest
 from baselines.strategies import make_strategy
+from baselines.strategy import Strategy
 from baselines.workers import Failure, run_each
 from entropy_explore_env.config import Scenario
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
@@ -53,8 +54,24 @@ def mission_record(env: EntropyExploreEnv, strategy: str, seed: int) -> Record:
         `sent_by_scan`, measurements sent after each of the team's scans; and `series`: time,
         entropy of the best map and measurements sent so far at up to 200 moments.
     """
+    return record_mission(env, make_strategy(strategy), seed)
+
+
+def record_mission(
+    env: EntropyExploreEnv,
+    strategy: Strategy,
+    seed: int,
+    after_step: Callable[[EntropyExploreEnv], None] | None = None,
+) -> Record:
+    """`mission_record` of a strategy that is there; `after_step` is called after the reset and every step."""
     recorder = Recorder(env.missions)
-    run_mission(env, make_strategy(strategy), seed, lambda _: recorder.note())
+
+    def note(env: EntropyExploreEnv) -> None:
+        recorder.note()
+        if after_step is not None:
+            after_step(env)
+
+    run_mission(env, strategy, seed, note)
     figures = mission_figures(env.missions, 0)
     best = recorder.entropy_bits.min(axis=1)
     middle = 0.5 * (figures["entropy_start_bits"] + figures["entropy_threshold_bits"])
