@@ -108,7 +108,13 @@ class _Memory:
 
 
 class MutualInformation:
-    """Chooses viewpoints by eq. 13; coordinated or not."""
+    """Chooses viewpoints by eq. 13; coordinated or not.
+
+    Attributes:
+        coordination: The settings.
+        decisions: How many of this mission's decisions followed the rule, and why others wandered: a teammate
+            was in the way, no candidate was worth anything, or it was a trap.
+    """
 
     def __init__(self, coordination: Coordination | None = None) -> None:
         """Take the settings."""
@@ -118,6 +124,7 @@ class MutualInformation:
         """A new mission begins."""
         grid, settings = scenario.grid, self.coordination
         self._rng = rng
+        self.decisions = {"rule": 0, "blocked": 0, "nothing": 0, "trap": 0}
         self._memories = [_Memory(deque(maxlen=settings.memory)) for _ in range(scenario.robots)]
         self._builds = [self._build(scenario, kind) for kind in scenario.kinds]
         self._marks = np.zeros(grid.voxels, np.uint8)
@@ -152,12 +159,15 @@ class MutualInformation:
         blocked = view.move_end is MoveEnd.TEAMMATE and view.kind.robot.when_blocked == "wander"
         viewpoint = None if blocked else self._best(view)
         if viewpoint is None:
+            self.decisions["blocked" if blocked else "nothing"] += 1
             return random_viewpoint(view, self._rng)
         alike = sum(_alike(viewpoint, earlier, grid.voxel_size_m) for earlier in memory.chosen)
         if alike >= self.coordination.repeats:
             memory.chosen.clear()
+            self.decisions["trap"] += 1
             return random_viewpoint(view, self._rng)
         memory.chosen.append(viewpoint)
+        self.decisions["rule"] += 1
         return viewpoint
 
     def _best(self, view: RobotView) -> np.ndarray | None:

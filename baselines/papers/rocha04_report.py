@@ -55,12 +55,12 @@ def write_report(folder: Path, records: Records, claims: Sequence[Claim], comman
     return folder / "rocha04.md"
 
 
-def print_claims(claims: Sequence[Claim]) -> None:
+def print_claims(claims: Sequence[Claim], paper: str = "Rocha04") -> None:
     """A table of the claims on standard output."""
     from rich.console import Console
     from rich.table import Table
 
-    table = Table(title="Rocha04", title_justify="left")
+    table = Table(title=paper, title_justify="left")
     table.add_column("claim")
     for head in ("paper", "ours", "95 % interval"):
         table.add_column(head, justify="right")

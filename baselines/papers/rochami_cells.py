@@ -18,6 +18,13 @@ from entropy_explore_env.scenarios import LAB, ROOM
 TEAMS = tuple(range(2, 11))
 FEW = (2, 4, 8)
 """Team sizes with one thing changed at a time."""
+QUICK_KAPPAS = (0.25, 1.0)
+KAPPA_CHANGES: dict[str, tuple[str, dict[str, Any], dict[str, Any]]] = {
+    "entropy": ("a voxel counts as known at σ = 0.03 instead of 0.2", {}, {"known_sigma": 0.03}),
+    "reach": ("candidates at most 1 m away", {"robot": {"reach_m": 1.0}}, {}),
+    "bodies": ("bodies off", {"robot": {"body_radius_m": 0.0}}, {"teammates_block": False}),
+}
+"""What is changed under κ = 0, ¼ and 1: a text, settings of the scenario, fields of Coordination."""
 KAPPAS = (0.0, 0.0625, 0.125, 0.25, 0.375, 0.5, 0.75, 1.0)
 COVERED = (4, 8)
 """Team sizes of which H(T) and I are followed."""
@@ -44,10 +51,12 @@ class Run:
     covered: bool = False
 
     def __call__(self, env: EntropyExploreEnv, strategy: str, seed: int) -> Record:
-        """Run the mission; the record has H(T) and I, if wanted, in `coverage`."""
+        """Run the mission; its record has the strategy's `decisions` and, if wanted, H(T) and I in `coverage`."""
         coverage = TeamCoverage(env.missions) if self.covered else None
         made = make_strategy(strategy) if self.coordination is None else MutualInformation(self.coordination)
         record = record_mission(env, made, seed, None if coverage is None else coverage.note)
+        if isinstance(made, MutualInformation):
+            record["decisions"] = made.decisions
         return record if coverage is None else {**record, "coverage": coverage.series()}
 
 
@@ -119,8 +128,10 @@ def cell_id(robots: int, method: str, blocked: str = "wait") -> str:
     return f"n{robots}-{method}-{blocked}"
 
 
-def kappa_id(kappa: float) -> str:
-    """Name of the cell with this cost sensitivity."""
+def kappa_id(kappa: float, change: str | None = None) -> str:
+    """Name of the cell with this cost sensitivity, and maybe with one thing changed."""
+    if change is not None:
+        return f"kappa-{kappa:g}-{change}"
     return f"kappa-{kappa:g}" if kappa > 0.0 else cell_id(2, "coordinated")
 
 
@@ -153,7 +164,12 @@ def experiment(starts: int, quick: bool) -> list[Cell]:
                 cells.append(_cell(name, settings, method, starts, covered=covered))
         short = _merged({"robots": robots}, _changed(reach_m=1.0))
         cells.append(_cell(f"n{robots}-random-1m", short, "random", starts))
-    for kappa in KAPPAS[2::2] if quick else KAPPAS[1:]:
+    for name, (_, settings, weighed) in () if quick else KAPPA_CHANGES.items():
+        for kappa in (0.0, 0.25, 1.0):
+            changed = _merged({"robots": 2}, settings)
+            cost = {**weighed, "distance_cost": kappa}
+            cells.append(_cell(kappa_id(kappa, name), changed, "coordinated", starts, cost))
+    for kappa in QUICK_KAPPAS if quick else KAPPAS[1:]:
         weighed = {"distance_cost": kappa}
         cells.append(_cell(kappa_id(kappa), {"robots": 2}, "coordinated", starts, weighed))
     for name in ("bodies", "reach") if quick else CHANGES:
