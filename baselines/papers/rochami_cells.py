@@ -51,7 +51,7 @@ class Run:
     covered: bool = False
 
     def __call__(self, env: EntropyExploreEnv, strategy: str, seed: int) -> Record:
-        """Run the mission; its record has the strategy's `decisions` and, if wanted, H(T) and I in `coverage`."""
+        """Run the mission; its record has the `decisions` and, if wanted, H(T) and I in `coverage`."""
         coverage = TeamCoverage(env.missions) if self.covered else None
         made = make_strategy(strategy) if self.coordination is None else MutualInformation(self.coordination)
         record = record_mission(env, made, seed, None if coverage is None else coverage.note)
