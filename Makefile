@@ -14,7 +14,7 @@ help:
 	@echo "make test       lint, then the tests"
 	@echo "make lint       ruff and pyright"
 	@echo "make bench      speed against peers"
-	@echo "make reproduce  the experiments of Rocha04, into docs/results"
+	@echo "make reproduce  the experiments of Rocha04 and RochaMI, into docs/results"
 	@echo "make clean      remove .venv, builds and caches; results stay"
 
 demo: $(STAMP)baselines
@@ -33,6 +33,7 @@ bench: $(STAMP)baselines $(STAMP)bench
 
 reproduce: $(STAMP)baselines
 	$(RUN) baselines.papers.rocha04 --out docs/results
+	$(RUN) baselines.papers.rochami --out docs/results
 
 # The stamp .venv/installed-EXTRA says that the package is installed with that extra.
 $(STAMP)%: pyproject.toml requirements/constraints.txt

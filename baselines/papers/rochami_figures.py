@@ -157,7 +157,9 @@ def figure_coverage(records: Records) -> tuple[Figure, Table]:
                 axes.plot(grid, curves.mean(axis=0), color=colour, label=method)
                 error = 1.96 * curves.std(axis=0, ddof=1) / np.sqrt(len(curves))
                 mean = curves.mean(axis=0)
-                axes.fill_between(grid, mean - error, mean + error, color=colour, alpha=0.2, linewidth=0)
+                axes.fill_between(
+                    grid, np.maximum(mean - error, 0.0), mean + error, color=colour, alpha=0.2, linewidth=0
+                )
                 axes.set_ylabel(f"{title} (1000 bits)")
                 if row == 0:
                     axes.set_title(f"{n} robots", fontsize=10)

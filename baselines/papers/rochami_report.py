@@ -63,10 +63,10 @@ def _text(records: Records, claims: Sequence[Claim], command: str) -> str:
     ]
     parts = [
         "# Rocha, coordination by mutual information, reproduced",
-        f"Written by `{command}`: {missions:,} missions, {starts} paired starts and worlds a point, seeds 0, 1, "
-        "…, the same in every cell. Intervals are 95 % bootstrap intervals over missions, of means unless they "
-        f"say otherwise; {capped} missions were cut off at {TIME_LIMIT_S:g} s, and count with it. The figures' "
-        "numbers lie as CSV in `rochami/`.",
+        f"Written by `{command}`: {missions:,} missions, {starts} paired starts and worlds a point, seeds 0, "
+        "1, …, the same in every cell. Intervals are 95 % bootstrap intervals over missions, of means unless "
+        f"they say otherwise; {capped} missions were cut off at {TIME_LIMIT_S:g} s, and count with it. The "
+        "figures' numbers lie as CSV in `rochami/`.",
         _RULES,
         f"## Claims: {held} of {len(claims)} hold",
         _HOLDS,
