@@ -138,7 +138,7 @@ REFUSED = {
     (Scenario, "scored"): SWITCH,
     (Scenario, "robot"): (None, Channel(), "free"),
     (Scenario, "sensor"): (None, Reward()),
-    (Scenario, "others"): (None, [], 1, (Robot(),), (None,)),
+    (Scenario, "others"): (None, [], 1, (Reward(),), (None,)),
     (RobotKind, "robot"): (None, Channel(), "free"),
     (RobotKind, "sensor"): (None, Reward()),
     (Scenario, "channel"): (None, Reward()),

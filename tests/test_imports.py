@@ -127,6 +127,7 @@ STRATEGIES_SEE = (
     "reports",
     "errors",
     "command",
+    "validation",
     "compilation",
     "writing",
     "version",
