@@ -81,12 +81,13 @@ def _on_uncoordinated(records: Records) -> str:
         ends = [change_id("wait-15", n, "uncoordinated") for n in (8, 2)]
         longer = f" With waits of 15 s instead of 5 s t(8)/t(2) is {_ratio(records, *ends)}."
     growth = _ratio(records, cell_id(sizes[-1], "uncoordinated"), cell_id(2, "uncoordinated"))
+    drives = f"{', '.join(shares)} are blocked for {', '.join(map(str, sizes))} robots"
     return (
-        "Of the uncoordinated robots' drives "
-        f"{', '.join(shares)} are blocked for {', '.join(map(str, sizes))} robots, where they wait. Yet "
-        f"t({sizes[-1]})/t(2) is {growth}: a robot scans where it was stopped, and all share what it sees, "
-        f"so that one more robot brings scans even where it only waits.{longer} Time would rise where a robot keeps its teammates from more scans than it brings: "
-        "where waits last much longer than a drive, where blocked robots do not scan, or do not share."
+        f"Of the uncoordinated robots' drives {drives}, where they wait. Yet t({sizes[-1]})/t(2) is {growth}: "
+        "a robot scans where it was stopped, and all share what it sees, so that one more robot brings scans "
+        f"even where it only waits.{longer} Time would rise where a robot keeps its teammates from more scans "
+        "than it brings: where waits last much longer than a drive, where blocked robots do not scan, or do "
+        "not share."
     )
 
 
