@@ -14,7 +14,7 @@ import math
 import re
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, is_dataclass
 from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import Any, TypeVar
@@ -122,6 +122,8 @@ class Cell:
         world = Path(self.scenario.world)
         content = hashlib.sha256(world.read_bytes()).hexdigest() if world.is_file() else ""
         described = repr((sources, content, scripted(self.scenario), self.strategy))
+        if is_dataclass(self.record):  # it has settings of its own
+            described += repr(self.record)
         return hashlib.sha256(described.encode()).hexdigest()[:16]
 
 
