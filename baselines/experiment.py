@@ -106,8 +106,7 @@ class Cell:
         scenario: The task.
         strategy: Name of the strategy.
         seeds: Number of missions; their seeds are 0, 1, …, the same in every cell (paired).
-        record: Runs a mission with a strategy and a seed, and says what is kept of it: a function, or a
-            dataclass with settings of its own.
+        record: Runs a mission with a strategy and a seed, and says what is kept of it.
     """
 
     id: str
@@ -122,8 +121,9 @@ class Cell:
         sources = sources_digest(self.strategy, mission, sys.modules[self.record.__module__])
         world = Path(self.scenario.world)
         content = hashlib.sha256(world.read_bytes()).hexdigest() if world.is_file() else ""
-        kept = repr(self.record) if is_dataclass(self.record) else self.record.__name__  # no address in it
-        described = repr((sources, content, scripted(self.scenario), self.strategy, kept))
+        described = repr((sources, content, scripted(self.scenario), self.strategy))
+        if is_dataclass(self.record):  # it has settings of its own
+            described += repr(self.record)
         return hashlib.sha256(described.encode()).hexdigest()[:16]
 
 

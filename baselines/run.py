@@ -31,7 +31,8 @@ class Args:
     scenario: Positional[str] = "room"
     """A named scenario: room, office, cave, … (the README lists them)."""
     strategy: str = "gradient"
-    """Chooses viewpoints: random, gradient, gradient-plane, information-rate, information-per-scan."""
+    """Chooses viewpoints: random, gradient, gradient-plane, mutual-information, ground-gradient,
+    information-rate, information-per-scan."""
     robots: int = 3
     """Team size."""
     seed: int = 0

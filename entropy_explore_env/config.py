@@ -261,7 +261,7 @@ class Channel:
         check_count(self, "burst", 0, 1_000_000)
         check_not_negative(self, "i_min_bits")
         if self.i_min_fill is not None:
-            check(self, "i_min_fill", "None, or a number above 0 up to 1", lambda v: 0 < v <= 1)
+            check(self, "i_min_fill", "None, or a number above 0 up to 10", lambda v: 0 < v <= 10)
             check(self, "i_min_bits", "above 0 where I_min is steered", lambda v: v > 0)
         check(self, "i_min_gain", "a number above 0 up to 1", lambda v: 0 < v <= 1)
         check_positive(self, "range_m", finite=False)

@@ -94,7 +94,7 @@ REFUSED = {
     (RangeSensor, "scan_every_m"): (*POSITIVE, 0.9e-3),
     (Channel, "burst"): (*COUNT, 1_000_001),
     (Channel, "i_min_bits"): NOT_NEGATIVE,
-    (Channel, "i_min_fill"): ("1", True, NAN, 0.0, -0.5, 1.01, INF),
+    (Channel, "i_min_fill"): ("1", True, NAN, 0.0, -0.5, 10.01, INF),
     (Channel, "i_min_gain"): (*POSITIVE, 1.01, INF),
     (Channel, "range_m"): POSITIVE,
     (Channel, "loss_probability"): (*NO_NUMBERS, -0.01, 1.01, INF),

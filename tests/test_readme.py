@@ -45,7 +45,8 @@ def rows_of(text: str) -> list[str]:
 
 
 @pytest.mark.parametrize(
-    ("heading", "report", "rows"), [("Rocha04, reproduced", "rocha04", 10), ("Speed", "speed", 15)]
+    ("heading", "report", "rows"),
+    [("Rocha04, reproduced", "rocha04", 10), ("RochaMI, reproduced", "rochami", 10), ("Speed", "speed", 15)],
 )
 def test_tables_are_those_of_the_reports(heading, report, rows):
     section = README.split(f"## {heading}\n")[1].split("\n## ")[0]

@@ -29,7 +29,7 @@ KAPPAS = (0.0, 0.0625, 0.125, 0.25, 0.375, 0.5, 0.75, 1.0)
 COVERED = (4, 8)
 """Team sizes of which H(T) and I are followed."""
 I_MINS = (0.6215, 0.3219, 0.0291)
-FILLS = (0.15, 0.25, 0.35, 0.5, 0.75, 1.0)
+FILLS = (0.15, 0.35, 0.5, 0.75, 1.0, 1.5, 3.0)
 SHARING_TEAMS = (2, 4)
 
 METHODS = ("coordinated", "uncoordinated", "random")

@@ -83,11 +83,11 @@ def _on_uncoordinated(records: Records) -> str:
     growth = _ratio(records, cell_id(sizes[-1], "uncoordinated"), cell_id(2, "uncoordinated"))
     drives = f"{', '.join(shares)} are blocked for {', '.join(map(str, sizes))} robots"
     return (
-        f"Of the uncoordinated robots' drives {drives}, where they wait. Yet t({sizes[-1]})/t(2) is {growth}: "
-        "a robot scans where it was stopped, and all share what it sees, so that one more robot brings scans "
-        f"even where it only waits.{longer} Time would rise where a robot keeps its teammates from more scans "
-        "than it brings: where waits last much longer than a drive, where blocked robots do not scan, or do "
-        "not share."
+        f"Of the uncoordinated robots' drives {drives}, where they wait. Yet t({sizes[-1]})/t(2) is "
+        f"{growth}: a robot scans where it was stopped, and all share what it sees, so that one more robot "
+        f"brings scans even where it only waits.{longer} Time would rise where a robot keeps its teammates "
+        "from more scans than it brings: where waits last much longer than a drive, where blocked robots do "
+        "not scan, or do not share."
     )
 
 

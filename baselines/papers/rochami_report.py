@@ -104,8 +104,8 @@ One robot is the same in both. What a robot does behind a teammate the paper doe
 _HOLDS = """What holds means: "coordinated is faster" is a paired Wilcoxon signed-rank test, one-sided,
 over all team sizes of a setting corrected by Holm, p < 0.01; a figure of the paper holds if it lies in
 our interval; "falls", "rises" and "monotone" ask for every step of the means and for the whole
-interval; "≥ 1" and "not slower" hold unless the whole interval contradicts them; "levels off" allows 10
-%."""
+interval; "≥ 1" and "not slower" hold unless the whole interval contradicts them; "levels off" allows a
+tenth."""
 
 _CHANGED = """Mean mission times with blocked robots that wait; the ratio is coordinated over
 uncoordinated with its interval, p of the paired test corrected over the table. A change that does not

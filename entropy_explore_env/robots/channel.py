@@ -81,7 +81,7 @@ def steered_i_min(i_min_bits, utility, burst, fill, gain):
         i_min_bits: I_min at the scan, > 0.
         utility: (R,) float64 bits of each ray; negative for a ray that measured nothing.
         burst: Most measurements of a batch, ≥ 1.
-        fill: Share of it, above 0.
+        fill: Share of it, above 0; above 1, poor scans fill it, too.
         gain: Most change of ln I_min.
     """
     reached = 0
