@@ -55,7 +55,7 @@ def progress_bar(title: str, hidden: bool) -> Iterator[Callable[[EntropyExploreE
             progress.stop()
 
 
-_OF_TEAMS = ("shared_measurements", "bits_sent", "balance")
+_OF_TEAMS = ("shared_measurements", "bits_sent", "balance", "entropy_mean_bits", "joint_bits")
 _ROWS: tuple[tuple[str, str, Callable[[Any], str]], ...] = (
     ("finished", "finished", lambda v: "yes" if v else "no"),
     ("ended because", "end_reason", str),
@@ -74,6 +74,8 @@ _ROWS: tuple[tuple[str, str, Callable[[Any], str]], ...] = (
     ("imbalance between robots", "balance", lambda v: f"{v:.2f}"),
     ("entropy at first", "entropy_start_bits", lambda v: f"{v:,.0f} bits"),
     ("entropy at the end", "entropy_end_bits", lambda v: f"{v:,.0f} bits"),
+    ("entropy, mean of the team", "entropy_mean_bits", lambda v: f"{v:,.0f} bits"),
+    ("entropy of the joint map", "joint_bits", lambda v: f"{v:,.0f} bits"),
     ("driven", "distance_m", lambda v: f"{v:,.1f} m"),
     ("blocked moves", "blocked_moves", lambda v: f"{v:,}"),
     ("computed, compiled and drawn in", "wall_s", lambda v: f"{v:,.2f} s"),
@@ -117,7 +119,9 @@ def print_table(figures: dict[str, Any], written: list[Path], scenario: Scenario
     marks = (figures["t50_s"], figures["t90_s"], figures["t99_s"])
     reached = ", ".join("-" if mark is None else f"{mark:,.0f}" for mark in marks)
     none = all(mark is None for mark in marks)
-    values = {**figures, **figures.get("joint", {}), "reached": "-" if none else reached + " s"}
+    joint = figures.get("joint", {})
+    values = {**figures, **joint, "reached": "-" if none else reached + " s"}
+    values["joint_bits"] = joint.get("entropy_bits")
     for label, shown in _setting(scenario):
         table.add_row(label, shown)
     for label, name, shown in _ROWS:

@@ -6,7 +6,7 @@ A mission ends when the map is known or its time is up; the table says which, an
 
 from __future__ import annotations
 
-import math
+import dataclasses
 import sys
 import time
 from collections.abc import Sequence
@@ -69,17 +69,26 @@ def main(words: Sequence[str]) -> int:
             print(f"{number + 1} of {len(files)}: {path.name}", file=sys.stderr, flush=True)
         rows.append(explore(path, args))
     if args.out is not None:
-        given = f"{args.folder.name} --strategy {args.strategy} --robots {args.robots}"
-        given += "" if args.resolution_m is None else f" --resolution-m {args.resolution_m:g}"
-        given += " --negate" if args.negate else ""
-        about = f"Made by `python -m baselines.tour {given}`, seed {args.seed}; missions are cut off after "
-        about += f"{args.time_limit_s:g} s."
+        about = f"Made by `{_command(args)}`: strategy {args.strategy}, {args.robots} robots, "
+        about += f"seed {args.seed}; missions are cut off after {args.time_limit_s:g} s."
         write_atomically(args.out, f"# Worlds explored\n\n{about}\n\n{table(rows)}\n")
     if args.json:
         print_json({"worlds": rows})
     else:
         print(table(rows), end="")
     return 0
+
+
+def _command(args: Args) -> str:
+    """What makes the same table again: the options that were given."""
+    words = ["python -m baselines.tour", args.folder.name]
+    for field in dataclasses.fields(args):
+        value = getattr(args, field.name)
+        if field.name not in ("folder", "out", "json") and value != field.default:
+            option = "--" + field.name.replace("_", "-")
+            said = f"{value:g}" if isinstance(value, float) else str(value)
+            words += [option] if value is True else [option, said]
+    return " ".join(words)
 
 
 def world_files(folder: Path) -> list[Path]:
@@ -126,48 +135,67 @@ def explore(path: Path, args: Args) -> dict[str, Any]:
     except WorldError as error:
         return {"world": path.name, "refused": str(error)}
     figures = mission_figures(env.missions, 0)
+    joint = {_JOINT.get(name, name): value for name, value in figures.pop("joint").items()}
     shape = env.scenario.grid.shape
     return {
+        **{name: value for name, value in figures.items() if name != "per_robot"},
+        **joint,
         "world": path.name,
         "voxels": " × ".join(map(str, shape if shape[2] > 1 else shape[:2])),
         "voxel_size_m": env.scenario.grid.voxel_size_m,
-        **{name: figures[name] for name in ("end_reason", "t_mission_s", "scans")},
-        **{name: figures["joint"][name] for name in ("explored", "error")},
         "wall_s": round(time.perf_counter() - started, 2),
     }
 
 
+_JOINT = {"entropy_bits": "joint_bits"}
+_HEAD: dict[str, tuple[str, str]] = {
+    "voxels": ("voxels", ""),
+    "voxel_size_m": ("edge (m)", "g"),
+    "end_reason": ("end", ""),
+    "t_mission_s": ("t (s)", ",.0f"),
+    "scans": ("scans", ","),
+    "explored": ("explored", ".1%"),
+    "error": ("map error", ".3f"),
+    "wall_s": ("computed in (s)", ".1f"),
+}
+_MORE: dict[str, tuple[str, str]] = {
+    "t50_s": ("T₅₀ (s)", ",.0f"),
+    "t90_s": ("T₉₀ (s)", ",.0f"),
+    "t99_s": ("T₉₉ (s)", ",.0f"),
+    "scans_over_floor": ("scans over the floor", ".2f"),
+    "entropy_end_bits": ("best map (bits)", ",.0f"),
+    "entropy_mean_bits": ("mean map (bits)", ",.0f"),
+    "joint_bits": ("joint map (bits)", ",.0f"),
+    "wrong": ("voxels wrong at ½", ".2%"),
+    "distance_m": ("driven (m)", ",.0f"),
+    "blocked_moves": ("blocked moves", ","),
+    "overlap": ("below I_min", ".0%"),
+    "balance": ("imbalance", ".2f"),
+    "bits_sent": ("bits sent", ","),
+    "bits_gained_per_bit_sent": ("bits gained per bit sent", ".3f"),
+}
+"""Columns: their heads and the form of their numbers."""
+
+
 def table(rows: list[dict[str, Any]]) -> str:
-    """The rows in Markdown, and why worlds were refused."""
-    head = [
-        "world",
-        "voxels",
-        "edge (m)",
-        "end",
-        "t (s)",
-        "scans",
-        "explored",
-        "map error",
-        "computed in (s)",
-    ]
-    shown = [
-        [
-            row["world"],
-            row["voxels"],
-            f"{row['voxel_size_m']:g}",
-            row["end_reason"],
-            f"{row['t_mission_s']:,.0f}",
-            f"{row['scans']:,}",
-            f"{row['explored']:.1%}",
-            "-" if row["error"] is None or math.isnan(row["error"]) else f"{row['error']:.3f}",
-            f"{row['wall_s']:.1f}",
-        ]
-        if "refused" not in row
-        else [row["world"], "-", "-", "refused", *["-"] * 5]
-        for row in rows
-    ]
+    """The rows in Markdown, how the teams did, and why worlds were refused."""
+    explored = [row for row in rows if "refused" not in row]
     reasons = "".join(f"\nRefused: {row['refused']}\n" for row in rows if "refused" in row)
-    return markdown_table(head, shown) + reasons
+    more = "\n" + _table(explored, _MORE) if explored else ""
+    return _table(rows, _HEAD) + more + reasons
+
+
+def _table(rows: list[dict[str, Any]], columns: dict[str, tuple[str, str]]) -> str:
+    """Some columns; what cannot be said is `-`."""
+    body = [[row["world"], *(_shown(row, name, form) for name, (_, form) in columns.items())] for row in rows]
+    return markdown_table(["world", *(head for head, _ in columns.values())], body)
+
+
+def _shown(row: dict[str, Any], name: str, form: str) -> str:
+    if "refused" in row:
+        return "refused" if name == "end_reason" else "-"
+    partial = name == "scans_over_floor" and not row["finished"]  # the floor is a whole map's
+    return "-" if row[name] is None or partial else format(row[name], form)
 
 
 if __name__ == "__main__":

@@ -18,6 +18,8 @@ from entropy_explore_env.belief.search_space import Search, cost_to, is_passable
 from entropy_explore_env.compilation import inlined_kernel, lean_kernel
 
 _SLACK = 1e-9
+_GRAZE = 1e-6
+"""A line so near to an edge, in voxel edges, goes through it: whoever drives it may be off by rounding."""
 _START, _FIRST = np.int64(0), np.int64(1)
 """Stops by number. NumPy integers, so that what takes one compiles for one type."""
 
@@ -31,13 +33,19 @@ def _axis(position, finish, size):
 
 @inlined_kernel
 def _share(index, step, position, finish):
-    """Share of a straight line up to the next face along an axis.
-
-    A quotient and no sum of quotients: where the line meets an edge the shares are equal.
-    """
+    """Share of a straight line up to the next face along an axis: a quotient and no sum of quotients."""
     if step == 0:
         return math.inf
     return (index + (1 if step > 0 else 0) - position) / (finish - position)
+
+
+@inlined_kernel
+def _together(share, nearest, way, shortest):
+    """Whether a face that is reached at a share of the line is crossed with the nearest one, at their edge.
+
+    Or so near to it that the line, moved sideways by `_GRAZE`, would meet them the other way round.
+    """
+    return share < 1.0 and (share - nearest) * min(abs(way), shortest) <= _GRAZE
 
 
 @lean_kernel
@@ -45,8 +53,8 @@ def cost_of_sight(search, lattice, costs, start, finish):
     """Cost of driving straight from one point to another, if nothing is in the way.
 
     The body has to fit in every voxel that the line crosses, judged at the voxel's centre, and in
-    all that it squeezes past where it goes through an edge or a corner. The first voxel may be
-    impassable: who stands there may leave.
+    all that it squeezes past where it goes through an edge or a corner, or grazes one. The first voxel
+    may be impassable: who stands there may leave.
 
     Args:
         search: The search that is asked, or any after `_begin`; keeps what was looked at.
@@ -77,7 +85,13 @@ def cost_of_sight(search, lattice, costs, start, finish):
             return total + (1.0 - share) * length * rate
         total += (nearest - share) * length * rate
         share = nearest
-        crossed = (share_x == nearest) + 2 * (share_y == nearest) + 4 * (share_z == nearest)
+        by = 0 if share_x == nearest else (1 if share_y == nearest else 2)
+        shortest = abs(finish[by] - start[by])
+        crossed = (
+            _together(share_x, nearest, finish[0] - start[0], shortest)
+            + 2 * _together(share_y, nearest, finish[1] - start[1], shortest)
+            + 4 * _together(share_z, nearest, finish[2] - start[2], shortest)
+        )
         for part in range(1, crossed + 1):  # what is squeezed past; the voxel that is entered comes last
             if part & crossed == part:
                 i = x + (step_x if part & 1 else 0)

@@ -18,7 +18,7 @@ _FLOOR_SCANS = 256
 _STEEPEST_RAD = math.pi / 4
 
 
-def mission_figures(missions: Missions, mission: int, floor: bool = False) -> dict[str, Any]:
+def mission_figures(missions: Missions, mission: int, floor: bool | None = None) -> dict[str, Any]:
     """What a mission came to.
 
     Entropies are those of the best-informed robot's map unless they say otherwise; counts are sums over
@@ -27,7 +27,8 @@ def mission_figures(missions: Missions, mission: int, floor: bool = False) -> di
     Args:
         missions: The missions.
         mission: Which.
-        floor: Whether `scans_over_floor` is wanted; the floor takes some milliseconds a world.
+        floor: Whether `scans_over_floor` is wanted; the floor takes some milliseconds a world. None = where
+            the scenario is scored.
 
     Returns:
         `scenario`, `world`, `robots`, `seed`, `finished`, `end_reason`; `t_mission_s`, and `t50_s`, `t90_s`,
@@ -44,7 +45,8 @@ def mission_figures(missions: Missions, mission: int, floor: bool = False) -> di
     end, world = missions.over(mission), missions.worlds[mission]
     scans, sent = int(robots["scans"].sum()), int(robots["bits_sent"].sum())
     measurements, gained = int(robots["measurements"].sum()), robots["gained_bits"]
-    least = information_floor(missions.scenario, world) if floor and world is not None else None
+    wanted = missions.scenario.scored if floor is None else floor
+    least = information_floor(missions.scenario, world) if wanted and world is not None else None
     return {
         "scenario": missions.scenario.name,
         "world": missions.scenario.world if world is None else world.name,

@@ -252,11 +252,23 @@ def world_from_file(path: Path, voxel_size_m: float, **options: Any) -> World:  
             raise SettingError(name, value, "one of the options " + ", ".join(LOADING))
     _check(options)
     path = path if str(path) == JACKSBORO else path.resolve()
-    return _kept_world(path, voxel_size_m, tuple(sorted(options.items())))
+    return _kept_world(path, _written(path), voxel_size_m, tuple(sorted(options.items())))
+
+
+def _written(path: Path) -> tuple[int, int]:
+    """When a file was written last, and its size: of another one the world is read anew."""
+    try:
+        about = path.stat()
+    except OSError:  # a name, or a file that reading will miss
+        return 0, 0
+    return about.st_mtime_ns, about.st_size
 
 
 @lru_cache(maxsize=4)
-def _kept_world(path: Path, voxel_size_m: float, options: tuple[tuple[str, Any], ...] = ()) -> World:
+def _kept_world(
+    path: Path, written: tuple[int, int], voxel_size_m: float, options: tuple[tuple[str, Any], ...]
+) -> World:
+    del written
     return load_world(path, voxel_size_m, **dict(options))
 
 

@@ -41,12 +41,19 @@ def test_every_world_of_the_folder_has_a_row(folder, capsys):
     out = folder / "table.md"
     assert run_command(tour.main, [str(folder), *SHORT, "--out", str(out)]) == 0
     said = capsys.readouterr()
-    rows = [line.split(" | ") for line in said.out.splitlines()[2:]]
+    rows = [line.split(" | ") for line in said.out.split("\n\n")[0].splitlines()[2:]]
     assert [row[0].strip("| ") for row in rows] == ["bare.pgm", "floor.yaml", "hut.npz"]
     assert [row[1] for row in rows] == ["22 × 15", "44 × 30", "9 × 12 × 7"]
     assert {row[3] for row in rows} <= {"MAPPED", "TIME_UP"}
     assert "3 of 3: hut.npz" in said.err
     assert all(line in out.read_text() for line in said.out.splitlines())
+    command = f"python -m baselines.tour {folder.name} --strategy random --time-limit-s 20"
+    about = f"Made by `{command}`: strategy random, 2 robots, seed 0; missions are cut off after 20 s."
+    assert about in out.read_text()
+    more = [line.split(" | ") for line in said.out.split("\n\n")[1].splitlines()]
+    assert len(more[0]) == 15 and more[0][5] == "best map (bits)"
+    assert [row[0].strip("| ") for row in more[2:]] == [row[0].strip("| ") for row in rows]
+    assert all(float(row[9].replace(",", "")) > 0 for row in more[2:])  # driven
 
 
 def test_results_as_one_object(folder, capsys):
@@ -55,6 +62,9 @@ def test_results_as_one_object(folder, capsys):
     worlds = json.loads(said.out)["worlds"]
     assert [world["world"] for world in worlds] == ["bare.pgm", "floor.yaml", "hut.npz"]
     assert all(0.0 < world["explored"] <= 1.0 and world["scans"] > 0 for world in worlds)
+    listed = {"t50_s", "t90_s", "t99_s", "entropy_mean_bits", "joint_bits", "wrong", "overlap", "balance"}
+    listed |= {"distance_m", "blocked_moves", "bits_sent", "bits_gained_per_bit_sent", "scans_over_floor"}
+    assert all(listed <= set(world) for world in worlds)
     assert said.err == ""
 
 
@@ -62,7 +72,8 @@ def test_a_world_that_cannot_be_used_is_a_row_and_the_others_are_explored(folder
     (folder / "below" / "broken.bt").write_bytes(b"no tree")
     assert run_command(tour.main, [str(folder), *SHORT]) == 0
     said = capsys.readouterr().out
-    rows = [line.split(" | ") for line in said.splitlines() if line.startswith("| ")][2:]
+    head = said.split("\n\n")[0]
+    rows = [line.split(" | ") for line in head.splitlines() if line.startswith("| ")][2:]
     assert [row[0].strip("| ") for row in rows if row[3] == "refused"] == ["broken.bt"]
     assert len(rows) == 4 and "\nRefused: world file = " in said
     assert run_command(tour.main, [str(folder), *SHORT, "--json"]) == 0

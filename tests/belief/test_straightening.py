@@ -97,6 +97,25 @@ def test_a_line_through_edges_and_corners_needs_what_it_squeezes_past(solid, fin
     assert sight(rates, start, finish) == pytest.approx(expected)
 
 
+@pytest.mark.parametrize("solid", [(1, 0, 0), (0, 1, 0), (2, 1, 0), (1, 2, 0)])
+@pytest.mark.parametrize("off", [0.0, 3e-15, -3e-15, 2e-10, -2e-10])
+def test_rounding_opens_no_corner(solid, off):
+    """Lines from centre to centre, as they come out of metres: a corner stays one, on either side."""
+    rates = np.ones(SIZE, np.float32)
+    rates[solid] = math.inf
+    for start, finish in (((0.5 + off, 0.5), (2.5, 2.5)), ((2.5, 2.5), (0.5, 0.5 - off))):
+        assert math.isinf(sight(rates, (*start, 0.5), (*finish, 0.5)))
+    beside = (0.5 + math.copysign(1e-4, solid[1] - solid[0]), 0.5, 0.5)
+    assert math.isfinite(sight(rates, beside, (2.5 + beside[0] - 0.5, 2.5, 0.5)))
+
+
+def test_a_line_that_ends_at_the_boundary_stays_inside():
+    """Just before the outermost faces, next to the last edge that it crosses."""
+    shape, end = (9, 6, 1), (9.0 - 1e-9, 4.0 + 1e-9, 0.5)
+    start = (8.5, 4.0 - 0.5, 0.5)
+    assert sight(np.ones(shape, np.float32), start, end) == pytest.approx(math.dist(start, end))
+
+
 def pulled(mean, precision, start, goal, radius=0.0, layer=None, unknown_cost=1.0, ends=None):
     """Cost of the way, points of the pulled one, its cost leg by leg."""
     lattice = new_lattice(mean.shape, radius, layer)

@@ -10,6 +10,7 @@ import pytest
 
 from entropy_explore_env import EntropyExploreEnv, RobotView, parallel_env
 from entropy_explore_env.config import Grid
+from entropy_explore_env.reports.metrics import mission_figures
 from tests.reference.scenes import SMALL
 
 BOX = "box-7x11x5"
@@ -155,3 +156,21 @@ def test_infos_agree_with_views_and_are_plain_python() -> None:
         for agent, observation in observations.items():
             assert observation["self"][9] == infos[agent]["deciding"]
     assert deciding == {True, False}
+
+
+def test_at_the_end_of_a_scored_mission_infos_say_all_figures() -> None:
+    env = parallel_env(BOX, robots=2, max_cycles=30, scored=True)
+    rng = np.random.default_rng(0)
+    _, infos = env.reset(seed=0)
+    while env.agents:
+        assert all("figures" not in info for info in infos.values())
+        infos = env.step({agent: rng.uniform(-1, 1, 5).astype(np.float32) for agent in env.agents})[4]
+    first, second = (infos[agent]["figures"] for agent in env.possible_agents)
+    assert first == second == mission_figures(env.missions, 0, floor=True)
+    assert first["scans_over_floor"] > 0 and set(first["joint"]) == {
+        "entropy_bits",
+        "explored",
+        "error",
+        "wrong",
+    }
+    assert mission_figures(env.missions, 0, floor=False)["scans_over_floor"] is None

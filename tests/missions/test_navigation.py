@@ -9,12 +9,13 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from entropy_explore_env.config import with_settings
+from entropy_explore_env.config import Grid, with_settings
 from entropy_explore_env.envs.conformance import check_conformance
 from entropy_explore_env.missions.missions import Missions
 from entropy_explore_env.missions.poses import pose_at
 from entropy_explore_env.robots.motion import MoveEnd
 from entropy_explore_env.scenarios import OFFICE, ROOM_FURNISHED, SCENARIOS
+from entropy_explore_env.worlds.world import World
 from tests.reference.scenes import free_box, random_actions, started, wander
 
 NO_PARTS = {"panorama": False, "own": False, "team": False, "patch": True, "patch_shape": (1, 1, 1)}
@@ -82,6 +83,26 @@ def test_bodies_never_overlap_on_planned_ways(crowd):
     assert corners > 0
     # Far goals in a crowd are seldom reached.
     assert ends["TEAMMATE"] and ends["NO_WAY"] and ends["ARRIVED"] + ends["SEEN"]
+
+
+@pytest.mark.parametrize("radius_m", [0.0, 0.06])
+@pytest.mark.parametrize(("shape", "motion"), [((23, 31, 1), "planar"), ((13, 17, 9), "free")])
+def test_who_knows_the_world_is_stopped_by_nothing_on_a_planned_way(shape, motion, radius_m):
+    """Also where voxel centres are not exact in metres: no rounding leads through a corner."""
+    ends = Counter()
+    robot = {**PLANNED, "motion": motion, "reach_m": math.inf, "body_radius_m": radius_m}
+    grid = Grid(shape, 0.1, (-3.3, 7.7, -0.4))
+    for seed in range(8):
+        solid = np.random.default_rng(seed).random(shape) < (0.12 if shape[2] == 1 else 0.06)
+        box = free_box(robots=1, robot={**robot, "sensor_height_m": 0.05}, ending=ENDLESS, grid=grid)
+        missions = Missions(box, given=[World(grid, solid, "known")])
+        missions.reset(0, seed)
+        rng = np.random.default_rng(seed)
+        for _ in range(40):
+            missions.mean[0], missions.precision[0] = solid, 1e9
+            missions.step(*random_actions(missions, rng))
+            ends[list(MoveEnd)[missions.state.robots[0, 0]["move_end"]].name] += 1
+    assert set(ends) == {"ARRIVED", "NO_WAY"} and ends["ARRIVED"] > 40
 
 
 def test_threads_batches_and_pickling_change_nothing():

@@ -86,6 +86,14 @@ def test_a_scenario_takes_any_file_and_keeps_its_voxel_size(tmp_path):
     assert world_from_file(path, 0.5) is world_from_file(path, 0.5)  # read once
 
 
+def test_a_file_that_was_written_again_is_read_again(tmp_path):
+    path = tmp_path / "plan.pgm"
+    path.write_bytes(pgm(np.full((40, 60), 255, np.uint8)))
+    first = world_from_file(path, 0.05)
+    path.write_bytes(pgm(np.full((30, 60), 255, np.uint8)))
+    assert (first.grid.shape, world_from_file(path, 0.05).grid.shape) == ((60, 40, 1), (60, 30, 1))
+
+
 @pytest.mark.skipif(not FILES, reason=f"{REAL} is not here: it is no part of the project")
 def test_every_real_world_loads():
     with kept_reader():

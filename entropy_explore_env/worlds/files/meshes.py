@@ -29,6 +29,8 @@ from entropy_explore_env.worlds.files.voxels import (
 NEEDS = (("trimesh", "trimesh"), ("scipy.ndimage", "scipy"))
 _INWARDS = 1e-6
 """Surfaces move so many voxels inwards: one between two voxels belongs to the solid's side."""
+_MOST_HALVINGS = 64
+"""Of edges: it ends long before that. trimesh's own estimate is too low for long thin triangles."""
 
 
 def read(path: Path, options: Options) -> Voxels:
@@ -59,7 +61,7 @@ def _voxels(mesh: Any, y_is_up: bool, options: Options) -> Voxels:  # noqa: ANN4
     if y_is_up:
         vertices = np.column_stack((vertices[:, 0], -vertices[:, 2], vertices[:, 1]))
     mesh.vertices = vertices - 0.5 * voxel_m  # trimesh's voxels have their centres on multiples
-    surface = mesh.voxelized(voxel_m, method="subdivide", max_iter=None)
+    surface = mesh.voxelized(voxel_m, method="subdivide", max_iter=_MOST_HALVINGS)
     solid = np.asarray((surface.fill(method="holes") if fill is not False else surface).matrix)
     labels = np.full([n + 2 * margin for n in solid.shape], FREE, np.int8)
     inside = tuple(slice(margin, margin + n) for n in solid.shape)

@@ -38,6 +38,19 @@ def test_boxes_are_solid_where_they_are(tmp_path, kind, voxel_m):
     np.testing.assert_array_equal(world.occupied, solid)
 
 
+@pytest.mark.parametrize("kind", ["obj", "stl", "glb", "ply"])
+@pytest.mark.parametrize("voxel_m", [0.1, 0.23])
+def test_long_thin_triangles_are_cut_small_enough(tmp_path, kind, voxel_m):
+    """A column of 0.2 × 0.2 × 3 m beside a table: in each of its layers, and nowhere else, it is solid."""
+    boxes = (((-4.8, 5.2, 1.2), (-3.8, 7.2, 1.8)), ((0.95, 3.15, -1.0), (1.15, 3.35, 2.0)))
+    world = load_world(write(tmp_path, kind, boxes), voxel_m)
+    for low, high in boxes:
+        inside = np.mgrid[tuple(slice(a + 0.01, b - 0.005, 0.045) for a, b in zip(low, high, strict=True))]
+        assert world.occupied[tuple(world.grid.voxel_of(inside.reshape(3, -1).T).T)].all()
+    for place in ((-1.0, 4.0, 0.5), (-4.3, 6.2, 0.9), (1.05, 5.0, 1.5)):
+        assert not world.occupied[tuple(world.grid.voxel_of(np.array(place)))]
+
+
 def test_a_hollow_box_keeps_its_inside(tmp_path):
     path = write(tmp_path, "stl", [((0, 0, 0), (3.5, 5.5, 2.5))])
     with pytest.raises(WorldError, match="free space"):
