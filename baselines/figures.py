@@ -10,10 +10,10 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from entropy_explore_env.config import Grid
 from entropy_explore_env.reports.glyphs import robot_colour
 from entropy_explore_env.reports.painting import entropy_share
 from entropy_explore_env.reports.recording import Recorder
+from entropy_explore_env.settings import Grid
 
 COLOURS = tuple(tuple(level / 255 for level in robot_colour(robot)) for robot in range(8))
 """Of the robots, as in every other picture; colour-blind people can tell them apart."""

@@ -23,9 +23,10 @@ from entropy_explore_env.belief.search_space import cost_to, new_search, way_to
 from entropy_explore_env.belief.straightening import straightened
 from entropy_explore_env.belief.visibility import CONE, SIGHT, cone_of, expected_scan_bits
 from entropy_explore_env.compilation import lean_kernel
-from entropy_explore_env.config import RobotKind, Scenario, centred_angles
+from entropy_explore_env.config import Scenario
 from entropy_explore_env.missions.view import RobotView
 from entropy_explore_env.robots.motion import driving_time, turning_time
+from entropy_explore_env.settings import RobotKind, centred_angles
 
 _KEPT = 3
 """Viewpoints around which others are drawn."""

@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 
 from baselines.strategy import Strategy
-from entropy_explore_env.config import Observation, Scenario, with_settings
+from entropy_explore_env.config import Scenario, with_settings
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
+from entropy_explore_env.settings import Observation
 
 NOTHING_OBSERVED = Observation(panorama=False, own=False, team=False)
 """Strategies read RobotViews: an observation for networks would cost time for nothing."""

@@ -30,10 +30,11 @@ from baselines.strategy import random_viewpoint
 from entropy_explore_env.belief.lattice import new_lattice
 from entropy_explore_env.belief.raycast import longest_crossing
 from entropy_explore_env.belief.visibility import CONE, cone_of, mark_cone
-from entropy_explore_env.config import Grid, RobotKind, Scenario, gaussian_entropy_bits
+from entropy_explore_env.config import Scenario
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.missions.view import RobotView, TeammateView
 from entropy_explore_env.robots.motion import MoveEnd
+from entropy_explore_env.settings import Grid, RobotKind, gaussian_entropy_bits
 from entropy_explore_env.validation import check, check_kind, check_not_negative, check_positive
 
 _ALIKE_RAD = math.radians(15.0)

@@ -18,10 +18,11 @@ from baselines.mission_log import MissionLog, Outputs, Wanted, show_results
 from baselines.strategies import make_strategy
 from baselines.terminal import progress_bar
 from baselines.world_file import Reading, world_settings
-from entropy_explore_env.config import Channel, Ending, RangeSensor, Robot, Scenario
+from entropy_explore_env.config import Scenario
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.scenarios import ROOM, find_scenario
+from entropy_explore_env.settings import Channel, Ending, RangeSensor, Robot
 
 
 @dataclass

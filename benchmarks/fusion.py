@@ -15,7 +15,6 @@ from benchmarks.peers import OctoMapTree
 from benchmarks.rows import Effort, Goal, Row, compared, interleave, timed
 from entropy_explore_env.belief.coverage_map import PRIOR_MEAN, measurement_precision
 from entropy_explore_env.compilation import lean_kernel
-from entropy_explore_env.config import Grid, RangeSensor
 from entropy_explore_env.robots.range_sensor import (
     Return,
     Scan,
@@ -26,6 +25,7 @@ from entropy_explore_env.robots.range_sensor import (
     trace_measurement,
 )
 from entropy_explore_env.scenarios import ROOM
+from entropy_explore_env.settings import Grid, RangeSensor
 
 FINE_GRID = Grid((103, 103, 43), 0.1, ROOM.grid.origin_m)
 """The room of 10.25 × 10.25 × 4.25 m in voxels of 0.1 m, rounded up."""

@@ -11,9 +11,10 @@ import math
 import numpy as np
 
 from benchmarks.rows import Effort, Goal, Row, Taken, compared, interleave, timed
-from entropy_explore_env.config import Ending, Grid, Scenario, with_settings
+from entropy_explore_env.config import Scenario, with_settings
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.scenarios import ROOM
+from entropy_explore_env.settings import Ending, Grid
 
 SHAPES = ((41, 41, 17), (200, 200, 25), (500, 500, 40), (1000, 1000, 100))
 """2.9·10⁴, 10⁶, 10⁷ and 10⁸ voxels."""

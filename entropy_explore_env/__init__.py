@@ -18,19 +18,7 @@ from entropy_explore_env.compilation import forget_stale_kernels
 
 forget_stale_kernels(Path(__file__).parent)
 
-from entropy_explore_env.config import (  # noqa: E402 - kernels are imported from here on
-    Action,
-    Channel,
-    Ending,
-    Grid,
-    Observation,
-    RangeSensor,
-    Reward,
-    Robot,
-    RobotKind,
-    Scenario,
-    with_settings,
-)
+from entropy_explore_env.config import Scenario, with_settings  # noqa: E402 - kernels are imported from here on
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv, env, parallel_env  # noqa: E402
 from entropy_explore_env.envs.single_env import SingleRobotEnv  # noqa: E402
 from entropy_explore_env.envs.vector_env import EntropyExploreVectorEnv  # noqa: E402
@@ -49,6 +37,17 @@ from entropy_explore_env.missions.view import RobotView  # noqa: E402
 from entropy_explore_env.robots.channel import Delivery  # noqa: E402
 from entropy_explore_env.robots.motion import MoveEnd  # noqa: E402
 from entropy_explore_env.scenarios import SCENARIOS, find_scenario  # noqa: E402
+from entropy_explore_env.settings import (  # noqa: E402 - kernels are imported from here on
+    Action,
+    Channel,
+    Ending,
+    Grid,
+    Observation,
+    RangeSensor,
+    Reward,
+    Robot,
+    RobotKind,
+)
 from entropy_explore_env.version import VERSION  # noqa: E402
 from entropy_explore_env.worlds.load import load_octomap, load_world, save_world  # noqa: E402
 from entropy_explore_env.worlds.world import World  # noqa: E402

@@ -10,7 +10,10 @@ import pickle
 import numpy as np
 import pytest
 
-from entropy_explore_env.config import (
+from entropy_explore_env.config import Scenario, with_settings
+from entropy_explore_env.errors import EntropyExploreError, SettingError
+from entropy_explore_env.scenarios import BOX, ROOM, SCENARIOS, find_scenario
+from entropy_explore_env.settings import (
     Action,
     Channel,
     Ending,
@@ -20,11 +23,7 @@ from entropy_explore_env.config import (
     Reward,
     Robot,
     RobotKind,
-    Scenario,
-    with_settings,
 )
-from entropy_explore_env.errors import EntropyExploreError, SettingError
-from entropy_explore_env.scenarios import BOX, ROOM, SCENARIOS, find_scenario
 
 NAN, INF = math.nan, math.inf
 NO_NUMBERS = ("1", None, True, [1.0], NAN)

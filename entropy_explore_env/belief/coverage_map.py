@@ -11,7 +11,7 @@ import numpy as np
 
 from entropy_explore_env.belief.raycast import TICKS
 from entropy_explore_env.compilation import inlined_kernel
-from entropy_explore_env.config import BITS_OF_UNIT_GAUSSIAN
+from entropy_explore_env.settings import BITS_OF_UNIT_GAUSSIAN
 
 PRIOR_MEAN = 0.5
 """Expected coverage of a voxel that nobody has measured: no preference."""

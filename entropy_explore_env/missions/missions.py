@@ -12,7 +12,7 @@ import numpy as np
 
 from entropy_explore_env.belief.coverage_map import PRIOR_MEAN, map_entropy_bits
 from entropy_explore_env.belief.pooling import fresh_sums
-from entropy_explore_env.config import Grid, Scenario, gaussian_entropy_bits
+from entropy_explore_env.config import Scenario
 from entropy_explore_env.errors import CallOrderError, SettingError, WorldError
 from entropy_explore_env.missions.navigation import plan_missions
 from entropy_explore_env.missions.observation import ObservationLayout, observation_rules, observe_mission
@@ -22,6 +22,7 @@ from entropy_explore_env.missions.tick import mask_missions, step_missions
 from entropy_explore_env.randomness import Stream, check_seed, generator, splitmix_states
 from entropy_explore_env.robots.navigator import new_navigators, touched_voxels
 from entropy_explore_env.robots.range_sensor import Scan, new_scan
+from entropy_explore_env.settings import Grid, gaussian_entropy_bits
 from entropy_explore_env.validation import is_whole
 from entropy_explore_env.worlds.given import checked_worlds, in_given_worlds, world_in_turn
 from entropy_explore_env.worlds.load import make_world, with_world

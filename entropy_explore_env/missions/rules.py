@@ -8,8 +8,9 @@ from typing import NamedTuple
 import numpy as np
 
 from entropy_explore_env.belief.pooling import Cells, new_cells
-from entropy_explore_env.config import Observation, Robot, Scenario
+from entropy_explore_env.config import Scenario
 from entropy_explore_env.robots.range_sensor import TeamSensors, team_sensors
+from entropy_explore_env.settings import Observation, Robot
 
 NUMBERS = np.dtype(
     [
@@ -55,7 +56,7 @@ NUMBERS = np.dtype(
     ],
     align=True,
 )
-"""The numbers of a scenario for one of its robots, in the units of `config`; inf means "never" or "all"."""
+"""The numbers of a scenario for one of its robots, in the units of `settings`; inf means "never" or "all"."""
 
 _NEVER = 2**62
 

@@ -17,7 +17,6 @@ from typing import Any
 
 import numpy as np
 
-from entropy_explore_env.config import RangeSensor
 from entropy_explore_env.errors import MissingExtraError
 from entropy_explore_env.missions.missions import Missions
 from entropy_explore_env.reports.glyphs import COLOURS, robot_colour
@@ -26,6 +25,7 @@ from entropy_explore_env.reports.projection import KNOWN_BELOW
 from entropy_explore_env.reports.recording import Ways, poses_now
 from entropy_explore_env.robots.channel import select_measurements
 from entropy_explore_env.robots.range_sensor import Return, sensor_model
+from entropy_explore_env.settings import RangeSensor
 
 TIMELINE = "simulated"
 MAX_CELLS = 300_000

@@ -24,8 +24,9 @@ from entropy_explore_env.belief.search_space import (
 )
 from entropy_explore_env.belief.straightening import cost_of_sight, pull_straight
 from entropy_explore_env.compilation import lean_kernel
-from entropy_explore_env.config import Robot, Scenario
+from entropy_explore_env.config import Scenario
 from entropy_explore_env.robots.motion import MoveEnd
+from entropy_explore_env.settings import Robot
 
 _ARRIVED, _NO_WAY, _CORNERS = MoveEnd.ARRIVED.code, MoveEnd.NO_WAY.code, MoveEnd.CORNERS.code
 _SLACK = 1e-9

@@ -22,8 +22,8 @@ from entropy_explore_env.belief.raycast import (
     longest_crossing,
 )
 from entropy_explore_env.compilation import inlined_kernel, lean_kernel
-from entropy_explore_env.config import Grid, RangeSensor, centred_angles
 from entropy_explore_env.randomness import draw_gaussian
+from entropy_explore_env.settings import Grid, RangeSensor, centred_angles
 
 
 class Return(enum.IntEnum):

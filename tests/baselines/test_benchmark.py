@@ -369,7 +369,7 @@ def test_random_is_always_there_and_first():
 
 
 def test_scenarios_are_names_and_files(tmp_path):
-    from entropy_explore_env.config import Grid
+    from entropy_explore_env.settings import Grid
     from entropy_explore_env.worlds.load import save_world
     from entropy_explore_env.worlds.world import World
 

@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 from baselines.gradient import GradientStrategy, steepest_viewpoint
 from baselines.strategy import random_viewpoint
 from entropy_explore_env.belief.fields import entropy_gradient
-from entropy_explore_env.config import Grid
 from entropy_explore_env.missions.view import RobotView, read_only, view_of
 from entropy_explore_env.robots.motion import MoveEnd
+from entropy_explore_env.settings import Grid
 from tests.reference import rocha04
 from tests.reference.scenes import (
     SHAPES,

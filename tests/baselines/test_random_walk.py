@@ -11,11 +11,12 @@ from scipy import stats
 from baselines.random_walk import RandomWalk
 from baselines.strategies import STRATEGIES, make_strategy
 from baselines.strategy import random_viewpoint
-from entropy_explore_env.config import Grid, Scenario
+from entropy_explore_env.config import Scenario
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.missions.action import action_space, decode_action
 from entropy_explore_env.missions.missions import Missions
 from entropy_explore_env.missions.view import RobotView, view_of
+from entropy_explore_env.settings import Grid
 from tests.reference.scenes import free_box, put, started
 
 HALL = Grid((21, 33, 17), 0.5, (-3.0, 2.0, 0.5))

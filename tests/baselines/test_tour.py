@@ -9,7 +9,7 @@ import pytest
 
 from baselines import tour
 from baselines.command import run_command
-from entropy_explore_env.config import Grid
+from entropy_explore_env.settings import Grid
 from entropy_explore_env.worlds.load import FORMATS, save_world
 from entropy_explore_env.worlds.world import World
 from tests.worlds.samples import pgm

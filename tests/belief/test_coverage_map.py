@@ -17,7 +17,7 @@ from entropy_explore_env.belief.coverage_map import (
     measurement_precision,
 )
 from entropy_explore_env.belief.raycast import NEVER_STOP, cast_ray
-from entropy_explore_env.config import gaussian_entropy_bits
+from entropy_explore_env.settings import gaussian_entropy_bits
 from tests.reference import rocha04
 from tests.reference.scenes import (
     as_arrays,

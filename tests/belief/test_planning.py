@@ -20,8 +20,8 @@ from entropy_explore_env.belief.planning import (
     shortest_way,
 )
 from entropy_explore_env.belief.search_space import new_search
-from entropy_explore_env.config import Grid
 from entropy_explore_env.errors import SettingError
+from entropy_explore_env.settings import Grid
 from entropy_explore_env.worlds.world import World
 from tests.reference.scenes import SHAPES, drawn, flat_index, random_cover, seeds
 

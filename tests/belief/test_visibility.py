@@ -21,8 +21,8 @@ from entropy_explore_env.belief.visibility import (
     visible_bits,
 )
 from entropy_explore_env.compilation import lean_kernel
-from entropy_explore_env.config import Grid, RangeSensor
 from entropy_explore_env.robots.range_sensor import fuse_scan, new_scan, sensor_model, take_scan
+from entropy_explore_env.settings import Grid, RangeSensor
 from tests.reference import rochami
 from tests.reference.scenes import (
     as_reference,

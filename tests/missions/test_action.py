@@ -10,10 +10,10 @@ from gymnasium import spaces
 from hypothesis import given
 from hypothesis import strategies as st
 
-from entropy_explore_env.config import Grid
 from entropy_explore_env.errors import ActionError
 from entropy_explore_env.missions.action import action_space, decode_action, encode_viewpoint, write_mask
 from entropy_explore_env.missions.rules import rules_of
+from entropy_explore_env.settings import Grid
 from tests.reference.scenes import drawn, free_box, seeds
 
 ODD_GRID = Grid((7, 11, 5), 0.3, (-1.7, 0.4, 2.05))

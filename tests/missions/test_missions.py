@@ -10,13 +10,14 @@ import pytest
 
 from entropy_explore_env.belief.coverage_map import map_entropy_bits
 from entropy_explore_env.belief.raycast import longest_crossing
-from entropy_explore_env.config import Grid, gaussian_entropy_bits, with_settings
+from entropy_explore_env.config import with_settings
 from entropy_explore_env.errors import CallOrderError, SettingError, WorldError
 from entropy_explore_env.missions.missions import Missions
 from entropy_explore_env.missions.poses import pose_at
 from entropy_explore_env.missions.state import MissionEnd
 from entropy_explore_env.robots.range_sensor import Return
 from entropy_explore_env.scenarios import ROOM, ROOM_FURNISHED
+from entropy_explore_env.settings import Grid, gaussian_entropy_bits
 from tests.reference import rocha04
 from tests.reference.scenes import as_arrays, free_box, random_actions, started, wander
 

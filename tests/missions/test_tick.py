@@ -7,12 +7,12 @@ import math
 import numpy as np
 import pytest
 
-from entropy_explore_env.config import Grid
 from entropy_explore_env.missions import missions as missions_module
 from entropy_explore_env.missions.poses import pose_at
 from entropy_explore_env.missions.view import view_of
 from entropy_explore_env.robots.motion import MoveEnd
 from entropy_explore_env.robots.range_sensor import Return
+from entropy_explore_env.settings import Grid
 from entropy_explore_env.worlds.world import World
 from tests.reference import rocha04
 from tests.reference.scenes import build, free_box, put, random_actions, started, wander

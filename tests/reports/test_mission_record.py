@@ -13,7 +13,6 @@ import pytest
 from hypothesis import given as drawing
 from hypothesis import strategies as st
 
-from entropy_explore_env.config import Grid
 from entropy_explore_env.errors import CallOrderError, RecordError, WorldError
 from entropy_explore_env.missions.missions import Missions
 from entropy_explore_env.reports.mission_record import (
@@ -25,6 +24,7 @@ from entropy_explore_env.reports.mission_record import (
     state_digest,
     world_digest,
 )
+from entropy_explore_env.settings import Grid
 from entropy_explore_env.settings_json import settings_json
 from entropy_explore_env.version import VERSION
 from entropy_explore_env.worlds.load import save_world, world_bytes

@@ -7,7 +7,6 @@ import math
 import numpy as np
 import pytest
 
-from entropy_explore_env.config import Grid
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.missions.missions import Missions
 from entropy_explore_env.reports import painting
@@ -20,6 +19,7 @@ from entropy_explore_env.reports.painting import (
 )
 from entropy_explore_env.reports.recording import poses_now
 from entropy_explore_env.reports.rendering import Frame, draw_frame
+from entropy_explore_env.settings import Grid
 from entropy_explore_env.worlds.world import World
 from tests.reference.scenes import free_box, random_actions, started
 

@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from entropy_explore_env.config import Robot, RobotKind
 from entropy_explore_env.reports.recording import Recorder, Ways, poses_now
+from entropy_explore_env.settings import Robot, RobotKind
 from tests.reference.scenes import free_box, random_actions, started
 
 

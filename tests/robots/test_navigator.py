@@ -11,7 +11,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import ndimage
 
-from entropy_explore_env.config import Grid
 from entropy_explore_env.robots.motion import (
     MoveEnd,
     driven_share,
@@ -20,6 +19,7 @@ from entropy_explore_env.robots.motion import (
     time_of_way,
 )
 from entropy_explore_env.robots.navigator import find_way, lattice_of, new_navigator
+from entropy_explore_env.settings import Grid
 from entropy_explore_env.worlds.world import World
 from tests.reference.scenes import drawn, free_box, ray_space, seeds
 

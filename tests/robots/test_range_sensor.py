@@ -9,7 +9,6 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from entropy_explore_env.config import Grid, RangeSensor
 from entropy_explore_env.robots.range_sensor import (
     Return,
     body_distance,
@@ -21,6 +20,7 @@ from entropy_explore_env.robots.range_sensor import (
     trace_measurement,
     visibility_parameters,
 )
+from entropy_explore_env.settings import Grid, RangeSensor
 from tests.reference import rocha04
 from tests.reference.scenes import SHAPES, as_reference, drawn, flat_index, random_belief, random_cover, seeds
 

@@ -110,7 +110,7 @@ def geotiff(samples, scale=(1.0, 1.0, 0.0), tie=(0.0, 0.0, 0.0, 100.0, 200.0, 0.
 
 
 def saved_world():
-    from entropy_explore_env.config import Grid
+    from entropy_explore_env.settings import Grid
     from entropy_explore_env.worlds.load import save_world
     from entropy_explore_env.worlds.world import World
 

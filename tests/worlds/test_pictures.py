@@ -7,7 +7,7 @@ import io
 import numpy as np
 import pytest
 
-from entropy_explore_env.config import Grid
+from entropy_explore_env.settings import Grid
 from entropy_explore_env.worlds.pictures import _FREE, _SOLID, _metres, _stretch, picture
 from entropy_explore_env.worlds.world import World
 

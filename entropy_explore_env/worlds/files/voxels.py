@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from entropy_explore_env.config import MAX_VOXELS_ALONG_AXIS
 from entropy_explore_env.errors import SettingError
+from entropy_explore_env.settings import MAX_VOXELS_ALONG_AXIS
 
 UNKNOWN, FREE, SOLID = -1, 0, 1
 """Labels of voxels."""

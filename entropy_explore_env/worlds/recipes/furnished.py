@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 
-from entropy_explore_env.config import Grid
 from entropy_explore_env.errors import WorldError
+from entropy_explore_env.settings import Grid
 from entropy_explore_env.worlds.world import World, connected_parts
 
 _ATTEMPTS = 100

@@ -11,8 +11,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from entropy_explore_env.config import Grid
 from entropy_explore_env.errors import WorldError
+from entropy_explore_env.settings import Grid
 from entropy_explore_env.worlds.load import load_world, save_world
 from entropy_explore_env.worlds.world import World
 from tests.reference.scenes import SHAPES, drawn, random_cover, seeds

@@ -1,0 +1,375 @@
+"""The parts of a scenario: frozen settings, checked once, the unit in every field's name (SI, bits)."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+
+from entropy_explore_env.errors import SettingError
+from entropy_explore_env.validation import (
+    check,
+    check_choice,
+    check_count,
+    check_counts,
+    check_kind,
+    check_not_negative,
+    check_positive,
+    is_number,
+)
+
+BITS_OF_UNIT_GAUSSIAN = 0.5 * math.log2(2.0 * math.pi * math.e)
+"""Differential entropy of N(0, 1) in bits: Rocha04, eq. 15 at σ = 1."""
+
+MAX_VOXELS = 2**31 - 1
+"""Voxels are numbered by 32-bit integers."""
+MAX_VOXELS_ALONG_AXIS = 2**20
+"""Rays measure their way in 64-bit integers."""
+
+
+def gaussian_entropy_bits(sigma: float) -> float:
+    """Differential entropy of a Gaussian in bits, log2 √(2πe) + log2 σ (Rocha04, eq. 15)."""
+    return BITS_OF_UNIT_GAUSSIAN + math.log2(sigma)
+
+
+@dataclass(frozen=True)
+class Grid:
+    """The voxels of a workspace. Frame: map, z up, metres (REP-103).
+
+    Attributes:
+        shape: Voxels along x, y and z; one along z is a 2-D world.
+        voxel_size_m: Edge of a voxel (`vsz` of Rocha04).
+        origin_m: Lower corner of voxel (0, 0, 0) in the map frame.
+    """
+
+    shape: tuple[int, int, int]
+    voxel_size_m: float
+    origin_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        """Check every field."""
+        check_counts(self, "shape", 1, MAX_VOXELS_ALONG_AXIS)
+        if math.prod(self.shape) > MAX_VOXELS:
+            raise SettingError("Grid.shape", self.shape, f"at most {MAX_VOXELS} voxels in all")
+        check(self, "voxel_size_m", "a number from 1e-6 to 1e6", lambda v: 1e-6 <= v <= 1e6)
+        finite = isinstance(self.origin_m, tuple) and len(self.origin_m) == 3
+        if not finite or not all(is_number(v) and abs(v) <= 1e9 for v in self.origin_m):
+            raise SettingError(
+                "Grid.origin_m", self.origin_m, "a tuple of three numbers (x, y, z) from -1e9 to 1e9"
+            )
+
+    @property
+    def voxels(self) -> int:
+        """Number of voxels V = X·Y·Z."""
+        return math.prod(self.shape)
+
+    @property
+    def flat(self) -> bool:
+        """Whether the world is 2-D: one voxel high."""
+        return self.shape[2] == 1
+
+    @property
+    def size_m(self) -> np.ndarray:
+        """(3,) float64, extent along x, y and z in metres."""
+        return np.asarray(self.shape) * self.voxel_size_m
+
+    def voxel_of(self, position_m: np.ndarray) -> np.ndarray:
+        """Indices (..., 3) int64 of the voxels that hold the points (..., 3), map frame, metres."""
+        scaled = (np.asarray(position_m) - np.asarray(self.origin_m)) / self.voxel_size_m
+        return np.floor(scaled).astype(np.int64)
+
+    def centre_of(self, voxel: np.ndarray) -> np.ndarray:
+        """Centres (..., 3) in metres, map frame, of the voxels with indices (..., 3)."""
+        return np.asarray(self.origin_m) + (np.asarray(voxel) + 0.5) * self.voxel_size_m
+
+
+@dataclass(frozen=True)
+class Robot:
+    """How a robot moves: from rest to rest, straight (Rocha04, table 1) or on a planned way.
+
+    Attributes:
+        motion: `free` flies anywhere; `planar` keeps the height of its sensor and looks level.
+        navigator: `straight` drives straight to the viewpoint; `planned` takes the cheapest way through
+            the robot's own belief, without stopping at its corners.
+        unknown_cost: Planned ways: what a metre through unknown voxels costs, in metres through
+            known ones; ≥ 1.
+        reach_m: Largest displacement of one decision (ξ of Rocha04, eq. 32); inf = the workspace.
+        max_speed_m_s: Top speed.
+        acceleration_m_s2: Of speeding up and of braking.
+        turn_rate_rad_s: Of yaw and pitch, while driving; inf = at once.
+        body_radius_m: The body is a ball; 0 = a point that blocks nobody.
+        sensor_height_m: Planar robots: height of the sensor above the workspace's floor.
+        when_blocked: After a drive that a teammate cut short (MoveEnd.TEAMMATE), who may move on: `wander`
+            decides anew at once, and our strategies then wander; `wait` stands still first. Either way
+            the robot scans where it stopped, as after every drive, before that.
+        blocked_wait_s: `wait`: from the end of that scan until it decides; nothing else ends the wait.
+    """
+
+    motion: Literal["free", "planar"] = "free"
+    navigator: Literal["straight", "planned"] = "straight"
+    unknown_cost: float = 2.0
+    reach_m: float = 0.5
+    max_speed_m_s: float = 0.25
+    acceleration_m_s2: float = 0.25
+    turn_rate_rad_s: float = math.pi / 2
+    body_radius_m: float = 0.1
+    sensor_height_m: float = 0.5
+    when_blocked: Literal["wander", "wait"] = "wander"
+    blocked_wait_s: float = 5.0
+
+    def __post_init__(self) -> None:
+        """Check every field."""
+        check_choice(self, "motion", Literal["free", "planar"])
+        check_choice(self, "navigator", Literal["straight", "planned"])
+        check(self, "unknown_cost", "a number from 1 to 1e6", lambda v: 1.0 <= v <= 1e6)
+        check_positive(self, "max_speed_m_s", "acceleration_m_s2")
+        check_positive(self, "reach_m", "turn_rate_rad_s", finite=False)
+        check(self, "reach_m", "a number from 0 to 1e6, or inf", lambda v: v <= 1e6 or v == math.inf)
+        check_not_negative(self, "body_radius_m", "sensor_height_m")
+        check_choice(self, "when_blocked", Literal["wander", "wait"])
+        check_positive(self, "blocked_wait_s")
+
+
+@dataclass(frozen=True)
+class RangeSensor:
+    """A range sensor that samples yaw and pitch around its gaze (Rocha04, eqs. 3-5, table 1).
+
+    Attributes:
+        field_of_view_rad: Full widths (yaw, pitch); (π/6, π/12) at π/90 gives 16 × 8 rays.
+        angular_step_rad: Between neighbouring rays.
+        max_range_m: Farthest return; inf = the workspace's boundary, which is a wall.
+        sigma_min: Standard deviation of coverage right before the sensor (eq. 5).
+        sigma_slope_per_m: Its growth with the measured distance, ζ (eq. 5).
+        range_noise_m: Standard deviation of the measured distance.
+        voxels_behind: Voxels behind the hit that a ray still updates (as covered: eq. 4).
+        scan_time_s: A scan takes this long, standing still.
+        scan_every_m: A scan is also taken under way, whenever so much of the way is driven: the robot
+            drives on, and the scan takes no time. inf = only on arrival.
+    """
+
+    field_of_view_rad: tuple[float, float] = (math.pi / 6, math.pi / 12)
+    angular_step_rad: float = math.pi / 90
+    max_range_m: float = math.inf
+    sigma_min: float = 0.08
+    sigma_slope_per_m: float = 0.006
+    range_noise_m: float = 0.0
+    voxels_behind: int = 1
+    scan_time_s: float = 0.5
+    scan_every_m: float = math.inf
+
+    def __post_init__(self) -> None:
+        """Check every field."""
+        limits = (2 * math.pi, math.pi)
+        view = self.field_of_view_rad
+        if (
+            not isinstance(view, tuple)
+            or len(view) != 2
+            or not all(is_number(v) and 0 <= v <= limit + 1e-9 for v, limit in zip(view, limits, strict=True))
+        ):
+            raise SettingError(
+                "RangeSensor.field_of_view_rad", view, "a tuple (yaw in [0, 2π], pitch in [0, π])"
+            )
+        check_positive(self, "scan_time_s")
+        check(self, "scan_every_m", "a number ≥ 1e-3, or inf", lambda v: v >= 1e-3)
+        check(self, "angular_step_rad", "a finite number ≥ 1e-6", lambda v: 1e-6 <= v < math.inf)
+        check_positive(self, "max_range_m", finite=False)
+        check_not_negative(self, "sigma_slope_per_m", "range_noise_m")
+        check(self, "sigma_min", "a number from 1e-4 to 1e4", lambda v: 1e-4 <= v <= 1e4)
+        check_count(self, "voxels_behind", 0, 1000)
+        if self.rays > 1_000_000:
+            raise SettingError(
+                "RangeSensor.angular_step_rad", self.angular_step_rad, "at most 1,000,000 rays"
+            )
+
+    @property
+    def columns(self) -> int:
+        """Rays side by side; a full turn is not closed by a second ray at its end."""
+        return self._samples(self.field_of_view_rad[0], closed=True)
+
+    @property
+    def rows(self) -> int:
+        """Rays above each other."""
+        return self._samples(self.field_of_view_rad[1], closed=False)
+
+    @property
+    def rays(self) -> int:
+        """R, rays of a scan."""
+        return self.columns * self.rows
+
+    def _samples(self, width_rad: float, closed: bool) -> int:
+        steps = math.floor(width_rad / self.angular_step_rad + 1e-9)
+        full_turn = closed and width_rad > 2 * math.pi - self.angular_step_rad / 2
+        return max(steps, 1) if full_turn else steps + 1
+
+
+@dataclass(frozen=True)
+class RobotKind:
+    """One kind of robot of a mixed team: how it moves and what it senses."""
+
+    robot: Robot = field(default_factory=Robot)
+    sensor: RangeSensor = field(default_factory=RangeSensor)
+
+    def __post_init__(self) -> None:
+        """Check every field."""
+        check_kind(self, "robot", Robot)
+        check_kind(self, "sensor", RangeSensor)
+
+
+def centred_angles(samples: int, step_rad: float) -> np.ndarray:
+    """(samples,) float64 angles around a gaze, in its middle, `step_rad` apart."""
+    return (np.arange(samples) - (samples - 1) / 2.0) * step_rad
+
+
+@dataclass(frozen=True)
+class Channel:
+    """What robots tell each other: the most useful measurements of a scan (Rocha04, eqs. 42-43).
+
+    Attributes:
+        burst: Most measurements of one batch; 0 shares none.
+        i_min_bits: I_min, the least utility of a measurement that is worth sending.
+        i_min_fill: None keeps I_min. A number lets each robot steer its own, from i_min_bits on, so that
+            on average over its scans so many bursts of measurements reach it (Rocha04, sect. 5.1.1).
+        i_min_gain: How much a scan with no such measurement, or with twice as many, changes ln I_min.
+        range_m: Farthest teammate that hears; inf = all.
+        loss_probability: Of a message on its way to one teammate.
+        delay_s: From sending to hearing.
+        announcements: Whether robots announce the viewpoints that they choose.
+    """
+
+    burst: int = 64
+    i_min_bits: float = 0.3219
+    i_min_fill: float | None = None
+    i_min_gain: float = 0.1
+    range_m: float = math.inf
+    loss_probability: float = 0.0
+    delay_s: float = 0.0
+    announcements: bool = True
+
+    def __post_init__(self) -> None:
+        """Check every field."""
+        check_count(self, "burst", 0, 1_000_000)
+        check_not_negative(self, "i_min_bits")
+        if self.i_min_fill is not None:
+            check(self, "i_min_fill", "None, or a number above 0 up to 10", lambda v: 0 < v <= 10)
+            check(self, "i_min_bits", "above 0 where I_min is steered", lambda v: v > 0)
+        check(self, "i_min_gain", "a number above 0 up to 1", lambda v: 0 < v <= 1)
+        check_positive(self, "range_m", finite=False)
+        check(self, "loss_probability", "a number from 0 to 1", lambda v: 0 <= v <= 1)
+        check(self, "delay_s", "a number from 0 to 3600", lambda v: 0 <= v <= 3600)
+        check_kind(self, "announcements", bool)
+
+
+@dataclass(frozen=True)
+class Ending:
+    """When a mission is over (Rocha04, eq. 41).
+
+    The threshold is the entropy of a map in which every voxel that can be seen at all has the
+    standard deviation `sigma_end`; where everything can be seen it is V·h(σ_end), as in Rocha04.
+
+    Attributes:
+        sigma_end: Standard deviation of coverage at which a voxel counts as known.
+        whose: Whether one robot's map has to pass the threshold, or all robots' maps.
+        time_limit_s: Simulated time after which the mission is cut off (a truncation); inf = never.
+        max_cycles: Steps after which it is cut off; None = never.
+    """
+
+    sigma_end: float = 0.03
+    whose: Literal["any", "all"] = "any"
+    time_limit_s: float = 10_000.0
+    max_cycles: int | None = None
+
+    def __post_init__(self) -> None:
+        """Check every field."""
+        check(self, "sigma_end", "a number from 1e-4 to 1e4", lambda v: 1e-4 <= v <= 1e4)
+        check_choice(self, "whose", Literal["any", "all"])
+        check_positive(self, "time_limit_s", finite=False)
+        if self.max_cycles is not None:
+            check_count(self, "max_cycles", 1, 2**62)
+
+
+@dataclass(frozen=True)
+class Reward:
+    """What a step is worth, in shares of H(0) - H_th, so that map size does not matter.
+
+    Attributes:
+        kind: `individual`: bits that the robot's own measurements took from its own map;
+            `team`: mean decrease of the robots' map entropies.
+        cost_per_s: Subtracted for every second that passes.
+    """
+
+    kind: Literal["individual", "team"] = "individual"
+    cost_per_s: float = 0.0
+
+    def __post_init__(self) -> None:
+        """Check every field."""
+        check_choice(self, "kind", Literal["individual", "team"])
+        check_not_negative(self, "cost_per_s")
+
+
+@dataclass(frozen=True)
+class Action:
+    """How a viewpoint is written as an action.
+
+    Attributes:
+        kind: `continuous`, a Box(-1, 1); or `discrete`, voxels within reach × gaze directions.
+        yaws: Discrete gazes around the horizon.
+        pitches: Discrete gazes up and down, from -π/4 to π/4; planar robots have one, level.
+    """
+
+    kind: Literal["continuous", "discrete"] = "continuous"
+    yaws: int = 16
+    pitches: int = 3
+
+    def __post_init__(self) -> None:
+        """Check every field."""
+        check_choice(self, "kind", Literal["continuous", "discrete"])
+        check_count(self, "yaws", 1, 360)
+        check_count(self, "pitches", 1, 90)
+
+
+@dataclass(frozen=True)
+class Observation:
+    """Which parts an observation has; a part that is left out costs nothing.
+
+    Attributes:
+        panorama: Utility and free distance of rays around the robot, by its own belief.
+        panorama_yaws: Directions around the horizon; None = 16, in 2-D worlds 32.
+        panorama_pitches: Directions up and down, from -π/4 to π/4; planar robots have one.
+        panorama_utility: `bits`, or `log2` for log2(1 + bits), which suits networks.
+        own: The robot's pose, time, remaining entropy and whether it decides (part `self`).
+        team: Where teammates were last heard, and what they announced.
+        patch: The belief around the robot.
+        patch_shape: Its voxels along x, y and z; odd, the robot in the middle.
+        overview: The whole belief, pooled.
+        overview_shape: Cells of the pooled belief along x, y and z, at most the world's.
+        action_mask: Discrete actions: whether the mask is part of the observation, too.
+        flat: One Box of all parts, in the order of this list.
+    """
+
+    panorama: bool = True
+    panorama_yaws: int | None = None
+    panorama_pitches: int = 3
+    panorama_utility: Literal["bits", "log2"] = "bits"
+    own: bool = True
+    team: bool = True
+    patch: bool = False
+    patch_shape: tuple[int, int, int] = (11, 11, 5)
+    overview: bool = False
+    overview_shape: tuple[int, int, int] = (8, 8, 4)
+    action_mask: bool = False
+    flat: bool = False
+
+    def __post_init__(self) -> None:
+        """Check every field."""
+        for name in ("panorama", "own", "team", "patch", "overview", "action_mask", "flat"):
+            check_kind(self, name, bool)
+        if self.panorama_yaws is not None:
+            check_count(self, "panorama_yaws", 1, 360)
+        check_count(self, "panorama_pitches", 1, 90)
+        check_choice(self, "panorama_utility", Literal["bits", "log2"])
+        check_counts(self, "patch_shape", 1, 255)
+        if not all(n % 2 for n in self.patch_shape):
+            raise SettingError("Observation.patch_shape", self.patch_shape, "odd numbers only")
+        check_counts(self, "overview_shape", 1, 64)
