@@ -135,7 +135,7 @@ def explore(path: Path, args: Args) -> dict[str, Any]:
     except WorldError as error:
         return {"world": path.name, "refused": str(error)}
     figures = mission_figures(env.missions, 0)
-    joint = {_JOINT.get(name, name): value for name, value in figures.pop("joint").items()}
+    joint = {str(_JOINT.get(name, name)): value for name, value in figures.pop("joint").items()}
     shape = env.scenario.grid.shape
     return {
         **{name: value for name, value in figures.items() if name != "per_robot"},

@@ -72,7 +72,8 @@ def paired_p(smaller: np.ndarray, larger: np.ndarray) -> float:
     """One-sided p of the paired Wilcoxon signed-rank test that the first are smaller; 1 if all are equal."""
     if np.array_equal(smaller, larger):
         return 1.0
-    return float(stats.wilcoxon(smaller, larger, alternative="less").pvalue)
+    _, p = stats.wilcoxon(smaller, larger, alternative="less")
+    return float(p)
 
 
 def _faster_claims(records: Records, blocked: str) -> list[Claim]:
