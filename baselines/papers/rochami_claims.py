@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from scipy import stats
@@ -72,8 +73,8 @@ def paired_p(smaller: np.ndarray, larger: np.ndarray) -> float:
     """One-sided p of the paired Wilcoxon signed-rank test that the first are smaller; 1 if all are equal."""
     if np.array_equal(smaller, larger):
         return 1.0
-    _, p = stats.wilcoxon(smaller, larger, alternative="less")
-    return float(p)
+    result: Any = stats.wilcoxon(smaller, larger, alternative="less")  # SciPy gives it no type
+    return float(result.pvalue)
 
 
 def _faster_claims(records: Records, blocked: str) -> list[Claim]:
