@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from baselines.command import parse, print_json, run_command
+from benchmarks.deciding import deciding_rows
 from benchmarks.fusion import fusion_rows
 from benchmarks.peers import load_octomap, load_spread
 from benchmarks.planning import planning_rows
@@ -34,6 +35,7 @@ JOBS: tuple[tuple[str, Callable[[Effort], list[Row]]], ...] = (
     ("VectorEnv beside the ParallelEnv, on one and two threads", vector_rows),
     ("where a step's time goes", profile_rows),
     ("shortest ways beside SciPy", planning_rows),
+    ("decisions of strategies", deciding_rows),
     ("steps in worlds of different sizes", size_rows),
     ("first steps of fresh processes", startup_rows),
 )

@@ -1,0 +1,99 @@
+"""What it costs to choose a viewpoint: mutual information with teammates' cones, and whole decisions."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Sequence
+
+import numpy as np
+
+from baselines.mission import run_mission, scripted
+from baselines.strategies import make_strategy
+from baselines.strategy import Strategy
+from benchmarks.rows import Effort, Goal, Row, alone, timed
+from entropy_explore_env.belief.visibility import CONE, cone_of, mark_cone, visible_bits
+from entropy_explore_env.compilation import kernel
+from entropy_explore_env.config import Scenario, with_settings
+from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
+from entropy_explore_env.missions.view import RobotView
+from entropy_explore_env.scenarios import LAB, ROOM
+
+TEAMMATES = 9
+_REPEATS = 20
+_SIGMA_KNOWN = 0.2
+
+
+def deciding_rows(effort: Effort) -> list[Row]:
+    """Mutual information in the laboratory, and a decision of each strategy that has a limit."""
+    rows = [mutual_information_row(effort)]
+    for scenario, robots, strategy in ((ROOM, 3, "information-rate"), (LAB, 10, "mutual-information")):
+        rows.append(decision_row(scenario, robots, strategy, effort.steps))
+    return rows
+
+
+def mutual_information_row(effort: Effort) -> Row:
+    """Milliseconds of I between a candidate and all teammates' cones, as far as the sensor reaches."""
+    grid, sensor, rng = LAB.grid, LAB.sensor, np.random.default_rng(0)
+    radius, half_angle = sensor.max_range_m / grid.voxel_size_m, 0.5 * math.hypot(*sensor.field_of_view_rad)
+    cones = np.zeros(TEAMMATES + 1, CONE)
+    for place in range(len(cones)):
+        x, y = rng.uniform(0.1, 0.9, 2) * grid.shape[:2]
+        height = LAB.robot.sensor_height_m / grid.voxel_size_m
+        cones[place] = cone_of(np.array([x, y, height, rng.uniform(-np.pi, np.pi), 0.0]), radius, half_angle)
+    precision = (10.0 ** rng.uniform(-3.0, 3.0, grid.voxels)).astype(np.float32)
+    marks = np.zeros(grid.voxels, np.uint8)
+
+    def work() -> None:
+        for _ in range(_REPEATS):
+            overlap_bits(cones, grid.shape, precision, _SIGMA_KNOWN**-2, marks)
+
+    work()
+    taken = [1e3 * timed(work).cpu_s / _REPEATS for _ in range(effort.rounds)]
+    job = f"mutual information of a cone and {TEAMMATES} others, lab, {sensor.max_range_m:g} m"
+    return alone(job, taken, "ms", Goal("<", 0.2, "ms"))
+
+
+@kernel
+def overlap_bits(
+    cones: np.ndarray,
+    size: tuple[int, int, int],
+    precision: np.ndarray,
+    known_precision: float,
+    marks: np.ndarray,
+) -> float:
+    """I of the last cone and all others, in bits; `marks` (V,) uint8 is cleared first."""
+    marks[:] = 0
+    for place in range(len(cones) - 1):
+        mark_cone(cones[place], size, None, marks)
+    return visible_bits(cones[len(cones) - 1], size, precision, known_precision, None, marks)[1]
+
+
+class Stopwatch:
+    """A strategy, and the processor time of its decisions."""
+
+    def __init__(self, strategy: Strategy) -> None:
+        """Nothing is measured yet."""
+        self._strategy = strategy
+        self.decisions_ms: list[float] = []
+
+    def reset(self, scenario: Scenario, rng: np.random.Generator) -> None:
+        """A new mission begins."""
+        self._strategy.reset(scenario, rng)
+
+    def choose(self, views: Sequence[RobotView]) -> list[np.ndarray]:
+        """What the strategy chooses; how long a view took it is noted."""
+        started = time.thread_time()
+        chosen = self._strategy.choose(views)
+        self.decisions_ms.append(1e3 * (time.thread_time() - started) / len(views))
+        return chosen
+
+
+def decision_row(scenario: Scenario, robots: int, strategy: str, steps: int) -> Row:
+    """Milliseconds a decision of a strategy over a mission, or as many steps of one."""
+    env = EntropyExploreEnv(with_settings(scripted(scenario), {"robots": robots, "max_cycles": steps}))
+    run_mission(env, make_strategy(strategy), 0)  # compiled now
+    watch = Stopwatch(make_strategy(strategy))
+    run_mission(env, watch, 1)
+    job = f"a decision of {strategy}, {scenario.name}, {robots} robots"
+    return alone(job, watch.decisions_ms, "ms", Goal("<", 5.0, "ms"))
