@@ -44,6 +44,30 @@ def projected_centroids(
 
 
 @lean_kernel
+def step_is_free(coverage: np.ndarray, size: tuple[int, int, int], here: int, there: int) -> bool:
+    """Whether one step leads from a voxel to another, past nothing covered.
+
+    Args:
+        coverage: (V,) float32, above ½ = covered.
+        size: (X, Y, Z) voxels.
+        here: Number of a voxel; may be covered.
+        there: Likewise.
+    """
+    column, other = here // size[2], there // size[2]
+    x, y, z = column // size[1], column % size[1], here % size[2]
+    i, j, k = other // size[1], other % size[1], there % size[2]
+    if abs(i - x) > 1 or abs(j - y) > 1 or abs(k - z) > 1:
+        return False
+    for a in range(min(x, i), max(x, i) + 1):
+        for b in range(min(y, j), max(y, j) + 1):
+            for c in range(min(z, k), max(z, k) + 1):
+                voxel = (a * size[1] + b) * size[2] + c
+                if voxel != here and coverage[voxel] > 0.5:
+                    return False
+    return True
+
+
+@lean_kernel
 def _sum_up(
     cells: np.ndarray, density: np.ndarray, threshold: float, sums: np.ndarray, uncertain: np.ndarray
 ) -> None:

@@ -28,8 +28,8 @@ from baselines.voronoi_control import (
     coverage_functionals,
     gradient_step,
     nearest_uncertain,
-    neighbours,
     projected_centroids,
+    step_is_free,
     way_to,
 )
 from entropy_explore_env.belief.geodesic_cells import NOBODY, new_tessellation, tessellate
@@ -98,6 +98,8 @@ class Mind:
         self.tessellations = 0
         self._of: tuple[object, ...] = ()
         self.targets = np.full(robots, NOBODY, np.int64)
+        self.uncertain = np.zeros(robots, np.int64)
+        self._functionals: np.ndarray | None = None
 
     @property
     def _metric(self) -> tuple[float, bool]:
@@ -110,7 +112,7 @@ class Mind:
         key = (self.belief.version, *places.tolist())
         if key == self._of:
             return
-        self._of, rules = key, self.rules
+        self._of, self._functionals, rules = key, None, self.rules
         self.density = np.maximum(self.belief.entropy, np.float32(rules.tau_floor))
         while True:
             toll, by_length = self._metric
@@ -133,7 +135,10 @@ class Mind:
 
     def functionals(self) -> np.ndarray:
         """(A,) the coverage functional of each cell."""
-        return coverage_functionals(self.space.cells, self.space.costs, self.density, self._robots)
+        if self._functionals is None:
+            arrays = self.space.cells, self.space.costs, self.density
+            self._functionals = coverage_functionals(*arrays, self._robots)
+        return self._functionals
 
     def way(self, voxel: int) -> np.ndarray:
         """(N,) the way from its robot to a voxel."""
@@ -208,6 +213,8 @@ class Simulation:
         minds = 1 if rules.perfect or known else robots
         self.minds = [Mind(GridBelief(occupied.shape, rules.fusion), rules, robots) for _ in range(minds)]
         self._scanner = Scanner(occupied, rules.sensor)
+        self._truth = occupied.astype(np.float32).reshape(-1)
+        self._quiet = 0
         self._heard = np.tile(self.places, (robots, 1))
         self._ways: list[np.ndarray] = [np.zeros(0, np.int64)] * robots
         self._wants_to_see = [False] * robots
@@ -243,7 +250,7 @@ class Simulation:
         return self.tally
 
     def step(self, functional: bool = True) -> bool:
-        """One iteration; returns False where all is explored and nobody moves."""
+        """One iteration; returns False where all is explored and nobody has moved for long enough."""
         tally, before = self.tally, sum(mind.tessellations for mind in self.minds)
         tally.places.append(self.places.tolist())
         if not self.known:
@@ -266,7 +273,8 @@ class Simulation:
         tally.uncertain.append(max(counts))
         tally.entropy.append(float(self.minds[0].belief.entropy.sum(dtype=np.float64)))
         tally.bits.append(self._bits)
-        return moved or not explored
+        self._quiet = 0 if moved or not explored else self._quiet + 1
+        return self._quiet < (1 if len(self.minds) == 1 else 2 * self.rules.phase)  # messages may be under way
 
     def _known_places(self, robot: int) -> np.ndarray:
         """(A,) where a robot believes all to be."""
@@ -319,8 +327,8 @@ class Simulation:
                 self._ways[robot] = mind.way(target)[1:] if target != NOBODY else self._ways[robot][:0]
                 self._wants_to_see[robot] = target != NOBODY and self._uncertain(mind, target)
                 step = int(self._ways[robot][0]) if len(self._ways[robot]) else place
-        if step != place and step not in neighbours(~self.occupied, place):
-            step = place  # another robot's reading, or none yet, of what is right beside it
+        if step != place and not step_is_free(self._truth, self.occupied.shape, place, step):
+            step = place  # what is right beside it is not known yet
             self._ways[robot] = self._ways[robot][:0]
         if step != place:
             self._ways[robot] = self._ways[robot][1:]
@@ -336,4 +344,5 @@ class Simulation:
             return False
         if (mind.belief.probability[way] > 0.5).any():
             return False
-        return int(way[0]) in neighbours(~mind.belief.occupied, int(self.places[robot]))
+        probability, size = mind.belief.probability, self.occupied.shape
+        return bool(step_is_free(probability, size, int(self.places[robot]), int(way[0])))

@@ -152,7 +152,7 @@ def all_runs(quick: bool, coverage_seeds: int, worlds: int) -> list[Run]:
                     4,
                     rules,
                     known=False,
-                    limit=2000 if quick else 8000,
+                    limit=3000 if quick else 8000,
                     pictured=seed == 0 and name in ("paper", "nearest-length") and range_cells == middle,
                 )
             )
