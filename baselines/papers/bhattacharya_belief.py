@@ -100,7 +100,14 @@ class Readings:
         """Take a scan in: (N,) cells, each once, and (N,) float32 what was read, u."""
         cells, read = scan
         _add_readings(
-            self.total, self.times, self.changed, self._count, cells, read, fusion.exponent, fusion.most_confident
+            self.total,
+            self.times,
+            self.changed,
+            self._count,
+            cells,
+            read,
+            fusion.exponent,
+            fusion.most_confident,
         )
 
 

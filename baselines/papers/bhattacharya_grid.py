@@ -274,7 +274,9 @@ class Simulation:
         tally.entropy.append(float(self.minds[0].belief.entropy.sum(dtype=np.float64)))
         tally.bits.append(self._bits)
         self._quiet = 0 if moved or not explored else self._quiet + 1
-        return self._quiet < (1 if len(self.minds) == 1 else 2 * self.rules.phase)  # messages may be under way
+        return self._quiet < (
+            1 if len(self.minds) == 1 else 2 * self.rules.phase
+        )  # messages may be under way
 
     def _known_places(self, robot: int) -> np.ndarray:
         """(A,) where a robot believes all to be."""

@@ -171,7 +171,9 @@ def start_cells(occupied: np.ndarray, starts: str, robots: int, seed: int) -> li
     if starts == "random":
         return rng.choice(free, robots, replace=False).tolist()
     width = occupied.shape[1]
-    first = int(free[np.argmin(free // width + free % width)]) if starts == "corner" else int(rng.choice(free))
+    first = (
+        int(free[np.argmin(free // width + free % width)]) if starts == "corner" else int(rng.choice(free))
+    )
     space = new_tessellation(occupied.shape)
     tessellate(space, np.where(occupied, np.inf, 1.0).astype(np.float32), np.array([first]))
     costs, found = space.costs.reshape(-1), list[int]()
@@ -195,7 +197,9 @@ def carried_out(run: Run) -> tuple[Record, dict[str, np.ndarray]]:
     taken: list[dict[str, np.ndarray]] = []
     for _ in range(run.limit):
         goes_on = simulation.step(False)
-        taken.append(_snapshot(simulation)) if len(simulation.tally.places) % 100 == 1 or not goes_on else None
+        taken.append(_snapshot(simulation)) if len(
+            simulation.tally.places
+        ) % 100 == 1 or not goes_on else None
         if not goes_on:
             simulation.tally.ended = "converged"
             break
