@@ -50,6 +50,7 @@ SIBLINGS = {
         "poses",
         "driving",
         "messages",
+        "phases",
         "scoring",
         "observation",
         "tick",
