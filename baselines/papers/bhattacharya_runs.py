@@ -172,7 +172,7 @@ def all_runs(quick: bool, coverage_seeds: int, worlds: int) -> list[Run]:
                     4,
                     Rules(sensor=Sensor(range_cells), **changes),
                     known=False,
-                    limit=3000 if plan == SMALL else 8000,
+                    limit=4000 if plan == SMALL else 15_000,
                     pictured=seed == 0 and name in ("paper", "nearest-length") and range_cells == middle,
                 )
             )
