@@ -1,7 +1,7 @@
 """Occupancy entropy of a Gaussian belief, and what a way through it costs: the fields of Voronoi coverage.
 
-Bhattacharya 2010 works on occupancy probabilities p; a voxel with coverage c ~ N(μ, σ) cut to [0, 1] is occupied
-with p = P(c > ½). Entropies are in nats, from 0 to ln 2.
+Bhattacharya 2010 works on occupancy probabilities p; a voxel with coverage c ~ N(μ, σ) cut to [0, 1] is
+occupied with p = P(c > ½). Entropies are in nats, from 0 to ln 2.
 """
 
 from __future__ import annotations

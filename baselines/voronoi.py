@@ -1,7 +1,8 @@
 """The strategy `voronoi`: explore and cover by geodesic Voronoi cells (Bhattacharya, Michael & Kumar 2010).
 
-Each robot parts its own belief among the team, from where it last heard the others, by ways that cost the entropy
-along them, and goes to a target in its own cell. A centralised team is the same code with perfect messages.
+Each robot parts its own belief among the team, from where it last heard the others, by ways that cost the
+entropy along them, and goes to a target in its own cell. A centralised team is the same code with perfect
+messages.
 """
 
 from __future__ import annotations
@@ -50,12 +51,12 @@ class Coverage:
     """How robots share the work.
 
     Attributes:
-        control: `projected-centroid` (eqs. 6-8); `gradient-search` (eq. 3), which takes `steps` steps a decision
-            and falls back on the projected centroid where none helps and the cell is not explored; `nearest`: the
-            uncertain voxel of the own cell that costs least to reach (ours).
+        control: `projected-centroid` (eqs. 6-8); `gradient-search` (eq. 3), which takes `steps` steps a
+            decision and falls back on the projected centroid where none helps and the cell is not explored;
+            `nearest`: the uncertain voxel of the own cell that costs least to reach (ours).
         metric: What ways cost until all is explored: `entropy` (sect. 5.2) or `length`.
-        known: What makes a voxel certain: its `occupancy` (p = P(c > ½), as in the paper), or its `deviation`, which
-            has to fall to the mission's σ_end (ours).
+        known: What makes a voxel certain: its `occupancy` (p = P(c > ½), as in the paper), or its
+            `deviation`, which has to fall to the mission's σ_end (ours).
         eta: η, what a voxel edge of way costs besides its entropy.
         tau: τ in nats: from here on a voxel is uncertain.
         tau_floor: τ′, the least density, below τ.

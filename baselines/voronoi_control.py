@@ -1,7 +1,7 @@
 """Controls of Voronoi coverage: where in its geodesic cell a robot goes (Bhattacharya, Michael & Kumar 2010).
 
-Costs are those of the tessellation that the cells come from (belief/geodesic_cells.py); densities φ have no unit.
-Voxels are numbered in C order; of equals the first by number is taken.
+Costs are those of the tessellation that the cells come from (belief/geodesic_cells.py); densities φ have no
+unit. Voxels are numbered in C order; of equals the first by number is taken.
 """
 
 from __future__ import annotations

@@ -235,10 +235,10 @@ def centred_angles(samples: int, step_rad: float) -> np.ndarray:
 class Channel:
     """What robots tell each other: the most useful measurements of a scan (Rocha04, eqs. 42-43).
 
-    A batch is sent at once (Rocha04) or, with `phase_s`, broadcast in phases (Bhattacharya 2010, sect. 5.3): a
-    phase's batches wait for its end, are repeated all through the next phase, and who has them already ignores
-    them. Either way `burst` and `i_min_bits` select what is in a batch: as many as there are rays, and 0, send
-    everything that was newly measured.
+    A batch is sent at once (Rocha04) or, with `phase_s`, broadcast in phases (Bhattacharya 2010, sect. 5.3):
+    a phase's batches wait for its end, are repeated all through the next phase, and who has them already
+    ignores them. Either way `burst` and `i_min_bits` select what is in a batch: as many as there are rays,
+    and 0, send everything that was newly measured.
 
     Attributes:
         burst: Most measurements of one batch; 0 shares none.

@@ -1,9 +1,9 @@
 """The belief of Bhattacharya 2010, sect. 5.3: occupancy probabilities of cells, and the broadcast in phases.
 
-A sensor at distance r from a cell is right with probability s(r) = s_n + (r/R)² (s_f - s_n); a reading z of a cell
-says u = z s + (1 - z)(1 - s); readings are fused by a generalised mean, p = g⁻¹(Σ g(u) / Σ 1), g(x) = xᵐ. Entropies
-are in nats, e = -p ln p - (1 - p) ln(1 - p) (eq. 9 with the sign that it lacks), and pass a 3 × 3 minimum filter.
-This belief serves the reproduction alone: the library's is a Gaussian a voxel.
+A sensor at distance r from a cell is right with probability s(r) = s_n + (r/R)² (s_f - s_n); a reading z of
+a cell says u = z s + (1 - z)(1 - s); readings are fused by a generalised mean, p = g⁻¹(Σ g(u) / Σ 1), g(x) =
+xᵐ. Entropies are in nats, e = -p ln p - (1 - p) ln(1 - p) (eq. 9 with the sign that it lacks), and pass a 3
+× 3 minimum filter. This belief serves the reproduction alone: the library's is a Gaussian a voxel.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """Bhattacharya's simulation: point robots on the cells of a plan, a step an iteration (sect. 4.3 and 5).
 
-In an iteration every robot scans, tells the others, tessellates its own belief from the positions it last heard,
-and takes one step. With perfect messages all beliefs are the same one, and a robot that knows what the others
-know needs no other code: that is the centralised run. Distances are in cells.
+In an iteration every robot scans, tells the others, tessellates its own belief from the positions it last
+heard, and takes one step. With perfect messages all beliefs are the same one, and a robot that knows what
+the others know needs no other code: that is the centralised run. Distances are in cells.
 """
 
 from __future__ import annotations
@@ -45,8 +45,8 @@ class Rules:
     """What robots do.
 
     Attributes:
-        control: `projected-centroid` (eqs. 6-8), `gradient-search` (eq. 3), or `nearest`: the uncertain cell of
-            the robot's own region that costs least to reach (ours; without one, the projected centroid).
+        control: `projected-centroid` (eqs. 6-8), `gradient-search` (eq. 3), or `nearest`: the uncertain cell
+            of the robot's own region that costs least to reach (ours; without one, the projected centroid).
         metric: What ways cost while there is something to explore: `entropy` (sect. 5.2) or `length`.
         eta: η, what a cell of way costs besides its entropy. In unknown space a diagonal step costs hardly
             more than a straight one: the entropy part does not know lengths.
@@ -234,7 +234,8 @@ class Simulation:
 
         Args:
             limit: Most iterations.
-            every: So often the coverage functional is noted where it would have to be worked out extra; 0 = never.
+            every: So often the coverage functional is noted where it would have to be worked out extra; 0 =
+            never.
         """
         seen: dict[tuple[int, ...], int] = {}
         for iteration in range(limit):

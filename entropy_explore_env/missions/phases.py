@@ -1,8 +1,9 @@
 """The broadcast in phases (Bhattacharya 2010, sect. 5.3): each robot holds two buffers of batches.
 
-What a robot selects from its scans goes into its collecting buffer. When a phase ends the buffers change places:
-the one that was filled is broadcast, at once and again evenly spread over the next phase, so that a lost message is
-made up for; who has it already ignores it. All of a phase's batches share the fate of a broadcast.
+What a robot selects from its scans goes into its collecting buffer. When a phase ends the buffers change
+places: the one that was filled is broadcast, at once and again evenly spread over the next phase, so that a
+lost message is made up for; who has it already ignores it. All of a phase's batches share the fate of a
+broadcast.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ from entropy_explore_env.robots.channel import Delivery, deliver
 
 _HEARD, _OUT_OF_RANGE, _LOST = (delivery.code for delivery in Delivery)
 _MISSING, _HAS_IT, _AGAIN, _NOW = 0, 1, 2, 3
-"""What a teammate has of a broadcast: nothing; all of it; it, and hears it again now; nothing, but hears it now."""
+"""What a teammate has of a broadcast: nothing; all; all, and hears it again; nothing, but hears it now."""
 
 
 @lean_kernel
