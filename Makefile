@@ -34,6 +34,7 @@ bench: $(STAMP)baselines $(STAMP)bench
 reproduce: $(STAMP)baselines
 	$(RUN) baselines.papers.rocha04 --out docs/results
 	$(RUN) baselines.papers.rochami --out docs/results
+	$(RUN) baselines.papers.bhattacharya --out docs/results
 
 # The stamp .venv/installed-EXTRA says that the package is installed with that extra.
 $(STAMP)%: pyproject.toml requirements/constraints.txt

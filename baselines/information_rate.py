@@ -73,7 +73,7 @@ class _Journey:
     """Places (3,) in grid units that are still ahead."""
 
 
-class _Build(NamedTuple):
+class Build(NamedTuple):
     """What a kind of robot is, for kernels."""
 
     yaws: np.ndarray
@@ -87,6 +87,24 @@ class _Build(NamedTuple):
     """Voxels that its rays cross at most."""
 
 
+def build_of(scenario: Scenario, kind: RobotKind, weighing: Weighing) -> Build:
+    """What kernels need of a kind of robot."""
+    grid, sensor, sight = scenario.grid, kind.sensor, np.zeros(1, SIGHT)
+    for name in ("max_range_m", "sigma_min", "sigma_slope_per_m", "voxels_behind"):
+        sight[name] = getattr(sensor, name)
+    sight["known"], sight["blocking"] = KNOWN_RATIO / scenario.sigma_prior**2, weighing.blocking
+    step, edge = sensor.angular_step_rad, grid.voxel_size_m
+    columns, rows = (max(n // weighing.thinning, 1) for n in (sensor.columns, sensor.rows))
+    sight["rays"] = sensor.rays / (columns * rows)
+    return Build(
+        yaws=centred_angles(columns, step) * sensor.columns / columns,
+        pitches=centred_angles(rows, step) * sensor.rows / rows,
+        sight=sight,
+        lattice=new_lattice(grid.shape, kind.robot.body_radius_m / edge, scenario.layer_of(kind.robot)),
+        crossing=longest_crossing(*grid.shape, sensor.max_range_m / edge, sensor.voxels_behind + 1),
+    )
+
+
 class InformationRate:
     """Chooses viewpoints by expected bits per second, or per scan."""
 
@@ -98,7 +116,7 @@ class InformationRate:
         """A new mission begins."""
         grid = scenario.grid
         self._rng, self._journeys = rng, [_Journey() for _ in range(scenario.robots)]
-        self._builds = [self._build(scenario, kind) for kind in scenario.kinds]
+        self._builds = [build_of(scenario, kind, self.weighing) for kind in scenario.kinds]
         longest = max(build.crossing for build in self._builds)
         self._scratch = (
             np.zeros(grid.voxels, np.float32),
@@ -108,24 +126,7 @@ class InformationRate:
         )
         self._search = new_search(grid.voxels)
 
-    def _build(self, scenario: Scenario, kind: RobotKind) -> _Build:
-        """What kernels need of a kind of robot."""
-        grid, sensor, sight = scenario.grid, kind.sensor, np.zeros(1, SIGHT)
-        for name in ("max_range_m", "sigma_min", "sigma_slope_per_m", "voxels_behind"):
-            sight[name] = getattr(sensor, name)
-        sight["known"], sight["blocking"] = KNOWN_RATIO / scenario.sigma_prior**2, self.weighing.blocking
-        step, edge = sensor.angular_step_rad, grid.voxel_size_m
-        columns, rows = (max(n // self.weighing.thinning, 1) for n in (sensor.columns, sensor.rows))
-        sight["rays"] = sensor.rays / (columns * rows)
-        return _Build(
-            yaws=centred_angles(columns, step) * sensor.columns / columns,
-            pitches=centred_angles(rows, step) * sensor.rows / rows,
-            sight=sight,
-            lattice=new_lattice(grid.shape, kind.robot.body_radius_m / edge, scenario.layer_of(kind.robot)),
-            crossing=longest_crossing(*grid.shape, sensor.max_range_m / edge, sensor.voxels_behind + 1),
-        )
-
-    def _build_of(self, view: RobotView) -> _Build:
+    def _build_of(self, view: RobotView) -> Build:
         return self._builds[view.robot % len(self._builds)]
 
     def choose(self, views: Sequence[RobotView]) -> list[np.ndarray]:

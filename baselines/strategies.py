@@ -11,6 +11,7 @@ from baselines.information_rate import InformationRate, Weighing
 from baselines.mutual_information import Coordination, MutualInformation
 from baselines.random_walk import RandomWalk
 from baselines.strategy import Strategy
+from baselines.voronoi import Coverage, VoronoiCoverage
 from entropy_explore_env.errors import SettingError
 
 STRATEGIES: MappingProxyType[str, Callable[[], Strategy]] = MappingProxyType(
@@ -22,6 +23,12 @@ STRATEGIES: MappingProxyType[str, Callable[[], Strategy]] = MappingProxyType(
         "ground-gradient": partial(MutualInformation, Coordination(coordinated=False)),
         "information-rate": InformationRate,
         "information-per-scan": partial(InformationRate, Weighing(per_scan=True, candidates=120)),
+        "voronoi": VoronoiCoverage,
+        "voronoi-gradient": partial(VoronoiCoverage, Coverage(control="gradient-search")),
+        "voronoi-nearest": partial(
+            VoronoiCoverage,
+            Coverage(control="nearest", metric="length", known="deviation", tau=0.02, tau_floor=0.01),
+        ),
     }
 )
 """Name → a function that makes the strategy."""

@@ -13,8 +13,11 @@ import numpy as np
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 
+from baselines.papers.bhattacharya_belief import Sensor
+from baselines.papers.bhattacharya_grid import Rules, Simulation
+from baselines.papers.bhattacharya_timing import cost_graph
 from benchmarks.rows import Effort, Goal, Row, alone, compared, interleave, timed
-from entropy_explore_env.belief.geodesic_cells import new_tessellation, tessellate
+from entropy_explore_env.belief.geodesic_cells import NOBODY, Tessellation, new_tessellation, tessellate
 from entropy_explore_env.belief.lattice import belief_costs, new_lattice
 from entropy_explore_env.belief.planning import search_ways
 from entropy_explore_env.belief.search_space import new_search
@@ -26,6 +29,7 @@ FLOOR = (1674, 1006, 1)
 SOURCES = 4
 _MAP_SHARE, _FLOOR_SHARE = 0.25, 0.16
 _EDGES = (4, 40)
+_ROOM = 40
 _PRIOR, _KNOWN = 1e-3, 100.0
 _NO_CELLS = np.zeros(0, np.int32)
 
@@ -40,25 +44,45 @@ def cluttered(shape: tuple[int, int, int], share: float, seed: int = 0) -> np.nd
     return covered
 
 
-def step_graph(covered: np.ndarray) -> csr_matrix:
-    """(V, V) steps between the free voxels of a 2-D world; none past a covered corner."""
-    size_x, size_y, _ = covered.shape
-    free, numbers = ~covered[:, :, 0], np.arange(covered.size).reshape(size_x, size_y)
-    rows, columns, lengths = [], [], []
+def rooms(shape: tuple[int, int, int], seed: int = 0) -> np.ndarray:
+    """(X, Y, 1) bool, walls every 40 cells, with a door of 6 cells between neighbouring rooms."""
+    rng, covered = np.random.default_rng(seed), np.zeros(shape, bool)
+    for x in range(_ROOM, shape[0], _ROOM):
+        covered[x] = True
+    for y in range(_ROOM, shape[1], _ROOM):
+        covered[:, y] = True
+    for x in range(0, shape[0], _ROOM):
+        for y in range(0, shape[1], _ROOM):
+            along = 1 + int(rng.integers(_ROOM - 8))
+            covered[x + _ROOM : x + _ROOM + 1, y + along : y + along + 6] = False
+            covered[x + along : x + along + 6, y + _ROOM : y + _ROOM + 1] = False
+    return covered
 
-    def moved(field: np.ndarray, x: int, y: int, by: tuple[int, int]) -> np.ndarray:
-        """What lies `by` beside the voxels from which a step (x, y) stays inside."""
-        low_x, low_y = max(-x, 0) + by[0], max(-y, 0) + by[1]
-        return field[low_x : low_x + size_x - abs(x), low_y : low_y + size_y - abs(y)]
 
-    for x, y in ((1, 0), (-1, 0), (0, 1), (0, -1), (1, 1), (1, -1), (-1, 1), (-1, -1)):
-        passed = [(0, 0), (x, y), (x, 0), (0, y)]
-        legal = np.logical_and.reduce([moved(free, x, y, by) for by in passed])
-        rows.append(moved(numbers, x, y, (0, 0))[legal])
-        columns.append(moved(numbers, x, y, (x, y))[legal])
-        lengths.append(np.full(len(rows[-1]), math.hypot(x, y)))
-    ends = (np.concatenate(rows), np.concatenate(columns))
-    return csr_matrix((np.concatenate(lengths), ends), shape=(covered.size, covered.size))
+def maze(shape: tuple[int, int, int], seed: int = 0) -> np.ndarray:
+    """(X, Y, 1) bool, corridors one cell wide with one way between any two places (a depth-first maze)."""
+    rng, covered = np.random.default_rng(seed), np.ones(shape, bool)
+    size, at = ((shape[0] - 1) // 2, (shape[1] - 1) // 2), (0, 0)
+    way, seen = [at], np.zeros(size, bool)
+    seen[at] = True
+    covered[1, 1] = False
+    while way:
+        x, y = way[-1]
+        around = [(x + 1, y), (x - 1, y), (x, y + 1), (x, y - 1)]
+        fresh = [n for n in around if 0 <= n[0] < size[0] and 0 <= n[1] < size[1] and not seen[n]]
+        if not fresh:
+            way.pop()
+            continue
+        i, j = fresh[int(rng.integers(len(fresh)))]
+        seen[i, j] = True
+        covered[2 * i + 1, 2 * j + 1] = covered[x + i + 1, y + j + 1] = False
+        way.append((i, j))
+    return covered
+
+
+def noise(shape: tuple[int, int, int], seed: int = 0) -> np.ndarray:
+    """(X, Y, 1) float32, rates drawn from 0.05 to 1 for each voxel by itself."""
+    return np.random.default_rng(seed).uniform(0.05, 1.0, shape).astype(np.float32)
 
 
 @dataclass(frozen=True)
@@ -82,21 +106,29 @@ class Search:
 
 
 def planning_rows(effort: Effort) -> list[Row]:
-    """Voronoi cells of four sources beside SciPy, and a plan across a floor."""
-    return [voronoi_row(MAP, effort), crossing_row(FLOOR, effort)]
+    """Voronoi cells of four sources beside SciPy, an iteration of coverage, and a plan across a floor."""
+    maps = {
+        "boxes": cost_rates(cluttered(MAP, _MAP_SHARE)),
+        "rooms": cost_rates(rooms(MAP)),
+        "a maze": cost_rates(maze(MAP)),
+        "white-noise costs": noise(MAP),
+    }
+    rows = [voronoi_row(name, rates, effort) for name, rates in maps.items()]
+    return [*rows, iteration_row(MAP, effort), crossing_row(FLOOR, effort)]
 
 
-def voronoi_row(shape: tuple[int, int, int], effort: Effort) -> Row:
+def cost_rates(covered: np.ndarray) -> np.ndarray:
+    """(X, Y, 1) float32, 1 where it is free, inf elsewhere."""
+    return np.where(covered, np.inf, 1.0).astype(np.float32)
+
+
+def voronoi_row(name: str, rates: np.ndarray, effort: Effort) -> Row:
     """Maps a second with the cells of SOURCES sources; SciPy gives the costs, and no cells."""
-    covered = cluttered(shape, _MAP_SHARE)
-    free = np.flatnonzero(~covered)
+    free, shape = np.flatnonzero(np.isfinite(rates)), rates.shape
     sources = np.random.default_rng(1).choice(free, SOURCES, replace=False).astype(np.int32)
-    graph, ours = step_graph(covered), new_tessellation(shape)
-    rates = np.where(covered, np.inf, 1.0).astype(np.float32)
+    graph, ours = cost_graph(rates), new_tessellation((shape[0], shape[1], 1))
     tessellate(ours, rates, sources)
-    theirs = dijkstra(graph, indices=sources, min_only=True)
-    if not np.allclose(ours.costs.ravel(), theirs, rtol=1e-6):
-        raise RuntimeError("our costs are not SciPy's")
+    check_tessellation(ours, graph, sources)
     taken = interleave(
         {
             "ours": lambda _: timed(lambda: tessellate(ours, rates, sources)),
@@ -105,13 +137,48 @@ def voronoi_row(shape: tuple[int, int, int], effort: Effort) -> Row:
         effort.long_rounds,
     )
     return compared(
-        f"geodesic Voronoi cells, {shape[0]} × {shape[1]}, {SOURCES} sources",
+        f"geodesic Voronoi cells, {shape[0]} × {shape[1]}, {SOURCES} sources, {name}",
         "SciPy dijkstra, min_only",
         [1.0 / t.cpu_s for t in taken["ours"]],
         [1.0 / t.cpu_s for t in taken["scipy"]],
         "maps/s",
         Goal("≥", 4.5),
     )
+
+
+def check_tessellation(ours: Tessellation, graph: csr_matrix, sources: np.ndarray) -> None:
+    """Raise a RuntimeError unless costs and cells are those of a Dijkstra from each source by itself."""
+    each = dijkstra(graph, indices=sources)
+    costs, cells, least = ours.costs.ravel(), ours.cells.ravel(), each.min(axis=0)
+    if not np.allclose(costs, least, rtol=1e-6):
+        raise RuntimeError("our costs are not SciPy's")
+    reached = np.flatnonzero(np.isfinite(least))
+    if (cells[~np.isfinite(least)] != NOBODY).any():
+        raise RuntimeError("somebody has what nobody reaches")
+    first = (each[:, reached] <= least[reached] * (1.0 + 1e-9)).argmax(axis=0)
+    if not np.array_equal(cells[reached], first):
+        raise RuntimeError("our cells are not those of the first nearest source")
+
+
+def iteration_row(shape: tuple[int, int, int], effort: Effort) -> Row:
+    """Milliseconds of the cells and targets of four robots that explore (the paper: 1.7 s)."""
+    covered = cluttered(shape, _MAP_SHARE)
+    starts = np.flatnonzero(~covered)[: 40 * SOURCES : 40]
+    simulation = Simulation(covered, starts.tolist(), Rules(sensor=Sensor(100.0)))
+    for _ in range(3):
+        simulation.step(functional=False)
+    mind, places = simulation.minds[0], simulation.places
+
+    def iterate() -> None:
+        mind.belief.version += 1  # as after a scan
+        mind.update(places)
+        for target in mind.targets:
+            mind.way(int(target))
+
+    iterate()
+    taken = [timed(iterate).cpu_s for _ in range(effort.long_rounds)]
+    job = f"cells, targets and ways of {SOURCES} exploring robots, {shape[0]} × {shape[1]}"
+    return alone(job, [1e3 * cpu_s for cpu_s in taken], "ms", Goal("≤", 1700.0 / 25.0, "ms"))
 
 
 def crossing_row(shape: tuple[int, int, int], effort: Effort) -> Row:

@@ -102,9 +102,11 @@ class Scenario:
         for kind in self.kinds:
             self._check_kind(kind.robot)
         rays = max(kind.sensor.rays for kind in self.kinds)
+        allowed = f"so short that at most {MAX_IN_FLIGHT} measurements are under way at once"
         if self.mail_places * max(min(self.channel.burst, rays), 1) > MAX_IN_FLIGHT:
-            allowed = f"so short that at most {MAX_IN_FLIGHT} measurements are under way at once"
             raise SettingError("Channel.delay_s", self.channel.delay_s, allowed)
+        if 2 * self.robots * self.phase_batches * max(min(self.channel.burst, rays), 1) > MAX_IN_FLIGHT:
+            raise SettingError("Channel.phase_s", self.channel.phase_s, allowed)
 
     def _check_kind(self, robot: Robot) -> None:
         """Check that a kind of robot fits the grid and the actions."""
@@ -142,12 +144,20 @@ class Scenario:
         """
         if self.channel.delay_s == 0.0 or self.robots == 1:
             return 0
+        return 2 * self._scans_within(self.channel.delay_s) * self.robots
+
+    @property
+    def phase_batches(self) -> int:
+        """Batches that a robot can collect in a phase of the broadcast; 0 where they are sent at once."""
+        return 0 if self.channel.phase_s == 0.0 else self._scans_within(self.channel.phase_s)
+
+    def _scans_within(self, time_s: float) -> int:
+        """Scans that a robot can take in this time, and two more."""
         apart_s = min(
             min(kind.sensor.scan_time_s, kind.sensor.scan_every_m / kind.robot.max_speed_m_s)
             for kind in self.kinds
         )
-        scans = math.floor(min(self.channel.delay_s / apart_s, 1e9)) + 2
-        return 2 * scans * self.robots
+        return math.floor(min(time_s / apart_s, 1e9)) + 2
 
     @property
     def planar(self) -> bool:

@@ -226,6 +226,11 @@ def centred_angles(samples: int, step_rad: float) -> np.ndarray:
 class Channel:
     """What robots tell each other: the most useful measurements of a scan (Rocha04, eqs. 42-43).
 
+    A batch is sent at once (Rocha04) or, with `phase_s`, broadcast in phases (Bhattacharya 2010, sect. 5.3):
+    a phase's batches wait for its end, are repeated all through the next phase, and who has them already
+    ignores them. Either way `burst` and `i_min_bits` select what is in a batch: as many as there are rays,
+    and 0, send everything that was newly measured.
+
     Attributes:
         burst: Most measurements of one batch; 0 shares none.
         i_min_bits: I_min, the least utility of a measurement that is worth sending.
@@ -236,6 +241,8 @@ class Channel:
         loss_probability: Of a message on its way to one teammate.
         delay_s: From sending to hearing.
         announcements: Whether robots announce the viewpoints that they choose.
+        phase_s: Length of a phase of the broadcast; 0 = batches are sent at once.
+        repeats: How often a phase's batches are sent in the next phase, evenly spread over it.
     """
 
     burst: int = 64
@@ -246,6 +253,8 @@ class Channel:
     loss_probability: float = 0.0
     delay_s: float = 0.0
     announcements: bool = True
+    phase_s: float = 0.0
+    repeats: int = 1
 
     def __post_init__(self) -> None:
         """Check every field."""
@@ -259,6 +268,10 @@ class Channel:
         check(self, "loss_probability", "a number from 0 to 1", lambda v: 0 <= v <= 1)
         check(self, "delay_s", "a number from 0 to 3600", lambda v: 0 <= v <= 3600)
         check_kind(self, "announcements", bool)
+        check(self, "phase_s", "0, or a number from 1e-3 to 3600", lambda v: v == 0 or 1e-3 <= v <= 3600)
+        check_count(self, "repeats", 1, 1000)
+        if self.phase_s > 0.0 and self.delay_s > 0.0:
+            raise SettingError("Channel.delay_s", self.delay_s, "0 where batches are broadcast in phases")
 
 
 @dataclass(frozen=True)

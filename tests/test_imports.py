@@ -51,6 +51,7 @@ SIBLINGS = {
         "poses",
         "driving",
         "messages",
+        "phases",
         "scoring",
         "observation",
         "tick",

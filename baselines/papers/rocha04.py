@@ -47,7 +47,8 @@ class Args:
 def main(words: Sequence[str]) -> int:
     """Run the command."""
     args = parse(Args, words, description=__doc__)
-    from baselines.papers.rocha04_report import print_claims, write_report  # matplotlib: after the help
+    from baselines.claims_table import print_claims
+    from baselines.papers.rocha04_report import write_report  # matplotlib: after the help
 
     for name, value in (("starts", args.starts), ("jobs", args.jobs)):
         if value is not None and value < 1:
@@ -68,7 +69,7 @@ def main(words: Sequence[str]) -> int:
         wall_s = round(time.perf_counter() - started, 1)
         print_json({"paper": "Rocha04", "claims": [claim.row() for claim in claims], "wall_s": wall_s})
     else:
-        print_claims(claims)
+        print_claims(claims, "Rocha04")
         print(f"written: {report}, its figures and tables beside it", file=sys.stderr)
     return 1 if args.strict and not all(claim.holds for claim in claims) else 0
 

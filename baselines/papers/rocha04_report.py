@@ -8,6 +8,7 @@ from pathlib import Path
 import matplotlib as mpl
 import numpy as np
 
+from baselines.claims_table import claims_table
 from baselines.experiment import (
     Claim,
     csv_table,
@@ -55,34 +56,6 @@ def write_report(folder: Path, records: Records, claims: Sequence[Claim], comman
     return folder / "rocha04.md"
 
 
-def print_claims(claims: Sequence[Claim], paper: str = "Rocha04") -> None:
-    """A table of the claims on standard output."""
-    from rich.console import Console
-    from rich.table import Table
-
-    table = Table(title=paper, title_justify="left")
-    table.add_column("claim")
-    for head in ("paper", "ours", "95 % interval"):
-        table.add_column(head, justify="right")
-    table.add_column("holds")
-    for claim in claims:
-        holds = "[green]yes[/green]" if claim.holds else "[red]no[/red]"
-        table.add_row(claim.claim, _shown(claim.paper), _shown(claim.ours), _interval(claim), holds)
-    Console().print(table)
-
-
-def _shown(value: float | str | None) -> str:
-    if value is None:
-        return "-"
-    if isinstance(value, str):
-        return value
-    return f"{value:,.0f}" if abs(value) >= 1000 else f"{value:,.4g}"
-
-
-def _interval(claim: Claim) -> str:
-    return "" if claim.low is None else f"{_shown(claim.low)} … {_shown(claim.high)}"
-
-
 def _table_1(room: Scenario) -> dict[str, list[object]]:
     """Table 1 with our settings."""
     grid, robot, sensor = room.grid, room.robot, room.sensor
@@ -117,10 +90,6 @@ def _text(records: Records, claims: Sequence[Claim], command: str) -> str:
     single, team = len(records["single"]), len(records[team_id(2, *STANDARD)])
     capped = sum(not record["finished"] for cell in records.values() for record in cell)
     held = sum(claim.holds for claim in claims)
-    rows = [
-        [c.claim, _shown(c.paper), _shown(c.ours), _interval(c), "yes" if c.holds else "**no**"]
-        for c in claims
-    ]
     figures = "\n".join(f"![Figure {n}](rocha04/figure-{n}.png)" for n in range(3, 9))
     parts = [
         "# Rocha, Dias and Carvalho 2004, reproduced",
@@ -131,7 +100,7 @@ def _text(records: Records, claims: Sequence[Claim], command: str) -> str:
         "in `rocha04/`.",
         f"## Claims: {held} of {len(claims)} hold",
         _RULES,
-        markdown_table(["claim", "paper", "ours", "95 % interval", "holds"], rows),
+        claims_table(claims),
         "## One robot",
         _single_table(records),
     ]

@@ -47,7 +47,7 @@ class Args:
 def main(words: Sequence[str]) -> int:
     """Run the command."""
     args = parse(Args, words, description=__doc__)
-    from baselines.papers.rocha04_report import print_claims  # matplotlib: after the help
+    from baselines.claims_table import print_claims
     from baselines.papers.rochami_report import write_report
 
     for name, value, least in (("starts", args.starts, 2), ("jobs", args.jobs, 1)):

@@ -110,12 +110,33 @@ def post_letter(delayed, numbers, state, scan, mission, index, count):
         state.mail_to[mission, place, mate] = False
     copy_numbers(robot.origin if count < 0 else robot.scan_pose, letter.pose, 5)
     write_announcement(robot, letter.announced)
+    pack_measurements(scan, count, state.mail_rays[mission, place])
+    return place
+
+
+@lean_kernel
+def pack_measurements(scan, count, packed):
+    """Fill (B, 5) with the first `count` measurements of `scan.order`: direction, distance, Return."""
     for i in range(count):
-        ray, mailed = scan.rays[scan.order[i]], state.mail_rays[mission, place, i]
+        ray, mailed = scan.rays[scan.order[i]], packed[i]
         copy_numbers(ray.direction, mailed, 3)
         mailed[3] = ray.length
         mailed[4] = ray.returned
-    return place
+
+
+@lean_kernel
+def unpack_measurements(rules, state, scan, mission, sender, pose, packed, count):
+    """Put packed measurements into a scan as if it had been taken at the sender's pose."""
+    numbers = rules.numbers[0]
+    size = (numbers.size[0], numbers.size[1], numbers.size[2])
+    start, sensor = grid_position(numbers, pose), rules.sensors.numbers[sender]
+    for i in range(count):
+        ray, mailed = scan.rays[i], packed[i]
+        scan.order[i] = i
+        copy_numbers(mailed, ray.direction, 3)
+        ray.length = mailed[3]
+        ray.returned = int(mailed[4])
+        trace_measurement(scan, i, sensor, size, numbers.voxel_size_m, start, state.truth[mission])
 
 
 @lean_kernel
@@ -166,17 +187,9 @@ def open_letter(delayed, rules, state, scan, mission, place):
     """A message arrives: its hearers fuse it, or note what it announces; its place is free again."""
     if delayed is None:
         return
-    numbers, letter = rules.numbers[0], state.mail[mission, place]
+    letter, packed = state.mail[mission, place], state.mail_rays[mission, place]
     letter.due_s = math.inf
-    size = (numbers.size[0], numbers.size[1], numbers.size[2])
-    start, sensor = grid_position(numbers, letter.pose), rules.sensors.numbers[letter.sender]
-    for i in range(letter.count):
-        ray, mailed = scan.rays[i], state.mail_rays[mission, place, i]
-        scan.order[i] = i
-        copy_numbers(mailed, ray.direction, 3)
-        ray.length = mailed[3]
-        ray.returned = int(mailed[4])
-        trace_measurement(scan, i, sensor, size, numbers.voxel_size_m, start, state.truth[mission])
+    unpack_measurements(rules, state, scan, mission, letter.sender, letter.pose, packed, letter.count)
     for robot in range(state.robots.shape[1]):
         if state.mail_to[mission, place, robot]:
             heard = state.heard[mission, robot, letter.sender]

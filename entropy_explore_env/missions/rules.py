@@ -45,6 +45,8 @@ NUMBERS = np.dtype(
         ("loss_probability", "f8"),
         ("delay_s", "f8"),
         ("announcements", "?"),
+        ("phase_s", "f8"),
+        ("repeats", "i8"),
         ("period_s", "f8"),  # length of a step; inf = until the next robot has to decide
         ("all_maps", "?"),
         ("time_limit_s", "f8"),
@@ -73,6 +75,8 @@ class Rules(NamedTuple):
     """(D, 2) float64, discrete gazes: yaw, pitch."""
     delayed: int | None
     """None where messages arrive at once: then nothing of the mail is compiled."""
+    phased: int | None
+    """None where batches are sent at once: then nothing of the broadcast in phases is compiled."""
     cells: Cells | None
     """Of the overview; None without it."""
     panorama: np.ndarray
@@ -101,6 +105,8 @@ def rules_of(scenario: Scenario) -> Rules:
         "loss_probability": channel.loss_probability,
         "delay_s": channel.delay_s,
         "announcements": channel.announcements,
+        "phase_s": channel.phase_s,
+        "repeats": channel.repeats,
         "period_s": math.inf if scenario.decision_period_s is None else scenario.decision_period_s,
         "all_maps": ending.whose == "all",
         "time_limit_s": ending.time_limit_s,
@@ -130,6 +136,7 @@ def rules_of(scenario: Scenario) -> Rules:
         moves=discrete_moves(scenario),
         gazes=gaze_set(scenario.action.yaws, 1 if scenario.planar else scenario.action.pitches),
         delayed=1 if channel.delay_s > 0.0 else None,
+        phased=1 if channel.phase_s > 0.0 else None,
         cells=None if (shape := overview_shape(scenario)) is None else new_cells(scenario.grid.shape, shape),
         panorama=panorama_directions(scenario),
     )

@@ -133,6 +133,22 @@ LETTER = np.dtype(
     align=True,
 )
 
+PHASES = np.dtype(
+    [
+        ("broadcasts", "i8"),  # how often the robots have broadcast
+        ("collecting", "i8"),  # the buffer, 0 or 1, that takes in new batches; the other one is broadcast
+    ],
+    align=True,
+)
+
+BATCH = np.dtype(
+    [
+        ("pose", "f8", (5,)),  # where the scan was taken
+        ("count", "i8"),  # measurements of it
+    ],
+    align=True,
+)
+
 
 class MissionState(NamedTuple):
     """Everything about E missions of A robots; V voxels, R rays of a scan, Q places for messages."""
@@ -172,6 +188,16 @@ class MissionState(NamedTuple):
     """(E, Q, A) bool: who will hear them."""
     mail_rays: np.ndarray
     """(E, Q, B, 5) float64: direction (3), distance in grid units, Return."""
+    phases: np.ndarray
+    """(E,) PHASES; (E, 0) and all that follows likewise where batches are sent at once."""
+    phase_waiting: np.ndarray
+    """(E, A, 2) int64, batches in each of a robot's two buffers."""
+    phase_batches: np.ndarray
+    """(E, A, 2, S) BATCH."""
+    phase_rays: np.ndarray
+    """(E, A, 2, S, B, 5) float64, as in the mail."""
+    phase_heard: np.ndarray
+    """(E, A, A) int8: whether b has what a broadcasts; see `missions/phases.py`."""
 
 
 def check_memory(scenario: Scenario, missions: int) -> None:
@@ -192,6 +218,7 @@ def new_state(scenario: Scenario, missions: int, cells: Cells | None) -> Mission
     """Arrays for E missions of a scenario, not yet reset; beliefs are pooled to the cells."""
     e, a, r = missions, scenario.robots, max(kind.sensor.rays for kind in scenario.kinds)
     v, q, b = scenario.grid.voxels, scenario.mail_places, min(scenario.channel.burst, r)
+    s = scenario.phase_batches
     truth, scored = np.zeros((e, v), np.float32), v if scenario.scored else 0
     radii = barrier_radii_m(scenario)
     return MissionState(
@@ -212,4 +239,9 @@ def new_state(scenario: Scenario, missions: int, cells: Cells | None) -> Mission
         mail=np.zeros((e, q), LETTER),
         mail_to=np.zeros((e, q, a), np.bool_),
         mail_rays=np.zeros((e, q, b if q else 0, 5)),
+        phases=np.zeros((e,) if s else (e, 0), PHASES),
+        phase_waiting=np.zeros((e, a if s else 0, 2), np.int64),
+        phase_batches=np.zeros((e, a if s else 0, 2, s), BATCH),
+        phase_rays=np.zeros((e, a if s else 0, 2, s, b, 5)),
+        phase_heard=np.zeros((e, a if s else 0, a), np.int8),
     )

@@ -13,6 +13,7 @@ from entropy_explore_env.missions.action import decode_action, write_mask
 from entropy_explore_env.missions.driving import depart, drive_on, next_decision, stop
 from entropy_explore_env.missions.messages import announce, fuse_measurements, next_letter, open_letter, send
 from entropy_explore_env.missions.observation import observe_mission
+from entropy_explore_env.missions.phases import broadcast_all, collect_batch, next_broadcast
 from entropy_explore_env.missions.poses import copy_numbers, grid_position, pose_at
 from entropy_explore_env.missions.reward import reward_robots
 from entropy_explore_env.missions.scoring import note_progress, score_scan
@@ -108,11 +109,15 @@ def advance(rules, state, scan, balls, mission):
     while clock.end == _RUNNING:
         letter, due_s = next_letter(mail)
         robot, scan_s = next_scan(robots)
-        if min(due_s, scan_s) > stop_s:
+        broadcast_s = next_broadcast(rules.phased, rules.numbers[0], state, mission)
+        if min(due_s, scan_s, broadcast_s) > stop_s:
             break
         if due_s <= scan_s:
             clock.time_s = max(clock.time_s, due_s)
             open_letter(rules.delayed, rules, state, scan, mission, letter)
+        elif broadcast_s <= scan_s:
+            clock.time_s = max(clock.time_s, broadcast_s)
+            broadcast_all(rules.phased, rules, state, scan, mission)
         else:
             clock.time_s = scan_s
             if robots[robot].waiting:
@@ -205,8 +210,10 @@ def scan_and_share(rules, state, team_scan, mission, index):
             robot.next_i_min_bits = steered_i_min(
                 robot.i_min_bits, scan.utility, numbers.burst, numbers.i_min_fill, numbers.i_min_gain
             )
-        if count > 0:
+        if count > 0 and rules.phased is None:
             send(rules, state, scan, mission, index, count)
+        elif count > 0:
+            collect_batch(rules.phased, state, scan, mission, index, count)
 
 
 @lean_kernel

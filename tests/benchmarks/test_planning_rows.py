@@ -5,10 +5,24 @@ from __future__ import annotations
 import math
 
 import numpy as np
+import pytest
 from scipy.sparse.csgraph import dijkstra
 
-from benchmarks.planning import Search, cluttered, crossing_row, step_graph, voronoi_row
+from baselines.papers.bhattacharya_timing import cost_graph
+from benchmarks.planning import (
+    Search,
+    check_tessellation,
+    cluttered,
+    cost_rates,
+    crossing_row,
+    iteration_row,
+    maze,
+    noise,
+    rooms,
+    voronoi_row,
+)
 from benchmarks.rows import Effort
+from entropy_explore_env.belief.geodesic_cells import new_tessellation, tessellate
 
 TINY = Effort(rounds=2, long_rounds=1)
 
@@ -17,7 +31,7 @@ def test_both_sides_have_the_same_steps():
     covered = cluttered((70, 53, 1), 0.2)
     free = np.flatnonzero(~covered)
     ours = Search(covered)
-    expected = dijkstra(step_graph(covered), indices=int(free[0]))
+    expected = dijkstra(cost_graph(cost_rates(covered)), indices=int(free[0]))
     for goal in free[:: len(free) // 7]:
         cost = ours.cost(int(free[0]), int(goal))
         assert cost == expected[goal] or math.isclose(cost, expected[goal], rel_tol=1e-8)
@@ -25,7 +39,37 @@ def test_both_sides_have_the_same_steps():
 
 
 def test_rows_are_measured():
-    voronoi = voronoi_row((90, 61, 1), TINY)
-    assert voronoi.unit == "maps/s" and voronoi.goal == "≥ 4.5 ×" and voronoi.ours > 0 and voronoi.theirs
+    shape = (90, 61, 1)
+    for name, rates in (
+        ("boxes", cost_rates(cluttered(shape, 0.2))),
+        ("rooms", cost_rates(rooms(shape))),
+        ("a maze", cost_rates(maze(shape))),
+        ("noise", noise(shape)),
+    ):
+        voronoi = voronoi_row(name, rates, TINY)
+        assert voronoi.unit == "maps/s" and voronoi.goal == "≥ 4.5 ×" and voronoi.ours > 0 and voronoi.theirs
+        assert name in voronoi.job
     crossing = crossing_row((201, 103, 1), TINY)
     assert crossing.unit == "ms" and crossing.goal == "< 50 ms" and crossing.ours > 0
+    iteration = iteration_row((160, 101, 1), TINY)
+    assert iteration.unit == "ms" and iteration.goal == "≤ 68 ms" and iteration.ours > 0
+
+
+def test_all_of_a_maze_and_of_rooms_is_connected():
+    for covered in (rooms((90, 61, 1)), maze((91, 61, 1))):
+        free = np.flatnonzero(~covered)
+        reached = np.isfinite(dijkstra(cost_graph(cost_rates(covered)), indices=int(free[0])))
+        assert reached[free].all() and 0.2 < covered.mean() + 0.2 < 0.8
+
+
+def test_wrong_costs_and_cells_are_found():
+    rates, sources = noise((40, 31, 1)), np.array([5, 900])
+    ours, graph = new_tessellation((40, 31, 1)), cost_graph(rates)
+    tessellate(ours, rates, sources)
+    check_tessellation(ours, graph, sources)
+    ours.cells[3, 3] ^= 1
+    with pytest.raises(RuntimeError, match="cells"):
+        check_tessellation(ours, graph, sources)
+    ours.costs[3, 3] *= 2.0
+    with pytest.raises(RuntimeError, match="costs"):
+        check_tessellation(ours, graph, sources)

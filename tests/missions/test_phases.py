@@ -1,0 +1,119 @@
+"""The broadcast in phases: when batches go out, what they cost, and that each is fused once."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from entropy_explore_env.belief.coverage_map import map_entropy_bits
+from entropy_explore_env.config import with_settings
+from entropy_explore_env.errors import SettingError
+from entropy_explore_env.reports.mission_record import state_digest
+from entropy_explore_env.settings import Channel
+from tests.reference.scenes import free_box, started, wander
+
+NO_ANNOUNCEMENTS = {"announcements": False, "i_min_bits": 0.0}
+
+
+def played(steps=60, seed=3, **channel):
+    scenario = free_box(robots=3, channel={**NO_ANNOUNCEMENTS, **channel}, ending={"sigma_end": 1e-4})
+    missions = started(scenario)
+    wander(missions, steps, seed)
+    return missions
+
+
+def robots_of(missions, field):
+    return missions.state.robots[0][field]
+
+
+def test_nothing_is_heard_before_the_first_phase_ends():
+    seen = []
+    missions = started(free_box(robots=3, channel={**NO_ANNOUNCEMENTS, "phase_s": 7.0}))
+
+    def note(_):
+        clock = missions.state.missions[0]
+        seen.append((float(clock["time_s"]), int(robots_of(missions, "messages_sent").sum())))
+
+    wander(missions, 40, 1, note)
+    early = [sent for time_s, sent in seen if time_s < 7.0]
+    assert len(early) > 3 and not any(early)
+    assert seen[-1][1] > 0
+
+
+def test_what_waits_is_sent_once_and_heard_by_all():
+    missions = played(phase_s=4.0)
+    sent, heard = robots_of(missions, "messages_sent"), robots_of(missions, "messages_received")
+    assert (heard == sent.sum() - sent).all() and sent.min() > 3
+    measured = robots_of(missions, "measurements_sent")
+    bits = 160 * sent + 96 * measured
+    np.testing.assert_array_equal(robots_of(missions, "bits_sent"), bits)
+    np.testing.assert_array_equal(robots_of(missions, "bits_received"), bits.sum() - bits)
+    batches, rest = divmod(int(measured.sum()), 8)
+    assert rest == 0 and batches == sent.sum()  # burst = 8 of every scan
+
+
+def test_repeats_cost_bits_and_are_fused_once():
+    once, thrice = played(phase_s=4.0, repeats=1), played(phase_s=4.0, repeats=3)
+    np.testing.assert_allclose(
+        robots_of(once, "measurements_received"), robots_of(thrice, "measurements_received"), atol=24
+    )
+    assert robots_of(thrice, "bits_sent").sum() > 2 * robots_of(once, "bits_sent").sum()
+    for missions in (once, thrice):
+        carried = robots_of(missions, "entropy_bits")
+        np.testing.assert_allclose(carried, map_entropy_bits(missions.precision[0]), rtol=1e-6)
+
+
+def test_repeats_make_up_for_lost_messages():
+    shares = []
+    for repeats in (1, 4):
+        missions = played(120, phase_s=4.0, repeats=repeats, loss_probability=0.5)
+        measured = robots_of(missions, "measurements")
+        waiting = missions.state.phase_batches[0]["count"].sum()
+        assert robots_of(missions, "messages_lost").sum() > 0 and waiting > 0
+        scans = robots_of(missions, "scans").sum()
+        shares.append(robots_of(missions, "measurements_received").sum() / (2 * 8 * scans))
+        assert measured.sum() > 0
+    assert shares[0] < 0.65 and shares[1] > 0.8
+
+
+def test_a_lossless_broadcast_brings_what_sending_at_once_brings():
+    """After the last phase all three hold the same measurements, in another order."""
+    at_once, phased = played(80), played(80, phase_s=0.25)
+    unsent = phased.state.phase_waiting[0].sum()
+    assert unsent <= 6
+    np.testing.assert_allclose(
+        robots_of(at_once, "entropy_bits"), robots_of(phased, "entropy_bits"), rtol=0.02
+    )
+
+
+def test_no_loss_is_drawn_twice_and_the_same_seed_gives_the_same_mission():
+    digests = [state_digest(played(phase_s=3.0, repeats=2, loss_probability=0.3), 0) for _ in range(2)]
+    assert digests[0] == digests[1]
+
+
+def test_without_phases_no_state_is_kept_for_them():
+    missions = started(free_box(robots=3))
+    assert missions.rules.phased is None
+    for name in ("phases", "phase_waiting", "phase_batches", "phase_rays", "phase_heard"):
+        assert getattr(missions.state, name).size == 0
+
+
+@pytest.mark.parametrize(
+    ("channel", "field"),
+    [
+        ({"phase_s": -1.0}, "Channel.phase_s"),
+        ({"phase_s": 4000.0}, "Channel.phase_s"),
+        ({"repeats": 0}, "Channel.repeats"),
+        ({"phase_s": 1.0, "delay_s": 1.0}, "Channel.delay_s"),
+    ],
+)
+def test_what_is_refused(channel, field):
+    with pytest.raises(SettingError) as raised:
+        Channel(**channel)
+    assert raised.value.field == field
+
+
+def test_phases_too_long_for_memory_are_refused():
+    with pytest.raises(SettingError) as raised:
+        with_settings(free_box(robots=100), {"channel": {"phase_s": 3600.0, "burst": 10**6}})
+    assert raised.value.field == "Channel.phase_s"
