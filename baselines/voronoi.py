@@ -14,7 +14,6 @@ from typing import Literal
 
 import numpy as np
 
-from baselines.information_rate import Build, Weighing, build_of, free_by_belief, weigh_viewpoints
 from baselines.occupancy_entropy import (
     close_voxels,
     fill_deviation_entropy,
@@ -22,6 +21,7 @@ from baselines.occupancy_entropy import (
     filtered,
 )
 from baselines.strategy import random_viewpoint
+from baselines.viewpoints import Build, build_of, free_by_belief, weigh_viewpoints
 from baselines.voronoi_control import (
     CellSearch,
     gradient_step,
@@ -106,7 +106,7 @@ class VoronoiCoverage:
         grid = scenario.grid
         self._rng = rng
         self._errands = [_Errand() for _ in range(scenario.robots)]
-        self._builds = [build_of(scenario, kind, Weighing()) for kind in scenario.kinds]
+        self._builds = [build_of(scenario, kind) for kind in scenario.kinds]
         self._space, self._inner = new_tessellation(grid.shape), new_tessellation(grid.shape)
         self._entropy = np.empty(grid.shape, np.float32)
         longest = max(build.crossing for build in self._builds) + sum(grid.shape)
@@ -150,8 +150,8 @@ class VoronoiCoverage:
         """(X, Y, Z) float32, what ways cost by the coverage's metric; inf where the body does not fit."""
         lattice, shape = self._build(view).lattice, view.scenario.grid.shape
         rates = entropy.copy() if self.coverage.metric == "entropy" else np.ones(shape, np.float32)
-        place = tuple(int(i) for i in np.unravel_index(here, shape))
-        close_voxels(view.mean, lattice.touched, lattice.margin, lattice.layer, place, rates)
+        x, y, z = (int(i) for i in np.unravel_index(here, shape))
+        close_voxels(view.mean, lattice.touched, lattice.margin, lattice.layer, (x, y, z), rates)
         return rates
 
     def _stands(self, errand: _Errand, entropy: np.ndarray, rates: np.ndarray) -> bool:

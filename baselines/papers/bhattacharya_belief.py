@@ -262,7 +262,8 @@ class Scanner:
         rays = math.ceil(2.0 * math.pi * sensor.range_cells * _RAYS_A_CELL)
         angles = np.arange(rays) * (2.0 * math.pi / rays)
         self._rays = np.stack([np.cos(angles), np.sin(angles), np.zeros(rays)], axis=1)
-        places = longest_crossing(*occupied.shape, sensor.range_cells, 1)
+        x, y, z = occupied.shape
+        places = longest_crossing(x, y, z, sensor.range_cells, 1)
         self._crossed, self._entered = np.empty(places, np.int32), np.empty(places, np.int64)
         self._seen, self._scans = np.zeros(occupied.size, np.int64), 0
         self._cells, self._read = np.empty(occupied.size, np.int32), np.empty(occupied.size, np.float32)

@@ -6,7 +6,6 @@ import math
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 
 from baselines.figures import COLOURS
@@ -21,7 +20,7 @@ def _cell_picture(occupied: np.ndarray, cells: np.ndarray) -> np.ndarray:
     """(Y, X, 3) cells in pale colours of their robots, walls dark; row 0 at the bottom."""
     picture = np.full((*cells.shape, 3), 0.93)
     for robot in range(int(cells.max(initial=-1)) + 1):
-        colour = np.array(to_rgb(COLOURS[robot % len(COLOURS)]))
+        colour = np.array(COLOURS[robot % len(COLOURS)])
         picture[cells == robot] = _PALE + (1.0 - _PALE) * colour
     picture[occupied] = 0.25
     return picture.transpose(1, 0, 2)

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from baselines import information_rate
-from baselines.information_rate import InformationRate, Weighing, _stops, free_by_belief
+from baselines.information_rate import InformationRate, Weighing, _stops
 from baselines.mission import run_mission, scripted
+from baselines.viewpoints import free_by_belief
 from entropy_explore_env.config import with_settings
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.missions.view import view_of
