@@ -59,8 +59,8 @@ class Fusion:
     """How readings of a cell become one probability.
 
     Attributes:
-        exponent: m of g(x) = xᵐ; 0 = g is the logarithm (the geometric mean). Large ones keep the highest
-            probability ever read, inf is not allowed.
+        exponent: m of g(x) = xᵐ; 0 = g is the logarithm (the geometric mean). The larger it is, the more the
+            highest probability ever read counts; single precision holds u⁸.
         most_confident: Keep the reading farthest from ½ instead of a mean.
     """
 
@@ -69,7 +69,7 @@ class Fusion:
 
     def __post_init__(self) -> None:
         """Check every field."""
-        check(self, "exponent", "a number from 0 to 100", lambda v: 0.0 <= v <= 100.0)
+        check(self, "exponent", "a number from 0 to 8", lambda v: 0.0 <= v <= 8.0)
         check_kind(self, "most_confident", bool)
 
 

@@ -77,7 +77,7 @@ def test_targets_are_those_of_the_equations(size, seed, threshold, by_length):
 
 
 def test_a_centroid_outside_of_its_cell_by_hand():
-    """A U of nine voxels: the centroid lies in the gap, the nearest voxel of the U is its foot's middle."""
+    """A U of nine voxels: the centroid, (1, 4/3), lies in the gap; two voxels are as near to it."""
     cells = np.full((3, 4, 1), NOBODY, np.int32)
     cells[0, :, 0] = cells[2, :, 0] = 0
     cells[1, 0, 0] = 0
