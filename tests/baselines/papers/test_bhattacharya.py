@@ -154,7 +154,7 @@ def test_lost_messages_come_again():
     simulation = Simulation(occupied, starts, rules, seed=1)
     for _ in range(16):
         simulation.step(False)
-    assert simulation._has.all()
+    assert simulation._has[~np.eye(3, dtype=bool)].all()  # whoever sent it has it anyway
 
 
 def test_a_start_in_a_wall_is_refused():
