@@ -99,6 +99,8 @@ REFUSED = {
     (Channel, "loss_probability"): (*NO_NUMBERS, -0.01, 1.01, INF),
     (Channel, "delay_s"): (*NO_NUMBERS, -0.01, 3601.0, INF),
     (Channel, "announcements"): SWITCH,
+    (Channel, "phase_s"): (*NO_NUMBERS, -0.01, 0.9e-3, 3601.0, INF),
+    (Channel, "repeats"): (*COUNT, 0, 1001),
     (Ending, "sigma_end"): (*POSITIVE, INF, 0.9e-4, 1.1e4),
     (Ending, "whose"): KIND,
     (Ending, "time_limit_s"): POSITIVE,
@@ -227,6 +229,8 @@ def test_settings_that_do_not_fit_each_other_are_refused():
         ),
         ({**discrete, "grid": Grid((70, 80, 60), 0.5), "robot": {"reach_m": 30.0}}, "Robot.reach_m"),
         ({"channel": {"delay_s": 3600.0}, "sensor": {"scan_time_s": 1e-4}}, "Channel.delay_s"),
+        ({"channel": {"phase_s": 3600.0}, "sensor": {"scan_time_s": 1e-4}}, "Channel.phase_s"),
+        ({"channel": {"phase_s": 1.0, "delay_s": 1.0}}, "Channel.delay_s"),
     ):
         assert refusal(lambda changes=settings: with_settings(BOX, changes)).field == field
     assert with_settings(BOX, {**discrete, "robot": {"reach_m": 0.5}}).action.kind == "discrete"
