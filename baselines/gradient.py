@@ -46,7 +46,7 @@ class GradientStrategy:
         grid, robot = view.scenario.grid, view.kind.robot
         projected = view.planar if self._motion_plane is None else self._motion_plane
         stuck = view.move_end is not MoveEnd.ARRIVED
-        position = (view.pose[:3] - np.asarray(grid.origin_m)) / grid.voxel_size_m
+        position = grid.in_grid_units(view.pose)[:3]
         reach = min(robot.reach_m / grid.voxel_size_m, float(sum(grid.shape)))
         viewpoint = view.pose.copy()
         found = not stuck and steepest_viewpoint(

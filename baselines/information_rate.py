@@ -15,13 +15,20 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from baselines.viewpoints import Build, build_of, free_by_belief, weigh_viewpoints
+from baselines.viewpoints import (
+    Build,
+    announced_cone,
+    build_of,
+    free_by_belief,
+    new_scratch,
+    weigh_viewpoints,
+)
 from entropy_explore_env.belief.lattice import belief_costs
 from entropy_explore_env.belief.planning import search_ways
 from entropy_explore_env.belief.raycast import STOP_AT_COVERED
 from entropy_explore_env.belief.search_space import cost_to, new_search, way_to
 from entropy_explore_env.belief.straightening import straightened
-from entropy_explore_env.belief.visibility import CONE, cone_of
+from entropy_explore_env.belief.visibility import CONE
 from entropy_explore_env.config import Scenario
 from entropy_explore_env.missions.view import RobotView
 from entropy_explore_env.robots.motion import driving_time
@@ -86,13 +93,7 @@ class InformationRate:
             build_of(scenario, kind, self.weighing.thinning, self.weighing.blocking)
             for kind in scenario.kinds
         ]
-        longest = max(build.crossing for build in self._builds)
-        self._scratch = (
-            np.zeros(grid.voxels, np.float32),
-            np.zeros(grid.voxels, np.int32),
-            np.zeros(longest + sum(grid.shape), np.int32),
-            np.zeros(longest + sum(grid.shape), np.int64),
-        )
+        self._scratch = new_scratch(grid, self._builds)
         self._search = new_search(grid.voxels)
 
     def _build_of(self, view: RobotView) -> Build:
@@ -104,7 +105,7 @@ class InformationRate:
 
     def _choose(self, view: RobotView) -> np.ndarray:
         journey = self._journeys[view.robot]
-        here = _in_grid_units(view, view.pose)
+        here = view.scenario.grid.in_grid_units(view.pose)
         cones = self._cones(view)
         if journey.stops and not _in_sight(view, here[:3], journey.stops[0], self._scratch):
             journey.stops = []
@@ -142,8 +143,7 @@ class InformationRate:
         heard = [mate for mate in view.teammates.values() if mate.announced_s >= 0.0 and mate.depth_m > 0.0]
         cones = np.zeros(len(heard), CONE)
         for place, mate in enumerate(heard):
-            depth = mate.depth_m / view.scenario.grid.voxel_size_m
-            cones[place] = cone_of(_in_grid_units(view, mate.viewpoint), depth, mate.half_angle_rad)
+            cones[place] = announced_cone(view.scenario.grid, mate)
         return cones
 
     def _drawn(self, view: RobotView, here: np.ndarray, stop: np.ndarray | None) -> np.ndarray:
@@ -278,13 +278,6 @@ class InformationRate:
         if view.planar:
             viewpoints[:, 2] = here[2]
         return viewpoints
-
-
-def _in_grid_units(view: RobotView, viewpoint: np.ndarray) -> np.ndarray:
-    """(5,) a viewpoint with its place in grid units."""
-    grid, converted = view.scenario.grid, viewpoint.copy()
-    converted[:3] = (converted[:3] - np.asarray(grid.origin_m)) / grid.voxel_size_m
-    return converted
 
 
 def _nearby_space(view: RobotView) -> tuple[int, float, np.ndarray]:

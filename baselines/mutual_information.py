@@ -27,14 +27,15 @@ import numpy as np
 
 from baselines.candidates import CANDIDATE, FACTORS, MATE, best_candidate, steep_voxels
 from baselines.strategy import random_viewpoint
+from baselines.viewpoints import announced_cone
 from entropy_explore_env.belief.lattice import new_lattice
 from entropy_explore_env.belief.raycast import longest_crossing
-from entropy_explore_env.belief.visibility import CONE, cone_of, mark_cone
+from entropy_explore_env.belief.visibility import CONE, mark_cone
 from entropy_explore_env.config import Scenario
 from entropy_explore_env.errors import SettingError
-from entropy_explore_env.missions.view import RobotView, TeammateView
+from entropy_explore_env.missions.view import RobotView
 from entropy_explore_env.robots.motion import MoveEnd
-from entropy_explore_env.settings import Grid, RobotKind, gaussian_entropy_bits
+from entropy_explore_env.settings import RobotKind, gaussian_entropy_bits
 from entropy_explore_env.validation import check, check_kind, check_not_negative, check_positive
 
 _ALIKE_RAD = math.radians(15.0)
@@ -175,7 +176,7 @@ class MutualInformation:
         """(5,) the viewpoint of eq. 13, map frame; None if no candidate is worth anything."""
         grid, settings = view.scenario.grid, self.coordination
         edge, origin = grid.voxel_size_m, np.asarray(grid.origin_m)
-        position = (view.pose[:3] - origin) / edge
+        position = grid.in_grid_units(view.pose)[:3]
         depth_m = max(view.depth_m, settings.least_radius_m)
         most_m = min(settings.most_radius_m, view.kind.robot.reach_m, float(grid.size_m.sum()))
         radius = min(depth_m, most_m) / edge
@@ -251,26 +252,12 @@ class MutualInformation:
             mate = view.teammates[number]
             under_way = mate.announced_s >= mate.heard_s
             touching_m = own_m + view.scenario.kind_of(number).robot.body_radius_m
-            heard[place]["begin"] = _in_grid_units(grid, mate.pose)[:3]
-            heard[place]["end"] = _in_grid_units(grid, mate.viewpoint if under_way else mate.pose)[:3]
+            heard[place]["begin"] = grid.in_grid_units(mate.pose)[:3]
+            heard[place]["end"] = grid.in_grid_units(mate.viewpoint if under_way else mate.pose)[:3]
             heard[place]["touching"] = touching_m / grid.voxel_size_m if settings.teammates_block else -1.0
             if settings.overlap and mate.announced_s >= 0.0 and mate.depth_m > 0.0:
                 mark_cone(announced_cone(grid, mate), grid.shape, sight, self._marks)
         return heard
-
-
-def announced_cone(grid: Grid, mate: TeammateView) -> np.void:
-    """The CONE that a teammate announced: V(Yˢ, r̂, α̂)."""
-    cones = np.zeros(1, CONE)
-    viewpoint = _in_grid_units(grid, mate.viewpoint)
-    cones[0] = cone_of(viewpoint, mate.depth_m / grid.voxel_size_m, mate.half_angle_rad)
-    return cones[0]
-
-
-def _in_grid_units(grid: Grid, viewpoint: np.ndarray) -> np.ndarray:
-    converted = viewpoint.copy()
-    converted[:3] = (converted[:3] - np.asarray(grid.origin_m)) / grid.voxel_size_m
-    return converted
 
 
 def _alike(one: np.ndarray, other: np.ndarray, voxel_size_m: float) -> bool:

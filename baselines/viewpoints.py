@@ -6,17 +6,19 @@ For strategies that weigh many viewpoints; grid units, seconds, bits.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from entropy_explore_env.belief.lattice import KNOWN_RATIO, Lattice, new_lattice
 from entropy_explore_env.belief.raycast import OPEN, STOP_AT_COVERED, cast_ray, longest_crossing
-from entropy_explore_env.belief.visibility import SIGHT, expected_scan_bits
+from entropy_explore_env.belief.visibility import CONE, SIGHT, cone_of, expected_scan_bits
 from entropy_explore_env.compilation import lean_kernel
 from entropy_explore_env.config import Scenario
+from entropy_explore_env.missions.view import TeammateView
 from entropy_explore_env.robots.motion import driving_time, turning_time
-from entropy_explore_env.settings import RobotKind, centred_angles
+from entropy_explore_env.settings import Grid, RobotKind, centred_angles
 
 
 class Build(NamedTuple):
@@ -56,6 +58,25 @@ def build_of(scenario: Scenario, kind: RobotKind, thinning: int = 2, blocking: f
         lattice=new_lattice(grid.shape, kind.robot.body_radius_m / edge, scenario.layer_of(kind.robot)),
         crossing=longest_crossing(*grid.shape, sensor.max_range_m / edge, sensor.voxels_behind + 1),
     )
+
+
+def new_scratch(grid: Grid, builds: Sequence[Build]) -> tuple[np.ndarray, ...]:
+    """Working space of the kernels below, and of `expected_scan_bits`, for robots of these kinds."""
+    longest = max(build.crossing for build in builds) + sum(grid.shape)
+    return (
+        np.zeros(grid.voxels, np.float32),
+        np.zeros(grid.voxels, np.int32),
+        np.zeros(longest, np.int32),
+        np.zeros(longest, np.int64),
+    )
+
+
+def announced_cone(grid: Grid, mate: TeammateView) -> np.void:
+    """The CONE that a teammate announced, in grid units: V(Yˢ, r̂, α̂) (RochaMI)."""
+    cones = np.zeros(1, CONE)
+    depth = mate.depth_m / grid.voxel_size_m
+    cones[0] = cone_of(grid.in_grid_units(mate.viewpoint), depth, mate.half_angle_rad)
+    return cones[0]
 
 
 @lean_kernel

@@ -21,7 +21,7 @@ from baselines.occupancy_entropy import (
     filtered,
 )
 from baselines.strategy import random_viewpoint
-from baselines.viewpoints import Build, build_of, free_by_belief, weigh_viewpoints
+from baselines.viewpoints import Build, build_of, free_by_belief, new_scratch, weigh_viewpoints
 from baselines.voronoi_control import (
     CellSearch,
     gradient_step,
@@ -109,13 +109,7 @@ class VoronoiCoverage:
         self._builds = [build_of(scenario, kind) for kind in scenario.kinds]
         self._space, self._inner = new_tessellation(grid.shape), new_tessellation(grid.shape)
         self._entropy = np.empty(grid.shape, np.float32)
-        longest = max(build.crossing for build in self._builds) + sum(grid.shape)
-        self._scratch = (
-            np.zeros(grid.voxels, np.float32),
-            np.zeros(grid.voxels, np.int32),
-            np.zeros(longest, np.int32),
-            np.zeros(longest, np.int64),
-        )
+        self._scratch = new_scratch(grid, self._builds)
 
     def choose(self, views: Sequence[RobotView]) -> list[np.ndarray]:
         """The viewpoint of each view, by its own belief and where it last heard the others."""
@@ -236,7 +230,7 @@ class VoronoiCoverage:
         mean, size = view.mean.reshape(-1), view.scenario.grid.shape
         radius = view.kind.robot.body_radius_m / view.scenario.grid.voxel_size_m
         x, y, z = (way / length).tolist()
-        start = _in_grid_units(view, view.pose)
+        start = view.scenario.grid.in_grid_units(view.pose)
         return bool(free_by_belief(mean, size, start, (x, y, z), length, radius, self._scratch))
 
     def _gazing(self, view: RobotView, viewpoint: np.ndarray) -> np.ndarray:
@@ -248,7 +242,7 @@ class VoronoiCoverage:
         yaws = view.pose[3] + np.arange(_GAZES) * (2.0 * math.pi / _GAZES)
         pitches = (0.0,) if view.planar else _PITCHES
         gazes = np.stack(np.meshgrid(yaws, pitches, indexing="ij"), axis=-1).reshape(-1, 2)
-        drawn = np.tile(_in_grid_units(view, viewpoint), (len(gazes), 1))
+        drawn = np.tile(view.scenario.grid.in_grid_units(viewpoint), (len(gazes), 1))
         drawn[:, 3:] = gazes
         bits, seconds = np.zeros(len(drawn)), np.zeros(len(drawn))
         weigh_viewpoints(
@@ -256,7 +250,7 @@ class VoronoiCoverage:
             view.precision.reshape(-1),
             view.scenario.grid.shape,
             view.scenario.grid.voxel_size_m,
-            _in_grid_units(view, view.pose),
+            view.scenario.grid.in_grid_units(view.pose),
             drawn,
             build.yaws,
             build.pitches,
@@ -273,13 +267,6 @@ class VoronoiCoverage:
 
     def _build(self, view: RobotView) -> Build:
         return self._builds[view.robot % len(self._builds)]
-
-
-def _in_grid_units(view: RobotView, pose: np.ndarray) -> np.ndarray:
-    """(5,) a pose with its place in grid units."""
-    out, grid = pose.copy(), view.scenario.grid
-    out[:3] = (pose[:3] - np.asarray(grid.origin_m)) / grid.voxel_size_m
-    return out
 
 
 def _voxel(view: RobotView, pose: np.ndarray) -> int:

@@ -35,8 +35,7 @@ class TeamCoverage:
         known = missions.scenario.ending.sigma_end**-2
         cones = np.zeros(len(robots), CONE)
         for place, robot in enumerate(robots):
-            viewpoint = robot["target"].copy()
-            viewpoint[:3] = (viewpoint[:3] - np.asarray(grid.origin_m)) / grid.voxel_size_m
+            viewpoint = grid.in_grid_units(robot["target"])
             depth = float(robot["depth_m"]) / grid.voxel_size_m
             cones[place] = cone_of(viewpoint, depth, float(robot["half_angle_rad"]))
         marks, shared = np.zeros(grid.voxels, np.uint8), 0.0
