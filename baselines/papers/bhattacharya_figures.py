@@ -7,6 +7,7 @@ import math
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from scipy import ndimage
 
 from baselines.figures import COLOURS
 from baselines.papers.bhattacharya_runs import Record, Run
@@ -14,6 +15,7 @@ from baselines.papers.bhattacharya_split import SHAPE, robot_cells, split, unkno
 from entropy_explore_env.belief.geodesic_cells import new_tessellation, tessellate
 
 _PALE = 0.72
+_BORDER = (0.12, 0.47, 0.71)
 
 
 def _cell_picture(occupied: np.ndarray, cells: np.ndarray) -> np.ndarray:
@@ -99,17 +101,23 @@ def figure_6(run: Run, record: Record, maps: dict[str, np.ndarray], title: str) 
         picture[:, :, 0] = picture[:, :, 2] = 1.0 - 0.75 * np.clip((entropy - 0.3) / 0.7, 0.0, 1.0)
         picture[cells < 0] = 0.55
         picture[maps[f"occupied_{number}"]] = 0.1
+        picture[_borders(cells)] = _BORDER
         axes.imshow(picture.transpose(1, 0, 2), origin="lower", interpolation="nearest")
-        for robot in range(run.robots):
-            levels = (cells == robot).T.astype(float)
-            if levels.any() and not levels.all():
-                axes.contour(levels, levels=[0.5], colors="tab:blue", linewidths=0.7)
         _ways(axes, places[:iteration], width)
         _bare(axes, f"iteration {iteration}")
     for axes in all_axes[moments:]:
         axes.set_visible(False)
     figure.suptitle(f"Fig. 6: {title}", x=0.01, ha="left")
     return figure
+
+
+def _borders(cells: np.ndarray) -> np.ndarray:
+    """(X, Y) bool, where two robots' cells meet, drawn wide enough to be seen; walls are no border."""
+    border = np.zeros(cells.shape, bool)
+    for axis in range(2):
+        here, there = np.moveaxis(cells, axis, 0)[:-1], np.moveaxis(cells, axis, 0)[1:]
+        np.moveaxis(border, axis, 0)[:-1] |= (here != there) & (here >= 0) & (there >= 0)
+    return ndimage.binary_dilation(border, iterations=max(len(cells) // 330, 1)) & (cells >= 0)
 
 
 def figure_progress(lines: list[tuple[str, Record]]) -> Figure:
