@@ -300,6 +300,18 @@ def ratio_interval(
     return (float(pairs[:, 0].mean() / pairs[:, 1].mean()), *_central(means[:, 0] / means[:, 1]))
 
 
+def median_ratio_interval(
+    upper: Sequence[float] | np.ndarray, lower: Sequence[float] | np.ndarray
+) -> tuple[float, float, float]:
+    """Ratio of two medians over the same seeds, and its 95 % interval (paired bootstrap)."""
+    pairs = np.stack([np.asarray(upper, float), np.asarray(lower, float)], axis=1)
+    medians = np.median(_resampled(pairs, len(pairs)), axis=1)
+    return (
+        float(np.median(pairs[:, 0]) / np.median(pairs[:, 1])),
+        *_central(medians[:, 0] / medians[:, 1]),
+    )
+
+
 def _resampled(sample: np.ndarray, size: int) -> np.ndarray:
     """(resamples, size, …) draws with replacement, always the same ones."""
     rows = np.random.default_rng(0).integers(len(sample), size=(_RESAMPLES, size))

@@ -18,16 +18,23 @@ from baselines import strategies
 def sources_digest(strategy: str, *modules: ModuleType) -> str:
     """Digest of the library, of a strategy with all that it imports of `baselines`, and of some modules.
 
-    Other strategies are not part of it, so that a new one leaves the results of the old ones in place.
+    Other strategies are not part of it, so that a new one leaves the results of the old ones in place. Of a
+    learned policy its weights count, and what runs it.
 
     Args:
         strategy: Its name.
         modules: Whatever else makes the results; what they import does not count.
     """
-    made_by = strategies.STRATEGIES[strategy]
     files = {Path(module.__file__) for module in modules if module.__file__}
-    files |= {_file_of(name) for name in imported(_maker(made_by).__module__)}
-    hasher = hashlib.sha256(_library_digest() + repr(_described(made_by)).encode())
+    if strategies.is_learned(strategy):
+        policies = strategies.learned_policies()
+        files |= set(policies.policy_files(strategy))
+        described: tuple[Any, ...] = (policies.__name__,)
+    else:
+        made_by = strategies.STRATEGIES[strategy]
+        files |= {_file_of(name) for name in imported(_maker(made_by).__module__)}
+        described = _described(made_by)
+    hasher = hashlib.sha256(_library_digest() + repr(described).encode())
     for file in sorted(files):
         hasher.update(file.read_bytes())
     return hasher.hexdigest()

@@ -1,10 +1,12 @@
-"""The strategies by name."""
+"""The strategies by name: scripted ones, and learned policies by where they lie."""
 
 from __future__ import annotations
 
+import importlib
 from collections.abc import Callable
 from functools import partial
-from types import MappingProxyType
+from pathlib import Path
+from types import MappingProxyType, ModuleType
 
 from baselines.gradient import GradientStrategy
 from baselines.information_rate import InformationRate, Weighing
@@ -12,7 +14,7 @@ from baselines.mutual_information import Coordination, MutualInformation
 from baselines.random_walk import RandomWalk
 from baselines.strategy import Strategy
 from baselines.voronoi import Coverage, VoronoiCoverage
-from entropy_explore_env.errors import SettingError
+from entropy_explore_env.errors import MissingExtraError, SettingError
 
 STRATEGIES: MappingProxyType[str, Callable[[], Strategy]] = MappingProxyType(
     {
@@ -34,12 +36,44 @@ STRATEGIES: MappingProxyType[str, Callable[[], Strategy]] = MappingProxyType(
 """Name → a function that makes the strategy."""
 
 
+_LEARNED = "training.policy"
+"""Makes strategies of learned policies. It is looked up when one is asked for, so that strategies need
+neither trainers nor networks."""
+_PRETRAINED = "pretrained:"
+
+
 def make_strategy(name: str) -> Strategy:
     """A new strategy.
 
+    Args:
+        name: One of STRATEGIES; or `pretrained:NAME`, a policy that comes with the project; or the folder of
+            a policy that was trained.
+
     Raises:
         SettingError: None has this name.
+        MissingExtraError: A policy was asked for, and what runs it is not installed.
     """
-    if name not in STRATEGIES:
-        raise SettingError("strategy", name, "one of " + ", ".join(STRATEGIES))
-    return STRATEGIES[name]()
+    if name in STRATEGIES:
+        return STRATEGIES[name]()
+    if is_learned(name):
+        return learned_policies().make_policy_strategy(name)
+    raise SettingError(
+        "strategy", name, f"one of {', '.join(STRATEGIES)}, {_PRETRAINED}NAME or a policy's folder"
+    )
+
+
+def is_learned(name: str) -> bool:
+    """Whether a name means a learned policy."""
+    return name not in STRATEGIES and (name.startswith(_PRETRAINED) or Path(name).is_dir())
+
+
+def learned_policies() -> ModuleType:
+    """The module that knows learned policies.
+
+    Raises:
+        MissingExtraError: What runs them is not installed.
+    """
+    try:
+        return importlib.import_module(_LEARNED)
+    except ModuleNotFoundError as error:
+        raise MissingExtraError(error.name or "torch", "training") from None

@@ -332,18 +332,22 @@ class Action:
     """How a viewpoint is written as an action.
 
     Attributes:
-        kind: `continuous`, a Box(-1, 1); or `discrete`, voxels within reach × gaze directions.
+        kind: `continuous`, a Box(-1, 1); or `discrete`, moves by whole voxels × gaze directions.
+        moves: Discrete moves: `all` voxels within reach, or `axes`: stay, and as far as reach and voxels
+            allow along each axis, both ways, which is 7 moves (5 of planar robots) to learn from.
         yaws: Discrete gazes around the horizon.
         pitches: Discrete gazes up and down, from -π/4 to π/4; planar robots have one, level.
     """
 
     kind: Literal["continuous", "discrete"] = "continuous"
+    moves: Literal["all", "axes"] = "all"
     yaws: int = 16
     pitches: int = 3
 
     def __post_init__(self) -> None:
         """Check every field."""
         check_choice(self, "kind", Literal["continuous", "discrete"])
+        check_choice(self, "moves", Literal["all", "axes"])
         check_count(self, "yaws", 1, 360)
         check_count(self, "pitches", 1, 90)
 
@@ -365,6 +369,8 @@ class Observation:
         overview_shape: Cells of the pooled belief along x, y and z, at most the world's.
         action_mask: Discrete actions: whether the mask is part of the observation, too.
         flat: One Box of all parts, in the order of this list.
+        while_busy: Whether robots that cannot choose observe, too. False: they observe zeros until they
+            decide or the mission is over, which costs nothing.
     """
 
     panorama: bool = True
@@ -379,10 +385,11 @@ class Observation:
     overview_shape: tuple[int, int, int] = (8, 8, 4)
     action_mask: bool = False
     flat: bool = False
+    while_busy: bool = True
 
     def __post_init__(self) -> None:
         """Check every field."""
-        for name in ("panorama", "own", "team", "patch", "overview", "action_mask", "flat"):
+        for name in ("panorama", "own", "team", "patch", "overview", "action_mask", "flat", "while_busy"):
             check_kind(self, name, bool)
         if self.panorama_yaws is not None:
             check_count(self, "panorama_yaws", 1, 360)

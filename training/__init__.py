@@ -1,1 +1,1 @@
-"""Trainers, one script each, and what turns a trained policy into a strategy."""
+"""Learning a policy: trainers, networks, checkpoints, and a policy as a strategy."""

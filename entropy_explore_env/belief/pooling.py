@@ -57,6 +57,29 @@ def normalised_entropy(prior_precision, end_precision, precision):
 
 
 @lean_kernel
+def pool_belief(cells, sums, ends, mean, precision):
+    """Fill the sums of a whole belief.
+
+    Args:
+        cells: The Cells.
+        sums: (2, C) float64, filled in.
+        ends: (prior, end) precision between which entropy is normalised.
+        mean: (V,) float32.
+        precision: (V,) float32.
+    """
+    for cell in range(sums.shape[1]):
+        sums[0, cell] = sums[1, cell] = 0.0
+    voxel = 0
+    for i in range(cells.size[0]):
+        for j in range(cells.size[1]):
+            for k in range(cells.size[2]):
+                cell = cells.x[i] + cells.y[j] + cells.z[k]
+                sums[0, cell] += normalised_entropy(ends[0], ends[1], np.float64(precision[voxel]))
+                sums[1, cell] += np.float64(mean[voxel])
+                voxel += 1
+
+
+@lean_kernel
 def fuse_pooled_ray(cells, sums, ends, mean, precision, crossed, coverage, free, n, measured):
     """Like `fuse_ray`; the sums of the cells that the ray crosses follow.
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -94,7 +94,7 @@ class EntropyExploreVectorEnv(VectorEnv[Any, Any, Any]):
         self._painters = [Painter(render_mode, mission) for mission in range(painted)]
 
     def reset(
-        self, *, seed: int | list[int | None] | None = None, options: dict[str, Any] | None = None
+        self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Any, dict[str, Any]]:
         """Start all missions, or those of `options["reset_mask"]` (E,) bool.
 
@@ -128,7 +128,7 @@ class EntropyExploreVectorEnv(VectorEnv[Any, Any, Any]):
             painter.watch(self.missions)
         return self._observations(), self._infos()
 
-    def _seeds(self, seed: int | list[int | None] | None) -> list[int | None]:
+    def _seeds(self, seed: int | Sequence[int | None] | None) -> list[int | None]:
         if seed is None or isinstance(seed, int | np.integer):
             first = None if seed is None else check_seed(seed)
             return [None if first is None else first + mission for mission in range(self.num_envs)]

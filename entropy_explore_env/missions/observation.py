@@ -21,8 +21,8 @@ Parts, in this order, each only if the scenario's settings ask for it (D directi
     action_mask (N,)       1 for each discrete action that makes sense
 
 Normalised entropy is 1 at the prior and 0 at the voxel entropy that ends a mission (clipped).
-A busy robot observes from where it is under way. Only a robot's own belief and what it heard over
-the channel enter.
+A busy robot observes from where it is under way, or zeros if the scenario says so. Only a robot's own
+belief and what it heard over the channel enter.
 """
 
 from __future__ import annotations
@@ -168,6 +168,8 @@ class ObservationRules(NamedTuple):
     patch_shape: tuple[int, int, int]
     kinds: int
     """K, of robots; 0 if all are alike."""
+    while_busy: bool
+    """Whether robots that do not decide observe, too."""
 
 
 def observation_rules(scenario: Scenario, layout: ObservationLayout) -> ObservationRules:
@@ -178,6 +180,7 @@ def observation_rules(scenario: Scenario, layout: ObservationLayout) -> Observat
         *(begin.get(name, -1) for name in ("panorama", "self", "team", "patch", "overview", "action_mask")),
         patch_shape=(int(patch[0]), int(patch[1]), int(patch[2])),
         kinds=len(scenario.kinds) if len(scenario.kinds) > 1 else 0,
+        while_busy=scenario.observation.while_busy,
     )
 
 
@@ -323,6 +326,43 @@ def observe_overview(cells, sums, out):
 
 
 @lean_kernel
+def observe_robot(
+    rules, parts, robot, pose, time_s, entropy_bits, deciding, heard, mean, precision, pooled, scan, out
+):
+    """Fill the flat observation of one robot.
+
+    Args:
+        rules: The scenario.
+        parts: Its ObservationRules.
+        robot: The robot's number.
+        pose: (x, y, z, yaw, pitch), where it is now.
+        time_s: Now.
+        entropy_bits: Entropy of its map.
+        deciding: Whether it decides.
+        heard: (A,) HEARD, what it heard of each teammate.
+        mean: (V,) float32, its expected coverage.
+        precision: (V,) float32, 1/σ² of it.
+        pooled: (2, C) float64, sums over the cells of the overview.
+        scan: Scratch space.
+        out: (F,) float32, filled in.
+    """
+    numbers = rules.numbers[robot]
+    start = grid_position(numbers, pose)
+    if parts.panorama >= 0:
+        observe_panorama(rules, robot, start, mean, precision, scan, out[parts.panorama :])
+    if parts.own >= 0:
+        observe_self(numbers, parts.kinds, pose, time_s, entropy_bits, deciding, out[parts.own :])
+    if parts.team >= 0:
+        observe_team(numbers, robot, pose, time_s, heard, out[parts.team :])
+    if parts.patch >= 0:
+        observe_patch(numbers, parts.patch_shape, robot, start, mean, precision, heard, out[parts.patch :])
+    if parts.overview >= 0:
+        observe_overview(rules.cells, pooled, out[parts.overview :])
+    if parts.action_mask >= 0:
+        write_mask(rules, robot, start, mean, out[parts.action_mask :])
+
+
+@lean_kernel
 def observe_mission(rules, parts, state, scan, mission, out):
     """Fill the flat observations of a mission's robots, each from where it is now.
 
@@ -334,24 +374,25 @@ def observe_mission(rules, parts, state, scan, mission, out):
         mission: Which mission.
         out: (A, F) float32, filled in.
     """
-    time_s = state.missions[mission].time_s
+    time_s, over = state.missions[mission].time_s, state.missions[mission].end != 0
     for robot in range(state.robots.shape[1]):
-        numbers = rules.numbers[robot]
-        own, heard, row = state.robots[mission, robot], state.heard[mission, robot], out[robot]
-        mean, precision = state.mean[mission, robot], state.precision[mission, robot]
-        pose = pose_at(numbers, own, time_s)
-        start = grid_position(numbers, pose)
-        if parts.panorama >= 0:
-            observe_panorama(rules, robot, start, mean, precision, scan, row[parts.panorama :])
-        if parts.own >= 0:
-            observe_self(numbers, parts.kinds, pose, time_s, own.entropy_bits, own.deciding, row[parts.own :])
-        if parts.team >= 0:
-            observe_team(numbers, robot, pose, time_s, heard, row[parts.team :])
-        if parts.patch >= 0:
-            observe_patch(
-                numbers, parts.patch_shape, robot, start, mean, precision, heard, row[parts.patch :]
-            )
-        if parts.overview >= 0:
-            observe_overview(rules.cells, state.pooled[mission, robot], row[parts.overview :])
-        if parts.action_mask >= 0:
-            write_mask(rules, robot, start, mean, row[parts.action_mask :])
+        own = state.robots[mission, robot]
+        if not (parts.while_busy or own.deciding or over):
+            for number in range(out.shape[1]):
+                out[robot, number] = 0.0
+            continue
+        observe_robot(
+            rules,
+            parts,
+            robot,
+            pose_at(rules.numbers[robot], own, time_s),
+            time_s,
+            own.entropy_bits,
+            own.deciding,
+            state.heard[mission, robot],
+            state.mean[mission, robot],
+            state.precision[mission, robot],
+            state.pooled[mission, robot],
+            scan,
+            out[robot],
+        )

@@ -171,8 +171,9 @@ def gaze_set(yaws: int, pitches: int) -> np.ndarray:
 def discrete_moves(scenario: Scenario) -> np.ndarray:
     """(K, 3) int64 voxel offsets within reach, the nearest first; the first is to stay.
 
-    The reach is the longest one of the team; a team of planar robots has none that change height. (1, 3)
-    zeros where actions are not discrete.
+    The reach is the longest one of the team; a team of planar robots has none that change height. Where the
+    scenario asks for moves along the axes, the farthest one each way. (1, 3) zeros where actions are not
+    discrete.
     """
     if scenario.action.kind != "discrete":
         return np.zeros((1, 3), np.int64)
@@ -184,7 +185,11 @@ def discrete_moves(scenario: Scenario) -> np.ndarray:
     steps = [np.arange(-most, most + 1) for most in farthest]
     offsets = np.stack(np.meshgrid(*steps, indexing="ij"), axis=-1).reshape(-1, 3)
     lengths = np.sqrt((offsets**2).sum(axis=1))
-    offsets, lengths = offsets[lengths <= reach], lengths[lengths <= reach]
+    wanted = lengths <= reach
+    if scenario.action.moves == "axes":
+        wanted &= ((offsets == 0) | (np.abs(offsets) == farthest)).all(axis=1)
+        wanted &= (offsets != 0).sum(axis=1) <= 1
+    offsets, lengths = offsets[wanted], lengths[wanted]
     return np.ascontiguousarray(offsets[np.argsort(lengths, kind="stable")], np.int64)
 
 

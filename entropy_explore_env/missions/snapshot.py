@@ -1,0 +1,65 @@
+"""Missions as plain arrays and back, bitwise: what a file needs so that they go on where they were."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from entropy_explore_env.errors import RecordError
+from entropy_explore_env.missions.missions import Missions
+
+_DRAWN = ("truth", "blocked", "visible")
+"""State that follows from a mission's seed and episode."""
+
+
+def snapshot(missions: Missions) -> dict[str, np.ndarray]:
+    """All that changes in missions, for `restore`.
+
+    Returns:
+        Arrays without Python objects, so that NumPy writes and reads them without pickle: `seeds` and
+        `episodes` (E,), `observations` (E, A, F) and the arrays of the MissionState, but for what the seeds
+        say.
+    """
+    state = missions.state._asdict()
+    kept = {name: array.copy() for name, array in state.items() if name not in _DRAWN}
+    kept["seeds"] = np.array([str(seed) for seed in missions.seeds])
+    kept["episodes"] = np.array(missions.episodes, np.int64)
+    kept["observations"] = missions.observations.copy()
+    return kept
+
+
+def restore(missions: Missions, arrays: Mapping[str, np.ndarray]) -> None:
+    """Put missions where others of the same scenario were.
+
+    Args:
+        missions: Of the same scenario and number.
+        arrays: As `snapshot` gave them.
+
+    Raises:
+        RecordError: An array is missing or does not fit these missions. Nothing has changed then.
+    """
+    expected = {**missions.state._asdict(), "observations": missions.observations}
+    expected["episodes"] = np.zeros(missions.count, np.int64)
+    for name, array in expected.items():
+        if name not in _DRAWN:
+            check_array(name, arrays.get(name), array)
+    seeds = arrays.get("seeds")
+    if seeds is None or seeds.shape != (missions.count,) or not all(str(seed).isdecimal() for seed in seeds):
+        raise RecordError("seeds", seeds, f"{missions.count} whole numbers ≥ 0")
+    for mission in range(missions.count):
+        missions.seeds[mission] = int(str(seeds[mission]))
+        missions.episodes[mission] = int(arrays["episodes"][mission]) - 1
+        first = missions.seeds[mission] if missions.episodes[mission] < 0 else None
+        missions.begin(missions.draw([mission], [first]))
+    for name, array in missions.state._asdict().items():
+        if name not in _DRAWN:
+            array[...] = arrays[name]
+    missions.observations[...] = arrays["observations"]
+
+
+def check_array(name: str, given: np.ndarray | None, expected: np.ndarray) -> None:
+    """Raise a RecordError unless an array has the shape and type of the one that it stands for."""
+    if given is None or given.shape != expected.shape or given.dtype != expected.dtype:
+        found = None if given is None else (given.shape, str(given.dtype))
+        raise RecordError(name, found, f"{expected.shape}, {expected.dtype}, as these missions have")

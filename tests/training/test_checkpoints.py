@@ -1,0 +1,240 @@
+"""Checkpoints come back as they were; what is broken, foreign or of something else is named."""
+
+from __future__ import annotations
+
+import json
+import pickle
+import shutil
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import torch
+from safetensors.torch import save_file
+
+from baselines.mission import run_mission
+from baselines.run import main as run_main
+from baselines.sources import sources_digest
+from baselines.strategies import make_strategy
+from entropy_explore_env.command import BAD_INPUT
+from entropy_explore_env.config import with_settings
+from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
+from entropy_explore_env.errors import SettingError
+from entropy_explore_env.scenarios import find_scenario
+from training import evaluate
+from training.checkpoints import (
+    Checkpoint,
+    PolicySettings,
+    checkpoint_name,
+    latest_checkpoint,
+    load_checkpoint,
+    save_checkpoint,
+)
+from training.errors import CheckpointError
+from training.policy import LearnedPolicy, load_policy, make_policy, scale_arrays, weights_of
+from training.scales import RunningScale
+from training.seeds import learning_seeds, validation_seeds
+
+FORM = {"robots": 2, "action": {"kind": "discrete", "moves": "axes"}, "observation": {"flat": True}}
+SCENARIO = with_settings(find_scenario("box-7x11x5"), FORM)
+SETTINGS = PolicySettings(SCENARIO, "vector", (6, 5))
+
+
+def fresh(settings: PolicySettings = SETTINGS) -> Checkpoint:
+    policy = make_policy(settings)
+    scale = RunningScale(policy.observation_space.shape[0])  # pyright: ignore
+    scales = scale_arrays("observations", scale) | scale_arrays("returns", RunningScale())
+    return Checkpoint(settings, {"steps": 12}, weights_of(policy), scales)
+
+
+@pytest.fixture
+def saved(tmp_path):
+    folder = tmp_path / "run" / checkpoint_name("best", 12)
+    save_checkpoint(folder, fresh())
+    return folder
+
+
+def test_a_checkpoint_comes_back_as_it_was(tmp_path):
+    kept = fresh()
+    kept.tensors = {"a": torch.arange(3), "b": torch.tensor(2.5)}
+    kept.arrays = {"x": np.array(["text"]), "y": np.zeros(2, [("p", "f8"), ("q", "?")])}
+    kept.numbers = {"big": 2**127}
+    save_checkpoint(tmp_path / "step-3", kept)
+    back = load_checkpoint(tmp_path / "step-3", training=True)
+    assert back.settings == kept.settings and back.progress == kept.progress and back.numbers == kept.numbers
+    for name in ("weights", "tensors"):
+        ours, theirs = getattr(kept, name), getattr(back, name)
+        assert ours.keys() == theirs.keys() and all(torch.equal(ours[key], theirs[key]) for key in ours)
+    assert all((back.arrays[name] == array).all() for name, array in kept.arrays.items())
+    assert all((back.scales[name] == array).all() for name, array in kept.scales.items())
+
+
+def test_the_latest_two_of_a_kind_stay_and_the_latest_is_taken(tmp_path):
+    for kind, steps in (("step", 1), ("step", 20), ("best", 7), ("step", 300)):
+        save_checkpoint(tmp_path / checkpoint_name(kind, steps), fresh())
+    assert sorted(path.name for path in tmp_path.iterdir()) == [
+        checkpoint_name("best", 7),
+        checkpoint_name("step", 20),
+        checkpoint_name("step", 300),
+    ]
+    assert latest_checkpoint(tmp_path, "best", "step").name == checkpoint_name("best", 7)
+    assert latest_checkpoint(tmp_path, "step").name == checkpoint_name("step", 300)
+    with pytest.raises(CheckpointError, match="a folder that"):
+        latest_checkpoint(tmp_path / "nowhere", "best")
+
+
+def spoil(folder: Path, what: str) -> None:
+    head, weights = folder / "policy.json", folder / "policy.safetensors"
+    if what == "missing":
+        weights.unlink()
+    elif what == "truncated":
+        weights.write_bytes(weights.read_bytes()[:-7])
+    elif what == "no head":
+        head.unlink()
+    elif what == "broken head":
+        head.write_bytes(b"\xff{" * 9)
+    elif what == "foreign":
+        head.write_text('["something else"]')
+    elif what == "pickled":
+        (folder / "normalisation.npz").write_bytes(pickle.dumps([1]))
+    else:
+        content = json.loads(head.read_text())
+        changes: dict[str, Any] = {
+            "format": {"format": 99},
+            "features": {"features": "magic"},
+            "hidden": {"hidden": [0]},
+            "scenario": {"scenario": {"name": 3}},
+            "digests": {"sha256": None},
+        }
+        head.write_text(json.dumps(content | changes[what]))
+
+
+@pytest.mark.parametrize(
+    "what",
+    "missing,truncated,no head,broken head,foreign,pickled,format,features,hidden,scenario,digests".split(
+        ","
+    ),
+)
+def test_what_is_broken_or_foreign_is_named(saved, what, capsys):
+    spoil(saved, what)
+    with pytest.raises(CheckpointError):
+        LearnedPolicy(saved)
+    words = ["box-7x11x5", "--robots", "2", "--strategy", str(saved.parent)]
+    from baselines.command import run_command
+
+    assert run_command(run_main, words) == BAD_INPUT
+    assert len(capsys.readouterr().err.splitlines()) == 1
+
+
+@pytest.mark.parametrize("what", ["missing", "shape", "more", "nan", "scale"])
+def test_weights_that_do_not_fit_are_named(tmp_path, what):
+    kept = fresh()
+    name = "action_net.weight"
+    if what == "missing":
+        del kept.weights[name]
+    elif what == "shape":
+        kept.weights[name] = kept.weights[name][:3].clone()
+    elif what == "more":
+        kept.weights["extra.weight"] = torch.zeros(2)
+    elif what == "nan":
+        kept.weights[name] = kept.weights[name] * np.nan
+    else:
+        kept.scales["observations_mean"] = np.zeros(2)
+    save_checkpoint(tmp_path / "step-1", kept)
+    with pytest.raises(CheckpointError, match="observations_mean" if what == "scale" else "weight"):
+        load_policy(load_checkpoint(tmp_path / "step-1"))
+
+
+def test_loading_runs_no_code(saved):
+    """An array of objects, which NumPy would unpickle, is refused even if its digest is right."""
+    import hashlib
+
+    array = np.array([{"any": "object"}], dtype=object)
+    np.savez(saved / "normalisation.npz", observations_mean=array)
+    head = json.loads((saved / "policy.json").read_text())
+    content = (saved / "normalisation.npz").read_bytes()
+    head["sha256"]["normalisation.npz"] = hashlib.sha256(content).hexdigest()
+    (saved / "policy.json").write_text(json.dumps(head))
+    with pytest.raises(CheckpointError, match="without objects"):
+        load_checkpoint(saved)
+    save_file({"a": torch.zeros(1)}, saved / "policy.safetensors")
+    with pytest.raises(CheckpointError, match="unchanged"):
+        load_checkpoint(saved)
+
+
+def test_a_policy_is_a_strategy_like_any_other(saved, tmp_path):
+    """Same seed, same mission; through any form of actions; a run's folder or a checkpoint's."""
+    ends = []
+    for name, action in ((saved, {}), (saved.parent, {}), (saved.parent, FORM["action"])):
+        settings = {"robots": 2, "decision_period_s": None, "time_limit_s": 60.0, "action": action}
+        env = EntropyExploreEnv("box-7x11x5", **settings)
+        run_mission(env, make_strategy(str(name)), 5)
+        ends.append([env.view(f"robot_{robot}").entropy_bits for robot in range(2)])
+    assert ends[0] == ends[1] and np.allclose(ends[0], ends[2], rtol=0.05)
+    before = sources_digest(str(saved))
+    torch.manual_seed(99)
+    save_checkpoint(saved, fresh())
+    assert sources_digest(str(saved)) != before
+
+
+@pytest.mark.parametrize(
+    ("settings", "named"),
+    [
+        ({"robots": 3}, "robots = 3"),
+        ({"robots": 2, "action": {"kind": "discrete"}}, "Scenario.action"),
+        ({"robots": 2, "others": find_scenario("office-mixed").others}, "observation self"),
+    ],
+)
+def test_a_policy_for_something_else_is_named(saved, settings, named):
+    scenario = with_settings(find_scenario("box-7x11x5"), settings)
+    with pytest.raises(CheckpointError, match=named):
+        LearnedPolicy(saved).reset(scenario, np.random.default_rng(0))
+
+
+def test_a_policy_of_one_grid_is_named_where_maps_differ(tmp_path):
+    form = {**FORM, "observation": {"flat": True, "overview": True}}
+    settings = PolicySettings(with_settings(find_scenario("box-7x11x5"), form), "maps", (4,))
+    save_checkpoint(tmp_path / "step-1", fresh(settings))
+    policy, wider = LearnedPolicy(tmp_path), with_settings(find_scenario("room"), {"robots": 2})
+    with pytest.raises(CheckpointError, match="overview"):
+        policy.reset(wider, np.random.default_rng(0))
+
+
+def test_an_unknown_policy_is_named():
+    with pytest.raises(SettingError, match="pretrained:cellar"):
+        make_strategy("pretrained:cellar")
+    with pytest.raises(SettingError, match="policy's folder"):
+        make_strategy("runs/nowhere")
+
+
+def test_seeds_of_learning_validation_and_tables_have_none_in_common():
+    learning = [seed for runner in range(4) for seed in learning_seeds(0, 64, runner)]
+    others = learning_seeds(1, 64)
+    assert len({*learning, *others}) == 5 * 64 and min(*learning, *others) >= 2**63
+    assert learning_seeds(0, 64) == learning[:64]
+    assert not {*learning, *others} & set(validation_seeds(1000)) and min(validation_seeds(1000)) >= 2**32
+
+
+def test_evaluate_puts_a_policy_beside_strategies(saved, tmp_path, capsys):
+    words = ["--strategy", str(saved.parent), "--against", "random,gradient", "--seeds", "3", "--jobs", "1"]
+    words += ["--runs", str(tmp_path / "missions")]
+    assert evaluate.run_command(evaluate.main, [*words, "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    rows = {row["strategy"]: row for row in found["rows"]}
+    assert list(rows) == [str(saved.parent), "random", "gradient"] and found["robots"] == 2
+    ours, theirs = rows[str(saved.parent)], rows["random"]
+    assert theirs["ratio"] == pytest.approx(ours["median_s"] / theirs["median_s"])
+    assert 0 <= theirs["faster"] <= 3 and found["better_rival"] in ("random", "gradient")
+    assert evaluate.run_command(evaluate.main, words) == 0  # from what is kept
+    assert "the policy beats those there on" in capsys.readouterr().out
+    assert evaluate.run_command(evaluate.main, [*words, "--robots", "3"]) == BAD_INPUT
+    assert "robots = 3" in capsys.readouterr().err
+    shutil.rmtree(saved.parent)
+    assert evaluate.run_command(evaluate.main, words) == BAD_INPUT
+
+
+def test_evaluation_takes_worlds_that_training_never_sees():
+    trained = PolicySettings(with_settings(find_scenario("room-furnished"), {"channel": {"burst": 7}}))
+    there = evaluate.evaluation_scenario(trained)
+    assert there.split == "test" and there.channel.burst == 7 and there.name == "room-furnished"

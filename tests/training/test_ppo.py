@@ -1,0 +1,215 @@
+"""Learning from one command: end to end, killed and resumed, and what it says to bad input."""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+
+from entropy_explore_env.command import BAD_INPUT
+from training import ppo
+from training.checkpoints import latest_checkpoint, load_checkpoint
+from training.decisions import DecisionBuffer
+from training.errors import NotFiniteError
+
+ROOT = Path(__file__).parents[2]
+TINY = (
+    "--scenario box-7x11x5 --robots 2 --missions 3 --threads 1 --rollout-steps 16 --batch 16 --epochs 2 "
+    "--hidden 8 8 --validation-missions 1 --time-limit-s 40 --validate-every 150 --checkpoint-every 90 --json"
+).split()
+
+
+def learn(out: Path, *more: str, steps: int = 384) -> int:
+    """The command in this process."""
+    return ppo.run_command(ppo.main, [*TINY, "--out", str(out), "--total-steps", str(steps), *more])
+
+
+def whole(out: Path) -> dict[str, bytes]:
+    """Every number of the latest checkpoint, bit for bit, but for how long it took."""
+    kept = load_checkpoint(latest_checkpoint(out, "step"), training=True)
+    tensors = {name: each.numpy() for name, each in (kept.weights | kept.tensors).items()}
+    bits = {name: numbers(each) for name, each in (tensors | kept.scales | kept.arrays).items()}
+    return bits | {"chance": json.dumps(kept.numbers["chance"]).encode()}
+
+
+def numbers(array: np.ndarray) -> bytes:
+    """The bits of an array, without those between the fields of a structured one."""
+    if array.dtype.names is None:
+        return array.tobytes()
+    return b"".join(numbers(array[name]) for name in array.dtype.names)
+
+
+@pytest.fixture(scope="module")
+def straight(tmp_path_factory):
+    """A run that nothing interrupted, and what it printed."""
+    out = tmp_path_factory.mktemp("straight") / "run"
+    done = subprocess.run(
+        [sys.executable, "-m", "training.ppo", *TINY, "--out", str(out), "--total-steps", "384"],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    return out, done
+
+
+def test_a_run_learns_and_leaves_what_it_should(straight):
+    out, done = straight
+    said = json.loads(done.stdout)
+    assert said["steps"] == 384 and set(said["best"]) >= {"steps", "mean_s", "finished"}
+    with (out / "curve.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    assert [int(row["steps"]) for row in rows] == [192, 384]
+    assert all(0.0 < float(row["median_s"]) <= 40.0 for row in rows)
+    assert (out / "best-mission" / "mission.gif").stat().st_size > 1000
+    assert list(out.glob("events.out.tfevents.*"))
+    first, last = (load_checkpoint(folder).weights for folder in sorted(out.glob("step-*")))
+    assert all(not torch.equal(first[name], last[name]) for name in first if name.endswith("weight"))
+
+
+def test_a_resumed_run_ends_bitwise_like_one_that_nothing_interrupted(straight, tmp_path, monkeypatch):
+    out = tmp_path / "run"
+
+    class Killed(BaseException):
+        """Stands for a kill: nothing of ours catches it."""
+
+    compute, rollouts = DecisionBuffer.compute_returns_and_advantage, []
+
+    def die(*args, **kwargs):
+        if len(rollouts) == 3:
+            raise Killed
+        rollouts.append(1)
+        return compute(*args, **kwargs)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(DecisionBuffer, "compute_returns_and_advantage", die)
+        with pytest.raises(Killed):
+            learn(out)
+    begun = latest_checkpoint(out, "step").name
+    assert 0 < int(begun.rpartition("-")[2]) < 384
+    assert learn(out, "--resume") == 0
+    assert whole(out) == whole(straight[0])
+    columns = ("steps", "mean_s", "median_s", "finished", "bits_per_bit")
+    curves = []
+    for run in (out, straight[0]):
+        with (run / "curve.csv").open() as file:
+            curves.append([[row[name] for name in columns] for row in csv.DictReader(file)])
+    assert curves[0] == curves[1]
+    assert load_checkpoint(latest_checkpoint(out, "best")).weights.keys()
+
+
+def test_a_run_that_is_killed_outright_goes_on(tmp_path, straight):
+    """With a real signal, at a moment that nobody chose."""
+    out = tmp_path / "run"
+    words = [sys.executable, "-m", "training.ppo", *TINY, "--out", str(out), "--total-steps", "384"]
+    with subprocess.Popen(words, cwd=ROOT, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as process:
+        deadline = time.monotonic() + 120
+        while not list(out.glob("step-*")) and process.poll() is None and time.monotonic() < deadline:
+            time.sleep(0.005)
+        process.send_signal(signal.SIGKILL)
+    assert learn(out, "--resume") == 0
+    assert whole(out) == whole(straight[0])
+
+
+def test_resuming_nothing_begins(tmp_path):
+    assert learn(tmp_path / "run", "--resume", steps=96) == 0
+
+
+def test_a_run_is_not_written_over_and_not_mixed_with_another(straight, capsys):
+    assert learn(straight[0]) == BAD_INPUT
+    assert "--resume to go on" in capsys.readouterr().err
+    assert learn(straight[0], "--resume", "--gamma", "0.5") == BAD_INPUT
+    assert capsys.readouterr().err.startswith("error: gamma = 0.5: allowed is 0.9, as in the run")
+    assert learn(straight[0], "--resume", "--channel.burst", "3") == BAD_INPUT
+    assert len(capsys.readouterr().err.splitlines()) == 1
+
+
+@pytest.mark.parametrize(
+    ("words", "named"),
+    [
+        (["--scenario", "cellar"], "cellar"),
+        (["--total-steps", "0"], "total_steps"),
+        (["--gamma", "0"], "gamma"),
+        (["--learning-rate", "nan"], "learning_rate"),
+        (["--entropy", "-1"], "entropy"),
+        (["--hidden", "0"], "hidden"),
+        (["--seed", "-1"], "seed"),
+        (["--patch"], "patch"),
+        (["--robots", "0"], "robots"),
+        (["--actions", "mixed"], "actions"),
+    ],
+)
+def test_bad_settings_are_one_line(tmp_path, capsys, words, named):
+    assert learn(tmp_path / "run", *words) == BAD_INPUT
+    said = capsys.readouterr().err.splitlines()
+    assert len(said) == 1 and named in said[0]
+    assert not (tmp_path / "run").exists()
+
+
+def test_a_folder_that_cannot_be_made_is_one_line(tmp_path, capsys):
+    (tmp_path / "file").write_text("")
+    assert learn(tmp_path / "file" / "run") == BAD_INPUT
+    assert len(capsys.readouterr().err.splitlines()) == 1
+
+
+@pytest.mark.parametrize("what", ["reward", "weights"])
+def test_what_is_not_finite_stops_the_run_and_leaves_the_last_good_checkpoint(
+    tmp_path, capsys, monkeypatch, what
+):
+    out, compute = tmp_path / "run", DecisionBuffer.compute_returns_and_advantage
+    add, steps = DecisionBuffer.add, []
+
+    def poisoned_add(self, obs, action, reward, *rest):
+        steps.append(1)
+        return add(self, obs, action, reward * np.nan if len(steps) > 40 else reward, *rest)
+
+    def poisoned_advantages(self, **given):
+        compute(self, **given)
+        steps.append(1)
+        if len(steps) > 2:
+            self.advantages[:] = np.inf
+
+    if what == "reward":
+        monkeypatch.setattr(DecisionBuffer, "add", poisoned_add)
+    else:
+        monkeypatch.setattr(DecisionBuffer, "compute_returns_and_advantage", poisoned_advantages)
+    assert learn(out) == BAD_INPUT
+    said = capsys.readouterr().err.splitlines()
+    assert len(said) == 1 and "finite" in said[0]
+    assert ("reward = nan" in said[0]) if what == "reward" else ("steps" in said[0])
+    kept = load_checkpoint(latest_checkpoint(out, "step"), training=True)
+    assert all(torch.isfinite(each).all() for each in kept.weights.values())
+
+
+def test_a_disk_that_is_full_leaves_the_last_good_checkpoint(tmp_path, capsys, monkeypatch):
+    out, fsync, calls = tmp_path / "run", os.fsync, []
+
+    def full(handle):
+        calls.append(1)
+        if list(out.glob("step-*")):
+            raise OSError(28, "No space left on device")
+        fsync(handle)
+
+    monkeypatch.setattr(os, "fsync", full)
+    assert learn(out) == BAD_INPUT
+    said = capsys.readouterr().err.splitlines()
+    assert len(said) == 1 and "No space left" in said[0]
+    monkeypatch.undo()
+    load_checkpoint(latest_checkpoint(out, "step"), training=True)
+    assert not list(out.glob(".*.unfinished"))
+    assert learn(out, "--resume") == 0
+
+
+def test_the_error_names_tensor_and_step():
+    assert str(NotFiniteError("train/loss", float("nan"), 12000)) == (
+        "train/loss = nan after 12,000 steps: allowed are finite numbers"
+    )

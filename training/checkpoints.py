@@ -1,0 +1,232 @@
+"""Checkpoints: a policy, and with it what a trainer needs to go on, in files that hold no code.
+
+A checkpoint is a folder that is there whole or not at all:
+
+    policy.json            the PolicySettings, how far training was, and each file's SHA-256
+    policy.safetensors     weights of the networks
+    normalisation.npz      means and deviations of observations and returns
+    training.safetensors   what only the trainer needs: the optimiser's state …
+    training.npz           … and the missions under way
+    training.json          … and random states, counts and the best score so far
+
+The last three are missing where only the policy is kept. Nothing is ever unpickled.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import json
+import os
+import shutil
+import zipfile
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from safetensors import SafetensorError
+from safetensors.torch import load as tensors_of
+from safetensors.torch import save as bytes_of
+
+from entropy_explore_env.config import Scenario
+from entropy_explore_env.errors import EntropyExploreError
+from entropy_explore_env.settings_json import scenario_of, settings_of
+from training.errors import CheckpointError
+from training.networks import FEATURES
+
+FORMAT = 1
+_KEPT = 2
+"""So many of the latest checkpoints of a run are kept, should the newest one be unreadable."""
+
+
+@dataclass(frozen=True)
+class PolicySettings:
+    """What a policy was made for, and from.
+
+    Attributes:
+        scenario: What it was trained in; it observes and acts as this says.
+        features: Which networks look at observations: a name of FEATURES.
+        hidden: Units of each hidden layer of actor and critic.
+    """
+
+    scenario: Scenario
+    features: str = "vector"
+    hidden: tuple[int, ...] = (128, 128)
+
+
+@dataclass
+class Checkpoint:
+    """What a checkpoint holds.
+
+    Attributes:
+        settings: Of the policy.
+        progress: What training says of itself: steps, seconds, the command, the latest validation.
+        weights: Of the networks.
+        scales: Arrays of the running scales.
+        tensors, arrays, numbers: What only the trainer needs; empty where only the policy is kept.
+    """
+
+    settings: PolicySettings
+    progress: dict[str, Any]
+    weights: dict[str, torch.Tensor]
+    scales: dict[str, np.ndarray]
+    tensors: dict[str, torch.Tensor] = field(default_factory=dict)
+    arrays: dict[str, np.ndarray] = field(default_factory=dict)
+    numbers: dict[str, Any] = field(default_factory=dict)
+
+
+def save_checkpoint(folder: Path, checkpoint: Checkpoint) -> None:
+    """Write a checkpoint; older ones of the same kind in the same place go, but for the latest.
+
+    Args:
+        folder: `…/KIND-STEPS`; it must not be there yet, or it is written anew.
+        checkpoint: What to keep.
+    """
+    files = {
+        "policy.safetensors": bytes_of(checkpoint.weights),
+        "normalisation.npz": _npz(checkpoint.scales),
+    }
+    if checkpoint.numbers:
+        files["training.safetensors"] = bytes_of(checkpoint.tensors)
+        files["training.npz"] = _npz(checkpoint.arrays)
+        files["training.json"] = _json(checkpoint.numbers)
+    files["policy.json"] = _json(
+        {
+            "format": FORMAT,
+            "features": checkpoint.settings.features,
+            "hidden": list(checkpoint.settings.hidden),
+            "progress": checkpoint.progress,
+            "sha256": {name: hashlib.sha256(content).hexdigest() for name, content in files.items()},
+            "scenario": settings_of(checkpoint.settings.scenario),
+        }
+    )
+    unfinished = folder.with_name(f".{folder.name}.unfinished")
+    shutil.rmtree(unfinished, ignore_errors=True)
+    try:
+        unfinished.mkdir(parents=True)
+        for name, content in files.items():
+            with (unfinished / name).open("wb") as file:
+                file.write(content)
+                file.flush()
+                os.fsync(file.fileno())
+        if folder.exists():
+            shutil.rmtree(folder)
+        unfinished.rename(folder)
+    except BaseException:
+        shutil.rmtree(unfinished, ignore_errors=True)
+        raise
+    kind = folder.name.rpartition("-")[0]
+    for old in _numbered(folder.parent, kind)[:-_KEPT]:
+        shutil.rmtree(old)
+
+
+def checkpoint_name(kind: str, steps: int) -> str:
+    """The name of a folder: names of one kind sort by steps."""
+    return f"{kind}-{steps:012d}"
+
+
+def _numbered(folder: Path, kind: str) -> list[Path]:
+    """The checkpoints of a kind, the oldest first."""
+    return sorted(path for path in folder.glob(f"{kind}-*") if path.name.rpartition("-")[2].isdecimal())
+
+
+def latest_checkpoint(folder: Path, *kinds: str) -> Path:
+    """The checkpoint that a folder is, or its latest one of the first kind that it has.
+
+    Raises:
+        CheckpointError: There is none.
+    """
+    if (folder / "policy.json").is_file():
+        return folder
+    for kind in kinds:
+        if there := _numbered(folder, kind):
+            return there[-1]
+    raise CheckpointError("checkpoint", str(folder), "a folder that training.ppo wrote")
+
+
+def load_checkpoint(folder: Path, training: bool = False) -> Checkpoint:
+    """Read a checkpoint.
+
+    Args:
+        folder: Of the checkpoint itself.
+        training: Whether the trainer's part is wanted, too.
+
+    Raises:
+        CheckpointError: It is missing, broken, foreign or of another format.
+    """
+    try:
+        head = json.loads((folder / "policy.json").read_text("utf-8"))
+    except (OSError, ValueError, RecursionError):
+        raise CheckpointError("checkpoint", str(folder), "a folder with a readable policy.json") from None
+    if not isinstance(head, dict) or head.get("format") != FORMAT:
+        found = head.get("format") if isinstance(head, dict) else head
+        raise CheckpointError(f"{folder / 'policy.json'}: format", found, f"{FORMAT}")
+    settings = _settings(folder, head)
+    digests = head.get("sha256")
+    if not isinstance(digests, dict) or not isinstance(head.get("progress"), dict):
+        raise CheckpointError(str(folder / "policy.json"), sorted(head), "a file with progress and sha256")
+    loaded = Checkpoint(
+        settings,
+        head["progress"],
+        _tensors(folder / "policy.safetensors", digests),
+        _arrays(folder / "normalisation.npz", digests),
+    )
+    if training:
+        loaded.tensors = _tensors(folder / "training.safetensors", digests)
+        loaded.arrays = _arrays(folder / "training.npz", digests)
+        loaded.numbers = json.loads(_content(folder / "training.json", digests))
+    return loaded
+
+
+def _settings(folder: Path, head: Mapping[str, Any]) -> PolicySettings:
+    """The PolicySettings that a head describes."""
+    features, hidden = head.get("features"), head.get("hidden")
+    if not isinstance(features, str) or features not in FEATURES:
+        raise CheckpointError(f"{folder}: features", features, "one of " + ", ".join(FEATURES))
+    if not isinstance(hidden, list) or not all(type(units) is int and 0 < units <= 65536 for units in hidden):
+        raise CheckpointError(f"{folder}: hidden", hidden, "a list of whole numbers from 1 to 65536")
+    try:
+        return PolicySettings(scenario_of(head.get("scenario", {})), features, tuple(hidden))
+    except EntropyExploreError as error:
+        raise CheckpointError(f"{folder}: scenario", str(error), "settings of this version") from None
+
+
+def _content(file: Path, digests: Mapping[str, Any]) -> bytes:
+    """A file's content, if it is what was written."""
+    try:
+        content = file.read_bytes()
+    except OSError as error:
+        raise CheckpointError(
+            "checkpoint", str(file), f"a file that can be read ({error.strerror})"
+        ) from None
+    if hashlib.sha256(content).hexdigest() != digests.get(file.name):
+        raise CheckpointError("checkpoint", str(file), "the file as it was written, whole and unchanged")
+    return content
+
+
+def _tensors(file: Path, digests: Mapping[str, Any]) -> dict[str, torch.Tensor]:
+    try:
+        return tensors_of(_content(file, digests))
+    except SafetensorError as error:
+        raise CheckpointError("checkpoint", str(file), f"safetensors ({error})") from None
+
+
+def _arrays(file: Path, digests: Mapping[str, Any]) -> dict[str, np.ndarray]:
+    try:
+        with np.load(io.BytesIO(_content(file, digests)), allow_pickle=False) as arrays:
+            return {name: arrays[name] for name in arrays.files}
+    except (ValueError, zipfile.BadZipFile, EOFError, OSError) as error:
+        raise CheckpointError("checkpoint", str(file), f"NumPy's npz without objects ({error})") from None
+
+
+def _npz(arrays: Mapping[str, np.ndarray]) -> bytes:
+    file = io.BytesIO()
+    np.savez(file, **arrays)  # pyright: ignore[reportArgumentType] - names are those of arrays
+    return file.getvalue()
+
+
+def _json(content: Mapping[str, Any]) -> bytes:
+    return json.dumps(content, indent=1, allow_nan=False).encode()

@@ -1,0 +1,199 @@
+"""A learned policy beside the strategies: `python -m training.evaluate --pretrained room`.
+
+Runs the policy and its rivals on the same seeds, in worlds of the test split that no training has seen, and
+prints how long their missions take. `--strategy runs/room-3` takes the best policy of a run instead. In
+`baselines.run` and `baselines.benchmark` the same names, `pretrained:room` and `runs/room-3`, are strategies
+like any other.
+"""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from baselines.command import make_folder, parse, print_json, run_command
+from baselines.experiment import Cell, Record, median_interval, median_ratio_interval, run_cells
+from baselines.strategies import make_strategy
+from entropy_explore_env.config import Scenario, with_settings
+from entropy_explore_env.errors import SettingError
+from entropy_explore_env.scenarios import find_scenario
+from entropy_explore_env.validation import is_whole
+from training.checkpoints import PolicySettings, latest_checkpoint, load_checkpoint
+from training.policy import POLICIES, PREFIX, policy_folder
+
+SIMPLE = ("gradient", "random")
+"""A policy must beat the better one of these, whatever else it is put beside."""
+
+
+@dataclass
+class Args:
+    """Put a learned policy beside the strategies."""
+
+    pretrained: str | None = None
+    """A policy that comes with the project: room."""
+    strategy: str | None = None
+    """The folder of a run of training.ppo, or of one of its checkpoints."""
+    against: str = "gradient,random,information-rate"
+    """Strategies, commas between."""
+    scenario: str | None = None
+    """A named scenario; default: the one that the policy was trained in."""
+    robots: int | None = None
+    """Team size; default: the one that the policy was trained with."""
+    seeds: int = 100
+    """Missions of each."""
+    jobs: int | None = None
+    """Processes; default: one a processor."""
+    runs: Path = Path("results/evaluation-runs")
+    """Folder that keeps the missions: what was stopped goes on where it was."""
+    json: bool = False
+    """Print one JSON object and nothing else."""
+
+
+def main(words: Sequence[str]) -> int:
+    """Run the command."""
+    args = parse(Args, words, description=__doc__)
+    if (args.pretrained is None) == (args.strategy is None):
+        raise SettingError("strategy", args.strategy, "given, or else --pretrained, not both")
+    for name, value in (("seeds", args.seeds), ("jobs", 1 if args.jobs is None else args.jobs)):
+        if not is_whole(value, 1):
+            raise SettingError(name, value, "a whole number ≥ 1")
+    policy = args.strategy if args.pretrained is None else PREFIX + args.pretrained
+    assert policy is not None
+    trained = load_checkpoint(latest_checkpoint(policy_folder(policy), *POLICIES)).settings
+    scenario = evaluation_scenario(trained, args.scenario, args.robots)
+    rivals = list(dict.fromkeys(args.against.split(",")))
+    for name in (policy, *rivals):
+        make_strategy(name).reset(scenario, np.random.default_rng(0))
+    make_folder("runs", args.runs)
+    began = time.perf_counter()
+    jobs = args.jobs or os.cpu_count() or 1
+    compared = compare(policy, rivals, scenario, args.seeds, args.runs, jobs, args.json)
+    if args.json:
+        print_json({**compared, "wall_s": round(time.perf_counter() - began, 1)})
+    else:
+        show(compared)
+    return 0
+
+
+def evaluation_scenario(
+    trained: PolicySettings, name: str | None = None, robots: int | None = None
+) -> Scenario:
+    """Where a policy is tested: a scenario as its name says, with the channel of training, test worlds.
+
+    Args:
+        trained: The policy's settings.
+        name: Of the scenario; None = that of training.
+        robots: Team size; None = that of training.
+    """
+    there = find_scenario(trained.scenario.name if name is None else name)
+    size = trained.scenario.robots if robots is None else robots
+    return with_settings(there, {"robots": size, "split": "test", "channel": trained.scenario.channel})
+
+
+def compare(
+    policy: str, rivals: Sequence[str], scenario: Scenario, seeds: int, runs: Path, jobs: int, quiet: bool
+) -> dict[str, Any]:
+    """Run a policy and its rivals on the seeds 0, 1, … and compare their mission times.
+
+    Args:
+        policy: Name of the policy as a strategy.
+        rivals: Names of strategies.
+        scenario: Where.
+        seeds: Missions of each.
+        runs: Folder that keeps the missions.
+        jobs: Processes.
+        quiet: Whether to show no progress.
+
+    Returns:
+        `scenario`, `robots`, `seeds`, and `rows`: of each strategy its name, `median_s` with its 95 %
+        interval (`low_s`, `high_s`), `mean_s`, `finished` of the missions, `scans` (median); of rivals also
+        `ratio`, the policy's median over theirs, with its paired interval, and `faster`: on how many seeds
+        the policy was.
+        `better_rival` is the one of SIMPLE with the smaller median, `faster_than_simple` on how many seeds
+        the policy beat all of these that took part.
+    """
+    place = f"{scenario.name}/robots-{scenario.robots}"
+    cells = [Cell(f"{place}/{name}", scenario, name, seeds) for name in (policy, *rivals)]
+    records = run_cells(cells, runs, jobs, "evaluation", quiet=quiet)
+    found = {name: records[cell.id] for name, cell in zip((policy, *rivals), cells, strict=True)}
+    times = {name: np.array([record["t_mission_s"] for record in own]) for name, own in found.items()}
+    rows = [_row(name, found[name], times[name], times[policy], name == policy) for name in found]
+    simple = [name for name in SIMPLE if name in rivals]
+    return {
+        "scenario": scenario.name,
+        "robots": scenario.robots,
+        "seeds": seeds,
+        "policy": policy,
+        "rows": rows,
+        "better_rival": min(simple, key=lambda name: float(np.median(times[name])), default=None),
+        "faster_than_simple": int(np.all([times[policy] < times[name] for name in simple], axis=0).sum())
+        if simple
+        else None,
+    }
+
+
+def _row(
+    name: str, records: Sequence[Record], times: np.ndarray, ours: np.ndarray, is_policy: bool
+) -> dict[str, Any]:
+    """A strategy's line of the table."""
+    median, low, high = median_interval(times)
+    row: dict[str, Any] = {
+        "strategy": name,
+        "median_s": median,
+        "low_s": low,
+        "high_s": high,
+        "mean_s": float(times.mean()),
+        "finished": int(sum(record["finished"] for record in records)),
+        "scans": float(np.median([record["scans"] for record in records])),
+    }
+    if not is_policy:
+        ratio, low, high = median_ratio_interval(ours, times)
+        row |= {"ratio": ratio, "ratio_low": low, "ratio_high": high, "faster": int((ours < times).sum())}
+    return row
+
+
+def show(compared: dict[str, Any]) -> None:
+    """Print a comparison as a table."""
+    from rich.console import Console
+    from rich.table import Table
+
+    seeds = compared["seeds"]
+    table = Table(title=f"{compared['scenario']}, {compared['robots']} robots, {seeds} test missions each")
+    table.add_column("strategy", overflow="fold")
+    for head in ("mission time", "finished", "scans", "policy's share", "policy faster"):
+        table.add_column(head, justify="right")
+    for row in compared["rows"]:
+        name, median, _, *others = table_cells(row, seeds)
+        table.add_row(name, *(cell.replace(" (", "\n(") for cell in (median, *others)))
+    Console(highlight=False).print(table)
+    print("mission times are medians, shares the policy's median over theirs; 95 % intervals")
+    if compared["better_rival"] is not None:
+        print(
+            f"better of {' and '.join(SIMPLE)}: {compared['better_rival']}; "
+            f"the policy beats those there on {compared['faster_than_simple']} of {seeds} starts"
+        )
+
+
+def table_cells(row: dict[str, Any], seeds: int) -> list[str]:
+    """A row as a person reads it."""
+    cells = [
+        row["strategy"],
+        f"{row['median_s']:,.0f} s ({row['low_s']:,.0f} … {row['high_s']:,.0f})",
+        f"{row['mean_s']:,.0f} s",
+        f"{row['finished']} of {seeds}",
+        f"{row['scans']:,.0f}",
+    ]
+    if "ratio" not in row:
+        return [*cells, "", ""]
+    ratio = f"{row['ratio']:.2f} ({row['ratio_low']:.2f} … {row['ratio_high']:.2f})"
+    return [*cells, ratio, f"{row['faster']} of {seeds}"]
+
+
+if __name__ == "__main__":
+    raise SystemExit(run_command(main))

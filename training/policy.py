@@ -1,0 +1,222 @@
+"""A learned policy: built from its settings, asked for actions, and as a strategy like any other."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import numpy as np
+import torch
+from stable_baselines3.common.policies import ActorCriticPolicy
+from torch.distributions import Categorical, Normal
+
+from entropy_explore_env.config import Scenario
+from entropy_explore_env.errors import SettingError
+from entropy_explore_env.missions.action import action_space
+from entropy_explore_env.missions.observation import ObservationLayout
+from entropy_explore_env.missions.view import RobotView
+from entropy_explore_env.missions.view_observation import ViewObserver
+from training.checkpoints import Checkpoint, PolicySettings, latest_checkpoint, load_checkpoint
+from training.errors import CheckpointError
+from training.networks import VectorFeatures, policy_settings
+from training.scales import RunningScale
+
+_SHARED = ("pi_features_extractor.", "vf_features_extractor.")
+"""Further names of `features_extractor`."""
+PRETRAINED = Path(__file__).parent / "pretrained"
+PREFIX = "pretrained:"
+POLICIES = ("best", "step")
+"""Kinds of checkpoints, the one that is preferred first."""
+
+
+def make_policy(
+    settings: PolicySettings, schedule: Callable[[float], float] = lambda remaining: 0.0
+) -> ActorCriticPolicy:
+    """A policy with fresh weights, as Stable-Baselines3 trains it."""
+    layout = ObservationLayout(settings.scenario)
+    return ActorCriticPolicy(
+        layout.flat_space(),
+        action_space(settings.scenario),
+        schedule,
+        **policy_settings(settings.features, layout, settings.hidden),
+    )
+
+
+def load_policy(checkpoint: Checkpoint) -> ActorCriticPolicy:
+    """The policy of a checkpoint.
+
+    Raises:
+        CheckpointError: Its weights do not fit its settings.
+    """
+    policy = make_policy(checkpoint.settings)
+    take_weights(policy, checkpoint)
+    policy.set_training_mode(False)
+    return policy
+
+
+def take_weights(policy: ActorCriticPolicy, checkpoint: Checkpoint) -> None:
+    """Put a checkpoint's weights and its scale of observations into a policy.
+
+    Raises:
+        CheckpointError: They do not fit. Nothing has changed then.
+    """
+    expected = weights_of(policy)
+    for name in expected.keys() | checkpoint.weights.keys():
+        there, wanted = checkpoint.weights.get(name), expected.get(name)
+        if there is None or wanted is None or there.shape != wanted.shape or there.dtype != wanted.dtype:
+            found = None if there is None else tuple(there.shape)
+            allowed = "no such tensor" if wanted is None else f"{tuple(wanted.shape)}, as its settings say"
+            raise CheckpointError(f"weights: {name}", found, allowed)
+        if not torch.isfinite(there).all():
+            raise CheckpointError(f"weights: {name}", "not finite", "finite numbers")
+    scale = scale_of(checkpoint.scales, "observations", policy.observation_space.shape[0])  # pyright: ignore
+    policy.load_state_dict(checkpoint.weights, strict=False)
+    rescale_observations(policy, scale)
+
+
+def weights_of(policy: ActorCriticPolicy) -> dict[str, torch.Tensor]:
+    """A policy's weights, each once: actor and critic share what looks at observations."""
+    return {name: each for name, each in policy.state_dict().items() if not name.startswith(_SHARED)}
+
+
+def rescale_observations(policy: ActorCriticPolicy, scale: RunningScale) -> None:
+    """Let a policy see observations in units of a scale."""
+    assert isinstance(policy.features_extractor, VectorFeatures)
+    policy.features_extractor.rescale(scale.mean, scale.deviation)
+
+
+def scale_arrays(name: str, scale: RunningScale) -> dict[str, np.ndarray]:
+    """A scale as arrays with a name before them."""
+    return {
+        f"{name}_count": np.array(scale.count),
+        f"{name}_mean": scale.mean,
+        f"{name}_variance": scale.variance,
+    }
+
+
+def scale_of(arrays: dict[str, np.ndarray], name: str, size: int) -> RunningScale:
+    """The scale that `scale_arrays` gave.
+
+    Raises:
+        CheckpointError: It is missing, of another size or not finite.
+    """
+    scale = RunningScale(size)
+    for part, shape in (("count", ()), ("mean", (size,)), ("variance", (size,))):
+        there = arrays.get(f"{name}_{part}")
+        if there is None or there.shape != shape or there.dtype != np.float64 or not np.isfinite(there).all():
+            found = None if there is None else there.shape
+            raise CheckpointError(f"normalisation: {name}_{part}", found, f"{shape} finite float64")
+        setattr(scale, part, float(there) if part == "count" else there)
+    return scale
+
+
+def choose_actions(
+    policy: ActorCriticPolicy, observations: np.ndarray, chance: torch.Generator | None
+) -> np.ndarray:
+    """Actions for observations, without touching the random state that training draws from.
+
+    Args:
+        policy: To ask.
+        observations: (N, F) float32.
+        chance: To draw actions from; None = the likeliest ones.
+
+    Returns:
+        (N,) int64, or (N, K) float32 within the space's bounds.
+    """
+    with torch.inference_mode():
+        chosen = policy.get_distribution(torch.as_tensor(observations)).distribution
+        if isinstance(chosen, Categorical):
+            if chance is None:
+                return chosen.logits.argmax(dim=1).numpy()
+            return torch.multinomial(chosen.probs, 1, generator=chance)[:, 0].numpy()
+        assert isinstance(chosen, Normal)
+        actions = chosen.mean
+        if chance is not None:
+            actions = torch.normal(actions, chosen.stddev, generator=chance)
+        return actions.clamp(-1.0, 1.0).numpy()
+
+
+class LearnedPolicy:
+    """The strategy of a checkpoint: each robot's policy sees its own RobotView, as observations show it.
+
+    It draws its actions, as it did in training, from the mission's stream for strategies.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        """Read a checkpoint.
+
+        Args:
+            folder: A checkpoint, or a run of `training.ppo`: then its best one.
+
+        Raises:
+            CheckpointError: It cannot be used.
+        """
+        self._checkpoint = load_checkpoint(latest_checkpoint(folder, *POLICIES))
+        self._policy = load_policy(self._checkpoint)
+        self._folder = folder
+
+    def reset(self, scenario: Scenario, rng: np.random.Generator) -> None:
+        """A new mission begins.
+
+        Raises:
+            CheckpointError: The policy was made for another number of robots, or for observations or
+                actions that this scenario cannot give.
+        """
+        trained = self._checkpoint.settings.scenario
+        self._observer = ViewObserver(scenario, trained.observation, trained.action)
+        there, wanted = self._observer.layout.parts, ObservationLayout(trained).parts
+        for name in wanted.keys() | there.keys():
+            shapes = [parts[name].shape if name in parts else None for parts in (there, wanted)]
+            if shapes[0] != shapes[1]:
+                what = "robots" if name == "team" else f"observation {name}"
+                found = scenario.robots if name == "team" else shapes[0]
+                fits = trained.robots if name == "team" else shapes[1]
+                raise CheckpointError(f"{self._folder}: {what}", found, f"{fits}, as the policy was trained")
+        actions = [action_space(each) for each in (self._observer.scenario, trained)]
+        if actions[0] != actions[1]:
+            raise CheckpointError(f"{self._folder}: actions", actions[0], f"{actions[1]}, as it was trained")
+        if scenario.action.kind == "discrete" and scenario.action != trained.action:
+            raise CheckpointError(
+                f"{self._folder}: Scenario.action", scenario.action, f"continuous, or {trained.action}"
+            )
+        self._chance = torch.Generator().manual_seed(int(rng.integers(2**63)))
+
+    def choose(self, views: Sequence[RobotView]) -> list[np.ndarray]:
+        """The policy's viewpoint for each view."""
+        observations = np.stack([self._observer.observe(view) for view in views])
+        actions = choose_actions(self._policy, observations, self._chance)
+        return [self._observer.viewpoint(view, action) for view, action in zip(views, actions, strict=True)]
+
+
+def policy_folder(name: str) -> Path:
+    """The folder that a strategy's name means: `pretrained:NAME`, or a folder.
+
+    Raises:
+        SettingError: No policy of this name comes with the project.
+    """
+    if not name.startswith(PREFIX):
+        return Path(name)
+    known = sorted(path.name for path in PRETRAINED.glob("*") if path.is_dir())
+    if name.removeprefix(PREFIX) not in known:
+        raise SettingError("strategy", name, "one of " + ", ".join(PREFIX + each for each in known))
+    return PRETRAINED / name.removeprefix(PREFIX)
+
+
+def make_policy_strategy(name: str) -> LearnedPolicy:
+    """The strategy of a learned policy.
+
+    Args:
+        name: `pretrained:NAME`, or a folder.
+
+    Raises:
+        SettingError: There is no such policy.
+        CheckpointError: It cannot be used.
+    """
+    return LearnedPolicy(policy_folder(name))
+
+
+def policy_files(name: str) -> list[Path]:
+    """The files that decide what a learned policy does: its checkpoint, and what runs it."""
+    checkpoint = latest_checkpoint(policy_folder(name), *POLICIES)
+    code = [Path(__file__).with_name(f"{module}.py") for module in ("policy", "networks", "checkpoints")]
+    return [checkpoint / "policy.json", checkpoint / "policy.safetensors", *code]

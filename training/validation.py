@@ -1,0 +1,73 @@
+"""How a policy does in missions that it does not learn from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from stable_baselines3.common.policies import ActorCriticPolicy
+
+from entropy_explore_env.config import Scenario, with_settings
+from entropy_explore_env.envs.vector_env import EntropyExploreVectorEnv
+from training.policy import choose_actions
+from training.seeds import validation_seeds
+
+
+@dataclass(frozen=True)
+class Validation:
+    """What validation came to, over its missions; one that was cut off counts with the time it had.
+
+    Attributes:
+        mean_s, median_s: Mission time.
+        finished: Share of the missions that were mapped.
+        bits_per_bit: Bits that teammates gained for each bit sent; None where nothing was sent.
+    """
+
+    mean_s: float
+    median_s: float
+    finished: float
+    bits_per_bit: float | None
+
+
+class Validator:
+    """The same missions again and again: worlds of the validation split, robots that wait for nobody."""
+
+    def __init__(self, scenario: Scenario, missions: int, threads: int) -> None:
+        """Make the missions.
+
+        Args:
+            scenario: What the policy is trained in.
+            missions: How many.
+            threads: That share them.
+        """
+        there = with_settings(scenario, {"split": "validation", "decision_period_s": None})
+        self._env = EntropyExploreVectorEnv(there, missions, threads=threads)
+        self._seeds = validation_seeds(missions)
+
+    def validate(self, policy: ActorCriticPolicy) -> Validation:
+        """Run each mission to its end."""
+        env, chance = self._env, torch.Generator().manual_seed(0)
+        missions, robots = env.num_envs, env.scenario.robots
+        observations, _ = env.reset(seed=self._seeds)
+        figures: list[dict[str, float] | None] = [None] * missions
+        while any(each is None for each in figures):
+            actions = choose_actions(policy, observations.reshape(missions * robots, -1), chance)
+            shape = (missions, robots) if robots > 1 else (missions,)
+            observations, _, _, _, infos = env.step(actions.reshape(shape + actions.shape[1:]))
+            for mission in np.flatnonzero(infos.get("_figures", ())).tolist():
+                figures[mission] = figures[mission] or infos["figures"][mission]
+        ended = [each for each in figures if each is not None]
+        times = np.array([each["t_mission_s"] for each in ended])
+        shared = [each["bits_gained_per_bit_sent"] for each in ended]
+        told = [each for each in shared if each is not None]
+        return Validation(
+            float(times.mean()),
+            float(np.median(times)),
+            float(np.mean([each["finished"] for each in ended])),
+            float(np.mean(told)) if told else None,
+        )
+
+    def close(self) -> None:
+        """End the threads."""
+        self._env.close()
