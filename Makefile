@@ -28,7 +28,7 @@ lint: $(STAMP)dev
 	$(RUN) ruff format --check .
 	$(RUN) pyright
 
-bench: $(STAMP)baselines $(STAMP)bench
+bench: $(STAMP)training $(STAMP)bench
 	$(RUN) benchmarks.speed
 
 reproduce: $(STAMP)baselines

@@ -1,7 +1,7 @@
 """Our speed beside peers, in one process and on one thread unless said: `python -m benchmarks.speed`.
 
 Each job and its peer take turns; every figure is a median over the rounds, and every ratio the
-median of the rounds' ratios. Needs the extras `bench` and `baselines`.
+median of the rounds' ratios. Needs the extras `bench` and `training`.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from typing import Any
 from baselines.command import parse, print_json, run_command
 from benchmarks.deciding import deciding_rows
 from benchmarks.fusion import fusion_rows
+from benchmarks.learning import learning_rows
 from benchmarks.peers import load_octomap, load_spread
 from benchmarks.planning import planning_rows
 from benchmarks.rows import FULL, QUICK, Effort, Row
@@ -36,13 +37,23 @@ JOBS: tuple[tuple[str, Callable[[Effort], list[Row]]], ...] = (
     ("where a step's time goes", profile_rows),
     ("shortest ways beside SciPy", planning_rows),
     ("decisions of strategies", deciding_rows),
+    ("learning", learning_rows),
     ("steps in worlds of different sizes", size_rows),
     ("first steps of fresh processes", startup_rows),
 )
 """What is measured, in this order, and what people read while they wait."""
 
 _BUSY = 0.5
-_PACKAGES = ("numpy", "numba", "octomap-python", "mpe2", "pettingzoo", "gymnasium")
+_PACKAGES = (
+    "numpy",
+    "numba",
+    "octomap-python",
+    "mpe2",
+    "pettingzoo",
+    "gymnasium",
+    "torch",
+    "stable-baselines3",
+)
 
 
 @dataclass(frozen=True)

@@ -23,6 +23,7 @@ from stable_baselines3.common.buffers import RolloutBuffer
 from stable_baselines3.common.type_aliases import RolloutBufferSamples
 
 from entropy_explore_env.envs.robot_vec_env import RobotVecEnv
+from entropy_explore_env.errors import SettingError
 from training.errors import NotFiniteError
 from training.scales import RunningScale
 
@@ -122,6 +123,8 @@ class DecisionBuffer(RolloutBuffer):
     def _keep_decisions(self) -> None:
         """Flatten the rollout to its decisions."""
         chosen = self.complete
+        if not chosen.any():
+            raise SettingError("rollout_steps", self.buffer_size, "steps in which a robot decides twice")
         for name in ("observations", "actions", "values", "log_probs", "advantages", "returns"):
             kept = getattr(self, name)[chosen]
             setattr(

@@ -5,15 +5,20 @@ Observations are flat vectors; a layout says where each part lies.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import itertools
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 import torch
 from gymnasium import spaces
+from stable_baselines3.common.policies import ActorCriticPolicy
 from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
 from torch import nn
 
+from entropy_explore_env.config import Scenario
+from entropy_explore_env.errors import SettingError
+from entropy_explore_env.missions.action import action_space
 from entropy_explore_env.missions.observation import ObservationLayout, Part
 
 _MAPS = ("patch", "overview")
@@ -106,16 +111,150 @@ def _convolution(shape: tuple[int, ...], channels: int, features: int) -> nn.Mod
     return nn.Sequential(layers, nn.Linear(size, features), nn.ReLU())
 
 
-FEATURES: Mapping[str, type[VectorFeatures]] = {"vector": VectorFeatures, "maps": MapFeatures}
-"""By the name that settings have for them."""
+class GazeHeads(nn.Module):
+    """Scores of moves and of gazes, and what the critic makes of it.
+
+    An MLP scores the moves. One small network, the same for every gaze, scores the gazes from the rays of the
+    panorama around that direction, and from what the MLP has to say: a direction that promises much looks the
+    same wherever it is, and is learned once.
+    """
+
+    def __init__(
+        self, features: int, panorama: tuple[int, int], moves: int, hidden: Sequence[int], channels: int = 16
+    ) -> None:
+        """Make the networks.
+
+        Args:
+            features: Numbers that are seen; the first 2·D of them are the panorama's.
+            panorama: Yaws and pitches of its D rays, which are those of the gazes.
+            moves: How many there are.
+            hidden: Units of the hidden layers of actor and critic.
+            channels: That a gaze is looked at with.
+        """
+        super().__init__()
+        self._panorama = panorama
+        self.latent_dim_pi, self.latent_dim_vf = moves + panorama[0] * panorama[1], hidden[-1]
+        self.actor, self.critic = _perceptron(features, hidden), _perceptron(features, hidden)
+        self.moves = nn.Linear(hidden[-1], moves)
+        self.around = nn.Conv2d(2, channels, 3)
+        self.said = nn.Linear(hidden[-1], channels)
+        self.gazes = nn.Conv2d(channels, 1, 1)
+
+    def forward(self, features: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
+        """Scores (N, moves + D) and the critic's units (N, hidden) of features (N, K)."""
+        return self.forward_actor(features), self.forward_critic(features)
+
+    def forward_actor(self, features: torch.Tensor) -> torch.Tensor:
+        """Scores of moves, then of gazes, (N, moves + D)."""
+        yaws, pitches = self._panorama
+        rays = features[:, : 2 * yaws * pitches].reshape(-1, 2, yaws, pitches)
+        rays = nn.functional.pad(rays, (0, 0, 1, 1), mode="circular")  # around the horizon
+        rays = nn.functional.pad(rays, (1, 1, 0, 0), mode="replicate")
+        units = self.actor(features)
+        looked = torch.tanh(self.around(rays) + self.said(units)[:, :, None, None])
+        return torch.cat([self.moves(units), self.gazes(looked).flatten(1)], dim=1)
+
+    def forward_critic(self, features: torch.Tensor) -> torch.Tensor:
+        """The critic's units."""
+        return self.critic(features)
 
 
-def policy_settings(features: str, layout: ObservationLayout, hidden: tuple[int, ...]) -> dict[str, Any]:
-    """`policy_kwargs` of a Stable-Baselines3 policy: orthogonal weights, tanh, actor and critic apart."""
-    return {
+class _Sums(nn.Module):
+    """Logits of every move with every gaze: the sums of their scores."""
+
+    def __init__(self, moves: int) -> None:
+        super().__init__()
+        self._moves = moves
+
+    def forward(self, scores: torch.Tensor) -> torch.Tensor:
+        """(N, moves·D) of scores (N, moves + D)."""
+        moves, gazes = scores[:, : self._moves], scores[:, self._moves :]
+        return (moves[:, :, None] + gazes[:, None, :]).flatten(1)
+
+
+class GazePolicy(ActorCriticPolicy):
+    """A policy of discrete actions that scores moves and gazes apart: see `GazeHeads`."""
+
+    def __init__(
+        self,
+        *args: Any,  # noqa: ANN401 - as ActorCriticPolicy has them
+        panorama: tuple[int, int],
+        moves: int,
+        hidden: tuple[int, ...],
+        **kwargs: Any,  # noqa: ANN401
+    ) -> None:
+        """Make the networks; see `GazeHeads` for what they need."""
+        self._heads = (panorama, moves, hidden)
+        super().__init__(*args, **kwargs)
+
+    def _build_mlp_extractor(self) -> None:
+        self.mlp_extractor = GazeHeads(self.features_dim, *self._heads)  # pyright: ignore
+
+    def _build(self, lr_schedule: Callable[[float], float]) -> None:
+        super()._build(lr_schedule)
+        assert isinstance(self.mlp_extractor, GazeHeads)
+        for last in (self.mlp_extractor.moves, self.mlp_extractor.gazes):  # all actions alike at first
+            nn.init.orthogonal_(last.weight, gain=0.01)
+        self.action_net = _Sums(self._heads[1])
+        rate: Any = {"lr": lr_schedule(1)}
+        self.optimizer = self.optimizer_class(self.parameters(), **rate, **self.optimizer_kwargs)
+
+
+def _perceptron(features: int, hidden: Sequence[int]) -> nn.Sequential:
+    sizes = [features, *hidden]
+    layers = [(nn.Linear(a, b), nn.Tanh()) for a, b in itertools.pairwise(sizes)]
+    return nn.Sequential(*itertools.chain.from_iterable(layers))
+
+
+FEATURES: Mapping[str, type[VectorFeatures]] = {
+    "gazes": VectorFeatures,
+    "vector": VectorFeatures,
+    "maps": MapFeatures,
+}
+"""What looks at observations, by the name that settings have for it."""
+
+
+def policy_class(features: str) -> type[ActorCriticPolicy]:
+    """The policy that goes with a name of FEATURES."""
+    return GazePolicy if features == "gazes" else ActorCriticPolicy
+
+
+def policy_settings(features: str, scenario: Scenario, hidden: tuple[int, ...]) -> dict[str, Any]:
+    """`policy_kwargs` of a Stable-Baselines3 policy: orthogonal weights, tanh, actor and critic apart.
+
+    Args:
+        features: A name of FEATURES.
+        scenario: Whose observations and actions.
+        hidden: Units of the hidden layers.
+
+    Raises:
+        SettingError: The scenario's actions or panorama do not go with the networks.
+    """
+    layout = ObservationLayout(scenario)
+    settings: dict[str, Any] = {
         "features_extractor_class": FEATURES[features],
         "features_extractor_kwargs": {"layout": layout},
         "net_arch": list(hidden),
         "activation_fn": nn.Tanh,
         "ortho_init": True,
     }
+    if features == "gazes":
+        rays, panorama = layout.parts.get("panorama"), gazes_of(scenario)
+        if scenario.action.kind != "discrete" or rays is None or rays.shape[1] != panorama[0] * panorama[1]:
+            allowed = "discrete actions, and a panorama with a ray for each gaze, for features gazes"
+            raise SettingError("actions", scenario.action.kind, allowed)
+        moves = action_count(scenario) // rays.shape[1]
+        settings |= {"panorama": panorama, "moves": moves, "hidden": hidden}
+    return settings
+
+
+def gazes_of(scenario: Scenario) -> tuple[int, int]:
+    """Yaws and pitches of a scenario's discrete gazes."""
+    return scenario.action.yaws, 1 if scenario.planar else scenario.action.pitches
+
+
+def action_count(scenario: Scenario) -> int:
+    """How many discrete actions a robot of a scenario has."""
+    space = action_space(scenario)
+    assert isinstance(space, spaces.Discrete)
+    return int(space.n)

@@ -18,7 +18,7 @@ from entropy_explore_env.missions.view import RobotView
 from entropy_explore_env.missions.view_observation import ViewObserver
 from training.checkpoints import Checkpoint, PolicySettings, latest_checkpoint, load_checkpoint
 from training.errors import CheckpointError
-from training.networks import VectorFeatures, policy_settings
+from training.networks import VectorFeatures, policy_class, policy_settings
 from training.scales import RunningScale
 
 _SHARED = ("pi_features_extractor.", "vf_features_extractor.")
@@ -33,12 +33,11 @@ def make_policy(
     settings: PolicySettings, schedule: Callable[[float], float] = lambda remaining: 0.0
 ) -> ActorCriticPolicy:
     """A policy with fresh weights, as Stable-Baselines3 trains it."""
-    layout = ObservationLayout(settings.scenario)
-    return ActorCriticPolicy(
-        layout.flat_space(),
+    return policy_class(settings.features)(
+        ObservationLayout(settings.scenario).flat_space(),
         action_space(settings.scenario),
         schedule,
-        **policy_settings(settings.features, layout, settings.hidden),
+        **policy_settings(settings.features, settings.scenario, settings.hidden),
     )
 
 

@@ -17,6 +17,7 @@ import dataclasses
 import json
 import shlex
 import time
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -47,7 +48,7 @@ from training.checkpoints import (
 from training.decisions import DecisionBuffer, Discount
 from training.errors import CheckpointError, NotFiniteError
 from training.film import film_best
-from training.networks import policy_settings
+from training.networks import policy_class, policy_settings
 from training.policy import (
     rescale_observations,
     scale_arrays,
@@ -95,8 +96,9 @@ class Args:
     """Missions are cut off then, in learning and in validation."""
     channel: Channel = dataclasses.field(default_factory=Channel)
 
-    features: Literal["vector", "maps"] = "vector"
-    """What looks at observations: an MLP at panorama, self and team; or convolutions at maps, too."""
+    features: Literal["gazes", "vector", "maps"] = "gazes"
+    """What looks at observations. vector: an MLP at panorama, self and team; gazes: beside it one small
+    network for every gaze, at the panorama around it; maps: beside the MLP convolutions at maps."""
     overview: bool = False
     """Observe the whole belief, pooled; with vector features as plain numbers."""
     patch: bool = False
@@ -104,7 +106,11 @@ class Args:
     hidden: tuple[int, ...] = (128, 128)
     """Units of the hidden layers of actor and critic."""
     actions: Literal["discrete", "continuous"] = "discrete"
-    """7 moves × 16 yaws × 3 pitches, or any viewpoint within reach."""
+    """7 moves × yaws × pitches, or any viewpoint within reach."""
+    yaws: int = 16
+    """Gazes, and rays of the panorama, around the horizon."""
+    pitches: int = 7
+    """Gazes, and rays of the panorama, from -45° to 45°."""
 
     rollout_steps: int = 128
     """Steps of a mission between two updates."""
@@ -196,8 +202,10 @@ def training_scenario(args: Args) -> Scenario:
             "decision_period_s": args.decision_period_s,
             "time_limit_s": args.time_limit_s,
             "reward": {"kind": args.reward, "cost_per_s": args.cost_per_s},
-            "action": {"kind": args.actions, "moves": "axes"},
+            "action": {"kind": args.actions, "moves": "axes", "yaws": args.yaws, "pitches": args.pitches},
             "observation": {
+                "panorama_yaws": args.yaws,
+                "panorama_pitches": args.pitches,
                 "panorama_utility": "log2",
                 "overview": args.overview,
                 "patch": args.patch,
@@ -248,28 +256,7 @@ class Run:
         self.validator = Validator(scenario, args.validation_missions, args.threads)
         self.observed, self.returns = RunningScale(self.layout.size), RunningScale(1, memory=2e5)
         self.chance = np.random.default_rng(args.seed)
-        self.model = PPO(
-            "MlpPolicy",
-            self.rows,
-            learning_rate=lambda remaining: args.learning_rate * max(remaining, 0.05),
-            n_steps=args.rollout_steps,
-            batch_size=args.batch,
-            n_epochs=args.epochs,
-            gamma=args.gamma,
-            gae_lambda=args.gae_lambda,
-            clip_range=args.clip,
-            ent_coef=args.entropy,
-            rollout_buffer_class=DecisionBuffer,
-            rollout_buffer_kwargs={
-                "rows": self.rows,
-                "discount": args.discount,
-                "scale": self.returns,
-                "chance": self.chance,
-            },
-            policy_kwargs=policy_settings(args.features, self.layout, tuple(args.hidden)),
-            seed=args.seed,
-            device="cpu",
-        )
+        self.model = self._model()
         assert isinstance(self.model.rollout_buffer, DecisionBuffer)
         self.buffer: DecisionBuffer = self.model.rollout_buffer
         self.seen = np.zeros((0, self.layout.size), np.float32)
@@ -277,6 +264,34 @@ class Run:
         self.curve: list[dict[str, float | None]] = []
         self.spent: dict[str, float] = {part: 0.0 for part in _PARTS}
         self.next_validation, self.next_checkpoint = args.validate_every, args.checkpoint_every
+
+    def _model(self) -> PPO:
+        """PPO with fresh weights, learning from decisions."""
+        args = self.args
+        with warnings.catch_warnings():
+            warnings.filterwarnings("ignore", message="You have specified a mini-batch")  # batches are even
+            return PPO(
+                policy_class(args.features),
+                self.rows,
+                learning_rate=lambda remaining: args.learning_rate * max(remaining, 0.05),
+                n_steps=args.rollout_steps,
+                batch_size=args.batch,
+                n_epochs=args.epochs,
+                gamma=args.gamma,
+                gae_lambda=args.gae_lambda,
+                clip_range=args.clip,
+                ent_coef=args.entropy,
+                rollout_buffer_class=DecisionBuffer,
+                rollout_buffer_kwargs={
+                    "rows": self.rows,
+                    "discount": args.discount,
+                    "scale": self.returns,
+                    "chance": self.chance,
+                },
+                policy_kwargs=policy_settings(args.features, self.scenario, tuple(args.hidden)),
+                seed=args.seed,
+                device="cpu",
+            )
 
     def learn(self, command: str) -> None:
         """Learn until all steps are done.

@@ -1,0 +1,138 @@
+"""What networks see of observations, and that gazes are scored alike wherever they are."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+import torch
+
+from entropy_explore_env.config import Scenario, with_settings
+from entropy_explore_env.errors import SettingError
+from entropy_explore_env.missions.observation import ObservationLayout
+from entropy_explore_env.scenarios import find_scenario
+from training.checkpoints import PolicySettings
+from training.networks import GazeHeads, MapFeatures, VectorFeatures, policy_settings
+from training.policy import choose_actions, make_policy, rescale_observations, weights_of
+from training.scales import RunningScale
+
+YAWS, PITCHES = 6, 3
+
+
+def scenario(name: str = "box-7x11x5", **observation: Any) -> Scenario:
+    form = {"flat": True, "panorama_yaws": YAWS, "panorama_pitches": PITCHES, **observation}
+    action = {"kind": "discrete", "moves": "axes", "yaws": YAWS, "pitches": PITCHES}
+    return with_settings(find_scenario(name), {"robots": 2, "observation": form, "action": action})
+
+
+def observations(there: Scenario, count: int = 5) -> torch.Tensor:
+    size = ObservationLayout(there).size
+    return torch.as_tensor(np.random.default_rng(0).uniform(0, 1, (count, size)).astype(np.float32))
+
+
+def test_vectors_are_the_parts_that_are_no_maps_scaled_and_clipped() -> None:
+    there = scenario(patch=True, patch_shape=(3, 5, 3), overview=True, action_mask=True)
+    layout, seen = ObservationLayout(there), observations(there)
+    features = VectorFeatures(layout.flat_space(), layout)
+    names = ("panorama", "self", "team")
+    parts = torch.cat([seen[:, layout.parts[name].start : layout.parts[name].stop] for name in names], dim=1)
+    assert torch.equal(features(seen), parts)
+    features.rescale(np.full(layout.size, 0.5), np.full(layout.size, 0.01))
+    assert torch.allclose(features(seen), ((parts - 0.5) / 0.01).clamp(-10, 10))
+    assert not features.state_dict()  # scales lie beside the weights, not among them
+
+
+@pytest.mark.parametrize(
+    ("name", "parts"),
+    [("box-7x11x5", ("patch", "overview")), ("office", ("overview",)), ("office", ("patch",))],
+)
+def test_maps_are_looked_at_whether_flat_or_not(name: str, parts: tuple[str, ...]) -> None:
+    """A change of any cell of a map changes the features; without maps none would."""
+    there = scenario(name, **{part: True for part in parts}, patch_shape=(5, 7, 1 if name == "office" else 3))
+    layout = ObservationLayout(there)
+    torch.manual_seed(0)
+    features = MapFeatures(layout.flat_space(), layout, channels=3, features=4)
+    seen = observations(there, 1).requires_grad_()
+    values = features(seen)
+    assert values.shape == (1, features.features_dim)
+    values.abs().sum().backward()
+    assert seen.grad is not None
+    for part in parts:
+        place = layout.parts[part]
+        assert seen.grad[0, place.start : place.stop].count_nonzero() > 0.5 * (place.stop - place.start)
+
+
+def test_a_gaze_is_scored_by_what_is_around_it_wherever_that_is() -> None:
+    """Turning the panorama turns the scores of gazes with it, where the MLP says the same."""
+    torch.manual_seed(0)
+    heads = GazeHeads(2 * YAWS * PITCHES + 4, (YAWS, PITCHES), 7, (5, 5))
+    for layer in (heads.actor[0],):  # the MLP sees nothing of the panorama
+        layer.weight.data[:, : 2 * YAWS * PITCHES] = 0.0  # pyright: ignore
+    seen = torch.rand(3, 2 * YAWS * PITCHES + 4)
+    rays = seen[:, : 2 * YAWS * PITCHES].reshape(3, 2, YAWS, PITCHES)
+    turned = seen.clone()
+    turned[:, : 2 * YAWS * PITCHES] = rays.roll(2, dims=2).reshape(3, -1)
+    ours, theirs = heads.forward_actor(seen), heads.forward_actor(turned)
+    assert torch.allclose(ours[:, :7], theirs[:, :7])
+    gazes = ours[:, 7:].reshape(3, YAWS, PITCHES)
+    assert torch.allclose(gazes.roll(2, dims=1), theirs[:, 7:].reshape(3, YAWS, PITCHES), atol=1e-6)
+    assert not torch.allclose(gazes, theirs[:, 7:].reshape(3, YAWS, PITCHES), atol=1e-3)
+
+
+def test_logits_are_the_sums_of_moves_and_gazes_in_the_order_of_actions() -> None:
+    torch.manual_seed(1)
+    there = scenario()
+    policy = make_policy(PolicySettings(there, "gazes", (8,)))
+    seen = observations(there)
+    scores = policy.mlp_extractor.forward_actor(policy.extract_features(seen))  # pyright: ignore
+    logits = policy.get_distribution(seen).distribution.logits  # pyright: ignore
+    moves, gazes = 7, YAWS * PITCHES
+    for move in range(moves):
+        for gaze in range(gazes):
+            difference = scores[:, move] + scores[:, moves + gaze] - scores[:, 0] - scores[:, moves]
+            assert torch.allclose(logits[:, move * gazes + gaze] - logits[:, 0], difference, atol=1e-5)
+    near = policy.get_distribution(seen).distribution.probs  # pyright: ignore
+    assert (near * moves * gazes - 1).abs().max() < 0.2  # at first all actions are about alike
+
+
+@pytest.mark.parametrize("features", ["gazes", "vector", "maps"])
+def test_each_weight_is_there_once_and_all_learn(features: str) -> None:
+    there = scenario(overview=features == "maps")
+    policy = make_policy(PolicySettings(there, features, (6,)))
+    known = {id(each) for each in policy.parameters()}
+    learning = {id(each) for group in policy.optimizer.param_groups for each in group["params"]}
+    assert known == learning
+    pointers = [each.data_ptr() for each in weights_of(policy).values()]
+    assert len(set(pointers)) == len(pointers) == len(known)
+
+
+def test_choosing_leaves_the_trainer_s_chance_alone_and_is_repeatable() -> None:
+    there = scenario()
+    policy, seen = make_policy(PolicySettings(there, "gazes", (8,))), observations(there, 50)
+    rescale_observations(policy, RunningScale(seen.shape[1]))
+    state = torch.get_rng_state()
+    first = choose_actions(policy, seen.numpy(), torch.Generator().manual_seed(3))
+    again = choose_actions(policy, seen.numpy(), torch.Generator().manual_seed(3))
+    other = choose_actions(policy, seen.numpy(), torch.Generator().manual_seed(4))
+    assert (first == again).all() and (first != other).any() and torch.equal(state, torch.get_rng_state())
+    likeliest = policy.get_distribution(seen).distribution.logits.argmax(dim=1)  # pyright: ignore
+    assert (choose_actions(policy, seen.numpy(), None) == likeliest.numpy()).all()
+
+
+def test_continuous_actions_stay_in_their_box() -> None:
+    there = with_settings(scenario(), {"action": {"kind": "continuous"}})
+    policy, seen = make_policy(PolicySettings(there, "vector", (8,))), observations(there, 50)
+    chosen = choose_actions(policy, seen.numpy(), torch.Generator().manual_seed(0))
+    assert chosen.shape == (50, 5) and np.abs(chosen).max() <= 1.0 and chosen.std() > 0.3
+    mean = choose_actions(policy, seen.numpy(), None)
+    assert np.abs(mean).max() < 0.2
+
+
+@pytest.mark.parametrize(
+    "change", [{"action": {"kind": "continuous"}}, {"observation": {"panorama_yaws": 4}}]
+)
+def test_gazes_want_a_ray_for_each_gaze(change: dict[str, Any]) -> None:
+    there = with_settings(scenario(), change)
+    with pytest.raises(SettingError, match="a ray for each gaze"):
+        policy_settings("gazes", there, (8,))
