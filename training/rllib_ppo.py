@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import contextlib
 import csv
-import dataclasses
 import json
 import logging
 import math
@@ -40,7 +39,7 @@ FIGURES = ("t_mission_s", "finished", "bits_gained_per_bit_sent")
 REACHED_WITHIN_S = 20.0
 """A cluster that does not answer within this time is not there."""
 STARTS = 3
-"""Ray gives up a start when a part of it needs more than 15 s (ray-project/ray#65983), as on a busy machine."""
+"""Ray gives up a start when a part of it needs more than 15 s, as on a busy machine (ray-project/ray#65983)."""
 
 
 @dataclass

@@ -105,7 +105,9 @@ class EntropyExploreMultiAgentEnv(MultiAgentEnv):
         """
         deciding = self.team.deciding_agents()
         if self.team.agents and set(action_dict) != set(deciding):
-            raise ActionError("action_dict", sorted(map(str, action_dict)), "one for each of " + ", ".join(deciding))
+            raise ActionError(
+                "action_dict", sorted(map(str, action_dict)), "one for each of " + ", ".join(deciding)
+            )
         ignored = dict.fromkeys(self.team.agents, self._ignored)
         actions = {**ignored, **action_dict}
         while True:

@@ -13,11 +13,11 @@ from entropy_explore_env.envs.conformance import leaves, require_same
 
 pytest.importorskip("ray.rllib", reason="ray[rllib] is not installed: make test-rllib")
 
-from ray.rllib.algorithms.ppo import PPOConfig  # noqa: E402
-from ray.rllib.env.env_context import EnvContext  # noqa: E402
-from ray.rllib.env.multi_agent_env_runner import MultiAgentEnvRunner  # noqa: E402
+from ray.rllib.algorithms.ppo import PPOConfig
+from ray.rllib.env.env_context import EnvContext
+from ray.rllib.env.multi_agent_env_runner import MultiAgentEnvRunner
 
-from entropy_explore_env.envs.rllib_env import (  # noqa: E402 - ray is there
+from entropy_explore_env.envs.rllib_env import (
     EntropyExploreMultiAgentEnv,
     endings,
     runner_seed,

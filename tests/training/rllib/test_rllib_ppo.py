@@ -11,11 +11,11 @@ import pytest
 
 pytest.importorskip("ray.rllib", reason="ray[rllib] is not installed: make test-rllib")
 
-from ray.rllib.env.multi_agent_env_runner import MultiAgentEnvRunner  # noqa: E402
+from ray.rllib.env.multi_agent_env_runner import MultiAgentEnvRunner
 
-from baselines.command import run_command  # noqa: E402 - ray is there
-from training import rllib_ppo  # noqa: E402
-from training.rllib_ppo import Args, check, configure, main  # noqa: E402
+from baselines.command import run_command
+from training import rllib_ppo
+from training.rllib_ppo import Args, check, configure, main
 
 pytestmark = [  # RLlib's own
     pytest.mark.filterwarnings("ignore::DeprecationWarning"),
