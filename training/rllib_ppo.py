@@ -31,6 +31,7 @@ from entropy_explore_env.errors import EntropyExploreError, MissingExtraError, S
 from entropy_explore_env.scenarios import find_scenario
 from entropy_explore_env.settings_json import settings_of
 from entropy_explore_env.writing import write_atomically
+from training.errors import NotFiniteError
 
 POLICY = "shared"
 LOSSES = ("total_loss", "policy_loss", "vf_loss", "entropy")
@@ -39,7 +40,7 @@ FIGURES = ("t_mission_s", "finished", "bits_gained_per_bit_sent")
 REACHED_WITHIN_S = 20.0
 """A cluster that does not answer within this time is not there."""
 STARTS = 3
-"""Ray gives up a start when a part of it needs more than 15 s, as on a busy machine (ray-project/ray#65983)."""
+"""Ray gives up a start when a part of it needs more than 15 s (ray-project/ray#65983): machines are busy."""
 
 
 @dataclass
@@ -121,7 +122,7 @@ def check(args: Args) -> dict[str, Any]:
         raise SettingError("address", args.address, "HOST:PORT of a Ray cluster, or auto")
     settings: dict[str, Any] = {
         "robots": args.robots,
-        "action": {"kind": "discrete"},
+        "action": {"kind": "discrete", "moves": "axes"},
         "observation": {"flat": True, "panorama_utility": "log2"},  # what a small network takes best
         "reward": {"cost_per_s": args.cost_per_s},
     }
@@ -182,7 +183,7 @@ def train(args: Args, env_settings: dict[str, Any]) -> None:
     """Train, and keep the progress and checkpoints.
 
     Raises:
-        EntropyExploreError: A loss is not finite; the last checkpoint stays.
+        NotFiniteError: A loss is not finite; the last checkpoint stays.
     """
     from entropy_explore_env.envs.rllib_env import EntropyExploreMultiAgentEnv
 
@@ -266,9 +267,12 @@ def _note_figures(episode: Any, metrics_logger: Any, **others: Any) -> None:  # 
 
 
 def loop(args: Args, algorithm: Any, begun: int) -> None:  # noqa: ANN401 - RLlib's Algorithm
-    """Iterate until the steps are done."""
+    """Iterate until the steps are done.
+
+    Raises:
+        NotFiniteError: A loss is not finite.
+    """
     iteration, steps, started = begun, 0, time.perf_counter()
-    saved = begun
     while steps < args.total_steps:
         row = progress_of(algorithm.train(), iteration := iteration + 1, args.robots)
         steps = int(row["decisions"])
@@ -277,11 +281,9 @@ def loop(args: Args, algorithm: Any, begun: int) -> None:  # noqa: ANN401 - RLli
         print(line_of(row), file=sys.stderr)
         for name in LOSSES:
             if not math.isfinite(row[name]):
-                kept = f"checkpoint-{saved:06}" if saved else "no checkpoint yet"
-                raise EntropyExploreError(f"iteration {iteration}: {name} = {row[name]}; kept: {kept}")
+                raise NotFiniteError(name, row[name], steps)
         if iteration % args.checkpoint_every == 0 or steps >= args.total_steps:
             save(algorithm, args.out, iteration)
-            saved = iteration
 
 
 def progress_of(result: dict[str, Any], iteration: int, robots: int) -> dict[str, float]:
