@@ -289,7 +289,10 @@ def loop(args: Args, algorithm: Any, begun: int) -> None:  # noqa: ANN401 - RLli
 def progress_of(result: dict[str, Any], iteration: int, robots: int) -> dict[str, float]:
     """A row of the progress from RLlib's result; NaN before the first mission ended."""
     runners, learner = result["env_runners"], result["learners"][POLICY]
-    row = {"iteration": iteration, "decisions": sum(runners["num_agent_steps_sampled_lifetime"].values())}
+    row: dict[str, float] = {
+        "iteration": iteration,
+        "decisions": sum(runners["num_agent_steps_sampled_lifetime"].values()),
+    }
     row["return"] = float(runners.get("episode_return_mean", math.nan)) / robots
     row.update({name: float(runners.get(name, math.nan)) for name in FIGURES})
     row.update({name: float(learner[name]) for name in LOSSES})

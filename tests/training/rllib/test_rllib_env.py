@@ -1,4 +1,5 @@
 """The adapter for RLlib: who is heard when, what is learned from, how episodes end, and who shares a seed."""
+# pyright: reportMissingImports=false
 
 from __future__ import annotations
 
@@ -37,7 +38,7 @@ BOX: dict[str, Any] = {
 }
 
 
-def chosen(env: EntropyExploreMultiAgentEnv, agents: Any, rng: np.random.Generator) -> dict[str, Any]:
+def chosen(env: Any, agents: Any, rng: np.random.Generator) -> dict[str, Any]:
     return {agent: int(rng.integers(env.action_spaces[agent].n)) for agent in agents}
 
 
