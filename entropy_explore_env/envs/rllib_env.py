@@ -66,7 +66,9 @@ class EntropyExploreMultiAgentEnv(MultiAgentEnv):
         self.render_mode = self.team.render_mode
         self._earned: dict[str, float] = {}
         one = self.action_spaces[self.possible_agents[0]]
-        self._ignored = np.int64(0) if isinstance(one, spaces.Discrete) else np.zeros(one.shape, one.dtype)
+        self._ignored = (
+            np.int64(0) if isinstance(one, spaces.Discrete) else np.zeros(one.shape or (), one.dtype)
+        )
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
