@@ -1,27 +1,33 @@
 # Everything runs in .venv, which the first target that needs it creates and fills under
-# requirements/constraints.txt; it is filled again when that file or pyproject.toml changes.
+# requirements/constraints.txt; it is filled again when that file or pyproject.toml changes. RLlib needs another
+# Gymnasium and has an environment of its own, .venv-rllib.
 
 PYTHON ?= python3
 VENV := .venv
 RUN := $(VENV)/bin/python -m
 STAMP := $(VENV)/installed-
+VENV_RLLIB := .venv-rllib
 
-.PHONY: help demo test lint bench reproduce clean
+.PHONY: help demo test test-rllib lint bench reproduce clean
 .NOTPARALLEL:
 
 help:
 	@echo "make demo       run one mission of three robots and show it in results/demo"
 	@echo "make test       lint, then the tests"
+	@echo "make test-rllib the tests of the trainer with RLlib"
 	@echo "make lint       ruff and pyright"
 	@echo "make bench      speed against peers"
 	@echo "make reproduce  the experiments of Rocha04 and RochaMI, into docs/results"
-	@echo "make clean      remove .venv, builds and caches; results stay"
+	@echo "make clean      remove the environments, builds and caches; results stay"
 
 demo: $(STAMP)baselines
 	$(RUN) baselines.run room --strategy gradient --robots 3 --seed 0 --out results/demo
 
 test: lint
 	$(RUN) pytest
+
+test-rllib: $(VENV_RLLIB)/installed
+	$(VENV_RLLIB)/bin/python -m pytest tests/training/rllib tests/training/test_rllib_refusals.py
 
 lint: $(STAMP)dev
 	$(RUN) ruff check .
@@ -43,6 +49,13 @@ $(STAMP)%: pyproject.toml requirements/constraints.txt
 	@$(RUN) pip install -qq --disable-pip-version-check -c requirements/constraints.txt -e ".[$*]"
 	@touch $@
 
+$(VENV_RLLIB)/installed: pyproject.toml requirements/constraints-rllib.txt
+	@$(VENV_RLLIB)/bin/python -m pip --version >/dev/null 2>&1 || $(PYTHON) -m venv $(VENV_RLLIB)
+	@echo "installing entropy_explore_env[rllib] in $(VENV_RLLIB), a minute or two the first time ..." >&2
+	@$(VENV_RLLIB)/bin/python -m pip install -qq --disable-pip-version-check \
+		-c requirements/constraints-rllib.txt -e ".[rllib]" "pytest>=8.2"
+	@touch $@
+
 clean:
-	rm -rf $(VENV) build dist *.egg-info .pytest_cache .ruff_cache .hypothesis
+	rm -rf $(VENV) $(VENV_RLLIB) build dist *.egg-info .pytest_cache .ruff_cache .hypothesis
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

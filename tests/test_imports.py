@@ -104,6 +104,7 @@ SIBLINGS = {
         "single_env",
         "vector_env",
         "robot_vec_env",
+        "rllib_env",
         "episodes",
         "conformance",
     ),
@@ -145,7 +146,7 @@ OWN_SIMULATIONS = (ROOT / "baselines/papers/bhattacharya_runs.py",)
 """A reproduction in a simulation of its own holds that simulation's truth, and may make worlds for it."""
 TRUTH = ("Missions", "World", "load_octomap", "load_world", "save_world")
 """Public names that show the truth: not for strategies."""
-HEAVY = ("baselines", "training", "benchmarks", "tests", "torch", "matplotlib", "stable_baselines3")
+HEAVY = ("baselines", "training", "benchmarks", "tests", "torch", "matplotlib", "stable_baselines3", "ray")
 
 
 class Import(NamedTuple):
@@ -298,7 +299,7 @@ def test_only_the_adapters_import_pettingzoo():
             assert inside.parts[0] in ("envs", "__init__.py"), str(each)
 
 
-ADAPTERS = (ROOT / LIBRARY / "envs/robot_vec_env.py",)
+ADAPTERS = (ROOT / LIBRARY / "envs/robot_vec_env.py", ROOT / LIBRARY / "envs/rllib_env.py")
 """Of trainers: they import their trainer at the top, and nothing of the library imports them."""
 
 

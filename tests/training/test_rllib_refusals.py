@@ -1,0 +1,121 @@
+"""What RLlib's trainer says to bad input, and what it keeps: none of this needs RLlib."""
+
+from __future__ import annotations
+
+import errno
+import math
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from baselines.command import run_command
+from entropy_explore_env import SettingError
+from training import rllib_ppo
+from training.errors import NotFiniteError
+from training.rllib_ppo import Args, last_checkpoint, loop, main
+
+
+@pytest.mark.parametrize(
+    ("words", "named"),
+    [
+        ("--scenario nowhere", "nowhere"),
+        ("--robots 0", "Scenario.robots = 0"),
+        ("--seed -1", "seed = -1"),
+        ("--runners -1", "runners = -1"),
+        ("--total-steps 0", "total_steps = 0"),
+        ("--minibatch 64 --batch 32", "minibatch = 64: allowed is at most the batch, 32"),
+        ("--learning-rate nan", "learning_rate = nan"),
+        ("--address somewhere", "HOST:PORT of a Ray cluster"),
+        ("--resume", "a folder with a checkpoint"),
+        ("--no-such-option 1", "no-such-option"),
+    ],
+)
+def test_bad_arguments_are_one_line_and_leave_nothing(words, named, tmp_path, capsys):
+    assert run_command(main, [*words.split(), "--out", str(tmp_path / "run")]) == 2
+    said = capsys.readouterr().err
+    assert said.startswith("error: ") and said.count("\n") == 1 and named in said
+    assert not (tmp_path / "run").exists()
+
+
+def test_a_folder_that_cannot_be_made(tmp_path, capsys):
+    (tmp_path / "file").touch()
+    assert run_command(main, ["--out", str(tmp_path / "file" / "run")]) == 2
+    said = capsys.readouterr().err
+    assert "a folder that can be made" in said and said.count("\n") == 1
+
+
+def test_a_folder_that_cannot_be_written(tmp_path, capsys, monkeypatch):
+    def refuse(path: Path, content: str) -> None:
+        raise PermissionError(errno.EACCES, "Permission denied", str(path))
+
+    monkeypatch.setattr(rllib_ppo, "write_atomically", refuse)
+    assert run_command(main, ["--out", str(tmp_path)]) == 2
+    said = capsys.readouterr().err
+    assert "a folder that can be written (Permission denied)" in said and said.count("\n") == 1
+
+
+def test_without_ray_the_extra_is_named(tmp_path, capsys, monkeypatch):
+    monkeypatch.setitem(sys.modules, "ray", None)
+    assert run_command(main, ["--out", str(tmp_path)]) == 2
+    assert capsys.readouterr().err == (
+        "error: ray[rllib] is not installed: pip install 'entropy_explore_env[rllib]'\n"
+    )
+
+
+class Scripted:
+    """Stands in for RLlib's Algorithm: 100 decisions an iteration, its losses as told."""
+
+    def __init__(self, losses: list[float], disk_full_at: int | None = None) -> None:
+        self.losses, self.full, self.done = losses, disk_full_at, 0
+
+    def train(self) -> dict[str, Any]:
+        self.done += 1
+        learner = dict.fromkeys(rllib_ppo.LOSSES, 0.5)
+        learner["vf_loss"] = self.losses[self.done - 1]
+        steps = {f"robot_{robot}": 50 * self.done for robot in range(2)}
+        runners = {"num_agent_steps_sampled_lifetime": steps, "episode_return_mean": 3.0, "t_mission_s": 7.0}
+        return {"env_runners": {**runners, "finished": 1.0}, "learners": {rllib_ppo.POLICY: learner}}
+
+    def save_to_path(self, path: str) -> None:
+        Path(path).mkdir()
+        if self.done == self.full:
+            raise OSError(errno.ENOSPC, "No space left on device", path)
+        (Path(path) / "iteration").write_text(str(self.done))
+
+
+def args_for(folder: Path, steps: int) -> Args:
+    return Args(out=folder, robots=2, total_steps=steps, checkpoint_every=2)
+
+
+def test_checkpoints_come_and_go(tmp_path, capsys):
+    loop(args_for(tmp_path, 500), Scripted([0.1] * 5), begun=0)
+    assert [path.name for path in tmp_path.glob("*checkpoint*")] == ["checkpoint-000005"]
+    rows = (tmp_path / "progress.csv").read_text().splitlines()
+    assert rows[0].startswith("iteration,decisions,return,t_mission_s,finished") and len(rows) == 6
+    assert rows[1].startswith("1,100,1.5,7.0,1.0,nan,0.5,0.5,0.1,0.5")
+    assert "100 decisions  return   1.500  missions of 7 s, 100% finished" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("bad", [math.nan, math.inf])
+def test_a_loss_that_is_not_finite_stops_and_keeps_the_last_checkpoint(bad, tmp_path):
+    with pytest.raises(NotFiniteError, match=r"vf_loss = (nan|inf) after 400 steps"):
+        loop(args_for(tmp_path, 900), Scripted([0.1, 0.1, 0.1, bad]), begun=0)
+    kept = last_checkpoint(tmp_path)
+    assert kept is not None and (kept / "iteration").read_text() == "2"
+
+
+def test_a_full_disk_keeps_the_last_checkpoint(tmp_path):
+    with pytest.raises(OSError, match="No space left"):
+        loop(args_for(tmp_path, 900), Scripted([0.1] * 9, disk_full_at=4), begun=0)
+    kept = last_checkpoint(tmp_path)
+    assert kept is not None and (kept / "iteration").read_text() == "2"
+    loop(args_for(tmp_path, 400), Scripted([0.1] * 4), begun=2)  # what was left unfinished is no hindrance
+    assert last_checkpoint(tmp_path) == tmp_path / "checkpoint-000006"
+
+
+def test_resuming_wants_a_whole_checkpoint(tmp_path):
+    (tmp_path / "unfinished-checkpoint").mkdir()
+    with pytest.raises(SettingError, match="a folder with a checkpoint"):
+        rllib_ppo.check(Args(out=tmp_path, resume=True))

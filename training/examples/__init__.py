@@ -1,0 +1,1 @@
+"""Short beginnings for trainers that are not ours; docs/training.md shows them."""
