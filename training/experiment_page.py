@@ -167,7 +167,8 @@ def _ablation_parts(found: Found) -> list[str]:
         "## What the design rests on\n",
         f"Runs of {found.steps:,} steps in the room, three robots, three seeds each, one thing changed at a "
         "time. Seconds are the mean mission time in the last validation (32 missions); differences are to "
-        "the default's run of the same seed. Three seeds tell large differences from none, not small ones: what "
+        "the default's run of the same seed. Three seeds tell large differences from none, not small ones: "
+        "what "
         "lies within the spread of the default's own runs "
         f"({usual.min():.1f} … {usual.max():.1f} s) is not told apart from chance.\n",
         markdown_table(head, rows),

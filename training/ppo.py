@@ -135,13 +135,15 @@ class Args:
     """Steps between two validations."""
     validation_missions: int = 32
     """Missions of each."""
+    video: bool = True
+    """At the end, run the best policy once and write its mission as a picture and an animation."""
     checkpoint_every: int = 500_000
     """Steps between two checkpoints; a run that is resumed loses at most so many."""
 
 
 _COUNTED = ("best", "curve", "next_validation", "next_checkpoint")
 _PARTS = ("collecting_s", "learning_s", "validating_s", "processor_s")
-_FREE = ("out", "resume", "threads", "json", "total_steps")
+_FREE = ("out", "video", "resume", "threads", "json", "total_steps")
 """Options that a resumed run may change."""
 
 
@@ -158,7 +160,7 @@ def main(words: Sequence[str]) -> int:
         if found is not None:
             run.resume(found)
         run.learn(shlex.join(["python", "-m", "training.ppo", *words]))
-    files = film_best(args.out, scenario)
+    files = film_best(args.out, scenario) if args.video else [args.out]
     summary = run.progress() | {"best": run.best, "files": [str(file) for file in files]}
     if args.json:
         print_json(summary)

@@ -36,7 +36,7 @@ def test_it_trains_with_two_runners_and_resumes(tmp_path):
     """Runners of a process of its own, as a person starts it."""
     command = [sys.executable, "-m", "training.rllib_ppo", *SMALL.split(), "--out", str(tmp_path / "run")]
     first = subprocess.run(
-        [*command, "--total-steps", "480"], cwd=ROOT, capture_output=True, text=True, timeout=240
+        [*command, "--total-steps", "480"], cwd=ROOT, capture_output=True, text=True, timeout=900
     )
     assert first.returncode == 0, first.stderr
     assert first.stderr.count(" decisions ") == 2 and "Warning" not in first.stderr
