@@ -51,6 +51,7 @@ def rows_of(text: str) -> list[str]:
         ("RochaMI, reproduced", "rochami", 10),
         ("Speed", "speed", 15),
         ("Strategies head to head", "head-to-head", 10),
+        ("A policy that learns", "ppo", 8),
     ],
 )
 def test_tables_are_those_of_the_reports(heading, report, rows):
