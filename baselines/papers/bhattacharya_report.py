@@ -14,13 +14,11 @@ from baselines.claims_table import claims_table
 from baselines.experiment import Claim, csv_table, markdown_table, median_interval
 from baselines.figures import STYLE, png
 from baselines.papers.bhattacharya_claims import (
-    PAPER_ITERATIONS,
-    PAPER_SHAPE,
     STARTS,
     Records,
     covering,
     exploring,
-    main_floor,
+    first_floor,
     until_explored,
 )
 from baselines.papers.bhattacharya_figures import figure_4, figure_6, figure_progress, figures_2_3
@@ -38,6 +36,7 @@ from baselines.papers.bhattacharya_runs import (
     CONTROLS,
     FLOORS,
     FUSIONS,
+    PICTURED,
     VARIANTS,
     Run,
     coverage_id,
@@ -72,22 +71,19 @@ def write_report(folder: Path, results: Results, claims: Sequence[Claim], comman
             rows.append((name, run, results.records[run.id]))
         write_atomically(beside / "figures-2-3.png", png(figures_2_3(rows)))
         write_atomically(beside / "figure-4.png", png(figure_4()))
-        floor = main_floor(results.records)
-        range_cells = FLOORS[floor].middle
-        for variant, name in (
-            ("paper", "the paper's settings"),
-            ("nearest-length", "plain cells, nearest target"),
+        for variant, name in zip(
+            PICTURED, ("the paper's settings", "plain cells, nearest target"), strict=True
         ):
-            run = runs[exploration_id(floor, variant, range_cells, 0)]
+            floor = first_floor(results.records, variant)
+            run = runs[exploration_id(floor, variant, FLOORS[floor].middle, 0)]
             with np.load(results.folder / f"{run.id}.npz") as maps:
                 size = f"{run.shape[0]} × {run.shape[1]} cells"
-                title = f"{size}, {run.robots} robots, range {range_cells:g}; {name}"
+                title = f"{size}, {run.robots} robots, range {run.rules.sensor.range_cells:g}; {name}"
                 picture = figure_6(run, results.records[run.id], dict(maps), title)
             write_atomically(beside / f"figure-6-{variant}.png", png(picture))
         lines = [
-            (name, found[0])
+            (name, exploring(results.records, "small", name, FLOORS["small"].middle)[0])
             for name in ("paper", *VARIANTS)
-            if (found := exploring(results.records, floor, name, range_cells))
         ]
         write_atomically(beside / "progress.png", png(figure_progress(lines)))
     columns: dict[str, list[object]] = {"variant": [], "iteration": [], "uncertain": []}
@@ -138,14 +134,10 @@ def _text(results: Results, claims: Sequence[Claim], command: str) -> str:
 def _exploration_parts(results: Results) -> list[str]:
     parts = [EXPLORATION_READING]
     for name, floor in FLOORS.items():
-        if found := exploring(results.records, name, "paper", floor.middle):
-            size, plans = (
-                " × ".join(map(str, floor.shape)),
-                "1 plan" if len(found) == 1 else f"{len(found)} plans",
-            )
-            parts += [f"### {name.capitalize()}: {size} cells, {floor.text}; {plans}"]
-            parts += [_exploration_table(results, name)]
-            parts += [_sweep_reading(results.records, name)] if floor.shape == PAPER_SHAPE else []
+        if table := _exploration_table(results.records, name):
+            size = " × ".join(map(str, floor.shape))
+            parts += [f"### {name.capitalize()}: {size} cells, {floor.text}", table]
+            parts += [_sweep_reading(results.records, name)] if len(floor.ranges) > 1 else []
     return [
         *parts,
         "![Fig. 6](bhattacharya/figure-6-paper.png)",
@@ -164,12 +156,13 @@ def _sweep_reading(records: Records, floor: str) -> str:
         found = exploring(records, floor, "paper", range_cells)
         if found and all(r["ended"] == "converged" for r in found):
             done[range_cells] = float(np.median([r["iterations"] for r in found]))
-    within = [range_cells for range_cells, iterations in done.items() if iterations <= PAPER_ITERATIONS]
+    most = FLOORS[floor].paper
+    within = [range_cells for range_cells, iterations in done.items() if iterations <= most]
     swept = ", ".join(f"{range_cells:g}" for range_cells in ranges)
     if within:
-        return f"Of the ranges {swept} the least that ends within {PAPER_ITERATIONS} is {min(within):g}."
+        return f"Of the ranges {swept} the least that ends within {most:,} iterations is {min(within):g}."
     fewest = f": the fewest are {min(done.values()):,.0f}" if done else ""
-    return f"None of the ranges {swept} ends within {PAPER_ITERATIONS} iterations{fewest}."
+    return f"None of the ranges {swept} ends within {most:,} iterations{fewest}."
 
 
 def _coverage_table(results: Results) -> str:
@@ -198,13 +191,13 @@ def _coverage_table(results: Results) -> str:
     return markdown_table([*head, "largest rise", "H at the end over H at first", "ms an iteration"], rows)
 
 
-def _exploration_table(results: Results, name: str) -> str:
+def _exploration_table(records: Records, name: str) -> str:
     floor = FLOORS[name]
     points = [("paper", r) for r in floor.ranges]
     points += [(variant, floor.middle) for variant in floor.variants if variant not in FUSIONS]
     rows = []
     for variant, range_cells in points:
-        found = exploring(results.records, name, variant, range_cells)
+        found = exploring(records, name, variant, range_cells)
         if found:
             explored = [r for r in found if r["explored_at"] is not None]
             ended = [r["iterations"] for r in found if r["ended"] == "converged"]

@@ -116,6 +116,7 @@ VARIANTS: dict[str, dict[str, Any]] = {
 }
 """Of (b): one thing changed at a time, but for `nearest-length`."""
 PICTURED = ("paper", "nearest-length")
+"""Of (b), each in the largest plan in which it is run."""
 
 FUSIONS: dict[str, dict[str, Any]] = {
     "far-mean": {"tau": 0.15, "tau_floor": 0.14},
@@ -132,6 +133,7 @@ class Floor:
         shape: Cells along x and y.
         cell_m: What the recipe takes a cell for; it draws rooms of 7-18 m.
         limit: Most iterations.
+        paper: In how many iterations the paper explores, covers and converges; in small plans a third.
         middle: Sensor range of the variants, in cells.
         ranges: Those of the paper's settings; the paper gives none.
         variants: What is run there besides.
@@ -141,6 +143,7 @@ class Floor:
     shape: tuple[int, int]
     cell_m: float
     limit: int
+    paper: int
     middle: float
     ranges: tuple[float, ...]
     variants: tuple[str, ...]
@@ -148,21 +151,22 @@ class Floor:
 
 
 FLOORS = {
-    "wide": Floor(
-        (1000, 783),
-        0.1 / 3.0,
-        25_000,
-        100.0,
-        (50.0, 100.0, 200.0, 400.0, 1300.0),
-        ("length", "nearest", "nearest-length"),
-        "rooms 210-540 cells wide",
-    ),
+    "wide": Floor((1000, 783), 0.1 / 3.0, 25_000, 2750, 100.0, (100.0,), (), "rooms 210-540 cells wide"),
     "narrow": Floor(
-        (1000, 783), 0.1, 25_000, 100.0, (100.0, 1300.0), ("nearest-length",), "rooms 70-180 cells wide"
+        (1000, 783), 0.1, 25_000, 2750, 100.0, (), ("nearest-length",), "rooms 70-180 cells wide"
     ),
-    "small": Floor((333, 261), 0.1, 4000, 35.0, (35.0,), (*VARIANTS, *FUSIONS), "rooms 70-180 cells wide"),
+    "small": Floor(
+        (333, 261),
+        0.1,
+        4000,
+        917,
+        35.0,
+        (17.0, 35.0, 70.0, 140.0, 433.0),
+        (*VARIANTS, *FUSIONS),
+        "the wide plans in cells three times as large",
+    ),
 }
-"""A range of 1300 cells looks over the whole plan. There is time to run many small plans."""
+"""The largest range looks over the whole plan. There is time to run many small plans, and few others."""
 
 
 def coverage_id(control: str, starts: str, seed: int) -> str:
@@ -202,7 +206,7 @@ def all_runs(coverage_seeds: int, plans: int, small_plans: int) -> list[Run]:
 
 
 def _exploration(floor: str, variant: str, range_cells: float, seed: int) -> Run:
-    """A run of (b); of those that may be pictured, the first is."""
+    """A run of (b); of those that may be pictured, the first is, on each kind of plan."""
     plan, changes = FLOORS[floor], {"paper": {}, **VARIANTS, **FUSIONS}[variant]
     return Run(
         exploration_id(floor, variant, range_cells, seed),
