@@ -232,19 +232,11 @@ def _fusion_table(results: Results) -> str:
     }
     rows = []
     for name in ("paper", *FUSIONS):
-        found = exploring(results.records, "small", name, FLOORS["small"].middle)
-        left = np.median([r["uncertain_left"] for r in found])
-        done = [r for r in found if r["explored_at"] is not None]
-        rows.append(
-            [
-                words[name],
-                f"{len(done)} of {len(found)}",
-                _median([until_explored(r) for r in found], len(done) == len(found)),
-                f"{left:,.0f}",
-            ]
-        )
+        first = exploring(results.records, "small", name, FLOORS["small"].middle)[0]
+        at = first["explored_at"]
+        rows.append([words[name], "never" if at is None else f"{at:,}", f"{first['uncertain_left']:,}"])
     size = " × ".join(map(str, FLOORS["small"].shape))
-    return markdown_table([f"{size} cells", "explored", "at iteration", "uncertain cells left, median"], rows)
+    return markdown_table([f"{size} cells, first plan", "all explored at", "uncertain cells left"], rows)
 
 
 def _split_table(splits: dict[str, Any]) -> str:
