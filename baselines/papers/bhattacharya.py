@@ -43,7 +43,7 @@ class Args:
     small_plans: int | None = None
     """Plans of 333 × 261 cells of (b); default: 10, with --quick 1."""
     missions: int | None = None
-    """Missions of (e), eight times as many of (f); default: 2, with --quick 1, and no (e). 0 = none."""
+    """Missions of (e), four times as many of (f); default: 5, with --quick 1, and no (e). 0 = none."""
     corridor: Path | None = None
     """An OctoMap of a real corridor for (e), such as geb079.bt."""
     jobs: int = 1
@@ -93,7 +93,7 @@ _DEFAULTS = {
     "starts": (20, 5, 1),
     "plans": (1, 0, 0),
     "small_plans": (10, 1, 1),
-    "missions": (2, 1, 0),
+    "missions": (5, 1, 0),
     "jobs": (1, 1, 1),
 }
 """In full, with --quick, and the least that can be asked for."""

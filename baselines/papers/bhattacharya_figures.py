@@ -133,6 +133,10 @@ def figure_progress(lines: list[tuple[str, Record]]) -> Figure:
             color=COLOURS[number % len(COLOURS)],
             linestyle="-" if number < len(COLOURS) else ":",
         )
-    axes.set(xlabel="iteration", ylabel="uncertain cells in reach (1000)", title="Exploration, first plan")
+    axes.set(
+        xlabel="iteration",
+        ylabel="uncertain cells in reach (1000)",
+        title="Exploration of the first small plan",
+    )
     axes.legend(frameon=False, fontsize=7)
     return figure

@@ -50,7 +50,7 @@ def mission_cells(seeds: int, corridor: Path | None) -> list[Cell]:
     """All cells.
 
     Args:
-        seeds: Missions of each flying team; eight times as many of each channel.
+        seeds: Missions of each flying team; four times as many of each channel.
         corridor: An OctoMap of a real corridor; None = without it.
     """
     cave = with_settings(find_scenario("cave"), {"robots": 4, "time_limit_s": FLYING_LIMIT_S, "scored": True})
@@ -66,7 +66,7 @@ def mission_cells(seeds: int, corridor: Path | None) -> list[Cell]:
         for loss in LOSSES:
             settings = {**channel, "i_min_bits": 0.0, "loss_probability": loss}
             scenario = with_settings(office, {"channel": settings, "time_limit_s": 1200.0})
-            cells.append(Cell(channel_id(name, loss), scenario, "voronoi-nearest", 8 * seeds))
+            cells.append(Cell(channel_id(name, loss), scenario, "voronoi-nearest", 4 * seeds))
     return cells
 
 
@@ -97,10 +97,10 @@ def channel_table(missions: Records) -> str:
                     f"{loss:g}",
                     channel,
                     f"{sum(r['finished'] for r in found)} of {len(found)}",
-                    _shown(mean_interval(_times(found)), ",.0f"),
+                    _shown(_times(found), ",.0f"),
                     f"{np.mean([r['bits_sent'] for r in found]) / 1e6:.2f}",
                     f"{np.mean([r['bits_sent'] / max(r['scans'], 1) for r in found]):,.0f}",
-                    _shown(mean_interval(_utilities(found)), ".3f"),
+                    _shown(_utilities(found), ".3f"),
                 ]
             )
     head = ["loss", "channel", "mapped", "mean t (s)", "Mbit sent", "bits sent a scan", "utility a bit sent"]
@@ -119,8 +119,8 @@ def flying_table(missions: Records) -> str:
                         world,
                         strategy,
                         f"{sum(r['finished'] for r in found)} of {len(found)}",
-                        _shown(mean_interval(_times(found)), ",.0f"),
-                        _shown(mean_interval([100.0 * r["joint"]["explored"] for r in found]), ".1f"),
+                        _shown(_times(found), ",.0f"),
+                        _shown([100.0 * r["joint"]["explored"] for r in found], ".1f"),
                         f"{np.mean([r['scans'] for r in found]):,.0f}",
                     ]
                 )
@@ -137,6 +137,7 @@ def _utilities(found: Sequence[Record]) -> list[float]:
     return [r["bits_gained_per_bit_sent"] or 0.0 for r in found]
 
 
-def _shown(found: tuple[float, float, float], form: str) -> str:
-    mean, low, high = (format(value, form) for value in found)
-    return f"{mean} ({low} … {high})"
+def _shown(values: Sequence[float], form: str) -> str:
+    """Mean with its interval, which one mission does not have."""
+    mean, low, high = (format(value, form) for value in mean_interval(values))
+    return f"{mean} ({low} … {high})" if len(values) > 1 else mean

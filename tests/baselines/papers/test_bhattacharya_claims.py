@@ -130,7 +130,7 @@ def test_rivals_send_as_many_measurements_a_scan():
         assert CHANNELS[phases]["burst"] * CHANNELS[phases].get("repeats", 1) == CHANNELS[utility]["burst"]
     cells = mission_cells(2, None)
     assert len({cell.id for cell in cells}) == len(cells)
-    assert {cell.seeds for cell in cells if cell.id.startswith("channel")} == {16}
+    assert {cell.seeds for cell in cells if cell.id.startswith("channel")} == {8}
     assert len({cell.strategy for cell in cells if cell.id.startswith("channel")}) == 1
 
 
