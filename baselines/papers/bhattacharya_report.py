@@ -103,7 +103,8 @@ def _text(results: Results, claims: Sequence[Claim], command: str) -> str:
         "# Bhattacharya, Michael and Kumar 2010, reproduced",
         f"Written by `{command}`: {len(results.runs)} runs and {missions} missions. Plans, starts and lost "
         "messages come from seeds 0, 1, …, the same for all variants; intervals are 95 % bootstrap intervals "
-        "over seeds. Point robots step from cell to cell, as there.",
+        "over seeds; one of fewer than five runs is hardly more than their span, and the tables say how many "
+        "there are. Point robots step from cell to cell, as there.",
         f"## Claims: {held} of {len(claims)} hold",
         "A claim with an interval holds if all of it says so; iterations and seconds of (b) hold by their "
         "median. Seconds are processor time on one thread of this machine, the paper's those of a 2.1 GHz "
