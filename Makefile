@@ -17,7 +17,7 @@ help:
 	@echo "make test-rllib the tests of the trainer with RLlib"
 	@echo "make lint       ruff and pyright"
 	@echo "make bench      speed against peers"
-	@echo "make reproduce  the experiments of Rocha04 and RochaMI, into docs/results"
+	@echo "make reproduce  the experiments of Rocha04, RochaMI and Bhattacharya, into docs/results: hours"
 	@echo "make clean      remove the environments, builds and caches; results stay"
 
 demo: $(STAMP)baselines

@@ -1,6 +1,6 @@
 """Bhattacharya 2010 reproduced: `python -m baselines.papers.bhattacharya [--quick] [--out DIR] [--json]`.
 
-Covers a known office with both controls, explores a large unknown plan over sensor ranges and with one thing
+Covers a known office with both controls, explores unknown plans over sensor ranges and with one thing
 changed at a time, splits an unknown region, and runs the strategy in this package's missions; writes figures
 2, 3, 4 and 6 and the claims. Runs are kept under `--runs`: a stopped experiment goes on where it was.
 """
@@ -18,10 +18,11 @@ import numpy as np
 from baselines.command import make_folder, parse, print_json, run_command
 from baselines.experiment import run_cells
 from baselines.papers.bhattacharya_claims import all_claims
-from baselines.papers.bhattacharya_missions import mission_cells
-from baselines.papers.bhattacharya_runs import MIDDLE_RANGE, QUICK_RANGE, all_runs, run_all, start_cells
+from baselines.papers.bhattacharya_grid import Simulation
+from baselines.papers.bhattacharya_missions import channel_claims, mission_cells
+from baselines.papers.bhattacharya_runs import Run, all_runs, run_all, start_cells
 from baselines.papers.bhattacharya_split import ratios
-from baselines.papers.bhattacharya_timing import beside_scipy
+from baselines.papers.bhattacharya_timing import beside_scipy, changed_share
 from entropy_explore_env.errors import SettingError
 
 
@@ -30,7 +31,7 @@ class Args:
     """Reproduce Bhattacharya, Michael and Kumar 2010."""
 
     quick: bool = False
-    """Smaller plans, fewer seeds, no flying teams: a few minutes."""
+    """Small plans alone, fewer seeds, no flying teams: a few minutes."""
     out: Path = Path("results/bhattacharya")
     """Folder for the report and its figures."""
     runs: Path = Path("results/bhattacharya-runs")
@@ -38,9 +39,11 @@ class Args:
     starts: int | None = None
     """Runs of (a) for each control and kind of start; default: 20, with --quick 5."""
     plans: int | None = None
-    """Plans of (b); default: 2, with --quick 1."""
+    """Plans of 1000 × 783 cells of (b), of each width of rooms; default: 1, with --quick 0."""
+    small_plans: int | None = None
+    """Plans of 333 × 261 cells of (b); default: 10, with --quick 1."""
     missions: int | None = None
-    """Missions of (e), four times as many of (f); default: 3, with --quick 1, and no (e). 0 = none."""
+    """Missions of (e), four times as many of (f); default: 5, with --quick 1, and no (e). 0 = none."""
     corridor: Path | None = None
     """An OctoMap of a real corridor for (e), such as geb079.bt."""
     jobs: int = 1
@@ -57,41 +60,24 @@ def main(words: Sequence[str]) -> int:
     from baselines.claims_table import print_claims
     from baselines.papers.bhattacharya_report import Results, write_report  # matplotlib: after the help
 
-    for name, value, least in (
-        ("starts", args.starts, 1),
-        ("plans", args.plans, 1),
-        ("jobs", args.jobs, 1),
-        ("missions", args.missions, 0),
-    ):
-        if value is not None and value < least:
-            raise SettingError(name, value, f"a whole number ≥ {least}")
+    chosen, given = _chosen(args)
     if args.corridor is not None and not args.corridor.is_file():
         raise SettingError("corridor", str(args.corridor), "a file")
     make_folder("out", args.out)
     make_folder("runs", args.runs)
     started = time.perf_counter()
-    runs = all_runs(
-        args.quick, args.starts or (5 if args.quick else 20), args.plans or (1 if args.quick else 2)
-    )
+    runs = all_runs(chosen["starts"], chosen["plans"], chosen["small_plans"])
     records = run_all(runs, args.runs, args.jobs, args.json)
-    missions = (1 if args.quick else 3) if args.missions is None else args.missions
+    missions = chosen["missions"]
     cells = mission_cells(missions, args.corridor) if missions else []
     if args.quick:
         cells = [cell for cell in cells if not cell.id.startswith("flying")]
     flown = run_cells(cells, args.runs, args.jobs, "missions", args.json) if cells else {}
-    middle, splits = QUICK_RANGE if args.quick else MIDDLE_RANGE, ratios()
-    plan = next(run for run in runs if run.id.startswith("exploration-paper")).plan()
-    rates = np.where(plan, np.inf, 1.0).astype(np.float32)
-    timing = beside_scipy(rates, np.array(start_cells(plan, "random", 4, 0)))
-    claims = all_claims(records, runs, splits, timing, middle)
-    given = "".join(
-        f" --{name} {value}"
-        for name, value in (("starts", args.starts), ("plans", args.plans), ("missions", args.missions))
-        if value is not None
-    )
+    splits, (timing, changed) = ratios(), _measured(runs)
+    claims = [*all_claims(records, splits, timing), *(channel_claims(flown) if flown else [])]
     given += f" --corridor {args.corridor.name}" if args.corridor else ""
     command = f"python -m baselines.papers.bhattacharya{' --quick' * args.quick}{given} --out {args.out}"
-    results = Results(runs, records, splits, timing, flown, middle, args.runs)
+    results = Results(runs, records, splits, timing, changed, flown, args.runs)
     report = write_report(args.out, results, claims, command)
     if args.json:
         wall_s = round(time.perf_counter() - started, 1)
@@ -101,6 +87,39 @@ def main(words: Sequence[str]) -> int:
         print_claims(claims, "Bhattacharya")
         print(f"written: {report}, its figures beside it", file=sys.stderr)
     return 1 if args.strict and not all(claim.holds for claim in claims) else 0
+
+
+_DEFAULTS = {
+    "starts": (20, 5, 1),
+    "plans": (1, 0, 0),
+    "small_plans": (10, 1, 1),
+    "missions": (5, 1, 0),
+    "jobs": (1, 1, 1),
+}
+"""In full, with --quick, and the least that can be asked for."""
+
+
+def _chosen(args: Args) -> tuple[dict[str, int], str]:
+    """How much is run, and the options that say so."""
+    chosen, given = {}, ""
+    for name, (full, quick, least) in _DEFAULTS.items():
+        value, option = getattr(args, name), name.replace("_", "-")
+        if value is not None and value < least:
+            raise SettingError(option, value, f"a whole number ≥ {least}")
+        chosen[name] = (quick if args.quick else full) if value is None else value
+        given += f" --{option} {value}" if value is not None and name != "jobs" else ""
+    return chosen, given
+
+
+def _measured(runs: Sequence[Run]) -> tuple[tuple[float, float], float]:
+    """Seconds beside SciPy's on the largest plan, and the share of cells that change, on a small one."""
+    unknown = [run for run in runs if not run.known]
+    plan = max((run.plan() for run in unknown), key=np.size)
+    rates = np.where(plan, np.inf, 1.0).astype(np.float32)
+    timing = beside_scipy(rates, np.array(start_cells(plan, "random", 4, 0)))
+    run = next(run for run in unknown if run.id.startswith("exploration-small-paper"))
+    starts = start_cells(run.plan(), run.starts, run.robots, run.seed)
+    return timing, changed_share(Simulation(run.plan(), starts, run.rules), 200)
 
 
 if __name__ == "__main__":

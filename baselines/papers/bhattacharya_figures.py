@@ -117,7 +117,8 @@ def _borders(cells: np.ndarray) -> np.ndarray:
     for axis in range(2):
         here, there = np.moveaxis(cells, axis, 0)[:-1], np.moveaxis(cells, axis, 0)[1:]
         np.moveaxis(border, axis, 0)[:-1] |= (here != there) & (here >= 0) & (there >= 0)
-    return ndimage.binary_dilation(border, iterations=max(len(cells) // 330, 1)) & (cells >= 0)
+    wide = np.asarray(ndimage.binary_dilation(border, iterations=max(len(cells) // 330, 1)), bool)
+    return wide & (cells >= 0)
 
 
 def figure_progress(lines: list[tuple[str, Record]]) -> Figure:
@@ -133,6 +134,10 @@ def figure_progress(lines: list[tuple[str, Record]]) -> Figure:
             color=COLOURS[number % len(COLOURS)],
             linestyle="-" if number < len(COLOURS) else ":",
         )
-    axes.set(xlabel="iteration", ylabel="uncertain cells in reach (1000)", title="Exploration, first plan")
+    axes.set(
+        xlabel="iteration",
+        ylabel="uncertain cells in reach (1000)",
+        title="Exploration of the first small plan",
+    )
     axes.legend(frameon=False, fontsize=7)
     return figure

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from baselines.experiment import Cell
+import numpy as np
+
+from baselines.experiment import Cell, Claim, Record, markdown_table, mean_interval, ratio_interval
 from entropy_explore_env.config import with_settings
 from entropy_explore_env.scenarios import find_scenario
 
@@ -22,6 +25,15 @@ CHANNELS: dict[str, dict[str, Any]] = {
 }
 """Channel settings; I_min = 0, so that the first four send 64 measurements a scan each, the others 180."""
 LOSSES = (0.0, 0.5)
+RIVALS = {
+    "phases-64-once": "utility-64",
+    "phases-32-twice": "utility-64",
+    "phases-16-four-times": "utility-64",
+    "phases-all-once": "utility-all",
+}
+"""Which settings send as many measurements a scan at once."""
+
+Records = Mapping[str, Sequence[Record]]
 
 
 def flying_id(world: str, strategy: str) -> str:
@@ -38,7 +50,7 @@ def mission_cells(seeds: int, corridor: Path | None) -> list[Cell]:
     """All cells.
 
     Args:
-        seeds: Missions of each.
+        seeds: Missions of each flying team; four times as many of each channel.
         corridor: An OctoMap of a real corridor; None = without it.
     """
     cave = with_settings(find_scenario("cave"), {"robots": 4, "time_limit_s": FLYING_LIMIT_S, "scored": True})
@@ -56,3 +68,76 @@ def mission_cells(seeds: int, corridor: Path | None) -> list[Cell]:
             scenario = with_settings(office, {"channel": settings, "time_limit_s": 1200.0})
             cells.append(Cell(channel_id(name, loss), scenario, "voronoi-nearest", 4 * seeds))
     return cells
+
+
+def channel_claims(missions: Records) -> list[Claim]:
+    """Selection by utility beside the broadcast in phases, at as many bits a scan; paired by seed."""
+    claims = []
+    for loss in LOSSES:
+        for phases, utility in RIVALS.items():
+            ours, theirs = missions[channel_id(utility, loss)], missions[channel_id(phases, loss)]
+            where = f"(f) loss {loss:g}, {utility} beside {phases}"
+            ratio, low, high = ratio_interval(_utilities(ours), _utilities(theirs))
+            text = f"{where}: sending at once brings more entropy a bit; ratio"
+            claims.append(Claim(f"utility-{phases}-{loss:g}", text, None, ratio, low, high, low > 1.0))
+            ratio, low, high = ratio_interval(_times(ours), _times(theirs))
+            text = f"{where}: sending at once maps faster; t ratio"
+            claims.append(Claim(f"time-{phases}-{loss:g}", text, None, ratio, low, high, high < 1.0))
+    return claims
+
+
+def channel_table(missions: Records) -> str:
+    """Both schemes, loss by loss."""
+    rows = []
+    for loss in LOSSES:
+        for channel in CHANNELS:
+            found = missions[channel_id(channel, loss)]
+            rows.append(
+                [
+                    f"{loss:g}",
+                    channel,
+                    f"{sum(r['finished'] for r in found)} of {len(found)}",
+                    _shown(_times(found), ",.0f"),
+                    f"{np.mean([r['bits_sent'] for r in found]) / 1e6:.2f}",
+                    f"{np.mean([r['bits_sent'] / max(r['scans'], 1) for r in found]):,.0f}",
+                    _shown(_utilities(found), ".3f"),
+                ]
+            )
+    head = ["loss", "channel", "mapped", "mean t (s)", "Mbit sent", "bits sent a scan", "utility a bit sent"]
+    return markdown_table(head, rows)
+
+
+def flying_table(missions: Records) -> str:
+    """Flying teams, world by world; empty if there are none."""
+    rows = []
+    for world in ("cave", "corridor"):
+        for strategy in FLYING:
+            found = missions.get(flying_id(world, strategy), [])
+            if found:
+                rows.append(
+                    [
+                        world,
+                        strategy,
+                        f"{sum(r['finished'] for r in found)} of {len(found)}",
+                        _shown(_times(found), ",.0f"),
+                        _shown([100.0 * r["joint"]["explored"] for r in found], ".1f"),
+                        f"{np.mean([r['scans'] for r in found]):,.0f}",
+                    ]
+                )
+    head = ["world", "strategy", "mapped", "mean t (s)", "explored (%)", "scans"]
+    return markdown_table(head, rows) if rows else ""
+
+
+def _times(found: Sequence[Record]) -> list[float]:
+    return [r["t_mission_s"] for r in found]
+
+
+def _utilities(found: Sequence[Record]) -> list[float]:
+    """Bits taken from the hearers' maps, for each bit sent."""
+    return [r["bits_gained_per_bit_sent"] or 0.0 for r in found]
+
+
+def _shown(values: Sequence[float], form: str) -> str:
+    """Mean with its interval, which one mission does not have."""
+    mean, low, high = (format(value, form) for value in mean_interval(values))
+    return f"{mean} ({low} … {high})" if len(values) > 1 else mean

@@ -12,7 +12,7 @@ import multiprocessing
 import sys
 from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
 from typing import Any, Literal
@@ -45,13 +45,14 @@ class Run:
     Attributes:
         id: Its name, also that of its files.
         world: Name of the recipe.
-        shape: Cells of the plan along x and y, of 0.1 m.
+        shape: Cells of the plan along x and y.
         starts: `random` all over the plan; `cluster`, side by side somewhere; `corner`, in the lower left.
         seed: Of plan, starts and lost messages.
         robots: How many.
         known: Whether the plan is known.
         limit: Most iterations.
         pictured: Whether maps are kept for a picture.
+        cell_m: What the recipe takes a cell for.
     """
 
     id: str
@@ -64,6 +65,7 @@ class Run:
     known: bool
     limit: int
     pictured: bool = False
+    cell_m: float = field(default=0.1, repr=False)  # the plan, which is part of the digest, tells
 
     def digest(self) -> str:
         """Of all that decides the results."""
@@ -72,7 +74,7 @@ class Run:
 
     def plan(self) -> np.ndarray:
         """(X, Y, 1) bool, occupied."""
-        grid = Grid((*self.shape, 1), 0.1)
+        grid = Grid((*self.shape, 1), self.cell_m)
         scenario = with_settings(find_scenario(self.world), {"grid": grid})
         return make_world(scenario, np.random.default_rng(self.seed)).occupied
 
@@ -105,9 +107,6 @@ CONTROLS: dict[str, dict[str, Any]] = {
 }
 """Of (a): the two of the paper, and the first with robots that move only if their own functional falls."""
 
-RANGES = (40.0, 60.0, 80.0, 100.0, 150.0, 200.0)
-"""Sensor ranges of (b), in cells; the paper gives none."""
-
 VARIANTS: dict[str, dict[str, Any]] = {
     "length": {"metric": "length"},
     "nearest": {"control": "nearest"},
@@ -115,14 +114,59 @@ VARIANTS: dict[str, dict[str, Any]] = {
     "phases": {"perfect": False, "phase": 10},
     "phases-loss": {"perfect": False, "phase": 10, "loss": 0.5},
 }
-"""Of (b): one thing changed at a time."""
+"""Of (b): one thing changed at a time, but for `nearest-length`."""
+PICTURED = ("paper", "nearest-length")
+"""Of (b), each in the largest plan in which it is run."""
 
 FUSIONS: dict[str, dict[str, Any]] = {
-    "far-certain": {},
     "far-mean": {"tau": 0.15, "tau_floor": 0.14},
     "far-best": {"tau": 0.15, "tau_floor": 0.14, "fusion": Fusion(most_confident=True)},
 }
-"""In a smaller plan: τ above the entropy of a far reading, and below it with either fusion."""
+"""Of (b), on the first small plan: τ below the entropy of a far reading, with either fusion."""
+
+
+@dataclass(frozen=True)
+class Floor:
+    """A kind of plan of (b).
+
+    Attributes:
+        shape: Cells along x and y.
+        cell_m: What the recipe takes a cell for; it draws rooms of 7-18 m.
+        limit: Most iterations.
+        paper: In how many iterations the paper explores, covers and converges; in small plans a third.
+        middle: Sensor range of the variants, in cells.
+        ranges: Those of the paper's settings; the paper gives none.
+        variants: What is run there besides.
+        text: What it is.
+    """
+
+    shape: tuple[int, int]
+    cell_m: float
+    limit: int
+    paper: int
+    middle: float
+    ranges: tuple[float, ...]
+    variants: tuple[str, ...]
+    text: str
+
+
+FLOORS = {
+    "wide": Floor((1000, 783), 0.1 / 3.0, 25_000, 2750, 100.0, (100.0,), (), "rooms 210-540 cells wide"),
+    "narrow": Floor(
+        (1000, 783), 0.1, 25_000, 2750, 100.0, (), ("nearest-length",), "rooms 70-180 cells wide"
+    ),
+    "small": Floor(
+        (333, 261),
+        0.1,
+        4000,
+        917,
+        35.0,
+        (17.0, 35.0, 70.0, 140.0, 433.0),
+        (*VARIANTS, *FUSIONS),
+        "the wide plans in cells three times as large",
+    ),
+}
+"""The largest range looks over the whole plan. There is time to run many small plans, and few others."""
 
 
 def coverage_id(control: str, starts: str, seed: int) -> str:
@@ -130,60 +174,57 @@ def coverage_id(control: str, starts: str, seed: int) -> str:
     return f"coverage-{control}-{starts}-{seed}"
 
 
-def exploration_id(variant: str, range_cells: float, seed: int) -> str:
+def exploration_id(floor: str, variant: str, range_cells: float, seed: int) -> str:
     """Name of a run of (b); variant `paper` = nothing changed."""
-    return f"exploration-{variant}-{range_cells:g}-{seed}"
+    return f"exploration-{floor}-{variant}-{range_cells:g}-{seed}"
 
 
-def all_runs(quick: bool, coverage_seeds: int, worlds: int) -> list[Run]:
-    """The runs; quick ones in plans of a third of the edges and at one range."""
-    runs = []
-    for name, changes in CONTROLS.items():
-        for starts in ("random", "cluster"):
-            for seed in range(coverage_seeds):
-                rules = Rules(keeps_targets=False, **changes)
-                runs.append(
-                    Run(
-                        coverage_id(name, starts, seed),
-                        "bhattacharya-office",
-                        (170, 200),
-                        starts,
-                        seed,
-                        5,
-                        rules,
-                        known=True,
-                        limit=2000,
-                    )
-                )
-    ranges, shape = ((QUICK_RANGE,), SMALL) if quick else (RANGES, LARGE)
-    middle = QUICK_RANGE if quick else MIDDLE_RANGE
-    points = [("paper", middle, {}, shape)]
-    points += [(name, middle, changes, shape) for name, changes in VARIANTS.items()]
-    points += [("paper", value, {}, shape) for value in ranges if value != middle]
-    points += [(name, QUICK_RANGE, changes, SMALL) for name, changes in FUSIONS.items()]
-    for seed in range(worlds):
-        for name, range_cells, changes, plan in points:
-            runs.append(
-                Run(
-                    exploration_id(name, range_cells, seed),
-                    "bhattacharya-cluttered",
-                    plan,
-                    "corner",
-                    seed,
-                    4,
-                    Rules(sensor=Sensor(range_cells), **changes),
-                    known=False,
-                    limit=4000 if plan == SMALL else 15_000,
-                    pictured=seed == 0 and name in ("paper", "nearest-length") and range_cells == middle,
-                )
-            )
+def all_runs(coverage_seeds: int, plans: int, small_plans: int) -> list[Run]:
+    """The runs of (a), and of (b) in small plans and in those of the paper's size."""
+    runs = [
+        Run(
+            coverage_id(name, starts, seed),
+            "bhattacharya-office",
+            (170, 200),
+            starts,
+            seed,
+            5,
+            Rules(keeps_targets=False, **changes),
+            known=True,
+            limit=2000,
+        )
+        for name, changes in CONTROLS.items()
+        for starts in ("random", "cluster")
+        for seed in range(coverage_seeds)
+    ]
+    for name, floor in FLOORS.items():
+        points = [("paper", range_cells) for range_cells in floor.ranges]
+        points += [(variant, floor.middle) for variant in floor.variants]
+        for seed in range(small_plans if name == "small" else plans):
+            runs += [
+                _exploration(name, variant, range_cells, seed)
+                for variant, range_cells in points
+                if seed == 0 or variant not in FUSIONS
+            ]
     return runs
 
 
-LARGE, SMALL = (1000, 783), (333, 261)
-QUICK_RANGE = 35.0
-MIDDLE_RANGE = 100.0
-"""Ranges at which the variants of (b) are run."""
+def _exploration(floor: str, variant: str, range_cells: float, seed: int) -> Run:
+    """A run of (b); of those that may be pictured, the first is, on each kind of plan."""
+    plan, changes = FLOORS[floor], {"paper": {}, **VARIANTS, **FUSIONS}[variant]
+    return Run(
+        exploration_id(floor, variant, range_cells, seed),
+        "bhattacharya-cluttered",
+        plan.shape,
+        "corner",
+        seed,
+        4,
+        Rules(sensor=Sensor(range_cells), **changes),
+        known=False,
+        limit=plan.limit,
+        pictured=seed == 0 and variant in PICTURED and range_cells == plan.middle,
+        cell_m=plan.cell_m,
+    )
 
 
 def start_cells(occupied: np.ndarray, starts: str, robots: int, seed: int) -> list[int]:

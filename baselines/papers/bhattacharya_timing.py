@@ -1,4 +1,4 @@
-"""Tessellations beside SciPy's Dijkstra, which gets its graph ready-made; both with the same costs."""
+"""Tessellations beside SciPy's Dijkstra, which gets its graph ready-made; what one leaves for the next."""
 
 from __future__ import annotations
 
@@ -11,7 +11,8 @@ import numpy as np
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 
-from entropy_explore_env.belief.geodesic_cells import new_tessellation, tessellate
+from baselines.papers.bhattacharya_grid import Simulation
+from entropy_explore_env.belief.geodesic_cells import NOBODY, new_tessellation, tessellate
 
 
 def cost_graph(rates: np.ndarray, toll: float = 0.0, by_length: bool = True) -> csr_matrix:
@@ -57,6 +58,27 @@ def beside_scipy(rates: np.ndarray, sources: np.ndarray, rounds: int = 5) -> tup
         ours.append(_timed(lambda: tessellate(space, rates, sources)))
         theirs.append(_timed(lambda: dijkstra(graph, indices=sources, min_only=True)))
     return statistics.median(ours), statistics.median(theirs)
+
+
+def changed_share(simulation: Simulation, iterations: int) -> float:
+    """Share of cells in reach whose cost or owner is another one than at the tessellation before; mean.
+
+    A search that starts from the last tessellation has to visit all of them.
+
+    Args:
+        simulation: With perfect messages; goes on from where it is.
+        iterations: How many.
+    """
+    space, shares = simulation.minds[0].space, list[float]()
+    costs, cells = space.costs.copy(), space.cells.copy()
+    for _ in range(iterations):
+        before = simulation.minds[0].tessellations
+        simulation.step(functional=False)
+        if simulation.minds[0].tessellations > before:
+            changed = (space.costs != costs) | (space.cells != cells)
+            shares.append(float(changed[space.cells != NOBODY].mean()))
+            costs, cells = space.costs.copy(), space.cells.copy()
+    return statistics.fmean(shares[1:]) if len(shares) > 1 else math.nan
 
 
 def _timed(work: Callable[[], object]) -> float:

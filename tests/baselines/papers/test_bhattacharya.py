@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import dataclasses
 import io
 import json
 import math
@@ -15,8 +16,9 @@ from baselines.command import run_command
 from baselines.papers import bhattacharya, bhattacharya_runs
 from baselines.papers.bhattacharya_belief import Fusion, GridBelief, Readings, Scanner, Sensor
 from baselines.papers.bhattacharya_grid import Rules, Simulation
-from baselines.papers.bhattacharya_runs import all_runs, start_cells
+from baselines.papers.bhattacharya_runs import FLOORS, all_runs, start_cells
 from baselines.papers.bhattacharya_split import split
+from baselines.papers.bhattacharya_timing import changed_share
 from entropy_explore_env.errors import SettingError
 from tests.reference.scenes import drawn, seeds
 
@@ -193,10 +195,8 @@ def test_entropy_splits_a_band_evenly_and_length_does_not():
 
 
 def test_the_command_writes_its_report_and_goes_on_where_it_was(tmp_path, monkeypatch):
-    monkeypatch.setattr(bhattacharya_runs, "SMALL", (210, 170))
-    monkeypatch.setattr(bhattacharya_runs, "QUICK_RANGE", 60.0)
-    monkeypatch.setattr(bhattacharya, "QUICK_RANGE", 60.0)
-    monkeypatch.setattr("baselines.papers.bhattacharya_report.QUICK_RANGE", 60.0)
+    small = dataclasses.replace(FLOORS["small"], shape=(210, 170), limit=300, middle=60.0, ranges=(60.0,))
+    monkeypatch.setitem(FLOORS, "small", small)
     words = ["--quick", "--starts", "1", "--missions", "0", "--json"]
     words += ["--out", str(tmp_path / "out"), "--runs", str(tmp_path / "runs")]
     printed = []
@@ -217,8 +217,17 @@ def test_the_command_writes_its_report_and_goes_on_where_it_was(tmp_path, monkey
     assert str(tmp_path / "runs") not in page
 
 
+def test_changed_share_by_hand():
+    """One robot in a corridor that it knows: all costs change when it steps, none when it stands."""
+    occupied = np.zeros((9, 1, 1), bool)
+    simulation = Simulation(occupied, [0], Rules(), known=True)
+    assert changed_share(simulation, 4) == 1.0  # to the middle
+    assert simulation.tally.places[-1] == [3]
+    assert math.isnan(changed_share(Simulation(occupied, [4], Rules(), known=True), 4))
+
+
 def test_runs_differ_by_what_decides_their_results():
-    runs = all_runs(quick=True, coverage_seeds=2, worlds=2)
+    runs = all_runs(2, 1, 2)
     assert len({run.id for run in runs}) == len(runs) == len({run.digest() for run in runs})
     assert {run.rules.control for run in runs} == {"projected-centroid", "gradient-search", "nearest"}
 
@@ -227,7 +236,8 @@ def test_runs_differ_by_what_decides_their_results():
     ("words", "message"),
     [
         (["--starts", "0"], "starts"),
-        (["--plans", "0"], "plans"),
+        (["--plans", "-1"], "plans"),
+        (["--small-plans", "0"], "small-plans"),
         (["--missions", "-1"], "missions"),
         (["--corridor", "nowhere.bt"], "corridor"),
     ],
