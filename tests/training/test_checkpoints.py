@@ -21,7 +21,9 @@ from entropy_explore_env.command import BAD_INPUT
 from entropy_explore_env.config import with_settings
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.errors import SettingError
+from entropy_explore_env.reports.metrics import mission_figures
 from entropy_explore_env.scenarios import find_scenario
+from entropy_explore_env.settings import Observation
 from training import evaluate
 from training.checkpoints import (
     Checkpoint,
@@ -32,7 +34,7 @@ from training.checkpoints import (
     save_checkpoint,
 )
 from training.errors import CheckpointError
-from training.policy import LearnedPolicy, load_policy, make_policy, scale_arrays, weights_of
+from training.policy import PRETRAINED, LearnedPolicy, load_policy, make_policy, scale_arrays, weights_of
 from training.scales import RunningScale
 from training.seeds import learning_seeds, validation_seeds
 
@@ -238,3 +240,14 @@ def test_evaluation_takes_worlds_that_training_never_sees():
     trained = PolicySettings(with_settings(find_scenario("room-furnished"), {"channel": {"burst": 7}}))
     there = evaluate.evaluation_scenario(trained)
     assert there.split == "test" and there.channel.burst == 7 and there.name == "room-furnished"
+
+
+def test_the_policy_that_comes_with_the_project_maps_the_room():
+    """Far sooner than the random walk, which takes some hundred seconds."""
+    env = EntropyExploreEnv("room", robots=3, decision_period_s=None, observation=Observation(panorama=False))
+    run_mission(env, make_strategy("pretrained:room"), 0)
+    figures = mission_figures(env.missions, 0)
+    assert figures["finished"] and figures["t_mission_s"] < 100.0
+    weights = PRETRAINED / "room" / "policy.safetensors"
+    assert weights.stat().st_size < 2_000_000
+    assert "--total-steps" in load_checkpoint(PRETRAINED / "room").progress["command"]
