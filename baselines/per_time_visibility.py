@@ -232,8 +232,10 @@ class FrontierStrategy:
     def _others_are_busy(self, view: RobotView, errand: _Errand) -> bool:
         """Whether a teammate has not scanned at its target yet.
 
-        It has if it waits, if it stands where the robot reckoned that it was sent, or if it has left from
-        there since the robot arrived: then it had waited for everybody.
+        It has if it waits, or if it has left since the robot arrived: then it had waited for everybody. Where
+        robots stop on their way, it has to stand, or to have left, where the robot reckoned that it was sent:
+        leaving a corner looks like leaving for a new target. As robots do not know from where others have
+        scanned, they may reckon wrongly, and then wait longer than the paper's central procedure.
         """
         for mate, seen in view.teammates.items():
             if seen.announced_s < 0.0 or stays(view, seen):
@@ -241,8 +243,9 @@ class FrontierStrategy:
             left_later = seen.announced_s >= errand.arrived_s
             if self._under_way(view, mate) and not left_later:
                 return True
-            target = errand.plan.get(mate)
-            if target is not None:
+            robot, target = self._scenario.kind_of(mate).robot, errand.plan.get(mate)
+            at_once = robot.navigator == "planned" and math.isinf(robot.reach_m)
+            if target is not None and not at_once:
                 apart_m = np.linalg.norm(seen.pose[:3] - target)
                 if apart_m > 1.5 * self._scenario.grid.voxel_size_m:
                     return True

@@ -60,7 +60,7 @@ CHANGES: dict[str, tuple[str, dict[str, Any], dict[str, Any]]] = {
     "unpromised": ("nothing is promised", {}, {"promises": False}),
 }
 """What is changed in plans: a text, settings of the scenario, fields of Exploring."""
-CHANGED_METHODS = ("ptv", "beta-10", "beta-20", "sync")
+CHANGED_METHODS = ("ptv", "beta-10", "beta-20")
 
 
 def part_of(world: str) -> str:

@@ -3,10 +3,8 @@
 Explored is, in plans, the share of the voxels that can be seen from where robots can be; over terrain the
 share of all columns whose surface a robot has mapped. All robots hear everything at once.
 
-In the environment a robot waits by scanning on the spot, so one that waits for the team leaves up to a scan
-late. In the paper all leave when the last has scanned. Synchronous missions are therefore timed by their
-journeys: a round lasts as long as its longest one, and the next begins at once. `t_env_s` is the
-environment's own clock.
+A robot that waits for its team scans on the spot meanwhile, and leaves when that scan is
+done: up to a scan later than the last one to arrive.
 """
 
 from __future__ import annotations
@@ -59,15 +57,12 @@ class Run:
         figures = mission_figures(env.missions, 0)
         limit_s = env.scenario.ending.time_limit_s
         finished, end_s = all(explorer.idle), times_s[-1]
-        if self.exploring.allotment == "synchronous":
-            times_s, shares, end_s = by_rounds(explorer, times_s, shares, env.scenario.sensor.scan_time_s)
         reached = {f"t{100 * mark:.0f}_s": _reached(times_s, shares, mark, limit_s) for mark in MARKS}
         rows = np.unique(np.linspace(0, len(times_s) - 1, _POINTS).round().astype(int))
         return {
             **{name: figures[name] for name in _KEPT},
             **reached,
             "t_none_s": round(float(end_s), 3) if finished else limit_s,
-            "t_env_s": figures["t_mission_s"],
             "finished": finished,
             "explored": round(float(shares[-1]), 5),
             "counted": explorer.counted(),
@@ -106,29 +101,6 @@ def followed(
             actions[env.agents[view.robot]] = np.asarray(view.action_for(viewpoint))
         env.step(actions)
     return times_s, shares
-
-
-def by_rounds(
-    explorer: FrontierStrategy, times_s: Sequence[float], shares: Sequence[float], first_s: float
-) -> tuple[Sequence[float], Sequence[float], float]:
-    """The clock of a team whose robots leave together: times of the ends of journeys, shares, and the end.
-
-    Args:
-        explorer: With the mission's journeys.
-        times_s: By the environment's clock.
-        shares: Explored then.
-        first_s: The first scan, before any journey.
-    """
-    rounds = [journey.number for journey in explorer.journeys]
-    lasted = np.zeros(max(rounds, default=0) + 1)
-    for journey in explorer.journeys:
-        lasted[journey.number] = max(lasted[journey.number], journey.seconds)
-    begins = first_s + np.concatenate([[0.0], np.cumsum(lasted)])
-    ends = [(begins[j.number] + j.seconds, np.interp(j.ended_s, times_s, shares)) for j in explorer.journeys]
-    first = (first_s, float(np.interp(first_s, times_s, shares)))
-    ordered = sorted([(0.0, 0.0), first, *((float(t), float(s)) for t, s in ends)])
-    best = np.maximum.accumulate([share for _, share in ordered])
-    return [t for t, _ in ordered], best.tolist(), float(begins[-1])
 
 
 def _reached(times_s: Sequence[float], shares: Sequence[float], mark: float, limit_s: float) -> float:

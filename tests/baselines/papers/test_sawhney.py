@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import io
 import json
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -29,8 +28,8 @@ from baselines.papers.sawhney_cells import (
 )
 from baselines.papers.sawhney_cells import experiment as cells_of
 from baselines.papers.sawhney_claims import all_claims, best_beta, compared, relative
-from baselines.papers.sawhney_missions import Run, by_rounds
-from baselines.per_time_visibility import Exploring, Journey, Metric
+from baselines.papers.sawhney_missions import Run
+from baselines.per_time_visibility import Exploring, Metric
 from entropy_explore_env.config import with_settings
 from entropy_explore_env.settings import Grid
 
@@ -103,21 +102,6 @@ def test_claims_hold_where_times_are_as_the_paper_says():
 def test_claims_do_not_hold_where_all_are_alike():
     claims = all_claims(synthetic(lambda world, team, method: 1.0))
     assert sum(claim.holds for claim in claims) < 0.2 * len(claims)
-
-
-def test_a_round_lasts_as_long_as_its_longest_journey():
-    """Two robots, two rounds of 5 and 3 s, 4 and 6 s after a scan of 2 s; who waited left a second late."""
-    journeys = [
-        Journey(0, 1, 5.0, 7.0),
-        Journey(1, 1, 3.0, 5.0),
-        Journey(1, 2, 6.0, 14.0),
-        Journey(0, 2, 4.0, 11.0),
-    ]
-    times_s, shares = [0.0, 2.0, 5.0, 7.0, 11.0, 14.0], [0.0, 0.1, 0.3, 0.5, 0.7, 1.0]
-    at_s, explored, end_s = by_rounds(SimpleNamespace(journeys=journeys), times_s, shares, 2.0)
-    assert list(at_s) == pytest.approx([0.0, 2.0, 5.0, 7.0, 11.0, 13.0])
-    assert list(explored) == pytest.approx([0.0, 0.1, 0.3, 0.5, 0.7, 1.0])
-    assert end_s == 13.0
 
 
 def tiny_cells(starts, flights, quick, dem):
