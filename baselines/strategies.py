@@ -8,9 +8,11 @@ from functools import partial
 from pathlib import Path
 from types import MappingProxyType, ModuleType
 
+from baselines.frontier_rivals import coordinated_frontier, nearest_frontier
 from baselines.gradient import GradientStrategy
 from baselines.information_rate import InformationRate, Weighing
 from baselines.mutual_information import Coordination, MutualInformation
+from baselines.per_time_visibility import FrontierStrategy
 from baselines.random_walk import RandomWalk
 from baselines.strategy import Strategy
 from baselines.voronoi import Coverage, VoronoiCoverage
@@ -25,6 +27,9 @@ STRATEGIES: MappingProxyType[str, Callable[[], Strategy]] = MappingProxyType(
         "ground-gradient": partial(MutualInformation, Coordination(coordinated=False)),
         "information-rate": InformationRate,
         "information-per-scan": partial(InformationRate, Weighing(per_scan=True, candidates=120)),
+        "per-time-visibility": FrontierStrategy,
+        "nearest-frontier": nearest_frontier,
+        "coordinated-frontier": coordinated_frontier,
         "voronoi": VoronoiCoverage,
         "voronoi-gradient": partial(VoronoiCoverage, Coverage(control="gradient-search")),
         "voronoi-nearest": partial(

@@ -18,6 +18,7 @@ from typing import Any
 
 from baselines.command import parse, print_json, run_command
 from benchmarks.deciding import deciding_rows
+from benchmarks.exploring import exploring_rows
 from benchmarks.fusion import fusion_rows
 from benchmarks.learning import learning_rows
 from benchmarks.peers import load_octomap, load_spread
@@ -38,6 +39,7 @@ JOBS: tuple[tuple[str, Callable[[Effort], list[Row]]], ...] = (
     ("shortest ways beside SciPy", planning_rows),
     ("decisions of strategies", deciding_rows),
     ("learning", learning_rows),
+    ("exploring plans", exploring_rows),
     ("steps in worlds of different sizes", size_rows),
     ("first steps of fresh processes", startup_rows),
 )

@@ -134,6 +134,12 @@ TERRAIN = Scenario(
 )
 """96 × 72 m of hills up to 18 m high, for UAVs that stay below the exposure surface (Sawhney)."""
 
+TERRAIN_SMOOTH = dataclasses.replace(TERRAIN, name="terrain-smooth", world="terrain-smooth")
+"""The same, gentler: Hurst exponent 0.95 instead of 0.8."""
+
+TERRAIN_ROUGH = dataclasses.replace(TERRAIN, name="terrain-rough", world="terrain-rough")
+"""The same, rugged: Hurst exponent 0.5."""
+
 OCCLUSIONS = Scenario(
     name="occlusions",
     grid=Grid((200, 200, 1), 0.5),
@@ -201,6 +207,8 @@ SCENARIOS = MappingProxyType(
             HYBRID,
             CAVE,
             TERRAIN,
+            TERRAIN_SMOOTH,
+            TERRAIN_ROUGH,
             OCCLUSIONS,
             LAB,
             BHATTACHARYA_OFFICE,

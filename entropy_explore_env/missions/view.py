@@ -76,6 +76,8 @@ class RobotView:
         depth_m, half_angle_rad: r̂ and α̂ of its latest scan.
         scan: Its latest scan.
         teammates: Robot number → what it heard of it.
+        ceiling: (X, Y) int32, in each column the first layer that is closed to robots (an exposure surface
+            is known beforehand); None = nothing is closed.
     """
 
     robot: int
@@ -93,6 +95,7 @@ class RobotView:
     half_angle_rad: float
     scan: ScanView
     teammates: dict[int, TeammateView]
+    ceiling: np.ndarray | None
     rules: Rules
 
     def action_for(self, viewpoint: np.ndarray) -> np.ndarray | np.int64:
@@ -116,6 +119,7 @@ def view_of(missions: Missions, mission: int, robot: int) -> RobotView:
     time_s = float(state.missions[mission]["time_s"])
     own, here = state.robots[mission, robot], (mission, robot)
     heard, rays = state.heard[here], int(rules.numbers[robot]["rays"])
+    world = missions.worlds[mission]
     return RobotView(
         robot=robot,
         scenario=missions.scenario,
@@ -137,6 +141,7 @@ def view_of(missions: Missions, mission: int, robot: int) -> RobotView:
             read_only(state.scan_utility_bits[here][:rays]),
         ),
         teammates={mate: _teammate(heard[mate]) for mate in range(len(heard)) if mate != robot},
+        ceiling=None if world is None else world.ceiling,
         rules=rules,
     )
 

@@ -19,7 +19,7 @@ from entropy_explore_env.worlds.recipes.hybrid import hybrid
 from entropy_explore_env.worlds.recipes.lab import lab
 from entropy_explore_env.worlds.recipes.occlusions import occlusions
 from entropy_explore_env.worlds.recipes.office import office
-from entropy_explore_env.worlds.recipes.terrain import terrain
+from entropy_explore_env.worlds.recipes.terrain import rough_terrain, smooth_terrain, terrain
 from entropy_explore_env.worlds.world import World
 
 RECIPES: Mapping[str, Callable[[Grid, np.random.Generator], World]] = MappingProxyType(
@@ -32,6 +32,8 @@ RECIPES: Mapping[str, Callable[[Grid, np.random.Generator], World]] = MappingPro
         "hybrid": hybrid,
         "cave": cave,
         "terrain": terrain,
+        "terrain-smooth": smooth_terrain,
+        "terrain-rough": rough_terrain,
         "occlusions": occlusions,
         "lab": lab,
         "bhattacharya-office": bhattacharya_office,

@@ -3,6 +3,7 @@
 Sawhney's worlds are height maps "with varying degrees of undulations" under an exposure surface, a height
 field known beforehand; neither is given. Here the ground is spectral fractal noise, and the exposure
 surface a smoothed hull of the ground with 4 m of air above the ground or more. Lengths in metres.
+Its roughness is that of its Hurst exponent: 0.8, and 0.95 and 0.5 for a smoother and a rougher one.
 """
 
 from __future__ import annotations
@@ -16,12 +17,22 @@ from entropy_explore_env.worlds.recipes.fractal import fractal_noise
 from entropy_explore_env.worlds.recipes.plan import BODY_RADIUS_M, passage_voxels
 from entropy_explore_env.worlds.world import World
 
-_HURST = 0.8
+_HURST, _SMOOTH, _ROUGH = 0.8, 0.95, 0.5
 _STEEP = 0.25
 """Most height of the relief, as a share of the shorter side."""
 _AIR_M = 4.0
 _HULL_M = 6.0
 """The hull takes the highest ground within this distance along either axis."""
+
+
+def smooth_terrain(grid: Grid, rng: np.random.Generator) -> World:
+    """Gentler hills; see `terrain`."""
+    return _ground(grid, rng, _SMOOTH, "terrain-smooth")
+
+
+def rough_terrain(grid: Grid, rng: np.random.Generator) -> World:
+    """Rugged hills; see `terrain`."""
+    return _ground(grid, rng, _ROUGH, "terrain-rough")
 
 
 def terrain(grid: Grid, rng: np.random.Generator) -> World:
@@ -41,6 +52,10 @@ def terrain(grid: Grid, rng: np.random.Generator) -> World:
     Raises:
         WorldError: The grid is flat or too small.
     """
+    return _ground(grid, rng, _HURST, "terrain")
+
+
+def _ground(grid: Grid, rng: np.random.Generator, hurst: float, name: str) -> World:
     edge_m, (columns_x, columns_y, layers) = grid.voxel_size_m, grid.shape
     body = passage_voxels(0.0, edge_m)
     air = max(round(_AIR_M / edge_m), body + 2)
@@ -48,11 +63,11 @@ def terrain(grid: Grid, rng: np.random.Generator) -> World:
     if grid.flat or min(grid.size_m[:2]) < 6.0 or relief < 1.0:
         high = f"{(air + 2) * edge_m:g} m"
         raise WorldError("Grid.shape", grid.shape, f"3-D, at least 6 × 6 m and {high} high for terrain")
-    noise = fractal_noise((columns_x, columns_y), _HURST, rng)
+    noise = fractal_noise((columns_x, columns_y), hurst, rng)
     heights = 1.0 + relief * (noise - noise.min()) / max(np.ptp(noise), 1e-9)
     ground = np.rint(heights).astype(np.int32)
     occupied = np.arange(layers) < ground[:, :, None]
-    return World(grid, occupied, "terrain", exposure_surface(ground, layers, air, edge_m))
+    return World(grid, occupied, name, exposure_surface(ground, layers, air, edge_m))
 
 
 def exposure_surface(ground: np.ndarray, layers: int, air: int, voxel_size_m: float) -> np.ndarray:

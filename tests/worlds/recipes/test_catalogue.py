@@ -29,6 +29,8 @@ FREE_SHARE = {
     "hybrid": (0.5, 0.85),
     "cave": (0.06, 0.25),
     "terrain": (0.4, 0.8),
+    "terrain-smooth": (0.4, 0.85),
+    "terrain-rough": (0.4, 0.8),
     "occlusions": (0.85, 0.9),
     "lab": (0.88, 0.98),
     "bhattacharya-office": (0.94, 0.98),
@@ -46,6 +48,8 @@ OTHER_GRIDS = {
     "hybrid": [Grid((101, 163, 1), 0.2), Grid((67, 53, 5), 0.4), Grid((29, 23, 1), 1.0)],
     "cave": [Grid((61, 97, 1), 0.2), Grid((53, 67, 23), 0.25), Grid((41, 23, 11), 0.8)],
     "terrain": [Grid((31, 47, 29), 0.3), Grid((13, 9, 11), 2.0), Grid((9, 7, 8), 1.0)],
+    "terrain-smooth": [Grid((31, 47, 29), 0.3), Grid((9, 7, 8), 1.0)],
+    "terrain-rough": [Grid((31, 47, 29), 0.3), Grid((9, 7, 8), 1.0)],
     "occlusions": [Grid((101, 83, 1), 0.6), Grid((47, 53, 4), 1.0)],
     "lab": [Grid((37, 43, 1), 0.1), Grid((17, 13, 7), 0.3), Grid((9, 7, 3), 0.6)],
     "bhattacharya-office": [Grid((61, 83, 1), 0.25), Grid((53, 37, 6), 0.4), Grid((15, 17, 1), 1.0)],
@@ -58,6 +62,8 @@ SMALLEST_M = {
     "hybrid": (20.0, 16.0),
     "cave": (12.0, 10.0),
     "terrain": (6.0, 6.0),
+    "terrain-smooth": (6.0, 6.0),
+    "terrain-rough": (6.0, 6.0),
     "occlusions": (40.0, 40.0),
     "lab": (4.0, 3.0),
     "bhattacharya-office": (14.0, 12.0),
@@ -126,7 +132,7 @@ def test_every_recipe_is_tried_on_other_grids_and_on_too_small_ones():
 @pytest.mark.parametrize("name", SMALLEST_M)
 def test_a_grid_that_is_too_small_is_refused_by_name(name):
     edge_m, (longest, shortest) = 0.2, SMALLEST_M[name]
-    high = round(5.4 / edge_m) if name == "terrain" else 1
+    high = round(5.4 / edge_m) if name.startswith("terrain") else 1
     long, short = round(longest / edge_m), round(shortest / edge_m)
     assert RECIPES[name](Grid((long, short, high), edge_m), np.random.default_rng(0)).occupied.any()
     assert RECIPES[name](Grid((short, long, high), edge_m), np.random.default_rng(1)).occupied.any()

@@ -1,0 +1,170 @@
+"""How many unexplored points are expected to be seen from a place: the V of Sawhney 2009, sects. 3.4-3.5.
+
+In a map of voxels rays go out until something believed covered stops them, or to the sensor's range; each
+unexplored voxel that they cross counts once. Over a height field (`terrain_view`) points are columns. A point
+that n robots have promised to see weighs 1/(1 + n). (The paper's 1/n would make the first promise free.) The
+naive V, for comparison, counts all unexplored points in a ball as large as the range. Grid units.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from baselines.frontier_map import STOPS_RAYS, UNEXPLORED
+from entropy_explore_env.belief.raycast import cast_ray, longest_crossing
+from entropy_explore_env.compilation import inlined_kernel, lean_kernel
+
+MOST_RAYS = 720
+
+
+class Tally(NamedTuple):
+    """Working space of counts, and what teammates promised to see; N points."""
+
+    stamp: np.ndarray
+    """(N,) int32, number of the count that met a point last."""
+    promised: np.ndarray
+    """(N,) uint8, robots that will see a point."""
+    marked: np.ndarray
+    """(N,) int32, points with promises …"""
+    numbers: np.ndarray
+    """(2,) int64: number of the latest count, and how many points are marked."""
+    crossed: np.ndarray
+    """(L,) int32, for `cast_ray`, as is …"""
+    entered: np.ndarray
+    """(L,) int64."""
+
+
+def new_tally(points: int, shape: tuple[int, int, int]) -> Tally:
+    """Working space for a map of this shape."""
+    longest = longest_crossing(*shape, math.inf, 2)
+    return Tally(
+        np.zeros(points, np.int32),
+        np.zeros(points, np.uint8),
+        np.zeros(points, np.int32),
+        np.zeros(2, np.int64),
+        np.zeros(longest, np.int32),
+        np.zeros(longest, np.int64),
+    )
+
+
+def rays_around(reach: float, pitches: np.ndarray) -> np.ndarray:
+    """(D, 3) float64 unit vectors all around, so dense that no voxel at `reach` lies between two of them.
+
+    Args:
+        reach: In voxel edges.
+        pitches: (rows,) radians downwards; with more than one row at most 32 to a turn.
+    """
+    turns = min(math.ceil(2.0 * math.pi * min(reach, 1e4)), MOST_RAYS if len(pitches) == 1 else 32)
+    return rays_towards((np.arange(turns) + 0.5) * (2.0 * math.pi / turns), pitches)
+
+
+def rays_towards(yaws: np.ndarray, pitches: np.ndarray) -> np.ndarray:
+    """(D, 3) float64 unit vectors of all pairs of yaw and pitch, radians."""
+    yaw, pitch = (axis.reshape(-1) for axis in np.meshgrid(yaws, pitches, indexing="ij"))
+    level = np.cos(pitch)
+    return np.stack([np.cos(yaw) * level, np.sin(yaw) * level, -np.sin(pitch)], axis=-1)
+
+
+@inlined_kernel
+def weight(promises):
+    """Of a point that so many robots have promised to see."""
+    return 1.0 / (1.0 + promises)
+
+
+@inlined_kernel
+def begin_count(tally):
+    """Number of a new count."""
+    tally.numbers[0] += 1
+    if tally.numbers[0] > 2**31 - 2:  # once in a lifetime
+        for point in range(len(tally.stamp)):
+            tally.stamp[point] = 0
+        tally.numbers[0] = 1
+    return np.int32(tally.numbers[0])
+
+
+@inlined_kernel
+def promise(tally, point):
+    """Note that one more robot will see a point."""
+    if tally.promised[point] == 0:
+        tally.marked[tally.numbers[1]] = point
+        tally.numbers[1] += 1
+    tally.promised[point] = min(np.int64(tally.promised[point]) + 1, 255)
+
+
+@lean_kernel
+def clear_promises(tally):
+    """Release all promises."""
+    for place in range(tally.numbers[1]):
+        tally.promised[tally.marked[place]] = 0
+    tally.numbers[1] = 0
+
+
+@lean_kernel
+def count_crossed(tally, state, size, start, directions, reach, marking):
+    """Unexplored voxels that rays from a place cross: (all, weighed by promises).
+
+    Args:
+        tally: Working space.
+        state: (V,) uint8 of a FrontierMap.
+        size: (X, Y, Z) voxels.
+        start: (3,) float64, the place.
+        directions: (D, 3) float64 unit vectors.
+        reach: Of the rays, in voxel edges; inf allowed.
+        marking: Whether the voxels are promised from now on.
+    """
+    number, points, weighed = begin_count(tally), 0, 0.0
+    begin = (start[0], start[1], start[2])
+    for ray in range(len(directions)):
+        direction = (directions[ray, 0], directions[ray, 1], directions[ray, 2])
+        _, n, _ = cast_ray(
+            state, STOPS_RAYS, size, begin, direction, reach, False, 1, tally.crossed, tally.entered
+        )
+        for place in range(n):
+            voxel = np.uint32(tally.crossed[place])
+            if state[voxel] & UNEXPLORED and tally.stamp[voxel] != number:
+                tally.stamp[voxel] = number
+                points += 1
+                weighed += weight(tally.promised[voxel])
+                if marking:
+                    promise(tally, voxel)
+    return points, weighed
+
+
+@lean_kernel
+def count_in_ball(tally, state, size, start, reach, marking):
+    """The naive V: unexplored voxels with their centres within reach of a place, seen or not."""
+    points, weighed = 0, 0.0
+    wide = min(reach, size[0] + size[1] + size[2])
+    for x in range(max(int(start[0] - wide - 0.5), 0), min(int(start[0] + wide + 1.0), size[0])):
+        for y in range(max(int(start[1] - wide - 0.5), 0), min(int(start[1] + wide + 1.0), size[1])):
+            for z in range(max(int(start[2] - wide - 0.5), 0), min(int(start[2] + wide + 1.0), size[2])):
+                dx, dy, dz = x + 0.5 - start[0], y + 0.5 - start[1], z + 0.5 - start[2]
+                voxel = (x * size[1] + y) * size[2] + z
+                if dx * dx + dy * dy + dz * dz <= wide * wide and state[voxel] & UNEXPLORED:
+                    points += 1
+                    weighed += weight(tally.promised[voxel])
+                    if marking:
+                        promise(tally, voxel)
+    return points, weighed
+
+
+@lean_kernel
+def count_from(tally, state, size, voxels, directions, reach, naive, seen, weighed):
+    """Fill (K,) with the points seen from K voxels' centres, and with them weighed by promises."""
+    for place in range(len(voxels)):
+        start = centre_of(size, voxels[place])
+        if naive:
+            points, value = count_in_ball(tally, state, size, start, reach, False)
+        else:
+            points, value = count_crossed(tally, state, size, start, directions, reach, False)
+        seen[place], weighed[place] = points, value
+
+
+@inlined_kernel
+def centre_of(size, voxel):
+    """(x, y, z) of a voxel's centre."""
+    column = voxel // size[2]
+    return column // size[1] + 0.5, column % size[1] + 0.5, voxel - column * size[2] + 0.5

@@ -1,0 +1,297 @@
+"""Who goes to which frontier candidate: synchronous and asynchronous allotment (Sawhney 2009, sect. 3.2).
+
+The pair of a robot and a candidate with the greatest value is allotted first; what is seen from there is
+promised, and the next pair is sought with what is left. Asynchronously only stopped robots take part, and
+promises of those under way stand until they have scanned; synchronously all wait for one another and take
+part together. Each robot allots from its own belief and from what reached it (poses, announcements): it
+works out the others' turns as they would, and takes its own. With perfect messages that is the paper's
+central procedure. A robot counts as stopped if it was heard since it announced its latest viewpoint, that
+is, its scan arrived.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from baselines.frontier_candidates import Looking, TerrainCandidates, VoxelCandidates
+from entropy_explore_env.belief.lattice import Costs, Lattice, new_lattice
+from entropy_explore_env.belief.planning import search_ways
+from entropy_explore_env.belief.search_space import Search, collect, cost_to
+from entropy_explore_env.compilation import lean_kernel
+from entropy_explore_env.config import Scenario
+from entropy_explore_env.missions.view import RobotView, TeammateView
+from entropy_explore_env.robots.motion import driving_time
+from entropy_explore_env.settings import RobotKind
+
+_BATCH = 8
+"""Candidates that are counted together; their number changes no result."""
+_NEAR = 4.0
+"""A first search for ways goes so many times as far as the sensor sees."""
+
+
+class Value(Protocol):
+    """What going to candidates is worth; never more for less V, or for a longer way."""
+
+    def __call__(
+        self, seen: np.ndarray, seconds: np.ndarray, edges: np.ndarray, taken: np.ndarray
+    ) -> np.ndarray:
+        """(K,) values; -inf = no candidate.
+
+        Args:
+            seen: (K,) V·(height factor) in points' size; inf = not known.
+            seconds: (K,) travel and scan.
+            edges: (K,) length of the way in voxel edges.
+            taken: (K,) how much of a frontier is taken by robots that go near it, ≥ 0 (Burgard 2005).
+        """
+        ...
+
+
+@dataclass(frozen=True)
+class Choice:
+    """A candidate that was allotted to a robot."""
+
+    slot: int
+    voxel: int
+    value: float
+
+
+class Allotter:
+    """Candidates of one robot's belief, and their allotment.
+
+    Attributes:
+        candidates: See frontier_candidates.py.
+        search: Working space for ways, shared with others.
+        counted: How many candidates were counted in all.
+    """
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        kind: RobotKind,
+        looking: Looking,
+        value: Value,
+        search: Search,
+        ceiling: np.ndarray | None,
+        lazy: bool,
+    ) -> None:
+        """Nothing is explored yet."""
+        self._value, self._lazy, self.search = value, lazy, search
+        self._edge, self._scenario = scenario.grid.voxel_size_m, scenario
+        layer = scenario.layer_of(kind.robot)
+        self.lattice: Lattice = new_lattice(scenario.grid.shape, 0.0, layer)
+        self.candidates: VoxelCandidates | TerrainCandidates
+        if ceiling is None:
+            self.candidates = VoxelCandidates(scenario, kind, looking)
+        else:
+            self.candidates = TerrainCandidates(scenario, kind, looking, ceiling)
+        rates = self.candidates.rates
+        self.costs = Costs(rates[:0], rates[:0], 0.0, 1.0, rates, 1.0)
+        self._no_cells = np.zeros(0, np.int32)
+        self.counted = 0
+
+    def allot(
+        self, view: RobotView, stopped: Sequence[int], targets: Sequence[np.ndarray], everybody: bool = False
+    ) -> dict[int, Choice]:
+        """The candidates that fall to a robot and to those before it.
+
+        Args:
+            view: Of the robot; its belief was taken in.
+            stopped: Teammates that are allotted something at the same time.
+            targets: (3,) places in grid units that others are under way to.
+            everybody: Whether those after it are wanted, too.
+
+        Returns:
+            Robot → candidate. It is not among them if nothing that is unexplored can be seen from any
+            candidate that it reaches.
+        """
+        candidates, taken = self.candidates, list(targets)
+        for target in targets:
+            candidates.promise(target)
+        waiting, found = [view.robot, *sorted(stopped)], dict[int, Choice]()
+        costs: dict[int, np.ndarray] = {}
+        if len(waiting) > 1:
+            costs = {robot: self._ways(view, robot, math.inf) for robot in waiting}
+        while waiting:
+            choices = {robot: self._best(view, robot, costs.get(robot), taken) for robot in waiting}
+            best = max(sorted(waiting), key=lambda robot: _worth(choices[robot]))
+            choice = choices[best]
+            if choice is None:
+                break
+            found[best] = choice
+            waiting.remove(best)
+            if best == view.robot and not everybody:
+                break
+            place = self.place_of(choice.voxel)
+            candidates.promise(place)
+            taken.append(place)
+        candidates.release()
+        return found
+
+    def place_of(self, voxel: int) -> np.ndarray:
+        """(3,) centre of a voxel, grid units."""
+        return np.stack(np.unravel_index(voxel, self._scenario.grid.shape)).astype(float) + 0.5
+
+    def start_of(self, pose: np.ndarray) -> int:
+        """Number of the voxel of a pose (5,), map frame."""
+        grid = self._scenario.grid
+        place = np.clip(grid.voxel_of(pose[:3]), 0, np.array(grid.shape) - 1)
+        if self.lattice.layer >= 0:
+            place[2] = self.lattice.layer
+        return int(np.ravel_multi_index(tuple(place), grid.shape))
+
+    def seek(self, pose: np.ndarray, goal: int, reach: float) -> None:
+        """Search ways from a pose to a voxel, or with -1 to all, through the mapped region."""
+        start = self.start_of(pose)
+        x, y, z = (int(i) for i in np.unravel_index(start, self._scenario.grid.shape))
+        opened = self.candidates.open_start(x, y, z)
+        source = np.array([start], np.int32)
+        search_ways(self.search, self.lattice, self.costs, source, goal, reach, self._no_cells)
+        self.candidates.close(opened)
+
+    def _ways(self, view: RobotView, robot: int, reach: float) -> np.ndarray:
+        """(V,) float64 lengths of ways from where a robot is, or was heard; inf = none within reach."""
+        pose = view.pose if robot == view.robot else view.teammates[robot].pose
+        self.seek(pose, -1, reach)
+        cost = np.empty(self._scenario.grid.voxels)
+        collect(self.search, cost)
+        return cost
+
+    def _best(
+        self, view: RobotView, robot: int, cost: np.ndarray | None, taken: Sequence[np.ndarray]
+    ) -> Choice | None:
+        """The best candidate of a robot; ways that are not given are searched no farther than is needed."""
+        if cost is not None:
+            return self._best_of(robot, cost, math.inf, taken)[0]
+        near = _NEAR * self.candidates.reach
+        if self._lazy and near < sum(self._scenario.grid.shape):
+            self.seek(view.pose, -1, near)
+            choice, sure = self._best_of(robot, None, near, taken)
+            if sure:
+                return choice
+        everywhere = self._ways(view, robot, math.inf)
+        choice, _ = self._best_of(robot, everywhere, math.inf, taken)
+        if choice is None:
+            self.candidates.other_of(everywhere)
+            choice, _ = self._best_of(robot, everywhere, math.inf, taken)
+        return choice
+
+    def _best_of(
+        self, robot: int, cost: np.ndarray | None, reach: float, taken: Sequence[np.ndarray]
+    ) -> tuple[Choice | None, bool]:
+        """The best of the candidates that were reached, and whether none beyond can be better."""
+        slots, voxels = self.candidates.found()
+        edges = self._edges_to(voxels, cost)
+        reached = np.isfinite(edges)
+        beyond = slots[~reached]
+        slots, voxels, edges = slots[reached], voxels[reached], edges[reached]
+        seconds = self.seconds(robot, edges)
+        takes = self._taken(voxels, taken)
+        point = self.candidates.point
+        most = self.candidates.most(slots) if self._lazy else np.full(len(slots), np.inf)
+        bound = self._value(np.minimum(most, self.candidates.limit()) * point, seconds, edges, takes)
+        order = np.argsort(-bound, kind="stable")
+        value = np.full(len(slots), -np.inf)
+        for first in range(0, len(order), _BATCH):
+            batch = order[first : first + _BATCH]
+            if self._lazy and bound[batch[0]] < value.max():
+                break
+            seen = self.candidates.count(slots[batch], voxels[batch]) * point
+            self.counted += len(batch)
+            worth = self._value(seen, seconds[batch], edges[batch], takes[batch])
+            value[batch] = np.where(seen > 0.0, worth, -np.inf)
+        best = int(np.argmax(value)) if len(value) else -1
+        choice = None
+        if best >= 0 and value[best] > -np.inf:
+            choice = Choice(int(slots[best]), int(voxels[best]), float(value[best]))
+        if len(beyond) == 0 or math.isinf(reach):
+            return choice, choice is not None or math.isinf(reach)
+        if choice is None:
+            return None, False
+        return choice, self._none_is_better(robot, beyond, reach, choice)
+
+    def _none_is_better(self, robot: int, slots: np.ndarray, reach: float, choice: Choice) -> bool:
+        """Whether no candidate farther away than `reach` can be worth as much as one that was found."""
+        for _ in range(2):
+            most = np.minimum(self.candidates.most(slots), self.candidates.limit())
+            there = np.full(len(slots), reach)
+            arrays = most * self.candidates.point, self.seconds(robot, there), there
+            better = slots[self._value(*arrays, np.zeros(len(slots))) >= choice.value]
+            new = better[np.isinf(self.candidates.most(better))]
+            if len(new) == 0:
+                break
+            self.candidates.count(new, self.candidates.voxels_of(new))
+            self.counted += len(new)
+        return len(better) == 0
+
+    def _edges_to(self, voxels: np.ndarray, cost: np.ndarray | None) -> np.ndarray:
+        if cost is not None:
+            return cost[voxels]
+        edges = np.empty(len(voxels))
+        ask_costs(self.search, voxels, edges)
+        return edges
+
+    def seconds(self, robot: int, edges: np.ndarray) -> np.ndarray:
+        """(K,) seconds of the drive along ways of so many voxel edges, and of the scans at its stops."""
+        kind = self._scenario.kind_of(robot)
+        length_m = edges * self._edge
+        stops = np.maximum(np.ceil(length_m / kind.robot.reach_m), 1.0)
+        hops_s = np.empty(len(edges))
+        fill_driving_times(length_m / stops, kind.robot.max_speed_m_s, kind.robot.acceleration_m_s2, hops_s)
+        return stops * (hops_s + kind.sensor.scan_time_s)
+
+    def _taken(self, voxels: np.ndarray, taken: Sequence[np.ndarray]) -> np.ndarray:
+        """(K,) Σ over targets of P(d) = 1 - d/range, within the range (Burgard 2005, eq. 6)."""
+        places = np.stack(np.unravel_index(voxels, self._scenario.grid.shape), axis=-1) + 0.5
+        total = np.zeros(len(voxels))
+        for target in taken:
+            apart = np.linalg.norm(places - target[:3], axis=1)
+            total += np.maximum(1.0 - apart / self.candidates.reach, 0.0)
+        return total
+
+
+@lean_kernel
+def ask_costs(search: Search, voxels: np.ndarray, out: np.ndarray) -> None:
+    """Fill (K,) with the costs of (K,) voxels in the latest search; inf = not reached."""
+    for place in range(len(voxels)):
+        out[place] = cost_to(search, voxels[place])
+
+
+@lean_kernel
+def fill_driving_times(
+    lengths_m: np.ndarray, max_speed_m_s: float, acceleration_m_s2: float, out: np.ndarray
+) -> None:
+    """Fill (K,) with the seconds of drives from rest to rest; of ways that do not end inf."""
+    for place in range(len(lengths_m)):
+        out[place] = math.inf
+        if lengths_m[place] < math.inf:
+            out[place] = driving_time(lengths_m[place], max_speed_m_s, acceleration_m_s2)
+
+
+def _worth(choice: Choice | None) -> float:
+    return -math.inf if choice is None else choice.value
+
+
+def under_way(view: RobotView, mate: TeammateView, robot: int) -> bool:
+    """Whether a teammate, by what was heard of it, is on its way to the viewpoint that it announced.
+
+    It is until a scan from there has been heard; scans under way, where sensors take them, do not count.
+    """
+    if mate.announced_s < 0.0:
+        return False
+    if mate.heard_s <= mate.announced_s:
+        return True
+    if math.isinf(view.scenario.kind_of(robot).sensor.scan_every_m):
+        return False
+    apart_m = float(np.linalg.norm(mate.pose[:3] - mate.viewpoint[:3]))
+    return apart_m > view.scenario.grid.voxel_size_m
+
+
+def stays(view: RobotView, mate: TeammateView) -> bool:
+    """Whether the viewpoint that a teammate announced is where it was already: it waits."""
+    apart_m = float(np.linalg.norm(mate.pose[:3] - mate.viewpoint[:3]))
+    return apart_m < 0.5 * view.scenario.grid.voxel_size_m

@@ -1,0 +1,369 @@
+"""Candidates of a robot's own belief, and what is expected to be seen from them: voxels, or ground below.
+
+Two kinds with one form: `VoxelCandidates` in plans and in any 3-D space, `TerrainCandidates` where there is
+an exposure surface. What was counted is kept: as no more points can be seen from a candidate than before
+while the map grows, it is an upper bound of what a new count would give (in voxels), or still right (on
+terrain, where nothing changed within range).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from baselines.expected_view import (
+    clear_promises,
+    count_crossed,
+    count_from,
+    count_in_ball,
+    new_tally,
+    rays_around,
+    rays_towards,
+)
+from baselines.frontier_map import (
+    NONE,
+    SPENT,
+    UNMAPPED,
+    choose_reached,
+    forget_seen,
+    look_at_blocks,
+    new_frontier_map,
+    put_block,
+    take_in,
+)
+from baselines.terrain_map import (
+    count_below,
+    count_columns_from,
+    count_columns_in_ball,
+    look_at_columns,
+    mean_ground,
+    new_terrain_map,
+    survey,
+)
+from entropy_explore_env.config import Scenario
+from entropy_explore_env.missions.view import RobotView
+from entropy_explore_env.settings import RobotKind
+from entropy_explore_env.validation import check, check_choice, check_positive
+
+Visibility = Literal["ray-cast", "naive"]
+_ROWS = 15
+"""Rows of imagined rays for robots that look up and down."""
+
+
+@dataclass(frozen=True)
+class Looking:
+    """What counts as explored, where candidates lie, and how V is counted.
+
+    Attributes:
+        sigma: σ at which a voxel is explored, and mapped.
+        spacing_m: Candidates lie about so far apart; never nearer than a voxel. None = a sixth of the range.
+        rise_m: The same above each other, over terrain; None = a sixth of the range.
+        visibility: `ray-cast`, or the `naive` count of all unexplored points in a ball.
+        gamma: γ of the height factor: relative height against absolute height. None = no height factor.
+        patch_m: Half the width of the patch whose mean ground is z_av.
+        too_high: Candidates higher above z_av than this share of the range are dropped.
+    """
+
+    sigma: float = 0.5
+    spacing_m: float | None = None
+    rise_m: float | None = None
+    visibility: Visibility = "ray-cast"
+    gamma: float | None = 0.5
+    patch_m: float = 5.0
+    too_high: float = 0.9
+
+    def __post_init__(self) -> None:
+        """Check every field."""
+        check(self, "sigma", "a number from 1e-4 to 1e4", lambda v: 1e-4 <= v <= 1e4)
+        for name in ("spacing_m", "rise_m"):
+            if getattr(self, name) is not None:
+                check_positive(self, name)
+        check_choice(self, "visibility", Visibility)
+        if self.gamma is not None:
+            check(self, "gamma", "None, or a number from 0 to 1", lambda v: 0.0 <= v <= 1.0)
+        check_positive(self, "patch_m", "too_high")
+
+    def levels(self, sigma: float, prior_precision: float) -> tuple[float, float]:
+        """What `take_in` takes, where σ is the level that counts as explored now."""
+        explored, mapped = (
+            float(np.float32(max(level**-2, prior_precision * (1.0 + 1e-6)))) for level in (sigma, self.sigma)
+        )
+        return explored, mapped
+
+
+class VoxelCandidates:
+    """Candidates and counts in a map of voxels; the points of V are voxels.
+
+    Attributes:
+        reach: Of the sensor, in voxel edges; no more than the workspace is wide.
+        point: Size of a point: m² in plans, else m³.
+        rates: (V,) float32, what ways cost in the mapped region; read-only.
+    """
+
+    def __init__(self, scenario: Scenario, kind: RobotKind, looking: Looking) -> None:
+        """Nothing is explored yet."""
+        grid, layer = scenario.grid, scenario.layer_of(kind.robot)
+        self._looking, self._size = looking, grid.shape
+        self._prior = scenario.sigma_prior**-2
+        self.reach = min(kind.sensor.max_range_m / grid.voxel_size_m, float(sum(grid.shape)))
+        spacing_m = looking.spacing_m or self.reach * grid.voxel_size_m / 6.0
+        body = kind.robot.body_radius_m / grid.voxel_size_m
+        spacing = max(round(spacing_m / grid.voxel_size_m), 1)
+        self._map = new_frontier_map(grid.shape, body, layer, spacing)
+        self._tally = new_tally(grid.voxels, grid.shape)
+        self._pitches = _pitches(kind, layer is None)
+        self._directions = rays_around(self.reach, self._pitches)
+        self.point = grid.voxel_size_m ** (2 if grid.flat else 3)
+        self.rates = _read_only(self._map.rates)
+        self._rates = self._map.rates
+
+    def update(self, view: RobotView, sigma: float) -> None:
+        """Take the belief in; σ is the level that counts as explored now."""
+        mean, precision = view.mean.reshape(-1), view.precision.reshape(-1)
+        take_in(self._map, mean, precision, self._looking.levels(sigma, self._prior))
+        forget_seen(self._map.changed, self._size, self._map.voxel, self._map.seen, self.reach)
+
+    def found(self) -> tuple[np.ndarray, np.ndarray]:
+        """(K,) slots of the candidates, and (K,) int32 their voxels."""
+        slots = np.flatnonzero((self._map.voxel != NONE) & (self._map.seen > 0.0))
+        return slots, self._map.voxel[slots]
+
+    def mapped_share(self) -> float:
+        """Share of all points that are mapped."""
+        return float((self._map.state & UNMAPPED == 0).mean())
+
+    def voxels_of(self, slots: np.ndarray) -> np.ndarray:
+        """(K,) int32, voxels of some candidates."""
+        return self._map.voxel[slots]
+
+    def most(self, slots: np.ndarray) -> np.ndarray:
+        """(K,) no fewer points than V·(height factor) of each; inf = not counted yet."""
+        return self._map.seen[slots].astype(np.float64)
+
+    def limit(self) -> float:
+        """No more points than this can be seen from anywhere."""
+        wide = self.reach + 2.0
+        within = math.pi * wide**2 if self._size[2] == 1 else 4.0 / 3.0 * math.pi * wide**3
+        return float(min(within, self._tally.stamp.size))
+
+    def count(self, slots: np.ndarray, voxels: np.ndarray) -> np.ndarray:
+        """(K,) V·(height factor): points expected to be seen, weighed by promises; 0 = nothing at all."""
+        seen, weighed = np.empty(len(slots)), np.empty(len(slots))
+        naive = self._looking.visibility == "naive"
+        arrays = self._map.state, self._size, voxels, self._directions
+        count_from(self._tally, *arrays, self.reach, naive, seen, weighed)
+        self._map.seen[slots] = seen
+        return weighed
+
+    def promise(self, place: np.ndarray) -> None:
+        """Somebody will scan at (3,), grid units: what is seen from there is promised once more."""
+        start = _tuple(place)
+        if self._looking.visibility == "naive":
+            count_in_ball(self._tally, self._map.state, self._size, start, self.reach, True)
+        else:
+            count_crossed(self._tally, self._map.state, self._size, start, self._directions, self.reach, True)
+
+    def release(self) -> None:
+        """Forget all promises."""
+        clear_promises(self._tally)
+
+    def spend(self, voxel: int) -> None:
+        """A scan was taken in a voxel: it is no candidate any more."""
+        self._map.flags[voxel] |= SPENT
+        x, y, z = np.unravel_index(voxel, self._size)
+        (across, blocks) = (self._map.across, self._map.blocks)
+        block = (int(x) // across[0] * blocks[1] + int(y) // across[1]) * blocks[2] + int(z) // across[2]
+        look_at_blocks(self._map, put_block(self._map, block, 0))
+
+    def unspend(self) -> None:
+        """Any place may be a candidate again: more is asked for from now on."""
+        self._map.flags[:] &= np.uint8(~SPENT & 0xFF)
+
+    def other_of(self, cost: np.ndarray) -> None:
+        """Blocks whose candidate was not reached may have one that was; (V,) float64 costs, inf = not."""
+        for slot in np.flatnonzero(self._map.voxel != NONE):
+            if math.isfinite(cost[self._map.voxel[slot]]):
+                continue
+            voxel = choose_reached(self._map, cost, slot)
+            if voxel != NONE:
+                self._map.voxel[slot], self._map.seen[slot] = voxel, math.inf
+
+    def open_start(self, x: int, y: int, z: int) -> list[int]:
+        """Let a robot leave the place where it stands: voxels by number that were closed."""
+        opened = []
+        for offset in self._map.ball:
+            place = x + offset[0], y + offset[1], z + offset[2]
+            if all(0 <= i < n for i, n in zip(place, self._size, strict=True)):
+                voxel = int(np.ravel_multi_index(place, self._size))
+                if math.isinf(self._rates[voxel]) and self._map.state[voxel] & 6 == 0:
+                    opened.append(voxel)
+        self._rates[opened] = 1.0
+        return opened
+
+    def close(self, voxels: list[int]) -> None:
+        """Close what `open_start` opened."""
+        self._rates[voxels] = np.inf
+
+    def gaze(self, place: np.ndarray, view: RobotView) -> tuple[float, float]:
+        """(yaw, pitch) in which most is seen from (3,), grid units; as it is for who sees all around."""
+        sensor, yaw = view.kind.sensor, float(view.pose[3])
+        turn, tilt = sensor.field_of_view_rad
+        all_around = turn > 2.0 * math.pi - 1.5 * sensor.angular_step_rad
+        if all_around and view.planar:
+            return yaw, 0.0
+        best, gaze = -1, (yaw, 0.0)
+        for pitch in (0.0,) if view.planar else (0.0, -0.7, 0.7):
+            pitches = self._pitches if view.planar else np.linspace(pitch - tilt / 2, pitch + tilt / 2, 5)
+            for way in range(1 if all_around else 16):
+                heading = yaw + way * (2.0 * math.pi / 16)
+                rays = rays_towards(np.linspace(heading - turn / 2, heading + turn / 2, 24), pitches)
+                arrays = self._map.state, self._size, _tuple(place), rays
+                points, _ = count_crossed(self._tally, *arrays, self.reach, False)
+                if points > best:
+                    best, gaze = points, ((heading + math.pi) % (2.0 * math.pi) - math.pi, pitch)
+        return gaze
+
+
+class TerrainCandidates:
+    """Candidates and counts above a height field; the points of V are columns of ground. Form as above."""
+
+    def __init__(self, scenario: Scenario, kind: RobotKind, looking: Looking, ceiling: np.ndarray) -> None:
+        """Nothing is explored yet."""
+        grid, sensor = scenario.grid, kind.sensor
+        edge = grid.voxel_size_m
+        self._looking, self._size = looking, grid.shape
+        self._prior = scenario.sigma_prior**-2
+        self.reach = min(sensor.max_range_m / edge, float(sum(grid.shape)))
+        apart = [
+            max(round((m or self.reach * edge / 6.0) / edge), 1) for m in (looking.spacing_m, looking.rise_m)
+        ]
+        self._map = new_terrain_map(grid.shape, kind.robot.body_radius_m / edge, *apart, ceiling)
+        self._tally = new_tally(grid.shape[0] * grid.shape[1], grid.shape)
+        turns = min(math.ceil(2.0 * math.pi * self.reach), 720)
+        angles = (np.arange(turns) + 0.5) * (2.0 * math.pi / turns)
+        self._azimuths = np.stack([np.cos(angles), np.sin(angles)], axis=-1)
+        self._tilt = sensor.field_of_view_rad[1]
+        top = max(0.5 * math.pi - self._tilt, 0.0)
+        patch = max(round(looking.patch_m / edge), 0)
+        gamma, high = looking.gamma or 0.0, looking.too_high * self.reach
+        self._look = (self.reach, math.tan(min(top, 1.5)), float(patch), gamma, high)
+        self.point = edge**2
+        self.rates = _read_only(self._map.rates)
+        self._rates = self._map.rates
+        self._factors = np.ones(len(self._map.voxel))
+        self._unit = edge if looking.gamma is not None else 1.0
+
+    def update(self, view: RobotView, sigma: float) -> None:
+        """See `VoxelCandidates`."""
+        levels = self._looking.levels(sigma, self._prior)
+        survey(self._map, view.mean.reshape(-1), view.precision.reshape(-1), levels)
+        wide = self.reach + self._look[2]
+        forget_seen(self._map.changed, self._size, self._map.voxel, self._map.seen, wide)
+
+    def found(self) -> tuple[np.ndarray, np.ndarray]:
+        """See `VoxelCandidates`."""
+        slots = np.flatnonzero((self._map.voxel != NONE) & (self._map.seen > 0.0))
+        return slots, self._map.voxel[slots]
+
+    def mapped_share(self) -> float:
+        """See `VoxelCandidates`."""
+        return float((self._map.ground != NONE).mean())
+
+    def voxels_of(self, slots: np.ndarray) -> np.ndarray:
+        """See `VoxelCandidates`."""
+        return self._map.voxel[slots]
+
+    def most(self, slots: np.ndarray) -> np.ndarray:
+        """See `VoxelCandidates`."""
+        return self._map.seen[slots] * self._factors[slots]
+
+    def limit(self) -> float:
+        """See `VoxelCandidates`."""
+        factor = 1.0 if self._looking.gamma is None else self._unit * self._size[2]
+        within = math.pi * (self.reach + 2.0) ** 2
+        return float(min(within, self._tally.stamp.size)) * factor
+
+    def count(self, slots: np.ndarray, voxels: np.ndarray) -> np.ndarray:
+        """See `VoxelCandidates`."""
+        seen, weighed, factor = (np.empty(len(slots)) for _ in range(3))
+        naive = self._looking.visibility == "naive"
+        count_columns_from(
+            self._tally, self._map, voxels, self._azimuths, self._look, naive, seen, weighed, factor
+        )
+        factor = (factor > 0.0).astype(float) if self._looking.gamma is None else factor * self._unit
+        self._map.seen[slots], self._factors[slots] = seen, np.maximum(factor, 1e-12)
+        return weighed * factor
+
+    def promise(self, place: np.ndarray) -> None:
+        """See `VoxelCandidates`."""
+        eye, reach, flattest = _tuple(place), self._look[0], self._look[1]
+        average = mean_ground(self._map, int(eye[0]), int(eye[1]), int(self._look[2]))
+        if self._looking.visibility == "naive":
+            count_columns_in_ball(self._tally, self._map, eye, average, reach, True)
+        else:
+            count_below(self._tally, self._map, eye, average, self._azimuths, reach, flattest, True)
+
+    def release(self) -> None:
+        """See `VoxelCandidates`."""
+        clear_promises(self._tally)
+
+    def spend(self, voxel: int) -> None:
+        """See `VoxelCandidates`."""
+        self._map.spent[voxel] = SPENT
+        x, y, _ = np.unravel_index(voxel, self._size)
+        wide = self._map.spacing
+        block = int(x) // wide * self._map.rows + int(y) // wide
+        look_at_columns(self._map, put_block(self._map, block, 0))
+
+    def unspend(self) -> None:
+        """See `VoxelCandidates`."""
+        self._map.spent[:] = 0
+
+    def other_of(self, cost: np.ndarray) -> None:
+        """Columns that hang together with nothing are no candidates: nothing to do."""
+
+    def open_start(self, x: int, y: int, z: int) -> list[int]:
+        """See `VoxelCandidates`."""
+        del x, y, z
+        return []
+
+    def close(self, voxels: list[int]) -> None:
+        """See `VoxelCandidates`."""
+
+    def gaze(self, place: np.ndarray, view: RobotView) -> tuple[float, float]:
+        """Down: the lowest rays straight down; who does not see all around turns to where most is seen."""
+        yaw, turn = float(view.pose[3]), view.kind.sensor.field_of_view_rad[0]
+        if turn <= 2.0 * math.pi - 1.5 * view.kind.sensor.angular_step_rad:
+            eye, best, first = _tuple(place), -1, yaw
+            average = mean_ground(self._map, int(eye[0]), int(eye[1]), int(self._look[2]))
+            for way in range(16):
+                heading = first + way * (2.0 * math.pi / 16)
+                ahead = self._azimuths @ (math.cos(heading), math.sin(heading)) >= math.cos(turn / 2)
+                arrays = self._tally, self._map, eye, average, self._azimuths[ahead]
+                points, _ = count_below(*arrays, self._look[0], self._look[1], False)
+                if points > best:
+                    best, yaw = points, (heading + math.pi) % (2.0 * math.pi) - math.pi
+        return yaw, 0.5 * math.pi - 0.5 * self._tilt
+
+
+def _pitches(kind: RobotKind, flies: bool) -> np.ndarray:
+    """(rows,) pitches of imagined rays: all for who flies, those of the sensor for who looks level."""
+    tilt = kind.sensor.field_of_view_rad[1]
+    if flies:
+        return (np.arange(_ROWS) + 0.5) * (math.pi / _ROWS) - math.pi / 2
+    rows = min(kind.sensor.rows, _ROWS)
+    return np.linspace(-tilt / 2, tilt / 2, rows) if rows > 1 else np.zeros(1)
+
+
+def _tuple(place: np.ndarray) -> tuple[float, float, float]:
+    """(x, y, z), for which kernels are compiled."""
+    return float(place[0]), float(place[1]), float(place[2])
+
+
+def _read_only(array: np.ndarray) -> np.ndarray:
+    view = array.view()
+    view.setflags(write=False)
+    return view

@@ -1,0 +1,86 @@
+"""Sawhney 2009 reproduced: `python -m baselines.papers.sawhney [--quick] [--out DIR] [--json]`.
+
+Explores plans and terrains by visibility per time, V/t, against V - βt, synchronous allotment, naive
+visibility and other rules of frontiers; times to 95 %, to 99 % and to no frontier side by side. Missions are
+kept under `--runs`: a stopped experiment goes on where it was.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from baselines.command import make_folder, parse, print_json, run_command
+from baselines.experiment import run_cells
+from baselines.papers.sawhney_cells import experiment
+from baselines.papers.sawhney_claims import all_claims
+from entropy_explore_env.errors import SettingError
+
+_STARTS, _QUICK_STARTS = 40, 4
+
+
+@dataclass
+class Args:
+    """Reproduce Sawhney, Fast Exploration in 2D and 3D Terrains."""
+
+    quick: bool = False
+    """Fewer starts, team sizes and β."""
+    out: Path = Path("results/sawhney")
+    """Folder for the report, its figures and tables."""
+    runs: Path = Path("results/sawhney-runs")
+    """Folder that keeps the missions."""
+    starts: int | None = None
+    """Missions a point in each plan; default: 40 (160 over the four plans), with --quick 4."""
+    flights: int | None = None
+    """The same over each terrain; 0 = plans only; default: 40 (120 over all three), with --quick 4."""
+    dem: Path | None = None
+    """A height map's file to fly over as well, such as the Jacksboro model, resampled to voxels of 1 m."""
+    jobs: int | None = None
+    """Processes; default: one a processor."""
+    json: bool = False
+    """Print one JSON object and nothing else."""
+    strict: bool = False
+    """Exit with 1 if a claim does not hold."""
+
+
+def main(words: Sequence[str]) -> int:
+    """Run the command."""
+    args = parse(Args, words, description=__doc__)
+    from baselines.claims_table import print_claims
+    from baselines.papers.sawhney_report import write_report
+
+    for name, value, least in (("starts", args.starts, 2), ("jobs", args.jobs, 1)):
+        if value is not None and value < least:
+            raise SettingError(name, value, f"a whole number ≥ {least}")
+    if args.flights is not None and (args.flights < 0 or args.flights == 1):
+        raise SettingError("flights", args.flights, "0, or a whole number ≥ 2")
+    if args.dem is not None and not args.dem.is_file():
+        raise SettingError("dem", str(args.dem), "a height map's file")
+    make_folder("out", args.out)
+    make_folder("runs", args.runs)
+    started = time.perf_counter()
+    usual = _QUICK_STARTS if args.quick else _STARTS
+    flights = usual if args.flights is None else args.flights
+    cells = experiment(args.starts or usual, flights, args.quick, args.dem)
+    records = run_cells(cells, args.runs, args.jobs or os.cpu_count() or 1, "Sawhney", quiet=args.json)
+    claims = all_claims(records)
+    given = " --quick" * args.quick
+    given += "".join(f" --{n} {v}" for n in ("starts", "flights") if (v := getattr(args, n)) is not None)
+    report = write_report(
+        args.out, records, claims, f"python -m baselines.papers.sawhney{given} --out {args.out}"
+    )
+    if args.json:
+        wall_s = round(time.perf_counter() - started, 1)
+        print_json({"paper": "Sawhney", "claims": [claim.row() for claim in claims], "wall_s": wall_s})
+    else:
+        print_claims(claims, "Sawhney")
+        print(f"written: {report}, its figures and tables beside it", file=sys.stderr)
+    return 1 if args.strict and not all(claim.holds for claim in claims) else 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(run_command(main))

@@ -1,0 +1,142 @@
+"""The experiment of Sawhney 2009 as cells: world, team size, metric and allotment of each point.
+
+β of V - βt goes with the units of V and t. The paper's β ∈ [1, 70] count its own terrain points; here a point
+is taken to be 0.05 m² of plan, and 4 m³ over terrain (m² of ground times the height factor): so the paper's
+numbers sweep 0.05 … 3.5 m²/s and 4 … 280 m³/s, from well below to well above what a robot discovers a second.
+"""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+from baselines.experiment import Cell
+from baselines.frontier_candidates import Looking
+from baselines.frontier_rivals import Coordinated, Nearest
+from baselines.papers.sawhney_missions import Run
+from baselines.per_time_visibility import Exploring, Metric
+from entropy_explore_env.config import Scenario, with_settings
+from entropy_explore_env.scenarios import find_scenario
+
+PLANS = ("office", "corridor", "cluttered", "hybrid")
+TERRAINS = ("terrain-smooth", "terrain", "terrain-rough")
+DEM = "dem"
+TEAMS, QUICK_TEAMS = (1, 2, 3, 4, 5, 6), {"plans": (1, 3), "terrains": (3,)}
+BETAS = (1, 2, 5, 10, 20, 30, 40, 50, 60, 70)
+QUICK_BETAS = (1, 5, 10, 20, 40, 70)
+POINT = {"plans": 0.05, "terrains": 4.0}
+"""What one of the paper's points is taken to be: m² of plan; m² of ground times metres of height factor."""
+BONUS = {"plans": 0.5, "terrains": 40.0}
+"""Of the finishing rule."""
+SIGMA = 0.5
+TIME_LIMIT_S = 3600.0
+CHANGED_TEAM = 3
+"""Team size at which one thing is changed at a time."""
+
+_PLAN: dict[str, Any] = {
+    "robot": {"reach_m": math.inf, "body_radius_m": 0.0, "unknown_cost": 1e4},
+    "sensor": {"max_range_m": 3.0, "angular_step_rad": math.pi / 180, "scan_time_s": 2.0},
+}
+_TERRAIN: dict[str, Any] = {
+    "robot": {"reach_m": math.inf, "body_radius_m": 0.0},
+    "sensor": {
+        "field_of_view_rad": (2 * math.pi, math.pi / 2),
+        "angular_step_rad": math.pi / 60,
+        "max_range_m": 20.0,
+        "scan_time_s": 2.0,
+    },
+}
+_ALL: dict[str, Any] = {
+    "channel": {"burst": 10_000, "i_min_bits": 0.0},
+    "ending": {"sigma_end": 1e-3, "time_limit_s": TIME_LIMIT_S},
+    "scored": True,
+}
+CHANGES: dict[str, tuple[str, dict[str, Any], dict[str, Any]]] = {
+    "scan-short": ("a scan takes 0.5 s", {"sensor": {"scan_time_s": 0.5}}, {}),
+    "scan-long": ("a scan takes 8 s", {"sensor": {"scan_time_s": 8.0}}, {}),
+    "range": ("the sensor sees twice as far", {"sensor": {"max_range_m": 6.0}}, {}),
+    "bodies": ("bodies of 0.2 m", {"robot": {"body_radius_m": 0.2}}, {}),
+    "unpromised": ("nothing is promised", {}, {"promises": False}),
+}
+"""What is changed in plans: a text, settings of the scenario, fields of Exploring."""
+CHANGED_METHODS = ("ptv", "beta-10", "beta-20")
+
+
+def part_of(world: str) -> str:
+    """`plans` or `terrains`."""
+    return "plans" if world in PLANS else "terrains"
+
+
+def methods(part: str, quick: bool) -> dict[str, dict[str, Any]]:
+    """Name of a method → fields of Exploring."""
+    betas = QUICK_BETAS if quick else BETAS
+    looking = {"looking": Looking(sigma=SIGMA, visibility="naive")}
+    found: dict[str, dict[str, Any]] = {
+        "ptv": {},
+        "sync": {"allotment": "synchronous"},
+        **{f"beta-{beta}": {"metric": Metric(beta * POINT[part])} for beta in betas},
+        "naive": looking,
+        "finish": {"metric": Metric(bonus=BONUS[part])},
+        "nearest": {"metric": Nearest(), "promises": False},
+        "coordinated": {"metric": Coordinated()},
+    }
+    if part == "terrains":
+        found["no-height"] = {"looking": Looking(sigma=SIGMA, gamma=None)}
+    return found
+
+
+def cell_id(world: str, robots: int, method: str, change: str | None = None) -> str:
+    """Name of a cell."""
+    return f"{world}/n{robots}/{method}" + ("" if change is None else f"-{change}")
+
+
+def experiment(starts: int, flights: int, quick: bool, dem: Path | None) -> list[Cell]:
+    """All cells.
+
+    Args:
+        starts: Missions a point in each plan.
+        flights: Missions a point over each terrain; 0 = none.
+        quick: Fewer team sizes and β.
+        dem: A height map's file, flown over as well.
+    """
+    cells = []
+    for world in (*PLANS, *TERRAINS, *((DEM,) if dem is not None else ())):
+        part = part_of(world)
+        if (starts if part == "plans" else flights) == 0:
+            continue
+        for robots in QUICK_TEAMS[part] if quick else TEAMS:
+            for method, exploring in methods(part, quick).items():
+                seeds = starts if part == "plans" else flights
+                cells.append(_cell(world, robots, method, exploring, seeds, dem))
+    for change, (_, settings, more) in CHANGES.items():
+        for world in PLANS[:1] if quick else PLANS:
+            for method in CHANGED_METHODS:
+                exploring = {**methods("plans", False)[method], **more}
+                cell = _cell(world, CHANGED_TEAM, method, exploring, starts, None, settings, change)
+                cells.append(cell)
+    return cells
+
+
+def _cell(
+    world: str,
+    robots: int,
+    method: str,
+    exploring: dict[str, Any],
+    seeds: int,
+    dem: Path | None,
+    settings: dict[str, Any] | None = None,
+    change: str | None = None,
+) -> Cell:
+    fields = {"looking": Looking(sigma=SIGMA), "finest_sigma": SIGMA, **exploring}
+    flown = str(dem) if world == DEM else None
+    run = Run(Exploring(**fields), flown)
+    name = cell_id(world, robots, method, change)
+    return Cell(name, _scenario(world, robots, settings or {}), "per-time-visibility", seeds, run)
+
+
+def _scenario(world: str, robots: int, settings: dict[str, Any]) -> Scenario:
+    base = find_scenario("terrain" if world == DEM else world)
+    scenario = with_settings(base, {**_ALL, "robots": robots})
+    scenario = with_settings(scenario, _PLAN if world in PLANS else _TERRAIN)
+    return with_settings(scenario, settings)

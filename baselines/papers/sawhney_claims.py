@@ -1,0 +1,189 @@
+"""The claims of Sawhney 2009, each beside what was measured, at three ends: 95 %, 99 %, no frontier left.
+
+Times are relative: over the mean of V/t, asynchronous, in the same world with the same team, so that all
+worlds and team sizes weigh alike; missions are paired by world, team size and seed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from baselines.experiment import Claim, Record, ratio_interval
+from baselines.papers.sawhney_cells import (
+    BETAS,
+    CHANGED_TEAM,
+    CHANGES,
+    DEM,
+    PLANS,
+    TEAMS,
+    TERRAINS,
+    cell_id,
+)
+
+Records = dict[str, list[Record]]
+
+ENDS = {"t95_s": "to 95 %", "t99_s": "to 99 %", "t_none_s": "to no frontier"}
+PARTS = {"plans": "2-D", "terrains": "3-D"}
+PAPER_ASYNCHRONOUS = {"plans": 0.90, "terrains": 0.91}
+"""Asynchronous over synchronous: about 10 % and 9 % faster."""
+PAPER_BEST_BETA = {"plans": 0.90, "terrains": 0.91}
+"""V/t over the best β: about 10 % and 9 % faster."""
+PAPER_BETA = {"plans": 30, "terrains": 40}
+"""The paper's best β."""
+
+
+def worlds_in(records: Records, part: str) -> tuple[str, ...]:
+    """Worlds of a part that were run."""
+    worlds = PLANS if part == "plans" else (*TERRAINS, DEM)
+    return tuple(w for w in worlds if any(cell_id(w, n, "ptv") in records for n in TEAMS))
+
+
+def teams_in(records: Records, part: str) -> tuple[int, ...]:
+    """Team sizes of a part that were run."""
+    worlds = worlds_in(records, part)
+    return tuple(n for n in TEAMS if worlds and cell_id(worlds[0], n, "ptv") in records)
+
+
+def betas_in(records: Records, part: str) -> tuple[int, ...]:
+    """The paper's β that were run in a part."""
+    world, team = worlds_in(records, part)[0], teams_in(records, part)[0]
+    return tuple(b for b in BETAS if cell_id(world, team, f"beta-{b}") in records)
+
+
+def times(records: Records, cell: str, end: str) -> np.ndarray:
+    """Times of a cell in seconds, by seed."""
+    return np.asarray([record[end] for record in records[cell]], float)
+
+
+def relative(
+    records: Records, part: str, method: str, end: str, teams: Sequence[int] = (), worlds: Sequence[str] = ()
+) -> np.ndarray:
+    """(N,) relative times of a method, in the same order for all methods."""
+    found = []
+    for world in worlds or worlds_in(records, part):
+        for n in teams or teams_in(records, part):
+            unit = times(records, cell_id(world, n, "ptv"), end).mean()
+            found.append(times(records, cell_id(world, n, method), end) / unit)
+    return np.concatenate(found)
+
+
+def compared(
+    records: Records,
+    part: str,
+    ours: str,
+    theirs: str,
+    end: str,
+    teams: Sequence[int] = (),
+    worlds: Sequence[str] = (),
+) -> tuple[float, float, float]:
+    """Time of a method over that of another, with its 95 % interval."""
+    pair = (relative(records, part, method, end, teams, worlds) for method in (ours, theirs))
+    return ratio_interval(*pair)
+
+
+def best_beta(records: Records, part: str, end: str, worlds: Sequence[str] = ()) -> int:
+    """The paper's β with the least mean time over worlds and team sizes; chosen from these same missions."""
+    found = betas_in(records, part)
+    return min(found, key=lambda b: relative(records, part, f"beta-{b}", end, (), worlds).mean())
+
+
+def all_claims(records: Records) -> list[Claim]:
+    """Every claim, from the missions' records by cell."""
+    claims = []
+    for part in PARTS:
+        if worlds_in(records, part):
+            claims += _part_claims(records, part)
+    return claims
+
+
+def _part_claims(records: Records, part: str) -> list[Claim]:
+    """The claims of plans, or of terrains."""
+    name, claims = PARTS[part], []
+    several = [n for n in teams_in(records, part) if n > 1]
+    for end, text in ENDS.items():
+        ratio = compared(records, part, "ptv", "sync", end, several)
+        claim = f"{name}, {text}: asynchronous is faster than synchronous; t ratio"
+        claims.append(_faster(f"{part}-async-{end}", claim, PAPER_ASYNCHRONOUS[part], ratio))
+    for end, text in ENDS.items():
+        best = best_beta(records, part, end)
+        ratio = compared(records, part, "ptv", f"beta-{best}", end)
+        claim = f"{name}, {text}: V/t is faster than the best β ({best}); t ratio"
+        claims.append(_faster(f"{part}-beta-{end}", claim, PAPER_BEST_BETA[part], ratio))
+    for end, text in ENDS.items():
+        claims += _extreme_claims(records, part, end, f"{name}, {text}")
+    claims.append(_no_single_beta(records, part))
+    for other, what in (
+        ("naive", "ray-cast V is faster than naive V"),
+        ("no-height", "the height factor helps"),
+    ):
+        if other == "no-height" and part == "plans":
+            continue
+        for end, text in ENDS.items():
+            ratio = compared(records, part, "ptv", other, end)
+            claims.append(_faster(f"{part}-{other}-{end}", f"{name}, {text}: {what}; t ratio", "< 1", ratio))
+    return [*claims, *_our_claims(records, part, name)]
+
+
+def _faster(name: str, claim: str, paper: float | str | None, ratio: tuple[float, float, float]) -> Claim:
+    """Holds if the whole interval is below 1."""
+    return Claim(name, claim, paper, *ratio, ratio[2] < 1.0)
+
+
+def _extreme_claims(records: Records, part: str, end: str, text: str) -> list[Claim]:
+    """The smallest and the largest β are slower than the best."""
+    best, claims = best_beta(records, part, end), []
+    for beta in (betas_in(records, part)[0], betas_in(records, part)[-1]):
+        ratio = compared(records, part, f"beta-{beta}", f"beta-{best}", end)
+        claim = f"{text}: β = {beta} is slower than the best β ({best}); t ratio"
+        claims.append(Claim(f"{part}-extreme-{beta}-{end}", claim, "> 1", *ratio, ratio[1] > 1.0))
+    return claims
+
+
+def _no_single_beta(records: Records, part: str) -> Claim:
+    """The best β differs from world to world."""
+    best = {world: best_beta(records, part, "t95_s", (world,)) for world in worlds_in(records, part)}
+    listed = ", ".join(f"{world} {beta}" for world, beta in best.items())
+    text = f"{PARTS[part]}, to 95 %: no single β is best in all worlds"
+    return Claim(f"{part}-no-single", text, "differs", listed, None, None, len(set(best.values())) > 1)
+
+
+def _our_claims(records: Records, part: str, name: str) -> list[Claim]:
+    """Not the paper's: the finishing rule, the rivals, and the gain over the best β by team size."""
+    claims = []
+    ratio = compared(records, part, "finish", "ptv", "t_none_s")
+    text = f"ours, {name}, to no frontier: (V + bonus)/t is faster than V/t; t ratio"
+    claims.append(_faster(f"{part}-finish", text, None, ratio))
+    for rival in ("nearest", "coordinated"):
+        for end in ("t95_s", "t_none_s"):
+            ratio = compared(records, part, "ptv", rival, end)
+            text = f"ours, {name}, {ENDS[end]}: V/t is faster than `{rival}-frontier`; t ratio"
+            claims.append(_faster(f"{part}-{rival}-{end}", text, None, ratio))
+    best = best_beta(records, part, "t95_s")
+    for n in teams_in(records, part):
+        ratio = compared(records, part, "ptv", f"beta-{best}", "t95_s", (n,))
+        text = f"ours, {name}, to 95 %, {n} robot{'s' * (n > 1)}: V/t is faster than β = {best}; t ratio"
+        claims.append(_faster(f"{part}-team-{n}", text, None, ratio))
+    return claims
+
+
+def changes_in(records: Records) -> dict[str, tuple[str, ...]]:
+    """What was changed → the plans in which it was."""
+    return {
+        change: worlds
+        for change in CHANGES
+        if (worlds := tuple(w for w in PLANS if cell_id(w, CHANGED_TEAM, "ptv", change) in records))
+    }
+
+
+def changed_ratio(
+    records: Records, change: str | None, method: str, end: str, worlds: Sequence[str]
+) -> tuple[float, float, float]:
+    """V/t over another method at `CHANGED_TEAM`, with one thing changed; relative in each world."""
+    ours, theirs = [], []
+    for world in worlds:
+        pair = [times(records, cell_id(world, CHANGED_TEAM, m, change), end) for m in ("ptv", method)]
+        ours.append(pair[0] / pair[0].mean())
+        theirs.append(pair[1] / pair[0].mean())
+    return ratio_interval(np.concatenate(ours), np.concatenate(theirs))

@@ -1,0 +1,155 @@
+"""The report of Sawhney 2009: Markdown with the claims and what was found, figures and tables beside it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import matplotlib as mpl
+import numpy as np
+
+from baselines.claims_table import claims_table
+from baselines.experiment import Claim, csv_table, markdown_table, mean_interval
+from baselines.figures import STYLE, png
+from baselines.papers.sawhney_cells import (
+    BONUS,
+    CHANGED_METHODS,
+    CHANGED_TEAM,
+    CHANGES,
+    POINT,
+    TIME_LIMIT_S,
+    cell_id,
+)
+from baselines.papers.sawhney_claims import (
+    ENDS,
+    PARTS,
+    Records,
+    betas_in,
+    changed_ratio,
+    changes_in,
+    relative,
+    teams_in,
+    worlds_in,
+)
+from baselines.papers.sawhney_figures import figure_beta, figure_curves, figure_teams
+from entropy_explore_env.writing import write_atomically
+
+PAPER_RUNS = {"plans": 160, "terrains": 120}
+_PICTURES = {"beta": figure_beta, "teams": figure_teams, "curves": figure_curves}
+
+
+def write_report(folder: Path, records: Records, claims: Sequence[Claim], command: str) -> Path:
+    """Write `sawhney.md` and, in a folder `sawhney` beside it, its figures and tables.
+
+    Returns:
+        Path of the report.
+    """
+    with mpl.rc_context(STYLE):
+        for part in PARTS:
+            for name, draw in _PICTURES.items() if worlds_in(records, part) else ():
+                figure, table = draw(records, part)
+                write_atomically(folder / "sawhney" / f"{part}-{name}.png", png(figure))
+                write_atomically(folder / "sawhney" / f"{part}-{name}.csv", csv_table(table))
+    write_atomically(folder / "sawhney.md", _text(records, claims, command))
+    return folder / "sawhney.md"
+
+
+def _text(records: Records, claims: Sequence[Claim], command: str) -> str:
+    missions = sum(len(cell) for cell in records.values())
+    cut = sum(not record["finished"] for cell in records.values() for record in cell)
+    held = sum(claim.holds for claim in claims)
+    parts = [
+        "# Sawhney, Krishna & Srinathan 2009, reproduced",
+        f"Written by `{command}`: {missions:,} missions; seeds 0, 1, … are the same worlds and starts in "
+        f"every cell. {cut} missions were cut off at {TIME_LIMIT_S:g} s, and count with it. The figures' "
+        "numbers lie as CSV in `sawhney/`.",
+        *(_runs(records, part) for part in PARTS),
+        _RULES,
+        f"## Claims: {held} of {len(claims)} hold",
+        _HOLDS,
+        claims_table(claims),
+    ]
+    for part, name in PARTS.items():
+        if worlds_in(records, part):
+            parts += [
+                f"## {name}",
+                f"![β](sawhney/{part}-beta.png)",
+                f"![Team sizes](sawhney/{part}-teams.png)",
+                f"![Curves](sawhney/{part}-curves.png)",
+                _times_table(records, part),
+            ]
+    if changes_in(records):
+        parts += ["## One thing changed at a time", _CHANGED, _changes_table(records)]
+    return "\n\n".join(part.strip() for part in parts) + "\n"
+
+
+def _runs(records: Records, part: str) -> str:
+    """How many missions a point has, beside the paper's."""
+    worlds, teams = worlds_in(records, part), teams_in(records, part)
+    if not worlds:
+        return f"**{PARTS[part]} was not run.**"
+    runs = sum(len(records[cell_id(world, teams[0], "ptv")]) for world in worlds)
+    betas = ", ".join(map(str, betas_in(records, part)))
+    fewer = f", fewer than the paper's {PAPER_RUNS[part]}" if runs < PAPER_RUNS[part] else ""
+    return (
+        f"{PARTS[part]}: {', '.join(worlds)}; teams of {', '.join(map(str, teams))}; "
+        f"**{runs} runs a point{fewer}**; β ∈ {{{betas}}} in the paper's numbers, each {POINT[part]:g} "
+        + ("m²/s." if part == "plans" else "m³/s.")
+    )
+
+
+_RULES = f"""Plans are the scenarios of these names: cells of 0.1 m, robots without bodies at 0.5 m/s and
+0.5 m/s² with a laser of 360 rays all around up to 3 m; a scan takes 2 s. Terrains are 96 × 72 m of fractal
+ground with up to 18 m of relief, Hurst exponents 0.95, 0.8 and 0.5, under an exposure surface at least 4 m
+above it; UAVs at 3 m/s and 2 m/s² with a scanner that looks down, all around, up to 20 m; a scan takes 2 s.
+Everybody hears every measurement and announcement at once. The paper gives none of these numbers.
+
+V is the area of unexplored cells, or of columns of ground (times the height factor, metres), t the seconds
+of the drive from rest to rest on the shortest way and of the scan. The paper counts V in terrain points and
+gives no unit: its β are taken to count points of {POINT["plans"]:g} m² in plans and of
+{POINT["terrains"]:g} m³ over terrain, so that its numbers 1 … 70 reach from well below to well above what a
+robot discovers a second. Promises weigh 1/(1 + promises): a literal 1/n_r would make the first one free.
+The finishing rule is ours: (V + v)/t with v = {BONUS["plans"]:g} m² in plans and {BONUS["terrains"]:g} m³
+over terrain. Who waits for a synchronous team scans meanwhile, and so leaves up to 2 s after the last has
+scanned."""
+
+_HOLDS = """Relative times are over the mean of asynchronous V/t in the same world with the same team, so that
+all weigh alike; ratios are of their means, with 95 % bootstrap intervals over missions paired by world, team
+and seed. "Faster" holds if the whole interval is below 1. The best β is chosen from the same missions, which
+favours it."""
+
+_CHANGED = f"""Teams of {CHANGED_TEAM} in plans: time of V/t over that of the other method."""
+
+
+def _times_table(records: Records, part: str) -> str:
+    """Relative times of every method at the three ends, and scans."""
+    world, n = worlds_in(records, part)[0], teams_in(records, part)[0]
+    prefix = cell_id(world, n, "")
+    rows = []
+    for method in [name[len(prefix) :] for name in records if name.startswith(prefix)]:
+        cells = [cell_id(w, k, method) for w in worlds_in(records, part) for k in teams_in(records, part)]
+        scans = np.mean([record["scans"] / record["robots"] for cell in cells for record in records[cell]])
+        shown = [
+            "{:.2f} ({:.2f} … {:.2f})".format(*mean_interval(relative(records, part, method, end)))
+            for end in ENDS
+        ]
+        rows.append([f"`{method}`", *shown, f"{scans:.0f}"])
+    head = ["method", *(f"relative time {text}" for text in ENDS.values()), "scans a robot"]
+    return markdown_table(head, rows)
+
+
+def _changes_table(records: Records) -> str:
+    """V/t over the others with one thing changed."""
+    rows = []
+    changes = changes_in(records)
+    everywhere = next(iter(changes.values()))
+    for change in (None, *changes):
+        worlds = everywhere if change is None else changes[change]
+        for method in CHANGED_METHODS[1:]:
+            ratios = [
+                "{:.2f} ({:.2f} … {:.2f})".format(*changed_ratio(records, change, method, end, worlds))
+                for end in ENDS
+            ]
+            text = "as it is" if change is None else CHANGES[change][0]
+            rows.append([text, f"V/t over `{method}`", *ratios, ", ".join(worlds)])
+    return markdown_table(["changed", "ratio", *ENDS.values(), "in"], rows)

@@ -1,0 +1,388 @@
+"""Frontiers of a height field below an exposure surface, and what is seen from there (Sawhney 2009).
+
+Points are columns. A column is explored once the voxel of its surface is: the highest one that is known and
+believed covered, with a known free one above it. Robots may be between the ground and the exposure surface of
+explored columns, whether or not a ray went through that air. On the edge lie explored columns beside
+unexplored ones; of each block of columns the candidate nearest to its middle stands for all, at several
+heights (sect. 3.2).
+
+Unexplored ground is taken to slope down from the mean height z_av of the ground around the place, to
+z = (1 - dist / range) z_av above the workspace's floor (sect. 3.4). A column is seen if a ray from the place
+meets its top: along every direction the steepest slope to what was passed is carried on. Grid units: heights
+are in layers.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from baselines.expected_view import begin_count, promise, weight
+from baselines.frontier_map import (
+    CANDIDATE,
+    COVERED,
+    EDGE,
+    NONE,
+    TILE,
+    UNEXPLORED,
+    UNMAPPED,
+    new_frontier_map,
+    put_block,
+    state_of,
+)
+from entropy_explore_env.compilation import inlined_kernel, lean_kernel
+
+
+class TerrainMap(NamedTuple):
+    """What is read off one robot's belief of a height field; B blocks of columns, H heights each."""
+
+    state: np.ndarray
+    """(V,) uint8, flags as in a FrontierMap."""
+    spent: np.ndarray
+    """(V,) uint8, SPENT where a scan was taken."""
+    ground: np.ndarray
+    """(X, Y) int32, solid layers of a mapped column; NONE = not mapped."""
+    unexplored: np.ndarray
+    """(X·Y,) uint8, whether a column's surface is not known as well as is asked for now."""
+    flags: np.ndarray
+    """(X·Y,) uint8: EDGE, CANDIDATE."""
+    rates: np.ndarray
+    """(V,) float32, what ways cost: 1 where the body may be, else inf."""
+    column: np.ndarray
+    """(B,) int32, the candidate column of a block; NONE = it has none."""
+    voxel: np.ndarray
+    """(B·H,) int32, its candidates; NONE = none at this height."""
+    seen: np.ndarray
+    """(B·H,) float32, points that can be seen from it; inf = not looked at since something changed nearby."""
+    dirty: np.ndarray
+    """(B,) uint8."""
+    waiting: np.ndarray
+    """(B,) int32."""
+    changed: np.ndarray
+    """(X / TILE, Y / TILE) uint8, where ground was found."""
+    ceiling: np.ndarray
+    """(X, Y) int32, first layer that is closed to robots."""
+    size: tuple[int, int, int]
+    spacing: int
+    rise: int
+    """Layers between two candidates above each other."""
+    heights: int
+    """H."""
+    rows: int
+    """Blocks along y."""
+    ball: np.ndarray
+    """(N, 3) int64, voxels that the body touches."""
+    reach: int
+    """Columns that it reaches to."""
+
+
+def new_terrain_map(
+    shape: tuple[int, int, int], body_radius: float, spacing: int, rise: int, ceiling: np.ndarray
+) -> TerrainMap:
+    """A map of which nothing is explored; arguments as of `new_frontier_map`."""
+    ball = new_frontier_map((3, 3, 3), body_radius, None, 1).ball
+    columns, voxels, heights = shape[0] * shape[1], math.prod(shape), math.ceil(shape[2] / rise)
+    rows = math.ceil(shape[1] / spacing)
+    count = math.ceil(shape[0] / spacing) * rows
+    return TerrainMap(
+        state=np.full(voxels, UNEXPLORED | UNMAPPED, np.uint8),
+        spent=np.zeros(voxels, np.uint8),
+        ground=np.full(shape[:2], NONE, np.int32),
+        unexplored=np.ones(columns, np.uint8),
+        flags=np.zeros(columns, np.uint8),
+        rates=np.full(voxels, np.inf, np.float32),
+        column=np.full(count, NONE, np.int32),
+        voxel=np.full(count * heights, NONE, np.int32),
+        seen=np.full(count * heights, np.inf, np.float32),
+        dirty=np.zeros(count, np.uint8),
+        waiting=np.zeros(count, np.int32),
+        changed=np.zeros((shape[0] // TILE + 1, shape[1] // TILE + 1), np.uint8),
+        ceiling=np.ascontiguousarray(ceiling, np.int32).copy(),
+        size=(int(shape[0]), int(shape[1]), int(shape[2])),
+        spacing=spacing,
+        rise=rise,
+        heights=heights,
+        rows=rows,
+        ball=ball,
+        reach=int(np.abs(ball).max()),
+    )
+
+
+@lean_kernel
+def survey(terrain, mean, precision, levels):
+    """Bring the map up to date with a belief: see `frontier_map.take_in`."""
+    size, count = terrain.size, 0
+    for column in range(size[0] * size[1]):
+        touched = False
+        for voxel in range(column * size[2], (column + 1) * size[2]):
+            now = state_of(mean[voxel], precision[voxel], levels)
+            if now != terrain.state[voxel]:
+                terrain.state[voxel] = now
+                touched = True
+        if touched:
+            x, y = column // size[1], column % size[1]
+            if find_ground(terrain, x, y):
+                terrain.changed[x // TILE, y // TILE] = 1
+            count = _put_around(terrain, x, y, terrain.reach + 2, count)
+    look_at_columns(terrain, count)
+
+
+@lean_kernel
+def look_at_columns(terrain, count):
+    """Find edge, room and candidates of the blocks that wait."""
+    for place in range(count):
+        _look_for_edge(terrain, terrain.waiting[place])
+    for place in range(count):
+        _look_for_candidates(terrain, terrain.waiting[place])
+        terrain.dirty[terrain.waiting[place]] = 0
+
+
+@lean_kernel
+def _put_around(terrain, x, y, reach, count):
+    """Note the blocks that have a column within `reach` along both axes."""
+    size, wide = terrain.size, terrain.spacing
+    for i in range(max(x - reach, 0) // wide, min(x + reach, size[0] - 1) // wide + 1):
+        for j in range(max(y - reach, 0) // wide, min(y + reach, size[1] - 1) // wide + 1):
+            count = put_block(terrain, i * terrain.rows + j, count)
+    return count
+
+
+@lean_kernel
+def find_ground(terrain, x, y):
+    """Read a column's ground off its voxels' states; returns whether it, or how well it is known, changed."""
+    size, state = terrain.size, terrain.state
+    column = x * size[1] + y
+    ground, unexplored = NONE, 1
+    for layer in range(size[2] - 1, -1, -1):
+        voxel = column * size[2] + layer
+        if state[voxel] & COVERED and state[voxel] & UNMAPPED == 0:
+            clear = layer == size[2] - 1 or state[voxel + 1] & (UNMAPPED | COVERED) == 0
+            if clear:
+                ground = layer + 1
+                unexplored = 1 if state[voxel] & UNEXPLORED else 0
+            break
+    different = ground != terrain.ground[x, y] or unexplored != terrain.unexplored[column]
+    terrain.ground[x, y], terrain.unexplored[column] = ground, unexplored
+    return different
+
+
+@inlined_kernel
+def _span(terrain, block):
+    """First column of a block along x and y, and one past its last."""
+    i, j, wide = block // terrain.rows, block % terrain.rows, terrain.spacing
+    return i * wide, min((i + 1) * wide, terrain.size[0]), j * wide, min((j + 1) * wide, terrain.size[1])
+
+
+@lean_kernel
+def _look_for_edge(terrain, block):
+    """Set EDGE in a block: mapped columns that are, or are beside, unexplored ones."""
+    size, ground, unexplored = terrain.size, terrain.ground, terrain.unexplored
+    i0, i1, j0, j1 = _span(terrain, block)
+    for x in range(i0, i1):
+        for y in range(j0, j1):
+            column = x * size[1] + y
+            terrain.flags[column] &= CANDIDATE
+            if ground[x, y] == NONE:
+                continue
+            found = unexplored[column] > 0
+            found |= x > 0 and unexplored[column - size[1]] > 0
+            found |= x < size[0] - 1 and unexplored[column + size[1]] > 0
+            found |= y > 0 and unexplored[column - 1] > 0
+            found |= y < size[1] - 1 and unexplored[column + 1] > 0
+            if found:
+                terrain.flags[column] |= EDGE
+
+
+@lean_kernel
+def may_fly(terrain, x, y, z):
+    """Whether all that a body touches is above mapped ground, below the ceiling and not covered."""
+    size = terrain.size
+    for offset in terrain.ball:
+        i, j, k = x + offset[0], y + offset[1], z + offset[2]
+        if not (0 <= i < size[0] and 0 <= j < size[1] and 0 <= k < size[2]):
+            return False
+        ground = terrain.ground[i, j]
+        if ground == NONE or k < ground or k >= terrain.ceiling[i, j]:
+            return False
+        if terrain.state[(i * size[1] + j) * size[2] + k] & COVERED:
+            return False
+    return True
+
+
+@lean_kernel
+def _look_for_candidates(terrain, block):
+    """Set rates and CANDIDATE in a block, choose its column, and the heights above it."""
+    size = terrain.size
+    i0, i1, j0, j1 = _span(terrain, block)
+    best, nearest = NONE, math.inf
+    for x in range(i0, i1):
+        for y in range(j0, j1):
+            column, room = x * size[1] + y, False
+            for z in range(size[2]):
+                flies = may_fly(terrain, x, y, z)
+                terrain.rates[column * size[2] + z] = 1.0 if flies else math.inf
+                room = room or flies
+            terrain.flags[column] &= EDGE
+            if room and _near_edge(terrain, x, y):
+                terrain.flags[column] |= CANDIDATE
+                dx, dy = 2 * x + 1 - i0 - i1, 2 * y + 1 - j0 - j1
+                if dx * dx + dy * dy < nearest:
+                    best, nearest = column, dx * dx + dy * dy
+    if best != terrain.column[block]:
+        terrain.column[block] = best
+        for height in range(terrain.heights):
+            terrain.seen[block * terrain.heights + height] = math.inf
+    for height in range(terrain.heights):
+        place = block * terrain.heights + height
+        voxel = NONE
+        if best != NONE:
+            layer = terrain.ground[best // size[1], best % size[1]] + 1 + height * terrain.rise
+            if layer < size[2]:
+                voxel = best * size[2] + layer
+        if voxel != NONE and (math.isinf(terrain.rates[voxel]) or terrain.spent[voxel]):
+            voxel = NONE
+        if voxel != terrain.voxel[place]:
+            terrain.voxel[place] = voxel
+            terrain.seen[place] = math.inf
+
+
+@inlined_kernel
+def _near_edge(terrain, x, y):
+    """Whether a column of the edge is so near that a body in this one touches it, or one beside it."""
+    size, reach = terrain.size, terrain.reach
+    for i in range(max(x - reach, 0), min(x + reach, size[0] - 1) + 1):
+        for j in range(max(y - reach, 0), min(y + reach, size[1] - 1) + 1):
+            if terrain.flags[i * size[1] + j] & EDGE:
+                return True
+    return False
+
+
+@lean_kernel
+def mean_ground(terrain, x, y, patch):
+    """z_av: mean ground of the mapped columns within `patch` of one along both axes; 0 where none is."""
+    total, count = 0.0, 0
+    for i in range(max(x - patch, 0), min(x + patch, terrain.size[0] - 1) + 1):
+        for j in range(max(y - patch, 0), min(y + patch, terrain.size[1] - 1) + 1):
+            if terrain.ground[i, j] != NONE:
+                total += terrain.ground[i, j]
+                count += 1
+    return total / count if count > 0 else 0.0
+
+
+@inlined_kernel
+def height_at(terrain, x, y, eye, average, reach):
+    """Height of a column: its ground if mapped, else extrapolated (sect. 3.4)."""
+    if terrain.ground[x, y] != NONE:
+        return np.float64(terrain.ground[x, y])
+    dx, dy = x + 0.5 - eye[0], y + 0.5 - eye[1]
+    return max((1.0 - math.sqrt(dx * dx + dy * dy) / reach) * average, 0.0)
+
+
+@lean_kernel
+def count_below(tally, terrain, eye, average, azimuths, reach, flattest, marking):
+    """Unexplored columns that are seen from a place: (all, weighed by promises).
+
+    Args:
+        tally: Working space.
+        terrain: The map.
+        eye: (x, y, z) of the place.
+        average: z_av there.
+        azimuths: (D, 2) float64 unit vectors.
+        reach: Of the sensor, > 0.
+        flattest: Tangent of the angle below the horizon from which on the sensor looks down.
+        marking: Whether the columns are promised from now on.
+    """
+    number, points, weighed = begin_count(tally), 0, 0.0
+    size = terrain.size
+    for direction in azimuths:
+        x, y = int(eye[0]), int(eye[1])
+        step_x, step_y = 1 if direction[0] > 0.0 else -1, 1 if direction[1] > 0.0 else -1
+        gap_x = 1.0 / abs(direction[0]) if direction[0] != 0.0 else math.inf
+        gap_y = 1.0 / abs(direction[1]) if direction[1] != 0.0 else math.inf
+        face_x = (x + 1 - eye[0] if step_x > 0 else eye[0] - x) * gap_x if gap_x < math.inf else math.inf
+        face_y = (y + 1 - eye[1] if step_y > 0 else eye[1] - y) * gap_y if gap_y < math.inf else math.inf
+        enters, horizon = 0.0, -math.inf
+        while enters <= reach:
+            leaves = min(face_x, face_y)
+            height = height_at(terrain, x, y, eye, average, reach)
+            drop = eye[2] - height
+            if drop <= 0.0:
+                break  # it hides the tops of all that is lower than the eye
+            slope = -drop / leaves
+            column = x * size[1] + y
+            near = enters * enters + drop * drop <= reach * reach
+            if slope > horizon and near and drop >= flattest * enters:
+                if terrain.unexplored[column] and tally.stamp[column] != number:
+                    tally.stamp[column] = number
+                    points += 1
+                    weighed += weight(tally.promised[column])
+                    if marking:
+                        promise(tally, column)
+            horizon = max(horizon, slope)
+            enters = leaves
+            if face_x <= face_y:
+                x, face_x = x + step_x, face_x + gap_x
+            else:
+                y, face_y = y + step_y, face_y + gap_y
+            if not (0 <= x < size[0] and 0 <= y < size[1]):
+                break
+    return points, weighed
+
+
+@lean_kernel
+def count_columns_in_ball(tally, terrain, eye, average, reach, marking):
+    """The naive V: unexplored columns whose tops, extrapolated, lie in a ball, seen or not."""
+    points, weighed, size = 0, 0.0, terrain.size
+    wide = min(reach, size[0] + size[1])
+    for x in range(max(int(eye[0] - wide - 0.5), 0), min(int(eye[0] + wide + 1.0), size[0])):
+        for y in range(max(int(eye[1] - wide - 0.5), 0), min(int(eye[1] + wide + 1.0), size[1])):
+            column = x * size[1] + y
+            if not terrain.unexplored[column]:
+                continue
+            drop = eye[2] - height_at(terrain, x, y, eye, average, reach)
+            dx, dy = x + 0.5 - eye[0], y + 0.5 - eye[1]
+            if dx * dx + dy * dy + drop * drop <= reach * reach:
+                points += 1
+                weighed += weight(tally.promised[column])
+                if marking:
+                    promise(tally, column)
+    return points, weighed
+
+
+@lean_kernel
+def count_columns_from(tally, terrain, voxels, azimuths, look, naive, seen, weighed, factor):
+    """Fill (K,) with the columns seen from K voxels, weighed by promises, and the height factor of each.
+
+    The factor is (z_f - z_av)^γ z_f^(1 - γ), heights above the workspace's floor in layers (sect. 3.3); 0 for
+    who is so high above the ground that little of it can be seen, and is no candidate.
+
+    Args:
+        tally: Working space.
+        terrain: The map.
+        voxels: (K,) int32.
+        azimuths: (D, 2) float64.
+        look: (reach, flattest, patch, γ, highest): of the sensor, of z_av, and the greatest z_f - z_av.
+        naive: Whether columns in a ball are counted.
+        seen: (K,) filled in.
+        weighed: (K,) filled in.
+        factor: (K,) filled in.
+    """
+    reach, flattest, patch, gamma, highest = look
+    size = terrain.size
+    for place in range(len(voxels)):
+        column = voxels[place] // size[2]
+        x, y = column // size[1], column % size[1]
+        eye = (x + 0.5, y + 0.5, voxels[place] - column * size[2] + 0.5)
+        average = mean_ground(terrain, x, y, int(patch))
+        above = eye[2] - average
+        seen[place], weighed[place], factor[place] = 0.0, 0.0, 0.0
+        if above > highest:
+            continue
+        factor[place] = max(above, 1e-3) ** gamma * eye[2] ** (1.0 - gamma)
+        if naive:
+            points, value = count_columns_in_ball(tally, terrain, eye, average, reach, False)
+        else:
+            points, value = count_below(tally, terrain, eye, average, azimuths, reach, flattest, False)
+        seen[place], weighed[place] = points, value

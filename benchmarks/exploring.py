@@ -1,0 +1,135 @@
+"""What exploring plans costs: a step with a dense scanner, a decision, expected visibility."""
+
+from __future__ import annotations
+
+import math
+import time
+
+import numpy as np
+
+from baselines.expected_view import count_from, new_tally, rays_around
+from baselines.frontier_allotment import Allotter
+from baselines.frontier_candidates import Looking
+from baselines.frontier_map import COVERED, UNEXPLORED, UNMAPPED
+from baselines.mission import scripted
+from baselines.per_time_visibility import Metric
+from benchmarks.rows import Effort, Goal, Row, alone, timed
+from entropy_explore_env.belief.search_space import new_search
+from entropy_explore_env.config import Scenario, with_settings
+from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
+from entropy_explore_env.missions.missions import Missions
+from entropy_explore_env.missions.view import view_of
+from entropy_explore_env.scenarios import find_scenario
+from entropy_explore_env.settings import Grid
+from entropy_explore_env.worlds.world import World
+
+PUBLISHED_STEPS_S = 10.0
+"""Steps a second measured of a published 2-D exploration environment (ARiADNE's sensor)."""
+_STEP_GOAL = 500.0 * PUBLISHED_STEPS_S
+_SIDE = 1000
+_ROOM, _DOOR = 50, 6
+"""Voxels along a room and a door of the large plan."""
+_PLACES = 200
+
+
+def exploring_rows(effort: Effort) -> list[Row]:
+    """A step with 720 rays on 480 × 640, a decision on 1000 × 1000, and expected visibility."""
+    return [step_row(effort), decision_row(effort), visibility_row(effort)]
+
+
+def dense_plan() -> Scenario:
+    """480 × 640 cells of clutter, a scanner of 720 rays all around."""
+    sensor = {"field_of_view_rad": (2 * math.pi, 0.0), "angular_step_rad": math.pi / 360, "max_range_m": 8.0}
+    settings = {"grid": Grid((480, 640, 1), 0.1), "robots": 1, "sensor": sensor, "robot": {"reach_m": 0.5}}
+    return with_settings(scripted(find_scenario("cluttered")), settings)
+
+
+def step_row(effort: Effort) -> Row:
+    """Steps a second of an environment whose robot scans 720 rays in each."""
+    env = EntropyExploreEnv(with_settings(dense_plan(), {"robot": {"navigator": "straight"}}))
+    rng = np.random.default_rng(0)
+
+    def work() -> None:
+        env.reset(seed=0)
+        for _ in range(effort.steps):
+            if not env.agents:
+                env.reset(seed=0)
+            env.step({agent: rng.uniform(-1, 1, 3).astype(np.float32) for agent in env.agents})
+
+    work()
+    rates = [effort.steps / timed(work).cpu_s for _ in range(effort.long_rounds)]
+    job = f"ParallelEnv.step, 720 rays all around up to 8 m, 480 × 640 (published: {PUBLISHED_STEPS_S:g}/s)"
+    return alone(job, rates, "steps/s", Goal("≥", _STEP_GOAL, "steps/s"))
+
+
+def rooms_plan() -> tuple[Scenario, np.ndarray]:
+    """1000 × 1000 cells in rooms with doors, and (X, Y, Z) bool what is solid."""
+    solid = np.zeros((_SIDE, _SIDE, 1), bool)
+    solid[::_ROOM] = solid[:, ::_ROOM] = solid[-1] = solid[:, -1] = True
+    for wall in range(_ROOM, _SIDE, _ROOM):
+        for room in range(0, _SIDE, _ROOM):
+            door = slice(room + _ROOM // 2, room + _ROOM // 2 + _DOOR)
+            solid[wall, door] = solid[door, wall] = False
+    settings = {
+        "grid": Grid((_SIDE, _SIDE, 1), 0.1),
+        "robots": 1,
+        "robot": {"reach_m": math.inf, "body_radius_m": 0.0},
+        "sensor": {"max_range_m": 3.0},
+    }
+    return with_settings(scripted(find_scenario("cluttered")), settings), solid
+
+
+def decision_row(effort: Effort) -> Row:
+    """Milliseconds a decision among some 200 candidates, half of the plan known, the other half not.
+
+    Between decisions the robot scans: a decision takes the new belief in, seeks ways, and counts.
+    """
+    scenario, solid = rooms_plan()
+    missions = Missions(scenario, given=[World(scenario.grid, solid, "rooms")])
+    missions.reset(0, 0)
+    known = np.zeros(solid.shape, bool)
+    known[: _SIDE // 2] = True
+    rng = np.random.default_rng(0)
+    for x, y in rng.integers(0, _SIDE // 2, (110, 2)):  # and patches of it unknown
+        known[x : x + 8, y : y + 8] = False
+    missions.mean[0, 0] = np.where(known, solid, 0.5)
+    missions.precision[0, 0] = np.where(known, 100.0, scenario.sigma_prior**-2)
+    missions.state.robots[0, 0]["goal"][:2] = missions.state.robots[0, 0]["origin"][:2] = 46.0
+    view, kind = view_of(missions, 0, 0), scenario.kind_of(0)
+    search = new_search(scenario.grid.voxels)
+    allotter = Allotter(scenario, kind, Looking(spacing_m=3.0), Metric(), search, None, lazy=True)
+    taken = []
+    for scan in range(effort.rounds + 2):
+        near = slice(455 + scan % 20, 475 + scan % 20)
+        missions.precision[0, 0, near, 455:475] += 1.0
+        missions.mean[0, 0, 500 + scan % 20, 400:420] = 0.1
+        missions.precision[0, 0, 500 + scan % 20, 400:420] = 100.0
+        started = time.thread_time()
+        allotter.candidates.update(view, 0.5)
+        allotter.allot(view, [], [])
+        taken.append(1e3 * (time.thread_time() - started))
+    count = len(allotter.candidates.found()[0])
+    job = f"a decision of per-time-visibility, 1000 × 1000, {count} candidates, ways and counts"
+    return alone(job, taken[2:], "ms", Goal("<", 50.0, "ms"))
+
+
+def visibility_row(effort: Effort) -> Row:
+    """Million rays a second of expected visibility on the same plan, 3 m far."""
+    _, solid = rooms_plan()
+    shape, rng = solid.shape, np.random.default_rng(0)
+    state = np.where(solid, COVERED, 0).astype(np.uint8)
+    state[rng.random(shape) < 0.5] |= UNEXPLORED | UNMAPPED
+    state[solid] = COVERED
+    free = np.flatnonzero(~solid)
+    voxels = rng.choice(free, _PLACES).astype(np.int32)
+    directions, tally = rays_around(30.0, np.zeros(1)), new_tally(state.size, shape)
+    seen, weighed = np.empty(_PLACES), np.empty(_PLACES)
+
+    def work() -> None:
+        count_from(tally, state.reshape(-1), shape, voxels, directions, 30.0, False, seen, weighed)
+
+    work()
+    rays = 1e-6 * _PLACES * len(directions)
+    rates = [rays / timed(work).cpu_s for _ in range(effort.rounds)]
+    job = "expected visibility, rays up to 30 voxels, 1000 × 1000"
+    return alone(job, rates, "Mray/s", Goal("≥", 5.0, "Mray/s"))

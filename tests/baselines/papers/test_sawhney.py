@@ -1,0 +1,173 @@
+"""`python -m baselines.papers.sawhney`: cells, claims, clocks, report and command."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import json
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from baselines import experiment
+from baselines.command import run_command
+from baselines.frontier_rivals import Nearest
+from baselines.papers import sawhney, sawhney_cells
+from baselines.papers.sawhney_cells import (
+    BETAS,
+    CHANGED_METHODS,
+    CHANGES,
+    PLANS,
+    POINT,
+    TEAMS,
+    TERRAINS,
+    cell_id,
+    methods,
+    part_of,
+)
+from baselines.papers.sawhney_cells import experiment as cells_of
+from baselines.papers.sawhney_claims import all_claims, best_beta, compared, relative
+from baselines.papers.sawhney_missions import Run
+from baselines.per_time_visibility import Exploring, Metric
+from entropy_explore_env.config import with_settings
+from entropy_explore_env.settings import Grid
+
+
+def test_the_cells_are_the_experiment_s():
+    cells = {cell.id: cell for cell in cells_of(40, 30, quick=False, dem=None)}
+    assert len({cell.digest for cell in cells.values()}) == len(cells)
+    for world in (*PLANS, *TERRAINS):
+        for n in TEAMS:
+            for beta in BETAS:
+                cell = cells[cell_id(world, n, f"beta-{beta}")]
+                assert cell.record.exploring.metric == Metric(beta * POINT[part_of(world)])
+                assert (cell.scenario.robots, cell.scenario.world) == (n, world)
+                assert cell.seeds == (40 if world in PLANS else 30)
+            assert cells[cell_id(world, n, "ptv")].record.exploring.metric == Metric()
+            assert cells[cell_id(world, n, "sync")].record.exploring.allotment == "synchronous"
+            assert cells[cell_id(world, n, "naive")].record.exploring.looking.visibility == "naive"
+            assert cells[cell_id(world, n, "nearest")].record.exploring.metric == Nearest()
+    assert cells[cell_id("terrain", 2, "no-height")].record.exploring.looking.gamma is None
+    for change in CHANGES:
+        for method in CHANGED_METHODS:
+            changed, base = (cells[cell_id("office", 3, method, c)] for c in (change, None))
+            assert (changed.scenario, changed.record) != (base.scenario, base.record)
+    quick = {cell.id for cell in cells_of(4, 4, quick=True, dem=None)}
+    assert quick < set(cells) and len(quick) < 200
+
+
+def synthetic(values, seeds=6):
+    """Records of the quick experiment with times that a function of world, team and method gives."""
+    rng, records = np.random.default_rng(0), {}
+    for cell in cells_of(seeds, seeds, quick=True, dem=None):
+        world, team, method = cell.id.split("/")
+        for _ in range(cell.seeds):
+            time_s = 100.0 * values(world, int(team[1:]), method) * (1.0 + 0.01 * rng.standard_normal())
+            records.setdefault(cell.id, []).append(
+                {
+                    **dict.fromkeys(("t95_s", "t99_s", "t_none_s"), time_s),
+                    "finished": True,
+                    "scans": 10,
+                    "robots": 1,
+                    "series": {"time_s": [0.0, 50.0, time_s], "explored": [0.0, 0.5, 1.0]},
+                }
+            )
+    return records
+
+
+def as_claimed(world, team, method):
+    """Times as the paper has them: the best β is 10 in two worlds and 20 elsewhere."""
+    unit = 1.0 + 0.3 * PLANS.index(world) if world in PLANS else 2.0
+    slower = {"ptv": 1.0, "finish": 0.9, "sync": 1.0 if team == 1 else 1.1}
+    if method.startswith("beta"):
+        best, beta = (10 if world in ("office", "terrain-rough") else 20), int(method.split("-")[1])
+        slower[method] = 1.1 + 0.2 * abs(np.log(beta / best))
+    return unit * slower.get(method, 1.2)
+
+
+def test_claims_hold_where_times_are_as_the_paper_says():
+    records = synthetic(as_claimed)
+    claims = {claim.id: claim for claim in all_claims(records)}
+    assert all(claim.holds for claim in claims.values()), [c for c in claims.values() if not c.holds]
+    assert claims["plans-async-t95_s"].ours == pytest.approx(1 / 1.1, abs=0.01)
+    assert best_beta(records, "plans", "t95_s") == 20
+    assert best_beta(records, "plans", "t95_s", ("office",)) == 10
+    for part in ("plans", "terrains"):
+        assert relative(records, part, "ptv", "t95_s").mean() == pytest.approx(1.0)
+    ratio, low, high = compared(records, "terrains", "naive", "ptv", "t99_s")
+    assert low < ratio < high and ratio == pytest.approx(1.2, abs=0.02)
+
+
+def test_claims_do_not_hold_where_all_are_alike():
+    claims = all_claims(synthetic(lambda world, team, method: 1.0))
+    assert sum(claim.holds for claim in claims) < 0.2 * len(claims)
+
+
+def tiny_cells(starts, flights, quick, dem):
+    """The quick experiment's cells in plans of 5 × 4 m and over terrains of 18 × 15 m, with few cells."""
+    del flights
+    found = []
+    for cell in cells_of(starts, starts, quick, dem):
+        world, _, method = cell.id.split("/")
+        grid = Grid((50, 60, 1), 0.1) if world in PLANS else Grid((18, 15, 13), 1.0)
+        scenario = with_settings(
+            cell.scenario,
+            {
+                "grid": grid,
+                "world": "cluttered" if world in PLANS else world,
+                "sensor": {"angular_step_rad": np.pi / 20},
+                "ending": {"time_limit_s": 60.0},
+            },
+        )
+        if world in ("office", "terrain") and "-" not in method.replace("beta-", "").replace("no-", ""):
+            found.append(experiment.Cell(cell.id, scenario, cell.strategy, starts, cell.record))
+    return found
+
+
+def test_the_command_writes_a_report_and_goes_on_where_it_was(tmp_path, monkeypatch):
+    monkeypatch.setattr(sawhney, "experiment", tiny_cells)
+    out, runs = tmp_path / "out", tmp_path / "runs"
+    words = ["--quick", "--starts", "2", "--jobs", "1", "--json", "--out", str(out), "--runs", str(runs)]
+    text = io.StringIO()
+    with contextlib.redirect_stdout(text):
+        assert run_command(sawhney.main, words) == 0
+    claims = json.loads(text.getvalue())["claims"]
+    assert len(claims) > 20
+    page = (out / "sawhney.md").read_text()
+    for name in (
+        "plans-beta",
+        "plans-teams",
+        "plans-curves",
+        "terrains-beta",
+        "terrains-teams",
+        "terrains-curves",
+    ):
+        assert f"sawhney/{name}.png" in page and (out / "sawhney" / f"{name}.csv").exists()
+        with Image.open(out / "sawhney" / f"{name}.png") as picture:
+            assert picture.size[0] > 200
+    assert "fewer than the paper's 160" in page
+    files = sorted(runs.rglob("*.json"))
+    before = [file.stat().st_mtime_ns for file in files]
+    with contextlib.redirect_stdout(io.StringIO()):
+        assert run_command(sawhney.main, words) == 0
+    assert [file.stat().st_mtime_ns for file in files] == before and (out / "sawhney.md").read_text() == page
+
+
+@pytest.mark.parametrize(
+    ("words", "complaint"),
+    [
+        (["--starts", "1"], "starts"),
+        (["--flights", "1"], "flights"),
+        (["--jobs", "0"], "jobs"),
+        (["--dem", "no"], "dem"),
+    ],
+)
+def test_what_is_refused(words, complaint, capsys):
+    assert run_command(sawhney.main, words) == 2
+    assert complaint in capsys.readouterr().err
+
+
+def test_methods_differ_in_plans_and_over_terrain():
+    assert set(methods("terrains", True)) - set(methods("plans", True)) == {"no-height"}
+    assert Run(Exploring()) == Run(Exploring()) and sawhney_cells.TIME_LIMIT_S == 3600.0

@@ -1,0 +1,276 @@
+"""The strategies of frontiers: how they allot, that lazily is as eagerly, and how missions end."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from baselines.frontier_allotment import under_way
+from baselines.frontier_candidates import Looking
+from baselines.frontier_rivals import Coordinated, Nearest
+from baselines.mission import run_mission, scripted
+from baselines.papers.sawhney_missions import followed
+from baselines.per_time_visibility import Exploring, FrontierStrategy, Metric
+from baselines.strategies import make_strategy
+from entropy_explore_env.config import with_settings
+from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
+from entropy_explore_env.errors import SettingError
+from entropy_explore_env.missions.state import MissionEnd
+from entropy_explore_env.missions.view import view_of
+from entropy_explore_env.reports.metrics import joint_figures, mission_figures
+from entropy_explore_env.scenarios import BOX, find_scenario
+from entropy_explore_env.settings import Grid
+from tests.reference import sawhney as reference
+from tests.reference.scenes import build, free_box, put, started
+
+NAMES = ("per-time-visibility", "nearest-frontier", "coordinated-frontier")
+PERFECT = {"burst": 10_000, "i_min_bits": 0.0}
+ONCE = 0.5
+
+
+def small_plan(**settings):
+    """A quarter of an office, for robots without bodies that go anywhere."""
+    base = with_settings(scripted(find_scenario("cluttered")), {"grid": Grid((70, 60, 1), 0.1)})
+    changes = {
+        "robots": 3,
+        "robot": {"reach_m": math.inf, "body_radius_m": 0.0, "unknown_cost": 1e4},
+        "sensor": {"max_range_m": 1.5, "angular_step_rad": math.pi / 90, "scan_time_s": 2.0},
+        "channel": PERFECT,
+        "ending": {"sigma_end": 1e-3, "time_limit_s": 900.0},
+        "scored": True,
+    }
+    return with_settings(base, {**changes, **settings})
+
+
+def small_terrain(**settings):
+    base = with_settings(scripted(find_scenario("terrain")), {"grid": Grid((31, 25, 16), 1.0)})
+    changes = {
+        "robots": 2,
+        "robot": {"reach_m": math.inf, "body_radius_m": 0.0},
+        "sensor": {
+            "field_of_view_rad": (2 * math.pi, math.pi / 2),
+            "angular_step_rad": math.pi / 30,
+            "max_range_m": 12.0,
+        },
+        "channel": PERFECT,
+        "ending": {"sigma_end": 1e-3, "time_limit_s": 600.0},
+    }
+    return with_settings(base, {**changes, **settings})
+
+
+def explored(scenario, seed=0, **exploring):
+    """A mission up to no frontier: environment, strategy, and what was done."""
+    explorer = FrontierStrategy(Exploring(**{"finest_sigma": ONCE, **exploring}))
+    env = EntropyExploreEnv(scenario)
+    times_s, shares = followed(env, explorer, seed)
+    return env, explorer, (list(times_s), list(shares), mission_figures(env.missions, 0)["distance_m"])
+
+
+@pytest.mark.parametrize("metric", [Metric(), Metric(0.5), Metric(bonus=0.5), Nearest(), Coordinated()])
+@pytest.mark.parametrize("allotment", ["asynchronous", "synchronous"])
+def test_lazily_is_as_eagerly_in_plans(metric, allotment):
+    settings = {"metric": metric, "allotment": allotment}
+    _, lazy, done = explored(small_plan(), 1, **settings)
+    _, eager, same = explored(small_plan(), 1, lazy=False, **settings)
+    assert done == same and lazy.counted() < eager.counted()
+    assert all(lazy.idle) and done[1][-1] > 0.99
+
+
+@pytest.mark.parametrize("settings", [{}, {"looking": Looking(gamma=None)}, {"metric": Metric(60.0)}])
+def test_lazily_is_as_eagerly_over_terrain(settings):
+    _, _, done = explored(small_terrain(), 2, **settings)
+    _, _, same = explored(small_terrain(), 2, lazy=False, **settings)
+    assert done == same  # so small, all is within range of what changes: nothing is saved
+
+
+@pytest.mark.parametrize("allotment", ["asynchronous", "synchronous"])
+def test_terrain_is_mapped_below_the_exposure_surface(allotment):
+    env, explorer, done = explored(small_terrain(), 3, allotment=allotment)
+    assert all(explorer.idle) and done[1][-1] > 0.97
+    truth = env.missions.state.truth[0].reshape(env.missions.grid.shape)
+    view = view_of(env.missions, 0, 0)
+    assert view.ceiling is not None and not view.ceiling.flags.writeable
+    layer = env.missions.grid.voxel_of(view.pose[:3])
+    assert truth.sum(axis=2)[layer[0], layer[1]] <= layer[2] < view.ceiling[layer[0], layer[1]]
+    assert env.missions.state.robots["blocked_moves"].sum() == 0
+
+
+def test_synchronous_robots_leave_together():
+    """Nobody sets out on its next journey before all have ended their latest one."""
+    _, explorer, _ = explored(small_plan(), 4, allotment="synchronous")
+    by_round: dict[int, list[tuple[float, float]]] = {}
+    for journey in explorer.journeys:
+        left_s = journey.ended_s - journey.seconds
+        by_round.setdefault(journey.number, []).append((left_s, journey.ended_s))
+    assert len(by_round) > 5
+    for number in range(2, len(by_round) + 1):
+        if len(by_round[number - 1]) == 3:
+            ended_s = max(end for _, end in by_round[number - 1])
+            assert all(left_s >= ended_s - 1e-6 for left_s, _ in by_round[number])
+
+
+def corridor(places, heard=True):
+    """Robots in a corridor along y of which the middle is known: unexplored at both ends."""
+    missions = started(
+        free_box(robots=len(places), robot={"reach_m": 50.0, "body_radius_m": 0.0}, sigma_prior=30.0)
+    )
+    solid = np.ones(missions.grid.shape, bool)
+    solid[3, :, 2] = False
+    build(missions, solid)
+    for robot, y in enumerate(places):
+        pose = np.zeros(5)
+        pose[:3] = missions.grid.centre_of(np.array([3, y, 2]))
+        put(missions, robot, pose)
+        missions.mean[0, robot][solid], missions.mean[0, robot][~solid] = 1.0, 0.0
+        missions.precision[0, robot] = 1e4
+        for y_unknown in (0, 1, 9, 10):
+            missions.mean[0, robot][3, y_unknown, 2] = 0.5
+            missions.precision[0, robot][3, y_unknown, 2] = 1e-3
+    for robot in range(len(places)) if heard else ():
+        for mate in range(len(places)):
+            seen = missions.state.heard[0, robot, mate]
+            seen["heard_s"], seen["announced_s"] = 0.0, -1.0
+            seen["pose"][:] = missions.state.robots[0, mate]["origin"]
+    return missions
+
+
+def sent(missions, **exploring):
+    """Layers along y to which robots go that have scanned once."""
+    strategy = FrontierStrategy(
+        Exploring(**{"finest_sigma": ONCE, "looking": Looking(spacing_m=0.5), **exploring})
+    )
+    strategy.reset(missions.scenario, np.random.default_rng(0))
+    for errand in strategy._errands:
+        errand.scanned = True
+    views = [view_of(missions, 0, robot) for robot in range(missions.scenario.robots)]
+    return [int(missions.grid.voxel_of(v[:3])[1]) for v in strategy.choose(views)]
+
+
+def test_who_stops_at_the_same_time_shares_the_frontiers():
+    assert sent(corridor((4, 6))) == [2, 8]
+    assert sent(corridor((3, 4))) == [2, 8]  # the second would be nearer to the first one's, too
+    assert sent(corridor((4, 3))) == [8, 2]
+    assert sent(corridor((3, 4)), promises=False) == [2, 2]
+    assert sent(corridor((3, 4)), metric=Nearest(), promises=False) == [2, 2]
+    assert sent(corridor((3, 4), heard=False)) == [2, 2]  # nothing was heard: each for itself
+
+
+def test_promises_stand_until_the_scan_is_heard():
+    missions = corridor((3, 4))  # V/t: 2/3.5 s at the near end, halved once promised; 2/5.5 s
+    seen = missions.state.heard[0, 1, 0]
+    seen["announced_s"] = 5.0
+    seen["announced"][:3] = missions.grid.centre_of(np.array([3, 2, 2]))
+    seen["heard_s"] = 5.0
+    assert sent(missions)[1] == 8
+    view = view_of(missions, 0, 1)
+    assert under_way(view, view.teammates[0], 0)
+    seen["heard_s"] = 6.0
+    view = view_of(missions, 0, 1)
+    assert not under_way(view, view.teammates[0], 0)
+    seen["announced_s"] = seen["heard_s"] = -1.0
+    assert sent(missions)[1] == 2
+
+
+def test_allotment_is_the_paper_s_loop():
+    """Beside the slow reference, in a plan of which little is known: three robots that have all stopped."""
+    shape = (14, 12, 1)
+    rng = np.random.default_rng(3)
+    scenario = small_plan(grid=Grid(shape, 0.5), sensor={"max_range_m": 2.6})
+    for _ in range(6):
+        missions = started(scenario)
+        solid = np.zeros(shape, bool)
+        build(missions, solid)
+        known = np.zeros(shape, bool)
+        known[2 : int(rng.integers(6, 11)), 1 : int(rng.integers(5, 10))] = True
+        for robot in range(3):
+            pose = np.zeros(5)
+            pose[:3] = missions.grid.centre_of(np.array([3 + robot, 2 + int(rng.integers(0, 2)), 0]))
+            put(missions, robot, pose)
+            missions.mean[0, robot] = np.where(known, 0.0, 0.5)
+            missions.precision[0, robot] = np.where(known, 1e4, 1e-3)
+        for robot in range(3):
+            for mate in range(3):
+                seen = missions.state.heard[0, robot, mate]
+                seen["heard_s"], seen["announced_s"] = 0.0, -1.0
+                seen["pose"][:] = missions.state.robots[0, mate]["origin"]
+        check_against_reference(missions, known)
+
+
+def check_against_reference(missions, known):
+    strategy = FrontierStrategy(Exploring(finest_sigma=ONCE, looking=Looking(spacing_m=1.0)))
+    strategy.reset(missions.scenario, np.random.default_rng(0))
+    views = [view_of(missions, 0, robot) for robot in range(3)]
+    for errand in strategy._errands:
+        errand.scanned = True
+    places = [tuple(missions.grid.voxel_of(v[:3]).tolist()) for v in strategy.choose(views)]
+    allotter = strategy._allotters[0]
+    _, voxels = allotter.candidates.found()
+    state = np.where(known, 0, 3)
+    directions, reach = allotter.candidates._directions, allotter.candidates.reach
+    shape, edge = known.shape, missions.grid.voxel_size_m
+    where = {int(v): np.stack(np.unravel_index(int(v), shape)) for v in voxels}
+    sees = {v: reference.seen_voxels(state, place + 0.5, directions, reach) for v, place in where.items()}
+    kind = missions.scenario.kind_of(0)
+
+    def value(robot, place, promised):
+        here = missions.grid.voxel_of(views[robot].pose[:3])
+        dx, dy = sorted(np.abs(where[place] - here)[:2])
+        length_m = (dy - dx + math.sqrt(2) * dx) * edge  # nothing is in the way in a known rectangle
+        v, a = kind.robot.max_speed_m_s, kind.robot.acceleration_m_s2
+        drive_s = 2 * math.sqrt(length_m / a) if length_m < v * v / a else length_m / v + v / a
+        seen = reference.weighed(sees[place], promised)
+        return seen / (drive_s + kind.sensor.scan_time_s) if seen else -math.inf
+
+    wanted = reference.allotted(range(3), list(where), value, sees.__getitem__, {})
+    assert places == [tuple(where[wanted[robot]].tolist()) for robot in range(3)]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_missions_in_a_box_end(name):
+    env = EntropyExploreEnv(with_settings(scripted(BOX), {"time_limit_s": 2000.0}))
+    run_mission(env, make_strategy(name), 0)
+    figures = mission_figures(env.missions, 0)
+    assert figures["finished"], figures["end_reason"]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_same_seed_gives_the_same_mission(name):
+    def figures():
+        env = EntropyExploreEnv(with_settings(scripted(BOX), {"robots": 3, "time_limit_s": 60.0}))
+        run_mission(env, make_strategy(name), 4)
+        return mission_figures(env.missions, 0)
+
+    assert figures() == figures()
+
+
+def test_bodies_and_a_short_reach_explore_an_office():
+    """The named scenario as it is: bodies of 0.3 m, 5 m of reach, a narrow channel."""
+    env = EntropyExploreEnv(with_settings(scripted(find_scenario("office")), {"robots": 2, "scored": True}))
+    explorer = FrontierStrategy(Exploring(finest_sigma=ONCE))
+    followed(env, explorer, 1)
+    assert all(explorer.idle) or env.missions.over(0) is MissionEnd.MAPPED
+    assert joint_figures(env.missions, 0)["explored"] > 0.97
+
+
+@pytest.mark.parametrize(
+    ("kind", "settings", "field"),
+    [
+        (Metric, {"beta": -1.0}, "Metric.beta"),
+        (Metric, {"bonus": -0.1}, "Metric.bonus"),
+        (Coordinated, {"beta": math.nan}, "Coordinated.beta"),
+        (Exploring, {"allotment": "central"}, "Exploring.allotment"),
+        (Exploring, {"finest_sigma": 0.6}, "Exploring.finest_sigma"),
+        (Exploring, {"promises": 1}, "Exploring.promises"),
+        (Looking, {"sigma": 0.0}, "Looking.sigma"),
+        (Looking, {"spacing_m": 0.0}, "Looking.spacing_m"),
+        (Looking, {"visibility": "all"}, "Looking.visibility"),
+        (Looking, {"gamma": 1.5}, "Looking.gamma"),
+        (Looking, {"too_high": 0.0}, "Looking.too_high"),
+    ],
+)
+def test_what_is_refused(kind, settings, field):
+    with pytest.raises(SettingError) as raised:
+        kind(**settings)
+    assert raised.value.field == field

@@ -1,0 +1,142 @@
+"""Frontiers and visibility over a height field: beside a slow reference, and by hand."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from baselines.expected_view import new_tally
+from baselines.frontier_map import NONE
+from baselines.terrain_map import (
+    count_below,
+    count_columns_from,
+    count_columns_in_ball,
+    mean_ground,
+    new_terrain_map,
+    survey,
+)
+from tests.reference import sawhney as reference
+from tests.reference.scenes import drawn, seeds
+
+LEVELS = (4.0, 4.0)
+SHAPE = (9, 13, 8)
+CEILING = 7
+
+
+def known_ground(ground, shape=SHAPE, ceiling=CEILING, radius=0.0, spacing=2, rise=2):
+    """A map in which the columns with ground ≥ 0 are known."""
+    terrain = new_terrain_map(shape, radius, spacing, rise, np.full(shape[:2], ceiling, np.int32))
+    survey_ground(terrain, ground, shape)
+    return terrain
+
+
+def survey_ground(terrain, ground, shape=SHAPE):
+    mean = np.where(np.arange(shape[2]) < ground[:, :, None], 0.9, 0.1).astype(np.float32)
+    precision = np.where(ground[:, :, None] < 0, 0.1, 9.0) * np.ones(shape)
+    survey(terrain, mean.reshape(-1), precision.astype(np.float32).reshape(-1), LEVELS)
+
+
+def hills(seed, known=0.7, shape=SHAPE):
+    rng = np.random.default_rng(seed)
+    ground = rng.integers(1, 5, shape[:2]).astype(np.int32)
+    ground[rng.random(shape[:2]) > known] = NONE
+    return ground, rng
+
+
+@given(seeds)
+@drawn(30)
+def test_ground_is_the_known_covered_voxel_below_a_known_free_one(seed):
+    rng = np.random.default_rng(seed)
+    mean = np.where(rng.random(SHAPE) < 0.5, 0.9, 0.1).astype(np.float32)
+    precision = np.where(rng.random(SHAPE) < 0.3, 0.1, 9.0).astype(np.float32)
+    terrain = new_terrain_map(SHAPE, 0.0, 3, 2, np.full(SHAPE[:2], CEILING, np.int32))
+    survey(terrain, mean.reshape(-1), precision.reshape(-1), LEVELS)
+    state = np.where(precision < 4.0, 3, 0) | np.where((mean > 0.5) & (precision >= 4.0), 4, 0)
+    np.testing.assert_array_equal(terrain.ground, reference.ground_of(state))
+
+
+@given(seeds, st.floats(0.5, 7.5), st.floats(3.0, 12.0), st.sampled_from([0.0, 0.3]))
+@drawn(60)
+def test_columns_are_those_whose_tops_rays_meet(seed, height, reach, flattest):
+    ground, rng = hills(seed)
+    x, y = int(rng.integers(0, 9)), int(rng.integers(0, 13))
+    ground[x, y] = 0 if ground[x, y] == NONE else min(ground[x, y], int(height))
+    terrain, eye = known_ground(ground), (x + 0.5, y + 0.5, height)
+    angles = 0.05 + np.arange(24) * (2 * math.pi / 24)
+    azimuths = np.stack([np.cos(angles), np.sin(angles)], axis=-1)
+    average = mean_ground(terrain, x, y, 2)
+    assert average == pytest.approx(reference.mean_height(terrain.ground, x, y, 2))
+    heights = reference.surface(terrain.ground, eye, average, reach)
+    unexplored = terrain.ground == NONE
+    wanted = reference.seen_columns(heights, unexplored, eye, azimuths, reach, flattest)
+    tally = new_tally(9 * 13, SHAPE)
+    points, value = count_below(tally, terrain, eye, average, azimuths, reach, flattest, True)
+    marked = {tuple(map(int, np.unravel_index(c, (9, 13)))) for c in tally.marked[: tally.numbers[1]]}
+    assert (points, value, marked) == (len(wanted), len(wanted), wanted)
+    assert count_below(tally, terrain, eye, average, azimuths, reach, flattest, False)[1] == len(wanted) / 2
+    ball = {
+        (i, j)
+        for i, j in np.argwhere(unexplored).tolist()
+        if math.dist((i + 0.5, j + 0.5, heights[i, j]), eye) <= reach
+    }
+    assert count_columns_in_ball(tally, terrain, eye, average, reach, False)[0] == len(ball)
+
+
+def test_a_ridge_hides_the_valley_behind_it_by_hand():
+    """Ground 1, a ridge of 4 at x = 4, unknown beyond: from 3 above the floor nothing is seen past it."""
+    ground = np.ones((9, 3), np.int32)
+    ground[4], ground[6:] = 4, NONE
+    east = np.array([[1.0, 0.0]])
+    tally = new_tally(27, (9, 3, 8))
+    terrain = known_ground(ground, (9, 3, 8))
+    for height, wanted in ((3.5, 0), (5.5, 1), (7.5, 2)):
+        # z_av = 1: extrapolated 1 - d/10. From 5.5 over the ridge's far edge at d = 4.5: slope -1/3, which
+        # meets height 0.4 … at d ≈ 15; from 7.5 slope -7/9: 0.2 … 0.4 at d ≈ 9; the last tops end at d = 8.5
+        eye = (0.5, 1.5, height)
+        found = count_below(tally, terrain, eye, 1.0, east, 10.0, 0.0, False)[0]
+        heights = reference.surface(ground, eye, 1.0, 10.0)
+        assert found == len(reference.seen_columns(heights, ground < 0, eye, east, 10.0, 0.0))
+        assert found <= wanted
+    ground[4] = 1
+    flat = known_ground(ground, (9, 3, 8))
+    assert count_below(tally, flat, (0.5, 1.5, 5.5), 1.0, east, 10.0, 0.0, False)[0] == 3
+
+
+def test_candidates_hang_above_the_edge_between_ground_and_ceiling():
+    ground = np.ones((9, 13), np.int32)
+    ground[5:] = NONE
+    terrain = known_ground(ground, spacing=1)
+    found = np.stack(np.unravel_index(terrain.voxel[terrain.voxel != NONE], SHAPE), axis=-1)
+    assert set(found[:, 0]) == {4} and set(found[:, 1]) == set(range(13))
+    assert set(found[:, 2]) == {2, 4, 6}  # a layer of air below, two apart, and below layer 7
+    rates = terrain.rates.reshape(SHAPE)
+    assert np.isfinite(rates[:5, :, 1:7]).all() and np.isinf(rates[5:]).all()
+    assert np.isinf(rates[:, :, 0]).all() and np.isinf(rates[:, :, 7]).all()
+    ground[5:7] = 2
+    survey_ground(terrain, ground)
+    found = np.stack(np.unravel_index(terrain.voxel[terrain.voxel != NONE], SHAPE), axis=-1)
+    assert set(found[:, 0]) == {6} and set(found[:, 2]) == {3, 5}
+
+
+def test_the_height_factor_by_hand():
+    """(z_f - z_av)^γ z_f^(1 - γ), and nothing for who is too high."""
+    ground = np.full((9, 13), 2, np.int32)
+    ground[7:] = NONE
+    terrain = known_ground(ground)
+    voxels = np.array([(4 * 13 + 5) * 8 + z for z in (3, 6)], np.int32)  # z_f = 3.5 and 6.5, z_av = 2
+    seen, value, factor = np.empty(2), np.empty(2), np.empty(2)
+    azimuths = np.array([[1.0, 0.0]])
+    tally = new_tally(9 * 13, SHAPE)
+    count_columns_from(
+        tally, terrain, voxels, azimuths, (10.0, 0.0, 1.0, 0.5, 9.0), False, seen, value, factor
+    )
+    assert factor.tolist() == pytest.approx([math.sqrt(1.5 * 3.5), math.sqrt(4.5 * 6.5)])
+    assert seen.tolist() == [1.0, 2.0]  # from 3.5 one ends on the line of sight over the edge
+    count_columns_from(
+        tally, terrain, voxels, azimuths, (10.0, 0.0, 1.0, 1.0, 4.0), False, seen, value, factor
+    )
+    assert factor.tolist() == pytest.approx([1.5, 0.0]) and seen[1] == 0.0

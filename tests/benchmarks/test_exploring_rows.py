@@ -1,0 +1,24 @@
+"""Rows of exploring plans: that they measure what they say."""
+
+from __future__ import annotations
+
+from benchmarks.exploring import dense_plan, exploring_rows, rooms_plan
+from benchmarks.rows import Effort
+
+
+def test_a_scan_has_720_rays_on_480_by_640():
+    scenario = dense_plan()
+    assert scenario.sensor.rays == 720 and scenario.grid.shape == (480, 640, 1)
+
+
+def test_rooms_have_doors():
+    scenario, solid = rooms_plan()
+    assert solid.shape == scenario.grid.shape == (1000, 1000, 1)
+    assert not solid[50, 25:31].any() and solid[50, 1:25].all() and not solid[25:31, 50].any()
+
+
+def test_rows_are_positive_and_have_goals():
+    rows = exploring_rows(Effort(rounds=1, long_rounds=1, steps=3))
+    assert len(rows) == 3 and all(row.ours > 0.0 and row.goal for row in rows)
+    candidates = int(rows[1].job.split(" candidates")[0].split()[-1])
+    assert 150 <= candidates <= 400
