@@ -237,10 +237,10 @@ class TerrainCandidates:
         self._looking, self._size = looking, grid.shape
         self._prior = scenario.sigma_prior**-2
         self.reach = min(sensor.max_range_m / edge, float(sum(grid.shape)))
-        apart = [
+        spacing, rise = (
             max(round((m or self.reach * edge / 6.0) / edge), 1) for m in (looking.spacing_m, looking.rise_m)
-        ]
-        self._map = new_terrain_map(grid.shape, kind.robot.body_radius_m / edge, *apart, ceiling)
+        )
+        self._map = new_terrain_map(grid.shape, kind.robot.body_radius_m / edge, spacing, rise, ceiling)
         self._tally = new_tally(grid.shape[0] * grid.shape[1], grid.shape)
         turns = min(math.ceil(2.0 * math.pi * self.reach), 720)
         angles = (np.arange(turns) + 0.5) * (2.0 * math.pi / turns)

@@ -159,7 +159,7 @@ def test_rows_go_on_bitwise_from_arrays(channel: dict[str, float], world: str) -
     for _ in range(70):
         actions = actions_of(first, rng)
         ours, theirs = first.step(actions), second.step(actions)
-        assert all((a == b).all() for a, b in zip(ours[:3], theirs[:3], strict=True))
+        assert all(np.array_equal(a, b) for a, b in zip(ours[:3], theirs[:3], strict=True))
         for mine, other in zip(ours[3], theirs[3], strict=True):
             last = [info.pop("terminal_observation", np.zeros(0)) for info in (mine, other)]
             assert np.array_equal(*last)
