@@ -66,6 +66,8 @@ class Args:
     """Print one JSON object and nothing else."""
     quick: bool = False
     """Fewer rounds: less than a minute instead of a few."""
+    only: str | None = None
+    """Measure no more than what this word is in the title of, such as learning."""
     strict: bool = False
     """Exit with 1 if a goal does not hold."""
     out: Path | None = None
@@ -77,12 +79,15 @@ def main(words: Sequence[str]) -> int:
     args = parse(Args, words, description=__doc__)
     if args.out is not None and (args.out.is_dir() or not _parent_exists(args.out)):
         raise SettingError("out", str(args.out), "a file in a folder that exists")
+    jobs = [(title, job) for title, job in JOBS if args.only is None or args.only in title]
+    if not jobs:
+        raise SettingError("only", args.only, "a word of one of: " + "; ".join(title for title, _ in JOBS))
     load_octomap()
     load_spread()
     _warn_if_busy()
     rows: list[Row] = []
-    for number, (title, job) in enumerate(JOBS, start=1):
-        print(f"[{number}/{len(JOBS)}] {title} …", file=sys.stderr, flush=True)
+    for number, (title, job) in enumerate(jobs, start=1):
+        print(f"[{number}/{len(jobs)}] {title} …", file=sys.stderr, flush=True)
         rows += job(QUICK if args.quick else FULL)
     about = {**machine(), "command": " ".join(["python -m benchmarks.speed", *words])}
     if args.out is not None:

@@ -92,6 +92,8 @@ class Args:
     """A few thousand steps a run and 3 test starts."""
     only_train: str | None = None
     """Train the runs whose names begin so, and write nothing."""
+    no_training: bool = False
+    """Write the page of what is there; changes that lack runs are left out."""
     json: bool = False
     """Print one JSON object and nothing else."""
 
@@ -105,7 +107,7 @@ class Found:
         compared: Scenario → what `evaluate.compare` found of its first run's policy.
         curves: Run → rows of its curve.
         spent: Run → its progress: steps and seconds.
-        ablations: Name → curves of its runs.
+        ablations: Name → curves of its runs; empty while runs are missing.
         steps: Of an ablation's run.
     """
 
@@ -130,7 +132,8 @@ def main(words: Sequence[str]) -> int:
     wanted = planned_runs(tasks, steps, args.quick)
     if args.only_train is not None:
         wanted = {name: options for name, options in wanted.items() if name.startswith(args.only_train)}
-    train(wanted, args.runs, jobs, args.json)
+    if not args.no_training:
+        train(wanted, args.runs, jobs, args.json)
     if args.only_train is not None:
         return 0
     make_folder("out", args.out)
@@ -221,16 +224,15 @@ def gather(tasks: Sequence[Task], steps: int, folder: Path, starts: int, jobs: i
             str(policy), [*RIVALS, *others], scenario, starts, folder / "missions", jobs, quiet
         )
     names = [task.run(seed) for task in tasks for seed in range(task.seeds)]
+    changed = {name: [folder / f"ablations/{name}-{seed}" for seed in range(SEEDS)] for name in ABLATIONS}
+    unfinished = [run for runs in changed.values() for run in runs if not (run / "curve.csv").is_file()]
     last = {name: load_checkpoint(latest_checkpoint(folder / name, "step")).progress for name in names}
     return Found(
         tasks,
         compared,
         {name: read_curve(folder / name) for name in names},
         last,
-        {
-            name: [read_curve(folder / f"ablations/{name}-{seed}") for seed in range(SEEDS)]
-            for name in ABLATIONS
-        },
+        {} if unfinished else {name: [read_curve(run) for run in runs] for name, runs in changed.items()},
         steps,
     )
 

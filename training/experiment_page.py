@@ -32,7 +32,8 @@ def write_page(out: Path, found: Found, command: str) -> Path:
         name = f"curve-{task.scenario}"
         write_atomically(out / "ppo" / f"{name}.png", png(curve_figure(task, found)))
         write_atomically(out / "ppo" / f"{name}.csv", _curves_csv(task, found))
-    write_atomically(out / "ppo" / "ablations.png", png(ablation_figure(found)))
+    if found.ablations:
+        write_atomically(out / "ppo" / "ablations.png", png(ablation_figure(found)))
     parts = [
         "# Learning with PPO\n",
         f"Made by `{command}`. One network drives every robot; it sees what its robot knows and nothing "
@@ -42,7 +43,8 @@ def write_page(out: Path, found: Found, command: str) -> Path:
     ]
     for task in found.tasks:
         parts += _task_parts(task, found)
-    parts += _ablation_parts(found)
+    if found.ablations:
+        parts += _ablation_parts(found)
     page = out / "ppo.md"
     write_atomically(page, "\n".join(parts))
     return page

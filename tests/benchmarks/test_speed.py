@@ -15,6 +15,7 @@ from baselines.command import run_command
 from benchmarks import speed, startup, stepping
 from benchmarks.fusion import Fusion, Measurements, fuse_floor, grid_rows, measure_room
 from benchmarks.rows import Effort, Goal, Row, Taken, alone, compared, interleave, timed
+from entropy_explore_env.errors import SettingError
 from entropy_explore_env.scenarios import ROOM
 from entropy_explore_env.settings import Grid, RangeSensor
 
@@ -236,3 +237,15 @@ def test_first_step_of_a_fresh_process(monkeypatch):
     monkeypatch.setattr(startup, "_FIRST_STEP", "raise ValueError('no such room')")
     with pytest.raises(RuntimeError, match="no such room"):
         startup.first_step()
+
+
+def test_only_what_is_asked_for_is_measured(monkeypatch, capsys):
+    jobs = (
+        ("sums of many", lambda effort: [HELD]),
+        ("products", lambda effort: pytest.fail("not asked for")),
+    )
+    monkeypatch.setattr(speed, "JOBS", jobs)
+    assert speed.main(["--only", "many", "--json"]) == 0
+    assert [row["job"] for row in json.loads(capsys.readouterr().out)["rows"]] == [HELD.job]
+    with pytest.raises(SettingError, match="sums of many; products"):
+        speed.main(["--only", "quotients"])
