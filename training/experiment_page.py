@@ -45,6 +45,8 @@ def write_page(out: Path, found: Found, command: str) -> Path:
         parts += _task_parts(task, found)
     if found.ablations:
         parts += _ablation_parts(found)
+    else:
+        parts.append("Runs with one thing changed at a time are not complete yet, and left out.\n")
     page = out / "ppo.md"
     write_atomically(page, "\n".join(parts))
     return page
