@@ -165,14 +165,15 @@ def show(compared: dict[str, Any]) -> None:
 
     seeds = compared["seeds"]
     table = Table(title=f"{compared['scenario']}, {compared['robots']} robots, {seeds} test missions each")
-    table.add_column("strategy", overflow="fold")
-    for head in ("mission time", "finished", "scans", "policy's share", "policy faster"):
+    table.add_column("strategy", overflow="fold", min_width=17)
+    for head in ("mission time", "finished", "scans", "share", "faster"):
         table.add_column(head, justify="right")
     for row in compared["rows"]:
         name, median, _, *others = table_cells(row, seeds)
         table.add_row(name, *(cell.replace(" (", "\n(") for cell in (median, *others)))
     Console(highlight=False).print(table)
-    print("mission times are medians, shares the policy's median over theirs; 95 % intervals")
+    print("mission time: median; share: the policy's median over theirs (95 % intervals);")
+    print("faster: on how many starts the policy was")
     if compared["better_rival"] is not None:
         print(
             f"better of {' and '.join(SIMPLE)}: {compared['better_rival']}; "
