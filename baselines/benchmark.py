@@ -21,6 +21,7 @@ from baselines.experiment import run_cells
 from baselines.head_to_head.cells import Entrants, chosen_scenarios, chosen_strategies
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.scenarios import SCENARIOS
+from entropy_explore_env.validation import check_whole
 
 _SCENARIOS = "room,room-furnished,lab,office,cave"
 _MOST_ROBOTS = 1000
@@ -95,8 +96,8 @@ def _entrants(args: Args) -> Entrants:
     """
     seeds = args.seeds if args.seeds is not None else (5 if args.quick else 30)
     for name, value in (("seeds", seeds), ("jobs", args.jobs)):
-        if value is not None and value < 1:
-            raise SettingError(name, value, "a whole number ≥ 1")
+        if value is not None:
+            check_whole(name, value, 1)
     for name, limit_s in (("time_limit_s", args.time_limit_s), ("wall_limit_s", args.wall_limit_s)):
         if limit_s is not None and not 0.0 < limit_s < math.inf:
             raise SettingError(name, limit_s, "a number > 0")

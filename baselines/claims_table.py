@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import sys
+import time
 from collections.abc import Sequence
+from pathlib import Path
 
+from baselines.command import print_json
 from baselines.experiment import Claim, markdown_table
 
 
@@ -30,6 +34,31 @@ def print_claims(claims: Sequence[Claim], paper: str = "Rocha04") -> None:
         holds = "[green]yes[/green]" if claim.holds else "[red]no[/red]"
         table.add_row(claim.claim, _shown(claim.paper), _shown(claim.ours), _interval(claim), holds)
     Console().print(table)
+
+
+def report_claims(
+    paper: str, claims: Sequence[Claim], report: Path, started: float, as_json: bool, strict: bool
+) -> int:
+    """Show what a reproduction came to, the way its command was asked to.
+
+    Args:
+        paper: Short name.
+        claims: Of the paper.
+        report: The page that was written.
+        started: `time.perf_counter()` when the work began.
+        as_json: One JSON object instead of a table.
+        strict: Whether a claim that does not hold is a failure.
+
+    Returns:
+        The command's exit code.
+    """
+    if as_json:
+        wall_s = round(time.perf_counter() - started, 1)
+        print_json({"paper": paper, "claims": [claim.row() for claim in claims], "wall_s": wall_s})
+    else:
+        print_claims(claims, paper)
+        print(f"written: {report}, its figures and tables beside it", file=sys.stderr)
+    return 1 if strict and not all(claim.holds for claim in claims) else 0
 
 
 def _shown(value: float | str | None) -> str:

@@ -20,9 +20,9 @@ from baselines.terminal import progress_bar
 from baselines.world_file import Reading, world_settings
 from entropy_explore_env.config import Scenario
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
-from entropy_explore_env.errors import SettingError
 from entropy_explore_env.scenarios import ROOM, find_scenario
 from entropy_explore_env.settings import Channel, Ending, RangeSensor, Robot
+from entropy_explore_env.validation import check_whole
 
 
 @dataclass
@@ -60,8 +60,7 @@ def main(words: Sequence[str]) -> int:
     named = parse(Args, words, default=_defaults(ROOM), description=__doc__).scenario
     args = parse(Args, words, default=_defaults(find_scenario(named)), description=__doc__)
     strategy = make_strategy(args.strategy)
-    if args.seed < 0:
-        raise SettingError("seed", args.seed, "a whole number ≥ 0")
+    check_whole("seed", args.seed, 0)
     env = _env(args)
     wanted = Wanted(args.output, args.out, args.record)
     wanted.prepare()

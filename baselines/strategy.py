@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Protocol
 
 import numpy as np
@@ -40,6 +40,26 @@ class Strategy(Protocol):
             For each view a viewpoint (5,): x, y, z, yaw, pitch; map frame, metres, radians.
         """
         ...
+
+
+class Stopwatch:
+    """A strategy, and how long its decisions take, in milliseconds a robot."""
+
+    def __init__(self, strategy: Strategy, clock: Callable[[], float]) -> None:
+        """Nothing is measured yet; `clock` tells seconds."""
+        self._strategy, self._clock = strategy, clock
+        self.decisions_ms: list[float] = []
+
+    def reset(self, scenario: Scenario, rng: np.random.Generator) -> None:
+        """A new mission begins."""
+        self._strategy.reset(scenario, rng)
+
+    def choose(self, views: Sequence[RobotView]) -> list[np.ndarray]:
+        """What the strategy chooses; how long a view took it is noted."""
+        started = self._clock()
+        chosen = self._strategy.choose(views)
+        self.decisions_ms.append(1e3 * (self._clock() - started) / max(len(views), 1))
+        return chosen
 
 
 def random_viewpoint(view: RobotView, rng: np.random.Generator) -> np.ndarray:

@@ -4,19 +4,17 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Sequence
 
 import numpy as np
 
 from baselines.mission import run_mission, scripted
 from baselines.strategies import make_strategy
-from baselines.strategy import Strategy
+from baselines.strategy import Stopwatch
 from benchmarks.rows import Effort, Goal, Row, alone, timed
 from entropy_explore_env.belief.visibility import CONE, cone_of, mark_cone, visible_bits
 from entropy_explore_env.compilation import kernel
 from entropy_explore_env.config import Scenario, with_settings
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
-from entropy_explore_env.missions.view import RobotView
 from entropy_explore_env.scenarios import LAB, ROOM
 
 TEAMMATES = 9
@@ -69,31 +67,11 @@ def overlap_bits(
     return visible_bits(cones[len(cones) - 1], size, precision, known_precision, None, marks)[1]
 
 
-class Stopwatch:
-    """A strategy, and the processor time of its decisions."""
-
-    def __init__(self, strategy: Strategy) -> None:
-        """Nothing is measured yet."""
-        self._strategy = strategy
-        self.decisions_ms: list[float] = []
-
-    def reset(self, scenario: Scenario, rng: np.random.Generator) -> None:
-        """A new mission begins."""
-        self._strategy.reset(scenario, rng)
-
-    def choose(self, views: Sequence[RobotView]) -> list[np.ndarray]:
-        """What the strategy chooses; how long a view took it is noted."""
-        started = time.thread_time()
-        chosen = self._strategy.choose(views)
-        self.decisions_ms.append(1e3 * (time.thread_time() - started) / len(views))
-        return chosen
-
-
 def decision_row(scenario: Scenario, robots: int, strategy: str, steps: int) -> Row:
     """Milliseconds a decision of a strategy over a mission, or as many steps of one."""
     env = EntropyExploreEnv(with_settings(scripted(scenario), {"robots": robots, "max_cycles": steps}))
     run_mission(env, make_strategy(strategy), 0)  # compiled now
-    watch = Stopwatch(make_strategy(strategy))
+    watch = Stopwatch(make_strategy(strategy), time.thread_time)
     run_mission(env, watch, 1)
     job = f"a decision of {strategy}, {scenario.name}, {robots} robots"
     return alone(job, watch.decisions_ms, "ms", Goal("<", 5.0, "ms"))

@@ -28,6 +28,12 @@ def is_whole(value: object, least: int, most: int | None = None) -> TypeGuard[in
     return bool(least <= value and (most is None or value <= most))
 
 
+def check_whole(name: str, value: object, least: int) -> None:
+    """Raise a SettingError unless a value that is no field is a whole number ≥ `least`."""
+    if not is_whole(value, least):
+        raise SettingError(name, value, f"a whole number ≥ {least}")
+
+
 def check(settings: object, name: str, allowed: str, accepts: Callable[[Any], bool]) -> None:
     """Raise a SettingError unless the field is a number that `accepts` takes; NaN never is."""
     value = getattr(settings, name)

@@ -23,7 +23,7 @@ from baselines.strategies import make_strategy
 from entropy_explore_env.config import Scenario, with_settings
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.scenarios import find_scenario
-from entropy_explore_env.validation import is_whole
+from entropy_explore_env.validation import check_whole
 from training.checkpoints import PolicySettings, latest_checkpoint, load_checkpoint
 from training.policy import POLICIES, PREFIX, policy_folder
 
@@ -61,8 +61,7 @@ def main(words: Sequence[str]) -> int:
     if (args.pretrained is None) == (args.strategy is None):
         raise SettingError("strategy", args.strategy, "given, or else --pretrained, not both")
     for name, value in (("seeds", args.seeds), ("jobs", 1 if args.jobs is None else args.jobs)):
-        if not is_whole(value, 1):
-            raise SettingError(name, value, "a whole number ≥ 1")
+        check_whole(name, value, 1)
     policy = args.strategy if args.pretrained is None else PREFIX + args.pretrained
     assert policy is not None
     trained = load_checkpoint(latest_checkpoint(policy_folder(policy), *POLICIES)).settings

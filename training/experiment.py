@@ -20,7 +20,7 @@ import numpy as np
 
 from baselines.command import make_folder, parse, print_json, run_command
 from entropy_explore_env.errors import SettingError
-from entropy_explore_env.validation import is_whole
+from entropy_explore_env.validation import check_whole
 from training.checkpoints import latest_checkpoint, load_checkpoint
 from training.errors import CheckpointError
 from training.evaluate import SIMPLE, compare, evaluation_scenario
@@ -123,8 +123,7 @@ def main(words: Sequence[str]) -> int:
     """Run the command."""
     args = parse(Args, words, description=__doc__)
     for name, value in (("seeds", args.seeds), ("jobs", 1 if args.jobs is None else args.jobs)):
-        if not is_whole(value, 1):
-            raise SettingError(name, value, "a whole number ≥ 1")
+        check_whole(name, value, 1)
     make_folder("runs", args.runs)
     jobs = args.jobs or os.cpu_count() or 1
     tasks = [Task(task.scenario, 8_192, task.seeds, task.goal) for task in TASKS] if args.quick else TASKS

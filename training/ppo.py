@@ -35,7 +35,7 @@ from entropy_explore_env.envs.robot_vec_env import RobotVecEnv
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.scenarios import find_scenario
 from entropy_explore_env.settings import Channel
-from entropy_explore_env.validation import is_whole
+from entropy_explore_env.validation import check_whole, is_whole
 from entropy_explore_env.writing import write_atomically
 from training.checkpoints import (
     Checkpoint,
@@ -141,6 +141,8 @@ class Args:
     """Steps between two checkpoints; a run that is resumed loses at most so many."""
 
 
+_COUNTS = ("missions", "total_steps", "threads", "rollout_steps", "epochs", "batch")
+_COUNTS += ("validate_every", "validation_missions", "checkpoint_every")
 _COUNTED = ("best", "curve", "next_validation", "next_checkpoint")
 _PARTS = ("collecting_s", "learning_s", "validating_s", "processor_s")
 _FREE = ("out", "video", "resume", "threads", "json", "total_steps")
@@ -171,14 +173,9 @@ def main(words: Sequence[str]) -> int:
 
 def _check(args: Args) -> None:
     """Raise a SettingError where a number is out of its range."""
-    for name in ("missions", "total_steps", "threads", "rollout_steps", "epochs", "batch"):
-        if not is_whole(getattr(args, name), 1):
-            raise SettingError(name, getattr(args, name), "a whole number ≥ 1")
-    for name in ("validate_every", "validation_missions", "checkpoint_every"):
-        if not is_whole(getattr(args, name), 1):
-            raise SettingError(name, getattr(args, name), "a whole number ≥ 1")
-    if not is_whole(args.seed, 0):
-        raise SettingError("seed", args.seed, "a whole number ≥ 0")
+    for name in _COUNTS:
+        check_whole(name, getattr(args, name), 1)
+    check_whole("seed", args.seed, 0)
     for name in ("gamma", "gae_lambda"):
         if not 0.0 < getattr(args, name) <= 1.0:
             raise SettingError(name, getattr(args, name), "a number above 0, at most 1")

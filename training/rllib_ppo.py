@@ -30,6 +30,7 @@ from entropy_explore_env.config import with_settings
 from entropy_explore_env.errors import EntropyExploreError, MissingExtraError, SettingError
 from entropy_explore_env.scenarios import find_scenario
 from entropy_explore_env.settings_json import settings_of
+from entropy_explore_env.validation import check_whole
 from entropy_explore_env.writing import write_atomically
 from training.errors import NotFiniteError
 
@@ -109,11 +110,9 @@ def check(args: Args) -> dict[str, Any]:
         SettingError: What is asked for is not there or out of its range.
     """
     for name in ("total_steps", "missions", "batch", "minibatch", "epochs", "checkpoint_every"):
-        if getattr(args, name) < 1:
-            raise SettingError(name, getattr(args, name), "a whole number ≥ 1")
+        check_whole(name, getattr(args, name), 1)
     for name in ("seed", "runners"):
-        if getattr(args, name) < 0:
-            raise SettingError(name, getattr(args, name), "a whole number ≥ 0")
+        check_whole(name, getattr(args, name), 0)
     if args.minibatch > args.batch:
         raise SettingError("minibatch", args.minibatch, f"at most the batch, {args.batch}")
     if not args.learning_rate > 0.0:

@@ -3,37 +3,15 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
 
 import numpy as np
 
 from baselines.experiment import Record
 from baselines.mission import run_mission
 from baselines.strategies import make_strategy
-from baselines.strategy import Strategy
-from entropy_explore_env.config import Scenario
+from baselines.strategy import Stopwatch
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
-from entropy_explore_env.missions.view import RobotView
 from entropy_explore_env.reports.metrics import mission_figures
-
-
-class _Timed:
-    """A strategy with a stopwatch."""
-
-    def __init__(self, strategy: Strategy) -> None:
-        self._strategy = strategy
-        self.decisions_ms: list[float] = []
-
-    def reset(self, scenario: Scenario, rng: np.random.Generator) -> None:
-        """A new mission begins."""
-        self._strategy.reset(scenario, rng)
-
-    def choose(self, views: Sequence[RobotView]) -> list[np.ndarray]:
-        """What the strategy chooses, and how long a view took it."""
-        started = time.perf_counter()
-        chosen = self._strategy.choose(views)
-        self.decisions_ms.append(1e3 * (time.perf_counter() - started) / max(len(views), 1))
-        return chosen
 
 
 def timed_record(env: EntropyExploreEnv, strategy: str, seed: int) -> Record:
@@ -43,7 +21,7 @@ def timed_record(env: EntropyExploreEnv, strategy: str, seed: int) -> Record:
         `mission_figures` with `scans_over_floor`, without those of single robots; and `clock`: `decision_ms`,
         the time that the strategy took for one robot (median over decisions), and `mission_s`.
     """
-    timed, started = _Timed(make_strategy(strategy)), time.perf_counter()
+    timed, started = Stopwatch(make_strategy(strategy), time.perf_counter), time.perf_counter()
     run_mission(env, timed, seed)
     mission_s = time.perf_counter() - started
     figures = mission_figures(env.missions, 0, floor=True)

@@ -7,7 +7,6 @@ changed at a time, splits an unknown region, and runs the strategy in this packa
 
 from __future__ import annotations
 
-import sys
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -15,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from baselines.command import make_folder, parse, print_json, run_command
+from baselines.command import make_folder, parse, run_command
 from baselines.experiment import run_cells
 from baselines.papers.bhattacharya_claims import all_claims
 from baselines.papers.bhattacharya_grid import Simulation
@@ -24,6 +23,7 @@ from baselines.papers.bhattacharya_runs import Run, all_runs, run_all, start_cel
 from baselines.papers.bhattacharya_split import ratios
 from baselines.papers.bhattacharya_timing import beside_scipy, changed_share
 from entropy_explore_env.errors import SettingError
+from entropy_explore_env.validation import check_whole
 
 
 @dataclass
@@ -57,7 +57,7 @@ class Args:
 def main(words: Sequence[str]) -> int:
     """Run the command."""
     args = parse(Args, words, description=__doc__)
-    from baselines.claims_table import print_claims
+    from baselines.claims_table import report_claims
     from baselines.papers.bhattacharya_report import Results, write_report  # matplotlib: after the help
 
     chosen, given = _chosen(args)
@@ -79,14 +79,7 @@ def main(words: Sequence[str]) -> int:
     command = f"python -m baselines.papers.bhattacharya{' --quick' * args.quick}{given} --out {args.out}"
     results = Results(runs, records, splits, timing, changed, flown, args.runs)
     report = write_report(args.out, results, claims, command)
-    if args.json:
-        wall_s = round(time.perf_counter() - started, 1)
-        rows = [claim.row() for claim in claims]
-        print_json({"paper": "Bhattacharya", "claims": rows, "wall_s": wall_s})
-    else:
-        print_claims(claims, "Bhattacharya")
-        print(f"written: {report}, its figures beside it", file=sys.stderr)
-    return 1 if args.strict and not all(claim.holds for claim in claims) else 0
+    return report_claims("Bhattacharya", claims, report, started, args.json, args.strict)
 
 
 _DEFAULTS = {
@@ -104,8 +97,8 @@ def _chosen(args: Args) -> tuple[dict[str, int], str]:
     chosen, given = {}, ""
     for name, (full, quick, least) in _DEFAULTS.items():
         value, option = getattr(args, name), name.replace("_", "-")
-        if value is not None and value < least:
-            raise SettingError(option, value, f"a whole number ≥ {least}")
+        if value is not None:
+            check_whole(option, value, least)
         chosen[name] = (quick if args.quick else full) if value is None else value
         given += f" --{option} {value}" if value is not None and name != "jobs" else ""
     return chosen, given

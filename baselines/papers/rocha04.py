@@ -8,17 +8,16 @@ claims. Missions are kept under `--runs`: a stopped experiment goes on where it 
 from __future__ import annotations
 
 import os
-import sys
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from baselines.command import make_folder, parse, print_json, run_command
+from baselines.command import make_folder, parse, run_command
 from baselines.experiment import run_cells
 from baselines.papers.rocha04_cells import experiment
 from baselines.papers.rocha04_claims import all_claims
-from entropy_explore_env.errors import SettingError
+from entropy_explore_env.validation import check_whole
 
 _STARTS = 100
 _QUICK_STARTS, _QUICK_SINGLE_STARTS = 10, 30
@@ -47,12 +46,12 @@ class Args:
 def main(words: Sequence[str]) -> int:
     """Run the command."""
     args = parse(Args, words, description=__doc__)
-    from baselines.claims_table import print_claims
+    from baselines.claims_table import report_claims
     from baselines.papers.rocha04_report import write_report  # matplotlib: after the help
 
     for name, value in (("starts", args.starts), ("jobs", args.jobs)):
-        if value is not None and value < 1:
-            raise SettingError(name, value, "a whole number ≥ 1")
+        if value is not None:
+            check_whole(name, value, 1)
     make_folder("out", args.out)
     make_folder("runs", args.runs)
     started = time.perf_counter()
@@ -65,13 +64,7 @@ def main(words: Sequence[str]) -> int:
     given = " --quick" * args.quick + (f" --starts {args.starts}" if args.starts else "")
     command = f"python -m baselines.papers.rocha04{given} --out {args.out}"
     report = write_report(args.out, records, claims, command)
-    if args.json:
-        wall_s = round(time.perf_counter() - started, 1)
-        print_json({"paper": "Rocha04", "claims": [claim.row() for claim in claims], "wall_s": wall_s})
-    else:
-        print_claims(claims, "Rocha04")
-        print(f"written: {report}, its figures and tables beside it", file=sys.stderr)
-    return 1 if args.strict and not all(claim.holds for claim in claims) else 0
+    return report_claims("Rocha04", claims, report, started, args.json, args.strict)
 
 
 if __name__ == "__main__":

@@ -9,17 +9,16 @@ steered I_min in Rocha04's room. Writes figures 6 and 7, three more, and the cla
 from __future__ import annotations
 
 import os
-import sys
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from baselines.command import make_folder, parse, print_json, run_command
+from baselines.command import make_folder, parse, run_command
 from baselines.experiment import run_cells
 from baselines.papers.rochami_cells import experiment
 from baselines.papers.rochami_claims import all_claims
-from entropy_explore_env.errors import SettingError
+from entropy_explore_env.validation import check_whole
 
 _STARTS, _QUICK_STARTS = 50, 10
 
@@ -47,12 +46,12 @@ class Args:
 def main(words: Sequence[str]) -> int:
     """Run the command."""
     args = parse(Args, words, description=__doc__)
-    from baselines.claims_table import print_claims
+    from baselines.claims_table import report_claims
     from baselines.papers.rochami_report import write_report
 
     for name, value, least in (("starts", args.starts, 2), ("jobs", args.jobs, 1)):
-        if value is not None and value < least:
-            raise SettingError(name, value, f"a whole number ≥ {least}")
+        if value is not None:
+            check_whole(name, value, least)
     make_folder("out", args.out)
     make_folder("runs", args.runs)
     started = time.perf_counter()
@@ -64,13 +63,7 @@ def main(words: Sequence[str]) -> int:
     report = write_report(
         args.out, records, claims, f"python -m baselines.papers.rochami{given} --out {args.out}"
     )
-    if args.json:
-        wall_s = round(time.perf_counter() - started, 1)
-        print_json({"paper": "RochaMI", "claims": [claim.row() for claim in claims], "wall_s": wall_s})
-    else:
-        print_claims(claims, "RochaMI")
-        print(f"written: {report}, its figures and tables beside it", file=sys.stderr)
-    return 1 if args.strict and not all(claim.holds for claim in claims) else 0
+    return report_claims("RochaMI", claims, report, started, args.json, args.strict)
 
 
 if __name__ == "__main__":

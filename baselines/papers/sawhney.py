@@ -8,17 +8,17 @@ kept under `--runs`: a stopped experiment goes on where it was.
 from __future__ import annotations
 
 import os
-import sys
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from baselines.command import make_folder, parse, print_json, run_command
+from baselines.command import make_folder, parse, run_command
 from baselines.experiment import run_cells
 from baselines.papers.sawhney_cells import experiment
 from baselines.papers.sawhney_claims import all_claims
 from entropy_explore_env.errors import SettingError
+from entropy_explore_env.validation import check_whole
 
 _STARTS, _QUICK_STARTS = 40, 4
 
@@ -50,12 +50,12 @@ class Args:
 def main(words: Sequence[str]) -> int:
     """Run the command."""
     args = parse(Args, words, description=__doc__)
-    from baselines.claims_table import print_claims
+    from baselines.claims_table import report_claims
     from baselines.papers.sawhney_report import write_report
 
     for name, value, least in (("starts", args.starts, 2), ("jobs", args.jobs, 1)):
-        if value is not None and value < least:
-            raise SettingError(name, value, f"a whole number ≥ {least}")
+        if value is not None:
+            check_whole(name, value, least)
     if args.flights is not None and (args.flights < 0 or args.flights == 1):
         raise SettingError("flights", args.flights, "0, or a whole number ≥ 2")
     if args.dem is not None and not args.dem.is_file():
@@ -73,13 +73,7 @@ def main(words: Sequence[str]) -> int:
     report = write_report(
         args.out, records, claims, f"python -m baselines.papers.sawhney{given} --out {args.out}"
     )
-    if args.json:
-        wall_s = round(time.perf_counter() - started, 1)
-        print_json({"paper": "Sawhney", "claims": [claim.row() for claim in claims], "wall_s": wall_s})
-    else:
-        print_claims(claims, "Sawhney")
-        print(f"written: {report}, its figures and tables beside it", file=sys.stderr)
-    return 1 if args.strict and not all(claim.holds for claim in claims) else 0
+    return report_claims("Sawhney", claims, report, started, args.json, args.strict)
 
 
 if __name__ == "__main__":

@@ -20,7 +20,7 @@ from entropy_explore_env.randomness import check_seed
 from entropy_explore_env.reports.metrics import mission_figures
 from entropy_explore_env.reports.painting import FRAMES_PER_S, RENDER_MODES, Painter, check_render_mode
 from entropy_explore_env.scenarios import find_scenario
-from entropy_explore_env.validation import is_whole
+from entropy_explore_env.validation import check_whole
 from entropy_explore_env.worlds.given import with_given_worlds
 
 _RUNNING, _MAPPED = MissionEnd.RUNNING.code, MissionEnd.MAPPED.code
@@ -66,8 +66,7 @@ class EntropyExploreVectorEnv(VectorEnv[Any, Any, Any]):
             WorldError: The world cannot be used.
         """
         check_render_mode(render_mode)
-        if not is_whole(num_envs, 1):
-            raise SettingError("num_envs", num_envs, "a whole number ≥ 1")
+        check_whole("num_envs", num_envs, 1)
         try:
             self.autoreset_mode = AutoresetMode(autoreset_mode)
         except ValueError:

@@ -13,7 +13,7 @@ import numpy as np
 from entropy_explore_env.belief.coverage_map import PRIOR_MEAN, map_entropy_bits
 from entropy_explore_env.belief.pooling import fresh_sums
 from entropy_explore_env.config import Scenario
-from entropy_explore_env.errors import CallOrderError, SettingError, WorldError
+from entropy_explore_env.errors import CallOrderError, WorldError
 from entropy_explore_env.missions.navigation import plan_missions
 from entropy_explore_env.missions.observation import ObservationLayout, observation_rules, observe_mission
 from entropy_explore_env.missions.rules import rules_of
@@ -23,7 +23,7 @@ from entropy_explore_env.randomness import Stream, check_seed, generator, splitm
 from entropy_explore_env.robots.navigator import new_navigators, touched_voxels
 from entropy_explore_env.robots.range_sensor import Scan, new_scan
 from entropy_explore_env.settings import Grid, gaussian_entropy_bits
-from entropy_explore_env.validation import is_whole
+from entropy_explore_env.validation import check_whole
 from entropy_explore_env.worlds.given import checked_worlds, in_given_worlds, world_in_turn
 from entropy_explore_env.worlds.load import make_world, with_world
 from entropy_explore_env.worlds.world import World
@@ -70,8 +70,7 @@ class Missions:
             WorldError: The world's file cannot be used, or the given ones differ in their grids.
         """
         for name, value in (("missions", count), ("threads", 1 if threads is None else threads)):
-            if not is_whole(value, 1):
-                raise SettingError(name, value, "a whole number ≥ 1")
+            check_whole(name, value, 1)
         scenario = in_given_worlds(scenario, given) if given else with_world(scenario)
         check_memory(scenario, int(count))
         self.scenario, self.given = scenario, checked_worlds(given) if given else ()
