@@ -74,6 +74,10 @@ def weight(promises):
     return 1.0 / (1.0 + promises)
 
 
+_WEIGHTS = 1.0 / (1.0 + np.arange(256))
+"""The same by number of promises."""
+
+
 @inlined_kernel
 def begin_count(tally):
     """Number of a new count."""
@@ -152,15 +156,71 @@ def count_in_ball(tally, state, size, start, reach, marking):
 
 
 @lean_kernel
-def count_from(tally, state, size, voxels, directions, reach, naive, seen, weighed):
-    """Fill (K,) with the points seen from K voxels' centres, and with them weighed by promises."""
+def count_from(tally, state, size, voxels, tree, met, seen, weighed):
+    """Fill (K,) with the points seen from K voxels' centres, and with them weighed by promises.
+
+    What `count_crossed` finds, with the rays as a RayTree of C cells; `met` is (C,) int32 scratch space.
+    """
+    for cell in range(len(met)):
+        met[cell] = -1
+    promises = tally.numbers[1] > 0
+    for place in range(len(voxels)):
+        voxel = np.int64(voxels[place])
+        column = voxel // size[2]
+        at = (column // size[1], column % size[1], voxel - column * size[2])
+        inside = _inside(tree, size, at)
+        if inside and not promises:
+            points, value = _climb(tally, state, size, voxel, tree, at, met, place, True, False)
+        elif inside:
+            points, value = _climb(tally, state, size, voxel, tree, at, met, place, True, True)
+        else:
+            points, value = _climb(tally, state, size, voxel, tree, at, met, place, False, True)
+        seen[place], weighed[place] = points, value
+
+
+@inlined_kernel
+def _inside(tree, size, at):
+    """Whether no ray from a voxel leaves the workspace."""
+    inside = True
+    for axis in range(3):
+        inside &= at[axis] + tree.low[axis] >= 0 and at[axis] + tree.high[axis] < size[axis]
+    return inside
+
+
+@inlined_kernel
+def _climb(tally, state, size, voxel, tree, at, met, place, inside, promises):
+    """Count along the tree's branches: (all, weighed). See `count_from`.
+
+    The rays start in a voxel, given by its number and by axis, the `place`-th that is counted from; they
+    leave the workspace nowhere (`inside`) or perhaps; there are `promises` or none.
+    """
+    points, weighed, node = 0, 0.0, np.uint32(0)
+    while node < np.uint32(len(tree.offset)):
+        if not inside:
+            x, y, z = at[0] + tree.steps[node, 0], at[1] + tree.steps[node, 1], at[2] + tree.steps[node, 2]
+            if not (0 <= x < size[0] and 0 <= y < size[1] and 0 <= z < size[2]):
+                node = tree.after[node]
+                continue
+        there, cell = np.uint64(voxel + tree.offset[node]), tree.cell[node]
+        flags = state[there]
+        fresh = (flags & UNEXPLORED != 0) & (met[cell] != place)
+        met[cell] = place
+        points += np.int64(fresh)
+        if promises and fresh:
+            weighed += _WEIGHTS[tally.promised[there]]
+        if flags > STOPS_RAYS and node > 0:
+            node = tree.after[node]
+        else:
+            node += np.uint32(1)
+    return points, weighed if promises else float(points)
+
+
+@lean_kernel
+def count_in_balls(tally, state, size, voxels, reach, seen, weighed):
+    """The same with the naive V."""
     for place in range(len(voxels)):
         start = centre_of(size, voxels[place])
-        if naive:
-            points, value = count_in_ball(tally, state, size, start, reach, False)
-        else:
-            points, value = count_crossed(tally, state, size, start, directions, reach, False)
-        seen[place], weighed[place] = points, value
+        seen[place], weighed[place] = count_in_ball(tally, state, size, start, reach, False)
 
 
 @inlined_kernel

@@ -19,6 +19,7 @@ from baselines.expected_view import (
     count_crossed,
     count_from,
     count_in_ball,
+    count_in_balls,
     new_tally,
     rays_around,
     rays_towards,
@@ -34,6 +35,7 @@ from baselines.frontier_map import (
     put_block,
     take_in,
 )
+from baselines.ray_tree import grow_tree
 from baselines.terrain_map import (
     count_below,
     count_columns_from,
@@ -116,6 +118,8 @@ class VoxelCandidates:
         self._tally = new_tally(grid.voxels, grid.shape)
         self._pitches = _pitches(kind, layer is None)
         self._directions = rays_around(self.reach, self._pitches)
+        self._tree = grow_tree(self._directions, self.reach, grid.shape)
+        self._met = np.empty(self._tree.cells, np.int32)
         self.point = grid.voxel_size_m ** (2 if grid.flat else 3)
         self.rates = _read_only(self._map.rates)
         self._rates = self._map.rates
@@ -152,9 +156,11 @@ class VoxelCandidates:
     def count(self, slots: np.ndarray, voxels: np.ndarray) -> np.ndarray:
         """(K,) V·(height factor): points expected to be seen, weighed by promises; 0 = nothing at all."""
         seen, weighed = np.empty(len(slots)), np.empty(len(slots))
-        naive = self._looking.visibility == "naive"
-        arrays = self._map.state, self._size, voxels, self._directions
-        count_from(self._tally, *arrays, self.reach, naive, seen, weighed)
+        arrays = self._tally, self._map.state, self._size, voxels
+        if self._looking.visibility == "naive":
+            count_in_balls(*arrays, self.reach, seen, weighed)
+        else:
+            count_from(*arrays, self._tree, self._met, seen, weighed)
         self._map.seen[slots] = seen
         return weighed
 

@@ -14,11 +14,13 @@ from baselines.expected_view import (
     count_crossed,
     count_from,
     count_in_ball,
+    count_in_balls,
     new_tally,
     rays_around,
     rays_towards,
 )
 from baselines.frontier_map import COVERED, UNEXPLORED
+from baselines.ray_tree import grow_tree
 from tests.reference import sawhney as reference
 from tests.reference.scenes import drawn, seeds
 
@@ -107,6 +109,47 @@ def test_rays_around_miss_no_voxel_within_reach():
     inside, _ = count_in_ball(tally, state.reshape(-1), shape, start, reach - 0.75, False)
     assert seen >= inside
     many, values = np.empty(2), np.empty(2)
-    voxels = np.array([0, 20 * 43 + 21], np.int32)
-    count_from(tally, state.reshape(-1), shape, voxels, directions, reach, False, many, values)
+    voxels, tree = np.array([0, 20 * 43 + 21], np.int32), grow_tree(directions, reach, shape)
+    count_from(tally, state.reshape(-1), shape, voxels, tree, np.empty(tree.cells, np.int32), many, values)
     assert many[1] == seen and many[0] < seen / 3
+
+
+@given(st.sampled_from(SHAPES), st.floats(0.3, 9.0) | st.just(math.inf), st.booleans(), seeds)
+@drawn(60)
+def test_a_tree_of_rays_sees_from_every_voxel_what_the_rays_see(shape, reach, promised, seed):
+    state, _, rng = scene(shape, seed)
+    tally, flat, directions = new_tally(state.size, shape), state.reshape(-1), rays(shape)
+    for _ in range(2 * promised):
+        other = tuple(int(rng.integers(0, n)) + 0.5 for n in shape)
+        count_crossed(tally, flat, shape, other, directions, 6.0, True)
+    voxels, seen, weighed = np.arange(state.size, dtype=np.int32), *np.empty((2, state.size))
+    tree = grow_tree(directions, reach, shape)
+    count_from(tally, flat, shape, voxels, tree, np.empty(tree.cells, np.int32), seen, weighed)
+    for voxel, points, value in zip(voxels, seen, weighed, strict=True):
+        start = tuple(int(i) + 0.5 for i in np.unravel_index(voxel, shape))
+        wanted = count_crossed(tally, flat, shape, start, directions, reach, False)
+        assert (points, value) == (wanted[0], pytest.approx(wanted[1]))
+
+
+def test_what_rays_share_is_walked_once():
+    """By hand: east, and two more that leave it after two and three voxels."""
+    directions = np.array([[1.0, 0.0, 0.0], [1.0, 0.25, 0.0], [1.0, 0.19, 0.0]])
+    directions /= np.linalg.norm(directions, axis=1)[:, None]
+    tree = grow_tree(directions, 4.2, (20, 9, 1))
+    assert tree.low == (0, 0, 0) and tree.high == (4, 1, 0)
+    assert tree.steps.tolist() == [
+        *([0, 0, 0], [1, 0, 0], [2, 0, 0], [2, 1, 0], [3, 1, 0], [4, 1, 0]),
+        *([3, 0, 0], [3, 1, 0], [4, 1, 0], [4, 0, 0]),
+    ]
+    assert tree.after.tolist() == [10, 10, 10, 6, 6, 6, 10, 9, 9, 10]
+    assert tree.cells == 8 and tree.cell[4] == tree.cell[7] != tree.cell[6]
+    assert tree.offset.tolist() == [9 * x + y for x, y, _ in tree.steps.tolist()]
+
+
+def test_naive_counts_from_many_places():
+    state, _, _ = scene((9, 6, 1), 3)
+    tally, voxels = new_tally(54, (9, 6, 1)), np.array([0, 29], np.int32)
+    seen, weighed = np.empty(2), np.empty(2)
+    count_in_balls(tally, state.reshape(-1), (9, 6, 1), voxels, 3.0, seen, weighed)
+    for voxel, points in zip(((0.5, 0.5, 0.5), (4.5, 5.5, 0.5)), seen, strict=True):
+        assert points == count_in_ball(tally, state.reshape(-1), (9, 6, 1), voxel, 3.0, False)[0]
