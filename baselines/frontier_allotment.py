@@ -30,8 +30,8 @@ from entropy_explore_env.settings import RobotKind
 
 _BATCH = 8
 """Candidates that are counted together; their number changes no result."""
-_NEAR = 4.0
-"""A first search for ways goes so many times as far as the sensor sees."""
+_WIDER = 2.0
+"""Ways are searched as far as the sensor sees, and then so many times as far until that is enough."""
 
 
 class Value(Protocol):
@@ -58,6 +58,18 @@ class Choice:
     slot: int
     voxel: int
     value: float
+
+
+@dataclass(frozen=True)
+class _Ways:
+    """Ways of a robot to all candidates."""
+
+    start: np.ndarray
+    """(3,) where they begin, grid units."""
+    reach: float
+    """How far they were searched, in voxel edges."""
+    edges: np.ndarray
+    """(B,) float64, lengths by the candidates' slots; inf = none within reach."""
 
 
 class Allotter:
@@ -113,11 +125,9 @@ class Allotter:
         for target in targets:
             candidates.promise(target)
         waiting, found = [view.robot, *sorted(stopped)], dict[int, Choice]()
-        costs: dict[int, np.ndarray] = {}
-        if len(waiting) > 1:
-            costs = {robot: self._ways(view, robot, math.inf) for robot in waiting}
+        ways: dict[int, _Ways] = {}
         while waiting:
-            choices = {robot: self._best(view, robot, costs.get(robot), taken) for robot in waiting}
+            choices = {robot: self._best(view, robot, ways, taken) for robot in waiting}
             best = max(sorted(waiting), key=lambda robot: _worth(choices[robot]))
             choice = choices[best]
             if choice is None:
@@ -153,39 +163,41 @@ class Allotter:
         search_ways(self.search, self.lattice, self.costs, source, goal, reach, self._no_cells)
         self.candidates.close(opened)
 
-    def _ways(self, view: RobotView, robot: int, reach: float) -> np.ndarray:
-        """(V,) float64 lengths of ways from where a robot is, or was heard; inf = none within reach."""
-        pose = view.pose if robot == view.robot else view.teammates[robot].pose
+    def _ways(self, pose: np.ndarray, reach: float) -> _Ways:
+        """From where a robot is, or was heard."""
         self.seek(pose, -1, reach)
-        cost = np.empty(self._scenario.grid.voxels)
-        collect(self.search, cost)
-        return cost
+        voxels = self.candidates.voxels_of(slice(None))
+        edges = np.full(len(voxels), np.inf)
+        ask_costs(self.search, voxels, edges)
+        return _Ways(self._scenario.grid.in_grid_units(pose)[:3], reach, edges)
 
     def _best(
-        self, view: RobotView, robot: int, cost: np.ndarray | None, taken: Sequence[np.ndarray]
+        self, view: RobotView, robot: int, ways: dict[int, _Ways], taken: Sequence[np.ndarray]
     ) -> Choice | None:
-        """The best candidate of a robot; ways that are not given are searched no farther than is needed."""
-        if cost is not None:
-            return self._best_of(robot, cost, math.inf, taken)[0]
-        near = _NEAR * self.candidates.reach
-        if self._lazy and near < sum(self._scenario.grid.shape):
-            self.seek(view.pose, -1, near)
-            choice, sure = self._best_of(robot, None, near, taken)
-            if sure:
-                return choice
-        everywhere = self._ways(view, robot, math.inf)
-        choice, _ = self._best_of(robot, everywhere, math.inf, taken)
-        if choice is None:
+        """The best candidate of a robot; ways are searched, and kept, no farther than is needed."""
+        pose = view.pose if robot == view.robot else view.teammates[robot].pose
+        whole = float(sum(self._scenario.grid.shape))
+        if robot not in ways:
+            near = self.candidates.reach if self._lazy else math.inf
+            ways[robot] = self._ways(pose, near if near < whole else math.inf)
+        choice, sure = self._best_of(robot, ways[robot], taken)
+        while not sure:
+            farther = _WIDER * ways[robot].reach
+            ways[robot] = self._ways(pose, farther if farther < whole else math.inf)
+            choice, sure = self._best_of(robot, ways[robot], taken)
+        if choice is None and robot == view.robot:
+            self.seek(pose, -1, math.inf)
+            everywhere = np.empty(self._scenario.grid.voxels)
+            collect(self.search, everywhere)
             self.candidates.other_of(everywhere)
-            choice, _ = self._best_of(robot, everywhere, math.inf, taken)
+            ways[robot] = self._ways(pose, math.inf)
+            choice, _ = self._best_of(robot, ways[robot], taken)
         return choice
 
-    def _best_of(
-        self, robot: int, cost: np.ndarray | None, reach: float, taken: Sequence[np.ndarray]
-    ) -> tuple[Choice | None, bool]:
+    def _best_of(self, robot: int, ways: _Ways, taken: Sequence[np.ndarray]) -> tuple[Choice | None, bool]:
         """The best of the candidates that were reached, and whether none beyond can be better."""
         slots, voxels = self.candidates.found()
-        edges = self._edges_to(voxels, cost)
+        edges = ways.edges[slots]
         reached = np.isfinite(edges)
         beyond = slots[~reached]
         slots, voxels, edges = slots[reached], voxels[reached], edges[reached]
@@ -208,32 +220,29 @@ class Allotter:
         choice = None
         if best >= 0 and value[best] > -np.inf:
             choice = Choice(int(slots[best]), int(voxels[best]), float(value[best]))
-        if len(beyond) == 0 or math.isinf(reach):
-            return choice, choice is not None or math.isinf(reach)
-        if choice is None:
-            return None, False
-        return choice, self._none_is_better(robot, beyond, reach, choice)
+        if len(beyond) == 0 or math.isinf(ways.reach):
+            return choice, True
+        return choice, choice is not None and self._none_is_better(robot, beyond, ways, choice)
 
-    def _none_is_better(self, robot: int, slots: np.ndarray, reach: float, choice: Choice) -> bool:
-        """Whether no candidate farther away than `reach` can be worth as much as one that was found."""
+    def _none_is_better(self, robot: int, slots: np.ndarray, ways: _Ways, choice: Choice) -> bool:
+        """Whether no candidate that was not reached can be worth as much as one that was found.
+
+        It lies beyond the search's reach, and not nearer than in a straight line.
+        """
+        apart = np.linalg.norm(self._places(self.candidates.voxels_of(slots)) - ways.start, axis=1)
+        edges = np.maximum(ways.reach, apart - 2.0)  # ways lead from centre to centre
+        seconds, nobody = self.seconds(robot, edges), np.zeros(len(slots))
+        better = np.ones(len(slots), bool)
         for _ in range(2):
             most = np.minimum(self.candidates.most(slots), self.candidates.limit())
-            there = np.full(len(slots), reach)
-            arrays = most * self.candidates.point, self.seconds(robot, there), there
-            better = slots[self._value(*arrays, np.zeros(len(slots))) >= choice.value]
-            new = better[np.isinf(self.candidates.most(better))]
+            value = self._value(most * self.candidates.point, seconds, edges, nobody)
+            better = value >= choice.value
+            new = slots[better & np.isinf(self.candidates.most(slots))]
             if len(new) == 0:
                 break
             self.candidates.count(new, self.candidates.voxels_of(new))
             self.counted += len(new)
-        return len(better) == 0
-
-    def _edges_to(self, voxels: np.ndarray, cost: np.ndarray | None) -> np.ndarray:
-        if cost is not None:
-            return cost[voxels]
-        edges = np.empty(len(voxels))
-        ask_costs(self.search, voxels, edges)
-        return edges
+        return not better.any()
 
     def seconds(self, robot: int, edges: np.ndarray) -> np.ndarray:
         """(K,) seconds of the drive along ways of so many voxel edges, and of the scans at its stops."""
@@ -246,19 +255,24 @@ class Allotter:
 
     def _taken(self, voxels: np.ndarray, taken: Sequence[np.ndarray]) -> np.ndarray:
         """(K,) Σ over targets of P(d) = 1 - d/range, within the range (Burgard 2005, eq. 6)."""
-        places = np.stack(np.unravel_index(voxels, self._scenario.grid.shape), axis=-1) + 0.5
+        places = self._places(voxels)
         total = np.zeros(len(voxels))
         for target in taken:
             apart = np.linalg.norm(places - target[:3], axis=1)
             total += np.maximum(1.0 - apart / self.candidates.reach, 0.0)
         return total
 
+    def _places(self, voxels: np.ndarray) -> np.ndarray:
+        """(K, 3) centres of (K,) voxels, grid units."""
+        return np.stack(np.unravel_index(voxels, self._scenario.grid.shape), axis=-1) + 0.5
+
 
 @lean_kernel
 def ask_costs(search: Search, voxels: np.ndarray, out: np.ndarray) -> None:
-    """Fill (K,) with the costs of (K,) voxels in the latest search; inf = not reached."""
+    """Fill (K,) with the costs of (K,) voxels in the latest search; those that are none stay."""
     for place in range(len(voxels)):
-        out[place] = cost_to(search, voxels[place])
+        if voxels[place] >= 0:
+            out[place] = cost_to(search, voxels[place])
 
 
 @lean_kernel

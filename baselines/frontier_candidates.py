@@ -139,8 +139,8 @@ class VoxelCandidates:
         """Share of all points that are mapped."""
         return float((self._map.state & UNMAPPED == 0).mean())
 
-    def voxels_of(self, slots: np.ndarray) -> np.ndarray:
-        """(K,) int32, voxels of some candidates."""
+    def voxels_of(self, slots: np.ndarray | slice) -> np.ndarray:
+        """(K,) int32, voxels of some candidates; NONE = there is none."""
         return self._map.voxel[slots]
 
     def most(self, slots: np.ndarray) -> np.ndarray:
@@ -278,7 +278,7 @@ class TerrainCandidates:
         """See `VoxelCandidates`."""
         return float((self._map.ground != NONE).mean())
 
-    def voxels_of(self, slots: np.ndarray) -> np.ndarray:
+    def voxels_of(self, slots: np.ndarray | slice) -> np.ndarray:
         """See `VoxelCandidates`."""
         return self._map.voxel[slots]
 
