@@ -57,13 +57,13 @@ def grow_tree(directions: np.ndarray, reach: float, size: tuple[int, int, int]) 
     new &= voxels >= 0
     _, depth = np.nonzero(new)
     steps = np.stack(np.unravel_index(voxels[new], shape), axis=-1) - margin
-    low, high = (tuple(int(step) for step in ends) for ends in (steps.min(0), steps.max(0)))
+    low, high = steps.min(0).tolist(), steps.max(0).tolist()
     offset = steps @ np.array([size[1] * size[2], size[2], 1])
     after = np.full(len(depth), len(depth))
     _find_next(depth, np.empty_like(depth), after)
     cells, cell = np.unique(voxels[new], return_inverse=True)
     numbers = cell.astype(np.uint32), after.astype(np.uint32)
-    return RayTree(steps.astype(np.int32), offset, *numbers, len(cells), low, high)
+    return RayTree(steps.astype(np.int32), offset, *numbers, len(cells), tuple(low), tuple(high))
 
 
 @lean_kernel

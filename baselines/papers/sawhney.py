@@ -37,8 +37,9 @@ class Args:
     """Missions a point in each plan; default: 40 (160 over the four plans), with --quick 4."""
     flights: int | None = None
     """The same over each terrain; 0 = plans only; default: 40 (120 over all three), with --quick 4."""
-    dem: Path | None = None
-    """A height map's file to fly over as well, such as the Jacksboro model, resampled to voxels of 1 m."""
+    dem: str | None = None
+    """A height map's file to fly over as well, in voxels of 1 m; default: jacksboro, a model of the
+    elevations that come with matplotlib; with --quick none."""
     jobs: int | None = None
     """Processes; default: one a processor."""
     json: bool = False
@@ -51,25 +52,29 @@ def main(words: Sequence[str]) -> int:
     """Run the command."""
     args = parse(Args, words, description=__doc__)
     from baselines.claims_table import report_claims
+    from baselines.papers.sawhney_dem import JACKSBORO, write_model
     from baselines.papers.sawhney_report import write_report
 
-    for name, value, least in (("starts", args.starts, 2), ("jobs", args.jobs, 1)):
+    for option, value, least in (("starts", args.starts, 2), ("jobs", args.jobs, 1)):
         if value is not None:
-            check_whole(name, value, least)
+            check_whole(option, value, least)
     if args.flights is not None and (args.flights < 0 or args.flights == 1):
         raise SettingError("flights", args.flights, "0, or a whole number ≥ 2")
-    if args.dem is not None and not args.dem.is_file():
-        raise SettingError("dem", str(args.dem), "a height map's file")
+    ground = args.dem or (None if args.quick or args.flights == 0 else JACKSBORO)
+    if ground is not None and ground != JACKSBORO and not Path(ground).is_file():
+        raise SettingError("dem", ground, f"a height map's file, or {JACKSBORO}")
     make_folder("out", args.out)
     make_folder("runs", args.runs)
     started = time.perf_counter()
     usual = _QUICK_STARTS if args.quick else _STARTS
     flights = usual if args.flights is None else args.flights
-    cells = experiment(args.starts or usual, flights, args.quick, args.dem)
+    dem = ground and (write_model(args.runs) if ground == JACKSBORO else Path(ground))
+    cells = experiment(args.starts or usual, flights, args.quick, dem or None)
     records = run_cells(cells, args.runs, args.jobs or os.cpu_count() or 1, "Sawhney", quiet=args.json)
     claims = all_claims(records)
     given = " --quick" * args.quick
-    given += "".join(f" --{n} {v}" for n in ("starts", "flights") if (v := getattr(args, n)) is not None)
+    options = ("starts", "flights", "dem")
+    given += "".join(f" --{option} {v}" for option in options if (v := getattr(args, option)) is not None)
     report = write_report(
         args.out, records, claims, f"python -m baselines.papers.sawhney{given} --out {args.out}"
     )

@@ -101,8 +101,10 @@ def _runs(records: Records, part: str) -> str:
 _RULES = f"""Plans are the scenarios of these names: cells of 0.1 m, robots without bodies at 0.5 m/s and
 0.5 m/s² with a laser of 360 rays all around up to 3 m; a scan takes 2 s. Terrains are 96 × 72 m of fractal
 ground with up to 18 m of relief, Hurst exponents 0.95, 0.8 and 0.5, under an exposure surface at least 4 m
-above it; UAVs at 3 m/s and 2 m/s² with a scanner that looks down, all around, up to 20 m; a scan takes 2 s.
-Everybody hears every measurement and announcement at once. The paper gives none of these numbers.
+above it; `dem` is a height map from a file, if not said otherwise the elevations of Jacksboro, Tennessee,
+in 1 : 300 and heights in 1 : 50: 30 × 32 km become 100 × 107 m with 17 m of relief. UAVs at 3 m/s and
+2 m/s² have a scanner that looks down, all around, up to 20 m; a scan takes 2 s. Everybody hears every
+measurement and announcement at once. The paper gives none of these numbers.
 
 V is the area of unexplored cells, or of columns of ground (times the height factor, metres), t the seconds
 of the drive from rest to rest on the shortest way and of the scan. The paper counts V in terrain points and

@@ -8,6 +8,7 @@ import json
 
 import numpy as np
 import pytest
+from matplotlib import cbook
 from PIL import Image
 
 from baselines import experiment
@@ -28,10 +29,12 @@ from baselines.papers.sawhney_cells import (
 )
 from baselines.papers.sawhney_cells import experiment as cells_of
 from baselines.papers.sawhney_claims import all_claims, best_beta, compared, relative
+from baselines.papers.sawhney_dem import write_model
 from baselines.papers.sawhney_missions import Run
 from baselines.per_time_visibility import Exploring, Metric
 from entropy_explore_env.config import with_settings
 from entropy_explore_env.settings import Grid
+from entropy_explore_env.worlds.load import load_world
 
 
 def test_the_cells_are_the_experiment_s():
@@ -171,3 +174,17 @@ def test_what_is_refused(words, complaint, capsys):
 def test_methods_differ_in_plans_and_over_terrain():
     assert set(methods("terrains", True)) - set(methods("plans", True)) == {"no-height"}
     assert Run(Exploring()) == Run(Exploring()) and sawhney_cells.TIME_LIMIT_S == 3600.0
+
+
+def test_the_model_of_jacksboro_is_a_world_to_fly_over(tmp_path):
+    """30.0 × 31.9 km of 236 … 1,076 m; 4 m of air above it; rows run from north to south."""
+    with np.load(cbook.get_sample_data("jacksboro_fault_dem.npz", asfileobj=False)) as dem:
+        elevation_m = dem["elevation"]
+    world = load_world(write_model(tmp_path), 1.0, ceiling_m=4.0)
+    assert world.grid.shape[:2] == (100, 107) and world.ceiling is not None
+    ground = world.occupied.sum(axis=2)
+    assert ground.max() - ground.min() == pytest.approx((1076 - 236) / 50, abs=1.0)
+    assert 3 <= (world.ceiling - ground).min() and (world.ceiling - ground).max() <= 5
+    highest = np.unravel_index(np.argmax(elevation_m), elevation_m.shape)
+    x, y = 100 * highest[1] / 403, 107 * (1.0 - highest[0] / 344)
+    assert ground[max(int(x) - 1, 0) : int(x) + 2, max(int(y) - 1, 0) : int(y) + 2].max() == ground.max()

@@ -1,0 +1,39 @@
+"""A model of real ground to fly over: the elevations of Jacksboro, Tennessee, that come with matplotlib.
+
+30 × 32 km in 1 : 300, as wide as the other terrains; its 840 m in 1 : 50, as high as they are. The ridges of
+the fault stand out as they do in pictures of it, six times as steep as they are.
+"""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+
+import numpy as np
+from matplotlib import cbook
+
+from entropy_explore_env.writing import write_atomically
+
+JACKSBORO = "jacksboro"
+ACROSS, UP = 300.0, 50.0
+"""Scales of the model."""
+_METRES_PER_DEGREE = 111_195.0
+"""Along a meridian."""
+
+
+def write_model(folder: Path) -> Path:
+    """Write the model, a height map that `load_world` reads.
+
+    Returns:
+        Its file in the folder.
+    """
+    with np.load(
+        cbook.get_sample_data("jacksboro_fault_dem.npz", asfileobj=False), allow_pickle=False
+    ) as dem:
+        elevation_m, middle = dem["elevation"] / UP, 0.5 * np.radians(dem["ymin"] + dem["ymax"])
+        spacing_m = np.array([dem["dx"] * np.cos(middle), dem["dy"]]) * _METRES_PER_DEGREE / ACROSS
+    buffer = io.BytesIO()
+    np.savez_compressed(buffer, elevation=elevation_m, spacing_m=spacing_m)
+    path = folder / f"{JACKSBORO}.npz"
+    write_atomically(path, buffer.getvalue())
+    return path
