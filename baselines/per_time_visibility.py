@@ -43,8 +43,7 @@ class Metric:
     Attributes:
         beta: β; None = V/t.
         bonus: What closing a frontier is worth besides what is seen, in V's units: slivers nearby are then
-        seen
-            to on the way, and not returned to at the end. 0 = the paper's metric.
+            seen to on the way, and not returned to at the end. 0 = the paper's metric.
     """
 
     beta: float | None = None

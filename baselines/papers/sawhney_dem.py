@@ -1,7 +1,7 @@
 """A model of real ground to fly over: the elevations of Jacksboro, Tennessee, that come with matplotlib.
 
-30 × 32 km in 1 : 300, as wide as the other terrains; its 840 m in 1 : 50, as high as they are. The ridges of
-the fault stand out as they do in pictures of it, six times as steep as they are.
+30 × 32 km in 1 : 400, as wide as the other terrains; its 840 m in 1 : 50, as high as they are. The ridges of
+the fault stand out as they do in pictures of it, eight times as steep as they are.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from matplotlib import cbook
 from entropy_explore_env.writing import write_atomically
 
 JACKSBORO = "jacksboro"
-ACROSS, UP = 300.0, 50.0
+ACROSS, UP = 400.0, 50.0
 """Scales of the model."""
 _METRES_PER_DEGREE = 111_195.0
 """Along a meridian."""

@@ -102,7 +102,7 @@ _RULES = f"""Plans are the scenarios of these names: cells of 0.1 m, robots with
 0.5 m/s² with a laser of 360 rays all around up to 3 m; a scan takes 2 s. Terrains are 96 × 72 m of fractal
 ground with up to 18 m of relief, Hurst exponents 0.95, 0.8 and 0.5, under an exposure surface at least 4 m
 above it; `dem` is a height map from a file, if not said otherwise the elevations of Jacksboro, Tennessee,
-in 1 : 300 and heights in 1 : 50: 30 × 32 km become 100 × 107 m with 17 m of relief. UAVs at 3 m/s and
+in 1 : 400 and heights in 1 : 50: 30 × 32 km become 75 × 80 m with 17 m of relief. UAVs at 3 m/s and
 2 m/s² have a scanner that looks down, all around, up to 20 m; a scan takes 2 s. Everybody hears every
 measurement and announcement at once. The paper gives none of these numbers.
 

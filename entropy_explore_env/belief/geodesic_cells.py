@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -130,6 +131,7 @@ def tessellate(
     )
 
 
+@lru_cache(maxsize=8)
 def _moves_in_space(strides: tuple[int, int, int]) -> np.ndarray:
     """(26, 3) int64: offset of each neighbour, how many axes it lies along, bits of the moves that it needs.
 

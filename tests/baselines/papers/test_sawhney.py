@@ -181,10 +181,10 @@ def test_the_model_of_jacksboro_is_a_world_to_fly_over(tmp_path):
     with np.load(cbook.get_sample_data("jacksboro_fault_dem.npz", asfileobj=False)) as dem:
         elevation_m = dem["elevation"]
     world = load_world(write_model(tmp_path), 1.0, ceiling_m=4.0)
-    assert world.grid.shape[:2] == (100, 107) and world.ceiling is not None
+    assert world.grid.shape[:2] == (75, 80) and world.ceiling is not None
     ground = world.occupied.sum(axis=2)
     assert ground.max() - ground.min() == pytest.approx((1076 - 236) / 50, abs=1.0)
     assert 3 <= (world.ceiling - ground).min() and (world.ceiling - ground).max() <= 5
     highest = np.unravel_index(np.argmax(elevation_m), elevation_m.shape)
-    x, y = 100 * highest[1] / 403, 107 * (1.0 - highest[0] / 344)
+    x, y = 75 * highest[1] / 403, 80 * (1.0 - highest[0] / 344)
     assert ground[max(int(x) - 1, 0) : int(x) + 2, max(int(y) - 1, 0) : int(y) + 2].max() == ground.max()
