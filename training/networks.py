@@ -20,6 +20,7 @@ from entropy_explore_env.config import Scenario
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.missions.action import action_space
 from entropy_explore_env.missions.observation import ObservationLayout, Part
+from training.distributions import MoveAndGaze
 
 _MAPS = ("patch", "overview")
 _HIDDEN = ("action_mask",)
@@ -132,6 +133,29 @@ def _places_around(yaws: int, pitches: int) -> np.ndarray:
     return np.array(places)
 
 
+class _Logistic(torch.autograd.Function):
+    """tanh x = 2 / (1 + e^(-2x)) - 1, exact to about 1e-7, in less than half of the time of PyTorch's."""
+
+    @staticmethod
+    def forward(ctx: Any, x: torch.Tensor) -> torch.Tensor:  # noqa: ANN401 - PyTorch has no type for it
+        y = (2.0 * x).sigmoid_().mul_(2.0).sub_(1.0)
+        ctx.save_for_backward(y)
+        return y
+
+    @staticmethod
+    def backward(ctx: Any, slope: torch.Tensor) -> torch.Tensor:  # noqa: ANN401
+        (y,) = ctx.saved_tensors
+        return torch.ops.aten.tanh_backward(slope, y)
+
+
+class Tanh(nn.Module):
+    """The hyperbolic tangent, fast on processors."""
+
+    def forward(self, x: torch.Tensor) -> torch.Tensor:
+        """Of any shape."""
+        return _Logistic.apply(x)  # pyright: ignore[reportReturnType]
+
+
 class GazeHeads(nn.Module):
     """Scores of moves and of gazes, and what the critic makes of it.
 
@@ -160,7 +184,7 @@ class GazeHeads(nn.Module):
         self.moves = nn.Linear(hidden[-1], moves)
         self.around = nn.Linear(2 * len(_AROUND), channels)
         self.said = nn.Linear(hidden[-1], channels)
-        self.gazes = nn.Linear(channels, 1)
+        self.gazes, self.tanh = nn.Linear(channels, 1), Tanh()
         self.register_buffer("places", torch.as_tensor(_places_around(*panorama)), persistent=False)
 
     def forward(self, features: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
@@ -171,25 +195,12 @@ class GazeHeads(nn.Module):
         """Scores of moves, then of gazes, (N, moves + D)."""
         rays = features.index_select(1, self.places).reshape(len(features), -1, 2 * len(_AROUND))
         units = self.actor(features)
-        looked = torch.tanh(self.around(rays) + self.said(units)[:, None])
+        looked = self.tanh(self.around(rays) + self.said(units)[:, None])
         return torch.cat([self.moves(units), self.gazes(looked)[:, :, 0]], dim=1)
 
     def forward_critic(self, features: torch.Tensor) -> torch.Tensor:
         """The critic's units."""
         return self.critic(features)
-
-
-class _Sums(nn.Module):
-    """Logits of every move with every gaze: the sums of their scores."""
-
-    def __init__(self, moves: int) -> None:
-        super().__init__()
-        self._moves = moves
-
-    def forward(self, scores: torch.Tensor) -> torch.Tensor:
-        """(N, moves·D) of scores (N, moves + D)."""
-        moves, gazes = scores[:, : self._moves], scores[:, self._moves :]
-        return (moves[:, :, None] + gazes[:, None, :]).flatten(1)
 
 
 class GazePolicy(ActorCriticPolicy):
@@ -215,14 +226,15 @@ class GazePolicy(ActorCriticPolicy):
         assert isinstance(self.mlp_extractor, GazeHeads)
         for last in (self.mlp_extractor.moves, self.mlp_extractor.gazes):  # all actions alike at first
             nn.init.orthogonal_(last.weight, gain=0.01)
-        self.action_net = _Sums(self._heads[1])
+        (yaws, pitches), moves, _ = self._heads
+        self.action_dist, self.action_net = MoveAndGaze(moves, yaws * pitches), nn.Identity()
         rate: Any = {"lr": lr_schedule(1)}
         self.optimizer = self.optimizer_class(self.parameters(), **rate, **self.optimizer_kwargs)
 
 
 def _perceptron(features: int, hidden: Sequence[int]) -> nn.Sequential:
     sizes = [features, *hidden]
-    layers = [(nn.Linear(a, b), nn.Tanh()) for a, b in itertools.pairwise(sizes)]
+    layers = [(nn.Linear(a, b), Tanh()) for a, b in itertools.pairwise(sizes)]
     return nn.Sequential(*itertools.chain.from_iterable(layers))
 
 

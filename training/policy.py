@@ -217,5 +217,6 @@ def make_policy_strategy(name: str) -> LearnedPolicy:
 def policy_files(name: str) -> list[Path]:
     """The files that decide what a learned policy does: its checkpoint, and what runs it."""
     checkpoint = latest_checkpoint(policy_folder(name), *POLICIES)
-    code = [Path(__file__).with_name(f"{module}.py") for module in ("policy", "networks", "checkpoints")]
+    modules = ("policy", "networks", "distributions", "checkpoints")
+    code = [Path(__file__).with_name(f"{module}.py") for module in modules]
     return [checkpoint / "policy.json", checkpoint / "policy.safetensors", *code]
