@@ -76,7 +76,7 @@ class DecisionBuffer(RolloutBuffer):
             raise NotFiniteError("reward", reward[~np.isfinite(reward)][0])
         self.decided[place], self.ended[place] = rows.decided, rows.ended
         self.elapsed_s[place], self.gained[place] = rows.elapsed_s, rows.rewards
-        # Stable-Baselines3 adds γ·V(last observation) to the rewards of missions that were cut off.
+        # As in Stable-Baselines3, γ·V(last observation) is added to rewards of missions that were cut off.
         cut_off = reward.astype(np.float64) - rows.rewards.astype(np.float32)
         self.beyond[place] = np.where(cut_off != 0.0, self.scale.restored(cut_off / self.gamma), 0.0)
         super().add(obs, action, reward, *rest)

@@ -25,11 +25,11 @@ from typing import Any, Literal
 
 import numpy as np
 import torch
-from stable_baselines3 import PPO
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import Logger, TensorBoardOutputFormat
 
 from baselines.command import make_folder, parse, print_json, run_command
+from baselines.experiment import csv_table
 from entropy_explore_env.config import Scenario, with_settings
 from entropy_explore_env.envs.robot_vec_env import RobotVecEnv
 from entropy_explore_env.errors import SettingError
@@ -45,6 +45,7 @@ from training.checkpoints import (
     load_checkpoint,
     save_checkpoint,
 )
+from training.collecting import DecisionPPO
 from training.decisions import DecisionBuffer, Discount
 from training.errors import CheckpointError, NotFiniteError
 from training.film import film_best
@@ -82,7 +83,7 @@ class Args:
     resume: bool = False
     """Go on from the latest checkpoint in the folder; from the beginning if there is none."""
     threads: int = 2
-    """For the missions and for the networks."""
+    """For the missions and for learning; the policy chooses on one."""
     json: bool = False
     """Print one JSON object and nothing else."""
 
@@ -264,12 +265,12 @@ class Run:
         self.spent: dict[str, float] = {part: 0.0 for part in _PARTS}
         self.next_validation, self.next_checkpoint = args.validate_every, args.checkpoint_every
 
-    def _model(self) -> PPO:
+    def _model(self) -> DecisionPPO:
         """PPO with fresh weights, learning from decisions."""
         args = self.args
         with warnings.catch_warnings():
             warnings.filterwarnings("ignore", message="You have specified a mini-batch")  # batches are even
-            return PPO(
+            return DecisionPPO(
                 policy_class(args.features),
                 self.rows,
                 learning_rate=lambda remaining: args.learning_rate * max(remaining, 0.05),
@@ -342,7 +343,8 @@ class Run:
         self.spent["validating_s"] += time.perf_counter() - began
         steps = self.model.num_timesteps
         self.curve.append({"steps": steps, **self.spent, **dataclasses.asdict(found)})
-        write_atomically(self.args.out / "curve.csv", _csv(self.curve))
+        columns = {name: [row[name] for row in self.curve] for name in self.curve[0]}
+        write_atomically(self.args.out / "curve.csv", csv_table(columns))
         for name, value in dataclasses.asdict(found).items():
             if value is not None:
                 self.model.logger.record(f"validation/{name}", value)
@@ -392,18 +394,6 @@ class Run:
         for name in _COUNTED:
             setattr(self, name, found.numbers[name])
         self.chance.bit_generator.state = found.numbers["chance"]
-
-
-def _csv(rows: list[dict[str, float | None]]) -> str:
-    lines = [",".join(rows[0])]
-    lines += [
-        ",".join(
-            "" if value is None else f"{value:.6g}" if isinstance(value, float) else str(value)
-            for value in row.values()
-        )
-        for row in rows
-    ]
-    return "\n".join(lines) + "\n"
 
 
 class _Rollouts(BaseCallback):
