@@ -7,6 +7,7 @@ was. `--quick` shrinks everything to some minutes and shows that it works, not w
 
 from __future__ import annotations
 
+import csv
 import os
 import subprocess
 import sys
@@ -238,10 +239,11 @@ def gather(tasks: Sequence[Task], steps: int, folder: Path, starts: int, jobs: i
 
 def read_curve(run: Path) -> list[dict[str, float]]:
     """The rows of a run's curve; what was not there is not a number."""
-    lines = (run / "curve.csv").read_text("utf-8").splitlines()
-    names = lines[0].split(",")
-    rows = ([float(cell) if cell else np.nan for cell in line.split(",")] for line in lines[1:])
-    return [dict(zip(names, row, strict=True)) for row in rows]
+    with (run / "curve.csv").open(encoding="utf-8", newline="") as file:
+        return [
+            {name: float(cell) if cell else np.nan for name, cell in row.items()}
+            for row in csv.DictReader(file)
+        ]
 
 
 if __name__ == "__main__":
