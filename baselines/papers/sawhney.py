@@ -40,6 +40,8 @@ class Args:
     dem: str | None = None
     """A height map's file to fly over as well, in voxels of 1 m; default: jacksboro, a model of the
     elevations that come with matplotlib; with --quick none."""
+    maps: tuple[Path, ...] = ()
+    """Plans from files, such as warehouse.yaml, to explore as well."""
     jobs: int | None = None
     """Processes; default: one a processor."""
     json: bool = False
@@ -63,18 +65,22 @@ def main(words: Sequence[str]) -> int:
     ground = args.dem or (None if args.quick or args.flights == 0 else JACKSBORO)
     if ground is not None and ground != JACKSBORO and not Path(ground).is_file():
         raise SettingError("dem", ground, f"a height map's file, or {JACKSBORO}")
+    for file in args.maps:
+        if not file.is_file():
+            raise SettingError("maps", str(file), "files of plans")
     make_folder("out", args.out)
     make_folder("runs", args.runs)
     started = time.perf_counter()
     usual = _QUICK_STARTS if args.quick else _STARTS
     flights = usual if args.flights is None else args.flights
     dem = ground and (write_model(args.runs) if ground == JACKSBORO else Path(ground))
-    cells = experiment(args.starts or usual, flights, args.quick, dem or None)
+    cells = experiment(args.starts or usual, flights, args.quick, dem or None, args.maps)
     records = run_cells(cells, args.runs, args.jobs or os.cpu_count() or 1, "Sawhney", quiet=args.json)
     claims = all_claims(records)
     given = " --quick" * args.quick
     options = ("starts", "flights", "dem")
     given += "".join(f" --{option} {v}" for option in options if (v := getattr(args, option)) is not None)
+    given += (" --maps " + " ".join(file.name for file in args.maps)) if args.maps else ""
     report = write_report(
         args.out, records, claims, f"python -m baselines.papers.sawhney{given} --out {args.out}"
     )

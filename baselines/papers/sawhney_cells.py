@@ -8,12 +8,16 @@ numbers sweep 0.05 … 3.5 m²/s and 4 … 280 m³/s, from well below to well ab
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from baselines.experiment import Cell
 from baselines.frontier_candidates import Looking
 from baselines.frontier_rivals import Coordinated, Nearest
+from baselines.papers.sawhney_maps import METHODS as MAP_METHODS
+from baselines.papers.sawhney_maps import TEAM as MAP_TEAM
+from baselines.papers.sawhney_maps import MapRun, map_world
 from baselines.papers.sawhney_missions import Run
 from baselines.per_time_visibility import Exploring, Metric
 from entropy_explore_env.config import Scenario, with_settings
@@ -29,6 +33,7 @@ POINT = {"plans": 0.05, "terrains": 4.0}
 """What one of the paper's points is taken to be: m² of plan; m² of ground times metres of height factor."""
 BONUS = {"plans": 0.5, "terrains": 40.0}
 """Of the finishing rule."""
+STRATEGY = "per-time-visibility"
 SIGMA = 0.5
 TIME_LIMIT_S = 3600.0
 CHANGED_TEAM = 3
@@ -91,7 +96,9 @@ def cell_id(world: str, robots: int, method: str, change: str | None = None) -> 
     return f"{world}/n{robots}/{method}" + ("" if change is None else f"-{change}")
 
 
-def experiment(starts: int, flights: int, quick: bool, dem: Path | None) -> list[Cell]:
+def experiment(
+    starts: int, flights: int, quick: bool, dem: Path | None, maps: Sequence[Path] = ()
+) -> list[Cell]:
     """All cells.
 
     Args:
@@ -99,6 +106,7 @@ def experiment(starts: int, flights: int, quick: bool, dem: Path | None) -> list
         flights: Missions a point over each terrain; 0 = none.
         quick: Fewer team sizes and β.
         dem: A height map's file, flown over as well.
+        maps: Files of plans, explored by one team each.
     """
     cells = []
     for world in (*PLANS, *TERRAINS, *((DEM,) if dem is not None else ())):
@@ -109,6 +117,11 @@ def experiment(starts: int, flights: int, quick: bool, dem: Path | None) -> list
             for method, exploring in methods(part, quick).items():
                 seeds = starts if part == "plans" else flights
                 cells.append(_cell(world, robots, method, exploring, seeds, dem))
+    for file in maps:
+        for method in MAP_METHODS:
+            run = MapRun(_exploring(methods("plans", False)[method]), str(file))
+            name = cell_id(map_world(file), MAP_TEAM, method)
+            cells.append(Cell(name, _scenario(PLANS[0], MAP_TEAM, {}), STRATEGY, starts, run))
     for change, (_, settings, more) in CHANGES.items():
         for world in PLANS[:1] if quick else PLANS:
             for method in CHANGED_METHODS:
@@ -128,11 +141,14 @@ def _cell(
     settings: dict[str, Any] | None = None,
     change: str | None = None,
 ) -> Cell:
-    fields = {"looking": Looking(sigma=SIGMA), "finest_sigma": SIGMA, **exploring}
-    flown = str(dem) if world == DEM else None
-    run = Run(Exploring(**fields), flown)
+    run = Run(_exploring(exploring), str(dem) if world == DEM else None)
     name = cell_id(world, robots, method, change)
-    return Cell(name, _scenario(world, robots, settings or {}), "per-time-visibility", seeds, run)
+    return Cell(name, _scenario(world, robots, settings or {}), STRATEGY, seeds, run)
+
+
+def _exploring(fields: dict[str, Any]) -> Exploring:
+    """How robots share frontiers: the experiment's settings, and some of a method."""
+    return Exploring(**{"looking": Looking(sigma=SIGMA), "finest_sigma": SIGMA, **fields})
 
 
 def _scenario(world: str, robots: int, settings: dict[str, Any]) -> Scenario:

@@ -30,6 +30,7 @@ from baselines.papers.sawhney_cells import (
 from baselines.papers.sawhney_cells import experiment as cells_of
 from baselines.papers.sawhney_claims import all_claims, best_beta, compared, relative
 from baselines.papers.sawhney_dem import write_model
+from baselines.papers.sawhney_maps import METHODS as MAP_METHODS
 from baselines.papers.sawhney_missions import Run
 from baselines.per_time_visibility import Exploring, Metric
 from entropy_explore_env.config import with_settings
@@ -107,11 +108,14 @@ def test_claims_do_not_hold_where_all_are_alike():
     assert sum(claim.holds for claim in claims) < 0.2 * len(claims)
 
 
-def tiny_cells(starts, flights, quick, dem):
+def tiny_cells(starts, flights, quick, dem, maps=()):
     """The quick experiment's cells in plans of 5 × 4 m and over terrains of 18 × 15 m, with few cells."""
     del flights
     found = []
-    for cell in cells_of(starts, starts, quick, dem):
+    for cell in cells_of(starts, starts, quick, dem, maps):
+        if cell.id.startswith("map-"):
+            found.append(cell)
+            continue
         world, _, method = cell.id.split("/")
         grid = Grid((50, 60, 1), 0.1) if world in PLANS else Grid((18, 15, 13), 1.0)
         scenario = with_settings(
@@ -131,7 +135,11 @@ def tiny_cells(starts, flights, quick, dem):
 def test_the_command_writes_a_report_and_goes_on_where_it_was(tmp_path, monkeypatch):
     monkeypatch.setattr(sawhney, "experiment", tiny_cells)
     out, runs = tmp_path / "out", tmp_path / "runs"
+    plan = np.full((40, 50), 255, np.uint8)
+    plan[:, :2] = plan[:, -2:] = plan[:2] = plan[-2:] = plan[:25, 22:26] = 0
+    Image.fromarray(plan).save(tmp_path / "hall.png")
     words = ["--quick", "--starts", "2", "--jobs", "1", "--json", "--out", str(out), "--runs", str(runs)]
+    words += ["--maps", str(tmp_path / "hall.png")]
     text = io.StringIO()
     with contextlib.redirect_stdout(text):
         assert run_command(sawhney.main, words) == 0
@@ -150,6 +158,8 @@ def test_the_command_writes_a_report_and_goes_on_where_it_was(tmp_path, monkeypa
         with Image.open(out / "sawhney" / f"{name}.png") as picture:
             assert picture.size[0] > 200
     assert "fewer than the paper's 160" in page
+    mapped = [row for row in page.splitlines() if row.startswith("| hall |")]
+    assert len(mapped) == len(MAP_METHODS) and all(" 99." in row or "100.00%" in row for row in mapped)
     files = sorted(runs.rglob("*.json"))
     before = [file.stat().st_mtime_ns for file in files]
     with contextlib.redirect_stdout(io.StringIO()):
@@ -164,6 +174,7 @@ def test_the_command_writes_a_report_and_goes_on_where_it_was(tmp_path, monkeypa
         (["--flights", "1"], "flights"),
         (["--jobs", "0"], "jobs"),
         (["--dem", "no"], "dem"),
+        (["--maps", "no"], "maps"),
     ],
 )
 def test_what_is_refused(words, complaint, capsys):

@@ -1,0 +1,73 @@
+"""Plans from files, explored by the methods of Sawhney's experiment: who is how fast, and what it costs.
+
+Real plans have what drawn ones lack: racks, clutter, and gaps that no robot gets through.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+
+from baselines.experiment import Record, markdown_table
+from baselines.papers.sawhney_missions import Run
+from baselines.per_time_visibility import Exploring
+from entropy_explore_env.config import Scenario
+from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
+
+TEAM = 3
+METHODS = ("ptv", "beta-1", "beta-10", "beta-40", "finish", "nearest", "coordinated")
+_MARK = "map-"
+
+
+@dataclass(frozen=True)
+class MapRun:
+    """Runs a mission in the plan of a file.
+
+    Attributes:
+        exploring: Of the robots.
+        world: The file.
+    """
+
+    exploring: Exploring
+    world: str
+
+    def __call__(self, env: EntropyExploreEnv, strategy: str, seed: int) -> Record:
+        """Run the mission: what `Run` gives, and `clock_s`, seconds of computing."""
+        there, began = _in_plan(env.scenario, self.world), time.process_time()
+        record = Run(self.exploring)(there, strategy, seed)
+        return {**record, "clock_s": round(time.process_time() - began, 3)}
+
+
+@lru_cache(maxsize=1)
+def _in_plan(scenario: Scenario, world: str) -> EntropyExploreEnv:
+    """An environment in the plan, kept for the next mission."""
+    return EntropyExploreEnv(scenario, world={"path": world})
+
+
+def map_world(file: Path) -> str:
+    """Name of the world of a file."""
+    return _MARK + file.stem
+
+
+def maps_table(records: Mapping[str, Sequence[Record]], ends: Mapping[str, str]) -> str:
+    """Mean times of every method in the plans of files, as Markdown; empty without such plans.
+
+    Args:
+        records: Cell id → records.
+        ends: Name of a time in a record → its heading.
+    """
+    rows = []
+    for cell, found in records.items():
+        world, _, method = cell.split("/")
+        if world.startswith(_MARK):
+            times = [f"{np.mean([record[end] for record in found]):,.0f} s" for end in ends]
+            explored, clock_s = (
+                np.mean([record[name] for record in found]) for name in ("explored", "clock_s")
+            )
+            rows.append([world[len(_MARK) :], f"`{method}`", *times, f"{explored:.2%}", f"{clock_s:.1f} s"])
+    return markdown_table(["plan", "method", *ends.values(), "explored", "computing"], rows) if rows else ""
