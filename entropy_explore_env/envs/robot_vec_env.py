@@ -72,7 +72,12 @@ class RobotVecEnv(VecEnv):
             WorldError: The world cannot be used.
         """
         self.vector_env = EntropyExploreVectorEnv(
-            scenario, missions, threads=threads, autoreset_mode=AutoresetMode.SAME_STEP, **settings
+            scenario,
+            missions,
+            threads=threads,
+            autoreset_mode=AutoresetMode.SAME_STEP,
+            action_masks=False,
+            **settings,
         )
         if seeds is not None and (len(seeds) != missions or not all(is_whole(seed, 0) for seed in seeds)):
             raise SettingError("seeds", list(seeds), f"{missions} whole numbers ≥ 0")

@@ -35,7 +35,7 @@ class EntropyExploreVectorEnv(VectorEnv[Any, Any, Any]):
 
     Infos, each with a mask `_name` (E,) as Gymnasium has it: `deciding`, `entropy_bits`, `own_bits`,
     `received_bits` and `reward_robots`, (E, A); `time_s` and `end` (code of a MissionEnd), (E,);
-    `action_mask`, (E, A, N), where actions are discrete.
+    `action_mask`, (E, A, N), where actions are discrete and masks are wanted.
     `final_obs` and `final_info` where autoreset is SAME_STEP.
     """
 
@@ -47,6 +47,7 @@ class EntropyExploreVectorEnv(VectorEnv[Any, Any, Any]):
         threads: int | None = 1,
         autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
         render_mode: str | None = None,
+        action_masks: bool = True,
         **settings: object,
     ) -> None:
         """Make the missions; `reset` starts them.
@@ -58,6 +59,7 @@ class EntropyExploreVectorEnv(VectorEnv[Any, Any, Any]):
             autoreset_mode: When a mission that is over starts anew: with the next step (its action
                 is ignored), within the same step, or never.
             render_mode: None, "human" or "rgb_array", of the first mission.
+            action_masks: Whether infos hold the masks of discrete actions; without them steps are faster.
             **settings: Fields of the Scenario to change; `world` may also be a World, a sequence of
                 them, or a mapping of a file's `path` and options: see `worlds.given`.
 
@@ -85,6 +87,7 @@ class EntropyExploreVectorEnv(VectorEnv[Any, Any, Any]):
         robots = self.scenario.robots
         space, observation = action_space(self.scenario), self.missions.layout.space()
         self._checker = ActionChecker(space)
+        self._masks = action_masks and self.scenario.action.kind == "discrete"
         self.single_action_space = space if robots == 1 else batch_space(space, robots)
         self.single_observation_space = observation if robots == 1 else batch_space(observation, robots)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
@@ -205,7 +208,7 @@ class EntropyExploreVectorEnv(VectorEnv[Any, Any, Any]):
         for name in ("deciding", "entropy_bits", "own_bits", "received_bits"):
             infos[name] = self._of_robots(robots[name]).copy()
         infos["reward_robots"] = self._of_robots(robots["reward"]).copy()
-        if self.scenario.action.kind == "discrete":
+        if self._masks:
             infos["action_mask"] = self._of_robots(self.missions.action_masks())
         infos.update({f"_{name}": np.ones(self.num_envs, bool) for name in list(infos)})
         over = clocks["end"] != _RUNNING

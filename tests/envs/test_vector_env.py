@@ -248,6 +248,15 @@ def test_infos_hold_the_masks_of_discrete_actions(robots: int) -> None:
     np.testing.assert_array_equal(mask.reshape(-1), observations["action_mask"].reshape(-1))
 
 
+def test_masks_are_left_out_where_nobody_wants_them():
+    env = EntropyExploreVectorEnv(BOX, 2, action={"kind": "discrete"}, action_masks=False)
+    _, infos = env.reset(seed=3)
+    assert "action_mask" not in infos and "_action_mask" not in infos
+    plain = EntropyExploreVectorEnv(BOX, 2, action={"kind": "discrete"})
+    _, more = plain.reset(seed=3)
+    assert set(more) - set(infos) == {"action_mask", "_action_mask"}
+
+
 @pytest.mark.parametrize("threads", [2, 3, None])
 def test_threads_make_no_difference(threads: int | None) -> None:
     settings = {"robots": 2, "channel": {"loss_probability": 0.3, "i_min_bits": 0.0}, **UNEVEN}
