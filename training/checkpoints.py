@@ -133,6 +133,13 @@ def _numbered(folder: Path, kind: str) -> list[Path]:
     return sorted(path for path in folder.glob(f"{kind}-*") if path.name.rpartition("-")[2].isdecimal())
 
 
+def forget_later(folder: Path, kind: str, steps: int) -> None:
+    """Remove the checkpoints of a kind beyond so many steps: a run that goes on from there makes its own."""
+    for later in _numbered(folder, kind):
+        if int(later.name.rpartition("-")[2]) > steps:
+            shutil.rmtree(later)
+
+
 def latest_checkpoint(folder: Path, *kinds: str) -> Path:
     """The checkpoint that a folder is, or its latest one of the first kind that it has.
 

@@ -36,6 +36,10 @@ class DecisionPPO(PPO):
         finally:
             torch.set_num_threads(threads)
 
+    def _excluded_save_params(self) -> list[str]:
+        """What `save` leaves out: the missions, and the buffer that they fill."""
+        return [*super()._excluded_save_params(), "rollout_buffer_class", "rollout_buffer_kwargs"]
+
     def _collect(self, env: RobotVecEnv, callback: BaseCallback, buffer: DecisionBuffer, steps: int) -> bool:
         """As `collect_rollouts`."""
         self.policy.set_training_mode(False)
@@ -54,8 +58,9 @@ class DecisionPPO(PPO):
             if not callback.on_step():
                 return False
             self._update_info_buffer(infos, dones)
-            self._add_beyond(rewards, dones, infos)
-            buffer.add(last, actions, rewards, self._last_episode_starts, values, log_probs)
+            starts = self._last_episode_starts
+            beyond = self._values_beyond(dones, infos)
+            buffer.add_step(beyond, last, actions, rewards, starts, values, log_probs)
             self._last_obs, self._last_episode_starts = observations, dones
         with torch.no_grad():
             values = self.policy.predict_values(torch.as_tensor(observations))
@@ -79,11 +84,12 @@ class DecisionPPO(PPO):
         actions, values, log_probs = found
         return actions, torch.as_tensor(values), torch.as_tensor(log_probs)
 
-    def _add_beyond(self, rewards: np.ndarray, dones: np.ndarray, infos: list[dict[str, Any]]) -> None:
-        """Add γ·V of their last observation to the rewards of missions that were cut off."""
+    def _values_beyond(self, dones: np.ndarray, infos: list[dict[str, Any]]) -> np.ndarray:
+        """(N,) values of the last observations of missions that were cut off, else 0."""
+        beyond = np.zeros(len(dones))
         cut_off = [row for row in np.flatnonzero(dones) if infos[row]["TimeLimit.truncated"]]
         if cut_off:
             last = np.stack([infos[row]["terminal_observation"] for row in cut_off])
             with torch.no_grad():
-                values = self.policy.predict_values(torch.as_tensor(last))
-            rewards[cut_off] += self.gamma * values[:, 0].numpy()
+                beyond[cut_off] = self.policy.predict_values(torch.as_tensor(last))[:, 0].numpy()
+        return beyond

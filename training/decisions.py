@@ -4,12 +4,13 @@ A robot that drives cannot choose; its rows in between are no transitions of the
 seconds belong to its last decision. Decisions k = 0, 1, … of a row are transitions of a semi-Markov
 decision process (Sutton, Precup & Singh 1999): with rewards r at times t,
 
-    R_k = Σ γ^(t - t_k) r(t)  for t_k <= t < t_(k+1),        Γ_k = γ^(t_(k+1) - t_k)
+    R_k = Σ γ^(t - t_k) r(t)  for t_k < t <= t_(k+1),        Γ_k = γ^(t_(k+1) - t_k)
     δ_k = R_k + Γ_k V(s_(k+1)) - V(s_k),                     A_k = δ_k + Γ_k λ A_(k+1)   (GAE)
 
-where γ discounts a second; or, where decisions are discounted, every decision alike: Γ_k = γ and R_k a
-plain sum. A mission that was cut off goes on as V says, one that is mapped is worth nothing more. A decision
-whose outcome lies beyond the rollout is left out; the one before it leads to its value.
+where γ discounts a second, and what a step brings counts at its end, when the scan is taken; or, where
+decisions are discounted, every decision alike: Γ_k = γ and R_k a plain sum. A mission that was cut off goes
+on as V says, one that is mapped is worth nothing more. A decision whose outcome lies beyond the rollout is
+left out; the one before it leads to its value.
 """
 
 from __future__ import annotations
@@ -65,21 +66,23 @@ class DecisionBuffer(RolloutBuffer):
         self.decided, self.ended = np.zeros(shape, bool), np.zeros(shape, bool)
         self.elapsed_s, self.gained, self.beyond = np.zeros(shape), np.zeros(shape), np.zeros(shape)
 
-    def add(self, obs: Any, action: Any, reward: np.ndarray, *rest: Any) -> None:  # noqa: ANN401
-        """Take a step; see RolloutBuffer.
+    def add_step(self, beyond: np.ndarray, *step: Any) -> None:  # noqa: ANN401 - as RolloutBuffer has it
+        """Take a step.
+
+        Args:
+            beyond: (N,) float64, values of the last observations of missions that were cut off, else 0.
+            *step: What `add` of RolloutBuffer takes.
 
         Raises:
             NotFiniteError: A reward is not a finite number.
         """
         place, rows = self.pos, self.rows
-        if not np.isfinite(reward).all():
-            raise NotFiniteError("reward", reward[~np.isfinite(reward)][0])
+        if not np.isfinite(rows.rewards).all():
+            raise NotFiniteError("reward", rows.rewards[~np.isfinite(rows.rewards)][0])
         self.decided[place], self.ended[place] = rows.decided, rows.ended
         self.elapsed_s[place], self.gained[place] = rows.elapsed_s, rows.rewards
-        # As in Stable-Baselines3, γ·V(last observation) is added to rewards of missions that were cut off.
-        cut_off = reward.astype(np.float64) - rows.rewards.astype(np.float32)
-        self.beyond[place] = np.where(cut_off != 0.0, self.scale.restored(cut_off / self.gamma), 0.0)
-        super().add(obs, action, reward, *rest)
+        self.beyond[place] = np.where(beyond != 0.0, self.scale.restored(beyond), 0.0)
+        self.add(*step)
 
     def compute_returns_and_advantage(self, last_values: torch.Tensor, dones: np.ndarray) -> None:
         """Advantages and returns of the decisions; which rows they are in goes into `complete`."""
@@ -96,7 +99,7 @@ class DecisionBuffer(RolloutBuffer):
             advantage, gained = np.where(ended, 0.0, advantage), np.where(ended, 0.0, gained)
             lasting, known = np.where(ended, 1.0, lasting), known | ended
             fade = self.gamma ** self.elapsed_s[step] if seconds else 1.0
-            gained, lasting = self.gained[step] + fade * gained, fade * lasting
+            gained, lasting = fade * (self.gained[step] + gained), fade * lasting
             shrink = lasting if seconds else self.gamma
             found = gained + shrink * after - values[step] + shrink * self.gae_lambda * advantage
             self.complete[step] = decided & known

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import torch
 from stable_baselines3.common.distributions import CategoricalDistribution
+from torch import nn
 from torch.distributions import Categorical
 
 
@@ -21,6 +22,11 @@ class MoveAndGaze(CategoricalDistribution):
         """Know how many there are, M and D."""
         super().__init__(moves * gazes)
         self._sizes = (moves, gazes)
+
+    def proba_distribution_net(self, latent_dim: int) -> nn.Module:
+        """Nothing: it is made of the scores as they are."""
+        del latent_dim
+        return nn.Identity()
 
     def proba_distribution(self, action_logits: torch.Tensor) -> MoveAndGaze:
         """Take the scores of moves, then of gazes, (N, M + D)."""

@@ -74,6 +74,8 @@ ABLATIONS: dict[str, tuple[str, tuple[str, ...]]] = {
     ),
 }
 """What is changed, one thing at a time: a sentence, and the options."""
+BESIDE = {name: "vector" if name == "overview" else "default" for name in ABLATIONS}
+"""The run that each differs from in that one thing."""
 ABLATION_STEPS = 200_000
 
 

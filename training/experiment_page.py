@@ -12,7 +12,7 @@ from baselines.experiment import csv_table, markdown_table
 from baselines.figures import COLOURS, STYLE, png
 from entropy_explore_env.writing import write_atomically
 from training.evaluate import SIMPLE, table_cells
-from training.experiment import ABLATIONS, Found, Task, planned_runs
+from training.experiment import ABLATIONS, BESIDE, Found, Task, planned_runs
 
 _LINES = {"gradient": "--", "random": ":", "information-rate": "-."}
 
@@ -161,19 +161,28 @@ def _ablation_parts(found: Found) -> list[str]:
     usual = ends["default"]
     rows = []
     for name, (sentence, options) in ABLATIONS.items():
-        own = ends[name]
-        apart = "" if name == "default" else f"{np.mean(own - usual):+.1f}"
-        spread = "" if name == "default" else f"{np.min(own - usual):+.1f} … {np.max(own - usual):+.1f}"
+        own, base = ends[name], BESIDE[name]
+        more = own - ends[base]
+        apart = "" if name == base else f"{np.mean(more):+.1f}"
+        spread = "" if name == base else f"{np.min(more):+.1f} … {np.max(more):+.1f}"
         times = ", ".join(f"{time:.1f}" for time in own)
-        rows.append((name, sentence, f"`{' '.join(options)}`" if options else "", times, apart, spread))
-    head = ["run", "what is changed", "options", "seconds, seeds 0, 1, 2", "mean difference", "range"]
+        shown = f"`{' '.join(options)}`" if options else ""
+        rows.append((name, sentence, shown, times, "" if name == base else base, apart, spread))
+    head = [
+        "run",
+        "what is changed",
+        "options",
+        "seconds, seeds 0, 1, 2",
+        "beside",
+        "mean difference",
+        "range",
+    ]
     return [
         "## What the design rests on\n",
         f"Runs of {found.steps:,} steps in the room, three robots, three seeds each, one thing changed at a "
-        "time. Seconds are the mean mission time in the last validation (32 missions); differences are to "
-        "the default's run of the same seed. Three seeds tell large differences from none, not small ones: "
-        "what "
-        "lies within the spread of the default's own runs "
+        "time. Seconds are the mean mission time in the last validation (32 missions); differences, their "
+        "mean and range, are to the run of the same seed that it stands beside. Three seeds tell large "
+        "differences from none, not small ones: what lies within the spread of the default's own runs "
         f"({usual.min():.1f} … {usual.max():.1f} s) is not told apart from chance.\n",
         markdown_table(head, rows),
         "![Mission times of the changed runs](ppo/ablations.png)\n",

@@ -47,8 +47,8 @@ class VectorFeatures(BaseFeaturesExtractor):
         places = np.concatenate([np.arange(part.start, part.stop) for part in chosen])
         super().__init__(space, len(places))
         self.register_buffer("places", torch.as_tensor(places), persistent=False)
-        self.register_buffer("mean", torch.zeros(layout.size), persistent=False)
-        self.register_buffer("deviation", torch.ones(layout.size), persistent=False)
+        self.register_buffer("mean", torch.zeros(layout.size))
+        self.register_buffer("deviation", torch.ones(layout.size))
 
     def rescale(self, mean: np.ndarray, deviation: np.ndarray) -> None:
         """Take over means and deviations (F,) of flat observations."""
@@ -222,14 +222,21 @@ class GazePolicy(ActorCriticPolicy):
         self.mlp_extractor = GazeHeads(self.features_dim, *self._heads)  # pyright: ignore
 
     def _build(self, lr_schedule: Callable[[float], float]) -> None:
+        (yaws, pitches), moves, _ = self._heads
+        self.action_dist = MoveAndGaze(moves, yaws * pitches)
         super()._build(lr_schedule)
         assert isinstance(self.mlp_extractor, GazeHeads)
         for last in (self.mlp_extractor.moves, self.mlp_extractor.gazes):  # all actions alike at first
             nn.init.orthogonal_(last.weight, gain=0.01)
-        (yaws, pitches), moves, _ = self._heads
-        self.action_dist, self.action_net = MoveAndGaze(moves, yaws * pitches), nn.Identity()
-        rate: Any = {"lr": lr_schedule(1)}
-        self.optimizer = self.optimizer_class(self.parameters(), **rate, **self.optimizer_kwargs)
+
+    def _get_constructor_parameters(self) -> dict[str, Any]:
+        """What `save` keeps to make the policy again."""
+        panorama, moves, hidden = self._heads
+        return super()._get_constructor_parameters() | {
+            "panorama": panorama,
+            "moves": moves,
+            "hidden": hidden,
+        }
 
 
 def _perceptron(features: int, hidden: Sequence[int]) -> nn.Sequential:

@@ -22,6 +22,8 @@ from training.networks import VectorFeatures, policy_class, policy_settings
 from training.scales import RunningScale
 
 _SHARED = ("pi_features_extractor.", "vf_features_extractor.")
+_SCALES = ("features_extractor.mean", "features_extractor.deviation")
+"""Kept as the scale of observations."""
 """Further names of `features_extractor`."""
 PRETRAINED = Path(__file__).parent / "pretrained"
 PREFIX = "pretrained:"
@@ -74,8 +76,9 @@ def take_weights(policy: ActorCriticPolicy, checkpoint: Checkpoint) -> None:
 
 
 def weights_of(policy: ActorCriticPolicy) -> dict[str, torch.Tensor]:
-    """A policy's weights, each once: actor and critic share what looks at observations."""
-    return {name: each for name, each in policy.state_dict().items() if not name.startswith(_SHARED)}
+    """A policy's weights, each once: actor and critic share what looks at observations; no scales."""
+    named = policy.state_dict().items()
+    return {name: each for name, each in named if not name.startswith(_SHARED) and name not in _SCALES}
 
 
 def rescale_observations(policy: ActorCriticPolicy, scale: RunningScale) -> None:
@@ -217,6 +220,6 @@ def make_policy_strategy(name: str) -> LearnedPolicy:
 def policy_files(name: str) -> list[Path]:
     """The files that decide what a learned policy does: its checkpoint, and what runs it."""
     checkpoint = latest_checkpoint(policy_folder(name), *POLICIES)
-    modules = ("policy", "networks", "distributions", "checkpoints")
+    modules = ("policy", "networks", "distributions", "checkpoints", "scales")
     code = [Path(__file__).with_name(f"{module}.py") for module in modules]
     return [checkpoint / "policy.json", checkpoint / "policy.safetensors", *code]

@@ -41,6 +41,7 @@ from training.checkpoints import (
     Checkpoint,
     PolicySettings,
     checkpoint_name,
+    forget_later,
     latest_checkpoint,
     load_checkpoint,
     save_checkpoint,
@@ -222,12 +223,14 @@ def _found_checkpoint(args: Args) -> Checkpoint | None:
     Raises:
         CheckpointError: There is something, but not to go on from.
     """
+    used = [path for mark in ("step-*", "best-*", "curve.csv") for path in args.out.glob(mark)]
+    if used and not args.resume:
+        raise SettingError("out", str(args.out), "a new folder, or --resume to go on with the run in it")
     try:
         folder = latest_checkpoint(args.out, "step")
     except CheckpointError:
+        forget_later(args.out, "best", 0)
         return None
-    if not args.resume:
-        raise SettingError("out", str(args.out), "a new folder, or --resume to go on with the run in it")
     found = load_checkpoint(folder, training=True)
     then, now = found.progress.get("args"), _described(args)
     for name, value in now.items():
@@ -305,7 +308,10 @@ class Run:
         if left > 0:
             try:
                 self.model.learn(left, callback=_Rollouts(self), reset_num_timesteps=False)
-            except ValueError as error:
+            except NotFiniteError as error:
+                steps = self.model.num_timesteps if error.steps is None else error.steps
+                raise NotFiniteError(error.tensor, error.value, steps) from None
+            except (ValueError, RuntimeError) as error:  # of distributions that are not finite
                 self.check_finite()
                 raise error
         self.validator.close()
@@ -315,7 +321,7 @@ class Run:
         """Raise a NotFiniteError if the latest loss or any weight is not finite."""
         steps = self.model.num_timesteps
         for name, value in self.model.logger.name_to_value.items():
-            if name.startswith("train/") and not np.isfinite(value):
+            if name.startswith("train/") and name.endswith("loss") and not np.isfinite(value):
                 raise NotFiniteError(name, value, steps)
         for name, weights in weights_of(self.model.policy).items():
             if not torch.isfinite(weights).all():
@@ -387,13 +393,17 @@ class Run:
             name = self.scenario.name
             raise CheckpointError("scenario", name, "the settings that the run was started with")
         take_weights(self.model.policy, found)
-        take_up_training(found, self.model, self.rows)
-        self.observed = scale_of(found.scales, "observations", self.layout.size)
-        self.returns.follow(scale_of(found.scales, "returns", 1))
-        self.spent = {part: found.progress[part] for part in _PARTS}
-        for name in _COUNTED:
-            setattr(self, name, found.numbers[name])
-        self.chance.bit_generator.state = found.numbers["chance"]
+        try:
+            take_up_training(found, self.model, self.rows)
+            self.observed = scale_of(found.scales, "observations", self.layout.size)
+            self.returns.follow(scale_of(found.scales, "returns", 1))
+            self.spent = {part: found.progress[part] for part in _PARTS}
+            for name in _COUNTED:
+                setattr(self, name, found.numbers[name])
+            self.chance.bit_generator.state = found.numbers["chance"]
+        except (LookupError, TypeError, ValueError) as error:
+            raise CheckpointError("checkpoint", repr(error), "one of this version of training.ppo") from None
+        forget_later(self.args.out, "best", self.model.num_timesteps)
 
 
 class _Rollouts(BaseCallback):

@@ -42,7 +42,7 @@ class Validator:
             threads: That share them.
         """
         there = with_settings(scenario, {"split": "validation", "decision_period_s": None})
-        self._env = EntropyExploreVectorEnv(there, missions, threads=threads)
+        self._env = EntropyExploreVectorEnv(there, missions, threads=threads, action_masks=False)
         self._seeds = validation_seeds(missions)
 
     def validate(self, policy: ActorCriticPolicy) -> Validation:

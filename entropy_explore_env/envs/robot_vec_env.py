@@ -64,7 +64,7 @@ class RobotVecEnv(VecEnv):
             scenario: A scenario's name, or a Scenario.
             missions: E.
             threads: That share the missions; None = one a processor. Results are the same.
-            seeds: (E,) of the missions' first reset; None = what `seed` says, else fresh ones.
+            seeds: (E,) of the missions' first reset, whatever `seed` says; None = that, else fresh ones.
             **settings: Fields of the Scenario to change.
 
         Raises:
@@ -100,7 +100,7 @@ class RobotVecEnv(VecEnv):
             Observations of the rows, (N, ...).
         """
         seeds: Any = self._first_seeds
-        if self._seeds[0] is not None:
+        if seeds is None and self._seeds[0] is not None:
             seeds = [self._seeds[row] for row in range(0, self.num_envs, self._robots)]
         observations, infos = self.vector_env.reset(seed=seeds)
         self._reset_seeds()

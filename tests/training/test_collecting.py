@@ -8,9 +8,13 @@ from typing import Any
 import numpy as np
 import pytest
 import torch
+from stable_baselines3 import PPO
 
 from baselines.command import parse
+from training.collecting import DecisionPPO
+from training.decisions import DecisionBuffer
 from training.ppo import Args, Run, training_scenario
+from training.seeds import learning_seeds
 from training.terminal import TrainingBar
 
 TINY = (
@@ -71,3 +75,50 @@ def test_busy_rows_change_nothing_and_decisions_are_the_policy_s(
         )
     assert np.allclose(log_probs, plain.log_probs[decided], atol=1e-4)
     assert np.allclose(values[:, 0], run.returns.restored(plain.values)[decided], atol=1e-4)
+
+
+def test_where_all_decide_rollouts_are_those_of_stable_baselines3(tmp_path: Path) -> None:
+    """One robot waits for nobody: every row decides, and what is drawn and valued is what PPO draws."""
+    words = ["--robots", "1"]
+    run = new_run(tmp_path, words)
+    collect(run)
+    other = new_run(tmp_path, words)
+    _, callback = other.model._setup_learn(1, None)
+    bootstrapped = []
+
+    def add_step(beyond: Any, *step: Any) -> None:
+        DecisionBuffer.add_step(other.buffer, beyond, *step)
+
+    def add(obs: Any, action: Any, reward: np.ndarray, *rest: Any) -> None:
+        bootstrapped.append((reward - other.rows.rewards.astype(np.float32)) / other.model.gamma)
+        other.buffer.add = DecisionBuffer.add.__get__(other.buffer)
+        add_step(np.zeros(len(reward)), obs, action, reward, *rest)
+        other.buffer.add = add
+
+    other.buffer.add = add
+    PPO.collect_rollouts(other.model, other.rows, callback, other.buffer, other.args.rollout_steps)
+    ours, theirs = run.buffer, other.buffer
+    assert ours.decided.all() and ours.ended.any()
+    for name in ("observations", "actions", "ended", "gained"):
+        assert np.array_equal(getattr(ours, name), getattr(theirs, name)), name
+    assert np.allclose(ours.log_probs, theirs.log_probs, atol=1e-5)
+    values = [each.returns.restored(each.buffer.values) for each in (run, other)]
+    assert np.allclose(*values, atol=1e-4)
+    assert ours.beyond.any() and np.allclose(ours.beyond, bootstrapped, atol=1e-4)
+
+
+def test_missions_to_learn_from_have_the_seeds_for_learning(tmp_path: Path) -> None:
+    run = new_run(tmp_path, ["--seed", "3"])
+    run.model._setup_learn(1, None)
+    assert list(run.rows.vector_env.missions.seeds) == learning_seeds(3, 3)
+
+
+def test_stable_baselines3_saves_the_trainer_without_its_missions(tmp_path: Path) -> None:
+    run = new_run(tmp_path, [])
+    collect(run)
+    run.model.save(tmp_path / "model.zip")
+    again = DecisionPPO.load(tmp_path / "model.zip", device="cpu")
+    seen = run.buffer.observations[: run.args.missions, 0]
+    assert np.array_equal(
+        run.model.predict(seen, deterministic=True)[0], again.predict(seen, deterministic=True)[0]
+    )

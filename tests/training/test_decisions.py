@@ -51,12 +51,12 @@ def filled(
     for step in range(steps):
         rows.decided, rows.ended, rows.elapsed_s = decided[step], ended[step], elapsed_s[step]
         rows.rewards = rewards[step]
-        given = rewards[step].astype(np.float32) + np.float32(gamma) * cut_off[step].astype(np.float32)
         seen = np.full((count, 2), step, np.float32)
-        buffer.add(
+        buffer.add_step(
+            cut_off[step],
             seen,
             np.arange(count) + 3,
-            given,
+            rewards[step],
             np.zeros(count),
             torch.as_tensor(values[step].astype(np.float32)),
             torch.zeros(count),
@@ -75,8 +75,8 @@ def walked(decided, rewards, elapsed_s, ended, cut_off, values, last, deciding, 
         """R, Γ, V of what comes next (None = of a decision), and which decision that is."""
         gained, fade = 0.0, 1.0
         for step in range(start, steps):
-            gained += (fade if discount == "seconds" else 1.0) * rewards[step]
             fade *= gamma ** elapsed_s[step]
+            gained += (fade if discount == "seconds" else 1.0) * rewards[step]
             shrink = fade if discount == "seconds" else gamma
             if ended[step]:
                 return gained, shrink, cut_off[step], None
@@ -127,7 +127,7 @@ def test_advantages_are_those_of_a_plain_walk(seed: int, discount: str) -> None:
 
 
 def test_a_drive_of_two_steps_by_hand() -> None:
-    """Decides, drives 1 s and 2 s, decides again: R = 1 + 0.8·3, Γ = 0.8³; then the rollout ends busy."""
+    """Decides, drives 1 s and 2 s, decides again: R = 0.8·1 + 0.8³·3, Γ = 0.8³; then the rollout ends."""
     column = np.array([[True], [False], [True]])
     nothing = np.zeros((3, 1))
     buffer = filled(
@@ -141,7 +141,7 @@ def test_a_drive_of_two_steps_by_hand() -> None:
         np.array([False]),
     )
     assert buffer.complete[:, 0].tolist() == [True, False, False]
-    assert buffer.advantages[0, 0] == pytest.approx(1 + 0.8 * 3 + 0.8**3 * 4 - 2)
+    assert buffer.advantages[0, 0] == pytest.approx(0.8 * 1 + 0.8**3 * 3 + 0.8**3 * 4 - 2)
 
 
 def test_only_decisions_are_learned_from_and_each_once() -> None:

@@ -73,7 +73,7 @@ def test_changes_are_told_seed_by_seed(tmp_path: Path) -> None:
     """60, 61, 62 s by default and 70, 69, 68 s with short batches: 8 s apart on average, from 6 to 10."""
     page = write_page(tmp_path, found(0.4, 20), "the command").read_text()
     line = next(line for line in page.splitlines() if line.startswith("| burst-32 "))
-    assert line.endswith("| 70.0, 69.0, 68.0 | +8.0 | +6.0 … +10.0 |")
+    assert line.endswith("| 70.0, 69.0, 68.0 | default | +8.0 | +6.0 … +10.0 |")
 
 
 def test_every_run_is_its_own_and_its_options_are_ppo_s() -> None:

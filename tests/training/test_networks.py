@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -40,7 +41,7 @@ def test_vectors_are_the_parts_that_are_no_maps_scaled_and_clipped() -> None:
     assert torch.equal(features(seen), parts)
     features.rescale(np.full(layout.size, 0.5), np.full(layout.size, 0.01))
     assert torch.allclose(features(seen), ((parts - 0.5) / 0.01).clamp(-10, 10))
-    assert not features.state_dict()  # scales lie beside the weights, not among them
+    assert set(features.state_dict()) == {"mean", "deviation"}
 
 
 @pytest.mark.parametrize(
@@ -136,3 +137,21 @@ def test_gazes_want_a_ray_for_each_gaze(change: dict[str, Any]) -> None:
     there = with_settings(scenario(), change)
     with pytest.raises(SettingError, match="a ray for each gaze"):
         policy_settings("gazes", there, (8,))
+
+
+@pytest.mark.parametrize("features", ["gazes", "vector"])
+def test_scales_lie_beside_the_weights_and_stable_baselines3_saves_both(
+    tmp_path: Path, features: str
+) -> None:
+    policy = make_policy(PolicySettings(scenario(), features, (8, 8)))
+    assert not any("deviation" in name or name.endswith(".mean") for name in weights_of(policy))
+    size = ObservationLayout(scenario()).size
+    scale = RunningScale(size)
+    scale.update(np.random.default_rng(1).normal(3.0, 2.0, (50, size)))
+    rescale_observations(policy, scale)
+    policy.save(str(tmp_path / "policy.zip"))
+    again = type(policy).load(str(tmp_path / "policy.zip"), device="cpu")
+    seen = observations(scenario(), 40).numpy()
+    before, _ = policy.predict(seen, deterministic=True)
+    assert len(set(before.tolist())) > 1
+    assert np.array_equal(before, again.predict(seen, deterministic=True)[0])
