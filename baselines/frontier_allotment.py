@@ -5,7 +5,8 @@ promised, and the next pair is sought with what is left. Asynchronously only sto
 promises of those under way stand until they have scanned; synchronously all wait for one another and take
 part together. Each robot allots from its own belief and from what reached it (poses, announcements): it
 works out the others' turns as they would, and takes its own. With perfect messages that is the paper's
-central procedure. A robot counts as stopped if it was heard since it announced its latest viewpoint, that
+central procedure; of teammates of another kind it takes them to see and to fit in like itself. A robot counts
+as stopped if it was heard since it announced its latest viewpoint, that
 is, its scan arrived.
 """
 
@@ -43,7 +44,7 @@ class Value(Protocol):
         """(K,) values; -inf = no candidate.
 
         Args:
-            seen: (K,) V·(height factor) in points' size; inf = not known.
+            seen: (K,) V·(height factor) in points' size.
             seconds: (K,) travel and scan.
             edges: (K,) length of the way in voxel edges.
             taken: (K,) how much of a frontier is taken by robots that go near it, ≥ 0 (Burgard 2005).
@@ -169,7 +170,7 @@ class Allotter:
         voxels = self.candidates.voxels_of(slice(None))
         edges = np.full(len(voxels), np.inf)
         ask_costs(self.search, voxels, edges)
-        return _Ways(self._scenario.grid.in_grid_units(pose)[:3], reach, edges)
+        return _Ways(self.place_of(self.start_of(pose)), reach, edges)
 
     def _best(
         self, view: RobotView, robot: int, ways: dict[int, _Ways], taken: Sequence[np.ndarray]
@@ -190,6 +191,7 @@ class Allotter:
             everywhere = np.empty(self._scenario.grid.voxels)
             collect(self.search, everywhere)
             self.candidates.other_of(everywhere)
+            ways.clear()  # candidates have moved
             ways[robot] = self._ways(pose, math.inf)
             choice, _ = self._best_of(robot, ways[robot], taken)
         return choice

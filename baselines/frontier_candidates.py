@@ -25,6 +25,7 @@ from baselines.expected_view import (
     rays_towards,
 )
 from baselines.frontier_map import (
+    COVERED,
     NONE,
     SPENT,
     UNMAPPED,
@@ -37,6 +38,7 @@ from baselines.frontier_map import (
 )
 from baselines.ray_tree import grow_tree
 from baselines.terrain_map import (
+    choose_reached_columns,
     count_below,
     count_columns_from,
     count_columns_in_ball,
@@ -179,14 +181,21 @@ class VoxelCandidates:
     def spend(self, voxel: int) -> None:
         """A scan was taken in a voxel: it is no candidate any more."""
         self._map.flags[voxel] |= SPENT
-        x, y, z = np.unravel_index(voxel, self._size)
+        look_at_blocks(self._map, put_block(self._map, self._block_of(voxel), 0))
+
+    def _block_of(self, voxel: int) -> int:
+        x, y, z = (int(i) for i in np.unravel_index(voxel, self._size))
         (across, blocks) = (self._map.across, self._map.blocks)
-        block = (int(x) // across[0] * blocks[1] + int(y) // across[1]) * blocks[2] + int(z) // across[2]
-        look_at_blocks(self._map, put_block(self._map, block, 0))
+        return (x // across[0] * blocks[1] + y // across[1]) * blocks[2] + z // across[2]
 
     def unspend(self) -> None:
         """Any place may be a candidate again: more is asked for from now on."""
-        self._map.flags[:] &= np.uint8(~SPENT & 0xFF)
+        spent = np.flatnonzero(self._map.flags & SPENT)
+        self._map.flags[spent] &= np.uint8(~SPENT & 0xFF)
+        count = 0
+        for voxel in spent:
+            count = put_block(self._map, self._block_of(int(voxel)), count)
+        look_at_blocks(self._map, count)
 
     def other_of(self, cost: np.ndarray) -> None:
         """Blocks whose candidate was not reached may have one that was; (V,) float64 costs, inf = not."""
@@ -204,7 +213,7 @@ class VoxelCandidates:
             place = x + offset[0], y + offset[1], z + offset[2]
             if all(0 <= i < n for i, n in zip(place, self._size, strict=True)):
                 voxel = int(np.ravel_multi_index(place, self._size))
-                if math.isinf(self._rates[voxel]) and self._map.state[voxel] & 6 == 0:
+                if math.isinf(self._rates[voxel]) and self._map.state[voxel] & (UNMAPPED | COVERED) == 0:
                     opened.append(voxel)
         self._rates[opened] = 1.0
         return opened
@@ -319,17 +328,23 @@ class TerrainCandidates:
     def spend(self, voxel: int) -> None:
         """See `VoxelCandidates`."""
         self._map.spent[voxel] = SPENT
-        x, y, _ = np.unravel_index(voxel, self._size)
-        wide = self._map.spacing
-        block = int(x) // wide * self._map.rows + int(y) // wide
-        look_at_columns(self._map, put_block(self._map, block, 0))
+        look_at_columns(self._map, put_block(self._map, self._block_of(voxel), 0))
+
+    def _block_of(self, voxel: int) -> int:
+        x, y, _ = (int(i) for i in np.unravel_index(voxel, self._size))
+        return x // self._map.spacing * self._map.rows + y // self._map.spacing
 
     def unspend(self) -> None:
         """See `VoxelCandidates`."""
+        spent, count = np.flatnonzero(self._map.spent), 0
         self._map.spent[:] = 0
+        for voxel in spent:
+            count = put_block(self._map, self._block_of(int(voxel)), count)
+        look_at_columns(self._map, count)
 
     def other_of(self, cost: np.ndarray) -> None:
-        """Columns that hang together with nothing are no candidates: nothing to do."""
+        """See `VoxelCandidates`."""
+        choose_reached_columns(self._map, cost)
 
     def open_start(self, x: int, y: int, z: int) -> list[int]:
         """See `VoxelCandidates`."""

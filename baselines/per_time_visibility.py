@@ -8,7 +8,10 @@ m³, heights in metres), t in seconds: β is in these units a second.
 Ours, where the paper says nothing: candidates are sampled one to a block; a place from which a robot has
 scanned is no candidate of it any more, so that slivers that its rays miss do not hold it; where nothing is
 left while teammates are under way it waits, scanning; and then a finer σ counts as explored, half the one
-before, until the mission's σ_end: a mission may ask for more than having seen everything once.
+before, until the mission's σ_end: a mission may ask for more than having seen everything once. Where nothing
+is left at that level either, it goes to random viewpoints. Robots that drive straight, or no farther than a
+reach, stop and scan at corners, which t does not count, and promise what they see from there first. V is what
+is seen all around; a sensor that looks one way is turned to where most of it lies.
 """
 
 from __future__ import annotations
@@ -248,6 +251,7 @@ class FrontierStrategy:
                 apart_m = np.linalg.norm(seen.pose[:3] - target)
                 if apart_m > 1.5 * self._scenario.grid.voxel_size_m:
                     return True
+                del errand.plan[mate]  # it has been there: wherever it goes now, it goes to its next target
         return False
 
     def _allotted(self, view: RobotView, errand: _Errand, allotter: Allotter) -> Choice | None:

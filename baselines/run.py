@@ -33,7 +33,8 @@ class Args:
     """A named scenario: room, office, cave, … (the README lists them)."""
     strategy: str = "gradient"
     """Chooses viewpoints: random, gradient, gradient-plane, mutual-information, ground-gradient,
-    information-rate, information-per-scan, voronoi, voronoi-gradient, voronoi-nearest; or a learned policy:
+    information-rate, information-per-scan, voronoi, voronoi-gradient, voronoi-nearest, per-time-visibility,
+    nearest-frontier, coordinated-frontier; or a learned policy:
     pretrained:room, or the folder of a run of training.ppo."""
     robots: int = 3
     """Team size."""

@@ -219,33 +219,82 @@ def _look_for_candidates(terrain, block):
     best, nearest = NONE, math.inf
     for x in range(i0, i1):
         for y in range(j0, j1):
-            column, room = x * size[1] + y, False
+            column = x * size[1] + y
             for z in range(size[2]):
-                flies = may_fly(terrain, x, y, z)
-                terrain.rates[column * size[2] + z] = 1.0 if flies else math.inf
-                room = room or flies
+                terrain.rates[column * size[2] + z] = 1.0 if may_fly(terrain, x, y, z) else math.inf
             terrain.flags[column] &= EDGE
-            if room and _near_edge(terrain, x, y):
+            if _near_edge(terrain, x, y) and _has_room(terrain, column):
                 terrain.flags[column] |= CANDIDATE
                 dx, dy = 2 * x + 1 - i0 - i1, 2 * y + 1 - j0 - j1
                 if dx * dx + dy * dy < nearest:
                     best, nearest = column, dx * dx + dy * dy
-    if best != terrain.column[block]:
-        terrain.column[block] = best
-        for height in range(terrain.heights):
-            terrain.seen[block * terrain.heights + height] = math.inf
+    _take_column(terrain, block, best)
+
+
+@inlined_kernel
+def _at_height(terrain, column, height):
+    """The voxel at a height of the candidates above a column; NONE where a body cannot be, or has scanned."""
+    layer = terrain.ground[column // terrain.size[1], column % terrain.size[1]] + 1 + height * terrain.rise
+    if layer >= terrain.size[2]:
+        return NONE
+    voxel = column * terrain.size[2] + layer
+    return NONE if math.isinf(terrain.rates[voxel]) or terrain.spent[voxel] else voxel
+
+
+@inlined_kernel
+def _has_room(terrain, column):
+    """Whether there is a candidate above a column."""
+    if terrain.ground[column // terrain.size[1], column % terrain.size[1]] == NONE:
+        return False
+    for height in range(terrain.heights):
+        if _at_height(terrain, column, height) != NONE:
+            return True
+    return False
+
+
+@lean_kernel
+def _take_column(terrain, block, column):
+    """Let a column, or NONE, have the candidates of a block."""
+    changed = column != terrain.column[block]
+    terrain.column[block] = column
     for height in range(terrain.heights):
         place = block * terrain.heights + height
-        voxel = NONE
-        if best != NONE:
-            layer = terrain.ground[best // size[1], best % size[1]] + 1 + height * terrain.rise
-            if layer < size[2]:
-                voxel = best * size[2] + layer
-        if voxel != NONE and (math.isinf(terrain.rates[voxel]) or terrain.spent[voxel]):
-            voxel = NONE
-        if voxel != terrain.voxel[place]:
+        voxel = _at_height(terrain, column, height) if column != NONE else NONE
+        if changed or voxel != terrain.voxel[place]:
             terrain.voxel[place] = voxel
             terrain.seen[place] = math.inf
+
+
+@lean_kernel
+def choose_reached_columns(terrain, cost):
+    """Let blocks whose candidates were not reached have a column with one that was; (V,) costs, inf = not."""
+    size = terrain.size
+    for block in range(len(terrain.column)):
+        if terrain.column[block] == NONE or _is_reached(terrain, terrain.column[block], cost):
+            continue
+        i0, i1, j0, j1 = _span(terrain, block)
+        best, nearest = NONE, math.inf
+        for x in range(i0, i1):
+            for y in range(j0, j1):
+                column, dx, dy = x * size[1] + y, 2 * x + 1 - i0 - i1, 2 * y + 1 - j0 - j1
+                if (
+                    terrain.flags[column] & CANDIDATE
+                    and dx * dx + dy * dy < nearest
+                    and _is_reached(terrain, column, cost)
+                ):
+                    best, nearest = column, dx * dx + dy * dy
+        if best != NONE:
+            _take_column(terrain, block, best)
+
+
+@inlined_kernel
+def _is_reached(terrain, column, cost):
+    """Whether a candidate above a column was reached."""
+    for height in range(terrain.heights):
+        voxel = _at_height(terrain, column, height)
+        if voxel != NONE and not math.isinf(cost[voxel]):
+            return True
+    return False
 
 
 @inlined_kernel

@@ -44,7 +44,7 @@ _PLAN: dict[str, Any] = {
     "sensor": {"max_range_m": 3.0, "angular_step_rad": math.pi / 180, "scan_time_s": 2.0},
 }
 _TERRAIN: dict[str, Any] = {
-    "robot": {"reach_m": math.inf, "body_radius_m": 0.0},
+    "robot": {"reach_m": math.inf, "body_radius_m": 0.0, "navigator": "planned", "unknown_cost": 1e4},
     "sensor": {
         "field_of_view_rad": (2 * math.pi, math.pi / 2),
         "angular_step_rad": math.pi / 60,
@@ -65,7 +65,7 @@ CHANGES: dict[str, tuple[str, dict[str, Any], dict[str, Any]]] = {
     "unpromised": ("nothing is promised", {}, {"promises": False}),
 }
 """What is changed in plans: a text, settings of the scenario, fields of Exploring."""
-CHANGED_METHODS = ("ptv", "beta-10", "beta-20")
+CHANGED_METHODS = ("ptv", "beta-10", "beta-20", "sync", "naive")
 
 
 def part_of(world: str) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 
 import numpy as np
@@ -97,18 +98,54 @@ def test_terrain_is_mapped_below_the_exposure_surface(allotment):
     assert env.missions.state.robots["blocked_moves"].sum() == 0
 
 
+@pytest.mark.parametrize("navigator", ["straight", "planned"])
+def test_synchronous_robots_over_terrain_wait_for_this_journey_and_no_other(navigator):
+    """Who waits scans on the spot, 0.5 s each time: it leaves soon after the last one has scanned."""
+    robot = {"reach_m": math.inf, "body_radius_m": 0.0, "navigator": navigator, "unknown_cost": 1e4}
+    scenario = small_terrain(robots=3, robot=robot)
+    _, explorer, _ = explored(scenario, 1, allotment="synchronous")
+    late_s = []
+    for before, after in itertools.pairwise(rounds(explorer)):
+        ended_s = max(end for _, end in before)
+        late_s += [left_s - ended_s for left_s, _ in after] if len(before) == len(after) == 3 else []
+    assert len(late_s) >= 9
+    assert np.mean(late_s) < 2.0 * scenario.kind_of(0).sensor.scan_time_s + 0.5
+
+
+def rounds(explorer):
+    """(left, ended) of the journeys of each round, s."""
+    by_round: dict[int, list[tuple[float, float]]] = {}
+    for journey in explorer.journeys:
+        by_round.setdefault(journey.number, []).append((journey.ended_s - journey.seconds, journey.ended_s))
+    return [by_round[number] for number in sorted(by_round)]
+
+
+@pytest.mark.parametrize("scenario", [small_plan(), small_terrain()])
+def test_where_a_robot_scanned_is_a_candidate_again_once_more_is_asked_for(scenario):
+    env, explorer, _ = explored(scenario, 2)
+    candidates = explorer._allotters[0].candidates
+    view = view_of(env.missions, 0, 0)
+    candidates.unspend()
+    candidates.update(view, 0.5)
+    before = set(candidates.found()[1].tolist())
+    candidates.update(view, 1e-3)
+    voxels = candidates.found()[1].tolist()
+    assert voxels and set(voxels) - before
+    candidates.spend(voxels[0])
+    assert voxels[0] not in candidates.found()[1]
+    candidates.unspend()
+    assert voxels[0] in candidates.found()[1]
+
+
 def test_synchronous_robots_leave_together():
     """Nobody sets out on its next journey before all have ended their latest one."""
     _, explorer, _ = explored(small_plan(), 4, allotment="synchronous")
-    by_round: dict[int, list[tuple[float, float]]] = {}
-    for journey in explorer.journeys:
-        left_s = journey.ended_s - journey.seconds
-        by_round.setdefault(journey.number, []).append((left_s, journey.ended_s))
-    assert len(by_round) > 5
-    for number in range(2, len(by_round) + 1):
-        if len(by_round[number - 1]) == 3:
-            ended_s = max(end for _, end in by_round[number - 1])
-            assert all(left_s >= ended_s - 1e-6 for left_s, _ in by_round[number])
+    found = rounds(explorer)
+    assert len(found) > 5
+    for before, after in itertools.pairwise(found):
+        if len(before) == 3:
+            ended_s = max(end for _, end in before)
+            assert all(left_s >= ended_s - 1e-6 for left_s, _ in after)
 
 
 def corridor(places, heard=True):

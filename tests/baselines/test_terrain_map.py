@@ -10,11 +10,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from baselines.expected_view import new_tally
-from baselines.frontier_map import NONE
+from baselines.frontier_map import NONE, put_block
 from baselines.terrain_map import (
+    choose_reached_columns,
     count_below,
     count_columns_from,
     count_columns_in_ball,
+    look_at_columns,
     mean_ground,
     new_terrain_map,
     survey,
@@ -120,6 +122,29 @@ def test_candidates_hang_above_the_edge_between_ground_and_ceiling():
     survey_ground(terrain, ground)
     found = np.stack(np.unravel_index(terrain.voxel[terrain.voxel != NONE], SHAPE), axis=-1)
     assert set(found[:, 0]) == {6} and set(found[:, 2]) == {3, 5}
+
+
+def test_a_block_gives_a_column_that_was_reached_or_has_room_left():
+    """Known ground at x = 0 and x = 2 in a block of four columns: the middle one first, then the other."""
+    ground = np.full((4, 4), NONE, np.int32)
+    ground[0, 1], ground[2, 1] = 1, 1
+    terrain = known_ground(ground, (4, 4, 8), spacing=4)
+    near, far = 2 * 4 + 1, 1
+    assert terrain.column[0] == near
+    cost = np.full(4 * 4 * 8, np.inf)
+    choose_reached_columns(terrain, cost)
+    assert terrain.column[0] == near  # neither was reached
+    cost[far * 8 + 4] = 3.0
+    terrain.seen[:] = 5.0
+    choose_reached_columns(terrain, cost)
+    assert terrain.column[0] == far and np.isinf(terrain.seen).all()
+    assert set(terrain.voxel[terrain.voxel != NONE] // 8) == {far}
+    terrain.spent[near * 8 :][:8] = 1
+    look_at_columns(terrain, put_block(terrain, 0, 0))
+    assert terrain.column[0] == far  # nothing is left above the middle one
+    terrain.spent[far * 8 :][:8] = 1
+    look_at_columns(terrain, put_block(terrain, 0, 0))
+    assert terrain.column[0] == NONE and (terrain.voxel == NONE).all()
 
 
 def test_the_height_factor_by_hand():
