@@ -59,6 +59,8 @@ class Choice:
     slot: int
     voxel: int
     value: float
+    seconds: float
+    """Of travel and scan."""
 
 
 @dataclass(frozen=True)
@@ -221,7 +223,7 @@ class Allotter:
         best = int(np.argmax(value)) if len(value) else -1
         choice = None
         if best >= 0 and value[best] > -np.inf:
-            choice = Choice(int(slots[best]), int(voxels[best]), float(value[best]))
+            choice = Choice(int(slots[best]), int(voxels[best]), float(value[best]), float(seconds[best]))
         if len(beyond) == 0 or math.isinf(ways.reach):
             return choice, True
         return choice, choice is not None and self._none_is_better(robot, beyond, ways, choice)

@@ -36,6 +36,8 @@ from entropy_explore_env.validation import check, check_choice, check_kind, chec
 Allotment = Literal["asynchronous", "synchronous"]
 _NOT_QUITE = 0.999
 """Of the reach, so that rounding does not pull a place towards the robot."""
+_SLACK = 1.5
+"""How many times as long as reckoned others may be under way: t does not count stops at corners."""
 _EARLY = (MoveEnd.OBSTACLE, MoveEnd.GROUND, MoveEnd.CEILING, MoveEnd.WALL, MoveEnd.TEAMMATE, MoveEnd.NO_WAY)
 
 
@@ -119,8 +121,8 @@ class _Errand:
     """Whether it has taken its first scan."""
     level: float = 0.0
     """σ that counts as explored."""
-    plan: dict[int, np.ndarray] = field(default_factory=dict)
-    """Where (3,), map frame, it reckoned that others were sent when it was."""
+    plan: dict[int, tuple[np.ndarray, float]] = field(default_factory=dict)
+    """Where (3,), map frame, it reckoned that others were sent when it was, and when they would be there."""
 
 
 class Journey(NamedTuple):
@@ -235,9 +237,9 @@ class FrontierStrategy:
         """Whether a teammate has not scanned at its target yet.
 
         It has if it waits, or if it has left since the robot arrived: then it had waited for everybody. Where
-        robots stop on their way, it has to stand, or to have left, where the robot reckoned that it was sent:
-        leaving a corner looks like leaving for a new target. As robots do not know from where others have
-        scanned, they may reckon wrongly, and then wait longer than the paper's central procedure.
+        robots stop on their way, it has to stand where the robot reckoned that it was sent, or time has to be up
+        for that: leaving a corner looks like leaving for a new target. As robots do not know from where others
+        have scanned, they may reckon wrongly.
         """
         for mate, seen in view.teammates.items():
             if seen.announced_s < 0.0 or stays(view, seen):
@@ -245,11 +247,12 @@ class FrontierStrategy:
             left_later = seen.announced_s >= errand.arrived_s
             if self._under_way(view, mate) and not left_later:
                 return True
-            robot, target = self._scenario.kind_of(mate).robot, errand.plan.get(mate)
+            robot = self._scenario.kind_of(mate).robot
             at_once = robot.navigator == "planned" and math.isinf(robot.reach_m)
-            if target is not None and not at_once:
+            if mate in errand.plan and not at_once:
+                target, due_s = errand.plan[mate]
                 apart_m = np.linalg.norm(seen.pose[:3] - target)
-                if apart_m > 1.5 * self._scenario.grid.voxel_size_m:
+                if apart_m > 1.5 * self._scenario.grid.voxel_size_m and view.time_s < due_s:
                     return True
                 del errand.plan[mate]  # it has been there: wherever it goes now, it goes to its next target
         return False
@@ -267,7 +270,10 @@ class FrontierStrategy:
         while True:
             plan = allotter.allot(view, stopped, targets, everybody=together)
             choice = plan.get(view.robot)
-            errand.plan = {mate: self._place(view, other.voxel) for mate, other in plan.items()}
+            errand.plan = {
+                mate: (self._place(view, other.voxel), view.time_s + _SLACK * other.seconds)
+                for mate, other in plan.items()
+            }
             if errand.level >= self.exploring.looking.sigma:
                 self.idle[view.robot] = choice is None
             if choice is not None or errand.level <= self._finest:

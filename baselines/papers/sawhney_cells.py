@@ -44,7 +44,7 @@ _PLAN: dict[str, Any] = {
     "sensor": {"max_range_m": 3.0, "angular_step_rad": math.pi / 180, "scan_time_s": 2.0},
 }
 _TERRAIN: dict[str, Any] = {
-    "robot": {"reach_m": math.inf, "body_radius_m": 0.0, "navigator": "planned", "unknown_cost": 1e4},
+    "robot": {"reach_m": math.inf, "body_radius_m": 0.0},
     "sensor": {
         "field_of_view_rad": (2 * math.pi, math.pi / 2),
         "angular_step_rad": math.pi / 60,
