@@ -237,9 +237,9 @@ class FrontierStrategy:
         """Whether a teammate has not scanned at its target yet.
 
         It has if it waits, or if it has left since the robot arrived: then it had waited for everybody. Where
-        robots stop on their way, it has to stand where the robot reckoned that it was sent, or time has to be up
-        for that: leaving a corner looks like leaving for a new target. As robots do not know from where others
-        have scanned, they may reckon wrongly.
+        robots stop on their way, it has to stand where the robot reckoned that it was sent, or time has to be
+        up for that: leaving a corner looks like leaving for a new target. As robots do not know from where
+        others have scanned, they may reckon wrongly.
         """
         for mate, seen in view.teammates.items():
             if seen.announced_s < 0.0 or stays(view, seen):

@@ -16,6 +16,7 @@ from baselines.experiment import Cell
 from baselines.frontier_candidates import Looking
 from baselines.frontier_rivals import Coordinated, Nearest
 from baselines.papers.sawhney_maps import METHODS as MAP_METHODS
+from baselines.papers.sawhney_maps import STARTS as MAP_STARTS
 from baselines.papers.sawhney_maps import TEAM as MAP_TEAM
 from baselines.papers.sawhney_maps import MapRun, map_world
 from baselines.papers.sawhney_missions import Run
@@ -106,7 +107,7 @@ def experiment(
         flights: Missions a point over each terrain; 0 = none.
         quick: Fewer team sizes and β.
         dem: A height map's file, flown over as well.
-        maps: Files of plans, explored by one team each.
+        maps: Files of plans, explored by one team each, from MAP_STARTS starts at most.
     """
     cells = []
     for world in (*PLANS, *TERRAINS, *((DEM,) if dem is not None else ())):
@@ -121,7 +122,9 @@ def experiment(
         for method in MAP_METHODS:
             run = MapRun(_exploring(methods("plans", False)[method]), str(file))
             name = cell_id(map_world(file), MAP_TEAM, method)
-            cells.append(Cell(name, _scenario(PLANS[0], MAP_TEAM, {}), STRATEGY, starts, run))
+            cells.append(
+                Cell(name, _scenario(PLANS[0], MAP_TEAM, {}), STRATEGY, min(starts, MAP_STARTS), run)
+            )
     for change, (_, settings, more) in CHANGES.items():
         for world in PLANS[:1] if quick else PLANS:
             for method in CHANGED_METHODS:

@@ -19,7 +19,7 @@ from baselines.per_time_visibility import Exploring
 from entropy_explore_env.config import Scenario
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 
-TEAM = 3
+TEAM, STARTS = 3, 2
 METHODS = ("ptv", "beta-1", "beta-10", "beta-40", "finish", "nearest", "coordinated")
 _MARK = "map-"
 
