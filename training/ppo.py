@@ -1,6 +1,6 @@
 """Learn a policy with PPO (Stable-Baselines3): one network drives every robot of every mission.
 
-    python -m training.ppo --scenario room --robots 3 --total-steps 2_000_000 --seed 0 --out runs/room-3
+    python -m training.ppo --scenario room --robots 3 --total-steps 2_500_000 --seed 0 --out runs/room-3
 
 The folder gets `curve.csv` (validation as it went), TensorBoard's files (`tensorboard --logdir runs`), the
 checkpoints `step-N` (the latest, to go on from with `--resume`) and `best-N` (by validation), and the best
@@ -75,7 +75,7 @@ class Args:
     """Team size."""
     missions: int = 64
     """Missions that are under way at once."""
-    total_steps: int = 2_000_000
+    total_steps: int = 2_500_000
     """Steps of robots, all missions together."""
     seed: int = 0
     """Of the weights, the missions and every other draw."""

@@ -121,21 +121,39 @@ def check(args: Args) -> dict[str, Any]:
         raise SettingError("address", args.address, "HOST:PORT of a Ray cluster, or auto")
     settings: dict[str, Any] = {
         "robots": args.robots,
+        "split": "train",
+        "decision_period_s": None,
         "action": {"kind": "discrete", "moves": "axes"},
         "observation": {"flat": True, "panorama_utility": "log2"},  # what a small network takes best
         "reward": {"cost_per_s": args.cost_per_s},
     }
     scenario = with_settings(find_scenario(args.scenario), settings)
-    if args.resume and last_checkpoint(args.out) is None:
+    found = last_checkpoint(args.out)
+    if args.resume and found is None:
         raise SettingError("resume", str(args.out), "a folder with a checkpoint")
+    if found is not None and not args.resume:
+        raise SettingError("out", str(args.out), "a new folder, or --resume to go on with the run in it")
     make_folder("out", args.out)
     shown = {name: str(value) if isinstance(value, Path) else value for name, value in vars(args).items()}
-    text = json.dumps({"args": shown, "scenario": settings_of(scenario)}, indent=2) + "\n"
+    described = settings_of(scenario)
+    if found is not None and _scenario_in(args.out / "settings.json") != described:
+        raise SettingError(
+            "scenario", args.scenario, "the settings that the run in the folder was begun with"
+        )
+    text = json.dumps({"args": shown, "scenario": described}, indent=2) + "\n"
     try:
         write_atomically(args.out / "settings.json", text)
     except OSError as error:
         raise SettingError("out", str(args.out), f"a folder that can be written ({error.strerror})") from None
     return {"scenario": args.scenario, **settings}
+
+
+def _scenario_in(file: Path) -> Any:  # noqa: ANN401 - JSON
+    """The scenario that a settings.json tells; None where there is none."""
+    try:
+        return json.loads(file.read_text("utf-8"))["scenario"]
+    except (OSError, ValueError, LookupError, TypeError):
+        return None
 
 
 def start_ray(args: Args) -> Any:  # noqa: ANN401 - a module that may not be there

@@ -125,8 +125,8 @@ all weigh alike; ratios are of their means, with 95 % bootstrap intervals over m
 and seed. "Faster" holds if the whole interval is below 1. The best β is chosen from the same missions, which
 favours it."""
 
-_MAPS = f"""Teams of {MAP_TEAM}, the settings of the other plans, cells resampled to 0.1 m, {MAP_STARTS} starts;
-mean times, and seconds of computing a mission on one thread."""
+_MAPS = f"""Teams of {MAP_TEAM}, the settings of the other plans, cells resampled to 0.1 m,
+{MAP_STARTS} starts; mean times, and seconds of computing a mission on one thread."""
 
 _CHANGED = f"""Teams of {CHANGED_TEAM} in plans: time of V/t over that of the other method."""
 

@@ -23,16 +23,19 @@ TINY += ("--validation-missions", "1")
 
 
 def test_rounds_are_those_after_the_first_and_their_parts_add_up() -> None:
-    rounds = learning_rounds(1, 3, TINY)
-    assert [each.steps for each in rounds] == [2 * 2 * 8] * 3
-    for each in rounds:
-        assert 0.0 < each.environment_s < each.collecting_s < each.whole_s
+    found = learning_rounds((1, 2), 3, TINY)
+    assert list(found) == [1, 2] and all(len(rounds) == 3 for rounds in found.values())
+    for each in [each for rounds in found.values() for each in rounds]:
+        assert each.steps == 2 * 2 * 8
+        assert 0.0 < each.environment_s and 0.0 < each.choosing_s and 0.0 < each.learning_s
+        assert each.environment_s + each.choosing_s < each.collecting_s < each.whole_s
         assert each.whole_s == pytest.approx(each.collecting_s + each.learning_s)
 
 
 def test_shares_add_up_and_goals_are_judged() -> None:
     rows = {(row.job, row.peer): row for row in learning_rows(QUICK, TINY)}
     shares = [row.ours for row in rows.values() if row.unit == "%"]
-    assert len(shares) == 3 and all(0 < share < 100 for share in shares)
+    assert len(shares) == 4 and all(0 < share < 100 for share in shares)
+    assert 90 < sum(shares) < 110  # medians, each of its own
     loop = rows["PPO, 64 missions × 3 robots, 2 threads", None]
     assert loop.goal == "≥ 12000 robot-steps/s" and loop.holds is (loop.ours >= 12_000)

@@ -93,9 +93,9 @@ def test_where_all_decide_rollouts_are_those_of_stable_baselines3(tmp_path: Path
         bootstrapped.append((reward - other.rows.rewards.astype(np.float32)) / other.model.gamma)
         other.buffer.add = DecisionBuffer.add.__get__(other.buffer)
         add_step(np.zeros(len(reward)), obs, action, reward, *rest)
-        other.buffer.add = add
+        other.buffer.add = add  # pyright: ignore[reportAttributeAccessIssue]
 
-    other.buffer.add = add
+    other.buffer.add = add  # pyright: ignore[reportAttributeAccessIssue]
     PPO.collect_rollouts(other.model, other.rows, callback, other.buffer, other.args.rollout_steps)
     ours, theirs = run.buffer, other.buffer
     assert ours.decided.all() and ours.ended.any()

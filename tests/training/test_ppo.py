@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -17,7 +18,7 @@ import torch
 
 from entropy_explore_env.command import BAD_INPUT
 from training import ppo
-from training.checkpoints import latest_checkpoint, load_checkpoint
+from training.checkpoints import checkpoint_name, latest_checkpoint, load_checkpoint
 from training.decisions import DecisionBuffer
 from training.errors import NotFiniteError
 
@@ -166,11 +167,13 @@ def test_what_is_not_finite_stops_the_run_and_leaves_the_last_good_checkpoint(
     tmp_path, capsys, monkeypatch, what
 ):
     out, compute = tmp_path / "run", DecisionBuffer.compute_returns_and_advantage
-    add, steps = DecisionBuffer.add, []
+    add, steps = DecisionBuffer.add_step, []
 
-    def poisoned_add(self, obs, action, reward, *rest):
+    def poisoned_add(self, *step):
         steps.append(1)
-        return add(self, obs, action, reward * np.nan if len(steps) > 40 else reward, *rest)
+        if len(steps) > 40:
+            self.rows.rewards[0] = np.nan
+        return add(self, *step)
 
     def poisoned_advantages(self, **given):
         compute(self, **given)
@@ -179,13 +182,13 @@ def test_what_is_not_finite_stops_the_run_and_leaves_the_last_good_checkpoint(
             self.advantages[:] = np.inf
 
     if what == "reward":
-        monkeypatch.setattr(DecisionBuffer, "add", poisoned_add)
+        monkeypatch.setattr(DecisionBuffer, "add_step", poisoned_add)
     else:
         monkeypatch.setattr(DecisionBuffer, "compute_returns_and_advantage", poisoned_advantages)
     assert learn(out) == BAD_INPUT
     said = capsys.readouterr().err.splitlines()
-    assert len(said) == 1 and "finite" in said[0]
-    assert ("reward = nan" in said[0]) if what == "reward" else ("steps" in said[0])
+    assert len(said) == 1 and "finite" in said[0] and "steps" in said[0]
+    assert what != "reward" or "reward = nan" in said[0]
     kept = load_checkpoint(latest_checkpoint(out, "step"), training=True)
     assert all(torch.isfinite(each).all() for each in kept.weights.values())
 
@@ -213,3 +216,19 @@ def test_the_error_names_tensor_and_step():
     assert str(NotFiniteError("train/loss", float("nan"), 12000)) == (
         "train/loss = nan after 12,000 steps: allowed are finite numbers"
     )
+
+
+def test_a_folder_with_a_run_is_not_begun_anew_and_later_best_policies_go(tmp_path, capsys):
+    """Between the first validation and the first checkpoint a kill leaves a best policy alone."""
+    out = tmp_path / "run"
+    assert learn(out, "--checkpoint-every", "99999", "--no-video", steps=192) == 0
+    capsys.readouterr()
+    for step in out.glob("step-*"):
+        shutil.rmtree(step)
+    later = out / checkpoint_name("best", 10**9)
+    shutil.copytree(latest_checkpoint(out, "best"), later)
+    assert learn(out, "--no-video", steps=192) == 2
+    assert "--resume" in capsys.readouterr().err
+    assert later.is_dir()
+    assert learn(out, "--no-video", "--resume", steps=192) == 0
+    assert not later.is_dir() and len(list(out.glob("best-*"))) >= 1

@@ -119,3 +119,15 @@ def test_resuming_wants_a_whole_checkpoint(tmp_path):
     (tmp_path / "unfinished-checkpoint").mkdir()
     with pytest.raises(SettingError, match="a folder with a checkpoint"):
         rllib_ppo.check(Args(out=tmp_path, resume=True))
+
+
+def test_a_folder_with_a_run_is_gone_on_with_and_not_begun_anew(tmp_path):
+    rllib_ppo.check(Args(out=tmp_path))
+    (tmp_path / "checkpoint-000010").mkdir()
+    before = (tmp_path / "settings.json").read_text()
+    with pytest.raises(SettingError, match="or --resume to go on"):
+        rllib_ppo.check(Args(out=tmp_path))
+    with pytest.raises(SettingError, match="scenario"):
+        rllib_ppo.check(Args(out=tmp_path, resume=True, robots=2))
+    assert (tmp_path / "settings.json").read_text() == before
+    assert rllib_ppo.check(Args(out=tmp_path, resume=True))["decision_period_s"] is None

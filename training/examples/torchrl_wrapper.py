@@ -21,5 +21,6 @@ class NumbersOnly(BaseParallelWrapper):
 team = eee.parallel_env("room", robots=3, observation={"flat": True}, action={"kind": "discrete"})
 env = PettingZooWrapper(NumbersOnly(team), seed=0)
 rollout = env.rollout(100)  # random actions among those that make sense; a policy goes here
-chosen = rollout["robot", "info", "deciding"] > 0  # (100, 3): learn from these actions only
+# Learn from these actions, (100, 3), only; rewards of a robot's other rows belong to its last one of these.
+chosen = rollout["robot", "info", "deciding"] > 0
 print(rollout["robot", "observation"].shape, rollout["next", "robot", "reward"].shape, chosen.sum())
