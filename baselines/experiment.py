@@ -118,13 +118,26 @@ class Cell:
     @cached_property
     def digest(self) -> str:
         """Of all that decides the results; worked out once, since it reads sources and world files."""
-        sources = sources_digest(self.strategy, mission, sys.modules[self.record.__module__])
-        world = Path(self.scenario.world)
-        content = hashlib.sha256(world.read_bytes()).hexdigest() if world.is_file() else ""
-        described = repr((sources, content, scripted(self.scenario), self.strategy))
-        if is_dataclass(self.record):  # it has settings of its own
-            described += repr(self.record)
+        parts = _parts(self.record)
+        made_by = {type(part).__module__ for part in parts if is_dataclass(part)} | {self.record.__module__}
+        described = repr(
+            (
+                sources_digest(self.strategy, mission.__name__, *sorted(made_by)),
+                scripted(self.scenario),
+                self.strategy,
+                self.record if is_dataclass(self.record) else None,  # it has settings of its own
+            )
+        )
+        for file in (self.scenario.world, *(part for part in parts if isinstance(part, str))):
+            if Path(file).is_file():
+                described += hashlib.sha256(Path(file).read_bytes()).hexdigest()
         return hashlib.sha256(described.encode()).hexdigest()[:16]
+
+
+def _parts(record: object) -> list[object]:
+    """A value, and where it is a dataclass the values of its fields, and of theirs."""
+    fields = vars(record).values() if is_dataclass(record) else ()
+    return [record, *(part for value in fields for part in _parts(value))]
 
 
 def run_cells(

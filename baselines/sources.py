@@ -8,14 +8,13 @@ import importlib.util
 from collections.abc import Callable, Iterator
 from functools import lru_cache, partial
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import entropy_explore_env
 from baselines import strategies
 
 
-def sources_digest(strategy: str, *modules: ModuleType) -> str:
+def sources_digest(strategy: str, *modules: str) -> str:
     """Digest of the library, of a strategy with all that it imports of `baselines`, and of some modules.
 
     Other strategies are not part of it, so that a new one leaves the results of the old ones in place. Of a
@@ -23,9 +22,10 @@ def sources_digest(strategy: str, *modules: ModuleType) -> str:
 
     Args:
         strategy: Its name.
-        modules: Whatever else makes the results; what they import does not count.
+        modules: Names of what else makes the results; of what they import, what lies in a package with them
+            inside `baselines` counts.
     """
-    files = {Path(module.__file__) for module in modules if module.__file__}
+    files = {_file_of(name) for module in modules for name in _with_neighbours(module)}
     if strategies.is_learned(strategy):
         policies = strategies.learned_policies()
         files |= set(policies.policy_files(strategy))
@@ -38,6 +38,13 @@ def sources_digest(strategy: str, *modules: ModuleType) -> str:
     for file in sorted(files):
         hasher.update(file.read_bytes())
     return hasher.hexdigest()
+
+
+def _with_neighbours(module: str) -> set[str]:
+    """A module, and what it imports of a package inside `baselines` that it is part of."""
+    package = module.rpartition(".")[0]
+    beside = imported(module) if package.startswith("baselines.") else ()
+    return {module, *(name for name in beside if name.startswith(package + "."))}
 
 
 @lru_cache(maxsize=1)

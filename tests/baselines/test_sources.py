@@ -7,10 +7,15 @@ from functools import partial
 import pytest
 
 from baselines import gradient, mission, random_walk, sources, strategies
+from baselines.experiment import Cell
+from baselines.frontier_rivals import Nearest
 from baselines.gradient import GradientStrategy
 from baselines.information_rate import InformationRate, Weighing
+from baselines.papers.sawhney_maps import MapRun
+from baselines.per_time_visibility import Exploring
 from baselines.random_walk import RandomWalk
 from baselines.sources import imported, sources_digest
+from entropy_explore_env.scenarios import find_scenario
 
 
 @pytest.fixture
@@ -35,7 +40,7 @@ def test_a_new_strategy_leaves_the_digest_of_another_as_it_is(entered):
     before = sources_digest("walk")
     entered(walk=RandomWalk, other=GradientStrategy)
     assert sources_digest("walk") == before == sources_digest("walk")
-    assert len({before, sources_digest("walk", mission), sources_digest("other")}) == 3
+    assert len({before, sources_digest("walk", mission.__name__), sources_digest("other")}) == 3
 
 
 def test_settings_of_a_strategy_are_part_of_its_digest(entered):
@@ -65,3 +70,30 @@ def test_code_of_the_strategy_and_of_the_library_counts(entered, monkeypatch, tm
         assert sources_digest("walk") == before
     monkeypatch.setattr(sources, "_library_digest", lambda: b"another library")
     assert sources_digest("walk") != before
+
+
+def test_what_a_record_is_made_by_counts(entered, monkeypatch, tmp_path):
+    """The settings of its fields, their modules, its neighbours in a package, and files that it names."""
+    entered(walk=RandomWalk)
+    world = tmp_path / "plan.png"
+    world.write_bytes(b"one")
+
+    def digest(metric=None):
+        exploring = Exploring() if metric is None else Exploring(metric=metric)
+        return Cell("cell", find_scenario("room"), "walk", 1, MapRun(exploring, str(world))).digest
+
+    before = digest()
+    assert digest() == before
+    world.write_bytes(b"two")
+    assert digest() != before
+    world.write_bytes(b"one")
+    assert digest() == before
+    files, changed = sources._file_of, tmp_path / "changed.py"
+    changed.write_text("# changed\n")
+    nearest = digest(Nearest())
+    for name in ("baselines.papers.sawhney_missions", "baselines.frontier_rivals"):
+        with monkeypatch.context() as patch:
+            patch.setattr(
+                sources, "_file_of", lambda module, name=name: changed if module == name else files(module)
+            )
+            assert digest(Nearest()) != nearest
