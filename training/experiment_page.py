@@ -82,9 +82,12 @@ def _task_parts(task: Task, found: Found) -> list[str]:
         f"## {task.scenario}, three robots\n",
         f"    python -m training.ppo {options} --threads 1 --out runs/{task.run(0)}\n",
         markdown_table(columns, runs),
+        "Minutes are those of the clock, processor minutes those of the run's one thread: other work on the "
+        "machine makes the difference. Collecting is the share of missions and choices in the loop, learning "
+        "the rest.\n",
         f"![Validation as learning goes on](ppo/curve-{task.scenario}.png)\n",
-        f"On {starts} test starts (the seeds 0 … {starts - 1}); shares and counts are those of the policy of "
-        "seed 0:\n",
+        f"On {starts} test starts (the seeds 0 … {starts - 1}). PPO's share is the median time of seed 0's "
+        "policy over that of the row's strategy; PPO faster, the starts on which it was.\n",
         markdown_table(head, [table_cells(row, starts) for row in rows]),
         _verdicts(task, found),
     ]
