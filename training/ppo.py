@@ -169,7 +169,11 @@ def main(words: Sequence[str]) -> int:
     if args.json:
         print_json(summary)
     else:
-        print(f"best policy: {summary['best']}\nseen in {', '.join(summary['files'])}")
+        best = run.best
+        print(
+            f"best policy, after {best['steps']:,} steps: missions take {best['mean_s']:.1f} s on average, "
+            f"{best['finished']:.0%} finished\nseen in {', '.join(summary['files'])}"
+        )
     return 0
 
 
