@@ -17,7 +17,7 @@ help:
 	@echo "make test-rllib the tests of the trainer with RLlib"
 	@echo "make lint       ruff and pyright"
 	@echo "make bench      speed against peers"
-	@echo "make reproduce  the experiments of Rocha04, RochaMI and Bhattacharya, into docs/results: hours"
+	@echo "make reproduce  the experiments of Rocha04, RochaMI, Bhattacharya and Sawhney, into docs/results: many hours"
 	@echo "make clean      remove the environments, builds and caches; results stay"
 
 demo: $(STAMP)baselines
@@ -41,6 +41,7 @@ reproduce: $(STAMP)baselines
 	$(RUN) baselines.papers.rocha04 --out docs/results
 	$(RUN) baselines.papers.rochami --out docs/results
 	$(RUN) baselines.papers.bhattacharya --out docs/results
+	$(RUN) baselines.papers.sawhney --out docs/results
 
 # The stamp .venv/installed-EXTRA says that the package is installed with that extra.
 $(STAMP)%: pyproject.toml requirements/constraints.txt

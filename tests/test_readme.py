@@ -50,6 +50,7 @@ def rows_of(text: str) -> list[str]:
         ("Rocha04, reproduced", "rocha04", 10),
         ("RochaMI, reproduced", "rochami", 10),
         ("Bhattacharya, reproduced", "bhattacharya", 10),
+        ("Sawhney, reproduced", "sawhney", 10),
         ("Speed", "speed", 15),
         ("Strategies head to head", "head-to-head", 10),
         ("A policy that learns", "ppo", 8),
