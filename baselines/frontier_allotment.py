@@ -6,8 +6,7 @@ promises of those under way stand until they have scanned; synchronously all wai
 part together. Each robot allots from its own belief and from what reached it (poses, announcements): it
 works out the others' turns as they would, and takes its own. With perfect messages that is the paper's
 central procedure; of teammates of another kind it takes them to see and to fit in like itself. A robot counts
-as stopped if it was heard since it announced its latest viewpoint, that
-is, its scan arrived.
+as stopped if it was heard since it announced its latest viewpoint, that is, its scan arrived.
 """
 
 from __future__ import annotations

@@ -175,6 +175,14 @@ def _span(terrain, block):
     return i * wide, min((i + 1) * wide, terrain.size[0]), j * wide, min((j + 1) * wide, terrain.size[1])
 
 
+@inlined_kernel
+def _apart(terrain, block, x, y):
+    """Squared distance, in half columns, of a column from the middle of its block."""
+    i0, i1, j0, j1 = _span(terrain, block)
+    dx, dy = 2 * x + 1 - i0 - i1, 2 * y + 1 - j0 - j1
+    return dx * dx + dy * dy
+
+
 @lean_kernel
 def _look_for_edge(terrain, block):
     """Set EDGE in a block: mapped columns that are, or are beside, unexplored ones."""
@@ -225,9 +233,9 @@ def _look_for_candidates(terrain, block):
             terrain.flags[column] &= EDGE
             if _near_edge(terrain, x, y) and _has_room(terrain, column):
                 terrain.flags[column] |= CANDIDATE
-                dx, dy = 2 * x + 1 - i0 - i1, 2 * y + 1 - j0 - j1
-                if dx * dx + dy * dy < nearest:
-                    best, nearest = column, dx * dx + dy * dy
+                apart = _apart(terrain, block, x, y)
+                if apart < nearest:
+                    best, nearest = column, apart
     _take_column(terrain, block, best)
 
 
@@ -276,13 +284,10 @@ def choose_reached_columns(terrain, cost):
         best, nearest = NONE, math.inf
         for x in range(i0, i1):
             for y in range(j0, j1):
-                column, dx, dy = x * size[1] + y, 2 * x + 1 - i0 - i1, 2 * y + 1 - j0 - j1
-                if (
-                    terrain.flags[column] & CANDIDATE
-                    and dx * dx + dy * dy < nearest
-                    and _is_reached(terrain, column, cost)
-                ):
-                    best, nearest = column, dx * dx + dy * dy
+                column, apart = x * size[1] + y, _apart(terrain, block, x, y)
+                wanted = terrain.flags[column] & CANDIDATE and apart < nearest
+                if wanted and _is_reached(terrain, column, cost):
+                    best, nearest = column, apart
         if best != NONE:
             _take_column(terrain, block, best)
 
