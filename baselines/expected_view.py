@@ -1,7 +1,7 @@
 """How many unexplored points are expected to be seen from a place: the V of Sawhney 2009, sects. 3.4-3.5.
 
 In a map of voxels rays go out until something believed covered stops them, or to the sensor's range; each
-unexplored voxel that they cross counts once. Over a height field (`terrain_map`) points are columns. A point
+unexplored voxel that they cross counts once. Over a height field (`terrain_view`) points are columns. A point
 that n robots have promised to see weighs 1/(1 + n). (The paper's 1/n would make the first promise free.) The
 naive V, for comparison, counts all unexplored points in a ball as large as the range. Grid units.
 """

@@ -37,16 +37,8 @@ from baselines.frontier_map import (
     take_in,
 )
 from baselines.ray_tree import grow_tree
-from baselines.terrain_map import (
-    choose_reached_columns,
-    count_below,
-    count_columns_from,
-    count_columns_in_ball,
-    look_at_columns,
-    mean_ground,
-    new_terrain_map,
-    survey,
-)
+from baselines.terrain_map import choose_reached_columns, look_at_columns, new_terrain_map, survey
+from baselines.terrain_view import count_below, count_columns_from, count_columns_in_ball, mean_ground
 from entropy_explore_env.config import Scenario
 from entropy_explore_env.missions.view import RobotView
 from entropy_explore_env.settings import RobotKind

@@ -1,15 +1,10 @@
-"""Frontiers of a height field below an exposure surface, and what is seen from there (Sawhney 2009).
+"""Frontiers of a height field below an exposure surface (Sawhney 2009).
 
 Points are columns. A column is explored once the voxel of its surface is: the highest one that is known and
 believed covered, with a known free one above it. Robots may be between the ground and the exposure surface of
 explored columns, whether or not a ray went through that air. On the edge lie explored columns beside
 unexplored ones; of each block of columns the candidate nearest to its middle stands for all, at several
-heights (sect. 3.2).
-
-Unexplored ground is taken to slope down from the mean height z_av of the ground around the place, to
-z = (1 - dist / range) z_av above the workspace's floor (sect. 3.4). A column is seen if a ray from the place
-meets its top: along every direction the steepest slope to what was passed is carried on. Grid units: heights
-are in layers.
+heights (sect. 3.2). Grid units: heights are in layers.
 """
 
 from __future__ import annotations
@@ -19,7 +14,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from baselines.expected_view import begin_count, promise, weight
 from baselines.frontier_map import (
     CANDIDATE,
     COVERED,
@@ -311,132 +305,3 @@ def _near_edge(terrain, x, y):
             if terrain.flags[i * size[1] + j] & EDGE:
                 return True
     return False
-
-
-@lean_kernel
-def mean_ground(terrain, x, y, patch):
-    """z_av: mean ground of the mapped columns within `patch` of one along both axes; 0 where none is."""
-    total, count = 0.0, 0
-    for i in range(max(x - patch, 0), min(x + patch, terrain.size[0] - 1) + 1):
-        for j in range(max(y - patch, 0), min(y + patch, terrain.size[1] - 1) + 1):
-            if terrain.ground[i, j] != NONE:
-                total += terrain.ground[i, j]
-                count += 1
-    return total / count if count > 0 else 0.0
-
-
-@inlined_kernel
-def height_at(terrain, x, y, eye, average, reach):
-    """Height of a column: its ground if mapped, else extrapolated (sect. 3.4)."""
-    if terrain.ground[x, y] != NONE:
-        return np.float64(terrain.ground[x, y])
-    dx, dy = x + 0.5 - eye[0], y + 0.5 - eye[1]
-    return max((1.0 - math.sqrt(dx * dx + dy * dy) / reach) * average, 0.0)
-
-
-@lean_kernel
-def count_below(tally, terrain, eye, average, azimuths, reach, flattest, marking):
-    """Unexplored columns that are seen from a place: (all, weighed by promises).
-
-    Args:
-        tally: Working space.
-        terrain: The map.
-        eye: (x, y, z) of the place.
-        average: z_av there.
-        azimuths: (D, 2) float64 unit vectors.
-        reach: Of the sensor, > 0.
-        flattest: Tangent of the angle below the horizon from which on the sensor looks down.
-        marking: Whether the columns are promised from now on.
-    """
-    number, points, weighed = begin_count(tally), 0, 0.0
-    size = terrain.size
-    for direction in azimuths:
-        x, y = int(eye[0]), int(eye[1])
-        step_x, step_y = 1 if direction[0] > 0.0 else -1, 1 if direction[1] > 0.0 else -1
-        gap_x = 1.0 / abs(direction[0]) if direction[0] != 0.0 else math.inf
-        gap_y = 1.0 / abs(direction[1]) if direction[1] != 0.0 else math.inf
-        face_x = (x + 1 - eye[0] if step_x > 0 else eye[0] - x) * gap_x if gap_x < math.inf else math.inf
-        face_y = (y + 1 - eye[1] if step_y > 0 else eye[1] - y) * gap_y if gap_y < math.inf else math.inf
-        enters, horizon = 0.0, -math.inf
-        while enters <= reach:
-            leaves = min(face_x, face_y)
-            height = height_at(terrain, x, y, eye, average, reach)
-            drop = eye[2] - height
-            if drop <= 0.0:
-                break  # it hides the tops of all that is lower than the eye
-            slope = -drop / leaves
-            column = x * size[1] + y
-            near = enters * enters + drop * drop <= reach * reach
-            if slope > horizon and near and drop >= flattest * enters:
-                if terrain.unexplored[column] and tally.stamp[column] != number:
-                    tally.stamp[column] = number
-                    points += 1
-                    weighed += weight(tally.promised[column])
-                    if marking:
-                        promise(tally, column)
-            horizon = max(horizon, slope)
-            enters = leaves
-            if face_x <= face_y:
-                x, face_x = x + step_x, face_x + gap_x
-            else:
-                y, face_y = y + step_y, face_y + gap_y
-            if not (0 <= x < size[0] and 0 <= y < size[1]):
-                break
-    return points, weighed
-
-
-@lean_kernel
-def count_columns_in_ball(tally, terrain, eye, average, reach, marking):
-    """The naive V: unexplored columns whose tops, extrapolated, lie in a ball, seen or not."""
-    points, weighed, size = 0, 0.0, terrain.size
-    wide = min(reach, size[0] + size[1])
-    for x in range(max(int(eye[0] - wide - 0.5), 0), min(int(eye[0] + wide + 1.0), size[0])):
-        for y in range(max(int(eye[1] - wide - 0.5), 0), min(int(eye[1] + wide + 1.0), size[1])):
-            column = x * size[1] + y
-            if not terrain.unexplored[column]:
-                continue
-            drop = eye[2] - height_at(terrain, x, y, eye, average, reach)
-            dx, dy = x + 0.5 - eye[0], y + 0.5 - eye[1]
-            if dx * dx + dy * dy + drop * drop <= reach * reach:
-                points += 1
-                weighed += weight(tally.promised[column])
-                if marking:
-                    promise(tally, column)
-    return points, weighed
-
-
-@lean_kernel
-def count_columns_from(tally, terrain, voxels, azimuths, look, naive, seen, weighed, factor):
-    """Fill (K,) with the columns seen from K voxels, weighed by promises, and the height factor of each.
-
-    The factor is (z_f - z_av)^γ z_f^(1 - γ), heights above the workspace's floor in layers (sect. 3.3); 0 for
-    who is so high above the ground that little of it can be seen, and is no candidate.
-
-    Args:
-        tally: Working space.
-        terrain: The map.
-        voxels: (K,) int32.
-        azimuths: (D, 2) float64.
-        look: (reach, flattest, patch, γ, highest): of the sensor, of z_av, and the greatest z_f - z_av.
-        naive: Whether columns in a ball are counted.
-        seen: (K,) filled in.
-        weighed: (K,) filled in.
-        factor: (K,) filled in.
-    """
-    reach, flattest, patch, gamma, highest = look
-    size = terrain.size
-    for place in range(len(voxels)):
-        column = voxels[place] // size[2]
-        x, y = column // size[1], column % size[1]
-        eye = (x + 0.5, y + 0.5, voxels[place] - column * size[2] + 0.5)
-        average = mean_ground(terrain, x, y, int(patch))
-        above = eye[2] - average
-        seen[place], weighed[place], factor[place] = 0.0, 0.0, 0.0
-        if above > highest:
-            continue
-        factor[place] = max(above, 1e-3) ** gamma * eye[2] ** (1.0 - gamma)
-        if naive:
-            points, value = count_columns_in_ball(tally, terrain, eye, average, reach, False)
-        else:
-            points, value = count_below(tally, terrain, eye, average, azimuths, reach, flattest, False)
-        seen[place], weighed[place] = points, value

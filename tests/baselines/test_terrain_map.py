@@ -11,16 +11,8 @@ from hypothesis import strategies as st
 
 from baselines.expected_view import new_tally
 from baselines.frontier_map import NONE, put_block
-from baselines.terrain_map import (
-    choose_reached_columns,
-    count_below,
-    count_columns_from,
-    count_columns_in_ball,
-    look_at_columns,
-    mean_ground,
-    new_terrain_map,
-    survey,
-)
+from baselines.terrain_map import choose_reached_columns, look_at_columns, new_terrain_map, survey
+from baselines.terrain_view import count_below, count_columns_from, count_columns_in_ball, mean_ground
 from tests.reference import sawhney as reference
 from tests.reference.scenes import drawn, seeds
 
