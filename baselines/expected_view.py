@@ -166,7 +166,7 @@ def count_from(tally, state, size, voxels, tree, met, seen, weighed):
     promises = tally.numbers[1] > 0
     for place in range(len(voxels)):
         voxel = np.int64(voxels[place])
-        at = _place_of(size, voxel)
+        at = place_in(size, voxel)
         inside = _inside(tree, size, at)
         if inside and not promises:
             points, value = _climb(tally, state, size, voxel, tree, at, met, place, True, False)
@@ -225,12 +225,12 @@ def count_in_balls(tally, state, size, voxels, reach, seen, weighed):
 @inlined_kernel
 def centre_of(size, voxel):
     """(x, y, z) of a voxel's centre."""
-    x, y, z = _place_of(size, voxel)
+    x, y, z = place_in(size, voxel)
     return x + 0.5, y + 0.5, z + 0.5
 
 
 @inlined_kernel
-def _place_of(size, voxel):
+def place_in(size, voxel):
     """(x, y, z) of a voxel, whole numbers."""
     column = voxel // size[2]
     return column // size[1], column % size[1], voxel - column * size[2]

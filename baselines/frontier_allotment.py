@@ -20,7 +20,7 @@ import numpy as np
 
 from baselines.frontier_candidates import Looking, TerrainCandidates, VoxelCandidates
 from entropy_explore_env.belief.lattice import Costs, Lattice, new_lattice
-from entropy_explore_env.belief.planning import search_ways
+from entropy_explore_env.belief.planning import begin_search, search_ways, widen_search
 from entropy_explore_env.belief.search_space import Search, collect, cost_to
 from entropy_explore_env.compilation import lean_kernel
 from entropy_explore_env.config import Scenario
@@ -28,9 +28,7 @@ from entropy_explore_env.missions.view import RobotView, TeammateView
 from entropy_explore_env.robots.motion import driving_time
 from entropy_explore_env.settings import RobotKind
 
-_BATCH = 8
-"""Candidates that are counted together; their number changes no result."""
-_WIDER = 2.0
+_WIDER = 1.4
 """Ways are searched as far as the sensor sees, and then so many times as far until that is enough."""
 
 
@@ -72,6 +70,8 @@ class _Ways:
     """How far they were searched, in voxel edges."""
     edges: np.ndarray
     """(B,) float64, lengths by the candidates' slots; inf = none within reach."""
+    search: int
+    """Number of their search, which can be gone on with as long as it is the latest."""
 
 
 class Allotter:
@@ -104,7 +104,7 @@ class Allotter:
         else:
             self.candidates = TerrainCandidates(scenario, kind, looking, ceiling)
         rates = self.candidates.rates
-        self.costs = Costs(rates[:0], rates[:0], 0.0, 1.0, rates, 1.0)
+        self.costs = Costs(rates[:0], rates[:0], 0.0, 1.0, rates, 1.0, rates[:0])
         self._no_cells = np.zeros(0, np.int32)
         self.counted = 0
 
@@ -159,19 +159,28 @@ class Allotter:
     def seek(self, pose: np.ndarray, goal: int, reach: float) -> None:
         """Search ways from a pose to a voxel, or with -1 to all, through the mapped region."""
         start = self.start_of(pose)
-        x, y, z = (int(i) for i in np.unravel_index(start, self._scenario.grid.shape))
-        opened = self.candidates.open_start(x, y, z)
+        opened = self.candidates.open_start(*self._axes_of(start))
         source = np.array([start], np.int32)
         search_ways(self.search, self.lattice, self.costs, source, goal, reach, self._no_cells)
         self.candidates.close(opened)
 
-    def _ways(self, pose: np.ndarray, reach: float) -> _Ways:
-        """From where a robot is, or was heard."""
-        self.seek(pose, -1, reach)
+    def _ways(self, pose: np.ndarray, reach: float, before: _Ways | None = None) -> _Ways:
+        """From where a robot is, or was heard; those found before, less far, are gone on with if possible."""
+        start = self.start_of(pose)
+        opened = self.candidates.open_start(*self._axes_of(start))
+        arrays = self.search, self.lattice, self.costs
+        if before is None or before.search != self.search.searches[0]:
+            begin_search(*arrays, np.array([start], np.int32), self._no_cells)
+        widen_search(*arrays, reach, self._no_cells)
+        self.candidates.close(opened)
         voxels = self.candidates.voxels_of(slice(None))
         edges = np.full(len(voxels), np.inf)
-        ask_costs(self.search, voxels, edges)
-        return _Ways(self.place_of(self.start_of(pose)), reach, edges)
+        ask_costs(self.search, voxels, reach, edges)
+        return _Ways(self.place_of(start), reach, edges, int(self.search.searches[0]))
+
+    def _axes_of(self, voxel: int) -> tuple[int, int, int]:
+        x, y, z = np.unravel_index(voxel, self._scenario.grid.shape)
+        return int(x), int(y), int(z)
 
     def _best(
         self, view: RobotView, robot: int, ways: dict[int, _Ways], taken: Sequence[np.ndarray]
@@ -182,11 +191,12 @@ class Allotter:
         if robot not in ways:
             near = self.candidates.reach if self._lazy else math.inf
             ways[robot] = self._ways(pose, near if near < whole else math.inf)
-        choice, sure = self._best_of(robot, ways[robot], taken)
+        weighed = np.full(len(ways[robot].edges), np.nan)
+        choice, sure = self._best_of(robot, ways[robot], taken, weighed)
         while not sure:
             farther = _WIDER * ways[robot].reach
-            ways[robot] = self._ways(pose, farther if farther < whole else math.inf)
-            choice, sure = self._best_of(robot, ways[robot], taken)
+            ways[robot] = self._ways(pose, farther if farther < whole else math.inf, ways[robot])
+            choice, sure = self._best_of(robot, ways[robot], taken, weighed)
         if choice is None and robot == view.robot:
             self.seek(pose, -1, math.inf)
             everywhere = np.empty(self._scenario.grid.voxels)
@@ -194,11 +204,16 @@ class Allotter:
             self.candidates.other_of(everywhere)
             ways.clear()  # candidates have moved
             ways[robot] = self._ways(pose, math.inf)
-            choice, _ = self._best_of(robot, ways[robot], taken)
+            choice, _ = self._best_of(robot, ways[robot], taken, np.full_like(weighed, np.nan))
         return choice
 
-    def _best_of(self, robot: int, ways: _Ways, taken: Sequence[np.ndarray]) -> tuple[Choice | None, bool]:
-        """The best of the candidates that were reached, and whether none beyond can be better."""
+    def _best_of(
+        self, robot: int, ways: _Ways, taken: Sequence[np.ndarray], weighed: np.ndarray
+    ) -> tuple[Choice | None, bool]:
+        """The best of the candidates that were reached, and whether none beyond can be better.
+
+        What is counted is kept in `weighed`, (B,) by slot; NaN = not counted yet.
+        """
         slots, voxels = self.candidates.found()
         edges = ways.edges[slots]
         reached = np.isfinite(edges)
@@ -211,12 +226,15 @@ class Allotter:
         bound = self._value(np.minimum(most, self.candidates.limit()) * point, seconds, edges, takes)
         order = np.argsort(-bound, kind="stable")
         value = np.full(len(slots), -np.inf)
-        for first in range(0, len(order), _BATCH):
-            batch = order[first : first + _BATCH]
+        size = self.candidates.batch
+        for first in range(0, len(order), size):
+            batch = order[first : first + size]
             if self._lazy and bound[batch[0]] < value.max():
                 break
-            seen = self.candidates.count(slots[batch], voxels[batch]) * point
-            self.counted += len(batch)
+            new = batch[np.isnan(weighed[slots[batch]])]
+            weighed[slots[new]] = self.candidates.count(slots[new], voxels[new])
+            self.counted += len(new)
+            seen = weighed[slots[batch]] * point
             worth = self._value(seen, seconds[batch], edges[batch], takes[batch])
             value[batch] = np.where(seen > 0.0, worth, -np.inf)
         best = int(np.argmax(value)) if len(value) else -1
@@ -240,7 +258,7 @@ class Allotter:
             most = np.minimum(self.candidates.most(slots), self.candidates.limit())
             value = self._value(most * self.candidates.point, seconds, edges, nobody)
             better = value >= choice.value
-            new = slots[better & np.isinf(self.candidates.most(slots))]
+            new = slots[better & ~self.candidates.counted(slots)]
             if len(new) == 0:
                 break
             self.candidates.count(new, self.candidates.voxels_of(new))
@@ -271,11 +289,12 @@ class Allotter:
 
 
 @lean_kernel
-def ask_costs(search: Search, voxels: np.ndarray, out: np.ndarray) -> None:
-    """Fill (K,) with the costs of (K,) voxels in the latest search; those that are none stay."""
+def ask_costs(search: Search, voxels: np.ndarray, reach: float, out: np.ndarray) -> None:
+    """Fill (K,) with the costs of (K,) voxels in the latest search, inf over the reach; who is none stays."""
     for place in range(len(voxels)):
         if voxels[place] >= 0:
-            out[place] = cost_to(search, voxels[place])
+            cost = cost_to(search, voxels[place])
+            out[place] = cost if cost <= reach else math.inf
 
 
 @lean_kernel

@@ -38,13 +38,23 @@ from baselines.frontier_map import (
 )
 from baselines.ray_tree import grow_tree
 from baselines.terrain_map import choose_reached_columns, look_at_columns, new_terrain_map, survey
-from baselines.terrain_view import count_below, count_columns_from, count_columns_in_ball, mean_ground
+from baselines.terrain_view import (
+    bound_columns,
+    count_below,
+    count_columns_from,
+    count_columns_in_ball,
+    half_widths,
+    mean_ground,
+    sum_rows,
+)
 from entropy_explore_env.config import Scenario
 from entropy_explore_env.missions.view import RobotView
 from entropy_explore_env.settings import RobotKind
 from entropy_explore_env.validation import check, check_choice, check_positive
 
 Visibility = Literal["ray-cast", "naive"]
+_BATCH_CELLS = 7500
+"""Cells that are walked in about the time that a call takes."""
 _ROWS = 15
 """Rows of imagined rays for robots that look up and down."""
 
@@ -82,10 +92,10 @@ class Looking:
             check(self, "gamma", "None, or a number from 0 to 1", lambda v: 0.0 <= v <= 1.0)
         check_positive(self, "patch_m", "too_high")
 
-    def levels(self, sigma: float, prior_precision: float) -> tuple[float, float]:
+    def levels(self, sigma: float, prior_precision: float) -> tuple[np.float32, np.float32]:
         """What `take_in` takes, where σ is the level that counts as explored now."""
         explored, mapped = (
-            float(np.float32(max(level**-2, prior_precision * (1.0 + 1e-6)))) for level in (sigma, self.sigma)
+            np.float32(max(level**-2, prior_precision * (1.0 + 1e-6))) for level in (sigma, self.sigma)
         )
         return explored, mapped
 
@@ -96,6 +106,7 @@ class VoxelCandidates:
     Attributes:
         reach: Of the sensor, in voxel edges; no more than the workspace is wide.
         point: Size of a point: m² in plans, else m³.
+        batch: How many candidates are worth counting at once; changes no result.
         rates: (V,) float32, what ways cost in the mapped region; read-only.
     """
 
@@ -114,6 +125,7 @@ class VoxelCandidates:
         self._directions = rays_around(self.reach, self._pitches)
         self._tree = grow_tree(self._directions, self.reach, grid.shape)
         self._met = np.empty(self._tree.cells, np.int32)
+        self.batch = 1 + _BATCH_CELLS // self._tree.cells
         self.point = grid.voxel_size_m ** (2 if grid.flat else 3)
         self.rates = _read_only(self._map.rates)
         self._rates = self._map.rates
@@ -140,6 +152,10 @@ class VoxelCandidates:
     def most(self, slots: np.ndarray) -> np.ndarray:
         """(K,) no fewer points than V·(height factor) of each; inf = not counted yet."""
         return self._map.seen[slots].astype(np.float64)
+
+    def counted(self, slots: np.ndarray) -> np.ndarray:
+        """(K,) bool, whether a candidate has been counted since something changed nearby."""
+        return np.isfinite(self._map.seen[slots])
 
     def limit(self) -> float:
         """No more points than this can be seen from anywhere."""
@@ -261,12 +277,16 @@ class TerrainCandidates:
         self.rates = _read_only(self._map.rates)
         self._rates = self._map.rates
         self._factors = np.ones(len(self._map.voxel))
+        self._sums = np.zeros((grid.shape[0], grid.shape[1] + 1), np.int32)
+        self._widths = half_widths(self.reach)
+        self.batch = 1 + _BATCH_CELLS // max(math.ceil(turns * self.reach), 1)
         self._unit = edge if looking.gamma is not None else 1.0
 
     def update(self, view: RobotView, sigma: float) -> None:
         """See `VoxelCandidates`."""
         levels = self._looking.levels(sigma, self._prior)
         survey(self._map, view.mean.reshape(-1), view.precision.reshape(-1), levels)
+        sum_rows(self._map, self._sums)
         wide = self.reach + self._look[2]
         forget_seen(self._map.changed, self._size, self._map.voxel, self._map.seen, wide)
 
@@ -284,8 +304,19 @@ class TerrainCandidates:
         return self._map.voxel[slots]
 
     def most(self, slots: np.ndarray) -> np.ndarray:
+        """See `VoxelCandidates`; of those not counted yet what is unexplored in range of them."""
+        most, factor = self._map.seen[slots].astype(np.float64), self._factors[slots]
+        fresh = np.isinf(most)
+        if fresh.any():
+            voxels = self._map.voxel[slots[fresh]]
+            bound, factor_there = np.empty(len(voxels)), np.empty(len(voxels))
+            bound_columns(self._map, self._sums, self._widths, voxels, self._look, bound, factor_there)
+            most[fresh], factor[fresh] = bound, self._in_metres(factor_there)
+        return most * factor
+
+    def counted(self, slots: np.ndarray) -> np.ndarray:
         """See `VoxelCandidates`."""
-        return self._map.seen[slots] * self._factors[slots]
+        return np.isfinite(self._map.seen[slots])
 
     def limit(self) -> float:
         """See `VoxelCandidates`."""
@@ -300,9 +331,13 @@ class TerrainCandidates:
         count_columns_from(
             self._tally, self._map, voxels, self._azimuths, self._look, naive, seen, weighed, factor
         )
-        factor = (factor > 0.0).astype(float) if self._looking.gamma is None else factor * self._unit
+        factor = self._in_metres(factor)
         self._map.seen[slots], self._factors[slots] = seen, np.maximum(factor, 1e-12)
         return weighed * factor
+
+    def _in_metres(self, factor: np.ndarray) -> np.ndarray:
+        """(K,) height factors; without, 1 where a candidate is low enough to be one."""
+        return (factor > 0.0).astype(float) if self._looking.gamma is None else factor * self._unit
 
     def promise(self, place: np.ndarray) -> None:
         """See `VoxelCandidates`."""

@@ -36,6 +36,8 @@ SPENT = 4
 TILE = 8
 """Changes are noted by square tiles, so many voxels wide."""
 NONE = -1
+GLANCE = 128
+"""Voxels that are looked at together for whether anything changed."""
 
 
 class FrontierMap(NamedTuple):
@@ -104,10 +106,20 @@ def new_frontier_map(
 @inlined_kernel
 def state_of(mean, precision, levels):
     """Flags of a voxel from its belief; `levels` as in `take_in`."""
-    state = UNEXPLORED if precision < levels[0] else 0
-    unmapped = precision < levels[1]
-    state |= UNMAPPED if unmapped else 0
-    return state | (COVERED if mean > STOP_AT_COVERED and not unmapped else 0)
+    unexplored, unmapped = np.uint8(precision < levels[0]), np.uint8(precision < levels[1])
+    covered = (
+        np.uint8(mean > np.float32(STOP_AT_COVERED)) & ~unmapped
+    )  # without branches: many voxels at once
+    return np.uint8(unexplored * UNEXPLORED | unmapped * UNMAPPED | covered * COVERED)
+
+
+@inlined_kernel
+def has_changed(state, mean, precision, levels, first, last):
+    """Whether the flags of voxels `first` … `last` - 1 are not those of the belief."""
+    different = np.uint8(0)
+    for voxel in range(first, last):
+        different |= state[voxel] ^ state_of(mean[voxel], precision[voxel], levels)
+    return different != 0
 
 
 @lean_kernel
@@ -145,17 +157,20 @@ def take_in(frontiers, mean, precision, levels):
     reach, count = 2, 0
     for offset in frontiers.ball:
         reach = max(reach, abs(offset[0]) + 2)
-    for column in range(size[0] * size[1]):
-        for voxel in range(column * size[2], (column + 1) * size[2]):
+    for first in range(0, len(state), GLANCE):
+        last = min(first + GLANCE, len(state))
+        if not has_changed(state, mean, precision, levels, first, last):
+            continue
+        for voxel in range(first, last):
             now = state_of(mean[voxel], precision[voxel], levels)
             before = state[voxel]
             if now == before:
                 continue
             state[voxel] = now
-            x, y = column // size[1], column % size[1]
+            column = voxel // size[2]
+            x, y, z = column // size[1], column % size[1], voxel % size[2]
             if before & COVERED > now & COVERED or before & UNEXPLORED < now & UNEXPLORED:
                 frontiers.changed[x // TILE, y // TILE] = 1
-            z = voxel - column * size[2]
             if layer < 0 or abs(z - layer) <= reach:
                 count = _put_around(frontiers, x, y, z, reach, count)
     look_at_blocks(frontiers, count)

@@ -22,6 +22,7 @@ from baselines.frontier_map import (
     TILE,
     UNEXPLORED,
     UNMAPPED,
+    has_changed,
     new_frontier_map,
     put_block,
     state_of,
@@ -109,13 +110,10 @@ def survey(terrain, mean, precision, levels):
     """Bring the map up to date with a belief: see `frontier_map.take_in`."""
     size, count = terrain.size, 0
     for column in range(size[0] * size[1]):
-        touched = False
-        for voxel in range(column * size[2], (column + 1) * size[2]):
-            now = state_of(mean[voxel], precision[voxel], levels)
-            if now != terrain.state[voxel]:
-                terrain.state[voxel] = now
-                touched = True
-        if touched:
+        first, last = column * size[2], (column + 1) * size[2]
+        if has_changed(terrain.state, mean, precision, levels, first, last):
+            for voxel in range(first, last):
+                terrain.state[voxel] = state_of(mean[voxel], precision[voxel], levels)
             x, y = column // size[1], column % size[1]
             if find_ground(terrain, x, y):
                 terrain.changed[x // TILE, y // TILE] = 1

@@ -12,7 +12,7 @@ import math
 
 import numpy as np
 
-from baselines.expected_view import begin_count, promise, weight
+from baselines.expected_view import begin_count, place_in, promise, weight
 from baselines.frontier_map import NONE
 from entropy_explore_env.compilation import inlined_kernel, lean_kernel
 
@@ -127,20 +127,68 @@ def count_columns_from(tally, terrain, voxels, azimuths, look, naive, seen, weig
         weighed: (K,) filled in.
         factor: (K,) filled in.
     """
-    reach, flattest, patch, gamma, highest = look
-    size = terrain.size
+    reach, flattest = look[0], look[1]
     for place in range(len(voxels)):
-        column = voxels[place] // size[2]
-        x, y = column // size[1], column % size[1]
-        eye = (x + 0.5, y + 0.5, voxels[place] - column * size[2] + 0.5)
-        average = mean_ground(terrain, x, y, int(patch))
-        above = eye[2] - average
-        seen[place], weighed[place], factor[place] = 0.0, 0.0, 0.0
-        if above > highest:
+        x, y, z = place_in(terrain.size, voxels[place])
+        eye = (x + 0.5, y + 0.5, z + 0.5)
+        average = mean_ground(terrain, x, y, int(look[2]))
+        seen[place], weighed[place] = 0.0, 0.0
+        factor[place] = _height_factor(eye[2], average, look)
+        if factor[place] == 0.0:
             continue
-        factor[place] = max(above, 1e-3) ** gamma * eye[2] ** (1.0 - gamma)
         if naive:
             points, value = count_columns_in_ball(tally, terrain, eye, average, reach, False)
         else:
             points, value = count_below(tally, terrain, eye, average, azimuths, reach, flattest, False)
         seen[place], weighed[place] = points, value
+
+
+@inlined_kernel
+def _height_factor(height, average, look):
+    """(z_f - z_av)^γ z_f^(1 - γ); 0 where z_f - z_av is too much. See `count_columns_from`."""
+    gamma, highest, above = look[3], look[4], height - average
+    return 0.0 if above > highest else max(above, 1e-3) ** gamma * height ** (1.0 - gamma)
+
+
+@lean_kernel
+def sum_rows(terrain, sums):
+    """Fill (X, Y + 1) int32 with the unexplored columns of each row along y before a column."""
+    for x in range(terrain.size[0]):
+        sums[x, 0] = 0
+        for y in range(terrain.size[1]):
+            sums[x, y + 1] = sums[x, y] + terrain.unexplored[x * terrain.size[1] + y]
+
+
+def half_widths(reach: float) -> np.ndarray:
+    """(W,) int64, how far on along y columns touch a disc of this radius, by their distance along x.
+
+    The disc is about the middle of a column; distances are in columns.
+    """
+    within = reach + math.sqrt(0.5)  # the middle of a column that touches it
+    return np.array([int(math.sqrt(within**2 - across**2)) for across in range(int(within) + 1)], np.int64)
+
+
+@lean_kernel
+def bound_columns(terrain, sums, widths, voxels, look, most, factor):
+    """Fill (K,) with the unexplored columns in range of K voxels, seen or not, and the height factors.
+
+    No more than this can be seen from there.
+
+    Args:
+        terrain: The map.
+        sums: (X, Y + 1) of `sum_rows`.
+        widths: (W,) of `half_widths`, for the sensor's reach.
+        voxels: (K,) int32.
+        look: As in `count_columns_from`.
+        most: (K,) filled in.
+        factor: (K,) filled in.
+    """
+    size, last = terrain.size, len(widths) - 1
+    for place in range(len(voxels)):
+        x, y, z = place_in(size, voxels[place])
+        factor[place] = _height_factor(z + 0.5, mean_ground(terrain, x, y, int(look[2])), look)
+        found = 0
+        for i in range(max(x - last, 0), min(x + last, size[0] - 1) + 1):
+            wide = widths[abs(i - x)]
+            found += sums[i, min(y + wide + 1, size[1])] - sums[i, max(y - wide, 0)]
+        most[place] = found

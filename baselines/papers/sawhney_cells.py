@@ -30,6 +30,8 @@ DEM = "dem"
 TEAMS, QUICK_TEAMS = (1, 2, 3, 4, 5, 6), {"plans": (1, 3), "terrains": (3,)}
 BETAS = (1, 2, 5, 10, 20, 30, 40, 50, 60, 70)
 QUICK_BETAS = (1, 5, 10, 20, 40, 70)
+FARTHER_BETAS = {"plans": (), "terrains": (100, 200)}
+"""Beyond the paper's, so that the best one has others on both sides."""
 POINT = {"plans": 0.05, "terrains": 4.0}
 """What one of the paper's points is taken to be: m² of plan; m² of ground times metres of height factor."""
 BONUS = {"plans": 0.5, "terrains": 40.0}
@@ -45,7 +47,7 @@ _PLAN: dict[str, Any] = {
     "sensor": {"max_range_m": 3.0, "angular_step_rad": math.pi / 180, "scan_time_s": 2.0},
 }
 _TERRAIN: dict[str, Any] = {
-    "robot": {"reach_m": math.inf, "body_radius_m": 0.0},
+    "robot": {"navigator": "planned", "reach_m": math.inf, "body_radius_m": 0.0},
     "sensor": {
         "field_of_view_rad": (2 * math.pi, math.pi / 2),
         "angular_step_rad": math.pi / 60,
@@ -58,15 +60,32 @@ _ALL: dict[str, Any] = {
     "ending": {"sigma_end": 1e-3, "time_limit_s": TIME_LIMIT_S},
     "scored": True,
 }
-CHANGES: dict[str, tuple[str, dict[str, Any], dict[str, Any]]] = {
-    "scan-short": ("a scan takes 0.5 s", {"sensor": {"scan_time_s": 0.5}}, {}),
-    "scan-long": ("a scan takes 8 s", {"sensor": {"scan_time_s": 8.0}}, {}),
-    "range": ("the sensor sees twice as far", {"sensor": {"max_range_m": 6.0}}, {}),
-    "bodies": ("bodies of 0.2 m", {"robot": {"body_radius_m": 0.2}}, {}),
-    "unpromised": ("nothing is promised", {}, {"promises": False}),
+_SCAN_SHORT = ("a scan takes 0.5 s", {"sensor": {"scan_time_s": 0.5}}, {})
+_SCAN_LONG = ("a scan takes 8 s", {"sensor": {"scan_time_s": 8.0}}, {})
+_UNPROMISED = ("nothing is promised", {}, {"promises": False})
+CHANGES: dict[str, dict[str, tuple[str, dict[str, Any], dict[str, Any]]]] = {
+    "plans": {
+        "scan-short": _SCAN_SHORT,
+        "scan-long": _SCAN_LONG,
+        "range": ("the sensor sees twice as far", {"sensor": {"max_range_m": 6.0}}, {}),
+        "bodies": ("bodies of 0.2 m", {"robot": {"body_radius_m": 0.2}}, {}),
+        "unpromised": _UNPROMISED,
+    },
+    "terrains": {
+        "scan-short": _SCAN_SHORT,
+        "scan-long": _SCAN_LONG,
+        "range": ("the sensor sees half as far", {"sensor": {"max_range_m": 10.0}}, {}),
+        "corners": ("UAVs stop and scan at every corner", {"robot": {"navigator": "straight"}}, {}),
+        "unpromised": _UNPROMISED,
+    },
 }
-"""What is changed in plans: a text, settings of the scenario, fields of Exploring."""
-CHANGED_METHODS = ("ptv", "beta-10", "beta-20", "sync", "naive")
+"""What is changed in plans, and over terrain: a text, settings of the scenario, fields of Exploring."""
+CHANGED_METHODS = {
+    "plans": ("ptv", "beta-10", "beta-20", "sync", "naive"),
+    "terrains": ("ptv", "beta-20", "beta-40", "sync", "naive"),
+}
+CHANGED_IN = {"plans": PLANS, "terrains": TERRAINS}
+QUICK_CHANGED_IN = {"plans": ("office",), "terrains": ("terrain",)}
 
 
 def part_of(world: str) -> str:
@@ -76,7 +95,7 @@ def part_of(world: str) -> str:
 
 def methods(part: str, quick: bool) -> dict[str, dict[str, Any]]:
     """Name of a method → fields of Exploring."""
-    betas = QUICK_BETAS if quick else BETAS
+    betas = (*(QUICK_BETAS if quick else BETAS), *FARTHER_BETAS[part])
     looking = {"looking": Looking(sigma=SIGMA, visibility="naive")}
     found: dict[str, dict[str, Any]] = {
         "ptv": {},
@@ -125,12 +144,13 @@ def experiment(
             cells.append(
                 Cell(name, _scenario(PLANS[0], MAP_TEAM, {}), STRATEGY, min(starts, MAP_STARTS), run)
             )
-    for change, (_, settings, more) in CHANGES.items():
-        for world in PLANS[:1] if quick else PLANS:
-            for method in CHANGED_METHODS:
-                exploring = {**methods("plans", False)[method], **more}
-                cell = _cell(world, CHANGED_TEAM, method, exploring, starts, None, settings, change)
-                cells.append(cell)
+    for part, seeds in (("plans", starts), ("terrains", flights)):
+        for change, (_, settings, more) in CHANGES[part].items() if seeds else ():
+            for world in (QUICK_CHANGED_IN if quick else CHANGED_IN)[part]:
+                for method in CHANGED_METHODS[part]:
+                    exploring = {**methods(part, False)[method], **more}
+                    cell = _cell(world, CHANGED_TEAM, method, exploring, seeds, None, settings, change)
+                    cells.append(cell)
     return cells
 
 

@@ -13,9 +13,11 @@ import numpy as np
 from baselines.experiment import Claim, Record, ratio_interval
 from baselines.papers.sawhney_cells import (
     BETAS,
+    CHANGED_IN,
     CHANGED_TEAM,
     CHANGES,
     DEM,
+    FARTHER_BETAS,
     PLANS,
     TEAMS,
     TERRAINS,
@@ -47,9 +49,9 @@ def teams_in(records: Records, part: str) -> tuple[int, ...]:
 
 
 def betas_in(records: Records, part: str) -> tuple[int, ...]:
-    """The paper's β that were run in a part."""
+    """The β that were run in a part, in the paper's numbers."""
     world, team = worlds_in(records, part)[0], teams_in(records, part)[0]
-    return tuple(b for b in BETAS if cell_id(world, team, f"beta-{b}") in records)
+    return tuple(b for b in (*BETAS, *FARTHER_BETAS[part]) if cell_id(world, team, f"beta-{b}") in records)
 
 
 def times(records: Records, cell: str, end: str) -> np.ndarray:
@@ -176,13 +178,13 @@ def _our_claims(records: Records, part: str, name: str) -> list[Claim]:
     return claims
 
 
-def changes_in(records: Records) -> dict[str, tuple[str, ...]]:
-    """What was changed → the plans in which it was."""
-    return {
-        change: worlds
-        for change in CHANGES
-        if (worlds := tuple(w for w in PLANS if cell_id(w, CHANGED_TEAM, "ptv", change) in records))
+def changes_in(records: Records, part: str) -> dict[str, tuple[str, ...]]:
+    """What was changed in a part → the worlds in which it was."""
+    found = {
+        change: tuple(w for w in CHANGED_IN[part] if cell_id(w, CHANGED_TEAM, "ptv", change) in records)
+        for change in CHANGES[part]
     }
+    return {change: worlds for change, worlds in found.items() if worlds}
 
 
 def changed_ratio(

@@ -83,8 +83,9 @@ def _text(records: Records, claims: Sequence[Claim], command: str) -> str:
             ]
     if table := maps_table(records, ENDS):
         parts += ["## Plans from files", _MAPS, table]
-    if changes_in(records):
-        parts += ["## One thing changed at a time", _CHANGED, _changes_table(records)]
+    changed = [_changes_table(records, part) for part in PARTS if changes_in(records, part)]
+    if changed:
+        parts += ["## One thing changed at a time", _CHANGED, *changed]
     return "\n\n".join(part.strip() for part in parts) + "\n"
 
 
@@ -128,7 +129,7 @@ favours it."""
 _MAPS = f"""Teams of {MAP_TEAM}, the settings of the other plans, cells resampled to 0.1 m,
 {MAP_STARTS} starts; mean times, and seconds of computing a mission on one thread."""
 
-_CHANGED = f"""Teams of {CHANGED_TEAM} in plans: time of V/t over that of the other method."""
+_CHANGED = f"""Teams of {CHANGED_TEAM}: time of V/t over that of the other method."""
 
 
 def _times_table(records: Records, part: str) -> str:
@@ -148,18 +149,18 @@ def _times_table(records: Records, part: str) -> str:
     return markdown_table(head, rows)
 
 
-def _changes_table(records: Records) -> str:
+def _changes_table(records: Records, part: str) -> str:
     """V/t over the others with one thing changed."""
     rows = []
-    changes = changes_in(records)
+    changes = changes_in(records, part)
     everywhere = next(iter(changes.values()))
     for change in (None, *changes):
         worlds = everywhere if change is None else changes[change]
-        for method in CHANGED_METHODS[1:]:
+        for method in CHANGED_METHODS[part][1:]:
             ratios = [
                 "{:.2f} ({:.2f} … {:.2f})".format(*changed_ratio(records, change, method, end, worlds))
                 for end in ENDS
             ]
-            text = "as it is" if change is None else CHANGES[change][0]
+            text = "as it is" if change is None else CHANGES[part][change][0]
             rows.append([text, f"V/t over `{method}`", *ratios, ", ".join(worlds)])
-    return markdown_table(["changed", "ratio", *ENDS.values(), "in"], rows)
+    return markdown_table([f"changed, {PARTS[part]}", "ratio", *ENDS.values(), "in"], rows)

@@ -90,20 +90,27 @@ def put(queue, bucket, voxel):
 
 
 @inlined_kernel
-def take_block(queue):
-    """Take the block that came last out of the first bucket that is not empty, which becomes the current.
-
-    Returns:
-        (block, count): its voxels are `blocks[block, 1 … count]`; give it back by `free_block` when
-        they are worked off. Block -1 = the queue is empty.
-    """
+def go_on(queue):
+    """Make the first bucket that is not empty the current one; returns whether there is one."""
     numbers, heads, current = queue.numbers[0], queue.heads, queue.numbers[0].current
     if numbers.waiting == 0:
-        return np.int64(_NONE), np.int64(0)
+        return False
     while heads[current & _RING, 0] == _NONE:
         current += 1
     numbers.current = current
-    place = current & _RING
+    return True
+
+
+@inlined_kernel
+def take_block(queue):
+    """Take the block that came last out of the current bucket, which is not empty.
+
+    Returns:
+        (block, count): its voxels are `blocks[block, 1 … count]`; give it back by `free_block` when
+        they are worked off.
+    """
+    numbers, heads = queue.numbers[0], queue.heads
+    place = numbers.current & _RING
     block, count = np.int64(heads[place, 0]), np.int64(heads[place, 1])
     heads[place, 0] = queue.blocks[block, 0]
     heads[place, 1] = _ENTRIES

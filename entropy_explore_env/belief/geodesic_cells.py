@@ -19,6 +19,7 @@ from entropy_explore_env.belief.bucket_queue import (
     BucketQueue,
     clear_queue,
     free_block,
+    go_on,
     new_queue,
     put,
     take_block,
@@ -218,10 +219,8 @@ def _tessellate(space, starts, steps, per_cost, moves):
             space.cost[voxel], space.cell[voxel] = 0.0, number
             put(queue, 0, voxel)
         number += 1
-    while True:
+    while go_on(queue):
         block, count = take_block(queue)
-        if block < 0:
-            break
         current = queue.numbers[0].current
         for entry in range(1, count + 1):
             voxel = np.int64(queue.blocks[block, entry])

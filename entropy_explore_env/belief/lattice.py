@@ -2,7 +2,7 @@
 
 A step costs its length times the mean of the two voxels' rates: the rate's integral along the
 straight line between the centres. A voxel believed free has rate 1, an unknown one `unknown_cost`;
-none can be entered that is believed covered, or in which the body does not fit.
+none can be entered that is believed covered, in which the body does not fit, or that is closed.
 """
 
 from __future__ import annotations
@@ -22,6 +22,9 @@ IMPASSABLE, FREE, UNKNOWN = 0, 1, 2
 
 KNOWN_RATIO = 2.0
 """A voxel is known once its precision is this many times the prior one: half a bit was learnt of it."""
+
+CLOSED = 3.0
+"""Of the barriers that bodies meet the one that is known beforehand: the ceiling."""
 
 MOST_RATE = 1e6
 """Rates are at most this many times the least one: a search works off a bucket for each least step."""
@@ -88,6 +91,8 @@ class Costs(NamedTuple):
     """(V,) float32 rates, inf = impassable, in place of the belief; empty = by the belief."""
     least_rate: float
     """No rate is less; 1 for a belief."""
+    barriers: np.ndarray
+    """(V,) float32, nobody enters where it is CLOSED, the rest is ignored; empty = nothing is closed."""
 
 
 def new_lattice(shape: tuple[int, int, int], body_radius: float = 0.0, layer: int | None = None) -> Lattice:
@@ -177,7 +182,13 @@ def belief_costs(
         raise SettingError("unknown_cost", unknown_cost, f"a number from 1 to {MOST_RATE:g}")
     flat = _numbered(mean)
     return Costs(
-        flat, _numbered(precision), KNOWN_RATIO * float(prior_precision), float(unknown_cost), flat[:0], 1.0
+        flat,
+        _numbered(precision),
+        KNOWN_RATIO * float(prior_precision),
+        float(unknown_cost),
+        flat[:0],
+        1.0,
+        flat[:0],
     )
 
 
@@ -197,7 +208,7 @@ def rate_costs(rates: np.ndarray) -> Costs:
     most = float(flat.max(initial=0.0, where=np.isfinite(flat)))
     if most > MOST_RATE * least:
         raise SettingError("rates", most, f"finite rates of at most {MOST_RATE:g} times the least, {least:g}")
-    return Costs(flat[:0], flat[:0], 0.0, 1.0, flat, least if math.isfinite(least) else 1.0)
+    return Costs(flat[:0], flat[:0], 0.0, 1.0, flat, least if math.isfinite(least) else 1.0, flat[:0])
 
 
 def _numbered(field: np.ndarray) -> np.ndarray:
@@ -216,6 +227,12 @@ def place_of(lattice, voxel):
 
 
 @inlined_kernel
+def is_closed(costs, voxel):
+    """Whether a voxel is closed to robots, whatever they believe of it."""
+    return len(costs.barriers) > 0 and costs.barriers[voxel] == CLOSED
+
+
+@inlined_kernel
 def look_at(lattice, costs, voxel, x, y, z, first, last):
     """What can be done in a voxel: impassable, free or unknown.
 
@@ -231,7 +248,7 @@ def look_at(lattice, costs, voxel, x, y, z, first, last):
     """
     if len(costs.rates) > 0:
         return FREE if costs.rates[voxel] < math.inf else IMPASSABLE
-    if costs.mean[voxel] > STOP_AT_COVERED:
+    if costs.mean[voxel] > STOP_AT_COVERED or is_closed(costs, voxel):
         return IMPASSABLE
     size, margin = lattice.size, lattice.margin
     if x < margin[0] or y < margin[1] or z < margin[2]:
@@ -256,4 +273,5 @@ def look_along(costs, first, last, number, marks):
         return
     for voxel in range(first, last):
         kind = UNKNOWN if costs.precision[voxel] < costs.known_precision else FREE
-        marks[voxel] = np.uint32(number + (IMPASSABLE if costs.mean[voxel] > STOP_AT_COVERED else kind))
+        covered = costs.mean[voxel] > STOP_AT_COVERED or is_closed(costs, voxel)
+        marks[voxel] = np.uint32(number + (IMPASSABLE if covered else kind))

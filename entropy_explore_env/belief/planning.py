@@ -14,6 +14,7 @@ import numpy as np
 from entropy_explore_env.belief.bucket_queue import (
     clear_queue,
     free_block,
+    go_on,
     keep_entries,
     put,
     queue_full,
@@ -26,6 +27,7 @@ from entropy_explore_env.belief.lattice import (
     UNKNOWN,
     Costs,
     Lattice,
+    is_closed,
     look_at,
     place_of,
 )
@@ -84,7 +86,8 @@ def _let_leave(search, lattice, costs, voxel):
             near = (i * size[1] + j) * size[2] + k
             if near != voxel and (lattice.layer < 0 or k == lattice.layer):
                 mark = mark_of(search, lattice, costs, near, i, j, k)
-                if mark & KIND == IMPASSABLE and costs.mean[near] <= STOP_AT_COVERED:
+                closed = costs.mean[near] > STOP_AT_COVERED or is_closed(costs, near)
+                if mark & KIND == IMPASSABLE and not closed:
                     kind = UNKNOWN if costs.precision[near] < costs.known_precision else FREE
                     search.mark[near] = np.uint32(number << SEARCH_SHIFT | TIGHT | kind)
 
@@ -196,6 +199,34 @@ def _step_on(search, lattice, costs, voxel, at, passable, goal, place, limit, pe
     return limit
 
 
+@inlined_kernel
+def _work_off(search, lattice, costs, goal, place, limit, per_cost, cells):
+    """Step on from a block of the current bucket; returns the limit of costs that are wanted now."""
+    marks, queue = search.mark, search.queue
+    block, count = take_block(queue)
+    for entry in range(count, 0, -1):
+        voxel = np.int64(queue.blocks[block, entry])
+        mark = np.int64(marks[voxel])
+        if not mark & OPEN:
+            continue
+        x, y, z = place_of(lattice, voxel)
+        ahead = search.cost[voxel]
+        if goal != _NOWHERE:
+            ahead += costs.least_rate * _to_goal((x, y, z), place)
+        if int(ahead * per_cost) > queue.numbers[0].current:  # it was too far ahead for the ring
+            put(queue, int(ahead * per_cost), voxel)
+            continue
+        marks[voxel] = np.uint32(mark ^ OPEN)
+        if ahead >= limit:
+            continue
+        passable = _passable_moves(search, lattice, costs, voxel, x, y, z)
+        limit = _step_on(
+            search, lattice, costs, voxel, (x, y, z), passable, goal, place, limit, per_cost, cells
+        )
+    free_block(queue, block)
+    return limit
+
+
 @lean_kernel
 def search_ways(search, lattice, costs, sources, goal, reach, cells):
     """Find the cheapest ways from the nearest of several sources to a goal, or to all voxels.
@@ -221,7 +252,6 @@ def search_ways(search, lattice, costs, sources, goal, reach, cells):
         Cost of the goal, inf = not reached within `reach`; without a goal 0.
     """
     _begin(search, lattice, costs, sources, cells)
-    marks, cost, queue = search.mark, search.cost, search.queue
     limit = np.nextafter(reach, math.inf)
     per_cost = _NARROWER**-1 / costs.least_rate
     place = (0, 0, 0)
@@ -233,32 +263,32 @@ def search_ways(search, lattice, costs, sources, goal, reach, cells):
         if mark & KIND == IMPASSABLE:
             return math.inf
         per_cost *= _PER_STEP_TO_GOAL
-    while True:
-        block, count = take_block(queue)
-        if block == _NOWHERE or queue.numbers[0].current > limit * per_cost:
-            break
-        for entry in range(count, 0, -1):
-            voxel = np.int64(queue.blocks[block, entry])
-            mark = np.int64(marks[voxel])
-            if not mark & OPEN:
-                continue
-            x, y, z = place_of(lattice, voxel)
-            here = cost[voxel]
-            ahead = here
-            if goal != _NOWHERE:
-                ahead += costs.least_rate * _to_goal((x, y, z), place)
-            if int(ahead * per_cost) > queue.numbers[0].current:  # it was too far ahead for the ring
-                put(queue, int(ahead * per_cost), voxel)
-                continue
-            marks[voxel] = np.uint32(mark ^ OPEN)
-            if ahead >= limit:
-                continue
-            passable = _passable_moves(search, lattice, costs, voxel, x, y, z)
-            limit = _step_on(
-                search, lattice, costs, voxel, (x, y, z), passable, goal, place, limit, per_cost, cells
-            )
-        free_block(queue, block)
+    while go_on(search.queue) and search.queue.numbers[0].current <= limit * per_cost:
+        limit = _work_off(search, lattice, costs, goal, place, limit, per_cost, cells)
     return cost_to(search, goal) if goal != _NOWHERE else 0.0
+
+
+@lean_kernel
+def begin_search(search, lattice, costs, sources, cells):
+    """Begin a search to all voxels, for `widen_search`; arguments as of `search_ways`."""
+    _begin(search, lattice, costs, sources, cells)
+
+
+@lean_kernel
+def widen_search(search, lattice, costs, reach, cells):
+    """Go on with a search to all voxels, and find the cheapest ways to those within reach.
+
+    Args:
+        search: Of `begin_search` or an earlier call, and of nothing since. Costs over the reach, which
+            `cost_to` gives of some voxels, are not final.
+        lattice: As in the search.
+        costs: As in the search.
+        reach: Largest cost, no less than before; inf allowed.
+        cells: As in the search.
+    """
+    per_cost, nowhere = _NARROWER**-1 / costs.least_rate, (0, 0, 0)
+    while go_on(search.queue) and search.queue.numbers[0].current <= reach * per_cost:
+        _work_off(search, lattice, costs, _NOWHERE, nowhere, math.inf, per_cost, cells)
 
 
 class Geodesics(NamedTuple):

@@ -174,6 +174,7 @@ class Missions:
             state.joint_precision[mission] = self.rules.numbers["prior_precision"][0]
             state.visible[mission] = world.visible(self.scenario).ravel()
         state.missions[mission]["reached_s"] = -1.0
+        state.missions[mission]["ceiling"] = world.ceiling is not None
         self._set_entropies(mission, world.visible_voxels(self.scenario))
         robots = state.robots[mission]
         for field in ("origin", "goal", "target", "scan_pose"):

@@ -39,14 +39,17 @@ def plan_missions(rules, state, navigator, kind, boxes, numbers, first, last):
                     box, number = boxes[mission, index], numbers[mission, index]
                     decode_action(rules, index, robot.goal, box, number, robot.target)
                     mean, precision = state.mean[mission, index], state.precision[mission, index]
-                    plan_way(own, navigator, mean, precision, robot)
+                    barriers = state.blocked[mission * own.radii + own.barriers]
+                    if not state.missions[mission].ceiling:
+                        barriers = barriers[:0]
+                    plan_way(own, navigator, mean, precision, barriers, robot)
 
 
 @lean_kernel
-def plan_way(numbers, navigator, mean, precision, robot):
+def plan_way(numbers, navigator, mean, precision, barriers, robot):
     """Write a robot's way to its target: waypoints in metres, and how it ends if nothing stops it."""
     start, goal = grid_position(numbers, robot.goal), grid_position(numbers, robot.target)
-    robot.waypoints, robot.way_end = find_way(navigator, mean, precision, start, goal, robot.way)
+    robot.waypoints, robot.way_end = find_way(navigator, mean, precision, barriers, start, goal, robot.way)
     for point in range(robot.waypoints):
         for axis in range(3):
             robot.way[point, axis] = numbers.origin_m[axis] + robot.way[point, axis] * numbers.voxel_size_m

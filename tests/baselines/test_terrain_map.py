@@ -12,7 +12,15 @@ from hypothesis import strategies as st
 from baselines.expected_view import new_tally
 from baselines.frontier_map import NONE, put_block
 from baselines.terrain_map import choose_reached_columns, look_at_columns, new_terrain_map, survey
-from baselines.terrain_view import count_below, count_columns_from, count_columns_in_ball, mean_ground
+from baselines.terrain_view import (
+    bound_columns,
+    count_below,
+    count_columns_from,
+    count_columns_in_ball,
+    half_widths,
+    mean_ground,
+    sum_rows,
+)
 from tests.reference import sawhney as reference
 from tests.reference.scenes import drawn, seeds
 
@@ -157,3 +165,24 @@ def test_the_height_factor_by_hand():
         tally, terrain, voxels, azimuths, (10.0, 0.0, 1.0, 1.0, 4.0), False, seen, value, factor
     )
     assert factor.tolist() == pytest.approx([1.5, 0.0]) and seen[1] == 0.0
+
+
+@given(seeds, st.floats(0.6, 12.0), st.booleans())
+@drawn(60)
+def test_no_more_is_seen_than_lies_in_range(seed, reach, naive):
+    ground, rng = hills(seed)
+    terrain = known_ground(ground)
+    voxels = rng.integers(0, math.prod(SHAPE), 20).astype(np.int32)
+    angles = 0.05 + np.arange(40) * (2 * math.pi / 40)
+    azimuths, look = np.stack([np.cos(angles), np.sin(angles)], axis=-1), (reach, 0.0, 2.0, 0.4, 5.0)
+    seen, weighed, factor, most, same = (np.empty(20) for _ in range(5))
+    tally, sums = new_tally(9 * 13, SHAPE), np.empty((9, 14), np.int32)
+    count_columns_from(tally, terrain, voxels, azimuths, look, naive, seen, weighed, factor)
+    sum_rows(terrain, sums)
+    bound_columns(terrain, sums, half_widths(reach), voxels, look, most, same)
+    np.testing.assert_array_equal(same, factor)
+    assert (seen <= most).all()
+    for voxel, bound in zip(voxels.tolist(), most, strict=True):
+        x, y, _ = np.unravel_index(voxel, SHAPE)
+        near = [math.dist((x, y), place) <= reach + math.sqrt(0.5) for place in np.ndindex(9, 13)]
+        assert bound == np.count_nonzero(np.reshape(near, (9, 13)) & (terrain.ground == NONE))

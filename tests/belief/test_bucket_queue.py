@@ -10,6 +10,7 @@ from entropy_explore_env.belief.bucket_queue import (
     BUCKETS,
     clear_queue,
     free_block,
+    go_on,
     keep_entries,
     new_queue,
     put,
@@ -23,13 +24,12 @@ ENTRIES = 400
 
 def emptied(queue):
     found = []
-    while True:
+    while go_on(queue):
         block, count = take_block(queue)
-        if block < 0:
-            return found
         voxels = queue.blocks[block, count:0:-1].tolist()
         found += [(int(queue.numbers[0]["current"]), voxel) for voxel in voxels]
         free_block(queue, block)
+    return found
 
 
 @drawn(60)
@@ -41,7 +41,7 @@ def test_what_is_put_in_comes_out_by_bucket_the_last_first(entries):
         for bucket, voxel in entries:
             put(queue, bucket, voxel)
         assert emptied(queue) == sorted(entries[::-1], key=lambda entry: entry[0])
-    assert take_block(queue) == (-1, 0)
+    assert not go_on(queue)
 
 
 def test_the_ring_turns_and_what_lies_beyond_it_waits_in_the_last_bucket():

@@ -15,11 +15,13 @@ from scipy.sparse.csgraph import dijkstra
 from entropy_explore_env.belief.lattice import KNOWN_RATIO, belief_costs, new_lattice, rate_costs
 from entropy_explore_env.belief.planning import (
     UNREACHED,
+    begin_search,
     geodesics,
     search_ways,
     shortest_way,
+    widen_search,
 )
-from entropy_explore_env.belief.search_space import new_search
+from entropy_explore_env.belief.search_space import collect, new_search
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.settings import Grid
 from entropy_explore_env.worlds.world import World
@@ -304,6 +306,23 @@ def test_ways_beyond_reach_are_not_found():
     expected = octile(FLAT, (0, 0, 0))
     np.testing.assert_allclose(found.cost, np.where(expected <= 3.0, expected, math.inf))
     assert ((found.cell == UNREACHED) == (expected > 3.0)).all()
+
+
+@drawn(40)
+@given(st.sampled_from(SHAPES), seeds, st.lists(st.floats(0.0, 40.0), min_size=1, max_size=4))
+def test_a_search_that_is_widened_finds_what_one_of_that_reach_finds(shape, seed, reaches):
+    rates, lattice = random_rates(shape, seed, 1.0), new_lattice(shape)
+    sources = np.random.default_rng(seed).integers(0, rates.size, 2).astype(np.int32)
+    costs, search, cell = rate_costs(rates), new_search(rates.size), np.full(rates.size, UNREACHED, np.int32)
+    begin_search(search, lattice, costs, sources, cell)
+    found = np.empty(rates.size)
+    for reach in (*sorted(reaches), math.inf):
+        widen_search(search, lattice, costs, reach, cell)
+        collect(search, found)
+        expected = geodesics(new_search(rates.size), lattice, costs, sources, reach)
+        within = found <= reach
+        np.testing.assert_array_equal(np.where(within, found, math.inf), expected.cost.ravel())
+        np.testing.assert_array_equal(np.where(within, cell, UNREACHED), expected.cell.ravel())
 
 
 @drawn(20)

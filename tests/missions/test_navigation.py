@@ -14,7 +14,7 @@ from entropy_explore_env.envs.conformance import check_conformance
 from entropy_explore_env.missions.missions import Missions
 from entropy_explore_env.missions.poses import pose_at
 from entropy_explore_env.robots.motion import MoveEnd
-from entropy_explore_env.scenarios import OFFICE, ROOM_FURNISHED, SCENARIOS
+from entropy_explore_env.scenarios import OFFICE, ROOM_FURNISHED, SCENARIOS, TERRAIN
 from entropy_explore_env.settings import Grid
 from entropy_explore_env.worlds.world import World
 from tests.reference.scenes import free_box, random_actions, started, wander
@@ -182,3 +182,23 @@ def test_teams_that_plan_conform(scenario, robots, kind):
         sensor={"scan_every_m": 0.5},
         action={"kind": kind},
     )
+
+
+@pytest.mark.parametrize("world", ["terrain", "terrain-rough"])
+def test_whoever_plans_knows_the_exposure_surface_and_never_meets_it(world):
+    """Flights to anywhere: those above the surface end below it with no way, and no drive runs into it."""
+    settings = {
+        "grid": Grid((40, 30, 20), 1.0),
+        "world": world,
+        "robots": 2,
+        "robot": {**PLANNED, "reach_m": math.inf},
+        "decision_period_s": None,
+        "ending": {**ENDLESS, "time_limit_s": 400.0},
+    }
+    missions = started(with_settings(TERRAIN, settings))
+    ends, rng = Counter(), np.random.default_rng(0)
+    for _ in range(60):
+        missions.step(*random_actions(missions, rng))
+        ends.update(missions.state.robots["move_end"].ravel().tolist())
+    assert ends[MoveEnd.CEILING.code] == 0
+    assert ends[MoveEnd.NO_WAY.code] > 0 and ends[MoveEnd.ARRIVED.code] > 0
