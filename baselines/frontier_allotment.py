@@ -144,6 +144,18 @@ class Allotter:
         candidates.release()
         return found
 
+    def options(self, view: RobotView) -> tuple[np.ndarray, np.ndarray]:
+        """What the robot can choose from now: (K,) seconds and (K,) V·(height factor) of each candidate.
+
+        Nothing is promised; the belief was taken in.
+        """
+        ways = self._ways(view.pose, math.inf)
+        slots, voxels = self.candidates.found()
+        reached = np.isfinite(ways.edges[slots])
+        slots, voxels = slots[reached], voxels[reached]
+        seen = self.candidates.count(slots, voxels) * self.candidates.point
+        return self.seconds(view.robot, ways.edges[slots]), seen
+
     def place_of(self, voxel: int) -> np.ndarray:
         """(3,) centre of a voxel, grid units."""
         return np.stack(np.unravel_index(voxel, self._scenario.grid.shape)).astype(float) + 0.5

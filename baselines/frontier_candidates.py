@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -26,6 +26,7 @@ from baselines.expected_view import (
 )
 from baselines.frontier_map import (
     COVERED,
+    EDGE,
     NONE,
     SPENT,
     UNMAPPED,
@@ -100,6 +101,19 @@ class Looking:
         return explored, mapped
 
 
+class Chart(NamedTuple):
+    """What a robot knows, seen from above, for pictures; (X, Y) each."""
+
+    mapped: np.ndarray
+    """bool"""
+    covered: np.ndarray
+    """bool, walls; over terrain none."""
+    edge: np.ndarray
+    """bool, mapped beside unexplored."""
+    ground: np.ndarray
+    """float64, height of the ground above the floor in voxel edges; NaN = not mapped, or a plan."""
+
+
 class VoxelCandidates:
     """Candidates and counts in a map of voxels; the points of V are voxels.
 
@@ -144,6 +158,22 @@ class VoxelCandidates:
     def mapped_share(self) -> float:
         """Share of all points that are mapped."""
         return float((self._map.state & UNMAPPED == 0).mean())
+
+    def chart(self) -> Chart:
+        """What is known, in space all heights laid over each other."""
+        state, edge = self._map.state.reshape(self._size), self._map.flags.reshape(self._size) & EDGE > 0
+        mapped, covered = state & UNMAPPED == 0, state & COVERED > 0
+        if self._map.layer >= 0:
+            mapped, covered, edge = (a[:, :, self._map.layer, None] for a in (mapped, covered, edge))
+        return Chart(mapped.any(2), covered.any(2), edge.any(2), np.full(self._size[:2], np.nan))
+
+    def expected(self, place: np.ndarray) -> np.ndarray:
+        """(X, Y) bool, what is expected to be seen from (3,), grid units, above or below each other."""
+        self.promise(place)
+        found = np.zeros(math.prod(self._size), bool)
+        found[self._tally.marked[: self._tally.numbers[1]]] = True
+        self.release()
+        return np.asarray(found.reshape(self._size).any(2))
 
     def voxels_of(self, slots: np.ndarray | slice) -> np.ndarray:
         """(K,) int32, voxels of some candidates; NONE = there is none."""
@@ -298,6 +328,20 @@ class TerrainCandidates:
     def mapped_share(self) -> float:
         """See `VoxelCandidates`."""
         return float((self._map.ground != NONE).mean())
+
+    def chart(self) -> Chart:
+        """See `VoxelCandidates`."""
+        mapped, edge = self._map.ground != NONE, self._map.flags.reshape(self._size[:2]) & EDGE > 0
+        ground = np.where(mapped, self._map.ground.astype(float), np.nan)
+        return Chart(mapped, np.zeros_like(mapped), edge, ground)
+
+    def expected(self, place: np.ndarray) -> np.ndarray:
+        """See `VoxelCandidates`."""
+        self.promise(place)
+        found = np.zeros(self._size[0] * self._size[1], bool)
+        found[self._tally.marked[: self._tally.numbers[1]]] = True
+        self.release()
+        return found.reshape(self._size[:2])
 
     def voxels_of(self, slots: np.ndarray | slice) -> np.ndarray:
         """See `VoxelCandidates`."""

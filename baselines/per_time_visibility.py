@@ -168,6 +168,10 @@ class FrontierStrategy:
         """Share of the points in the map of a robot that knows most of them: of columns over terrain."""
         return max((allotter.candidates.mapped_share() for allotter in self._allotters.values()), default=0.0)
 
+    def allotter_of(self, robot: int) -> Allotter:
+        """What a robot keeps of frontiers; there is none before it first chose."""
+        return self._allotters[robot]
+
     def counted(self) -> int:
         """How many candidates were counted in this mission."""
         return sum(allotter.counted for allotter in self._allotters.values())

@@ -81,9 +81,8 @@ def main(words: Sequence[str]) -> int:
     options = ("starts", "flights", "dem")
     given += "".join(f" --{option} {v}" for option in options if (v := getattr(args, option)) is not None)
     given += (" --maps " + " ".join(file.name for file in args.maps)) if args.maps else ""
-    report = write_report(
-        args.out, records, claims, f"python -m baselines.papers.sawhney{given} --out {args.out}"
-    )
+    command = f"python -m baselines.papers.sawhney{given} --out {args.out}"
+    report = write_report(args.out, records, claims, command, dem or None)
     return report_claims("Sawhney", claims, report, started, args.json, args.strict)
 
 

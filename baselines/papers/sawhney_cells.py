@@ -154,6 +154,19 @@ def experiment(
     return cells
 
 
+def world_cell(
+    world: str,
+    robots: int,
+    method: str | Metric,
+    dem: Path | None = None,
+    change: dict[str, Any] | None = None,
+) -> Cell:
+    """One mission's cell of a world, by a method or a metric; `change` are settings of the scenario."""
+    part = part_of(world)
+    exploring = {"metric": method} if isinstance(method, Metric) else methods(part, False)[method]
+    return _cell(world, robots, str(method), exploring, 1, dem, change)
+
+
 def _cell(
     world: str,
     robots: int,

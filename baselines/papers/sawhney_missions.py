@@ -9,7 +9,7 @@ done: up to a scan later than the last one to arrive.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -19,6 +19,7 @@ from baselines.experiment import Record
 from baselines.per_time_visibility import Exploring, FrontierStrategy
 from entropy_explore_env.config import Scenario
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
+from entropy_explore_env.missions.view import RobotView
 from entropy_explore_env.reports.metrics import joint_figures, mission_figures
 
 MARKS = (0.5, 0.9, 0.95, 0.99)
@@ -50,8 +51,7 @@ class Run:
             `series`: time and explored share; and counts.
         """
         del strategy
-        if self.world is not None:
-            env = _in_world(env.scenario, self.world, self.ceiling_m)
+        env = self.placed(env)
         explorer = FrontierStrategy(self.exploring)
         times_s, shares = followed(env, explorer, seed)
         figures = mission_figures(env.missions, 0)
@@ -72,11 +72,24 @@ class Run:
             },
         }
 
+    def placed(self, env: EntropyExploreEnv) -> EntropyExploreEnv:
+        """The environment, or one in this cell's height map."""
+        return env if self.world is None else _in_world(env.scenario, self.world, self.ceiling_m)
+
 
 def followed(
-    env: EntropyExploreEnv, explorer: FrontierStrategy, seed: int
+    env: EntropyExploreEnv,
+    explorer: FrontierStrategy,
+    seed: int,
+    look: Callable[[float, Sequence[RobotView]], None] | None = None,
 ) -> tuple[Sequence[float], Sequence[float]]:
     """Run a mission until all robots find nothing unexplored, or it is cut off.
+
+    Args:
+        env: Where.
+        explorer: Of the robots.
+        seed: Of the mission.
+        look: Called when robots have chosen, with the explored share and the views of those.
 
     Returns:
         Times and explored shares after the reset and each step.
@@ -95,6 +108,8 @@ def followed(
             if over_terrain
             else float(joint_figures(env.missions, 0)["explored"] or 0.0)
         )
+        if look is not None:
+            look(shares[-1], views)
         if all(explorer.idle):
             break
         for view, viewpoint in zip(views, chosen, strict=True):

@@ -35,14 +35,24 @@ from baselines.papers.sawhney_figures import figure_beta, figure_curves, figure_
 from baselines.papers.sawhney_maps import STARTS as MAP_STARTS
 from baselines.papers.sawhney_maps import TEAM as MAP_TEAM
 from baselines.papers.sawhney_maps import maps_table
+from baselines.papers.sawhney_pictures import OptionMeans, pictures
 from entropy_explore_env.writing import write_atomically
 
 PAPER_RUNS = {"plans": 160, "terrains": 120}
 _PICTURES = {"beta": figure_beta, "teams": figure_teams, "curves": figure_curves}
 
 
-def write_report(folder: Path, records: Records, claims: Sequence[Claim], command: str) -> Path:
+def write_report(
+    folder: Path, records: Records, claims: Sequence[Claim], command: str, dem: Path | None = None
+) -> Path:
     """Write `sawhney.md` and, in a folder `sawhney` beside it, its figures and tables.
+
+    Args:
+        folder: Where.
+        records: Cell id → records.
+        claims: What is claimed.
+        command: That made them.
+        dem: The height map's file that was flown over as well.
 
     Returns:
         Path of the report.
@@ -53,7 +63,11 @@ def write_report(folder: Path, records: Records, claims: Sequence[Claim], comman
                 figure, table = draw(records, part)
                 write_atomically(folder / "sawhney" / f"{part}-{name}.png", png(figure))
                 write_atomically(folder / "sawhney" / f"{part}-{name}.csv", csv_table(table))
-    write_atomically(folder / "sawhney.md", _text(records, claims, command))
+        drawn, means = pictures([part for part in PARTS if worlds_in(records, part)], dem)
+        for name, figure in drawn.items():
+            write_atomically(folder / "sawhney" / f"{name}.png", png(figure))
+    text = _text(records, claims, command) + _pictures_text(list(drawn), means)
+    write_atomically(folder / "sawhney.md", text)
     return folder / "sawhney.md"
 
 
@@ -102,6 +116,32 @@ def _runs(records: Records, part: str) -> str:
         f"**{runs} runs a point{fewer}**; β ∈ {{{betas}}} in the paper's numbers, each {POINT[part]:g} "
         + ("m²/s." if part == "plans" else "m³/s.")
     )
+
+
+_TITLES = {
+    "worlds": "Worlds, fig. 5",
+    "options": "Options, fig. 1",
+    "plan-mission": "A mission in a plan, fig. 7",
+    "ways": "Ways, figs. 11 and 12",
+    "terrain-mission": "A mission over terrain, fig. 9",
+    "section": "A section, figs. 2 to 4",
+}
+_PAPER_MEANS = {"V - 2t": "18.8, 2.7, 10", "V - 20t": "11, 1, 11", "V/t": "15.2, 1.3, 12.5"}
+_OPTIONS = """Fig. 1, whose options are taken to be all pairs of t = 1 … 10 and V = 2, 4 … 20: means of V, t
+and V/t over the ten that a metric goes for first. The paper's ten of V - 2t leave out some that are worth
+more by that metric, such as (3, 18): its figure has fewer points."""
+
+
+def _pictures_text(drawn: Sequence[str], means: Sequence[OptionMeans]) -> str:
+    """The figures that show no measurements."""
+    parts = ["## The paper's other figures", *(f"![{_TITLES[name]}](sawhney/{name}.png)" for name in drawn)]
+    if means:
+        rows = [
+            [name, _PAPER_MEANS[name], f"{seen:.3g}, {seconds:.3g}, {ratio:.3g}"]
+            for name, seen, seconds, ratio in means
+        ]
+        parts += [_OPTIONS, markdown_table(["metric", "paper", "ours"], rows)]
+    return "\n" + "\n\n".join(parts) + "\n"
 
 
 _RULES = f"""Plans are the scenarios of these names: cells of 0.1 m, robots without bodies at 0.5 m/s and

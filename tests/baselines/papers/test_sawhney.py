@@ -9,12 +9,13 @@ import json
 import numpy as np
 import pytest
 from matplotlib import cbook
+from matplotlib.figure import Figure
 from PIL import Image
 
 from baselines import experiment
 from baselines.command import run_command
 from baselines.frontier_rivals import Nearest
-from baselines.papers import sawhney, sawhney_cells
+from baselines.papers import sawhney, sawhney_cells, sawhney_report
 from baselines.papers.sawhney_cells import (
     BETAS,
     CHANGED_METHODS,
@@ -53,12 +54,14 @@ def test_the_cells_are_the_experiment_s():
             assert cells[cell_id(world, n, "naive")].record.exploring.looking.visibility == "naive"
             assert cells[cell_id(world, n, "nearest")].record.exploring.metric == Nearest()
     assert cells[cell_id("terrain", 2, "no-height")].record.exploring.looking.gamma is None
-    for change in CHANGES:
-        for method in CHANGED_METHODS:
-            changed, base = (cells[cell_id("office", 3, method, c)] for c in (change, None))
-            assert (changed.scenario, changed.record) != (base.scenario, base.record)
+    for part, world in (("plans", "office"), ("terrains", "terrain-rough")):
+        for change in CHANGES[part]:
+            for method in CHANGED_METHODS[part]:
+                changed, base = (cells[cell_id(world, 3, method, c)] for c in (change, None))
+                assert (changed.scenario, changed.record) != (base.scenario, base.record)
+                assert changed.seeds == base.seeds
     quick = {cell.id for cell in cells_of(4, 4, quick=True, dem=None)}
-    assert quick < set(cells) and len(quick) < 200
+    assert quick < set(cells) and len(quick) < 230
 
 
 def synthetic(values, seeds=6):
@@ -134,6 +137,7 @@ def tiny_cells(starts, flights, quick, dem, maps=()):
 
 def test_the_command_writes_a_report_and_goes_on_where_it_was(tmp_path, monkeypatch):
     monkeypatch.setattr(sawhney, "experiment", tiny_cells)
+    monkeypatch.setattr(sawhney_report, "pictures", lambda parts, dem: ({"section": Figure()}, []))
     out, runs = tmp_path / "out", tmp_path / "runs"
     plan = np.full((40, 50), 255, np.uint8)
     plan[:, :2] = plan[:, -2:] = plan[:2] = plan[-2:] = plan[:25, 22:26] = 0
@@ -157,7 +161,7 @@ def test_the_command_writes_a_report_and_goes_on_where_it_was(tmp_path, monkeypa
         assert f"sawhney/{name}.png" in page and (out / "sawhney" / f"{name}.csv").exists()
         with Image.open(out / "sawhney" / f"{name}.png") as picture:
             assert picture.size[0] > 200
-    assert "fewer than the paper's 160" in page
+    assert "fewer than the paper's 160" in page and "sawhney/section.png" in page
     mapped = [row for row in page.splitlines() if row.startswith("| hall |")]
     assert len(mapped) == len(MAP_METHODS) and all(" 99." in row or "100.00%" in row for row in mapped)
     files = sorted(runs.rglob("*.json"))
@@ -183,7 +187,8 @@ def test_what_is_refused(words, complaint, capsys):
 
 
 def test_methods_differ_in_plans_and_over_terrain():
-    assert set(methods("terrains", True)) - set(methods("plans", True)) == {"no-height"}
+    farther = {f"beta-{beta}" for beta in sawhney_cells.FARTHER_BETAS["terrains"]}
+    assert set(methods("terrains", True)) - set(methods("plans", True)) == {"no-height", *farther}
     assert Run(Exploring()) == Run(Exploring()) and sawhney_cells.TIME_LIMIT_S == 3600.0
 
 
