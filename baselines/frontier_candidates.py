@@ -54,6 +54,7 @@ from entropy_explore_env.settings import RobotKind
 from entropy_explore_env.validation import check, check_choice, check_positive
 
 Visibility = Literal["ray-cast", "naive"]
+UnexploredGround = Literal["falling", "level"]
 _BATCH_CELLS = 7500
 """Cells that are walked in about the time that a call takes."""
 _ROWS = 15
@@ -71,6 +72,8 @@ class Looking:
         visibility: `ray-cast`, or the `naive` count of all unexplored points in a ball.
         gamma: γ of the height factor: relative height against absolute height. None = no height factor.
         patch_m: Half the width of the patch whose mean ground is z_av.
+        unexplored_ground: Over terrain, what is assumed of ground that is not explored: `falling` from z_av
+            at the candidate to the workspace's floor where the range ends (sect. 3.4), or `level` at z_av.
         too_high: Candidates higher above z_av than this share of the range are dropped.
     """
 
@@ -80,6 +83,7 @@ class Looking:
     visibility: Visibility = "ray-cast"
     gamma: float | None = 0.5
     patch_m: float = 5.0
+    unexplored_ground: UnexploredGround = "falling"
     too_high: float = 0.9
 
     def __post_init__(self) -> None:
@@ -89,6 +93,7 @@ class Looking:
             if getattr(self, name) is not None:
                 check_positive(self, name)
         check_choice(self, "visibility", Visibility)
+        check_choice(self, "unexplored_ground", UnexploredGround)
         if self.gamma is not None:
             check(self, "gamma", "None, or a number from 0 to 1", lambda v: 0.0 <= v <= 1.0)
         check_positive(self, "patch_m", "too_high")
@@ -302,7 +307,8 @@ class TerrainCandidates:
         top = max(0.5 * math.pi - self._tilt, 0.0)
         patch = max(round(looking.patch_m / edge), 0)
         gamma, high = looking.gamma or 0.0, looking.too_high * self.reach
-        self._look = (self.reach, math.tan(min(top, 1.5)), float(patch), gamma, high)
+        fade = self.reach if looking.unexplored_ground == "falling" else math.inf
+        self._look = (self.reach, math.tan(min(top, 1.5)), float(patch), gamma, high, fade)
         self.point = edge**2
         self.rates = _read_only(self._map.rates)
         self._rates = self._map.rates
@@ -385,12 +391,12 @@ class TerrainCandidates:
 
     def promise(self, place: np.ndarray) -> None:
         """See `VoxelCandidates`."""
-        eye, reach, flattest = _tuple(place), self._look[0], self._look[1]
+        eye, (reach, flattest, fade) = _tuple(place), (self._look[0], self._look[1], self._look[5])
         average = mean_ground(self._map, int(eye[0]), int(eye[1]), int(self._look[2]))
         if self._looking.visibility == "naive":
-            count_columns_in_ball(self._tally, self._map, eye, average, reach, True)
+            count_columns_in_ball(self._tally, self._map, eye, average, reach, fade, True)
         else:
-            count_below(self._tally, self._map, eye, average, self._azimuths, reach, flattest, True)
+            count_below(self._tally, self._map, eye, average, self._azimuths, reach, flattest, fade, True)
 
     def release(self) -> None:
         """See `VoxelCandidates`."""
@@ -435,7 +441,7 @@ class TerrainCandidates:
                 heading = first + way * (2.0 * math.pi / 16)
                 ahead = self._azimuths @ (math.cos(heading), math.sin(heading)) >= math.cos(turn / 2)
                 arrays = self._tally, self._map, eye, average, self._azimuths[ahead]
-                points, _ = count_below(*arrays, self._look[0], self._look[1], False)
+                points, _ = count_below(*arrays, self._look[0], self._look[1], self._look[5], False)
                 if points > best:
                     best, yaw = points, (heading + math.pi) % (2.0 * math.pi) - math.pi
         return yaw, 0.5 * math.pi - 0.5 * self._tilt

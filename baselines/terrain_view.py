@@ -30,16 +30,16 @@ def mean_ground(terrain, x, y, patch):
 
 
 @inlined_kernel
-def height_at(terrain, x, y, eye, average, reach):
-    """Height of a column: its ground if mapped, else extrapolated (sect. 3.4)."""
+def height_at(terrain, x, y, eye, average, fade):
+    """Height of a column: its ground if mapped, else extrapolated (sect. 3.4), 0 from `fade` columns on."""
     if terrain.ground[x, y] != NONE:
         return np.float64(terrain.ground[x, y])
     dx, dy = x + 0.5 - eye[0], y + 0.5 - eye[1]
-    return max((1.0 - math.sqrt(dx * dx + dy * dy) / reach) * average, 0.0)
+    return max((1.0 - math.sqrt(dx * dx + dy * dy) / fade) * average, 0.0)
 
 
 @lean_kernel
-def count_below(tally, terrain, eye, average, azimuths, reach, flattest, marking):
+def count_below(tally, terrain, eye, average, azimuths, reach, flattest, fade, marking):
     """Unexplored columns that are seen from a place: (all, weighed by promises).
 
     Args:
@@ -50,6 +50,7 @@ def count_below(tally, terrain, eye, average, azimuths, reach, flattest, marking
         azimuths: (D, 2) float64 unit vectors.
         reach: Of the sensor, > 0.
         flattest: Tangent of the angle below the horizon from which on the sensor looks down.
+        fade: How far away unexplored ground is taken to have come down to the floor; inf = it is level.
         marking: Whether the columns are promised from now on.
     """
     number, points, weighed = begin_count(tally), 0, 0.0
@@ -64,7 +65,7 @@ def count_below(tally, terrain, eye, average, azimuths, reach, flattest, marking
         enters, horizon = 0.0, -math.inf
         while enters <= reach:
             leaves = min(face_x, face_y)
-            height = height_at(terrain, x, y, eye, average, reach)
+            height = height_at(terrain, x, y, eye, average, fade)
             drop = eye[2] - height
             if drop <= 0.0:
                 break  # it hides the tops of all that is lower than the eye
@@ -90,7 +91,7 @@ def count_below(tally, terrain, eye, average, azimuths, reach, flattest, marking
 
 
 @lean_kernel
-def count_columns_in_ball(tally, terrain, eye, average, reach, marking):
+def count_columns_in_ball(tally, terrain, eye, average, reach, fade, marking):
     """The naive V: unexplored columns whose tops, extrapolated, lie in a ball, seen or not."""
     points, weighed, size = 0, 0.0, terrain.size
     wide = min(reach, size[0] + size[1])
@@ -99,7 +100,7 @@ def count_columns_in_ball(tally, terrain, eye, average, reach, marking):
             column = x * size[1] + y
             if not terrain.unexplored[column]:
                 continue
-            drop = eye[2] - height_at(terrain, x, y, eye, average, reach)
+            drop = eye[2] - height_at(terrain, x, y, eye, average, fade)
             dx, dy = x + 0.5 - eye[0], y + 0.5 - eye[1]
             if dx * dx + dy * dy + drop * drop <= reach * reach:
                 points += 1
@@ -121,13 +122,14 @@ def count_columns_from(tally, terrain, voxels, azimuths, look, naive, seen, weig
         terrain: The map.
         voxels: (K,) int32.
         azimuths: (D, 2) float64.
-        look: (reach, flattest, patch, γ, highest): of the sensor, of z_av, and the greatest z_f - z_av.
+        look: (reach, flattest, patch, γ, highest, fade): of the sensor, of z_av, the greatest z_f - z_av, and
+            as in `count_below`.
         naive: Whether columns in a ball are counted.
         seen: (K,) filled in.
         weighed: (K,) filled in.
         factor: (K,) filled in.
     """
-    reach, flattest = look[0], look[1]
+    reach, flattest, fade = look[0], look[1], look[5]
     for place in range(len(voxels)):
         x, y, z = place_in(terrain.size, voxels[place])
         eye = (x + 0.5, y + 0.5, z + 0.5)
@@ -137,9 +139,9 @@ def count_columns_from(tally, terrain, voxels, azimuths, look, naive, seen, weig
         if factor[place] == 0.0:
             continue
         if naive:
-            points, value = count_columns_in_ball(tally, terrain, eye, average, reach, False)
+            points, value = count_columns_in_ball(tally, terrain, eye, average, reach, fade, False)
         else:
-            points, value = count_below(tally, terrain, eye, average, azimuths, reach, flattest, False)
+            points, value = count_below(tally, terrain, eye, average, azimuths, reach, flattest, fade, False)
         seen[place], weighed[place] = points, value
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -60,26 +61,39 @@ _ALL: dict[str, Any] = {
     "ending": {"sigma_end": 1e-3, "time_limit_s": TIME_LIMIT_S},
     "scored": True,
 }
-_SCAN_SHORT = ("a scan takes 0.5 s", {"sensor": {"scan_time_s": 0.5}}, {})
-_SCAN_LONG = ("a scan takes 8 s", {"sensor": {"scan_time_s": 8.0}}, {})
-_UNPROMISED = ("nothing is promised", {}, {"promises": False})
-CHANGES: dict[str, dict[str, tuple[str, dict[str, Any], dict[str, Any]]]] = {
+
+
+@dataclass(frozen=True)
+class Change:
+    """One thing that is changed: settings of the scenario, fields of Exploring, fields of its Looking."""
+
+    text: str
+    settings: dict[str, Any] = field(default_factory=dict)
+    exploring: dict[str, Any] = field(default_factory=dict)
+    looking: dict[str, Any] = field(default_factory=dict)
+
+
+_SCAN_SHORT = Change("a scan takes 0.5 s", {"sensor": {"scan_time_s": 0.5}})
+_SCAN_LONG = Change("a scan takes 8 s", {"sensor": {"scan_time_s": 8.0}})
+_UNPROMISED = Change("nothing is promised", exploring={"promises": False})
+CHANGES: dict[str, dict[str, Change]] = {
     "plans": {
         "scan-short": _SCAN_SHORT,
         "scan-long": _SCAN_LONG,
-        "range": ("the sensor sees twice as far", {"sensor": {"max_range_m": 6.0}}, {}),
-        "bodies": ("bodies of 0.2 m", {"robot": {"body_radius_m": 0.2}}, {}),
+        "range": Change("the sensor sees twice as far", {"sensor": {"max_range_m": 6.0}}),
+        "bodies": Change("bodies of 0.2 m", {"robot": {"body_radius_m": 0.2}}),
         "unpromised": _UNPROMISED,
     },
     "terrains": {
         "scan-short": _SCAN_SHORT,
         "scan-long": _SCAN_LONG,
-        "range": ("the sensor sees half as far", {"sensor": {"max_range_m": 10.0}}, {}),
-        "corners": ("UAVs stop and scan at every corner", {"robot": {"navigator": "straight"}}, {}),
+        "range": Change("the sensor sees half as far", {"sensor": {"max_range_m": 10.0}}),
+        "level": Change("unexplored ground is taken to be level", looking={"unexplored_ground": "level"}),
+        "corners": Change("UAVs stop and scan at every corner", {"robot": {"navigator": "straight"}}),
         "unpromised": _UNPROMISED,
     },
 }
-"""What is changed in plans, and over terrain: a text, settings of the scenario, fields of Exploring."""
+"""What is changed in plans, and over terrain."""
 CHANGED_METHODS = {
     "plans": ("ptv", "beta-10", "beta-20", "sync", "naive"),
     "terrains": ("ptv", "beta-20", "beta-40", "sync", "naive"),
@@ -145,11 +159,13 @@ def experiment(
                 Cell(name, _scenario(PLANS[0], MAP_TEAM, {}), STRATEGY, min(starts, MAP_STARTS), run)
             )
     for part, seeds in (("plans", starts), ("terrains", flights)):
-        for change, (_, settings, more) in CHANGES[part].items() if seeds else ():
+        for name, change in CHANGES[part].items() if seeds else ():
             for world in (QUICK_CHANGED_IN if quick else CHANGED_IN)[part]:
                 for method in CHANGED_METHODS[part]:
-                    exploring = {**methods(part, False)[method], **more}
-                    cell = _cell(world, CHANGED_TEAM, method, exploring, seeds, None, settings, change)
+                    exploring = {**methods(part, False)[method], **change.exploring}
+                    looking = exploring.get("looking", Looking(sigma=SIGMA))
+                    exploring["looking"] = replace(looking, **change.looking)
+                    cell = _cell(world, CHANGED_TEAM, method, exploring, seeds, None, change.settings, name)
                     cells.append(cell)
     return cells
 

@@ -201,6 +201,6 @@ def _changes_table(records: Records, part: str) -> str:
                 "{:.2f} ({:.2f} … {:.2f})".format(*changed_ratio(records, change, method, end, worlds))
                 for end in ENDS
             ]
-            text = "as it is" if change is None else CHANGES[part][change][0]
+            text = "as it is" if change is None else CHANGES[part][change].text
             rows.append([text, f"V/t over `{method}`", *ratios, ", ".join(worlds)])
     return markdown_table([f"changed, {PARTS[part]}", "ratio", *ENDS.values(), "in"], rows)

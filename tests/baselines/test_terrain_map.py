@@ -61,9 +61,9 @@ def test_ground_is_the_known_covered_voxel_below_a_known_free_one(seed):
     np.testing.assert_array_equal(terrain.ground, reference.ground_of(state))
 
 
-@given(seeds, st.floats(0.5, 7.5), st.floats(3.0, 12.0), st.sampled_from([0.0, 0.3]))
+@given(seeds, st.floats(0.5, 7.5), st.floats(3.0, 12.0), st.sampled_from([0.0, 0.3]), st.booleans())
 @drawn(60)
-def test_columns_are_those_whose_tops_rays_meet(seed, height, reach, flattest):
+def test_columns_are_those_whose_tops_rays_meet(seed, height, reach, flattest, level):
     ground, rng = hills(seed)
     x, y = int(rng.integers(0, 9)), int(rng.integers(0, 13))
     ground[x, y] = 0 if ground[x, y] == NONE else min(ground[x, y], int(height))
@@ -72,20 +72,24 @@ def test_columns_are_those_whose_tops_rays_meet(seed, height, reach, flattest):
     azimuths = np.stack([np.cos(angles), np.sin(angles)], axis=-1)
     average = mean_ground(terrain, x, y, 2)
     assert average == pytest.approx(reference.mean_height(terrain.ground, x, y, 2))
-    heights = reference.surface(terrain.ground, eye, average, reach)
+    fade = math.inf if level else reach
+    heights = reference.surface(terrain.ground, eye, average, fade)
     unexplored = terrain.ground == NONE
     wanted = reference.seen_columns(heights, unexplored, eye, azimuths, reach, flattest)
     tally = new_tally(9 * 13, SHAPE)
-    points, value = count_below(tally, terrain, eye, average, azimuths, reach, flattest, True)
+    points, value = count_below(tally, terrain, eye, average, azimuths, reach, flattest, fade, True)
     marked = {tuple(map(int, np.unravel_index(c, (9, 13)))) for c in tally.marked[: tally.numbers[1]]}
     assert (points, value, marked) == (len(wanted), len(wanted), wanted)
-    assert count_below(tally, terrain, eye, average, azimuths, reach, flattest, False)[1] == len(wanted) / 2
+    assert (
+        count_below(tally, terrain, eye, average, azimuths, reach, flattest, fade, False)[1]
+        == len(wanted) / 2
+    )
     ball = {
         (i, j)
         for i, j in np.argwhere(unexplored).tolist()
         if math.dist((i + 0.5, j + 0.5, heights[i, j]), eye) <= reach
     }
-    assert count_columns_in_ball(tally, terrain, eye, average, reach, False)[0] == len(ball)
+    assert count_columns_in_ball(tally, terrain, eye, average, reach, fade, False)[0] == len(ball)
 
 
 def test_a_ridge_hides_the_valley_behind_it_by_hand():
@@ -99,13 +103,13 @@ def test_a_ridge_hides_the_valley_behind_it_by_hand():
         # z_av = 1: extrapolated 1 - d/10. From 5.5 over the ridge's far edge at d = 4.5: slope -1/3, which
         # meets height 0.4 … at d ≈ 15; from 7.5 slope -7/9: 0.2 … 0.4 at d ≈ 9; the last tops end at d = 8.5
         eye = (0.5, 1.5, height)
-        found = count_below(tally, terrain, eye, 1.0, east, 10.0, 0.0, False)[0]
+        found = count_below(tally, terrain, eye, 1.0, east, 10.0, 0.0, 10.0, False)[0]
         heights = reference.surface(ground, eye, 1.0, 10.0)
         assert found == len(reference.seen_columns(heights, ground < 0, eye, east, 10.0, 0.0))
         assert found <= wanted
     ground[4] = 1
     flat = known_ground(ground, (9, 3, 8))
-    assert count_below(tally, flat, (0.5, 1.5, 5.5), 1.0, east, 10.0, 0.0, False)[0] == 3
+    assert count_below(tally, flat, (0.5, 1.5, 5.5), 1.0, east, 10.0, 0.0, 10.0, False)[0] == 3
 
 
 def test_candidates_hang_above_the_edge_between_ground_and_ceiling():
@@ -174,7 +178,7 @@ def test_no_more_is_seen_than_lies_in_range(seed, reach, naive):
     terrain = known_ground(ground)
     voxels = rng.integers(0, math.prod(SHAPE), 20).astype(np.int32)
     angles = 0.05 + np.arange(40) * (2 * math.pi / 40)
-    azimuths, look = np.stack([np.cos(angles), np.sin(angles)], axis=-1), (reach, 0.0, 2.0, 0.4, 5.0)
+    azimuths, look = np.stack([np.cos(angles), np.sin(angles)], axis=-1), (reach, 0.0, 2.0, 0.4, 5.0, reach)
     seen, weighed, factor, most, same = (np.empty(20) for _ in range(5))
     tally, sums = new_tally(9 * 13, SHAPE), np.empty((9, 14), np.int32)
     count_columns_from(tally, terrain, voxels, azimuths, look, naive, seen, weighed, factor)

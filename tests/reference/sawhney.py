@@ -105,12 +105,12 @@ def mean_height(ground: np.ndarray, x: int, y: int, patch: int) -> float:
     return float(known.mean()) if len(known) else 0.0
 
 
-def surface(ground: np.ndarray, eye: Sequence[float], average: float, reach: float) -> np.ndarray:
-    """(X, Y) heights, extrapolated as z = (1 - dist/range) z_av where unknown, and not below the floor."""
+def surface(ground: np.ndarray, eye: Sequence[float], average: float, fade: float) -> np.ndarray:
+    """(X, Y) heights, extrapolated as z = (1 - dist/fade) z_av where unknown, and not below the floor."""
     found = ground.astype(float)
     for x, y in np.argwhere(ground < 0):
         dist = math.hypot(x + 0.5 - eye[0], y + 0.5 - eye[1])
-        found[x, y] = max((1.0 - dist / reach) * average, 0.0)
+        found[x, y] = max((1.0 - dist / fade) * average, 0.0)
     return found
 
 
