@@ -161,12 +161,12 @@ def test_the_height_factor_by_hand():
     azimuths = np.array([[1.0, 0.0]])
     tally = new_tally(9 * 13, SHAPE)
     count_columns_from(
-        tally, terrain, voxels, azimuths, (10.0, 0.0, 1.0, 0.5, 9.0), False, seen, value, factor
+        tally, terrain, voxels, azimuths, (10.0, 0.0, 1.0, 0.5, 9.0, 10.0), False, seen, value, factor
     )
     assert factor.tolist() == pytest.approx([math.sqrt(1.5 * 3.5), math.sqrt(4.5 * 6.5)])
     assert seen.tolist() == [1.0, 2.0]  # from 3.5 one ends on the line of sight over the edge
     count_columns_from(
-        tally, terrain, voxels, azimuths, (10.0, 0.0, 1.0, 1.0, 4.0), False, seen, value, factor
+        tally, terrain, voxels, azimuths, (10.0, 0.0, 1.0, 1.0, 4.0, 10.0), False, seen, value, factor
     )
     assert factor.tolist() == pytest.approx([1.5, 0.0]) and seen[1] == 0.0
 
