@@ -19,7 +19,7 @@ from typing import Protocol
 import numpy as np
 
 from baselines.frontier_candidates import Looking, TerrainCandidates, VoxelCandidates
-from entropy_explore_env.belief.lattice import Costs, Lattice, new_lattice
+from entropy_explore_env.belief.lattice import NOTHING_CLOSED, Costs, Lattice, new_lattice
 from entropy_explore_env.belief.planning import begin_search, search_ways, widen_search
 from entropy_explore_env.belief.search_space import Search, collect, cost_to
 from entropy_explore_env.compilation import lean_kernel
@@ -104,7 +104,7 @@ class Allotter:
         else:
             self.candidates = TerrainCandidates(scenario, kind, looking, ceiling)
         rates = self.candidates.rates
-        self.costs = Costs(rates[:0], rates[:0], 0.0, 1.0, rates, 1.0, rates[:0])
+        self.costs = Costs(rates[:0], rates[:0], 0.0, 1.0, rates, 1.0, NOTHING_CLOSED)
         self._no_cells = np.zeros(0, np.int32)
         self.counted = 0
 
@@ -210,12 +210,13 @@ class Allotter:
             ways[robot] = self._ways(pose, farther if farther < whole else math.inf, ways[robot])
             choice, sure = self._best_of(robot, ways[robot], taken, weighed)
         if choice is None and robot == view.robot:
-            self.seek(pose, -1, math.inf)
+            ways[robot] = self._ways(pose, math.inf, ways[robot])
             everywhere = np.empty(self._scenario.grid.voxels)
             collect(self.search, everywhere)
             self.candidates.other_of(everywhere)
+            found = self._ways(pose, math.inf, ways[robot])
             ways.clear()  # candidates have moved
-            ways[robot] = self._ways(pose, math.inf)
+            ways[robot] = found
             choice, _ = self._best_of(robot, ways[robot], taken, np.full_like(weighed, np.nan))
         return choice
 

@@ -95,6 +95,7 @@ class InformationRate:
         ]
         self._scratch = new_scratch(grid, self._builds)
         self._search = new_search(grid.voxels)
+        self._ceiling: tuple[np.ndarray, float, np.ndarray | None] | None = None
 
     def _build_of(self, view: RobotView) -> Build:
         return self._builds[view.robot % len(self._builds)]
@@ -239,7 +240,8 @@ class InformationRate:
         if (bits / (np.maximum(straight / reach, 1.0) * each)).max() <= rate:
             return []
         prior = view.scenario.sigma_prior**-2
-        costs = belief_costs(view.mean, view.precision, prior, self.weighing.unknown_cost)
+        closed = self._closed(view)
+        costs = belief_costs(view.mean, view.precision, prior, self.weighing.unknown_cost, closed)
         start = np.ravel_multi_index(tuple(here[:3].astype(int)), grid.shape)
         nobody = np.zeros(0, np.int32)
         search_ways(self._search, lattice, costs, np.array([start], np.int32), -1, math.inf, nobody)
@@ -266,8 +268,19 @@ class InformationRate:
         drawn = self._rng.integers(0, grid.voxels, _LOTS * self.weighing.places)
         if view.planar:
             drawn += int(here[2]) - drawn % grid.shape[2]
-        free = drawn[view.mean.reshape(-1)[drawn] <= STOP_AT_COVERED]
-        return free if len(free) else drawn
+        free = view.mean.reshape(-1)[drawn] <= STOP_AT_COVERED
+        if (closed := self._closed(view)) is not None:
+            free &= ~closed.reshape(-1)[drawn]
+        return drawn[free] if free.any() else drawn
+
+    def _closed(self, view: RobotView) -> np.ndarray | None:
+        """(X, Y, Z) bool, where the robot would reach above the ceiling; None = there is none."""
+        if view.ceiling is None:
+            return None
+        radius_m = view.kind.robot.body_radius_m
+        if self._ceiling is None or self._ceiling[0] is not view.ceiling or self._ceiling[1] != radius_m:
+            self._ceiling = view.ceiling, radius_m, view.closed()
+        return self._ceiling[2]
 
     def _places(self, view: RobotView, here: np.ndarray, voxels: np.ndarray) -> np.ndarray:
         """(K, 5) viewpoints in grid units at the least known of some voxels, a few gazes each."""

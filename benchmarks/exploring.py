@@ -1,4 +1,4 @@
-"""What exploring plans costs: a step with a dense scanner, a decision, expected visibility."""
+"""What exploring plans costs: a step with a dense scanner, a decision, expected visibility, a mission."""
 
 from __future__ import annotations
 
@@ -12,8 +12,10 @@ from baselines.frontier_allotment import Allotter
 from baselines.frontier_candidates import Looking
 from baselines.frontier_map import COVERED, UNEXPLORED, UNMAPPED
 from baselines.mission import scripted
-from baselines.per_time_visibility import Metric
+from baselines.papers.sawhney_missions import followed
+from baselines.per_time_visibility import Exploring, FrontierStrategy, Metric
 from baselines.ray_tree import grow_tree
+from benchmarks.planning import FLOOR, cluttered
 from benchmarks.rows import Effort, Goal, Row, alone, timed
 from entropy_explore_env.belief.search_space import new_search
 from entropy_explore_env.config import Scenario, with_settings
@@ -31,12 +33,13 @@ _SIDE = 1000
 _ROOM, _DOOR = 50, 6
 """Voxels along a room and a door of the large plan."""
 _PLACES = 200
+_FLOOR_SHARE, _FLOOR_EDGE_M = 0.16, 0.03
 
 
 def exploring_rows(effort: Effort) -> list[Row]:
-    """A step with 720 rays on 480 × 640, decisions on 1000 × 1000, and expected visibility."""
+    """A step with 720 rays on 480 × 640, decisions on 1000 × 1000, expected visibility, a whole mission."""
     decisions = [decision_row(effort, lazy) for lazy in (True, False)]
-    return [step_row(effort), *decisions, visibility_row(effort)]
+    return [step_row(effort), *decisions, visibility_row(effort), floor_row(effort)]
 
 
 def dense_plan() -> Scenario:
@@ -93,7 +96,7 @@ def decision_row(effort: Effort, lazy: bool) -> Row:
     known = np.zeros(solid.shape, bool)
     known[: _SIDE // 2] = True
     rng = np.random.default_rng(0)
-    for x, y in rng.integers(0, _SIDE // 2, (140, 2)):  # and patches of it unknown
+    for x, y in rng.integers(0, _SIDE // 2, (170, 2)):  # and patches of it unknown
         known[x : x + 8, y : y + 8] = False
     missions.mean[0, 0] = np.where(known, solid, 0.5)
     missions.precision[0, 0] = np.where(known, 100.0, scenario.sigma_prior**-2)
@@ -139,3 +142,30 @@ def visibility_row(effort: Effort) -> Row:
     rates = [rays / timed(work).cpu_s for _ in range(effort.rounds)]
     job = "expected visibility, rays up to 30 voxels, 1000 × 1000"
     return alone(job, rates, "Mray/s", Goal("≥", 5.0, "Mray/s"))
+
+
+def floor_row(effort: Effort, shape: tuple[int, int, int] = FLOOR) -> Row:
+    """Seconds on the clock of a mission of three robots, until no frontier is left, on a cluttered floor."""
+    covered = cluttered(shape, _FLOOR_SHARE)
+    settings = {
+        "grid": Grid(shape, _FLOOR_EDGE_M),
+        "robots": 3,
+        "robot": {"reach_m": math.inf, "body_radius_m": 0.0, "unknown_cost": 1e4},
+        "sensor": {"max_range_m": 10.0, "angular_step_rad": math.pi / 180, "scan_time_s": 2.0},
+        "channel": {"burst": 10_000, "i_min_bits": 0.0},
+        "ending": {"sigma_end": 1e-3, "time_limit_s": 1e5},
+        "scored": True,
+    }
+    scenario = with_settings(scripted(find_scenario("cluttered")), settings)
+    env = EntropyExploreEnv(scenario, world=World(scenario.grid, covered, "floor"))
+    explorer = FrontierStrategy(Exploring(finest_sigma=0.5))
+    followed(env, explorer, 0)  # compiles
+    taken = []
+    for _ in range(min(effort.long_rounds, 2)):
+        started = time.perf_counter()
+        followed(env, explorer, 0)
+        taken.append(time.perf_counter() - started)
+    job = (
+        f"a mission of 3 robots on {shape[0]} × {shape[1]} cells, {_FLOOR_SHARE:.0%} covered, to no frontier"
+    )
+    return alone(job, taken, "s", Goal("<", 60.0, "s"))

@@ -98,7 +98,8 @@ class Robot:
     Attributes:
         motion: `free` flies anywhere; `planar` keeps the height of its sensor and looks level.
         navigator: `straight` drives straight to the viewpoint; `planned` takes the cheapest way through
-            the robot's own belief, without stopping at its corners.
+            the robot's own belief, below the ceiling where the world has one (all robots know where it
+            is), without stopping at its corners.
         unknown_cost: Planned ways: what a metre through unknown voxels costs, in metres through
             known ones; ≥ 1.
         reach_m: Largest displacement of one decision (ξ of Rocha04, eq. 32); inf = the workspace.

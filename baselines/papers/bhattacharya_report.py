@@ -66,7 +66,10 @@ def write_report(folder: Path, results: Results, claims: Sequence[Claim], comman
     beside, runs = folder / "bhattacharya", {run.id: run for run in results.runs}
     with mpl.rc_context(STYLE):
         rows = []
-        for control, name in (("gradient", "gradient search"), ("projected-guarded", "projected centroid")):
+        for control, name in (
+            ("gradient", "gradient search"),
+            ("projected-guarded", "projected centroid, guarded"),
+        ):
             run = runs[coverage_id(control, "cluster", 0)]
             rows.append((name, run, results.records[run.id]))
         write_atomically(beside / "figures-2-3.png", png(figures_2_3(rows)))

@@ -15,7 +15,7 @@ from pathlib import Path
 
 from baselines.command import make_folder, parse, run_command
 from baselines.experiment import run_cells
-from baselines.papers.sawhney_cells import experiment
+from baselines.papers.sawhney_cells import TEAMS, experiment
 from baselines.papers.sawhney_claims import all_claims
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.validation import check_whole
@@ -42,6 +42,8 @@ class Args:
     elevations that come with matplotlib; with --quick none."""
     maps: tuple[Path, ...] = ()
     """Plans from files, such as warehouse.yaml, to explore as well."""
+    teams: tuple[int, ...] = ()
+    """Team sizes, from 1 to 6; default: all, with --quick 1 and 3 in plans, 3 over terrain."""
     jobs: int | None = None
     """Processes; default: one a processor."""
     json: bool = False
@@ -62,6 +64,9 @@ def main(words: Sequence[str]) -> int:
             check_whole(option, value, least)
     if args.flights is not None and (args.flights < 0 or args.flights == 1):
         raise SettingError("flights", args.flights, "0, or a whole number ≥ 2")
+    for team in args.teams:
+        if team not in TEAMS or args.teams.count(team) > 1:
+            raise SettingError("teams", args.teams, f"different ones of {TEAMS}")
     ground = args.dem or (None if args.quick or args.flights == 0 else JACKSBORO)
     if ground is not None and ground != JACKSBORO and not Path(ground).is_file():
         raise SettingError("dem", ground, f"a height map's file, or {JACKSBORO}")
@@ -74,12 +79,13 @@ def main(words: Sequence[str]) -> int:
     usual = _QUICK_STARTS if args.quick else _STARTS
     flights = usual if args.flights is None else args.flights
     dem = ground and (write_model(args.runs) if ground == JACKSBORO else Path(ground))
-    cells = experiment(args.starts or usual, flights, args.quick, dem or None, args.maps)
+    cells = experiment(args.starts or usual, flights, args.quick, dem or None, args.maps, args.teams)
     records = run_cells(cells, args.runs, args.jobs or os.cpu_count() or 1, "Sawhney", quiet=args.json)
     claims = all_claims(records)
     given = " --quick" * args.quick
     options = ("starts", "flights", "dem")
     given += "".join(f" --{option} {v}" for option in options if (v := getattr(args, option)) is not None)
+    given += (" --teams " + " ".join(map(str, args.teams))) if args.teams else ""
     given += (" --maps " + " ".join(file.name for file in args.maps)) if args.maps else ""
     command = f"python -m baselines.papers.sawhney{given} --out {args.out}"
     report = write_report(args.out, records, claims, command, dem or None)

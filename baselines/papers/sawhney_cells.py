@@ -95,8 +95,8 @@ CHANGES: dict[str, dict[str, Change]] = {
 }
 """What is changed in plans, and over terrain."""
 CHANGED_METHODS = {
-    "plans": ("ptv", "beta-10", "beta-20", "sync", "naive"),
-    "terrains": ("ptv", "beta-20", "beta-40", "sync", "naive"),
+    "plans": ("ptv", "beta-5", "beta-20", "sync", "naive"),
+    "terrains": ("ptv", "beta-5", "beta-20", "sync", "naive", "no-height"),
 }
 CHANGED_IN = {"plans": PLANS, "terrains": TERRAINS}
 QUICK_CHANGED_IN = {"plans": ("office",), "terrains": ("terrain",)}
@@ -131,7 +131,12 @@ def cell_id(world: str, robots: int, method: str, change: str | None = None) -> 
 
 
 def experiment(
-    starts: int, flights: int, quick: bool, dem: Path | None, maps: Sequence[Path] = ()
+    starts: int,
+    flights: int,
+    quick: bool,
+    dem: Path | None,
+    maps: Sequence[Path] = (),
+    teams: Sequence[int] = (),
 ) -> list[Cell]:
     """All cells.
 
@@ -141,13 +146,14 @@ def experiment(
         quick: Fewer team sizes and β.
         dem: A height map's file, flown over as well.
         maps: Files of plans, explored by one team each, from MAP_STARTS starts at most.
+        teams: Team sizes; none = the usual ones.
     """
     cells = []
     for world in (*PLANS, *TERRAINS, *((DEM,) if dem is not None else ())):
         part = part_of(world)
         if (starts if part == "plans" else flights) == 0:
             continue
-        for robots in QUICK_TEAMS[part] if quick else TEAMS:
+        for robots in teams or (QUICK_TEAMS[part] if quick else TEAMS):
             for method, exploring in methods(part, quick).items():
                 seeds = starts if part == "plans" else flights
                 cells.append(_cell(world, robots, method, exploring, seeds, dem))
@@ -170,17 +176,11 @@ def experiment(
     return cells
 
 
-def world_cell(
-    world: str,
-    robots: int,
-    method: str | Metric,
-    dem: Path | None = None,
-    change: dict[str, Any] | None = None,
-) -> Cell:
-    """One mission's cell of a world, by a method or a metric; `change` are settings of the scenario."""
-    part = part_of(world)
-    exploring = {"metric": method} if isinstance(method, Metric) else methods(part, False)[method]
-    return _cell(world, robots, str(method), exploring, 1, dem, change)
+def world_cell(world: str, robots: int, method: str | Metric, dem: Path | None = None) -> Cell:
+    """A cell of one mission in a world, by a method of the experiment or by a metric."""
+    if isinstance(method, Metric):
+        return _cell(world, robots, f"metric-{method.beta}-{method.bonus}", {"metric": method}, 1, dem)
+    return _cell(world, robots, method, methods(part_of(world), False)[method], 1, dem)
 
 
 def _cell(

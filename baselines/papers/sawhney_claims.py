@@ -85,10 +85,17 @@ def compared(
     return ratio_interval(*pair)
 
 
-def best_beta(records: Records, part: str, end: str, worlds: Sequence[str] = ()) -> int:
-    """The paper's β with the least mean time over worlds and team sizes; chosen from these same missions."""
-    found = betas_in(records, part)
-    return min(found, key=lambda b: relative(records, part, f"beta-{b}", end, (), worlds).mean())
+def best_beta(
+    records: Records,
+    part: str,
+    end: str,
+    worlds: Sequence[str] = (),
+    teams: Sequence[int] = (),
+    among: Sequence[int] = BETAS,
+) -> int:
+    """The β with the least mean time over worlds and team sizes; chosen from these same missions."""
+    found = [beta for beta in betas_in(records, part) if beta in among]
+    return min(found, key=lambda b: relative(records, part, f"beta-{b}", end, teams, worlds).mean())
 
 
 def all_claims(records: Records) -> list[Claim]:
@@ -135,8 +142,23 @@ def _faster(name: str, claim: str, paper: float | str | None, ratio: tuple[float
 
 def _extreme_claims(records: Records, part: str, end: str, text: str) -> list[Claim]:
     """The smallest and the largest β are slower than the best."""
-    best, claims = best_beta(records, part, end), []
-    for beta in (betas_in(records, part)[0], betas_in(records, part)[-1]):
+    best, claims, swept = best_beta(records, part, end), [], betas_in(records, part)
+    widest = best_beta(records, part, end, among=swept)
+    claim = f"ours, {text}: the best of all β that were tried ({widest}) has others on both sides; its place"
+    inside = swept[0] < widest < swept[-1]
+    claims.append(
+        Claim(
+            f"{part}-interior-{end}",
+            claim,
+            None,
+            f"{swept.index(widest) + 1} of {len(swept)}",
+            None,
+            None,
+            inside,
+        )
+    )
+    betas = [beta for beta in swept if beta in BETAS]
+    for beta in (betas[0], betas[-1]):
         ratio = compared(records, part, f"beta-{beta}", f"beta-{best}", end)
         claim = f"{text}: β = {beta} is slower than the best β ({best}); t ratio"
         claims.append(Claim(f"{part}-extreme-{beta}-{end}", claim, "> 1", *ratio, ratio[1] > 1.0))
@@ -170,6 +192,11 @@ def _our_claims(records: Records, part: str, name: str) -> list[Claim]:
             ratio = compared(records, part, "ptv", rival, end)
             text = f"ours, {name}, {ENDS[end]}: V/t is faster than `{rival}-frontier`; t ratio"
             claims.append(_faster(f"{part}-{rival}-{end}", text, None, ratio))
+    for n in teams_in(records, part):
+        if n > 1:
+            ratio = compared(records, part, "ptv", "sync", "t95_s", (n,))
+            text = f"ours, {name}, to 95 %, {n} robots: asynchronous is faster than synchronous; t ratio"
+            claims.append(_faster(f"{part}-async-team-{n}", text, None, ratio))
     best = best_beta(records, part, "t95_s")
     for n in teams_in(records, part):
         ratio = compared(records, part, "ptv", f"beta-{best}", "t95_s", (n,))

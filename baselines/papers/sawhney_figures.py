@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import numpy as np
+from matplotlib import colormaps
 from matplotlib.figure import Figure
 
 from baselines.experiment import mean_interval
 from baselines.figures import COLOURS
-from baselines.papers.sawhney_cells import PLANS, TERRAINS
+from baselines.papers.sawhney_cells import cell_id
 from baselines.papers.sawhney_claims import (
     ENDS,
     PAPER_ASYNCHRONOUS,
@@ -19,6 +21,7 @@ from baselines.papers.sawhney_claims import (
     compared,
     relative,
     teams_in,
+    times,
     worlds_in,
 )
 
@@ -26,7 +29,7 @@ Table = dict[str, list[object]]
 
 
 def figure_beta(records: Records, part: str) -> tuple[Figure, Table]:
-    """Relative time over β, at three ends, and in each world to 95 %; V/t is 1 (figs. 6 and 8)."""
+    """Relative time over β, at three ends, and in each world to 95 %; V/t is 1."""
     betas = betas_in(records, part)
     figure = Figure(figsize=(9.6, 4.0), layout="constrained")
     left, right = figure.subplots(1, 2, sharey=True)
@@ -57,8 +60,44 @@ def figure_beta(records: Records, part: str) -> tuple[Figure, Table]:
         axes.set_title(title, fontsize=9)
         axes.legend(frameon=False, fontsize=8)
     left.set_ylabel("time over that of V/t (dashed)")
+    figure.suptitle(f"V - βt against V/t, {PARTS[part]}; means, 95 % intervals", fontsize=10)
+    return figure, table
+
+
+def figure_times(records: Records, part: str) -> tuple[Figure, Table]:
+    """Seconds to 95 % over team size: V/t and every β (figs. 6, 8); and synchronous and naive (4.1, 10)."""
+    teams, worlds, end = teams_in(records, part), worlds_in(records, part), "t95_s"
+    figure = Figure(figsize=(9.6, 4.0), layout="constrained")
+    left, right = figure.subplots(1, 2, sharey=True)
+    table: Table = {name: [] for name in ("method", "robots", "mean_s", "low_s", "high_s")}
+    betas = betas_in(records, part)
+    shades = colormaps["viridis_r"].resampled(len(betas) + 1)
+    lines = [(left, f"beta-{beta}", f"β = {beta}", shades(number + 1)) for number, beta in enumerate(betas)]
+    lines += [(left, "ptv", "V/t", "k"), (right, "ptv", "V/t, asynchronous", "k")]
+    lines += [(right, "sync", "V/t, synchronous", COLOURS[0]), (right, "naive", "naive V/t", COLOURS[1])]
+    for axes, method, label, colour in lines:
+        points = []
+        for n in teams:
+            found = np.concatenate([times(records, cell_id(world, n, method), end) for world in worlds])
+            points.append(mean_interval(found))
+        mean, low, high = zip(*points, strict=True)
+        axes.plot(teams, mean, "o-", color=colour, markersize=3, linewidth=1 + (method == "ptv"), label=label)
+        if axes is right:
+            axes.fill_between(teams, low, high, color=colour, alpha=0.12, linewidth=0)
+        if axes is left or method != "ptv":
+            for n, point in zip(teams, points, strict=True):
+                values = (method, n, *(round(value, 2) for value in point))
+                for name, value in zip(table, values, strict=True):
+                    table[name].append(value)
+    for axes in (left, right):
+        axes.set(xlabel="robots", xticks=teams)
+        axes.legend(frameon=False, fontsize=7, ncols=2 if axes is left else 1)
+    left.set_ylabel("simulated seconds to 95 %")
     number = "6" if part == "plans" else "8"
-    figure.suptitle(f"Fig. {number}: V - βt against V/t, {PARTS[part]}; means, 95 % intervals", fontsize=10)
+    names = (
+        f"Figs. {number} and {'4.1' if part == 'plans' else '10'}, {PARTS[part]}: mean times over all worlds"
+    )
+    figure.suptitle(names, fontsize=10)
     return figure, table
 
 
@@ -105,16 +144,14 @@ def figure_teams(records: Records, part: str) -> tuple[Figure, Table]:
 
 def figure_curves(records: Records, part: str) -> tuple[Figure, Table]:
     """Explored share over time of one mission each of V/t and the best β, in every world (seed 0)."""
-    worlds = [
-        world for world in (PLANS if part == "plans" else TERRAINS) if world in worlds_in(records, part)
-    ]
+    worlds = worlds_in(records, part)
     best, n = best_beta(records, part, "t95_s"), teams_in(records, part)[-1]
     figure = Figure(figsize=(2.5 * len(worlds), 2.6), layout="constrained")
     panels = figure.subplots(1, len(worlds), sharey=True, squeeze=False)[0]
     table: Table = {name: [] for name in ("world", "method", "time_s", "explored")}
     for axes, world in zip(panels, worlds, strict=True):
         for number, method in enumerate(("ptv", f"beta-{best}", "sync")):
-            series = records[f"{world}/n{n}/{method}"][0]["series"]
+            series = records[cell_id(world, n, method)][0]["series"]
             label = {"ptv": "V/t", "sync": "V/t, synchronous"}.get(method, f"β = {best}")
             axes.step(series["time_s"], series["explored"], where="post", color=COLOURS[number], label=label)
             table["time_s"] += series["time_s"]

@@ -81,7 +81,7 @@ def followed(
     env: EntropyExploreEnv,
     explorer: FrontierStrategy,
     seed: int,
-    look: Callable[[float, Sequence[RobotView]], None] | None = None,
+    look: Callable[[float, Sequence[RobotView], Sequence[np.ndarray]], None] | None = None,
 ) -> tuple[Sequence[float], Sequence[float]]:
     """Run a mission until all robots find nothing unexplored, or it is cut off.
 
@@ -89,7 +89,7 @@ def followed(
         env: Where.
         explorer: Of the robots.
         seed: Of the mission.
-        look: Called when robots have chosen, with the explored share and the views of those.
+        look: Called when robots have chosen, with the explored share, their views and their viewpoints.
 
     Returns:
         Times and explored shares after the reset and each step.
@@ -109,7 +109,7 @@ def followed(
             else float(joint_figures(env.missions, 0)["explored"] or 0.0)
         )
         if look is not None:
-            look(shares[-1], views)
+            look(shares[-1], views, chosen)
         if all(explorer.idle):
             break
         for view, viewpoint in zip(views, chosen, strict=True):

@@ -44,14 +44,16 @@ OptionMeans = tuple[str, float, float, float]
 
 @dataclass(frozen=True)
 class Snapshot:
-    """A mission at a moment: what robot 0 knows, and where all have been."""
+    """A mission at a moment: what robot 0 knew when it last chose, and where all have been."""
 
     time_s: float
     share: float
     chart: Chart
     expected: np.ndarray
-    """(X, Y) bool, what somebody on its way expects to see."""
+    """(X, Y) bool, what robots on their ways to viewpoints, or about to leave for them, expect to see."""
     ways_m: list[np.ndarray]
+    finished: bool
+    """Whether no frontier was left."""
 
 
 def pictures(parts: Sequence[str], dem: Path | None) -> tuple[dict[str, Figure], list[OptionMeans]]:
@@ -129,32 +131,41 @@ def _options_on_the_way() -> tuple[np.ndarray, np.ndarray]:
     cell = world_cell("hybrid", 1, "ptv")
     explorer = FrontierStrategy(_run(cell).exploring)
 
-    def look(share: float, views: Sequence[RobotView]) -> None:
+    latest = list[RobotView]()
+
+    def look(share: float, views: Sequence[RobotView], _: Sequence[np.ndarray]) -> None:
+        latest[:] = views
         if share >= 0.5 and not found:
             found.append(explorer.allotter_of(0).options(views[0]))
 
     followed(_environment(cell), explorer, 0, look)
-    return found[0]
+    return found[0] if found else explorer.allotter_of(0).options(latest[0])
 
 
 def snapshots(cell: Cell, seed: int, marks: Sequence[float] = _MARKS) -> list[Snapshot]:
-    """A mission of a cell when so much was explored, and at its end."""
+    """A mission of a cell when shares but for the last were explored, as far as they were, and its end."""
     env, explorer = _environment(cell), FrontierStrategy(_run(cell).exploring)
-    ways, taken, robots = Ways(cell.scenario.robots), list[Snapshot](), range(cell.scenario.robots)
+    ways, taken, grid = Ways(cell.scenario.robots), list[Snapshot](), cell.scenario.grid
 
-    def look(share: float, views: Sequence[RobotView]) -> None:
+    def snap(time_s: float, share: float, targets: Sequence[np.ndarray]) -> None:
+        candidates, finished = explorer.allotter_of(0).candidates, all(explorer.idle)
+        expected = np.zeros(grid.shape[:2], bool)
+        for target in () if finished else targets:
+            expected |= candidates.expected(grid.in_grid_units(target)[:3])
+        way = ways.so_far(env.missions)
+        taken.append(Snapshot(time_s, share, candidates.chart(), expected, way, finished))
+
+    def look(share: float, views: Sequence[RobotView], chosen: Sequence[np.ndarray]) -> None:
         ways.note(env.missions)
-        ends = all(explorer.idle)
-        if ends or (len(taken) < len(marks) - 1 and share >= marks[len(taken)]):
-            candidates = explorer.allotter_of(views[0].robot).candidates
-            expected = np.zeros(env.missions.grid.shape[:2], bool)
-            for robot in robots:
-                target = env.missions.state.robots[0, robot]["target"]
-                expected |= candidates.expected(env.missions.grid.in_grid_units(target)[:3])
-            way = ways.so_far(env.missions)
-            taken.append(Snapshot(views[0].time_s, share, candidates.chart(), expected, way))
+        if len(taken) < len(marks) - 1 and share >= marks[len(taken)]:
+            targets = list(env.missions.state.robots[0]["target"])
+            for view, viewpoint in zip(views, chosen, strict=True):
+                targets[view.robot] = viewpoint
+            snap(views[0].time_s, share, targets)
 
-    followed(env, explorer, seed, look)
+    times_s, shares = followed(env, explorer, seed, look)
+    ways.note(env.missions)
+    snap(times_s[-1], shares[-1], list(env.missions.state.robots[0]["target"]))
     return taken
 
 
@@ -199,10 +210,10 @@ def figure_ways(cells: Sequence[tuple[str, Cell]]) -> Figure:
     """Figs. 11 and 12: the ways of one robot by several metrics in the same plan, to 95 % and to the end."""
     figure, panels = _panels(2 * len(cells), cells[0][1].scenario.grid.size_m)
     for number, (name, cell) in enumerate(cells):
-        for axes, now in zip(panels[number :: len(cells)], snapshots(cell, 0, (0.95, 1.0)), strict=True):
+        for axes, now in zip(panels[number :: len(cells)], snapshots(cell, 0, (0.95, 1.0)), strict=False):
             _show(axes, _plan_colours(now.chart), cell, now.ways_m)
             length_m = float(np.linalg.norm(np.diff(now.ways_m[0], axis=0), axis=1).sum())
-            until = "no frontier" if now.share > 0.99 else "95 %"
+            until = "no frontier" if now.finished else f"{now.share:.0%}"
             axes.set_title(f"{name}, to {until}: {now.time_s:.0f} s, {length_m:.0f} m", fontsize=8)
     figure.suptitle("Figs. 11-12: the way of one robot, ○ start, □ end", fontsize=10)
     return figure
@@ -255,7 +266,8 @@ def figure_section(cell: Cell) -> Figure:
         between = slice(min(x, column), max(x, column) + 1)
         ends = sorted([(x, eye), (int(column), float(ground[column]))])
         line = np.linspace(ends[0][1], ends[1][1], abs(x - int(column)) + 1)
-        if (line + 1e-9 >= ground[between]).all():
+        within = np.hypot(across[column] - across[x], eye - ground[column]) <= reach_m
+        if within and (line + 1e-9 >= ground[between]).all():
             axes.plot(
                 [across[x], across[column]], [eye, ground[column]], color=COLOURS[1], linewidth=0.4, alpha=0.6
             )
@@ -271,6 +283,13 @@ def figure_section(cell: Cell) -> Figure:
 def ground_of(world: World) -> np.ndarray:
     """(X, Y) int, solid layers of a height field."""
     return world.occupied.sum(2)
+
+
+def visible_area_m2(world: str) -> float:
+    """Of the cells of a plan that can be seen from where robots can be, seed 0."""
+    env = _environment(world_cell(world, 1, "ptv"))
+    env.reset(seed=0)
+    return float(env.missions.state.visible[0].sum()) * env.missions.grid.voxel_size_m**2
 
 
 def _world_of(cell: Cell) -> World:

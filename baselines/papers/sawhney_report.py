@@ -11,12 +11,14 @@ import numpy as np
 from baselines.claims_table import claims_table
 from baselines.experiment import Claim, csv_table, markdown_table, mean_interval
 from baselines.figures import STYLE, png
+from baselines.frontier_candidates import Looking
 from baselines.papers.sawhney_cells import (
     BONUS,
     CHANGED_METHODS,
     CHANGED_TEAM,
     CHANGES,
     POINT,
+    SIGMA,
     TIME_LIMIT_S,
     cell_id,
 )
@@ -24,22 +26,24 @@ from baselines.papers.sawhney_claims import (
     ENDS,
     PARTS,
     Records,
+    best_beta,
     betas_in,
     changed_ratio,
     changes_in,
     relative,
     teams_in,
+    times,
     worlds_in,
 )
-from baselines.papers.sawhney_figures import figure_beta, figure_curves, figure_teams
+from baselines.papers.sawhney_figures import figure_beta, figure_curves, figure_teams, figure_times
 from baselines.papers.sawhney_maps import STARTS as MAP_STARTS
 from baselines.papers.sawhney_maps import TEAM as MAP_TEAM
 from baselines.papers.sawhney_maps import maps_table
-from baselines.papers.sawhney_pictures import OptionMeans, pictures
+from baselines.papers.sawhney_pictures import OptionMeans, pictures, visible_area_m2
 from entropy_explore_env.writing import write_atomically
 
 PAPER_RUNS = {"plans": 160, "terrains": 120}
-_PICTURES = {"beta": figure_beta, "teams": figure_teams, "curves": figure_curves}
+_PICTURES = {"times": figure_times, "beta": figure_beta, "teams": figure_teams, "curves": figure_curves}
 
 
 def write_report(
@@ -90,10 +94,13 @@ def _text(records: Records, claims: Sequence[Claim], command: str) -> str:
         if worlds_in(records, part):
             parts += [
                 f"## {name}",
+                _FIGURES,
+                f"![Times over team size](sawhney/{part}-times.png)",
                 f"![β](sawhney/{part}-beta.png)",
                 f"![Team sizes](sawhney/{part}-teams.png)",
                 f"![Curves](sawhney/{part}-curves.png)",
                 _times_table(records, part),
+                _betas_table(records, part),
             ]
     if table := maps_table(records, ENDS):
         parts += ["## Plans from files", _MAPS, table]
@@ -118,7 +125,7 @@ def _runs(records: Records, part: str) -> str:
     )
 
 
-_TITLES = {
+TITLES = {
     "worlds": "Worlds, fig. 5",
     "options": "Options, fig. 1",
     "plan-mission": "A mission in a plan, fig. 7",
@@ -134,7 +141,7 @@ more by that metric, such as (3, 18): its figure has fewer points."""
 
 def _pictures_text(drawn: Sequence[str], means: Sequence[OptionMeans]) -> str:
     """The figures that show no measurements."""
-    parts = ["## The paper's other figures", *(f"![{_TITLES[name]}](sawhney/{name}.png)" for name in drawn)]
+    parts = ["## The paper's other figures", *(f"![{TITLES[name]}](sawhney/{name}.png)" for name in drawn)]
     if means:
         rows = [
             [name, _PAPER_MEANS[name], f"{seen:.3g}, {seconds:.3g}, {ratio:.3g}"]
@@ -144,13 +151,23 @@ def _pictures_text(drawn: Sequence[str], means: Sequence[OptionMeans]) -> str:
     return "\n" + "\n\n".join(parts) + "\n"
 
 
+_LOOKING = Looking()
 _RULES = f"""Plans are the scenarios of these names: cells of 0.1 m, robots without bodies at 0.5 m/s and
 0.5 m/s² with a laser of 360 rays all around up to 3 m; a scan takes 2 s. Terrains are 96 × 72 m of fractal
 ground with up to 18 m of relief, Hurst exponents 0.95, 0.8 and 0.5, under an exposure surface at least 4 m
 above it; `dem` is a height map from a file, if not said otherwise the elevations of Jacksboro, Tennessee,
 in 1 : 400 and heights in 1 : 50: 30 × 32 km become 75 × 80 m with 17 m of relief. UAVs at 3 m/s and
-2 m/s² have a scanner that looks down, all around, up to 20 m; a scan takes 2 s. Everybody hears every
+2 m/s² fly planned ways below it, and have a scanner that looks down, all around, up to 20 m; a scan takes
+2 s. Everybody hears every
 measurement and announcement at once. The paper gives none of these numbers.
+
+A cell of a plan, or the surface of a column of ground, is explored once its σ has fallen below {SIGMA:g}.
+Candidates lie a sixth of the sensor's range apart, over terrain in height as well; γ = {_LOOKING.gamma:g},
+z_av is the mean ground within {_LOOKING.patch_m:g} m, and candidates higher above it than
+{_LOOKING.too_high:g} of the range are dropped. "95 %" is a share of the cells that can be seen from where
+robots can be, measured at all; over terrain a share of all columns. t takes ways along the grid; robots drive
+them pulled straight, up to 8 % shorter. What somebody under way has promised to see is worked out anew from
+its target at each decision, by the map as it is then; in the paper the marks stay those of the allotment.
 
 V is the area of unexplored cells, or of columns of ground (times the height factor, metres), t the seconds
 of the drive from rest to rest on the shortest way and of the scan. The paper counts V in terrain points and
@@ -160,6 +177,9 @@ robot discovers a second. Promises weigh 1/(1 + promises): a literal 1/n_r would
 The finishing rule is ours: (V + v)/t with v = {BONUS["plans"]:g} m² in plans and {BONUS["terrains"]:g} m³
 over terrain. Who waits for a synchronous team scans meanwhile, and so leaves up to 2 s after the last has
 scanned."""
+
+_FIGURES = """The paper's curves are pictures without numbers; what its text says of them stands in the table
+of claims, and as a star or a dotted line below."""
 
 _HOLDS = """Relative times are over the mean of asynchronous V/t in the same world with the same team, so that
 all weigh alike; ratios are of their means, with 95 % bootstrap intervals over missions paired by world, team
@@ -187,6 +207,31 @@ def _times_table(records: Records, part: str) -> str:
         rows.append([f"`{method}`", *shown, f"{scans:.0f}"])
     head = ["method", *(f"relative time {text}" for text in ENDS.values()), "scans a robot"]
     return markdown_table(head, rows)
+
+
+def _betas_table(records: Records, part: str) -> str:
+    """The best β of each team, and what a robot discovers a second meanwhile."""
+    rows = []
+    for n in teams_in(records, part):
+        best = [best_beta(records, part, end, teams=(n,)) for end in ENDS]
+        rate = _discovered(records, part, n) if part == "plans" else None
+        shown = "-" if rate is None else f"{rate:.1f}"
+        rows.append([str(n), *(str(beta) for beta in best), shown])
+    head = [
+        "robots",
+        *(f"best β {text}" for text in ENDS.values()),
+        "discovered a robot and second, same unit",
+    ]
+    return markdown_table(head, rows)
+
+
+def _discovered(records: Records, part: str, n: int) -> float:
+    """Of V/t up to 95 %, in the paper's numbers of points; over terrain V is no area alone."""
+    rates = []
+    for world in worlds_in(records, part):
+        area_m2 = visible_area_m2(world)
+        rates += list(0.95 * area_m2 / (n * times(records, cell_id(world, n, "ptv"), "t95_s")))
+    return float(np.mean(rates)) / POINT[part]
 
 
 def _changes_table(records: Records, part: str) -> str:

@@ -23,9 +23,6 @@ IMPASSABLE, FREE, UNKNOWN = 0, 1, 2
 KNOWN_RATIO = 2.0
 """A voxel is known once its precision is this many times the prior one: half a bit was learnt of it."""
 
-CLOSED = 3.0
-"""Of the barriers that bodies meet the one that is known beforehand: the ceiling."""
-
 MOST_RATE = 1e6
 """Rates are at most this many times the least one: a search works off a bucket for each least step."""
 
@@ -55,6 +52,9 @@ MOVE = np.dtype(
     ],
     align=True,
 )
+
+
+NOTHING_CLOSED = np.zeros(0, np.bool_)
 
 
 class Lattice(NamedTuple):
@@ -91,8 +91,8 @@ class Costs(NamedTuple):
     """(V,) float32 rates, inf = impassable, in place of the belief; empty = by the belief."""
     least_rate: float
     """No rate is less; 1 for a belief."""
-    barriers: np.ndarray
-    """(V,) float32, nobody enters where it is CLOSED, the rest is ignored; empty = nothing is closed."""
+    closed: np.ndarray
+    """(V,) bool, with a belief: nobody enters there, whatever is believed; empty = nothing is closed."""
 
 
 def new_lattice(shape: tuple[int, int, int], body_radius: float = 0.0, layer: int | None = None) -> Lattice:
@@ -164,7 +164,11 @@ def _touched(
 
 
 def belief_costs(
-    mean: np.ndarray, precision: np.ndarray, prior_precision: float, unknown_cost: float = 1.0
+    mean: np.ndarray,
+    precision: np.ndarray,
+    prior_precision: float,
+    unknown_cost: float = 1.0,
+    closed: np.ndarray | None = None,
 ) -> Costs:
     """Search through a belief.
 
@@ -174,10 +178,14 @@ def belief_costs(
         prior_precision: That of a voxel that nobody has measured; known are voxels with KNOWN_RATIO
             times as much.
         unknown_cost: What a voxel edge of way through unknown voxels costs.
+        closed: The same shape, bool, where the body may not be whatever is believed: above a ceiling, see
+            `worlds.world.closed_by`. None = nowhere.
 
     Raises:
-        SettingError: The cost is no number from 1 to MOST_RATE.
+        SettingError: The cost is no number from 1 to MOST_RATE, or `closed` has another shape or type.
     """
+    if closed is not None and (closed.shape != mean.shape or closed.dtype != np.bool_):
+        raise SettingError("closed", f"{closed.shape} {closed.dtype}", f"None, or {mean.shape} bool")
     if not (1.0 <= unknown_cost <= MOST_RATE):
         raise SettingError("unknown_cost", unknown_cost, f"a number from 1 to {MOST_RATE:g}")
     flat = _numbered(mean)
@@ -188,7 +196,7 @@ def belief_costs(
         float(unknown_cost),
         flat[:0],
         1.0,
-        flat[:0],
+        NOTHING_CLOSED if closed is None else np.ascontiguousarray(closed).reshape(-1),
     )
 
 
@@ -208,7 +216,7 @@ def rate_costs(rates: np.ndarray) -> Costs:
     most = float(flat.max(initial=0.0, where=np.isfinite(flat)))
     if most > MOST_RATE * least:
         raise SettingError("rates", most, f"finite rates of at most {MOST_RATE:g} times the least, {least:g}")
-    return Costs(flat[:0], flat[:0], 0.0, 1.0, flat, least if math.isfinite(least) else 1.0, flat[:0])
+    return Costs(flat[:0], flat[:0], 0.0, 1.0, flat, least if math.isfinite(least) else 1.0, NOTHING_CLOSED)
 
 
 def _numbered(field: np.ndarray) -> np.ndarray:
@@ -229,7 +237,7 @@ def place_of(lattice, voxel):
 @inlined_kernel
 def is_closed(costs, voxel):
     """Whether a voxel is closed to robots, whatever they believe of it."""
-    return len(costs.barriers) > 0 and costs.barriers[voxel] == CLOSED
+    return len(costs.closed) > 0 and costs.closed[voxel]
 
 
 @inlined_kernel

@@ -86,8 +86,8 @@ def _let_leave(search, lattice, costs, voxel):
             near = (i * size[1] + j) * size[2] + k
             if near != voxel and (lattice.layer < 0 or k == lattice.layer):
                 mark = mark_of(search, lattice, costs, near, i, j, k)
-                closed = costs.mean[near] > STOP_AT_COVERED or is_closed(costs, near)
-                if mark & KIND == IMPASSABLE and not closed:
+                open_there = costs.mean[near] <= STOP_AT_COVERED and not is_closed(costs, near)
+                if mark & KIND == IMPASSABLE and open_there:
                     kind = UNKNOWN if costs.precision[near] < costs.known_precision else FREE
                     search.mark[near] = np.uint32(number << SEARCH_SHIFT | TIGHT | kind)
 

@@ -80,6 +80,7 @@ class Missions:
         self.layout = ObservationLayout(scenario)
         self._parts = observation_rules(scenario, self.layout)
         self.state: MissionState = new_state(scenario, self.count, self.rules.cells)
+        self._closed = np.zeros((self.count * int(self.rules.numbers["radii"][0]), 0), np.bool_)
         self.worlds: list[World | None] = [None] * self.count
         self.seeds = [0] * self.count
         self.episodes = [-1] * self.count
@@ -159,6 +160,8 @@ class Missions:
         if world.ceiling is not None and self.state.blocked is self.state.truth:
             self.state = self.state._replace(blocked=self.state.truth.copy())
         state = self.state
+        if world.ceiling is not None and not self._closed.size and self._navigators[0]:
+            self._closed = np.zeros((len(self._closed), self.grid.voxels), np.bool_)
         if world is not self.worlds[mission]:
             self.worlds[mission] = world
             state.truth[mission] = world.occupied.ravel()
@@ -174,7 +177,6 @@ class Missions:
             state.joint_precision[mission] = self.rules.numbers["prior_precision"][0]
             state.visible[mission] = world.visible(self.scenario).ravel()
         state.missions[mission]["reached_s"] = -1.0
-        state.missions[mission]["ceiling"] = world.ceiling is not None
         self._set_entropies(mission, world.visible_voxels(self.scenario))
         robots = state.robots[mission]
         for field in ("origin", "goal", "target", "scan_pose"):
@@ -194,6 +196,8 @@ class Missions:
             numbers, kind = self.rules.numbers[robot], self.scenario.kind_of(robot)
             row = mission * numbers["radii"] + numbers["barriers"]
             self.state.blocked[row] = world.layout(self.scenario, kind).barriers.ravel()
+            if self._closed.size:
+                self._closed[row] = world.closed(kind.robot.body_radius_m).ravel()
 
     def _set_entropies(self, mission: int, visible_voxels: int) -> None:
         """H(0) by eq. 25, and H_th: voxels that can be seen at σ_end, the others at the prior."""
@@ -233,7 +237,7 @@ class Missions:
 
     def _step_range(self, thread: int, first: int, last: int, boxes: np.ndarray, numbers: np.ndarray) -> None:
         for kind, navigator in self._navigators[thread].items():
-            plan_missions(self.rules, self.state, navigator, kind, boxes, numbers, first, last)
+            plan_missions(self.rules, self.state, self._closed, navigator, kind, boxes, numbers, first, last)
         step_missions(
             self.rules,
             self._parts,

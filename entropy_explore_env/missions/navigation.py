@@ -17,12 +17,14 @@ _ARRIVED = MoveEnd.ARRIVED.code
 
 
 @lean_kernel
-def plan_missions(rules, state, navigator, kind, boxes, numbers, first, last):
+def plan_missions(rules, state, closed, navigator, kind, boxes, numbers, first, last):
     """Plan the ways of the robots of one kind that decide, each through its own belief.
 
     Args:
         rules: The scenario.
         state: The MissionState of E missions; targets and ways are filled in.
+        closed: (E·N, V) bool, for the N radii of bodies as in `blocked`, where one would reach above the
+            ceiling, which those who plan know; (E·N, 0) = no mission has one.
         navigator: Working space for this kind, not shared with another thread.
         kind: Its number.
         boxes: (E, A, N) float64 continuous actions.
@@ -39,17 +41,15 @@ def plan_missions(rules, state, navigator, kind, boxes, numbers, first, last):
                     box, number = boxes[mission, index], numbers[mission, index]
                     decode_action(rules, index, robot.goal, box, number, robot.target)
                     mean, precision = state.mean[mission, index], state.precision[mission, index]
-                    barriers = state.blocked[mission * own.radii + own.barriers]
-                    if not state.missions[mission].ceiling:
-                        barriers = barriers[:0]
-                    plan_way(own, navigator, mean, precision, barriers, robot)
+                    there = closed[mission * own.radii + own.barriers]
+                    plan_way(own, navigator, mean, precision, there, robot)
 
 
 @lean_kernel
-def plan_way(numbers, navigator, mean, precision, barriers, robot):
+def plan_way(numbers, navigator, mean, precision, closed, robot):
     """Write a robot's way to its target: waypoints in metres, and how it ends if nothing stops it."""
     start, goal = grid_position(numbers, robot.goal), grid_position(numbers, robot.target)
-    robot.waypoints, robot.way_end = find_way(navigator, mean, precision, barriers, start, goal, robot.way)
+    robot.waypoints, robot.way_end = find_way(navigator, mean, precision, closed, start, goal, robot.way)
     for point in range(robot.waypoints):
         for axis in range(3):
             robot.way[point, axis] = numbers.origin_m[axis] + robot.way[point, axis] * numbers.voxel_size_m

@@ -42,7 +42,6 @@ MISSION = np.dtype(
         ("cycles", "i8"),  # steps so far
         ("end", "i8"),  # code of a MissionEnd
         ("letters", "i8"),  # delayed messages sent so far
-        ("ceiling", "?"),  # whether the world has one; those who plan know where it is
         ("reached_s", "f8", (4,)),  # when the best map had lost each of PROGRESS; -1 = not yet
         # of the joint map, where the scenario is scored
         ("joint_bits", "f8"),  # its entropy

@@ -16,6 +16,7 @@ from entropy_explore_env.missions.poses import place_at, pose_at
 from entropy_explore_env.missions.rules import Rules
 from entropy_explore_env.robots.motion import MoveEnd
 from entropy_explore_env.settings import RobotKind
+from entropy_explore_env.worlds.world import closed_by
 
 
 @dataclass(frozen=True)
@@ -111,6 +112,13 @@ class RobotView:
     def planar(self) -> bool:
         """Whether it stays in its plane and looks level."""
         return self.scenario.layer_of(self.kind.robot) is not None
+
+    def closed(self) -> np.ndarray | None:
+        """(X, Y, Z) bool, where its body would reach above the ceiling; None = there is none."""
+        if self.ceiling is None:
+            return None
+        grid = self.scenario.grid
+        return closed_by(self.ceiling, grid.shape[2], self.kind.robot.body_radius_m / grid.voxel_size_m)
 
 
 def view_of(missions: Missions, mission: int, robot: int) -> RobotView:

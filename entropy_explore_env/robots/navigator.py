@@ -159,14 +159,14 @@ def _search_way(navigator, costs, source, goal):
 
 
 @lean_kernel
-def find_way(navigator, mean, precision, barriers, start, goal, waypoints):
+def find_way(navigator, mean, precision, closed, start, goal, waypoints):
     """Fill in the points to which a robot has to drive straight, one after the other.
 
     Args:
         navigator: Working space.
         mean: (V,) float32, the robot's expected coverage.
         precision: (V,) float32, 1/σ² of it.
-        barriers: (V,) float32 or (0,), see `Costs`.
+        closed: (V,) bool, where the body would reach above the ceiling; (0,) = there is none.
         start: (x, y, z), inside the workspace.
         goal: (x, y, z), anywhere.
         waypoints: (W, 3) float64, filled in; the start is none of them.
@@ -176,7 +176,7 @@ def find_way(navigator, mean, precision, barriers, start, goal, waypoints):
         the code of ARRIVED, NO_WAY or CORNERS (the way needs more than W).
     """
     search, lattice = navigator.search, navigator.lattice
-    costs = Costs(mean, precision, navigator.known_precision, navigator.unknown_cost, mean[:0], 1.0, barriers)
+    costs = Costs(mean, precision, navigator.known_precision, navigator.unknown_cost, mean[:0], 1.0, closed)
     begin, finish = navigator.ends[0], navigator.ends[1]
     inside, length = True, 0.0
     for axis in range(3):

@@ -90,29 +90,19 @@ class World:
         if self.ceiling is None:
             return solid.view(np.uint8)
         barriers = solid.astype(np.uint8)
-        above = np.arange(self.grid.shape[2]) >= self.ceiling[:, :, None]
-        barriers[self._touching(above, body_radius_m, boundary=False)] = Barrier.CEILING
+        barriers[self.closed(body_radius_m)] = Barrier.CEILING
         barriers[self._touching(self.occupied, body_radius_m, boundary=False)] = Barrier.GROUND
         return barriers
 
+    def closed(self, body_radius_m: float) -> np.ndarray:
+        """(X, Y, Z) bool, where a ball-shaped body would reach above the ceiling, whatever else it meets."""
+        if self.ceiling is None:
+            return np.zeros(self.grid.shape, bool)
+        return closed_by(self.ceiling, self.grid.shape[2], body_radius_m / self.grid.voxel_size_m)
+
     def _touching(self, closed: np.ndarray, body_radius_m: float, boundary: bool) -> np.ndarray:
         """(X, Y, Z) bool: a body in the voxel's centre meets a closed voxel, or leaves the workspace."""
-        radius = body_radius_m / self.grid.voxel_size_m
-        if radius <= 0.5 + 1e-9:
-            return closed
-        if 2.0 * radius > max(self.grid.shape):
-            return np.full(self.grid.shape, boundary or closed.any())
-        height = 0 if self.grid.flat else math.ceil(radius - 0.5)
-        reach = math.ceil(radius - 0.5)
-        offsets = np.ogrid[-reach : reach + 1, -reach : reach + 1, -height : height + 1]
-        gaps = [np.maximum(np.abs(axis) - 0.5, 0.0) for axis in offsets]
-        ball = gaps[0] ** 2 + gaps[1] ** 2 + gaps[2] ** 2 < radius**2 - 1e-9
-        walled = np.pad(closed, [(reach, reach), (reach, reach), (height, height)], constant_values=boundary)
-        swollen = ndimage.binary_dilation(walled, ball)
-        inside = tuple(
-            slice(pad, pad + n) for pad, n in zip((reach, reach, height), self.grid.shape, strict=True)
-        )
-        return swollen[inside]
+        return _swollen(closed, body_radius_m / self.grid.voxel_size_m, boundary)
 
     @cached_property
     def _layouts(self) -> dict[tuple[float, int | None, int, tuple[float, float, float] | None], Layout]:
@@ -231,6 +221,37 @@ class Layout:
     def visible_voxels(self) -> int:
         """How many voxels can be seen at all."""
         return int(self.visible.sum())
+
+
+def closed_by(ceiling: np.ndarray, layers: int, body_radius: float) -> np.ndarray:
+    """Where a ball-shaped body in a voxel's centre would reach above a ceiling.
+
+    Args:
+        ceiling: (X, Y) int32, in each column the first closed layer.
+        layers: Z.
+        body_radius: In voxel edges.
+
+    Returns:
+        (X, Y, Z) bool.
+    """
+    return _swollen(np.arange(layers) >= ceiling[:, :, None], body_radius, boundary=False)
+
+
+def _swollen(closed: np.ndarray, radius: float, boundary: bool) -> np.ndarray:
+    """(X, Y, Z) bool: a ball in the voxel's centre meets a closed voxel; radius in voxel edges."""
+    if radius <= 0.5 + 1e-9:
+        return closed
+    if 2.0 * radius > max(closed.shape):
+        return np.full(closed.shape, boundary or closed.any())
+    reach = math.ceil(radius - 0.5)
+    height = 0 if closed.shape[2] == 1 else reach
+    offsets = np.ogrid[-reach : reach + 1, -reach : reach + 1, -height : height + 1]
+    gaps = [np.maximum(np.abs(axis) - 0.5, 0.0) for axis in offsets]
+    ball = gaps[0] ** 2 + gaps[1] ** 2 + gaps[2] ** 2 < radius**2 - 1e-9
+    walled = np.pad(closed, [(reach, reach), (reach, reach), (height, height)], constant_values=boundary)
+    swollen = ndimage.binary_dilation(walled, ball)
+    inside = tuple(slice(pad, pad + n) for pad, n in zip((reach, reach, height), closed.shape, strict=True))
+    return np.asarray(swollen[inside])
 
 
 def connected_parts(room: np.ndarray) -> tuple[np.ndarray, int]:

@@ -16,6 +16,7 @@ from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.missions.view import view_of
 from entropy_explore_env.reports.metrics import mission_figures
 from entropy_explore_env.scenarios import BOX, ROOM, find_scenario
+from entropy_explore_env.settings import Grid
 from tests.reference.scenes import free_box, started
 
 SIZE = (7, 11, 5)
@@ -122,3 +123,24 @@ def test_a_way_whose_first_stop_is_out_of_sight_is_not_taken(monkeypatch):
     (viewpoint,) = strategy.choose([env.view("robot_0")])
     assert asked == [1] and np.isfinite(viewpoint).all()
     assert strategy._journeys[0].stops == [] and strategy._journeys[0].patience > 0
+
+
+def test_it_does_not_fly_into_the_ceiling_that_it_knows():
+    """Ways to somewhere better, planned by the strategy itself for robots that drive straight."""
+    settings = {
+        "grid": Grid((30, 24, 16), 1.0),
+        "robots": 1,
+        "robot": {"body_radius_m": 0.8},
+        "decision_period_s": None,
+        "ending": {"sigma_end": 1e-3, "time_limit_s": 300.0},
+    }
+    env = EntropyExploreEnv(with_settings(find_scenario("terrain"), settings))
+    env.reset(seed=0)
+    view = env.view("robot_0")
+    world, closed = env.missions.worlds[0], view.closed()
+    assert world is not None and closed is not None
+    np.testing.assert_array_equal(closed, world.closed(0.8))
+    strategy = InformationRate()
+    strategy.reset(env.scenario, env.strategy_generator())
+    drawn = strategy._drawn_voxels(view, view.pose[:3])
+    assert len(drawn) > 0 and not closed.reshape(-1)[drawn].any()

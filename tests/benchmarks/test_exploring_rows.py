@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from benchmarks import exploring
 from benchmarks.exploring import dense_plan, exploring_rows, rooms_plan
 from benchmarks.rows import Effort
 
@@ -17,8 +18,10 @@ def test_rooms_have_doors():
     assert not solid[50, 25:31].any() and solid[50, 1:25].all() and not solid[25:31, 50].any()
 
 
-def test_rows_are_positive_and_have_goals():
+def test_rows_are_positive_and_have_goals(monkeypatch):
+    small = exploring.floor_row
+    monkeypatch.setattr(exploring, "floor_row", lambda effort: small(effort, (90, 70, 1)))
     rows = exploring_rows(Effort(rounds=1, long_rounds=1, steps=3))
-    assert len(rows) == 3 and all(row.ours > 0.0 and row.goal for row in rows)
-    candidates = int(rows[1].job.split(" candidates")[0].split()[-1])
-    assert 150 <= candidates <= 400
+    assert len(rows) == 5 and all(row.ours > 0.0 and row.goal for row in rows)
+    for row in rows[1:3]:
+        assert 200 <= int(row.job.split(" candidates")[0].split()[-1]) <= 400

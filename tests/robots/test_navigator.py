@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import ndimage
 
-from entropy_explore_env.belief.lattice import CLOSED
+from entropy_explore_env.belief.lattice import NOTHING_CLOSED
 from entropy_explore_env.robots.motion import (
     MoveEnd,
     driven_share,
@@ -21,7 +21,7 @@ from entropy_explore_env.robots.motion import (
 )
 from entropy_explore_env.robots.navigator import find_way, lattice_of, new_navigator
 from entropy_explore_env.settings import Grid
-from entropy_explore_env.worlds.world import Barrier, World
+from entropy_explore_env.worlds.world import World
 from tests.reference.scenes import drawn, free_box, ray_space, seeds
 
 FLAT = Grid((7, 11, 1), 0.5)
@@ -32,15 +32,15 @@ def planner(grid=FLAT, **robot):
     return free_box(robots=1, grid=grid, robot={"navigator": "planned", "reach_m": math.inf, **robot})
 
 
-def plan(scenario, solid, start, goal, known=None, places=32, barriers=None):
+def plan(scenario, solid, start, goal, known=None, places=32, closed=None):
     """Waypoints (N, 3) and the end of a plan through what is known, (X, Y, Z) bool; None = all.
 
-    `barriers` (X, Y, Z) are those of a world with a ceiling.
+    `closed` (X, Y, Z) bool is where the body would reach above the ceiling.
     """
     mean = solid.astype(np.float32).ravel()
     precision = np.full(mean.shape, KNOWN) if known is None else np.where(known.ravel(), KNOWN, PRIOR)
     points = np.full((places, 3), np.nan)
-    closed = mean[:0] if barriers is None else barriers.astype(np.float32).ravel()
+    closed = NOTHING_CLOSED if closed is None else closed.ravel()
     navigator = new_navigator(scenario, scenario.robot)
     count, code = find_way(navigator, mean, precision, closed, start, goal, points)
     assert np.isnan(points[count:]).all()
@@ -117,21 +117,37 @@ def test_planar_robots_keep_their_height_and_may_pass_under_what_is_above_them()
 
 
 @pytest.mark.parametrize(("radius", "closed_from", "below"), [(0.2, 3, [4]), (0.4, 4, [3, 4, 5])])
-def test_planners_know_the_ceiling_and_of_the_ground_what_was_seen(radius, closed_from, below):
-    """At x = 4 the ceiling leaves what is below layer 3 to the body; a step in the ground is unknown."""
+@pytest.mark.parametrize("cliff", [1, 5])
+def test_planners_know_the_ceiling_and_of_the_ground_what_was_seen(radius, closed_from, below, cliff):
+    """At x = 4 the ceiling leaves what is below layer 3 to the body; a cliff at x = 6 is unknown.
+
+    Even where it is higher than the ceiling beside it, it changes nothing in the plan.
+    """
     grid, solid = Grid((9, 7, 6), 0.5), np.zeros((9, 7, 6), bool)
     solid[:, :, 0] = True
     believed, ceiling = solid.copy(), np.full(grid.shape[:2], 6, np.int32)
-    solid[6, :, 1], ceiling[4] = True, closed_from
-    barriers = World(grid, solid, "step", ceiling).barriers(radius)
+    solid[5, :, 1:cliff], ceiling[4] = True, closed_from
+    closed = World(grid, solid, "step", ceiling).closed(radius)
     scenario, start, goal = planner(grid, body_radius_m=radius), (1.5, 3.5, 4.5), (7.5, 3.5, 2.5)
-    points, end = plan(scenario, believed, start, goal, barriers=barriers)
+    points, end = plan(scenario, believed, start, goal, closed=closed)
     assert end is MoveEnd.ARRIVED and len(points) > 1
     stops = np.vstack([start, points])
     line = np.concatenate([np.linspace(a, b, 50) for a, b in itertools.pairwise(stops)])
     there = np.isin(np.floor(line[:, 0]), below)
     assert there.any() and line[there, 2].max() < 3.0 + 1e-9
     assert len(plan(scenario, believed, start, goal)[0]) == 1  # as nothing is believed to be in the way
+
+
+def test_who_leaves_a_tight_start_does_not_leave_it_upwards_through_the_ceiling():
+    """A body of 0.4 m touches a wall at its side; upwards is the nearest way out, and closed."""
+    grid, solid = Grid((9, 7, 6), 0.5), np.zeros((9, 7, 6), bool)
+    solid[4, 3, 2], closed = True, np.zeros(grid.shape, bool)
+    closed[:, :, 4:] = True
+    scenario, start = planner(grid, body_radius_m=0.4), (3.5, 3.5, 3.5)
+    for above, highest in ((None, 4.5), (closed, 3.5)):
+        points, end = plan(scenario, solid, start, (3.5, 3.5, 4.5), closed=above)
+        assert points[:, 2].max() == highest
+        assert end is (MoveEnd.ARRIVED if above is None else MoveEnd.NO_WAY)
 
 
 def test_a_body_keeps_away_from_walls():
@@ -214,7 +230,3 @@ def test_the_time_of_a_place_on_the_way_is_when_the_robot_is_there(length, share
     time_s = time_of_way(share * length, length, speed, acceleration)
     assert 0.0 <= time_s <= driving_time(length, speed, acceleration) + 1e-9
     assert driven_share(time_s, length, speed, acceleration) == pytest.approx(share, abs=1e-6)
-
-
-def test_what_planners_take_for_closed_is_the_ceiling():
-    assert CLOSED == Barrier.CEILING

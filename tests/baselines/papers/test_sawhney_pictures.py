@@ -10,8 +10,11 @@ import numpy as np
 import pytest
 
 from baselines.figures import png
-from baselines.papers import sawhney_pictures
-from baselines.papers.sawhney_cells import world_cell
+from baselines.mission import scripted
+from baselines.papers import sawhney_pictures, sawhney_report
+from baselines.papers.sawhney_cells import PLANS, TERRAINS, world_cell
+from baselines.papers.sawhney_dem import write_model
+from baselines.papers.sawhney_missions import followed
 from baselines.papers.sawhney_pictures import (
     example_options,
     figure_plan,
@@ -22,7 +25,7 @@ from baselines.papers.sawhney_pictures import (
     ground_of,
     snapshots,
 )
-from baselines.per_time_visibility import Metric
+from baselines.per_time_visibility import FrontierStrategy, Metric
 from entropy_explore_env.config import with_settings
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.settings import Grid
@@ -83,6 +86,46 @@ def test_snapshots_are_of_one_mission_as_it_goes_on(world):
         assert truth.occupied[:, :, 0][known.covered].all()
     for robot, way in enumerate(taken[0].ways_m):
         np.testing.assert_allclose(way[0], env.view(f"robot_{robot}").pose[:3])
+
+
+def test_expected_is_what_those_who_choose_now_will_see():
+    """By the snapshot's own candidates, from the viewpoints that were just chosen."""
+    cell, chosen_at = small_cell("office", 1), {}
+    explorer, env = FrontierStrategy(cell.record.exploring), EntropyExploreEnv(scripted(cell.scenario))
+
+    def look(share, views, chosen):
+        place = env.missions.grid.in_grid_units(chosen[0])[:3]
+        chosen_at[views[0].time_s] = explorer.allotter_of(0).candidates.expected(place)
+
+    followed(env, explorer, 0, look)
+    taken = snapshots(cell, 0)
+    assert len(taken) == 4
+    for now in taken[:-1]:
+        np.testing.assert_array_equal(now.expected, chosen_at[now.time_s])
+
+
+def test_a_mission_that_is_cut_off_is_drawn_as_far_as_it_came():
+    plan, terrain = (
+        dataclasses.replace(cell, scenario=with_settings(cell.scenario, {"ending": {"time_limit_s": 4.0}}))
+        for cell in (small_cell("office", 1), small_cell("terrain", 1))
+    )
+    assert not snapshots(plan, 0)[-1].finished
+    for figure in (figure_plan(plan, "plan"), figure_section(terrain), figure_ways([("V/t", plan)] * 2)):
+        assert len(png(figure)) > 4000
+
+
+def test_every_picture_has_a_title_and_the_worlds_are_drawn(monkeypatch, tmp_path):
+    monkeypatch.setattr(
+        sawhney_pictures,
+        "world_cell",
+        lambda name, robots, *_: small_cell("terrain" if "terrain" in name else "office", robots),
+    )
+    drawn, means = sawhney_pictures.pictures(("plans", "terrains"), None)
+    assert set(drawn) == set(sawhney_report.TITLES) and len(means) == 3
+    assert set(sawhney_pictures.pictures(("terrains",), None)[0]) == {"worlds", "terrain-mission", "section"}
+    monkeypatch.undo()
+    figure = sawhney_pictures.figure_worlds(write_model(tmp_path))
+    assert [axes.get_title() for axes in figure.axes] == [*PLANS, *TERRAINS, "dem"]
 
 
 def test_pictures_of_small_missions(monkeypatch):
