@@ -6,7 +6,7 @@ import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import matplotlib as mpl
 import numpy as np
@@ -24,7 +24,7 @@ from baselines.per_time_visibility import FrontierStrategy, Metric
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.missions.view import RobotView
 from entropy_explore_env.reports.recording import Ways
-from entropy_explore_env.worlds.world import World
+from entropy_explore_env.settings import Grid
 
 TEAM = 3
 """Robots in figs. 7 and 9, as there."""
@@ -36,6 +36,16 @@ _EXAMPLE_T, _EXAMPLE_V = range(1, 11), range(2, 21, 2)
 _FIRST = 10
 """So many of the options are what a metric goes for (sect. 2)."""
 _UNKNOWN, _FREE, _WALL, _EDGE = "#c3c7cf", "#ffffff", "#27408b", "#e02020"
+
+
+class Shown(NamedTuple):
+    """A true world in a picture."""
+
+    grid: Grid
+    occupied: np.ndarray
+    """(X, Y, Z) bool"""
+    ceiling: np.ndarray | None
+    """(X, Y) int32"""
 
 
 OptionMeans = tuple[str, float, float, float]
@@ -280,7 +290,7 @@ def figure_section(cell: Cell) -> Figure:
     return figure
 
 
-def ground_of(world: World) -> np.ndarray:
+def ground_of(world: Shown) -> np.ndarray:
     """(X, Y) int, solid layers of a height field."""
     return world.occupied.sum(2)
 
@@ -292,13 +302,13 @@ def visible_area_m2(world: str) -> float:
     return float(env.missions.state.visible[0].sum()) * env.missions.grid.voxel_size_m**2
 
 
-def _world_of(cell: Cell) -> World:
+def _world_of(cell: Cell) -> Shown:
     """The world of a cell's mission of seed 0."""
     env = _environment(cell)
     env.reset(seed=0)
     world = env.missions.worlds[0]
     assert world is not None
-    return world
+    return Shown(world.grid, world.occupied, world.ceiling)
 
 
 def _environment(cell: Cell) -> EntropyExploreEnv:
@@ -325,7 +335,7 @@ def _panels(count: int, size_m: np.ndarray, width: float = 2.7) -> tuple[Figure,
 
 
 def _show(
-    axes: Axes, picture: np.ndarray, cell: Cell, ways_m: Sequence[np.ndarray], world: World | None = None
+    axes: Axes, picture: np.ndarray, cell: Cell, ways_m: Sequence[np.ndarray], world: Shown | None = None
 ) -> None:
     """Draw (X, Y, 3) seen from above in metres, with ways over it."""
     grid = cell.scenario.grid if world is None else world.grid
