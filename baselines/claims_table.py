@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import platform
 import sys
 import time
 from collections.abc import Sequence
@@ -71,3 +72,11 @@ def _shown(value: float | str | None) -> str:
 
 def _interval(claim: Claim) -> str:
     return "" if claim.low is None else f"{_shown(claim.low)} … {_shown(claim.high)}"
+
+
+def processor() -> str:
+    """The processor's name, as the system tells it: what seconds were measured on."""
+    table = Path("/proc/cpuinfo")
+    lines = table.read_text().splitlines() if table.exists() else []
+    names = [line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")]
+    return names[0] if names else platform.processor() or "unknown"

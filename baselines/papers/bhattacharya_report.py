@@ -10,7 +10,7 @@ from typing import Any
 import matplotlib as mpl
 import numpy as np
 
-from baselines.claims_table import claims_table
+from baselines.claims_table import claims_table, processor
 from baselines.experiment import Claim, csv_table, markdown_table, median_interval
 from baselines.figures import STYLE, png
 from baselines.papers.bhattacharya_claims import (
@@ -110,8 +110,8 @@ def _text(results: Results, claims: Sequence[Claim], command: str) -> str:
         "there are. Point robots step from cell to cell, as there.",
         f"## Claims: {held} of {len(claims)} hold",
         "A claim with an interval holds if all of it says so; iterations and seconds of (b) hold by their "
-        "median. Seconds are processor time on one thread of this machine, the paper's those of a 2.1 GHz "
-        "Pentium of 2010.",
+        f"median. Seconds are processor time on one thread of a machine with {processor()}, the paper's "
+        "those of a 2.1 GHz Pentium of 2010.",
         claims_table(claims),
         "## (a), (d) A known office, 170 × 200, five robots",
         _coverage_table(results),
@@ -128,7 +128,7 @@ def _text(results: Results, claims: Sequence[Claim], command: str) -> str:
         parts += ["## (e) Flying teams, in this package's missions", FLYING_READING, flying]
     if results.missions:
         parts += [
-            "## (f) Both channel schemes at equal bits",
+            "## (f) Both channel schemes at equal bits a scan",
             CHANNEL_READING,
             channel_table(results.missions),
         ]
