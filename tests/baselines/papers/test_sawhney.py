@@ -111,11 +111,11 @@ def test_claims_do_not_hold_where_all_are_alike():
     assert sum(claim.holds for claim in claims) < 0.2 * len(claims)
 
 
-def tiny_cells(starts, flights, quick, dem, maps=()):
+def tiny_cells(starts, flights, quick, dem, maps=(), teams=()):
     """The quick experiment's cells in plans of 5 × 4 m and over terrains of 18 × 15 m, with few cells."""
     del flights
     found = []
-    for cell in cells_of(starts, starts, quick, dem, maps):
+    for cell in cells_of(starts, starts, quick, dem, maps, teams):
         if cell.id.startswith("map-"):
             found.append(cell)
             continue
@@ -178,6 +178,8 @@ def test_the_command_writes_a_report_and_goes_on_where_it_was(tmp_path, monkeypa
         (["--flights", "1"], "flights"),
         (["--jobs", "0"], "jobs"),
         (["--dem", "no"], "dem"),
+        (["--teams", "1", "7"], "teams"),
+        (["--teams", "3", "3"], "teams"),
         (["--maps", "no"], "maps"),
     ],
 )
