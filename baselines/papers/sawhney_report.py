@@ -158,8 +158,7 @@ ground with up to 18 m of relief, Hurst exponents 0.95, 0.8 and 0.5, under an ex
 above it; `dem` is a height map from a file, if not said otherwise the elevations of Jacksboro, Tennessee,
 in 1 : 400 and heights in 1 : 50: 30 × 32 km become 75 × 80 m with 17 m of relief. UAVs at 3 m/s and
 2 m/s² fly planned ways below it, and have a scanner that looks down, all around, up to 20 m; a scan takes
-2 s. Everybody hears every
-measurement and announcement at once. The paper gives none of these numbers.
+2 s. Everybody hears every measurement and announcement at once. The paper gives none of these numbers.
 
 A cell of a plan, or the surface of a column of ground, is explored once its σ has fallen below {SIGMA:g}.
 Candidates lie a sixth of the sensor's range apart, over terrain in height as well; γ = {_LOOKING.gamma:g},
@@ -189,7 +188,8 @@ favours it."""
 _MAPS = f"""Teams of {MAP_TEAM}, the settings of the other plans, cells resampled to 0.1 m,
 {MAP_STARTS} starts; mean times, and seconds of computing a mission on one thread."""
 
-_CHANGED = f"""Teams of {CHANGED_TEAM}: time of V/t over that of the other method."""
+_CHANGED = f"""Teams of {CHANGED_TEAM}: time of V/t over that of the other method. Intervals over so few missions
+in one world say little more than how far they lie apart; "as it is" are the same seeds and worlds."""
 
 
 def _times_table(records: Records, part: str) -> str:
