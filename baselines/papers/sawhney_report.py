@@ -188,8 +188,8 @@ favours it."""
 _MAPS = f"""Teams of {MAP_TEAM}, the settings of the other plans, cells resampled to 0.1 m,
 {MAP_STARTS} starts; mean times, and seconds of computing a mission on one thread."""
 
-_CHANGED = f"""Teams of {CHANGED_TEAM}: time of V/t over that of the other method. Intervals over so few missions
-in one world say little more than how far they lie apart; "as it is" are the same seeds and worlds."""
+_CHANGED = f"""Teams of {CHANGED_TEAM}: time of V/t over that of the other method. Intervals over so few
+missions in one world say little more than how far they lie apart; "as it is" has the same seeds and worlds."""
 
 
 def _times_table(records: Records, part: str) -> str:
