@@ -189,7 +189,7 @@ _MAPS = f"""Teams of {MAP_TEAM}, the settings of the other plans, cells resample
 {MAP_STARTS} starts; mean times, and seconds of computing a mission on one thread."""
 
 _CHANGED = f"""Teams of {CHANGED_TEAM}: time of V/t over that of the other method. Intervals over so few
-missions in one world say little more than how far they lie apart; "as it is" has the same seeds and worlds."""
+missions in one world say little more than how far they lie apart; "as it is" has the same seeds."""
 
 
 def _times_table(records: Records, part: str) -> str:
