@@ -12,6 +12,7 @@ from gymnasium import spaces
 from hypothesis import given
 from hypothesis import strategies as st
 
+from tests.reference.scenes import drawn
 from training.decisions import DecisionBuffer
 from training.errors import NotFiniteError
 from training.scales import RunningScale
@@ -93,6 +94,7 @@ def walked(decided, rewards, elapsed_s, ended, cut_off, values, last, deciding, 
     return out
 
 
+@drawn()
 @given(st.integers(0, 2**32 - 1), st.sampled_from(["seconds", "decisions"]))
 def test_advantages_are_those_of_a_plain_walk(seed: int, discount: str) -> None:
     rng, steps, count = np.random.default_rng(seed), int(np.random.default_rng(seed).integers(1, 12)), 5
@@ -183,6 +185,7 @@ def test_a_reward_that_is_not_finite_stops() -> None:
         filled(ones > 0, ones * np.nan, ones, ones < 0, ones * 0, ones, np.ones(2), np.ones(2, bool))
 
 
+@drawn()
 @given(st.lists(st.integers(1, 9), min_size=1, max_size=6), st.integers(0, 1000))
 def test_a_running_scale_is_the_scale_of_all(sizes: list[int], seed: int) -> None:
     rng, scale = np.random.default_rng(seed), RunningScale(3)

@@ -18,6 +18,7 @@ from baselines.head_to_head.measures import (
     iqm_interval,
     profile,
 )
+from tests.reference.scenes import drawn
 
 RNG = np.random.default_rng(3)
 OURS, THEIRS = RNG.gamma(3.0, 100.0, (3, 7)), RNG.gamma(4.0, 100.0, (3, 7))
@@ -43,11 +44,13 @@ def test_the_interquartile_mean_worked_out_by_hand():
     assert interquartile_mean(rows).tolist() == [0.5, 5.0]
 
 
+@drawn()
 @given(SCORES)
 def test_the_interquartile_mean_is_scipy_s(scores):
     assert iqm_interval(scores).value == pytest.approx(stats.trim_mean(scores, 0.25, axis=None))
 
 
+@drawn()
 @given(SCORES, st.randoms(use_true_random=False), st.integers(2, 5))
 def test_order_and_unit_do_not_matter_to_the_mean(scores, random, unit):
     shuffled = scores.ravel().copy()
@@ -100,6 +103,7 @@ def test_the_probability_worked_out_by_hand():
     assert improvement_interval(ours, theirs).value == pytest.approx((faster + equal / 2) / 9 / 2)
 
 
+@drawn()
 @given(SCORES, st.randoms(use_true_random=False))
 def test_the_probability_is_mann_whitney_s(scores, random):
     theirs = scores.ravel().copy()
@@ -143,6 +147,7 @@ def test_the_profile_worked_out_by_hand():
     assert (shares.low[2], shares.high[2]) == (0.0, 1.0)
 
 
+@drawn()
 @given(SCORES)
 def test_a_profile_rises_within_its_band(scores):
     thresholds = np.linspace(0.0, 41.0, 30)
