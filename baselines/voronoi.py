@@ -61,6 +61,10 @@ class Coverage:
         tau: τ in nats: from here on a voxel is uncertain.
         tau_floor: τ′, the least density, below τ.
         steps: Steps of the gradient search a decision.
+
+    Once all is explored the projected centroid may lead robots in circles, as in the paper's reproduction on a
+    known map; what keeps them from it there (`Rules.guarded`) is not part of this strategy: missions are over
+    when all is explored.
     """
 
     control: Control = "projected-centroid"

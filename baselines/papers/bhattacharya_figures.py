@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -10,7 +11,7 @@ from matplotlib.figure import Figure
 from scipy import ndimage
 
 from baselines.figures import COLOURS
-from baselines.papers.bhattacharya_runs import Record, Run
+from baselines.papers.bhattacharya_runs import Record, Run, start_cells
 from baselines.papers.bhattacharya_split import SHAPE, robot_cells, split, unknown_region
 from entropy_explore_env.belief.geodesic_cells import new_tessellation, tessellate
 
@@ -50,8 +51,23 @@ def _bare(axes: Axes, title: str) -> None:
     axes.spines[:].set_visible(True)
 
 
-def figures_2_3(rows: list[tuple[str, Run, Record]]) -> Figure:
-    """Cells and ways along the convergence, a row a control (figs. 2b and 3)."""
+def figure_2(office: Run) -> Figure:
+    """Geodesic cells: three robots on 200 × 200 cells, and five in the office, at random places (fig. 2)."""
+    clutter = replace(office, world="bhattacharya-cluttered", shape=(200, 200), cell_m=0.1, robots=3, seed=0)
+    figure = Figure(figsize=(7.2, 3.6), layout="constrained")
+    for axes, run in zip(figure.subplots(1, 2), (clutter, office), strict=True):
+        occupied = run.plan()
+        places = start_cells(occupied, "random", run.robots, 0)
+        cells = _tessellated(occupied, places)
+        axes.imshow(_cell_picture(occupied[:, :, 0], cells), origin="lower", interpolation="nearest")
+        _ways(axes, np.array([places]), occupied.shape[1])
+        _bare(axes, f"{run.shape[0]} × {run.shape[1]} cells, {run.robots} robots")
+    figure.suptitle("Fig. 2: geodesic cells", x=0.01, ha="left")
+    return figure
+
+
+def figure_3(rows: list[tuple[str, Run, Record]]) -> Figure:
+    """Cells and ways along the convergence, a row a control (fig. 3)."""
     moments = 4
     figure = Figure(figsize=(9.6, 2.9 * len(rows)), layout="constrained")
     axes = figure.subplots(len(rows), moments, squeeze=False)
@@ -63,7 +79,7 @@ def figures_2_3(rows: list[tuple[str, Run, Record]]) -> Figure:
             picture.imshow(_cell_picture(occupied[:, :, 0], cells), origin="lower", interpolation="nearest")
             _ways(picture, places[: last + 1], occupied.shape[1])
             _bare(picture, f"{name}, iteration {last}")
-    figure.suptitle("Figs. 2 and 3: five robots cover a known office", x=0.01, ha="left")
+    figure.suptitle("Fig. 3: five robots cover a known office", x=0.01, ha="left")
     return figure
 
 

@@ -21,7 +21,7 @@ from baselines.papers.bhattacharya_claims import (
     first_floor,
     until_explored,
 )
-from baselines.papers.bhattacharya_figures import figure_4, figure_6, figure_progress, figures_2_3
+from baselines.papers.bhattacharya_figures import figure_2, figure_3, figure_4, figure_6, figure_progress
 from baselines.papers.bhattacharya_missions import Records as MissionRecords
 from baselines.papers.bhattacharya_missions import channel_table, flying_table
 from baselines.papers.bhattacharya_reading import (
@@ -72,7 +72,8 @@ def write_report(folder: Path, results: Results, claims: Sequence[Claim], comman
         ):
             run = runs[coverage_id(control, "cluster", 0)]
             rows.append((name, run, results.records[run.id]))
-        write_atomically(beside / "figures-2-3.png", png(figures_2_3(rows)))
+        write_atomically(beside / "figure-2.png", png(figure_2(rows[0][1])))
+        write_atomically(beside / "figure-3.png", png(figure_3(rows)))
         write_atomically(beside / "figure-4.png", png(figure_4()))
         for variant, name in zip(
             PICTURED, ("the paper's settings", "plain cells, nearest target"), strict=True
@@ -116,7 +117,8 @@ def _text(results: Results, claims: Sequence[Claim], command: str) -> str:
         "## (a), (d) A known office, 170 × 200, five robots",
         _coverage_table(results),
         COVERAGE_READING,
-        "![Cells and ways](bhattacharya/figures-2-3.png)",
+        "![Cells](bhattacharya/figure-2.png)",
+        "![Cells and ways](bhattacharya/figure-3.png)",
         "## (b) Exploration and coverage of an unknown plan, four robots from the lower left",
         *_exploration_parts(results),
         "## (c) Splitting an unknown region",

@@ -211,7 +211,7 @@ def test_the_command_writes_its_report_and_goes_on_where_it_was(tmp_path, monkey
     ]
     assert [c["id"] for c in claims[0]] == [c["id"] for c in claims[1]]
     page = (tmp_path / "out" / "bhattacharya.md").read_text()
-    for name in ("figures-2-3", "figure-4", "figure-6-paper", "figure-6-nearest-length", "progress"):
+    for name in ("figure-2", "figure-3", "figure-4", "figure-6-paper", "figure-6-nearest-length", "progress"):
         assert f"bhattacharya/{name}.png" in page
         assert (tmp_path / "out" / "bhattacharya" / f"{name}.png").stat().st_size > 5000
     assert str(tmp_path / "runs") not in page
