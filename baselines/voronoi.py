@@ -50,6 +50,9 @@ _NOT_QUITE = 0.999
 class Coverage:
     """How robots share the work.
 
+    Once all is explored the projected centroid may lead robots in circles, as on a known map in the paper's
+    reproduction; its guard (`Rules.guarded`) is not part of this strategy, as missions are over by then.
+
     Attributes:
         control: `projected-centroid` (eqs. 6-8); `gradient-search` (eq. 3), which takes `steps` steps a
             decision and falls back on the projected centroid where none helps and the cell is not explored;
@@ -61,10 +64,6 @@ class Coverage:
         tau: τ in nats: from here on a voxel is uncertain.
         tau_floor: τ′, the least density, below τ.
         steps: Steps of the gradient search a decision.
-
-    Once all is explored the projected centroid may lead robots in circles, as in the paper's reproduction on a
-    known map; what keeps them from it there (`Rules.guarded`) is not part of this strategy: missions are over
-    when all is explored.
     """
 
     control: Control = "projected-centroid"
