@@ -217,9 +217,9 @@ def test_a_way_ends_before_what_the_robot_did_not_know_of():
 
 
 @pytest.mark.parametrize(
-    ("goal", "end", "height"), [(1.75, MoveEnd.CEILING, 1.25), (0.25, MoveEnd.GROUND, 0.75)]
+    ("goal", "end", "height"), [(1.75, MoveEnd.NO_WAY, 1.25), (0.25, MoveEnd.GROUND, 0.75)]
 )
-def test_ground_and_ceiling_end_a_way_by_name(monkeypatch, goal, end, height):
+def test_unknown_ground_ends_a_way_by_name_and_a_ceiling_is_known(monkeypatch, goal, end, height):
     """Ground that nobody knows of up to z = 0.5, and a ceiling at z = 1.5; the plan leads around a pillar."""
     grid = Grid((7, 11, 5), 0.5)
     ground = np.zeros(grid.shape, bool)

@@ -75,12 +75,19 @@ def doubled(data: bytes, rng: np.random.Generator) -> bytes:
     return data[:start] + piece * int(rng.integers(2, 400)) + data[start:]
 
 
+def _undated(name: str) -> zipfile.ZipInfo:
+    """A member of an archive that is the same at any time."""
+    info = zipfile.ZipInfo(name)
+    info.compress_type = zipfile.ZIP_DEFLATED
+    return info
+
+
 def nested(data: bytes, rng: np.random.Generator) -> bytes:
     """An archive with the file in it, in an archive, in an archive."""
     for _ in range(int(rng.integers(1, 4))):
         buffer = io.BytesIO()
         with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
-            archive.writestr("elevation.npy" if rng.random() < 0.5 else "../../elevation.npy", data)
+            archive.writestr(_undated("elevation.npy" if rng.random() < 0.5 else "../../elevation.npy"), data)
         data = buffer.getvalue()
     return data
 
@@ -138,7 +145,7 @@ def repaired_zip(data: bytes, rng: np.random.Generator) -> bytes:
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
         for each, content in members.items():
-            archive.writestr(each, content)
+            archive.writestr(_undated(each), content)
     return buffer.getvalue()
 
 
