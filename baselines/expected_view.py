@@ -98,6 +98,15 @@ def promise(tally, point):
     tally.promised[point] = min(np.int64(tally.promised[point]) + 1, 255)
 
 
+@inlined_kernel
+def count_point(tally, point, marking):
+    """What a point that is seen counts; if `marking` it is promised from now on."""
+    value = weight(tally.promised[point])
+    if marking:
+        promise(tally, point)
+    return value
+
+
 @lean_kernel
 def clear_promises(tally):
     """Release all promises."""
@@ -131,9 +140,7 @@ def count_crossed(tally, state, size, start, directions, reach, marking):
             if state[voxel] & UNEXPLORED and tally.stamp[voxel] != number:
                 tally.stamp[voxel] = number
                 points += 1
-                weighed += weight(tally.promised[voxel])
-                if marking:
-                    promise(tally, voxel)
+                weighed += count_point(tally, voxel, marking)
     return points, weighed
 
 
@@ -149,9 +156,7 @@ def count_in_ball(tally, state, size, start, reach, marking):
                 voxel = (x * size[1] + y) * size[2] + z
                 if dx * dx + dy * dy + dz * dz <= wide * wide and state[voxel] & UNEXPLORED:
                     points += 1
-                    weighed += weight(tally.promised[voxel])
-                    if marking:
-                        promise(tally, voxel)
+                    weighed += count_point(tally, voxel, marking)
     return points, weighed
 
 

@@ -83,9 +83,9 @@ def _slice(figure: Figure, axes: Axes, recorder: Recorder, entropy: bool) -> Non
     share = entropy_share(missions, 0, 0)[:, :, layer]
     shown = share if entropy else np.ma.masked_where(share > 0.9, missions.mean[0, 0][:, :, layer])
     colours = mpl.colormaps["magma" if entropy else "Greys"].with_extremes(bad="#c9d6e8")
-    low, size = np.asarray(grid.origin_m), grid.size_m
-    extent = (low[0], low[0] + size[0], low[1], low[1] + size[1])
-    image = axes.imshow(shown.T, origin="lower", extent=extent, cmap=colours, vmin=0, vmax=1, aspect="equal")
+    image = axes.imshow(
+        shown.T, origin="lower", extent=extent_of(grid), cmap=colours, vmin=0, vmax=1, aspect="equal"
+    )
     for robot, way in enumerate(recorder.ways_m):
         colour = COLOURS[robot % len(COLOURS)]
         axes.plot(way[:, 0], way[:, 1], color=colour, linewidth=0.9)
@@ -98,6 +98,12 @@ def _slice(figure: Figure, axes: Axes, recorder: Recorder, entropy: bool) -> Non
     axes.set_title(f"What robot_0 knows\n{height}○ start, □ end", fontsize=8)
     label = "share of the entropy left" if entropy else "coverage; blue: unknown"
     figure.colorbar(image, ax=axes, shrink=0.7, label=label)
+
+
+def extent_of(grid: Grid) -> tuple[float, float, float, float]:
+    """A workspace from above, in metres, as matplotlib's `imshow` wants it: left, right, bottom, top."""
+    low, size = grid.origin_m, grid.size_m
+    return float(low[0]), float(low[0] + size[0]), float(low[1]), float(low[1] + size[1])
 
 
 def _busiest_layer(places_m: np.ndarray, grid: Grid) -> int:

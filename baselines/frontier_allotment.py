@@ -12,13 +12,15 @@ as stopped if it was heard since it announced its latest viewpoint, that is, its
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 
-from baselines.frontier_candidates import Looking, TerrainCandidates, VoxelCandidates
+from baselines.frontier_candidates import Candidates, Looking, VoxelCandidates
+from baselines.terrain_candidates import TerrainCandidates
 from entropy_explore_env.belief.lattice import NOTHING_CLOSED, Costs, Lattice, new_lattice
 from entropy_explore_env.belief.planning import begin_search, search_ways, widen_search
 from entropy_explore_env.belief.search_space import Search, collect, cost_to
@@ -78,7 +80,7 @@ class Allotter:
     """Candidates of one robot's belief, and their allotment.
 
     Attributes:
-        candidates: See frontier_candidates.py.
+        candidates: See frontier_candidates.py and terrain_candidates.py.
         search: Working space for ways, shared with others.
         counted: How many candidates were counted in all.
     """
@@ -98,11 +100,11 @@ class Allotter:
         self._edge, self._scenario = scenario.grid.voxel_size_m, scenario
         layer = scenario.layer_of(kind.robot)
         self.lattice: Lattice = new_lattice(scenario.grid.shape, 0.0, layer)
-        self.candidates: VoxelCandidates | TerrainCandidates
-        if ceiling is None:
-            self.candidates = VoxelCandidates(scenario, kind, looking)
-        else:
-            self.candidates = TerrainCandidates(scenario, kind, looking, ceiling)
+        self.candidates: Candidates = (
+            VoxelCandidates(scenario, kind, looking)
+            if ceiling is None
+            else TerrainCandidates(scenario, kind, looking, ceiling)
+        )
         rates = self.candidates.rates
         self.costs = Costs(rates[:0], rates[:0], 0.0, 1.0, rates, 1.0, NOTHING_CLOSED)
         self._no_cells = np.zeros(0, np.int32)
@@ -168,31 +170,30 @@ class Allotter:
             place[2] = self.lattice.layer
         return int(np.ravel_multi_index(tuple(place), grid.shape))
 
-    def seek(self, pose: np.ndarray, goal: int, reach: float) -> None:
-        """Search ways from a pose to a voxel, or with -1 to all, through the mapped region."""
+    def seek(self, pose: np.ndarray, goal: int) -> None:
+        """Search the way from a pose to a voxel, through the mapped region."""
+        with self._left(pose) as source:
+            search_ways(self.search, self.lattice, self.costs, source, goal, math.inf, self._no_cells)
+
+    @contextmanager
+    def _left(self, pose: np.ndarray) -> Iterator[np.ndarray]:
+        """(1,) int32, the voxel of a pose; while it is dealt with it can be left, though it may be closed."""
         start = self.start_of(pose)
-        opened = self.candidates.open_start(*self._axes_of(start))
-        source = np.array([start], np.int32)
-        search_ways(self.search, self.lattice, self.costs, source, goal, reach, self._no_cells)
+        opened = self.candidates.open_start(start)
+        yield np.array([start], np.int32)
         self.candidates.close(opened)
 
     def _ways(self, pose: np.ndarray, reach: float, before: _Ways | None = None) -> _Ways:
         """From where a robot is, or was heard; those found before, less far, are gone on with if possible."""
-        start = self.start_of(pose)
-        opened = self.candidates.open_start(*self._axes_of(start))
         arrays = self.search, self.lattice, self.costs
-        if before is None or before.search != self.search.searches[0]:
-            begin_search(*arrays, np.array([start], np.int32), self._no_cells)
-        widen_search(*arrays, reach, self._no_cells)
-        self.candidates.close(opened)
+        with self._left(pose) as source:
+            if before is None or before.search != self.search.searches[0]:
+                begin_search(*arrays, source, self._no_cells)
+            widen_search(*arrays, reach, self._no_cells)
         voxels = self.candidates.voxels_of(slice(None))
         edges = np.full(len(voxels), np.inf)
         ask_costs(self.search, voxels, reach, edges)
-        return _Ways(self.place_of(start), reach, edges, int(self.search.searches[0]))
-
-    def _axes_of(self, voxel: int) -> tuple[int, int, int]:
-        x, y, z = np.unravel_index(voxel, self._scenario.grid.shape)
-        return int(x), int(y), int(z)
+        return _Ways(self.place_of(int(source[0])), reach, edges, int(self.search.searches[0]))
 
     def _best(
         self, view: RobotView, robot: int, ways: dict[int, _Ways], taken: Sequence[np.ndarray]
@@ -210,13 +211,12 @@ class Allotter:
             ways[robot] = self._ways(pose, farther if farther < whole else math.inf, ways[robot])
             choice, sure = self._best_of(robot, ways[robot], taken, weighed)
         if choice is None and robot == view.robot:
-            ways[robot] = self._ways(pose, math.inf, ways[robot])
+            whole_map = self._ways(pose, math.inf, ways[robot])
             everywhere = np.empty(self._scenario.grid.voxels)
             collect(self.search, everywhere)
             self.candidates.other_of(everywhere)
-            found = self._ways(pose, math.inf, ways[robot])
             ways.clear()  # candidates have moved
-            ways[robot] = found
+            ways[robot] = self._ways(pose, math.inf, whole_map)
             choice, _ = self._best_of(robot, ways[robot], taken, np.full_like(weighed, np.nan))
         return choice
 

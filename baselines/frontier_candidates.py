@@ -1,20 +1,20 @@
-"""Candidates of a robot's own belief, and what is expected to be seen from them: voxels, or ground below.
+"""Candidates of a robot's own belief, in plans and in any 3-D space, and the voxels to be seen from them.
 
-Two kinds with one form: `VoxelCandidates` in plans and in any 3-D space, `TerrainCandidates` where there is
-an exposure surface. What was counted is kept: as no more points can be seen from a candidate than before
-while the map grows, it is an upper bound of what a new count would give (in voxels), or still right (on
-terrain, where nothing changed within range).
+What was counted is kept: as no more voxels can be seen from a candidate than before while the map grows, it
+is an upper bound of what a new count would give. Over a height field: terrain_candidates.py.
 """
 
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import Literal, NamedTuple
+from typing import Generic, Literal, NamedTuple, TypeVar
 
 import numpy as np
 
 from baselines.expected_view import (
+    Tally,
     clear_promises,
     count_crossed,
     count_from,
@@ -30,6 +30,7 @@ from baselines.frontier_map import (
     NONE,
     SPENT,
     UNMAPPED,
+    FrontierMap,
     choose_reached,
     forget_seen,
     look_at_blocks,
@@ -38,16 +39,7 @@ from baselines.frontier_map import (
     take_in,
 )
 from baselines.ray_tree import grow_tree
-from baselines.terrain_map import choose_reached_columns, look_at_columns, new_terrain_map, survey
-from baselines.terrain_view import (
-    bound_columns,
-    count_below,
-    count_columns_from,
-    count_columns_in_ball,
-    half_widths,
-    mean_ground,
-    sum_rows,
-)
+from baselines.terrain_map import TerrainMap
 from entropy_explore_env.config import Scenario
 from entropy_explore_env.missions.view import RobotView
 from entropy_explore_env.settings import RobotKind
@@ -55,7 +47,8 @@ from entropy_explore_env.validation import check, check_choice, check_positive
 
 Visibility = Literal["ray-cast", "naive"]
 UnexploredGround = Literal["falling", "level"]
-_BATCH_CELLS = 7500
+Map = TypeVar("Map", FrontierMap, TerrainMap)
+BATCH_CELLS = 7500
 """Cells that are walked in about the time that a call takes."""
 _ROWS = 15
 """Rows of imagined rays for robots that look up and down."""
@@ -119,87 +112,186 @@ class Chart(NamedTuple):
     """float64, height of the ground above the floor in voxel edges; NaN = not mapped, or a plan."""
 
 
-class VoxelCandidates:
-    """Candidates and counts in a map of voxels; the points of V are voxels.
+class Candidates(ABC, Generic[Map]):
+    """Candidates of one robot's belief, a few slots for each block of its map, and V of each: points seen.
 
     Attributes:
         reach: Of the sensor, in voxel edges; no more than the workspace is wide.
-        point: Size of a point: m² in plans, else m³.
+        point: Size of a point: m² in plans and over terrain, else m³.
         batch: How many candidates are worth counting at once; changes no result.
         rates: (V,) float32, what ways cost in the mapped region; read-only.
     """
 
+    _map: Map
+    _tally: Tally
+    _spent: np.ndarray
+    """(V,) uint8, SPENT where a scan was taken."""
+    point: float
+    batch: int
+
     def __init__(self, scenario: Scenario, kind: RobotKind, looking: Looking) -> None:
         """Nothing is explored yet."""
-        grid, layer = scenario.grid, scenario.layer_of(kind.robot)
+        grid = scenario.grid
         self._looking, self._size = looking, grid.shape
         self._prior = scenario.sigma_prior**-2
         self.reach = min(kind.sensor.max_range_m / grid.voxel_size_m, float(sum(grid.shape)))
-        spacing_m = looking.spacing_m or self.reach * grid.voxel_size_m / 6.0
-        body = kind.robot.body_radius_m / grid.voxel_size_m
-        spacing = max(round(spacing_m / grid.voxel_size_m), 1)
-        self._map = new_frontier_map(grid.shape, body, layer, spacing)
-        self._tally = new_tally(grid.voxels, grid.shape)
-        self._pitches = _pitches(kind, layer is None)
-        self._directions = rays_around(self.reach, self._pitches)
-        self._tree = grow_tree(self._directions, self.reach, grid.shape)
-        self._met = np.empty(self._tree.cells, np.int32)
-        self.batch = 1 + _BATCH_CELLS // self._tree.cells
-        self.point = grid.voxel_size_m ** (2 if grid.flat else 3)
-        self.rates = _read_only(self._map.rates)
-        self._rates = self._map.rates
 
+    @property
+    def rates(self) -> np.ndarray:
+        """See above."""
+        view = self._map.rates.view()
+        view.setflags(write=False)
+        return view
+
+    @abstractmethod
     def update(self, view: RobotView, sigma: float) -> None:
         """Take the belief in; σ is the level that counts as explored now."""
-        mean, precision = view.mean.reshape(-1), view.precision.reshape(-1)
-        take_in(self._map, mean, precision, self._looking.levels(sigma, self._prior))
-        forget_seen(self._map.changed, self._size, self._map.voxel, self._map.seen, self.reach)
+
+    @abstractmethod
+    def mapped_share(self) -> float:
+        """Share of all points that are mapped."""
+
+    @abstractmethod
+    def chart(self) -> Chart:
+        """What is known, in space all heights laid over each other."""
+
+    @abstractmethod
+    def most(self, slots: np.ndarray) -> np.ndarray:
+        """(K,) no fewer points than V·(height factor) of each; inf = nothing is known of it yet."""
+
+    @abstractmethod
+    def limit(self) -> float:
+        """No more points than this can be seen from anywhere."""
+
+    @abstractmethod
+    def count(self, slots: np.ndarray, voxels: np.ndarray) -> np.ndarray:
+        """(K,) V·(height factor): points expected to be seen, weighed by promises; 0 = nothing at all."""
+
+    @abstractmethod
+    def promise(self, place: np.ndarray) -> None:
+        """Somebody will scan at (3,), grid units: what is seen from there is promised once more."""
+
+    @abstractmethod
+    def other_of(self, cost: np.ndarray) -> None:
+        """Blocks whose candidate was not reached may have one that was; (V,) float64 costs, inf = not."""
+
+    @abstractmethod
+    def gaze(self, place: np.ndarray, view: RobotView) -> tuple[float, float]:
+        """(yaw, pitch) in which most is seen from (3,), grid units; as it is for who sees all around."""
+
+    @abstractmethod
+    def _block_of(self, x: int, y: int, z: int) -> int:
+        """Number of the block of a voxel."""
+
+    @abstractmethod
+    def _look_at(self, count: int) -> None:
+        """Choose the candidates of the blocks that were put first in line."""
 
     def found(self) -> tuple[np.ndarray, np.ndarray]:
         """(K,) slots of the candidates, and (K,) int32 their voxels."""
         slots = np.flatnonzero((self._map.voxel != NONE) & (self._map.seen > 0.0))
         return slots, self._map.voxel[slots]
 
+    def voxels_of(self, slots: np.ndarray | slice) -> np.ndarray:
+        """(K,) int32, voxels of some candidates; NONE = there is none."""
+        return self._map.voxel[slots]
+
+    def counted(self, slots: np.ndarray) -> np.ndarray:
+        """(K,) bool, whether a candidate has been counted since something changed nearby."""
+        return np.isfinite(self._map.seen[slots])
+
+    def expected(self, place: np.ndarray) -> np.ndarray:
+        """(X, Y) bool, what is expected to be seen from (3,), grid units, above or below each other."""
+        self.promise(place)
+        found = np.zeros(self._tally.stamp.size, bool)
+        found[self._tally.marked[: self._tally.numbers[1]]] = True
+        self.release()
+        return np.asarray(found.reshape(*self._size[:2], -1).any(2))
+
+    def release(self) -> None:
+        """Forget all promises."""
+        clear_promises(self._tally)
+
+    def spend(self, voxel: int) -> None:
+        """A scan was taken in a voxel: it is no candidate any more."""
+        self._spent[voxel] |= SPENT
+        self._look_at(put_block(self._map, self._block_of(*self._axes_of(voxel)), 0))
+
+    def unspend(self) -> None:
+        """Any place may be a candidate again: more is asked for from now on."""
+        spent, count = np.flatnonzero(self._spent & SPENT), 0
+        self._spent[spent] &= np.uint8(~SPENT & 0xFF)
+        for voxel in spent:
+            count = put_block(self._map, self._block_of(*self._axes_of(int(voxel))), count)
+        self._look_at(count)
+
+    def open_start(self, voxel: int) -> list[int]:
+        """Let a robot leave the place where it stands: voxels by number that were closed."""
+        del voxel
+        return []
+
+    def close(self, voxels: list[int]) -> None:
+        """Close what `open_start` opened."""
+        self._map.rates[voxels] = np.inf
+
+    def _axes_of(self, voxel: int) -> tuple[int, int, int]:
+        x, y, z = np.unravel_index(voxel, self._size)
+        return int(x), int(y), int(z)
+
+    def _apart(self, wanted_m: float | None, edge_m: float) -> int:
+        """Voxels from a candidate to the next: so many metres, or None = a sixth of the range."""
+        return max(round((wanted_m or self.reach * edge_m / 6.0) / edge_m), 1)
+
+
+class VoxelCandidates(Candidates[FrontierMap]):
+    """Candidates and counts in a map of voxels; the points of V are voxels."""
+
+    def __init__(self, scenario: Scenario, kind: RobotKind, looking: Looking) -> None:
+        """Nothing is explored yet."""
+        super().__init__(scenario, kind, looking)
+        grid, layer = scenario.grid, scenario.layer_of(kind.robot)
+        edge = grid.voxel_size_m
+        spacing = self._apart(looking.spacing_m, edge)
+        self._map = new_frontier_map(grid.shape, kind.robot.body_radius_m / edge, layer, spacing)
+        self._spent = self._map.flags
+        self._tally = new_tally(grid.voxels, grid.shape)
+        self._pitches = _pitches(kind, layer is None)
+        self._directions = rays_around(self.reach, self._pitches)
+        self._tree = grow_tree(self._directions, self.reach, grid.shape)
+        self._met = np.empty(self._tree.cells, np.int32)
+        self.batch = 1 + BATCH_CELLS // self._tree.cells
+        self.point = edge ** (2 if grid.flat else 3)
+
+    def update(self, view: RobotView, sigma: float) -> None:
+        """See `Candidates`."""
+        mean, precision = view.mean.reshape(-1), view.precision.reshape(-1)
+        take_in(self._map, mean, precision, self._looking.levels(sigma, self._prior))
+        forget_seen(self._map.changed, self._size, self._map.voxel, self._map.seen, self.reach)
+
     def mapped_share(self) -> float:
-        """Share of all points that are mapped."""
+        """See `Candidates`."""
         return float((self._map.state & UNMAPPED == 0).mean())
 
     def chart(self) -> Chart:
-        """What is known, in space all heights laid over each other."""
+        """See `Candidates`."""
         state, edge = self._map.state.reshape(self._size), self._map.flags.reshape(self._size) & EDGE > 0
         mapped, covered = state & UNMAPPED == 0, state & COVERED > 0
         if self._map.layer >= 0:
             mapped, covered, edge = (a[:, :, self._map.layer, None] for a in (mapped, covered, edge))
         return Chart(mapped.any(2), covered.any(2), edge.any(2), np.full(self._size[:2], np.nan))
 
-    def expected(self, place: np.ndarray) -> np.ndarray:
-        """(X, Y) bool, what is expected to be seen from (3,), grid units, above or below each other."""
-        self.promise(place)
-        found = np.zeros(math.prod(self._size), bool)
-        found[self._tally.marked[: self._tally.numbers[1]]] = True
-        self.release()
-        return np.asarray(found.reshape(self._size).any(2))
-
-    def voxels_of(self, slots: np.ndarray | slice) -> np.ndarray:
-        """(K,) int32, voxels of some candidates; NONE = there is none."""
-        return self._map.voxel[slots]
-
     def most(self, slots: np.ndarray) -> np.ndarray:
-        """(K,) no fewer points than V·(height factor) of each; inf = not counted yet."""
+        """See `Candidates`."""
         return self._map.seen[slots].astype(np.float64)
 
-    def counted(self, slots: np.ndarray) -> np.ndarray:
-        """(K,) bool, whether a candidate has been counted since something changed nearby."""
-        return np.isfinite(self._map.seen[slots])
-
     def limit(self) -> float:
-        """No more points than this can be seen from anywhere."""
+        """See `Candidates`."""
         wide = self.reach + 2.0
         within = math.pi * wide**2 if self._size[2] == 1 else 4.0 / 3.0 * math.pi * wide**3
         return float(min(within, self._tally.stamp.size))
 
     def count(self, slots: np.ndarray, voxels: np.ndarray) -> np.ndarray:
-        """(K,) V·(height factor): points expected to be seen, weighed by promises; 0 = nothing at all."""
+        """See `Candidates`."""
         seen, weighed = np.empty(len(slots)), np.empty(len(slots))
         arrays = self._tally, self._map.state, self._size, voxels
         if self._looking.visibility == "naive":
@@ -210,38 +302,24 @@ class VoxelCandidates:
         return weighed
 
     def promise(self, place: np.ndarray) -> None:
-        """Somebody will scan at (3,), grid units: what is seen from there is promised once more."""
-        start = _tuple(place)
+        """See `Candidates`."""
+        start = as_tuple(place)
         if self._looking.visibility == "naive":
             count_in_ball(self._tally, self._map.state, self._size, start, self.reach, True)
         else:
             count_crossed(self._tally, self._map.state, self._size, start, self._directions, self.reach, True)
 
-    def release(self) -> None:
-        """Forget all promises."""
-        clear_promises(self._tally)
-
-    def spend(self, voxel: int) -> None:
-        """A scan was taken in a voxel: it is no candidate any more."""
-        self._map.flags[voxel] |= SPENT
-        look_at_blocks(self._map, put_block(self._map, self._block_of(voxel), 0))
-
-    def _block_of(self, voxel: int) -> int:
-        x, y, z = (int(i) for i in np.unravel_index(voxel, self._size))
-        (across, blocks) = (self._map.across, self._map.blocks)
+    def _block_of(self, x: int, y: int, z: int) -> int:
+        """See `Candidates`."""
+        across, blocks = self._map.across, self._map.blocks
         return (x // across[0] * blocks[1] + y // across[1]) * blocks[2] + z // across[2]
 
-    def unspend(self) -> None:
-        """Any place may be a candidate again: more is asked for from now on."""
-        spent = np.flatnonzero(self._map.flags & SPENT)
-        self._map.flags[spent] &= np.uint8(~SPENT & 0xFF)
-        count = 0
-        for voxel in spent:
-            count = put_block(self._map, self._block_of(int(voxel)), count)
+    def _look_at(self, count: int) -> None:
+        """See `Candidates`."""
         look_at_blocks(self._map, count)
 
     def other_of(self, cost: np.ndarray) -> None:
-        """Blocks whose candidate was not reached may have one that was; (V,) float64 costs, inf = not."""
+        """See `Candidates`."""
         for slot in np.flatnonzero(self._map.voxel != NONE):
             if math.isfinite(cost[self._map.voxel[slot]]):
                 continue
@@ -249,24 +327,23 @@ class VoxelCandidates:
             if voxel != NONE:
                 self._map.voxel[slot], self._map.seen[slot] = voxel, math.inf
 
-    def open_start(self, x: int, y: int, z: int) -> list[int]:
-        """Let a robot leave the place where it stands: voxels by number that were closed."""
-        opened = []
+    def open_start(self, voxel: int) -> list[int]:
+        """See `Candidates`."""
+        opened, (x, y, z) = [], self._axes_of(voxel)
         for offset in self._map.ball:
             place = x + offset[0], y + offset[1], z + offset[2]
             if all(0 <= i < n for i, n in zip(place, self._size, strict=True)):
-                voxel = int(np.ravel_multi_index(place, self._size))
-                if math.isinf(self._rates[voxel]) and self._map.state[voxel] & (UNMAPPED | COVERED) == 0:
-                    opened.append(voxel)
-        self._rates[opened] = 1.0
+                beside = int(np.ravel_multi_index(place, self._size))
+                if (
+                    math.isinf(self._map.rates[beside])
+                    and self._map.state[beside] & (UNMAPPED | COVERED) == 0
+                ):
+                    opened.append(beside)
+        self._map.rates[opened] = 1.0
         return opened
 
-    def close(self, voxels: list[int]) -> None:
-        """Close what `open_start` opened."""
-        self._rates[voxels] = np.inf
-
     def gaze(self, place: np.ndarray, view: RobotView) -> tuple[float, float]:
-        """(yaw, pitch) in which most is seen from (3,), grid units; as it is for who sees all around."""
+        """See `Candidates`."""
         sensor, yaw = view.kind.sensor, float(view.pose[3])
         turn, tilt = sensor.field_of_view_rad
         all_around = turn > 2.0 * math.pi - 1.5 * sensor.angular_step_rad
@@ -278,173 +355,11 @@ class VoxelCandidates:
             for way in range(1 if all_around else 16):
                 heading = yaw + way * (2.0 * math.pi / 16)
                 rays = rays_towards(np.linspace(heading - turn / 2, heading + turn / 2, 24), pitches)
-                arrays = self._map.state, self._size, _tuple(place), rays
+                arrays = self._map.state, self._size, as_tuple(place), rays
                 points, _ = count_crossed(self._tally, *arrays, self.reach, False)
                 if points > best:
                     best, gaze = points, ((heading + math.pi) % (2.0 * math.pi) - math.pi, pitch)
         return gaze
-
-
-class TerrainCandidates:
-    """Candidates and counts above a height field; the points of V are columns of ground. Form as above."""
-
-    def __init__(self, scenario: Scenario, kind: RobotKind, looking: Looking, ceiling: np.ndarray) -> None:
-        """Nothing is explored yet."""
-        grid, sensor = scenario.grid, kind.sensor
-        edge = grid.voxel_size_m
-        self._looking, self._size = looking, grid.shape
-        self._prior = scenario.sigma_prior**-2
-        self.reach = min(sensor.max_range_m / edge, float(sum(grid.shape)))
-        spacing, rise = (
-            max(round((m or self.reach * edge / 6.0) / edge), 1) for m in (looking.spacing_m, looking.rise_m)
-        )
-        self._map = new_terrain_map(grid.shape, kind.robot.body_radius_m / edge, spacing, rise, ceiling)
-        self._tally = new_tally(grid.shape[0] * grid.shape[1], grid.shape)
-        turns = min(math.ceil(2.0 * math.pi * self.reach), 720)
-        angles = (np.arange(turns) + 0.5) * (2.0 * math.pi / turns)
-        self._azimuths = np.stack([np.cos(angles), np.sin(angles)], axis=-1)
-        self._tilt = sensor.field_of_view_rad[1]
-        top = max(0.5 * math.pi - self._tilt, 0.0)
-        patch = max(round(looking.patch_m / edge), 0)
-        gamma, high = looking.gamma or 0.0, looking.too_high * self.reach
-        fade = self.reach if looking.unexplored_ground == "falling" else math.inf
-        self._look = (self.reach, math.tan(min(top, 1.5)), float(patch), gamma, high, fade)
-        self.point = edge**2
-        self.rates = _read_only(self._map.rates)
-        self._rates = self._map.rates
-        self._factors = np.ones(len(self._map.voxel))
-        self._sums = np.zeros((grid.shape[0], grid.shape[1] + 1), np.int32)
-        self._widths = half_widths(self.reach)
-        self.batch = 1 + _BATCH_CELLS // max(math.ceil(turns * self.reach), 1)
-        self._unit = edge if looking.gamma is not None else 1.0
-
-    def update(self, view: RobotView, sigma: float) -> None:
-        """See `VoxelCandidates`."""
-        levels = self._looking.levels(sigma, self._prior)
-        survey(self._map, view.mean.reshape(-1), view.precision.reshape(-1), levels)
-        sum_rows(self._map, self._sums)
-        wide = self.reach + self._look[2]
-        forget_seen(self._map.changed, self._size, self._map.voxel, self._map.seen, wide)
-
-    def found(self) -> tuple[np.ndarray, np.ndarray]:
-        """See `VoxelCandidates`."""
-        slots = np.flatnonzero((self._map.voxel != NONE) & (self._map.seen > 0.0))
-        return slots, self._map.voxel[slots]
-
-    def mapped_share(self) -> float:
-        """See `VoxelCandidates`."""
-        return float((self._map.ground != NONE).mean())
-
-    def chart(self) -> Chart:
-        """See `VoxelCandidates`."""
-        mapped, edge = self._map.ground != NONE, self._map.flags.reshape(self._size[:2]) & EDGE > 0
-        ground = np.where(mapped, self._map.ground.astype(float), np.nan)
-        return Chart(mapped, np.zeros_like(mapped), edge, ground)
-
-    def expected(self, place: np.ndarray) -> np.ndarray:
-        """See `VoxelCandidates`."""
-        self.promise(place)
-        found = np.zeros(self._size[0] * self._size[1], bool)
-        found[self._tally.marked[: self._tally.numbers[1]]] = True
-        self.release()
-        return found.reshape(self._size[:2])
-
-    def voxels_of(self, slots: np.ndarray | slice) -> np.ndarray:
-        """See `VoxelCandidates`."""
-        return self._map.voxel[slots]
-
-    def most(self, slots: np.ndarray) -> np.ndarray:
-        """See `VoxelCandidates`; of those not counted yet what is unexplored in range of them."""
-        most, factor = self._map.seen[slots].astype(np.float64), self._factors[slots]
-        fresh = np.isinf(most)
-        if fresh.any():
-            voxels = self._map.voxel[slots[fresh]]
-            bound, factor_there = np.empty(len(voxels)), np.empty(len(voxels))
-            bound_columns(self._map, self._sums, self._widths, voxels, self._look, bound, factor_there)
-            most[fresh], factor[fresh] = bound, self._in_metres(factor_there)
-        return most * factor
-
-    def counted(self, slots: np.ndarray) -> np.ndarray:
-        """See `VoxelCandidates`."""
-        return np.isfinite(self._map.seen[slots])
-
-    def limit(self) -> float:
-        """See `VoxelCandidates`."""
-        factor = 1.0 if self._looking.gamma is None else self._unit * self._size[2]
-        within = math.pi * (self.reach + 2.0) ** 2
-        return float(min(within, self._tally.stamp.size)) * factor
-
-    def count(self, slots: np.ndarray, voxels: np.ndarray) -> np.ndarray:
-        """See `VoxelCandidates`."""
-        seen, weighed, factor = (np.empty(len(slots)) for _ in range(3))
-        naive = self._looking.visibility == "naive"
-        count_columns_from(
-            self._tally, self._map, voxels, self._azimuths, self._look, naive, seen, weighed, factor
-        )
-        factor = self._in_metres(factor)
-        self._map.seen[slots], self._factors[slots] = seen, np.maximum(factor, 1e-12)
-        return weighed * factor
-
-    def _in_metres(self, factor: np.ndarray) -> np.ndarray:
-        """(K,) height factors; without, 1 where a candidate is low enough to be one."""
-        return (factor > 0.0).astype(float) if self._looking.gamma is None else factor * self._unit
-
-    def promise(self, place: np.ndarray) -> None:
-        """See `VoxelCandidates`."""
-        eye, (reach, flattest, fade) = _tuple(place), (self._look[0], self._look[1], self._look[5])
-        average = mean_ground(self._map, int(eye[0]), int(eye[1]), int(self._look[2]))
-        if self._looking.visibility == "naive":
-            count_columns_in_ball(self._tally, self._map, eye, average, reach, fade, True)
-        else:
-            count_below(self._tally, self._map, eye, average, self._azimuths, reach, flattest, fade, True)
-
-    def release(self) -> None:
-        """See `VoxelCandidates`."""
-        clear_promises(self._tally)
-
-    def spend(self, voxel: int) -> None:
-        """See `VoxelCandidates`."""
-        self._map.spent[voxel] = SPENT
-        look_at_columns(self._map, put_block(self._map, self._block_of(voxel), 0))
-
-    def _block_of(self, voxel: int) -> int:
-        x, y, _ = (int(i) for i in np.unravel_index(voxel, self._size))
-        return x // self._map.spacing * self._map.rows + y // self._map.spacing
-
-    def unspend(self) -> None:
-        """See `VoxelCandidates`."""
-        spent, count = np.flatnonzero(self._map.spent), 0
-        self._map.spent[:] = 0
-        for voxel in spent:
-            count = put_block(self._map, self._block_of(int(voxel)), count)
-        look_at_columns(self._map, count)
-
-    def other_of(self, cost: np.ndarray) -> None:
-        """See `VoxelCandidates`."""
-        choose_reached_columns(self._map, cost)
-
-    def open_start(self, x: int, y: int, z: int) -> list[int]:
-        """See `VoxelCandidates`."""
-        del x, y, z
-        return []
-
-    def close(self, voxels: list[int]) -> None:
-        """See `VoxelCandidates`."""
-
-    def gaze(self, place: np.ndarray, view: RobotView) -> tuple[float, float]:
-        """Down: the lowest rays straight down; who does not see all around turns to where most is seen."""
-        yaw, turn = float(view.pose[3]), view.kind.sensor.field_of_view_rad[0]
-        if turn <= 2.0 * math.pi - 1.5 * view.kind.sensor.angular_step_rad:
-            eye, best, first = _tuple(place), -1, yaw
-            average = mean_ground(self._map, int(eye[0]), int(eye[1]), int(self._look[2]))
-            for way in range(16):
-                heading = first + way * (2.0 * math.pi / 16)
-                ahead = self._azimuths @ (math.cos(heading), math.sin(heading)) >= math.cos(turn / 2)
-                arrays = self._tally, self._map, eye, average, self._azimuths[ahead]
-                points, _ = count_below(*arrays, self._look[0], self._look[1], self._look[5], False)
-                if points > best:
-                    best, yaw = points, (heading + math.pi) % (2.0 * math.pi) - math.pi
-        return yaw, 0.5 * math.pi - 0.5 * self._tilt
 
 
 def _pitches(kind: RobotKind, flies: bool) -> np.ndarray:
@@ -456,12 +371,6 @@ def _pitches(kind: RobotKind, flies: bool) -> np.ndarray:
     return np.linspace(-tilt / 2, tilt / 2, rows) if rows > 1 else np.zeros(1)
 
 
-def _tuple(place: np.ndarray) -> tuple[float, float, float]:
+def as_tuple(place: np.ndarray) -> tuple[float, float, float]:
     """(x, y, z), for which kernels are compiled."""
     return float(place[0]), float(place[1]), float(place[2])
-
-
-def _read_only(array: np.ndarray) -> np.ndarray:
-    view = array.view()
-    view.setflags(write=False)
-    return view

@@ -95,7 +95,6 @@ class InformationRate:
         ]
         self._scratch = new_scratch(grid, self._builds)
         self._search = new_search(grid.voxels)
-        self._ceiling: tuple[np.ndarray, float, np.ndarray | None] | None = None
 
     def _build_of(self, view: RobotView) -> Build:
         return self._builds[view.robot % len(self._builds)]
@@ -233,14 +232,14 @@ class InformationRate:
         limits = robot.max_speed_m_s, robot.acceleration_m_s2
         hop_s = driving_time(reach * grid.voxel_size_m, *limits) + view.kind.sensor.scan_time_s
         each = 1.0 if self.weighing.per_scan else hop_s
-        drawn = self._drawn_voxels(view, here)
+        closed = view.closed()
+        drawn = self._drawn_voxels(view, here, closed)
         places = self._places(view, here, drawn)
         bits, _ = self._weighed(view, places[0], places, cones, anywhere=True)
         straight = np.linalg.norm(places[:, :3] - here[:3], axis=1)
         if (bits / (np.maximum(straight / reach, 1.0) * each)).max() <= rate:
             return []
         prior = view.scenario.sigma_prior**-2
-        closed = self._closed(view)
         costs = belief_costs(view.mean, view.precision, prior, self.weighing.unknown_cost, closed)
         start = np.ravel_multi_index(tuple(here[:3].astype(int)), grid.shape)
         nobody = np.zeros(0, np.int32)
@@ -262,25 +261,16 @@ class InformationRate:
         points = straightened(self._search, lattice, costs, way, here[:3].copy(), places[best, :3].copy())
         return _stops(here[:3], points, reach)
 
-    def _drawn_voxels(self, view: RobotView, here: np.ndarray) -> np.ndarray:
-        """(N,) random voxels that are not believed covered; of a planar robot's layer."""
+    def _drawn_voxels(self, view: RobotView, here: np.ndarray, closed: np.ndarray | None) -> np.ndarray:
+        """(N,) random voxels that are neither closed nor believed covered; of a planar robot's layer."""
         grid = view.scenario.grid
         drawn = self._rng.integers(0, grid.voxels, _LOTS * self.weighing.places)
         if view.planar:
             drawn += int(here[2]) - drawn % grid.shape[2]
         free = view.mean.reshape(-1)[drawn] <= STOP_AT_COVERED
-        if (closed := self._closed(view)) is not None:
+        if closed is not None:
             free &= ~closed.reshape(-1)[drawn]
         return drawn[free] if free.any() else drawn
-
-    def _closed(self, view: RobotView) -> np.ndarray | None:
-        """(X, Y, Z) bool, where the robot would reach above the ceiling; None = there is none."""
-        if view.ceiling is None:
-            return None
-        radius_m = view.kind.robot.body_radius_m
-        if self._ceiling is None or self._ceiling[0] is not view.ceiling or self._ceiling[1] != radius_m:
-            self._ceiling = view.ceiling, radius_m, view.closed()
-        return self._ceiling[2]
 
     def _places(self, view: RobotView, here: np.ndarray, voxels: np.ndarray) -> np.ndarray:
         """(K, 5) viewpoints in grid units at the least known of some voxels, a few gazes each."""

@@ -302,7 +302,7 @@ class FrontierStrategy:
         goal = self._place(view, choice.voxel)
         if robot.navigator == "planned" and math.isinf(robot.reach_m):
             return [goal]
-        allotter.seek(view.pose, choice.voxel, math.inf)
+        allotter.seek(view.pose, choice.voxel)
         search, lattice = allotter.search, allotter.lattice
         way = np.empty(way_to(search, lattice, choice.voxel, np.empty(0, np.int32)), np.int32)
         if way_to(search, lattice, choice.voxel, way) == 0:

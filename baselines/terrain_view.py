@@ -9,12 +9,30 @@ Grid units: heights are in layers.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
-from baselines.expected_view import begin_count, place_in, promise, weight
+from baselines.expected_view import begin_count, count_point, place_in
 from baselines.frontier_map import NONE
 from entropy_explore_env.compilation import inlined_kernel, lean_kernel
+
+
+class Look(NamedTuple):
+    """How columns are looked at from candidates; lengths in columns and layers."""
+
+    reach: float
+    """Of the sensor, > 0."""
+    flattest: float
+    """Tangent of the angle below the horizon from which on the sensor looks down."""
+    patch: int
+    """Half the width of the patch whose mean ground is z_av."""
+    gamma: float
+    """Of the height factor."""
+    highest: float
+    """The greatest z_f - z_av of a candidate."""
+    fade: float
+    """How far away unexplored ground is taken to have come down to the floor; inf = it is level."""
 
 
 @lean_kernel
@@ -39,7 +57,7 @@ def height_at(terrain, x, y, eye, average, fade):
 
 
 @lean_kernel
-def count_below(tally, terrain, eye, average, azimuths, reach, flattest, fade, marking):
+def count_below(tally, terrain, eye, average, azimuths, look, marking):
     """Unexplored columns that are seen from a place: (all, weighed by promises).
 
     Args:
@@ -48,13 +66,11 @@ def count_below(tally, terrain, eye, average, azimuths, reach, flattest, fade, m
         eye: (x, y, z) of the place.
         average: z_av there.
         azimuths: (D, 2) float64 unit vectors.
-        reach: Of the sensor, > 0.
-        flattest: Tangent of the angle below the horizon from which on the sensor looks down.
-        fade: How far away unexplored ground is taken to have come down to the floor; inf = it is level.
+        look: Reach, flattest and fade matter.
         marking: Whether the columns are promised from now on.
     """
     number, points, weighed = begin_count(tally), 0, 0.0
-    size = terrain.size
+    size, reach = terrain.size, look.reach
     for direction in azimuths:
         x, y = int(eye[0]), int(eye[1])
         step_x, step_y = 1 if direction[0] > 0.0 else -1, 1 if direction[1] > 0.0 else -1
@@ -65,20 +81,18 @@ def count_below(tally, terrain, eye, average, azimuths, reach, flattest, fade, m
         enters, horizon = 0.0, -math.inf
         while enters <= reach:
             leaves = min(face_x, face_y)
-            height = height_at(terrain, x, y, eye, average, fade)
+            height = height_at(terrain, x, y, eye, average, look.fade)
             drop = eye[2] - height
             if drop <= 0.0:
                 break  # it hides the tops of all that is lower than the eye
             slope = -drop / leaves
             column = x * size[1] + y
             near = enters * enters + drop * drop <= reach * reach
-            if slope > horizon and near and drop >= flattest * enters:
+            if slope > horizon and near and drop >= look.flattest * enters:
                 if terrain.unexplored[column] and tally.stamp[column] != number:
                     tally.stamp[column] = number
                     points += 1
-                    weighed += weight(tally.promised[column])
-                    if marking:
-                        promise(tally, column)
+                    weighed += count_point(tally, column, marking)
             horizon = max(horizon, slope)
             enters = leaves
             if face_x <= face_y:
@@ -91,22 +105,20 @@ def count_below(tally, terrain, eye, average, azimuths, reach, flattest, fade, m
 
 
 @lean_kernel
-def count_columns_in_ball(tally, terrain, eye, average, reach, fade, marking):
+def count_columns_in_ball(tally, terrain, eye, average, look, marking):
     """The naive V: unexplored columns whose tops, extrapolated, lie in a ball, seen or not."""
-    points, weighed, size = 0, 0.0, terrain.size
+    points, weighed, size, reach = 0, 0.0, terrain.size, look.reach
     wide = min(reach, size[0] + size[1])
     for x in range(max(int(eye[0] - wide - 0.5), 0), min(int(eye[0] + wide + 1.0), size[0])):
         for y in range(max(int(eye[1] - wide - 0.5), 0), min(int(eye[1] + wide + 1.0), size[1])):
             column = x * size[1] + y
             if not terrain.unexplored[column]:
                 continue
-            drop = eye[2] - height_at(terrain, x, y, eye, average, fade)
+            drop = eye[2] - height_at(terrain, x, y, eye, average, look.fade)
             dx, dy = x + 0.5 - eye[0], y + 0.5 - eye[1]
             if dx * dx + dy * dy + drop * drop <= reach * reach:
                 points += 1
-                weighed += weight(tally.promised[column])
-                if marking:
-                    promise(tally, column)
+                weighed += count_point(tally, column, marking)
     return points, weighed
 
 
@@ -122,34 +134,32 @@ def count_columns_from(tally, terrain, voxels, azimuths, look, naive, seen, weig
         terrain: The map.
         voxels: (K,) int32.
         azimuths: (D, 2) float64.
-        look: (reach, flattest, patch, γ, highest, fade): of the sensor, of z_av, the greatest z_f - z_av, and
-            as in `count_below`.
+        look: How they are looked at.
         naive: Whether columns in a ball are counted.
         seen: (K,) filled in.
         weighed: (K,) filled in.
         factor: (K,) filled in.
     """
-    reach, flattest, fade = look[0], look[1], look[5]
     for place in range(len(voxels)):
         x, y, z = place_in(terrain.size, voxels[place])
         eye = (x + 0.5, y + 0.5, z + 0.5)
-        average = mean_ground(terrain, x, y, int(look[2]))
+        average = mean_ground(terrain, x, y, look.patch)
         seen[place], weighed[place] = 0.0, 0.0
         factor[place] = _height_factor(eye[2], average, look)
         if factor[place] == 0.0:
             continue
         if naive:
-            points, value = count_columns_in_ball(tally, terrain, eye, average, reach, fade, False)
+            points, value = count_columns_in_ball(tally, terrain, eye, average, look, False)
         else:
-            points, value = count_below(tally, terrain, eye, average, azimuths, reach, flattest, fade, False)
+            points, value = count_below(tally, terrain, eye, average, azimuths, look, False)
         seen[place], weighed[place] = points, value
 
 
 @inlined_kernel
 def _height_factor(height, average, look):
     """(z_f - z_av)^γ z_f^(1 - γ); 0 where z_f - z_av is too much. See `count_columns_from`."""
-    gamma, highest, above = look[3], look[4], height - average
-    return 0.0 if above > highest else max(above, 1e-3) ** gamma * height ** (1.0 - gamma)
+    above, gamma = height - average, look.gamma
+    return 0.0 if above > look.highest else max(above, 1e-3) ** gamma * height ** (1.0 - gamma)
 
 
 @lean_kernel
@@ -181,14 +191,14 @@ def bound_columns(terrain, sums, widths, voxels, look, most, factor):
         sums: (X, Y + 1) of `sum_rows`.
         widths: (W,) of `half_widths`, for the sensor's reach.
         voxels: (K,) int32.
-        look: As in `count_columns_from`.
+        look: How they are looked at.
         most: (K,) filled in.
         factor: (K,) filled in.
     """
     size, last = terrain.size, len(widths) - 1
     for place in range(len(voxels)):
         x, y, z = place_in(size, voxels[place])
-        factor[place] = _height_factor(z + 0.5, mean_ground(terrain, x, y, int(look[2])), look)
+        factor[place] = _height_factor(z + 0.5, mean_ground(terrain, x, y, look.patch), look)
         found = 0
         for i in range(max(x - last, 0), min(x + last, size[0] - 1) + 1):
             wide = widths[abs(i - x)]

@@ -12,8 +12,9 @@ from baselines.frontier_allotment import Allotter
 from baselines.frontier_candidates import Looking
 from baselines.frontier_map import COVERED, UNEXPLORED, UNMAPPED
 from baselines.mission import scripted
-from baselines.papers.sawhney_missions import followed
-from baselines.per_time_visibility import Exploring, FrontierStrategy, Metric
+from baselines.papers.sawhney_cells import world_cell
+from baselines.papers.sawhney_missions import Run, followed
+from baselines.per_time_visibility import FrontierStrategy, Metric
 from baselines.ray_tree import grow_tree
 from benchmarks.planning import FLOOR, cluttered
 from benchmarks.rows import Effort, Goal, Row, alone, timed
@@ -156,19 +157,17 @@ def floor_row(effort: Effort, shape: tuple[int, int, int] = FLOOR) -> Row:
 
 
 def mission_s(shape: tuple[int, int, int]) -> float:
-    """Seconds on the clock of such a mission."""
+    """Seconds on the clock of such a mission, with the settings of Sawhney's experiment."""
+    cell = world_cell("cluttered", 3, "ptv")
+    assert isinstance(cell.record, Run)
     settings = {
         "grid": Grid(shape, _FLOOR_EDGE_M),
-        "robots": 3,
-        "robot": {"reach_m": math.inf, "body_radius_m": 0.0, "unknown_cost": 1e4},
-        "sensor": {"max_range_m": 10.0, "angular_step_rad": math.pi / 180, "scan_time_s": 2.0},
-        "channel": {"burst": 10_000, "i_min_bits": 0.0},
-        "ending": {"sigma_end": 1e-3, "time_limit_s": 1e5},
-        "scored": True,
+        "sensor": {"max_range_m": 10.0},
+        "ending": {"time_limit_s": 1e5},
     }
-    scenario = with_settings(scripted(find_scenario("cluttered")), settings)
+    scenario = with_settings(scripted(cell.scenario), settings)
     floor = World(scenario.grid, cluttered(shape, _FLOOR_SHARE), "floor")
-    env, explorer = EntropyExploreEnv(scenario, world=floor), FrontierStrategy(Exploring(finest_sigma=0.5))
+    env, explorer = EntropyExploreEnv(scenario, world=floor), FrontierStrategy(cell.record.exploring)
     started = time.perf_counter()
     followed(env, explorer, 0)
     return time.perf_counter() - started

@@ -15,7 +15,7 @@ from matplotlib.colors import LightSource, to_rgb
 from matplotlib.figure import Figure
 
 from baselines.experiment import Cell
-from baselines.figures import COLOURS
+from baselines.figures import COLOURS, extent_of
 from baselines.frontier_candidates import Chart
 from baselines.mission import scripted
 from baselines.papers.sawhney_cells import PLANS, POINT, TERRAINS, world_cell
@@ -184,7 +184,7 @@ def figure_plan(cell: Cell, title: str) -> Figure:
     grid, taken = cell.scenario.grid, snapshots(cell, 0)
     figure, panels = _panels(len(taken), grid.size_m)
     for axes, now in zip(panels, taken, strict=True):
-        _show(axes, _plan_colours(now.chart), cell, now.ways_m)
+        _show(axes, _plan_colours(now.chart), cell.scenario.grid, now.ways_m)
         axes.set_title(f"{now.time_s:.0f} s, {now.share:.0%} explored", fontsize=8)
     figure.suptitle(title, fontsize=10)
     return figure
@@ -210,7 +210,7 @@ def figure_terrain(cell: Cell, title: str) -> Figure:
         picture = np.where(now.chart.mapped[..., None], green, 0.25 + 0.5 * grey)
         picture[now.expected & ~now.chart.mapped] = to_rgb("#f5d90a")
         picture[now.chart.edge] = to_rgb(_EDGE)
-        _show(axes, picture, cell, now.ways_m)
+        _show(axes, picture, grid, now.ways_m)
         axes.set_title(f"{now.time_s:.0f} s, {now.share:.0%} explored", fontsize=8)
     figure.suptitle(title, fontsize=10)
     return figure
@@ -221,7 +221,7 @@ def figure_ways(cells: Sequence[tuple[str, Cell]]) -> Figure:
     figure, panels = _panels(2 * len(cells), cells[0][1].scenario.grid.size_m)
     for number, (name, cell) in enumerate(cells):
         for axes, now in zip(panels[number :: len(cells)], snapshots(cell, 0, (0.95, 1.0)), strict=False):
-            _show(axes, _plan_colours(now.chart), cell, now.ways_m)
+            _show(axes, _plan_colours(now.chart), cell.scenario.grid, now.ways_m)
             length_m = float(np.linalg.norm(np.diff(now.ways_m[0], axis=0), axis=1).sum())
             until = "no frontier" if now.finished else f"{now.share:.0%}"
             axes.set_title(f"{name}, to {until}: {now.time_s:.0f} s, {length_m:.0f} m", fontsize=8)
@@ -243,7 +243,7 @@ def figure_worlds(dem: Path | None) -> Figure:
             picture = np.where(world.occupied[:, :, 0, None], to_rgb(_WALL), (1.0, 1.0, 1.0))
         else:
             picture = _shaded(ground_of(world), "gist_earth", world.grid.voxel_size_m)
-        _show(axes, picture, cell, [], world)
+        _show(axes, picture, world.grid)
         axes.set_title(name, fontsize=9)
     figure.suptitle("Fig. 5: the worlds (seed 0), metres", fontsize=10)
     return figure
@@ -334,23 +334,15 @@ def _panels(count: int, size_m: np.ndarray, width: float = 2.7) -> tuple[Figure,
     return figure, figure.subplots(1, count, squeeze=False)[0]
 
 
-def _show(
-    axes: Axes, picture: np.ndarray, cell: Cell, ways_m: Sequence[np.ndarray], world: Shown | None = None
-) -> None:
+def _show(axes: Axes, picture: np.ndarray, grid: Grid, ways_m: Sequence[np.ndarray] = ()) -> None:
     """Draw (X, Y, 3) seen from above in metres, with ways over it."""
-    grid = cell.scenario.grid if world is None else world.grid
-    low, size = np.asarray(grid.origin_m), grid.size_m
-    extent = (low[0], low[0] + size[0], low[1], low[1] + size[1])
-    axes.imshow(np.swapaxes(picture, 0, 1), origin="lower", extent=extent, interpolation="nearest")
+    axes.imshow(np.swapaxes(picture, 0, 1), origin="lower", extent=extent_of(grid), interpolation="nearest")
     for robot, way in enumerate(ways_m):
         colour = COLOURS[robot % len(COLOURS)]
         axes.plot(way[:, 0], way[:, 1], color=colour, linewidth=0.9)
-        axes.plot(
-            *way[0, :2], marker="o", color=colour, markersize=4, markeredgecolor="k", markeredgewidth=0.5
-        )
-        axes.plot(
-            *way[-1, :2], marker="s", color=colour, markersize=4, markeredgecolor="k", markeredgewidth=0.5
-        )
+        for place, marker in ((way[0], "o"), (way[-1], "s")):
+            style: dict[str, Any] = {"color": colour, "markeredgecolor": "k", "markeredgewidth": 0.5}
+            axes.plot(*place[:2], marker=marker, markersize=4, **style)
     axes.tick_params(labelsize=7)
     for side in ("top", "right"):
         axes.spines[side].set_visible(True)

@@ -211,11 +211,13 @@ def _times_table(records: Records, part: str) -> str:
 
 def _betas_table(records: Records, part: str) -> str:
     """The best β of each team, and what a robot discovers a second meanwhile."""
-    rows = []
+    rows, areas_m2 = (
+        [],
+        {world: visible_area_m2(world) for world in worlds_in(records, part) if part == "plans"},
+    )
     for n in teams_in(records, part):
         best = [best_beta(records, part, end, teams=(n,)) for end in ENDS]
-        rate = _discovered(records, part, n) if part == "plans" else None
-        shown = "-" if rate is None else f"{rate:.1f}"
+        shown = f"{_discovered(records, n, areas_m2):.1f}" if areas_m2 else "-"
         rows.append([str(n), *(str(beta) for beta in best), shown])
     head = [
         "robots",
@@ -225,13 +227,13 @@ def _betas_table(records: Records, part: str) -> str:
     return markdown_table(head, rows)
 
 
-def _discovered(records: Records, part: str, n: int) -> float:
-    """Of V/t up to 95 %, in the paper's numbers of points; over terrain V is no area alone."""
-    rates = []
-    for world in worlds_in(records, part):
-        area_m2 = visible_area_m2(world)
-        rates += list(0.95 * area_m2 / (n * times(records, cell_id(world, n, "ptv"), "t95_s")))
-    return float(np.mean(rates)) / POINT[part]
+def _discovered(records: Records, n: int, areas_m2: dict[str, float]) -> float:
+    """By V/t in plans of these areas up to 95 %, in the paper's numbers; over terrain V is no area alone."""
+    rates = [
+        0.95 * area_m2 / (n * times(records, cell_id(world, n, "ptv"), "t95_s"))
+        for world, area_m2 in areas_m2.items()
+    ]
+    return float(np.mean(np.concatenate(rates))) / POINT["plans"]
 
 
 def _changes_table(records: Records, part: str) -> str:

@@ -93,8 +93,11 @@ def _let_leave(search, lattice, costs, voxel):
 
 
 @lean_kernel
-def _begin(search, lattice, costs, sources, cells):
-    """Forget the search before, and put the sources into the queue."""
+def begin_search(search, lattice, costs, sources, cells):
+    """Forget the search before, and begin one: of `search_ways`, or to all voxels for `widen_search`.
+
+    Arguments as of `search_ways`.
+    """
     search.searches[0] += 1
     if search.searches[0] > SEARCHES:  # once in millions of searches
         search.mark[:] = 0
@@ -251,7 +254,7 @@ def search_ways(search, lattice, costs, sources, goal, reach, cells):
     Returns:
         Cost of the goal, inf = not reached within `reach`; without a goal 0.
     """
-    _begin(search, lattice, costs, sources, cells)
+    begin_search(search, lattice, costs, sources, cells)
     limit = np.nextafter(reach, math.inf)
     per_cost = _NARROWER**-1 / costs.least_rate
     place = (0, 0, 0)
@@ -266,12 +269,6 @@ def search_ways(search, lattice, costs, sources, goal, reach, cells):
     while go_on(search.queue) and search.queue.numbers[0].current <= limit * per_cost:
         limit = _work_off(search, lattice, costs, goal, place, limit, per_cost, cells)
     return cost_to(search, goal) if goal != _NOWHERE else 0.0
-
-
-@lean_kernel
-def begin_search(search, lattice, costs, sources, cells):
-    """Begin a search to all voxels, for `widen_search`; arguments as of `search_ways`."""
-    _begin(search, lattice, costs, sources, cells)
 
 
 @lean_kernel

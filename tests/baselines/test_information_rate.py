@@ -142,5 +142,5 @@ def test_it_does_not_fly_into_the_ceiling_that_it_knows():
     np.testing.assert_array_equal(closed, world.closed(0.8))
     strategy = InformationRate()
     strategy.reset(env.scenario, env.strategy_generator())
-    drawn = strategy._drawn_voxels(view, view.pose[:3])
+    drawn = strategy._drawn_voxels(view, view.pose[:3], closed)
     assert len(drawn) > 0 and not closed.reshape(-1)[drawn].any()

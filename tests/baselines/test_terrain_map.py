@@ -13,6 +13,7 @@ from baselines.expected_view import new_tally
 from baselines.frontier_map import NONE, put_block
 from baselines.terrain_map import choose_reached_columns, look_at_columns, new_terrain_map, survey
 from baselines.terrain_view import (
+    Look,
     bound_columns,
     count_below,
     count_columns_from,
@@ -77,19 +78,17 @@ def test_columns_are_those_whose_tops_rays_meet(seed, height, reach, flattest, l
     unexplored = terrain.ground == NONE
     wanted = reference.seen_columns(heights, unexplored, eye, azimuths, reach, flattest)
     tally = new_tally(9 * 13, SHAPE)
-    points, value = count_below(tally, terrain, eye, average, azimuths, reach, flattest, fade, True)
+    look = Look(reach, flattest, 2, 0.5, math.inf, fade)
+    points, value = count_below(tally, terrain, eye, average, azimuths, look, True)
     marked = {tuple(map(int, np.unravel_index(c, (9, 13)))) for c in tally.marked[: tally.numbers[1]]}
     assert (points, value, marked) == (len(wanted), len(wanted), wanted)
-    assert (
-        count_below(tally, terrain, eye, average, azimuths, reach, flattest, fade, False)[1]
-        == len(wanted) / 2
-    )
+    assert count_below(tally, terrain, eye, average, azimuths, look, False)[1] == len(wanted) / 2
     ball = {
         (i, j)
         for i, j in np.argwhere(unexplored).tolist()
         if math.dist((i + 0.5, j + 0.5, heights[i, j]), eye) <= reach
     }
-    assert count_columns_in_ball(tally, terrain, eye, average, reach, fade, False)[0] == len(ball)
+    assert count_columns_in_ball(tally, terrain, eye, average, look, False)[0] == len(ball)
 
 
 def test_a_ridge_hides_the_valley_behind_it_by_hand():
@@ -97,19 +96,19 @@ def test_a_ridge_hides_the_valley_behind_it_by_hand():
     ground = np.ones((9, 3), np.int32)
     ground[4], ground[6:] = 4, NONE
     east = np.array([[1.0, 0.0]])
-    tally = new_tally(27, (9, 3, 8))
+    tally, look = new_tally(27, (9, 3, 8)), Look(10.0, 0.0, 2, 0.5, math.inf, fade=10.0)
     terrain = known_ground(ground, (9, 3, 8))
     for height, wanted in ((3.5, 0), (5.5, 1), (7.5, 2)):
         # z_av = 1: extrapolated 1 - d/10. From 5.5 over the ridge's far edge at d = 4.5: slope -1/3, which
         # meets height 0.4 … at d ≈ 15; from 7.5 slope -7/9: 0.2 … 0.4 at d ≈ 9; the last tops end at d = 8.5
         eye = (0.5, 1.5, height)
-        found = count_below(tally, terrain, eye, 1.0, east, 10.0, 0.0, 10.0, False)[0]
+        found = count_below(tally, terrain, eye, 1.0, east, look, False)[0]
         heights = reference.surface(ground, eye, 1.0, 10.0)
         assert found == len(reference.seen_columns(heights, ground < 0, eye, east, 10.0, 0.0))
         assert found <= wanted
     ground[4] = 1
     flat = known_ground(ground, (9, 3, 8))
-    assert count_below(tally, flat, (0.5, 1.5, 5.5), 1.0, east, 10.0, 0.0, 10.0, False)[0] == 3
+    assert count_below(tally, flat, (0.5, 1.5, 5.5), 1.0, east, look, False)[0] == 3
 
 
 def test_candidates_hang_above_the_edge_between_ground_and_ceiling():
@@ -160,14 +159,12 @@ def test_the_height_factor_by_hand():
     seen, value, factor = np.empty(2), np.empty(2), np.empty(2)
     azimuths = np.array([[1.0, 0.0]])
     tally = new_tally(9 * 13, SHAPE)
-    count_columns_from(
-        tally, terrain, voxels, azimuths, (10.0, 0.0, 1.0, 0.5, 9.0, 10.0), False, seen, value, factor
-    )
+    look = Look(10.0, 0.0, patch=1, gamma=0.5, highest=9.0, fade=10.0)
+    count_columns_from(tally, terrain, voxels, azimuths, look, False, seen, value, factor)
     assert factor.tolist() == pytest.approx([math.sqrt(1.5 * 3.5), math.sqrt(4.5 * 6.5)])
     assert seen.tolist() == [1.0, 2.0]  # from 3.5 one ends on the line of sight over the edge
-    count_columns_from(
-        tally, terrain, voxels, azimuths, (10.0, 0.0, 1.0, 1.0, 4.0, 10.0), False, seen, value, factor
-    )
+    look = look._replace(gamma=1.0, highest=4.0)
+    count_columns_from(tally, terrain, voxels, azimuths, look, False, seen, value, factor)
     assert factor.tolist() == pytest.approx([1.5, 0.0]) and seen[1] == 0.0
 
 
@@ -178,7 +175,7 @@ def test_no_more_is_seen_than_lies_in_range(seed, reach, naive):
     terrain = known_ground(ground)
     voxels = rng.integers(0, math.prod(SHAPE), 20).astype(np.int32)
     angles = 0.05 + np.arange(40) * (2 * math.pi / 40)
-    azimuths, look = np.stack([np.cos(angles), np.sin(angles)], axis=-1), (reach, 0.0, 2.0, 0.4, 5.0, reach)
+    azimuths, look = np.stack([np.cos(angles), np.sin(angles)], axis=-1), Look(reach, 0.0, 2, 0.4, 5.0, reach)
     seen, weighed, factor, most, same = (np.empty(20) for _ in range(5))
     tally, sums = new_tally(9 * 13, SHAPE), np.empty((9, 14), np.int32)
     count_columns_from(tally, terrain, voxels, azimuths, look, naive, seen, weighed, factor)
