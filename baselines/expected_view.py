@@ -13,7 +13,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from baselines.frontier_map import STOPS_RAYS, UNEXPLORED
+from baselines.frontier_map import NONE, STOPS_RAYS, UNEXPLORED
+from baselines.ray_tree import cell_at
 from entropy_explore_env.belief.raycast import cast_ray, longest_crossing
 from entropy_explore_env.compilation import inlined_kernel, lean_kernel
 
@@ -168,17 +169,17 @@ def count_from(tally, state, size, voxels, tree, met, seen, weighed):
     """
     for cell in range(len(met)):
         met[cell] = -1
-    promises = tally.numbers[1] > 0
+    promises, nodes = tally.numbers[1] > 0, len(tree.offset)
     for place in range(len(voxels)):
         voxel = np.int64(voxels[place])
         at = place_in(size, voxel)
         inside = _inside(tree, size, at)
         if inside and not promises:
-            points, value = _climb(tally, state, size, voxel, tree, at, met, place, True, False)
+            points, value = _climb(tally, state, size, voxel, tree, at, met, place, 0, nodes, True, False)
         elif inside:
-            points, value = _climb(tally, state, size, voxel, tree, at, met, place, True, True)
+            points, value = _climb(tally, state, size, voxel, tree, at, met, place, 0, nodes, True, True)
         else:
-            points, value = _climb(tally, state, size, voxel, tree, at, met, place, False, True)
+            points, value = _climb(tally, state, size, voxel, tree, at, met, place, 0, nodes, False, True)
         seen[place], weighed[place] = points, value
 
 
@@ -192,14 +193,14 @@ def _inside(tree, size, at):
 
 
 @inlined_kernel
-def _climb(tally, state, size, voxel, tree, at, met, place, inside, promises):
-    """Count along the tree's branches: (all, weighed). See `count_from`.
+def _climb(tally, state, size, voxel, tree, at, met, place, first, last, inside, promises):
+    """Count along the tree's branches, its nodes `first` … `last` - 1: (all, weighed). See `count_from`.
 
     The rays start in a voxel, given by its number and by axis, the `place`-th that is counted from; they
     leave the workspace nowhere (`inside`) or perhaps; there are `promises` or none.
     """
-    points, weighed, node = 0, 0.0, np.uint32(0)
-    while node < np.uint32(len(tree.offset)):
+    points, weighed, node = 0, 0.0, np.uint32(first)
+    while node < np.uint32(last):
         if not inside:
             x, y, z = at[0] + tree.steps[node, 0], at[1] + tree.steps[node, 1], at[2] + tree.steps[node, 2]
             if not (0 <= x < size[0] and 0 <= y < size[1] and 0 <= z < size[2]):
@@ -217,6 +218,56 @@ def _climb(tally, state, size, voxel, tree, at, met, place, inside, promises):
         else:
             node += np.uint32(1)
     return points, weighed if promises else float(points)
+
+
+@lean_kernel
+def add_opened(tally, state, size, opened, voxels, tree, met, seen):
+    """Add to (K,) bounds of what is seen from K voxels what is seen now through voxels that turned out free.
+
+    So they stay bounds, though rays go on where they ended before: nothing else shows more than it did.
+
+    Args:
+        tally: Working space.
+        state: (V,) uint8, as it is now.
+        size: (X, Y, Z) voxels.
+        opened: (N,) int32, voxels that were covered when the bounds were found, and are not now.
+        voxels: (K,) int32; NONE = there is none.
+        tree: A RayTree of C cells, by which the bounds were found.
+        met: (C,) int32 scratch space.
+        seen: (K,) float32, changed in place; inf = there is no bound, and will be none.
+    """
+    for cell in range(len(met)):
+        met[cell] = -1
+    for place in range(len(voxels)):
+        if voxels[place] == NONE or math.isinf(seen[place]):
+            continue
+        voxel = np.int64(voxels[place])
+        at = place_in(size, voxel)
+        for other in opened:
+            x, y, z = place_in(size, other)
+            cell = cell_at(tree, x - at[0], y - at[1], z - at[2])
+            if cell < 0:
+                continue
+            for number in range(tree.first[cell], tree.first[cell + 1]):
+                node = np.int64(tree.nodes[number])
+                if node > 0 and _is_reached(state, voxel, tree, node):
+                    branch = node + 1, tree.after[node], False, False
+                    seen[place] += _climb(tally, state, size, voxel, tree, at, met, place, *branch)[0]
+
+
+@lean_kernel
+def _is_reached(state, voxel, tree, node):
+    """Whether nothing stops the rays from a voxel before a node of their tree."""
+    at = np.int64(0)
+    while at != node:
+        after = np.int64(tree.after[at])
+        if node >= after:
+            at = after
+            continue
+        if at > 0 and state[voxel + tree.offset[at]] > STOPS_RAYS:
+            return False
+        at += 1
+    return True
 
 
 @lean_kernel

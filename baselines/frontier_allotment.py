@@ -256,27 +256,33 @@ class Allotter:
             choice = Choice(int(slots[best]), int(voxels[best]), float(value[best]), float(seconds[best]))
         if len(beyond) == 0 or math.isinf(ways.reach):
             return choice, True
-        return choice, choice is not None and self._none_is_better(robot, beyond, ways, choice)
+        return choice, choice is not None and self._none_is_better(robot, beyond, ways, choice, weighed)
 
-    def _none_is_better(self, robot: int, slots: np.ndarray, ways: _Ways, choice: Choice) -> bool:
+    def _none_is_better(
+        self, robot: int, slots: np.ndarray, ways: _Ways, choice: Choice, weighed: np.ndarray
+    ) -> bool:
         """Whether no candidate that was not reached can be worth as much as one that was found.
 
-        It lies beyond the search's reach, and not nearer than in a straight line.
+        It lies beyond the search's reach, and not nearer than in a straight line. The most promising ones are
+        counted, since that costs less than to search farther; `weighed` as in `_best_of`.
         """
         apart = np.linalg.norm(self._places(self.candidates.voxels_of(slots)) - ways.start, axis=1)
         edges = np.maximum(ways.reach, apart - 2.0)  # ways lead from centre to centre
         seconds, nobody = self.seconds(robot, edges), np.zeros(len(slots))
-        better = np.ones(len(slots), bool)
-        for _ in range(2):
-            most = np.minimum(self.candidates.most(slots), self.candidates.limit())
-            value = self._value(most * self.candidates.point, seconds, edges, nobody)
-            better = value >= choice.value
-            new = slots[better & ~self.candidates.counted(slots)]
-            if len(new) == 0:
-                break
-            self.candidates.count(new, self.candidates.voxels_of(new))
+        most = np.minimum(self.candidates.most(slots), self.candidates.limit())
+        bound = self._value(most * self.candidates.point, seconds, edges, nobody)
+        better = np.flatnonzero(bound >= choice.value)
+        order, size = better[np.argsort(-bound[better], kind="stable")], self.candidates.batch
+        for first in range(0, len(order), size):
+            batch = order[first : first + size]
+            new = slots[batch][np.isnan(weighed[slots[batch]])]
+            weighed[new] = self.candidates.count(new, self.candidates.voxels_of(new))
             self.counted += len(new)
-        return not better.any()
+            seen = weighed[slots[batch]] * self.candidates.point
+            worth = self._value(seen, seconds[batch], edges[batch], nobody[batch])
+            if (worth[seen > 0.0] >= choice.value).any():
+                return False
+        return True
 
     def seconds(self, robot: int, edges: np.ndarray) -> np.ndarray:
         """(K,) seconds of the drive along ways of so many voxel edges, and of the scans at its stops."""

@@ -15,6 +15,7 @@ import numpy as np
 
 from baselines.expected_view import (
     Tally,
+    add_opened,
     clear_promises,
     count_crossed,
     count_from,
@@ -28,11 +29,11 @@ from baselines.frontier_map import (
     COVERED,
     EDGE,
     NONE,
+    OPENED,
     SPENT,
     UNMAPPED,
     FrontierMap,
     choose_reached,
-    forget_seen,
     look_at_blocks,
     new_frontier_map,
     put_block,
@@ -196,10 +197,6 @@ class Candidates(ABC, Generic[Map]):
         """(K,) int32, voxels of some candidates; NONE = there is none."""
         return self._map.voxel[slots]
 
-    def counted(self, slots: np.ndarray) -> np.ndarray:
-        """(K,) bool, whether a candidate has been counted since something changed nearby."""
-        return np.isfinite(self._map.seen[slots])
-
     def expected(self, place: np.ndarray) -> np.ndarray:
         """(X, Y) bool, what is expected to be seen from (3,), grid units, above or below each other."""
         self.promise(place)
@@ -266,7 +263,13 @@ class VoxelCandidates(Candidates[FrontierMap]):
         """See `Candidates`."""
         mean, precision = view.mean.reshape(-1), view.precision.reshape(-1)
         take_in(self._map, mean, precision, self._looking.levels(sigma, self._prior))
-        forget_seen(self._map.changed, self._size, self._map.voxel, self._map.seen, self.reach)
+        count, found = int(self._map.openings[0]), self._map.seen
+        self._map.openings[0] = 0
+        if count > OPENED:
+            found[:] = math.inf
+        elif count > 0 and self._looking.visibility == "ray-cast":
+            arrays = self._map.opened[:count], self._map.voxel, self._tree, self._met
+            add_opened(self._tally, self._map.state, self._size, *arrays, found)
 
     def mapped_share(self) -> float:
         """See `Candidates`."""

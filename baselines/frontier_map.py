@@ -33,8 +33,8 @@ CANDIDATE = 2
 SPENT = 4
 """A scan was taken here: no candidate any more."""
 
-TILE = 8
-"""Changes are noted by square tiles, so many voxels wide."""
+OPENED = 4096
+"""Of so many voxels at once it is noted that they turned out free."""
 NONE = -1
 GLANCE = 128
 """Voxels that are looked at together for whether anything changed."""
@@ -57,8 +57,10 @@ class FrontierMap(NamedTuple):
     """(B,) uint8, whether a block has to be looked at again."""
     waiting: np.ndarray
     """(B,) int32, those blocks."""
-    changed: np.ndarray
-    """(X / TILE, Y / TILE) uint8, where more may be seen than before: something covered turned out free."""
+    opened: np.ndarray
+    """(OPENED,) int32, voxels that turned out free: past them more may be seen than before …"""
+    openings: np.ndarray
+    """(1,) int64, … how many; more than OPENED = more may be seen anywhere."""
     size: tuple[int, int, int]
     across: tuple[int, int, int]
     """Voxels of a block along each axis."""
@@ -94,7 +96,8 @@ def new_frontier_map(
         seen=np.full(count, np.inf, np.float32),
         dirty=np.zeros(count, np.uint8),
         waiting=np.zeros(count, np.int32),
-        changed=np.zeros((shape[0] // TILE + 1, shape[1] // TILE + 1), np.uint8),
+        opened=np.zeros(OPENED, np.int32),
+        openings=np.zeros(1, np.int64),
         size=(int(shape[0]), int(shape[1]), int(shape[2])),
         across=across,
         blocks=(blocks[0], blocks[1], blocks[2]),
@@ -143,6 +146,16 @@ def _put_around(frontiers, x, y, z, reach, count):
     return count
 
 
+@inlined_kernel
+def _note_opened(frontiers, voxel):
+    """Note that a voxel turned out free."""
+    count = frontiers.openings[0]
+    if count < OPENED:
+        frontiers.opened[count] = voxel
+    if count <= OPENED:
+        frontiers.openings[0] = count + 1
+
+
 @lean_kernel
 def take_in(frontiers, mean, precision, levels):
     """Bring the map up to date with a belief: one glance at every voxel, and work where something changed.
@@ -169,8 +182,10 @@ def take_in(frontiers, mean, precision, levels):
             state[voxel] = now
             column = voxel // size[2]
             x, y, z = column // size[1], column % size[1], voxel % size[2]
-            if before & COVERED > now & COVERED or before & UNEXPLORED < now & UNEXPLORED:
-                frontiers.changed[x // TILE, y // TILE] = 1
+            if before & COVERED > now & COVERED:
+                _note_opened(frontiers, voxel)
+            if before & UNEXPLORED < now & UNEXPLORED:  # more is asked for: a level has been changed
+                frontiers.openings[0] = OPENED + 1
             if layer < 0 or abs(z - layer) <= reach:
                 count = _put_around(frontiers, x, y, z, reach, count)
     look_at_blocks(frontiers, count)
@@ -288,38 +303,6 @@ def _apart(low, high, x, y, z):
     """Squared distance, in half voxels, of a voxel from the middle of its block."""
     dx, dy, dz = 2 * x + 1 - low[0] - high[0], 2 * y + 1 - low[1] - high[1], 2 * z + 1 - low[2] - high[2]
     return dx * dx + dy * dy + dz * dz
-
-
-@lean_kernel
-def forget_seen(changed, size, voxels, seen, reach):
-    """Forget how much can be seen from candidates within reach of a tile that changed; none is changed then.
-
-    Args:
-        changed: (TX, TY) uint8, cleared.
-        size: (X, Y, Z) voxels.
-        voxels: (B,) int32 candidates, NONE = none.
-        seen: (B,) float32, set to inf.
-        reach: In voxel edges, at most as far as the grid is wide.
-    """
-    some = False
-    for i in range(changed.shape[0]):
-        for j in range(changed.shape[1]):
-            some = some or changed[i, j] > 0
-    if not some:
-        return
-    wide = int(min(reach, size[0] + size[1])) + 1
-    for place in range(len(voxels)):
-        if voxels[place] == NONE or math.isinf(seen[place]):
-            continue
-        column = voxels[place] // size[2]
-        x, y = column // size[1], column % size[1]
-        for i in range(max(x - wide, 0) // TILE, min((x + wide) // TILE, changed.shape[0] - 1) + 1):
-            for j in range(max(y - wide, 0) // TILE, min((y + wide) // TILE, changed.shape[1] - 1) + 1):
-                if changed[i, j]:
-                    seen[place] = math.inf
-    for i in range(changed.shape[0]):
-        for j in range(changed.shape[1]):
-            changed[i, j] = 0
 
 
 @lean_kernel

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from entropy_explore_env.belief.raycast import cast_ray, longest_crossing
-from entropy_explore_env.compilation import lean_kernel
+from entropy_explore_env.compilation import inlined_kernel, lean_kernel
 
 
 class RayTree(NamedTuple):
@@ -29,6 +29,14 @@ class RayTree(NamedTuple):
     """(N,) uint32, the node to go on with where this one stops its rays."""
     cells: int
     """How many voxels there are, each once."""
+    box: np.ndarray
+    """(C,) int64, their numbers in a box around the first, `margin` wide on either side of it; ascending."""
+    margin: tuple[int, int, int]
+    """See `box`."""
+    nodes: np.ndarray
+    """(N,) uint32, nodes in the order of their cells."""
+    first: np.ndarray
+    """(C + 1,) int64, where the nodes of each cell begin in `nodes`, and where the last one's end."""
     low: tuple[int, int, int]
     """Smallest steps along the axes …"""
     high: tuple[int, int, int]
@@ -62,8 +70,31 @@ def grow_tree(directions: np.ndarray, reach: float, size: tuple[int, int, int]) 
     after = np.full(len(depth), len(depth))
     _find_next(depth, np.empty_like(depth), after)
     cells, cell = np.unique(voxels[new], return_inverse=True)
-    numbers = cell.astype(np.uint32), after.astype(np.uint32)
-    return RayTree(steps.astype(np.int32), offset, *numbers, len(cells), tuple(low), tuple(high))
+    return RayTree(
+        steps.astype(np.int32),
+        offset,
+        cell.astype(np.uint32),
+        after.astype(np.uint32),
+        cells=len(cells),
+        box=cells.astype(np.int64),
+        margin=(int(margin[0]), int(margin[1]), int(margin[2])),
+        nodes=np.argsort(cell, kind="stable").astype(np.uint32),
+        first=np.concatenate([[0], np.cumsum(np.bincount(cell))]).astype(np.int64),
+        low=tuple(low),
+        high=tuple(high),
+    )
+
+
+@inlined_kernel
+def cell_at(tree, x, y, z):
+    """Number of the cell at a step from the first voxel; -1 = no ray crosses it."""
+    margin = tree.margin
+    if abs(x) > margin[0] or abs(y) > margin[1] or abs(z) > margin[2]:
+        return -1
+    wide, high = 2 * margin[1] + 1, 2 * margin[2] + 1
+    number = ((x + margin[0]) * wide + y + margin[1]) * high + z + margin[2]
+    cell = np.searchsorted(tree.box, number)
+    return cell if cell < len(tree.box) and tree.box[cell] == number else -1
 
 
 @lean_kernel

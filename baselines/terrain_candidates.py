@@ -11,10 +11,11 @@ import numpy as np
 
 from baselines.expected_view import new_tally
 from baselines.frontier_candidates import BATCH_CELLS, Candidates, Chart, Looking, as_tuple
-from baselines.frontier_map import EDGE, NONE, forget_seen
+from baselines.frontier_map import EDGE, NONE
 from baselines.terrain_map import (
     TerrainMap,
     choose_reached_columns,
+    forget_seen,
     look_at_columns,
     new_terrain_map,
     survey,

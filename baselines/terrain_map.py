@@ -19,7 +19,6 @@ from baselines.frontier_map import (
     COVERED,
     EDGE,
     NONE,
-    TILE,
     UNEXPLORED,
     UNMAPPED,
     has_changed,
@@ -28,6 +27,9 @@ from baselines.frontier_map import (
     state_of,
 )
 from entropy_explore_env.compilation import inlined_kernel, lean_kernel
+
+TILE = 8
+"""Changes are noted by square tiles, so many columns wide."""
 
 
 class TerrainMap(NamedTuple):
@@ -303,3 +305,35 @@ def _near_edge(terrain, x, y):
             if terrain.flags[i * size[1] + j] & EDGE:
                 return True
     return False
+
+
+@lean_kernel
+def forget_seen(changed, size, voxels, seen, reach):
+    """Forget how much can be seen from candidates within reach of a tile that changed; none is changed then.
+
+    Args:
+        changed: (TX, TY) uint8, cleared.
+        size: (X, Y, Z) voxels.
+        voxels: (B,) int32 candidates, NONE = none.
+        seen: (B,) float32, set to inf.
+        reach: In voxel edges, at most as far as the grid is wide.
+    """
+    some = False
+    for i in range(changed.shape[0]):
+        for j in range(changed.shape[1]):
+            some = some or changed[i, j] > 0
+    if not some:
+        return
+    wide = int(min(reach, size[0] + size[1])) + 1
+    for place in range(len(voxels)):
+        if voxels[place] == NONE or math.isinf(seen[place]):
+            continue
+        column = voxels[place] // size[2]
+        x, y = column // size[1], column % size[1]
+        for i in range(max(x - wide, 0) // TILE, min((x + wide) // TILE, changed.shape[0] - 1) + 1):
+            for j in range(max(y - wide, 0) // TILE, min((y + wide) // TILE, changed.shape[1] - 1) + 1):
+                if changed[i, j]:
+                    seen[place] = math.inf
+    for i in range(changed.shape[0]):
+        for j in range(changed.shape[1]):
+            changed[i, j] = 0

@@ -65,7 +65,6 @@ class Run:
             "t_none_s": round(float(end_s), 3) if finished else limit_s,
             "finished": finished,
             "explored": round(float(shares[-1]), 5),
-            "counted": explorer.counted(),
             "series": {
                 "time_s": np.round(np.asarray(times_s)[rows], 2).tolist(),
                 "explored": np.round(np.asarray(shares)[rows], 4).tolist(),

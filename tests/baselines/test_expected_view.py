@@ -10,6 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from baselines.expected_view import (
+    add_opened,
     clear_promises,
     count_crossed,
     count_from,
@@ -153,3 +154,50 @@ def test_naive_counts_from_many_places():
     count_in_balls(tally, state.reshape(-1), (9, 6, 1), voxels, 3.0, seen, weighed)
     for voxel, points in zip(((0.5, 0.5, 0.5), (4.5, 5.5, 0.5)), seen, strict=True):
         assert points == count_in_ball(tally, state.reshape(-1), (9, 6, 1), voxel, 3.0, False)[0]
+
+
+@given(st.sampled_from(SHAPES), st.floats(0.6, 9.0) | st.just(math.inf), seeds)
+@drawn(80)
+def test_bounds_stay_bounds_when_walls_turn_out_free(shape, reach, seed):
+    state, _, rng = scene(shape, seed, covered=0.4)
+    tally, flat, tree = new_tally(state.size, shape), state.reshape(-1), grow_tree(rays(shape), reach, shape)
+    voxels, met = np.arange(-1, state.size, dtype=np.int32), np.empty(tree.cells, np.int32)
+    counted, now, _ = np.empty((3, state.size))
+    count_from(tally, flat, shape, voxels[1:], tree, met, counted, _)
+    seen = np.concatenate([[5.0], counted]).astype(np.float32)
+    seen[3] = math.inf
+    walls = np.flatnonzero(flat & COVERED)
+    opened = rng.choice(walls, min(int(rng.integers(0, 4)), len(walls)), replace=False).astype(np.int32)
+    flat[opened] &= ~np.uint8(COVERED)
+    add_opened(tally, flat, shape, opened, voxels, tree, met, seen)
+    count_from(tally, flat, shape, voxels[1:], tree, met, now, _)
+    assert (seen[1:] >= now).all()
+    assert seen[0] == 5.0 and math.isinf(seen[3])
+    same = np.delete(np.arange(state.size), 2)
+    through = _reached_through(flat, shape, opened, voxels[1:], rays(shape), reach)
+    assert (seen[1:][same] == counted[same])[~through[same]].all()
+
+
+def _reached_through(state, shape, opened, voxels, directions, reach):
+    """Whether a ray from each voxel passes one that was opened, and so may show more."""
+    marked = np.zeros_like(state)
+    marked[opened] = UNEXPLORED
+    tally, free = new_tally(state.size, shape), (state & COVERED) | marked
+    starts = [tuple(int(i) + 0.5 for i in np.unravel_index(voxel, shape)) for voxel in voxels]
+    passed = [count_crossed(tally, free, shape, start, directions, reach, False)[0] for start in starts]
+    return np.array(passed) > 0
+
+
+def test_behind_a_wall_that_turned_out_free_by_hand():
+    """Looking east along six voxels, the wall at 3 hides two; once it is free they are added."""
+    state = np.full(6, UNEXPLORED, np.uint8)
+    state[0], state[3] = 0, COVERED
+    shape, east = (6, 1, 1), np.array([[1.0, 0.0, 0.0]])
+    tree, tally, seen = grow_tree(east, 9.0, shape), new_tally(6, shape), np.array([2.0, 0.0], np.float32)
+    voxels, met, wall = np.array([0, 4], np.int32), np.empty(tree.cells, np.int32), np.array([3], np.int32)
+    state[3] = 0
+    add_opened(tally, state, shape, wall, voxels, tree, met, seen)
+    assert seen.tolist() == [4.0, 0.0]
+    state[2] = COVERED  # something nearer hides the hole
+    add_opened(tally, state, shape, wall, voxels, tree, met, seen)
+    assert seen.tolist() == [4.0, 0.0]

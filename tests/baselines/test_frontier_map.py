@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
@@ -12,10 +10,9 @@ from baselines.frontier_map import (
     CANDIDATE,
     COVERED,
     NONE,
-    TILE,
+    OPENED,
     UNEXPLORED,
     UNMAPPED,
-    forget_seen,
     new_frontier_map,
     take_in,
 )
@@ -102,16 +99,29 @@ def test_a_corridor_by_hand():
     assert (frontiers.voxel == NONE).all()
 
 
-def test_what_was_seen_is_forgotten_near_what_turned_out_free_and_nowhere_else():
-    size = (40, 30, 1)
-    voxels = np.array([0, 20 * 30 + 15, NONE, 39 * 30 + 29], np.int32)
-    seen = np.array([5.0, 6.0, 7.0, 8.0], np.float32)
-    changed = np.zeros((40 // TILE + 1, 30 // TILE + 1), np.uint8)
-    forget_seen(changed, size, voxels, seen, 5.0)
-    assert seen.tolist() == [5.0, 6.0, 7.0, 8.0]
-    changed[0, 0] = 1
-    forget_seen(changed, size, voxels, seen, 5.0)
-    assert seen.tolist() == [math.inf, 6.0, 7.0, 8.0] and not changed.any()
-    changed[2, 1] = 1  # x 16 … 23, y 8 … 15
-    forget_seen(changed, size, voxels, seen, 100.0)
-    assert np.isinf(seen[[0, 1, 3]]).all() and seen[2] == 7.0
+def test_what_turned_out_free_is_noted_by_hand():
+    """Of three covered voxels one becomes free, one stays, one is not mapped any more at a finer level."""
+    shape = (4, 3, 1)
+    mean, precision = np.full(12, 0.9, np.float32), np.full(12, 9.0, np.float32)
+    frontiers = new_frontier_map(shape, 0.0, 0, 2)
+    take_in(frontiers, mean, precision, LEVELS)
+    assert frontiers.openings[0] == 0
+    mean[7] = 0.1
+    take_in(frontiers, mean, precision, LEVELS)
+    assert frontiers.openings[0] == 1 and frontiers.opened[0] == 7
+    take_in(frontiers, mean, precision, (16.0, 1.0))
+    assert frontiers.openings[0] > OPENED  # all is unexplored again: more may be seen anywhere
+
+
+def test_more_openings_than_are_noted():
+    shape = (70, 61, 1)
+    mean, precision = np.full(70 * 61, 0.9, np.float32), np.full(70 * 61, 9.0, np.float32)
+    frontiers = new_frontier_map(shape, 0.0, 0, 8)
+    take_in(frontiers, mean, precision, LEVELS)
+    mean[:OPENED] = 0.1
+    take_in(frontiers, mean, precision, LEVELS)
+    assert frontiers.openings[0] == OPENED
+    np.testing.assert_array_equal(frontiers.opened, np.arange(OPENED))
+    mean[OPENED] = 0.1
+    take_in(frontiers, mean, precision, LEVELS)
+    assert frontiers.openings[0] == OPENED + 1

@@ -11,7 +11,14 @@ from hypothesis import strategies as st
 
 from baselines.expected_view import new_tally
 from baselines.frontier_map import NONE, put_block
-from baselines.terrain_map import choose_reached_columns, look_at_columns, new_terrain_map, survey
+from baselines.terrain_map import (
+    TILE,
+    choose_reached_columns,
+    forget_seen,
+    look_at_columns,
+    new_terrain_map,
+    survey,
+)
 from baselines.terrain_view import (
     Look,
     bound_columns,
@@ -187,3 +194,18 @@ def test_no_more_is_seen_than_lies_in_range(seed, reach, naive):
         x, y, _ = np.unravel_index(voxel, SHAPE)
         near = [math.dist((x, y), place) <= reach + math.sqrt(0.5) for place in np.ndindex(9, 13)]
         assert bound == np.count_nonzero(np.reshape(near, (9, 13)) & (terrain.ground == NONE))
+
+
+def test_what_was_seen_is_forgotten_near_new_ground_and_nowhere_else():
+    size = (40, 30, 1)
+    voxels = np.array([0, 20 * 30 + 15, NONE, 39 * 30 + 29], np.int32)
+    seen = np.array([5.0, 6.0, 7.0, 8.0], np.float32)
+    changed = np.zeros((40 // TILE + 1, 30 // TILE + 1), np.uint8)
+    forget_seen(changed, size, voxels, seen, 5.0)
+    assert seen.tolist() == [5.0, 6.0, 7.0, 8.0]
+    changed[0, 0] = 1
+    forget_seen(changed, size, voxels, seen, 5.0)
+    assert seen.tolist() == [math.inf, 6.0, 7.0, 8.0] and not changed.any()
+    changed[2, 1] = 1  # x 16 … 23, y 8 … 15
+    forget_seen(changed, size, voxels, seen, 100.0)
+    assert np.isinf(seen[[0, 1, 3]]).all() and seen[2] == 7.0
