@@ -37,7 +37,7 @@ OPENED = 4096
 """Of so many voxels at once it is noted that they turned out free."""
 NONE = -1
 GLANCE = 128
-"""Voxels that are looked at together for whether anything changed."""
+"""Voxels that are looked at together for whether anything was measured."""
 
 
 class FrontierMap(NamedTuple):
@@ -57,6 +57,10 @@ class FrontierMap(NamedTuple):
     """(B,) uint8, whether a block has to be looked at again."""
     waiting: np.ndarray
     """(B,) int32, those blocks."""
+    sums: np.ndarray
+    """(V / GLANCE,) uint64, sums of precisions as bits, of so many voxels at a time, when taken in."""
+    levels: np.ndarray
+    """(2,) float32, levels at that time; NaN = nothing was taken in."""
     opened: np.ndarray
     """(OPENED,) int32, voxels that turned out free: past them more may be seen than before …"""
     openings: np.ndarray
@@ -96,6 +100,8 @@ def new_frontier_map(
         seen=np.full(count, np.inf, np.float32),
         dirty=np.zeros(count, np.uint8),
         waiting=np.zeros(count, np.int32),
+        sums=np.zeros(math.ceil(voxels / GLANCE), np.uint64),
+        levels=np.full(2, np.nan, np.float32),
         opened=np.zeros(OPENED, np.int32),
         openings=np.zeros(1, np.int64),
         size=(int(shape[0]), int(shape[1]), int(shape[2])),
@@ -114,15 +120,6 @@ def state_of(mean, precision, levels):
         np.uint8(mean > np.float32(STOP_AT_COVERED)) & ~unmapped
     )  # without branches: many voxels at once
     return np.uint8(unexplored * UNEXPLORED | unmapped * UNMAPPED | covered * COVERED)
-
-
-@inlined_kernel
-def has_changed(state, mean, precision, levels, first, last):
-    """Whether the flags of voxels `first` … `last` - 1 are not those of the belief."""
-    different = np.uint8(0)
-    for voxel in range(first, last):
-        different |= state[voxel] ^ state_of(mean[voxel], precision[voxel], levels)
-    return different != 0
 
 
 @lean_kernel
@@ -158,22 +155,30 @@ def _note_opened(frontiers, voxel):
 
 @lean_kernel
 def take_in(frontiers, mean, precision, levels):
-    """Bring the map up to date with a belief: one glance at every voxel, and work where something changed.
+    """Bring the map up to date with a belief: sums over all voxels, and work where something changed.
+
+    Every measurement of a voxel raises its precision, and with it the number that its bits make: so the sum
+    over some voxels is what it was if, and only if, none of them was measured.
 
     Args:
         frontiers: Of the robot.
         mean: (V,) float32.
-        precision: (V,) float32 1/σ².
+        precision: (V,) float32 1/σ², nowhere less than in the belief that was taken in before.
         levels: (explored, mapped): precisions from which on a voxel is explored, and mapped.
     """
     size, layer, state = frontiers.size, frontiers.layer, frontiers.state
-    reach, count = 2, 0
+    reach, count, bits = 2, 0, precision.view(np.uint32)
+    as_before = frontiers.levels[0] == levels[0] and frontiers.levels[1] == levels[1]
+    frontiers.levels[0], frontiers.levels[1] = levels[0], levels[1]
     for offset in frontiers.ball:
         reach = max(reach, abs(offset[0]) + 2)
     for first in range(0, len(state), GLANCE):
-        last = min(first + GLANCE, len(state))
-        if not has_changed(state, mean, precision, levels, first, last):
+        last, total = min(first + GLANCE, len(state)), np.uint64(0)
+        for voxel in range(first, last):
+            total += np.uint64(bits[voxel])
+        if as_before and total == frontiers.sums[first // GLANCE]:
             continue
+        frontiers.sums[first // GLANCE] = total
         for voxel in range(first, last):
             now = state_of(mean[voxel], precision[voxel], levels)
             before = state[voxel]

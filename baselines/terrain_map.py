@@ -21,7 +21,6 @@ from baselines.frontier_map import (
     NONE,
     UNEXPLORED,
     UNMAPPED,
-    has_changed,
     new_frontier_map,
     put_block,
     state_of,
@@ -107,13 +106,22 @@ def new_terrain_map(
     )
 
 
+@inlined_kernel
+def _has_changed(state, mean, precision, levels, first, last):
+    """Whether the flags of voxels `first` … `last` - 1 are not those of the belief."""
+    different = np.uint8(0)
+    for voxel in range(first, last):
+        different |= state[voxel] ^ state_of(mean[voxel], precision[voxel], levels)
+    return different != 0
+
+
 @lean_kernel
 def survey(terrain, mean, precision, levels):
     """Bring the map up to date with a belief: see `frontier_map.take_in`."""
     size, count = terrain.size, 0
     for column in range(size[0] * size[1]):
         first, last = column * size[2], (column + 1) * size[2]
-        if has_changed(terrain.state, mean, precision, levels, first, last):
+        if _has_changed(terrain.state, mean, precision, levels, first, last):
             for voxel in range(first, last):
                 terrain.state[voxel] = state_of(mean[voxel], precision[voxel], levels)
             x, y = column // size[1], column % size[1]

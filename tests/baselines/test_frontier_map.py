@@ -31,13 +31,13 @@ def random_map(shape, rng):
     return mean, precision
 
 
-def state_of(mean, precision):
-    state = np.where(precision < LEVELS[0], UNEXPLORED, 0) | np.where(precision < LEVELS[1], UNMAPPED, 0)
-    return state | np.where((mean > 0.5) & (precision >= LEVELS[1]), COVERED, 0)
+def state_of(mean, precision, levels=LEVELS):
+    state = np.where(precision < levels[0], UNEXPLORED, 0) | np.where(precision < levels[1], UNMAPPED, 0)
+    return state | np.where((mean > 0.5) & (precision >= levels[1]), COVERED, 0)
 
 
-def updated(frontiers, mean, precision):
-    take_in(frontiers, mean.reshape(-1), precision.reshape(-1), LEVELS)
+def updated(frontiers, mean, precision, levels=LEVELS):
+    take_in(frontiers, mean.reshape(-1), precision.reshape(-1), levels)
 
 
 @given(st.sampled_from(SHAPES), st.sampled_from([0.0, 1.0, 1.3]), st.integers(1, 4), seeds)
@@ -47,9 +47,9 @@ def test_candidates_and_rates_are_those_of_the_definition_after_every_change(sha
     layer = 0 if shape[2] == 1 else None
     frontiers = new_frontier_map(shape, radius, layer, spacing)
     mean, precision = random_map(shape, rng)
-    for _ in range(3):
-        updated(frontiers, mean, precision)
-        state = state_of(mean, precision)
+    for levels in (LEVELS, LEVELS, (8.0, 1.0), (8.0, 1.0)):
+        updated(frontiers, mean, precision, levels)
+        state = state_of(mean, precision, levels)
         np.testing.assert_array_equal(frontiers.state.reshape(shape), state)
         ball = frontiers.ball.tolist()
         np.testing.assert_array_equal(
@@ -60,7 +60,7 @@ def test_candidates_and_rates_are_those_of_the_definition_after_every_change(sha
         check_blocks(frontiers, wanted, spacing)
         here = tuple(rng.integers(0, n) for n in shape)
         patch = tuple(slice(max(i - 1, 0), i + 2) for i in here)
-        precision[patch] = rng.choice([0.5, 9.0])
+        precision[patch] += rng.choice([0.5, 9.0])
         mean[patch] = rng.choice([0.1, 0.9])
 
 
@@ -106,7 +106,7 @@ def test_what_turned_out_free_is_noted_by_hand():
     frontiers = new_frontier_map(shape, 0.0, 0, 2)
     take_in(frontiers, mean, precision, LEVELS)
     assert frontiers.openings[0] == 0
-    mean[7] = 0.1
+    mean[7], precision[7] = 0.1, 10.0
     take_in(frontiers, mean, precision, LEVELS)
     assert frontiers.openings[0] == 1 and frontiers.opened[0] == 7
     take_in(frontiers, mean, precision, (16.0, 1.0))
@@ -118,10 +118,10 @@ def test_more_openings_than_are_noted():
     mean, precision = np.full(70 * 61, 0.9, np.float32), np.full(70 * 61, 9.0, np.float32)
     frontiers = new_frontier_map(shape, 0.0, 0, 8)
     take_in(frontiers, mean, precision, LEVELS)
-    mean[:OPENED] = 0.1
+    mean[:OPENED], precision[:OPENED] = 0.1, 10.0
     take_in(frontiers, mean, precision, LEVELS)
     assert frontiers.openings[0] == OPENED
     np.testing.assert_array_equal(frontiers.opened, np.arange(OPENED))
-    mean[OPENED] = 0.1
+    mean[OPENED], precision[OPENED] = 0.1, 10.0
     take_in(frontiers, mean, precision, LEVELS)
     assert frontiers.openings[0] == OPENED + 1
