@@ -1,7 +1,8 @@
 """Candidates of a robot's own belief, in plans and in any 3-D space, and the voxels to be seen from them.
 
 What was counted is kept: as no more voxels can be seen from a candidate than before while the map grows, it
-is an upper bound of what a new count would give. Over a height field: terrain_candidates.py.
+is an upper bound of what a new count would give. Only through walls that turned out free more may be seen,
+which is added. Over a height field: terrain_candidates.py.
 """
 
 from __future__ import annotations

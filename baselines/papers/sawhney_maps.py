@@ -13,13 +13,13 @@ from pathlib import Path
 
 import numpy as np
 
-from baselines.experiment import Record, markdown_table
+from baselines.experiment import Record, markdown_table, mean_interval
 from baselines.papers.sawhney_missions import Run
 from baselines.per_time_visibility import Exploring
 from entropy_explore_env.config import Scenario
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 
-TEAM, STARTS = 3, 2
+TEAM, STARTS = 3, 5
 METHODS = ("ptv", "beta-1", "beta-10", "beta-40", "finish", "nearest", "coordinated")
 _MARK = "map-"
 
@@ -55,7 +55,7 @@ def map_world(file: Path) -> str:
 
 
 def maps_table(records: Mapping[str, Sequence[Record]], ends: Mapping[str, str]) -> str:
-    """Mean times of every method in the plans of files, as Markdown; empty without such plans.
+    """Mean times of every method in the plans of files with intervals, as Markdown; empty without such plans.
 
     Args:
         records: Cell id → records.
@@ -65,7 +65,10 @@ def maps_table(records: Mapping[str, Sequence[Record]], ends: Mapping[str, str])
     for cell, found in records.items():
         world, _, method = cell.split("/")
         if world.startswith(_MARK):
-            times = [f"{np.mean([record[end] for record in found]):,.0f} s" for end in ends]
+            times = [
+                "{:,.0f} s ({:,.0f} … {:,.0f})".format(*mean_interval([record[end] for record in found]))
+                for end in ends
+            ]
             explored, clock_s = (
                 np.mean([record[name] for record in found]) for name in ("explored", "clock_s")
             )

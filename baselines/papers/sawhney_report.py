@@ -185,8 +185,8 @@ all weigh alike; ratios are of their means, with 95 % bootstrap intervals over m
 and seed. "Faster" holds if the whole interval is below 1. The best β is chosen from the same missions, which
 favours it."""
 
-_MAPS = f"""Teams of {MAP_TEAM}, the settings of the other plans, cells resampled to 0.1 m,
-{MAP_STARTS} starts; mean times, and seconds of computing a mission on one thread."""
+_MAPS = f"""Teams of {MAP_TEAM}, the settings of the other plans, cells resampled to 0.1 m, up to
+{MAP_STARTS} starts; mean times with 95 % intervals, and seconds of computing a mission on one thread."""
 
 _CHANGED = f"""Teams of {CHANGED_TEAM}: time of V/t over that of the other method. Intervals over so few
 missions in one world say little more than how far they lie apart; "as it is" has the same seeds."""
