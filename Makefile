@@ -23,8 +23,9 @@ help:
 demo: $(STAMP)baselines
 	$(RUN) baselines.run room --strategy gradient --robots 3 --seed 0 --out results/demo
 
+# A file of tests stays in one process: its fixtures, and what it compiles, are made once.
 test: lint
-	$(RUN) pytest
+	$(RUN) pytest -n auto --maxprocesses 4 --dist loadfile
 
 test-rllib: $(VENV_RLLIB)/installed
 	$(VENV_RLLIB)/bin/python -m pytest tests/training/rllib tests/training/test_rllib_refusals.py
