@@ -104,9 +104,11 @@ def _text(records: Records, claims: Sequence[Claim], command: str) -> str:
             ]
     if table := maps_table(records, ENDS):
         parts += ["## Plans from files", _MAPS, table]
-    changed = [_changes_table(records, part) for part in PARTS if changes_in(records, part)]
+    changed = [part for part in PARTS if changes_in(records, part)]
     if changed:
-        parts += ["## One thing changed at a time", _CHANGED, *changed]
+        parts += ["## One thing changed at a time", _CHANGED]
+        parts += [_causes_table(records, part) for part in changed]
+        parts += [_changes_table(records, part) for part in changed]
     return "\n\n".join(part.strip() for part in parts) + "\n"
 
 
@@ -188,8 +190,9 @@ favours it."""
 _MAPS = f"""Teams of {MAP_TEAM}, the settings of the other plans, cells resampled to 0.1 m, up to
 {MAP_STARTS} starts; mean times with 95 % intervals, and seconds of computing a mission on one thread."""
 
-_CHANGED = f"""Teams of {CHANGED_TEAM}: time of V/t over that of the other method. Intervals over so few
-missions in one world say little more than how far they lie apart; "as it is" has the same seeds."""
+_CHANGED = f"""Teams of {CHANGED_TEAM}: time of V/t over that of the other method, relative in each world; "as
+it is" has the same seeds. First what does not hold as it is, and the changes with which it does (the whole
+interval below 1): there its cause lies. Then all changes."""
 
 
 def _times_table(records: Records, part: str) -> str:
@@ -200,10 +203,7 @@ def _times_table(records: Records, part: str) -> str:
     for method in [name[len(prefix) :] for name in records if name.startswith(prefix)]:
         cells = [cell_id(w, k, method) for w in worlds_in(records, part) for k in teams_in(records, part)]
         scans = np.mean([record["scans"] / record["robots"] for cell in cells for record in records[cell]])
-        shown = [
-            "{:.2f} ({:.2f} … {:.2f})".format(*mean_interval(relative(records, part, method, end)))
-            for end in ENDS
-        ]
+        shown = [_interval(mean_interval(relative(records, part, method, end))) for end in ENDS]
         rows.append([f"`{method}`", *shown, f"{scans:.0f}"])
     head = ["method", *(f"relative time {text}" for text in ENDS.values()), "scans a robot"]
     return markdown_table(head, rows)
@@ -211,10 +211,8 @@ def _times_table(records: Records, part: str) -> str:
 
 def _betas_table(records: Records, part: str) -> str:
     """The best β of each team, and what a robot discovers a second meanwhile."""
-    rows, areas_m2 = (
-        [],
-        {world: visible_area_m2(world) for world in worlds_in(records, part) if part == "plans"},
-    )
+    plans = worlds_in(records, part) if part == "plans" else ()
+    rows, areas_m2 = [], {world: visible_area_m2(world) for world in plans}
     for n in teams_in(records, part):
         best = [best_beta(records, part, end, teams=(n,)) for end in ENDS]
         shown = f"{_discovered(records, n, areas_m2):.1f}" if areas_m2 else "-"
@@ -236,6 +234,26 @@ def _discovered(records: Records, n: int, areas_m2: dict[str, float]) -> float:
     return float(np.mean(np.concatenate(rates))) / POINT["plans"]
 
 
+def _causes_table(records: Records, part: str) -> str:
+    """Where V/t is not faster as it is, and what has to be changed for it."""
+    rows, changes = [], changes_in(records, part)
+    everywhere = next(iter(changes.values()))
+    for method in CHANGED_METHODS[part][1:]:
+        for end, text in ENDS.items():
+            plain = changed_ratio(records, None, method, end, everywhere)
+            if plain[2] < 1.0:
+                continue
+            found = {c: changed_ratio(records, c, method, end, worlds) for c, worlds in changes.items()}
+            causes = sorted((c for c in found if found[c][2] < 1.0), key=lambda c: found[c][0])
+            listed = "; ".join(f"{CHANGES[part][c].text}: {_interval(found[c])}" for c in causes)
+            rows.append([f"V/t over `{method}`, {text}", _interval(plain), listed or "none that was tried"])
+    return markdown_table([f"{PARTS[part]}, does not hold", "as it is", "holds if"], rows)
+
+
+def _interval(found: tuple[float, float, float]) -> str:
+    return "{:.2f} ({:.2f} … {:.2f})".format(*found)
+
+
 def _changes_table(records: Records, part: str) -> str:
     """V/t over the others with one thing changed."""
     rows = []
@@ -244,10 +262,7 @@ def _changes_table(records: Records, part: str) -> str:
     for change in (None, *changes):
         worlds = everywhere if change is None else changes[change]
         for method in CHANGED_METHODS[part][1:]:
-            ratios = [
-                "{:.2f} ({:.2f} … {:.2f})".format(*changed_ratio(records, change, method, end, worlds))
-                for end in ENDS
-            ]
+            ratios = [_interval(changed_ratio(records, change, method, end, worlds)) for end in ENDS]
             text = "as it is" if change is None else CHANGES[part][change].text
             rows.append([text, f"V/t over `{method}`", *ratios, ", ".join(worlds)])
     return markdown_table([f"changed, {PARTS[part]}", "ratio", *ENDS.values(), "in"], rows)

@@ -106,6 +106,17 @@ def test_claims_hold_where_times_are_as_the_paper_says():
     assert low < ratio < high and ratio == pytest.approx(1.2, abs=0.02)
 
 
+def test_causes_are_the_changes_with_which_a_claim_holds():
+    """Synchronous robots are faster, but not if a scan takes 8 s; over naive V/t holds as it is."""
+    times = {"sync": 0.8, "sync-scan-long": 1.6, "naive": 1.2}
+    table = sawhney_report._causes_table(synthetic(lambda w, team, method: times.get(method, 1.0)), "plans")
+    rows = [row for row in table.splitlines() if "V/t over" in row]
+    assert [row.count("a scan takes 8 s: 0.6") for row in rows if "`sync`" in row] == [1, 1, 1]
+    assert all(row.count(":") == 1 for row in rows if "`sync`" in row)  # and no other change
+    assert all("none that was tried" in row for row in rows if "`beta-" in row)
+    assert not any("`naive`" in row for row in rows)
+
+
 def test_claims_do_not_hold_where_all_are_alike():
     claims = all_claims(synthetic(lambda world, team, method: 1.0))
     assert sum(claim.holds for claim in claims) < 0.2 * len(claims)
