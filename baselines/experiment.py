@@ -313,6 +313,16 @@ def ratio_interval(
     return (float(pairs[:, 0].mean() / pairs[:, 1].mean()), *_central(means[:, 0] / means[:, 1]))
 
 
+def double_ratio_interval(
+    upper: np.ndarray, lower: np.ndarray, upper_before: np.ndarray, lower_before: np.ndarray
+) -> tuple[float, float, float]:
+    """A ratio of two means over the same ratio before, all over the same seeds, and its 95 % interval."""
+    rows = np.stack([upper, lower, upper_before, lower_before], axis=1)
+    means = np.concatenate([rows.mean(axis=0)[None], _resampled(rows, len(rows)).mean(axis=1)])
+    ratios = means[:, 0] / means[:, 1] / (means[:, 2] / means[:, 3])
+    return (float(ratios[0]), *_central(ratios[1:]))
+
+
 def median_ratio_interval(
     upper: Sequence[float] | np.ndarray, lower: Sequence[float] | np.ndarray
 ) -> tuple[float, float, float]:

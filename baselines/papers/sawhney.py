@@ -73,6 +73,8 @@ def main(words: Sequence[str]) -> int:
     for file in args.maps:
         if not file.is_file():
             raise SettingError("maps", str(file), "files of plans")
+    if len({file.stem for file in args.maps}) < len(args.maps):
+        raise SettingError("maps", " ".join(map(str, args.maps)), "files of different names")
     make_folder("out", args.out)
     make_folder("runs", args.runs)
     started = time.perf_counter()

@@ -145,8 +145,8 @@ def experiment(
         flights: Missions a point over each terrain; 0 = none.
         quick: Fewer team sizes and β.
         dem: A height map's file, flown over as well.
-        maps: Files of plans, explored by one team each, from MAP_STARTS starts at most.
-        teams: Team sizes; none = the usual ones.
+        maps: Files of plans of different names, explored by one team each, from MAP_STARTS starts at most.
+        teams: Team sizes; none = the usual ones. With CHANGED_TEAM things are changed one at a time.
     """
     cells = []
     for world in (*PLANS, *TERRAINS, *((DEM,) if dem is not None else ())):
@@ -165,7 +165,8 @@ def experiment(
                 Cell(name, _scenario(PLANS[0], MAP_TEAM, {}), STRATEGY, min(starts, MAP_STARTS), run)
             )
     for part, seeds in (("plans", starts), ("terrains", flights)):
-        for name, change in CHANGES[part].items() if seeds else ():
+        ran = teams or (QUICK_TEAMS[part] if quick else TEAMS)
+        for name, change in CHANGES[part].items() if seeds and CHANGED_TEAM in ran else ():
             for world in (QUICK_CHANGED_IN if quick else CHANGED_IN)[part]:
                 for method in CHANGED_METHODS[part]:
                     exploring = {**methods(part, False)[method], **change.exploring}

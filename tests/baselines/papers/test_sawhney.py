@@ -76,6 +76,7 @@ def synthetic(values, seeds=6):
                     **dict.fromkeys(("t95_s", "t99_s", "t_none_s"), time_s),
                     "finished": True,
                     "scans": 10,
+                    "distance_m": time_s,
                     "robots": 1,
                     "series": {"time_s": [0.0, 50.0, time_s], "explored": [0.0, 0.5, 1.0]},
                 }
@@ -108,18 +109,46 @@ def test_claims_hold_where_times_are_as_the_paper_says():
 
 def test_causes_are_the_changes_with_which_a_claim_holds():
     """Synchronous robots are faster, but not if a scan takes 8 s; over naive V/t holds as it is."""
-    times = {"sync": 0.8, "sync-scan-long": 1.6, "naive": 1.2}
-    table = sawhney_report._causes_table(synthetic(lambda w, team, method: times.get(method, 1.0)), "plans")
-    rows = [row for row in table.splitlines() if "V/t over" in row]
-    assert [row.count("a scan takes 8 s: 0.6") for row in rows if "`sync`" in row] == [1, 1, 1]
-    assert all(row.count(":") == 1 for row in rows if "`sync`" in row)  # and no other change
-    assert all("none that was tried" in row for row in rows if "`beta-" in row)
-    assert not any("`naive`" in row for row in rows)
+    times = {"sync": 0.8, "sync-scan-long": 1.6, "naive": 1.2, "beta-5": 0.9, "beta-20-range": 0.7}
+    times |= {f"beta-5-{change}": 1.1 for change in CHANGES["plans"]}
+    records = synthetic(lambda world, team, method: times.get(method, 1.0))
+    table = sawhney_report._causes_table(records, "plans").splitlines()
+    rows = {what: [row for row in table if what in row] for what in ("`sync`", "`naive`", "beta-5")}
+    assert [len(found) for found in rows.values()] == [3, 3, 3]
+    assert all("| a scan takes 8 s: 0.6" in row and row.count(":") == 1 for row in rows["`sync`"])
+    assert all("holds as it is" in row for row in rows["`naive`"])
+    assert all("none that was tried" in row for row in rows["beta-5"])  # β = 20 is as fast as V/t
+    table = sawhney_report._changes_table(records, "plans").splitlines()
+    row = next(row for row in table if row.startswith("| a scan takes 8 s | V/t over `sync`"))
+    cells = [cell.strip() for cell in row.split("|")[3:-1]]
+    assert (
+        cells[0].startswith("0.6")
+        and cells[3].startswith(("0.99", "1.0"))
+        and cells[4].startswith(("1.9", "2.0"))
+    )
+
+
+def test_own_betas_are_judged_by_other_missions():
+    """All β are alike: whichever a world's missions favour, others do not."""
+    claims = {claim.id: claim for claim in all_claims(synthetic(lambda world, team, method: 1.0, seeds=9))}
+    assert not any(claims[f"plans-no-single-{end}"].holds for end in ("t95_s", "t99_s", "t_none_s"))
+
+
+def test_single_robots_have_nobody_to_wait_for():
+    alone = {name: found for name, found in synthetic(as_claimed).items() if "/n1/" in name}
+    claims = all_claims(alone)
+    assert claims and not any("synchronous" in claim.claim for claim in claims)
+    assert [claim.paper for claim in claims if "1 robot:" in claim.claim] == [0.93]
+    assert not any(cell.id.count("-scan-") for cell in cells_of(2, 2, False, None, (), (1, 6)))
+    assert any(cell.id.count("-scan-") for cell in cells_of(2, 2, False, None, (), (1, 3)))
 
 
 def test_claims_do_not_hold_where_all_are_alike():
     claims = all_claims(synthetic(lambda world, team, method: 1.0))
-    assert sum(claim.holds for claim in claims) < 0.2 * len(claims)
+    alike = [claim for claim in claims if claim.id.endswith("-points")]
+    faster = [claim for claim in claims if claim.id.split("-")[1] not in ("points", "interior")]
+    assert len(alike) == 2 and all(claim.holds for claim in alike)
+    assert sum(claim.holds for claim in faster) < 0.15 * len(faster)
 
 
 def tiny_cells(starts, flights, quick, dem, maps=(), teams=()):
