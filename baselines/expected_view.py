@@ -227,10 +227,10 @@ def add_opened(tally, state, size, opened, voxels, tree, met, seen):
     So they stay bounds, though rays go on where they ended before: nothing else shows more than it did.
 
     Args:
-        tally: Working space.
+        tally: As `count_from` takes it; it stays as it is.
         state: (V,) uint8, as it is now.
         size: (X, Y, Z) voxels.
-        opened: (N,) int32, voxels that were covered when the bounds were found, and are not now.
+        opened: (N,) int32, voxels that were covered when bounds were last added to, and are not now.
         voxels: (K,) int32; NONE = there is none.
         tree: A RayTree of C cells, by which the bounds were found.
         met: (C,) int32 scratch space.
@@ -251,8 +251,21 @@ def add_opened(tally, state, size, opened, voxels, tree, met, seen):
             for number in range(tree.first[cell], tree.first[cell + 1]):
                 node = np.int64(tree.nodes[number])
                 if node > 0 and _is_reached(state, voxel, tree, node):
-                    branch = node + 1, tree.after[node], False, False
-                    seen[place] += _climb(tally, state, size, voxel, tree, at, met, place, *branch)[0]
+                    first, last = node + 1, tree.after[node]
+                    seen[place] += _climb(
+                        tally,
+                        state,
+                        size,
+                        voxel,
+                        tree,
+                        at,
+                        met,
+                        place,
+                        first,
+                        last,
+                        inside=False,
+                        promises=False,
+                    )[0]
 
 
 @lean_kernel
@@ -272,7 +285,7 @@ def _is_reached(state, voxel, tree, node):
 
 @lean_kernel
 def count_in_balls(tally, state, size, voxels, reach, seen, weighed):
-    """The same with the naive V."""
+    """`count_from` with the naive V."""
     for place in range(len(voxels)):
         start = centre_of(size, voxels[place])
         seen[place], weighed[place] = count_in_ball(tally, state, size, start, reach, False)

@@ -6,7 +6,8 @@ promises of those under way stand until they have scanned; synchronously all wai
 part together. Each robot allots from its own belief and from what reached it (poses, announcements): it
 works out the others' turns as they would, and takes its own. With perfect messages that is the paper's
 central procedure; of teammates of another kind it takes them to see and to fit in like itself. A robot counts
-as stopped if it was heard since it announced its latest viewpoint, that is, its scan arrived.
+as stopped if it was heard since it announced its latest viewpoint, that is, its scan arrived; or if nothing
+was heard of it for longer than any drive takes.
 """
 
 from __future__ import annotations
@@ -30,6 +31,8 @@ from entropy_explore_env.missions.view import RobotView, TeammateView
 from entropy_explore_env.robots.motion import driving_time
 from entropy_explore_env.settings import RobotKind
 
+_LOST_AFTER = 2.0
+"""Times a drive along all sides of the workspace: as long nobody is under way without being heard."""
 _WIDER = 1.4
 """Ways are searched as far as the sensor sees, and then so many times as far until that is enough."""
 
@@ -172,21 +175,23 @@ class Allotter:
 
     def seek(self, pose: np.ndarray, goal: int) -> None:
         """Search the way from a pose to a voxel, through the mapped region."""
-        with self._left(pose) as source:
+        with self._start_opened(pose) as source:
             search_ways(self.search, self.lattice, self.costs, source, goal, math.inf, self._no_cells)
 
     @contextmanager
-    def _left(self, pose: np.ndarray) -> Iterator[np.ndarray]:
-        """(1,) int32, the voxel of a pose; while it is dealt with it can be left, though it may be closed."""
+    def _start_opened(self, pose: np.ndarray) -> Iterator[np.ndarray]:
+        """(1,) int32, the voxel of a pose; meanwhile it can be left, though it may be closed."""
         start = self.start_of(pose)
         opened = self.candidates.open_start(start)
-        yield np.array([start], np.int32)
-        self.candidates.close(opened)
+        try:
+            yield np.array([start], np.int32)
+        finally:
+            self.candidates.close(opened)
 
     def _ways(self, pose: np.ndarray, reach: float, before: _Ways | None = None) -> _Ways:
         """From where a robot is, or was heard; those found before, less far, are gone on with if possible."""
         arrays = self.search, self.lattice, self.costs
-        with self._left(pose) as source:
+        with self._start_opened(pose) as source:
             if before is None or before.search != self.search.searches[0]:
                 begin_search(*arrays, source, self._no_cells)
             widen_search(*arrays, reach, self._no_cells)
@@ -227,7 +232,7 @@ class Allotter:
 
         What is counted is kept in `weighed`, (B,) by slot; NaN = not counted yet.
         """
-        slots, voxels = self.candidates.found()
+        slots, voxels = self.candidates.found(all_of_them=not self._lazy)
         edges = ways.edges[slots]
         reached = np.isfinite(edges)
         beyond = slots[~reached]
@@ -334,13 +339,16 @@ def _worth(choice: Choice | None) -> float:
 def under_way(view: RobotView, mate: TeammateView, robot: int) -> bool:
     """Whether a teammate, by what was heard of it, is on its way to the viewpoint that it announced.
 
-    It is until a scan from there has been heard; scans under way, where sensors take them, do not count.
+    It is until a scan from there has been heard, or for so long that it cannot be any more: it is out of the
+    channel's range, or its messages were lost. Scans under way, where sensors take them, do not count.
     """
     if mate.announced_s < 0.0:
         return False
+    kind, size_m = view.scenario.kind_of(robot), view.scenario.grid.size_m
     if mate.heard_s <= mate.announced_s:
-        return True
-    if math.isinf(view.scenario.kind_of(robot).sensor.scan_every_m):
+        drive_s = driving_time(float(sum(size_m)), kind.robot.max_speed_m_s, kind.robot.acceleration_m_s2)
+        return view.time_s - mate.announced_s <= _LOST_AFTER * drive_s + kind.sensor.scan_time_s
+    if math.isinf(kind.sensor.scan_every_m):
         return False
     apart_m = float(np.linalg.norm(mate.pose[:3] - mate.viewpoint[:3]))
     return apart_m > view.scenario.grid.voxel_size_m

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import Generic, Literal, NamedTuple, TypeVar
+from typing import Generic, Literal, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 
@@ -41,7 +41,6 @@ from baselines.frontier_map import (
     take_in,
 )
 from baselines.ray_tree import grow_tree
-from baselines.terrain_map import TerrainMap
 from entropy_explore_env.config import Scenario
 from entropy_explore_env.missions.view import RobotView
 from entropy_explore_env.settings import RobotKind
@@ -49,7 +48,6 @@ from entropy_explore_env.validation import check, check_choice, check_positive
 
 Visibility = Literal["ray-cast", "naive"]
 UnexploredGround = Literal["falling", "level"]
-Map = TypeVar("Map", FrontierMap, TerrainMap)
 BATCH_CELLS = 7500
 """Cells that are walked in about the time that a call takes."""
 _ROWS = 15
@@ -70,6 +68,9 @@ class Looking:
         unexplored_ground: Over terrain, what is assumed of ground that is not explored: `falling` from z_av
             at the candidate to the workspace's floor where the range ends (sect. 3.4), or `level` at z_av.
         too_high: Candidates higher above z_av than this share of the range are dropped.
+
+    Raises:
+        SettingError: A field is none of these.
     """
 
     sigma: float = 0.5
@@ -112,6 +113,28 @@ class Chart(NamedTuple):
     """bool, mapped beside unexplored."""
     ground: np.ndarray
     """float64, height of the ground above the floor in voxel edges; NaN = not mapped, or a plan."""
+
+
+class BlockMap(Protocol):
+    """What candidates of all kinds need of their map; B slots, V voxels."""
+
+    @property
+    def rates(self) -> np.ndarray:
+        """(V,) float32, what ways cost."""
+        ...
+
+    @property
+    def voxel(self) -> np.ndarray:
+        """(B,) int32, the candidate in a slot; NONE = there is none."""
+        ...
+
+    @property
+    def seen(self) -> np.ndarray:
+        """(B,) float32, no fewer points than can be seen from it."""
+        ...
+
+
+Map = TypeVar("Map", bound=BlockMap)
 
 
 class Candidates(ABC, Generic[Map]):
@@ -163,7 +186,7 @@ class Candidates(ABC, Generic[Map]):
 
     @abstractmethod
     def limit(self) -> float:
-        """No more points than this can be seen from anywhere."""
+        """No V·(height factor) is more than this, from anywhere."""
 
     @abstractmethod
     def count(self, slots: np.ndarray, voxels: np.ndarray) -> np.ndarray:
@@ -189,9 +212,9 @@ class Candidates(ABC, Generic[Map]):
     def _look_at(self, count: int) -> None:
         """Choose the candidates of the blocks that were put first in line."""
 
-    def found(self) -> tuple[np.ndarray, np.ndarray]:
-        """(K,) slots of the candidates, and (K,) int32 their voxels."""
-        slots = np.flatnonzero((self._map.voxel != NONE) & (self._map.seen > 0.0))
+    def found(self, all_of_them: bool = False) -> tuple[np.ndarray, np.ndarray]:
+        """(K,) slots of the candidates, and (K,) int32 their voxels; those that show nothing if asked for."""
+        slots = np.flatnonzero((self._map.voxel != NONE) & (all_of_them | (self._map.seen > 0.0)))
         return slots, self._map.voxel[slots]
 
     def voxels_of(self, slots: np.ndarray | slice) -> np.ndarray:
@@ -236,7 +259,7 @@ class Candidates(ABC, Generic[Map]):
         x, y, z = np.unravel_index(voxel, self._size)
         return int(x), int(y), int(z)
 
-    def _apart(self, wanted_m: float | None, edge_m: float) -> int:
+    def _spacing(self, wanted_m: float | None, edge_m: float) -> int:
         """Voxels from a candidate to the next: so many metres, or None = a sixth of the range."""
         return max(round((wanted_m or self.reach * edge_m / 6.0) / edge_m), 1)
 
@@ -249,7 +272,7 @@ class VoxelCandidates(Candidates[FrontierMap]):
         super().__init__(scenario, kind, looking)
         grid, layer = scenario.grid, scenario.layer_of(kind.robot)
         edge = grid.voxel_size_m
-        spacing = self._apart(looking.spacing_m, edge)
+        spacing = self._spacing(looking.spacing_m, edge)
         self._map = new_frontier_map(grid.shape, kind.robot.body_radius_m / edge, layer, spacing)
         self._spent = self._map.flags
         self._tally = new_tally(grid.voxels, grid.shape)
@@ -264,13 +287,13 @@ class VoxelCandidates(Candidates[FrontierMap]):
         """See `Candidates`."""
         mean, precision = view.mean.reshape(-1), view.precision.reshape(-1)
         take_in(self._map, mean, precision, self._looking.levels(sigma, self._prior))
-        count, found = int(self._map.openings[0]), self._map.seen
-        self._map.openings[0] = 0
+        count, bounds = int(self._map.opened_count[0]), self._map.seen
+        self._map.opened_count[0] = 0
         if count > OPENED:
-            found[:] = math.inf
+            bounds[:] = math.inf
         elif count > 0 and self._looking.visibility == "ray-cast":
             arrays = self._map.opened[:count], self._map.voxel, self._tree, self._met
-            add_opened(self._tally, self._map.state, self._size, *arrays, found)
+            add_opened(self._tally, self._map.state, self._size, *arrays, bounds)
 
     def mapped_share(self) -> float:
         """See `Candidates`."""

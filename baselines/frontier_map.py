@@ -33,8 +33,8 @@ CANDIDATE = 2
 SPENT = 4
 """A scan was taken here: no candidate any more."""
 
-OPENED = 4096
-"""Of so many voxels at once it is noted that they turned out free."""
+OPENED = 256
+"""Of so many voxels at once it is noted that they turned out free: with more, all is counted anew as fast."""
 NONE = -1
 GLANCE = 128
 """Voxels that are looked at together for whether anything was measured."""
@@ -52,7 +52,7 @@ class FrontierMap(NamedTuple):
     voxel: np.ndarray
     """(B,) int32, the candidate of a block; NONE = it has none."""
     seen: np.ndarray
-    """(B,) float32, no fewer points than can be seen from it; inf = not looked at yet."""
+    """(B,) float32, no fewer points than can be seen from it; inf = nothing is known, or not any more."""
     dirty: np.ndarray
     """(B,) uint8, whether a block has to be looked at again."""
     waiting: np.ndarray
@@ -63,7 +63,7 @@ class FrontierMap(NamedTuple):
     """(2,) float32, levels at that time; NaN = nothing was taken in."""
     opened: np.ndarray
     """(OPENED,) int32, voxels that turned out free: past them more may be seen than before …"""
-    openings: np.ndarray
+    opened_count: np.ndarray
     """(1,) int64, … how many; more than OPENED = more may be seen anywhere."""
     size: tuple[int, int, int]
     across: tuple[int, int, int]
@@ -103,7 +103,7 @@ def new_frontier_map(
         sums=np.zeros(math.ceil(voxels / GLANCE), np.uint64),
         levels=np.full(2, np.nan, np.float32),
         opened=np.zeros(OPENED, np.int32),
-        openings=np.zeros(1, np.int64),
+        opened_count=np.zeros(1, np.int64),
         size=(int(shape[0]), int(shape[1]), int(shape[2])),
         across=across,
         blocks=(blocks[0], blocks[1], blocks[2]),
@@ -146,24 +146,25 @@ def _put_around(frontiers, x, y, z, reach, count):
 @inlined_kernel
 def _note_opened(frontiers, voxel):
     """Note that a voxel turned out free."""
-    count = frontiers.openings[0]
+    count = frontiers.opened_count[0]
     if count < OPENED:
         frontiers.opened[count] = voxel
     if count <= OPENED:
-        frontiers.openings[0] = count + 1
+        frontiers.opened_count[0] = count + 1
 
 
 @lean_kernel
 def take_in(frontiers, mean, precision, levels):
     """Bring the map up to date with a belief: sums over all voxels, and work where something changed.
 
-    Every measurement of a voxel raises its precision, and with it the number that its bits make: so the sum
-    over some voxels is what it was if, and only if, none of them was measured.
+    A measurement of a voxel raises its precision, and with it the number that its bits make, so the sum over
+    some voxels is what it was only if none of them was measured. (One too weak to raise a float32 does not
+    move the mean either.)
 
     Args:
         frontiers: Of the robot.
-        mean: (V,) float32.
-        precision: (V,) float32 1/σ², nowhere less than in the belief that was taken in before.
+        mean: (V,) float32, changed only where the precision was raised since it was taken in.
+        precision: (V,) float32 1/σ², nowhere less than it was then.
         levels: (explored, mapped): precisions from which on a voxel is explored, and mapped.
     """
     size, layer, state = frontiers.size, frontiers.layer, frontiers.state
@@ -190,7 +191,7 @@ def take_in(frontiers, mean, precision, levels):
             if before & COVERED > now & COVERED:
                 _note_opened(frontiers, voxel)
             if before & UNEXPLORED < now & UNEXPLORED:  # more is asked for: a level has been changed
-                frontiers.openings[0] = OPENED + 1
+                frontiers.opened_count[0] = OPENED + 1
             if layer < 0 or abs(z - layer) <= reach:
                 count = _put_around(frontiers, x, y, z, reach, count)
     look_at_blocks(frontiers, count)

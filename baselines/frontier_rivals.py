@@ -34,6 +34,9 @@ class Coordinated:
 
     Attributes:
         beta: β, a voxel edge of way; the paper finds 0.01 … 50 alike.
+
+    Raises:
+        SettingError: β is no number ≥ 0.
     """
 
     beta: float = 0.01

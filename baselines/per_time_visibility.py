@@ -29,6 +29,7 @@ from baselines.strategy import random_viewpoint
 from entropy_explore_env.belief.search_space import new_search, way_to
 from entropy_explore_env.belief.straightening import straightened
 from entropy_explore_env.config import Scenario
+from entropy_explore_env.errors import SettingError
 from entropy_explore_env.missions.view import RobotView
 from entropy_explore_env.robots.motion import MoveEnd
 from entropy_explore_env.validation import check, check_choice, check_kind, check_not_negative
@@ -49,6 +50,9 @@ class Metric:
         beta: β; None = V/t.
         bonus: What closing a frontier is worth besides what is seen, in V's units: slivers nearby are then
             seen to on the way, and not returned to at the end. 0 = the paper's metric.
+
+    Raises:
+        SettingError: One of them is no number that is allowed.
     """
 
     beta: float | None = None
@@ -81,6 +85,9 @@ class Exploring:
         finest_sigma: The last σ that counts as explored, no more than that of `looking`; None = the mission's
             σ_end.
         lazy: Candidates are counted only as far as is needed; the results are the same.
+
+    Raises:
+        SettingError: A field is none of these.
     """
 
     metric: Value = field(default_factory=Metric)
@@ -92,6 +99,8 @@ class Exploring:
 
     def __post_init__(self) -> None:
         """Check every field."""
+        if isinstance(self.metric, type) or not callable(self.metric):
+            raise SettingError("Exploring.metric", self.metric, "a Metric, or another Value")
         check_choice(self, "allotment", Allotment)
         check_kind(self, "promises", bool)
         check_kind(self, "looking", Looking)
@@ -145,7 +154,13 @@ class FrontierStrategy:
     """
 
     def __init__(self, exploring: Exploring | None = None) -> None:
-        """Take the settings."""
+        """Take the settings; None = the defaults.
+
+        Raises:
+            SettingError: They are something else.
+        """
+        if not isinstance(exploring, Exploring | None):
+            raise SettingError("exploring", exploring, "None, or an Exploring")
         self.exploring = exploring or Exploring()
 
     def reset(self, scenario: Scenario, rng: np.random.Generator) -> None:

@@ -42,7 +42,7 @@ class TerrainCandidates(Candidates[TerrainMap]):
         """Nothing is explored yet."""
         super().__init__(scenario, kind, looking)
         (x, y, _), edge = self._size, scenario.grid.voxel_size_m
-        apart = self._apart(looking.spacing_m, edge), self._apart(looking.rise_m, edge)
+        apart = self._spacing(looking.spacing_m, edge), self._spacing(looking.rise_m, edge)
         self._map = new_terrain_map(self._size, kind.robot.body_radius_m / edge, *apart, ceiling)
         self._spent = self._map.spent
         self._tally = new_tally(x * y, self._size)

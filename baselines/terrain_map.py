@@ -117,7 +117,7 @@ def _has_changed(state, mean, precision, levels, first, last):
 
 @lean_kernel
 def survey(terrain, mean, precision, levels):
-    """Bring the map up to date with a belief: see `frontier_map.take_in`."""
+    """Bring the map up to date with a belief, voxel by voxel; arguments as of `frontier_map.take_in`."""
     size, count = terrain.size, 0
     for column in range(size[0] * size[1]):
         first, last = column * size[2], (column + 1) * size[2]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+from pathlib import Path
 
 import numpy as np
 
@@ -25,6 +26,7 @@ from entropy_explore_env.missions.missions import Missions
 from entropy_explore_env.missions.view import view_of
 from entropy_explore_env.scenarios import find_scenario
 from entropy_explore_env.settings import Grid
+from entropy_explore_env.worlds.load import load_world
 from entropy_explore_env.worlds.world import World
 
 PUBLISHED_STEPS_S = 10.0
@@ -39,9 +41,9 @@ _WARM = (90, 70, 1)
 
 
 def exploring_rows(effort: Effort) -> list[Row]:
-    """A step with 720 rays on 480 × 640, decisions on 1000 × 1000, expected visibility, a whole mission."""
+    """A step with 720 rays on 480 × 640, decisions on large plans, expected visibility, a whole mission."""
     decisions = [decision_row(effort, lazy) for lazy in (True, False)]
-    return [step_row(effort), *decisions, visibility_row(effort), floor_row(effort)]
+    return [step_row(effort), *decisions, larger_row(effort), visibility_row(effort), floor_row(effort)]
 
 
 def dense_plan() -> Scenario:
@@ -69,16 +71,16 @@ def step_row(effort: Effort) -> Row:
     return alone(job, rates, "steps/s", Goal("≥", _STEP_GOAL, "steps/s"))
 
 
-def rooms_plan() -> tuple[Scenario, np.ndarray]:
-    """1000 × 1000 cells in rooms with doors, and (X, Y, Z) bool what is solid."""
-    solid = np.zeros((_SIDE, _SIDE, 1), bool)
+def rooms_plan(side: int = _SIDE) -> tuple[Scenario, np.ndarray]:
+    """1000 × 1000 cells in rooms with doors, or another square, and (X, Y, Z) bool what is solid."""
+    solid = np.zeros((side, side, 1), bool)
     solid[::_ROOM] = solid[:, ::_ROOM] = solid[-1] = solid[:, -1] = True
-    for wall in range(_ROOM, _SIDE, _ROOM):
-        for room in range(0, _SIDE, _ROOM):
+    for wall in range(_ROOM, side, _ROOM):
+        for room in range(0, side, _ROOM):
             door = slice(room + _ROOM // 2, room + _ROOM // 2 + _DOOR)
             solid[wall, door] = solid[door, wall] = False
     settings = {
-        "grid": Grid((_SIDE, _SIDE, 1), 0.1),
+        "grid": Grid((side, side, 1), 0.1),
         "robots": 1,
         "robot": {"reach_m": math.inf, "body_radius_m": 0.0},
         "sensor": {"max_range_m": 3.0},
@@ -86,40 +88,68 @@ def rooms_plan() -> tuple[Scenario, np.ndarray]:
     return with_settings(scripted(find_scenario("cluttered")), settings), solid
 
 
-def decision_row(effort: Effort, lazy: bool) -> Row:
-    """Milliseconds a decision among some 200 candidates, half of the plan known, the other half not.
+class Deciding:
+    """Decisions among some 200 candidates, 500 × 1000 cells of a plan known, the others not.
 
     Between decisions the robot scans: a decision takes the new belief in, seeks ways, and counts; lazily as
     far as the choice needs it, else ways to all candidates and V of each.
     """
-    scenario, solid = rooms_plan()
+
+    def __init__(self, lazy: bool, side: int = _SIDE) -> None:
+        """Prepare the plan."""
+        scenario, solid = rooms_plan(side)
+        self._missions, self._scans = _half_known(scenario, solid), 0
+        self._view, kind = view_of(self._missions, 0, 0), scenario.kind_of(0)
+        search = new_search(scenario.grid.voxels)
+        self.allotter = Allotter(scenario, kind, Looking(spacing_m=3.0), Metric(), search, None, lazy)
+
+    def decide_ms(self) -> float:
+        """Milliseconds of the next decision."""
+        precision, mean, scan = self._missions.precision[0, 0], self._missions.mean[0, 0], self._scans % 20
+        self._scans += 1
+        wall = 450, 405 + self._scans % 90  # a voxel of it turns out free
+        mean[wall], precision[wall] = 0.1, precision[wall] + 1.0
+        precision[455 + scan : 475 + scan, 455:475] += 1.0
+        mean[500 + scan, 400:420], precision[500 + scan, 400:420] = 0.1, 100.0 + self._scans
+        started = time.thread_time()
+        self.allotter.candidates.update(self._view, 0.5)
+        self.allotter.allot(self._view, [], [])
+        return 1e3 * (time.thread_time() - started)
+
+
+def _half_known(scenario: Scenario, solid: np.ndarray) -> Missions:
+    """A mission in which 500 × 1000 cells of a plan are known, but for patches."""
     missions = Missions(scenario, given=[World(scenario.grid, solid, "rooms")])
     missions.reset(0, 0)
     known = np.zeros(solid.shape, bool)
-    known[: _SIDE // 2] = True
+    known[: _SIDE // 2, :_SIDE] = True
     rng = np.random.default_rng(0)
     for x, y in rng.integers(0, _SIDE // 2, (170, 2)):  # and patches of it unknown
         known[x : x + 8, y : y + 8] = False
     missions.mean[0, 0] = np.where(known, solid, 0.5)
     missions.precision[0, 0] = np.where(known, 100.0, scenario.sigma_prior**-2)
     missions.state.robots[0, 0]["goal"][:2] = missions.state.robots[0, 0]["origin"][:2] = 46.0
-    view, kind = view_of(missions, 0, 0), scenario.kind_of(0)
-    search = new_search(scenario.grid.voxels)
-    allotter = Allotter(scenario, kind, Looking(spacing_m=3.0), Metric(), search, None, lazy)
-    taken = []
-    for scan in range(effort.rounds + 2):
-        near = slice(455 + scan % 20, 475 + scan % 20)
-        missions.precision[0, 0, near, 455:475] += 1.0
-        missions.mean[0, 0, 500 + scan % 20, 400:420] = 0.1
-        missions.precision[0, 0, 500 + scan % 20, 400:420] = 100.0
-        started = time.thread_time()
-        allotter.candidates.update(view, 0.5)
-        allotter.allot(view, [], [])
-        taken.append(1e3 * (time.thread_time() - started))
-    count = len(allotter.candidates.found()[0])
+    return missions
+
+
+def decision_row(effort: Effort, lazy: bool) -> Row:
+    """Milliseconds a decision on 1000 × 1000 cells."""
+    deciding = Deciding(lazy)
+    taken = [deciding.decide_ms() for _ in range(effort.rounds + 2)]
+    count = len(deciding.allotter.candidates.found()[0])
     job = f"a decision of per-time-visibility, 1000 × 1000, {count} candidates, "
     job += "as far as the choice needs" if lazy else "ways to all and V of each"
     return alone(job, taken[2:], "ms", Goal("<", 50.0, "ms"))
+
+
+def larger_row(effort: Effort) -> Row:
+    """The same in a map of four times as many cells, of which as much is known and as much changes."""
+    small, large = Deciding(True), Deciding(True, 2 * _SIDE)
+    pairs = np.array([(large.decide_ms(), small.decide_ms()) for _ in range(effort.rounds + 2)])[2:]
+    ours, theirs = (float(value) for value in np.median(pairs, axis=0))
+    ratio = float(np.median(pairs[:, 0] / pairs[:, 1]))
+    job = "a decision of per-time-visibility, 2000 × 2000, as much known and changed"
+    return Row(job, "1000 × 1000", ours, theirs, "ms", ratio, None, None)
 
 
 def visibility_row(effort: Effort) -> Row:
@@ -148,26 +178,34 @@ def visibility_row(effort: Effort) -> Row:
 
 def floor_row(effort: Effort, shape: tuple[int, int, int] = FLOOR) -> Row:
     """Seconds on the clock of a mission of three robots, until no frontier is left, on a cluttered floor."""
-    del effort  # minutes: once is enough
-    mission_s(_WARM)  # compiles
-    job = (
-        f"a mission of 3 robots on {shape[0]} × {shape[1]} cells, {_FLOOR_SHARE:.0%} covered, to no frontier"
-    )
-    return alone(job, [mission_s(shape)], "s", Goal("<", 60.0, "s"))
+    del effort  # a minute: once is enough
+    return mission_row("a cluttered floor", _floor(shape))
 
 
-def mission_s(shape: tuple[int, int, int]) -> float:
+def plan_row(file: Path) -> Row:
+    """The same in a plan from a file, at its own resolution."""
+    return mission_row(file.stem, load_world(file))
+
+
+def mission_row(name: str, world: World) -> Row:
+    """Seconds on the clock of a mission of three robots with lasers of 10 m, until no frontier is left."""
+    mission_s(_floor(_WARM))  # compiles
+    across, along, _ = world.grid.shape
+    job = f"a mission of 3 robots in {name}, {across} × {along} cells, to no frontier"
+    return alone(job, [mission_s(world)], "s", Goal("<", 60.0, "s"))
+
+
+def _floor(shape: tuple[int, int, int]) -> World:
+    return World(Grid(shape, _FLOOR_EDGE_M), cluttered(shape, _FLOOR_SHARE), "floor")
+
+
+def mission_s(world: World) -> float:
     """Seconds on the clock of such a mission, with the settings of Sawhney's experiment."""
     cell = world_cell("cluttered", 3, "ptv")
     assert isinstance(cell.record, Run)
-    settings = {
-        "grid": Grid(shape, _FLOOR_EDGE_M),
-        "sensor": {"max_range_m": 10.0},
-        "ending": {"time_limit_s": 1e5},
-    }
+    settings = {"grid": world.grid, "sensor": {"max_range_m": 10.0}, "ending": {"time_limit_s": 1e5}}
     scenario = with_settings(scripted(cell.scenario), settings)
-    floor = World(scenario.grid, cluttered(shape, _FLOOR_SHARE), "floor")
-    env, explorer = EntropyExploreEnv(scenario, world=floor), FrontierStrategy(cell.record.exploring)
+    env, explorer = EntropyExploreEnv(scenario, world=world), FrontierStrategy(cell.record.exploring)
     started = time.perf_counter()
     followed(env, explorer, 0)
     return time.perf_counter() - started

@@ -19,7 +19,7 @@ from typing import Any
 from baselines.claims_table import processor
 from baselines.command import parse, print_json, run_command
 from benchmarks.deciding import deciding_rows
-from benchmarks.exploring import exploring_rows
+from benchmarks.exploring import exploring_rows, plan_row
 from benchmarks.fusion import fusion_rows
 from benchmarks.learning import learning_rows
 from benchmarks.peers import load_octomap, load_spread
@@ -71,6 +71,8 @@ class Args:
     """Measure no more than what this word is in the title of, such as learning."""
     strict: bool = False
     """Exit with 1 if a goal does not hold."""
+    plan: Path | None = None
+    """A plan's file, such as warehouse.yaml, for three robots to explore as well."""
     out: Path | None = None
     """A Markdown file for the table."""
 
@@ -80,6 +82,8 @@ def main(words: Sequence[str]) -> int:
     args = parse(Args, words, description=__doc__)
     if args.out is not None and (args.out.is_dir() or not _parent_exists(args.out)):
         raise SettingError("out", str(args.out), "a file in a folder that exists")
+    if args.plan is not None and not args.plan.is_file():
+        raise SettingError("plan", str(args.plan), "a file")
     jobs = [(title, job) for title, job in JOBS if args.only is None or args.only in title]
     if not jobs:
         raise SettingError("only", args.only, "a word of one of: " + "; ".join(title for title, _ in JOBS))
@@ -90,6 +94,8 @@ def main(words: Sequence[str]) -> int:
     for number, (title, job) in enumerate(jobs, start=1):
         print(f"[{number}/{len(jobs)}] {title} …", file=sys.stderr, flush=True)
         rows += job(QUICK if args.quick else FULL)
+        if job is exploring_rows and args.plan is not None:
+            rows.append(plan_row(args.plan))
     about = {**machine(), "command": " ".join(["python -m benchmarks.speed", *words])}
     if args.out is not None:
         write_atomically(args.out, markdown(about, rows))

@@ -1,12 +1,16 @@
 """How kernels are compiled, and when compiled code on disk is forgotten.
 
 Numba compiles a kernel anew when its own file changes, but not when a kernel that it calls changes in
-another file: after an update, or an edit, old and new code would mix without a word.
+another file: after an update, or an edit, old and new code would mix without a word. And two processes that
+compile a kernel for different types at the same time may give both the same file: here every file has a name
+of its own.
 """
 
 from __future__ import annotations
 
 import hashlib
+import secrets
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -15,14 +19,29 @@ from numba import njit
 _OPTIONS: dict[str, Any] = {"cache": True, "nogil": True, "error_model": "numpy"}
 _LEAN_OPTIONS: dict[str, Any] = {**_OPTIONS, "_nrt": False}
 
-kernel = njit(**_OPTIONS)
+
+def _compiled(**options: Any) -> Callable[[Callable[..., Any]], Any]:  # noqa: ANN401 - a dispatcher, or the function
+    """`njit` whose code on disk no other process writes over."""
+
+    def decorate(function: Callable[..., Any]) -> Any:  # noqa: ANN401
+        dispatcher = njit(**options)(function)
+        files = getattr(getattr(dispatcher, "_cache", None), "_cache_file", None)
+        if files is not None:
+            numbered = files._data_name
+            files._data_name = lambda number: f"{secrets.token_hex(4)}.{numbered(number)}"
+        return dispatcher
+
+    return decorate
+
+
+kernel = _compiled(**_OPTIONS)
 """Compiled once and kept on disk; other threads run meanwhile; a division by zero gives inf or nan."""
-lean_kernel = njit(**_LEAN_OPTIONS)
+lean_kernel = _compiled(**_LEAN_OPTIONS)
 """A kernel that makes no array and so counts no references: each row that it slices would cost a count.
 
 Numba refuses to compile one that does make an array.
 """
-inlined_kernel = njit(**_LEAN_OPTIONS, forceinline=True)
+inlined_kernel = _compiled(**_LEAN_OPTIONS, forceinline=True)
 """A lean kernel for what happens once a ray: it becomes part of each kernel that calls it."""
 
 
@@ -45,8 +64,9 @@ def forget_stale_kernels(folder: Path, *others: Path) -> None:
     try:
         if seen.is_file() and seen.read_text() == hasher.hexdigest():
             return
-        for index in folder.rglob("__pycache__/*.nbi"):
-            index.unlink(missing_ok=True)
+        for kind in ("nbi", "nbc"):
+            for file in folder.rglob(f"__pycache__/*.{kind}"):
+                file.unlink(missing_ok=True)
         seen.parent.mkdir(exist_ok=True)
         seen.write_text(hasher.hexdigest())
     except OSError:

@@ -81,3 +81,17 @@ def test_a_lean_kernel_makes_no_array():
 
     with pytest.raises(NumbaError, match="Only accept returning of array passed into the function"):
         careless()
+
+
+def test_compiled_code_has_a_file_of_its_own(tmp_path):
+    """Two processes that save at the same time must not write to one file: none is a number alone."""
+    package = tmp_path / "kernels"
+    package.mkdir()
+    (package / "__init__.py").write_text("")
+    (package / "leaf.py").write_text(LEAF.format("10.0"))
+    (package / "caller.py").write_text(CALLER + "print(caller(1))\n")
+    assert answer(tmp_path) == "11.0\n11.0"
+    files = [file.name for file in package.rglob("*.nbc") if ".caller-" in file.name]
+    assert len(files) == 2 and len({name.split(".")[0] for name in files}) == 2
+    assert answer(tmp_path) == "11.0\n11.0"
+    assert sorted(files) == sorted(file.name for file in package.rglob("*.nbc") if ".caller-" in file.name)

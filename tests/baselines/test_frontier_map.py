@@ -19,7 +19,7 @@ from baselines.frontier_map import (
 from tests.reference import sawhney as reference
 from tests.reference.scenes import drawn, seeds
 
-LEVELS = (4.0, 1.0)
+LEVELS, FINER = (np.float32(4.0), np.float32(1.0)), (np.float32(8.0), np.float32(1.0))
 SHAPES = ((7, 11, 1), (9, 6, 1), (4, 7, 5), (13, 2, 3))
 
 
@@ -47,7 +47,7 @@ def test_candidates_and_rates_are_those_of_the_definition_after_every_change(sha
     layer = 0 if shape[2] == 1 else None
     frontiers = new_frontier_map(shape, radius, layer, spacing)
     mean, precision = random_map(shape, rng)
-    for levels in (LEVELS, LEVELS, (8.0, 1.0), (8.0, 1.0)):
+    for levels in (LEVELS, LEVELS, FINER, FINER):
         updated(frontiers, mean, precision, levels)
         state = state_of(mean, precision, levels)
         np.testing.assert_array_equal(frontiers.state.reshape(shape), state)
@@ -100,17 +100,17 @@ def test_a_corridor_by_hand():
 
 
 def test_what_turned_out_free_is_noted_by_hand():
-    """Of three covered voxels one becomes free, one stays, one is not mapped any more at a finer level."""
+    """Of twelve covered voxels one becomes free; then all are asked for at a finer level."""
     shape = (4, 3, 1)
     mean, precision = np.full(12, 0.9, np.float32), np.full(12, 9.0, np.float32)
     frontiers = new_frontier_map(shape, 0.0, 0, 2)
     take_in(frontiers, mean, precision, LEVELS)
-    assert frontiers.openings[0] == 0
+    assert frontiers.opened_count[0] == 0
     mean[7], precision[7] = 0.1, 10.0
     take_in(frontiers, mean, precision, LEVELS)
-    assert frontiers.openings[0] == 1 and frontiers.opened[0] == 7
-    take_in(frontiers, mean, precision, (16.0, 1.0))
-    assert frontiers.openings[0] > OPENED  # all is unexplored again: more may be seen anywhere
+    assert frontiers.opened_count[0] == 1 and frontiers.opened[0] == 7
+    take_in(frontiers, mean, precision, (np.float32(16.0), np.float32(1.0)))
+    assert frontiers.opened_count[0] > OPENED  # all is unexplored again: more may be seen anywhere
 
 
 def test_more_openings_than_are_noted():
@@ -120,8 +120,8 @@ def test_more_openings_than_are_noted():
     take_in(frontiers, mean, precision, LEVELS)
     mean[:OPENED], precision[:OPENED] = 0.1, 10.0
     take_in(frontiers, mean, precision, LEVELS)
-    assert frontiers.openings[0] == OPENED
+    assert frontiers.opened_count[0] == OPENED
     np.testing.assert_array_equal(frontiers.opened, np.arange(OPENED))
     mean[OPENED], precision[OPENED] = 0.1, 10.0
     take_in(frontiers, mean, precision, LEVELS)
-    assert frontiers.openings[0] == OPENED + 1
+    assert frontiers.opened_count[0] == OPENED + 1

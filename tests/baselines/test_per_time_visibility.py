@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import itertools
 import math
 
@@ -10,6 +11,7 @@ import pytest
 
 from baselines.frontier_allotment import under_way
 from baselines.frontier_candidates import Looking, VoxelCandidates
+from baselines.frontier_map import COVERED, NONE
 from baselines.frontier_rivals import Coordinated, Nearest
 from baselines.mission import run_mission, scripted
 from baselines.papers.sawhney_missions import followed
@@ -21,6 +23,7 @@ from entropy_explore_env.errors import SettingError
 from entropy_explore_env.missions.state import MissionEnd
 from entropy_explore_env.missions.view import view_of
 from entropy_explore_env.reports.metrics import joint_figures, mission_figures
+from entropy_explore_env.robots.motion import driving_time
 from entropy_explore_env.scenarios import BOX, find_scenario
 from entropy_explore_env.settings import Grid
 from tests.reference import sawhney as reference
@@ -93,6 +96,38 @@ def test_lazily_is_as_eagerly_over_terrain(settings):
     _, lazy, done = explored(small_terrain(), 2, **settings)
     _, eager, same = explored(small_terrain(), 2, lazy=False, **settings)
     assert done == same and lazy.counted() < eager.counted()
+
+
+@pytest.mark.parametrize(("seed", "finest"), [(753, 0.2), (89, 0.05)])
+def test_bounds_stay_bounds_through_a_noisy_mission(monkeypatch, seed, finest):
+    """After every update no kept count is less than a new one, through walls that turn out free, too."""
+    opened, levels, update = [], set(), VoxelCandidates.update
+
+    def checked(self, view, sigma):
+        before = self._map.state.copy()
+        update(self, view, sigma)
+        opened.append(np.count_nonzero(before & COVERED > self._map.state & COVERED))
+        levels.add(sigma)
+        slots = np.flatnonzero((self._map.voxel != NONE) & np.isfinite(self._map.seen))
+        bounds = self._map.seen[slots].copy()
+        kept = self._map.seen.copy()
+        self.count(slots, self._map.voxel[slots])
+        assert (bounds >= self._map.seen[slots]).all()
+        self._map.seen[:] = kept
+
+    monkeypatch.setattr(VoxelCandidates, "update", checked)
+    noisy = {"max_range_m": 1.5, "angular_step_rad": math.pi / 90, "scan_time_s": 2.0, "range_noise_m": 0.3}
+    explored(small_plan(sensor=noisy), seed, allotment="synchronous", finest_sigma=finest)
+    assert max(opened) > 5 and len(levels) > 1
+
+
+@pytest.mark.parametrize("allotment", ["asynchronous", "synchronous"])
+def test_all_is_explored_with_lost_and_unheard_messages(allotment):
+    """Decentralised: a third of the messages lost, none heard beyond 3 m, few measurements in each."""
+    channel = {"burst": 30, "i_min_bits": 0.0, "loss_probability": 0.3, "range_m": 3.0}
+    env, explorer, done = explored(small_plan(channel=channel), 4, allotment=allotment)
+    assert all(explorer.idle) and done[1][-1] > 0.97
+    assert mission_figures(env.missions, 0)["t_mission_s"] < 900.0
 
 
 @pytest.mark.parametrize("allotment", ["asynchronous", "synchronous"])
@@ -215,6 +250,12 @@ def test_promises_stand_until_the_scan_is_heard():
     seen["heard_s"] = 6.0
     view = view_of(missions, 0, 1)
     assert not under_way(view, view.teammates[0], 0)
+    seen["announced_s"] = seen["heard_s"] = 6.0
+    kind, longest_m = missions.scenario.kind_of(0), sum(missions.grid.size_m)
+    drive_s = driving_time(longest_m, kind.robot.max_speed_m_s, kind.robot.acceleration_m_s2)
+    for late_s, lost in ((1.9 * drive_s, False), (2.1 * drive_s + kind.sensor.scan_time_s, True)):
+        view = dataclasses.replace(view_of(missions, 0, 1), time_s=6.0 + late_s)
+        assert under_way(view, view.teammates[0], 0) is not lost
     seen["announced_s"] = seen["heard_s"] = -1.0
     assert sent(missions)[1] == 2
 
@@ -311,6 +352,10 @@ def test_bodies_and_a_short_reach_explore_an_office():
         (Exploring, {"allotment": "central"}, "Exploring.allotment"),
         (Exploring, {"finest_sigma": 0.6}, "Exploring.finest_sigma"),
         (Exploring, {"promises": 1}, "Exploring.promises"),
+        (Exploring, {"metric": None}, "Exploring.metric"),
+        (Exploring, {"metric": "V/t"}, "Exploring.metric"),
+        (Exploring, {"metric": Metric}, "Exploring.metric"),
+        (FrontierStrategy, {"exploring": "V/t"}, "exploring"),
         (Looking, {"sigma": 0.0}, "Looking.sigma"),
         (Looking, {"spacing_m": 0.0}, "Looking.spacing_m"),
         (Looking, {"visibility": "all"}, "Looking.visibility"),

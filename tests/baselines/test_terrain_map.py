@@ -32,7 +32,7 @@ from baselines.terrain_view import (
 from tests.reference import sawhney as reference
 from tests.reference.scenes import drawn, seeds
 
-LEVELS = (4.0, 4.0)
+LEVELS = np.float32(4.0), np.float32(4.0)
 SHAPE = (9, 13, 8)
 CEILING = 7
 

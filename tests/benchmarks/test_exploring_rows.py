@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import numpy as np
+from PIL import Image
+
 from benchmarks import exploring
 from benchmarks.exploring import dense_plan, exploring_rows, rooms_plan
 from benchmarks.rows import Effort
@@ -22,6 +25,16 @@ def test_rows_are_positive_and_have_goals(monkeypatch):
     small = exploring.floor_row
     monkeypatch.setattr(exploring, "floor_row", lambda effort: small(effort, (90, 70, 1)))
     rows = exploring_rows(Effort(rounds=1, long_rounds=1, steps=3))
-    assert len(rows) == 5 and all(row.ours > 0.0 and row.goal for row in rows)
+    assert len(rows) == 6 and all(row.ours > 0.0 for row in rows)
+    assert all(row.goal for row in (*rows[:3], *rows[4:]))
+    assert rows[3].ratio == rows[3].ours / rows[3].theirs  # of the only round
     for row in rows[1:3]:
         assert 200 <= int(row.job.split(" candidates")[0].split()[-1]) <= 400
+
+
+def test_a_plan_from_a_file_is_explored_at_its_own_resolution(tmp_path):
+    plan = np.full((40, 50), 255, np.uint8)
+    plan[:2] = plan[-2:] = plan[:, :2] = plan[:, -2:] = plan[:25, 22:26] = 0
+    Image.fromarray(plan).save(tmp_path / "hall.png")
+    row = exploring.plan_row(tmp_path / "hall.png")
+    assert "in hall, 50 × 40 cells" in row.job and 0.0 < row.ours < 60.0 and row.holds

@@ -221,6 +221,7 @@ def test_the_command_writes_a_report_and_goes_on_where_it_was(tmp_path, monkeypa
         (["--teams", "1", "7"], "teams"),
         (["--teams", "3", "3"], "teams"),
         (["--maps", "no"], "maps"),
+        (["--maps", "pyproject.toml", "./pyproject.toml"], "maps"),
     ],
 )
 def test_what_is_refused(words, complaint, capsys):
