@@ -93,11 +93,11 @@ def figure_times(records: Records, part: str) -> tuple[Figure, Table]:
         axes.set(xlabel="robots", xticks=teams)
         axes.legend(frameon=False, fontsize=7, ncols=2 if axes is left else 1)
     left.set_ylabel("simulated seconds to 95 %")
-    number = "6" if part == "plans" else "8"
-    names = (
-        f"Figs. {number} and {'4.1' if part == 'plans' else '10'}, {PARTS[part]}: mean times over all worlds"
+    left.set_title("V - βt and V/t: fig. " + ("6" if part == "plans" else "8"), fontsize=9)
+    right.set_title(
+        "allotment and V: " + ("sect. 4.1" if part == "plans" else "sect. 4.1 and fig. 10"), fontsize=9
     )
-    figure.suptitle(names, fontsize=10)
+    figure.suptitle(f"{PARTS[part]}: mean times over all worlds", fontsize=10)
     return figure, table
 
 

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import matplotlib as mpl
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.colors import LightSource, to_rgb
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
 
 from baselines.experiment import Cell
 from baselines.figures import COLOURS, extent_of
@@ -35,7 +38,15 @@ _MARKS = (0.15, 0.45, 0.75, 1.0)
 _EXAMPLE_T, _EXAMPLE_V = range(1, 11), range(2, 21, 2)
 _FIRST = 10
 """So many of the options are what a metric goes for (sect. 2)."""
-_UNKNOWN, _FREE, _WALL, _EDGE = "#c3c7cf", "#ffffff", "#27408b", "#e02020"
+_UNKNOWN, _FREE, _WALL, _EDGE, _EXPECTED = "#c3c7cf", "#ffffff", "#27408b", "#e02020", "#f5d90a"
+_PLAN_KEY = {"unexplored": _UNKNOWN, "free": _FREE, "wall": _WALL, "frontier": _EDGE}
+_TERRAIN_KEY = {
+    "unexplored": "0.5",
+    "explored": "#7fb966",
+    "expected to be seen from where robots go": _EXPECTED,
+    "frontier": _EDGE,
+}
+"""Name → colour."""
 
 
 class Shown(NamedTuple):
@@ -119,7 +130,7 @@ def figure_options() -> tuple[Figure, list[OptionMeans]]:
     ]
     _draw_options(axes[3], seconds, seen, [*chosen, ("V/t", first_options(Metric(), seconds, seen))])
     axes[3].set(title="ours: hybrid, half explored", xlabel="t (s)", ylabel="V (m²)")
-    axes[3].legend(frameon=False, fontsize=7, loc="center")
+    figure.legend(*axes[3].get_legend_handles_labels(), loc="outside lower right", ncols=3, frameon=False)
     for panel in axes:
         panel.title.set_size(9)
     figure.suptitle("Fig. 1: the first ten options of each metric", fontsize=10)
@@ -131,7 +142,9 @@ def _draw_options(
 ) -> None:
     axes.plot(seconds, seen, ".", color="0.75", markersize=5)
     for number, (name, first) in enumerate(chosen):
-        style: dict[str, Any] = {"color": COLOURS[number], "markersize": 8 - 2.5 * number, "linewidth": 0.7}
+        size = 9 - 3 * number if len(chosen) > 1 else 7  # around each other where metrics agree
+        style: dict[str, Any] = {"color": COLOURS[number], "markersize": size, "linewidth": 0.7}
+        style |= {"markerfacecolor": "none", "markeredgewidth": 1.3} if len(chosen) > 1 else {}
         axes.plot(seconds[first], seen[first], "o-", label=name, **style)
 
 
@@ -187,6 +200,7 @@ def figure_plan(cell: Cell, title: str) -> Figure:
         _show(axes, _plan_colours(now.chart), cell.scenario.grid, now.ways_m)
         axes.set_title(f"{now.time_s:.0f} s, {now.share:.0%} explored", fontsize=8)
     figure.suptitle(title, fontsize=10)
+    _explain(figure, _PLAN_KEY)
     return figure
 
 
@@ -208,11 +222,12 @@ def figure_terrain(cell: Cell, title: str) -> Figure:
     green = _shaded(heights, "summer", grid.voxel_size_m)
     for axes, now in zip(panels, taken, strict=True):
         picture = np.where(now.chart.mapped[..., None], green, 0.25 + 0.5 * grey)
-        picture[now.expected & ~now.chart.mapped] = to_rgb("#f5d90a")
+        picture[now.expected & ~now.chart.mapped] = to_rgb(_EXPECTED)
         picture[now.chart.edge] = to_rgb(_EDGE)
         _show(axes, picture, grid, now.ways_m)
         axes.set_title(f"{now.time_s:.0f} s, {now.share:.0%} explored", fontsize=8)
     figure.suptitle(title, fontsize=10)
+    _explain(figure, _TERRAIN_KEY)
     return figure
 
 
@@ -225,7 +240,8 @@ def figure_ways(cells: Sequence[tuple[str, Cell]]) -> Figure:
             length_m = float(np.linalg.norm(np.diff(now.ways_m[0], axis=0), axis=1).sum())
             until = "no frontier" if now.finished else f"{now.share:.0%}"
             axes.set_title(f"{name}, to {until}: {now.time_s:.0f} s, {length_m:.0f} m", fontsize=8)
-    figure.suptitle("Figs. 11-12: the way of one robot, ○ start, □ end", fontsize=10)
+    figure.suptitle("Figs. 11-12: the way of one robot", fontsize=10)
+    _explain(figure, _PLAN_KEY)
     return figure
 
 
@@ -263,7 +279,7 @@ def figure_section(cell: Cell) -> Figure:
     assumed = np.maximum(1.0 - np.abs(across - across[x]) / reach_m, 0.0) * average
     assumed[np.abs(across - across[x]) > reach_m] = np.nan
     assumed[~np.isnan(known)] = np.nan
-    figure = Figure(figsize=(9.6, 3.4), layout="constrained")
+    figure = Figure(figsize=(9.6, 3.8), layout="constrained")
     axes = figure.subplots()
     axes.fill_between(across, 0.0, ground, color="0.85", step="mid", label="ground")
     axes.step(across, known, where="mid", color="#1a7f37", linewidth=2.2, label="explored")
@@ -284,8 +300,16 @@ def figure_section(cell: Cell) -> Figure:
     axes.plot(
         across[x], eye, "s", color=COLOURS[1], markeredgecolor="k", markersize=7, label="UAV, what it sees"
     )
+    wide = across[[max(x - patch, 0), min(x + patch, len(across) - 1)]]
+    axes.plot(wide, [average, average], "k", linewidth=1.2, label="z_av, mean ground nearby")
+    for aside, low, name in ((-1.2, average, "z_f - z_av"), (1.2, 0.0, "z_f")):
+        place, arrow = across[x] + aside, {"arrowstyle": "<->", "linewidth": 0.9, "shrinkA": 0, "shrinkB": 0}
+        axes.annotate("", (place, low), (place, eye), arrowprops=arrow)
+        axes.text(
+            place + 0.4 * aside, max(low - 1.2, 5.0), name, fontsize=8, ha="right" if aside < 0 else "left"
+        )
     axes.set(xlabel="x (m)", ylabel="height (m)", aspect="equal", xlim=(across[0], across[-1]))
-    figure.legend(*axes.get_legend_handles_labels(), loc="outside lower center", ncols=5, frameon=False)
+    figure.legend(*axes.get_legend_handles_labels(), loc="outside lower center", ncols=3, frameon=False)
     figure.suptitle("Figs. 2-4: a section through a mission over `terrain`", fontsize=10)
     return figure
 
@@ -328,9 +352,20 @@ def _shaded(heights: np.ndarray, colours: str, edge_m: float) -> np.ndarray:
     return light.shade_rgb(flat, heights.astype(float) * edge_m, blend_mode="soft", fraction=0.9)
 
 
+def _explain(figure: Figure, key: Mapping[str, str]) -> None:
+    """Below a figure, what its colours and marks are."""
+    handles: list[Artist] = [
+        Patch(facecolor=colour, edgecolor="0.5", linewidth=0.5, label=name) for name, colour in key.items()
+    ]
+    for marker, name in (("o", "start of a way"), ("s", "robot")):
+        style: dict[str, Any] = {"color": "0.6", "markeredgecolor": "k", "linestyle": "none", "markersize": 4}
+        handles.append(Line2D([], [], marker=marker, label=name, **style))
+    figure.legend(handles=handles, loc="outside lower center", ncols=len(handles), frameon=False, fontsize=7)
+
+
 def _panels(count: int, size_m: np.ndarray, width: float = 2.7) -> tuple[Figure, Sequence[Axes]]:
     """A figure with panels side by side, as high as the world asks for."""
-    figure = Figure(figsize=(width * count, width * float(size_m[1] / size_m[0]) + 0.7), layout="constrained")
+    figure = Figure(figsize=(width * count, width * float(size_m[1] / size_m[0]) + 0.9), layout="constrained")
     return figure, figure.subplots(1, count, squeeze=False)[0]
 
 
