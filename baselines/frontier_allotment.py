@@ -59,8 +59,11 @@ class Choice:
     """A candidate that was allotted to a robot."""
 
     slot: int
+    """Of the candidate in its map."""
     voxel: int
+    """In which it lies."""
     value: float
+    """By the metric."""
     seconds: float
     """Of travel and scan."""
 
@@ -98,7 +101,17 @@ class Allotter:
         ceiling: np.ndarray | None,
         lazy: bool,
     ) -> None:
-        """Nothing is explored yet."""
+        """Nothing is explored yet.
+
+        Args:
+            scenario: The mission's settings.
+            kind: Of the robot.
+            looking: Where candidates lie, and how V is counted.
+            value: The metric.
+            search: Working space for ways.
+            ceiling: (X, Y) the exposure surface in layers; None = candidates are voxels.
+            lazy: Whether candidates are counted only as far as a choice needs.
+        """
         self._value, self._lazy, self.search = value, lazy, search
         self._edge, self._scenario = scenario.grid.voxel_size_m, scenario
         layer = scenario.layer_of(kind.robot)

@@ -1,10 +1,11 @@
 """Frontier candidates of a belief, kept up to date as it changes: where mapped space ends (Yamauchi 1998).
 
 A voxel is explored once its σ has fallen to a stated level. A body may stand where all that it touches is
-explored and believed free: the mapped region, whose connected part is left to the search for ways. On its
-edge lie voxels that are explored and free beside unexplored ones; a candidate is a voxel in which the body
-may stand and touches the edge. Of each block of voxels, as wide as the sampling's
-spacing, the candidate nearest to its middle stands for all. Grid units; voxels by number, C order.
+explored at the first such level and believed free: the mapped region, whose connected part is left to the
+search for ways. On its edge lie free voxels beside unexplored ones; where a finer level counts now, also those
+that are unexplored themselves. A candidate is a voxel in which the body may stand and touches the edge. Of each
+block of voxels, as wide as the sampling's spacing, the candidate nearest to its middle stands for all. Grid
+units; voxels by number, C order.
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ STOPS_RAYS = 3
 """States above this do."""
 
 EDGE = 1
-"""Explored, free, and beside an unexplored voxel."""
+"""Mapped and free, and itself unexplored at the level that counts now, or beside such a voxel."""
 CANDIDATE = 2
 SPENT = 4
 """A scan was taken here: no candidate any more."""

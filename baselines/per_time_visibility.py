@@ -176,7 +176,7 @@ class FrontierStrategy:
         self.journeys = list[Journey]()
 
     def choose(self, views: Sequence[RobotView]) -> list[np.ndarray]:
-        """The viewpoint of each view, by its own belief and what it has heard."""
+        """(5,) viewpoint of each view, map frame, by its own belief and what it has heard."""
         return [self._choose(view) for view in views]
 
     def mapped_share(self) -> float:

@@ -3,8 +3,8 @@
 Points are columns. A column is explored once the voxel of its surface is: the highest one that is known and
 believed covered, with a known free one above it. Robots may be between the ground and the exposure surface of
 explored columns, whether or not a ray went through that air. On the edge lie explored columns beside
-unexplored ones; of each block of columns the candidate nearest to its middle stands for all, at several
-heights (sect. 3.2). Grid units: heights are in layers.
+unexplored ones (see frontier_map.py); of each block of columns the candidate nearest to its middle stands for
+all, at several heights (sect. 3.2). Grid units: heights are in layers.
 """
 
 from __future__ import annotations

@@ -249,13 +249,10 @@ def _betas_table(records: Records, part: str) -> str:
     rows, areas_m2 = [], {world: visible_area_m2(world) for world in plans}
     for n in teams_in(records, part):
         best = [best_beta(records, part, end, teams=(n,)) for end in ENDS]
-        shown = f"{_discovered(records, n, areas_m2):.1f}" if areas_m2 else "-"
-        rows.append([str(n), *(str(beta) for beta in best), shown])
-    head = [
-        "robots",
-        *(f"best β {text}" for text in ENDS.values()),
-        "discovered a robot and second, same unit",
-    ]
+        shown = [f"{_discovered(records, n, areas_m2):.1f}"] if areas_m2 else []
+        rows.append([str(n), *(str(beta) for beta in best), *shown])
+    head = ["robots", *(f"best β {text}" for text in ENDS.values())]
+    head += ["discovered a robot and second, same unit, with the areas of seed 0"] if areas_m2 else []
     return markdown_table(head, rows)
 
 
