@@ -2,10 +2,10 @@
 
 A voxel is explored once its σ has fallen to a stated level. A body may stand where all that it touches is
 explored at the first such level and believed free: the mapped region, whose connected part is left to the
-search for ways. On its edge lie free voxels beside unexplored ones; where a finer level counts now, also those
-that are unexplored themselves. A candidate is a voxel in which the body may stand and touches the edge. Of each
-block of voxels, as wide as the sampling's spacing, the candidate nearest to its middle stands for all. Grid
-units; voxels by number, C order.
+search for ways. On its edge lie free voxels beside unexplored ones; where a finer level counts now, also
+those that are unexplored themselves. A candidate is a voxel in which the body may stand and touches the
+edge. Of each block of voxels, as wide as the sampling's spacing, the candidate nearest to its middle stands
+for all. Grid units; voxels by number, C order.
 """
 
 from __future__ import annotations
