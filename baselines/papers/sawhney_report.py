@@ -108,7 +108,8 @@ def _text(records: Records, claims: Sequence[Claim], command: str) -> str:
     changed = [part for part in PARTS if changes_in(records, part)]
     if changed:
         parts += ["## One thing changed at a time", _CHANGED]
-        parts += [_causes_table(records, part) for part in changed]
+        for part in changed:
+            parts += [_causes_table(records, part), _changed_worlds_table(records, part)]
         parts += [_changes_table(records, part) for part in changed]
     return "\n\n".join(part.strip() for part in parts) + "\n"
 
@@ -214,7 +215,7 @@ whole interval is below 1. The best β is chosen from the same missions, which f
 the extremes; only where worlds have their own, others judge."""
 
 _MAPS = f"""Teams of {MAP_TEAM}, the settings of the other plans, cells resampled to 0.1 m, up to
-{MAP_STARTS} starts; mean times with 95 % intervals, and seconds of computing a mission on one thread."""
+{MAP_STARTS} starts; mean times with 95 % intervals, and median seconds of computing on one thread."""
 
 _CHANGED = f"""Teams of {CHANGED_TEAM}, V/t over another method. "Holds with" lists the changes with which
 V/t is faster, and faster against the same method than it is without (95 % intervals of the ratio, and of
@@ -282,6 +283,19 @@ def _causes_table(records: Records, part: str) -> str:
             listed = "; ".join(causes) or "none that was tried"
             rows.append([f"{name}, {text}", _interval(ratio), "holds as it is" if ratio[2] < 1.0 else listed])
     return markdown_table([f"{PARTS[part]}, V/t is faster than", "as it is", "holds with"], rows)
+
+
+def _changed_worlds_table(records: Records, part: str) -> str:
+    """V/t over the faster of the two β to 95 %, in every world, as it is and with one thing changed."""
+    rows, changes = [], changes_in(records, part)
+    worlds = next(iter(changes.values()))
+    for change in (None, *changes):
+        found = []
+        for world in worlds:
+            rival = next(iter(_rivals(records, part, change, "t95_s", (world,)).values()))
+            found.append(_interval(changed_ratio(records, change, rival, "t95_s", (world,))))
+        rows.append(["as it is" if change is None else CHANGES[part][change].text, *found])
+    return markdown_table([f"{PARTS[part]}, V/t over the faster β, to 95 %", *worlds], rows)
 
 
 def _rivals(

@@ -118,6 +118,9 @@ def test_causes_are_the_changes_with_which_a_claim_holds():
     assert all("| a scan takes 8 s: 0.6" in row and row.count(":") == 1 for row in rows["`sync`"])
     assert all("holds as it is" in row for row in rows["`naive`"])
     assert all("none that was tried" in row for row in rows["beta-5"])  # β = 20 is as fast as V/t
+    table = sawhney_report._changed_worlds_table(records, "plans").splitlines()
+    ratios = [float(row.split("|")[2].split()[0]) for row in table[2:]]
+    assert ratios == pytest.approx([1.11, 1.0, 1.0, 1.43, 1.0, 1.0], abs=0.03)
     table = sawhney_report._changes_table(records, "plans").splitlines()
     row = next(row for row in table if row.startswith("| a scan takes 8 s | V/t over `sync`"))
     cells = [cell.strip() for cell in row.split("|")[3:-1]]
