@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import time
-from pathlib import Path
 
 import numpy as np
 
@@ -26,7 +25,6 @@ from entropy_explore_env.missions.missions import Missions
 from entropy_explore_env.missions.view import view_of
 from entropy_explore_env.scenarios import find_scenario
 from entropy_explore_env.settings import Grid
-from entropy_explore_env.worlds.load import load_world
 from entropy_explore_env.worlds.world import World
 
 PUBLISHED_STEPS_S = 10.0
@@ -180,11 +178,6 @@ def floor_row(effort: Effort, shape: tuple[int, int, int] = FLOOR) -> Row:
     """Seconds on the clock of a mission of three robots, until no frontier is left, on a cluttered floor."""
     del effort  # a minute: once is enough
     return mission_row("a cluttered floor", _floor(shape))
-
-
-def plan_row(file: Path) -> Row:
-    """The same in a plan from a file, at its own resolution."""
-    return mission_row(file.stem, load_world(file))
 
 
 def mission_row(name: str, world: World) -> Row:

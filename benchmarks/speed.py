@@ -19,7 +19,7 @@ from typing import Any
 from baselines.claims_table import processor
 from baselines.command import parse, print_json, run_command
 from benchmarks.deciding import deciding_rows
-from benchmarks.exploring import exploring_rows, plan_row
+from benchmarks.exploring import exploring_rows, mission_row
 from benchmarks.fusion import fusion_rows
 from benchmarks.learning import learning_rows
 from benchmarks.peers import load_octomap, load_spread
@@ -29,6 +29,7 @@ from benchmarks.startup import startup_rows
 from benchmarks.stepping import profile_rows, spread_rows, vector_rows
 from benchmarks.world_size import size_rows
 from entropy_explore_env.errors import SettingError
+from entropy_explore_env.worlds.load import load_world
 from entropy_explore_env.writing import write_atomically
 
 GOAL_MISSED = 1
@@ -82,8 +83,7 @@ def main(words: Sequence[str]) -> int:
     args = parse(Args, words, description=__doc__)
     if args.out is not None and (args.out.is_dir() or not _parent_exists(args.out)):
         raise SettingError("out", str(args.out), "a file in a folder that exists")
-    if args.plan is not None and not args.plan.is_file():
-        raise SettingError("plan", str(args.plan), "a file")
+    plan = None if args.plan is None else load_world(args.plan)
     jobs = [(title, job) for title, job in JOBS if args.only is None or args.only in title]
     if not jobs:
         raise SettingError("only", args.only, "a word of one of: " + "; ".join(title for title, _ in JOBS))
@@ -94,8 +94,8 @@ def main(words: Sequence[str]) -> int:
     for number, (title, job) in enumerate(jobs, start=1):
         print(f"[{number}/{len(jobs)}] {title} …", file=sys.stderr, flush=True)
         rows += job(QUICK if args.quick else FULL)
-        if job is exploring_rows and args.plan is not None:
-            rows.append(plan_row(args.plan))
+        if job is exploring_rows and args.plan is not None and plan is not None:
+            rows.append(mission_row(args.plan.stem, plan))
     about = {**machine(), "command": " ".join(["python -m benchmarks.speed", *words])}
     if args.out is not None:
         write_atomically(args.out, markdown(about, rows))

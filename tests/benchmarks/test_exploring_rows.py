@@ -8,6 +8,7 @@ from PIL import Image
 from benchmarks import exploring
 from benchmarks.exploring import dense_plan, exploring_rows, rooms_plan
 from benchmarks.rows import Effort
+from entropy_explore_env.worlds.load import load_world
 
 
 def test_a_scan_has_720_rays_on_480_by_640():
@@ -36,5 +37,5 @@ def test_a_plan_from_a_file_is_explored_at_its_own_resolution(tmp_path):
     plan = np.full((40, 50), 255, np.uint8)
     plan[:2] = plan[-2:] = plan[:, :2] = plan[:, -2:] = plan[:25, 22:26] = 0
     Image.fromarray(plan).save(tmp_path / "hall.png")
-    row = exploring.plan_row(tmp_path / "hall.png")
+    row = exploring.mission_row("hall", load_world(tmp_path / "hall.png"))
     assert "in hall, 50 × 40 cells" in row.job and 0.0 < row.ours < 60.0 and row.holds

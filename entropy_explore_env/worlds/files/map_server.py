@@ -124,7 +124,7 @@ def _origin(about: dict[str, Any]) -> tuple[float, float, float]:
 
 
 def _image(path: Path, about: dict[str, Any]) -> Path:
-    """The image's path, which must lie in the YAML's folder, links followed."""
+    """The image's path, which must lie in the YAML's folder, or in that of the file which it links to."""
     name, allowed = about["image"], "a map whose image is a .pgm or .png in the YAML's folder"
     if not isinstance(name, str) or "\0" in name:
         raise RefusedError(allowed)
@@ -132,6 +132,6 @@ def _image(path: Path, about: dict[str, Any]) -> Path:
         raise RefusedError(allowed)
     folder = path.parent.resolve()
     image = (folder / name).resolve()
-    if not image.is_relative_to(folder):
+    if not any(image.is_relative_to(allowed_in) for allowed_in in (folder, path.resolve().parent)):
         raise RefusedError(allowed)
     return image

@@ -92,6 +92,16 @@ def test_an_image_in_a_folder_below_is_read(tmp_path):
     assert load_world(path).grid.shape == (11, 7, 1)
 
 
+def test_a_map_may_be_linked_to(tmp_path):
+    """Yaml and image are links to one folder."""
+    (tmp_path / "there").mkdir()
+    (tmp_path / "here").mkdir()
+    path = write(tmp_path / "there", YAML, pgm(plan()))
+    for file in (path, path.with_name("plan.pgm")):
+        (tmp_path / "here" / file.name).symlink_to(file)
+    assert load_world(tmp_path / "here" / path.name).grid.shape == (11, 7, 1)
+
+
 @pytest.mark.parametrize(
     "image",
     [
