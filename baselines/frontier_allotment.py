@@ -20,8 +20,9 @@ from typing import Protocol
 
 import numpy as np
 
-from baselines.frontier_candidates import Candidates, Looking, VoxelCandidates
+from baselines.frontier_candidates import Candidates, Looking
 from baselines.terrain_candidates import TerrainCandidates
+from baselines.voxel_candidates import VoxelCandidates
 from entropy_explore_env.belief.lattice import NOTHING_CLOSED, Costs, Lattice, new_lattice
 from entropy_explore_env.belief.planning import begin_search, search_ways, widen_search
 from entropy_explore_env.belief.search_space import Search, collect, cost_to
@@ -86,7 +87,7 @@ class Allotter:
     """Candidates of one robot's belief, and their allotment.
 
     Attributes:
-        candidates: See frontier_candidates.py and terrain_candidates.py.
+        candidates: See frontier_candidates.py.
         search: Working space for ways, shared with others.
         counted: How many candidates were counted in all.
     """
@@ -246,13 +247,12 @@ class Allotter:
         What is counted is kept in `weighed`, (B,) by slot; NaN = not counted yet.
         """
         slots, voxels = self.candidates.found(all_of_them=not self._lazy)
-        edges = ways.edges[slots]
+        edges, point = ways.edges[slots], self.candidates.point
         reached = np.isfinite(edges)
         beyond = slots[~reached]
         slots, voxels, edges = slots[reached], voxels[reached], edges[reached]
         seconds = self.seconds(robot, edges)
         takes = self._taken(voxels, taken)
-        point = self.candidates.point
         most = self.candidates.most(slots) if self._lazy else np.full(len(slots), np.inf)
         bound = self._value(np.minimum(most, self.candidates.limit()) * point, seconds, edges, takes)
         order = np.argsort(-bound, kind="stable")
@@ -262,10 +262,7 @@ class Allotter:
             batch = order[first : first + size]
             if self._lazy and bound[batch[0]] < value.max():
                 break
-            new = batch[np.isnan(weighed[slots[batch]])]
-            weighed[slots[new]] = self.candidates.count(slots[new], voxels[new])
-            self.counted += len(new)
-            seen = weighed[slots[batch]] * point
+            seen = self._seen(slots[batch], weighed)
             worth = self._value(seen, seconds[batch], edges[batch], takes[batch])
             value[batch] = np.where(seen > 0.0, worth, -np.inf)
         best = int(np.argmax(value)) if len(value) else -1
@@ -275,6 +272,13 @@ class Allotter:
         if len(beyond) == 0 or math.isinf(ways.reach):
             return choice, True
         return choice, choice is not None and self._none_is_better(robot, beyond, ways, choice, weighed)
+
+    def _seen(self, slots: np.ndarray, weighed: np.ndarray) -> np.ndarray:
+        """(K,) V·(height factor) of candidates in points' size; `weighed` as in `_best_of`."""
+        new = slots[np.isnan(weighed[slots])]
+        weighed[new] = self.candidates.count(new, self.candidates.voxels_of(new))
+        self.counted += len(new)
+        return weighed[slots] * self.candidates.point
 
     def _none_is_better(
         self, robot: int, slots: np.ndarray, ways: _Ways, choice: Choice, weighed: np.ndarray
@@ -293,10 +297,7 @@ class Allotter:
         order, size = better[np.argsort(-bound[better], kind="stable")], self.candidates.batch
         for first in range(0, len(order), size):
             batch = order[first : first + size]
-            new = slots[batch][np.isnan(weighed[slots[batch]])]
-            weighed[new] = self.candidates.count(new, self.candidates.voxels_of(new))
-            self.counted += len(new)
-            seen = weighed[slots[batch]] * self.candidates.point
+            seen = self._seen(slots[batch], weighed)
             worth = self._value(seen, seconds[batch], edges[batch], nobody[batch])
             if (worth[seen > 0.0] >= choice.value).any():
                 return False

@@ -30,6 +30,7 @@ from baselines.terrain_view import (
     mean_ground,
     sum_rows,
 )
+from baselines.viewpoints import sees_all_around
 from entropy_explore_env.config import Scenario
 from entropy_explore_env.missions.view import RobotView
 from entropy_explore_env.settings import RobotKind
@@ -144,7 +145,7 @@ class TerrainCandidates(Candidates[TerrainMap]):
     def gaze(self, place: np.ndarray, view: RobotView) -> tuple[float, float]:
         """Down: the lowest rays straight down; who does not see all around turns to where most is seen."""
         yaw, turn = float(view.pose[3]), view.kind.sensor.field_of_view_rad[0]
-        if turn <= 2.0 * math.pi - 1.5 * view.kind.sensor.angular_step_rad:
+        if not sees_all_around(view.kind.sensor):
             (eye, average), best, first = self._from(place), -1, yaw
             for way in range(16):
                 heading = first + way * (2.0 * math.pi / 16)

@@ -18,7 +18,12 @@ from entropy_explore_env.compilation import lean_kernel
 from entropy_explore_env.config import Scenario
 from entropy_explore_env.missions.view import TeammateView
 from entropy_explore_env.robots.motion import driving_time, turning_time
-from entropy_explore_env.settings import Grid, RobotKind, centred_angles
+from entropy_explore_env.settings import Grid, RangeSensor, RobotKind, centred_angles
+
+
+def sees_all_around(sensor: RangeSensor) -> bool:
+    """Whether a sensor's rays leave no gap around it, so that its yaw does not matter."""
+    return sensor.field_of_view_rad[0] > 2.0 * math.pi - 1.5 * sensor.angular_step_rad
 
 
 class Build(NamedTuple):

@@ -21,7 +21,14 @@ from baselines.occupancy_entropy import (
     filtered,
 )
 from baselines.strategy import random_viewpoint
-from baselines.viewpoints import Build, build_of, free_by_belief, new_scratch, weigh_viewpoints
+from baselines.viewpoints import (
+    Build,
+    build_of,
+    free_by_belief,
+    new_scratch,
+    sees_all_around,
+    weigh_viewpoints,
+)
 from baselines.voronoi_control import (
     CellSearch,
     gradient_step,
@@ -239,8 +246,7 @@ class VoronoiCoverage:
     def _gazing(self, view: RobotView, viewpoint: np.ndarray) -> np.ndarray:
         """The viewpoint with the gaze from which most bits are expected; as it is for a sensor all around."""
         build, kind = self._build(view), view.kind
-        turn = kind.sensor.field_of_view_rad[0]
-        if view.planar and turn > 2.0 * math.pi - 1.5 * kind.sensor.angular_step_rad:
+        if view.planar and sees_all_around(kind.sensor):
             return viewpoint
         yaws = view.pose[3] + np.arange(_GAZES) * (2.0 * math.pi / _GAZES)
         pitches = (0.0,) if view.planar else _PITCHES

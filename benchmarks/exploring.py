@@ -17,7 +17,7 @@ from baselines.papers.sawhney_missions import Run, followed
 from baselines.per_time_visibility import FrontierStrategy, Metric
 from baselines.ray_tree import grow_tree
 from benchmarks.planning import FLOOR, cluttered
-from benchmarks.rows import Effort, Goal, Row, alone, timed
+from benchmarks.rows import Effort, Goal, Row, alone, compared, timed
 from entropy_explore_env.belief.search_space import new_search
 from entropy_explore_env.config import Scenario, with_settings
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
@@ -143,11 +143,9 @@ def decision_row(effort: Effort, lazy: bool) -> Row:
 def larger_row(effort: Effort) -> Row:
     """The same in a map of four times as many cells, of which as much is known and as much changes."""
     small, large = Deciding(True), Deciding(True, 2 * _SIDE)
-    pairs = np.array([(large.decide_ms(), small.decide_ms()) for _ in range(effort.rounds + 2)])[2:]
-    ours, theirs = (float(value) for value in np.median(pairs, axis=0))
-    ratio = float(np.median(pairs[:, 0] / pairs[:, 1]))
+    ours, theirs = np.array([(large.decide_ms(), small.decide_ms()) for _ in range(effort.rounds + 2)])[2:].T
     job = "a decision of per-time-visibility, 2000 × 2000, as much known and changed"
-    return Row(job, "1000 × 1000", ours, theirs, "ms", ratio, None, None)
+    return compared(job, "1000 × 1000", ours.tolist(), theirs.tolist(), "ms")
 
 
 def visibility_row(effort: Effort) -> Row:

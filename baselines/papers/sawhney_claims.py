@@ -289,22 +289,31 @@ def changed_itself(
     records: Records, change: str, method: str, end: str, worlds: Sequence[str]
 ) -> tuple[float, float, float]:
     """A method with one thing changed over itself as it is; relative in each world."""
-    pair = []
-    for which in (change, None):
-        cells = [cell_id(world, CHANGED_TEAM, method, which) for world in worlds]
-        units = [times(records, cell_id(world, CHANGED_TEAM, method), end).mean() for world in worlds]
-        found = [times(records, cell, end) / unit for cell, unit in zip(cells, units, strict=True)]
-        pair.append(np.concatenate(found))
-    return ratio_interval(*pair)
+    plain, changed = _in_units_of_first(records, ((method, None), (method, change)), end, worlds)
+    return ratio_interval(changed, plain)
+
+
+def fastest_changed(
+    records: Records, change: str | None, methods: Sequence[str], end: str, worlds: Sequence[str]
+) -> str:
+    """Of some methods the one with the least mean time, relative to V/t in each world."""
+    return min(methods, key=lambda method: _changed(records, change, method, end, worlds)[1].mean())
 
 
 def _changed(
     records: Records, change: str | None, method: str, end: str, worlds: Sequence[str]
 ) -> tuple[np.ndarray, np.ndarray]:
     """(N,) relative times of V/t and of another method, by world and seed."""
-    ours, theirs = [], []
+    return _in_units_of_first(records, (("ptv", change), (method, change)), end, worlds)
+
+
+def _in_units_of_first(
+    records: Records, pair: Sequence[tuple[str, str | None]], end: str, worlds: Sequence[str]
+) -> tuple[np.ndarray, np.ndarray]:
+    """(N,) times of two methods, each with what is changed, over the first one's mean in each world."""
+    found: tuple[list[np.ndarray], list[np.ndarray]] = [], []
     for world in worlds:
-        pair = [times(records, cell_id(world, CHANGED_TEAM, m, change), end) for m in ("ptv", method)]
-        ours.append(pair[0] / pair[0].mean())
-        theirs.append(pair[1] / pair[0].mean())
-    return np.concatenate(ours), np.concatenate(theirs)
+        both = [times(records, cell_id(world, CHANGED_TEAM, *cell), end) for cell in pair]
+        for values, taken in zip(found, both, strict=True):
+            values.append(taken / both[0].mean())
+    return np.concatenate(found[0]), np.concatenate(found[1])

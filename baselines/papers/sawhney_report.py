@@ -33,6 +33,7 @@ from baselines.papers.sawhney_claims import (
     changed_ratio,
     changes_in,
     compared,
+    fastest_changed,
     relative,
     teams_in,
     times,
@@ -129,8 +130,8 @@ def _cut(records: Records) -> str:
 
 def _held(claims: Sequence[Claim]) -> str:
     """How many claims hold, the paper's and ours."""
-    ours = [claim.holds for claim in claims if claim.claim.startswith("ours")]
-    paper = [claim.holds for claim in claims if not claim.claim.startswith("ours")]
+    ours = [claim.holds for claim in claims if claim.paper is None]
+    paper = [claim.holds for claim in claims if claim.paper is not None]
     return f"{sum(paper)} of the paper's {len(paper)} hold, and {sum(ours)} of {len(ours)} of ours"
 
 
@@ -234,7 +235,7 @@ def _times_table(records: Records, part: str) -> str:
         cells = [cell_id(w, k, method) for w in worlds_in(records, part) for k in teams_in(records, part)]
         scans = np.mean([record["scans"] / record["robots"] for cell in cells for record in records[cell]])
         shown = [_interval(mean_interval(relative(records, part, method, end))) for end in ENDS]
-        rows.append([f"`{method}`", *shown, f"{after_99(records, part, method):.0%}", f"{scans:.0f}"])
+        rows.append([f"`{method}`", *shown, f"{_after_99(records, part, method):.0%}", f"{scans:.0f}"])
     head = [
         "method",
         *(f"relative time {text}" for text in ENDS.values()),
@@ -303,7 +304,7 @@ def _rivals(
 ) -> dict[str, str]:
     """Name → method that V/t is compared with; of the two β that are changed, too, the faster one."""
     betas = [method for method in CHANGED_METHODS[part] if method.startswith("beta-")]
-    faster = max(betas, key=lambda method: changed_ratio(records, change, method, end, worlds)[0])
+    faster = fastest_changed(records, change, betas, end, worlds)
     others = [method for method in CHANGED_METHODS[part][1:] if method not in betas]
     listed = " and ".join(f"`{beta}`" for beta in betas)
     return {f"the faster of {listed}": faster, **{f"`{method}`": method for method in others}}
@@ -344,7 +345,7 @@ def _worlds_table(records: Records, part: str) -> str:
     return markdown_table(["V/t over the best β in", *heads], rows)
 
 
-def after_99(records: Records, part: str, method: str) -> float:
+def _after_99(records: Records, part: str, method: str) -> float:
     """Share of a mission's time to no frontier that follows 99 %, mean over all missions of a method."""
     cells = [cell_id(w, n, method) for w in worlds_in(records, part) for n in teams_in(records, part)]
     shares = [1.0 - times(records, cell, "t99_s") / times(records, cell, "t_none_s") for cell in cells]

@@ -10,13 +10,14 @@ import numpy as np
 import pytest
 
 from baselines.frontier_allotment import under_way
-from baselines.frontier_candidates import Looking, VoxelCandidates
+from baselines.frontier_candidates import Looking
 from baselines.frontier_map import COVERED, NONE
 from baselines.frontier_rivals import Coordinated, Nearest
 from baselines.mission import run_mission, scripted
 from baselines.papers.sawhney_missions import followed
 from baselines.per_time_visibility import Exploring, FrontierStrategy, Metric
 from baselines.strategies import make_strategy
+from baselines.voxel_candidates import VoxelCandidates
 from entropy_explore_env.config import with_settings
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.errors import SettingError
