@@ -16,8 +16,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from baselines.command import make_folder, parse, print_json, run_command
-from baselines.experiment import run_cells
+from baselines.cli.arguments import make_folder, parse, print_json, run_command
+from baselines.experiments.cells import run_cells
 from baselines.head_to_head.cells import Entrants, chosen_scenarios, chosen_strategies
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.scenarios import SCENARIOS
@@ -62,8 +62,8 @@ def main(words: Sequence[str]) -> int:
     args = parse(Args, words, description=__doc__)
     entrants = _entrants(args)
     from baselines.head_to_head.page import write_page  # matplotlib: after the help
-    from baselines.head_to_head.summary import printed_results, show_results
-    from baselines.head_to_head.table import Results
+    from baselines.head_to_head.rows import Results
+    from baselines.head_to_head.terminal import printed_results, show_results
 
     runs = args.runs or args.out / "runs"
     make_folder("out", args.out)

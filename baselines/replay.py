@@ -15,9 +15,9 @@ from typing import Any
 
 import numpy as np
 
-from baselines.command import OmitArgPrefixes, Positional, parse, run_command
-from baselines.mission_log import MissionLog, Outputs, Wanted, show_results
-from baselines.terminal import progress_bar
+from baselines.cli.arguments import OmitArgPrefixes, Positional, parse, run_command
+from baselines.cli.mission_outputs import MissionLog, Outputs, Wanted, show_results
+from baselines.cli.progress import progress_bar
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.reports.mission_record import MissionRecord, check_world, load_record, state_digest
 from entropy_explore_env.version import VERSION

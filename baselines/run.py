@@ -12,14 +12,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from baselines.command import OmitArgPrefixes, Positional, parse, run_command
-from baselines.mission import run_mission, scripted
-from baselines.mission_log import MissionLog, Outputs, Wanted, show_results
+from baselines.cli.arguments import OmitArgPrefixes, Positional, parse, run_command
+from baselines.cli.mission_outputs import MissionLog, Outputs, Wanted, show_results
+from baselines.cli.progress import progress_bar
+from baselines.cli.world_options import Reading, world_settings
+from baselines.experiments.mission import run_mission, scripted
 from baselines.strategies import make_strategy
-from baselines.terminal import progress_bar
-from baselines.world_file import Reading, world_settings
-from entropy_explore_env.config import Scenario
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
+from entropy_explore_env.scenario import Scenario
 from entropy_explore_env.scenarios import ROOM, find_scenario
 from entropy_explore_env.settings import Channel, Ending, RangeSensor, Robot
 from entropy_explore_env.validation import check_whole

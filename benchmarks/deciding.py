@@ -7,14 +7,14 @@ import time
 
 import numpy as np
 
-from baselines.mission import run_mission, scripted
+from baselines.experiments.mission import run_mission, scripted
 from baselines.strategies import make_strategy
-from baselines.strategy import Stopwatch
+from baselines.strategies.protocol import Stopwatch
 from benchmarks.rows import Effort, Goal, Row, alone, timed
 from entropy_explore_env.belief.visibility import CONE, cone_of, mark_cone, visible_bits
-from entropy_explore_env.compilation import kernel
-from entropy_explore_env.config import Scenario, with_settings
+from entropy_explore_env.compilation.kernels import kernel
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
+from entropy_explore_env.scenario import Scenario, with_settings
 from entropy_explore_env.scenarios import LAB, ROOM
 
 TEAMMATES = 9

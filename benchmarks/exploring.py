@@ -7,22 +7,22 @@ import time
 
 import numpy as np
 
-from baselines.expected_view import count_from, new_tally, rays_around
-from baselines.frontier_allotment import Allotter
-from baselines.frontier_candidates import Looking
-from baselines.frontier_map import COVERED, UNEXPLORED, UNMAPPED
-from baselines.mission import scripted
-from baselines.papers.sawhney_cells import world_cell
-from baselines.papers.sawhney_missions import Run, followed
-from baselines.per_time_visibility import FrontierStrategy, Metric
-from baselines.ray_tree import grow_tree
+from baselines.experiments.mission import scripted
+from baselines.papers.sawhney.mission import Run, followed
+from baselines.papers.sawhney.sweep import world_cell
+from baselines.strategies.frontier import FrontierStrategy, Metric
+from baselines.strategies.frontier.allocation import Allotter
+from baselines.strategies.frontier.candidates import Looking
+from baselines.strategies.frontier.voxel.map import COVERED, UNEXPLORED, UNMAPPED
+from baselines.strategies.frontier.voxel.ray_tree import grow_tree
+from baselines.strategies.frontier.voxel.visibility import count_from, new_tally, rays_around
 from benchmarks.planning import FLOOR, cluttered
 from benchmarks.rows import Effort, Goal, Row, alone, compared, timed
-from entropy_explore_env.belief.search_space import new_search
-from entropy_explore_env.config import Scenario, with_settings
+from entropy_explore_env.belief.paths.search import new_search
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
-from entropy_explore_env.missions.missions import Missions
+from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.missions.view import view_of
+from entropy_explore_env.scenario import Scenario, with_settings
 from entropy_explore_env.scenarios import find_scenario
 from entropy_explore_env.settings import Grid
 from entropy_explore_env.worlds.world import World

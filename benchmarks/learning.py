@@ -63,7 +63,7 @@ class Loop:
         try:
             import torch
 
-            from baselines.command import parse
+            from baselines.cli.arguments import parse
             from training.ppo import Args, Run, training_scenario
             from training.terminal import TrainingBar
         except ModuleNotFoundError as error:

@@ -13,14 +13,14 @@ import numpy as np
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 
-from baselines.papers.bhattacharya_belief import Sensor
-from baselines.papers.bhattacharya_grid import Rules, Simulation
-from baselines.papers.bhattacharya_timing import cost_graph
+from baselines.papers.bhattacharya.simulation.belief import Sensor
+from baselines.papers.bhattacharya.simulation.team import Rules, Simulation
+from baselines.papers.bhattacharya.timing import cost_graph
 from benchmarks.rows import Effort, Goal, Row, alone, compared, interleave, timed
-from entropy_explore_env.belief.geodesic_cells import NOBODY, Tessellation, new_tessellation, tessellate
-from entropy_explore_env.belief.lattice import belief_costs, new_lattice
-from entropy_explore_env.belief.planning import search_ways
-from entropy_explore_env.belief.search_space import new_search
+from entropy_explore_env.belief.paths.geodesic_cells import NOBODY, Tessellation, new_tessellation, tessellate
+from entropy_explore_env.belief.paths.lattice import belief_costs, new_lattice
+from entropy_explore_env.belief.paths.planning import search_ways
+from entropy_explore_env.belief.paths.search import new_search
 
 MAP = (1000, 783, 1)
 """The cluttered map of Bhattacharya, 1000 × 783."""

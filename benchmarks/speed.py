@@ -16,8 +16,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from baselines.claims_table import processor
-from baselines.command import parse, print_json, run_command
+from baselines.cli.arguments import parse, print_json, run_command
+from baselines.experiments.claims import processor
 from benchmarks.deciding import deciding_rows
 from benchmarks.exploring import exploring_rows, mission_row
 from benchmarks.fusion import fusion_rows

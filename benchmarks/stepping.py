@@ -17,9 +17,9 @@ import numpy as np
 
 from benchmarks.peers import Spread
 from benchmarks.rows import Effort, Goal, Job, Row, Taken, compared, interleave, timed
-from entropy_explore_env.config import Scenario, with_settings
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.envs.vector_env import EntropyExploreVectorEnv
+from entropy_explore_env.scenario import Scenario, with_settings
 from entropy_explore_env.scenarios import ROOM
 from entropy_explore_env.settings import Ending
 

@@ -11,8 +11,8 @@ import math
 import numpy as np
 
 from benchmarks.rows import Effort, Goal, Row, Taken, compared, interleave, timed
-from entropy_explore_env.config import Scenario, with_settings
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
+from entropy_explore_env.scenario import Scenario, with_settings
 from entropy_explore_env.scenarios import ROOM
 from entropy_explore_env.settings import Ending, Grid
 

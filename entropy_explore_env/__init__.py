@@ -14,11 +14,10 @@ from pathlib import Path
 import gymnasium
 import pettingzoo
 
-from entropy_explore_env.compilation import forget_stale_kernels
+from entropy_explore_env.compilation.kernels import forget_stale_kernels
 
 forget_stale_kernels(Path(__file__).parent)
 
-from entropy_explore_env.config import Scenario, with_settings  # noqa: E402 - kernels are imported from here on
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv, env, parallel_env  # noqa: E402
 from entropy_explore_env.envs.single_env import SingleRobotEnv  # noqa: E402
 from entropy_explore_env.envs.vector_env import EntropyExploreVectorEnv  # noqa: E402
@@ -31,11 +30,12 @@ from entropy_explore_env.errors import (  # noqa: E402
     SettingError,
     WorldError,
 )
-from entropy_explore_env.missions.missions import Missions  # noqa: E402
+from entropy_explore_env.missions.simulation import Missions  # noqa: E402
 from entropy_explore_env.missions.state import MissionEnd  # noqa: E402
 from entropy_explore_env.missions.view import RobotView  # noqa: E402
 from entropy_explore_env.robots.channel import Delivery  # noqa: E402
 from entropy_explore_env.robots.motion import MoveEnd  # noqa: E402
+from entropy_explore_env.scenario import Scenario, with_settings  # noqa: E402 - kernels are imported from here on
 from entropy_explore_env.scenarios import SCENARIOS, find_scenario  # noqa: E402
 from entropy_explore_env.settings import (  # noqa: E402 - kernels are imported from here on
     Action,

@@ -11,7 +11,7 @@ import math
 
 import numpy as np
 
-from entropy_explore_env.compilation import lean_kernel
+from entropy_explore_env.compilation.kernels import lean_kernel
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.validation import is_whole
 

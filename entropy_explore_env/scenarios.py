@@ -6,8 +6,8 @@ import dataclasses
 import math
 from types import MappingProxyType
 
-from entropy_explore_env.config import Scenario
 from entropy_explore_env.errors import SettingError
+from entropy_explore_env.scenario import Scenario
 from entropy_explore_env.settings import Channel, Ending, Grid, RangeSensor, Robot, RobotKind
 
 _ROOM_GRID = Grid((41, 41, 17), 0.25, (-0.125, -0.125, -0.125))

@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from entropy_explore_env.config import Scenario
 from entropy_explore_env.errors import SettingError
+from entropy_explore_env.scenario import Scenario
 
 INFINITY = "inf"
 """JSON has no infinity; where a number belongs, this text stands for it."""

@@ -6,7 +6,7 @@ import sys
 
 import pytest
 
-from baselines import command as checkout
+from baselines.cli import arguments as checkout
 from entropy_explore_env import command
 from entropy_explore_env.command import BAD_INPUT, INTERRUPTED, LineParser, UsageError
 from entropy_explore_env.errors import CallOrderError, SettingError, WorldError

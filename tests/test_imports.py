@@ -142,7 +142,7 @@ STRATEGIES_SEE = (
     "version",
 )
 """What `baselines` and `training` may import of the library; robots.motion for why a drive ended."""
-OWN_SIMULATIONS = (ROOT / "baselines/papers/bhattacharya_runs.py",)
+OWN_SIMULATIONS = (ROOT / "baselines/papers/bhattacharya/sweep.py",)
 """A reproduction in a simulation of its own holds that simulation's truth, and may make worlds for it."""
 TRUTH = ("Missions", "World", "load_octomap", "load_world", "save_world")
 """Public names that show the truth: not for strategies."""
@@ -279,7 +279,7 @@ def test_the_library_imports_only_what_lies_below():
         ("worlds/files/voxels.py", "worlds.load.load_world", "which stands below it"),
         ("worlds/load.py", "worlds.files.voxels.Voxels", None),
         ("reports/metrics.py", "envs.parallel_env.env", "which lies above"),
-        ("config.py", "scenarios.ROOM", "which lies above"),
+        ("scenario.py", "scenarios.ROOM", "which lies above"),
         ("belief/__init__.py", "belief.raycast", "one sentence"),
         ("envs/infos.py", "nowhere.at_all", "which is no module"),
         ("missions/view.py", "missions.missions.Missions", None),

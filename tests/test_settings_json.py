@@ -12,8 +12,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from entropy_explore_env import settings_json as module
-from entropy_explore_env.config import Scenario, with_settings
 from entropy_explore_env.errors import SettingError
+from entropy_explore_env.scenario import Scenario, with_settings
 from entropy_explore_env.scenarios import BOX, ROOM, SCENARIOS
 from entropy_explore_env.settings import Grid
 from entropy_explore_env.settings_json import scenario_from_json, scenario_of, settings_json, settings_of

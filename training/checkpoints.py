@@ -31,8 +31,8 @@ from safetensors import SafetensorError
 from safetensors.torch import load as tensors_of
 from safetensors.torch import save as bytes_of
 
-from entropy_explore_env.config import Scenario
 from entropy_explore_env.errors import EntropyExploreError
+from entropy_explore_env.scenario import Scenario
 from entropy_explore_env.settings_json import scenario_of, settings_of
 from training.errors import CheckpointError
 from training.networks import FEATURES

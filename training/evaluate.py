@@ -17,11 +17,11 @@ from typing import Any
 
 import numpy as np
 
-from baselines.command import make_folder, parse, print_json, run_command
-from baselines.experiment import Cell, Record, median_interval, median_ratio_interval, run_cells
+from baselines.cli.arguments import make_folder, parse, print_json, run_command
+from baselines.experiments.cells import Cell, Record, median_interval, median_ratio_interval, run_cells
 from baselines.strategies import make_strategy
-from entropy_explore_env.config import Scenario, with_settings
 from entropy_explore_env.errors import SettingError
+from entropy_explore_env.scenario import Scenario, with_settings
 from entropy_explore_env.scenarios import find_scenario
 from entropy_explore_env.validation import check_whole
 from training.checkpoints import PolicySettings, latest_checkpoint, load_checkpoint

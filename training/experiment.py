@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from baselines.command import make_folder, parse, print_json, run_command
+from baselines.cli.arguments import make_folder, parse, print_json, run_command
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.validation import check_whole
 from training.checkpoints import latest_checkpoint, load_checkpoint

@@ -8,8 +8,8 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 
-from baselines.experiment import csv_table, markdown_table
-from baselines.figures import COLOURS, STYLE, png
+from baselines.cli.figures import COLOURS, STYLE, png
+from baselines.experiments.cells import csv_table, markdown_table
 from entropy_explore_env.writing import write_atomically
 from training.evaluate import SIMPLE, table_cells
 from training.experiment import ABLATIONS, BESIDE, Found, Task, planned_runs

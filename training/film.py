@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from baselines.mission import run_mission, scripted
-from baselines.mission_log import MissionLog, Outputs, Wanted
-from entropy_explore_env.config import Scenario, with_settings
+from baselines.cli.mission_outputs import MissionLog, Outputs, Wanted
+from baselines.experiments.mission import run_mission, scripted
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
+from entropy_explore_env.scenario import Scenario, with_settings
 from training.policy import LearnedPolicy
 from training.seeds import validation_seeds
 

@@ -16,10 +16,10 @@ from stable_baselines3.common.policies import ActorCriticPolicy
 from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
 from torch import nn
 
-from entropy_explore_env.config import Scenario
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.missions.action import action_space
 from entropy_explore_env.missions.observation import ObservationLayout, Part
+from entropy_explore_env.scenario import Scenario
 from training.distributions import MoveAndGaze
 
 _MAPS = ("patch", "overview")

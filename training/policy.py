@@ -10,12 +10,12 @@ import torch
 from stable_baselines3.common.policies import ActorCriticPolicy
 from torch.distributions import Categorical, Normal
 
-from entropy_explore_env.config import Scenario
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.missions.action import action_space
 from entropy_explore_env.missions.observation import ObservationLayout
 from entropy_explore_env.missions.view import RobotView
 from entropy_explore_env.missions.view_observation import ViewObserver
+from entropy_explore_env.scenario import Scenario
 from training.checkpoints import Checkpoint, PolicySettings, latest_checkpoint, load_checkpoint
 from training.errors import CheckpointError
 from training.networks import VectorFeatures, policy_class, policy_settings

@@ -28,11 +28,11 @@ import torch
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import Logger, TensorBoardOutputFormat
 
-from baselines.command import make_folder, parse, print_json, run_command
-from baselines.experiment import csv_table
-from entropy_explore_env.config import Scenario, with_settings
+from baselines.cli.arguments import make_folder, parse, print_json, run_command
+from baselines.experiments.cells import csv_table
 from entropy_explore_env.envs.robot_vec_env import RobotVecEnv
 from entropy_explore_env.errors import SettingError
+from entropy_explore_env.scenario import Scenario, with_settings
 from entropy_explore_env.scenarios import find_scenario
 from entropy_explore_env.settings import Channel
 from entropy_explore_env.validation import check_whole, is_whole

@@ -25,9 +25,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from baselines.command import make_folder, parse, run_command
-from entropy_explore_env.config import with_settings
+from baselines.cli.arguments import make_folder, parse, run_command
 from entropy_explore_env.errors import EntropyExploreError, MissingExtraError, SettingError
+from entropy_explore_env.scenario import with_settings
 from entropy_explore_env.scenarios import find_scenario
 from entropy_explore_env.settings_json import settings_of
 from entropy_explore_env.validation import check_whole

@@ -8,8 +8,8 @@ import numpy as np
 import torch
 from stable_baselines3.common.policies import ActorCriticPolicy
 
-from entropy_explore_env.config import Scenario, with_settings
 from entropy_explore_env.envs.vector_env import EntropyExploreVectorEnv
+from entropy_explore_env.scenario import Scenario, with_settings
 from training.policy import choose_actions
 from training.seeds import validation_seeds
 

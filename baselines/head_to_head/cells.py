@@ -6,14 +6,14 @@ import dataclasses
 from dataclasses import dataclass
 from pathlib import Path
 
-from baselines.experiment import Cell
-from baselines.head_to_head.record import timed_record
-from baselines.mission import scripted
+from baselines.experiments.cells import Cell
+from baselines.experiments.mission import scripted
+from baselines.head_to_head.timed_mission import timed_record
 from baselines.strategies import STRATEGIES, make_strategy
-from baselines.tour import is_plan
-from entropy_explore_env.config import Scenario, with_settings
+from baselines.world_sweep import is_plan
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.errors import SettingError
+from entropy_explore_env.scenario import Scenario, with_settings
 from entropy_explore_env.scenarios import SCENARIOS, find_scenario
 
 YARDSTICK = "random"

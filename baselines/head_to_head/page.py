@@ -7,11 +7,11 @@ from pathlib import Path
 
 import matplotlib as mpl
 
-from baselines.experiment import csv_table, markdown_table
-from baselines.figures import STYLE, png
+from baselines.cli.figures import STYLE, png
+from baselines.experiments.cells import csv_table, markdown_table
 from baselines.head_to_head.cells import YARDSTICK
-from baselines.head_to_head.plots import profile_figure, time_figure
-from baselines.head_to_head.table import (
+from baselines.head_to_head.figures import profile_figure, time_figure
+from baselines.head_to_head.rows import (
     MARKS,
     RIVALS,
     Results,
@@ -22,7 +22,7 @@ from baselines.head_to_head.table import (
     overall_rows,
     scenario_rows,
 )
-from entropy_explore_env.config import Scenario
+from entropy_explore_env.scenario import Scenario
 from entropy_explore_env.writing import write_atomically
 
 PAGE = "head-to-head.md"

@@ -10,7 +10,7 @@ import math
 import numpy as np
 
 from entropy_explore_env.belief.raycast import TICKS
-from entropy_explore_env.compilation import inlined_kernel
+from entropy_explore_env.compilation.kernels import inlined_kernel
 from entropy_explore_env.settings import BITS_OF_UNIT_GAUSSIAN
 
 PRIOR_MEAN = 0.5

@@ -11,7 +11,7 @@ import math
 
 import numpy as np
 
-from entropy_explore_env.compilation import inlined_kernel, lean_kernel
+from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel
 
 OPEN = 0
 """The ray reached its length without meeting anything."""

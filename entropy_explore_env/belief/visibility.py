@@ -19,7 +19,7 @@ import numpy as np
 
 from entropy_explore_env.belief.coverage_map import measurement_precision
 from entropy_explore_env.belief.raycast import STOP_AT_COVERED, cast_ray
-from entropy_explore_env.compilation import inlined_kernel, lean_kernel
+from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel
 
 CONE = np.dtype(
     [

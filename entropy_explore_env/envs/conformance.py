@@ -24,7 +24,6 @@ from typing import Any
 import numpy as np
 
 from entropy_explore_env.command import LineParser, run_command
-from entropy_explore_env.config import Scenario
 from entropy_explore_env.envs.episodes import (
     EPISODES,
     OTHER_ACTIONS,
@@ -47,6 +46,7 @@ from entropy_explore_env.envs.vector_env import EntropyExploreVectorEnv
 from entropy_explore_env.errors import ActionError, CallOrderError, EntropyExploreError
 from entropy_explore_env.missions.state import MissionEnd
 from entropy_explore_env.randomness import check_seed
+from entropy_explore_env.scenario import Scenario
 from entropy_explore_env.scenarios import find_scenario
 from entropy_explore_env.worlds.given import with_given_worlds
 from entropy_explore_env.worlds.load import with_world

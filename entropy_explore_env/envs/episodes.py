@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from entropy_explore_env.config import Scenario
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.envs.vector_env import EntropyExploreVectorEnv
-from entropy_explore_env.missions.missions import Missions
 from entropy_explore_env.missions.rules import rules_of
+from entropy_explore_env.missions.simulation import Missions
+from entropy_explore_env.scenario import Scenario
 from entropy_explore_env.worlds.world import World
 
 EPISODES = 2

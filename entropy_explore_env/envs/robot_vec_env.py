@@ -12,12 +12,12 @@ from typing import Any
 import numpy as np
 from gymnasium.vector import AutoresetMode
 
-from entropy_explore_env.config import Scenario
 from entropy_explore_env.envs.vector_env import EntropyExploreVectorEnv
 from entropy_explore_env.errors import MissingExtraError, SettingError
 from entropy_explore_env.missions.action import action_space
 from entropy_explore_env.missions.snapshot import check_array, restore, snapshot
 from entropy_explore_env.missions.state import MissionEnd
+from entropy_explore_env.scenario import Scenario
 from entropy_explore_env.validation import is_whole
 
 try:

@@ -22,10 +22,10 @@ import numpy as np
 from gymnasium import spaces
 
 from entropy_explore_env.belief.raycast import STOP_AT_COVERED
-from entropy_explore_env.compilation import lean_kernel
-from entropy_explore_env.config import Scenario
+from entropy_explore_env.compilation.kernels import lean_kernel
 from entropy_explore_env.errors import ActionError
 from entropy_explore_env.missions.rules import Rules, rules_of
+from entropy_explore_env.scenario import Scenario
 
 _ROUNDING = 1e-6
 """A displacement may exceed the reach by this share: the rounding of float32 actions."""

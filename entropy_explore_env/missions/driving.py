@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 
-from entropy_explore_env.compilation import lean_kernel
+from entropy_explore_env.compilation.kernels import lean_kernel
 from entropy_explore_env.missions.poses import (
     copy_numbers,
     distance_between,

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from entropy_explore_env.belief.pooling import fuse_pooled_ray
-from entropy_explore_env.compilation import lean_kernel
+from entropy_explore_env.compilation.kernels import lean_kernel
 from entropy_explore_env.missions.poses import copy_numbers, grid_position, pose_at
 from entropy_explore_env.robots.channel import (
     BITS_PER_ANNOUNCEMENT,

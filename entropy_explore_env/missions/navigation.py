@@ -5,7 +5,7 @@ So planning is compiled only where somebody plans.
 
 from __future__ import annotations
 
-from entropy_explore_env.compilation import lean_kernel
+from entropy_explore_env.compilation.kernels import lean_kernel
 from entropy_explore_env.missions.action import decode_action
 from entropy_explore_env.missions.poses import grid_position
 from entropy_explore_env.missions.state import MissionEnd

@@ -36,11 +36,11 @@ from gymnasium import spaces
 from entropy_explore_env.belief.coverage_map import expected_utility, measurement_precision
 from entropy_explore_env.belief.pooling import normalised_entropy
 from entropy_explore_env.belief.raycast import OPEN, STOP_AT_COVERED, cast_ray, longest_crossing
-from entropy_explore_env.compilation import lean_kernel
-from entropy_explore_env.config import Scenario
+from entropy_explore_env.compilation.kernels import lean_kernel
 from entropy_explore_env.missions.action import write_mask
 from entropy_explore_env.missions.poses import grid_position, pose_at
 from entropy_explore_env.missions.rules import Rules, overview_shape, rules_of
+from entropy_explore_env.scenario import Scenario
 
 OWN_NUMBERS = 10
 TEAMMATE_NUMBERS = 19

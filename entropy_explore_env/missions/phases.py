@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 
-from entropy_explore_env.compilation import lean_kernel
+from entropy_explore_env.compilation.kernels import lean_kernel
 from entropy_explore_env.missions.messages import (
     hear_batch,
     message_bits,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from entropy_explore_env.compilation import inlined_kernel, lean_kernel
+from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel
 from entropy_explore_env.robots.motion import driven_share, turning_time
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from entropy_explore_env.compilation import lean_kernel
+from entropy_explore_env.compilation.kernels import lean_kernel
 
 
 @lean_kernel

@@ -8,8 +8,8 @@ from typing import NamedTuple
 import numpy as np
 
 from entropy_explore_env.belief.pooling import Cells, new_cells
-from entropy_explore_env.config import Scenario
 from entropy_explore_env.robots.range_sensor import TeamSensors, team_sensors
+from entropy_explore_env.scenario import Scenario
 from entropy_explore_env.settings import Observation, Robot
 
 NUMBERS = np.dtype(

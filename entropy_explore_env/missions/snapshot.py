@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from entropy_explore_env.errors import RecordError
-from entropy_explore_env.missions.missions import Missions
+from entropy_explore_env.missions.simulation import Missions
 
 _DRAWN = ("truth", "blocked", "visible")
 """State that follows from a mission's seed and episode."""

@@ -15,9 +15,9 @@ from typing import NamedTuple
 import numpy as np
 
 from entropy_explore_env.belief.pooling import Cells
-from entropy_explore_env.config import Scenario
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.missions.rules import barrier_radii_m
+from entropy_explore_env.scenario import Scenario
 
 
 class MissionEnd(enum.Enum):

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 
-from entropy_explore_env.compilation import lean_kernel
+from entropy_explore_env.compilation.kernels import lean_kernel
 from entropy_explore_env.missions.action import decode_action, write_mask
 from entropy_explore_env.missions.driving import depart, drive_on, next_decision, stop
 from entropy_explore_env.missions.messages import announce, fuse_measurements, next_letter, open_letter, send

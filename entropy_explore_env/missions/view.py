@@ -9,12 +9,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from entropy_explore_env.config import Scenario
 from entropy_explore_env.missions.action import encode_viewpoint
-from entropy_explore_env.missions.missions import Missions
 from entropy_explore_env.missions.poses import place_at, pose_at
 from entropy_explore_env.missions.rules import Rules
+from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.robots.motion import MoveEnd
+from entropy_explore_env.scenario import Scenario
 from entropy_explore_env.settings import RobotKind
 from entropy_explore_env.worlds.world import closed_by
 

@@ -8,13 +8,13 @@ from __future__ import annotations
 import numpy as np
 
 from entropy_explore_env.belief.pooling import pool_belief
-from entropy_explore_env.config import Scenario, with_settings
 from entropy_explore_env.missions.action import decode_action
 from entropy_explore_env.missions.observation import ObservationLayout, observation_rules, observe_robot
 from entropy_explore_env.missions.rules import rules_of
 from entropy_explore_env.missions.state import HEARD
 from entropy_explore_env.missions.view import RobotView
 from entropy_explore_env.robots.range_sensor import new_scan
+from entropy_explore_env.scenario import Scenario, with_settings
 from entropy_explore_env.settings import Action, Observation
 
 

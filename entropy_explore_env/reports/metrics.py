@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from entropy_explore_env.config import Scenario
-from entropy_explore_env.missions.missions import Missions
+from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.missions.state import COUNTED, MissionEnd
 from entropy_explore_env.robots.range_sensor import Return, new_scan, sensor_model, take_scan
+from entropy_explore_env.scenario import Scenario
 from entropy_explore_env.settings import RobotKind
 from entropy_explore_env.worlds.world import World
 

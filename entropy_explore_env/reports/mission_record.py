@@ -19,9 +19,9 @@ from typing import Any
 
 import numpy as np
 
-from entropy_explore_env.config import Scenario
 from entropy_explore_env.errors import CallOrderError, EntropyExploreError, RecordError, WorldError
-from entropy_explore_env.missions.missions import Missions
+from entropy_explore_env.missions.simulation import Missions
+from entropy_explore_env.scenario import Scenario
 from entropy_explore_env.settings_json import scenario_from_json, settings_json
 from entropy_explore_env.version import VERSION
 from entropy_explore_env.worlds.files.archives import arrays

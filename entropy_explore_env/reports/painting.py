@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from entropy_explore_env.errors import CallOrderError, SettingError
-from entropy_explore_env.missions.missions import Missions
+from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.reports.animation import Window
 from entropy_explore_env.reports.projection import shares_left
 from entropy_explore_env.reports.recording import Ways, poses_now

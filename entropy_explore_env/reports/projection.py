@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from entropy_explore_env.compilation import lean_kernel
+from entropy_explore_env.compilation.kernels import lean_kernel
 
 KNOWN_BELOW = 0.9
 """A voxel with less than this share of its entropy left counts as known."""

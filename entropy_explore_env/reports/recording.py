@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 
-from entropy_explore_env.missions.missions import Missions
 from entropy_explore_env.missions.poses import place_at, pose_at
+from entropy_explore_env.missions.simulation import Missions
 
 
 def poses_now(missions: Missions, mission: int) -> np.ndarray:

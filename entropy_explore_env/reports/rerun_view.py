@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from entropy_explore_env.errors import MissingExtraError
-from entropy_explore_env.missions.missions import Missions
+from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.reports.glyphs import COLOURS, robot_colour
 from entropy_explore_env.reports.painting import entropy_share, remaining_share, world_name
 from entropy_explore_env.reports.projection import KNOWN_BELOW

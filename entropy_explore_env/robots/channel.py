@@ -11,7 +11,7 @@ from __future__ import annotations
 import enum
 import math
 
-from entropy_explore_env.compilation import lean_kernel
+from entropy_explore_env.compilation.kernels import lean_kernel
 from entropy_explore_env.randomness import draw_uniform
 
 BITS_PER_MEASUREMENT = 96

@@ -12,7 +12,7 @@ import enum
 import math
 
 from entropy_explore_env.belief.raycast import OBSTACLE, OPEN, STOP_AT_COVERED, TICKS, cast_ray
-from entropy_explore_env.compilation import lean_kernel
+from entropy_explore_env.compilation.kernels import lean_kernel
 
 
 class MoveEnd(enum.Enum):

@@ -12,9 +12,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from entropy_explore_env.belief.lattice import KNOWN_RATIO, Costs, Lattice, new_lattice, place_of
-from entropy_explore_env.belief.planning import search_ways
-from entropy_explore_env.belief.search_space import (
+from entropy_explore_env.belief.paths.lattice import KNOWN_RATIO, Costs, Lattice, new_lattice, place_of
+from entropy_explore_env.belief.paths.planning import search_ways
+from entropy_explore_env.belief.paths.search import (
     Search,
     cost_to,
     is_passable,
@@ -22,10 +22,10 @@ from entropy_explore_env.belief.search_space import (
     new_search,
     way_to,
 )
-from entropy_explore_env.belief.straightening import cost_of_sight, pull_straight
-from entropy_explore_env.compilation import lean_kernel
-from entropy_explore_env.config import Scenario
+from entropy_explore_env.belief.paths.string_pulling import cost_of_sight, pull_straight
+from entropy_explore_env.compilation.kernels import lean_kernel
 from entropy_explore_env.robots.motion import MoveEnd
+from entropy_explore_env.scenario import Scenario
 from entropy_explore_env.settings import Robot
 
 _ARRIVED, _NO_WAY, _CORNERS = MoveEnd.ARRIVED.code, MoveEnd.NO_WAY.code, MoveEnd.CORNERS.code

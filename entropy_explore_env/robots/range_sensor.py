@@ -21,7 +21,7 @@ from entropy_explore_env.belief.raycast import (
     cast_ray,
     longest_crossing,
 )
-from entropy_explore_env.compilation import inlined_kernel, lean_kernel
+from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel
 from entropy_explore_env.randomness import draw_gaussian
 from entropy_explore_env.settings import Grid, RangeSensor, centred_angles
 

@@ -16,9 +16,9 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from entropy_explore_env.command import LineParser, run_command
-from entropy_explore_env.config import with_settings
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.randomness import Stream, check_seed, generator
+from entropy_explore_env.scenario import with_settings
 from entropy_explore_env.scenarios import SCENARIOS
 from entropy_explore_env.worlds.files.jacksboro import NAME as JACKSBORO
 from entropy_explore_env.worlds.load import FORMATS, load_world, make_world, save_world

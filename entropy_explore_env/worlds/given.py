@@ -8,8 +8,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from entropy_explore_env.config import Scenario, with_settings
 from entropy_explore_env.errors import SettingError, WorldError
+from entropy_explore_env.scenario import Scenario, with_settings
 from entropy_explore_env.worlds.load import world_from_file
 from entropy_explore_env.worlds.world import World
 

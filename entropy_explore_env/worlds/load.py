@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from entropy_explore_env.config import Scenario
 from entropy_explore_env.errors import SettingError, WorldError
+from entropy_explore_env.scenario import Scenario
 from entropy_explore_env.settings import Grid
 from entropy_explore_env.validation import is_number, is_whole
 from entropy_explore_env.worlds.files.archives import restored, saved

@@ -12,8 +12,8 @@ import numpy as np
 from scipy import ndimage
 from scipy.spatial import ConvexHull
 
-from entropy_explore_env.config import Scenario
 from entropy_explore_env.errors import WorldError
+from entropy_explore_env.scenario import Scenario
 from entropy_explore_env.settings import Grid, RobotKind
 
 

@@ -15,19 +15,20 @@ import pytest
 from PIL import Image
 from scipy import stats
 
-from baselines import benchmark, experiment, strategies
-from baselines.command import run_command
+from baselines import benchmark, strategies
+from baselines.cli.arguments import run_command
+from baselines.experiments import cells as experiment
+from baselines.experiments.mission import run_mission, scripted
 from baselines.head_to_head import cells as head_to_head_cells
 from baselines.head_to_head.cells import Entrants, chosen_scenarios, chosen_strategies
 from baselines.head_to_head.page import write_page
-from baselines.head_to_head.record import timed_record
-from baselines.head_to_head.table import Results, failed_rows, mission_rows, overall_rows, scenario_rows
-from baselines.mission import run_mission, scripted
-from baselines.random_walk import RandomWalk
+from baselines.head_to_head.rows import Results, failed_rows, mission_rows, overall_rows, scenario_rows
+from baselines.head_to_head.timed_mission import timed_record
 from baselines.strategies import make_strategy
-from entropy_explore_env.config import with_settings
+from baselines.strategies.random_walk import RandomWalk
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.reports.metrics import mission_figures
+from entropy_explore_env.scenario import with_settings
 from entropy_explore_env.scenarios import BOX, LAB
 
 ROOT = Path(__file__).parents[2]
@@ -171,8 +172,8 @@ KILLER = """
 import os, random, signal, sys, time
 from pathlib import Path
 from baselines import benchmark
-from baselines.command import run_command
-import baselines.head_to_head.page, baselines.head_to_head.summary, baselines.workers
+from baselines.cli.arguments import run_command
+import baselines.head_to_head.page, baselines.head_to_head.terminal, baselines.experiments.worker_pool
 from tests.baselines.test_benchmark import PAIR
 
 folder, kills = Path(sys.argv[1]), int(sys.argv[2])
@@ -399,7 +400,7 @@ def test_the_page_of_a_file_does_not_say_where_it_lies(tmp_path, capsys):
 
 def test_what_a_record_says_of_the_clock_is_its_own(monkeypatch):
     ticks = iter(range(10**6))
-    monkeypatch.setattr("baselines.head_to_head.record.time.perf_counter", lambda: float(next(ticks)))
+    monkeypatch.setattr("baselines.head_to_head.timed_mission.time.perf_counter", lambda: float(next(ticks)))
     env = EntropyExploreEnv(scripted(with_settings(BOX, {"scored": True, "robots": 1, "time_limit_s": 9.0})))
     record = timed_record(env, "random", 0)
     assert record["clock"]["decision_ms"] == 1000.0  # a tick a decision

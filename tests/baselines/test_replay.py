@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from baselines import replay, run
-from baselines.command import run_command
+from baselines.cli.arguments import run_command
 from entropy_explore_env.reports.mission_record import load_record, save_record
 from entropy_explore_env.settings_json import scenario_of
 from entropy_explore_env.worlds import load
@@ -29,7 +29,7 @@ class Ran(NamedTuple):
 
 @pytest.fixture
 def command(capsys, monkeypatch):
-    monkeypatch.setattr("baselines.figures.mission_picture", lambda recorder, title, strategy: b"picture")
+    monkeypatch.setattr("baselines.cli.figures.mission_picture", lambda recorder, title, strategy: b"picture")
 
     def ran(main, *words: str | Path) -> Ran:
         code = run_command(main, [str(word) for word in words])

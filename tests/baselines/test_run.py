@@ -16,16 +16,17 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from baselines import mission_log, replay, run
-from baselines.command import run_command
-from baselines.mission import run_mission, scripted
+from baselines import replay, run
+from baselines.cli import mission_outputs as mission_log
+from baselines.cli.arguments import run_command
+from baselines.cli.world_options import Reading
+from baselines.experiments.mission import run_mission, scripted
 from baselines.strategies import make_strategy
-from baselines.world_file import Reading
-from entropy_explore_env.config import with_settings
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.missions.state import MissionEnd
 from entropy_explore_env.reports.metrics import mission_figures
 from entropy_explore_env.reports.mission_record import load_record
+from entropy_explore_env.scenario import with_settings
 from entropy_explore_env.scenarios import BOX
 from entropy_explore_env.worlds.load import LOADING
 from tests.worlds.samples import pgm
@@ -336,7 +337,7 @@ def test_a_long_mission_keeps_its_ends_and_not_too_many_moments(command, tmp_pat
 
 def fake_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
     """Save the time that matplotlib takes."""
-    monkeypatch.setattr("baselines.figures.mission_picture", lambda recorder, title, strategy: b"picture")
+    monkeypatch.setattr("baselines.cli.figures.mission_picture", lambda recorder, title, strategy: b"picture")
 
 
 def test_the_table_says_what_was_written(command, tmp_path, monkeypatch):

@@ -20,7 +20,7 @@ from entropy_explore_env.belief.visibility import (
     marked_bits,
     visible_bits,
 )
-from entropy_explore_env.compilation import lean_kernel
+from entropy_explore_env.compilation.kernels import lean_kernel
 from entropy_explore_env.robots.range_sensor import fuse_scan, new_scan, sensor_model, take_scan
 from entropy_explore_env.settings import Grid, RangeSensor
 from tests.reference import rochami

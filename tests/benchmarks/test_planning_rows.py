@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.sparse.csgraph import dijkstra
 
-from baselines.papers.bhattacharya_timing import cost_graph
+from baselines.papers.bhattacharya.timing import cost_graph
 from benchmarks.planning import (
     Search,
     check_tessellation,
@@ -22,7 +22,7 @@ from benchmarks.planning import (
     voronoi_row,
 )
 from benchmarks.rows import Effort
-from entropy_explore_env.belief.geodesic_cells import new_tessellation, tessellate
+from entropy_explore_env.belief.paths.geodesic_cells import new_tessellation, tessellate
 
 TINY = Effort(rounds=2, long_rounds=1)
 

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from baselines.command import run_command
+from baselines.cli.arguments import run_command
 from benchmarks import speed, startup, stepping
 from benchmarks.fusion import Fusion, Measurements, fuse_floor, grid_rows, measure_room
 from benchmarks.rows import Effort, Goal, Row, Taken, alone, compared, interleave, timed

@@ -15,7 +15,6 @@ import pytest
 
 from entropy_explore_env import SCENARIOS, EntropyExploreEnv, EntropyExploreVectorEnv, Missions, SettingError
 from entropy_explore_env.command import BAD_INPUT, run_command
-from entropy_explore_env.config import with_settings
 from entropy_explore_env.envs import conformance
 from entropy_explore_env.envs.checks import ActionChecker
 from entropy_explore_env.envs.conformance import (
@@ -25,6 +24,7 @@ from entropy_explore_env.envs.conformance import (
     leaves,
     require_same,
 )
+from entropy_explore_env.scenario import with_settings
 from entropy_explore_env.settings import Grid
 from tests.reference.scenes import SMALL
 

@@ -10,10 +10,10 @@ from gymnasium import spaces
 from hypothesis import given
 from hypothesis import strategies as st
 
-from entropy_explore_env.config import with_settings
 from entropy_explore_env.errors import ActionError
 from entropy_explore_env.missions.action import action_space, decode_action, encode_viewpoint, write_mask
 from entropy_explore_env.missions.rules import rules_of
+from entropy_explore_env.scenario import with_settings
 from entropy_explore_env.scenarios import BOX
 from entropy_explore_env.settings import Grid
 from tests.reference.scenes import drawn, free_box, seeds

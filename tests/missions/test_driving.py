@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from entropy_explore_env.missions import missions as missions_module
+from entropy_explore_env.missions import simulation as missions_module
 from entropy_explore_env.missions.poses import place_at, pose_at
 from entropy_explore_env.missions.view import view_of
 from entropy_explore_env.robots.motion import MoveEnd

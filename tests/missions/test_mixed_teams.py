@@ -10,14 +10,14 @@ import numpy as np
 import pytest
 
 from entropy_explore_env.belief.coverage_map import map_entropy_bits
-from entropy_explore_env.config import with_settings
 from entropy_explore_env.errors import SettingError
-from entropy_explore_env.missions.missions import Missions
 from entropy_explore_env.missions.poses import pose_at
 from entropy_explore_env.missions.rules import rules_of
+from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.missions.view import view_of
 from entropy_explore_env.reports.metrics import information_floor
 from entropy_explore_env.robots.motion import MoveEnd
+from entropy_explore_env.scenario import with_settings
 from entropy_explore_env.scenarios import OFFICE_3D, OFFICE_MIXED
 from entropy_explore_env.settings import Grid, RangeSensor, Robot, RobotKind
 from entropy_explore_env.settings_json import scenario_from_json, settings_json

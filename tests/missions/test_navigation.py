@@ -9,11 +9,11 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from entropy_explore_env.config import with_settings
 from entropy_explore_env.envs.conformance import check_conformance
-from entropy_explore_env.missions.missions import Missions
 from entropy_explore_env.missions.poses import pose_at
+from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.robots.motion import MoveEnd
+from entropy_explore_env.scenario import with_settings
 from entropy_explore_env.scenarios import OFFICE, ROOM_FURNISHED, SCENARIOS, TERRAIN
 from entropy_explore_env.settings import Grid
 from entropy_explore_env.worlds.world import World

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from entropy_explore_env.belief.coverage_map import map_entropy_bits
-from entropy_explore_env.config import with_settings
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.reports.mission_record import state_digest
+from entropy_explore_env.scenario import with_settings
 from entropy_explore_env.settings import Channel
 from tests.reference.scenes import free_box, started, wander
 

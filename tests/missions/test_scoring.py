@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from entropy_explore_env.belief.coverage_map import map_entropy_bits
-from entropy_explore_env.missions.missions import Missions
+from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.missions.state import PROGRESS
 from entropy_explore_env.reports.metrics import joint_figures
 from tests.reference.scenes import free_box, random_actions, started, wander

@@ -14,8 +14,8 @@ from hypothesis import HealthCheck, settings
 from hypothesis import strategies as st
 
 from entropy_explore_env.belief.raycast import longest_crossing
-from entropy_explore_env.config import Scenario, with_settings
-from entropy_explore_env.missions.missions import Missions
+from entropy_explore_env.missions.simulation import Missions
+from entropy_explore_env.scenario import Scenario, with_settings
 from entropy_explore_env.scenarios import BOX
 from tests.reference import rocha04
 

@@ -9,7 +9,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from baselines.candidates import CANDIDATE, FACTORS, MATE, best_candidate, steep_voxels
+from baselines.strategies.mutual_information.candidates import (
+    CANDIDATE,
+    FACTORS,
+    MATE,
+    best_candidate,
+    steep_voxels,
+)
 from entropy_explore_env.belief.visibility import CONE, cone_of, mark_cone
 from tests.reference import rochami
 from tests.reference.scenes import as_reference, drawn, random_belief, ray_space, seeds

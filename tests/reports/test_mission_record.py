@@ -14,7 +14,7 @@ from hypothesis import given as drawing
 from hypothesis import strategies as st
 
 from entropy_explore_env.errors import CallOrderError, RecordError, WorldError
-from entropy_explore_env.missions.missions import Missions
+from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.reports.mission_record import (
     CommandRecorder,
     MissionRecord,

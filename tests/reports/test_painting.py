@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from entropy_explore_env.errors import SettingError
-from entropy_explore_env.missions.missions import Missions
+from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.reports import painting
 from entropy_explore_env.reports.painting import (
     RENDER_MODES,

@@ -9,12 +9,12 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from entropy_explore_env.config import with_settings
 from entropy_explore_env.errors import MissingExtraError
 from entropy_explore_env.reports import rerun_view
 from entropy_explore_env.reports.painting import entropy_share, remaining_share
 from entropy_explore_env.reports.recording import Recorder
 from entropy_explore_env.reports.rerun_view import RerunView, cone_edges, shared_ends_m
+from entropy_explore_env.scenario import with_settings
 from entropy_explore_env.scenarios import ROOM_FURNISHED
 from entropy_explore_env.settings import RangeSensor
 from tests.reference.scenes import free_box, random_actions, started

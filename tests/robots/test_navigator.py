@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import ndimage
 
-from entropy_explore_env.belief.lattice import NOTHING_CLOSED
+from entropy_explore_env.belief.paths.lattice import NOTHING_CLOSED
 from entropy_explore_env.robots.motion import (
     MoveEnd,
     driven_share,

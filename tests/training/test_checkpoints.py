@@ -13,15 +13,15 @@ import pytest
 import torch
 from safetensors.torch import save_file
 
-from baselines.mission import run_mission
+from baselines.experiments.mission import run_mission
+from baselines.experiments.provenance import sources_digest
 from baselines.run import main as run_main
-from baselines.sources import sources_digest
 from baselines.strategies import make_strategy
 from entropy_explore_env.command import BAD_INPUT
-from entropy_explore_env.config import with_settings
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.reports.metrics import mission_figures
+from entropy_explore_env.scenario import with_settings
 from entropy_explore_env.scenarios import find_scenario
 from entropy_explore_env.settings import Observation
 from training import evaluate
@@ -123,7 +123,7 @@ def test_what_is_broken_or_foreign_is_named(saved, what, capsys):
     with pytest.raises(CheckpointError):
         LearnedPolicy(saved)
     words = ["box-7x11x5", "--robots", "2", "--strategy", str(saved.parent)]
-    from baselines.command import run_command
+    from baselines.cli.arguments import run_command
 
     assert run_command(run_main, words) == BAD_INPUT
     assert len(capsys.readouterr().err.splitlines()) == 1

@@ -10,7 +10,7 @@ import pytest
 import torch
 from stable_baselines3 import PPO
 
-from baselines.command import parse
+from baselines.cli.arguments import parse
 from training.collecting import DecisionPPO
 from training.decisions import DecisionBuffer
 from training.ppo import Args, Run, training_scenario

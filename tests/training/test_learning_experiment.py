@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from baselines.command import parse
+from baselines.cli.arguments import parse
 from entropy_explore_env.command import BAD_INPUT
 from entropy_explore_env.errors import SettingError
 from training import experiment, ppo

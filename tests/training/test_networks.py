@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 import torch
 
-from entropy_explore_env.config import Scenario, with_settings
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.missions.observation import ObservationLayout
+from entropy_explore_env.scenario import Scenario, with_settings
 from entropy_explore_env.scenarios import find_scenario
 from training.checkpoints import PolicySettings
 from training.networks import GazeHeads, MapFeatures, VectorFeatures, policy_settings

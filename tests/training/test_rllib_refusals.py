@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from baselines.command import run_command
+from baselines.cli.arguments import run_command
 from entropy_explore_env import SettingError
 from training import rllib_ppo
 from training.errors import NotFiniteError

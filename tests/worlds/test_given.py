@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from entropy_explore_env.errors import EntropyExploreError, SettingError, WorldError
-from entropy_explore_env.missions.missions import Missions
+from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.settings import Grid
 from entropy_explore_env.worlds.given import GIVEN, in_given_worlds, with_given_worlds, world_in_turn
 from entropy_explore_env.worlds.load import load_world, save_world, world_bytes, world_from_bytes

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from entropy_explore_env.errors import SettingError, WorldError
-from entropy_explore_env.missions.missions import Missions
+from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.randomness import Stream, generator
 from entropy_explore_env.scenarios import BOX, ROOM_FURNISHED
 from entropy_explore_env.worlds.load import make_world, with_world, world_from_file, world_with_number

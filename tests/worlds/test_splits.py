@@ -9,9 +9,9 @@ from typing import get_args, get_type_hints
 import numpy as np
 import pytest
 
-from entropy_explore_env.config import Scenario, with_settings
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.randomness import Stream, generator
+from entropy_explore_env.scenario import Scenario, with_settings
 from entropy_explore_env.scenarios import BHATTACHARYA_OFFICE, ROOM_FURNISHED
 from entropy_explore_env.worlds import splits
 from entropy_explore_env.worlds.load import make_world, world_with_number

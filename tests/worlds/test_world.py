@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from entropy_explore_env.config import with_settings
 from entropy_explore_env.errors import WorldError
+from entropy_explore_env.scenario import with_settings
 from entropy_explore_env.settings import Grid, Robot
 from entropy_explore_env.worlds.world import Barrier, World
 from tests.reference.scenes import drawn, free_box, random_cover, seeds

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from entropy_explore_env.compilation import lean_kernel
+from entropy_explore_env.compilation.kernels import lean_kernel
 from entropy_explore_env.worlds.files.voxels import FREE, SOLID, Voxels, checked_shape
 
 FREE_AT_LEAST = 0.5

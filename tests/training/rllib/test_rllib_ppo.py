@@ -14,7 +14,7 @@ pytest.importorskip("ray.rllib", reason="ray[rllib] is not installed: make test-
 
 from ray.rllib.env.multi_agent_env_runner import MultiAgentEnvRunner
 
-from baselines.command import run_command
+from baselines.cli.arguments import run_command
 from training import rllib_ppo
 from training.rllib_ppo import Args, check, configure, main
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from entropy_explore_env.errors import SettingError, WorldError
-from entropy_explore_env.missions.missions import Missions
+from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.scenarios import BOX
 from entropy_explore_env.worlds.files import process
 from entropy_explore_env.worlds.load import load_octomap, make_world, with_world

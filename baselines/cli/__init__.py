@@ -1,0 +1,1 @@
+"""What the commands share: arguments, progress, outputs of missions, options of worlds."""

@@ -1,0 +1,204 @@
+"""What a command keeps of a mission while it runs, and the files that it writes at its end."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import time
+from collections.abc import Mapping
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+from baselines.cli.arguments import make_folder, print_json
+from baselines.cli.progress import named, print_table
+from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
+from entropy_explore_env.errors import MissingExtraError, SettingError
+from entropy_explore_env.reports.animation import Film, animate, write_video
+from entropy_explore_env.reports.metrics import mission_figures
+from entropy_explore_env.reports.mission_record import CommandRecorder, save_record
+from entropy_explore_env.reports.painting import Painter
+from entropy_explore_env.reports.recording import Recorder
+from entropy_explore_env.reports.rerun_view import RerunView
+from entropy_explore_env.settings_json import settings_of
+from entropy_explore_env.writing import write_atomically
+
+_GIF_PICTURES, _GIF_FRAME_S, _GIF_LAST = 100, 0.1, 20
+_VIDEO_PICTURES, _VIDEO_FRAMES_PER_S, _VIDEO_LAST = 600, 25, 50
+"""Most pictures, how long each is shown, and how often the last one."""
+_SERIES_POINTS = 500
+
+
+@dataclass
+class Outputs:
+    """Files of any mission that is run or replayed, and the form of its results."""
+
+    gif: Path | None = None
+    """File for an animated GIF of the mission."""
+    mp4: Path | None = None
+    """File for a video of the mission (extra viewer)."""
+    rerun: Path | None = None
+    """File for a recording, an .rrd that Rerun's viewer opens (extra viewer)."""
+    json: bool = False
+    """Print one JSON object and nothing else."""
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """Which files a person asked for.
+
+    Attributes:
+        outputs: Those that each have an option.
+        out: Folder for mission.json, mission.png and mission.gif, and for mission.npz where it is `recorded`.
+        record: A mission record, an `.npz`.
+        recorded: Whether the folder gets a record, too; a replay has one already.
+    """
+
+    outputs: Outputs
+    out: Path | None = None
+    record: Path | None = None
+    recorded: bool = True
+
+    def prepare(self) -> None:
+        """Make the folders and find the packages, before anything is computed for nothing.
+
+        Raises:
+            SettingError: A file or folder cannot be made.
+            MissingExtraError: A package is not installed.
+        """
+        mp4, rerun = self.outputs.mp4, self.outputs.rerun
+        for package, module, file in (("av", "av", mp4), ("rerun-sdk", "rerun", rerun)):
+            if file is not None and importlib.util.find_spec(module) is None:
+                raise MissingExtraError(package, "viewer")
+        if self.out is not None:
+            make_folder("out", self.out)
+        files = {"gif": self.outputs.gif, "mp4": mp4, "record": self.record, "rerun": rerun}
+        for option, file in files.items():
+            if file is not None:
+                make_folder(option, file.parent)
+                if file.is_dir():
+                    raise SettingError(option, str(file), "a file, not a folder")
+
+
+class MissionLog:
+    """Follows the mission of an environment; used as a context, so that nothing unfinished is left."""
+
+    def __init__(self, wanted: Wanted) -> None:
+        """Take which files are wanted; `note` starts when the mission has been reset."""
+        self._wanted, self._began = wanted, time.perf_counter()
+        self._painter = Painter("rgb_array")
+        self._gifs = [
+            file for file in (wanted.out and wanted.out / "mission.gif", wanted.outputs.gif) if file
+        ]
+        films = {
+            "gif": _GIF_PICTURES if self._gifs else 0,
+            "mp4": _VIDEO_PICTURES if wanted.outputs.mp4 else 0,
+        }
+        self._films = {kind: Film(most) for kind, most in films.items() if most}
+        self._rerun: RerunView | None = None
+        self._stack = ExitStack()
+        self._started = False
+
+    def __enter__(self) -> MissionLog:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._stack.close()
+
+    def _start(self, env: EntropyExploreEnv) -> None:
+        self.recorder, self.commands = Recorder(env.missions), CommandRecorder(env.missions)
+        if self._wanted.outputs.rerun is not None:
+            self._rerun = self._stack.enter_context(RerunView(env.missions, self._wanted.outputs.rerun))
+        self._started = True
+
+    def command(self, actions: Mapping[str, Any]) -> None:
+        """Note the actions that the next step is given."""
+        self.commands.command(actions)
+
+    def note(self, env: EntropyExploreEnv) -> None:
+        """Note the moment after the reset or a step."""
+        if not self._started:
+            self._start(env)
+        self.recorder.note()
+        self.commands.note()
+        if self._rerun is not None:
+            self._rerun.note()
+        if not self._films:
+            return
+        self._painter.watch(env.missions)
+        time_s = self.recorder.latest_s
+        films = [film for film in self._films.values() if film.due(time_s) or not env.agents]
+        picture = self._painter.picture(env.missions) if films else None
+        for film in films:
+            if picture is not None:
+                film.add(time_s, picture)
+
+    def finish(self, strategy: str, **more: Any) -> tuple[dict[str, Any], list[Path]]:  # noqa: ANN401 - JSON
+        """Sum the mission up and write the files, each whole or not at all.
+
+        Args:
+            strategy: Who chose the commands.
+            **more: Further figures.
+
+        Returns:
+            The figures, and what was written.
+        """
+        figures = mission_figures(self.recorder.missions, 0, floor=True)
+        figures = {
+            "scenario": figures.pop("scenario"),
+            "strategy": strategy,
+            **figures,
+            **more,
+            "wall_s": round(time.perf_counter() - self._began, 3),
+        }
+        return figures, self._write(figures)
+
+    def _write(self, figures: dict[str, Any]) -> list[Path]:
+        wanted, written = self._wanted, []
+        if wanted.out is not None:
+            written += self._write_folder(wanted.out, figures)
+        for file in self._gifs:
+            animate(self._films["gif"].pictures(_GIF_LAST), file, _GIF_FRAME_S)
+            written.append(file)
+        if wanted.outputs.mp4 is not None:
+            write_video(self._films["mp4"].pictures(_VIDEO_LAST), wanted.outputs.mp4, _VIDEO_FRAMES_PER_S)
+            written.append(wanted.outputs.mp4)
+        kept = wanted.out / "mission.npz" if wanted.out is not None and wanted.recorded else None
+        for file in (kept, wanted.record):
+            if file is not None:
+                save_record(self.commands.record(figures["strategy"]), file)
+                written.append(file)
+        if self._rerun is not None:
+            self._rerun.finish()
+            written.append(self._rerun.path)
+        return written
+
+    def _write_folder(self, folder: Path, figures: dict[str, Any]) -> list[Path]:
+        """The figures with their series, and the picture of curves and maps."""
+        from baselines.cli.figures import mission_picture
+
+        recorder = self.recorder
+        rows = recorder.spread(_SERIES_POINTS)
+        series = {
+            "time_s": recorder.time_s[rows].tolist(),
+            "entropy_bits": recorder.entropy_bits[rows].tolist(),
+            "scans": recorder.scans[rows].tolist(),
+            "shared_measurements": recorder.shared[rows].tolist(),
+        }
+        content = {**figures, "settings": settings_of(recorder.missions.scenario), "series": series}
+        write_atomically(folder / "mission.json", json.dumps(content, indent=1, allow_nan=False) + "\n")
+        picture = mission_picture(recorder, named(figures), figures["strategy"])
+        write_atomically(folder / "mission.png", picture)
+        return [folder / "mission.json", folder / "mission.png"]
+
+
+def show_results(env: EntropyExploreEnv, figures: dict[str, Any], written: list[Path], as_json: bool) -> None:
+    """Print what a mission came to: one JSON object, or a table and the files that were written."""
+    if as_json:
+        print_json(figures)
+    else:
+        print_table(figures, written, env.scenario)

@@ -1,0 +1,135 @@
+"""What a person sees of a mission in the terminal: a progress bar on standard error, then a table."""
+
+from __future__ import annotations
+
+import math
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
+from entropy_explore_env.reports.painting import remaining_share
+from entropy_explore_env.scenario import Scenario, with_settings
+from entropy_explore_env.scenarios import SCENARIOS
+
+
+@contextmanager
+def progress_bar(title: str, hidden: bool) -> Iterator[Callable[[EntropyExploreEnv], None]]:
+    """A bar that is there from the first call of the function given, to be called after every step."""
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        TextColumn(
+            "entropy left {task.fields[left]:>6.1%}  simulated {task.fields[time_s]:>7,.0f} s  "
+            "shared {task.fields[shared]:>7,}"
+        ),
+        TimeElapsedColumn(),
+    )
+    console = Console(file=sys.stderr)
+    hidden = hidden or not console.is_terminal
+    progress = Progress(*columns, console=console, transient=True, disable=hidden)
+    task = progress.add_task(title, total=1.0, left=1.0, time_s=0.0, shared=0)
+
+    started = False
+
+    def show(env: EntropyExploreEnv) -> None:
+        nonlocal started
+        if not started:
+            progress.start()
+            started = True
+        state = env.missions.state
+        left = max(float(remaining_share(env.missions, 0).min()), 0.0)
+        shared = int(state.robots[0]["measurements_sent"].sum())
+        time_s = float(state.missions[0]["time_s"])
+        progress.update(task, completed=1.0 - left, left=left, time_s=time_s, shared=shared)
+
+    try:
+        yield show
+    finally:
+        if started:  # else it would print an empty line
+            progress.stop()
+
+
+_OF_TEAMS = ("shared_measurements", "bits_sent", "balance", "entropy_mean_bits", "joint_bits")
+_ROWS: tuple[tuple[str, str, Callable[[Any], str]], ...] = (
+    ("finished", "finished", lambda v: "yes" if v else "no"),
+    ("ended because", "end_reason", str),
+    ("mission time", "t_mission_s", lambda v: f"{v:,.1f} s"),
+    ("half, 90 %, 99 % of the bits after", "reached", str),
+    ("scans", "scans", lambda v: f"{v:,}"),
+    ("scans over the floor", "scans_over_floor", lambda v: f"{v:.2f}"),
+    ("measurements", "measurements", lambda v: f"{v:,}"),
+    ("shared measurements", "shared_measurements", lambda v: f"{v:,}"),
+    ("bits sent", "bits_sent", lambda v: f"{v:,}"),
+    ("bits gained per bit sent", "bits_gained_per_bit_sent", lambda v: f"{v:.3f}"),
+    ("measurements below I_min", "overlap", lambda v: f"{v:.0%}"),
+    ("explored by the team", "explored", lambda v: f"{v:.1%}"),
+    ("map error, mean", "error", lambda v: f"{v:.4f}"),
+    ("voxels on the wrong side of ½", "wrong", lambda v: f"{v:.2%}"),
+    ("imbalance between robots", "balance", lambda v: f"{v:.2f}"),
+    ("entropy at first", "entropy_start_bits", lambda v: f"{v:,.0f} bits"),
+    ("entropy at the end", "entropy_end_bits", lambda v: f"{v:,.0f} bits"),
+    ("entropy, mean of the team", "entropy_mean_bits", lambda v: f"{v:,.0f} bits"),
+    ("entropy of the joint map", "joint_bits", lambda v: f"{v:,.0f} bits"),
+    ("driven", "distance_m", lambda v: f"{v:,.1f} m"),
+    ("blocked moves", "blocked_moves", lambda v: f"{v:,}"),
+    ("computed, compiled and drawn in", "wall_s", lambda v: f"{v:,.2f} s"),
+)
+
+
+def named(figures: dict[str, Any]) -> str:
+    """Scenario and, where it says more, its world."""
+    same = figures["world"] in ("empty", "furnished", figures["scenario"])
+    return figures["scenario"] if same else f"{figures['scenario']} ({figures['world']})"
+
+
+def _setting(scenario: Scenario) -> Iterator[tuple[str, str]]:
+    """Where a mission took place and whose robots were there: rows of the table."""
+    grid = scenario.grid
+    axes = 2 if grid.flat else 3
+    yield "world", f"{' × '.join(map(str, grid.shape[:axes]))} voxels of {grid.voxel_size_m:.4g} m"
+    edges = (f"{edge_m:.4g}" if edge_m < 1000 else f"{edge_m:,.0f}" for edge_m in grid.size_m[:axes])
+    yield "its size", f"{' × '.join(edges)} m"
+    named = SCENARIOS.get(scenario.name)
+    if named is not None:
+        there = with_settings(named, {"grid": grid})  # in a 2-D world the sensor is level
+        usual = (there.robot, there.sensor, there.others)
+        changed = usual != (scenario.robot, scenario.sensor, scenario.others)
+        yield "robots and sensor", f"those of {named.name}" + (", changed" if changed else "")
+    ranges = {kind.sensor.max_range_m: None for kind in scenario.kinds}  # in order, each once
+    said = ("the whole world" if range_m == math.inf else f"{range_m:g} m" for range_m in ranges)
+    yield "sensor's range", ", ".join(said)
+
+
+def print_table(figures: dict[str, Any], written: list[Path], scenario: Scenario) -> None:
+    """Print what a mission came to, and the files that were written."""
+    from rich.console import Console
+    from rich.table import Table
+
+    team = f"{figures['robots']} robot" + ("s" if figures["robots"] > 1 else "")
+    print(f"{named(figures)}, {figures['strategy']}, {team}, seed {figures['seed']}")
+    table = Table(show_header=False)
+    table.add_column(style="dim")
+    table.add_column(justify="right")
+    marks = (figures["t50_s"], figures["t90_s"], figures["t99_s"])
+    reached = ", ".join("-" if mark is None else f"{mark:,.0f}" for mark in marks)
+    none = all(mark is None for mark in marks)
+    joint = figures.get("joint", {})
+    values = {**figures, **joint, "reached": "-" if none else reached + " s"}
+    values["joint_bits"] = joint.get("entropy_bits")
+    for label, shown in _setting(scenario):
+        table.add_row(label, shown)
+    for label, name, shown in _ROWS:
+        alone = figures["robots"] == 1 and name in _OF_TEAMS
+        partial = name == "scans_over_floor" and not figures["finished"]  # the floor is a whole map's
+        if values.get(name) is not None and not alone and not partial:
+            table.add_row(label, shown(values[name]))
+    console = Console()
+    console.print(table)
+    if written:
+        console.print(f"written: {', '.join(map(str, written))}", highlight=False, soft_wrap=True)

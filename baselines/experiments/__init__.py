@@ -1,0 +1,1 @@
+"""Experiments: missions in cells, run by worker processes, resumable; statistics, claims and tables."""

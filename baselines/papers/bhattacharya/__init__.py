@@ -1,0 +1,1 @@
+"""Bhattacharya, Michael and Kumar 2010, reproduced: `python -m baselines.papers.bhattacharya`."""

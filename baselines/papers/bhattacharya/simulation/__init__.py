@@ -1,0 +1,1 @@
+"""Bhattacharya's simulation on the cells of a plan."""

@@ -1,0 +1,78 @@
+"""The experiment of Rocha04 as cells: scenario, strategy and number of starts of each point."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from baselines.experiments.cells import Cell
+from entropy_explore_env.scenario import Scenario, with_settings
+from entropy_explore_env.scenarios import ROOM
+
+TEAMS = (2, 3, 4)
+BURSTS = (32, 64, 128)
+I_MINS = (0.6215, 0.3219, 0.0291)
+STANDARD = (64, 0.3219)
+"""burst and I_min of figure 4."""
+RIVALS = ("random", "gradient-plane", "information-rate")
+"""What stands beside eqs. 33-34 for every team size: a random walk, the motion-plane rule, and ours."""
+
+CHANGES: dict[str, tuple[str, dict[str, Any], str]] = {
+    "scan-0": ("scan time 0.001 s instead of 0.5 s", {"sensor": {"scan_time_s": 0.001}}, "gradient"),
+    "scan-1": ("scan time 1 s", {"sensor": {"scan_time_s": 1.0}}, "gradient"),
+    "turn": (
+        "turn rate π/2 rad/s instead of unlimited",
+        {"robot": {"turn_rate_rad_s": math.pi / 2}},
+        "gradient",
+    ),
+    "behind-0": ("rays update nothing behind the hit", {"sensor": {"voxels_behind": 0}}, "gradient"),
+    "reach-1": ("search radius ξ of one voxel, 0.25 m", {"robot": {"reach_m": 0.25}}, "gradient"),
+    "reach-4": ("search radius ξ of 1 m", {"robot": {"reach_m": 1.0}}, "gradient"),
+    "furnished": ("boxes on the floor (the worlds of room-furnished)", {"world": "furnished"}, "gradient"),
+    "plane-scan-0": (
+        "motion plane and scan time 0.001 s (two changes)",
+        {"sensor": {"scan_time_s": 0.001}},
+        "gradient-plane",
+    ),
+}
+"""Name → (what is changed, the settings, the strategy): one thing at a time (the last: two), one robot."""
+
+
+def team_id(robots: int, burst: int, i_min_bits: float) -> str:
+    """Name of the cell with this team; one robot shares with nobody, whatever the channel."""
+    return "single" if robots == 1 else f"team-{robots}-burst-{burst}-imin-{i_min_bits}"
+
+
+def rival_id(robots: int, strategy: str) -> str:
+    """Name of the cell in which another strategy stands beside `team_id(robots, *STANDARD)`."""
+    return f"single-{strategy}" if robots == 1 else f"team-{robots}-{strategy}"
+
+
+def experiment(starts: int, single_starts: int, changes: bool) -> list[Cell]:
+    """All cells.
+
+    Args:
+        starts: Missions a cell.
+        single_starts: Missions of the cells with one robot.
+        changes: Whether the room with one thing changed at a time is part of it.
+    """
+    single = with_settings(ROOM, {"robots": 1})
+    cells = [
+        Cell("single", single, "gradient", single_starts),
+        *(Cell(f"single-{strategy}", single, strategy, single_starts) for strategy in RIVALS),
+    ]
+    for robots in TEAMS:
+        for burst in BURSTS:
+            for i_min_bits in I_MINS:
+                scenario = _team(robots, burst, i_min_bits)
+                cells.append(Cell(team_id(robots, burst, i_min_bits), scenario, "gradient", starts))
+        for strategy in RIVALS:
+            cells.append(Cell(f"team-{robots}-{strategy}", _team(robots, *STANDARD), strategy, starts))
+    if changes:
+        for name, (_, settings, strategy) in CHANGES.items():
+            cells.append(Cell(f"change-{name}", with_settings(single, settings), strategy, single_starts))
+    return cells
+
+
+def _team(robots: int, burst: int, i_min_bits: float) -> Scenario:
+    return with_settings(ROOM, {"robots": robots, "channel": {"burst": burst, "i_min_bits": i_min_bits}})

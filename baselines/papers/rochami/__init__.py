@@ -1,0 +1,1 @@
+"""Rocha, Ferreira and Dias (RochaMI), reproduced: `python -m baselines.papers.rochami`."""

@@ -1,0 +1,225 @@
+"""The claims of RochaMI, each beside what was measured."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from scipy import stats
+
+from baselines.experiments.cells import Claim, Record, ratio_interval
+from baselines.papers.rochami.sweep import (
+    BLOCKED,
+    FILLS,
+    I_MINS,
+    KAPPAS,
+    SHARING_TEAMS,
+    TEAMS,
+    cell_id,
+    kappa_id,
+    sharing_id,
+)
+
+Records = dict[str, list[Record]]
+
+LEVEL = 0.01
+PAPER_UNCOORDINATED, PAPER_COORDINATED, PAPER_REAL = 0.81, 0.59, 0.72
+"""Time of two robots over that of one: both methods, and an earlier real run without coordination."""
+_RESAMPLES = 9999
+_KNEE = 0.25
+"""κ up to which distance falls at little cost in time."""
+_LEVEL_BAND = 0.1
+"""A product that changes by less than this share has levelled off."""
+
+
+def all_claims(records: Records) -> list[Claim]:
+    """Every claim, from the missions' records by cell."""
+    claims = []
+    for blocked in BLOCKED:
+        claims += _faster_claims(records, blocked)
+    for blocked in BLOCKED:
+        claims += [*_pair_claims(records, blocked), *_size_claims(records, blocked)]
+    return [*claims, *_kappa_claims(records), *_random_claims(records), *_sharing_claims(records)]
+
+
+def times(records: Records, cell: str) -> np.ndarray:
+    """Mission times of a cell in seconds, by seed; a mission cut off counts with its limit."""
+    return np.asarray([record["t_mission_s"] for record in records[cell]])
+
+
+def distances(records: Records, cell: str) -> np.ndarray:
+    """Metres that a robot drove on average, by seed."""
+    return np.asarray([record["distance_m"] / record["robots"] for record in records[cell]])
+
+
+def teams_in(records: Records) -> tuple[int, ...]:
+    """Team sizes of the main experiment that there are."""
+    return tuple(n for n in TEAMS if cell_id(n, "coordinated") in records)
+
+
+def holm(p_values: Sequence[float]) -> np.ndarray:
+    """p-values corrected for their number (Holm 1979)."""
+    p = np.asarray(p_values, float)
+    order = np.argsort(p, kind="stable")
+    scaled = np.maximum.accumulate(p[order] * np.arange(len(p), 0, -1))
+    corrected = np.empty(len(p))
+    corrected[order] = np.minimum(scaled, 1.0)
+    return corrected
+
+
+def paired_p(smaller: np.ndarray, larger: np.ndarray) -> float:
+    """One-sided p of the paired Wilcoxon signed-rank test that the first are smaller; 1 if all are equal."""
+    if np.array_equal(smaller, larger):
+        return 1.0
+    result: Any = stats.wilcoxon(smaller, larger, alternative="less")  # SciPy gives it no type
+    return float(result.pvalue)
+
+
+def _faster_claims(records: Records, blocked: str) -> list[Claim]:
+    """Coordinated teams are faster, whatever their size."""
+    claims, sizes = [], teams_in(records)
+    pairs = [
+        (
+            times(records, cell_id(n, "coordinated", blocked)),
+            times(records, cell_id(n, "uncoordinated", blocked)),
+        )
+        for n in sizes
+    ]
+    corrected = holm([paired_p(*pair) for pair in pairs])
+    for n, pair, p in zip(sizes, pairs, corrected, strict=True):
+        ratio, low, high = ratio_interval(*pair)
+        text = (
+            f"blocked robots {blocked}, {n} robots: the coordinated team is faster (Wilcoxon, Holm: "
+            f"p = {p:.1g}); t ratio"
+        )
+        claims.append(Claim(f"faster-{blocked}-{n}", text, "< 1", ratio, low, high, bool(p < LEVEL)))
+    return claims
+
+
+def _pair_claims(records: Records, blocked: str) -> list[Claim]:
+    """Two robots against one: the paper's ratios."""
+    claims, alone = [], times(records, cell_id(1, "coordinated"))
+    for method, paper in (("coordinated", PAPER_COORDINATED), ("uncoordinated", PAPER_UNCOORDINATED)):
+        ratio, low, high = ratio_interval(times(records, cell_id(2, method, blocked)), alone)
+        text = f"blocked robots {blocked}, {method}: t(2)/t(1)"
+        claims.append(Claim(f"pair-{blocked}-{method}", text, paper, ratio, low, high, low <= paper <= high))
+    return claims
+
+
+def _size_claims(records: Records, blocked: str) -> list[Claim]:
+    """How the times change with the team's size."""
+    sizes, alone = teams_in(records), times(records, cell_id(1, "coordinated"))
+    joint = {n: times(records, cell_id(n, "coordinated", blocked)) for n in sizes}
+    apart = {n: times(records, cell_id(n, "uncoordinated", blocked)) for n in sizes}
+    up_to_8 = [n for n in sizes if n <= 8]
+    falls = all(joint[later].mean() < joint[earlier].mean() for earlier, later in pairwise(up_to_8))
+    ratio, low, high = ratio_interval(joint[up_to_8[-1]], joint[2])
+    shown = ", ".join(f"{joint[n].mean():,.0f}" for n in sizes)
+    prefix = f"blocked robots {blocked}, "
+    text = f"{prefix}coordinated: t falls from 2 to 8 robots ({shown} s for {_list(sizes)}); t(8)/t(2)"
+    claims = [Claim(f"falls-{blocked}", text, "falls", ratio, low, high, falls and high < 1)]
+    last = sizes[-1]
+    if last > 8:
+        ratio, low, high = ratio_interval(joint[last], joint[8])
+        text = f"{prefix}coordinated: beyond 8 robots t does not fall any more; t({last})/t(8)"
+        claims.append(Claim(f"flattens-{blocked}", text, "≥ 1", ratio, low, high, high >= 1))
+    ratio, low, high = ratio_interval(apart[last], apart[2])
+    shown = ", ".join(f"{apart[n].mean():,.0f}" for n in sizes)
+    text = f"{prefix}uncoordinated: t rises from 2 robots on ({shown} s for {_list(sizes)}); t({last})/t(2)"
+    claims.append(Claim(f"worsens-{blocked}", text, "> 1", ratio, low, high, low > 1))
+    ratio, low, high = ratio_interval(apart[last], alone)
+    text = f"{prefix}uncoordinated: {last} robots are slower than one; t({last})/t(1)"
+    return [*claims, Claim(f"slower-{blocked}", text, "> 1", ratio, low, high, low > 1)]
+
+
+def _list(sizes: Sequence[int]) -> str:
+    return ", ".join(map(str, sizes)) + " robots"
+
+
+def _kappa_claims(records: Records) -> list[Claim]:
+    """What the cost of distance does to two robots."""
+    kappas = [kappa for kappa in KAPPAS if kappa_id(kappa) in records]
+    time_s = {kappa: times(records, kappa_id(kappa)) for kappa in kappas}
+    way_m = {kappa: distances(records, kappa_id(kappa)) for kappa in kappas}
+    both = {kappa: time_s[kappa] * way_m[kappa] for kappa in kappas}
+    last = kappas[-1]
+    shown = [", ".join(f"{values[kappa].mean():,.0f}" for kappa in kappas) for values in (time_s, way_m)]
+    asked = f"κ = {', '.join(f'{kappa:g}' for kappa in kappas)}"
+    rises = all(time_s[b].mean() > time_s[a].mean() for a, b in pairwise(kappas))
+    ratio, low, high = ratio_interval(time_s[last], time_s[0.0])
+    text = f"2 robots: t rises with κ ({shown[0]} s for {asked}); t({last:g})/t(0)"
+    claims = [Claim("kappa-time", text, "> 1, monotone", ratio, low, high, rises and low > 1)]
+    falls = all(way_m[b].mean() < way_m[a].mean() for a, b in pairwise(kappas))
+    ratio, low, high = ratio_interval(way_m[last], way_m[0.0])
+    text = f"2 robots: the distance driven falls with κ ({shown[1]} m); d({last:g})/d(0)"
+    claims.append(Claim("kappa-distance", text, "< 1, monotone", ratio, low, high, falls and high < 1))
+    middle = min(kappas, key=lambda kappa: abs(kappa - _KNEE))
+    ratio, low, high = ratio_interval(both[middle], both[0.0])
+    text = f"2 robots: t·d falls up to κ = {middle:g}; (t·d)({middle:g})/(t·d)(0)"
+    claims.append(Claim("kappa-product-falls", text, "< 1", ratio, low, high, high < 1))
+    ratio, low, high = ratio_interval(both[last], both[middle])
+    text = f"2 robots: t·d levels off beyond κ = {middle:g} (within 10 %); (t·d)({last:g})/(t·d)({middle:g})"
+    level = 1 - _LEVEL_BAND <= ratio <= 1 + _LEVEL_BAND
+    return [*claims, Claim("kappa-product", text, "≈ 1", ratio, low, high, level)]
+
+
+def _random_claims(records: Records) -> list[Claim]:
+    """Not the paper's: the coordinated team against random walks from the same starts."""
+    claims = []
+    for n in (1, *teams_in(records)):
+        for walk, text in ((cell_id(n, "random"), "as far"), (f"n{n}-random-1m", "steps up to 1 m")):
+            ratio, low, high = ratio_interval(times(records, cell_id(n, "coordinated")), times(records, walk))
+            team = f"{n} robot{'s' if n > 1 else ''}"
+            claim = f"ours, {team}: coordinated is faster than a random walk ({text}); t ratio"
+            claims.append(Claim(f"random-{n}-{text.split()[0]}", claim, None, ratio, low, high, high < 1))
+    return claims
+
+
+def _sharing_claims(records: Records) -> list[Claim]:
+    """Rocha04's further work: a steered I_min against fixed ones, at equal bits sent."""
+    claims = []
+    for robots in SHARING_TEAMS:
+        if sharing_id(robots, I_MINS[0]) not in records:
+            continue
+        for i_min_bits in I_MINS:
+            ratio, low, high, share = steered_ratio(records, robots, i_min_bits)
+            text = (
+                f"Rocha04's room, {robots} robots: a steered I_min is not slower than {i_min_bits} at "
+                f"the bits that it sends ({share}); t ratio"
+            )
+            name = f"steered-{robots}-{i_min_bits}"
+            claims.append(Claim(name, text, None, ratio, low, high, low <= 1))
+    return claims
+
+
+def bits_sent(records: Records, cell: str) -> np.ndarray:
+    """Measurement bits and all that a team sent, by seed, in megabits."""
+    return np.asarray([record["bits_sent"] / 1e6 for record in records[cell]])
+
+
+def steered_ratio(records: Records, robots: int, i_min_bits: float) -> tuple[float, float, float, str]:
+    """Time with a steered I_min, read between its fills at the bits of a fixed one, over that one's time.
+
+    Returns:
+        Ratio of means, the ends of its 95 % bootstrap interval over seeds, and where it was read.
+    """
+    fills = [fill for fill in FILLS if sharing_id(robots, fill=fill) in records]
+    steered = [sharing_id(robots, fill=fill) for fill in fills]
+    fixed = sharing_id(robots, i_min_bits)
+    time_s = np.stack([times(records, cell) for cell in [*steered, fixed]])
+    sent = np.stack([bits_sent(records, cell) for cell in [*steered, fixed]])
+    rows = np.random.default_rng(0).integers(time_s.shape[1], size=(_RESAMPLES, time_s.shape[1]))
+
+    def ratio(time_s: np.ndarray, sent: np.ndarray) -> float:
+        order = np.argsort(sent[:-1])
+        return float(np.interp(sent[-1], sent[:-1][order], time_s[:-1][order]) / time_s[-1])
+
+    drawn_s, drawn_sent = time_s[:, rows].mean(axis=2), sent[:, rows].mean(axis=2)
+    ratios = [ratio(drawn_s[:, i], drawn_sent[:, i]) for i in range(_RESAMPLES)]
+    low, high = np.quantile(ratios, (0.025, 0.975))
+    means = sent.mean(axis=1)
+    inside = means[:-1].min() <= means[-1] <= means[:-1].max()
+    where = f"{means[-1]:.2f} Mbit" + ("" if inside else ", beyond its fills: the nearest one")
+    return ratio(time_s.mean(axis=1), means), float(low), float(high), where

@@ -1,0 +1,129 @@
+"""A mission of Sawhney's experiment: run until no frontier is left, with the times on the way.
+
+Explored is, in plans, the share of the voxels that can be seen from where robots can be; over terrain the
+share of all columns whose surface a robot has mapped. All robots hear everything at once.
+
+A robot that waits for its team scans on the spot meanwhile, and leaves when that scan is
+done: up to a scan later than the last one to arrive.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from baselines.experiments.cells import Record
+from baselines.strategies.frontier import Exploring, FrontierStrategy
+from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
+from entropy_explore_env.missions.view import RobotView
+from entropy_explore_env.reports.metrics import joint_figures, mission_figures
+from entropy_explore_env.scenario import Scenario
+
+MARKS = (0.5, 0.9, 0.95, 0.99)
+"""Explored shares at which the time is taken."""
+_POINTS = 60
+_KEPT = ("seed", "scans", "distance_m", "blocked_moves", "robots")
+
+
+@dataclass(frozen=True)
+class Run:
+    """Runs a mission of a cell.
+
+    Attributes:
+        exploring: Of the robots.
+        world: A height map's file to be in, in place of the scenario's world; None = that.
+        ceiling_m: Of the exposure surface above it.
+    """
+
+    exploring: Exploring
+    world: str | None = None
+    ceiling_m: float = 4.0
+
+    def __call__(self, env: EntropyExploreEnv, strategy: str, seed: int) -> Record:
+        """Run the mission.
+
+        Returns:
+            `t50_s`, `t90_s`, `t95_s`, `t99_s`, `t_none_s`: when so much was explored, and when no frontier
+            was left; the time limit where that never happened; `finished`: whether none was left; `t_env_s`;
+            `series`: time and explored share; and counts.
+        """
+        del strategy
+        env = self.placed(env)
+        explorer = FrontierStrategy(self.exploring)
+        times_s, shares = followed(env, explorer, seed)
+        figures = mission_figures(env.missions, 0)
+        limit_s = env.scenario.ending.time_limit_s
+        finished, end_s = all(explorer.idle), times_s[-1]
+        reached = {f"t{100 * mark:.0f}_s": _reached(times_s, shares, mark, limit_s) for mark in MARKS}
+        rows = np.unique(np.linspace(0, len(times_s) - 1, _POINTS).round().astype(int))
+        return {
+            **{name: figures[name] for name in _KEPT},
+            **reached,
+            "t_none_s": round(float(end_s), 3) if finished else limit_s,
+            "finished": finished,
+            "explored": round(float(shares[-1]), 5),
+            "series": {
+                "time_s": np.round(np.asarray(times_s)[rows], 2).tolist(),
+                "explored": np.round(np.asarray(shares)[rows], 4).tolist(),
+            },
+        }
+
+    def placed(self, env: EntropyExploreEnv) -> EntropyExploreEnv:
+        """The environment, or one in this cell's height map."""
+        return env if self.world is None else _in_world(env.scenario, self.world, self.ceiling_m)
+
+
+def followed(
+    env: EntropyExploreEnv,
+    explorer: FrontierStrategy,
+    seed: int,
+    look: Callable[[float, Sequence[RobotView], Sequence[np.ndarray]], None] | None = None,
+) -> tuple[Sequence[float], Sequence[float]]:
+    """Run a mission until all robots find nothing unexplored, or it is cut off.
+
+    Args:
+        env: Where.
+        explorer: Of the robots.
+        seed: Of the mission.
+        look: Called when robots have chosen, with the explored share, their views and their viewpoints.
+
+    Returns:
+        Times and explored shares after the reset and each step.
+    """
+    env.reset(seed=seed)
+    explorer.reset(env.scenario, env.strategy_generator())
+    actions = {agent: np.zeros(env.action_space(agent).shape or (), np.float32) for agent in env.agents}
+    times_s, shares = [0.0], [0.0]
+    while env.agents:
+        views = [env.view(agent) for agent in env.deciding_agents()]
+        chosen = explorer.choose(views)
+        over_terrain = views[0].ceiling is not None
+        times_s.append(views[0].time_s)
+        shares.append(
+            explorer.mapped_share()
+            if over_terrain
+            else float(joint_figures(env.missions, 0)["explored"] or 0.0)
+        )
+        if look is not None:
+            look(shares[-1], views, chosen)
+        if all(explorer.idle):
+            break
+        for view, viewpoint in zip(views, chosen, strict=True):
+            actions[env.agents[view.robot]] = np.asarray(view.action_for(viewpoint))
+        env.step(actions)
+    return times_s, shares
+
+
+def _reached(times_s: Sequence[float], shares: Sequence[float], mark: float, limit_s: float) -> float:
+    """First time with this share."""
+    there = np.flatnonzero(np.asarray(shares) >= mark)
+    return round(float(times_s[there[0]]), 3) if len(there) else limit_s
+
+
+@lru_cache(maxsize=1)
+def _in_world(scenario: Scenario, world: str, ceiling_m: float) -> EntropyExploreEnv:
+    """An environment in a height map, kept for the next mission."""
+    return EntropyExploreEnv(scenario, world={"path": world, "ceiling_m": ceiling_m})

@@ -1,0 +1,211 @@
+"""The experiment of Sawhney 2009 as cells: world, team size, metric and allotment of each point.
+
+β of V - βt goes with the units of V and t. The paper's β ∈ [1, 70] count its own terrain points; here a point
+is taken to be 0.05 m² of plan, and 4 m³ over terrain (m² of ground times the height factor): so the paper's
+numbers sweep 0.05 … 3.5 m²/s and 4 … 280 m³/s, from well below to well above what a robot discovers a second.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+from baselines.experiments.cells import Cell
+from baselines.papers.sawhney.map_files import METHODS as MAP_METHODS
+from baselines.papers.sawhney.map_files import STARTS as MAP_STARTS
+from baselines.papers.sawhney.map_files import TEAM as MAP_TEAM
+from baselines.papers.sawhney.map_files import MapRun, map_world
+from baselines.papers.sawhney.mission import Run
+from baselines.strategies.frontier import Exploring, Metric
+from baselines.strategies.frontier.candidates import Looking
+from baselines.strategies.frontier.metrics import Coordinated, Nearest
+from entropy_explore_env.scenario import Scenario, with_settings
+from entropy_explore_env.scenarios import find_scenario
+
+PLANS = ("office", "corridor", "cluttered", "hybrid")
+TERRAINS = ("terrain-smooth", "terrain", "terrain-rough")
+DEM = "dem"
+TEAMS, QUICK_TEAMS = (1, 2, 3, 4, 5, 6), {"plans": (1, 3), "terrains": (3,)}
+BETAS = (1, 2, 5, 10, 20, 30, 40, 50, 60, 70)
+QUICK_BETAS = (1, 5, 10, 20, 40, 70)
+FARTHER_BETAS = {"plans": (), "terrains": (100, 200)}
+"""Beyond the paper's, so that the best one has others on both sides."""
+POINT = {"plans": 0.05, "terrains": 4.0}
+"""What one of the paper's points is taken to be: m² of plan; m² of ground times metres of height factor."""
+BONUS = {"plans": 0.5, "terrains": 40.0}
+"""Of the finishing rule."""
+STRATEGY = "per-time-visibility"
+SIGMA = 0.5
+TIME_LIMIT_S = 3600.0
+CHANGED_TEAM = 3
+"""Team size at which one thing is changed at a time."""
+
+_PLAN: dict[str, Any] = {
+    "robot": {"reach_m": math.inf, "body_radius_m": 0.0, "unknown_cost": 1e4},
+    "sensor": {"max_range_m": 3.0, "angular_step_rad": math.pi / 180, "scan_time_s": 2.0},
+}
+_TERRAIN: dict[str, Any] = {
+    "robot": {"navigator": "planned", "reach_m": math.inf, "body_radius_m": 0.0},
+    "sensor": {
+        "field_of_view_rad": (2 * math.pi, math.pi / 2),
+        "angular_step_rad": math.pi / 60,
+        "max_range_m": 20.0,
+        "scan_time_s": 2.0,
+    },
+}
+_ALL: dict[str, Any] = {
+    "channel": {"burst": 10_000, "i_min_bits": 0.0},
+    "ending": {"sigma_end": 1e-3, "time_limit_s": TIME_LIMIT_S},
+    "scored": True,
+}
+
+
+@dataclass(frozen=True)
+class Change:
+    """One thing that is changed: settings of the scenario, fields of Exploring, fields of its Looking."""
+
+    text: str
+    settings: dict[str, Any] = field(default_factory=dict)
+    exploring: dict[str, Any] = field(default_factory=dict)
+    looking: dict[str, Any] = field(default_factory=dict)
+
+
+_SCAN_SHORT = Change("a scan takes 0.5 s", {"sensor": {"scan_time_s": 0.5}})
+_SCAN_LONG = Change("a scan takes 8 s", {"sensor": {"scan_time_s": 8.0}})
+_UNPROMISED = Change("nothing is promised", exploring={"promises": False})
+CHANGES: dict[str, dict[str, Change]] = {
+    "plans": {
+        "scan-short": _SCAN_SHORT,
+        "scan-long": _SCAN_LONG,
+        "range": Change("the sensor sees twice as far", {"sensor": {"max_range_m": 6.0}}),
+        "bodies": Change("bodies of 0.2 m", {"robot": {"body_radius_m": 0.2}}),
+        "unpromised": _UNPROMISED,
+    },
+    "terrains": {
+        "scan-short": _SCAN_SHORT,
+        "scan-long": _SCAN_LONG,
+        "range": Change("the sensor sees half as far", {"sensor": {"max_range_m": 10.0}}),
+        "level": Change("unexplored ground is taken to be level", looking={"unexplored_ground": "level"}),
+        "corners": Change("UAVs stop and scan at every corner", {"robot": {"navigator": "straight"}}),
+        "unpromised": _UNPROMISED,
+    },
+}
+"""What is changed in plans, and over terrain."""
+CHANGED_METHODS = {
+    "plans": ("ptv", "beta-5", "beta-20", "sync", "naive"),
+    "terrains": ("ptv", "beta-5", "beta-20", "sync", "naive", "no-height"),
+}
+CHANGED_IN = {"plans": PLANS, "terrains": TERRAINS}
+QUICK_CHANGED_IN = {"plans": ("office",), "terrains": ("terrain",)}
+
+
+def part_of(world: str) -> str:
+    """`plans` or `terrains`."""
+    return "plans" if world in PLANS else "terrains"
+
+
+def methods(part: str, quick: bool) -> dict[str, dict[str, Any]]:
+    """Name of a method → fields of Exploring."""
+    betas = (*(QUICK_BETAS if quick else BETAS), *FARTHER_BETAS[part])
+    looking = {"looking": Looking(sigma=SIGMA, visibility="naive")}
+    found: dict[str, dict[str, Any]] = {
+        "ptv": {},
+        "sync": {"allotment": "synchronous"},
+        **{f"beta-{beta}": {"metric": Metric(beta * POINT[part])} for beta in betas},
+        "naive": looking,
+        "finish": {"metric": Metric(bonus=BONUS[part])},
+        "nearest": {"metric": Nearest(), "promises": False},
+        "coordinated": {"metric": Coordinated()},
+    }
+    if part == "terrains":
+        found["no-height"] = {"looking": Looking(sigma=SIGMA, gamma=None)}
+    return found
+
+
+def cell_id(world: str, robots: int, method: str, change: str | None = None) -> str:
+    """Name of a cell."""
+    return f"{world}/n{robots}/{method}" + ("" if change is None else f"-{change}")
+
+
+def experiment(
+    starts: int,
+    flights: int,
+    quick: bool,
+    dem: Path | None,
+    maps: Sequence[Path] = (),
+    teams: Sequence[int] = (),
+) -> list[Cell]:
+    """All cells.
+
+    Args:
+        starts: Missions a point in each plan.
+        flights: Missions a point over each terrain; 0 = none.
+        quick: Fewer team sizes and β.
+        dem: A height map's file, flown over as well.
+        maps: Files of plans of different names, explored by one team each, from MAP_STARTS starts at most.
+        teams: Team sizes; none = the usual ones. With CHANGED_TEAM things are changed one at a time.
+    """
+    cells = []
+    for world in (*PLANS, *TERRAINS, *((DEM,) if dem is not None else ())):
+        part = part_of(world)
+        if (starts if part == "plans" else flights) == 0:
+            continue
+        for robots in teams or (QUICK_TEAMS[part] if quick else TEAMS):
+            for method, exploring in methods(part, quick).items():
+                seeds = starts if part == "plans" else flights
+                cells.append(_cell(world, robots, method, exploring, seeds, dem))
+    for file in maps:
+        for method in MAP_METHODS:
+            run = MapRun(_exploring(methods("plans", False)[method]), str(file))
+            name = cell_id(map_world(file), MAP_TEAM, method)
+            cells.append(
+                Cell(name, _scenario(PLANS[0], MAP_TEAM, {}), STRATEGY, min(starts, MAP_STARTS), run)
+            )
+    for part, seeds in (("plans", starts), ("terrains", flights)):
+        ran = teams or (QUICK_TEAMS[part] if quick else TEAMS)
+        for name, change in CHANGES[part].items() if seeds and CHANGED_TEAM in ran else ():
+            for world in (QUICK_CHANGED_IN if quick else CHANGED_IN)[part]:
+                for method in CHANGED_METHODS[part]:
+                    exploring = {**methods(part, False)[method], **change.exploring}
+                    looking = exploring.get("looking", Looking(sigma=SIGMA))
+                    exploring["looking"] = replace(looking, **change.looking)
+                    cell = _cell(world, CHANGED_TEAM, method, exploring, seeds, None, change.settings, name)
+                    cells.append(cell)
+    return cells
+
+
+def world_cell(world: str, robots: int, method: str | Metric, dem: Path | None = None) -> Cell:
+    """A cell of one mission in a world, by a method of the experiment or by a metric."""
+    if isinstance(method, Metric):
+        return _cell(world, robots, f"metric-{method.beta}-{method.bonus}", {"metric": method}, 1, dem)
+    return _cell(world, robots, method, methods(part_of(world), False)[method], 1, dem)
+
+
+def _cell(
+    world: str,
+    robots: int,
+    method: str,
+    exploring: dict[str, Any],
+    seeds: int,
+    dem: Path | None,
+    settings: dict[str, Any] | None = None,
+    change: str | None = None,
+) -> Cell:
+    run = Run(_exploring(exploring), str(dem) if world == DEM else None)
+    name = cell_id(world, robots, method, change)
+    return Cell(name, _scenario(world, robots, settings or {}), STRATEGY, seeds, run)
+
+
+def _exploring(fields: dict[str, Any]) -> Exploring:
+    """How robots share frontiers: the experiment's settings, and some of a method."""
+    return Exploring(**{"looking": Looking(sigma=SIGMA), "finest_sigma": SIGMA, **fields})
+
+
+def _scenario(world: str, robots: int, settings: dict[str, Any]) -> Scenario:
+    base = find_scenario("terrain" if world == DEM else world)
+    scenario = with_settings(base, {**_ALL, "robots": robots})
+    scenario = with_settings(scenario, _PLAN if world in PLANS else _TERRAIN)
+    return with_settings(scenario, settings)

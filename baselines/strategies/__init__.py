@@ -1,0 +1,84 @@
+"""The strategies by name: scripted ones, and learned policies by where they lie."""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from types import MappingProxyType, ModuleType
+
+from baselines.strategies.frontier import FrontierStrategy
+from baselines.strategies.frontier.metrics import coordinated_frontier, nearest_frontier
+from baselines.strategies.gradient import GradientStrategy
+from baselines.strategies.information_rate import InformationRate, Weighing
+from baselines.strategies.mutual_information import Coordination, MutualInformation
+from baselines.strategies.protocol import Strategy
+from baselines.strategies.random_walk import RandomWalk
+from baselines.strategies.voronoi import Coverage, VoronoiCoverage
+from entropy_explore_env.errors import MissingExtraError, SettingError
+
+STRATEGIES: MappingProxyType[str, Callable[[], Strategy]] = MappingProxyType(
+    {
+        "random": RandomWalk,
+        "gradient": GradientStrategy,
+        "gradient-plane": partial(GradientStrategy, motion_plane=True),
+        "mutual-information": MutualInformation,
+        "ground-gradient": partial(MutualInformation, Coordination(coordinated=False)),
+        "information-rate": InformationRate,
+        "information-per-scan": partial(InformationRate, Weighing(per_scan=True, candidates=120)),
+        "per-time-visibility": FrontierStrategy,
+        "nearest-frontier": nearest_frontier,
+        "coordinated-frontier": coordinated_frontier,
+        "voronoi": VoronoiCoverage,
+        "voronoi-gradient": partial(VoronoiCoverage, Coverage(control="gradient-search")),
+        "voronoi-nearest": partial(
+            VoronoiCoverage,
+            Coverage(control="nearest", metric="length", known="deviation", tau=0.02, tau_floor=0.01),
+        ),
+    }
+)
+"""Name → a function that makes the strategy."""
+
+
+_LEARNED = "training.policy"
+"""Makes strategies of learned policies. It is looked up when one is asked for, so that strategies need
+neither trainers nor networks."""
+_PRETRAINED = "pretrained:"
+
+
+def make_strategy(name: str) -> Strategy:
+    """A new strategy.
+
+    Args:
+        name: One of STRATEGIES; or `pretrained:NAME`, a policy that comes with the project; or the folder of
+            a policy that was trained.
+
+    Raises:
+        SettingError: None has this name.
+        MissingExtraError: A policy was asked for, and what runs it is not installed.
+    """
+    if name in STRATEGIES:
+        return STRATEGIES[name]()
+    if is_learned(name):
+        return learned_policies().make_policy_strategy(name)
+    raise SettingError(
+        "strategy", name, f"one of {', '.join(STRATEGIES)}, {_PRETRAINED}NAME or a policy's folder"
+    )
+
+
+def is_learned(name: str) -> bool:
+    """Whether a name means a learned policy."""
+    return name not in STRATEGIES and (name.startswith(_PRETRAINED) or Path(name).is_dir())
+
+
+def learned_policies() -> ModuleType:
+    """The module that knows learned policies.
+
+    Raises:
+        MissingExtraError: What runs them is not installed.
+    """
+    try:
+        return importlib.import_module(_LEARNED)
+    except ModuleNotFoundError as error:
+        raise MissingExtraError(error.name or "torch", "training") from None

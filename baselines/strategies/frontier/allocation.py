@@ -1,0 +1,374 @@
+"""Who goes to which frontier candidate: synchronous and asynchronous allotment (Sawhney 2009, sect. 3.2).
+
+The pair of a robot and a candidate with the greatest value is allotted first; what is seen from there is
+promised, and the next pair is sought with what is left. Asynchronously only stopped robots take part, and
+promises of those under way stand until they have scanned; synchronously all wait for one another and take
+part together. Each robot allots from its own belief and from what reached it (poses, announcements): it
+works out the others' turns as they would, and takes its own. With perfect messages that is the paper's
+central procedure; of teammates of another kind it takes them to see and to fit in like itself. A robot counts
+as stopped if it was heard since it announced its latest viewpoint, that is, its scan arrived; or if nothing
+was heard of it for longer than any drive takes.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from baselines.strategies.frontier.candidates import Candidates, Looking
+from baselines.strategies.frontier.terrain.candidates import TerrainCandidates
+from baselines.strategies.frontier.voxel.candidates import VoxelCandidates
+from entropy_explore_env.belief.paths.lattice import NOTHING_CLOSED, Costs, Lattice, new_lattice
+from entropy_explore_env.belief.paths.planning import begin_search, search_ways, widen_search
+from entropy_explore_env.belief.paths.search import Search, collect, cost_to
+from entropy_explore_env.compilation.kernels import lean_kernel
+from entropy_explore_env.missions.view import RobotView, TeammateView
+from entropy_explore_env.robots.motion import driving_time
+from entropy_explore_env.scenario import Scenario
+from entropy_explore_env.settings import RobotKind
+
+_LOST_AFTER = 2.0
+"""Times a drive along all sides of the workspace: as long nobody is under way without being heard."""
+_WIDER = 1.4
+"""Ways are searched as far as the sensor sees, and then so many times as far until that is enough."""
+
+
+class Value(Protocol):
+    """What going to candidates is worth; never more for less V, or for a longer way."""
+
+    def __call__(
+        self, seen: np.ndarray, seconds: np.ndarray, edges: np.ndarray, taken: np.ndarray
+    ) -> np.ndarray:
+        """(K,) values; -inf = no candidate.
+
+        Args:
+            seen: (K,) V·(height factor) in points' size.
+            seconds: (K,) travel and scan.
+            edges: (K,) length of the way in voxel edges.
+            taken: (K,) how much of a frontier is taken by robots that go near it, ≥ 0 (Burgard 2005).
+        """
+        ...
+
+
+@dataclass(frozen=True)
+class Choice:
+    """A candidate that was allotted to a robot."""
+
+    slot: int
+    """Of the candidate in its map."""
+    voxel: int
+    """In which it lies."""
+    value: float
+    """By the metric."""
+    seconds: float
+    """Of travel and scan."""
+
+
+@dataclass(frozen=True)
+class _Ways:
+    """Ways of a robot to all candidates."""
+
+    start: np.ndarray
+    """(3,) where they begin, grid units."""
+    reach: float
+    """How far they were searched, in voxel edges."""
+    edges: np.ndarray
+    """(B,) float64, lengths by the candidates' slots; inf = none within reach."""
+    search: int
+    """Number of their search, which can be gone on with as long as it is the latest."""
+
+
+class Allotter:
+    """Candidates of one robot's belief, and their allotment.
+
+    Attributes:
+        candidates: See frontier_candidates.py.
+        search: Working space for ways, shared with others.
+        counted: How many candidates were counted in all.
+    """
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        kind: RobotKind,
+        looking: Looking,
+        value: Value,
+        search: Search,
+        ceiling: np.ndarray | None,
+        lazy: bool,
+    ) -> None:
+        """Nothing is explored yet.
+
+        Args:
+            scenario: The mission's settings.
+            kind: Of the robot.
+            looking: Where candidates lie, and how V is counted.
+            value: The metric.
+            search: Working space for ways.
+            ceiling: (X, Y) the exposure surface in layers; None = candidates are voxels.
+            lazy: Whether candidates are counted only as far as a choice needs.
+        """
+        self._value, self._lazy, self.search = value, lazy, search
+        self._edge, self._scenario = scenario.grid.voxel_size_m, scenario
+        layer = scenario.layer_of(kind.robot)
+        self.lattice: Lattice = new_lattice(scenario.grid.shape, 0.0, layer)
+        self.candidates: Candidates = (
+            VoxelCandidates(scenario, kind, looking)
+            if ceiling is None
+            else TerrainCandidates(scenario, kind, looking, ceiling)
+        )
+        rates = self.candidates.rates
+        self.costs = Costs(rates[:0], rates[:0], 0.0, 1.0, rates, 1.0, NOTHING_CLOSED)
+        self._no_cells = np.zeros(0, np.int32)
+        self.counted = 0
+
+    def allot(
+        self, view: RobotView, stopped: Sequence[int], targets: Sequence[np.ndarray], everybody: bool = False
+    ) -> dict[int, Choice]:
+        """The candidates that fall to a robot and to those before it.
+
+        Args:
+            view: Of the robot; its belief was taken in.
+            stopped: Teammates that are allotted something at the same time.
+            targets: (3,) places in grid units that others are under way to.
+            everybody: Whether those after it are wanted, too.
+
+        Returns:
+            Robot → candidate. It is not among them if nothing that is unexplored can be seen from any
+            candidate that it reaches.
+        """
+        candidates, taken = self.candidates, list(targets)
+        for target in targets:
+            candidates.promise(target)
+        waiting, found = [view.robot, *sorted(stopped)], dict[int, Choice]()
+        ways: dict[int, _Ways] = {}
+        while waiting:
+            choices = {robot: self._best(view, robot, ways, taken) for robot in waiting}
+            best = max(sorted(waiting), key=lambda robot: _worth(choices[robot]))
+            choice = choices[best]
+            if choice is None:
+                break
+            found[best] = choice
+            waiting.remove(best)
+            if best == view.robot and not everybody:
+                break
+            place = self.place_of(choice.voxel)
+            candidates.promise(place)
+            taken.append(place)
+        candidates.release()
+        return found
+
+    def options(self, view: RobotView) -> tuple[np.ndarray, np.ndarray]:
+        """What the robot can choose from now: (K,) seconds and (K,) V·(height factor) of each candidate.
+
+        Nothing is promised; the belief was taken in.
+        """
+        ways = self._ways(view.pose, math.inf)
+        slots, voxels = self.candidates.found()
+        reached = np.isfinite(ways.edges[slots])
+        slots, voxels = slots[reached], voxels[reached]
+        seen = self.candidates.count(slots, voxels) * self.candidates.point
+        return self.seconds(view.robot, ways.edges[slots]), seen
+
+    def place_of(self, voxel: int) -> np.ndarray:
+        """(3,) centre of a voxel, grid units."""
+        return np.stack(np.unravel_index(voxel, self._scenario.grid.shape)).astype(float) + 0.5
+
+    def start_of(self, pose: np.ndarray) -> int:
+        """Number of the voxel of a pose (5,), map frame."""
+        grid = self._scenario.grid
+        place = np.clip(grid.voxel_of(pose[:3]), 0, np.array(grid.shape) - 1)
+        if self.lattice.layer >= 0:
+            place[2] = self.lattice.layer
+        return int(np.ravel_multi_index(tuple(place), grid.shape))
+
+    def seek(self, pose: np.ndarray, goal: int) -> None:
+        """Search the way from a pose to a voxel, through the mapped region."""
+        with self._start_opened(pose) as source:
+            search_ways(self.search, self.lattice, self.costs, source, goal, math.inf, self._no_cells)
+
+    @contextmanager
+    def _start_opened(self, pose: np.ndarray) -> Iterator[np.ndarray]:
+        """(1,) int32, the voxel of a pose; meanwhile it can be left, though it may be closed."""
+        start = self.start_of(pose)
+        opened = self.candidates.open_start(start)
+        try:
+            yield np.array([start], np.int32)
+        finally:
+            self.candidates.close(opened)
+
+    def _ways(self, pose: np.ndarray, reach: float, before: _Ways | None = None) -> _Ways:
+        """From where a robot is, or was heard; those found before, less far, are gone on with if possible."""
+        arrays = self.search, self.lattice, self.costs
+        with self._start_opened(pose) as source:
+            if before is None or before.search != self.search.searches[0]:
+                begin_search(*arrays, source, self._no_cells)
+            widen_search(*arrays, reach, self._no_cells)
+        voxels = self.candidates.voxels_of(slice(None))
+        edges = np.full(len(voxels), np.inf)
+        ask_costs(self.search, voxels, reach, edges)
+        return _Ways(self.place_of(int(source[0])), reach, edges, int(self.search.searches[0]))
+
+    def _best(
+        self, view: RobotView, robot: int, ways: dict[int, _Ways], taken: Sequence[np.ndarray]
+    ) -> Choice | None:
+        """The best candidate of a robot; ways are searched, and kept, no farther than is needed."""
+        pose = view.pose if robot == view.robot else view.teammates[robot].pose
+        whole = float(sum(self._scenario.grid.shape))
+        if robot not in ways:
+            near = self.candidates.reach if self._lazy else math.inf
+            ways[robot] = self._ways(pose, near if near < whole else math.inf)
+        weighed = np.full(len(ways[robot].edges), np.nan)
+        choice, sure = self._best_of(robot, ways[robot], taken, weighed)
+        while not sure:
+            farther = _WIDER * ways[robot].reach
+            ways[robot] = self._ways(pose, farther if farther < whole else math.inf, ways[robot])
+            choice, sure = self._best_of(robot, ways[robot], taken, weighed)
+        if choice is None and robot == view.robot:
+            whole_map = self._ways(pose, math.inf, ways[robot])
+            everywhere = np.empty(self._scenario.grid.voxels)
+            collect(self.search, everywhere)
+            self.candidates.other_of(everywhere)
+            ways.clear()  # candidates have moved
+            ways[robot] = self._ways(pose, math.inf, whole_map)
+            choice, _ = self._best_of(robot, ways[robot], taken, np.full_like(weighed, np.nan))
+        return choice
+
+    def _best_of(
+        self, robot: int, ways: _Ways, taken: Sequence[np.ndarray], weighed: np.ndarray
+    ) -> tuple[Choice | None, bool]:
+        """The best of the candidates that were reached, and whether none beyond can be better.
+
+        What is counted is kept in `weighed`, (B,) by slot; NaN = not counted yet.
+        """
+        slots, voxels = self.candidates.found(all_of_them=not self._lazy)
+        edges, point = ways.edges[slots], self.candidates.point
+        reached = np.isfinite(edges)
+        beyond = slots[~reached]
+        slots, voxels, edges = slots[reached], voxels[reached], edges[reached]
+        seconds = self.seconds(robot, edges)
+        takes = self._taken(voxels, taken)
+        most = self.candidates.most(slots) if self._lazy else np.full(len(slots), np.inf)
+        bound = self._value(np.minimum(most, self.candidates.limit()) * point, seconds, edges, takes)
+        order = np.argsort(-bound, kind="stable")
+        value = np.full(len(slots), -np.inf)
+        size = self.candidates.batch
+        for first in range(0, len(order), size):
+            batch = order[first : first + size]
+            if self._lazy and bound[batch[0]] < value.max():
+                break
+            seen = self._seen(slots[batch], weighed)
+            worth = self._value(seen, seconds[batch], edges[batch], takes[batch])
+            value[batch] = np.where(seen > 0.0, worth, -np.inf)
+        best = int(np.argmax(value)) if len(value) else -1
+        choice = None
+        if best >= 0 and value[best] > -np.inf:
+            choice = Choice(int(slots[best]), int(voxels[best]), float(value[best]), float(seconds[best]))
+        if len(beyond) == 0 or math.isinf(ways.reach):
+            return choice, True
+        return choice, choice is not None and self._none_is_better(robot, beyond, ways, choice, weighed)
+
+    def _seen(self, slots: np.ndarray, weighed: np.ndarray) -> np.ndarray:
+        """(K,) V·(height factor) of candidates in points' size; `weighed` as in `_best_of`."""
+        new = slots[np.isnan(weighed[slots])]
+        weighed[new] = self.candidates.count(new, self.candidates.voxels_of(new))
+        self.counted += len(new)
+        return weighed[slots] * self.candidates.point
+
+    def _none_is_better(
+        self, robot: int, slots: np.ndarray, ways: _Ways, choice: Choice, weighed: np.ndarray
+    ) -> bool:
+        """Whether no candidate that was not reached can be worth as much as one that was found.
+
+        It lies beyond the search's reach, and not nearer than in a straight line. The most promising ones are
+        counted, since that costs less than to search farther; `weighed` as in `_best_of`.
+        """
+        apart = np.linalg.norm(self._places(self.candidates.voxels_of(slots)) - ways.start, axis=1)
+        edges = np.maximum(ways.reach, apart - 2.0)  # ways lead from centre to centre
+        seconds, nobody = self.seconds(robot, edges), np.zeros(len(slots))
+        most = np.minimum(self.candidates.most(slots), self.candidates.limit())
+        bound = self._value(most * self.candidates.point, seconds, edges, nobody)
+        better = np.flatnonzero(bound >= choice.value)
+        order, size = better[np.argsort(-bound[better], kind="stable")], self.candidates.batch
+        for first in range(0, len(order), size):
+            batch = order[first : first + size]
+            seen = self._seen(slots[batch], weighed)
+            worth = self._value(seen, seconds[batch], edges[batch], nobody[batch])
+            if (worth[seen > 0.0] >= choice.value).any():
+                return False
+        return True
+
+    def seconds(self, robot: int, edges: np.ndarray) -> np.ndarray:
+        """(K,) seconds of the drive along ways of so many voxel edges, and of the scans at its stops."""
+        kind = self._scenario.kind_of(robot)
+        length_m = edges * self._edge
+        stops = np.maximum(np.ceil(length_m / kind.robot.reach_m), 1.0)
+        hops_s = np.empty(len(edges))
+        fill_driving_times(length_m / stops, kind.robot.max_speed_m_s, kind.robot.acceleration_m_s2, hops_s)
+        return stops * (hops_s + kind.sensor.scan_time_s)
+
+    def _taken(self, voxels: np.ndarray, taken: Sequence[np.ndarray]) -> np.ndarray:
+        """(K,) Σ over targets of P(d) = 1 - d/range, within the range (Burgard 2005, eq. 6)."""
+        places = self._places(voxels)
+        total = np.zeros(len(voxels))
+        for target in taken:
+            apart = np.linalg.norm(places - target[:3], axis=1)
+            total += np.maximum(1.0 - apart / self.candidates.reach, 0.0)
+        return total
+
+    def _places(self, voxels: np.ndarray) -> np.ndarray:
+        """(K, 3) centres of (K,) voxels, grid units."""
+        return np.stack(np.unravel_index(voxels, self._scenario.grid.shape), axis=-1) + 0.5
+
+
+@lean_kernel
+def ask_costs(search: Search, voxels: np.ndarray, reach: float, out: np.ndarray) -> None:
+    """Fill (K,) with the costs of (K,) voxels in the latest search, inf over the reach; who is none stays."""
+    for place in range(len(voxels)):
+        if voxels[place] >= 0:
+            cost = cost_to(search, voxels[place])
+            out[place] = cost if cost <= reach else math.inf
+
+
+@lean_kernel
+def fill_driving_times(
+    lengths_m: np.ndarray, max_speed_m_s: float, acceleration_m_s2: float, out: np.ndarray
+) -> None:
+    """Fill (K,) with the seconds of drives from rest to rest; of ways that do not end inf."""
+    for place in range(len(lengths_m)):
+        out[place] = math.inf
+        if lengths_m[place] < math.inf:
+            out[place] = driving_time(lengths_m[place], max_speed_m_s, acceleration_m_s2)
+
+
+def _worth(choice: Choice | None) -> float:
+    return -math.inf if choice is None else choice.value
+
+
+def under_way(view: RobotView, mate: TeammateView, robot: int) -> bool:
+    """Whether a teammate, by what was heard of it, is on its way to the viewpoint that it announced.
+
+    It is until a scan from there has been heard, or for so long that it cannot be any more: it is out of the
+    channel's range, or its messages were lost. Scans under way, where sensors take them, do not count.
+    """
+    if mate.announced_s < 0.0:
+        return False
+    kind, size_m = view.scenario.kind_of(robot), view.scenario.grid.size_m
+    if mate.heard_s <= mate.announced_s:
+        drive_s = driving_time(float(sum(size_m)), kind.robot.max_speed_m_s, kind.robot.acceleration_m_s2)
+        return view.time_s - mate.announced_s <= _LOST_AFTER * drive_s + kind.sensor.scan_time_s
+    if math.isinf(kind.sensor.scan_every_m):
+        return False
+    apart_m = float(np.linalg.norm(mate.pose[:3] - mate.viewpoint[:3]))
+    return apart_m > view.scenario.grid.voxel_size_m
+
+
+def stays(view: RobotView, mate: TeammateView) -> bool:
+    """Whether the viewpoint that a teammate announced is where it was already: it waits."""
+    apart_m = float(np.linalg.norm(mate.pose[:3] - mate.viewpoint[:3]))
+    return apart_m < 0.5 * view.scenario.grid.voxel_size_m

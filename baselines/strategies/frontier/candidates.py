@@ -1,0 +1,247 @@
+"""Candidates of a robot's own belief, and what is expected to be seen from them: one form for all kinds.
+
+Two kinds: voxel_candidates.py, in plans and in any 3-D space, and terrain_candidates.py, over a height field.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import Generic, Literal, NamedTuple, Protocol, TypeVar
+
+import numpy as np
+
+from baselines.strategies.frontier.voxel.map import (
+    NONE,
+    SPENT,
+    put_block,
+)
+from baselines.strategies.frontier.voxel.visibility import (
+    Tally,
+    clear_promises,
+)
+from entropy_explore_env.missions.view import RobotView
+from entropy_explore_env.scenario import Scenario
+from entropy_explore_env.settings import RobotKind
+from entropy_explore_env.validation import check, check_choice, check_positive
+
+Visibility = Literal["ray-cast", "naive"]
+UnexploredGround = Literal["falling", "level"]
+BATCH_CELLS = 7500
+"""Cells that are walked in about the time that a call takes."""
+
+
+@dataclass(frozen=True)
+class Looking:
+    """What counts as explored, where candidates lie, and how V is counted.
+
+    Attributes:
+        sigma: σ at which a voxel is explored, and mapped.
+        spacing_m: Candidates lie about so far apart; never nearer than a voxel. None = a sixth of the range.
+        rise_m: The same above each other, over terrain; None = a sixth of the range.
+        visibility: `ray-cast`, or the `naive` count of all unexplored points in a ball.
+        gamma: γ of the height factor: relative height against absolute height. None = no height factor.
+        patch_m: Half the width of the patch whose mean ground is z_av.
+        unexplored_ground: Over terrain, what is assumed of ground that is not explored: `falling` from z_av
+            at the candidate to the workspace's floor where the range ends (sect. 3.4), or `level` at z_av.
+        too_high: Candidates higher above z_av than this share of the range are dropped.
+
+    Raises:
+        SettingError: A field is none of these.
+    """
+
+    sigma: float = 0.5
+    spacing_m: float | None = None
+    rise_m: float | None = None
+    visibility: Visibility = "ray-cast"
+    gamma: float | None = 0.5
+    patch_m: float = 5.0
+    unexplored_ground: UnexploredGround = "falling"
+    too_high: float = 0.9
+
+    def __post_init__(self) -> None:
+        """Check every field."""
+        check(self, "sigma", "a number from 1e-4 to 1e4", lambda v: 1e-4 <= v <= 1e4)
+        for name in ("spacing_m", "rise_m"):
+            if getattr(self, name) is not None:
+                check_positive(self, name)
+        check_choice(self, "visibility", Visibility)
+        check_choice(self, "unexplored_ground", UnexploredGround)
+        if self.gamma is not None:
+            check(self, "gamma", "None, or a number from 0 to 1", lambda v: 0.0 <= v <= 1.0)
+        check_positive(self, "patch_m", "too_high")
+
+    def levels(self, sigma: float, prior_precision: float) -> tuple[np.float32, np.float32]:
+        """What `take_in` takes, where σ is the level that counts as explored now."""
+        explored, mapped = (
+            np.float32(max(level**-2, prior_precision * (1.0 + 1e-6))) for level in (sigma, self.sigma)
+        )
+        return explored, mapped
+
+
+class Chart(NamedTuple):
+    """What a robot knows, seen from above, for pictures; (X, Y) each."""
+
+    mapped: np.ndarray
+    """bool"""
+    covered: np.ndarray
+    """bool, walls; over terrain none."""
+    edge: np.ndarray
+    """bool, mapped beside unexplored."""
+    ground: np.ndarray
+    """float64, height of the ground above the floor in voxel edges; NaN = not mapped, or a plan."""
+
+
+class BlockMap(Protocol):
+    """What candidates of all kinds need of their map; B slots, V voxels."""
+
+    @property
+    def rates(self) -> np.ndarray:
+        """(V,) float32, what ways cost."""
+        ...
+
+    @property
+    def voxel(self) -> np.ndarray:
+        """(B,) int32, the candidate in a slot; NONE = there is none."""
+        ...
+
+    @property
+    def seen(self) -> np.ndarray:
+        """(B,) float32, no fewer points than can be seen from it."""
+        ...
+
+
+Map = TypeVar("Map", bound=BlockMap)
+
+
+class Candidates(ABC, Generic[Map]):
+    """Candidates of one robot's belief, a few slots for each block of its map, and V of each: points seen.
+
+    Attributes:
+        reach: Of the sensor, in voxel edges; no more than the workspace is wide.
+        point: Size of a point: m² in plans and over terrain, else m³.
+        batch: How many candidates are worth counting at once; changes no result.
+        rates: (V,) float32, what ways cost in the mapped region; read-only.
+    """
+
+    _map: Map
+    _size: tuple[int, int, int]
+    _tally: Tally
+    _spent: np.ndarray
+    """(V,) uint8, SPENT where a scan was taken."""
+    point: float
+    batch: int
+
+    def __init__(self, scenario: Scenario, kind: RobotKind, looking: Looking) -> None:
+        """Nothing is explored yet."""
+        grid = scenario.grid
+        self._looking, self._size = looking, grid.shape
+        self._prior = scenario.sigma_prior**-2
+        self.reach = min(kind.sensor.max_range_m / grid.voxel_size_m, float(sum(grid.shape)))
+
+    @property
+    def rates(self) -> np.ndarray:
+        """See above."""
+        view = self._map.rates.view()
+        view.setflags(write=False)
+        return view
+
+    @abstractmethod
+    def update(self, view: RobotView, sigma: float) -> None:
+        """Take the belief in; σ is the level that counts as explored now."""
+
+    @abstractmethod
+    def mapped_share(self) -> float:
+        """Share of all points that are mapped."""
+
+    @abstractmethod
+    def chart(self) -> Chart:
+        """What is known, in space all heights laid over each other."""
+
+    @abstractmethod
+    def most(self, slots: np.ndarray) -> np.ndarray:
+        """(K,) no fewer points than V·(height factor) of each; inf = nothing is known of it yet."""
+
+    @abstractmethod
+    def limit(self) -> float:
+        """No V·(height factor) is more than this, from anywhere."""
+
+    @abstractmethod
+    def count(self, slots: np.ndarray, voxels: np.ndarray) -> np.ndarray:
+        """(K,) V·(height factor): points expected to be seen, weighed by promises; 0 = nothing at all."""
+
+    @abstractmethod
+    def promise(self, place: np.ndarray) -> None:
+        """Somebody will scan at (3,), grid units: what is seen from there is promised once more."""
+
+    @abstractmethod
+    def other_of(self, cost: np.ndarray) -> None:
+        """Blocks whose candidate was not reached may have one that was; (V,) float64 costs, inf = not."""
+
+    @abstractmethod
+    def gaze(self, place: np.ndarray, view: RobotView) -> tuple[float, float]:
+        """(yaw, pitch) in which most is seen from (3,), grid units; as it is for who sees all around."""
+
+    @abstractmethod
+    def _block_of(self, x: int, y: int, z: int) -> int:
+        """Number of the block of a voxel."""
+
+    @abstractmethod
+    def _look_at(self, count: int) -> None:
+        """Choose the candidates of the blocks that were put first in line."""
+
+    def found(self, all_of_them: bool = False) -> tuple[np.ndarray, np.ndarray]:
+        """(K,) slots of the candidates, and (K,) int32 their voxels; those that show nothing if asked for."""
+        slots = np.flatnonzero((self._map.voxel != NONE) & (all_of_them | (self._map.seen > 0.0)))
+        return slots, self._map.voxel[slots]
+
+    def voxels_of(self, slots: np.ndarray | slice) -> np.ndarray:
+        """(K,) int32, voxels of some candidates; NONE = there is none."""
+        return self._map.voxel[slots]
+
+    def expected(self, place: np.ndarray) -> np.ndarray:
+        """(X, Y) bool, what is expected to be seen from (3,), grid units, above or below each other."""
+        self.promise(place)
+        found = np.zeros(self._tally.stamp.size, bool)
+        found[self._tally.marked[: self._tally.numbers[1]]] = True
+        self.release()
+        return np.asarray(found.reshape(*self._size[:2], -1).any(2))
+
+    def release(self) -> None:
+        """Forget all promises."""
+        clear_promises(self._tally)
+
+    def spend(self, voxel: int) -> None:
+        """A scan was taken in a voxel: it is no candidate any more."""
+        self._spent[voxel] |= SPENT
+        self._look_at(put_block(self._map, self._block_of(*self._axes_of(voxel)), 0))
+
+    def unspend(self) -> None:
+        """Any place may be a candidate again: more is asked for from now on."""
+        spent, count = np.flatnonzero(self._spent & SPENT), 0
+        self._spent[spent] &= np.uint8(~SPENT & 0xFF)
+        for voxel in spent:
+            count = put_block(self._map, self._block_of(*self._axes_of(int(voxel))), count)
+        self._look_at(count)
+
+    def open_start(self, voxel: int) -> list[int]:
+        """Let a robot leave the place where it stands: voxels by number that were closed."""
+        del voxel
+        return []
+
+    def close(self, voxels: list[int]) -> None:
+        """Close what `open_start` opened."""
+        self._map.rates[voxels] = np.inf
+
+    def _axes_of(self, voxel: int) -> tuple[int, int, int]:
+        x, y, z = np.unravel_index(voxel, self._size)
+        return int(x), int(y), int(z)
+
+    def _spacing(self, wanted_m: float | None, edge_m: float) -> int:
+        """Voxels from a candidate to the next: so many metres, or None = a sixth of the range."""
+        return max(round((wanted_m or self.reach * edge_m / 6.0) / edge_m), 1)
+
+
+def as_tuple(place: np.ndarray) -> tuple[float, float, float]:
+    """(x, y, z), for which kernels are compiled."""
+    return float(place[0]), float(place[1]), float(place[2])

@@ -1,0 +1,1 @@
+"""Frontier candidates over a height field below an exposure surface."""

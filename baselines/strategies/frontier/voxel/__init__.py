@@ -1,0 +1,1 @@
+"""Frontier candidates in plans and any 3-D space."""

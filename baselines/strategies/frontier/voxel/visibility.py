@@ -1,0 +1,305 @@
+"""How many unexplored points are expected to be seen from a place: the V of Sawhney 2009, sects. 3.4-3.5.
+
+In a map of voxels rays go out until something believed covered stops them, or to the sensor's range; each
+unexplored voxel that they cross counts once. Over a height field (`terrain_view`) points are columns. A point
+that n robots have promised to see weighs 1/(1 + n). (The paper's 1/n would make the first promise free.) The
+naive V, for comparison, counts all unexplored points in a ball as large as the range. Grid units.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from baselines.strategies.frontier.voxel.map import NONE, STOPS_RAYS, UNEXPLORED
+from baselines.strategies.frontier.voxel.ray_tree import cell_at
+from entropy_explore_env.belief.raycast import cast_ray, longest_crossing
+from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel
+
+MOST_RAYS = 720
+
+
+class Tally(NamedTuple):
+    """Working space of counts, and what teammates promised to see; N points."""
+
+    stamp: np.ndarray
+    """(N,) int32, number of the count that met a point last."""
+    promised: np.ndarray
+    """(N,) uint8, robots that will see a point."""
+    marked: np.ndarray
+    """(N,) int32, points with promises …"""
+    numbers: np.ndarray
+    """(2,) int64: number of the latest count, and how many points are marked."""
+    crossed: np.ndarray
+    """(L,) int32, for `cast_ray`, as is …"""
+    entered: np.ndarray
+    """(L,) int64."""
+
+
+def new_tally(points: int, shape: tuple[int, int, int]) -> Tally:
+    """Working space for a map of this shape."""
+    longest = longest_crossing(*shape, math.inf, 2)
+    return Tally(
+        np.zeros(points, np.int32),
+        np.zeros(points, np.uint8),
+        np.zeros(points, np.int32),
+        np.zeros(2, np.int64),
+        np.zeros(longest, np.int32),
+        np.zeros(longest, np.int64),
+    )
+
+
+def rays_around(reach: float, pitches: np.ndarray) -> np.ndarray:
+    """(D, 3) float64 unit vectors all around: in plans one for every voxel edge at `reach`, up to MOST_RAYS.
+
+    Args:
+        reach: In voxel edges.
+        pitches: (rows,) radians downwards; with more than one row at most 32 to a turn.
+    """
+    turns = min(math.ceil(2.0 * math.pi * min(reach, 1e4)), MOST_RAYS if len(pitches) == 1 else 32)
+    return rays_towards((np.arange(turns) + 0.5) * (2.0 * math.pi / turns), pitches)
+
+
+def rays_towards(yaws: np.ndarray, pitches: np.ndarray) -> np.ndarray:
+    """(D, 3) float64 unit vectors of all pairs of yaw and pitch, radians."""
+    yaw, pitch = (axis.reshape(-1) for axis in np.meshgrid(yaws, pitches, indexing="ij"))
+    level = np.cos(pitch)
+    return np.stack([np.cos(yaw) * level, np.sin(yaw) * level, -np.sin(pitch)], axis=-1)
+
+
+@inlined_kernel
+def weight(promises):
+    """Of a point that so many robots have promised to see."""
+    return 1.0 / (1.0 + promises)
+
+
+_WEIGHTS = 1.0 / (1.0 + np.arange(256))
+"""The same by number of promises."""
+
+
+@inlined_kernel
+def begin_count(tally):
+    """Number of a new count."""
+    tally.numbers[0] += 1
+    if tally.numbers[0] > 2**31 - 2:  # once in a lifetime
+        for point in range(len(tally.stamp)):
+            tally.stamp[point] = 0
+        tally.numbers[0] = 1
+    return np.int32(tally.numbers[0])
+
+
+@inlined_kernel
+def promise(tally, point):
+    """Note that one more robot will see a point."""
+    if tally.promised[point] == 0:
+        tally.marked[tally.numbers[1]] = point
+        tally.numbers[1] += 1
+    tally.promised[point] = min(np.int64(tally.promised[point]) + 1, 255)
+
+
+@inlined_kernel
+def count_point(tally, point, marking):
+    """What a point that is seen counts; if `marking` it is promised from now on."""
+    value = weight(tally.promised[point])
+    if marking:
+        promise(tally, point)
+    return value
+
+
+@lean_kernel
+def clear_promises(tally):
+    """Release all promises."""
+    for place in range(tally.numbers[1]):
+        tally.promised[tally.marked[place]] = 0
+    tally.numbers[1] = 0
+
+
+@lean_kernel
+def count_crossed(tally, state, size, start, directions, reach, marking):
+    """Unexplored voxels that rays from a place cross: (all, weighed by promises).
+
+    Args:
+        tally: Working space.
+        state: (V,) uint8 of a FrontierMap.
+        size: (X, Y, Z) voxels.
+        start: (3,) float64, the place.
+        directions: (D, 3) float64 unit vectors.
+        reach: Of the rays, in voxel edges; inf allowed.
+        marking: Whether the voxels are promised from now on.
+    """
+    number, points, weighed = begin_count(tally), 0, 0.0
+    begin = (start[0], start[1], start[2])
+    for ray in range(len(directions)):
+        direction = (directions[ray, 0], directions[ray, 1], directions[ray, 2])
+        _, n, _ = cast_ray(
+            state, STOPS_RAYS, size, begin, direction, reach, False, 1, tally.crossed, tally.entered
+        )
+        for place in range(n):
+            voxel = np.uint32(tally.crossed[place])
+            if state[voxel] & UNEXPLORED and tally.stamp[voxel] != number:
+                tally.stamp[voxel] = number
+                points += 1
+                weighed += count_point(tally, voxel, marking)
+    return points, weighed
+
+
+@lean_kernel
+def count_in_ball(tally, state, size, start, reach, marking):
+    """The naive V: unexplored voxels with their centres within reach of a place, seen or not."""
+    points, weighed = 0, 0.0
+    wide = min(reach, size[0] + size[1] + size[2])
+    for x in range(max(int(start[0] - wide - 0.5), 0), min(int(start[0] + wide + 1.0), size[0])):
+        for y in range(max(int(start[1] - wide - 0.5), 0), min(int(start[1] + wide + 1.0), size[1])):
+            for z in range(max(int(start[2] - wide - 0.5), 0), min(int(start[2] + wide + 1.0), size[2])):
+                dx, dy, dz = x + 0.5 - start[0], y + 0.5 - start[1], z + 0.5 - start[2]
+                voxel = (x * size[1] + y) * size[2] + z
+                if dx * dx + dy * dy + dz * dz <= wide * wide and state[voxel] & UNEXPLORED:
+                    points += 1
+                    weighed += count_point(tally, voxel, marking)
+    return points, weighed
+
+
+@lean_kernel
+def count_from(tally, state, size, voxels, tree, met, seen, weighed):
+    """Fill (K,) with the points seen from K voxels' centres, and with them weighed by promises.
+
+    What `count_crossed` finds, with the rays as a RayTree of C cells; `met` is (C,) int32 scratch space.
+    """
+    for cell in range(len(met)):
+        met[cell] = -1
+    promises, nodes = tally.numbers[1] > 0, len(tree.offset)
+    for place in range(len(voxels)):
+        voxel = np.int64(voxels[place])
+        at = place_in(size, voxel)
+        inside = _inside(tree, size, at)
+        if inside and not promises:
+            points, value = _climb(tally, state, size, voxel, tree, at, met, place, 0, nodes, True, False)
+        elif inside:
+            points, value = _climb(tally, state, size, voxel, tree, at, met, place, 0, nodes, True, True)
+        else:
+            points, value = _climb(tally, state, size, voxel, tree, at, met, place, 0, nodes, False, True)
+        seen[place], weighed[place] = points, value
+
+
+@inlined_kernel
+def _inside(tree, size, at):
+    """Whether no ray from a voxel leaves the workspace."""
+    inside = True
+    for axis in range(3):
+        inside &= at[axis] + tree.low[axis] >= 0 and at[axis] + tree.high[axis] < size[axis]
+    return inside
+
+
+@inlined_kernel
+def _climb(tally, state, size, voxel, tree, at, met, place, first, last, inside, promises):
+    """Count along the tree's branches, its nodes `first` … `last` - 1: (all, weighed). See `count_from`.
+
+    The rays start in a voxel, given by its number and by axis, the `place`-th that is counted from; they
+    leave the workspace nowhere (`inside`) or perhaps; there are `promises` or none.
+    """
+    points, weighed, node = 0, 0.0, np.uint32(first)
+    while node < np.uint32(last):
+        if not inside:
+            x, y, z = at[0] + tree.steps[node, 0], at[1] + tree.steps[node, 1], at[2] + tree.steps[node, 2]
+            if not (0 <= x < size[0] and 0 <= y < size[1] and 0 <= z < size[2]):
+                node = tree.after[node]
+                continue
+        there, cell = np.uint64(voxel + tree.offset[node]), tree.cell[node]
+        flags = state[there]
+        fresh = (flags & UNEXPLORED != 0) & (met[cell] != place)
+        met[cell] = place
+        points += np.int64(fresh)
+        if promises and fresh:
+            weighed += _WEIGHTS[tally.promised[there]]
+        if flags > STOPS_RAYS and node > 0:
+            node = tree.after[node]
+        else:
+            node += np.uint32(1)
+    return points, weighed if promises else float(points)
+
+
+@lean_kernel
+def add_opened(tally, state, size, opened, voxels, tree, met, seen):
+    """Add to (K,) bounds of what is seen from K voxels what is seen now through voxels that turned out free.
+
+    So they stay bounds, though rays go on where they ended before: nothing else shows more than it did.
+
+    Args:
+        tally: As `count_from` takes it; it stays as it is.
+        state: (V,) uint8, as it is now.
+        size: (X, Y, Z) voxels.
+        opened: (N,) int32, voxels that were covered when bounds were last added to, and are not now.
+        voxels: (K,) int32; NONE = there is none.
+        tree: A RayTree of C cells, by which the bounds were found.
+        met: (C,) int32 scratch space.
+        seen: (K,) float32, changed in place; inf = there is no bound, and will be none.
+    """
+    for cell in range(len(met)):
+        met[cell] = -1
+    for place in range(len(voxels)):
+        if voxels[place] == NONE or math.isinf(seen[place]):
+            continue
+        voxel = np.int64(voxels[place])
+        at = place_in(size, voxel)
+        for other in opened:
+            x, y, z = place_in(size, other)
+            cell = cell_at(tree, x - at[0], y - at[1], z - at[2])
+            if cell < 0:
+                continue
+            for number in range(tree.first[cell], tree.first[cell + 1]):
+                node = np.int64(tree.nodes[number])
+                if node > 0 and _is_reached(state, voxel, tree, node):
+                    first, last = node + 1, tree.after[node]
+                    seen[place] += _climb(
+                        tally,
+                        state,
+                        size,
+                        voxel,
+                        tree,
+                        at,
+                        met,
+                        place,
+                        first,
+                        last,
+                        inside=False,
+                        promises=False,
+                    )[0]
+
+
+@lean_kernel
+def _is_reached(state, voxel, tree, node):
+    """Whether nothing stops the rays from a voxel before a node of their tree."""
+    at = np.int64(0)
+    while at != node:
+        after = np.int64(tree.after[at])
+        if node >= after:
+            at = after
+            continue
+        if at > 0 and state[voxel + tree.offset[at]] > STOPS_RAYS:
+            return False
+        at += 1
+    return True
+
+
+@lean_kernel
+def count_in_balls(tally, state, size, voxels, reach, seen, weighed):
+    """`count_from` with the naive V."""
+    for place in range(len(voxels)):
+        start = centre_of(size, voxels[place])
+        seen[place], weighed[place] = count_in_ball(tally, state, size, start, reach, False)
+
+
+@inlined_kernel
+def centre_of(size, voxel):
+    """(x, y, z) of a voxel's centre."""
+    x, y, z = place_in(size, voxel)
+    return x + 0.5, y + 0.5, z + 0.5
+
+
+@inlined_kernel
+def place_in(size, voxel):
+    """(x, y, z) of a voxel, whole numbers."""
+    column = voxel // size[2]
+    return column // size[1], column % size[1], voxel - column * size[2]

@@ -1,0 +1,281 @@
+"""Controls of Voronoi coverage: where in its geodesic cell a robot goes (Bhattacharya, Michael & Kumar 2010).
+
+Costs are those of the tessellation that the cells come from (belief/paths/geodesic_cells.py); densities φ
+have no unit. Voxels are numbered in C order; of equals the first by number is taken.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from entropy_explore_env.belief.paths.geodesic_cells import NOBODY, Tessellation, tessellate
+from entropy_explore_env.belief.paths.lattice import DIAGONALS
+from entropy_explore_env.compilation.kernels import inlined_kernel, kernel, lean_kernel
+
+LN2 = math.log(2.0)
+"""Entropy of a voxel that nobody has measured, in nats."""
+
+
+def projected_centroids(
+    cells: np.ndarray, density: np.ndarray, threshold: float, sources: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """The centroid of each cell, projected into it (eqs. 6-8).
+
+        C = Σ q φ(q) / Σ φ(q)   over the cell;   the target is the q nearest to C, of those with φ(q) ≥ τ if
+        there are any, else of all voxels of the cell.
+
+    Args:
+        cells: (X, Y, Z) int32, whose each voxel is; NOBODY = nobody's.
+        density: (X, Y, Z) float32, φ > 0.
+        threshold: τ.
+        sources: How many cells S there are.
+
+    Returns:
+        (S,) int64 targets, NOBODY for an empty cell, and (S,) int64, how many voxels have φ ≥ τ.
+    """
+    sums, nearest = np.zeros((sources, 4)), np.full((sources, 2), np.inf)
+    targets = np.full((sources, 2), NOBODY, np.int64)
+    uncertain = np.zeros(sources, np.int64)
+    _sum_up(cells, density, threshold, sums, uncertain)
+    _project(cells, density, threshold, sums, nearest, targets)
+    return np.where(targets[:, 0] == NOBODY, targets[:, 1], targets[:, 0]), uncertain
+
+
+@lean_kernel
+def step_is_free(coverage: np.ndarray, size: tuple[int, int, int], here: int, there: int) -> bool:
+    """Whether one step leads from a voxel to another, past nothing covered.
+
+    Args:
+        coverage: (V,) float32, above ½ = covered.
+        size: (X, Y, Z) voxels.
+        here: Number of a voxel; may be covered.
+        there: Likewise.
+    """
+    column, other = here // size[2], there // size[2]
+    x, y, z = column // size[1], column % size[1], here % size[2]
+    i, j, k = other // size[1], other % size[1], there % size[2]
+    if abs(i - x) > 1 or abs(j - y) > 1 or abs(k - z) > 1:
+        return False
+    for a in range(min(x, i), max(x, i) + 1):
+        for b in range(min(y, j), max(y, j) + 1):
+            for c in range(min(z, k), max(z, k) + 1):
+                voxel = (a * size[1] + b) * size[2] + c
+                if voxel != here and coverage[voxel] > 0.5:
+                    return False
+    return True
+
+
+@lean_kernel
+def _sum_up(
+    cells: np.ndarray, density: np.ndarray, threshold: float, sums: np.ndarray, uncertain: np.ndarray
+) -> None:
+    """Add up φ, xφ, yφ and zφ of each cell, and count where φ ≥ τ."""
+    for x in range(cells.shape[0]):
+        for y in range(cells.shape[1]):
+            for z in range(cells.shape[2]):
+                cell = cells[x, y, z]
+                if cell >= 0:
+                    weight = np.float64(density[x, y, z])
+                    sums[cell, 0] += weight
+                    sums[cell, 1] += weight * x
+                    sums[cell, 2] += weight * y
+                    sums[cell, 3] += weight * z
+                    uncertain[cell] += weight >= threshold
+
+
+@lean_kernel
+def _project(
+    cells: np.ndarray,
+    density: np.ndarray,
+    threshold: float,
+    sums: np.ndarray,
+    nearest: np.ndarray,
+    targets: np.ndarray,
+) -> None:
+    """Fill (S, 2) voxels nearest to the centroids: with φ ≥ τ, and of the others."""
+    voxel = 0
+    for x in range(cells.shape[0]):
+        for y in range(cells.shape[1]):
+            for z in range(cells.shape[2]):
+                cell = cells[x, y, z]
+                if cell >= 0:
+                    total, rest = sums[cell, 0], 0 if density[x, y, z] >= threshold else 1
+                    away_x, away_y = x - sums[cell, 1] / total, y - sums[cell, 2] / total
+                    away_z = z - sums[cell, 3] / total
+                    away = away_x * away_x + away_y * away_y + away_z * away_z
+                    if away < nearest[cell, rest]:
+                        nearest[cell, rest], targets[cell, rest] = away, voxel
+                voxel += 1
+
+
+def nearest_uncertain(
+    cells: np.ndarray, costs: np.ndarray, density: np.ndarray, threshold: float, sources: int
+) -> np.ndarray:
+    """(S,) int64: of each cell the voxel with φ ≥ τ that costs least to reach; NOBODY = it has none."""
+    cheapest, targets = np.full(sources, np.inf), np.full(sources, NOBODY, np.int64)
+    _seek_uncertain(cells, costs, density, threshold, cheapest, targets)
+    return targets
+
+
+@lean_kernel
+def _seek_uncertain(
+    cells: np.ndarray,
+    costs: np.ndarray,
+    density: np.ndarray,
+    threshold: float,
+    cheapest: np.ndarray,
+    targets: np.ndarray,
+) -> None:
+    voxel = 0
+    for x in range(cells.shape[0]):
+        for y in range(cells.shape[1]):
+            for z in range(cells.shape[2]):
+                cell = cells[x, y, z]
+                if cell >= 0 and density[x, y, z] >= threshold and costs[x, y, z] < cheapest[cell]:
+                    cheapest[cell], targets[cell] = costs[x, y, z], voxel
+                voxel += 1
+
+
+def coverage_functionals(
+    cells: np.ndarray, costs: np.ndarray, density: np.ndarray, sources: int
+) -> np.ndarray:
+    """(S,) float64, the coverage functional of each cell, H = Σ d(q, p)² φ(q) (sect. 3, f(x) = x²)."""
+    functionals = np.zeros(sources)
+    _add_functionals(cells, costs, density, functionals)
+    return functionals
+
+
+@lean_kernel
+def _add_functionals(
+    cells: np.ndarray, costs: np.ndarray, density: np.ndarray, functionals: np.ndarray
+) -> None:
+    for x in range(cells.shape[0]):
+        for y in range(cells.shape[1]):
+            for z in range(cells.shape[2]):
+                cell = cells[x, y, z]
+                if cell >= 0:
+                    cost = costs[x, y, z]
+                    functionals[cell] += cost * cost * np.float64(density[x, y, z])
+
+
+class CellSearch:
+    """What the functional of one robot's cell would be if the robot stood elsewhere in it (eq. 3)."""
+
+    def __init__(self, space: Tessellation, rates: np.ndarray, density: np.ndarray, cell: int) -> None:
+        """Search in the cell alone: distances are those of ways that do not leave it.
+
+        Args:
+            space: Working space; overwritten.
+            rates: (X, Y, Z) float32, as the tessellation had them.
+            density: (X, Y, Z) float32, φ.
+            cell: (X, Y, Z) bool, the cell.
+        """
+        self._space, self._density = space, density
+        self._rates = np.where(cell, rates, np.float32(np.inf))
+
+    def functional(self, voxel: int, toll: float, by_length: bool) -> float:
+        """H of the cell for a robot in this voxel; inf where part of the cell would be out of reach."""
+        tessellate(self._space, self._rates, np.array([voxel]), toll, by_length)
+        if np.count_nonzero(self._space.cell == 0) < np.count_nonzero(np.isfinite(self._rates)):
+            return math.inf
+        return float(coverage_functionals(self._space.cells, self._space.costs, self._density, 1)[0])
+
+
+def neighbours(free: np.ndarray, voxel: int) -> list[int]:
+    """Voxels to which one step leads: up to 8, or 26, none past a corner; by number.
+
+    Args:
+        free: (X, Y, Z) bool.
+        voxel: From where.
+    """
+    place, size = np.unravel_index(voxel, free.shape), free.shape
+    found = []
+    for step in np.ndindex(3, 3, 3):
+        there = [int(at) + along - 1 for at, along in zip(place, step, strict=True)]
+        if there != list(place) and all(0 <= i < n for i, n in zip(there, size, strict=True)):
+            spans = [slice(min(at, to), max(at, to) + 1) for at, to in zip(place, there, strict=True)]
+            if free[tuple(spans)].all():
+                found.append(int(np.ravel_multi_index(there, size)))
+    return found
+
+
+def gradient_step(search: CellSearch, cell: np.ndarray, voxel: int, toll: float, by_length: bool) -> int:
+    """The neighbour in its own cell at which the robot's functional is least; itself if none is less (eq. 3).
+
+    Args:
+        search: Of the robot's cell.
+        cell: (X, Y, Z) bool, the cell.
+        voxel: Where the robot is.
+        toll: As the tessellation had it.
+        by_length: Likewise.
+    """
+    best, least = voxel, search.functional(voxel, toll, by_length)
+    for near in neighbours(cell, voxel):
+        functional = search.functional(near, toll, by_length)
+        if functional < least:
+            best, least = near, functional
+    return best
+
+
+def way_to(space: Tessellation, rates: np.ndarray, voxel: int, toll: float, by_length: bool) -> np.ndarray:
+    """The cheapest way from a cell's source to a voxel in it; it does not leave the cell.
+
+    Read off the costs backwards: no search is needed.
+
+    Args:
+        space: After `tessellate`.
+        rates: As the tessellation had them.
+        voxel: Where the way ends.
+        toll: As the tessellation had it.
+        by_length: Likewise.
+
+    Returns:
+        (N,) int64 voxels from the source on, both ends with it; none if nobody reaches the voxel.
+    """
+    lengths = np.array([(length if by_length else 1.0, toll * length) for length in DIAGONALS])
+    cells, costs = space.cells, space.costs
+    if cells.reshape(-1)[voxel] == NOBODY:
+        return np.zeros(0, np.int64)
+    return _walk_back(cells, costs, rates, lengths, voxel)
+
+
+@inlined_kernel
+def _legal(rates: np.ndarray, x: int, y: int, z: int, i: int, j: int, k: int) -> bool:
+    """Whether nothing impassable is in the box between two neighbouring voxels."""
+    for a in range(min(x, i), max(x, i) + 1):
+        for b in range(min(y, j), max(y, j) + 1):
+            for c in range(min(z, k), max(z, k) + 1):
+                if math.isinf(rates[a, b, c]):
+                    return False
+    return True
+
+
+@kernel
+def _walk_back(
+    cells: np.ndarray, costs: np.ndarray, rates: np.ndarray, lengths: np.ndarray, voxel: int
+) -> np.ndarray:
+    size_x, size_y, size_z = cells.shape
+    way = np.empty(cells.size, np.int64)
+    way[0], count = voxel, 1
+    x, y, z = voxel // (size_y * size_z), voxel // size_z % size_y, voxel % size_z
+    cell = cells[x, y, z]
+    while costs[x, y, z] > 0.0:
+        best, next_x, next_y, next_z = math.inf, x, y, z
+        for i in range(max(x - 1, 0), min(x + 2, size_x)):
+            for j in range(max(y - 1, 0), min(y + 2, size_y)):
+                for k in range(max(z - 1, 0), min(z + 2, size_z)):
+                    if cells[i, j, k] != cell or costs[i, j, k] >= costs[x, y, z]:
+                        continue
+                    axes = abs(i - x) + abs(j - y) + abs(k - z)
+                    mean = 0.5 * (np.float64(rates[i, j, k]) + np.float64(rates[x, y, z]))
+                    cost = costs[i, j, k] + lengths[axes - 1, 1] + mean * lengths[axes - 1, 0]
+                    if cost < best and _legal(rates, x, y, z, i, j, k):
+                        best, next_x, next_y, next_z = cost, i, j, k
+        if math.isinf(best):  # the costs are not those of these rates
+            return way[:0].copy()
+        x, y, z = next_x, next_y, next_z
+        way[count] = (x * size_y + y) * size_z + z
+        count += 1
+    return way[:count][::-1].copy()

@@ -1,0 +1,74 @@
+"""The form of every command: arguments, one line for an error, exit codes, one JSON object."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+from baselines.cli.arguments import parse, print_json, run_command
+from entropy_explore_env.command import BAD_INPUT, UsageError
+from entropy_explore_env.errors import MissingExtraError
+
+
+@dataclass
+class Args:
+    """Do something."""
+
+    number: int = 3
+    """How many."""
+    folder: Path | None = None
+    """Where."""
+    loud: bool = False
+    """Whether to shout."""
+
+
+def test_words_become_arguments():
+    assert parse(Args, []) == Args()
+    assert parse(Args, ["--number", "5", "--folder", "a/b", "--loud"]) == Args(5, Path("a/b"), True)
+    assert parse(Args, ["--loud"], default=Args(7)) == Args(7, None, True)
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--number", "many"], "--number"),
+        (["--number"], "--number"),
+        (["--nmber", "3"], "--nmber"),
+        (["stray"], "stray"),
+        (["--loud", "yes"], "yes"),
+    ],
+)
+def test_words_that_do_not_fit_are_named_in_one_line_and_print_nothing(words, said, capsys):
+    with pytest.raises(UsageError) as error:
+        parse(Args, words)
+    assert said in str(error.value) and "\n" not in str(error.value)
+    assert not set(str(error.value)) & set("│╭╮╰╯─")
+    assert capsys.readouterr() == ("", "")
+
+
+def test_help_goes_to_standard_output_and_ends_well(capsys):
+    with pytest.raises(SystemExit) as stop:
+        run_command(lambda words: 0 if parse(Args, words) else 1, ["--help"])
+    out, err = capsys.readouterr()
+    assert stop.value.code in (0, None) and err == ""
+    assert "How many." in out and "--number" in out
+
+
+def test_a_package_that_is_missing_is_named_with_its_extra(capsys, monkeypatch):
+    monkeypatch.setitem(__import__("sys").modules, "tyro", None)
+    assert run_command(lambda words: 0 if parse(Args, words) else 1, []) == BAD_INPUT
+    out, err = capsys.readouterr()
+    assert out == "" and err.count("\n") == 1 and "entropy_explore_env[baselines]" in err
+    assert isinstance(MissingExtraError("tyro", "baselines"), ImportError)
+
+
+def test_json_is_one_object_that_any_reader_takes(capsys):
+    print_json({"a": [1.5, None, True], "b": "σ"})
+    out, err = capsys.readouterr()
+    assert json.loads(out) == {"a": [1.5, None, True], "b": "σ"} and err == ""
+    with pytest.raises(ValueError, match="JSON"):
+        print_json({"a": float("nan")})
+    assert capsys.readouterr().out == ""

@@ -1,0 +1,249 @@
+"""The reproduction of Bhattacharya 2010: its belief, its simulation, and the command from end to end."""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+import io
+import json
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+
+from baselines.cli.arguments import run_command
+from baselines.papers.bhattacharya import __main__ as bhattacharya
+from baselines.papers.bhattacharya import sweep as bhattacharya_runs
+from baselines.papers.bhattacharya.simulation.belief import Fusion, GridBelief, Readings, Scanner, Sensor
+from baselines.papers.bhattacharya.simulation.team import Rules, Simulation
+from baselines.papers.bhattacharya.splitting import split
+from baselines.papers.bhattacharya.sweep import FLOORS, all_runs, start_cells
+from baselines.papers.bhattacharya.timing import changed_share
+from entropy_explore_env.errors import SettingError
+from tests.reference.scenes import drawn, seeds
+
+SHAPE = (9, 13, 1)
+
+
+def plan(seed, share=0.15, shape=(17, 23, 1)):
+    return np.random.default_rng(seed).random(shape) < share
+
+
+# --- the belief
+
+
+def test_the_sensor_s_confidence_by_hand():
+    sensor = Sensor(10.0, near=0.9, far=0.6)
+    assert [sensor.confidence(r) for r in (0.0, 5.0, 10.0, 10.1)] == pytest.approx([0.9, 0.825, 0.6, 0.0])
+
+
+@pytest.mark.parametrize(
+    ("fusion", "expected"),
+    [
+        (Fusion(1.0), (0.1 + 0.3) / 2),
+        (Fusion(2.0), math.sqrt((0.01 + 0.09) / 2)),
+        (Fusion(0.0), math.sqrt(0.1 * 0.3)),
+        (Fusion(8.0), ((0.1**8 + 0.3**8) / 2) ** 0.125),  # near the larger one
+        (Fusion(most_confident=True), 0.1),
+    ],
+)
+def test_fusion_by_hand(fusion, expected):
+    """A cell read as 0.1 and as 0.3, by scans and by way of a buffer."""
+    one, other, buffer = GridBelief(SHAPE, fusion), GridBelief(SHAPE, fusion), Readings(math.prod(SHAPE))
+    for read in (0.1, 0.3):
+        scan = np.array([20], np.int32), np.array([read], np.float32)
+        one.take_scan(scan)
+        buffer.add(scan, fusion)
+    other.take_readings(buffer)
+    for belief in (one, other):
+        assert belief.probability[20] == pytest.approx(expected, rel=1e-5)
+        assert (np.delete(belief.probability, 20) == 0.5).all()
+    assert buffer.count == 1
+    buffer.clear()
+    assert buffer.count == 0 and not buffer.total.any() and not buffer.times.any()
+
+
+@given(seeds)
+@drawn(20)
+def test_entropies_are_filtered_only_where_they_may_change(seed):
+    rng, belief = np.random.default_rng(seed), GridBelief(SHAPE, Fusion())
+    for _ in range(4):
+        cells = rng.choice(math.prod(SHAPE), rng.integers(1, 9), replace=False).astype(np.int32)
+        belief.take_scan((cells, rng.uniform(0.01, 0.99, len(cells)).astype(np.float32)))
+    p = belief.probability.astype(float).reshape(SHAPE[:2])
+    raw = -p * np.log(p) - (1 - p) * np.log(1 - p)
+    for x, y in np.ndindex(*SHAPE[:2]):
+        around = raw[max(x - 1, 0) : x + 2, max(y - 1, 0) : y + 2]
+        assert belief.entropy[x, y, 0] == pytest.approx(around.min(), rel=1e-4)
+
+
+def test_a_scan_sees_up_to_walls_and_reads_each_cell_once():
+    occupied = np.zeros((21, 15, 1), bool)
+    occupied[12] = True
+    scanner = Scanner(occupied, Sensor(8.0, 0.9, 0.6))
+    cells, read = scanner.scan(7 * 15 + 7)
+    assert len(set(cells.tolist())) == len(cells)
+    found = dict(zip(cells.tolist(), read.tolist(), strict=True))
+    assert found[7 * 15 + 7] == pytest.approx(0.1) and found[12 * 15 + 7] == pytest.approx(
+        0.9 - 0.3 * 25 / 64
+    )
+    away = {c: math.hypot(c // 15 - 7, c % 15 - 7) for c in found}
+    assert max(away.values()) <= 8.0 and not any(c // 15 > 12 for c in found)
+    free = [c for c in range(21 * 15) if c // 15 < 12 and math.hypot(c // 15 - 7, c % 15 - 7) <= 7.0]
+    assert set(free) <= set(found)
+
+
+# --- the simulation
+
+
+@pytest.mark.parametrize("control", ["projected-centroid", "gradient-search"])
+def test_the_functional_of_guarded_robots_falls_until_they_converge(control):
+    for seed in range(4):
+        occupied = plan(seed)
+        rules = Rules(control=control, keeps_targets=False)
+        simulation = Simulation(occupied, start_cells(occupied, "random", 3, seed), rules, known=True)
+        tally = simulation.run(400, 1)
+        assert tally.ended == "converged"
+        assert (np.diff(tally.functional) <= 1e-9 * np.array(tally.functional[:-1])).all()
+
+
+def test_robots_step_to_free_neighbours_and_explore_all_that_can_be_reached():
+    for seed, perfect in ((0, True), (1, True), (2, False)):
+        occupied = plan(seed)
+        starts = start_cells(occupied, "corner", 3, seed)
+        rules = Rules(sensor=Sensor(6.0), perfect=perfect, phase=3)
+        simulation = Simulation(occupied, starts, rules, seed=seed)
+        tally = simulation.run(600)
+        assert tally.ended == "converged" and tally.uncertain[-1] == 0
+        places = np.array(tally.places)
+        assert not occupied.reshape(-1)[places].any()
+        steps = np.abs(np.diff(np.stack([places // 23, places % 23]), axis=1)).max(axis=0)
+        assert steps.max() == 1
+        for mind in simulation.minds:
+            believed = mind.belief.occupied
+            assert not believed[~occupied].any() and believed.any()
+
+
+def test_one_robot_needs_no_messages():
+    occupied = plan(4)
+    start = start_cells(occupied, "corner", 1, 0)
+    tallies = [
+        Simulation(occupied, start, Rules(sensor=Sensor(5.0), perfect=perfect)).run(300)
+        for perfect in (True, False)
+    ]
+    assert tallies[0].places == tallies[1].places
+
+
+def test_a_phase_reaches_everybody_once_whatever_is_repeated():
+    """Without loss all beliefs hold all readings but those that still wait."""
+    occupied = plan(5)
+    starts = start_cells(occupied, "random", 3, 5)
+    simulation = Simulation(occupied, starts, Rules(sensor=Sensor(5.0), perfect=False, phase=4))
+    for _ in range(9):  # swaps before iterations 0, 4 and 8: what was read in 0-7 is everywhere
+        simulation.step(False)
+    times = [mind.belief._times.copy() for mind in simulation.minds]
+    waiting = [buffer.times for buffer in simulation._sensing]
+    common = [own - wait for own, wait in zip(times, waiting, strict=True)]
+    np.testing.assert_array_equal(common[0], common[1])
+    np.testing.assert_array_equal(common[0], common[2])
+    assert common[0].sum() > 0 and waiting[0].sum() > 0
+
+
+def test_lost_messages_come_again():
+    occupied = plan(6)
+    starts = start_cells(occupied, "random", 3, 6)
+    rules = Rules(sensor=Sensor(5.0), perfect=False, phase=8, loss=0.6)
+    simulation = Simulation(occupied, starts, rules, seed=1)
+    for _ in range(16):
+        simulation.step(False)
+    assert simulation._has[~np.eye(3, dtype=bool)].all()  # whoever sent it has it anyway
+
+
+def test_a_start_in_a_wall_is_refused():
+    occupied = plan(0)
+    with pytest.raises(SettingError, match="starts"):
+        Simulation(occupied, [int(np.flatnonzero(occupied)[0])], Rules())
+
+
+@pytest.mark.parametrize(
+    ("settings", "field"),
+    [
+        ({"control": "x"}, "Rules.control"),
+        ({"tau_floor": 0.4}, "Rules.tau_floor"),
+        ({"loss": 1.5}, "Rules.loss"),
+        ({"phase": 0}, "Rules.phase"),
+        ({"eta": 0.0}, "Rules.eta"),
+    ],
+)
+def test_what_is_refused(settings, field):
+    with pytest.raises(SettingError) as raised:
+        Rules(**settings)
+    assert raised.value.field == field
+
+
+# --- figure 4
+
+
+def test_entropy_splits_a_band_evenly_and_length_does_not():
+    assert split("band", 0.01).ratio == pytest.approx(1.0, abs=0.1)
+    assert split("band", None).ratio < 0.3
+    assert split("patch", 0.01).ratio < 0.5
+    assert set(np.unique(split("band", 0.01).cells)) == {0, 1}
+
+
+# --- the command
+
+
+def test_the_command_writes_its_report_and_goes_on_where_it_was(tmp_path, monkeypatch):
+    small = dataclasses.replace(FLOORS["small"], shape=(210, 170), limit=300, middle=60.0, ranges=(60.0,))
+    monkeypatch.setitem(FLOORS, "small", small)
+    words = ["--quick", "--starts", "1", "--missions", "0", "--json"]
+    words += ["--out", str(tmp_path / "out"), "--runs", str(tmp_path / "runs")]
+    printed = []
+    for _ in range(2):
+        out = io.StringIO()
+        with contextlib.redirect_stdout(out):
+            assert run_command(bhattacharya.main, words) == 0
+        printed.append(json.loads(out.getvalue()))
+        monkeypatch.setattr(bhattacharya_runs, "carried_out", None)  # nothing must be run again
+    claims = [
+        [{**claim, "ours": 0} if claim["id"] == "scipy" else claim for claim in p["claims"]] for p in printed
+    ]
+    assert [c["id"] for c in claims[0]] == [c["id"] for c in claims[1]]
+    page = (tmp_path / "out" / "bhattacharya.md").read_text()
+    for name in ("figure-2", "figure-3", "figure-4", "figure-6-paper", "figure-6-nearest-length", "progress"):
+        assert f"bhattacharya/{name}.png" in page
+        assert (tmp_path / "out" / "bhattacharya" / f"{name}.png").stat().st_size > 5000
+    assert str(tmp_path / "runs") not in page
+
+
+def test_changed_share_by_hand():
+    """One robot in a corridor that it knows: all costs change when it steps, none when it stands."""
+    occupied = np.zeros((9, 1, 1), bool)
+    simulation = Simulation(occupied, [0], Rules(), known=True)
+    assert changed_share(simulation, 4) == 1.0  # to the middle
+    assert simulation.tally.places[-1] == [3]
+    assert math.isnan(changed_share(Simulation(occupied, [4], Rules(), known=True), 4))
+
+
+def test_runs_differ_by_what_decides_their_results():
+    runs = all_runs(2, 1, 2)
+    assert len({run.id for run in runs}) == len(runs) == len({run.digest() for run in runs})
+    assert {run.rules.control for run in runs} == {"projected-centroid", "gradient-search", "nearest"}
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["--starts", "0"], "starts"),
+        (["--plans", "-1"], "plans"),
+        (["--small-plans", "0"], "small-plans"),
+        (["--missions", "-1"], "missions"),
+        (["--corridor", "nowhere.bt"], "corridor"),
+    ],
+)
+def test_bad_words_are_refused_in_one_line(words, message, capsys):
+    assert run_command(bhattacharya.main, words) == 2
+    error = capsys.readouterr().err
+    assert error.startswith("error: ") and message in error and error.count("\n") == 1

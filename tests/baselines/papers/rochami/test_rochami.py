@@ -1,0 +1,295 @@
+"""`python -m baselines.papers.rochami`: cells, claims, coverage, report and command."""
+
+from __future__ import annotations
+
+import contextlib
+import csv
+import io
+import json
+import math
+import re
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from baselines.cli.arguments import run_command
+from baselines.experiments import cells as experiment
+from baselines.experiments.cells import Record
+from baselines.experiments.mission import scripted
+from baselines.papers.rochami import __main__ as rochami
+from baselines.papers.rochami import sweep as rochami_cells
+from baselines.papers.rochami.claims import all_claims, holm, paired_p, steered_ratio
+from baselines.papers.rochami.coverage import TeamCoverage
+from baselines.papers.rochami.report import FIGURES
+from baselines.papers.rochami.sweep import (
+    BLOCKED,
+    CHANGES,
+    FEW,
+    FILLS,
+    I_MINS,
+    KAPPAS,
+    METHODS,
+    SHARING_TEAMS,
+    TEAMS,
+    cell_id,
+    change_id,
+    kappa_id,
+    sharing_id,
+)
+from baselines.papers.rochami.sweep import experiment as cells_of
+from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
+from entropy_explore_env.scenario import with_settings
+from entropy_explore_env.scenarios import BOX
+from tests.reference import rochami as reference
+from tests.reference.scenes import as_reference
+
+# --- the cells
+
+
+def test_the_cells_are_the_experiment_s():
+    cells = {cell.id: cell for cell in cells_of(50, quick=False)}
+    assert len({cell.digest for cell in cells.values()}) >= len(cells) - 3  # κ = 0 with one thing changed
+    for n in TEAMS:
+        for blocked in BLOCKED:
+            for method in METHODS:
+                cell = cells[cell_id(n, method, blocked)]
+                assert (cell.scenario.robots, cell.scenario.robot.when_blocked) == (n, blocked)
+                assert cell.scenario.channel.announcements == (method == "coordinated")
+                assert (cell.strategy == "random") == (method == "random")
+                if method != "random":
+                    assert cell.record.coordination.coordinated == (method == "coordinated")
+    assert cell_id(1, "coordinated", "wander") == cell_id(1, "uncoordinated") in cells
+    assert all(kappa_id(kappa) in cells for kappa in KAPPAS)
+    assert cells[kappa_id(0.25)].record.coordination.distance_cost == 0.25
+    for name, change in CHANGES.items():
+        for n in FEW:
+            for method in METHODS[:2]:
+                cell = cells[change_id(name, n, method)]
+                if method == "coordinated" or change.both:
+                    base = cells[cell_id(n, method)]
+                    assert (cell.scenario, cell.record) != (base.scenario, base.record)
+    for n in SHARING_TEAMS:
+        assert {cells[sharing_id(n, i)].scenario.channel.i_min_fill for i in I_MINS} == {None}
+        assert [cells[sharing_id(n, fill=f)].scenario.channel.i_min_fill for f in FILLS] == list(FILLS)
+    quick = {cell.id for cell in cells_of(10, quick=True)}
+    assert quick < set(cells) and len(quick) < 60
+
+
+# --- claims
+
+
+def as_the_paper_says(starts=20) -> dict[str, list[Record]]:
+    """Missions in which every claim of the paper holds, a random walk is slower and steering pays."""
+    luck = np.random.default_rng(0).uniform(0.95, 1.05, starts)
+    joint = {1: 1.0, 2: 0.59, 3: 0.55, 4: 0.5, 5: 0.46, 6: 0.43, 7: 0.41, 8: 0.4, 9: 0.42, 10: 0.44}
+    apart = {1: 1.0, 2: 0.81, **{n: 0.81 + 0.07 * (n - 2) for n in range(3, 11)}}
+    records = {}
+    for cell in cells_of(starts, quick=False):
+        n, time_s, way_m, sent = cell.scenario.robots, 300.0, 20.0, 3.0
+        if cell.id.startswith("sharing"):
+            fill, i_min_bits = cell.scenario.channel.i_min_fill, cell.scenario.channel.i_min_bits
+            sent = 4.0 * fill if fill else {0.6215: 1.0, 0.3219: 2.0, 0.0291: 3.0}[i_min_bits]
+            time_s = (200.0 if fill else 250.0) - 20.0 * sent
+        elif cell.strategy == "random":
+            time_s *= 1.2 * joint[n]
+        else:
+            time_s *= (joint if cell.record.coordination.coordinated else apart)[n]
+            kappa = cell.record.coordination.distance_cost
+            time_s *= 1.0 + 0.5 * kappa
+            way_m /= 1.0 + 0.5 * kappa + 2.0 * min(kappa, 0.25)
+        records[cell.id] = [
+            {
+                "seed": seed,
+                "robots": n,
+                "finished": True,
+                "t_mission_s": time_s * luck[seed] * (1.0 + 0.001 * (seed % 3)),
+                "distance_m": n * way_m * luck[seed],
+                "bits_sent": 1e6 * sent,
+                "scans": 10 * n,
+                "blocked_moves": n,
+            }
+            for seed in range(min(starts, cell.seeds))
+        ]
+    return records
+
+
+PAPER = as_the_paper_says()
+
+
+def claims_of(records):
+    return {claim.id: claim for claim in all_claims(records)}
+
+
+def test_where_everything_is_as_the_paper_says_every_claim_holds():
+    claims = claims_of(PAPER)
+    assert len(claims) > 50
+    assert [claim.claim for claim in claims.values() if not claim.holds] == []
+    assert claims["pair-wait-coordinated"].ours == pytest.approx(0.59, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("cell", "factor", "broken"),
+    [
+        (cell_id(5, "coordinated"), 3.0, {"faster-wait-5", "falls-wait"}),
+        (cell_id(2, "uncoordinated", "wander"), 0.8, {"pair-wander-uncoordinated"}),
+        (cell_id(10, "uncoordinated"), 0.3, {"faster-wait-10", "worsens-wait", "slower-wait"}),
+        (cell_id(10, "coordinated", "wander"), 0.5, {"flattens-wander"}),
+        (kappa_id(1.0), 0.5, {"kappa-time", "kappa-product"}),
+        (kappa_id(0.25), 2.0, {"kappa-time", "kappa-product", "kappa-product-falls"}),
+        (sharing_id(4, 0.3219), 0.5, {"steered-4-0.3219"}),
+        ("n6-random-1m", 0.5, {"random-6-steps"}),
+    ],
+)
+def test_a_claim_fails_where_its_cell_says_otherwise(cell, factor, broken):
+    records = dict(PAPER)
+    records[cell] = [{**r, "t_mission_s": r["t_mission_s"] * factor} for r in PAPER[cell]]
+    failed = {name for name, claim in claims_of(records).items() if not claim.holds}
+    assert broken <= failed and len(failed) <= len(broken) + 3
+
+
+def test_holm_by_hand():
+    assert holm([0.01, 0.04, 0.03, 0.005]) == pytest.approx([0.03, 0.06, 0.06, 0.02])
+    assert holm([0.5, 0.9]) == pytest.approx([1.0, 1.0])
+    assert paired_p(np.ones(5), np.ones(5)) == 1.0
+    five = np.arange(1.0, 6.0)
+    assert paired_p(np.zeros(5), five) == pytest.approx(1 / 32)  # all five signs alike
+    assert paired_p(five, np.zeros(5)) == 1.0
+
+
+def test_a_steered_i_min_is_read_between_its_fills():
+    ratio, low, high, where = steered_ratio(PAPER, 2, 0.3219)  # 2 Mbit: 160 s over 210 s
+    assert ratio == pytest.approx(160 / 210) and low <= ratio <= high and where == "2.00 Mbit"
+
+
+# --- coverage
+
+
+def test_the_team_s_coverage_is_that_of_the_reference():
+    env = EntropyExploreEnv(scripted(with_settings(BOX, {"robots": 3})))
+    env.reset(seed=3)
+    coverage, rng = TeamCoverage(env.missions), np.random.default_rng(0)
+    for _ in range(12):
+        env.step({agent: rng.uniform(-1, 1, 5).astype(np.float32) for agent in env.agents})
+        coverage.note(env)
+    robots = env.missions.state.robots[0]
+    best = int(robots["entropy_bits"].argmin())
+    beliefs = as_reference(env.missions.mean[0, best], env.missions.precision[0, best])
+    sigma, covered, twice = env.scenario.ending.sigma_end, set(), 0.0
+    for robot in robots:
+        place = robot["target"][:3] / 0.5
+        cone = reference.Cone(place, *robot["target"][3:], robot["depth_m"] / 0.5, robot["half_angle_rad"])
+        seen = reference.visible(cone, beliefs, (7, 11, 5))
+        twice += reference.covered_bits(seen & covered, beliefs, sigma)
+        covered |= seen
+    series = coverage.series()
+    assert series["team_bits"][-1] == pytest.approx(
+        reference.covered_bits(covered, beliefs, sigma), rel=1e-3, abs=0.1
+    )
+    assert series["shared_bits"][-1] == pytest.approx(twice, rel=1e-3, abs=0.1)
+    assert series["time_s"][-1] == pytest.approx(env.missions.state.missions[0]["time_s"], abs=0.01)
+    assert max(series["team_bits"]) > 0.0
+
+
+# --- the command, from end to end, in a tiny box
+
+
+class Tiny(NamedTuple):
+    folder: Path
+    words: list[str]
+    code: int
+    out: str
+    err: str
+
+
+@pytest.fixture(scope="module")
+def tiny(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("rochami")
+    words = ["--starts", "2", "--jobs", "2", "--runs", str(folder / "runs"), "--out", str(folder / "out")]
+    robot = {"motion": "planar", "sensor_height_m": 1.25, "body_radius_m": 0.1}
+    box = with_settings(BOX, {"robot": robot, "ending": {"sigma_end": 0.5}})
+    out, err = io.StringIO(), io.StringIO()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(rochami_cells, "LAB", box)
+        patch.setattr(
+            rochami_cells, "ROOM", with_settings(BOX, {"ending": {"sigma_end": 1.0, "time_limit_s": 100.0}})
+        )
+        base = {"robot": {"when_blocked": "wait"}, "ending": {"sigma_end": 0.5, "time_limit_s": 60.0}}
+        patch.setattr(rochami_cells, "_BASE", base)
+        patch.setattr(rochami, "_QUICK_STARTS", 2)
+        with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
+            code = run_command(rochami.main, [*words, "--json"])
+        yield Tiny(folder, words, code, out.getvalue(), err.getvalue())
+
+
+@pytest.fixture
+def no_process(monkeypatch):
+    """All missions are there: none must be run again."""
+
+    def nothing_to_do(_: object, tasks: list, *__: object) -> list:
+        assert not tasks, "missions were run"
+        return []
+
+    monkeypatch.setattr(experiment, "run_each", nothing_to_do)
+
+
+def test_json_is_one_object_with_the_claims(tiny):
+    assert (tiny.code, tiny.err) == (0, "")
+    printed = json.loads(tiny.out, parse_constant=pytest.fail)
+    assert list(printed) == ["paper", "claims", "wall_s"] and printed["paper"] == "RochaMI"
+    ids = [claim["id"] for claim in printed["claims"]]
+    assert len(set(ids)) == len(ids) > 50
+    assert all(math.isfinite(claim["ours"]) for claim in printed["claims"])
+
+
+def check_report(folder: Path, quick: bool) -> None:
+    assert sorted(path.name for path in folder.iterdir()) == ["rochami", "rochami.md"]
+    beside = folder / "rochami"
+    wanted = [f"{name}.{kind}" for name in FIGURES for kind in ("png", "csv")]
+    assert sorted(path.name for path in beside.iterdir()) == sorted(wanted)
+    for name in FIGURES:
+        with Image.open(beside / f"{name}.png") as picture:
+            picture.load()
+            assert picture.format == "PNG" and min(picture.size) > 200
+        head, *rows = csv.reader((beside / f"{name}.csv").read_text().splitlines())
+        assert rows and len(set(head)) == len(head) and all(len(row) == len(head) for row in rows)
+    report = (folder / "rochami.md").read_text()
+    assert sorted(re.findall(r"\]\(([^)]+)\)", report)) == sorted(f"rochami/{name}.png" for name in FIGURES)
+    assert "nan" not in report.split() and ("--quick" in report) == quick
+
+
+def test_the_report_is_whole_and_its_table_holds_the_records_numbers(tiny):
+    check_report(tiny.folder / "out", quick=False)
+    with (tiny.folder / "out" / "rochami" / "figure-6.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    for row in rows[:: len(rows) // 7]:
+        cell = cell_id(int(row["robots"]), row["method"], row["blocked"])
+        if row["method"] == "random-1m":
+            cell = f"n{row['robots']}-random-1m"
+        kept = [json.loads(path.read_text())["record"] for path in (tiny.folder / "runs" / cell).iterdir()]
+        assert float(row["mean_s"]) == pytest.approx(
+            np.mean([record["t_mission_s"] for record in kept]), abs=0.01
+        )
+        if row["method"] in METHODS[:2]:
+            assert all(sum(record["decisions"].values()) > 0 for record in kept)
+
+
+def test_a_quick_one_takes_what_is_there(tiny, no_process, capsys, tmp_path):
+    words = [*tiny.words, "--out", str(tmp_path), "--quick", "--json"]
+    assert run_command(rochami.main, words) == 0
+    ids = {claim["id"] for claim in json.loads(capsys.readouterr().out)["claims"]}
+    assert {"faster-wait-2", "faster-wander-8", "kappa-product", "steered-2-0.3219"} <= ids
+    check_report(tmp_path, quick=True)
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [(["--starts", "1"], ["starts", "1"]), (["--jobs", "-1"], ["jobs", "-1"]), (["lab"], ["lab"])],
+)
+def test_bad_input_is_one_line_and_code_2(words, said, capsys):
+    code = run_command(rochami.main, words)
+    out, err = capsys.readouterr()
+    assert (code, out) == (2, "")
+    assert err.startswith("error: ") and err.count("\n") == 1 and all(word in err for word in said)

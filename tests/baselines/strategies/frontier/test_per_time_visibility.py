@@ -1,0 +1,370 @@
+"""The strategies of frontiers: how they allot, that lazily is as eagerly, and how missions end."""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+import math
+
+import numpy as np
+import pytest
+
+from baselines.experiments.mission import run_mission, scripted
+from baselines.papers.sawhney.mission import followed
+from baselines.strategies import make_strategy
+from baselines.strategies.frontier import Exploring, FrontierStrategy, Metric
+from baselines.strategies.frontier.allocation import under_way
+from baselines.strategies.frontier.candidates import Looking
+from baselines.strategies.frontier.metrics import Coordinated, Nearest
+from baselines.strategies.frontier.voxel.candidates import VoxelCandidates
+from baselines.strategies.frontier.voxel.map import COVERED, NONE
+from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
+from entropy_explore_env.errors import SettingError
+from entropy_explore_env.missions.state import MissionEnd
+from entropy_explore_env.missions.view import view_of
+from entropy_explore_env.reports.metrics import joint_figures, mission_figures
+from entropy_explore_env.robots.motion import driving_time
+from entropy_explore_env.scenario import with_settings
+from entropy_explore_env.scenarios import BOX, find_scenario
+from entropy_explore_env.settings import Grid
+from tests.reference import sawhney as reference
+from tests.reference.scenes import build, free_box, put, started
+
+NAMES = ("per-time-visibility", "nearest-frontier", "coordinated-frontier")
+PERFECT = {"burst": 10_000, "i_min_bits": 0.0}
+ONCE = 0.5
+
+
+def small_plan(**settings):
+    """A quarter of an office, for robots without bodies that go anywhere."""
+    base = with_settings(scripted(find_scenario("cluttered")), {"grid": Grid((70, 60, 1), 0.1)})
+    changes = {
+        "robots": 3,
+        "robot": {"reach_m": math.inf, "body_radius_m": 0.0, "unknown_cost": 1e4},
+        "sensor": {"max_range_m": 1.5, "angular_step_rad": math.pi / 90, "scan_time_s": 2.0},
+        "channel": PERFECT,
+        "ending": {"sigma_end": 1e-3, "time_limit_s": 900.0},
+        "scored": True,
+    }
+    return with_settings(base, {**changes, **settings})
+
+
+def small_terrain(**settings):
+    base = with_settings(scripted(find_scenario("terrain")), {"grid": Grid((31, 25, 16), 1.0)})
+    changes = {
+        "robots": 2,
+        "robot": {"reach_m": math.inf, "body_radius_m": 0.0},
+        "sensor": {
+            "field_of_view_rad": (2 * math.pi, math.pi / 2),
+            "angular_step_rad": math.pi / 30,
+            "max_range_m": 12.0,
+        },
+        "channel": PERFECT,
+        "ending": {"sigma_end": 1e-3, "time_limit_s": 600.0},
+    }
+    return with_settings(base, {**changes, **settings})
+
+
+def explored(scenario, seed=0, **exploring):
+    """A mission up to no frontier: environment, strategy, and what was done."""
+    explorer = FrontierStrategy(Exploring(**{"finest_sigma": ONCE, **exploring}))
+    env = EntropyExploreEnv(scenario)
+    times_s, shares = followed(env, explorer, seed)
+    return env, explorer, (list(times_s), list(shares), mission_figures(env.missions, 0)["distance_m"])
+
+
+@pytest.mark.parametrize("metric", [Metric(), Metric(0.5), Metric(bonus=0.5), Nearest(), Coordinated()])
+@pytest.mark.parametrize("allotment", ["asynchronous", "synchronous"])
+def test_lazily_is_as_eagerly_in_plans(metric, allotment):
+    settings = {"metric": metric, "allotment": allotment}
+    _, lazy, done = explored(small_plan(), 1, **settings)
+    _, eager, same = explored(small_plan(), 1, lazy=False, **settings)
+    assert done == same and lazy.counted() < eager.counted()
+    assert all(lazy.idle) and done[1][-1] > 0.99
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        {},
+        {"looking": Looking(gamma=None)},
+        {"metric": Metric(60.0)},
+        {"looking": Looking(visibility="naive")},
+        {"looking": Looking(unexplored_ground="level")},
+    ],
+)
+def test_lazily_is_as_eagerly_over_terrain(settings):
+    _, lazy, done = explored(small_terrain(), 2, **settings)
+    _, eager, same = explored(small_terrain(), 2, lazy=False, **settings)
+    assert done == same and lazy.counted() < eager.counted()
+
+
+@pytest.mark.parametrize(("seed", "finest"), [(753, 0.2), (89, 0.05)])
+def test_bounds_stay_bounds_through_a_noisy_mission(monkeypatch, seed, finest):
+    """After every update no kept count is less than a new one, through walls that turn out free, too."""
+    opened, levels, update = [], set(), VoxelCandidates.update
+
+    def checked(self, view, sigma):
+        before = self._map.state.copy()
+        update(self, view, sigma)
+        opened.append(np.count_nonzero(before & COVERED > self._map.state & COVERED))
+        levels.add(sigma)
+        slots = np.flatnonzero((self._map.voxel != NONE) & np.isfinite(self._map.seen))
+        bounds = self._map.seen[slots].copy()
+        kept = self._map.seen.copy()
+        self.count(slots, self._map.voxel[slots])
+        assert (bounds >= self._map.seen[slots]).all()
+        self._map.seen[:] = kept
+
+    monkeypatch.setattr(VoxelCandidates, "update", checked)
+    noisy = {"max_range_m": 1.5, "angular_step_rad": math.pi / 90, "scan_time_s": 2.0, "range_noise_m": 0.3}
+    explored(small_plan(sensor=noisy), seed, allotment="synchronous", finest_sigma=finest)
+    assert max(opened) > 5 and len(levels) > 1
+
+
+@pytest.mark.parametrize("allotment", ["asynchronous", "synchronous"])
+def test_all_is_explored_with_lost_and_unheard_messages(allotment):
+    """Decentralised: a third of the messages lost, none heard beyond 3 m, few measurements in each."""
+    channel = {"burst": 30, "i_min_bits": 0.0, "loss_probability": 0.3, "range_m": 3.0}
+    env, explorer, done = explored(small_plan(channel=channel), 4, allotment=allotment)
+    assert all(explorer.idle) and done[1][-1] > 0.97
+    assert mission_figures(env.missions, 0)["t_mission_s"] < 900.0
+
+
+@pytest.mark.parametrize("allotment", ["asynchronous", "synchronous"])
+def test_terrain_is_mapped_below_the_exposure_surface(allotment):
+    env, explorer, done = explored(small_terrain(), 3, allotment=allotment)
+    assert all(explorer.idle) and done[1][-1] > 0.97
+    truth = env.missions.state.truth[0].reshape(env.missions.grid.shape)
+    view = view_of(env.missions, 0, 0)
+    assert view.ceiling is not None and not view.ceiling.flags.writeable
+    layer = env.missions.grid.voxel_of(view.pose[:3])
+    assert truth.sum(axis=2)[layer[0], layer[1]] <= layer[2] < view.ceiling[layer[0], layer[1]]
+    assert env.missions.state.robots["blocked_moves"].sum() == 0
+
+
+@pytest.mark.parametrize("navigator", ["straight", "planned"])
+def test_synchronous_robots_over_terrain_wait_for_this_journey_and_no_other(navigator):
+    """Who waits scans on the spot, 0.5 s each time: it leaves soon after the last one has scanned."""
+    robot = {"reach_m": math.inf, "body_radius_m": 0.0, "navigator": navigator, "unknown_cost": 1e4}
+    scenario = small_terrain(robots=3, robot=robot)
+    _, explorer, _ = explored(scenario, 1, allotment="synchronous")
+    late_s = []
+    for before, after in itertools.pairwise(rounds(explorer)):
+        ended_s = max(end for _, end in before)
+        late_s += [left_s - ended_s for left_s, _ in after] if len(before) == len(after) == 3 else []
+    assert len(late_s) >= 9
+    assert np.mean(late_s) < 2.0 * scenario.kind_of(0).sensor.scan_time_s + 0.5
+
+
+def rounds(explorer):
+    """(left, ended) of the journeys of each round, s."""
+    by_round: dict[int, list[tuple[float, float]]] = {}
+    for journey in explorer.journeys:
+        by_round.setdefault(journey.number, []).append((journey.ended_s - journey.seconds, journey.ended_s))
+    return [by_round[number] for number in sorted(by_round)]
+
+
+@pytest.mark.parametrize("scenario", [small_plan(), small_terrain()])
+def test_where_a_robot_scanned_is_a_candidate_again_once_more_is_asked_for(scenario):
+    env, explorer, _ = explored(scenario, 2)
+    candidates = explorer._allotters[0].candidates
+    view = view_of(env.missions, 0, 0)
+    candidates.unspend()
+    candidates.update(view, 0.5)
+    before = set(candidates.found()[1].tolist())
+    candidates.update(view, 1e-3)
+    voxels = candidates.found()[1].tolist()
+    assert voxels and set(voxels) - before
+    candidates.spend(voxels[0])
+    assert voxels[0] not in candidates.found()[1]
+    candidates.unspend()
+    assert voxels[0] in candidates.found()[1]
+
+
+def test_synchronous_robots_leave_together():
+    """Nobody sets out on its next journey before all have ended their latest one."""
+    _, explorer, _ = explored(small_plan(), 4, allotment="synchronous")
+    found = rounds(explorer)
+    assert len(found) > 5
+    for before, after in itertools.pairwise(found):
+        if len(before) == 3:
+            ended_s = max(end for _, end in before)
+            assert all(left_s >= ended_s - 1e-6 for left_s, _ in after)
+
+
+def corridor(places, heard=True):
+    """Robots in a corridor along y of which the middle is known: unexplored at both ends."""
+    missions = started(
+        free_box(robots=len(places), robot={"reach_m": 50.0, "body_radius_m": 0.0}, sigma_prior=30.0)
+    )
+    solid = np.ones(missions.grid.shape, bool)
+    solid[3, :, 2] = False
+    build(missions, solid)
+    for robot, y in enumerate(places):
+        pose = np.zeros(5)
+        pose[:3] = missions.grid.centre_of(np.array([3, y, 2]))
+        put(missions, robot, pose)
+        missions.mean[0, robot][solid], missions.mean[0, robot][~solid] = 1.0, 0.0
+        missions.precision[0, robot] = 1e4
+        for y_unknown in (0, 1, 9, 10):
+            missions.mean[0, robot][3, y_unknown, 2] = 0.5
+            missions.precision[0, robot][3, y_unknown, 2] = 1e-3
+    for robot in range(len(places)) if heard else ():
+        for mate in range(len(places)):
+            seen = missions.state.heard[0, robot, mate]
+            seen["heard_s"], seen["announced_s"] = 0.0, -1.0
+            seen["pose"][:] = missions.state.robots[0, mate]["origin"]
+    return missions
+
+
+def sent(missions, **exploring):
+    """Layers along y to which robots go that have scanned once."""
+    strategy = FrontierStrategy(
+        Exploring(**{"finest_sigma": ONCE, "looking": Looking(spacing_m=0.5), **exploring})
+    )
+    strategy.reset(missions.scenario, np.random.default_rng(0))
+    for errand in strategy._errands:
+        errand.scanned = True
+    views = [view_of(missions, 0, robot) for robot in range(missions.scenario.robots)]
+    return [int(missions.grid.voxel_of(v[:3])[1]) for v in strategy.choose(views)]
+
+
+def test_who_stops_at_the_same_time_shares_the_frontiers():
+    assert sent(corridor((4, 6))) == [2, 8]
+    assert sent(corridor((3, 4))) == [2, 8]  # the second would be nearer to the first one's, too
+    assert sent(corridor((4, 3))) == [8, 2]
+    assert sent(corridor((3, 4)), promises=False) == [2, 2]
+    assert sent(corridor((3, 4)), metric=Nearest(), promises=False) == [2, 2]
+    assert sent(corridor((3, 4), heard=False)) == [2, 2]  # nothing was heard: each for itself
+
+
+def test_promises_stand_until_the_scan_is_heard():
+    missions = corridor((3, 4))  # V/t: 2/3.5 s at the near end, halved once promised; 2/5.5 s
+    seen = missions.state.heard[0, 1, 0]
+    seen["announced_s"] = 5.0
+    seen["announced"][:3] = missions.grid.centre_of(np.array([3, 2, 2]))
+    seen["heard_s"] = 5.0
+    assert sent(missions)[1] == 8
+    view = view_of(missions, 0, 1)
+    assert under_way(view, view.teammates[0], 0)
+    seen["heard_s"] = 6.0
+    view = view_of(missions, 0, 1)
+    assert not under_way(view, view.teammates[0], 0)
+    seen["announced_s"] = seen["heard_s"] = 6.0
+    kind, longest_m = missions.scenario.kind_of(0), sum(missions.grid.size_m)
+    drive_s = driving_time(longest_m, kind.robot.max_speed_m_s, kind.robot.acceleration_m_s2)
+    for late_s, lost in ((1.9 * drive_s, False), (2.1 * drive_s + kind.sensor.scan_time_s, True)):
+        view = dataclasses.replace(view_of(missions, 0, 1), time_s=6.0 + late_s)
+        assert under_way(view, view.teammates[0], 0) is not lost
+    seen["announced_s"] = seen["heard_s"] = -1.0
+    assert sent(missions)[1] == 2
+
+
+def test_allotment_is_the_paper_s_loop():
+    """Beside the slow reference, in a plan of which little is known: three robots that have all stopped."""
+    shape = (14, 12, 1)
+    rng = np.random.default_rng(3)
+    scenario = small_plan(grid=Grid(shape, 0.5), sensor={"max_range_m": 2.6})
+    for _ in range(6):
+        missions = started(scenario)
+        solid = np.zeros(shape, bool)
+        build(missions, solid)
+        known = np.zeros(shape, bool)
+        known[2 : int(rng.integers(6, 11)), 1 : int(rng.integers(5, 10))] = True
+        for robot in range(3):
+            pose = np.zeros(5)
+            pose[:3] = missions.grid.centre_of(np.array([3 + robot, 2 + int(rng.integers(0, 2)), 0]))
+            put(missions, robot, pose)
+            missions.mean[0, robot] = np.where(known, 0.0, 0.5)
+            missions.precision[0, robot] = np.where(known, 1e4, 1e-3)
+        for robot in range(3):
+            for mate in range(3):
+                seen = missions.state.heard[0, robot, mate]
+                seen["heard_s"], seen["announced_s"] = 0.0, -1.0
+                seen["pose"][:] = missions.state.robots[0, mate]["origin"]
+        check_against_reference(missions, known)
+
+
+def check_against_reference(missions, known):
+    strategy = FrontierStrategy(Exploring(finest_sigma=ONCE, looking=Looking(spacing_m=1.0)))
+    strategy.reset(missions.scenario, np.random.default_rng(0))
+    views = [view_of(missions, 0, robot) for robot in range(3)]
+    for errand in strategy._errands:
+        errand.scanned = True
+    places = [tuple(missions.grid.voxel_of(v[:3]).tolist()) for v in strategy.choose(views)]
+    allotter = strategy._allotters[0]
+    assert isinstance(allotter.candidates, VoxelCandidates)
+    _, voxels = allotter.candidates.found()
+    state = np.where(known, 0, 3)
+    directions, reach = allotter.candidates._directions, allotter.candidates.reach
+    shape, edge = known.shape, missions.grid.voxel_size_m
+    where = {int(v): np.stack(np.unravel_index(int(v), shape)) for v in voxels}
+    sees = {v: reference.seen_voxels(state, place + 0.5, directions, reach) for v, place in where.items()}
+    kind = missions.scenario.kind_of(0)
+
+    def value(robot, place, promised):
+        here = missions.grid.voxel_of(views[robot].pose[:3])
+        dx, dy = sorted(np.abs(where[place] - here)[:2])
+        length_m = (dy - dx + math.sqrt(2) * dx) * edge  # nothing is in the way in a known rectangle
+        v, a = kind.robot.max_speed_m_s, kind.robot.acceleration_m_s2
+        drive_s = 2 * math.sqrt(length_m / a) if length_m < v * v / a else length_m / v + v / a
+        seen = reference.weighed(sees[place], promised)
+        return seen / (drive_s + kind.sensor.scan_time_s) if seen else -math.inf
+
+    wanted = reference.allotted(range(3), list(where), value, sees.__getitem__, {})
+    assert places == [tuple(where[wanted[robot]].tolist()) for robot in range(3)]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_missions_in_a_box_end(name):
+    env = EntropyExploreEnv(with_settings(scripted(BOX), {"time_limit_s": 2000.0}))
+    run_mission(env, make_strategy(name), 0)
+    figures = mission_figures(env.missions, 0)
+    assert figures["finished"], figures["end_reason"]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_same_seed_gives_the_same_mission(name):
+    def figures():
+        env = EntropyExploreEnv(with_settings(scripted(BOX), {"robots": 3, "time_limit_s": 60.0}))
+        run_mission(env, make_strategy(name), 4)
+        return mission_figures(env.missions, 0)
+
+    assert figures() == figures()
+
+
+def test_bodies_and_a_short_reach_explore_an_office():
+    """The named scenario as it is: bodies of 0.3 m, 5 m of reach, a narrow channel."""
+    env = EntropyExploreEnv(with_settings(scripted(find_scenario("office")), {"robots": 2, "scored": True}))
+    explorer = FrontierStrategy(Exploring(finest_sigma=ONCE))
+    followed(env, explorer, 1)
+    assert all(explorer.idle) or env.missions.over(0) is MissionEnd.MAPPED
+    explored = joint_figures(env.missions, 0)["explored"]
+    assert explored is not None and explored > 0.97
+
+
+@pytest.mark.parametrize(
+    ("kind", "settings", "field"),
+    [
+        (Metric, {"beta": -1.0}, "Metric.beta"),
+        (Metric, {"bonus": -0.1}, "Metric.bonus"),
+        (Coordinated, {"beta": math.nan}, "Coordinated.beta"),
+        (Exploring, {"allotment": "central"}, "Exploring.allotment"),
+        (Exploring, {"finest_sigma": 0.6}, "Exploring.finest_sigma"),
+        (Exploring, {"promises": 1}, "Exploring.promises"),
+        (Exploring, {"metric": None}, "Exploring.metric"),
+        (Exploring, {"metric": "V/t"}, "Exploring.metric"),
+        (Exploring, {"metric": Metric}, "Exploring.metric"),
+        (FrontierStrategy, {"exploring": "V/t"}, "exploring"),
+        (Looking, {"sigma": 0.0}, "Looking.sigma"),
+        (Looking, {"spacing_m": 0.0}, "Looking.spacing_m"),
+        (Looking, {"visibility": "all"}, "Looking.visibility"),
+        (Looking, {"gamma": 1.5}, "Looking.gamma"),
+        (Looking, {"too_high": 0.0}, "Looking.too_high"),
+    ],
+)
+def test_what_is_refused(kind, settings, field):
+    with pytest.raises(SettingError) as raised:
+        kind(**settings)
+    assert raised.value.field == field

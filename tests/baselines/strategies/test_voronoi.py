@@ -1,0 +1,151 @@
+"""The strategy `voronoi`: what it holds uncertain, where it goes, and how missions end."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from scipy import stats
+
+from baselines.experiments.mission import run_mission, scripted
+from baselines.strategies import make_strategy
+from baselines.strategies.voronoi import Coverage, VoronoiCoverage
+from baselines.strategies.voronoi.controls import LN2
+from baselines.strategies.voronoi.occupancy_entropy import (
+    close_voxels,
+    fill_deviation_entropy,
+    fill_occupancy_entropy,
+    filtered,
+)
+from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
+from entropy_explore_env.errors import SettingError
+from entropy_explore_env.missions.view import view_of
+from entropy_explore_env.reports.metrics import mission_figures
+from entropy_explore_env.scenario import with_settings
+from entropy_explore_env.scenarios import BOX, find_scenario
+from tests.reference.scenes import build, drawn, free_box, put, random_belief, seeds, started
+
+NAMES = ("voronoi", "voronoi-gradient", "voronoi-nearest")
+
+
+def figures_of(name, scenario=BOX, seed=0, **settings):
+    env = EntropyExploreEnv(with_settings(scripted(scenario), settings))
+    run_mission(env, make_strategy(name), seed)
+    return mission_figures(env.missions, 0)
+
+
+@given(seeds)
+@drawn(20)
+def test_occupancy_is_that_of_a_truncated_normal(seed):
+    mean, precision = random_belief((3, 4, 2), seed)
+    entropy = np.empty(24, np.float32)
+    fill_occupancy_entropy(mean.reshape(-1), precision.reshape(-1), entropy)
+    for voxel in range(24):
+        mu, sigma = float(mean.reshape(-1)[voxel]), float(precision.reshape(-1)[voxel]) ** -0.5
+        cut = stats.truncnorm(-mu / sigma, (1.0 - mu) / sigma, mu, sigma)
+        p = min(max(float(cut.sf(0.5)), 1e-300), 1.0 - 1e-16)
+        assert entropy[voxel] == pytest.approx(-p * math.log(p) - (1 - p) * math.log(1 - p), abs=2e-6)
+
+
+def test_entropies_by_hand():
+    out = np.empty(4, np.float32)
+    fill_occupancy_entropy(
+        np.array([0.5, 0.5, 0.0, 1.0], np.float32), np.array([1e-3, 1e3, 1e3, 1e3], np.float32), out
+    )
+    np.testing.assert_allclose(out, [LN2, LN2, 0.0, 0.0], atol=1e-7)
+    fill_deviation_entropy(np.array([1e-2, 1.0, 1e2, 1e4], np.float32), 1e-2, 1e2, out)
+    np.testing.assert_allclose(out, [LN2, LN2 / 2, 0.0, 0.0], atol=1e-7)
+    field = np.full((4, 5, 1), LN2, np.float32)
+    field[1, 1] = 0.1
+    low = filtered(field)
+    assert (low[:3, :3] == np.float32(0.1)).all() and (low[3] == np.float32(LN2)).all()
+
+
+def test_where_a_body_does_not_fit_by_hand():
+    mean = np.zeros((5, 7, 1), np.float32)
+    mean[2, 3] = 1.0
+    cross = np.array([(0, 0, 0), (1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0)])
+    rates = np.ones((5, 7, 1), np.float32)
+    close_voxels(mean, cross, (1, 1, 0), 0, (2, 2, 0), rates)
+    closed = np.isinf(rates[:, :, 0])
+    assert closed[0].all() and closed[:, 6].all() and closed[2, 3] and closed[1, 3] and closed[2, 4]
+    assert not closed[2, 2] and not closed[2, 1] and not closed[1, 2]  # its start, and what it touches there
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_missions_in_a_box_end(name):
+    figures = figures_of(name, sigma_prior=30.0, time_limit_s=600.0)
+    assert figures["finished"], figures["end_reason"]
+
+
+@pytest.mark.parametrize("name", ["voronoi", "voronoi-nearest"])
+def test_an_office_is_explored(name):
+    figures = figures_of(name, find_scenario("office"), seed=1, scored=True)
+    assert figures["finished"] and figures["joint"]["explored"] > 0.95
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_same_seed_gives_the_same_mission(name):
+    first, second = (figures_of(name, seed=4, robots=3, time_limit_s=60.0) for _ in range(2))
+    assert first == second
+
+
+def corridor_missions(places):
+    """A corridor of voxels, robots in it; both know all of one another."""
+    missions = started(free_box(robots=2, robot={"reach_m": 50.0}))
+    solid = np.ones(missions.grid.shape, bool)
+    solid[3, 1:10, 2] = False
+    build(missions, solid)
+    for robot, y in enumerate(places):
+        pose = np.zeros(5)
+        pose[:3] = missions.grid.centre_of(np.array([3, y, 2]))
+        put(missions, robot, pose)
+        missions.mean[0, robot][solid], missions.mean[0, robot][~solid] = 1.0, 0.0
+        missions.precision[0, robot] = 1e4
+    for robot in range(2):
+        seen = missions.state.heard[0, robot, 1 - robot]
+        seen["heard_s"], seen["pose"][:3] = 0.0, missions.state.robots[0, 1 - robot]["origin"][:3]
+    return missions
+
+
+def chosen(missions, coverage):
+    strategy = VoronoiCoverage(coverage)
+    strategy.reset(missions.scenario, np.random.default_rng(0))
+    views = [view_of(missions, 0, robot) for robot in range(2)]
+    return [missions.grid.voxel_of(v[:3])[1] for v in strategy.choose(views)]
+
+
+def test_robots_that_know_all_spread_to_the_middles_of_their_halves():
+    assert chosen(corridor_missions((1, 3)), Coverage()) == [1, 6]  # cells 1-2 and 3-9, ties to the first
+    assert chosen(corridor_missions((2, 7)), Coverage()) == [2, 7]
+
+
+@pytest.mark.parametrize("control", ["projected-centroid", "nearest"])
+def test_each_goes_to_what_is_uncertain_in_its_own_half(control):
+    missions = corridor_missions((3, 6))
+    for robot in range(2):
+        for y in (1, 9):
+            missions.mean[0, robot][2:5, max(y - 1, 0) : y + 2, 1:4] = 0.5
+            missions.precision[0, robot][2:5, max(y - 1, 0) : y + 2, 1:4] = 1e-3
+    first, second = chosen(missions, Coverage(control=control))
+    assert first < 3 and second > 6
+
+
+@pytest.mark.parametrize(
+    ("settings", "field"),
+    [
+        ({"control": "frontier"}, "Coverage.control"),
+        ({"metric": "time"}, "Coverage.metric"),
+        ({"known": "no"}, "Coverage.known"),
+        ({"eta": 0.0}, "Coverage.eta"),
+        ({"tau": 0.7}, "Coverage.tau"),
+        ({"tau_floor": 0.35}, "Coverage.tau_floor"),
+        ({"steps": 0}, "Coverage.steps"),
+    ],
+)
+def test_what_is_refused(settings, field):
+    with pytest.raises(SettingError) as raised:
+        Coverage(**settings)
+    assert raised.value.field == field

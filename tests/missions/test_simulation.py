@@ -1,0 +1,534 @@
+"""Whole missions: against the slow reference, and what must hold in every step of any mission."""
+
+from __future__ import annotations
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+
+from entropy_explore_env.belief.coverage_map import map_entropy_bits
+from entropy_explore_env.belief.raycast import longest_crossing
+from entropy_explore_env.errors import CallOrderError, SettingError, WorldError
+from entropy_explore_env.missions.poses import pose_at
+from entropy_explore_env.missions.simulation import Missions
+from entropy_explore_env.missions.state import MissionEnd
+from entropy_explore_env.robots.range_sensor import Return
+from entropy_explore_env.scenario import with_settings
+from entropy_explore_env.scenarios import ROOM, ROOM_FURNISHED
+from entropy_explore_env.settings import Grid, gaussian_entropy_bits
+from tests.reference import rocha04
+from tests.reference.scenes import as_arrays, free_box, random_actions, started, wander
+
+ENDLESS = {"sigma_end": 1e-4}
+NO_PARTS = {"panorama": False, "own": False, "team": False}
+
+
+# --- A mission of the reference
+
+
+class SlowMission:
+    """A mission at instants of the library's clock, computed by the reference from poses alone."""
+
+    def __init__(self, missions):
+        self.scenario, self.missions = missions.scenario, missions
+        self.size = missions.grid.shape
+        self.truth = missions.state.truth[0].reshape(self.size) > 0.5
+        prior = (0.5, self.scenario.sigma_prior)
+        robots = range(self.scenario.robots)
+        self.beliefs = [dict.fromkeys(np.ndindex(*self.size), prior) for _ in robots]
+        sensor = self.scenario.sensor
+        self.numbers = rocha04.Sensor(missions.grid.voxel_size_m, sensor.sigma_min, sensor.sigma_slope_per_m)
+        self.sent = [0 for _ in robots]
+
+    def grid_units(self, place_m):
+        return (np.asarray(place_m) - self.missions.grid.origin_m) / self.missions.grid.voxel_size_m
+
+    def gazes(self, pose):
+        """Yaw and pitch of every ray, column by column."""
+        sensor = self.scenario.sensor
+        angles = [
+            pose[3 + axis] + (np.arange(count) - (count - 1) / 2) * sensor.angular_step_rad
+            for axis, count in enumerate((sensor.columns, sensor.rows))
+        ]
+        return list(itertools.product(*angles))
+
+    def where(self, robot, time_s):
+        """A robot's place in grid units: its drive by the integrated trapezoid."""
+        own, pace = self.missions.state.robots[0, robot], self.scenario.robot
+        origin, goal, since = own["origin"][:3], own["goal"][:3], time_s - own["depart_s"]
+        length, limits = math.dist(origin, goal), (pace.max_speed_m_s, pace.acceleration_m_s2)
+        if since >= rocha04.drive_s(length, *limits):
+            return self.grid_units(goal)
+        share = rocha04.way_at_m(since, length, *limits, steps=400) / length
+        return self.grid_units(origin + share * (goal - origin))
+
+    def scan(self, robot, time_s):
+        """What a robot that stands at its goal measures: rays' ends, voxels and lengths."""
+        pose, sensor = self.missions.state.robots[0, robot]["goal"], self.scenario.sensor
+        start, radius = (
+            self.grid_units(pose[:3]),
+            self.scenario.robot.body_radius_m / self.numbers.voxel_size_m,
+        )
+        mates = [self.where(mate, time_s) for mate in range(self.scenario.robots) if mate != robot]
+        rays = []
+        for gaze in self.gazes(pose):
+            direction, longest = rocha04.gaze(*gaze), sensor.max_range_m / self.numbers.voxel_size_m
+            assert rocha04.is_generic(start, direction, self.size, longest, 1e-9), "take another seed"
+            ray = rocha04.trace(
+                lambda v: self.truth[v], start, direction, self.size, longest, sensor.voxels_behind
+            )
+            bodies = [rocha04.distance_to_ball(start, direction, mate, radius) for mate in mates]
+            hidden = radius > 0.0 and min(bodies, default=math.inf) < ray.length
+            code = Return.NOTHING if hidden else Return.FREE if ray.end == rocha04.OPEN else Return.HIT
+            rays.append((code, ray))
+        return start, rays
+
+    def fuse(self, robot, start, code, ray):
+        range_m = ray.length * self.numbers.voxel_size_m
+        return rocha04.integrate(
+            self.beliefs[robot], ray.voxels, start, range_m, code == Return.HIT, self.numbers
+        )
+
+    def arrive(self, robot, time_s):
+        """A robot scans, fuses and shares; compares the rays with the library's."""
+        state, channel = self.missions.state, self.scenario.channel
+        start, rays = self.scan(robot, time_s)
+        assert state.scan_returned[0, robot].tolist() == [code for code, _ in rays]
+        measured = [code != Return.NOTHING for code, _ in rays]
+        ranges = [ray.length * self.numbers.voxel_size_m for _, ray in rays]
+        assert state.scan_range_m[0, robot][measured] == pytest.approx(np.array(ranges)[measured], rel=1e-9)
+        utility = [self.fuse(robot, start, code, ray) if code else -1.0 for code, ray in rays]
+        ours = np.where(measured, state.scan_utility_bits[0, robot], -1.0)
+        assert ours == pytest.approx(utility, rel=2e-5, abs=2e-5)
+        chosen = rocha04.select(ours.tolist(), channel.burst, channel.i_min_bits)
+        assert rocha04.is_valid_selection(ours.tolist(), chosen, channel.burst, channel.i_min_bits)
+        self.sent[robot] += len(chosen)
+        for mate in range(self.scenario.robots):
+            if mate != robot:
+                for ray in chosen:
+                    self.fuse(mate, start, *rays[ray])
+
+
+REFERENCE_CASES = {
+    "empty": {"robots": 2},
+    "furnished": {"robots": 3, "world": "furnished", "robot": {"body_radius_m": 0.2}},
+    "short": {"robots": 2, "sensor": {"max_range_m": 1.1, "voxels_behind": 0}, "channel": {"burst": 30}},
+    "planar": {
+        "robots": 2,
+        "world": "furnished",
+        "robot": {"motion": "planar", "sensor_height_m": 0.6},
+        "sensor": {"voxels_behind": 2},
+        "channel": {"i_min_bits": 20.0, "burst": 5},
+    },
+    "flat": {
+        "robots": 3,
+        "world": "furnished",
+        "grid": Grid((13, 9, 1), 0.4, (-1.0, 0.3, 0.0)),
+        "sensor": {"field_of_view_rad": (math.pi, 0.0)},
+        "channel": {"i_min_bits": 5.0},
+    },
+}
+
+
+@pytest.mark.parametrize("case", REFERENCE_CASES)
+def test_a_mission_is_what_the_reference_computes(case):
+    """Scans, utilities, selections and all beliefs, from the poses and the truth alone."""
+    missions = started(free_box(**REFERENCE_CASES[case], ending=ENDLESS), seed=2)
+    slow, rng, batches = SlowMission(missions), np.random.default_rng(1), 0
+    robots = missions.state.robots[0]
+    for _ in range(30):
+        scans = robots["scans"].copy()
+        missions.step(*random_actions(missions, rng))
+        time_s = missions.state.missions[0]["time_s"]
+        for robot in np.flatnonzero(robots["scans"] > scans):
+            assert robots["ready_s"][robot] == time_s
+            slow.arrive(int(robot), time_s)
+            batches += 1
+    assert batches >= 30
+    assert robots["measurements_sent"].tolist() == slow.sent
+    assert min(slow.sent) > 0
+    for robot, beliefs in enumerate(slow.beliefs):
+        mean, precision = as_arrays(beliefs, missions.grid.shape)
+        np.testing.assert_allclose(missions.mean[0, robot], mean, atol=5e-5)
+        np.testing.assert_allclose(missions.precision[0, robot], precision, rtol=1e-4)
+        entropy = rocha04.map_entropy_bits(sigma for _, sigma in beliefs.values())
+        assert robots["entropy_bits"][robot] == pytest.approx(entropy, abs=0.01)
+
+
+# --- Invariants
+
+INVARIANT_CASES = {
+    "events": {"robots": 3},
+    "period": {"robots": 4, "decision_period_s": 0.75, "world": "furnished"},
+    "late": {"robots": 3, "decision_period_s": 0.5, "channel": {"delay_s": 1.3}},
+    "lossy": {"robots": 3, "channel": {"loss_probability": 0.4, "range_m": 2.5}},
+    "noisy": {"robots": 2, "sensor": {"range_noise_m": 0.2, "max_range_m": 1.5, "voxels_behind": 3}},
+    "team": {"robots": 2, "reward": {"kind": "team", "cost_per_s": 1e-3}, "world": "furnished"},
+    "alone": {"robots": 1, "decision_period_s": 2.0},
+    "no announcements": {"robots": 2, "channel": {"announcements": False, "burst": 3}},
+    "no sharing": {"robots": 2, "channel": {"burst": 0}},
+    "big bodies": {"robots": 5, "robot": {"body_radius_m": 0.3}, "decision_period_s": 0.5},
+    "flat": {
+        "robots": 3,
+        "world": "furnished",
+        "grid": Grid((13, 9, 1), 0.4, (-1.0, 0.3, 0.0)),
+        "sensor": {"field_of_view_rad": (2.0, 0.0)},
+    },
+    "discrete": {"robots": 2, "action": {"kind": "discrete"}, "robot": {"motion": "planar"}},
+}
+
+
+class Watch:
+    """Looks at a mission before and after each step, and complains."""
+
+    def __init__(self, missions):
+        self.missions, self.channel = missions, missions.scenario.channel
+        self.mates = missions.scenario.robots - 1
+        self.announcements = np.zeros(self.mates + 1, int)
+        self.batches = np.zeros(self.mates + 1, int)
+        self.gained = np.zeros(self.mates + 1)
+        self.remember()
+
+    def remember(self):
+        state = self.missions.state
+        self.mean, self.precision = state.mean[0].copy(), state.precision[0].copy()
+        self.robots, self.clock = state.robots[0].copy(), state.missions[0].copy()
+
+    def check(self, _step):
+        self.beliefs()
+        self.rewards()
+        self.clocks()
+        self.sharing()
+        self.remember()
+
+    def beliefs(self):
+        state, robots = self.missions.state, self.missions.state.robots[0]
+        assert (state.precision[0] >= self.precision).all()
+        assert np.isfinite(state.precision[0]).all()
+        assert ((state.mean[0] >= 0.0) & (state.mean[0] <= 1.0)).all()
+        assert (robots["entropy_bits"] <= self.robots["entropy_bits"]).all()
+        assert (robots["own_bits"] >= 0.0).all()
+        assert (robots["received_bits"] >= 0.0).all()
+        self.gained += robots["own_bits"] + robots["received_bits"]
+        start = state.missions[0]["entropy_start_bits"]
+        assert start - robots["entropy_bits"] == pytest.approx(self.gained, abs=1e-6)
+        full = map_entropy_bits(self.missions.precision[0])
+        assert robots["entropy_bits"] == pytest.approx(full, rel=1e-6, abs=1e-6 * start)
+        unchanged = (state.precision[0] == self.precision) & (state.mean[0] != self.mean)
+        assert not unchanged.any()  # what no ray crossed keeps its mean, too
+
+    def rewards(self):
+        state, settings = self.missions.state, self.missions.scenario.reward
+        robots, clock = state.robots[0], state.missions[0]
+        cost = settings.cost_per_s * (clock["time_s"] - self.clock["time_s"])
+        gained = robots["own_bits"].copy()
+        if settings.kind == "team":
+            gained[:] = (self.robots["entropy_bits"] - robots["entropy_bits"]).mean()
+        expected = gained / (clock["entropy_start_bits"] - clock["entropy_end_bits"]) - cost
+        assert robots["reward"] == pytest.approx(expected, rel=1e-9, abs=1e-12)
+
+    def clocks(self):
+        state, period = self.missions.state, self.missions.scenario.decision_period_s
+        robots, clock = state.robots[0], state.missions[0]
+        assert clock["end"] == MissionEnd.RUNNING.code
+        assert clock["cycles"] == self.clock["cycles"] + 1
+        if period is not None:
+            assert clock["time_s"] == self.clock["time_s"] + period
+        else:
+            assert clock["time_s"] == robots["ready_s"][robots["deciding"]].max()
+            assert (robots["ready_s"][~robots["deciding"]] > clock["time_s"]).all()
+            assert robots["deciding"].any()
+        assert (robots["deciding"] == (robots["ready_s"] <= clock["time_s"])).all()
+        departed = self.robots["deciding"]
+        assert (robots["depart_s"][departed] == self.clock["time_s"]).all()
+        for field in ("origin", "goal", "depart_s", "target"):
+            assert (robots[field][~departed] == self.robots[field][~departed]).all()
+        longest = robots["ready_s"] - robots["depart_s"]
+        assert (longest >= self.missions.scenario.sensor.scan_time_s).all()
+        way = np.linalg.norm((robots["goal"] - robots["origin"])[:, :3], axis=1)
+        more = robots["distance_m"] - self.robots["distance_m"]
+        assert more == pytest.approx(np.where(departed, way, 0.0), abs=1e-9)
+        assert (robots["scans"] - self.robots["scans"])[robots["deciding"]].tolist() == [1] * robots[
+            "deciding"
+        ].sum()
+
+    def sharing(self):
+        state, robots = self.missions.state, self.missions.state.robots[0]
+        scanned = robots["scans"] > self.robots["scans"]
+        sent = robots["measurements_sent"] - self.robots["measurements_sent"]
+        assert (sent[~scanned] == 0).all()
+        for robot in np.flatnonzero(scanned):
+            returned, bits = state.scan_returned[0, robot], state.scan_utility_bits[0, robot]
+            measured = returned != Return.NOTHING
+            assert (bits[~measured] == 0.0).all()
+            assert (bits[measured] >= 0.0).all()
+            more = robots["measurements"][robot] - self.robots["measurements"][robot]
+            assert more == measured.sum()
+            worth = (bits[measured] >= self.channel.i_min_bits).sum()
+            assert sent[robot] == (min(self.channel.burst, worth) if self.mates else 0)
+            assert robots["scan_pose"][robot].tolist() == robots["goal"][robot].tolist()
+        if self.mates:
+            self.batches += sent > 0
+            self.announcements += self.robots["deciding"] & self.channel.announcements
+        assert (robots["messages_sent"] == self.batches + self.announcements).all()
+        cost = 96 * robots["measurements_sent"] + 160 * self.batches + 384 * self.announcements
+        assert (robots["bits_sent"] == cost).all()
+        self.receiving(robots)
+
+    def receiving(self, robots):
+        """Every message is heard once by each teammate, lost, out of range, or still under way."""
+        waiting = sum(
+            state["due_s"] < math.inf and to
+            for state, row in zip(self.missions.state.mail[0], self.missions.state.mail_to[0], strict=True)
+            for to in row
+        )
+        arrived = robots["messages_received"].sum()
+        missed = robots["messages_lost"].sum() + robots["messages_out_of_range"].sum()
+        assert arrived + missed + waiting == self.mates * robots["messages_sent"].sum()
+        if missed + waiting == 0:
+            for counted in ("messages", "measurements", "bits"):
+                sent, received = robots[f"{counted}_sent"], robots[f"{counted}_received"]
+                assert received.tolist() == (sent.sum() - sent).tolist()
+        assert (robots["bits_received"] >= 96 * robots["measurements_received"]).all()
+
+
+@pytest.mark.parametrize("case", INVARIANT_CASES)
+def test_what_holds_in_every_step_of_a_mission(case):
+    settings = {**INVARIANT_CASES[case], "ending": ENDLESS}
+    missions = started(free_box(**settings), seed=11)
+    watch = Watch(missions)
+    wander(missions, 60, 7, watch.check)
+    robots = missions.state.robots[0]
+    assert (robots["scans"] > 5).all()
+    if case == "lossy":
+        assert robots["messages_lost"].min() > 0
+        assert robots["messages_out_of_range"].max() > 0
+    if case == "late":
+        assert robots["messages_received"].min() > 0
+
+
+def test_the_carried_entropy_agrees_with_the_map_after_a_million_updates():
+    room = {"robots": 2, "observation": NO_PARTS, "decision_period_s": None, "ending": ENDLESS}
+    missions = started(with_settings(ROOM, room))
+    updates, rng = 0.0, np.random.default_rng(0)
+    robots, ranges = missions.state.robots[0], missions.state.scan_range_m[0]
+    bits = np.zeros(2)
+    while updates < 1e6:
+        scans = robots["scans"].copy()
+        missions.step(*random_actions(missions, rng))
+        bits += robots["own_bits"] + robots["received_bits"]
+        # A voxel holds at most √3 edges of a ray.
+        updates += sum(ranges[r].sum() for r in np.flatnonzero(robots["scans"] > scans)) / (0.25 * 3**0.5)
+        assert missions.over(0) is MissionEnd.RUNNING
+    full = map_entropy_bits(missions.precision[0])
+    assert robots["entropy_bits"] == pytest.approx(full, rel=1e-6)
+    start = missions.state.missions[0]["entropy_start_bits"]
+    assert start - robots["entropy_bits"] == pytest.approx(bits, abs=1e-6)
+    assert (np.abs(full) > 1000.0).all()  # relative to something
+
+
+def test_the_paper_s_room():
+    """28,577 voxels, 128 rays, H(0) = 1.987·10⁵ and H_th = -8.6068·10⁴."""
+    missions = started(with_settings(ROOM, {"robots": 1}))
+    clock = missions.state.missions[0]
+    assert missions.grid.voxels == 28_577
+    assert missions.scenario.sensor.rays == 128
+    assert clock["entropy_start_bits"] == pytest.approx(198_724.06, abs=0.01)
+    assert clock["entropy_end_bits"] == pytest.approx(-86_068.15, abs=0.01)
+    assert map_entropy_bits(missions.precision[0, 0]) == pytest.approx(198_724.06, abs=0.1)
+    wander(missions, 20, 0)
+    assert missions.state.robots[0, 0]["measurements"] == 128 * missions.state.robots[0, 0]["scans"]
+    assert (missions.state.scan_returned == Return.HIT).all()  # the boundary is a wall
+
+
+def test_the_threshold_asks_for_nothing_that_cannot_be_seen():
+    """A furnished room: solid voxels behind others keep their prior entropy."""
+    missions = started(ROOM_FURNISHED, seed=1)
+    world, clock = missions.worlds[0], missions.state.missions[0]
+    visible = world.layout(ROOM_FURNISHED).visible_voxels
+    assert 0.9 * 28_577 < visible < 28_577
+    known, unknown = gaussian_entropy_bits(0.03), gaussian_entropy_bits(30.0)
+    expected = visible * known + (28_577 - visible) * unknown
+    assert clock["entropy_end_bits"] == pytest.approx(expected, rel=1e-9)
+
+
+# --- Bodies
+
+CROWDS = {
+    "big bodies in the tiny box": free_box(
+        robots=5, robot={"body_radius_m": 0.35, "reach_m": 3.0}, decision_period_s=0.6, observation=NO_PARTS
+    ),
+    "small bodies, furnished": free_box(
+        robots=5, robot={"body_radius_m": 0.24, "reach_m": 3.0}, world="furnished", observation=NO_PARTS
+    ),
+    "big bodies in a furnished room": with_settings(
+        ROOM_FURNISHED,
+        {
+            "robots": 5,
+            "robot": {"body_radius_m": 0.4, "reach_m": 6.0, "max_speed_m_s": 1.0},
+            "decision_period_s": 1.1,
+            "observation": NO_PARTS,
+            "sensor": {"angular_step_rad": math.pi / 12},
+        },
+    ),
+}
+
+
+@pytest.mark.parametrize("crowd", CROWDS)
+def test_bodies_never_overlap_and_never_stand_in_solid_voxels(crowd):
+    """At any time, not only when a step ends: robots that departed with a step are looked at within it."""
+    missions = started(with_settings(CROWDS[crowd], {"ending": ENDLESS}), seed=6)
+    grid, radius = missions.grid, missions.scenario.robot.body_radius_m
+    blocked = missions.worlds[0].layout(missions.scenario).barriers > 0
+    robots, closest, before_s = missions.state.robots[0], [math.inf], 0.0
+
+    def look(_step):
+        nonlocal before_s
+        now_s = missions.state.missions[0]["time_s"]
+        for time_s in np.linspace(before_s, now_s, 9):
+            places = np.array([pose_at(missions.rules.numbers[0], robot, time_s)[:3] for robot in robots])
+            apart = np.linalg.norm(places[:, None] - places[None], axis=-1)[np.triu_indices(len(places), 1)]
+            closest[0] = min(closest[0], apart.min())
+            assert apart.min() >= 2 * radius
+            voxels = grid.voxel_of(places)
+            assert ((voxels >= 0) & (voxels < grid.shape)).all()
+            assert not blocked[tuple(voxels.T)].any()
+        before_s = now_s
+
+    wander(missions, 100, 3, look)
+    assert closest[0] < 2.2 * radius  # they did meet
+    assert robots["blocked_moves"].min() > 5
+
+
+@pytest.mark.parametrize("world", ["empty", "furnished"])
+def test_round_numbers_do_not_bring_robots_into_walls_and_furniture(world):
+    """Displacements of quarters of the reach end on faces between voxels, exactly."""
+    missions = started(free_box(robots=1, world=world, observation=NO_PARTS), seed=6)
+    truth, rng = missions.state.truth[0].reshape(missions.grid.shape), np.random.default_rng(0)
+    for _ in range(200):
+        boxes = rng.choice([-1.0, -0.5, -0.25, 0.0, 0.25, 0.5, 1.0], (1, 1, 5))
+        missions.step(boxes, np.zeros((1, 1), np.int64))
+        voxel = missions.grid.voxel_of(missions.state.robots[0, 0]["goal"][:3])
+        assert ((voxel >= 0) & (voxel < missions.grid.shape)).all()
+        assert truth[tuple(voxel)] == 0.0
+
+
+def test_the_scratch_space_holds_the_farthest_drive():
+    """Compiled code does not check: numbers written beyond its end destroy what lies there."""
+    sensor = {"max_range_m": 0.3, "field_of_view_rad": (0.0, 0.0)}
+    missions = Missions(free_box(robot={"reach_m": math.inf}, sensor=sensor))
+    needed = longest_crossing(*missions.grid.shape, math.inf, 1)
+    for scan in missions._scans:
+        assert min(len(scan.way), len(scan.way_entered)) >= needed
+
+
+def test_starts_are_voxel_centres_with_room_apart_from_each_other():
+    seen = set()
+    for seed in range(20):
+        missions = started(CROWDS["big bodies in the tiny box"], seed=seed)
+        poses, grid = missions.state.robots[0]["goal"], missions.grid
+        voxels = grid.voxel_of(poses[:, :3])
+        np.testing.assert_allclose(grid.centre_of(voxels), poses[:, :3])
+        blocked = missions.worlds[0].layout(missions.scenario).barriers > 0
+        assert not blocked[tuple(voxels.T)].any()
+        apart = np.linalg.norm(poses[:, None, :3] - poses[None, :, :3], axis=-1)
+        assert apart[np.triu_indices(5, 1)].min() >= 0.7
+        assert (poses[:, 4] == 0.0).all()
+        assert (np.abs(poses[:, 3]) <= math.pi).all()
+        seen.add(poses.tobytes())
+    assert len(seen) == 20
+
+
+def test_robots_start_near_the_first_one_where_the_scenario_says_so():
+    for seed in range(20):
+        near, anywhere = (
+            started(free_box(robots=4, start_radius_m=radius_m), seed=seed) for radius_m in (0.8, math.inf)
+        )
+        places = near.state.robots[0]["goal"][:, :3]
+        assert np.linalg.norm(places - places[0], axis=1).max() <= 0.8
+        assert (near.state.robots[0]["goal"][0] == anywhere.state.robots[0]["goal"][0]).all()
+    with pytest.raises(WorldError, match=r"Scenario\.robots = 4: allowed is at most"):
+        started(free_box(robots=4, start_radius_m=0.3, robot={"body_radius_m": 0.2}))
+
+
+def test_more_robots_than_there_is_room_for_are_refused_before_anything_changes():
+    crowd = free_box(robots=60, robot={"body_radius_m": 0.6}, observation=NO_PARTS)
+    missions = Missions(crowd)
+    with pytest.raises(WorldError, match=r"Scenario\.robots = 60: allowed is at most"):
+        missions.reset(0, 1)
+    assert missions.worlds == [None]
+    assert not missions.state.precision.any()
+    too_big = Missions(free_box(robot={"body_radius_m": 1.3}))
+    with pytest.raises(WorldError, match=r"room for a body of radius 1\.3 m"):
+        too_big.reset(0, 1)
+
+
+# --- Ends
+
+
+def test_a_mission_ends_with_the_first_scan_that_brings_one_map_below_the_threshold():
+    missions = started(free_box(ending={"sigma_end": 15.0}, channel={"burst": 0}), seed=5)
+    threshold, robots = missions.state.missions[0]["entropy_end_bits"], missions.state.robots[0]
+    before = robots["entropy_bits"].copy()
+    while missions.over(0) is MissionEnd.RUNNING:
+        assert (robots["entropy_bits"] > threshold).all()
+        before = robots["entropy_bits"].copy()
+        wander(missions, 1, missions.state.missions[0]["cycles"])
+    assert missions.over(0) is MissionEnd.MAPPED
+    assert robots["entropy_bits"].min() <= threshold < before.min()
+    assert robots["entropy_bits"].max() > threshold  # the other map is not that far yet
+
+
+def test_all_maps_below_the_threshold():
+    settings = {"ending": {"sigma_end": 20.0, "whose": "all"}, "channel": {"burst": 0}}
+    missions = started(free_box(**settings), seed=5)
+    threshold, robots = missions.state.missions[0]["entropy_end_bits"], missions.state.robots[0]
+    one_alone = False
+    while missions.over(0) is MissionEnd.RUNNING:
+        one_alone |= bool((robots["entropy_bits"] <= threshold).sum() == 1)
+        wander(missions, 1, missions.state.missions[0]["cycles"])
+    assert missions.over(0) is MissionEnd.MAPPED
+    assert one_alone
+    assert (robots["entropy_bits"] <= threshold).all()
+
+
+@pytest.mark.parametrize("period", [None, 0.8])
+def test_a_mission_is_cut_off_at_its_time_limit(period):
+    missions = started(free_box(decision_period_s=period, ending={"time_limit_s": 7.3}), seed=5)
+    while missions.over(0) is MissionEnd.RUNNING:
+        assert missions.state.missions[0]["time_s"] < 7.3
+        wander(missions, 1, 0)
+    assert missions.over(0) is MissionEnd.TIME_UP
+    assert missions.state.missions[0]["time_s"] == 7.3
+
+
+def test_a_mission_is_cut_off_after_its_last_cycle_and_then_stands_still():
+    missions = started(free_box(ending={"max_cycles": 6}), seed=5)
+    wander(missions, 6, 0)
+    assert missions.over(0) is MissionEnd.CYCLES_UP
+    before = [array.tobytes() for array in missions.state]
+    wander(missions, 2, 1)
+    assert [array.tobytes() for array in missions.state] == before
+    assert missions.state.missions[0]["cycles"] == 6
+
+
+def test_steps_before_a_reset_and_counts_that_are_none():
+    with pytest.raises(CallOrderError, match="step before reset"):
+        wander(Missions(free_box()), 1, 0)
+    for count in (0, -1, 1.5, True, "2"):
+        with pytest.raises(SettingError, match=r"missions = .*: allowed is a whole number ≥ 1"):
+            Missions(free_box(), count)
+        with pytest.raises(SettingError, match=r"threads = .*: allowed is a whole number ≥ 1"):
+            Missions(free_box(), 1, count)
+
+
+def test_a_reset_forgets_everything_of_the_mission_before():
+    settings = {"robots": 3, "channel": {"delay_s": 0.7}, "world": "furnished"}
+    used, fresh = started(free_box(**settings), seed=1), started(free_box(**settings), seed=2)
+    wander(used, 20, 0)
+    used.reset(0, 2)
+    for name, one, other in zip(used.state._fields, used.state, fresh.state, strict=True):
+        assert one.tobytes() == other.tobytes(), name
+    np.testing.assert_array_equal(used.observations, fresh.observations)

@@ -1,0 +1,354 @@
+"""Settings: what is out of range, of the wrong kind or unknown is refused by name, value and range."""
+
+from __future__ import annotations
+
+import copy
+import dataclasses
+import math
+import pickle
+
+import numpy as np
+import pytest
+
+from entropy_explore_env.errors import EntropyExploreError, SettingError
+from entropy_explore_env.scenario import Scenario, with_settings
+from entropy_explore_env.scenarios import BOX, ROOM, SCENARIOS, find_scenario
+from entropy_explore_env.settings import (
+    Action,
+    Channel,
+    Ending,
+    Grid,
+    Observation,
+    RangeSensor,
+    Reward,
+    Robot,
+    RobotKind,
+)
+
+NAN, INF = math.nan, math.inf
+NO_NUMBERS = ("1", None, True, [1.0], NAN)
+"""Never a number > 0, nor one of another range."""
+POSITIVE = (*NO_NUMBERS, 0.0, -1.0)
+NOT_NEGATIVE = (*NO_NUMBERS, -1e-9, INF)
+COUNT = (*NO_NUMBERS, 1.5, -1)
+KIND = (None, 1, "free ", "FREE", NAN, [])
+SWITCH = (None, 1, 0.0, "yes", NAN)
+
+REFUSED = {
+    (Grid, "shape"): (
+        (7, 11),
+        (7, 11, 5, 2),
+        [7, 11, 5],
+        (7, 11, 0),
+        (7.0, 11, 5),
+        (7, -1, 5),
+        (True, 11, 5),
+        "7x11x5",
+        None,
+        (2048, 2048, 2048),
+    ),
+    (Grid, "voxel_size_m"): (*POSITIVE, INF),
+    (Grid, "origin_m"): (
+        (0.0, 0.0),
+        [0.0, 0.0, 0.0],
+        (0.0, NAN, 0.0),
+        (0.0, INF, 0.0),
+        None,
+        (0, "0", 0),
+        (0, True, 0),
+    ),
+    (Scenario, "split"): (None, 1, "Train", "holdout", "", NAN, []),
+    (Robot, "motion"): KIND,
+    (Robot, "navigator"): KIND,
+    (Robot, "unknown_cost"): (*NO_NUMBERS, 0.0, 0.999, INF, 1.1e6),
+    (Robot, "reach_m"): POSITIVE,
+    (Robot, "max_speed_m_s"): (*POSITIVE, INF),
+    (Robot, "acceleration_m_s2"): (*POSITIVE, INF),
+    (Robot, "turn_rate_rad_s"): POSITIVE,
+    (Robot, "body_radius_m"): NOT_NEGATIVE,
+    (Robot, "sensor_height_m"): NOT_NEGATIVE,
+    (Robot, "when_blocked"): KIND,
+    (Robot, "blocked_wait_s"): (*POSITIVE, INF),
+    (Scenario, "start_radius_m"): POSITIVE,
+    (RangeSensor, "field_of_view_rad"): (
+        0.5,
+        (0.5,),
+        [0.5, 0.5],
+        (0.5, NAN),
+        (-0.1, 0.5),
+        (0.5, -0.1),
+        (7.0, 0.5),
+        (0.5, 3.2),
+        ("0.5", 0.5),
+        (True, 0.5),
+        None,
+    ),
+    (RangeSensor, "angular_step_rad"): (*POSITIVE, INF, 1e-5, 1e-320),
+    (RangeSensor, "max_range_m"): POSITIVE,
+    (RangeSensor, "sigma_min"): (*POSITIVE, INF, 0.9e-4, 1.1e4),
+    (RangeSensor, "sigma_slope_per_m"): NOT_NEGATIVE,
+    (RangeSensor, "range_noise_m"): NOT_NEGATIVE,
+    (RangeSensor, "voxels_behind"): (*COUNT, 1001),
+    (RangeSensor, "scan_time_s"): (*POSITIVE, INF),
+    (RangeSensor, "scan_every_m"): (*POSITIVE, 0.9e-3),
+    (Channel, "burst"): (*COUNT, 1_000_001),
+    (Channel, "i_min_bits"): NOT_NEGATIVE,
+    (Channel, "i_min_fill"): ("1", True, NAN, 0.0, -0.5, 10.01, INF),
+    (Channel, "i_min_gain"): (*POSITIVE, 1.01, INF),
+    (Channel, "range_m"): POSITIVE,
+    (Channel, "loss_probability"): (*NO_NUMBERS, -0.01, 1.01, INF),
+    (Channel, "delay_s"): (*NO_NUMBERS, -0.01, 3601.0, INF),
+    (Channel, "announcements"): SWITCH,
+    (Channel, "phase_s"): (*NO_NUMBERS, -0.01, 0.9e-3, 3601.0, INF),
+    (Channel, "repeats"): (*COUNT, 0, 1001),
+    (Ending, "sigma_end"): (*POSITIVE, INF, 0.9e-4, 1.1e4),
+    (Ending, "whose"): KIND,
+    (Ending, "time_limit_s"): POSITIVE,
+    (Ending, "max_cycles"): ("1", True, [1], NAN, 0, -1, 1.5, 2**63),
+    (Reward, "kind"): KIND,
+    (Reward, "cost_per_s"): NOT_NEGATIVE,
+    (Action, "kind"): KIND,
+    (Action, "moves"): KIND,
+    (Action, "yaws"): (*COUNT, 0, 361),
+    (Action, "pitches"): (*COUNT, 0, 91),
+    (Observation, "panorama"): SWITCH,
+    (Observation, "panorama_yaws"): ("16", True, NAN, 0, 361, 16.0),
+    (Observation, "panorama_pitches"): (*COUNT, 0, 91),
+    (Observation, "panorama_utility"): KIND,
+    (Observation, "own"): SWITCH,
+    (Observation, "team"): SWITCH,
+    (Observation, "patch"): SWITCH,
+    (Observation, "patch_shape"): (
+        (11, 11),
+        [11, 11, 5],
+        (10, 11, 5),
+        (11, 11, 257),
+        (11.0, 11, 5),
+        11,
+        None,
+    ),
+    (Observation, "overview"): SWITCH,
+    (Observation, "overview_shape"): ((8, 8), [8, 8, 4], (0, 8, 4), (65, 8, 4), (8.0, 8, 4), None),
+    (Observation, "action_mask"): SWITCH,
+    (Observation, "flat"): SWITCH,
+    (Observation, "while_busy"): SWITCH,
+    (Scenario, "name"): (None, 1),
+    (Scenario, "grid"): (None, (7, 11, 5)),
+    (Scenario, "world"): (None, 1),
+    (Scenario, "robots"): (*COUNT, 0, 1001),
+    (Scenario, "sigma_prior"): (*POSITIVE, INF, 0.9e-3, 1.1e4),
+    (Scenario, "decision_period_s"): ("1", True, [1.0], NAN, 0.0, -1.0, INF),
+    (Scenario, "scored"): SWITCH,
+    (Scenario, "robot"): (None, Channel(), "free"),
+    (Scenario, "sensor"): (None, Reward()),
+    (Scenario, "others"): (None, [], 1, (Reward(),), (None,)),
+    (RobotKind, "robot"): (None, Channel(), "free"),
+    (RobotKind, "sensor"): (None, Reward()),
+    (Scenario, "channel"): (None, Reward()),
+    (Scenario, "ending"): (None, Reward()),
+    (Scenario, "reward"): (None, Ending(), "team"),
+    (Scenario, "action"): (None, Reward(), "discrete"),
+    (Scenario, "observation"): (None, Reward()),
+}
+DEFAULTS = {Grid: {"shape": (7, 11, 5), "voxel_size_m": 0.5}, Scenario: {"name": "a", "grid": BOX.grid}}
+CASES = [(kind, name, value) for (kind, name), values in REFUSED.items() for value in values]
+
+
+def refusal(call):
+    """The SettingError of a call: one line with field, value and what is allowed."""
+    with pytest.raises(SettingError) as raised:
+        call()
+    error = raised.value
+    assert isinstance(error, EntropyExploreError)
+    assert isinstance(error, ValueError)
+    assert str(error) == f"{error.field} = {error.value!r}: allowed is {error.allowed}"
+    assert error.allowed
+    assert "\n" not in str(error)
+    return error
+
+
+@pytest.mark.parametrize(
+    ("kind", "name", "value"), CASES, ids=lambda part: getattr(part, "__name__", None) or repr(part)
+)
+def test_a_setting_that_is_not_allowed_is_refused(kind, name, value):
+    error = refusal(lambda: kind(**{**DEFAULTS.get(kind, {}), name: value}))
+    assert error.field == f"{kind.__name__}.{name}"
+    assert error.value is value
+
+
+def test_every_setting_is_in_the_list():
+    fields = {
+        (kind, field.name) for kind in {kind for kind, _ in REFUSED} for field in dataclasses.fields(kind)
+    }
+    assert fields == set(REFUSED)
+
+
+ACCEPTED = [
+    (Grid, {"shape": (1, 1, 1), "voxel_size_m": 1e-3, "origin_m": (-1, 2.5, 0)}),
+    (Grid, {"shape": (np.int64(7), np.int32(11), 5), "voxel_size_m": np.float64(0.5)}),
+    (Robot, {"reach_m": INF, "turn_rate_rad_s": INF, "body_radius_m": 0, "sensor_height_m": 0}),
+    (Robot, {"motion": "planar", "reach_m": 3, "navigator": "planned", "unknown_cost": 1}),
+    (RangeSensor, {"scan_every_m": 1e-3}),
+    (RangeSensor, {"scan_every_m": INF}),
+    (RangeSensor, {"field_of_view_rad": (2 * math.pi, math.pi), "max_range_m": INF, "voxels_behind": 0}),
+    (RangeSensor, {"field_of_view_rad": (0, 0), "sigma_min": 1e-4, "sigma_slope_per_m": 0}),
+    (Channel, {"burst": 0, "i_min_bits": 0, "range_m": 1e-9, "loss_probability": 1, "delay_s": 3600}),
+    (Ending, {"sigma_end": 1e-4, "whose": "all", "time_limit_s": INF, "max_cycles": 1}),
+    (Reward, {"kind": "team", "cost_per_s": 0}),
+    (Action, {"kind": "discrete", "yaws": 1, "pitches": 1}),
+    (Observation, {"panorama_yaws": 1, "panorama_utility": "log2", "patch_shape": (1, 1, 1)}),
+]
+
+
+@pytest.mark.parametrize(("kind", "settings"), ACCEPTED)
+def test_the_ends_of_the_ranges_are_allowed(kind, settings):
+    made = kind(**settings)
+    for name, value in settings.items():
+        assert getattr(made, name) == value
+
+
+def test_a_number_that_no_float_holds_is_refused_in_a_short_line():
+    with pytest.raises(SettingError) as caught:
+        Robot(reach_m=10**400)
+    assert caught.value.field == "Robot.reach_m"
+    assert len(str(caught.value)) < 300
+
+
+def test_settings_that_do_not_fit_each_other_are_refused():
+    discrete = {"action": {"kind": "discrete"}}
+    for settings, field in (
+        ({"ending": {"sigma_end": 30.0}}, "Ending.sigma_end"),
+        ({"sigma_prior": 0.01}, "Ending.sigma_end"),
+        ({**discrete, "robot": {"reach_m": INF}}, "Action.kind"),
+        ({**discrete, "robot": {"reach_m": 0.49}}, "Robot.reach_m"),
+        ({"robot": {"motion": "planar", "sensor_height_m": 2.5}}, "Robot.sensor_height_m"),
+        (  # 0.85 < 17 · 0.05 in floating-point numbers, but 0.85 / 0.05 is 17
+            {
+                "grid": Grid((7, 11, 17), 0.05),
+                "robot": {"motion": "planar", "sensor_height_m": 0.85, "body_radius_m": 0.01},
+            },
+            "Robot.sensor_height_m",
+        ),
+        ({**discrete, "grid": Grid((70, 80, 60), 0.5), "robot": {"reach_m": 30.0}}, "Robot.reach_m"),
+        ({"channel": {"delay_s": 3600.0}, "sensor": {"scan_time_s": 1e-4}}, "Channel.delay_s"),
+        ({"channel": {"phase_s": 3600.0}, "sensor": {"scan_time_s": 1e-4}}, "Channel.phase_s"),
+        ({"channel": {"phase_s": 1.0, "delay_s": 1.0}}, "Channel.delay_s"),
+    ):
+        assert refusal(lambda changes=settings: with_settings(BOX, changes)).field == field
+    assert with_settings(BOX, {**discrete, "robot": {"reach_m": 0.5}}).action.kind == "discrete"
+    flat = {"grid": Grid((7, 11, 1), 0.1), "robot": {"motion": "planar", "sensor_height_m": 2.5}}
+    assert with_settings(BOX, flat).planar  # in a 2-D world there is no height
+    level = with_settings(BOX, {"grid": Grid((7, 11, 1), 0.1)}).sensor
+    assert (level.rows, level.columns) == (1, BOX.sensor.columns)  # ... and nothing above the horizon
+
+
+def test_nested_settings():
+    changed = with_settings(BOX, {"robots": 4, "channel": {"burst": 3, "delay_s": 0.5}, "robot": Robot()})
+    assert (changed.robots, changed.channel.burst, changed.channel.delay_s) == (4, 3, 0.5)
+    assert changed.channel.i_min_bits == BOX.channel.i_min_bits  # what is not named stays
+    assert changed.robot == Robot() != BOX.robot
+    assert BOX.channel.burst == 8
+    assert with_settings(BOX, {}) == BOX
+    assert with_settings(BOX, {"grid": {"voxel_size_m": 0.25}}).grid.shape == BOX.grid.shape
+
+
+def test_short_names_of_the_ending():
+    for ending in ({"whose": "all"}, Ending(whose="all")):
+        changed = with_settings(BOX, {"ending": ending, "max_cycles": 7, "time_limit_s": 60.0}).ending
+        assert (changed.whose, changed.max_cycles, changed.time_limit_s) == ("all", 7, 60.0)
+    assert with_settings(BOX, {"max_cycles": 7}).ending.sigma_end == BOX.ending.sigma_end
+    assert refusal(lambda: with_settings(BOX, {"max_cycles": 0})).field == "Ending.max_cycles"
+
+
+@pytest.mark.parametrize(
+    ("settings", "field"),
+    [
+        ({"robotz": 3}, "Scenario.robotz"),
+        ({"channel": {"bursts": 3}}, "Channel.bursts"),
+        ({"channel.burst": 3}, "Scenario.channel.burst"),
+        ({"robot": {"max_cycles": 3}}, "Robot.max_cycles"),
+        ({"channel": {"burst": NAN}}, "Channel.burst"),
+        ({"channel": 3}, "Scenario.channel"),
+        ({"grid": {"shape": [7, 11, 5]}}, "Grid.shape"),
+        ({"agents": ()}, "Scenario.agents"),
+        ({"ending": 5, "max_cycles": 3}, "Scenario.ending"),
+    ],
+)
+def test_unknown_names_and_nested_values_that_are_not_allowed(settings, field):
+    assert refusal(lambda: with_settings(BOX, settings)).field == field
+
+
+def test_an_unknown_name_is_answered_with_the_names_that_there_are():
+    for settings, part in (({"robotz": 3}, Scenario), ({"channel": {"bursts": 3}}, Channel)):
+        allowed = refusal(lambda changes=settings: with_settings(BOX, changes)).allowed
+        names = [field.name for field in dataclasses.fields(part)]
+        assert allowed == "one of the fields " + ", ".join(names)
+
+
+@pytest.mark.parametrize("scenario", SCENARIOS.values(), ids=SCENARIOS)
+def test_scenarios_are_frozen_and_found_by_name(scenario):
+    assert find_scenario(scenario.name) is scenario
+    assert find_scenario(scenario) is scenario
+    for part in (scenario, scenario.grid, scenario.robot, scenario.sensor, scenario.channel, scenario.ending):
+        name = dataclasses.fields(part)[0].name
+        with pytest.raises(dataclasses.FrozenInstanceError):
+            setattr(part, name, getattr(part, name))
+    with pytest.raises(TypeError):
+        SCENARIOS["room"] = scenario
+    assert pickle.loads(pickle.dumps(scenario)) == scenario == copy.deepcopy(scenario)
+    assert hash(pickle.loads(pickle.dumps(scenario))) == hash(scenario)
+    assert scenario.agents == tuple(f"robot_{robot}" for robot in range(scenario.robots))
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "castle",
+        "Room",
+        "",
+        None,
+        3,
+        ["room"],
+    ],
+)
+def test_a_scenario_that_nobody_knows(name):
+    error = refusal(lambda: find_scenario(name))
+    assert (error.field, error.value) == ("scenario", name)
+    assert all(known in error.allowed for known in SCENARIOS)
+
+
+def test_the_paper_s_parameters():
+    """Tables 1 and 2 of Rocha04."""
+    assert (ROOM.grid.shape, ROOM.grid.voxel_size_m, ROOM.grid.voxels) == ((41, 41, 17), 0.25, 28_577)
+    assert ROOM.grid.centre_of(np.array([0, 0, 0])).tolist() == [0.0, 0.0, 0.0]
+    assert ROOM.grid.centre_of(np.array([40, 40, 16])).tolist() == [10.0, 10.0, 4.0]
+    robot, sensor = ROOM.robot, ROOM.sensor
+    assert (robot.max_speed_m_s, robot.acceleration_m_s2, robot.reach_m) == (0.25, 0.25, 0.5)
+    assert (robot.motion, robot.turn_rate_rad_s) == ("free", INF)
+    assert (sensor.sigma_min, sensor.sigma_slope_per_m) == (0.08, 0.006)
+    assert (sensor.field_of_view_rad, sensor.angular_step_rad) == ((math.pi / 6, math.pi / 12), math.pi / 90)
+    assert (sensor.columns, sensor.rows, sensor.rays) == (16, 8, 128)
+    assert (ROOM.sigma_prior, ROOM.ending.sigma_end, ROOM.ending.whose) == (30.0, 0.03, "any")
+    assert (ROOM.channel.burst, ROOM.channel.i_min_bits) == (64, 0.3219)
+    assert (ROOM.channel.loss_probability, ROOM.channel.delay_s, ROOM.channel.range_m) == (0.0, 0.0, INF)
+
+
+def test_points_and_voxels():
+    grid = Grid((7, 11, 5), 0.25, (-1.0, 2.0, 0.5))
+    assert grid.centre_of(np.array([[0, 0, 0], [6, 10, 4]])).tolist() == [
+        [-0.875, 2.125, 0.625],
+        [0.625, 4.625, 1.625],
+    ]
+    assert grid.voxel_of(np.array([0.6, 4.7, 1.5])).tolist() == [6, 10, 4]
+    assert grid.voxel_of(np.array([-1.01, 2.0, 0.5])).tolist() == [-1, 0, 0]
+    assert grid.size_m.tolist() == [1.75, 2.75, 1.25]
+    assert not grid.flat
+    assert Grid((7, 11, 1), 0.25).flat
+    voxels = np.argwhere(np.ones(grid.shape))
+    assert (grid.voxel_of(grid.centre_of(voxels)) == voxels).all()
+
+
+def test_errors_survive_the_way_to_another_process():
+    error = refusal(lambda: Robot(reach_m=-1.0))
+    again = pickle.loads(pickle.dumps(error))
+    assert (type(again), str(again)) == (type(error), str(error))
