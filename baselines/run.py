@@ -93,7 +93,7 @@ def _env(args: Args) -> EntropyExploreEnv:
     """The scenario with the command line's settings, in its world or in the file's."""
     settings = {name: getattr(args, name) for name in ("robots", "robot", "sensor", "channel", "ending")}
     world = world_settings(args.world, args.voxel_size_m, args.world_file)
-    return EntropyExploreEnv(scripted(find_scenario(args.scenario)), scored=True, **settings, **world)
+    return EntropyExploreEnv(scripted(find_scenario(args.scenario)), track_truth=True, **settings, **world)
 
 
 if __name__ == "__main__":

@@ -122,7 +122,7 @@ def env_for(path: Path, args: Args) -> EntropyExploreEnv:
     reading = Reading(resolution_m=args.resolution_m, negate=args.negate)
     world = world_settings(str(path), edge_m, reading if path.suffix.lower() in _IMAGES else Reading())
     return EntropyExploreEnv(
-        scenario, robots=args.robots, scored=True, time_limit_s=args.time_limit_s, **world
+        scenario, robots=args.robots, track_truth=True, time_limit_s=args.time_limit_s, **world
     )
 
 

@@ -50,13 +50,13 @@ class Scenario:
             (worlds/splits.py). Files, and recipes without chance, are one world in all of them.
         robots: Team size A.
         robot, sensor: How robots move and what they sense.
-        others: Further kinds of robots, for a mixed team: of K kinds in all, the first being `robot` with
-            `sensor`, robot a is of kind a mod K. All share one form of action and observation
+        extra_kinds: Further kinds of robots, for a mixed team: of K kinds in all, the first being `robot`
+            with `sensor`, robot a is of kind a mod K. All share one form of action and observation
             (missions/action.py, missions/observation.py).
         start_radius_m: Robots start at most so far from where the first one does; inf = anywhere.
         sigma_prior: Standard deviation of coverage before any measurement; the mean is ½.
         decision_period_s: A step lasts this long; None = until the next robot has to decide.
-        scored: Whether the team's joint map, of everything measured, is kept and compared with the
+        track_truth: Whether the team's joint map, of everything measured, is kept and compared with the
             truth: for figures only, nobody acts on it. It costs one more map a mission.
     """
 
@@ -68,10 +68,10 @@ class Scenario:
     start_radius_m: float = math.inf
     sigma_prior: float = 30.0
     decision_period_s: float | None = 1.0
-    scored: bool = False
+    track_truth: bool = False
     robot: Robot = field(default_factory=Robot)
     sensor: RangeSensor = field(default_factory=RangeSensor)
-    others: tuple[RobotKind, ...] = ()
+    extra_kinds: tuple[RobotKind, ...] = ()
     channel: Channel = field(default_factory=Channel)
     ending: Ending = field(default_factory=Ending)
     reward: Reward = field(default_factory=Reward)
@@ -82,19 +82,21 @@ class Scenario:
         """Check every field, and that the parts fit each other; level the sensor in a 2-D world."""
         for name, kind in (("name", str), ("world", str), ("grid", Grid), *_PARTS):
             check_kind(self, name, kind)
-        if not isinstance(self.others, tuple) or not all(isinstance(o, RobotKind) for o in self.others):
-            raise SettingError("Scenario.others", self.others, "a tuple of RobotKind")
+        if not isinstance(self.extra_kinds, tuple) or not all(
+            isinstance(o, RobotKind) for o in self.extra_kinds
+        ):
+            raise SettingError("Scenario.extra_kinds", self.extra_kinds, "a tuple of RobotKind")
         if self.grid.flat:
             object.__setattr__(self, "sensor", _level(self.sensor))
-            others = tuple(RobotKind(kind.robot, _level(kind.sensor)) for kind in self.others)
-            object.__setattr__(self, "others", others)
+            extra_kinds = tuple(RobotKind(kind.robot, _level(kind.sensor)) for kind in self.extra_kinds)
+            object.__setattr__(self, "extra_kinds", extra_kinds)
         check_choice(self, "split", Literal["train", "validation", "test"])
         check_count(self, "robots", 1, 1000)
         check_positive(self, "start_radius_m", finite=False)
         check(self, "sigma_prior", "a number from 1e-3 to 1e4", lambda v: 1e-3 <= v <= 1e4)
         if self.decision_period_s is not None:
             check_positive(self, "decision_period_s")
-        check_kind(self, "scored", bool)
+        check_kind(self, "track_truth", bool)
         if self.ending.sigma_end >= self.sigma_prior:
             raise SettingError(
                 "Ending.sigma_end", self.ending.sigma_end, f"below sigma_prior = {self.sigma_prior}"
@@ -130,7 +132,7 @@ class Scenario:
     @cached_property
     def kinds(self) -> tuple[RobotKind, ...]:
         """The K kinds of robots in the team."""
-        return (RobotKind(self.robot, self.sensor), *self.others)[: self.robots]
+        return (RobotKind(self.robot, self.sensor), *self.extra_kinds)[: self.robots]
 
     def kind_of(self, robot: int) -> RobotKind:
         """What a robot of the team, by its number, is."""

@@ -77,7 +77,7 @@ OFFICE_MIXED = dataclasses.replace(
     name="office-mixed",
     robot=dataclasses.replace(_WHEELED, reach_m=OFFICE_3D.robot.reach_m),
     sensor=RangeSensor((2 * math.pi, math.pi / 6), math.pi / 60, max_range_m=8.0),
-    others=(RobotKind(OFFICE_3D.robot, OFFICE_3D.sensor),),
+    extra_kinds=(RobotKind(OFFICE_3D.robot, OFFICE_3D.sensor),),
 )
 """The same office for mixed teams: ground robots with a scanner, 120 × 11 rays all around, take turns with
 the flying ones."""

@@ -290,20 +290,20 @@ class Ending:
 
     Attributes:
         sigma_end: Standard deviation of coverage at which a voxel counts as known.
-        whose: Whether one robot's map has to pass the threshold, or all robots' maps.
+        termination: `any` or `all`: whether one robot's map has to pass the threshold, or all robots' maps.
         time_limit_s: Simulated time after which the mission is cut off (a truncation); inf = never.
         max_cycles: Steps after which it is cut off; None = never.
     """
 
     sigma_end: float = 0.03
-    whose: Literal["any", "all"] = "any"
+    termination: Literal["any", "all"] = "any"
     time_limit_s: float = 10_000.0
     max_cycles: int | None = None
 
     def __post_init__(self) -> None:
         """Check every field."""
         check(self, "sigma_end", "a number from 1e-4 to 1e4", lambda v: 1e-4 <= v <= 1e4)
-        check_choice(self, "whose", Literal["any", "all"])
+        check_choice(self, "termination", Literal["any", "all"])
         check_positive(self, "time_limit_s", finite=False)
         if self.max_cycles is not None:
             check_count(self, "max_cycles", 1, 2**62)
@@ -362,7 +362,7 @@ class Observation:
         panorama_yaws: Directions around the horizon; None = 16, in 2-D worlds 32.
         panorama_pitches: Directions up and down, from -π/4 to π/4; planar robots have one.
         panorama_utility: `bits`, or `log2` for log2(1 + bits), which suits networks.
-        own: The robot's pose, time, remaining entropy and whether it decides (part `self`).
+        self_state: The robot's pose, time, remaining entropy and whether it decides (part `self`).
         team: Where teammates were last heard, and what they announced.
         patch: The belief around the robot.
         patch_shape: Its voxels along x, y and z; odd, the robot in the middle.
@@ -378,7 +378,7 @@ class Observation:
     panorama_yaws: int | None = None
     panorama_pitches: int = 3
     panorama_utility: Literal["bits", "log2"] = "bits"
-    own: bool = True
+    self_state: bool = True
     team: bool = True
     patch: bool = False
     patch_shape: tuple[int, int, int] = (11, 11, 5)
@@ -390,7 +390,16 @@ class Observation:
 
     def __post_init__(self) -> None:
         """Check every field."""
-        for name in ("panorama", "own", "team", "patch", "overview", "action_mask", "flat", "while_busy"):
+        for name in (
+            "panorama",
+            "self_state",
+            "team",
+            "patch",
+            "overview",
+            "action_mask",
+            "flat",
+            "while_busy",
+        ):
             check_kind(self, name, bool)
         if self.panorama_yaws is not None:
             check_count(self, "panorama_yaws", 1, 360)

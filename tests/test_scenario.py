@@ -102,7 +102,7 @@ REFUSED = {
     (Channel, "phase_s"): (*NO_NUMBERS, -0.01, 0.9e-3, 3601.0, INF),
     (Channel, "repeats"): (*COUNT, 0, 1001),
     (Ending, "sigma_end"): (*POSITIVE, INF, 0.9e-4, 1.1e4),
-    (Ending, "whose"): KIND,
+    (Ending, "termination"): KIND,
     (Ending, "time_limit_s"): POSITIVE,
     (Ending, "max_cycles"): ("1", True, [1], NAN, 0, -1, 1.5, 2**63),
     (Reward, "kind"): KIND,
@@ -115,7 +115,7 @@ REFUSED = {
     (Observation, "panorama_yaws"): ("16", True, NAN, 0, 361, 16.0),
     (Observation, "panorama_pitches"): (*COUNT, 0, 91),
     (Observation, "panorama_utility"): KIND,
-    (Observation, "own"): SWITCH,
+    (Observation, "self_state"): SWITCH,
     (Observation, "team"): SWITCH,
     (Observation, "patch"): SWITCH,
     (Observation, "patch_shape"): (
@@ -138,10 +138,10 @@ REFUSED = {
     (Scenario, "robots"): (*COUNT, 0, 1001),
     (Scenario, "sigma_prior"): (*POSITIVE, INF, 0.9e-3, 1.1e4),
     (Scenario, "decision_period_s"): ("1", True, [1.0], NAN, 0.0, -1.0, INF),
-    (Scenario, "scored"): SWITCH,
+    (Scenario, "track_truth"): SWITCH,
     (Scenario, "robot"): (None, Channel(), "free"),
     (Scenario, "sensor"): (None, Reward()),
-    (Scenario, "others"): (None, [], 1, (Reward(),), (None,)),
+    (Scenario, "extra_kinds"): (None, [], 1, (Reward(),), (None,)),
     (RobotKind, "robot"): (None, Channel(), "free"),
     (RobotKind, "sensor"): (None, Reward()),
     (Scenario, "channel"): (None, Reward()),
@@ -193,7 +193,7 @@ ACCEPTED = [
     (RangeSensor, {"field_of_view_rad": (2 * math.pi, math.pi), "max_range_m": INF, "voxels_behind": 0}),
     (RangeSensor, {"field_of_view_rad": (0, 0), "sigma_min": 1e-4, "sigma_slope_per_m": 0}),
     (Channel, {"burst": 0, "i_min_bits": 0, "range_m": 1e-9, "loss_probability": 1, "delay_s": 3600}),
-    (Ending, {"sigma_end": 1e-4, "whose": "all", "time_limit_s": INF, "max_cycles": 1}),
+    (Ending, {"sigma_end": 1e-4, "termination": "all", "time_limit_s": INF, "max_cycles": 1}),
     (Reward, {"kind": "team", "cost_per_s": 0}),
     (Action, {"kind": "discrete", "yaws": 1, "pitches": 1}),
     (Observation, {"panorama_yaws": 1, "panorama_utility": "log2", "patch_shape": (1, 1, 1)}),
@@ -253,9 +253,9 @@ def test_nested_settings():
 
 
 def test_short_names_of_the_ending():
-    for ending in ({"whose": "all"}, Ending(whose="all")):
+    for ending in ({"termination": "all"}, Ending(termination="all")):
         changed = with_settings(BOX, {"ending": ending, "max_cycles": 7, "time_limit_s": 60.0}).ending
-        assert (changed.whose, changed.max_cycles, changed.time_limit_s) == ("all", 7, 60.0)
+        assert (changed.termination, changed.max_cycles, changed.time_limit_s) == ("all", 7, 60.0)
     assert with_settings(BOX, {"max_cycles": 7}).ending.sigma_end == BOX.ending.sigma_end
     assert refusal(lambda: with_settings(BOX, {"max_cycles": 0})).field == "Ending.max_cycles"
 
@@ -328,7 +328,7 @@ def test_the_paper_s_parameters():
     assert (sensor.sigma_min, sensor.sigma_slope_per_m) == (0.08, 0.006)
     assert (sensor.field_of_view_rad, sensor.angular_step_rad) == ((math.pi / 6, math.pi / 12), math.pi / 90)
     assert (sensor.columns, sensor.rows, sensor.rays) == (16, 8, 128)
-    assert (ROOM.sigma_prior, ROOM.ending.sigma_end, ROOM.ending.whose) == (30.0, 0.03, "any")
+    assert (ROOM.sigma_prior, ROOM.ending.sigma_end, ROOM.ending.termination) == (30.0, 0.03, "any")
     assert (ROOM.channel.burst, ROOM.channel.i_min_bits) == (64, 0.3219)
     assert (ROOM.channel.loss_probability, ROOM.channel.delay_s, ROOM.channel.range_m) == (0.0, 0.0, INF)
 

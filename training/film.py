@@ -24,7 +24,7 @@ def film_best(run: Path, scenario: Scenario) -> list[Path]:
     """
     wanted = Wanted(Outputs(json=True), run / "best-mission", recorded=False)
     wanted.prepare()
-    form = {"split": "validation", "scored": True, "action": {"kind": "continuous"}}
+    form = {"split": "validation", "track_truth": True, "action": {"kind": "continuous"}}
     env = EntropyExploreEnv(with_settings(scripted(scenario), form))
     with MissionLog(wanted) as log:
         run_mission(env, LearnedPolicy(run), validation_seeds(1)[0], log.note, log.command)

@@ -98,8 +98,8 @@ def _setting(scenario: Scenario) -> Iterator[tuple[str, str]]:
     named = SCENARIOS.get(scenario.name)
     if named is not None:
         there = with_settings(named, {"grid": grid})  # in a 2-D world the sensor is level
-        usual = (there.robot, there.sensor, there.others)
-        changed = usual != (scenario.robot, scenario.sensor, scenario.others)
+        usual = (there.robot, there.sensor, there.extra_kinds)
+        changed = usual != (scenario.robot, scenario.sensor, scenario.extra_kinds)
         yield "robots and sensor", f"those of {named.name}" + (", changed" if changed else "")
     ranges = {kind.sensor.max_range_m: None for kind in scenario.kinds}  # in order, each once
     said = ("the whole world" if range_m == math.inf else f"{range_m:g} m" for range_m in ranges)

@@ -12,7 +12,7 @@ from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.scenario import Scenario, with_settings
 from entropy_explore_env.settings import Observation
 
-NOTHING_OBSERVED = Observation(panorama=False, own=False, team=False)
+NOTHING_OBSERVED = Observation(panorama=False, self_state=False, team=False)
 """Strategies read RobotViews: an observation for networks would cost time for nothing."""
 
 

@@ -93,7 +93,7 @@ def chosen_scenarios(
             name, scenario = Path(word).stem, _file_scenario(word, world_scenario)
         if name in chosen:
             raise SettingError("scenarios", words, f"each name once, not {name} twice")
-        settings = {"scored": True, "robots": 1}
+        settings = {"track_truth": True, "robots": 1}
         if time_limit_s is not None:
             settings["time_limit_s"] = time_limit_s
         scenario = with_settings(scenario, settings)

@@ -127,7 +127,7 @@ def _parts(scenario: Scenario) -> dict[str, Part]:
             [[math.log2(1 + most) if rules.numbers[0]["panorama_log"] else most], [farthest]]
         ) * (1 + 1e-6)
         limits["panorama"] = ((2, len(rules.panorama)), 0.0, high)
-    if settings.own:
+    if settings.self_state:
         kinds = len(scenario.kinds)
         limits["self"] = ((OWN_NUMBERS + (kinds if kinds > 1 else 0),), -1.0, one)
     if settings.team and scenario.robots > 1:

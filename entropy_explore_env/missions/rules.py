@@ -54,7 +54,7 @@ NUMBERS = np.dtype(
         ("team_reward", "?"),
         ("cost_per_s", "f8"),
         ("panorama_log", "?"),
-        ("scored", "?"),
+        ("track_truth", "?"),
     ],
     align=True,
 )
@@ -108,12 +108,12 @@ def rules_of(scenario: Scenario) -> Rules:
         "phase_s": channel.phase_s,
         "repeats": channel.repeats,
         "period_s": math.inf if scenario.decision_period_s is None else scenario.decision_period_s,
-        "all_maps": ending.whose == "all",
+        "all_maps": ending.termination == "all",
         "time_limit_s": ending.time_limit_s,
         "max_cycles": _NEVER if ending.max_cycles is None else ending.max_cycles,
         "team_reward": scenario.reward.kind == "team",
         "cost_per_s": scenario.reward.cost_per_s,
-        "scored": scenario.scored,
+        "track_truth": scenario.track_truth,
         "panorama_log": scenario.observation.panorama_utility == "log2",
     }
     numbers = np.zeros(scenario.robots, NUMBERS)

@@ -172,7 +172,7 @@ class Missions:
         state.precision[mission] = self.rules.numbers["prior_precision"][0]
         if self.rules.cells is not None:
             state.pooled[mission] = fresh_sums(self.rules.cells)
-        if self.scenario.scored:
+        if self.scenario.track_truth:
             state.joint_mean[mission] = PRIOR_MEAN
             state.joint_precision[mission] = self.rules.numbers["prior_precision"][0]
             state.visible[mission] = world.visible(self.scenario).ravel()

@@ -203,7 +203,7 @@ class MissionState(NamedTuple):
 def check_memory(scenario: Scenario, missions: int) -> None:
     """Raise a SettingError where the arrays of so many missions are larger than the memory there is."""
     rays = max(kind.sensor.rays for kind in scenario.kinds) * sum(scenario.grid.shape) * 8
-    maps = scenario.robots + scenario.scored
+    maps = scenario.robots + scenario.track_truth
     needed = missions * scenario.grid.voxels * (4 + 8 * maps) + rays
     try:
         there_is = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
@@ -219,7 +219,7 @@ def new_state(scenario: Scenario, missions: int, cells: Cells | None) -> Mission
     e, a, r = missions, scenario.robots, max(kind.sensor.rays for kind in scenario.kinds)
     v, q, b = scenario.grid.voxels, scenario.mail_places, min(scenario.channel.burst, r)
     s = scenario.phase_batches
-    truth, scored = np.zeros((e, v), np.float32), v if scenario.scored else 0
+    truth, scored = np.zeros((e, v), np.float32), v if scenario.track_truth else 0
     radii = barrier_radii_m(scenario)
     return MissionState(
         truth=truth,

@@ -202,7 +202,7 @@ def scan_and_share(rules, state, team_scan, mission, index):
             scan.utility[ray] = -1.0
         elif scan.utility[ray] < robot.i_min_bits:
             robot.redundant += 1
-    if numbers.scored:
+    if numbers.track_truth:
         score_scan(state, scan, mission, numbers.prior_precision)
     if state.robots.shape[1] > 1 and numbers.burst > 0:
         count = select_measurements(scan.utility, numbers.burst, robot.i_min_bits, scan.order)

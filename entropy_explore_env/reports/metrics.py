@@ -46,7 +46,7 @@ def mission_figures(missions: Missions, mission: int, floor: bool | None = None)
     end, world = missions.over(mission), missions.worlds[mission]
     scans, sent = int(robots["scans"].sum()), int(robots["bits_sent"].sum())
     measurements, gained = int(robots["measurements"].sum()), robots["gained_bits"]
-    wanted = missions.scenario.scored if floor is None else floor
+    wanted = missions.scenario.track_truth if floor is None else floor
     least = information_floor(missions.scenario, world) if wanted and world is not None else None
     return {
         "scenario": missions.scenario.name,
@@ -73,7 +73,7 @@ def mission_figures(missions: Missions, mission: int, floor: bool | None = None)
         "balance": float(gained.std() / gained.mean()) if gained.any() else None,
         "distance_m": float(robots["distance_m"].sum()),
         "blocked_moves": int(robots["blocked_moves"].sum()),
-        **({"joint": joint_figures(missions, mission)} if missions.scenario.scored else {}),
+        **({"joint": joint_figures(missions, mission)} if missions.scenario.track_truth else {}),
         "per_robot": [{name: robot[name].item() for name in COUNTED} for robot in robots],
     }
 

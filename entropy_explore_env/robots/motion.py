@@ -24,7 +24,7 @@ class MoveEnd(enum.Enum):
     CEILING = "The ceiling was in the way: the robot stands in the last voxel below it on its way."
     WALL = "The workspace ends there: the robot stands in its last voxel on the way."
     TEAMMATE = "A teammate's body, or the way that it still has to drive, was in the way."
-    NO_WAY = "No way to the viewpoint was known: the robot stands as near to it as it knew to get."
+    NO_PATH = "No way to the viewpoint was known: the robot stands as near to it as it knew to get."
     CORNERS = "The way had more corners than a drive may have: the robot stands at the last of them."
     SEEN = "A scan under way showed that the rest of the way is blocked: the robot stands where it was."
 

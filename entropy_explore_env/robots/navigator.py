@@ -28,7 +28,7 @@ from entropy_explore_env.robots.motion import MoveEnd
 from entropy_explore_env.scenario import Scenario
 from entropy_explore_env.settings import Robot
 
-_ARRIVED, _NO_WAY, _CORNERS = MoveEnd.ARRIVED.code, MoveEnd.NO_WAY.code, MoveEnd.CORNERS.code
+_ARRIVED, _NO_PATH, _CORNERS = MoveEnd.ARRIVED.code, MoveEnd.NO_PATH.code, MoveEnd.CORNERS.code
 _SLACK = 1e-9
 _PASSABLE, _REACHED = np.int64(0), np.int64(1)
 """Which voxels `_nearest` may choose. NumPy integers, so that it compiles for one type."""
@@ -173,7 +173,7 @@ def find_way(navigator, mean, precision, closed, start, goal, waypoints):
 
     Returns:
         (count, code): how many there are, at least one, and how the drive ends if nothing stops it:
-        the code of ARRIVED, NO_WAY or CORNERS (the way needs more than W).
+        the code of ARRIVED, NO_PATH or CORNERS (the way needs more than W).
     """
     search, lattice = navigator.search, navigator.lattice
     costs = Costs(mean, precision, navigator.known_precision, navigator.unknown_cost, mean[:0], 1.0, closed)
@@ -201,7 +201,7 @@ def find_way(navigator, mean, precision, closed, start, goal, waypoints):
     code = _ARRIVED
     found = _search_way(navigator, costs, source, wanted)
     if found != wanted or not inside:
-        code = _NO_WAY
+        code = _NO_PATH
         x, y, z = place_of(lattice, found)
         for axis, index in enumerate((x, y, z)):
             if found == source or (axis == 2 and lattice.layer >= 0):

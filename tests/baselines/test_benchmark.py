@@ -105,7 +105,9 @@ def test_the_page_says_what_made_it_and_every_row(pair):
 
 def test_figures_are_those_of_the_missions(pair):
     folder, _ = pair
-    env = EntropyExploreEnv(scripted(with_settings(BOX, {"scored": True, "time_limit_s": 60.0, "robots": 2})))
+    env = EntropyExploreEnv(
+        scripted(with_settings(BOX, {"track_truth": True, "time_limit_s": 60.0, "robots": 2}))
+    )
     for seed in (0, 5):
         run_mission(env, make_strategy("gradient"), seed)
         figures = mission_figures(env.missions, 0, floor=True)
@@ -378,7 +380,9 @@ def test_scenarios_are_names_and_files(tmp_path):
     solid[4, 5] = True
     save_world(World(Grid(solid.shape, 0.25), solid, "hut"), tmp_path / "hut.npz")
     chosen = chosen_scenarios(f"lab,{tmp_path / 'hut.npz'}", None, None)
-    assert list(chosen) == ["lab", "hut"] and all(one.scored and one.robots == 1 for one in chosen.values())
+    assert list(chosen) == ["lab", "hut"] and all(
+        one.track_truth and one.robots == 1 for one in chosen.values()
+    )
     assert chosen["lab"].ending == LAB.ending and chosen["lab"].grid == LAB.grid
     assert chosen["hut"].grid.shape == (9, 12, 7) and chosen["hut"].robot.reach_m == 0.5  # those of the room
     chosen = chosen_scenarios(str(tmp_path / "hut.npz"), "cave", 77.0)
@@ -401,7 +405,9 @@ def test_the_page_of_a_file_does_not_say_where_it_lies(tmp_path, capsys):
 def test_what_a_record_says_of_the_clock_is_its_own(monkeypatch):
     ticks = iter(range(10**6))
     monkeypatch.setattr("baselines.head_to_head.timed_mission.time.perf_counter", lambda: float(next(ticks)))
-    env = EntropyExploreEnv(scripted(with_settings(BOX, {"scored": True, "robots": 1, "time_limit_s": 9.0})))
+    env = EntropyExploreEnv(
+        scripted(with_settings(BOX, {"track_truth": True, "robots": 1, "time_limit_s": 9.0}))
+    )
     record = timed_record(env, "random", 0)
     assert record["clock"]["decision_ms"] == 1000.0  # a tick a decision
     assert record["clock"]["mission_s"] >= 2 * 3 and "per_robot" not in record

@@ -89,7 +89,7 @@ def without_clock(figures: dict) -> dict:
 def test_json_is_one_object_with_every_key_and_the_mission_s_own_figures(figures):
     printed = figures("--strategy", "random", "--seed", "4")
     assert set(NAMED) <= set(printed)
-    env = EntropyExploreEnv(with_settings(scripted(BOX), {"scored": True}))
+    env = EntropyExploreEnv(with_settings(scripted(BOX), {"track_truth": True}))
     run_mission(env, make_strategy("random"), 4)
     expected = {"strategy": "random", **mission_figures(env.missions, 0, floor=True)}
     assert without_clock(printed) == json.loads(json.dumps(expected))

@@ -62,7 +62,11 @@ def test_scenarios_conform(scenario: str, robots: int, kind: str) -> None:
         {"decision_period_s": None, "time_limit_s": 25.0, "observation": {"flat": True}},
         {"robots": 9, "robot": {"body_radius_m": 0.24}, "reward": {"kind": "team", "cost_per_s": 0.001}},
         {"robot": {"motion": "planar", "reach_m": float("inf")}, "channel": {"range_m": 1.5}},
-        {"grid": Grid((9, 6, 1), 0.5), "world": "furnished", "ending": {"sigma_end": 3.0, "whose": "all"}},
+        {
+            "grid": Grid((9, 6, 1), 0.5),
+            "world": "furnished",
+            "ending": {"sigma_end": 3.0, "termination": "all"},
+        },
     ],
 )
 def test_scenarios_of_one_s_own_conform(monkeypatch: pytest.MonkeyPatch, settings: dict[str, Any]) -> None:

@@ -24,7 +24,7 @@ from entropy_explore_env import env, environment_id, parallel_env
 from tests.reference.scenes import SMALL
 
 PARTS: dict[str, dict[str, Any]] = {
-    "nothing": {"panorama": False, "own": False, "team": False},
+    "nothing": {"panorama": False, "self_state": False, "team": False},
     "self": {"panorama": False, "team": False},
     "default": {},
     "everything": {"patch": True, "overview": True, "action_mask": True},

@@ -159,7 +159,7 @@ def test_infos_agree_with_views_and_are_plain_python() -> None:
 
 
 def test_at_the_end_of_a_scored_mission_infos_say_all_figures() -> None:
-    env = parallel_env(BOX, robots=2, max_cycles=30, scored=True)
+    env = parallel_env(BOX, robots=2, max_cycles=30, track_truth=True)
     rng = np.random.default_rng(0)
     _, infos = env.reset(seed=0)
     while env.agents:

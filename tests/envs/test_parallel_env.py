@@ -113,7 +113,7 @@ def test_the_mission_ends_for_all_robots_together_when_a_map_is_known() -> None:
 def test_all_maps_have_to_pass_the_threshold_where_the_scenario_says_so() -> None:
     settings = {"robots": 3, "channel": {"burst": 0}}
     one = played(parallel_env(BOX, ending={"sigma_end": 10.0}, **settings))
-    all_maps = played(parallel_env(BOX, ending={"sigma_end": 10.0, "whose": "all"}, **settings))
+    all_maps = played(parallel_env(BOX, ending={"sigma_end": 10.0, "termination": "all"}, **settings))
     threshold = BOX_VOXELS * math.log2(math.sqrt(2 * math.pi * math.e) * 10.0)
     passed = [
         [info["entropy_bits"] <= threshold for info in results[-1][4].values()] for results in (one, all_maps)

@@ -143,7 +143,7 @@ def test_the_last_observation_of_a_busy_robot_is_whole() -> None:
 @pytest.mark.parametrize("channel", [{}, {"delay_s": 1.5}, {"phase_s": 3.0}, {"loss_probability": 0.4}])
 @pytest.mark.parametrize("world", ["empty", "furnished"])
 def test_rows_go_on_bitwise_from_arrays(channel: dict[str, float], world: str) -> None:
-    settings = {"channel": channel, "world": world, "time_limit_s": 40.0, "scored": True}
+    settings = {"channel": channel, "world": world, "time_limit_s": 40.0, "track_truth": True}
     settings["observation"] = Observation(flat=True, overview=True, overview_shape=(3, 4, 2))
     first, rng = made(**settings), np.random.default_rng(5)
     first.reset()

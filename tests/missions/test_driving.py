@@ -183,11 +183,11 @@ def test_the_end_of_a_way_counts_though_an_unseen_wall_ends_the_drive_before():
     beyond = (1.75, 5.25, 0.25, 0.5, 0.0)
     assert end_of(toward(missions, beyond)[0]) is MoveEnd.SEEN
     robot = toward(missions, beyond)[0]  # now it knows that there is no way: up to the wall
-    assert end_of(robot) is MoveEnd.NO_WAY
+    assert end_of(robot) is MoveEnd.NO_PATH
     assert robot["goal"][:3] == pytest.approx([1.75, 3.75, 0.25])
     assert robot["blocked_moves"] == 2
     robot = toward(missions, beyond)[0]  # nearer it cannot get
-    assert (end_of(robot), robot["way_m"]) == (MoveEnd.NO_WAY, 0.0)
+    assert (end_of(robot), robot["way_m"]) == (MoveEnd.NO_PATH, 0.0)
     assert robot["goal"] == pytest.approx([1.75, 3.75, 0.25, 0.5, 0.0])
 
 
@@ -217,7 +217,7 @@ def test_a_way_ends_before_what_the_robot_did_not_know_of():
 
 
 @pytest.mark.parametrize(
-    ("goal", "end", "height"), [(1.75, MoveEnd.NO_WAY, 1.25), (0.25, MoveEnd.GROUND, 0.75)]
+    ("goal", "end", "height"), [(1.75, MoveEnd.NO_PATH, 1.25), (0.25, MoveEnd.GROUND, 0.75)]
 )
 def test_unknown_ground_ends_a_way_by_name_and_a_ceiling_is_known(monkeypatch, goal, end, height):
     """Ground that nobody knows of up to z = 0.5, and a ceiling at z = 1.5; the plan leads around a pillar."""

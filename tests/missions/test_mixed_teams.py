@@ -46,7 +46,9 @@ ENDLESS = {"sigma_end": 1e-3, "time_limit_s": math.inf}
 def box_of(kinds, **changes):
     """The tiny box with a team of these kinds."""
     first, *others = kinds
-    return free_box(robot=first.robot, sensor=first.sensor, others=tuple(others), ending=ENDLESS, **changes)
+    return free_box(
+        robot=first.robot, sensor=first.sensor, extra_kinds=tuple(others), ending=ENDLESS, **changes
+    )
 
 
 KINDS = (GROUND, SCOUT)
@@ -95,7 +97,7 @@ def test_each_robot_does_what_it_would_in_a_team_of_its_kind(kind, world):
 
 def test_a_second_kind_like_the_first_changes_nothing_but_the_word_for_it():
     alike = free_box(robots=4, robot={"body_radius_m": 0.2, "reach_m": 2.0}, world="furnished")
-    named = with_settings(alike, {"others": (RobotKind(alike.robot, alike.sensor),)})
+    named = with_settings(alike, {"extra_kinds": (RobotKind(alike.robot, alike.sensor),)})
     one, other = started(alike, seed=3), started(named, seed=3)
     rng = np.random.default_rng(5)
     for _ in range(50):
@@ -264,7 +266,9 @@ def test_the_threshold_asks_for_what_any_robot_can_see():
 
 
 def test_entropies_are_those_of_the_maps():
-    missions = started(box_of(KINDS, robots=4, channel={"delay_s": 0.7, "burst": 9}, scored=True), seed=8)
+    missions = started(
+        box_of(KINDS, robots=4, channel={"delay_s": 0.7, "burst": 9}, track_truth=True), seed=8
+    )
     wander(missions, 80, 6)
     for robot in range(4):
         entropy = float(map_entropy_bits(missions.precision[0, robot]))

@@ -19,7 +19,7 @@ from entropy_explore_env.settings import Grid
 from entropy_explore_env.worlds.world import World
 from tests.reference.scenes import free_box, random_actions, started, wander
 
-NO_PARTS = {"panorama": False, "own": False, "team": False, "patch": True, "patch_shape": (1, 1, 1)}
+NO_PARTS = {"panorama": False, "self_state": False, "team": False, "patch": True, "patch_shape": (1, 1, 1)}
 ENDLESS = {"sigma_end": 1e-3}
 PLANNED = {"navigator": "planned"}
 WANDERERS = free_box(
@@ -83,7 +83,7 @@ def test_bodies_never_overlap_on_planned_ways(crowd):
     assert closest[0] < 2.2 * radius  # they did meet
     assert corners > 0
     # Far goals in a crowd are seldom reached.
-    assert ends["TEAMMATE"] and ends["NO_WAY"] and ends["ARRIVED"] + ends["SEEN"]
+    assert ends["TEAMMATE"] and ends["NO_PATH"] and ends["ARRIVED"] + ends["SEEN"]
 
 
 @pytest.mark.parametrize("radius_m", [0.0, 0.06])
@@ -103,7 +103,7 @@ def test_who_knows_the_world_is_stopped_by_nothing_on_a_planned_way(shape, motio
             missions.mean[0], missions.precision[0] = solid, 1e9
             missions.step(*random_actions(missions, rng))
             ends[list(MoveEnd)[missions.state.robots[0, 0]["move_end"]].name] += 1
-    assert set(ends) == {"ARRIVED", "NO_WAY"} and ends["ARRIVED"] > 40
+    assert set(ends) == {"ARRIVED", "NO_PATH"} and ends["ARRIVED"] > 40
 
 
 def test_threads_batches_and_pickling_change_nothing():
@@ -201,4 +201,4 @@ def test_whoever_plans_knows_the_exposure_surface_and_never_meets_it(world):
         missions.step(*random_actions(missions, rng))
         ends.update(missions.state.robots["move_end"].ravel().tolist())
     assert ends[MoveEnd.CEILING.code] == 0
-    assert ends[MoveEnd.NO_WAY.code] > 0 and ends[MoveEnd.ARRIVED.code] > 0
+    assert ends[MoveEnd.NO_PATH.code] > 0 and ends[MoveEnd.ARRIVED.code] > 0

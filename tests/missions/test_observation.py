@@ -269,7 +269,7 @@ def test_panorama_is_what_a_scan_there_would_bring_if_the_belief_were_the_truth(
 
 
 def test_parts_left_out_leave_no_numbers():
-    nothing = {"panorama": False, "own": False, "team": False}
+    nothing = {"panorama": False, "self_state": False, "team": False}
     missions = started(free_box(observation=nothing))
     assert missions.observations.shape == (1, 2, 0)
     only = started(free_box(observation={**nothing, "team": True}))

@@ -16,7 +16,7 @@ NOISY = {"sensor": {"range_noise_m": 0.2, "max_range_m": 2.0}, "channel": {"loss
 
 @pytest.mark.parametrize("settings", [{}, NOISY, {"world": "furnished"}], ids=["box", "noisy", "furnished"])
 def test_the_joint_map_is_scored_as_if_it_were_looked_at_whole(settings):
-    missions = started(free_box(scored=True, **settings), seed=4)
+    missions = started(free_box(track_truth=True, **settings), seed=4)
     clock, state = missions.state.missions[0], missions.state
     assert (clock["explored"], clock["error"], clock["wrong"]) == (0, 0.0, 0)
     for step in range(5):
@@ -36,7 +36,7 @@ def test_the_joint_map_is_scored_as_if_it_were_looked_at_whole(settings):
 
 def test_the_joint_map_knows_what_all_robots_measured_and_no_more():
     """Without a channel it is the product of all robots' maps, one prior counted once."""
-    missions = started(free_box(scored=True, channel={"burst": 0}), seed=2)
+    missions = started(free_box(track_truth=True, channel={"burst": 0}), seed=2)
     wander(missions, 30, 0)
     state, prior = missions.state, missions.rules.numbers[0]["prior_precision"]
     together = state.precision[0].astype(np.float64).sum(axis=0) - (missions.scenario.robots - 1) * prior
@@ -49,7 +49,7 @@ def clock_bits(missions: Missions) -> float:
 
 
 def test_nobody_acts_on_the_score():
-    plain, scored = (started(free_box(scored=flag), seed=3) for flag in (False, True))
+    plain, scored = (started(free_box(track_truth=flag), seed=3) for flag in (False, True))
     for missions in (plain, scored):
         wander(missions, 40, 1)
     assert plain.state.joint_mean.shape == plain.state.visible.shape == (1, 0)

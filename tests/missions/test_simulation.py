@@ -22,7 +22,7 @@ from tests.reference import rocha04
 from tests.reference.scenes import as_arrays, free_box, random_actions, started, wander
 
 ENDLESS = {"sigma_end": 1e-4}
-NO_PARTS = {"panorama": False, "own": False, "team": False}
+NO_PARTS = {"panorama": False, "self_state": False, "team": False}
 
 
 # --- A mission of the reference
@@ -482,7 +482,7 @@ def test_a_mission_ends_with_the_first_scan_that_brings_one_map_below_the_thresh
 
 
 def test_all_maps_below_the_threshold():
-    settings = {"ending": {"sigma_end": 20.0, "whose": "all"}, "channel": {"burst": 0}}
+    settings = {"ending": {"sigma_end": 20.0, "termination": "all"}, "channel": {"burst": 0}}
     missions = started(free_box(**settings), seed=5)
     threshold, robots = missions.state.missions[0]["entropy_end_bits"], missions.state.robots[0]
     one_alone = False

@@ -15,7 +15,7 @@ from entropy_explore_env.settings import Action, Observation
 EVERYTHING = Observation(
     flat=True, patch=True, overview=True, overview_shape=(3, 4, 2), action_mask=True, panorama_utility="log2"
 )
-PLAIN = Observation(panorama=False, own=False, team=False)
+PLAIN = Observation(panorama=False, self_state=False, team=False)
 
 
 @pytest.mark.parametrize("scenario", ["box-7x11x5", "office-mixed", "hybrid"])

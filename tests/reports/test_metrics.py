@@ -115,7 +115,7 @@ def test_what_cannot_be_said_is_none():
 
 
 def test_joint_figures_by_hand():
-    missions = started(free_box(scored=True), seed=1)
+    missions = started(free_box(track_truth=True), seed=1)
     clock = missions.state.missions[0]
     assert joint_figures(missions, 0)["error"] is joint_figures(missions, 0)["wrong"] is None
     clock["joint_bits"], clock["explored"], clock["explored_visible"] = -7.5, 40, 30

@@ -53,7 +53,7 @@ def saved(record: MissionRecord, folder: Path) -> Path:
 
 @pytest.mark.parametrize(
     "changes",
-    [{}, {"robots": 1}, {"action": {"kind": "discrete"}}, {"scored": True, "channel": {"delay_s": 2.0}}],
+    [{}, {"robots": 1}, {"action": {"kind": "discrete"}}, {"track_truth": True, "channel": {"delay_s": 2.0}}],
 )
 def test_a_record_comes_back_exactly_and_its_commands_lead_to_the_same_state(changes, tmp_path):
     record, missions = recorded(**changes)
@@ -136,7 +136,7 @@ def test_before_a_reset_there_is_nothing_to_record():
 
 
 def test_a_digest_sees_every_array_and_field():
-    missions = started(free_box(robots=2, scored=True, channel={"delay_s": 1.0}), seed=3, missions=2)
+    missions = started(free_box(robots=2, track_truth=True, channel={"delay_s": 1.0}), seed=3, missions=2)
     before, other = state_digest(missions, 0), state_digest(missions, 1)
     assert before != other
     seen = 0

@@ -75,7 +75,7 @@ def test_a_recorder_follows_the_first_mission_only():
 
 WANDERERS = {
     "straight": {},
-    "mixed": {"others": (RobotKind(Robot(reach_m=2.0, max_speed_m_s=1.5, acceleration_m_s2=2.0)),)},
+    "mixed": {"extra_kinds": (RobotKind(Robot(reach_m=2.0, max_speed_m_s=1.5, acceleration_m_s2=2.0)),)},
     "planned": {
         "world": "furnished",
         "robot": {"navigator": "planned", "reach_m": math.inf, "body_radius_m": 0.2},

@@ -94,13 +94,13 @@ def test_unknown_space_is_passed_where_the_way_around_costs_more(cost, corners):
 )
 def test_where_no_way_is_known_it_leads_to_the_nearest_place(goal, nearest):
     points, end = plan(planner(), wall(open_from=11), (1.5, 1.5, 0.5), goal)
-    assert end is MoveEnd.NO_WAY
+    assert end is MoveEnd.NO_PATH
     assert points[-1].tolist() == list(nearest)
 
 
 def test_who_cannot_get_nearer_stays_where_it_is():
     points, end = plan(planner(), wall(open_from=11), (2.7, 4.6, 0.5), (5.5, 4.5, 0.5))
-    assert (points.tolist(), end) == ([[2.7, 4.6, 0.5]], MoveEnd.NO_WAY)
+    assert (points.tolist(), end) == ([[2.7, 4.6, 0.5]], MoveEnd.NO_PATH)
 
 
 def test_planar_robots_keep_their_height_and_may_pass_under_what_is_above_them():
@@ -147,12 +147,12 @@ def test_who_leaves_a_tight_start_does_not_leave_it_upwards_through_the_ceiling(
     for above, highest in ((None, 4.5), (closed, 3.5)):
         points, end = plan(scenario, solid, start, (3.5, 3.5, 4.5), closed=above)
         assert points[:, 2].max() == highest
-        assert end is (MoveEnd.ARRIVED if above is None else MoveEnd.NO_WAY)
+        assert end is (MoveEnd.ARRIVED if above is None else MoveEnd.NO_PATH)
 
 
 def test_a_body_keeps_away_from_walls():
     """A gap of two voxels is too narrow for a body of 0.4 m, which touches the wall from either row."""
-    for radius, end in ((0.2, MoveEnd.ARRIVED), (0.4, MoveEnd.NO_WAY)):
+    for radius, end in ((0.2, MoveEnd.ARRIVED), (0.4, MoveEnd.NO_PATH)):
         _, found = plan(planner(body_radius_m=radius), wall(), (1.5, 1.5, 0.5), (5.5, 1.5, 0.5))
         assert found is end
 

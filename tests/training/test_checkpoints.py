@@ -185,7 +185,7 @@ def test_a_policy_is_a_strategy_like_any_other(saved, tmp_path):
     [
         ({"robots": 3}, "robots = 3"),
         ({"robots": 2, "action": {"kind": "discrete"}}, "Scenario.action"),
-        ({"robots": 2, "others": find_scenario("office-mixed").others}, "observation self"),
+        ({"robots": 2, "extra_kinds": find_scenario("office-mixed").extra_kinds}, "observation self"),
     ],
 )
 def test_a_policy_for_something_else_is_named(saved, settings, named):

@@ -53,10 +53,12 @@ def mission_cells(seeds: int, corridor: Path | None) -> list[Cell]:
         seeds: Missions of each flying team; four times as many of each channel.
         corridor: An OctoMap of a real corridor; None = without it.
     """
-    cave = with_settings(find_scenario("cave"), {"robots": 4, "time_limit_s": FLYING_LIMIT_S, "scored": True})
+    cave = with_settings(
+        find_scenario("cave"), {"robots": 4, "time_limit_s": FLYING_LIMIT_S, "track_truth": True}
+    )
     cells = [Cell(flying_id("cave", strategy), cave, strategy, seeds) for strategy in FLYING]
     if corridor is not None:
-        changes = {"world": str(corridor), "robots": 4, "time_limit_s": FLYING_LIMIT_S, "scored": True}
+        changes = {"world": str(corridor), "robots": 4, "time_limit_s": FLYING_LIMIT_S, "track_truth": True}
         robot = {"navigator": "planned", "reach_m": 3.0, "max_speed_m_s": 0.5, "acceleration_m_s2": 0.5}
         sensor = find_scenario("office-3d").sensor
         real = with_settings(find_scenario("room"), {**changes, "robot": robot, "sensor": sensor})

@@ -59,7 +59,7 @@ _TERRAIN: dict[str, Any] = {
 _ALL: dict[str, Any] = {
     "channel": {"burst": 10_000, "i_min_bits": 0.0},
     "ending": {"sigma_end": 1e-3, "time_limit_s": TIME_LIMIT_S},
-    "scored": True,
+    "track_truth": True,
 }
 
 

@@ -39,7 +39,7 @@ _NOT_QUITE = 0.999
 """Of the reach, so that rounding does not pull a place towards the robot."""
 _SLACK = 1.5
 """How many times as long as reckoned others may be under way: t does not count stops at corners."""
-_EARLY = (MoveEnd.OBSTACLE, MoveEnd.GROUND, MoveEnd.CEILING, MoveEnd.WALL, MoveEnd.TEAMMATE, MoveEnd.NO_WAY)
+_EARLY = (MoveEnd.OBSTACLE, MoveEnd.GROUND, MoveEnd.CEILING, MoveEnd.WALL, MoveEnd.TEAMMATE, MoveEnd.NO_PATH)
 
 
 @dataclass(frozen=True)

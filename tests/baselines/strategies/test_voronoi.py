@@ -82,7 +82,7 @@ def test_missions_in_a_box_end(name):
 
 @pytest.mark.parametrize("name", ["voronoi", "voronoi-nearest"])
 def test_an_office_is_explored(name):
-    figures = figures_of(name, find_scenario("office"), seed=1, scored=True)
+    figures = figures_of(name, find_scenario("office"), seed=1, track_truth=True)
     assert figures["finished"] and figures["joint"]["explored"] > 0.95
 
 

@@ -44,7 +44,7 @@ def small_plan(**settings):
         "sensor": {"max_range_m": 1.5, "angular_step_rad": math.pi / 90, "scan_time_s": 2.0},
         "channel": PERFECT,
         "ending": {"sigma_end": 1e-3, "time_limit_s": 900.0},
-        "scored": True,
+        "track_truth": True,
     }
     return with_settings(base, {**changes, **settings})
 
@@ -336,7 +336,9 @@ def test_the_same_seed_gives_the_same_mission(name):
 
 def test_bodies_and_a_short_reach_explore_an_office():
     """The named scenario as it is: bodies of 0.3 m, 5 m of reach, a narrow channel."""
-    env = EntropyExploreEnv(with_settings(scripted(find_scenario("office")), {"robots": 2, "scored": True}))
+    env = EntropyExploreEnv(
+        with_settings(scripted(find_scenario("office")), {"robots": 2, "track_truth": True})
+    )
     explorer = FrontierStrategy(Exploring(finest_sigma=ONCE))
     followed(env, explorer, 1)
     assert all(explorer.idle) or env.missions.over(0) is MissionEnd.MAPPED
