@@ -15,7 +15,7 @@ help:
 	@echo "make demo       run one mission of three robots and show it in results/demo"
 	@echo "make test       lint, then the tests"
 	@echo "make test-rllib the tests of the trainer with RLlib"
-	@echo "make lint       ruff and pyright"
+	@echo "make lint       ruff, pyright and the contracts of imports"
 	@echo "make bench      speed against peers"
 	@echo "make reproduce  the experiments of Rocha04, RochaMI, Bhattacharya and Sawhney, into docs/results: many hours"
 	@echo "make clean      remove the environments, builds and caches; results stay"
@@ -34,6 +34,7 @@ lint: $(STAMP)dev
 	$(RUN) ruff check .
 	$(RUN) ruff format --check .
 	$(RUN) pyright
+	$(VENV)/bin/lint-imports --no-cache
 
 bench: $(STAMP)training $(STAMP)bench
 	$(RUN) benchmarks.speed

@@ -64,12 +64,5 @@ def test_tables_are_those_of_the_reports(heading, report, rows):
     assert [row for row in shown if row not in written] == []
 
 
-def test_the_list_of_rooms_names_every_file():
-    rooms = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
-    listed = set(re.findall(r"\b(\w+)\.py\b", rooms.split("    baselines/")[0])) - {"test_imports"}
-    library = {path.stem for path in (ROOT / "entropy_explore_env").rglob("*.py")} - {"__init__", "__main__"}
-    assert listed == library
-
-
 def test_no_placeholder_is_left():
     assert "RESULTS_" not in README

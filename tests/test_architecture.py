@@ -1,0 +1,73 @@
+"""docs/architecture.md names every module, every folder of tests, and nothing that is not there."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+ROOT = Path(__file__).parents[1]
+PAGE = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
+PACKAGES = ("entropy_explore_env", "baselines", "training", "benchmarks")
+FOLDERS = (*PACKAGES, "tests")
+
+
+def named_paths(page: str) -> list[str]:
+    """The paths in the page's trees; a tree begins with a folder of ours, other indented blocks do not."""
+    paths, folders = [], []
+    for line in page.splitlines():
+        entry = re.match(r"    ( *)(\w+)(/|\.py)( |$)", line)
+        if entry is None:
+            folders = []
+            continue
+        depth, name, ending = len(entry[1]) // 2, entry[2], entry[3]
+        if depth == 0 and name not in FOLDERS:
+            continue
+        folders = [*folders[:depth], name]
+        paths.append("/".join(folders) + ending)
+    return paths
+
+
+def test_the_page_names_every_module_once_and_nothing_else():
+    there = {
+        path.relative_to(ROOT).as_posix()
+        for package in PACKAGES
+        for path in (ROOT / package).rglob("*.py")
+        if path.name != "__init__.py"
+    }
+    there |= {
+        path.parent.relative_to(ROOT).as_posix() + "/"
+        for package in PACKAGES
+        for path in (ROOT / package).rglob("__init__.py")
+    }
+    there |= {path.parent.relative_to(ROOT).as_posix() + "/" for path in (ROOT / "tests").rglob("*.py")}
+    there |= {parent + "/" for path in there for parent in folders_above(path)}
+    named = named_paths(PAGE)
+    assert len(named) == len(set(named)), "named twice"
+    missing, gone = sorted(there - set(named)), sorted(set(named) - there)
+    assert not missing, f"docs/architecture.md lacks a line for {missing}"
+    assert not gone, f"docs/architecture.md names what is not there: {gone}"
+
+
+def folders_above(path: str) -> list[str]:
+    return [parent.as_posix() for parent in Path(path).parents if parent.as_posix() != "."]
+
+
+def test_lines_of_the_page_say_what_a_module_does():
+    entries = re.findall(r"^ {4,}(\w+\.py) *(.*)$", PAGE, flags=re.MULTILINE)
+    assert len(entries) > 100
+    assert [name for name, said in entries if len(said) < 5] == []
+
+
+def test_the_tree_is_read_by_its_indentation():
+    page = """
+    A ──► B
+    other/         not ours
+
+    training/      learning
+      a.py         x
+      b/           y
+        c.py       z
+      d.py         z
+    """
+    below = ["", "a.py", "b/", "b/c.py", "d.py"]
+    assert named_paths(page) == [f"training/{path}" for path in below]
