@@ -40,7 +40,7 @@ def test_teams_start_and_gather_bits(name):
     assert len(infos) == scenario.robots and gained > 0.0
     for agent in infos:
         place = tuple(scenario.grid.voxel_of(env.view(agent).pose[:3]))
-        assert not layout.barriers[place], f"{agent} is where its body does not fit"
+        assert not layout.collision_mask[place], f"{agent} is where its body does not fit"
 
 
 @pytest.mark.parametrize("name", LARGE)

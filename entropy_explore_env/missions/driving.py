@@ -37,7 +37,7 @@ def depart(team, blocked, robots, index, time_s, scan):
 
     Args:
         team: (A,) NUMBERS.
-        blocked: (V,) float32, a Barrier each, for its body.
+        blocked: (V,) float32, a Collision each, for its body.
         robots: (A,) ROBOT.
         index: Which robot.
         time_s: When it departs.

@@ -195,9 +195,9 @@ class Missions:
         for robot in range(min(len(self.scenario.kinds), self.scenario.robots)):
             numbers, kind = self.rules.numbers[robot], self.scenario.kind_of(robot)
             row = mission * numbers["radii"] + numbers["barriers"]
-            self.state.blocked[row] = world.layout(self.scenario, kind).barriers.ravel()
+            self.state.blocked[row] = world.layout(self.scenario, kind).collision_mask.ravel()
             if self._closed.size:
-                self._closed[row] = world.closed(kind.robot.body_radius_m).ravel()
+                self._closed[row] = world.no_fly_mask(kind.robot.body_radius_m).ravel()
 
     def _set_entropies(self, mission: int, visible_voxels: int) -> None:
         """H(0) by eq. 25, and H_th: voxels that can be seen at σ_end, the others at the prior."""

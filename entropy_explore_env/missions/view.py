@@ -16,7 +16,7 @@ from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.robots.motion import MoveEnd
 from entropy_explore_env.scenario import Scenario
 from entropy_explore_env.settings import RobotKind
-from entropy_explore_env.worlds.world import closed_by
+from entropy_explore_env.worlds.world import no_fly_mask
 
 
 @dataclass(frozen=True)
@@ -77,8 +77,8 @@ class RobotView:
         depth_m, half_angle_rad: r̂ and α̂ of its latest scan.
         scan: Its latest scan.
         teammates: Robot number → what it heard of it.
-        ceiling: (X, Y) int32, in each column the first layer that is closed to robots (an exposure surface
-            is known beforehand); None = nothing is closed.
+        ceiling: (X, Y) int32, in each column the lowest layer of the no-fly zone (an exposure surface
+            is known beforehand); None = no such zone.
     """
 
     robot: int
@@ -113,12 +113,12 @@ class RobotView:
         """Whether it stays in its plane and looks level."""
         return self.scenario.layer_of(self.kind.robot) is not None
 
-    def closed(self) -> np.ndarray | None:
-        """(X, Y, Z) bool, where its body would reach above the ceiling; None = there is none."""
+    def no_fly_mask(self) -> np.ndarray | None:
+        """(X, Y, Z) bool, where its body would reach above the ceiling; None = there is no ceiling."""
         if self.ceiling is None:
             return None
         grid = self.scenario.grid
-        return closed_by(self.ceiling, grid.shape[2], self.kind.robot.body_radius_m / grid.voxel_size_m)
+        return no_fly_mask(self.ceiling, grid.shape[2], self.kind.robot.body_radius_m / grid.voxel_size_m)
 
 
 def view_of(missions: Missions, mission: int, robot: int) -> RobotView:

@@ -37,7 +37,7 @@ class MoveEnd(enum.Enum):
 _ARRIVED, _WALL = MoveEnd.ARRIVED.code, MoveEnd.WALL.code
 _OBSTACLE, _GROUND, _CEILING = MoveEnd.OBSTACLE.code, MoveEnd.GROUND.code, MoveEnd.CEILING.code
 _ENDS_AT = (_ARRIVED, _OBSTACLE, _GROUND, _CEILING)
-"""How a drive ends at each Barrier."""
+"""How a drive ends at each Collision."""
 _TOUCH = 1e-6
 """Bodies stop this far apart, in voxel edges, so that rounding cannot make them overlap."""
 _HALVINGS = 60
@@ -136,7 +136,7 @@ def free_way(blocked, size, start, finish, direction, length, crossed, entered):
     """How far a body can drive on a line before something solid.
 
     Args:
-        blocked: (V,) float32, a Barrier each: above ½ the body does not fit.
+        blocked: (V,) float32, a Collision each: above ½ the body does not fit.
         size: (X, Y, Z) voxels.
         start: (x, y, z) in grid units.
         finish: (x, y, z), where the drive is to end.

@@ -1,4 +1,4 @@
-"""The truth: which voxels of a workspace are solid, where a body fits, what can be seen at all."""
+"""The true world: which voxels are solid, where a robot's body fits, which voxels can be observed at all."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import enum
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from typing import cast
+from typing import NamedTuple
 
 import numpy as np
 from scipy import ndimage
@@ -15,19 +15,20 @@ from scipy.spatial import ConvexHull
 from entropy_explore_env.errors import WorldError
 from entropy_explore_env.scenario import Scenario
 from entropy_explore_env.settings import Grid, RobotKind
+from entropy_explore_env.worlds.components import connected_components, largest_component
 
 
-class Barrier(enum.IntEnum):
-    """Why a body cannot be in a voxel."""
+class Collision(enum.IntEnum):
+    """What a body collides with whose centre is in a voxel."""
 
     NONE = 0
-    """It can."""
+    """Nothing: the body fits."""
     SOLID = 1
-    """It would touch something solid, or leave the workspace."""
+    """A solid voxel, or the boundary of the workspace."""
     GROUND = 2
-    """It would touch what is solid in a world with a ceiling: the terrain."""
+    """A solid voxel of a world with a ceiling: the terrain."""
     CEILING = 3
-    """It would reach above the ceiling."""
+    """The ceiling: the body would reach into the no-fly zone."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -35,12 +36,12 @@ class World:
     """A true world. The boundary of the grid is a wall.
 
     Attributes:
-        grid: Its voxels.
+        grid: The voxel grid.
         occupied: (X, Y, Z) bool, read-only; whether a voxel is solid.
-        name: Where it came from.
-        ceiling: (X, Y) int32, read-only, or None: in each column the first layer that is closed to
-            robots, though not to rays (an exposure surface over terrain); Z = none.
-        yaw_rad: How the grid's frame is turned against the frame of the file that it came from.
+        name: Of the recipe or the file that it was made from.
+        ceiling: (X, Y) int32, read-only, or None: in each column the lowest layer of the no-fly zone, which
+            robots must not enter and rays may cross (an exposure surface over terrain); Z = no such layer.
+        yaw_rad: Rotation of the grid's frame against the frame of the file.
     """
 
     grid: Grid
@@ -75,195 +76,194 @@ class World:
         x, y, z = self.grid.shape
         return f"World({self.name!r}, {x} × {y} × {z} voxels of {self.grid.voxel_size_m:g} m)"
 
-    def barriers(self, body_radius_m: float) -> np.ndarray:
-        """Where the centre of a ball-shaped body cannot be, judged at voxel centres.
+    def collision_mask(self, body_radius_m: float) -> np.ndarray:
+        """Where the centre of a spherical body cannot be, judged at voxel centres.
 
         Args:
-            body_radius_m: Radius of the body in metres.
+            body_radius_m: Radius of the body in metres; up to half a voxel, the body fits wherever its
+                voxel is free.
 
         Returns:
-            (X, Y, Z) uint8, a Barrier each. With a radius of at most half a voxel they are the solid
-            voxels, and those from the ceiling on. A body that meets several things meets the ground
-            first, then the ceiling, then the boundary.
+            (X, Y, Z) uint8, a Collision each. Where a body collides with several things, the first of
+            ground, ceiling and boundary counts.
         """
-        solid = self._touching(self.occupied, body_radius_m, boundary=True)
+        radius = body_radius_m / self.grid.voxel_size_m
+        solid = _inflated(self.occupied, radius, boundary=True)
         if self.ceiling is None:
             return solid.view(np.uint8)
-        barriers = solid.astype(np.uint8)
-        barriers[self.closed(body_radius_m)] = Barrier.CEILING
-        barriers[self._touching(self.occupied, body_radius_m, boundary=False)] = Barrier.GROUND
-        return barriers
+        mask = solid.astype(np.uint8)
+        mask[self.no_fly_mask(body_radius_m)] = Collision.CEILING
+        mask[_inflated(self.occupied, radius, boundary=False)] = Collision.GROUND
+        return mask
 
-    def closed(self, body_radius_m: float) -> np.ndarray:
-        """(X, Y, Z) bool, where a ball-shaped body would reach above the ceiling, whatever else it meets."""
+    def no_fly_mask(self, body_radius_m: float) -> np.ndarray:
+        """(X, Y, Z) bool, where a spherical body would reach above the ceiling, solid voxels or not."""
         if self.ceiling is None:
             return np.zeros(self.grid.shape, bool)
-        return closed_by(self.ceiling, self.grid.shape[2], body_radius_m / self.grid.voxel_size_m)
-
-    def _touching(self, closed: np.ndarray, body_radius_m: float, boundary: bool) -> np.ndarray:
-        """(X, Y, Z) bool: a body in the voxel's centre meets a closed voxel, or leaves the workspace."""
-        return _swollen(closed, body_radius_m / self.grid.voxel_size_m, boundary)
+        return no_fly_mask(self.ceiling, self.grid.shape[2], body_radius_m / self.grid.voxel_size_m)
 
     @cached_property
-    def _layouts(self) -> dict[tuple[float, int | None, int, tuple[float, float, float] | None], Layout]:
+    def _layouts(self) -> dict[tuple[float, int | None, int, _LevelView | None], Layout]:
         return {}
 
     def layout(self, scenario: Scenario, kind: RobotKind | None = None) -> Layout:
-        """Where robots of a scenario can start and go, and what they can see; worked out once.
+        """Where robots of a scenario can start and drive, and what they can observe; computed once.
 
         Args:
             scenario: The task.
-            kind: Of the robots; None = the first.
+            kind: Of the robots; None = the scenario's first.
 
         Raises:
             WorldError: No voxel has room for a robot.
         """
         robot, sensor = (scenario.robot, scenario.sensor) if kind is None else (kind.robot, kind.sensor)
-        height, level = scenario.layer_of(robot), None
-        if height is not None and not scenario.grid.flat:
-            steepest = 0.5 * (sensor.rows - 1) * sensor.angular_step_rad
-            level = robot.sensor_height_m, steepest, sensor.max_range_m
-        key = (robot.body_radius_m, height, sensor.voxels_behind, level)
+        layer, level_view = scenario.layer_of(robot), None
+        if layer is not None and not scenario.grid.flat:
+            steepest_rad = 0.5 * (sensor.rows - 1) * sensor.angular_step_rad
+            level_view = _LevelView(robot.sensor_height_m, steepest_rad, sensor.max_range_m)
+        key = (robot.body_radius_m, layer, sensor.voxels_behind, level_view)
         if key not in self._layouts:
-            self._layouts[key] = self._laid_out(*key)
+            self._layouts[key] = self._compute_layout(*key)
         return self._layouts[key]
 
     def visible(self, scenario: Scenario) -> np.ndarray:
-        """(X, Y, Z) bool, which voxels some robot of the team can see at all."""
-        first, *others = (self.layout(scenario, kind).visible for kind in scenario.kinds)
-        return np.logical_or.reduce([first, *others]) if others else first
+        """(X, Y, Z) bool, which voxels some robot of the team can observe at all."""
+        first, *more = (self.layout(scenario, kind).visible for kind in scenario.kinds)
+        return np.logical_or.reduce([first, *more]) if more else first
 
     def visible_voxels(self, scenario: Scenario) -> int:
-        """How many voxels some robot of the team can see at all."""
+        """How many voxels some robot of the team can observe at all."""
         if len(scenario.kinds) == 1:
             return self.layout(scenario).visible_voxels
         return int(self.visible(scenario).sum())
 
-    def _laid_out(
-        self,
-        body_radius_m: float,
-        height: int | None,
-        voxels_behind: int,
-        level: tuple[float, float, float] | None,
+    def _compute_layout(
+        self, body_radius_m: float, layer: int | None, voxels_behind: int, level_view: _LevelView | None
     ) -> Layout:
-        barriers = self.barriers(body_radius_m)
-        room = barriers == Barrier.NONE
-        if height is not None:
-            room[:, :, :height] = room[:, :, height + 1 :] = False
-        starts = _largest_component(room)
+        collision_mask = self.collision_mask(body_radius_m)
+        fits = collision_mask == Collision.NONE
+        if layer is not None:
+            fits[:, :, :layer] = fits[:, :, layer + 1 :] = False
+        starts = largest_component(fits)
         if not starts.any():
             allowed = f"a world with room for a body of radius {body_radius_m} m"
-            if height is not None and not self.grid.flat:
-                allowed += f" in layer {height}, where planar robots stay"
+            if layer is not None and not self.grid.flat:
+                allowed += f" in layer {layer}, where planar robots stay"
             raise WorldError("world", self.name, allowed)
-        labels, _ = connected_parts(~self.occupied)
-        seen = np.isin(labels, np.unique(labels[starts]))
+        labels, _ = connected_components(~self.occupied)
+        visible = np.isin(labels, np.unique(labels[starts]))
         if voxels_behind:
-            seen |= ndimage.binary_dilation(seen, iterations=voxels_behind) & self.occupied
-        if level is not None:
-            seen &= self._within_view(np.any(starts, axis=2), *level)
-        return Layout(barriers, np.flatnonzero(starts), seen)
+            visible |= ndimage.binary_dilation(visible, iterations=voxels_behind) & self.occupied
+        if level_view is not None:
+            visible &= self._within_view(np.any(starts, axis=2), level_view)
+        return Layout(collision_mask, np.flatnonzero(starts), visible)
 
-    def _within_view(
-        self, floor: np.ndarray, sensor_height_m: float, steepest_rad: float, max_range_m: float
-    ) -> np.ndarray:
-        """Which voxels a sensor that looks level can have in its field of view, obstacles left aside.
+    def _within_view(self, positions: np.ndarray, view: _LevelView) -> np.ndarray:
+        """Which voxels a level sensor can have in its field of view, occlusions disregarded.
 
-        A voxel that is dz above or below the sensor is in view from |dz|/tan φ away, φ the steepest ray: it
-        is seen if some place is so far away, and some no farther than the range. Robots' places hang
-        together, so one of them is both.
+        A voxel that is dz above or below the sensor is in view from |dz|/tan φ away, φ the steepest ray. It
+        is visible if some position is at least so far away, and some position within range. The positions
+        are connected, so then one position is both.
 
         Args:
-            floor: (X, Y) bool, where robots can be.
-            sensor_height_m: Above the workspace's floor.
-            steepest_rad: Largest angle of a ray above the horizon.
-            max_range_m: Of the sensor.
+            positions: (X, Y) bool, where robots can be.
+            view: The sensor's.
 
         Returns:
             (X, Y, Z) bool.
         """
         edge_m = self.grid.voxel_size_m
-        places = np.argwhere(floor)
-        corners = places[ConvexHull(places).vertices] if _spans_plane(places) else places
+        indices = np.argwhere(positions)
+        corners = indices[ConvexHull(indices).vertices] if _spans_plane(indices) else indices
         x, y = np.indices(self.grid.shape[:2])
         farthest = np.zeros(self.grid.shape[:2])
         for i, j in corners:
             np.maximum(farthest, np.hypot(x - i, y - j), out=farthest)
-        nearest = np.asarray(ndimage.distance_transform_edt(~floor))
-        rises = np.abs((np.arange(self.grid.shape[2]) + 0.5) * edge_m - sensor_height_m) - 0.5 * edge_m
-        needed = np.maximum(rises, 0.0) / max(math.tan(steepest_rad), 1e-9) / edge_m
-        reach = max_range_m / edge_m
-        return (farthest[:, :, None] >= needed) & (np.maximum(nearest[:, :, None], needed) <= reach)
+        nearest = np.asarray(ndimage.distance_transform_edt(~positions))
+        centres_m = (np.arange(self.grid.shape[2]) + 0.5) * edge_m
+        rises_m = np.abs(centres_m - view.sensor_height_m) - 0.5 * edge_m
+        needed = np.maximum(rises_m, 0.0) / max(math.tan(view.steepest_rad), 1e-9) / edge_m
+        range_ = view.max_range_m / edge_m
+        return (farthest[:, :, None] >= needed) & (np.maximum(nearest[:, :, None], needed) <= range_)
 
 
-def _spans_plane(places: np.ndarray) -> bool:
+class _LevelView(NamedTuple):
+    """The field of view of a sensor that always looks level.
+
+    Attributes:
+        sensor_height_m: Above the workspace's floor.
+        steepest_rad: Largest angle of a ray above the horizon.
+        max_range_m: Of the sensor.
+    """
+
+    sensor_height_m: float
+    steepest_rad: float
+    max_range_m: float
+
+
+def _spans_plane(points: np.ndarray) -> bool:
     """Whether (N, 2) points do not lie on one line."""
-    return len(places) > 2 and int(np.linalg.matrix_rank(places - places[0])) == 2
+    return len(points) > 2 and int(np.linalg.matrix_rank(points - points[0])) == 2
 
 
 @dataclass(frozen=True, eq=False)
 class Layout:
-    """What a kind of robot can do in a world.
+    """Where one kind of robot can be in a world, and what it can observe.
 
     Attributes:
-        barriers: (X, Y, Z) uint8, a Barrier each: whether its body fits into the voxel, or why not.
-        starts: (N,) flat indices of the voxels where it may start: the largest connected part.
-        visible: (X, Y, Z) bool, which voxels can be seen from there at all: the free space that hangs
-            together with it, and the skin of the solid voxels around; for robots that look level only
-            what their sensor's field of view can hold.
+        collision_mask: (X, Y, Z) uint8, a Collision each: whether its body fits, or what it collides with.
+        starts: (N,) flat indices of the voxels where it may start: the largest connected component of
+            those in which it fits.
+        visible: (X, Y, Z) bool, the voxels that can be observed from there at all: the free space that is
+            connected to the starts, and the surface of the solid voxels around it; for robots with a
+            level sensor only what can be in its field of view.
     """
 
-    barriers: np.ndarray
+    collision_mask: np.ndarray
     starts: np.ndarray
     visible: np.ndarray
 
     @cached_property
     def visible_voxels(self) -> int:
-        """How many voxels can be seen at all."""
+        """How many voxels can be observed at all."""
         return int(self.visible.sum())
 
 
-def closed_by(ceiling: np.ndarray, layers: int, body_radius: float) -> np.ndarray:
-    """Where a ball-shaped body in a voxel's centre would reach above a ceiling.
+def no_fly_mask(ceiling: np.ndarray, layers: int, body_radius: float) -> np.ndarray:
+    """Where a spherical body in a voxel's centre would reach above a ceiling.
 
     Args:
-        ceiling: (X, Y) int32, in each column the first closed layer.
+        ceiling: (X, Y) int32, in each column the lowest layer of the no-fly zone.
         layers: Z.
         body_radius: In voxel edges.
 
     Returns:
         (X, Y, Z) bool.
     """
-    return _swollen(np.arange(layers) >= ceiling[:, :, None], body_radius, boundary=False)
+    return _inflated(np.arange(layers) >= ceiling[:, :, None], body_radius, boundary=False)
 
 
-def _swollen(closed: np.ndarray, radius: float, boundary: bool) -> np.ndarray:
-    """(X, Y, Z) bool: a ball in the voxel's centre meets a closed voxel; radius in voxel edges."""
+def _inflated(mask: np.ndarray, radius: float, boundary: bool) -> np.ndarray:
+    """A mask inflated by the radius of a spherical body.
+
+    Args:
+        mask: (X, Y, Z) bool.
+        radius: In voxel edges.
+        boundary: Whether all outside the grid counts as part of the mask.
+
+    Returns:
+        (X, Y, Z) bool: whether a sphere around the voxel's centre overlaps a voxel of the mask.
+    """
     if radius <= 0.5 + 1e-9:
-        return closed
-    if 2.0 * radius > max(closed.shape):
-        return np.full(closed.shape, boundary or closed.any())
+        return mask
+    if 2.0 * radius > max(mask.shape):
+        return np.full(mask.shape, boundary or mask.any())
     reach = math.ceil(radius - 0.5)
-    height = 0 if closed.shape[2] == 1 else reach
-    offsets = np.ogrid[-reach : reach + 1, -reach : reach + 1, -height : height + 1]
+    pads = (reach, reach, 0 if mask.shape[2] == 1 else reach)
+    offsets = np.ogrid[tuple(slice(-pad, pad + 1) for pad in pads)]
     gaps = [np.maximum(np.abs(axis) - 0.5, 0.0) for axis in offsets]
-    ball = gaps[0] ** 2 + gaps[1] ** 2 + gaps[2] ** 2 < radius**2 - 1e-9
-    walled = np.pad(closed, [(reach, reach), (reach, reach), (height, height)], constant_values=boundary)
-    swollen = ndimage.binary_dilation(walled, ball)
-    inside = tuple(slice(pad, pad + n) for pad, n in zip((reach, reach, height), closed.shape, strict=True))
-    return np.asarray(swollen[inside])
-
-
-def connected_parts(room: np.ndarray) -> tuple[np.ndarray, int]:
-    """Face-connected parts of a (X, Y, Z) bool array: their numbers, from 1, by voxel, and how many."""
-    return cast("tuple[np.ndarray, int]", ndimage.label(room))
-
-
-def _largest_component(room: np.ndarray) -> np.ndarray:
-    """The largest face-connected part of a (X, Y, Z) bool array."""
-    labels, parts = connected_parts(room)
-    if parts <= 1:
-        return room
-    sizes = np.bincount(labels.ravel())
-    sizes[0] = 0
-    return labels == int(sizes.argmax())
+    sphere = gaps[0] ** 2 + gaps[1] ** 2 + gaps[2] ** 2 < radius**2 - 1e-9
+    padded = np.pad(mask, [(pad, pad) for pad in pads], constant_values=boundary)
+    inflated = ndimage.binary_dilation(padded, sphere)
+    inside = tuple(slice(pad, pad + n) for pad, n in zip(pads, mask.shape, strict=True))
+    return np.asarray(inflated[inside])

@@ -162,7 +162,7 @@ def test_bodies_of_two_sizes_by_hand():
         missions.step(boxes * 0.0 + np.array([0, 0, 0, 0, 0.0]), np.zeros((1, 2), np.int64))
     assert missions.state.scan_returned[0, 0, 0] == 0  # B's body is in the way
     blocked = [
-        missions.worlds[0].layout(missions.scenario, kind).barriers for kind in missions.scenario.kinds
+        missions.worlds[0].layout(missions.scenario, kind).collision_mask for kind in missions.scenario.kinds
     ]
     assert not blocked[0].any() and blocked[1][0].all() and not blocked[1][1:-1, 1:-1, 1:-1].any()
     np.testing.assert_array_equal(missions.state.blocked, [each.ravel() for each in blocked])
@@ -180,7 +180,8 @@ def test_bodies_of_many_sizes_never_overlap(navigator):
     radii = np.array([missions.scenario.kind_of(robot).robot.body_radius_m for robot in range(6)])
     world, grid, numbers = missions.worlds[0], missions.grid, missions.rules.numbers
     blocked = [
-        world.layout(missions.scenario, missions.scenario.kind_of(robot)).barriers > 0 for robot in range(6)
+        world.layout(missions.scenario, missions.scenario.kind_of(robot)).collision_mask > 0
+        for robot in range(6)
     ]
     closest, before_s = [math.inf], [0.0]
 

@@ -61,7 +61,7 @@ def test_bodies_never_overlap_on_planned_ways(crowd):
     """At any time within a step; with scans under way, which may end a drive, when a step ends."""
     missions = started(with_settings(CROWDS[crowd], {"ending": ENDLESS, "observation": NO_PARTS}), seed=6)
     grid, radius = missions.grid, missions.scenario.robot.body_radius_m
-    blocked = missions.worlds[0].layout(missions.scenario).barriers > 0
+    blocked = missions.worlds[0].layout(missions.scenario).collision_mask > 0
     robots, closest, before_s, ends = missions.state.robots[0], [math.inf], 0.0, Counter()
     corners, looks = 0, 9 if math.isinf(missions.scenario.sensor.scan_every_m) else 1
 

@@ -381,7 +381,7 @@ def test_bodies_never_overlap_and_never_stand_in_solid_voxels(crowd):
     """At any time, not only when a step ends: robots that departed with a step are looked at within it."""
     missions = started(with_settings(CROWDS[crowd], {"ending": ENDLESS}), seed=6)
     grid, radius = missions.grid, missions.scenario.robot.body_radius_m
-    blocked = missions.worlds[0].layout(missions.scenario).barriers > 0
+    blocked = missions.worlds[0].layout(missions.scenario).collision_mask > 0
     robots, closest, before_s = missions.state.robots[0], [math.inf], 0.0
 
     def look(_step):
@@ -431,7 +431,7 @@ def test_starts_are_voxel_centres_with_room_apart_from_each_other():
         poses, grid = missions.state.robots[0]["goal"], missions.grid
         voxels = grid.voxel_of(poses[:, :3])
         np.testing.assert_allclose(grid.centre_of(voxels), poses[:, :3])
-        blocked = missions.worlds[0].layout(missions.scenario).barriers > 0
+        blocked = missions.worlds[0].layout(missions.scenario).collision_mask > 0
         assert not blocked[tuple(voxels.T)].any()
         apart = np.linalg.norm(poses[:, None, :3] - poses[None, :, :3], axis=-1)
         assert apart[np.triu_indices(5, 1)].min() >= 0.7

@@ -127,7 +127,7 @@ def test_planners_know_the_ceiling_and_of_the_ground_what_was_seen(radius, close
     solid[:, :, 0] = True
     believed, ceiling = solid.copy(), np.full(grid.shape[:2], 6, np.int32)
     solid[5, :, 1:cliff], ceiling[4] = True, closed_from
-    closed = World(grid, solid, "step", ceiling).closed(radius)
+    closed = World(grid, solid, "step", ceiling).no_fly_mask(radius)
     scenario, start, goal = planner(grid, body_radius_m=radius), (1.5, 3.5, 4.5), (7.5, 3.5, 2.5)
     points, end = plan(scenario, believed, start, goal, closed=closed)
     assert end is MoveEnd.ARRIVED and len(points) > 1
@@ -165,7 +165,7 @@ def test_who_knows_the_world_meets_nothing_and_gets_wherever_a_way_leads(seed, s
     scenario = planner(Grid(shape, 0.5), body_radius_m=radius)
     occupied = rng.random(shape) < rng.choice([0.05, 0.2, 0.4])
     occupied[tuple(n // 2 for n in shape)] = False
-    room = World(scenario.grid, occupied, "random").barriers(radius) == 0
+    room = World(scenario.grid, occupied, "random").collision_mask(radius) == 0
     if not room.any():
         return
     free = np.argwhere(room)

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from entropy_explore_env.errors import WorldError
 from entropy_explore_env.scenario import with_settings
 from entropy_explore_env.settings import Grid, Robot
-from entropy_explore_env.worlds.world import Barrier, World
+from entropy_explore_env.worlds.world import Collision, World
 from tests.reference.scenes import drawn, free_box, random_cover, seeds
 
 SIZE = (7, 11, 5)
@@ -67,7 +67,7 @@ def body_hits(occupied, voxel, radius):
 )
 def test_a_body_fits_where_it_meets_nothing_solid(seed, size, body_radius_m):
     occupied = random_cover(size, 0.06, seed) > 0.5
-    blocked = world_of(occupied).barriers(body_radius_m) > 0
+    blocked = world_of(occupied).collision_mask(body_radius_m) > 0
     expected = np.zeros(size, bool)
     for voxel in np.ndindex(*size):
         expected[voxel] = body_hits(occupied, voxel, body_radius_m / 0.5)
@@ -76,12 +76,12 @@ def test_a_body_fits_where_it_meets_nothing_solid(seed, size, body_radius_m):
 
 @drawn(40)
 @given(seeds, st.sampled_from([SIZE, (3, 8, 6), (9, 6, 1)]), st.sampled_from([0.1, 0.4]), st.integers(0, 1))
-def test_starts_are_the_largest_part_and_all_that_hangs_together_with_it_is_visible(
+def test_starts_are_the_largest_component_and_all_that_is_connected_to_it_is_visible(
     seed, size, body_radius_m, behind
 ):
     occupied = random_cover(size, 0.35, seed) > 0.5
     world = world_of(occupied)
-    room = world.barriers(body_radius_m) == Barrier.NONE
+    room = world.collision_mask(body_radius_m) == Collision.NONE
     scenario = free_box(
         grid=world.grid, robot={"body_radius_m": body_radius_m}, sensor={"voxels_behind": behind}
     )
@@ -185,18 +185,18 @@ def terrain() -> World:
 def test_between_ground_and_ceiling():
     world = terrain()
     columns = {
-        0: [Barrier.GROUND, Barrier.NONE, Barrier.NONE, Barrier.NONE, Barrier.CEILING],
-        3: [Barrier.GROUND, Barrier.GROUND, Barrier.GROUND, Barrier.NONE, Barrier.CEILING],
-        5: [Barrier.GROUND, Barrier.NONE, Barrier.CEILING, Barrier.CEILING, Barrier.CEILING],
+        0: [Collision.GROUND, Collision.NONE, Collision.NONE, Collision.NONE, Collision.CEILING],
+        3: [Collision.GROUND, Collision.GROUND, Collision.GROUND, Collision.NONE, Collision.CEILING],
+        5: [Collision.GROUND, Collision.NONE, Collision.CEILING, Collision.CEILING, Collision.CEILING],
     }
-    small, large = world.barriers(0.1), world.barriers(0.3)  # 0.6 voxels: it meets the next ones
+    small, large = world.collision_mask(0.1), world.collision_mask(0.3)  # 0.6 voxels: it meets the next ones
     for x, column in columns.items():
         assert small[x, 4].tolist() == column
     assert large[1, 4].tolist() == [2, 2, 0, 3, 3]
     assert large[5, 4].tolist() == [2, 2, 3, 3, 3]
     assert large[4, 4].tolist() == [2, 2, 2, 3, 3]  # beside the ridge; over it, beside the low ceiling
     layout = world.layout(free_box(grid=world.grid))
-    assert len(layout.starts) == (small == Barrier.NONE).sum() == 11 * (5 * 3 + 1 + 1)
+    assert len(layout.starts) == (small == Collision.NONE).sum() == 11 * (5 * 3 + 1 + 1)
     # Rays go above the ceiling: all free voxels can be seen, and the skin of the ground.
     skin = 11 * (7 + 1)  # the top of each column, and the ridge below its top
     assert layout.visible_voxels == (~world.occupied).sum() + skin

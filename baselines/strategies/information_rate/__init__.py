@@ -232,7 +232,7 @@ class InformationRate:
         limits = robot.max_speed_m_s, robot.acceleration_m_s2
         hop_s = driving_time(reach * grid.voxel_size_m, *limits) + view.kind.sensor.scan_time_s
         each = 1.0 if self.weighing.per_scan else hop_s
-        closed = view.closed()
+        closed = view.no_fly_mask()
         drawn = self._drawn_voxels(view, here, closed)
         places = self._places(view, here, drawn)
         bits, _ = self._weighed(view, places[0], places, cones, anywhere=True)

@@ -99,7 +99,7 @@ def new_lattice(shape: tuple[int, int, int], body_radius: float = 0.0, layer: in
     """Steps of a ball-shaped body in a workspace.
 
     A diagonal step needs every voxel that it squeezes past to be passable. The body fits where it
-    touches no covered voxel, as in `World.barriers`; the boundary of the workspace counts as
+    touches no covered voxel, as in `World.collision_mask`; the boundary of the workspace counts as
     covered, but not above and below a body that stays in its layer.
 
     Args:
@@ -179,7 +179,7 @@ def belief_costs(
             times as much.
         unknown_cost: What a voxel edge of way through unknown voxels costs.
         closed: The same shape, bool, where the body may not be whatever is believed: above a ceiling, see
-            `worlds.world.closed_by`. None = nowhere.
+            `worlds.world.no_fly_mask`. None = nowhere.
 
     Raises:
         SettingError: The cost is no number from 1 to MOST_RATE, or `closed` has another shape or type.

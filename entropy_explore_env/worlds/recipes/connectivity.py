@@ -9,8 +9,9 @@ from scipy import ndimage
 
 from entropy_explore_env.errors import WorldError
 from entropy_explore_env.settings import Grid
+from entropy_explore_env.worlds.components import connected_components, largest_component
 from entropy_explore_env.worlds.recipes.plan import BODY_RADIUS_M, passage_voxels
-from entropy_explore_env.worlds.world import World, connected_parts
+from entropy_explore_env.worlds.world import Collision, World
 
 _ROUNDS = 20
 
@@ -29,17 +30,7 @@ def body_room(occupied: np.ndarray, voxel_size_m: float) -> np.ndarray:
         return np.zeros_like(occupied)
     shape = (occupied.shape[0], occupied.shape[1], occupied.shape[2] if occupied.ndim == 3 else 1)
     world = World(Grid(shape, voxel_size_m), occupied.reshape(shape).copy(), "under construction")
-    return (world.barriers(BODY_RADIUS_M) == 0).reshape(occupied.shape)
-
-
-def largest_part(room: np.ndarray) -> np.ndarray:
-    """The largest face-connected part of a bool array; nothing if there is none."""
-    labels, parts = connected_parts(room)
-    if parts <= 1:
-        return room
-    sizes = np.bincount(labels.ravel())
-    sizes[0] = 0
-    return labels == int(sizes.argmax())
+    return (world.collision_mask(BODY_RADIUS_M) == Collision.NONE).reshape(occupied.shape)
 
 
 def cut_gates(
@@ -96,10 +87,10 @@ def fill_pockets(occupied: np.ndarray, voxel_size_m: float) -> np.ndarray:
     occupied = occupied.copy()
     for _ in range(_ROUNDS):
         room = body_room(occupied, voxel_size_m)
-        main = largest_part(room)
+        main = largest_component(room)
         if not main.any():
             break
-        free, parts = connected_parts(~occupied)
+        free, parts = connected_components(~occupied)
         if parts > 1:
             occupied |= free != free[tuple(np.argwhere(main)[0])]
             continue

@@ -8,7 +8,8 @@ import numpy as np
 
 from entropy_explore_env.errors import WorldError
 from entropy_explore_env.settings import Grid
-from entropy_explore_env.worlds.world import World, connected_parts
+from entropy_explore_env.worlds.components import connected_components
+from entropy_explore_env.worlds.world import World
 
 _ATTEMPTS = 100
 _FURNITURE_SHARE = 0.08
@@ -30,7 +31,7 @@ def furnished(grid: Grid, rng: np.random.Generator) -> World:
     """
     for _ in range(_ATTEMPTS):
         occupied = _boxes(grid, rng)
-        _, parts = connected_parts(~occupied)
+        _, parts = connected_components(~occupied)
         if parts == 1 and occupied.any():
             return World(grid, occupied, "furnished")
     raise WorldError("Grid.shape", grid.shape, "a workspace with room for furniture")

@@ -8,8 +8,9 @@ from __future__ import annotations
 import numpy as np
 
 from entropy_explore_env.settings import Grid
+from entropy_explore_env.worlds.components import largest_component
 from entropy_explore_env.worlds.recipes.cluttered import cluttered_plan
-from entropy_explore_env.worlds.recipes.connectivity import body_room, cut_gates, fill_pockets, largest_part
+from entropy_explore_env.worlds.recipes.connectivity import body_room, cut_gates, fill_pockets
 from entropy_explore_env.worlds.recipes.corridor import corridor_plan
 from entropy_explore_env.worlds.recipes.office import office_plan
 from entropy_explore_env.worlds.recipes.plan import Rectangle, bare_plan, extruded, require_size
@@ -68,5 +69,5 @@ def _regions(whole: Rectangle, wall: int, rng: np.random.Generator) -> list[Rect
 def _room_in(solid: np.ndarray, region: Rectangle, voxel_size_m: float) -> np.ndarray:
     """(X, Y) bool, where a body is in the largest part of a region, walled by its edge."""
     room = np.zeros_like(solid)
-    room[region.window] = largest_part(body_room(solid[region.window], voxel_size_m))
+    room[region.window] = largest_component(body_room(solid[region.window], voxel_size_m))
     return room

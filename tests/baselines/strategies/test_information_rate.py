@@ -137,9 +137,9 @@ def test_it_does_not_fly_into_the_ceiling_that_it_knows():
     env = EntropyExploreEnv(with_settings(find_scenario("terrain"), settings))
     env.reset(seed=0)
     view = env.view("robot_0")
-    world, closed = env.missions.worlds[0], view.closed()
+    world, closed = env.missions.worlds[0], view.no_fly_mask()
     assert world is not None and closed is not None
-    np.testing.assert_array_equal(closed, world.closed(0.8))
+    np.testing.assert_array_equal(closed, world.no_fly_mask(0.8))
     strategy = InformationRate()
     strategy.reset(env.scenario, env.strategy_generator())
     drawn = strategy._drawn_voxels(view, view.pose[:3], closed)

@@ -123,11 +123,11 @@ def test_ways_to_a_goal_are_those_of_dijkstra_and_their_steps_sum_up(shape, seed
     st.sampled_from([1.0, 2.5]),
 )
 def test_a_body_goes_where_the_world_has_room_for_it(seed, shape, radius, unknown_cost):
-    """Incremental looks at the body's ball agree with `World.barriers`, for unknown voxels too."""
+    """Incremental looks at the body's ball agree with `World.collision_mask`, for unknown voxels too."""
     rng = np.random.default_rng(seed)
     covered = random_cover(shape, 0.03, seed) > 0.5
     covered.ravel()[0] = False
-    blocked = World(Grid(shape, 1.0), covered, "drawn").barriers(radius) > 0
+    blocked = World(Grid(shape, 1.0), covered, "drawn").collision_mask(radius) > 0
     if blocked.all():
         return
     precision = np.where(rng.random(shape) < 0.4, UNKNOWN, KNOWN).astype(np.float32)
@@ -145,7 +145,7 @@ def test_planar_robots_stay_in_their_layer_and_know_no_floor(seed, layer, radius
     covered = random_cover(SIZE, 0.03, seed) > 0.5
     tall = np.zeros((7, 11, 5 + 4), bool)
     tall[:, :, 2:-2] = covered  # room above and below: the boundary there does not count
-    blocked = World(Grid(tall.shape, 1.0), tall, "drawn").barriers(radius)[:, :, 2:-2] > 0
+    blocked = World(Grid(tall.shape, 1.0), tall, "drawn").collision_mask(radius)[:, :, 2:-2] > 0
     free = np.argwhere(~blocked[:, :, layer])
     if len(free) == 0:
         return
@@ -287,7 +287,7 @@ def test_a_body_that_touches_something_at_its_start_may_leave():
     assert [5, 5, 0] not in way.tolist()
     # On the other side of it, around: the body's room begins where it touches nothing more.
     cost, way = plan(*known(covered), start, (2, 5, 0), radius=2.2)
-    blocked = World(Grid(covered.shape, 1.0), covered, "by hand").barriers(2.2) > 0
+    blocked = World(Grid(covered.shape, 1.0), covered, "by hand").collision_mask(2.2) > 0
     ball = [v for v in way.tolist() if blocked[tuple(v)]]
     assert all(math.dist(v, start) < 2.2 + 1.0 for v in ball) and not math.isinf(cost)
 

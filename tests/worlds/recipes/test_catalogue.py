@@ -77,7 +77,7 @@ def parts(room):
 
 def require_connected(world, what):
     """All places of a body, and all free voxels, are one part each."""
-    assert parts(world.barriers(BODY_M) == 0) == 1, what
+    assert parts(world.collision_mask(BODY_M) == 0) == 1, what
     assert parts(~world.occupied) == 1, what
 
 
@@ -93,7 +93,7 @@ def test_robots_of_its_scenario_can_go_wherever_they_fit(name):
         if scenario.world != "furnished":
             require_connected(world, f"{name} {seed}")
         layout = world.layout(scenario)
-        room = layout.barriers == 0 if plane is None else layout.barriers[:, :, plane] == 0
+        room = layout.collision_mask == 0 if plane is None else layout.collision_mask[:, :, plane] == 0
         assert len(layout.starts) == room.sum(), f"{name} {seed}: {parts(room)} parts"
         assert low <= (~world.occupied).mean() <= high, f"{name} {seed}: {(~world.occupied).mean()}"
         hashes.add(world.occupied.tobytes())

@@ -10,7 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from entropy_explore_env.errors import WorldError
-from entropy_explore_env.worlds.recipes.connectivity import body_room, cut_gates, fill_pockets, largest_part
+from entropy_explore_env.worlds.components import largest_component
+from entropy_explore_env.worlds.recipes.connectivity import body_room, cut_gates, fill_pockets
 from tests.reference.scenes import drawn, random_cover, seeds
 
 
@@ -42,7 +43,7 @@ def test_filled_space_is_connected_and_only_more_is_solid(seed, size, edge_m):
         voxels = [tuple(voxel) for voxel in np.argwhere(room).tolist()]
         assert flood(room, voxels[0]) == set(voxels)
     # Nothing is lost that was in the largest part and away from every pocket:
-    main = largest_part(body_room(occupied, edge_m))
+    main = largest_component(body_room(occupied, edge_m))
     assert body_room(filled, edge_m).sum() >= 0.5 * main.sum()
 
 
@@ -90,7 +91,7 @@ def test_gates_join_two_rooms():
         before = solid.copy()
         cut_gates(solid, *parts, 1, 1.0, 0.25, np.random.default_rng(seed))
         joined = body_room(solid, 0.25)
-        assert largest_part(joined).sum() == joined.sum() > parts.sum()
+        assert largest_component(joined).sum() == joined.sum() > parts.sum()
         opened = np.argwhere(before & ~solid)
         assert (opened[:, 0] >= 12).all() and (opened[:, 0] <= 20).all()
         assert (opened[:, 0] == 13).sum() == 5  # 1 m: four voxels, and the one in the middle

@@ -45,7 +45,7 @@ def test_every_layer_of_a_furnished_room_is_connected_for_bodies():
             walled[ROOM.window] = occupied[ROOM.window]
             world = World(Grid(SHAPE, 0.1), walled, "room")
             for body_m in (0.2, 0.3):
-                room = world.barriers(body_m) == 0
+                room = world.collision_mask(body_m) == 0
                 layers = [ndimage.label(room[:, :, z])[1] for z in range(SHAPE[2])]
                 assert max(layers) == 1, (seed, body_m, layers)
 

@@ -53,7 +53,7 @@ def test_doors_have_lintels_and_rooms_furniture_in_3_d():
             assert not occupied[room.window][:, :, 8:].any()  # nothing above 2 m
         world = World(OFFICE_3D.grid, occupied.copy(), "office")
         for layer in (1, 2, 3):  # ground robots at up to 1 m
-            assert ndimage.label((world.barriers(0.3) == 0)[:, :, layer])[1] == 1
+            assert ndimage.label((world.collision_mask(0.3) == 0)[:, :, layer])[1] == 1
 
 
 def test_2_d_offices_are_bare():

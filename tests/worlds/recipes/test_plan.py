@@ -32,7 +32,7 @@ def fits(width, edge_m, body_m):
     occupied = np.ones((5 * width + 90, width + 2, 1), bool)
     occupied[:, 1:-1] = False
     world = World(Grid(occupied.shape, edge_m), occupied, "way")
-    middle = (world.barriers(body_m) == 0)[occupied.shape[0] // 2]
+    middle = (world.collision_mask(body_m) == 0)[occupied.shape[0] // 2]
     return bool(middle.any())
 
 

@@ -26,7 +26,7 @@ def test_the_ceiling_is_above_the_ground_with_room_for_a_robot_between(grid):
         gaps_m = (world.ceiling - ground) * grid.voxel_size_m
         assert gaps_m.min() >= min(4.0, 2 * 0.3)
         assert gaps_m.min() >= 4.0 - grid.voxel_size_m
-        places = (world.barriers(0.3) == 0).any(axis=2)
+        places = (world.collision_mask(0.3) == 0).any(axis=2)
         margin = 0 if grid.voxel_size_m >= 0.6 else int(np.ceil(0.3 / grid.voxel_size_m - 0.5 - 1e-9))
         inner = places[margin : grid.shape[0] - margin, margin : grid.shape[1] - margin]
         assert inner.all(), f"columns without room: {(~inner).sum()}"
