@@ -8,12 +8,13 @@ RUN := $(VENV)/bin/python -m
 STAMP := $(VENV)/installed-
 VENV_RLLIB := .venv-rllib
 
-.PHONY: help demo test test-rllib lint bench reproduce clean
+.PHONY: help demo test test-long test-rllib lint bench reproduce clean
 .NOTPARALLEL:
 
 help:
 	@echo "make demo       run one mission of three robots and show it in results/demo"
 	@echo "make test       lint, then the tests"
+	@echo "make test-long  also the long ones, and more and other drawn examples: an hour"
 	@echo "make test-rllib the tests of the trainer with RLlib"
 	@echo "make lint       ruff, pyright and the contracts of imports"
 	@echo "make bench      speed against peers"
@@ -23,9 +24,11 @@ help:
 demo: $(STAMP)baselines
 	$(RUN) baselines.run room --strategy gradient --robots 3 --seed 0 --out results/demo
 
-# A file of tests stays in one process: its fixtures, and what it compiles, are made once.
 test: lint
-	$(RUN) pytest -n auto --maxprocesses 4 --dist loadfile
+	$(RUN) pytest -n auto --maxprocesses 4 --dist worksteal
+
+test-long: $(STAMP)dev
+	$(RUN) pytest -n auto --maxprocesses 4 --dist worksteal -m "long or not long" --hypothesis-profile=long
 
 test-rllib: $(VENV_RLLIB)/installed
 	$(VENV_RLLIB)/bin/python -m pytest tests/training/rllib tests/training/test_rllib_refusals.py
@@ -56,7 +59,7 @@ $(VENV_RLLIB)/installed: pyproject.toml requirements/constraints-rllib.txt
 	@$(VENV_RLLIB)/bin/python -m pip --version >/dev/null 2>&1 || $(PYTHON) -m venv $(VENV_RLLIB)
 	@echo "installing entropy_explore_env[rllib] in $(VENV_RLLIB), a minute or two the first time ..." >&2
 	@$(VENV_RLLIB)/bin/python -m pip install -qq --disable-pip-version-check \
-		-c requirements/constraints-rllib.txt -e ".[rllib]" "pytest>=8.2"
+		-c requirements/constraints-rllib.txt -e ".[rllib]" "pytest>=8.2" "hypothesis>=6.100"
 	@touch $@
 
 clean:

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from hypothesis import HealthCheck, settings
+from hypothesis import settings
 from hypothesis import strategies as st
 
 from entropy_explore_env.belief.raycast import longest_crossing
@@ -26,13 +26,8 @@ SHAPES = ((7, 11, 5), (3, 8, 6), (9, 6, 1), (13, 2, 4), (1, 10, 3))
 
 
 def drawn(examples: int = 60) -> settings:
-    """Hypothesis settings: the same examples every time, however slow the machine."""
-    return settings(
-        max_examples=examples,
-        deadline=None,
-        derandomize=True,
-        suppress_health_check=[HealthCheck.too_slow, HealthCheck.filter_too_much],
-    )
+    """So many examples for Hypothesis, and ten times as many in its profile `long` (tests/conftest.py)."""
+    return settings(max_examples=examples * settings.default.max_examples // 100)
 
 
 seeds = st.integers(0, 2**32 - 1)
