@@ -19,7 +19,7 @@ from baselines.cli.arguments import OmitArgPrefixes, Positional, parse, run_comm
 from baselines.cli.mission_outputs import MissionLog, Outputs, Wanted, show_results
 from baselines.cli.progress import progress_bar
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
-from entropy_explore_env.reports.mission_record import MissionRecord, check_world, load_record, state_digest
+from entropy_explore_env.reports.mission_record import MissionRecord, check_world, load_record, same_end
 from entropy_explore_env.version import VERSION
 
 _DIFFERS = 1
@@ -49,7 +49,7 @@ def main(words: Sequence[str]) -> int:
     title = f"{record.scenario.name}, replayed"
     with MissionLog(wanted) as log, progress_bar(title, hidden=args.output.json) as show:
         env = _replayed(record, log, show)
-        same = state_digest(env.missions, 0) == record.digest
+        same = same_end(record, env.missions)
         replayed = {"same": same, "recorded_by": record.library, "replayed_by": VERSION}
         figures, written = log.finish(record.strategy, replayed=replayed)
     show_results(env, figures, written, args.output.json)

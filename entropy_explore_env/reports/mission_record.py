@@ -1,15 +1,15 @@
 """A mission as a file from which it can be run again, bit for bit: settings, seed, every command, a digest.
 
-An `.npz` without pickled objects. Its entries are `format` ("entropy_explore_env mission"), `version` (1),
+An `.npz` without pickled objects. Its entries are `format` ("entropy_explore_env mission"), `version` (3),
 `library` (its version), `settings` (JSON, `settings_json`), `seed` (decimal digits), `episode`, `strategy`,
-`commands` ((T, A, N) floating-point or (T, A) whole numbers, exactly as given), `scan_s` and `scan_robot`
-(S,), `digest` and `world_digest` (SHA-256), and `checksum` (SHA-256 of all other entries). Where the world
-was given as an object, `version` is 2 and there is also `world`: the bytes that `save_world` writes.
+`reward_function` (a name, or empty), `commands` ((T, A, N) floating-point or (T, A) whole numbers, exactly as
+given), `scan_s` and `scan_robot` (S,), `digest` and `world_digest` (SHA-256), and `checksum` (SHA-256 of all
+other entries). Only where they were given: `world`, an object, as the bytes that `save_world` writes;
+`world_number`; `starts`, (A, 5). Files of earlier versions are read, too: see reports/record_versions.py.
 """
 
 from __future__ import annotations
 
-import hashlib
 import io
 import re
 from collections.abc import Mapping
@@ -21,6 +21,15 @@ import numpy as np
 
 from entropy_explore_env.errors import CallOrderError, EntropyExploreError, RecordError, WorldError
 from entropy_explore_env.missions.simulation import Missions
+from entropy_explore_env.reports.record_versions import (
+    FORMAT_VERSION,
+    LAST_NAMED_DIGEST,
+    OPTIONAL,
+    REQUIRED,
+    digest_of_version,
+    named_digest,
+)
+from entropy_explore_env.reports.state_values import state_digest
 from entropy_explore_env.scenario import Scenario
 from entropy_explore_env.settings_json import scenario_from_json, settings_json
 from entropy_explore_env.version import VERSION
@@ -32,7 +41,7 @@ from entropy_explore_env.worlds.recipes.catalogue import RECIPES
 from entropy_explore_env.worlds.world import World
 from entropy_explore_env.writing import write_atomically
 
-FORMAT, FORMAT_VERSION, VERSION_WITH_WORLD = "entropy_explore_env mission", 1, 2
+FORMAT = "entropy_explore_env mission"
 MAX_FILE_BYTES = 1 << 30
 _LONGEST_TEXT = 1 << 20
 _TEXTS = ("format", "library", "settings", "seed", "strategy", "digest", "world_digest", "checksum")
@@ -51,11 +60,18 @@ class MissionRecord:
             where robots' actions differ in length, N is the longest and zeros fill the others up.
         scan_s: (S,) float64, when scans ended, in the order in which they were noted.
         scan_robot: (S,) int64, whose they were.
-        digest: Of the state at the end: see `state_digest`.
+        digest: Of the state at the end: see `digest_of_version`.
         world_digest: Of the true world: see `world_digest`.
-        strategy: Who chose the commands; for people.
+        strategy: What chose the commands; for people.
         library: Version of the library that ran the mission.
         world: The true world, where it was given as an object; None = the scenario says where it comes from.
+        world_number: Of the recipe's world, where the reset was given one; None = drawn.
+        starts: (A, 5) float64 poses that the reset was given; None = drawn.
+        reward_function: Qualified name of the function that rewarded the robots; empty = the scenario's
+            reward did. It has no part in the state: a replay does not need it.
+        version: Of the format, which says how the digest is made.
+
+    Records compare and hash by identity: two of them are equal only if they are the same object.
     """
 
     scenario: Scenario
@@ -69,6 +85,10 @@ class MissionRecord:
     strategy: str = ""
     library: str = VERSION
     world: World | None = None
+    world_number: int | None = None
+    starts: np.ndarray | None = None
+    reward_function: str = ""
+    version: int = FORMAT_VERSION
 
 
 class CommandRecorder:
@@ -133,16 +153,9 @@ class CommandRecorder:
         return table.reshape(-1, robots, longest)
 
 
-def state_digest(missions: Missions, mission: int) -> str:
-    """SHA-256 of all state arrays of a mission: names, types, shapes and bytes; without padding."""
-    parts = {}
-    for name, array in zip(missions.state._fields, missions.state, strict=True):
-        if name.startswith("phase") and missions.rules.phased is None:
-            continue  # records are older than the broadcast in phases
-        fields = array.dtype.names
-        parts |= {f"{name}.{field}": array[mission][field] for field in fields} if fields else {}
-        parts |= {} if fields else {name: array[mission]}
-    return _sha256(parts)
+def same_end(record: MissionRecord, missions: Missions) -> bool:
+    """Whether the first of some missions is, bit for bit, where the record's mission ended."""
+    return digest_of_version(missions, 0, record.version) == record.digest
 
 
 def world_digest(missions: Missions, mission: int) -> str:
@@ -156,7 +169,7 @@ def world_digest(missions: Missions, mission: int) -> str:
         "occupied": np.packbits(world.occupied),
         "shape": np.asarray(grid.shape, np.int64),
     }
-    return _sha256(parts if world.ceiling is None else {**parts, "ceiling": world.ceiling})
+    return named_digest(parts if world.ceiling is None else {**parts, "ceiling": world.ceiling})
 
 
 def check_world(record: MissionRecord, missions: Missions) -> None:
@@ -164,14 +177,6 @@ def check_world(record: MissionRecord, missions: Missions) -> None:
     world = record.scenario.world
     if world not in (*RECIPES, GIVEN) and world_digest(missions, 0) != record.world_digest:
         raise WorldError("Scenario.world", world, "the file of the recorded mission, unchanged")
-
-
-def _sha256(parts: Mapping[str, np.ndarray]) -> str:
-    digest = hashlib.sha256()
-    for name, part in parts.items():
-        digest.update(f"{name} {part.dtype.str} {part.shape}\n".encode())
-        digest.update(np.ascontiguousarray(part).reshape(-1).view(np.uint8).data)
-    return digest.hexdigest()
 
 
 def save_record(record: MissionRecord, path: Path) -> None:
@@ -183,7 +188,7 @@ def save_record(record: MissionRecord, path: Path) -> None:
     """
     entries = {
         "format": np.asarray(FORMAT),
-        "version": np.int64(FORMAT_VERSION if record.world is None else VERSION_WITH_WORLD),
+        "version": np.int64(record.version),
         "library": np.asarray(record.library),
         "settings": np.asarray(settings_json(record.scenario)),
         "seed": np.asarray(str(record.seed)),
@@ -195,10 +200,16 @@ def save_record(record: MissionRecord, path: Path) -> None:
         "digest": np.asarray(record.digest),
         "world_digest": np.asarray(record.world_digest),
     }
+    if record.version > LAST_NAMED_DIGEST:
+        entries["reward_function"] = np.asarray(record.reward_function)
     if record.world is not None:
         if record.world.grid.voxels > MAX_FILE_VOXELS:
             raise RecordError("world", record.world, f"one of at most {MAX_FILE_VOXELS} voxels in a record")
         entries["world"] = np.frombuffer(world_bytes(record.world), np.uint8)
+    if record.world_number is not None:
+        entries["world_number"] = np.int64(record.world_number)
+    if record.starts is not None:
+        entries["starts"] = record.starts
     buffer = io.BytesIO()
     np.savez_compressed(buffer, **entries, checksum=np.asarray(_checksum(entries)))
     write_atomically(path, buffer.getvalue())
@@ -206,7 +217,7 @@ def save_record(record: MissionRecord, path: Path) -> None:
 
 def _checksum(entries: Mapping[str, Any]) -> str:
     """SHA-256 of all entries but the checksum itself."""
-    return _sha256({name: np.asarray(entries[name]) for name in sorted(entries) if name != "checksum"})
+    return named_digest({name: np.asarray(entries[name]) for name in sorted(entries) if name != "checksum"})
 
 
 def load_record(path: Path) -> MissionRecord:
@@ -235,11 +246,12 @@ def _checked(entries: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
     """The entries, all there, of this format, as they were written."""
     if str(entries.get("format")) != FORMAT:
         raise RefusedError("a mission record, as --record writes it")
-    versions = {FORMAT_VERSION: (), VERSION_WITH_WORLD: ("world",)}
     version = int(entries["version"])
-    if version not in versions:
-        raise RefusedError(f"a mission record of format version {' or '.join(map(str, versions))}")
-    if set(entries) != {*_TEXTS, *_NUMBERS, *versions[version]} or _checksum(entries) != str(
+    if version not in REQUIRED:
+        raise RefusedError(f"a mission record of format version {', '.join(map(str, REQUIRED))}")
+    needed = {*_TEXTS, *_NUMBERS, *REQUIRED[version]}
+    there = set(entries)
+    if not needed <= there <= needed.union(OPTIONAL[version]) or _checksum(entries) != str(
         entries["checksum"]
     ):
         raise RefusedError("a mission record as it was written: this one was changed or damaged")
@@ -251,10 +263,12 @@ def _record(entries: dict[str, np.ndarray]) -> MissionRecord:
     texts = {name: str(entries[name]) for name in _TEXTS}
     scenario = scenario_from_json(texts["settings"])
     commands, scan_s, scan_robot = (entries[name] for name in ("commands", "scan_s", "scan_robot"))
-    scans, team = len(scan_s), scenario.robots
+    scans, team, version = len(scan_s), scenario.robots, int(entries["version"])
     kinds = {2: "i", 3: "f"}
     digests = (texts["digest"], texts["world_digest"])
     world = world_from_bytes(entries["world"].tobytes()) if "world" in entries else None
+    reward_function = str(entries.get("reward_function", ""))
+    number, starts = entries.get("world_number"), entries.get("starts")
     if (
         commands.dtype.kind != kinds.get(commands.ndim)
         or commands.shape[1] != team
@@ -262,10 +276,14 @@ def _record(entries: dict[str, np.ndarray]) -> MissionRecord:
         or (scan_robot.dtype, scan_robot.shape) != (np.int64, (scans,))
         or not all(re.fullmatch("[0-9a-f]{64}", digest) for digest in digests)
         or not re.fullmatch("[0-9]{1,4000}", texts["seed"])
-        or len(texts["strategy"]) > _LONGEST_TEXT
+        or max(len(texts["strategy"]), len(reward_function)) > _LONGEST_TEXT
         or not 0 <= int(entries["episode"]) < 1_000_000
-        or (scenario.world == GIVEN) != (world is not None)
+        or (scenario.world == GIVEN and world is None)
+        or (scenario.world != GIVEN and world is not None and version <= LAST_NAMED_DIGEST)
         or (world is not None and world.grid != scenario.grid)
+        or (number is not None and (number.shape != () or number.dtype != np.int64 or number < 0))
+        or (number is not None and world is not None)
+        or (starts is not None and (starts.shape != (team, 5) or starts.dtype != np.float64))
     ):
         raise RefusedError("a mission record whose entries fit each other")
     return MissionRecord(
@@ -279,4 +297,8 @@ def _record(entries: dict[str, np.ndarray]) -> MissionRecord:
         strategy=texts["strategy"],
         library=texts["library"],
         world=world,
+        world_number=None if number is None else int(number),
+        starts=starts,
+        reward_function=reward_function,
+        version=version,
     )

@@ -7,7 +7,7 @@ import pytest
 
 from entropy_explore_env.belief.coverage_map import map_entropy_bits
 from entropy_explore_env.errors import SettingError
-from entropy_explore_env.reports.mission_record import state_digest
+from entropy_explore_env.reports.state_values import state_digest
 from entropy_explore_env.scenario import with_settings
 from entropy_explore_env.settings import Channel
 from tests.reference.scenes import free_box, started, wander

@@ -6,6 +6,7 @@ import dataclasses
 import hashlib
 import io
 import zipfile
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -20,12 +21,18 @@ from entropy_explore_env.reports.mission_record import (
     MissionRecord,
     check_world,
     load_record,
+    same_end,
     save_record,
-    state_digest,
     world_digest,
 )
+from entropy_explore_env.reports.record_versions import digest_of_version, named_digest
+from entropy_explore_env.reports.state_values import (
+    FOLLOWS_FROM_WORLD,
+    state_digest,
+    state_values,
+    value_bytes,
+)
 from entropy_explore_env.settings import Grid
-from entropy_explore_env.settings_json import settings_json
 from entropy_explore_env.version import VERSION
 from entropy_explore_env.worlds.load import save_world, world_bytes
 from entropy_explore_env.worlds.world import World
@@ -135,39 +142,93 @@ def test_before_a_reset_there_is_nothing_to_record():
 # --- digests
 
 
-def test_a_digest_sees_every_array_and_field():
-    missions = started(free_box(robots=2, track_truth=True, channel={"delay_s": 1.0}), seed=3, missions=2)
+DELAYED = {"robots": 2, "track_truth": True, "channel": {"delay_s": 1.0}}
+PHASED = {"robots": 2, "channel": {"phase_s": 3.0, "repeats": 2}}
+
+
+def leaf_arrays(state: object) -> Iterator[np.ndarray]:
+    """All arrays of a state, however they are grouped, and all fields of structured ones."""
+    for part in state if isinstance(state, tuple) else ():
+        yield from leaf_arrays(part)
+    if isinstance(state, np.ndarray):
+        yield from [state[name] for name in state.dtype.names] if state.dtype.names else [state]
+
+
+@pytest.mark.parametrize("changes", [DELAYED, PHASED])
+def test_a_digest_sees_every_array_and_field(changes):
+    missions = started(free_box(**changes), seed=3, missions=2)
     before, other = state_digest(missions, 0), state_digest(missions, 1)
     assert before != other
+    derived = [id(getattr(missions.state, name)) for name in FOLLOWS_FROM_WORLD]
     seen = 0
-    for name, array in zip(missions.state._fields, missions.state, strict=True):
-        for field in array.dtype.names or (None,):
-            part = array[0] if field is None else array[0][field]
-            if name == "blocked" or np.size(part) == 0:
-                continue
-            kept = array.copy()
-            flat = array[0].reshape(-1) if field is None else array[0:1][field].reshape(-1)
-            target = flat[-1:] if field is None else None
-            if target is not None:
-                target[...] = ~target if target.dtype == bool else target + 1
-            else:
-                whole = array[field]
-                whole[0] = ~whole[0] if whole.dtype == bool else whole[0] + 1
-                if np.isinf(whole[0]).any():
-                    whole[0] = 0.0
-            assert state_digest(missions, 0) != before, (name, field)
-            array[...] = kept
-            assert state_digest(missions, 0) == before
-            seen += 1
-    assert seen > 50 and state_digest(missions, 1) == other
+    for array in leaf_arrays(missions.state):
+        skipped = id(array) in derived and array is not missions.state.truth
+        if skipped or array[0:1].size == 0:
+            continue
+        kept, target = array.copy(), array[0:1]
+        target[...] = ~target if target.dtype == bool else np.where(np.isinf(target), 0, target + 1)
+        assert state_digest(missions, 0) != before
+        assert state_digest(missions, 1) == other
+        array[...] = kept
+        assert state_digest(missions, 0) == before
+        seen += 1
+    assert seen > 50
+
+
+def test_a_digest_covers_values_and_neither_names_nor_shapes_nor_widths(monkeypatch):
+    missions = started(free_box(**DELAYED), seed=3)
+    values, before = state_values(missions, 0), state_digest(missions, 0)
+    others = {f"{name} today": value for name, value in values.items() if name not in FOLLOWS_FROM_WORLD}
+    others = {
+        name: value.reshape(-1).astype(np.int16 if value.dtype == np.int8 else value.dtype)
+        for name, value in others.items()
+    }
+    monkeypatch.setattr("entropy_explore_env.reports.state_values.state_values", lambda *_: others)
+    assert state_digest(missions, 0) == before
+    swapped = dict(reversed(others.items()))
+    monkeypatch.setattr("entropy_explore_env.reports.state_values.state_values", lambda *_: swapped)
+    assert state_digest(missions, 0) != before
 
 
 def test_a_digest_by_hand():
-    from entropy_explore_env.reports import mission_record
-
+    assert value_bytes(np.array([1, -2], np.int8)) == b"i 2\n" + np.array([1, -2], "<i8").tobytes()
+    assert value_bytes(np.array(True)) == b"b 1\n\x01"
+    assert value_bytes(np.array([[0.5]], np.float32)) == b"f4 1\n" + np.array([0.5], "<f4").tobytes()
+    assert value_bytes(np.array([3], np.uint64)) == b"u 1\n" + np.array([3], "<u8").tobytes()
     text = b"a <f8 (2,)\n" + np.array([1.0, 2.0]).tobytes() + b"b |b1 ()\n\x01"
     parts = {"a": np.array([1.0, 2.0]), "b": np.array(True)}
-    assert mission_record._sha256(parts) == hashlib.sha256(text).hexdigest()
+    assert named_digest(parts) == hashlib.sha256(text).hexdigest()
+
+
+FIRST_DIGESTS = {
+    "delayed": "e1bd4f38fd78b4690b65f2416c90ca1a4795a337a68c067bc76bc5baacee19cb",
+    "phased": "43bbafe1e9ef4986b5e5e461cdd7e8aec6813eb05331862092d38d76dcfd31e0",
+}
+"""Of the states below, by the code that wrote format version 1."""
+
+
+@pytest.mark.parametrize(("name", "changes"), [("delayed", DELAYED), ("phased", PHASED)])
+def test_the_digest_of_earlier_versions_is_what_it_was(name, changes):
+    """Names, types and shapes included; the state is filled with numbers that no arithmetic made."""
+    missions = started(free_box(**changes), seed=3)
+    for number, value in enumerate(state_values(missions, 0).values()):
+        value[...] = (np.arange(value.size).reshape(value.shape) + number) % 2
+    for version in (1, 2):
+        assert digest_of_version(missions, 0, version) == FIRST_DIGESTS[name]
+    assert digest_of_version(missions, 0, 3) == state_digest(missions, 0) != FIRST_DIGESTS[name]
+
+
+def test_records_of_earlier_versions_load_are_verified_and_are_written_as_they_were(file, tmp_path):
+    record, missions = recorded()
+    first = {name: value for name, value in entries_of(file).items() if name != "reward_function"}
+    digest = digest_of_version(missions, 0, 1)
+    old = repacked({**first, "version": np.int64(1), "digest": np.asarray(digest)})
+    back = load_record_bytes(old, tmp_path)
+    assert (back.version, back.digest, back.reward_function) == (1, digest, "")
+    assert same_end(back, missions) and same_end(record, missions)
+    assert not same_end(dataclasses.replace(back, version=3), missions)
+    assert saved(back, tmp_path).read_bytes() == old
+    refused(repacked({**first, "version": np.int64(2)}), tmp_path, "changed or damaged")
 
 
 def test_another_world_in_the_file_is_refused(tmp_path):
@@ -217,8 +278,9 @@ def test_a_record_holds_the_world_that_was_given(tmp_path):
     assert state_digest(again, 0) == back.digest
 
 
-def test_records_without_such_a_world_are_of_the_first_format(file, tmp_path):
-    assert int(entries_of(file)["version"]) == 1 and "world" not in entries_of(file)
+def test_records_without_such_a_world_have_no_entry_for_it(file, tmp_path):
+    assert int(entries_of(file)["version"]) == 3
+    assert not {"world", "world_number", "starts"} & entries_of(file).keys()
     assert load_record_bytes(file, tmp_path).world is None
 
 
@@ -241,11 +303,7 @@ def other_world() -> np.ndarray:
         ("world", np.zeros(9, np.uint8), "a whole .npz"),
         ("world", np.zeros(0, np.uint8), "a whole .npz"),
         ("world", other_world(), "fit each other"),
-        (
-            "settings",
-            settings_json(free_box(robots=2)),
-            "fit each other",
-        ),  # a scenario with a world of its own
+        ("world_number", np.int64(3), "fit each other"),
     ],
 )
 def test_forged_worlds_are_refused(name, value, said, tmp_path):
@@ -316,17 +374,23 @@ def test_what_was_changed_by_hand_is_refused(name, file, tmp_path):
 
 def forged(file: bytes, **changes: object) -> bytes:
     """The record with other entries, its checksum made to fit."""
+    entries = {**entries_of(file), **{name: np.asarray(value) for name, value in changes.items()}}
+    return repacked({name: value for name, value in entries.items() if value.dtype != object or value.shape})
+
+
+def repacked(entries: dict) -> bytes:
+    """Entries as a record's bytes, with the checksum that they need."""
     from entropy_explore_env.reports import mission_record
 
-    entries = {**entries_of(file), **{name: np.asarray(value) for name, value in changes.items()}}
-    entries = {name: value for name, value in entries.items() if value.dtype != object or value.shape}
+    del entries["checksum"]
     return packed({**entries, "checksum": np.asarray(mission_record._checksum(entries))})
 
 
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
-        ({"version": np.int64(3)}, "format version 1 or 2"),
+        ({"version": np.int64(4)}, "format version 1, 2, 3"),
+        ({"version": np.int64(1)}, "changed or damaged"),
         ({"version": np.int64(2)}, "changed or damaged"),
         ({"format": "another"}, "as --record writes it"),
         ({"commands": np.zeros((3, 7, 5), np.float32)}, "fit each other"),
@@ -339,6 +403,11 @@ def forged(file: bytes, **changes: object) -> bytes:
         ({"settings": "{}"}, "settings are allowed"),
         ({"settings": "["}, "settings are allowed"),
         ({"more": np.zeros(3)}, "changed or damaged"),
+        ({"world_number": np.int64(-1)}, "fit each other"),
+        ({"world_number": np.float64(1.0)}, "fit each other"),
+        ({"starts": np.zeros((2, 3))}, "fit each other"),
+        ({"starts": np.zeros((2, 5), np.float32)}, "fit each other"),
+        ({"reward_function": "x" * 2_000_000}, "fit each other"),
     ],
 )
 def test_forged_records_are_refused(changes, said, file, tmp_path):

@@ -1,0 +1,121 @@
+"""The state of a mission value by value, and its digest: names and grouping in the code do not matter to it.
+
+Records refer to values by the names of their format, which stay when arrays and fields of the code are
+renamed or grouped anew; `_ARRAYS` and `_FIELDS_TODAY` say where each of them is found today.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
+
+import numpy as np
+
+from entropy_explore_env.missions.simulation import Missions
+from entropy_explore_env.missions.state import MissionState
+
+_ARRAYS: Mapping[str, Callable[[MissionState], np.ndarray]] = MappingProxyType(
+    {
+        "truth": lambda state: state.truth,
+        "blocked": lambda state: state.blocked,
+        "mean": lambda state: state.mean,
+        "precision": lambda state: state.precision,
+        "pooled": lambda state: state.pooled,
+        "joint_mean": lambda state: state.joint_mean,
+        "joint_precision": lambda state: state.joint_precision,
+        "visible": lambda state: state.visible,
+        "missions": lambda state: state.missions,
+        "robots": lambda state: state.robots,
+        "heard": lambda state: state.heard,
+        "scan_range_m": lambda state: state.scan_range_m,
+        "scan_returned": lambda state: state.scan_returned,
+        "scan_utility_bits": lambda state: state.scan_utility_bits,
+        "mail": lambda state: state.mail,
+        "mail_to": lambda state: state.mail_to,
+        "mail_rays": lambda state: state.mail_rays,
+        "phases": lambda state: state.phases,
+        "phase_waiting": lambda state: state.phase_waiting,
+        "phase_batches": lambda state: state.phase_batches,
+        "phase_rays": lambda state: state.phase_rays,
+        "phase_heard": lambda state: state.phase_heard,
+    }
+)
+"""Name in records → the array (E, ...) that holds it today."""
+
+_FIELDS: Mapping[str, tuple[str, ...]] = MappingProxyType(
+    {
+        "missions": tuple(
+            "entropy_start_bits entropy_end_bits time_s cycles end letters reached_s "
+            "joint_bits explored explored_visible error wrong".split()
+        ),
+        "robots": tuple(
+            "entropy_bits deciding waiting origin goal target scan_pose way waypoints way_end corners way_m "
+            "depart_s next_scan_s way_scans ready_s move_end depth_m half_angle_rad i_min_bits "
+            "next_i_min_bits own_bits received_bits reward sensor_chance channel_chance "
+            "distance_m scans measurements redundant gained_bits heard_bits blocked_moves "
+            "messages_sent measurements_sent bits_sent messages_received measurements_received bits_received "
+            "messages_lost messages_out_of_range".split()
+        ),
+        "heard": ("heard_s", "pose", "announced_s", "announced"),
+        "mail": ("due_s", "sent_s", "serial", "sender", "count", "pose", "announced"),
+        "phases": ("broadcasts", "collecting"),
+        "phase_batches": ("pose", "count"),
+    }
+)
+"""Name in records → the fields of this array, by their names in records, in the order of the digest."""
+
+_FIELDS_TODAY: Mapping[str, str] = MappingProxyType({})
+"""`array.field` in records → the field's name today, where it is another one."""
+
+FOLLOWS_FROM_WORLD = ("blocked", "visible")
+"""Values that the true world and the scenario determine; the digest leaves them out."""
+
+
+def state_values(missions: Missions, mission: int) -> dict[str, np.ndarray]:
+    """All values of a mission's state, by their names in records (`array` or `array.field`).
+
+    Records of every format version are verified by these values: whatever is done to the state, each
+    keeps its name, its place in this order, its shape without the axis E, and its type. Nobody else
+    reads the state by name for a file.
+
+    Args:
+        missions: Missions of which one is read.
+        mission: Which one.
+
+    Returns:
+        Name → array, a view of the state, in the order of the digest; the phases of the broadcast only
+        where there are some.
+    """
+    values: dict[str, np.ndarray] = {}
+    for name, read in _ARRAYS.items():
+        if name.startswith("phase") and missions.rules.phased is None:
+            continue
+        array = read(missions.state)
+        for field in _FIELDS.get(name, ()):
+            today = _FIELDS_TODAY.get(f"{name}.{field}", field)
+            values[f"{name}.{field}"] = array[today][mission, ...]
+        if name not in _FIELDS:
+            values[name] = array[mission]
+    return values
+
+
+def state_digest(missions: Missions, mission: int) -> str:
+    """SHA-256 of a mission's values in the order of `state_values`, without their names and shapes.
+
+    Of each value: its kind (b, i, u, f4, f8), the number of its entries, and their bytes, whole numbers as
+    64-bit ones, least byte first. What follows from the world is left out.
+    """
+    digest = hashlib.sha256()
+    for name, value in state_values(missions, mission).items():
+        if name not in FOLLOWS_FROM_WORLD:
+            digest.update(value_bytes(value))
+    return digest.hexdigest()
+
+
+def value_bytes(value: np.ndarray) -> bytes:
+    """A value as the digest takes it: see `state_digest`."""
+    kind = value.dtype.kind
+    stored = {"b": "|b1", "i": "<i8", "u": "<u8", "f": f"<f{value.dtype.itemsize}"}[kind]
+    said = kind + (str(value.dtype.itemsize) if kind == "f" else "")
+    return f"{said} {value.size}\n".encode() + np.ascontiguousarray(value, stored).tobytes()
