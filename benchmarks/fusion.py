@@ -13,7 +13,8 @@ import numpy as np
 
 from benchmarks.peers import OctoMapTree
 from benchmarks.rows import Effort, Goal, Row, compared, interleave, timed
-from entropy_explore_env.belief.coverage_map import PRIOR_MEAN, measurement_precision
+from entropy_explore_env.belief.map_update import PRIOR_MEAN
+from entropy_explore_env.belief.measurement_model import measurement_precision
 from entropy_explore_env.compilation.kernels import lean_kernel
 from entropy_explore_env.robots.range_sensor import (
     Return,

@@ -20,7 +20,7 @@ HEAVY = (*PACKAGES[1:], "tests", "torch", "matplotlib", "stable_baselines3", "ra
 """What importing the library never loads, nor what only some need."""
 FOR_SOME = ("pygame", "PIL", "av", "rerun", "octomap", "tyro", "rich", "tensorboard", "pandas")
 WRONG_IMPORTS = {
-    f"{LIBRARY}.belief.raycast": (f"{LIBRARY}.belief.coverage_map", f"{LIBRARY}.robots.motion"),
+    f"{LIBRARY}.belief.raycast": (f"{LIBRARY}.belief.map_update", f"{LIBRARY}.robots.motion"),
     f"{LIBRARY}.belief.paths.lattice": (f"{LIBRARY}.belief.paths.planning",),
     f"{LIBRARY}.robots.channel": (f"{LIBRARY}.robots.motion", "pettingzoo"),
     f"{LIBRARY}.missions.rules": (f"{LIBRARY}.missions.tick", "torch"),

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from entropy_explore_env.belief.coverage_map import PRIOR_MEAN, fuse_ray
+from entropy_explore_env.belief.map_update import PRIOR_MEAN, fuse_ray
 from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel
 
 

@@ -17,7 +17,7 @@ import math
 
 import numpy as np
 
-from entropy_explore_env.belief.coverage_map import measurement_precision
+from entropy_explore_env.belief.measurement_model import measurement_precision
 from entropy_explore_env.belief.raycast import STOP_AT_COVERED, cast_ray
 from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel
 

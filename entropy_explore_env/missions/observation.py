@@ -33,7 +33,8 @@ from typing import NamedTuple
 import numpy as np
 from gymnasium import spaces
 
-from entropy_explore_env.belief.coverage_map import expected_utility, measurement_precision
+from entropy_explore_env.belief.map_update import expected_utility
+from entropy_explore_env.belief.measurement_model import measurement_precision
 from entropy_explore_env.belief.pooling import normalised_entropy
 from entropy_explore_env.belief.raycast import OPEN, STOP_AT_COVERED, cast_ray, longest_crossing
 from entropy_explore_env.compilation.kernels import lean_kernel

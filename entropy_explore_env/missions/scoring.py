@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from entropy_explore_env.belief.coverage_map import fuse_ray
+from entropy_explore_env.belief.map_update import fuse_ray
 from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel
 from entropy_explore_env.missions.state import PROGRESS
 from entropy_explore_env.robots.range_sensor import Return

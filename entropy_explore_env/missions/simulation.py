@@ -10,7 +10,8 @@ from typing import TypeAlias
 
 import numpy as np
 
-from entropy_explore_env.belief.coverage_map import PRIOR_MEAN, map_entropy_bits
+from entropy_explore_env.belief.entropy import map_entropy_bits
+from entropy_explore_env.belief.map_update import PRIOR_MEAN
 from entropy_explore_env.belief.pooling import fresh_sums
 from entropy_explore_env.errors import CallOrderError, WorldError
 from entropy_explore_env.missions.navigation import plan_missions

@@ -13,7 +13,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from entropy_explore_env.belief.coverage_map import fuse_ray, measured_coverage, measurement_precision
+from entropy_explore_env.belief.map_update import fuse_ray
+from entropy_explore_env.belief.measurement_model import measured_coverage, measurement_precision
 from entropy_explore_env.belief.raycast import (
     NEVER_STOP,
     OPEN,

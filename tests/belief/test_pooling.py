@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from entropy_explore_env.belief.coverage_map import fuse_ray
+from entropy_explore_env.belief.map_update import fuse_ray
 from entropy_explore_env.belief.pooling import fresh_sums, fuse_pooled_ray, new_cells, normalised_entropy
 from tests.reference.scenes import drawn, seeds
 

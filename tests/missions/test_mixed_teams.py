@@ -9,7 +9,7 @@ import pickle
 import numpy as np
 import pytest
 
-from entropy_explore_env.belief.coverage_map import map_entropy_bits
+from entropy_explore_env.belief.entropy import map_entropy_bits
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.missions.poses import pose_at
 from entropy_explore_env.missions.rules import rules_of

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from entropy_explore_env.belief.coverage_map import map_entropy_bits
+from entropy_explore_env.belief.entropy import map_entropy_bits
 from entropy_explore_env.robots.range_sensor import RangeSensor, fuse_scan, new_scan, sensor_model, take_scan
 from entropy_explore_env.settings import Grid, gaussian_entropy_bits
 from tests.reference import rocha04

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from entropy_explore_env.belief.coverage_map import map_entropy_bits
+from entropy_explore_env.belief.entropy import map_entropy_bits
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.reports.state_values import state_digest
 from entropy_explore_env.scenario import with_settings

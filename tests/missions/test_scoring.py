@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from entropy_explore_env.belief.coverage_map import map_entropy_bits
+from entropy_explore_env.belief.entropy import map_entropy_bits
 from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.missions.state import PROGRESS
 from entropy_explore_env.reports.metrics import joint_figures

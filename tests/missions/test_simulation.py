@@ -8,7 +8,7 @@ import math
 import numpy as np
 import pytest
 
-from entropy_explore_env.belief.coverage_map import map_entropy_bits
+from entropy_explore_env.belief.entropy import map_entropy_bits
 from entropy_explore_env.belief.raycast import longest_crossing
 from entropy_explore_env.errors import CallOrderError, SettingError, WorldError
 from entropy_explore_env.missions.poses import pose_at

@@ -9,13 +9,9 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from entropy_explore_env.belief.coverage_map import (
-    expected_utility,
-    fuse_ray,
-    map_entropy_bits,
-    measured_coverage,
-    measurement_precision,
-)
+from entropy_explore_env.belief.entropy import map_entropy_bits
+from entropy_explore_env.belief.map_update import expected_utility, fuse_ray
+from entropy_explore_env.belief.measurement_model import measured_coverage, measurement_precision
 from entropy_explore_env.belief.raycast import NEVER_STOP, cast_ray
 from entropy_explore_env.settings import gaussian_entropy_bits
 from tests.reference import rocha04

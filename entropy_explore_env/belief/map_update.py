@@ -1,0 +1,88 @@
+"""How a range measurement changes a belief, and what it brings (Rocha04, sect. 2-3).
+
+A belief holds one Gaussian of coverage per voxel, as mean and precision 1/σ². Coverage is the covered share
+of a voxel, in [0, 1]; information is in bits.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from entropy_explore_env.compilation.kernels import inlined_kernel
+
+PRIOR_MEAN = 0.5
+"""Expected coverage of a voxel that nobody has measured: no preference."""
+
+_FOLD_BELOW = 1e-250
+"""A product of precision ratios is folded into bits, by its logarithm, before it could leave a float64.
+
+Settings keep a ratio above 1e-16, so that a product that is not yet below stays above 1e-266.
+"""
+
+
+@inlined_kernel
+def fuse_ray(mean, precision, crossed, coverage, free, n, measured):
+    """Fuse one range measurement into the voxels that its ray crosses.
+
+    The product of two Gaussians (Rocha04, eqs. 17-18) adds precisions and weighs means by them;
+    the measurement's utility (eq. 27) falls out as
+
+        I = ½ log2 Π p′/p    over the crossed voxels.
+
+    Args:
+        mean: (V,) float32, expected coverage in [0, 1]; changed in place.
+        precision: (V,) float32, 1/σ², > 0; changed in place.
+        crossed: (L,) int32, the crossed voxels, each once; `n` of them.
+        coverage: (L,) float32, measured coverage, from index `free` on; before it is 0.
+        free: Number of leading voxels that measure 0.
+        n: Number of crossed voxels.
+        measured: Precision of the measurement, 1/σ(d)².
+
+    Returns:
+        Utility in bits, ≥ 0.
+    """
+    gain, bits, shrink = np.float32(measured), 0.0, 1.0
+    for i in range(free):
+        voxel = np.uint32(crossed[i])
+        before = precision[voxel]
+        after = before + gain
+        share = before / after
+        precision[voxel] = after
+        mean[voxel] = mean[voxel] * share
+        shrink *= share
+        if shrink < _FOLD_BELOW:
+            bits -= math.log2(shrink)
+            shrink = 1.0
+    for i in range(free, n):
+        voxel = np.uint32(crossed[i])
+        before = precision[voxel]
+        after = before + gain
+        share = before / after
+        precision[voxel] = after
+        mean[voxel] = coverage[i] + (mean[voxel] - coverage[i]) * share
+        shrink *= share
+        if shrink < _FOLD_BELOW:
+            bits -= math.log2(shrink)
+            shrink = 1.0
+    return 0.5 * (bits - math.log2(shrink))
+
+
+@inlined_kernel
+def expected_utility(precision, crossed, n, measured):
+    """Utility in bits that a ray over these voxels would bring; nothing is changed (eq. 27).
+
+    Args:
+        precision: (V,) float32, 1/σ².
+        crossed: (L,) int32, the crossed voxels; `n` of them.
+        n: Number of crossed voxels.
+        measured: Precision of the measurement, 1/σ(d)².
+    """
+    bits, growth, gain = 0.0, 1.0, np.float32(measured)
+    for i in range(n):
+        growth *= np.float32(1.0) + gain / precision[np.uint32(crossed[i])]
+        if growth > 1.0 / _FOLD_BELOW:
+            bits += math.log2(growth)
+            growth = 1.0
+    return 0.5 * (bits + math.log2(growth))
