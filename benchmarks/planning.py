@@ -17,9 +17,14 @@ from baselines.papers.bhattacharya.simulation.belief import Sensor
 from baselines.papers.bhattacharya.simulation.team import Rules, Simulation
 from baselines.papers.bhattacharya.timing import cost_graph
 from benchmarks.rows import Effort, Goal, Row, alone, compared, interleave, timed
-from entropy_explore_env.belief.paths.geodesic_cells import NOBODY, Tessellation, new_tessellation, tessellate
+from entropy_explore_env.belief.paths.geodesic_cells import (
+    UNREACHED,
+    Tessellation,
+    new_tessellation,
+    tessellate,
+)
 from entropy_explore_env.belief.paths.lattice import belief_costs, new_lattice
-from entropy_explore_env.belief.paths.planning import search_ways
+from entropy_explore_env.belief.paths.planning import search_paths
 from entropy_explore_env.belief.paths.search import new_search
 
 MAP = (1000, 783, 1)
@@ -31,7 +36,6 @@ _MAP_SHARE, _FLOOR_SHARE = 0.25, 0.16
 _EDGES = (4, 40)
 _ROOM = 40
 _PRIOR, _KNOWN = 1e-3, 100.0
-_NO_CELLS = np.zeros(0, np.int32)
 
 
 def cluttered(shape: tuple[int, int, int], share: float, seed: int = 0) -> np.ndarray:
@@ -100,9 +104,9 @@ class Search:
         object.__setattr__(self, "_parts", parts)
 
     def cost(self, start: int, goal: int) -> float:
-        """Cost of a way."""
+        """Cost of a path."""
         sources = np.array([start], np.int32)
-        return search_ways(*self._parts, sources, goal, math.inf, _NO_CELLS)  # type: ignore[attr-defined]
+        return search_paths(*self._parts, sources, goal, math.inf)  # type: ignore[attr-defined]
 
 
 def planning_rows(effort: Effort) -> list[Row]:
@@ -153,8 +157,8 @@ def check_tessellation(ours: Tessellation, graph: csr_matrix, sources: np.ndarra
     if not np.allclose(costs, least, rtol=1e-6):
         raise RuntimeError("our costs are not SciPy's")
     reached = np.flatnonzero(np.isfinite(least))
-    if (cells[~np.isfinite(least)] != NOBODY).any():
-        raise RuntimeError("somebody has what nobody reaches")
+    if (cells[~np.isfinite(least)] != UNREACHED).any():
+        raise RuntimeError("a voxel that no source reaches has a cell")
     first = (each[:, reached] <= least[reached] * (1.0 + 1e-9)).argmax(axis=0)
     if not np.array_equal(cells[reached], first):
         raise RuntimeError("our cells are not those of the first nearest source")

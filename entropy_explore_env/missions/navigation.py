@@ -1,6 +1,6 @@
-"""Where robots with a navigator plan their ways: before a step, apart from it.
+"""Path planning for the robots that have a navigator: before a step, in a call of its own.
 
-So planning is compiled only where somebody plans.
+So planning is compiled only for missions in which robots plan.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from entropy_explore_env.missions.action import decode_action
 from entropy_explore_env.missions.poses import grid_position
 from entropy_explore_env.missions.state import MissionEnd
 from entropy_explore_env.robots.motion import MoveEnd
-from entropy_explore_env.robots.navigator import find_way
+from entropy_explore_env.robots.navigator import plan_path
 
 _RUNNING = MissionEnd.RUNNING.code
 _ARRIVED = MoveEnd.ARRIVED.code
@@ -18,7 +18,7 @@ _ARRIVED = MoveEnd.ARRIVED.code
 
 @lean_kernel
 def plan_missions(rules, state, closed, navigator, kind, boxes, numbers, first, last):
-    """Plan the ways of the robots of one kind that decide, each through its own belief.
+    """Plan the paths of the robots of one kind that decide, each through its own belief.
 
     Args:
         rules: The scenario.
@@ -42,14 +42,14 @@ def plan_missions(rules, state, closed, navigator, kind, boxes, numbers, first, 
                     decode_action(rules, index, robot.goal, box, number, robot.target)
                     mean, precision = state.mean[mission, index], state.precision[mission, index]
                     there = closed[mission * own.radii + own.barriers]
-                    plan_way(own, navigator, mean, precision, there, robot)
+                    plan_drive(own, navigator, mean, precision, there, robot)
 
 
 @lean_kernel
-def plan_way(numbers, navigator, mean, precision, closed, robot):
-    """Write a robot's way to its target: waypoints in metres, and how it ends if nothing stops it."""
+def plan_drive(numbers, navigator, mean, precision, no_fly, robot):
+    """Write a robot's path to its target: waypoints in metres, and how its drive ends if nothing stops it."""
     start, goal = grid_position(numbers, robot.goal), grid_position(numbers, robot.target)
-    robot.waypoints, robot.way_end = find_way(navigator, mean, precision, closed, start, goal, robot.way)
+    robot.waypoints, robot.way_end = plan_path(navigator, mean, precision, no_fly, start, goal, robot.way)
     for point in range(robot.waypoints):
         for axis in range(3):
             robot.way[point, axis] = numbers.origin_m[axis] + robot.way[point, axis] * numbers.voxel_size_m

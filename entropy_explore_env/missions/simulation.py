@@ -20,7 +20,7 @@ from entropy_explore_env.missions.rules import rules_of
 from entropy_explore_env.missions.state import MissionEnd, MissionState, check_memory, new_state
 from entropy_explore_env.missions.tick import mask_missions, step_missions
 from entropy_explore_env.randomness import Stream, check_seed, generator, splitmix_states
-from entropy_explore_env.robots.navigator import new_navigators, touched_voxels
+from entropy_explore_env.robots.navigator import footprints, new_navigators
 from entropy_explore_env.robots.range_sensor import Scan, new_scan
 from entropy_explore_env.scenario import Scenario
 from entropy_explore_env.settings import Grid, gaussian_entropy_bits
@@ -100,7 +100,7 @@ class Missions:
         ]
         self._navigators = [new_navigators(self.scenario) for _ in range(self.threads)]
         planning = self._navigators[0]
-        self._balls = touched_voxels(planning, len(kinds)) if planning else None
+        self._balls = footprints(planning, len(kinds)) if planning else None
 
     @property
     def grid(self) -> Grid:

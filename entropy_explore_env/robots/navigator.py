@@ -1,7 +1,7 @@
 """The navigator: from where a robot is to where it wants to be, through what it believes, in grid units.
 
-The way is the cheapest one by steps between voxel centres (`planning`), pulled straight. Where none is
-known it leads as near to the goal as one is known to lead.
+The path is the cheapest one by steps between voxel centres (`planning`), shortened by string pulling. Where
+no path to the goal is known, it leads to the reachable voxel nearest to the goal.
 """
 
 from __future__ import annotations
@@ -12,17 +12,18 @@ from typing import NamedTuple
 
 import numpy as np
 
-from entropy_explore_env.belief.paths.lattice import KNOWN_RATIO, Costs, Lattice, new_lattice, place_of
-from entropy_explore_env.belief.paths.planning import search_ways
+from entropy_explore_env.belief.paths.lattice import KNOWN_RATIO, Costs, Lattice, new_lattice
+from entropy_explore_env.belief.paths.planning import search_paths
 from entropy_explore_env.belief.paths.search import (
     Search,
     cost_to,
+    extract_path,
     is_passable,
     mark_of,
     new_search,
-    way_to,
 )
-from entropy_explore_env.belief.paths.string_pulling import cost_of_sight, pull_straight
+from entropy_explore_env.belief.paths.string_pulling import Path, line_of_sight_cost, string_pull
+from entropy_explore_env.belief.voxel_index import flat_index, grid_index
 from entropy_explore_env.compilation.kernels import lean_kernel
 from entropy_explore_env.robots.motion import MoveEnd
 from entropy_explore_env.scenario import Scenario
@@ -35,20 +36,18 @@ _PASSABLE, _REACHED = np.int64(0), np.int64(1)
 
 
 class Navigator(NamedTuple):
-    """Working space of plans, for one thread. Its memory is taken where plans come to."""
+    """Memory of plans, for one thread; the system provides the memory of a voxel when a plan reaches it."""
 
     search: Search
     lattice: Lattice
     known_precision: float
     unknown_cost: float
     source: np.ndarray
-    """(1,) int32, the voxel in which a way begins."""
-    no_cells: np.ndarray
-    """(0,) int32."""
-    way: np.ndarray
-    """(V,) int32, voxels on the way."""
+    """(1,) int32, the voxel in which a path starts."""
+    path: np.ndarray
+    """(V,) int32, voxels of the path."""
     ends: np.ndarray
-    """(2, 3) float64, start and finish of the way."""
+    """(2, 3) float64, start and finish of the path."""
 
 
 def lattice_of(scenario: Scenario, robot: Robot) -> Lattice:
@@ -58,9 +57,9 @@ def lattice_of(scenario: Scenario, robot: Robot) -> Lattice:
 
 
 def new_navigators(scenario: Scenario) -> dict[int, Navigator]:
-    """Working space for the plans of each kind of robot that plans, by its number.
+    """Memory for the plans of each kind of robot that plans, by its number.
 
-    They share all that is as large as the map, so they may not be used at once.
+    They share all arrays of the map's size, so they may not be used at the same time.
     """
     planning = {n: kind.robot for n, kind in enumerate(scenario.kinds) if kind.robot.navigator == "planned"}
     navigators: dict[int, Navigator] = {}
@@ -74,17 +73,17 @@ def new_navigators(scenario: Scenario) -> dict[int, Navigator]:
     return navigators
 
 
-def touched_voxels(navigators: Mapping[int, Navigator], kinds: int) -> np.ndarray:
-    """(K, B, 3) int64, what bodies of each kind touch, by axis; their own voxel fills up."""
-    touched = {kind: navigator.lattice.touched for kind, navigator in navigators.items()}
-    balls = np.zeros((kinds, max(len(each) for each in touched.values()), 3), np.int64)
-    for kind, each in touched.items():
-        balls[kind, : len(each)] = each
-    return balls
+def footprints(navigators: Mapping[int, Navigator], kinds: int) -> np.ndarray:
+    """(K, B, 3) int64 footprints of each kind's body as index offsets, padded with (0, 0, 0)."""
+    each = {kind: navigator.lattice.footprint for kind, navigator in navigators.items()}
+    padded = np.zeros((kinds, max(len(footprint) for footprint in each.values()), 3), np.int64)
+    for kind, footprint in each.items():
+        padded[kind, : len(footprint)] = footprint
+    return padded
 
 
 def new_navigator(scenario: Scenario, robot: Robot) -> Navigator:
-    """Working space for the plans of one kind of robot."""
+    """Memory for the plans of one kind of robot."""
     prior_precision = float(np.float32(scenario.sigma_prior**-2))
     return Navigator(
         search=new_search(scenario.grid.voxels),
@@ -92,8 +91,7 @@ def new_navigator(scenario: Scenario, robot: Robot) -> Navigator:
         known_precision=KNOWN_RATIO * prior_precision,
         unknown_cost=float(robot.unknown_cost),
         source=np.zeros(1, np.int32),
-        no_cells=np.zeros(0, np.int32),
-        way=np.empty(scenario.grid.voxels, np.int32),
+        path=np.empty(scenario.grid.voxels, np.int32),
         ends=np.zeros((2, 3)),
     )
 
@@ -117,8 +115,8 @@ def _nearest(search, lattice, costs, goal, start, choice):
     Looked for in growing shells around the goal; of equals the first. The start is one, whatever it is.
     """
     size, layer = lattice.size, lattice.layer
-    x, y, z = place_of(lattice, goal)
-    i, j, k = place_of(lattice, start)
+    x, y, z = grid_index(size, goal)
+    i, j, k = grid_index(size, start)
     best, nearest = start, (i - x) ** 2 + (j - y) ** 2 + (k - z) ** 2
     shell = 1
     while shell * shell < nearest:
@@ -131,7 +129,7 @@ def _nearest(search, lattice, costs, goal, start, choice):
                     apart = (i - x) ** 2 + (j - y) ** 2 + (k - z) ** 2
                     if apart >= nearest:
                         continue
-                    voxel = (i * size[1] + j) * size[2] + k
+                    voxel = flat_index(size, i, j, k)
                     if choice == _REACHED:
                         found = not math.isinf(cost_to(search, voxel))
                     else:
@@ -143,40 +141,40 @@ def _nearest(search, lattice, costs, goal, start, choice):
 
 
 @lean_kernel
-def _search_way(navigator, costs, source, goal):
-    """Search the way to a voxel or, where none is known, to the nearest one; returns where it leads."""
+def _search_path(navigator, costs, source, goal):
+    """Search a path to a voxel or, where none is known, to the nearest reachable one; returns its end."""
     search, lattice = navigator.search, navigator.lattice
-    cost = search_ways(search, lattice, costs, navigator.source, goal, math.inf, navigator.no_cells)
+    cost = search_paths(search, lattice, costs, navigator.source, goal, math.inf)
     if not math.isinf(cost):
         return goal
-    x, y, z = place_of(lattice, goal)
+    x, y, z = grid_index(lattice.size, goal)
     if not is_passable(mark_of(search, lattice, costs, goal, x, y, z)):  # then nothing was searched
         near = _nearest(search, lattice, costs, goal, source, _PASSABLE)
-        cost = search_ways(search, lattice, costs, navigator.source, near, math.inf, navigator.no_cells)
+        cost = search_paths(search, lattice, costs, navigator.source, near, math.inf)
         if not math.isinf(cost):
             return near
     return _nearest(search, lattice, costs, goal, source, _REACHED)
 
 
 @lean_kernel
-def find_way(navigator, mean, precision, closed, start, goal, waypoints):
+def plan_path(navigator, mean, precision, no_fly, start, goal, waypoints):
     """Fill in the points to which a robot has to drive straight, one after the other.
 
     Args:
-        navigator: Working space.
+        navigator: Memory of the plan.
         mean: (V,) float32, the robot's expected coverage.
         precision: (V,) float32, 1/σ² of it.
-        closed: (V,) bool, where the body would reach above the ceiling; (0,) = there is none.
+        no_fly: (V,) bool, where the body would reach above the ceiling; (0,) = there is no ceiling.
         start: (x, y, z), inside the workspace.
         goal: (x, y, z), anywhere.
-        waypoints: (W, 3) float64, filled in; the start is none of them.
+        waypoints: (W, 3) float64, filled in; the start is not among them.
 
     Returns:
         (count, code): how many there are, at least one, and how the drive ends if nothing stops it:
-        the code of ARRIVED, NO_PATH or CORNERS (the way needs more than W).
+        the code of ARRIVED, NO_PATH or CORNERS (the path needs more than W).
     """
     search, lattice = navigator.search, navigator.lattice
-    costs = Costs(mean, precision, navigator.known_precision, navigator.unknown_cost, mean[:0], 1.0, closed)
+    costs = Costs(mean, precision, navigator.known_precision, navigator.unknown_cost, mean[:0], 1.0, no_fly)
     begin, finish = navigator.ends[0], navigator.ends[1]
     inside, length = True, 0.0
     for axis in range(3):
@@ -186,8 +184,8 @@ def find_way(navigator, mean, precision, closed, start, goal, waypoints):
     source, wanted = _voxel_at(lattice, begin), _voxel_at(lattice, finish)
     navigator.source[0] = source
     if inside:  # straight through known free space there is nothing to search
-        search_ways(search, lattice, costs, navigator.source, source, 0.0, navigator.no_cells)
-        sight = cost_of_sight(
+        search_paths(search, lattice, costs, navigator.source, source, 0.0)
+        sight = line_of_sight_cost(
             search,
             lattice,
             costs,
@@ -199,17 +197,18 @@ def find_way(navigator, mean, precision, closed, start, goal, waypoints):
                 waypoints[0, axis] = finish[axis]
             return 1, _ARRIVED
     code = _ARRIVED
-    found = _search_way(navigator, costs, source, wanted)
+    found = _search_path(navigator, costs, source, wanted)
     if found != wanted or not inside:
         code = _NO_PATH
-        x, y, z = place_of(lattice, found)
+        x, y, z = grid_index(lattice.size, found)
         for axis, index in enumerate((x, y, z)):
             if found == source or (axis == 2 and lattice.layer >= 0):
                 finish[axis] = begin[axis]
             else:
                 finish[axis] = index + 0.5
-    voxels = way_to(search, lattice, found, navigator.way)
-    count = pull_straight(search, lattice, costs, navigator.way, voxels, begin, finish, waypoints)
+    voxels = extract_path(search, lattice, found, navigator.path)
+    path = Path(navigator.path, voxels, begin, finish)
+    count = string_pull(search, lattice, costs, path, waypoints)
     if count == 0:
         count = 1
         for axis in range(3):

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import ndimage
 
-from entropy_explore_env.belief.paths.lattice import NOTHING_CLOSED
+from entropy_explore_env.belief.paths.lattice import NO_FLY_NOWHERE
 from entropy_explore_env.robots.motion import (
     MoveEnd,
     driven_share,
@@ -19,7 +19,7 @@ from entropy_explore_env.robots.motion import (
     line_believed_blocked,
     time_of_way,
 )
-from entropy_explore_env.robots.navigator import find_way, lattice_of, new_navigator
+from entropy_explore_env.robots.navigator import lattice_of, new_navigator, plan_path
 from entropy_explore_env.settings import Grid
 from entropy_explore_env.worlds.world import World
 from tests.reference.scenes import drawn, free_box, ray_space, seeds
@@ -40,9 +40,9 @@ def plan(scenario, solid, start, goal, known=None, places=32, closed=None):
     mean = solid.astype(np.float32).ravel()
     precision = np.full(mean.shape, KNOWN) if known is None else np.where(known.ravel(), KNOWN, PRIOR)
     points = np.full((places, 3), np.nan)
-    closed = NOTHING_CLOSED if closed is None else closed.ravel()
+    closed = NO_FLY_NOWHERE if closed is None else closed.ravel()
     navigator = new_navigator(scenario, scenario.robot)
-    count, code = find_way(navigator, mean, precision, closed, start, goal, points)
+    count, code = plan_path(navigator, mean, precision, closed, start, goal, points)
     assert np.isnan(points[count:]).all()
     return points[:count], list(MoveEnd)[code]
 
@@ -186,7 +186,7 @@ def test_who_knows_the_world_meets_nothing_and_gets_wherever_a_way_leads(seed, s
         assert not line_believed_blocked(
             occupied.ravel().astype(np.float32),
             shape,
-            lattice_of(scenario, scenario.robot).touched,
+            lattice_of(scenario, scenario.robot).footprint,
             radius / 0.5,
             tuple(begin),
             tuple(finish),
@@ -204,7 +204,7 @@ def test_what_lies_within_the_body_s_reach_blocks_a_line():
     size = (7, 11, 1)
     crossed, entered = ray_space(size)
     wide = planner(body_radius_m=0.6)
-    ball = lattice_of(wide, wide.robot).touched
+    ball = lattice_of(wide, wide.robot).footprint
 
     def blocked(covered, begin_y):
         mean = np.full(size, 0.5, np.float32)

@@ -12,15 +12,15 @@ from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 
 from baselines.papers.bhattacharya.simulation.team import Simulation
-from entropy_explore_env.belief.paths.geodesic_cells import NOBODY, new_tessellation, tessellate
+from entropy_explore_env.belief.paths.geodesic_cells import UNREACHED, new_tessellation, tessellate
 
 
-def cost_graph(rates: np.ndarray, toll: float = 0.0, by_length: bool = True) -> csr_matrix:
+def cost_graph(rates: np.ndarray, length_cost: float = 0.0, by_length: bool = True) -> csr_matrix:
     """(V, V) what steps between the cells of a plan cost, as `tessellate` has it; none past a corner.
 
     Args:
         rates: (X, Y, 1) float32; inf = impassable.
-        toll: What every edge of way costs besides.
+        length_cost: Cost of a voxel edge of path in addition.
         by_length: Whether diagonal steps pay the rates of their whole length.
     """
     size_x, size_y, _ = rates.shape
@@ -38,7 +38,7 @@ def cost_graph(rates: np.ndarray, toll: float = 0.0, by_length: bool = True) -> 
         mean = 0.5 * (moved(plane, x, y, (0, 0))[legal] + moved(plane, x, y, (x, y))[legal])
         rows.append(moved(numbers, x, y, (0, 0))[legal])
         columns.append(moved(numbers, x, y, (x, y))[legal])
-        costs.append(mean * (length if by_length else 1.0) + toll * length)
+        costs.append(mean * (length if by_length else 1.0) + length_cost * length)
     ends = (np.concatenate(rows), np.concatenate(columns))
     return csr_matrix((np.concatenate(costs), ends), shape=(rates.size, rates.size))
 
@@ -76,7 +76,7 @@ def changed_share(simulation: Simulation, iterations: int) -> float:
         simulation.step(functional=False)
         if simulation.minds[0].tessellations > before:
             changed = (space.costs != costs) | (space.cells != cells)
-            shares.append(float(changed[space.cells != NOBODY].mean()))
+            shares.append(float(changed[space.cells != UNREACHED].mean()))
             costs, cells = space.costs.copy(), space.cells.copy()
     return statistics.fmean(shares[1:]) if len(shares) > 1 else math.nan
 

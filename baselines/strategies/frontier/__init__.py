@@ -26,8 +26,8 @@ import numpy as np
 from baselines.strategies.frontier.allocation import Allotter, Choice, Value, stays, under_way
 from baselines.strategies.frontier.candidates import Looking
 from baselines.strategies.protocol import random_viewpoint
-from entropy_explore_env.belief.paths.search import new_search, way_to
-from entropy_explore_env.belief.paths.string_pulling import straightened
+from entropy_explore_env.belief.paths.search import extract_path, new_search
+from entropy_explore_env.belief.paths.string_pulling import string_pulled
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.missions.view import RobotView
 from entropy_explore_env.robots.motion import MoveEnd
@@ -319,14 +319,14 @@ class FrontierStrategy:
             return [goal]
         allotter.seek(view.pose, choice.voxel)
         search, lattice = allotter.search, allotter.lattice
-        way = np.empty(way_to(search, lattice, choice.voxel, np.empty(0, np.int32)), np.int32)
-        if way_to(search, lattice, choice.voxel, way) == 0:
+        path = np.empty(extract_path(search, lattice, choice.voxel, np.empty(0, np.int32)), np.int32)
+        if extract_path(search, lattice, choice.voxel, path) == 0:
             return [goal]
         start = grid.in_grid_units(view.pose)[:3]
         end = np.stack(np.unravel_index(choice.voxel, grid.shape)) + 0.5
         if lattice.layer >= 0:
             end[2] = start[2]
-        points = straightened(search, lattice, allotter.costs, way, start, end)
+        points = string_pulled(search, lattice, allotter.costs, path, start, end)
         reach = min(robot.reach_m * _NOT_QUITE / grid.voxel_size_m, float(sum(grid.shape)))
         stops, at = [], start
         for point in points:

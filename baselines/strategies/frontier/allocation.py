@@ -23,9 +23,9 @@ import numpy as np
 from baselines.strategies.frontier.candidates import Candidates, Looking
 from baselines.strategies.frontier.terrain.candidates import TerrainCandidates
 from baselines.strategies.frontier.voxel.candidates import VoxelCandidates
-from entropy_explore_env.belief.paths.lattice import NOTHING_CLOSED, Costs, Lattice, new_lattice
-from entropy_explore_env.belief.paths.planning import begin_search, search_ways, widen_search
-from entropy_explore_env.belief.paths.search import Search, collect, cost_to
+from entropy_explore_env.belief.paths.lattice import Lattice, costs_of, new_lattice
+from entropy_explore_env.belief.paths.planning import resume_search, search_paths, start_search
+from entropy_explore_env.belief.paths.search import Search, cost_to, costs_to_all
 from entropy_explore_env.compilation.kernels import lean_kernel
 from entropy_explore_env.missions.view import RobotView, TeammateView
 from entropy_explore_env.robots.motion import driving_time
@@ -122,9 +122,7 @@ class Allotter:
             if ceiling is None
             else TerrainCandidates(scenario, kind, looking, ceiling)
         )
-        rates = self.candidates.rates
-        self.costs = Costs(rates[:0], rates[:0], 0.0, 1.0, rates, 1.0, NOTHING_CLOSED)
-        self._no_cells = np.zeros(0, np.int32)
+        self.costs = costs_of(self.candidates.rates, 1.0)
         self.counted = 0
 
     def allot(
@@ -190,7 +188,7 @@ class Allotter:
     def seek(self, pose: np.ndarray, goal: int) -> None:
         """Search the way from a pose to a voxel, through the mapped region."""
         with self._start_opened(pose) as source:
-            search_ways(self.search, self.lattice, self.costs, source, goal, math.inf, self._no_cells)
+            search_paths(self.search, self.lattice, self.costs, source, goal, math.inf)
 
     @contextmanager
     def _start_opened(self, pose: np.ndarray) -> Iterator[np.ndarray]:
@@ -207,8 +205,8 @@ class Allotter:
         arrays = self.search, self.lattice, self.costs
         with self._start_opened(pose) as source:
             if before is None or before.search != self.search.searches[0]:
-                begin_search(*arrays, source, self._no_cells)
-            widen_search(*arrays, reach, self._no_cells)
+                start_search(*arrays, source)
+            resume_search(*arrays, reach)
         voxels = self.candidates.voxels_of(slice(None))
         edges = np.full(len(voxels), np.inf)
         ask_costs(self.search, voxels, reach, edges)
@@ -232,7 +230,7 @@ class Allotter:
         if choice is None and robot == view.robot:
             whole_map = self._ways(pose, math.inf, ways[robot])
             everywhere = np.empty(self._scenario.grid.voxels)
-            collect(self.search, everywhere)
+            costs_to_all(self.search, everywhere)
             self.candidates.other_of(everywhere)
             ways.clear()  # candidates have moved
             ways[robot] = self._ways(pose, math.inf, whole_map)

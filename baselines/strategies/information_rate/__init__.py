@@ -24,9 +24,9 @@ from baselines.strategies.information_rate.expected_bits import (
     weigh_viewpoints,
 )
 from entropy_explore_env.belief.paths.lattice import belief_costs
-from entropy_explore_env.belief.paths.planning import search_ways
-from entropy_explore_env.belief.paths.search import cost_to, new_search, way_to
-from entropy_explore_env.belief.paths.string_pulling import straightened
+from entropy_explore_env.belief.paths.planning import ANY_GOAL, search_paths
+from entropy_explore_env.belief.paths.search import cost_to, extract_path, new_search
+from entropy_explore_env.belief.paths.string_pulling import string_pulled
 from entropy_explore_env.belief.raycast import STOP_AT_COVERED
 from entropy_explore_env.belief.visibility import CONE
 from entropy_explore_env.missions.view import RobotView
@@ -242,8 +242,7 @@ class InformationRate:
         prior = view.scenario.sigma_prior**-2
         costs = belief_costs(view.mean, view.precision, prior, self.weighing.unknown_cost, closed)
         start = np.ravel_multi_index(tuple(here[:3].astype(int)), grid.shape)
-        nobody = np.zeros(0, np.int32)
-        search_ways(self._search, lattice, costs, np.array([start], np.int32), -1, math.inf, nobody)
+        search_paths(self._search, lattice, costs, np.array([start], np.int32), ANY_GOAL, math.inf)
         cost = np.array([cost_to(self._search, int(voxel)) for voxel in drawn])
         reached = np.isfinite(cost) & (cost > 0.0)
         if not reached.any():
@@ -256,9 +255,10 @@ class InformationRate:
         best = int(np.argmax(worth))
         if worth[best] <= rate:
             return []
-        way = np.empty(way_to(self._search, lattice, int(goals[best]), nobody), np.int32)
-        way_to(self._search, lattice, int(goals[best]), way)
-        points = straightened(self._search, lattice, costs, way, here[:3].copy(), places[best, :3].copy())
+        goal, none = int(goals[best]), np.empty(0, np.int32)
+        path = np.empty(extract_path(self._search, lattice, goal, none), np.int32)
+        extract_path(self._search, lattice, goal, path)
+        points = string_pulled(self._search, lattice, costs, path, here[:3].copy(), places[best, :3].copy())
         return _stops(here[:3], points, reach)
 
     def _drawn_voxels(self, view: RobotView, here: np.ndarray, closed: np.ndarray | None) -> np.ndarray:

@@ -153,7 +153,7 @@ class MutualInformation:
         widest = 0.5 * sensor.angular_step_rad * math.hypot(sensor.columns - 1, sensor.rows - 1)
         places = longest_crossing(*grid.shape, math.inf, 1)
         return _Build(
-            ball=new_lattice(grid.shape, radius, scenario.layer_of(kind.robot)).touched,
+            ball=new_lattice(grid.shape, radius, scenario.layer_of(kind.robot)).footprint,
             half_angle_rad=min(widest, math.pi),
             space=(np.zeros(places, np.int32), np.zeros(places, np.int64)),
         )

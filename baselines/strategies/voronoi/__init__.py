@@ -28,7 +28,6 @@ from baselines.strategies.voronoi.controls import (
     gradient_step,
     nearest_uncertain,
     projected_centroids,
-    way_to,
 )
 from baselines.strategies.voronoi.occupancy_entropy import (
     close_voxels,
@@ -36,7 +35,12 @@ from baselines.strategies.voronoi.occupancy_entropy import (
     fill_occupancy_entropy,
     filtered,
 )
-from entropy_explore_env.belief.paths.geodesic_cells import NOBODY, new_tessellation, tessellate
+from entropy_explore_env.belief.paths.geodesic_cells import (
+    UNREACHED,
+    extract_path,
+    new_tessellation,
+    tessellate,
+)
 from entropy_explore_env.belief.visibility import CONE
 from entropy_explore_env.missions.view import RobotView
 from entropy_explore_env.robots.motion import MoveEnd
@@ -155,7 +159,7 @@ class VoronoiCoverage:
         lattice, shape = self._build(view).lattice, view.scenario.grid.shape
         rates = entropy.copy() if self.coverage.metric == "entropy" else np.ones(shape, np.float32)
         x, y, z = (int(i) for i in np.unravel_index(here, shape))
-        close_voxels(view.mean, lattice.touched, lattice.margin, lattice.layer, (x, y, z), rates)
+        close_voxels(view.mean, lattice.footprint, lattice.margin, lattice.layer, (x, y, z), rates)
         return rates
 
     def _stands(self, errand: _Errand, entropy: np.ndarray, rates: np.ndarray) -> bool:
@@ -186,10 +190,10 @@ class VoronoiCoverage:
             errand.way = self._descent(rates, density, own, here, metric)
         if (
             len(errand.way) == 0
-            and target != NOBODY
+            and target != UNREACHED
             and (coverage.control != "gradient-search" or uncertain[own])
         ):
-            errand.way = way_to(self._space, rates, target, *metric)[1:]
+            errand.way = extract_path(self._space, rates, target, *metric)[1:]
             errand.to_see = bool(entropy.reshape(-1)[target] >= coverage.tau)
 
     def _descent(

@@ -10,9 +10,8 @@ import math
 
 import numpy as np
 
-from entropy_explore_env.belief.paths.geodesic_cells import NOBODY, Tessellation, tessellate
-from entropy_explore_env.belief.paths.lattice import DIAGONALS
-from entropy_explore_env.compilation.kernels import inlined_kernel, kernel, lean_kernel
+from entropy_explore_env.belief.paths.geodesic_cells import UNREACHED, Tessellation, tessellate
+from entropy_explore_env.compilation.kernels import lean_kernel
 
 LN2 = math.log(2.0)
 """Entropy of a voxel that nobody has measured, in nats."""
@@ -27,20 +26,20 @@ def projected_centroids(
         there are any, else of all voxels of the cell.
 
     Args:
-        cells: (X, Y, Z) int32, whose each voxel is; NOBODY = nobody's.
+        cells: (X, Y, Z) int32, whose each voxel is; UNREACHED = nobody's.
         density: (X, Y, Z) float32, φ > 0.
         threshold: τ.
         sources: How many cells S there are.
 
     Returns:
-        (S,) int64 targets, NOBODY for an empty cell, and (S,) int64, how many voxels have φ ≥ τ.
+        (S,) int64 targets, UNREACHED for an empty cell, and (S,) int64, how many voxels have φ ≥ τ.
     """
     sums, nearest = np.zeros((sources, 4)), np.full((sources, 2), np.inf)
-    targets = np.full((sources, 2), NOBODY, np.int64)
+    targets = np.full((sources, 2), UNREACHED, np.int64)
     uncertain = np.zeros(sources, np.int64)
     _sum_up(cells, density, threshold, sums, uncertain)
     _project(cells, density, threshold, sums, nearest, targets)
-    return np.where(targets[:, 0] == NOBODY, targets[:, 1], targets[:, 0]), uncertain
+    return np.where(targets[:, 0] == UNREACHED, targets[:, 1], targets[:, 0]), uncertain
 
 
 @lean_kernel
@@ -113,8 +112,8 @@ def _project(
 def nearest_uncertain(
     cells: np.ndarray, costs: np.ndarray, density: np.ndarray, threshold: float, sources: int
 ) -> np.ndarray:
-    """(S,) int64: of each cell the voxel with φ ≥ τ that costs least to reach; NOBODY = it has none."""
-    cheapest, targets = np.full(sources, np.inf), np.full(sources, NOBODY, np.int64)
+    """(S,) int64: of each cell the voxel with φ ≥ τ that costs least to reach; UNREACHED = it has none."""
+    cheapest, targets = np.full(sources, np.inf), np.full(sources, UNREACHED, np.int64)
     _seek_uncertain(cells, costs, density, threshold, cheapest, targets)
     return targets
 
@@ -175,9 +174,9 @@ class CellSearch:
         self._space, self._density = space, density
         self._rates = np.where(cell, rates, np.float32(np.inf))
 
-    def functional(self, voxel: int, toll: float, by_length: bool) -> float:
+    def functional(self, voxel: int, length_cost: float, by_length: bool) -> float:
         """H of the cell for a robot in this voxel; inf where part of the cell would be out of reach."""
-        tessellate(self._space, self._rates, np.array([voxel]), toll, by_length)
+        tessellate(self._space, self._rates, np.array([voxel]), length_cost, by_length)
         if np.count_nonzero(self._space.cell == 0) < np.count_nonzero(np.isfinite(self._rates)):
             return math.inf
         return float(coverage_functionals(self._space.cells, self._space.costs, self._density, 1)[0])
@@ -201,81 +200,21 @@ def neighbours(free: np.ndarray, voxel: int) -> list[int]:
     return found
 
 
-def gradient_step(search: CellSearch, cell: np.ndarray, voxel: int, toll: float, by_length: bool) -> int:
+def gradient_step(
+    search: CellSearch, cell: np.ndarray, voxel: int, length_cost: float, by_length: bool
+) -> int:
     """The neighbour in its own cell at which the robot's functional is least; itself if none is less (eq. 3).
 
     Args:
         search: Of the robot's cell.
         cell: (X, Y, Z) bool, the cell.
         voxel: Where the robot is.
-        toll: As the tessellation had it.
+        length_cost: As the tessellation had it.
         by_length: Likewise.
     """
-    best, least = voxel, search.functional(voxel, toll, by_length)
+    best, least = voxel, search.functional(voxel, length_cost, by_length)
     for near in neighbours(cell, voxel):
-        functional = search.functional(near, toll, by_length)
+        functional = search.functional(near, length_cost, by_length)
         if functional < least:
             best, least = near, functional
     return best
-
-
-def way_to(space: Tessellation, rates: np.ndarray, voxel: int, toll: float, by_length: bool) -> np.ndarray:
-    """The cheapest way from a cell's source to a voxel in it; it does not leave the cell.
-
-    Read off the costs backwards: no search is needed.
-
-    Args:
-        space: After `tessellate`.
-        rates: As the tessellation had them.
-        voxel: Where the way ends.
-        toll: As the tessellation had it.
-        by_length: Likewise.
-
-    Returns:
-        (N,) int64 voxels from the source on, both ends with it; none if nobody reaches the voxel.
-    """
-    lengths = np.array([(length if by_length else 1.0, toll * length) for length in DIAGONALS])
-    cells, costs = space.cells, space.costs
-    if cells.reshape(-1)[voxel] == NOBODY:
-        return np.zeros(0, np.int64)
-    return _walk_back(cells, costs, rates, lengths, voxel)
-
-
-@inlined_kernel
-def _legal(rates: np.ndarray, x: int, y: int, z: int, i: int, j: int, k: int) -> bool:
-    """Whether nothing impassable is in the box between two neighbouring voxels."""
-    for a in range(min(x, i), max(x, i) + 1):
-        for b in range(min(y, j), max(y, j) + 1):
-            for c in range(min(z, k), max(z, k) + 1):
-                if math.isinf(rates[a, b, c]):
-                    return False
-    return True
-
-
-@kernel
-def _walk_back(
-    cells: np.ndarray, costs: np.ndarray, rates: np.ndarray, lengths: np.ndarray, voxel: int
-) -> np.ndarray:
-    size_x, size_y, size_z = cells.shape
-    way = np.empty(cells.size, np.int64)
-    way[0], count = voxel, 1
-    x, y, z = voxel // (size_y * size_z), voxel // size_z % size_y, voxel % size_z
-    cell = cells[x, y, z]
-    while costs[x, y, z] > 0.0:
-        best, next_x, next_y, next_z = math.inf, x, y, z
-        for i in range(max(x - 1, 0), min(x + 2, size_x)):
-            for j in range(max(y - 1, 0), min(y + 2, size_y)):
-                for k in range(max(z - 1, 0), min(z + 2, size_z)):
-                    if cells[i, j, k] != cell or costs[i, j, k] >= costs[x, y, z]:
-                        continue
-                    axes = abs(i - x) + abs(j - y) + abs(k - z)
-                    mean = 0.5 * (np.float64(rates[i, j, k]) + np.float64(rates[x, y, z]))
-                    cost = costs[i, j, k] + lengths[axes - 1, 1] + mean * lengths[axes - 1, 0]
-                    if cost < best and _legal(rates, x, y, z, i, j, k):
-                        best, next_x, next_y, next_z = cost, i, j, k
-        if math.isinf(best):  # the costs are not those of these rates
-            return way[:0].copy()
-        x, y, z = next_x, next_y, next_z
-        way[count] = (x * size_y + y) * size_z + z
-        count += 1
-    return way[:count][::-1].copy()

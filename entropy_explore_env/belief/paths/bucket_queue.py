@@ -1,8 +1,8 @@
-"""A queue of voxels by cost, in a ring of buckets (Dial 1969; Denardo & Fox 1979).
+"""A priority queue of voxels by cost: a ring of buckets (Dial 1969; Denardo & Fox 1979).
 
-A bucket holds the voxels whose keys lie in one interval, in no order: putting in and taking out cost
-the same however many wait. Its entries lie in blocks of one cache line; blocks that are emptied serve
-again, so that the queue takes the memory of the entries that wait at once.
+A bucket holds the voxels whose keys lie in one interval, in no order: pushing and popping take the same
+time whatever the length of the queue. The voxels of a bucket lie in a linked list of blocks of one cache
+line each. Emptied blocks are used again, so the queue needs only the memory of what it holds at one time.
 """
 
 from __future__ import annotations
@@ -14,146 +14,151 @@ import numpy as np
 from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel
 
 BUCKETS = 1024
-"""Buckets of the ring, a power of two; what lies farther ahead waits in the last one."""
+"""Buckets of the ring, a power of two; keys beyond the ring go into the last one."""
 
-_RING = BUCKETS - 1
-_ENTRIES = 15
+_RING_MASK = BUCKETS - 1
+_BLOCK_ENTRIES = 15
 """Voxels of a block: with the number of the next block they fill 64 bytes."""
-_NONE = -1
+_NO_BLOCK = -1
 
-_NUMBERS = np.dtype(
+_STATE = np.dtype(
     [
-        ("current", "i8"),  # number of the bucket that is worked off
-        ("waiting", "i8"),  # entries in all buckets
-        ("fresh", "i8"),  # first block that was never used
-        ("freed", "i8"),  # first block that can be used again; -1 = none
+        ("current", "i8"),  # number of the bucket that is processed now
+        ("entries", "i8"),  # voxels in all buckets
+        ("unused", "i8"),  # first of the blocks that were never used
+        ("free", "i8"),  # first block of the list of emptied ones; -1 = none
     ],
     align=True,
 )
 
 
 class BucketQueue(NamedTuple):
-    """A queue. Its buckets are numbered from 0; `BUCKETS` of them, from the current one on, can be filled."""
+    """A queue. Buckets are numbered from 0; at any time `BUCKETS` of them, from the current one on, exist."""
 
     blocks: np.ndarray
     """(N, 16) int32: the next block of the bucket, -1 = none, and 15 voxels."""
     heads: np.ndarray
-    """(BUCKETS, 2) int32: first block, -1 = none, and how many voxels it holds; all others are full."""
-    numbers: np.ndarray
-    """(1,) of _NUMBERS."""
+    """(BUCKETS, 2) int32: first block of a bucket, -1 = none, and how many voxels it holds.
+
+    All other blocks of a bucket are full.
+    """
+    state: np.ndarray
+    """(1,) of _STATE."""
 
 
 def new_queue(entries: int) -> BucketQueue:
-    """A queue with room for this many entries; the memory is taken when it is used."""
-    # One block a bucket is partly filled, one is taken out, one is spare.
-    blocks = entries // _ENTRIES + 1 + BUCKETS + 2
+    """A queue with room for this many entries; the system provides the memory when it is first written."""
+    # One block of each bucket is partly filled, one is popped, one is spare.
+    blocks = entries // _BLOCK_ENTRIES + 1 + BUCKETS + 2
     return BucketQueue(
-        np.empty((blocks, _ENTRIES + 1), np.int32), np.empty((BUCKETS, 2), np.int32), np.zeros(1, _NUMBERS)
+        np.empty((blocks, _BLOCK_ENTRIES + 1), np.int32),
+        np.empty((BUCKETS, 2), np.int32),
+        np.zeros(1, _STATE),
     )
 
 
 @lean_kernel
 def clear_queue(queue):
-    """Empty a queue, whatever it holds; the current bucket is the first."""
+    """Empty a queue; its current bucket becomes the first one."""
     for place in range(BUCKETS):
-        queue.heads[place, 0], queue.heads[place, 1] = _NONE, 0
-    numbers = queue.numbers[0]
-    numbers.current, numbers.waiting, numbers.fresh, numbers.freed = 0, 0, 0, _NONE
+        queue.heads[place, 0], queue.heads[place, 1] = _NO_BLOCK, 0
+    state = queue.state[0]
+    state.current, state.entries, state.unused, state.free = 0, 0, 0, _NO_BLOCK
 
 
 @inlined_kernel
 def queue_full(queue):
-    """Whether no block is left but the spare one, which `keep_entries` needs."""
-    numbers = queue.numbers[0]
-    return numbers.freed == _NONE and numbers.fresh >= len(queue.blocks) - 1
+    """Whether only the spare block is left, which `compact` needs."""
+    state = queue.state[0]
+    return state.free == _NO_BLOCK and state.unused >= len(queue.blocks) - 1
 
 
 @inlined_kernel
-def put(queue, bucket, voxel):
-    """Put a voxel into a bucket: one before the current counts as it, one beyond the ring as the last."""
-    numbers, heads, blocks = queue.numbers[0], queue.heads, queue.blocks
-    place = min(max(bucket, numbers.current), numbers.current + _RING) & _RING
+def push(queue, bucket, voxel):
+    """Push a voxel into a bucket: the current one if it is earlier, the last one if it is beyond the ring."""
+    state, heads, blocks = queue.state[0], queue.heads, queue.blocks
+    place = min(max(bucket, state.current), state.current + _RING_MASK) & _RING_MASK
     count = heads[place, 1]
-    if heads[place, 0] == _NONE or count == _ENTRIES:
-        block = numbers.freed
-        if block == _NONE:
-            block = numbers.fresh
-            numbers.fresh += 1
+    if heads[place, 0] == _NO_BLOCK or count == _BLOCK_ENTRIES:
+        block = state.free
+        if block == _NO_BLOCK:
+            block = state.unused
+            state.unused += 1
         else:
-            numbers.freed = blocks[block, 0]
+            state.free = blocks[block, 0]
         blocks[block, 0] = heads[place, 0]
         heads[place, 0] = block
         count = 0
     blocks[heads[place, 0], count + 1] = voxel
     heads[place, 1] = count + 1
-    numbers.waiting += 1
+    state.entries += 1
 
 
 @inlined_kernel
-def go_on(queue):
-    """Make the first bucket that is not empty the current one; returns whether there is one."""
-    numbers, heads, current = queue.numbers[0], queue.heads, queue.numbers[0].current
-    if numbers.waiting == 0:
+def advance(queue):
+    """Make the first bucket that is not empty the current one; False if the queue is empty."""
+    state, heads, current = queue.state[0], queue.heads, queue.state[0].current
+    if state.entries == 0:
         return False
-    while heads[current & _RING, 0] == _NONE:
+    while heads[current & _RING_MASK, 0] == _NO_BLOCK:
         current += 1
-    numbers.current = current
+    state.current = current
     return True
 
 
 @inlined_kernel
-def take_block(queue):
-    """Take the block that came last out of the current bucket, which is not empty.
+def pop_block(queue):
+    """Pop the latest block of the current bucket, which must not be empty.
 
     Returns:
-        (block, count): its voxels are `blocks[block, 1 … count]`; give it back by `free_block` when
-        they are worked off.
+        (block, count): its voxels are `blocks[block, 1 … count]`. Return it by `free_block` when they are
+        processed.
     """
-    numbers, heads = queue.numbers[0], queue.heads
-    place = numbers.current & _RING
+    state, heads = queue.state[0], queue.heads
+    place = state.current & _RING_MASK
     block, count = np.int64(heads[place, 0]), np.int64(heads[place, 1])
     heads[place, 0] = queue.blocks[block, 0]
-    heads[place, 1] = _ENTRIES
-    numbers.waiting -= count
+    heads[place, 1] = _BLOCK_ENTRIES
+    state.entries -= count
     return block, count
 
 
 @inlined_kernel
 def free_block(queue, block):
-    """Let a block that was taken out serve again."""
-    queue.blocks[block, 0] = queue.numbers[0].freed
-    queue.numbers[0].freed = block
+    """Let a popped block be used again."""
+    queue.blocks[block, 0] = queue.state[0].free
+    queue.state[0].free = block
 
 
 @lean_kernel
-def keep_entries(queue, mark, bit):
-    """Drop entries whose voxel does not bear a mark, and all but the first of each voxel.
+def compact(queue, mark, bit):
+    """Drop the entries that are out of date, and all but the first entry of each voxel.
 
     Args:
-        queue: Changed in place; with one block to spare.
-        mark: (V,) uint32; afterwards as before.
-        bit: The bit of a mark that says that the voxel waits.
+        queue: Changed in place; one block must be spare.
+        mark: (V,) uint32; the same afterwards.
+        bit: The bit of `mark` that is set while a voxel is in the queue: entries without it are out of date.
     """
-    numbers, heads, blocks = queue.numbers[0], queue.heads, queue.blocks
-    numbers.waiting = 0
-    for bucket in range(numbers.current, numbers.current + BUCKETS):
-        place = bucket & _RING
+    state, heads, blocks = queue.state[0], queue.heads, queue.blocks
+    state.entries = 0
+    for bucket in range(state.current, state.current + BUCKETS):
+        place = bucket & _RING_MASK
         block, count = heads[place, 0], heads[place, 1]
-        heads[place, 0], heads[place, 1] = _NONE, 0
-        while block != _NONE:
+        heads[place, 0], heads[place, 1] = _NO_BLOCK, 0
+        while block != _NO_BLOCK:
             for entry in range(1, count + 1):
                 voxel = blocks[block, entry]
                 if mark[voxel] & bit:
-                    mark[voxel] = np.uint32(mark[voxel] ^ bit)
-                    put(queue, bucket, voxel)
-            after = blocks[block, 0]
-            blocks[block, 0] = numbers.freed
-            numbers.freed = block
-            block, count = after, _ENTRIES
+                    mark[voxel] = np.uint32(mark[voxel] ^ bit)  # so that a second entry is dropped
+                    push(queue, bucket, voxel)
+            following = blocks[block, 0]
+            blocks[block, 0] = state.free
+            state.free = block
+            block, count = following, _BLOCK_ENTRIES
     for place in range(BUCKETS):
         block, count = heads[place, 0], heads[place, 1]
-        while block != _NONE:
+        while block != _NO_BLOCK:
             for entry in range(1, count + 1):
                 voxel = blocks[block, entry]
                 mark[voxel] = np.uint32(mark[voxel] | bit)
-            block, count = blocks[block, 0], _ENTRIES
+            block, count = blocks[block, 0], _BLOCK_ENTRIES

@@ -1,9 +1,9 @@
-"""Geodesic Voronoi cells of a whole grid: which source each voxel is nearest to, by the cost of the way.
+"""Geodesic Voronoi cells of a whole grid: the source from which each voxel is cheapest to reach.
 
-Shortest ways from several sources at once (Bhattacharya, Michael & Kumar 2010, sect. 4.1) on the 8- or
-26-connected grid, exact: every bucket of the queue is narrower than the least step, so that a bucket's
-voxels are final when it is worked off. Where only a part of a large world is wanted, or a robot's body
-has to fit, `planning` searches; this looks at every voxel, and at nothing twice.
+Shortest paths from several sources at once (Bhattacharya, Michael & Kumar 2010, sect. 4.1) on the 8- or
+26-connected grid, exact: every bucket of the queue is narrower than the cheapest step, so the voxels of a
+bucket are final when it is processed. This visits every voxel once. Where only a part of a large world is
+wanted, or a robot's body has to fit, `planning` searches.
 """
 
 from __future__ import annotations
@@ -17,40 +17,41 @@ import numpy as np
 
 from entropy_explore_env.belief.paths.bucket_queue import (
     BucketQueue,
+    advance,
     clear_queue,
     free_block,
-    go_on,
     new_queue,
-    put,
-    take_block,
+    pop_block,
+    push,
 )
 from entropy_explore_env.belief.paths.lattice import DIAGONALS
-from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel
+from entropy_explore_env.belief.voxel_index import flat_index
+from entropy_explore_env.compilation.kernels import inlined_kernel, kernel, lean_kernel
 from entropy_explore_env.errors import SettingError
 
-NOBODY = -1
+UNREACHED = -1
 """Cell of a voxel that no source reaches."""
 
-_NARROWER = 1.0 - 2.0**-20
-"""Buckets are so much narrower than the least step that rounding puts no two ends of a step into one."""
-_IN_SPACE = 26
-_MOST_TO_LEAST = 1e9
+_BUCKET_WIDTH = 1.0 - 2.0**-20
+"""Width of a bucket in cheapest steps: below 1, so that rounding puts no step's ends into one bucket."""
+_SPACE_MOVES = 26
+_MAX_COST_RATIO = 1e9
 
 
 class Tessellation(NamedTuple):
-    """Working space and result; P voxels of a grid with a margin around it, at which every way ends."""
+    """Memory and result; P voxels of a grid with an impassable margin around it."""
 
-    half_rate: np.ndarray
-    """(P,) float32, half of what a step to or from a voxel costs; inf = impassable, and the margin."""
+    half_cost: np.ndarray
+    """(P,) float32, half of the traversal cost; inf = impassable, and in the margin."""
     cost: np.ndarray
-    """(P,) float64, of the way from the nearest source; inf = none."""
+    """(P,) float64, cost of the path from the nearest source; inf = there is none."""
     cell: np.ndarray
-    """(P,) int32, number of that source, or NOBODY."""
+    """(P,) int32, number of that source, or UNREACHED."""
     queue: BucketQueue
     shape: tuple[int, int, int]
     """(X, Y, Z) without the margin."""
     strides: tuple[int, int, int]
-    """Between neighbours along x, y and z; 0 along z in a 2-D world."""
+    """Differences of index between neighbours along x, y and z; 0 along z in a 2-D world."""
 
     @property
     def cells(self) -> np.ndarray:
@@ -59,12 +60,12 @@ class Tessellation(NamedTuple):
 
     @property
     def costs(self) -> np.ndarray:
-        """(X, Y, Z) float64, the cost of the way from it; a view."""
+        """(X, Y, Z) float64, the cost of the path from it; a view."""
         return _inside(self, self.cost)
 
 
 def new_tessellation(shape: tuple[int, int, int]) -> Tessellation:
-    """Working space for a grid of (X, Y, Z) voxels."""
+    """Memory for a grid of (X, Y, Z) voxels."""
     x, y, z = shape
     strides = (y + 2, 1, 0) if z == 1 else ((y + 2) * (z + 2), z + 2, 1)
     voxels = (x + 2) * (y + 2) * (1 if z == 1 else z + 2)
@@ -72,7 +73,7 @@ def new_tessellation(shape: tuple[int, int, int]) -> Tessellation:
         np.full(voxels, np.inf, np.float32),
         np.empty(voxels),
         np.empty(voxels, np.int32),
-        new_queue((8 if z == 1 else _IN_SPACE) * voxels),  # a step to a voxel puts it in at most once
+        new_queue((8 if z == 1 else _SPACE_MOVES) * voxels),  # each step pushes a voxel at most once
         shape,
         strides,
     )
@@ -87,46 +88,59 @@ def _inside(space: Tessellation, padded: np.ndarray) -> np.ndarray:
 
 
 def tessellate(
-    space: Tessellation, rates: np.ndarray, sources: np.ndarray, toll: float = 0.0, by_length: bool = True
+    space: Tessellation,
+    traversal_cost: np.ndarray,
+    sources: np.ndarray,
+    length_cost: float = 0.0,
+    by_length: bool = True,
 ) -> None:
-    """Give every voxel to the source from which the way costs least; of equals, to the first.
+    """Assign every voxel to the source from which it is cheapest to reach; of equals, to the first.
 
-    A step from s to t of length ‖s - t‖, in voxel edges, costs
+    With c the traversal cost, a step from s to t of length ‖s - t‖, in voxel edges, costs
 
-        by length:  (rate(s) + rate(t)) / 2 · ‖s - t‖ + toll · ‖s - t‖
-        else:       (rate(s) + rate(t)) / 2 + toll · ‖s - t‖      (Bhattacharya: η = toll)
+        by length:  (c(s) + c(t)) / 2 · ‖s - t‖ + length_cost · ‖s - t‖
+        else:       (c(s) + c(t)) / 2 + length_cost · ‖s - t‖      (Bhattacharya: η = length_cost)
 
-    A diagonal step needs all voxels that it squeezes past to be passable.
+    A diagonal step is possible only if all voxels at the edges that it crosses are passable.
 
     Args:
-        space: Working space of the grid; filled in.
-        rates: (X, Y, Z) float, ≥ 0, each; inf = impassable.
-        sources: (S,) int, numbers of voxels in C order; impassable ones, and those that share the voxel
-            of an earlier one, get no cell.
-        toll: What every edge of way costs besides, ≥ 0.
-        by_length: Whether diagonal steps pay the rates of their whole length.
+        space: Memory for the grid; filled in.
+        traversal_cost: (X, Y, Z) float, ≥ 0, of each voxel; inf = impassable.
+        sources: (S,) int, numbers of voxels in C order. Impassable ones get no cell, nor do those in the
+            voxel of an earlier one.
+        length_cost: Cost of a voxel edge of path in addition, ≥ 0.
+        by_length: Whether diagonal steps pay the traversal cost for their whole length.
 
     Raises:
-        SettingError: Wrong shapes; or the dearest step costs over 1e9 times the cheapest, or that is free.
+        SettingError: Wrong shapes; the cheapest step is free, or costs less than 1e-9 of the dearest.
     """
-    if rates.shape != space.shape:
-        raise SettingError("rates", rates.shape, f"an array of shape {space.shape}")
-    if len(sources) and not 0 <= int(sources.min()) <= int(sources.max()) < rates.size:
-        raise SettingError("sources", sources.tolist(), f"numbers of voxels, from 0 to {rates.size - 1}")
-    least = float(rates.min())
-    most = float(np.where(np.isfinite(rates), rates, 0.0).max())  # three times as fast as max's `where=`
-    cheapest = min(least, most) + toll
-    if not (least >= 0.0 and toll >= 0.0 and 0.0 < cheapest and (most + toll) <= _MOST_TO_LEAST * cheapest):
-        allowed = (
-            f"rates and a toll ≥ 0, of which the least step costs more than 1/{_MOST_TO_LEAST:g} of the most"
+    if traversal_cost.shape != space.shape:
+        raise SettingError("traversal_cost", traversal_cost.shape, f"an array of shape {space.shape}")
+    if len(sources) and not 0 <= int(sources.min()) <= int(sources.max()) < traversal_cost.size:
+        raise SettingError(
+            "sources", sources.tolist(), f"numbers of voxels, from 0 to {traversal_cost.size - 1}"
         )
-        raise SettingError("rates", (least, most, toll), allowed)
-    np.multiply(rates, 0.5, out=_inside(space, space.half_rate), casting="same_kind")
-    steps = np.array([(length if by_length else 1.0, toll * length) for length in DIAGONALS])
+    least = float(traversal_cost.min())
+    most = float(
+        np.where(np.isfinite(traversal_cost), traversal_cost, 0.0).max()
+    )  # three times as fast as max's `where=`
+    cheapest = min(least, most) + length_cost
+    if not (
+        least >= 0.0
+        and length_cost >= 0.0
+        and 0.0 < cheapest
+        and (most + length_cost) <= _MAX_COST_RATIO * cheapest
+    ):
+        allowed = (
+            f"costs ≥ 0, of which the cheapest step has more than 1/{_MAX_COST_RATIO:g} of the dearest one's"
+        )
+        raise SettingError("traversal_cost", (least, most, length_cost), allowed)
+    np.multiply(traversal_cost, 0.5, out=_inside(space, space.half_cost), casting="same_kind")
+    steps = np.array([(length if by_length else 1.0, length_cost * length) for length in DIAGONALS])
     margin = (1, 1, 0 if space.shape[2] == 1 else 1)
-    places = np.stack(np.unravel_index(sources, rates.shape), axis=-1) + margin
+    places = np.stack(np.unravel_index(sources, traversal_cost.shape), axis=-1) + margin
     starts = (places @ np.array(space.strides)).astype(np.int64)
-    per_cost = 1.0 / (cheapest * _NARROWER)
+    per_cost = 1.0 / (cheapest * _BUCKET_WIDTH)
     _tessellate(
         space, starts, steps, per_cost, None if space.shape[2] == 1 else _moves_in_space(space.strides)
     )
@@ -134,9 +148,9 @@ def tessellate(
 
 @lru_cache(maxsize=8)
 def _moves_in_space(strides: tuple[int, int, int]) -> np.ndarray:
-    """(26, 3) int64: offset of each neighbour, how many axes it lies along, bits of the moves that it needs.
+    """(26, 3) int64: offset of each neighbour, number of axes of the step, bits of the moves that it needs.
 
-    The axes come first, so that the first moves are those that others need.
+    Moves along one axis come first: these are the ones that others need.
     """
     moves: list[tuple[int, ...]] = [m for m in itertools.product((-1, 0, 1), repeat=3) if any(m)]
     moves.sort(key=lambda move: sum(map(abs, move)))
@@ -149,87 +163,150 @@ def _moves_in_space(strides: tuple[int, int, int]) -> np.ndarray:
 
 
 @inlined_kernel
-def _reach(space, voxel, cost, source, per_cost):
-    """A way to a voxel, from a source: take it if it is cheaper, or as cheap and the source comes first."""
+def _relax(space, voxel, cost, source, per_cost):
+    """Use a path to a voxel if it is cheaper than before, or as cheap and from an earlier source."""
     before = space.cost[voxel]
     if cost < before:
         bucket = int(cost * per_cost)
-        waits = not math.isinf(before) and int(before * per_cost) == bucket
+        queued = not math.isinf(before) and int(before * per_cost) == bucket
         space.cost[voxel], space.cell[voxel] = cost, source
-        if not waits:
-            put(space.queue, bucket, voxel)
+        if not queued:
+            push(space.queue, bucket, voxel)
     elif cost == before and source < space.cell[voxel]:
         space.cell[voxel] = source
 
 
 @inlined_kernel
-def _step_in_plane(space, voxel, steps, per_cost):
+def _relax_in_plane(space, voxel, steps, per_cost):
     """Reach the 8 neighbours of a voxel."""
-    half, row = space.half_rate, space.strides[0]
+    half, row = space.half_cost, space.strides[0]
     cost, here, source = space.cost[voxel], np.float64(half[voxel]), space.cell[voxel]
     east, west = half[voxel + 1], half[voxel - 1]
     north, south = half[voxel + row], half[voxel - row]
-    factor, toll = steps[0, 0], cost + steps[0, 1]
-    _reach(space, voxel + 1, toll + (here + east) * factor, source, per_cost)
-    _reach(space, voxel - 1, toll + (here + west) * factor, source, per_cost)
-    _reach(space, voxel + row, toll + (here + north) * factor, source, per_cost)
-    _reach(space, voxel - row, toll + (here + south) * factor, source, per_cost)
-    factor, toll = steps[1, 0], cost + steps[1, 1]
+    factor, base = steps[0, 0], cost + steps[0, 1]
+    _relax(space, voxel + 1, base + (here + east) * factor, source, per_cost)
+    _relax(space, voxel - 1, base + (here + west) * factor, source, per_cost)
+    _relax(space, voxel + row, base + (here + north) * factor, source, per_cost)
+    _relax(space, voxel - row, base + (here + south) * factor, source, per_cost)
+    factor, base = steps[1, 0], cost + steps[1, 1]
     if east + north < math.inf:
-        _reach(space, voxel + 1 + row, toll + (here + half[voxel + 1 + row]) * factor, source, per_cost)
+        _relax(space, voxel + 1 + row, base + (here + half[voxel + 1 + row]) * factor, source, per_cost)
     if east + south < math.inf:
-        _reach(space, voxel + 1 - row, toll + (here + half[voxel + 1 - row]) * factor, source, per_cost)
+        _relax(space, voxel + 1 - row, base + (here + half[voxel + 1 - row]) * factor, source, per_cost)
     if west + north < math.inf:
-        _reach(space, voxel - 1 + row, toll + (here + half[voxel - 1 + row]) * factor, source, per_cost)
+        _relax(space, voxel - 1 + row, base + (here + half[voxel - 1 + row]) * factor, source, per_cost)
     if west + south < math.inf:
-        _reach(space, voxel - 1 - row, toll + (here + half[voxel - 1 - row]) * factor, source, per_cost)
+        _relax(space, voxel - 1 - row, base + (here + half[voxel - 1 - row]) * factor, source, per_cost)
 
 
 @inlined_kernel
-def _step_in_space(space, voxel, steps, per_cost, moves):
+def _relax_in_space(space, voxel, steps, per_cost, moves):
     """Reach the 26 neighbours of a voxel."""
-    half = space.half_rate
+    half = space.half_cost
     cost, here, source, passable = space.cost[voxel], np.float64(half[voxel]), space.cell[voxel], 0
-    for k in range(_IN_SPACE):
+    for k in range(_SPACE_MOVES):
         passable |= np.int64(half[voxel + moves[k, 0]] < math.inf) << k
-    for k in range(_IN_SPACE):
+    for k in range(_SPACE_MOVES):
         if passable & moves[k, 2] == moves[k, 2]:
             near, axes = voxel + moves[k, 0], moves[k, 1] - 1
             there = cost + steps[axes, 1] + (here + half[near]) * steps[axes, 0]
-            _reach(space, near, there, source, per_cost)
+            _relax(space, near, there, source, per_cost)
 
 
 @lean_kernel
 def _tessellate(space, starts, steps, per_cost, moves):
-    """Work off the queue of ways from all sources.
+    """Fill in costs and cells from all sources.
 
     Args:
-        space: Its rates filled in; cost and cells are filled.
-        starts: (S,) int64, voxels with the margin counted in.
-        steps: (3, 2) float64: by axes of a step, the factor of its mean rate, and what it costs besides.
-        per_cost: Buckets for a unit of cost; a step is never shorter than a bucket.
+        space: Its traversal costs filled in.
+        starts: (S,) int64, voxels of the grid with its margin.
+        steps: (3, 2) float64, by number of axes of a step: factor of its mean traversal cost, and its cost in
+            addition.
+        per_cost: Buckets per unit of cost; no step is shorter than a bucket.
         moves: Of 3-D grids; None = the grid is flat.
     """
     queue, number = space.queue, 0
     clear_queue(queue)
     for voxel in range(len(space.cost)):
-        space.cost[voxel], space.cell[voxel] = math.inf, NOBODY
+        space.cost[voxel], space.cell[voxel] = math.inf, UNREACHED
     for voxel in starts:
-        if math.isinf(space.cost[voxel]) and space.half_rate[voxel] < math.inf:
+        if math.isinf(space.cost[voxel]) and space.half_cost[voxel] < math.inf:
             space.cost[voxel], space.cell[voxel] = 0.0, number
-            put(queue, 0, voxel)
+            push(queue, 0, voxel)
         number += 1
-    while go_on(queue):
-        block, count = take_block(queue)
-        current = queue.numbers[0].current
+    while advance(queue):
+        block, count = pop_block(queue)
+        current = queue.state[0].current
         for entry in range(1, count + 1):
             voxel = np.int64(queue.blocks[block, entry])
             bucket = int(space.cost[voxel] * per_cost)
-            if bucket > current:  # it lay beyond the ring
-                put(queue, bucket, voxel)
-            elif bucket == current:  # else it was worked off before
+            if bucket > current:  # its key lay beyond the ring
+                push(queue, bucket, voxel)
+            elif bucket == current:  # else it was expanded before
                 if moves is None:
-                    _step_in_plane(space, voxel, steps, per_cost)
+                    _relax_in_plane(space, voxel, steps, per_cost)
                 else:
-                    _step_in_space(space, voxel, steps, per_cost, moves)
+                    _relax_in_space(space, voxel, steps, per_cost, moves)
         free_block(queue, block)
+
+
+def extract_path(
+    space: Tessellation, traversal_cost: np.ndarray, voxel: int, length_cost: float, by_length: bool
+) -> np.ndarray:
+    """The cheapest path from a cell's source to a voxel in it; it does not leave the cell.
+
+    Read off the costs backwards, without a search.
+
+    Args:
+        space: After `tessellate`.
+        traversal_cost: As in `tessellate`.
+        voxel: Where the path ends.
+        length_cost: As in `tessellate`.
+        by_length: Likewise.
+
+    Returns:
+        (N,) int64 voxels from the source to `voxel`, both included; none if no source reaches it.
+    """
+    steps = np.array([(length if by_length else 1.0, length_cost * length) for length in DIAGONALS])
+    cells, costs = space.cells, space.costs
+    if cells.reshape(-1)[voxel] == UNREACHED:
+        return np.zeros(0, np.int64)
+    return _trace_back(cells, costs, traversal_cost, steps, voxel)
+
+
+@inlined_kernel
+def _step_possible(traversal_cost, x, y, z, i, j, k):
+    """Whether all voxels in the box between two neighbouring voxels are passable."""
+    for a in range(min(x, i), max(x, i) + 1):
+        for b in range(min(y, j), max(y, j) + 1):
+            for c in range(min(z, k), max(z, k) + 1):
+                if math.isinf(traversal_cost[a, b, c]):
+                    return False
+    return True
+
+
+@kernel
+def _trace_back(cells, costs, traversal_cost, steps, voxel):
+    size = cells.shape
+    path = np.empty(cells.size, np.int64)
+    path[0], count = voxel, 1
+    x, y, z = voxel // (size[1] * size[2]), voxel // size[2] % size[1], voxel % size[2]
+    cell = cells[x, y, z]
+    while costs[x, y, z] > 0.0:
+        best, next_x, next_y, next_z = math.inf, x, y, z
+        for i in range(max(x - 1, 0), min(x + 2, size[0])):
+            for j in range(max(y - 1, 0), min(y + 2, size[1])):
+                for k in range(max(z - 1, 0), min(z + 2, size[2])):
+                    if cells[i, j, k] != cell or costs[i, j, k] >= costs[x, y, z]:
+                        continue
+                    axes = abs(i - x) + abs(j - y) + abs(k - z)
+                    mean = 0.5 * (np.float64(traversal_cost[i, j, k]) + np.float64(traversal_cost[x, y, z]))
+                    cost = costs[i, j, k] + steps[axes - 1, 1] + mean * steps[axes - 1, 0]
+                    if cost < best and _step_possible(traversal_cost, x, y, z, i, j, k):
+                        best, next_x, next_y, next_z = cost, i, j, k
+        if math.isinf(best):  # the costs are not those of these traversal costs
+            return path[:0].copy()
+        x, y, z = next_x, next_y, next_z
+        path[count] = flat_index(size, x, y, z)
+        count += 1
+    return path[:count][::-1].copy()

@@ -18,9 +18,13 @@ from baselines.strategies.voronoi.controls import (
     neighbours,
     projected_centroids,
     step_is_free,
-    way_to,
 )
-from entropy_explore_env.belief.paths.geodesic_cells import NOBODY, new_tessellation, tessellate
+from entropy_explore_env.belief.paths.geodesic_cells import (
+    UNREACHED,
+    extract_path,
+    new_tessellation,
+    tessellate,
+)
 from tests.belief.paths.test_geodesic_cells import drawn_rates
 from tests.reference.scenes import SHAPES, drawn, seeds
 
@@ -41,7 +45,7 @@ def by_hand(cells, density, threshold, cell):
     """Eqs. 6-8 of one cell, voxel by voxel."""
     voxels = [at for at in np.ndindex(*cells.shape) if cells[at] == cell]
     if not voxels:
-        return NOBODY, 0
+        return UNREACHED, 0
     weights = [float(density[at]) for at in voxels]
     total = sum(weights)
     centre = [sum(w * at[axis] for w, at in zip(weights, voxels, strict=True)) / total for axis in range(3)]
@@ -62,7 +66,7 @@ def test_targets_are_those_of_the_equations(size, seed, threshold, by_length):
     for cell in range(len(sources)):
         target, high = by_hand(space.cells, density, threshold, cell)
         assert uncertain[cell] == high
-        if target != NOBODY:  # rounding may choose between equals
+        if target != UNREACHED:  # rounding may choose between equals
             place, ours = (np.unravel_index(int(v), size) for v in (target, targets[cell]))
             own = space.cells == cell
             weights = np.where(own, density, 0.0).astype(float)
@@ -71,38 +75,41 @@ def test_targets_are_those_of_the_equations(size, seed, threshold, by_length):
             assert away[0] == pytest.approx(away[1]) and own[ours]
         mask = (space.cells == cell) & (density >= np.float32(threshold))
         costs = np.where(mask, space.costs, np.inf).reshape(-1)
-        assert near[cell] == (int(np.argmin(costs)) if mask.any() else NOBODY)
+        assert near[cell] == (int(np.argmin(costs)) if mask.any() else UNREACHED)
         own = space.cells == cell
         assert functionals[cell] == pytest.approx((space.costs[own] ** 2 * density[own]).sum())
 
 
 def test_a_centroid_outside_of_its_cell_by_hand():
     """A U of nine voxels: the centroid, (1, 4/3), lies in the gap; two voxels are as near to it."""
-    cells = np.full((3, 4, 1), NOBODY, np.int32)
+    cells = np.full((3, 4, 1), UNREACHED, np.int32)
     cells[0, :, 0] = cells[2, :, 0] = 0
     cells[1, 0, 0] = 0
     density = np.ones((3, 4, 1), np.float32)
     targets, uncertain = projected_centroids(cells, density, 2.0, 2)
-    assert (targets.tolist(), uncertain.tolist()) == ([1, NOBODY], [0, 0])  # (0, 1) before (2, 1): by number
+    assert (targets.tolist(), uncertain.tolist()) == (
+        [1, UNREACHED],
+        [0, 0],
+    )  # (0, 1) before (2, 1): by number
     density[2, 3, 0] = 3.0
     targets, uncertain = projected_centroids(cells, density, 2.0, 2)
-    assert (targets.tolist(), uncertain.tolist()) == ([11, NOBODY], [1, 0])
+    assert (targets.tolist(), uncertain.tolist()) == ([11, UNREACHED], [1, 0])
 
 
 @given(st.sampled_from(SHAPES), seeds, st.booleans())
 @drawn(30)
-def test_ways_stay_in_the_cell_and_cost_what_the_tessellation_says(size, seed, by_length):
+def test_paths_stay_in_the_cell_and_cost_what_the_tessellation_says(size, seed, by_length):
     rates, _, sources, space = scene(size, seed, by_length)
     for voxel in range(0, rates.size, 3):
-        way = way_to(space, rates, voxel, 0.01, by_length)
+        path = extract_path(space, rates, voxel, 0.01, by_length)
         cell = space.cells.reshape(-1)[voxel]
-        if cell == NOBODY:
-            assert len(way) == 0
+        if cell == UNREACHED:
+            assert len(path) == 0
             continue
-        assert way[0] == sources[cell] and way[-1] == voxel
-        assert (space.cells.reshape(-1)[way] == cell).all()
+        assert path[0] == sources[cell] and path[-1] == voxel
+        assert (space.cells.reshape(-1)[path] == cell).all()
         cost = 0.0
-        for here, there in itertools.pairwise(way.tolist()):
+        for here, there in itertools.pairwise(path.tolist()):
             assert there in neighbours(np.isfinite(rates), here)
             axes = np.abs(np.subtract(np.unravel_index(here, size), np.unravel_index(there, size))).sum()
             length, flat = math.sqrt(axes), rates.reshape(-1)
@@ -137,12 +144,12 @@ def test_gradient_search_walks_to_the_middle_of_a_corridor():
     size = (9, 1, 1)
     rates, space = np.ones(size, np.float32), new_tessellation(size)
     density, cell = np.ones(size, np.float32), np.ones(size, bool)
-    search, place, way = CellSearch(space, rates, density, cell), 1, [1]
+    search, place, path = CellSearch(space, rates, density, cell), 1, [1]
     assert search.functional(1, 0.0, True) == 1 + sum(k * k for k in range(8))
     while (step := gradient_step(search, cell, place, 0.0, True)) != place:
         place = step
-        way.append(step)
-    assert way == [1, 2, 3, 4]
+        path.append(step)
+    assert path == [1, 2, 3, 4]
 
 
 def test_a_place_from_which_the_cell_cannot_be_reached_whole_is_worth_nothing():

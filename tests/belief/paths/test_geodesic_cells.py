@@ -11,13 +11,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from entropy_explore_env.belief.paths.geodesic_cells import NOBODY, new_tessellation, tessellate
+from entropy_explore_env.belief.paths.geodesic_cells import UNREACHED, new_tessellation, tessellate
 from entropy_explore_env.errors import SettingError
 from tests.reference.scenes import SHAPES, drawn, seeds
 
 
-def slow_costs(rates, source, toll, by_length):
-    """Cost of the way from one voxel to all, by a heap and a dictionary."""
+def slow_costs(rates, source, length_cost, by_length):
+    """Costs of the paths from one voxel to all, by a heap and a dictionary."""
     size, found = rates.shape, {}
     heap = [(0.0, source)] if math.isfinite(rates[source]) else []
     while heap:
@@ -37,7 +37,7 @@ def slow_costs(rates, source, toll, by_length):
             there = tuple(int(a + b) for a, b in zip(here, step, strict=True))
             length = math.sqrt(sum(map(abs, step)))
             mean = 0.5 * (float(rates[here]) + float(rates[there]))
-            heapq.heappush(heap, (cost + mean * (length if by_length else 1.0) + toll * length, there))
+            heapq.heappush(heap, (cost + mean * (length if by_length else 1.0) + length_cost * length, there))
     out = np.full(size, np.inf)
     for voxel, cost in found.items():
         out[voxel] = cost
@@ -45,7 +45,7 @@ def slow_costs(rates, source, toll, by_length):
 
 
 def drawn_rates(size, seed, walls):
-    """Rates over four decades, and walls."""
+    """Traversal costs over four decades, and walls."""
     rng = np.random.default_rng(seed)
     rates = (10.0 ** rng.uniform(-2.0, 2.0, size)).astype(np.float32)
     rates[rng.random(size) < walls] = np.inf
@@ -56,19 +56,19 @@ def drawn_rates(size, seed, walls):
     st.sampled_from(SHAPES), seeds, st.sampled_from([0.0, 0.3]), st.sampled_from([0.0, 0.7]), st.booleans()
 )
 @drawn(40)
-def test_costs_and_cells_are_those_of_a_slow_dijkstra(size, seed, walls, toll, by_length):
+def test_costs_and_cells_are_those_of_a_slow_dijkstra(size, seed, walls, length_cost, by_length):
     rates, rng = drawn_rates(size, seed, walls)
     if np.isinf(rates).all():
         rates[0, 0, 0] = 1.0
     sources = rng.integers(0, rates.size, 3)
     space = new_tessellation(size)
     for _ in range(2):  # the second time in the same space
-        tessellate(space, rates, sources, toll, by_length)
+        tessellate(space, rates, sources, length_cost, by_length)
         places = [tuple(int(i) for i in np.unravel_index(source, size)) for source in sources]
-        each = np.stack([slow_costs(rates, place, toll, by_length) for place in places])
+        each = np.stack([slow_costs(rates, place, length_cost, by_length) for place in places])
         np.testing.assert_allclose(space.costs, each.min(axis=0), rtol=1e-9)
         reached = np.isfinite(space.costs)
-        assert (space.cells[~reached] == NOBODY).all()
+        assert (space.cells[~reached] == UNREACHED).all()
         owned = np.take_along_axis(each, np.maximum(space.cells, 0)[None], axis=0)[0]
         np.testing.assert_allclose(owned[reached], space.costs[reached], rtol=1e-9)
         first = (each <= each.min(axis=0) * (1 + 1e-9)).argmax(axis=0)
@@ -82,22 +82,22 @@ def test_a_corridor_by_hand():
     rates[6] = np.inf
     space = new_tessellation((7, 1, 1))
     tessellate(space, rates, np.array([4, 0]))
-    assert space.cells.ravel().tolist() == [1, 1, 0, 0, 0, 0, NOBODY]
+    assert space.cells.ravel().tolist() == [1, 1, 0, 0, 0, 0, UNREACHED]
     assert space.costs.ravel().tolist() == [0.0, 1.0, 2.0, 1.0, 0.0, 1.0, math.inf]
-    tessellate(space, rates, np.array([0, 4]), toll=0.5)
-    assert space.cells.ravel().tolist() == [0, 0, 0, 1, 1, 1, NOBODY]
+    tessellate(space, rates, np.array([0, 4]), length_cost=0.5)
+    assert space.cells.ravel().tolist() == [0, 0, 0, 1, 1, 1, UNREACHED]
     assert space.costs.ravel()[:4].tolist() == [0.0, 1.5, 3.0, 1.5]
 
 
-def test_what_a_diagonal_step_costs_by_hand():
+def test_cost_of_a_diagonal_step_by_hand():
     rates = np.array([[2.0, 4.0, np.inf], [4.0, 6.0, np.inf]], np.float32)[:, :, None]
     space = new_tessellation((2, 3, 1))
-    tessellate(space, rates, np.array([0]), toll=0.25)
+    tessellate(space, rates, np.array([0]), length_cost=0.25)
     assert space.costs[1, 1, 0] == pytest.approx((4.0 + 0.25) * math.sqrt(2.0))
-    tessellate(space, rates, np.array([0]), toll=0.25, by_length=False)
+    tessellate(space, rates, np.array([0]), length_cost=0.25, by_length=False)
     assert space.costs[1, 1, 0] == pytest.approx(4.0 + 0.25 * math.sqrt(2.0))
-    rates[0, 1] = np.inf  # nothing squeezes past a corner
-    tessellate(space, rates, np.array([0]), toll=0.25, by_length=False)
+    rates[0, 1] = np.inf  # no path cuts a corner
+    tessellate(space, rates, np.array([0]), length_cost=0.25, by_length=False)
     assert space.costs[1, 1, 0] == pytest.approx(3.0 + 5.0 + 0.5)
 
 
@@ -107,13 +107,13 @@ def test_sources_that_are_impassable_or_share_a_voxel_get_no_cell():
     wall = int(np.ravel_multi_index((1, 2, 0), rates.shape))
     space = new_tessellation(rates.shape)
     tessellate(space, rates, np.array([wall, 5, 5, 23]))
-    assert set(np.unique(space.cells)) == {NOBODY, 1, 3}
-    assert (space.cells == NOBODY).sum() == 1
+    assert set(np.unique(space.cells)) == {UNREACHED, 1, 3}
+    assert (space.cells == UNREACHED).sum() == 1
     tessellate(space, rates, np.array([], np.int64))
-    assert (space.cells == NOBODY).all() and np.isinf(space.costs).all()
+    assert (space.cells == UNREACHED).all() and np.isinf(space.costs).all()
 
 
-def test_rates_far_apart_go_beyond_the_ring_of_buckets():
+def test_costs_of_very_different_size_go_beyond_the_ring_of_buckets():
     rates = np.ones((5, 9, 1), np.float32)
     rates[2] = 1e6
     rates[:, 4] = 3e4
@@ -126,28 +126,28 @@ def test_rates_far_apart_go_beyond_the_ring_of_buckets():
 @pytest.mark.parametrize(
     ("change", "field"),
     [
-        ({"rates": np.ones((3, 4, 1), np.float32)}, "rates"),
-        ({"rates": np.full((3, 5, 1), -1.0)}, "rates"),
-        ({"rates": np.full((3, 5, 1), np.nan)}, "rates"),
-        ({"rates": np.zeros((3, 5, 1))}, "rates"),
-        ({"toll": -1.0}, "rates"),
-        ({"toll": math.nan}, "rates"),
+        ({"rates": np.ones((3, 4, 1), np.float32)}, "traversal_cost"),
+        ({"rates": np.full((3, 5, 1), -1.0)}, "traversal_cost"),
+        ({"rates": np.full((3, 5, 1), np.nan)}, "traversal_cost"),
+        ({"rates": np.zeros((3, 5, 1))}, "traversal_cost"),
+        ({"length_cost": -1.0}, "traversal_cost"),
+        ({"length_cost": math.nan}, "traversal_cost"),
         ({"sources": np.array([15])}, "sources"),
         ({"sources": np.array([-1])}, "sources"),
-        ({"rates": np.geomspace(1e-6, 1e6, 15).reshape(3, 5, 1)}, "rates"),
+        ({"rates": np.geomspace(1e-6, 1e6, 15).reshape(3, 5, 1)}, "traversal_cost"),
     ],
 )
 def test_what_is_refused(change, field):
-    given_ = {"rates": np.ones((3, 5, 1)), "sources": np.array([0]), "toll": 0.0} | change
+    given_ = {"rates": np.ones((3, 5, 1)), "sources": np.array([0]), "length_cost": 0.0} | change
     space = new_tessellation((3, 5, 1))
-    before = space.half_rate.copy()
+    before = space.half_cost.copy()
     with pytest.raises(SettingError) as raised:
-        tessellate(space, given_["rates"], given_["sources"], given_["toll"])
+        tessellate(space, given_["rates"], given_["sources"], given_["length_cost"])
     assert raised.value.field == field and "\n" not in str(raised.value)
-    np.testing.assert_array_equal(space.half_rate, before)
+    np.testing.assert_array_equal(space.half_cost, before)
 
 
 def test_all_impassable_and_free_of_charge():
     space = new_tessellation((3, 5, 1))
-    tessellate(space, np.zeros((3, 5, 1)), np.array([7]), toll=1.0)  # only the way costs
+    tessellate(space, np.zeros((3, 5, 1)), np.array([7]), length_cost=1.0)  # only length costs
     assert space.costs[0, 0, 0] == pytest.approx(1.0 + math.sqrt(2.0))

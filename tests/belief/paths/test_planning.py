@@ -1,4 +1,4 @@
-"""Shortest ways against SciPy's Dijkstra on an explicit graph, and by hand."""
+"""Shortest paths against SciPy's Dijkstra on an explicit graph, and by hand."""
 
 from __future__ import annotations
 
@@ -12,16 +12,15 @@ from hypothesis import strategies as st
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 
-from entropy_explore_env.belief.paths.lattice import KNOWN_RATIO, belief_costs, new_lattice, rate_costs
+from entropy_explore_env.belief.paths.lattice import KNOWN_RATIO, belief_costs, field_costs, new_lattice
 from entropy_explore_env.belief.paths.planning import (
-    UNREACHED,
-    begin_search,
-    geodesics,
-    search_ways,
-    shortest_way,
-    widen_search,
+    ANY_GOAL,
+    resume_search,
+    search_paths,
+    shortest_path,
+    start_search,
 )
-from entropy_explore_env.belief.paths.search import collect, new_search
+from entropy_explore_env.belief.paths.search import costs_to_all, new_search
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.settings import Grid
 from entropy_explore_env.worlds.world import World
@@ -31,7 +30,6 @@ SIZE = (7, 11, 5)
 FLAT = (9, 6, 1)
 PRIOR = 1.0 / 900.0
 KNOWN, UNKNOWN = 100.0, PRIOR
-NO_CELLS = np.zeros(0, np.int32)
 SQRT2, SQRT3 = math.sqrt(2.0), math.sqrt(3.0)
 
 
@@ -68,49 +66,53 @@ def known(covered):
     return covered.astype(np.float32), np.full(covered.shape, KNOWN, np.float32)
 
 
-def plan(mean, precision, start, goal, radius=0.0, layer=None, unknown_cost=1.0, reach=math.inf):
-    """Cost and voxels (N, 3) of a way through a belief."""
+def all_costs(search, lattice, costs, sources, max_cost=math.inf):
+    """(X, Y, Z) costs of the paths from the nearest of some voxels."""
+    cost = np.empty(lattice.size)
+    search_paths(search, lattice, costs, np.array(sources, np.int32), ANY_GOAL, float(max_cost))
+    costs_to_all(search, cost.reshape(-1))
+    return cost
+
+
+def plan(mean, precision, start, goal, radius=0.0, layer=None, unknown_cost=1.0, max_cost=math.inf):
+    """Cost and voxels (N, 3) of a path through a belief."""
     costs = belief_costs(mean, precision, PRIOR, unknown_cost)
     lattice = new_lattice(mean.shape, radius, layer)
     ends = flat_index([start, goal], mean.shape)
-    cost, way = shortest_way(new_search(mean.size), lattice, costs, *ends, reach)
-    return cost, np.stack(np.unravel_index(way, mean.shape), axis=-1)
+    cost, path = shortest_path(new_search(mean.size), lattice, costs, *ends, max_cost)
+    return cost, np.stack(np.unravel_index(path, mean.shape), axis=-1)
 
 
 @drawn(60)
 @given(st.sampled_from(SHAPES), seeds, st.sampled_from([0.0, 0.3, 1.0, 2.5]), st.integers(1, 4))
-def test_costs_and_cells_are_those_of_dijkstra(shape, seed, decades, count):
+def test_costs_are_those_of_dijkstra(shape, seed, decades, count):
     rates = random_rates(shape, seed, decades)
     rng = np.random.default_rng(seed)
     free = np.flatnonzero(np.isfinite(rates))
     sources = rng.choice(free, min(count, len(free)), replace=False)
     graph = graph_of(rates)
     each = dijkstra(graph, indices=sources)
-    found = geodesics(new_search(rates.size), new_lattice(shape), rate_costs(rates), sources)
-    np.testing.assert_allclose(found.cost.ravel(), each.min(axis=0), rtol=1e-8)
-    nearest = each <= each.min(axis=0) * (1.0 + 1e-9)
-    reached = np.isfinite(each.min(axis=0))
-    expected = np.where(reached, nearest.argmax(axis=0), UNREACHED)  # the first of equals
-    np.testing.assert_array_equal(found.cell.ravel(), expected)
+    found = all_costs(new_search(rates.size), new_lattice(shape), field_costs(rates), sources)
+    np.testing.assert_allclose(found.ravel(), each.min(axis=0), rtol=1e-8)
 
 
 @drawn(60)
 @given(st.sampled_from(SHAPES), seeds, st.sampled_from([0.0, 0.3, 1.0, 2.5]))
-def test_ways_to_a_goal_are_those_of_dijkstra_and_their_steps_sum_up(shape, seed, decades):
+def test_paths_to_a_goal_are_those_of_dijkstra_and_their_steps_sum_up(shape, seed, decades):
     rates = random_rates(shape, seed, decades)
     free = np.flatnonzero(np.isfinite(rates))
     start, goal = np.random.default_rng(seed).choice(free, 2).tolist()
     graph = graph_of(rates)
     expected = dijkstra(graph, indices=start)[goal]
-    search, lattice, costs = new_search(rates.size), new_lattice(shape), rate_costs(rates)
-    cost, way = shortest_way(search, lattice, costs, start, goal)
+    search, lattice, costs = new_search(rates.size), new_lattice(shape), field_costs(rates)
+    cost, path = shortest_path(search, lattice, costs, start, goal)
     assert cost == pytest.approx(expected, rel=1e-8)
     if math.isinf(expected):
-        assert len(way) == 0
+        assert len(path) == 0
         return
-    assert (way[0], way[-1]) == (start, goal)
-    assert way.dtype == np.int32
-    steps = [graph[a, b] for a, b in itertools.pairwise(way.tolist())]
+    assert (path[0], path[-1]) == (start, goal)
+    assert path.dtype == np.int32
+    steps = [graph[a, b] for a, b in itertools.pairwise(path.tolist())]
     assert all(step > 0.0 for step in steps)
     assert sum(steps) == pytest.approx(expected, rel=1e-8)
 
@@ -123,7 +125,7 @@ def test_ways_to_a_goal_are_those_of_dijkstra_and_their_steps_sum_up(shape, seed
     st.sampled_from([1.0, 2.5]),
 )
 def test_a_body_goes_where_the_world_has_room_for_it(seed, shape, radius, unknown_cost):
-    """Incremental looks at the body's ball agree with `World.collision_mask`, for unknown voxels too."""
+    """Incremental checks of the footprint agree with `World.collision_mask`, for unknown voxels too."""
     rng = np.random.default_rng(seed)
     covered = random_cover(shape, 0.03, seed) > 0.5
     covered.ravel()[0] = False
@@ -134,14 +136,14 @@ def test_a_body_goes_where_the_world_has_room_for_it(seed, shape, radius, unknow
     rates = np.where(blocked, math.inf, np.where(precision == UNKNOWN, unknown_cost, 1.0))
     source = rng.choice(np.flatnonzero(~blocked))
     costs = belief_costs(covered.astype(np.float32), precision, PRIOR, unknown_cost)
-    found = geodesics(new_search(covered.size), new_lattice(shape, radius), costs, [source])
+    found = all_costs(new_search(covered.size), new_lattice(shape, radius), costs, [source])
     expected = dijkstra(graph_of(rates), indices=source)
-    np.testing.assert_allclose(found.cost.ravel(), expected, rtol=1e-8)
+    np.testing.assert_allclose(found.ravel(), expected, rtol=1e-8)
 
 
 @drawn(25)
 @given(seeds, st.integers(0, 4), st.sampled_from([0.0, 1.2]))
-def test_planar_robots_stay_in_their_layer_and_know_no_floor(seed, layer, radius):
+def test_planar_robots_stay_in_their_layer_and_ignore_the_floor(seed, layer, radius):
     covered = random_cover(SIZE, 0.03, seed) > 0.5
     tall = np.zeros((7, 11, 5 + 4), bool)
     tall[:, :, 2:-2] = covered  # room above and below: the boundary there does not count
@@ -150,31 +152,31 @@ def test_planar_robots_stay_in_their_layer_and_know_no_floor(seed, layer, radius
     if len(free) == 0:
         return
     source = np.ravel_multi_index((*free[seed % len(free)], layer), SIZE)
-    found = geodesics(
+    found = all_costs(
         new_search(covered.size),
         new_lattice(SIZE, radius, layer),
         belief_costs(*known(covered), PRIOR),
         [source],
     )
     expected = dijkstra(graph_of(np.where(blocked, math.inf, 1.0), layer), indices=source)
-    np.testing.assert_allclose(found.cost.ravel(), expected, rtol=1e-8)
-    assert np.isinf(np.delete(found.cost, layer, axis=2)).all()
+    np.testing.assert_allclose(found.ravel(), expected, rtol=1e-8)
+    assert np.isinf(np.delete(found, layer, axis=2)).all()
 
 
 def test_a_wall_with_a_gap():
     """Wall x = 4 with a gap at y = 5, from (1, 0) to (7, 0): two diagonals may not cut the gap's corners."""
     covered = np.zeros(FLAT, bool)
     covered[4, :5] = True
-    cost, way = plan(*known(covered), (1, 0, 0), (7, 0, 0))
+    cost, path = plan(*known(covered), (1, 0, 0), (7, 0, 0))
     # To (3, 5): 2 diagonals and 3 straight; through to (5, 5): 2; and the same back.
     assert cost == pytest.approx(2 * (2 * SQRT2 + 3) + 2)
-    assert [4, 5, 0] in way.tolist()
-    steps = np.abs(np.diff(way, axis=0)).sum(axis=1)
-    at = way.tolist().index([4, 5, 0])
+    assert [4, 5, 0] in path.tolist()
+    steps = np.abs(np.diff(path, axis=0)).sum(axis=1)
+    at = path.tolist().index([4, 5, 0])
     assert steps[at - 1] == steps[at] == 1
 
 
-def test_nobody_squeezes_between_two_corners():
+def test_no_path_leads_between_two_corners():
     covered = np.zeros((3, 4, 1), bool)
     covered[1, :3] = True
     assert plan(*known(covered), (0, 2, 0), (2, 2, 0))[0] == pytest.approx(4.0)
@@ -199,14 +201,14 @@ def test_a_space_diagonal_passes_six_voxels(solid):
     [(1.0, 8.0, True), (2.0, 8.0 + 3.0, True), (1.7, 8.0 + 3 * 0.7, True), (2.5, 6 + 4 * SQRT2, False)],
 )
 def test_unknown_space_is_gone_through_or_around(unknown_cost, cost, through):
-    """Three unknown columns, x = 3 … 5, y < 4, on the way from (0, 3) to (8, 3)."""
+    """Three unknown columns, x = 3 … 5, y < 4, on the straight path from (0, 3) to (8, 3)."""
     mean, precision = known(np.zeros(FLAT, bool))
     precision[3:6, :4] = UNKNOWN
     around = 8.0 - 2.0 + 2.0 * SQRT2  # one row up before x = 3, down after x = 5
     expected = min(8.0 + 3.0 * (unknown_cost - 1.0), around)
-    found, way = plan(mean, precision, (0, 3, 0), (8, 3, 0), unknown_cost=unknown_cost)
+    found, path = plan(mean, precision, (0, 3, 0), (8, 3, 0), unknown_cost=unknown_cost)
     assert found == pytest.approx(expected)
-    assert (precision[tuple(way.T)] == UNKNOWN).any() == (expected < around)
+    assert (precision[tuple(path.T)] == UNKNOWN).any() == (expected < around)
 
 
 def test_known_is_what_brought_half_a_bit():
@@ -225,34 +227,23 @@ def test_coverage_of_a_half_is_passable():
     assert math.isinf(plan(mean, precision, (0, 0, 0), (2, 0, 0))[0])
 
 
-@pytest.mark.parametrize("sources", [[(0, 1, 0), (8, 1, 0)], [(8, 1, 0), (0, 1, 0)]])
-def test_of_sources_at_the_same_cost_the_first_has_the_voxel(sources):
-    """The middle column x = 4 is as far from one as from the other."""
-    free = belief_costs(*known(np.zeros(FLAT, bool)), PRIOR)
-    found = geodesics(new_search(54), new_lattice(FLAT), free, flat_index(sources, FLAT))
-    each = [octile(FLAT, source) for source in sources]
-    np.testing.assert_allclose(found.cost, np.minimum(*each))
-    tied = np.isclose(*each)
-    assert tied[4].all() and tied.sum() == 6
-    np.testing.assert_array_equal(found.cell, np.where(tied, 0, np.argmin(each, axis=0)))
-
-
 def octile(shape, voxel):
     """Costs in free 2-D space."""
     x, y = np.abs(np.arange(shape[0]) - voxel[0])[:, None], np.abs(np.arange(shape[1]) - voxel[1])
     return (np.maximum(x, y) + (SQRT2 - 1.0) * np.minimum(x, y))[:, :, None]
 
 
-def test_the_same_source_twice_is_the_first():
-    costs = belief_costs(*known(np.zeros(SIZE, bool)), PRIOR)
-    found = geodesics(new_search(385), new_lattice(SIZE), costs, [5, 5])
-    assert (found.cell == 0).all()
+def test_each_voxel_is_reached_from_the_nearest_source():
+    free = belief_costs(*known(np.zeros(FLAT, bool)), PRIOR)
+    sources = [(0, 1, 0), (8, 1, 0), (0, 1, 0)]
+    found = all_costs(new_search(54), new_lattice(FLAT), free, flat_index(sources, FLAT))
+    np.testing.assert_allclose(found, np.minimum(*(octile(FLAT, source) for source in sources[:2])))
 
 
 def test_start_is_goal():
     mean, precision = known(np.zeros(SIZE, bool))
-    cost, way = plan(mean, precision, (1, 2, 3), (1, 2, 3))
-    assert cost == 0.0 and way.tolist() == [[1, 2, 3]]
+    cost, path = plan(mean, precision, (1, 2, 3), (1, 2, 3))
+    assert cost == 0.0 and path.tolist() == [[1, 2, 3]]
     mean[1, 2, 3] = 1.0
     assert plan(mean, precision, (1, 2, 3), (1, 2, 3))[0] == 0.0
 
@@ -261,8 +252,8 @@ def test_a_goal_behind_walls_or_inside_one_is_not_reached():
     covered = np.zeros(SIZE, bool)
     covered[3] = True
     for goal in ((6, 10, 4), (3, 5, 2)):
-        cost, way = plan(*known(covered), (0, 0, 0), goal)
-        assert math.isinf(cost) and way.shape == (0, 3)
+        cost, path = plan(*known(covered), (0, 0, 0), goal)
+        assert math.isinf(cost) and path.shape == (0, 3)
 
 
 def test_a_start_inside_a_covered_voxel_may_be_left_and_not_entered_again():
@@ -271,24 +262,24 @@ def test_a_start_inside_a_covered_voxel_may_be_left_and_not_entered_again():
     cost, _ = plan(*known(covered), (2, 1, 0), (4, 1, 0))
     assert cost == 2.0
     costs, lattice = belief_costs(*known(covered), PRIOR), new_lattice((5, 3, 1))
-    found = geodesics(new_search(15), lattice, costs, flat_index([(2, 1, 0), (0, 0, 0)], (5, 3, 1)))
-    assert found.cell[4, 1, 0] == 0 and np.isinf(found.cost[2, 0, 0])
+    found = all_costs(new_search(15), lattice, costs, flat_index([(2, 1, 0), (0, 0, 0)], (5, 3, 1)))
+    assert found[4, 1, 0] == 2.0 and np.isinf(found[2, 0, 0])
     behind, _ = plan(*known(covered), (0, 1, 0), (4, 1, 0))
     assert math.isinf(behind)
 
 
 def test_a_body_that_touches_something_at_its_start_may_leave():
-    """Radius 2.2, and a covered voxel beside the start: away from it goes the way, never into it."""
+    """Radius 2.2, and a covered voxel beside the start: the path leads away from it, never into it."""
     covered = np.zeros((19, 11, 1), bool)
     covered[5, 5] = True
     start, goal = (6, 5, 0), (15, 5, 0)
-    cost, way = plan(*known(covered), start, goal, radius=2.2)
+    cost, path = plan(*known(covered), start, goal, radius=2.2)
     assert cost == pytest.approx(9.0)
-    assert [5, 5, 0] not in way.tolist()
+    assert [5, 5, 0] not in path.tolist()
     # On the other side of it, around: the body's room begins where it touches nothing more.
-    cost, way = plan(*known(covered), start, (2, 5, 0), radius=2.2)
+    cost, path = plan(*known(covered), start, (2, 5, 0), radius=2.2)
     blocked = World(Grid(covered.shape, 1.0), covered, "by hand").collision_mask(2.2) > 0
-    ball = [v for v in way.tolist() if blocked[tuple(v)]]
+    ball = [v for v in path.tolist() if blocked[tuple(v)]]
     assert all(math.dist(v, start) < 2.2 + 1.0 for v in ball) and not math.isinf(cost)
 
 
@@ -298,31 +289,29 @@ def test_a_body_in_a_corridor(radius, fits):
     assert math.isinf(plan(*known(np.zeros((9, 3, 1), bool)), (2, 1, 0), (6, 1, 0), radius)[0]) != fits
 
 
-def test_ways_beyond_reach_are_not_found():
+def test_paths_above_the_largest_cost_are_not_found():
     belief = known(np.zeros(FLAT, bool))
-    assert plan(*belief, (0, 0, 0), (8, 0, 0), reach=8.0)[0] == 8.0
-    assert math.isinf(plan(*belief, (0, 0, 0), (8, 0, 0), reach=7.999)[0])
-    found = geodesics(new_search(54), new_lattice(FLAT), belief_costs(*belief, PRIOR), [0], reach=3.0)
+    assert plan(*belief, (0, 0, 0), (8, 0, 0), max_cost=8.0)[0] == 8.0
+    assert math.isinf(plan(*belief, (0, 0, 0), (8, 0, 0), max_cost=7.999)[0])
+    found = all_costs(new_search(54), new_lattice(FLAT), belief_costs(*belief, PRIOR), [0], max_cost=3.0)
     expected = octile(FLAT, (0, 0, 0))
-    np.testing.assert_allclose(found.cost, np.where(expected <= 3.0, expected, math.inf))
-    assert ((found.cell == UNREACHED) == (expected > 3.0)).all()
+    np.testing.assert_allclose(found, np.where(expected <= 3.0, expected, math.inf))
 
 
 @drawn(40)
 @given(st.sampled_from(SHAPES), seeds, st.lists(st.floats(0.0, 40.0), min_size=1, max_size=4))
-def test_a_search_that_is_widened_finds_what_one_of_that_reach_finds(shape, seed, reaches):
+def test_a_resumed_search_finds_what_one_up_to_that_cost_finds(shape, seed, limits):
     rates, lattice = random_rates(shape, seed, 1.0), new_lattice(shape)
     sources = np.random.default_rng(seed).integers(0, rates.size, 2).astype(np.int32)
-    costs, search, cell = rate_costs(rates), new_search(rates.size), np.full(rates.size, UNREACHED, np.int32)
-    begin_search(search, lattice, costs, sources, cell)
+    costs, search = field_costs(rates), new_search(rates.size)
+    start_search(search, lattice, costs, sources)
     found = np.empty(rates.size)
-    for reach in (*sorted(reaches), math.inf):
-        widen_search(search, lattice, costs, reach, cell)
-        collect(search, found)
-        expected = geodesics(new_search(rates.size), lattice, costs, sources, reach)
-        within = found <= reach
-        np.testing.assert_array_equal(np.where(within, found, math.inf), expected.cost.ravel())
-        np.testing.assert_array_equal(np.where(within, cell, UNREACHED), expected.cell.ravel())
+    for max_cost in (*sorted(limits), math.inf):
+        resume_search(search, lattice, costs, max_cost)
+        costs_to_all(search, found)
+        expected = all_costs(new_search(rates.size), lattice, costs, sources, max_cost)
+        within = found <= max_cost
+        np.testing.assert_array_equal(np.where(within, found, math.inf), expected.ravel())
 
 
 @drawn(20)
@@ -332,8 +321,8 @@ def test_searches_do_not_disturb_later_ones(shape, several):
     for seed in several:
         rates = random_rates(shape, seed, 1.0)
         start, goal = np.random.default_rng(seed).integers(0, rates.size, 2).tolist()
-        used = shortest_way(search, lattice, rate_costs(rates), start, goal)
-        fresh = shortest_way(new_search(rates.size), lattice, rate_costs(rates), start, goal)
+        used = shortest_path(search, lattice, field_costs(rates), start, goal)
+        fresh = shortest_path(new_search(rates.size), lattice, field_costs(rates), start, goal)
         assert used[0] == fresh[0]
         np.testing.assert_array_equal(used[1], fresh[1])
 
@@ -341,25 +330,24 @@ def test_searches_do_not_disturb_later_ones(shape, several):
 def test_marks_of_millions_of_searches_ago_do_not_count():
     rates, lattice = random_rates(SIZE, 3, 0.5), new_lattice(SIZE)
     search = new_search(rates.size)
-    geodesics(search, lattice, rate_costs(random_rates(SIZE, 4, 0.5)), [7])
+    all_costs(search, lattice, field_costs(random_rates(SIZE, 4, 0.5)), [7])
     search.searches[0] = 2**23 - 1
-    found = geodesics(search, lattice, rate_costs(rates), [9])
+    found = all_costs(search, lattice, field_costs(rates), [9])
     assert search.searches[0] == 1
-    fresh = geodesics(new_search(rates.size), lattice, rate_costs(rates), [9])
-    np.testing.assert_array_equal(found.cost, fresh.cost)
+    fresh = all_costs(new_search(rates.size), lattice, field_costs(rates), [9])
+    np.testing.assert_array_equal(found, fresh)
 
 
 def test_a_full_queue_drops_what_is_out_of_date():
-    """Rates from 1 to 10⁴ fill the queue with entries of voxels that were reached cheaper since."""
+    """Costs from 1 to 10⁴ fill the queue with entries of voxels that were reached cheaper since."""
     shape = (60, 41, 1)
     rates, lattice = random_rates(shape, 1, 2.0, walls=0.0), new_lattice(shape)
     roomy, tight = new_search(rates.size), new_search(rates.size)
-    expected = geodesics(roomy, lattice, rate_costs(rates), [5, 2000])
-    used = int(roomy.queue.numbers["fresh"][0])
+    expected = all_costs(roomy, lattice, field_costs(rates), [5, 2000])
+    used = int(roomy.queue.state["unused"][0])
     tight = tight._replace(queue=tight.queue._replace(blocks=tight.queue.blocks[: used - 3]))
-    found = geodesics(tight, lattice, rate_costs(rates), [5, 2000])
-    np.testing.assert_array_equal(found.cost, expected.cost)
-    np.testing.assert_array_equal(found.cell, expected.cell)
+    found = all_costs(tight, lattice, field_costs(rates), [5, 2000])
+    np.testing.assert_array_equal(found, expected)
 
 
 def test_a_search_leaves_the_memory_of_what_it_does_not_reach_alone():
@@ -367,8 +355,8 @@ def test_a_search_leaves_the_memory_of_what_it_does_not_reach_alone():
     search, costs = new_search(60_000), belief_costs(*known(np.zeros(shape, bool)), PRIOR)
     search.cost[:] = -1.0
     sources = np.array(flat_index([(150, 100, 0)], shape), np.int32)
-    search_ways(search, new_lattice(shape), costs, sources, -1, 5.0, NO_CELLS)
-    assert 0 < np.count_nonzero(search.mark) <= 13 * 2 * 32  # looked at 32 at a time
+    search_paths(search, new_lattice(shape), costs, sources, ANY_GOAL, 5.0)
+    assert 0 < np.count_nonzero(search.mark) <= 13 * 2 * 32  # classified 32 at a time
     assert np.count_nonzero(search.cost != -1.0) <= 11 * 11
 
 
@@ -380,9 +368,9 @@ def test_a_search_leaves_the_memory_of_what_it_does_not_reach_alone():
         (lambda: new_lattice(SIZE, 0.0, 5), "layer"),
         (lambda: belief_costs(*known(np.zeros(SIZE, bool)), PRIOR, 0.99), "unknown_cost"),
         (lambda: belief_costs(*known(np.zeros(SIZE, bool)), PRIOR, math.inf), "unknown_cost"),
-        (lambda: rate_costs(np.zeros(SIZE, np.float32)), "rates"),
-        (lambda: rate_costs(np.full(SIZE, math.nan, np.float32)), "rates"),
-        (lambda: rate_costs(np.array([1.0, 1.1e6, math.inf], np.float32)), "rates"),
+        (lambda: field_costs(np.zeros(SIZE, np.float32)), "per_edge"),
+        (lambda: field_costs(np.full(SIZE, math.nan, np.float32)), "per_edge"),
+        (lambda: field_costs(np.array([1.0, 1.1e6, math.inf], np.float32)), "per_edge"),
     ],
 )
 def test_what_is_refused(ask, field):
@@ -398,17 +386,15 @@ def test_what_is_refused(ask, field):
         ({"goal": 385}, "goal"),
         ({"goal": 2.0}, "goal"),
         ({"start": 1}, "start"),
-        ({"reach": -1.0}, "reach"),
-        ({"reach": math.nan}, "reach"),
+        ({"max_cost": -1.0}, "max_cost"),
+        ({"max_cost": math.nan}, "max_cost"),
         ({"search": new_search(384)}, "search"),
-        ({"costs": rate_costs(np.ones(386, np.float32))}, "costs"),
+        ({"costs": field_costs(np.ones(386, np.float32))}, "costs"),
     ],
 )
-def test_what_a_way_refuses(change, field):
+def test_what_a_path_search_refuses(change, field):
     costs = belief_costs(*known(np.zeros(SIZE, bool)), PRIOR)
     asked = {"search": new_search(385), "lattice": new_lattice(SIZE, 0.0, 2), "costs": costs}
     with pytest.raises(SettingError) as raised:
-        shortest_way(**{**asked, "start": 2, "goal": 7, **change})
+        shortest_path(**{**asked, "start": 2, "goal": 7, **change})
     assert raised.value.field == field
-    with pytest.raises(SettingError, match="sources"):
-        geodesics(asked["search"], asked["lattice"], costs, [])

@@ -1,4 +1,4 @@
-"""Lines of sight against dense sampling, and that pulled ways are free and never dearer."""
+"""Lines of sight against dense sampling; string-pulled paths are free and never cost more."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from entropy_explore_env.belief.paths.lattice import belief_costs, new_lattice, rate_costs
-from entropy_explore_env.belief.paths.planning import shortest_way
+from entropy_explore_env.belief.paths.lattice import belief_costs, field_costs, new_lattice
+from entropy_explore_env.belief.paths.planning import shortest_path
 from entropy_explore_env.belief.paths.search import new_search
-from entropy_explore_env.belief.paths.string_pulling import cost_of_sight, straightened
+from entropy_explore_env.belief.paths.string_pulling import line_of_sight_cost, string_pulled
 from tests.reference.scenes import SHAPES, drawn, flat_index, random_cover, seeds
 
 SIZE = (7, 11, 5)
@@ -23,9 +23,9 @@ SQRT2 = math.sqrt(2.0)
 
 def sight(rates, start, finish):
     """The cost of a straight line through rates, in a search of its own."""
-    search, lattice, costs = new_search(rates.size), new_lattice(rates.shape), rate_costs(rates)
-    shortest_way(search, lattice, costs, 0, 0)
-    return cost_of_sight(search, lattice, costs, tuple(map(float, start)), tuple(map(float, finish)))
+    search, lattice, costs = new_search(rates.size), new_lattice(rates.shape), field_costs(rates)
+    shortest_path(search, lattice, costs, 0, 0)
+    return line_of_sight_cost(search, lattice, costs, tuple(map(float, start)), tuple(map(float, finish)))
 
 
 def sampled(rates, start, finish, samples=2000):
@@ -61,10 +61,10 @@ def test_a_line_of_sight_costs_what_it_crosses(shape, seed, walls):
 
 def shortest_crossing(rates, start, finish):
     """Length of the shortest piece of the line inside an impassable voxel."""
-    start, way = np.asarray(start), np.asarray(finish) - np.asarray(start)
+    start, extent = np.asarray(start), np.asarray(finish) - np.asarray(start)
     least = math.inf
     for voxel in np.argwhere(np.isinf(rates)):
-        ends = np.sort((np.stack([voxel, voxel + 1]) - start) / way, axis=0)
+        ends = np.sort((np.stack([voxel, voxel + 1]) - start) / extent, axis=0)
         low, high = max(ends[0].max(), 0.0), min(ends[1].min(), 1.0)
         if high > low:
             least = min(least, (high - low) * math.dist(start, finish))
@@ -85,7 +85,7 @@ def shortest_crossing(rates, start, finish):
         ((0, 1, 0), (4.5, 2.5, 0.5), True),
     ],
 )
-def test_a_line_through_edges_and_corners_needs_what_it_squeezes_past(solid, finish, free):
+def test_a_line_through_edges_and_corners_needs_the_voxels_beside_them(solid, finish, free):
     """From the centre of (0, 0, 0); to (4, 2, 0) the line goes through no edge, but four voxels."""
     rates = np.ones(SIZE, np.float32)
     rates[solid] = math.inf
@@ -117,20 +117,20 @@ def test_a_line_that_ends_at_the_boundary_stays_inside():
 
 
 def pulled(mean, precision, start, goal, radius=0.0, layer=None, unknown_cost=1.0, ends=None):
-    """Cost of the way, points of the pulled one, its cost leg by leg."""
+    """Cost and voxels of the path, its waypoints, and the cost of each leg."""
     lattice = new_lattice(mean.shape, radius, layer)
     costs = belief_costs(mean, precision, 1e-3, unknown_cost)
     search = new_search(mean.size)
-    cost, way = shortest_way(search, lattice, costs, start, goal)
+    cost, path = shortest_path(search, lattice, costs, start, goal)
     first, last = ends or (centre(start, mean.shape), centre(goal, mean.shape))
-    if not len(way):
-        return cost, way, None, None
-    points = np.vstack([first, straightened(search, lattice, costs, way, first, last)])
+    if not len(path):
+        return cost, path, None, None
+    points = np.vstack([first, string_pulled(search, lattice, costs, path, first, last)])
     legs = [
-        cost_of_sight(search, lattice, costs, tuple(a.tolist()), tuple(b.tolist()))
+        line_of_sight_cost(search, lattice, costs, tuple(a.tolist()), tuple(b.tolist()))
         for a, b in itertools.pairwise(points)
     ]
-    return cost, way, points, legs
+    return cost, path, points, legs
 
 
 @drawn(50)
@@ -140,7 +140,7 @@ def pulled(mean, precision, start, goal, radius=0.0, layer=None, unknown_cost=1.
     st.sampled_from([0.0, 0.8, 1.3]),
     st.sampled_from([1.0, 3.0]),
 )
-def test_a_pulled_way_is_free_and_no_dearer_and_turns_on_the_way(shape, seed, radius, unknown_cost):
+def test_a_pulled_path_is_free_costs_no_more_and_turns_on_the_path(shape, seed, radius, unknown_cost):
     rng = np.random.default_rng(seed)
     mean = random_cover(shape, 0.1 if radius == 0.0 else 0.03, seed)
     precision = rng.choice([1e-3, 50.0], shape).astype(np.float32)
@@ -148,13 +148,15 @@ def test_a_pulled_way_is_free_and_no_dearer_and_turns_on_the_way(shape, seed, ra
     shift = rng.uniform(-0.45, 0.45, (2, 3)) * (1.0, 1.0, shape[2] > 1)
     ends = tuple(centre(voxel, shape) + by for voxel, by in zip((start, goal), shift, strict=True))
     for given_ends in (None, ends):
-        cost, way, points, legs = pulled(mean, precision, start, goal, radius, None, unknown_cost, given_ends)
+        cost, path, points, legs = pulled(
+            mean, precision, start, goal, radius, None, unknown_cost, given_ends
+        )
         if points is None:
             return
         assert np.isfinite(legs).all()
         slack = unknown_cost * np.abs(shift).sum() if given_ends else 0.0
         assert sum(legs) <= cost + slack + 1e-6
-        centres = {tuple(centre(voxel, shape)) for voxel in way}
+        centres = {tuple(centre(voxel, shape)) for voxel in path}
         assert all(tuple(point) in centres for point in points[1:-1].tolist())
         np.testing.assert_array_equal(points[-1], (given_ends or (0, centre(goal, shape)))[1])
         assert all(math.dist(a, b) > 0.0 for a, b in itertools.pairwise(points))
@@ -166,15 +168,15 @@ def test_around_the_end_of_a_wall_in_three_legs():
     covered[4, :4] = 1.0
     known = np.full(FLAT, 50.0, np.float32)
     start, goal = flat_index([(0, 0, 0), (8, 0, 0)], FLAT)
-    cost, way, points, legs = pulled(covered, known, start, goal)
+    cost, path, points, legs = pulled(covered, known, start, goal)
     assert cost == pytest.approx(2 * (3 * SQRT2 + 1) + 2)
     assert points.tolist() == [[0.5, 0.5, 0.5], [3.5, 4.5, 0.5], [5.5, 4.5, 0.5], [8.5, 0.5, 0.5]]
     assert sum(legs) == pytest.approx(2 * 5 + 2)
-    assert len(way) == 11
+    assert len(path) == 11
 
 
-def test_unknown_space_is_not_cut_across_where_that_is_dearer():
-    """A detour around dear unknown space stays one; where it is cheap the way is straight."""
+def test_unknown_space_is_not_cut_across_where_that_costs_more():
+    """A detour around expensive unknown space stays; where it is cheap the path is straight."""
     mean, precision = np.zeros(FLAT, np.float32), np.full(FLAT, 50.0, np.float32)
     precision[2:7, :4] = 1e-3
     start, goal = flat_index([(0, 3, 0), (8, 3, 0)], FLAT)
@@ -194,7 +196,7 @@ def test_planar_bodies_keep_the_height_of_their_start():
     assert points is not None and (points[:, 2] == 2.2).all()
 
 
-def test_who_stands_at_the_goal_need_not_drive():
+def test_a_body_at_the_goal_does_not_drive():
     mean, precision = np.zeros(SIZE, np.float32), np.full(SIZE, 50.0, np.float32)
     assert len(pulled(mean, precision, 17, 17)[2]) == 1
     place = centre(17, SIZE)

@@ -30,9 +30,13 @@ from baselines.strategies.voronoi.controls import (
     nearest_uncertain,
     projected_centroids,
     step_is_free,
-    way_to,
 )
-from entropy_explore_env.belief.paths.geodesic_cells import NOBODY, new_tessellation, tessellate
+from entropy_explore_env.belief.paths.geodesic_cells import (
+    UNREACHED,
+    extract_path,
+    new_tessellation,
+    tessellate,
+)
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.validation import check, check_choice, check_count, check_kind, check_not_negative
 
@@ -97,13 +101,13 @@ class Mind:
         self.explored = False
         self.tessellations = 0
         self._of: tuple[object, ...] = ()
-        self.targets = np.full(robots, NOBODY, np.int64)
+        self.targets = np.full(robots, UNREACHED, np.int64)
         self.uncertain = np.zeros(robots, np.int64)
         self._functionals: np.ndarray | None = None
 
     @property
     def _metric(self) -> tuple[float, bool]:
-        """The toll of ways, and whether they are lengths."""
+        """What a voxel edge of path costs in addition, and whether costs are lengths."""
         by_length = self.explored or self.rules.metric == "length"
         return (0.0, True) if by_length else (self.rules.eta, False)
 
@@ -115,12 +119,12 @@ class Mind:
         self._of, self._functionals, rules = key, None, self.rules
         self.density = np.maximum(self.belief.entropy, np.float32(rules.tau_floor))
         while True:
-            toll, by_length = self._metric
+            length_cost, by_length = self._metric
             rates = np.ones_like(self.density) if by_length else self.belief.entropy.copy()
             rates[self.belief.occupied] = np.inf
             rates.reshape(-1)[places] = np.minimum(rates.reshape(-1)[places], 1.0)
             self.rates = rates
-            tessellate(self.space, rates, places, toll, by_length)
+            tessellate(self.space, rates, places, length_cost, by_length)
             self.tessellations += 1
             found = projected_centroids(self.space.cells, self.density, rules.tau, self._robots)
             self.targets, self.uncertain = found
@@ -131,7 +135,7 @@ class Mind:
         if rules.control == "nearest" and not explored:
             arrays = self.space.cells, self.space.costs, self.density
             near = nearest_uncertain(*arrays, rules.tau, self._robots)
-            self.targets = np.where(near == NOBODY, self.targets, near)
+            self.targets = np.where(near == UNREACHED, self.targets, near)
 
     def functionals(self) -> np.ndarray:
         """(A,) the coverage functional of each cell."""
@@ -142,7 +146,7 @@ class Mind:
 
     def way(self, voxel: int) -> np.ndarray:
         """(N,) the way from its robot to a voxel."""
-        return way_to(self.space, self.rates, voxel, *self._metric)
+        return extract_path(self.space, self.rates, voxel, *self._metric)
 
     def covering_step(self, robot: int, place: int) -> int:
         """Where a robot steps that explores no more."""
@@ -327,8 +331,8 @@ class Simulation:
                 step = mind.covering_step(robot, place)
             else:
                 target = int(mind.targets[robot])
-                self._ways[robot] = mind.way(target)[1:] if target != NOBODY else self._ways[robot][:0]
-                self._wants_to_see[robot] = target != NOBODY and self._uncertain(mind, target)
+                self._ways[robot] = mind.way(target)[1:] if target != UNREACHED else self._ways[robot][:0]
+                self._wants_to_see[robot] = target != UNREACHED and self._uncertain(mind, target)
                 step = int(self._ways[robot][0]) if len(self._ways[robot]) else place
         if step != place and not step_is_free(self._truth, self.occupied.shape, place, step):
             step = place  # what is right beside it is not known yet

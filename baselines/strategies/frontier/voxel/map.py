@@ -87,7 +87,7 @@ def new_frontier_map(
         layer: The only one that is looked at (planar robots); None = all.
         spacing: Voxels along the edge of a block.
     """
-    touched = [tuple(offset) for offset in new_lattice(shape, body_radius, layer).touched.tolist()]
+    touched = [tuple(offset) for offset in new_lattice(shape, body_radius, layer).footprint.tolist()]
     ball = [(0, 0, 0), *(offset for offset in touched if any(offset))]
     flat = shape[2] == 1 or layer is not None
     across = (spacing, spacing, shape[2] if flat else spacing)
