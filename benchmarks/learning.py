@@ -64,18 +64,17 @@ class Loop:
             import torch
 
             from baselines.cli.arguments import parse
-            from training.ppo import Args, Run, training_scenario
-            from training.terminal import TrainingBar
+            from training.ppo import Args, set_up, training_scenario
         except ModuleNotFoundError as error:
             raise MissingExtraError(error.name or "torch", "training") from None
         self._torch, self._threads = torch, threads
         args = parse(Args, ["--threads", str(threads), "--out", str(folder / f"run-{threads}"), *words])
-        self._run = Run(args, training_scenario(args), TrainingBar(1, hidden=True))
-        self._steps = args.rollout_steps * self._run.rows.num_envs
+        self._state = set_up(args, training_scenario(args))
+        self._steps = args.rollout_steps * self._state.envs.num_envs
         self._spent = {"environment": 0.0, "choosing": 0.0, "learning": 0.0}
-        model: Any = self._run.model
-        self._run.rows.step = self._timed("environment", self._run.rows.step)
-        model._choose = self._timed("choosing", model._choose)
+        model: Any = self._state.model
+        self._state.envs.step = self._timed("environment", self._state.envs.step)
+        model.choose = self._timed("choosing", model.choose)
         model.train = self._timed("learning", model.train)
 
     def _timed(self, part: str, work: Callable[..., Any]) -> Any:  # noqa: ANN401 - what stands in for a method
@@ -94,7 +93,7 @@ class Loop:
         self._torch.set_num_threads(self._threads)
         began = time.perf_counter()
         try:
-            self._run.model.learn(self._steps, log_interval=2**31, reset_num_timesteps=False)
+            self._state.model.learn(self._steps, log_interval=2**31, reset_num_timesteps=False)
         finally:
             self._torch.set_num_threads(before)
         whole_s, spent = time.perf_counter() - began, self._spent
@@ -103,8 +102,7 @@ class Loop:
 
     def close(self) -> None:
         """End its threads."""
-        self._run.validator.close()
-        self._run.rows.close()
+        self._state.envs.close()
 
 
 def learning_rounds(

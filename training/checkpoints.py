@@ -1,15 +1,15 @@
-"""Checkpoints: a policy, and with it what a trainer needs to go on, in files that hold no code.
+"""Checkpoints: a policy, and what its trainer needs to continue, in files that hold no code.
 
-A checkpoint is a folder that is there whole or not at all:
+A checkpoint is a folder, which is written whole or not at all:
 
     policy.json            the PolicySettings, how far training was, and each file's SHA-256
     policy.safetensors     weights of the networks
-    normalisation.npz      means and deviations of observations and returns
-    training.safetensors   what only the trainer needs: the optimiser's state …
-    training.npz           … and the missions under way
-    training.json          … and random states, counts and the best score so far
+    normalisation.npz      means and variances of observations and returns
+    training.safetensors   of the trainer: the optimiser's state, PyTorch's random state
+    training.npz           of the trainer: the missions that are under way
+    training.json          of the trainer: counters, the curve, the best validation, a random state
 
-The last three are missing where only the policy is kept. Nothing is ever unpickled.
+Checkpoints of the policy alone lack the last three. Nothing is ever unpickled.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ import os
 import shutil
 import zipfile
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -39,16 +39,16 @@ from training.networks import FEATURES
 
 FORMAT = 1
 _KEPT = 2
-"""So many of the latest checkpoints of a run are kept, should the newest one be unreadable."""
+"""How many of a run's latest checkpoints of a kind stay, in case the newest one turns out unreadable."""
 
 
 @dataclass(frozen=True)
 class PolicySettings:
-    """What a policy was made for, and from.
+    """What determines a policy's networks.
 
     Attributes:
-        scenario: What it was trained in; it observes and acts as this says.
-        features: Which networks look at observations: a name of FEATURES.
+        scenario: The scenario of training; its observations and actions are the policy's.
+        features: The networks that read observations: a name of FEATURES.
         hidden: Units of each hidden layer of actor and critic.
     """
 
@@ -57,42 +57,55 @@ class PolicySettings:
     hidden: tuple[int, ...] = (128, 128)
 
 
+@dataclass(frozen=True)
+class TrainerState:
+    """What only the trainer needs.
+
+    Attributes:
+        tensors: The optimiser's and PyTorch's random state.
+        arrays: The missions that are under way.
+        counters: Whatever else JSON holds.
+    """
+
+    tensors: dict[str, torch.Tensor]
+    arrays: dict[str, np.ndarray]
+    counters: dict[str, Any]
+
+
 @dataclass
 class Checkpoint:
     """What a checkpoint holds.
 
     Attributes:
         settings: Of the policy.
-        progress: What training says of itself: steps, seconds, the command, the latest validation.
+        progress: How far training is: steps, seconds, the command, the latest validation.
         weights: Of the networks.
-        scales: Arrays of the running scales.
-        tensors, arrays, numbers: What only the trainer needs; empty where only the policy is kept.
+        normalisation: Arrays of the Normalisers.
+        trainer: What continuing needs; None in a checkpoint of the policy alone.
     """
 
     settings: PolicySettings
     progress: dict[str, Any]
     weights: dict[str, torch.Tensor]
-    scales: dict[str, np.ndarray]
-    tensors: dict[str, torch.Tensor] = field(default_factory=dict)
-    arrays: dict[str, np.ndarray] = field(default_factory=dict)
-    numbers: dict[str, Any] = field(default_factory=dict)
+    normalisation: dict[str, np.ndarray]
+    trainer: TrainerState | None = None
 
 
 def save_checkpoint(folder: Path, checkpoint: Checkpoint) -> None:
-    """Write a checkpoint; older ones of the same kind in the same place go, but for the latest.
+    """Write a checkpoint, and remove all but the latest two of its kind.
 
     Args:
-        folder: `…/KIND-STEPS`; it must not be there yet, or it is written anew.
-        checkpoint: What to keep.
+        folder: `…/KIND-STEPS`; replaced if it exists.
+        checkpoint: What to write.
     """
     files = {
         "policy.safetensors": bytes_of(checkpoint.weights),
-        "normalisation.npz": _npz(checkpoint.scales),
+        "normalisation.npz": _npz(checkpoint.normalisation),
     }
-    if checkpoint.numbers:
-        files["training.safetensors"] = bytes_of(checkpoint.tensors)
-        files["training.npz"] = _npz(checkpoint.arrays)
-        files["training.json"] = _json(checkpoint.numbers)
+    if checkpoint.trainer is not None:
+        files["training.safetensors"] = bytes_of(checkpoint.trainer.tensors)
+        files["training.npz"] = _npz(checkpoint.trainer.arrays)
+        files["training.json"] = _json(checkpoint.trainer.counters)
     files["policy.json"] = _json(
         {
             "format": FORMAT,
@@ -103,6 +116,14 @@ def save_checkpoint(folder: Path, checkpoint: Checkpoint) -> None:
             "scenario": settings_of(checkpoint.settings.scenario),
         }
     )
+    _write_folder(folder, files)
+    kind = folder.name.rpartition("-")[0]
+    for old in _numbered(folder.parent, kind)[:-_KEPT]:
+        shutil.rmtree(old)
+
+
+def _write_folder(folder: Path, files: Mapping[str, bytes]) -> None:
+    """Write a folder of files, whole or not at all."""
     unfinished = folder.with_name(f".{folder.name}.unfinished")
     shutil.rmtree(unfinished, ignore_errors=True)
     try:
@@ -118,30 +139,27 @@ def save_checkpoint(folder: Path, checkpoint: Checkpoint) -> None:
     except BaseException:
         shutil.rmtree(unfinished, ignore_errors=True)
         raise
-    kind = folder.name.rpartition("-")[0]
-    for old in _numbered(folder.parent, kind)[:-_KEPT]:
-        shutil.rmtree(old)
 
 
 def checkpoint_name(kind: str, steps: int) -> str:
-    """The name of a folder: names of one kind sort by steps."""
+    """The name of a checkpoint's folder; names of one kind sort by steps."""
     return f"{kind}-{steps:012d}"
 
 
 def _numbered(folder: Path, kind: str) -> list[Path]:
-    """The checkpoints of a kind, the oldest first."""
+    """The checkpoints of a kind, oldest first."""
     return sorted(path for path in folder.glob(f"{kind}-*") if path.name.rpartition("-")[2].isdecimal())
 
 
 def forget_later(folder: Path, kind: str, steps: int) -> None:
-    """Remove the checkpoints of a kind beyond so many steps: a run that goes on from there makes its own."""
+    """Remove checkpoints of a kind with more steps: a run that is resumed from there writes its own."""
     for later in _numbered(folder, kind):
         if int(later.name.rpartition("-")[2]) > steps:
             shutil.rmtree(later)
 
 
 def latest_checkpoint(folder: Path, *kinds: str) -> Path:
-    """The checkpoint that a folder is, or its latest one of the first kind that it has.
+    """The folder itself if it is a checkpoint, else its latest one of the first kind that it has.
 
     Raises:
         CheckpointError: There is none.
@@ -159,7 +177,7 @@ def load_checkpoint(folder: Path, training: bool = False) -> Checkpoint:
 
     Args:
         folder: Of the checkpoint itself.
-        training: Whether the trainer's part is wanted, too.
+        training: Whether to read the trainer's state, too.
 
     Raises:
         CheckpointError: It is missing, broken, foreign or of another format.
@@ -169,8 +187,8 @@ def load_checkpoint(folder: Path, training: bool = False) -> Checkpoint:
     except (OSError, ValueError, RecursionError):
         raise CheckpointError("checkpoint", str(folder), "a folder with a readable policy.json") from None
     if not isinstance(head, dict) or head.get("format") != FORMAT:
-        found = head.get("format") if isinstance(head, dict) else head
-        raise CheckpointError(f"{folder / 'policy.json'}: format", found, f"{FORMAT}")
+        given = head.get("format") if isinstance(head, dict) else head
+        raise CheckpointError(f"{folder / 'policy.json'}: format", given, f"{FORMAT}")
     settings = _settings(folder, head)
     digests = head.get("sha256")
     if not isinstance(digests, dict) or not isinstance(head.get("progress"), dict):
@@ -182,9 +200,11 @@ def load_checkpoint(folder: Path, training: bool = False) -> Checkpoint:
         _arrays(folder / "normalisation.npz", digests),
     )
     if training:
-        loaded.tensors = _tensors(folder / "training.safetensors", digests)
-        loaded.arrays = _arrays(folder / "training.npz", digests)
-        loaded.numbers = json.loads(_content(folder / "training.json", digests))
+        loaded.trainer = TrainerState(
+            _tensors(folder / "training.safetensors", digests),
+            _arrays(folder / "training.npz", digests),
+            json.loads(_content(folder / "training.json", digests)),
+        )
     return loaded
 
 
@@ -202,7 +222,7 @@ def _settings(folder: Path, head: Mapping[str, Any]) -> PolicySettings:
 
 
 def _content(file: Path, digests: Mapping[str, Any]) -> bytes:
-    """A file's content, if it is what was written."""
+    """A file's content, if it is what save_checkpoint wrote."""
     try:
         content = file.read_bytes()
     except OSError as error:

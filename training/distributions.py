@@ -1,10 +1,10 @@
-"""The distribution of moves and gazes whose scores add up: the product of two small ones.
+"""The distribution of pairs of a move and a gaze whose scores add up: a product of two small distributions.
 
 Action m·D + g is move m of M with gaze g of D. Its logit is the sum of their scores, a(m) + b(g), and so
 
     p(m, g) = softmax(a)(m) softmax(b)(g),    H = H(softmax(a)) + H(softmax(b)):
 
-a move and a gaze are drawn, weighed and learned apart, as M + D numbers instead of M·D.
+so M + D numbers are drawn from and learned instead of M·D.
 """
 
 from __future__ import annotations
@@ -16,15 +16,15 @@ from torch.distributions import Categorical
 
 
 class MoveAndGaze(CategoricalDistribution):
-    """A move and a gaze, independent of each other; made of their scores (N, M + D)."""
+    """A move and a gaze, independent of each other, from their scores (N, M + D)."""
 
     def __init__(self, moves: int, gazes: int) -> None:
-        """Know how many there are, M and D."""
+        """Take M, the number of moves, and D, that of gazes."""
         super().__init__(moves * gazes)
         self._sizes = (moves, gazes)
 
     def proba_distribution_net(self, latent_dim: int) -> nn.Module:
-        """Nothing: it is made of the scores as they are."""
+        """The identity: the scores need no further layer."""
         del latent_dim
         return nn.Identity()
 
@@ -36,12 +36,12 @@ class MoveAndGaze(CategoricalDistribution):
 
     @property
     def distribution(self) -> Categorical:
-        """The same as one distribution of all M·D actions, for whoever wants the likeliest or all of them."""
+        """The same as one distribution over all M·D actions."""
         return Categorical(logits=(self._moves[:, :, None] + self._gazes[:, None, :]).flatten(1))
 
     @distribution.setter
     def distribution(self, value: None) -> None:
-        """Stable-Baselines3 begins with none."""
+        """Stable-Baselines3 sets None at first; there is nothing to set."""
 
     def log_prob(self, actions: torch.Tensor) -> torch.Tensor:
         """(N,) logarithms of the probabilities of actions (N,)."""
@@ -50,7 +50,7 @@ class MoveAndGaze(CategoricalDistribution):
         return parts[:, 0]
 
     def entropy(self) -> torch.Tensor:
-        """(N,), in nats."""
+        """(N,) entropies in nats."""
         moves, gazes = self._moves, self._gazes
         return -(moves.exp() * moves).sum(dim=1) - (gazes.exp() * gazes).sum(dim=1)
 

@@ -1,6 +1,6 @@
-"""What networks see of an observation: panorama, own state and team as numbers, maps through convolutions.
+"""The networks of policies: an MLP over vectors, convolutions over maps, one small network for all gazes.
 
-Observations are flat vectors; a layout says where each part lies.
+Observations are flat vectors; an ObservationLayout says where each part lies.
 """
 
 from __future__ import annotations
@@ -24,60 +24,60 @@ from training.distributions import MoveAndGaze
 
 _MAPS = ("patch", "overview")
 _HIDDEN = ("action_mask",)
-"""Parts that are not looked at."""
-_MOST = 10.0
-"""Scaled numbers are clipped to this: what was never seen in training must not drown the rest."""
+"""Parts that networks do not read."""
+_CLIP = 10.0
+"""Normalised numbers are clipped to ±this, so that what training never saw does not drown the rest."""
 
 
 class VectorFeatures(BaseFeaturesExtractor):
-    """The parts that are no maps, scaled: the default, for an MLP."""
+    """All parts but maps, normalised: input of an MLP."""
 
     places: torch.Tensor
     mean: torch.Tensor
-    deviation: torch.Tensor
+    std: torch.Tensor
 
     def __init__(self, space: spaces.Box, layout: ObservationLayout) -> None:
-        """Look at all parts but maps.
+        """Read all parts but maps.
 
         Args:
             space: Of flat observations.
             layout: Where their parts lie.
         """
-        chosen = [part for name, part in layout.parts.items() if name not in (*_MAPS, *_HIDDEN)]
-        places = np.concatenate([np.arange(part.start, part.stop) for part in chosen])
+        vectors = [part for name, part in layout.parts.items() if name not in (*_MAPS, *_HIDDEN)]
+        places = np.concatenate([np.arange(part.start, part.stop) for part in vectors])
         super().__init__(space, len(places))
         self.register_buffer("places", torch.as_tensor(places), persistent=False)
         self.register_buffer("mean", torch.zeros(layout.size))
-        self.register_buffer("deviation", torch.ones(layout.size))
+        self.register_buffer("std", torch.ones(layout.size))
 
-    def rescale(self, mean: np.ndarray, deviation: np.ndarray) -> None:
-        """Take over means and deviations (F,) of flat observations."""
+    def normalise_by(self, mean: np.ndarray, std: np.ndarray) -> None:
+        """Normalise by these means and standard deviations (F,) of flat observations."""
         self.mean.copy_(torch.as_tensor(mean))
-        self.deviation.copy_(torch.as_tensor(deviation))
+        self.std.copy_(torch.as_tensor(std))
 
     def forward(self, observations: torch.Tensor) -> torch.Tensor:
         """Features (N, K) of observations (N, F)."""
-        scaled = (observations - self.mean) / self.deviation
-        return scaled.index_select(1, self.places).clamp(-_MOST, _MOST)
+        normalised = (observations - self.mean) / self.std
+        return normalised.index_select(1, self.places).clamp(-_CLIP, _CLIP)
 
 
 class MapFeatures(VectorFeatures):
-    """Besides the vector, the patch around the robot and the overview through small convolutions.
+    """The vector, and features of the patch around the robot and of the overview from small convolutions.
 
-    Maps that are one voxel high are two-dimensional, and so are their convolutions. Maps hold numbers from
-    0 to 1 and are not scaled.
+    Maps one voxel high get two-dimensional convolutions, others three-dimensional ones. Maps hold numbers
+    from 0 to 1 and are not normalised.
     """
 
     def __init__(
         self, space: spaces.Box, layout: ObservationLayout, channels: int = 16, features: int = 64
     ) -> None:
-        """Look at everything.
+        """Read all parts.
 
         Args:
             space: Of flat observations.
             layout: Where their parts lie.
             channels: Of the first convolution; the second has twice as many.
-            features: That each map comes to.
+            features: Of each map.
         """
         super().__init__(space, layout)
         self._maps: dict[str, Part] = {name: layout.parts[name] for name in _MAPS if name in layout.parts}
@@ -113,14 +113,14 @@ def _convolution(shape: tuple[int, ...], channels: int, features: int) -> nn.Mod
 
 
 _AROUND = tuple(itertools.product((-1, 0, 1), (-1, 0, 1)))
-"""Steps in yaw and pitch from a direction to those around it, itself among them."""
+"""Steps in yaw and pitch from a direction to its neighbours, itself included."""
 
 
 def _places_around(yaws: int, pitches: int) -> np.ndarray:
-    """(D·18,) places in a panorama (2, D) of what each gaze is scored by, all around the horizon.
+    """(D·18,) indices into a panorama (2, D): both channels of the nine directions around each gaze.
 
-    Above the highest pitch and below the lowest one nothing is known: they stand for themselves. (A gather
-    and a product are three times as fast as a convolution of so few channels.)
+    Yaws wrap around; at the highest and lowest pitch, the direction itself stands for what lies beyond. (A
+    gather and a product are three times as fast as a convolution of so few channels.)
     """
     directions = yaws * pitches
     places = [
@@ -134,7 +134,7 @@ def _places_around(yaws: int, pitches: int) -> np.ndarray:
 
 
 class _Logistic(torch.autograd.Function):
-    """tanh x = 2 / (1 + e^(-2x)) - 1, exact to about 1e-7, in less than half of the time of PyTorch's."""
+    """tanh x = 2 / (1 + e^(-2x)) - 1, exact to about 1e-7, in less than half the time of PyTorch's tanh."""
 
     @staticmethod
     def forward(ctx: Any, x: torch.Tensor) -> torch.Tensor:  # noqa: ANN401 - PyTorch has no type for it
@@ -149,7 +149,7 @@ class _Logistic(torch.autograd.Function):
 
 
 class Tanh(nn.Module):
-    """The hyperbolic tangent, fast on processors."""
+    """The hyperbolic tangent, fast on CPUs."""
 
     def forward(self, x: torch.Tensor) -> torch.Tensor:
         """Of any shape."""
@@ -157,11 +157,11 @@ class Tanh(nn.Module):
 
 
 class GazeHeads(nn.Module):
-    """Scores of moves and of gazes, and what the critic makes of it.
+    """Scores of moves and of gazes, and the units of the critic.
 
-    An MLP scores the moves. One small network, the same for every gaze, scores the gazes from the rays of the
-    panorama around that direction, and from what the MLP has to say: a direction that promises much looks the
-    same wherever it is, and is learned once.
+    An MLP scores the moves. One small network with the same weights for every gaze scores the gazes: it reads
+    the panorama's rays around that direction and the MLP's units. So a promising direction is learned once,
+    not once for every yaw and pitch.
     """
 
     places: torch.Tensor
@@ -172,11 +172,11 @@ class GazeHeads(nn.Module):
         """Make the networks.
 
         Args:
-            features: Numbers that are seen; the first 2·D of them are the panorama's.
-            panorama: Yaws and pitches of its D rays, which are those of the gazes.
-            moves: How many there are.
+            features: Size of the input, whose first 2·D numbers are the panorama's.
+            panorama: Numbers of yaws and pitches, of gazes and of the panorama's D rays alike.
+            moves: Number of moves.
             hidden: Units of the hidden layers of actor and critic.
-            channels: That a gaze is looked at with.
+            channels: Units of the network that scores a gaze.
         """
         super().__init__()
         self.latent_dim_pi, self.latent_dim_vf = moves + panorama[0] * panorama[1], hidden[-1]
@@ -204,7 +204,7 @@ class GazeHeads(nn.Module):
 
 
 class GazePolicy(ActorCriticPolicy):
-    """A policy of discrete actions that scores moves and gazes apart: see `GazeHeads`."""
+    """A policy of discrete actions that scores moves and gazes separately: see `GazeHeads`."""
 
     def __init__(
         self,
@@ -214,7 +214,7 @@ class GazePolicy(ActorCriticPolicy):
         hidden: tuple[int, ...],
         **kwargs: Any,  # noqa: ANN401
     ) -> None:
-        """Make the networks; see `GazeHeads` for what they need."""
+        """Make the networks; see `GazeHeads` for the arguments."""
         self._heads = (panorama, moves, hidden)
         super().__init__(*args, **kwargs)
 
@@ -226,11 +226,11 @@ class GazePolicy(ActorCriticPolicy):
         self.action_dist = MoveAndGaze(moves, yaws * pitches)
         super()._build(lr_schedule)
         assert isinstance(self.mlp_extractor, GazeHeads)
-        for last in (self.mlp_extractor.moves, self.mlp_extractor.gazes):  # all actions alike at first
+        for last in (self.mlp_extractor.moves, self.mlp_extractor.gazes):  # nearly uniform at first
             nn.init.orthogonal_(last.weight, gain=0.01)
 
     def _get_constructor_parameters(self) -> dict[str, Any]:
-        """What `save` keeps to make the policy again."""
+        """Arguments that `save` stores, to make the policy again."""
         panorama, moves, hidden = self._heads
         return super()._get_constructor_parameters() | {
             "panorama": panorama,
@@ -250,7 +250,7 @@ FEATURES: Mapping[str, type[VectorFeatures]] = {
     "vector": VectorFeatures,
     "maps": MapFeatures,
 }
-"""What looks at observations, by the name that settings have for it."""
+"""Networks that read observations, by the name of the option `--features`."""
 
 
 def policy_class(features: str) -> type[ActorCriticPolicy]:
@@ -259,7 +259,7 @@ def policy_class(features: str) -> type[ActorCriticPolicy]:
 
 
 def policy_settings(features: str, scenario: Scenario, hidden: tuple[int, ...]) -> dict[str, Any]:
-    """`policy_kwargs` of a Stable-Baselines3 policy: orthogonal weights, tanh, actor and critic apart.
+    """`policy_kwargs` of a Stable-Baselines3 policy: orthogonal weights, tanh, separate actor and critic.
 
     Args:
         features: A name of FEATURES.
@@ -267,7 +267,7 @@ def policy_settings(features: str, scenario: Scenario, hidden: tuple[int, ...]) 
         hidden: Units of the hidden layers.
 
     Raises:
-        SettingError: The scenario's actions or panorama do not go with the networks.
+        SettingError: The networks cannot have the scenario's actions or panorama.
     """
     layout = ObservationLayout(scenario)
     settings: dict[str, Any] = {

@@ -1,4 +1,4 @@
-"""A learned policy: built from its settings, asked for actions, and as a strategy like any other."""
+"""A learned policy: built from its settings, loaded from a checkpoint, and used as a strategy."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ from entropy_explore_env.scenario import Scenario
 from training.checkpoints import Checkpoint, PolicySettings, latest_checkpoint, load_checkpoint
 from training.errors import CheckpointError
 from training.networks import VectorFeatures, policy_class, policy_settings
-from training.scales import RunningScale
+from training.normalisation import Normaliser
 
 _SHARED = ("pi_features_extractor.", "vf_features_extractor.")
-_SCALES = ("features_extractor.mean", "features_extractor.deviation")
-"""Kept as the scale of observations."""
-"""Further names of `features_extractor`."""
+"""Further names of `features_extractor`, which actor and critic share."""
+_NORMALISATION = ("features_extractor.mean", "features_extractor.std")
+"""Kept in the checkpoint's normalisation, not among its weights."""
 PRETRAINED = Path(__file__).parent / "pretrained"
 PREFIX = "pretrained:"
 POLICIES = ("best", "step")
-"""Kinds of checkpoints, the one that is preferred first."""
+"""Kinds of checkpoints, in order of preference."""
 
 
 def make_policy(
@@ -50,77 +50,53 @@ def load_policy(checkpoint: Checkpoint) -> ActorCriticPolicy:
         CheckpointError: Its weights do not fit its settings.
     """
     policy = make_policy(checkpoint.settings)
-    take_weights(policy, checkpoint)
+    load_weights(policy, checkpoint)
     policy.set_training_mode(False)
     return policy
 
 
-def take_weights(policy: ActorCriticPolicy, checkpoint: Checkpoint) -> None:
-    """Put a checkpoint's weights and its scale of observations into a policy.
+def load_weights(policy: ActorCriticPolicy, checkpoint: Checkpoint) -> None:
+    """Put a checkpoint's weights and its normalisation of observations into a policy.
 
     Raises:
         CheckpointError: They do not fit. Nothing has changed then.
     """
     expected = weights_of(policy)
     for name in expected.keys() | checkpoint.weights.keys():
-        there, wanted = checkpoint.weights.get(name), expected.get(name)
-        if there is None or wanted is None or there.shape != wanted.shape or there.dtype != wanted.dtype:
-            found = None if there is None else tuple(there.shape)
+        given, wanted = checkpoint.weights.get(name), expected.get(name)
+        if given is None or wanted is None or given.shape != wanted.shape or given.dtype != wanted.dtype:
+            shape = None if given is None else tuple(given.shape)
             allowed = "no such tensor" if wanted is None else f"{tuple(wanted.shape)}, as its settings say"
-            raise CheckpointError(f"weights: {name}", found, allowed)
-        if not torch.isfinite(there).all():
+            raise CheckpointError(f"weights: {name}", shape, allowed)
+        if not torch.isfinite(given).all():
             raise CheckpointError(f"weights: {name}", "not finite", "finite numbers")
-    scale = scale_of(checkpoint.scales, "observations", policy.observation_space.shape[0])  # pyright: ignore
+    stats = Normaliser(ObservationLayout(checkpoint.settings.scenario).size)
+    stats.load_arrays("observations", checkpoint.normalisation)
     policy.load_state_dict(checkpoint.weights, strict=False)
-    rescale_observations(policy, scale)
+    normalise_observations(policy, stats)
 
 
 def weights_of(policy: ActorCriticPolicy) -> dict[str, torch.Tensor]:
-    """A policy's weights, each once: actor and critic share what looks at observations; no scales."""
+    """A policy's weights, each under one name, without the normalisation of observations."""
     named = policy.state_dict().items()
-    return {name: each for name, each in named if not name.startswith(_SHARED) and name not in _SCALES}
+    return {name: each for name, each in named if not name.startswith(_SHARED) and name not in _NORMALISATION}
 
 
-def rescale_observations(policy: ActorCriticPolicy, scale: RunningScale) -> None:
-    """Let a policy see observations in units of a scale."""
+def normalise_observations(policy: ActorCriticPolicy, stats: Normaliser) -> None:
+    """Let a policy's networks see normalised observations."""
     assert isinstance(policy.features_extractor, VectorFeatures)
-    policy.features_extractor.rescale(scale.mean, scale.deviation)
-
-
-def scale_arrays(name: str, scale: RunningScale) -> dict[str, np.ndarray]:
-    """A scale as arrays with a name before them."""
-    return {
-        f"{name}_count": np.array(scale.count),
-        f"{name}_mean": scale.mean,
-        f"{name}_variance": scale.variance,
-    }
-
-
-def scale_of(arrays: dict[str, np.ndarray], name: str, size: int) -> RunningScale:
-    """The scale that `scale_arrays` gave.
-
-    Raises:
-        CheckpointError: It is missing, of another size or not finite.
-    """
-    scale = RunningScale(size)
-    for part, shape in (("count", ()), ("mean", (size,)), ("variance", (size,))):
-        there = arrays.get(f"{name}_{part}")
-        if there is None or there.shape != shape or there.dtype != np.float64 or not np.isfinite(there).all():
-            found = None if there is None else there.shape
-            raise CheckpointError(f"normalisation: {name}_{part}", found, f"{shape} finite float64")
-        setattr(scale, part, float(there) if part == "count" else there)
-    return scale
+    policy.features_extractor.normalise_by(stats.mean, stats.std)
 
 
 def choose_actions(
-    policy: ActorCriticPolicy, observations: np.ndarray, chance: torch.Generator | None
+    policy: ActorCriticPolicy, observations: np.ndarray, rng: torch.Generator | None
 ) -> np.ndarray:
     """Actions for observations, without touching the random state that training draws from.
 
     Args:
-        policy: To ask.
+        policy: Chooses.
         observations: (N, F) float32.
-        chance: To draw actions from; None = the likeliest ones.
+        rng: Draws the actions from the policy's distribution; None = its likeliest actions.
 
     Returns:
         (N,) int64, or (N, K) float32 within the space's bounds.
@@ -128,27 +104,28 @@ def choose_actions(
     with torch.inference_mode():
         chosen = policy.get_distribution(torch.as_tensor(observations)).distribution
         if isinstance(chosen, Categorical):
-            if chance is None:
+            if rng is None:
                 return chosen.logits.argmax(dim=1).numpy()
-            return torch.multinomial(chosen.probs, 1, generator=chance)[:, 0].numpy()
+            return torch.multinomial(chosen.probs, 1, generator=rng)[:, 0].numpy()
         assert isinstance(chosen, Normal)
         actions = chosen.mean
-        if chance is not None:
-            actions = torch.normal(actions, chosen.stddev, generator=chance)
+        if rng is not None:
+            actions = torch.normal(actions, chosen.stddev, generator=rng)
         return actions.clamp(-1.0, 1.0).numpy()
 
 
 class LearnedPolicy:
-    """The strategy of a checkpoint: each robot's policy sees its own RobotView, as observations show it.
+    """The strategy of a checkpoint: every robot's policy observes that robot's own RobotView.
 
-    It draws its actions, as it did in training, from the mission's stream for strategies.
+    As in training, actions are drawn from the policy's distribution; the mission's random stream for
+    strategies seeds the draws.
     """
 
     def __init__(self, folder: Path) -> None:
         """Read a checkpoint.
 
         Args:
-            folder: A checkpoint, or a run of `training.ppo`: then its best one.
+            folder: A checkpoint, or a run of `training.ppo`, whose best checkpoint is taken.
 
         Raises:
             CheckpointError: It cannot be used.
@@ -158,22 +135,22 @@ class LearnedPolicy:
         self._folder = folder
 
     def reset(self, scenario: Scenario, rng: np.random.Generator) -> None:
-        """A new mission begins.
+        """Begin a mission.
 
         Raises:
-            CheckpointError: The policy was made for another number of robots, or for observations or
-                actions that this scenario cannot give.
+            CheckpointError: The policy was trained for another number of robots, or with observations or
+                actions that this scenario does not have.
         """
         trained = self._checkpoint.settings.scenario
         self._observer = ViewObserver(scenario, trained.observation, trained.action)
-        there, wanted = self._observer.layout.parts, ObservationLayout(trained).parts
-        for name in wanted.keys() | there.keys():
-            shapes = [parts[name].shape if name in parts else None for parts in (there, wanted)]
+        offered, wanted = self._observer.layout.parts, ObservationLayout(trained).parts
+        for name in wanted.keys() | offered.keys():
+            shapes = [parts[name].shape if name in parts else None for parts in (offered, wanted)]
             if shapes[0] != shapes[1]:
                 what = "robots" if name == "team" else f"observation {name}"
-                found = scenario.robots if name == "team" else shapes[0]
+                given = scenario.robots if name == "team" else shapes[0]
                 fits = trained.robots if name == "team" else shapes[1]
-                raise CheckpointError(f"{self._folder}: {what}", found, f"{fits}, as the policy was trained")
+                raise CheckpointError(f"{self._folder}: {what}", given, f"{fits}, as the policy was trained")
         actions = [action_space(each) for each in (self._observer.scenario, trained)]
         if actions[0] != actions[1]:
             raise CheckpointError(f"{self._folder}: actions", actions[0], f"{actions[1]}, as it was trained")
@@ -181,12 +158,12 @@ class LearnedPolicy:
             raise CheckpointError(
                 f"{self._folder}: Scenario.action", scenario.action, f"continuous, or {trained.action}"
             )
-        self._chance = torch.Generator().manual_seed(int(rng.integers(2**63)))
+        self._rng = torch.Generator().manual_seed(int(rng.integers(2**63)))
 
     def choose(self, views: Sequence[RobotView]) -> list[np.ndarray]:
         """The policy's viewpoint for each view."""
         observations = np.stack([self._observer.observe(view) for view in views])
-        actions = choose_actions(self._policy, observations, self._chance)
+        actions = choose_actions(self._policy, observations, self._rng)
         return [self._observer.viewpoint(view, action) for view, action in zip(views, actions, strict=True)]
 
 
@@ -218,8 +195,8 @@ def make_policy_strategy(name: str) -> LearnedPolicy:
 
 
 def policy_files(name: str) -> list[Path]:
-    """The files that decide what a learned policy does: its checkpoint, and what runs it."""
+    """The files that determine what a learned policy does: its checkpoint, and the modules that run it."""
     checkpoint = latest_checkpoint(policy_folder(name), *POLICIES)
-    modules = ("policy", "networks", "distributions", "checkpoints", "scales")
+    modules = ("policy", "networks", "distributions", "checkpoints", "normalisation")
     code = [Path(__file__).with_name(f"{module}.py") for module in modules]
     return [checkpoint / "policy.json", checkpoint / "policy.safetensors", *code]

@@ -1,7 +1,10 @@
-"""What a trainer needs to go on bitwise where it was: optimiser, random states, missions under way."""
+"""A training run's state, and how a checkpoint saves and restores all of it, bit for bit."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -9,53 +12,162 @@ import torch
 from stable_baselines3 import PPO
 
 from entropy_explore_env.envs.robot_vec_env import RobotVecEnv
-from training.checkpoints import Checkpoint
+from entropy_explore_env.errors import SettingError
+from training.advantages import DecisionBuffer
+from training.checkpoints import (
+    Checkpoint,
+    PolicySettings,
+    TrainerState,
+    forget_later,
+    latest_checkpoint,
+    load_checkpoint,
+)
+from training.errors import CheckpointError
+from training.normalisation import Normaliser
+from training.policy import load_weights, weights_of
+from training.progress import Progress
 
-_CHANCE = "torch_chance"
-_ROWS = "rows."
+_TORCH_RNG = "torch_chance"  # names in files of every version
+_SHUFFLE_RNG = "chance"
+_ENVS = "rows."
+_COUNTERS = ("best", "curve", "next_validation", "next_checkpoint")
 
 
-def keep_training(checkpoint: Checkpoint, model: PPO, rows: RobotVecEnv, numbers: dict[str, Any]) -> None:
-    """Put into a checkpoint what going on takes.
+@dataclass
+class TrainingState:
+    """Everything that training changes.
 
-    Args:
-        checkpoint: Of the policy; its part for the trainer is filled in.
-        model: Between two rollouts.
-        rows: Where it learns.
-        numbers: What else the trainer counts.
+    Attributes:
+        settings: Of the policy.
+        model: Policy, optimiser and counters.
+        envs: The missions that are under way.
+        observation_stats: Mean and deviation of the observations that were learned from.
+        progress: How far the run is.
+        command: What the run was started with.
+        options: Those of the command, as JSON holds them.
     """
-    state = model.policy.optimizer.state_dict()["state"]
-    checkpoint.tensors = {f"{i}.{name}": each for i, own in state.items() for name, each in own.items()}
-    checkpoint.tensors[_CHANCE] = torch.get_rng_state()
-    checkpoint.arrays = {_ROWS + name: array for name, array in rows.arrays().items()}
-    checkpoint.arrays["last_observations"] = np.asarray(model._last_obs)
-    checkpoint.arrays["episode_starts"] = np.asarray(model._last_episode_starts)
-    checkpoint.numbers = numbers | {"updates": model._n_updates}
+
+    settings: PolicySettings
+    model: PPO
+    envs: RobotVecEnv
+    observation_stats: Normaliser
+    progress: Progress
+    command: str = ""
+    options: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def buffer(self) -> DecisionBuffer:
+        """The model's rollout buffer."""
+        assert isinstance(self.model.rollout_buffer, DecisionBuffer)
+        return self.model.rollout_buffer
+
+    def summary(self) -> dict[str, Any]:
+        """How far the run is, and how it was started, as JSON holds it."""
+        return {
+            "command": self.command,
+            "args": self.options,
+            "steps": self.model.num_timesteps,
+            **self.progress.seconds,
+            "validation": self.progress.curve[-1] if self.progress.curve else None,
+        }
 
 
-def take_up_training(found: Checkpoint, model: PPO, rows: RobotVecEnv) -> None:
-    """Put model and rows where those of a checkpoint were; the policy's weights are another matter.
+def save_policy(state: TrainingState) -> Checkpoint:
+    """The policy alone."""
+    stats = state.observation_stats.arrays("observations") | state.buffer.return_stats.arrays("returns")
+    return Checkpoint(state.settings, state.summary(), weights_of(state.model.policy), stats)
 
-    Args:
-        found: With its part for the trainer.
-        model: Of the same settings.
-        rows: Likewise.
+
+def save_state(state: TrainingState) -> Checkpoint:
+    """The policy and all that training needs to continue, between two rollouts."""
+    checkpoint, model = save_policy(state), state.model
+    optimiser = model.policy.optimizer.state_dict()["state"]
+    tensors = {f"{i}.{name}": each for i, own in optimiser.items() for name, each in own.items()}
+    arrays = {_ENVS + name: array for name, array in state.envs.arrays().items()}
+    checkpoint.trainer = TrainerState(
+        tensors | {_TORCH_RNG: torch.get_rng_state()},
+        arrays
+        | {
+            "last_observations": np.asarray(model._last_obs),
+            "episode_starts": np.asarray(model._last_episode_starts),
+        },
+        {name: getattr(state.progress, name) for name in _COUNTERS}
+        | {_SHUFFLE_RNG: state.buffer.rng.bit_generator.state, "updates": model._n_updates},
+    )
+    return checkpoint
+
+
+def restore_state(state: TrainingState, checkpoint: Checkpoint) -> None:
+    """Put a run that was set up with the same options where the checkpoint's run was.
 
     Raises:
-        RecordError: The missions of the checkpoint do not fit the rows.
+        CheckpointError: It does not fit this run.
     """
-    state: dict[int, dict[str, torch.Tensor]] = {}
-    for name, tensor in found.tensors.items():
-        if name != _CHANCE:
+    if checkpoint.settings != state.settings:
+        allowed = "the settings that the run was started with"
+        raise CheckpointError("scenario", state.settings.scenario.name, allowed)
+    load_weights(state.model.policy, checkpoint)
+    try:
+        _restore_trainer(state, checkpoint)
+    except (AttributeError, LookupError, TypeError, ValueError) as error:
+        raise CheckpointError("checkpoint", repr(error), "one of this version of training.ppo") from None
+
+
+def _restore_trainer(state: TrainingState, checkpoint: Checkpoint) -> None:
+    """Everything but the policy's weights."""
+    model, buffer, trainer = state.model, state.buffer, checkpoint.trainer
+    if trainer is None:
+        raise LookupError("no trainer's state")
+    optimiser: dict[int, dict[str, torch.Tensor]] = {}
+    for name, tensor in trainer.tensors.items():
+        if name != _TORCH_RNG:
             place, _, part = name.partition(".")
-            state.setdefault(int(place), {})[part] = tensor
-    optimiser = model.policy.optimizer
-    optimiser.load_state_dict(optimiser.state_dict() | {"state": state})
-    rows.reset()
-    rows.set_arrays(
-        {name.removeprefix(_ROWS): each for name, each in found.arrays.items() if name.startswith(_ROWS)}
+            optimiser.setdefault(int(place), {})[part] = tensor
+    model.policy.optimizer.load_state_dict(model.policy.optimizer.state_dict() | {"state": optimiser})
+    state.envs.reset()
+    arrays = trainer.arrays
+    state.envs.set_arrays(
+        {name.removeprefix(_ENVS): array for name, array in arrays.items() if name.startswith(_ENVS)}
     )
-    model._last_obs = found.arrays["last_observations"]
-    model._last_episode_starts = found.arrays["episode_starts"]
-    model.num_timesteps, model._n_updates = found.progress["steps"], found.numbers["updates"]
-    torch.set_rng_state(found.tensors[_CHANCE])
+    model._last_obs = arrays["last_observations"]
+    model._last_episode_starts = arrays["episode_starts"]
+    model.num_timesteps, model._n_updates = checkpoint.progress["steps"], trainer.counters["updates"]
+    state.observation_stats.load_arrays("observations", checkpoint.normalisation)
+    buffer.return_stats.load_arrays("returns", checkpoint.normalisation)
+    buffer.rng.bit_generator.state = trainer.counters[_SHUFFLE_RNG]
+    for name in _COUNTERS:
+        setattr(state.progress, name, trainer.counters[name])
+    state.progress.seconds = {part: checkpoint.progress[part] for part in state.progress.seconds}
+    torch.set_rng_state(trainer.tensors[_TORCH_RNG])
+
+
+def checkpoint_to_resume(
+    folder: Path, resume: bool, options: Mapping[str, Any], changeable: frozenset[str]
+) -> Checkpoint | None:
+    """The checkpoint that a run continues from; None for a new run.
+
+    Args:
+        folder: Of the run.
+        resume: Whether a run that is in the folder may be continued.
+        options: Of the command, as JSON holds them.
+        changeable: Options that may differ from those that the run was started with.
+
+    Raises:
+        SettingError: There is a run in the folder, and it is not to be continued.
+        CheckpointError: The run was started with other options, or its checkpoint is broken.
+    """
+    used = [path for pattern in ("step-*", "best-*", "curve.csv") for path in folder.glob(pattern)]
+    if used and not resume:
+        raise SettingError("out", str(folder), "a new folder, or --resume to continue the run in it")
+    try:
+        latest = latest_checkpoint(folder, "step")
+    except CheckpointError:
+        forget_later(folder, "best", 0)
+        return None
+    checkpoint = load_checkpoint(latest, training=True)
+    before = checkpoint.progress.get("args")
+    for name, value in options.items():
+        was = before.get(name) if isinstance(before, dict) else None
+        if name not in changeable and was != value:
+            raise CheckpointError(name, value, f"{was}, as in the run that {latest} belongs to")
+    return checkpoint

@@ -16,10 +16,10 @@ from training.seeds import validation_seeds
 
 @dataclass(frozen=True)
 class Validation:
-    """What validation came to, over its missions; one that was cut off counts with the time it had.
+    """Means over the missions of a validation.
 
     Attributes:
-        mean_s, median_s: Mission time.
+        mean_s, median_s: Mission time; a mission that was cut off counts with the time limit.
         finished: Share of the missions that were mapped.
         bits_per_bit: Bits that teammates gained for each bit sent; None where nothing was sent.
     """
@@ -31,41 +31,41 @@ class Validation:
 
 
 class Validator:
-    """The same missions again and again: worlds of the validation split, robots that wait for nobody."""
+    """The same missions every time: worlds of the validation split, where robots decide whenever they can."""
 
     def __init__(self, scenario: Scenario, missions: int, threads: int) -> None:
         """Make the missions.
 
         Args:
-            scenario: What the policy is trained in.
-            missions: How many.
-            threads: That share them.
+            scenario: The scenario of training.
+            missions: How many missions to run.
+            threads: Threads that share them.
         """
-        there = with_settings(scenario, {"split": "validation", "decision_period_s": None})
-        self._env = EntropyExploreVectorEnv(there, missions, threads=threads, action_masks=False)
+        validation = with_settings(scenario, {"split": "validation", "decision_period_s": None})
+        self._env = EntropyExploreVectorEnv(validation, missions, threads=threads, action_masks=False)
         self._seeds = validation_seeds(missions)
 
     def validate(self, policy: ActorCriticPolicy) -> Validation:
-        """Run each mission to its end."""
-        env, chance = self._env, torch.Generator().manual_seed(0)
+        """Run each mission to its end; the random state of training stays as it is."""
+        env, rng = self._env, torch.Generator().manual_seed(0)
         missions, robots = env.num_envs, env.scenario.robots
         observations, _ = env.reset(seed=self._seeds)
         figures: list[dict[str, float] | None] = [None] * missions
         while any(each is None for each in figures):
-            actions = choose_actions(policy, observations.reshape(missions * robots, -1), chance)
+            actions = choose_actions(policy, observations.reshape(missions * robots, -1), rng)
             shape = (missions, robots) if robots > 1 else (missions,)
             observations, _, _, _, infos = env.step(actions.reshape(shape + actions.shape[1:]))
             for mission in np.flatnonzero(infos.get("_figures", ())).tolist():
                 figures[mission] = figures[mission] or infos["figures"][mission]
         ended = [each for each in figures if each is not None]
-        times = np.array([each["t_mission_s"] for each in ended])
-        shared = [each["bits_gained_per_bit_sent"] for each in ended]
-        told = [each for each in shared if each is not None]
+        times_s = np.array([each["t_mission_s"] for each in ended])
+        gained_per_sent = [each["bits_gained_per_bit_sent"] for each in ended]
+        defined = [each for each in gained_per_sent if each is not None]
         return Validation(
-            float(times.mean()),
-            float(np.median(times)),
+            float(times_s.mean()),
+            float(np.median(times_s)),
             float(np.mean([each["finished"] for each in ended])),
-            float(np.mean(told)) if told else None,
+            float(np.mean(defined)) if defined else None,
         )
 
     def close(self) -> None:

@@ -15,8 +15,8 @@ from entropy_explore_env.scenario import Scenario, with_settings
 from entropy_explore_env.scenarios import find_scenario
 from training.checkpoints import PolicySettings
 from training.networks import GazeHeads, MapFeatures, VectorFeatures, policy_settings
-from training.policy import choose_actions, make_policy, rescale_observations, weights_of
-from training.scales import RunningScale
+from training.normalisation import Normaliser
+from training.policy import choose_actions, make_policy, normalise_observations, weights_of
 
 YAWS, PITCHES = 6, 3
 
@@ -39,9 +39,9 @@ def test_vectors_are_the_parts_that_are_no_maps_scaled_and_clipped() -> None:
     names = ("panorama", "self", "team")
     parts = torch.cat([seen[:, layout.parts[name].start : layout.parts[name].stop] for name in names], dim=1)
     assert torch.equal(features(seen), parts)
-    features.rescale(np.full(layout.size, 0.5), np.full(layout.size, 0.01))
+    features.normalise_by(np.full(layout.size, 0.5), np.full(layout.size, 0.01))
     assert torch.allclose(features(seen), ((parts - 0.5) / 0.01).clamp(-10, 10))
-    assert set(features.state_dict()) == {"mean", "deviation"}
+    assert set(features.state_dict()) == {"mean", "std"}
 
 
 @pytest.mark.parametrize(
@@ -111,7 +111,7 @@ def test_each_weight_is_there_once_and_all_learn(features: str) -> None:
 def test_choosing_leaves_the_trainer_s_chance_alone_and_is_repeatable() -> None:
     there = scenario()
     policy, seen = make_policy(PolicySettings(there, "gazes", (8,))), observations(there, 50)
-    rescale_observations(policy, RunningScale(seen.shape[1]))
+    normalise_observations(policy, Normaliser(seen.shape[1]))
     state = torch.get_rng_state()
     first = choose_actions(policy, seen.numpy(), torch.Generator().manual_seed(3))
     again = choose_actions(policy, seen.numpy(), torch.Generator().manual_seed(3))
@@ -140,15 +140,15 @@ def test_gazes_want_a_ray_for_each_gaze(change: dict[str, Any]) -> None:
 
 
 @pytest.mark.parametrize("features", ["gazes", "vector"])
-def test_scales_lie_beside_the_weights_and_stable_baselines3_saves_both(
+def test_normalisation_lies_beside_the_weights_and_stable_baselines3_saves_both(
     tmp_path: Path, features: str
 ) -> None:
     policy = make_policy(PolicySettings(scenario(), features, (8, 8)))
-    assert not any("deviation" in name or name.endswith(".mean") for name in weights_of(policy))
+    assert not any(name.endswith((".mean", ".std")) for name in weights_of(policy))
     size = ObservationLayout(scenario()).size
-    scale = RunningScale(size)
-    scale.update(np.random.default_rng(1).normal(3.0, 2.0, (50, size)))
-    rescale_observations(policy, scale)
+    stats = Normaliser(size)
+    stats.update(np.random.default_rng(1).normal(3.0, 2.0, (50, size)))
+    normalise_observations(policy, stats)
     policy.save(str(tmp_path / "policy.zip"))
     again = type(policy).load(str(tmp_path / "policy.zip"), device="cpu")
     seen = observations(scenario(), 40).numpy()

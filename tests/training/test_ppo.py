@@ -17,9 +17,10 @@ import pytest
 import torch
 
 from entropy_explore_env.command import BAD_INPUT
+from entropy_explore_env.envs.robot_vec_env import RobotVecEnv
 from training import ppo
+from training.advantages import DecisionBuffer
 from training.checkpoints import checkpoint_name, latest_checkpoint, load_checkpoint
-from training.decisions import DecisionBuffer
 from training.errors import NotFiniteError
 
 ROOT = Path(__file__).parents[2]
@@ -37,9 +38,11 @@ def learn(out: Path, *more: str, steps: int = 384) -> int:
 def whole(out: Path) -> dict[str, bytes]:
     """Every number of the latest checkpoint, bit for bit, but for how long it took."""
     kept = load_checkpoint(latest_checkpoint(out, "step"), training=True)
-    tensors = {name: each.numpy() for name, each in (kept.weights | kept.tensors).items()}
-    bits = {name: numbers(each) for name, each in (tensors | kept.scales | kept.arrays).items()}
-    return bits | {"chance": json.dumps(kept.numbers["chance"]).encode()}
+    trainer = kept.trainer
+    assert trainer is not None
+    tensors = {name: each.numpy() for name, each in (kept.weights | trainer.tensors).items()}
+    bits = {name: numbers(each) for name, each in (tensors | kept.normalisation | trainer.arrays).items()}
+    return bits | {"chance": json.dumps(trainer.counters["chance"]).encode()}
 
 
 def numbers(array: np.ndarray) -> bytes:
@@ -127,7 +130,7 @@ def test_resuming_nothing_begins(tmp_path):
 
 def test_a_run_is_not_written_over_and_not_mixed_with_another(straight, capsys):
     assert learn(straight[0]) == BAD_INPUT
-    assert "--resume to go on" in capsys.readouterr().err
+    assert "--resume to continue" in capsys.readouterr().err
     assert learn(straight[0], "--resume", "--gamma", "0.5") == BAD_INPUT
     assert capsys.readouterr().err.startswith("error: gamma = 0.5: allowed is 0.9, as in the run")
     assert learn(straight[0], "--resume", "--channel.burst", "3") == BAD_INPUT
@@ -167,13 +170,14 @@ def test_what_is_not_finite_stops_the_run_and_leaves_the_last_good_checkpoint(
     tmp_path, capsys, monkeypatch, what
 ):
     out, compute = tmp_path / "run", DecisionBuffer.compute_returns_and_advantage
-    add, steps = DecisionBuffer.add_step, []
+    wait, steps = RobotVecEnv.step_wait, []
 
-    def poisoned_add(self, *step):
+    def poisoned_wait(self):
         steps.append(1)
+        stepped = wait(self)
         if len(steps) > 40:
-            self.rows.rewards[0] = np.nan
-        return add(self, *step)
+            self.rewards[0] = np.nan
+        return stepped
 
     def poisoned_advantages(self, **given):
         compute(self, **given)
@@ -182,13 +186,13 @@ def test_what_is_not_finite_stops_the_run_and_leaves_the_last_good_checkpoint(
             self.advantages[:] = np.inf
 
     if what == "reward":
-        monkeypatch.setattr(DecisionBuffer, "add_step", poisoned_add)
+        monkeypatch.setattr(RobotVecEnv, "step_wait", poisoned_wait)
     else:
         monkeypatch.setattr(DecisionBuffer, "compute_returns_and_advantage", poisoned_advantages)
     assert learn(out) == BAD_INPUT
     said = capsys.readouterr().err.splitlines()
     assert len(said) == 1 and "finite" in said[0] and "steps" in said[0]
-    assert what != "reward" or "reward = nan" in said[0]
+    assert what != "reward" or "reward = nan after 246 steps" in said[0]
     kept = load_checkpoint(latest_checkpoint(out, "step"), training=True)
     assert all(torch.isfinite(each).all() for each in kept.weights.values())
 

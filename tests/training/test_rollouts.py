@@ -1,4 +1,4 @@
-"""Rollouts ask the policy where robots decide, and nothing of the other rows counts."""
+"""Rollouts ask the policy where robots decide, and nothing of busy robots counts."""
 
 from __future__ import annotations
 
@@ -11,28 +11,28 @@ import torch
 from stable_baselines3 import PPO
 
 from baselines.cli.arguments import parse
-from training.collecting import DecisionPPO
-from training.decisions import DecisionBuffer
-from training.ppo import Args, Run, training_scenario
+from training.advantages import DecisionBuffer
+from training.ppo import Args, DecisionPPO, set_up, training_scenario
+from training.resuming import TrainingState
 from training.seeds import learning_seeds
-from training.terminal import TrainingBar
 
+STEPS = 64
 TINY = (
-    "--scenario box-7x11x5 --robots 2 --missions 3 --threads 1 --rollout-steps 64 --hidden 8 8 "
+    f"--scenario box-7x11x5 --robots 2 --missions 3 --threads 1 --rollout-steps {STEPS} --hidden 8 8 "
     "--validation-missions 1 --time-limit-s 30"
 ).split()
 
 
-def new_run(out: Path, words: list[str]) -> Run:
+def new_run(words: list[str]) -> TrainingState:
     """A run before its first rollout."""
-    args = parse(Args, [*TINY, *words, "--out", str(out / "run")])
-    return Run(args, training_scenario(args), TrainingBar(1, hidden=True))
+    args = parse(Args, [*TINY, *words])
+    return set_up(args, training_scenario(args))
 
 
-def collect(run: Run) -> None:
+def collect(run: TrainingState) -> None:
     """One rollout."""
     _, callback = run.model._setup_learn(1, None)
-    assert run.model.collect_rollouts(run.rows, callback, run.buffer, run.args.rollout_steps)
+    assert run.model.collect_rollouts(run.envs, callback, run.buffer, STEPS)
 
 
 def spoil(rows: Any, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -53,18 +53,19 @@ def spoil(rows: Any, monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.parametrize("words", ["", "--features vector", "--features vector --actions continuous"])
 def test_busy_rows_change_nothing_and_decisions_are_the_policy_s(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, words: str
+    monkeypatch: pytest.MonkeyPatch, words: str
 ) -> None:
-    run = new_run(tmp_path, words.split())
+    run = new_run(words.split())
     collect(run)
-    other = new_run(tmp_path, words.split())
-    spoil(other.rows, monkeypatch)
+    other = new_run(words.split())
+    spoil(other.envs, monkeypatch)
     collect(other)
     plain, spoiled = run.buffer, other.buffer
-    decided = plain.decided
-    assert 0.0 < decided.mean() < 0.9 and plain.ended.any() and plain.beyond.any()
-    for name in ("decided", "complete", "gained", "beyond"):
-        assert np.array_equal(getattr(plain, name), getattr(spoiled, name)), name
+    decided = plain.steps.decided
+    assert 0.0 < decided.mean() < 0.9 and plain.steps.ended.any() and plain.steps.final_values.any()
+    assert np.array_equal(plain.complete, spoiled.complete)
+    for name in ("decided", "ended", "rewards", "final_values"):
+        assert np.array_equal(getattr(plain.steps, name), getattr(spoiled.steps, name)), name
     for name in ("observations", "actions", "values", "log_probs", "advantages"):
         assert np.array_equal(getattr(plain, name)[decided], getattr(spoiled, name)[decided]), name
     assert not plain.actions[~decided].any() and not plain.log_probs[~decided].any()
@@ -74,51 +75,54 @@ def test_busy_rows_change_nothing_and_decisions_are_the_policy_s(
             torch.as_tensor(plain.observations[decided]), chosen if "continuous" in words else chosen[:, 0]
         )
     assert np.allclose(log_probs, plain.log_probs[decided], atol=1e-4)
-    assert np.allclose(values[:, 0], run.returns.restored(plain.values)[decided], atol=1e-4)
+    assert np.allclose(values[:, 0], plain.return_stats.denormalise(plain.values)[decided], atol=1e-4)
 
 
-def test_where_all_decide_rollouts_are_those_of_stable_baselines3(tmp_path: Path) -> None:
+def test_where_all_decide_rollouts_are_those_of_stable_baselines3() -> None:
     """One robot waits for nobody: every row decides, and what is drawn and valued is what PPO draws."""
     words = ["--robots", "1"]
-    run = new_run(tmp_path, words)
+    run = new_run(words)
     collect(run)
-    other = new_run(tmp_path, words)
+    other = new_run(words)
     _, callback = other.model._setup_learn(1, None)
     bootstrapped = []
 
-    def add_step(beyond: Any, *step: Any) -> None:
-        DecisionBuffer.add_step(other.buffer, beyond, *step)
+    def add_step(final_values: Any, *step: Any) -> None:
+        DecisionBuffer.add_step(other.buffer, final_values, *step)
 
     def add(obs: Any, action: Any, reward: np.ndarray, *rest: Any) -> None:
-        bootstrapped.append((reward - other.rows.rewards.astype(np.float32)) / other.model.gamma)
+        bootstrapped.append((reward - other.envs.rewards.astype(np.float32)) / other.model.gamma)
         other.buffer.add = DecisionBuffer.add.__get__(other.buffer)
         add_step(np.zeros(len(reward)), obs, action, reward, *rest)
         other.buffer.add = add  # pyright: ignore[reportAttributeAccessIssue]
 
     other.buffer.add = add  # pyright: ignore[reportAttributeAccessIssue]
-    PPO.collect_rollouts(other.model, other.rows, callback, other.buffer, other.args.rollout_steps)
+    PPO.collect_rollouts(other.model, other.envs, callback, other.buffer, STEPS)
     ours, theirs = run.buffer, other.buffer
-    assert ours.decided.all() and ours.ended.any()
-    for name in ("observations", "actions", "ended", "gained"):
+    assert ours.steps.decided.all() and ours.steps.ended.any()
+    for name in ("observations", "actions"):
         assert np.array_equal(getattr(ours, name), getattr(theirs, name)), name
+    for name in ("ended", "rewards"):
+        assert np.array_equal(getattr(ours.steps, name), getattr(theirs.steps, name)), name
     assert np.allclose(ours.log_probs, theirs.log_probs, atol=1e-5)
-    values = [each.returns.restored(each.buffer.values) for each in (run, other)]
+    values = [each.return_stats.denormalise(each.values) for each in (ours, theirs)]
     assert np.allclose(*values, atol=1e-4)
-    assert ours.beyond.any() and np.allclose(ours.beyond, bootstrapped, atol=1e-4)
+    final_values = ours.steps.final_values
+    assert final_values.any() and np.allclose(final_values, bootstrapped, atol=1e-4)
 
 
-def test_missions_to_learn_from_have_the_seeds_for_learning(tmp_path: Path) -> None:
-    run = new_run(tmp_path, ["--seed", "3"])
+def test_missions_to_learn_from_have_the_seeds_for_learning() -> None:
+    run = new_run(["--seed", "3"])
     run.model._setup_learn(1, None)
-    assert list(run.rows.vector_env.missions.seeds) == learning_seeds(3, 3)
+    assert list(run.envs.vector_env.missions.seeds) == learning_seeds(3, 3)
 
 
 def test_stable_baselines3_saves_the_trainer_without_its_missions(tmp_path: Path) -> None:
-    run = new_run(tmp_path, [])
+    run = new_run([])
     collect(run)
     run.model.save(tmp_path / "model.zip")
     again = DecisionPPO.load(tmp_path / "model.zip", device="cpu")
-    seen = run.buffer.observations[: run.args.missions, 0]
+    seen = run.buffer.observations[:, 0]
     assert np.array_equal(
         run.model.predict(seen, deterministic=True)[0], again.predict(seen, deterministic=True)[0]
     )

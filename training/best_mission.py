@@ -12,21 +12,21 @@ from training.policy import LearnedPolicy
 from training.seeds import validation_seeds
 
 
-def film_best(run: Path, scenario: Scenario) -> list[Path]:
-    """Run a validation mission of the best policy and write what it looked like.
+def draw_best_mission(run: Path, scenario: Scenario) -> list[Path]:
+    """Run a validation mission of the best policy and draw it.
 
     Args:
-        run: Folder of the run; `best-mission` in it gets the files.
-        scenario: That the policy learned in.
+        run: Folder of the run; the files go into `best-mission` in it.
+        scenario: The scenario of training.
 
     Returns:
         The files.
     """
     wanted = Wanted(Outputs(json=True), run / "best-mission", recorded=False)
     wanted.prepare()
-    form = {"split": "validation", "track_truth": True, "action": {"kind": "continuous"}}
-    env = EntropyExploreEnv(with_settings(scripted(scenario), form))
+    changes = {"split": "validation", "track_truth": True, "action": {"kind": "continuous"}}
+    env = EntropyExploreEnv(with_settings(scripted(scenario), changes))
     with MissionLog(wanted) as log:
         run_mission(env, LearnedPolicy(run), validation_seeds(1)[0], log.note, log.command)
-        _, written = log.finish(str(run))
-    return written
+        _, files = log.finish(str(run))
+    return files
