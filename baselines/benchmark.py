@@ -18,7 +18,7 @@ from pathlib import Path
 
 from baselines.cli.arguments import make_folder, parse, print_json, run_command
 from baselines.experiments.cells import run_cells
-from baselines.head_to_head.cells import Entrants, chosen_scenarios, chosen_strategies
+from baselines.head_to_head.cells import Entries, chosen_scenarios, chosen_strategies
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.scenarios import SCENARIOS
 from entropy_explore_env.validation import check_whole
@@ -60,7 +60,7 @@ class Args:
 def main(words: Sequence[str]) -> int:
     """Run the command."""
     args = parse(Args, words, description=__doc__)
-    entrants = _entrants(args)
+    entries = _entries(args)
     from baselines.head_to_head.page import write_page  # matplotlib: after the help
     from baselines.head_to_head.rows import Results
     from baselines.head_to_head.terminal import printed_results, show_results
@@ -70,7 +70,7 @@ def main(words: Sequence[str]) -> int:
     make_folder("runs", runs)
     started = time.perf_counter()
     records = run_cells(
-        entrants.cells(),
+        entries.cells(),
         runs,
         args.jobs or os.cpu_count() or 1,
         "head to head",
@@ -78,8 +78,8 @@ def main(words: Sequence[str]) -> int:
         limit_s=args.wall_limit_s,
         keep_failures=True,
     )
-    results = Results(entrants, records)
-    page = write_page(args.out, results, _command(args, entrants))
+    results = Results(entries, records)
+    page = write_page(args.out, results, _command(args, entries))
     if args.json:
         print_json({**printed_results(results), "wall_s": round(time.perf_counter() - started, 1)})
     else:
@@ -88,7 +88,7 @@ def main(words: Sequence[str]) -> int:
     return 0
 
 
-def _entrants(args: Args) -> Entrants:
+def _entries(args: Args) -> Entries:
     """What takes part.
 
     Raises:
@@ -107,7 +107,7 @@ def _entrants(args: Args) -> Entrants:
     strategies = chosen_strategies(args.strategies)
     wanted = args.scenarios if args.scenarios is not None else ("room,office" if args.quick else _SCENARIOS)
     scenarios = chosen_scenarios(wanted, args.world_scenario, args.time_limit_s)
-    return Entrants(scenarios, strategies, robots, seeds)
+    return Entries(scenarios, strategies, robots, seeds)
 
 
 def _team_sizes(words: str) -> tuple[int, ...]:
@@ -120,14 +120,14 @@ def _team_sizes(words: str) -> tuple[int, ...]:
     return sizes
 
 
-def _command(args: Args, entrants: Entrants) -> str:
+def _command(args: Args, entries: Entries) -> str:
     """What makes the same page again, wherever the world files lie."""
-    scenarios = args.scenarios or ",".join(entrants.scenarios)
+    scenarios = args.scenarios or ",".join(entries.scenarios)
     given = {
         "scenarios": ",".join(Path(word).name for word in scenarios.split(",")),
         "strategies": args.strategies,
-        "robots": ",".join(map(str, entrants.robots)),
-        "seeds": str(entrants.seeds),
+        "robots": ",".join(map(str, entries.robots)),
+        "seeds": str(entries.seeds),
         "world-scenario": args.world_scenario,
         "time-limit-s": None if args.time_limit_s is None else f"{args.time_limit_s:g}",
     }

@@ -16,8 +16,8 @@ from typing import Any
 
 from baselines.cli.arguments import Positional, parse, print_json, run_command
 from baselines.cli.world_options import Reading, world_settings
-from baselines.experiments.cells import markdown_table
 from baselines.experiments.mission import run_mission, scripted
+from baselines.experiments.tables import markdown_table
 from baselines.strategies import make_strategy
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.errors import SettingError, WorldError

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from baselines.cli.arguments import parse, print_json, run_command
-from baselines.experiments.claims import processor
+from baselines.experiments.machine import processor
 from benchmarks.deciding import deciding_rows
 from benchmarks.exploring import exploring_rows, mission_row
 from benchmarks.fusion import fusion_rows

@@ -18,7 +18,9 @@ from typing import Any
 import numpy as np
 
 from baselines.cli.arguments import make_folder, parse, print_json, run_command
-from baselines.experiments.cells import Cell, Record, median_interval, median_ratio_interval, run_cells
+from baselines.experiments.cells import Cell, run_cells
+from baselines.experiments.mission import Record
+from baselines.experiments.statistics import median_interval, median_ratio_interval
 from baselines.strategies import make_strategy
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.scenario import Scenario, with_settings

@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from baselines.cli.figures import COLOURS, STYLE, png
-from baselines.experiments.cells import csv_table, markdown_table
+from baselines.experiments.tables import csv_table, markdown_table
 from entropy_explore_env.writing import write_atomically
 from training.evaluate import SIMPLE, table_cells
 from training.experiment import ABLATIONS, BESIDE, Found, Task, planned_runs

@@ -1,4 +1,4 @@
-"""Experiments: many missions in cells, run in processes, resumable; claims with intervals.
+"""Experiments as cells of missions, run in processes, resumable.
 
 A cell is a scenario with a strategy; its missions differ by seed. Every mission leaves one small
 file, written whole or not at all, so that an experiment goes on where it was stopped.
@@ -6,95 +6,32 @@ file, written whole or not at all, so that an experiment goes on where it was st
 
 from __future__ import annotations
 
-import csv
 import hashlib
-import io
 import json
 import math
 import re
 import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, is_dataclass
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, is_dataclass
 from functools import cached_property, lru_cache
 from pathlib import Path
-from typing import Any, TypeVar
-
-import numpy as np
+from typing import TypeVar
 
 from baselines.experiments import mission
-from baselines.experiments.mission import run_mission, scripted
+from baselines.experiments.mission import Record, mission_record, scripted
 from baselines.experiments.provenance import sources_digest
 from baselines.experiments.worker_pool import Failure, run_each
-from baselines.strategies import make_strategy
-from baselines.strategies.protocol import Strategy
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
-from entropy_explore_env.reports.metrics import mission_figures
-from entropy_explore_env.reports.recording import Recorder
 from entropy_explore_env.scenario import Scenario
 from entropy_explore_env.writing import write_atomically
 
-_SERIES_POINTS = 200
 _PACE_PERIOD_S = 600.0
 """The bar's time left is reckoned from so much of the past: single missions differ a lot."""
 _LONGEST_REASON = 200
 _ADDRESS = re.compile(r" at 0x[0-9a-fA-F]+")
 """Where an object lies: another place in every process."""
-_RESAMPLES = 9999
-_CONFIDENCE = 0.95
 
-Record = dict[str, Any]
 Item = TypeVar("Item")
-
-
-def mission_record(env: EntropyExploreEnv, strategy: str, seed: int) -> Record:
-    """Run a mission and keep what reports need of it.
-
-    Returns:
-        The mission's figures; `half_s`, when the best map had lost half of H(0) - H_th;
-        `sent_by_scan`, measurements sent after each of the team's scans; and `series`: time,
-        entropy of the best map and measurements sent so far at up to 200 moments.
-    """
-    return record_mission(env, make_strategy(strategy), seed)
-
-
-def record_mission(
-    env: EntropyExploreEnv,
-    strategy: Strategy,
-    seed: int,
-    after_step: Callable[[EntropyExploreEnv], None] | None = None,
-) -> Record:
-    """`mission_record` of a strategy that is there; `after_step` is called after the reset and every step."""
-    recorder = Recorder(env.missions)
-
-    def note(env: EntropyExploreEnv) -> None:
-        recorder.note()
-        if after_step is not None:
-            after_step(env)
-
-    run_mission(env, strategy, seed, note)
-    figures = mission_figures(env.missions, 0)
-    best = recorder.entropy_bits.min(axis=1)
-    middle = 0.5 * (figures["entropy_start_bits"] + figures["entropy_threshold_bits"])
-    halved = np.flatnonzero(best <= middle)
-    rows = recorder.spread(_SERIES_POINTS)
-    single = np.flatnonzero(np.diff(recorder.scans) == 1)
-    scanned = np.diff(recorder.robot_scans, axis=0)[single].argmax(axis=1)
-    places = recorder.places_m[1:]
-    apart_m = np.linalg.norm(places[:, :, None] - places[:, None], axis=-1).sum() / max(
-        len(places) * places.shape[1] * (places.shape[1] - 1), 1
-    )
-    return {
-        **figures,
-        "half_s": float(recorder.time_s[halved[0]]) if len(halved) else None,
-        "sent_by_scan": np.diff(recorder.shared)[single].tolist(),
-        "depth_by_scan_m": np.round(recorder.depths_m[1:][single, scanned], 3).tolist(),
-        "apart_m": round(float(apart_m), 3),
-        "series": {
-            "time_s": np.round(recorder.time_s[rows], 3).tolist(),
-            "entropy_bits": np.round(best[rows], 1).tolist(),
-            "shared_measurements": recorder.shared[rows].tolist(),
-        },
-    }
 
 
 @dataclass(frozen=True)
@@ -256,104 +193,3 @@ def _read(folder: Path, cell: Cell, seed: int, limit_s: float = math.inf) -> Rec
         return None
     ended_after_s = record.get("limit_s")
     return None if ended_after_s is not None and ended_after_s < limit_s else record
-
-
-@dataclass(frozen=True)
-class Claim:
-    """A claim of a paper beside what was measured.
-
-    Attributes:
-        id: Stable name.
-        claim: What is claimed.
-        paper: The paper's figure, if it gives one.
-        ours: Ours.
-        low: Lower end of a 95 % interval of ours, if it has one.
-        high: Upper end.
-        holds: Whether the claim holds.
-    """
-
-    id: str
-    claim: str
-    paper: float | str | None
-    ours: float | str | None
-    low: float | None
-    high: float | None
-    holds: bool
-
-    def row(self) -> dict[str, Any]:
-        """As JSON has it."""
-        return asdict(self)
-
-
-def mean_interval(values: Sequence[float] | np.ndarray) -> tuple[float, float, float]:
-    """Mean and its 95 % interval by bootstrap over missions (percentiles)."""
-    sample = np.asarray(values, float)
-    means = _resampled(sample, len(sample)).mean(axis=1)
-    return (float(sample.mean()), *_central(means))
-
-
-def median_interval(values: Sequence[float] | np.ndarray) -> tuple[float, float, float]:
-    """Median and its 95 % interval by bootstrap over missions (percentiles)."""
-    sample = np.asarray(values, float)
-    medians = np.median(_resampled(sample, len(sample)), axis=1)
-    return (float(np.median(sample)), *_central(medians))
-
-
-def small_mean_range(values: Sequence[float] | np.ndarray, starts: int) -> tuple[float, float]:
-    """Where 95 % of the means of only `starts` missions lie."""
-    return _central(_resampled(np.asarray(values, float), starts).mean(axis=1))
-
-
-def ratio_interval(
-    upper: Sequence[float] | np.ndarray, lower: Sequence[float] | np.ndarray
-) -> tuple[float, float, float]:
-    """Ratio of two means over the same seeds, and its 95 % interval (paired bootstrap)."""
-    pairs = np.stack([np.asarray(upper, float), np.asarray(lower, float)], axis=1)
-    means = _resampled(pairs, len(pairs)).mean(axis=1)
-    return (float(pairs[:, 0].mean() / pairs[:, 1].mean()), *_central(means[:, 0] / means[:, 1]))
-
-
-def double_ratio_interval(
-    upper: np.ndarray, lower: np.ndarray, upper_before: np.ndarray, lower_before: np.ndarray
-) -> tuple[float, float, float]:
-    """A ratio of two means over the same ratio before, all over the same seeds, and its 95 % interval."""
-    rows = np.stack([upper, lower, upper_before, lower_before], axis=1)
-    means = np.concatenate([rows.mean(axis=0)[None], _resampled(rows, len(rows)).mean(axis=1)])
-    ratios = means[:, 0] / means[:, 1] / (means[:, 2] / means[:, 3])
-    return (float(ratios[0]), *_central(ratios[1:]))
-
-
-def median_ratio_interval(
-    upper: Sequence[float] | np.ndarray, lower: Sequence[float] | np.ndarray
-) -> tuple[float, float, float]:
-    """Ratio of two medians over the same seeds, and its 95 % interval (paired bootstrap)."""
-    pairs = np.stack([np.asarray(upper, float), np.asarray(lower, float)], axis=1)
-    medians = np.median(_resampled(pairs, len(pairs)), axis=1)
-    return (
-        float(np.median(pairs[:, 0]) / np.median(pairs[:, 1])),
-        *_central(medians[:, 0] / medians[:, 1]),
-    )
-
-
-def _resampled(sample: np.ndarray, size: int) -> np.ndarray:
-    """(resamples, size, …) draws with replacement, always the same ones."""
-    rows = np.random.default_rng(0).integers(len(sample), size=(_RESAMPLES, size))
-    return sample[rows]
-
-
-def _central(values: np.ndarray) -> tuple[float, float]:
-    low, high = np.quantile(values, [(1 - _CONFIDENCE) / 2, (1 + _CONFIDENCE) / 2])
-    return float(low), float(high)
-
-
-def markdown_table(head: Sequence[str], rows: Sequence[Sequence[object]]) -> str:
-    """A Markdown table."""
-    lines = [head, ["---"] * len(head), *rows]
-    return "\n".join("| " + " | ".join(str(cell) for cell in line) + " |" for line in lines) + "\n"
-
-
-def csv_table(columns: Mapping[str, Sequence[object]]) -> str:
-    """Columns of equal length as CSV."""
-    text = io.StringIO()
-    csv.writer(text, lineterminator="\n").writerows([tuple(columns), *zip(*columns.values(), strict=True)])
-    return text.getvalue()

@@ -1,27 +1,69 @@
-"""A paper's claims as people read them: a table in the terminal, and one in Markdown."""
+"""Claims of a paper beside what was measured, as people read them: in the terminal, and in Markdown."""
 
 from __future__ import annotations
 
-import platform
 import sys
 import time
 from collections.abc import Sequence
+from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
 
 from baselines.cli.arguments import print_json
-from baselines.experiments.cells import Claim, markdown_table
+from baselines.experiments.tables import markdown_table
+
+_DIGITS = 4
+"""Significant digits of figures below 1000; above, whole numbers."""
 
 
-def claims_table(claims: Sequence[Claim]) -> str:
-    """The claims as a Markdown table."""
+@dataclass(frozen=True)
+class Claim:
+    """A claim of a paper beside what was measured.
+
+    Attributes:
+        id: Stable name.
+        claim: What is claimed.
+        paper: The paper's figure, if it gives one.
+        ours: Ours.
+        low: Lower end of a 95 % interval of ours, if it has one.
+        high: Upper end.
+        holds: Whether the claim holds.
+    """
+
+    id: str
+    claim: str
+    paper: float | str | None
+    ours: float | str | None
+    low: float | None
+    high: float | None
+    holds: bool
+
+    def row(self) -> dict[str, Any]:
+        """As JSON has it."""
+        return asdict(self)
+
+
+def claims_table(claims: Sequence[Claim], interval_digits: int = _DIGITS) -> str:
+    """The claims as a Markdown table.
+
+    Args:
+        claims: A row each.
+        interval_digits: Significant digits of the ends of intervals.
+    """
     rows = [
-        [c.claim, _shown(c.paper), _shown(c.ours), _interval(c), "yes" if c.holds else "**no**"]
-        for c in claims
+        [
+            claim.claim,
+            _shown(claim.paper),
+            _shown(claim.ours),
+            _interval(claim, interval_digits),
+            "yes" if claim.holds else "**no**",
+        ]
+        for claim in claims
     ]
     return markdown_table(["claim", "paper", "ours", "95 % interval", "holds"], rows)
 
 
-def print_claims(claims: Sequence[Claim], paper: str = "Rocha04") -> None:
+def print_claims(claims: Sequence[Claim], paper: str) -> None:
     """A table of the claims on standard output."""
     from rich.console import Console
     from rich.table import Table
@@ -62,21 +104,13 @@ def report_claims(
     return 1 if strict and not all(claim.holds for claim in claims) else 0
 
 
-def _shown(value: float | str | None) -> str:
+def _shown(value: float | str | None, digits: int = _DIGITS) -> str:
     if value is None:
         return "-"
     if isinstance(value, str):
         return value
-    return f"{value:,.0f}" if abs(value) >= 1000 else f"{value:,.4g}"
+    return f"{value:,.0f}" if abs(value) >= 1000 else f"{value:,.{digits}g}"
 
 
-def _interval(claim: Claim) -> str:
-    return "" if claim.low is None else f"{_shown(claim.low)} … {_shown(claim.high)}"
-
-
-def processor() -> str:
-    """The processor's name, as the system tells it: what seconds were measured on."""
-    table = Path("/proc/cpuinfo")
-    lines = table.read_text().splitlines() if table.exists() else []
-    names = [line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")]
-    return names[0] if names else platform.processor() or "unknown"
+def _interval(claim: Claim, digits: int = _DIGITS) -> str:
+    return "" if claim.low is None else f"{_shown(claim.low, digits)} … {_shown(claim.high, digits)}"

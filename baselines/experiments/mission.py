@@ -1,4 +1,4 @@
-"""Run one mission of a strategy through the environment."""
+"""One mission of a strategy: how it runs through the environment, and what is recorded of it."""
 
 from __future__ import annotations
 
@@ -7,13 +7,21 @@ from typing import Any
 
 import numpy as np
 
+from baselines.strategies import make_strategy
 from baselines.strategies.protocol import Strategy
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
+from entropy_explore_env.reports.metrics import mission_figures
+from entropy_explore_env.reports.recording import Recorder
 from entropy_explore_env.scenario import Scenario, with_settings
 from entropy_explore_env.settings import Observation
 
 NOTHING_OBSERVED = Observation(panorama=False, self_state=False, team=False)
 """Strategies read RobotViews: an observation for networks would cost time for nothing."""
+
+Record = dict[str, Any]
+"""What is kept of a mission; JSON."""
+
+_SERIES_POINTS = 200
 
 
 def scripted(scenario: Scenario) -> Scenario:
@@ -57,3 +65,64 @@ def _idle_action(env: EntropyExploreEnv, agent: str) -> np.ndarray | np.int64:
     """An action for a robot that is busy: it is ignored."""
     space = env.action_space(agent)
     return np.zeros(space.shape, np.float32) if space.shape else np.int64(0)
+
+
+def mission_record(env: EntropyExploreEnv, strategy: str, seed: int) -> Record:
+    """Run a mission of the strategy with this name, and record what `record_mission` does."""
+    return record_mission(env, make_strategy(strategy), seed)
+
+
+def record_mission(
+    env: EntropyExploreEnv,
+    strategy: Strategy,
+    seed: int,
+    after_step: Callable[[EntropyExploreEnv], None] | None = None,
+) -> Record:
+    """Run a mission and record what reports need of it.
+
+    Args:
+        env: With any settings.
+        strategy: Chooses the viewpoints.
+        seed: Of the mission.
+        after_step: Called after the reset and after every step.
+
+    Returns:
+        The mission's figures; `half_s`, when the best map had lost half of H(0) - H_th; `sent_by_scan` and
+        `depth_by_scan_m`, measurements sent after each of the team's scans and how far it looked;
+        `apart_m`, the robots' mean distance from each other; and `series`: time, entropy of the best map
+        and measurements sent so far at up to 200 moments.
+    """
+    recorder = Recorder(env.missions)
+
+    def note(env: EntropyExploreEnv) -> None:
+        recorder.note()
+        if after_step is not None:
+            after_step(env)
+
+    run_mission(env, strategy, seed, note)
+    figures = mission_figures(env.missions, 0)
+    best = recorder.entropy_bits.min(axis=1)
+    middle = 0.5 * (figures["entropy_start_bits"] + figures["entropy_threshold_bits"])
+    halved = np.flatnonzero(best <= middle)
+    rows = recorder.spread(_SERIES_POINTS)
+    single = np.flatnonzero(np.diff(recorder.scans) == 1)
+    scanned = np.diff(recorder.robot_scans, axis=0)[single].argmax(axis=1)
+    return {
+        **figures,
+        "half_s": float(recorder.time_s[halved[0]]) if len(halved) else None,
+        "sent_by_scan": np.diff(recorder.shared)[single].tolist(),
+        "depth_by_scan_m": np.round(recorder.depths_m[1:][single, scanned], 3).tolist(),
+        "apart_m": round(_mean_distance_apart_m(recorder.places_m[1:]), 3),
+        "series": {
+            "time_s": np.round(recorder.time_s[rows], 3).tolist(),
+            "entropy_bits": np.round(best[rows], 1).tolist(),
+            "shared_measurements": recorder.shared[rows].tolist(),
+        },
+    }
+
+
+def _mean_distance_apart_m(places_m: np.ndarray) -> float:
+    """Mean distance between two robots over the moments (T, A, 3); 0 for one robot."""
+    moments, robots, _ = places_m.shape
+    distances_m = np.linalg.norm(places_m[:, :, None] - places_m[:, None], axis=-1)
+    return float(distances_m.sum() / max(moments * robots * (robots - 1), 1))

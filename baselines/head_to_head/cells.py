@@ -16,12 +16,12 @@ from entropy_explore_env.errors import SettingError
 from entropy_explore_env.scenario import Scenario, with_settings
 from entropy_explore_env.scenarios import SCENARIOS, find_scenario
 
-YARDSTICK = "random"
+BASELINE = "random"
 """The strategy that every other one is measured by; it is always part of the table."""
 
 
 @dataclass(frozen=True)
-class Entrants:
+class Entries:
     """The experiment.
 
     Attributes:
@@ -65,7 +65,7 @@ def chosen_strategies(words: str) -> tuple[str, ...]:
     names = list(STRATEGIES) if words == "all" else words.split(",")
     for name in names:
         make_strategy(name)
-    return tuple(dict.fromkeys([YARDSTICK, *names]))
+    return tuple(dict.fromkeys([BASELINE, *names]))
 
 
 def chosen_scenarios(

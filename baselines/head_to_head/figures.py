@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
 from baselines.cli.figures import COLOURS
-from baselines.head_to_head.cells import YARDSTICK
+from baselines.head_to_head.cells import BASELINE
 from baselines.head_to_head.rows import Results, Row
 
 _INK = ((0.0, 0.0, 0.0), *(COLOURS[place] for place in (5, 3, 2, 0, 4, 1)))
@@ -23,14 +23,14 @@ _THRESHOLDS = 2.0 ** (np.arange(-6 * 24, 4 * 24 + 1) / 24)
 
 def profile_figure(results: Results) -> tuple[Figure, list[Row]]:
     """Share of missions mapped within a multiple of the random walk's time; a panel a team size."""
-    teams = results.entrants.robots
+    teams = results.entries.robots
     across = len(teams) if len(teams) < 4 else math.ceil(len(teams) / 2)
     down = math.ceil(len(teams) / across)
     figure = Figure(figsize=(3.4 * max(across, 2) + 0.6, 3.1 * down + 0.6), layout="constrained")
     panels = figure.subplots(down, across, sharex=True, sharey=True, squeeze=False).ravel()
     table: list[Row] = []
     for robots, axes in zip(teams, panels, strict=False):
-        for place, strategy in enumerate(results.entrants.strategies):
+        for place, strategy in enumerate(results.entries.strategies):
             share, low, high = results.profile(robots, strategy, _THRESHOLDS)
             colour, line = _look(place)
             axes.fill_between(_THRESHOLDS, low, high, step="post", color=colour, alpha=0.12, linewidth=0)
@@ -48,7 +48,7 @@ def profile_figure(results: Results) -> tuple[Figure, list[Row]]:
         axes.tick_params(labelbottom=True)  # also where no panel stands below
         axes.grid(axis="y", color="0.9", linewidth=0.8)
     _hide(panels[len(teams) :])
-    figure.supxlabel(f"mission time over that of {YARDSTICK} with the same seed", fontsize=9)
+    figure.supxlabel(f"mission time over that of {BASELINE} with the same seed", fontsize=9)
     figure.supylabel("share of missions mapped", fontsize=9)
     _legend(figure, panels[0])
     return figure, table
@@ -56,15 +56,15 @@ def profile_figure(results: Results) -> tuple[Figure, list[Row]]:
 
 def time_figure(results: Results, rows: list[Row]) -> Figure:
     """Mission times in seconds with their intervals: a panel a scenario, logarithmic, team sizes beside."""
-    scenarios, strategies = list(results.entrants.scenarios), results.entrants.strategies
+    scenarios, strategies = list(results.entries.scenarios), results.entries.strategies
     across = min(len(scenarios), 2)
     down = math.ceil(len(scenarios) / across)
     figure = Figure(figsize=(4.9 * across, 2.7 * down + 0.6), layout="constrained")
     panels = figure.subplots(down, across, squeeze=False).ravel()
-    teams = results.entrants.robots
+    teams = results.entries.robots
     apart = 0.8 / len(strategies)
     for name, axes in zip(scenarios, panels, strict=False):
-        limit_s = results.entrants.scenarios[name].ending.time_limit_s
+        limit_s = results.entries.scenarios[name].ending.time_limit_s
         lowest_s = min(row["time_s_low"] for row in rows if row["scenario"] == name)
         axes.set_ylim(lowest_s / 1.4, limit_s * 1.4)
         axes.set_yscale("log")

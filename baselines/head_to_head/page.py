@@ -8,12 +8,12 @@ from pathlib import Path
 import matplotlib as mpl
 
 from baselines.cli.figures import STYLE, png
-from baselines.experiments.cells import csv_table, markdown_table
-from baselines.head_to_head.cells import YARDSTICK
+from baselines.experiments.tables import csv_table, markdown_table
+from baselines.head_to_head.cells import BASELINE
 from baselines.head_to_head.figures import profile_figure, time_figure
 from baselines.head_to_head.rows import (
     MARKS,
-    RIVALS,
+    REFERENCES,
     Results,
     Row,
     clock_rows,
@@ -26,7 +26,7 @@ from entropy_explore_env.scenario import Scenario
 from entropy_explore_env.writing import write_atomically
 
 PAGE = "head-to-head.md"
-BESIDE = "head-to-head"
+FILES = "head-to-head"
 _DIGITS = 6
 """Significant digits of the CSV tables."""
 
@@ -45,7 +45,7 @@ def write_page(folder: Path, results: Results, command: str) -> Path:
     Returns:
         Path of the page.
     """
-    beside = folder / BESIDE
+    beside = folder / FILES
     scenarios, overall = scenario_rows(results), overall_rows(results)
     with mpl.rc_context(STYLE):
         profiles, shares = profile_figure(results)
@@ -78,7 +78,7 @@ def _cell(value: object) -> object:
 
 def _parts(results: Results, scenarios: list[Row], overall: list[Row], command: str) -> list[str]:
     """The page from top to bottom."""
-    seeds = results.entrants.seeds
+    seeds = results.entries.seeds
     parts = [
         "# Strategies head to head",
         f"Written by `{command}`: every strategy with the same {seeds} seed{'s' if seeds > 1 else ''} "
@@ -86,13 +86,13 @@ def _parts(results: Results, scenarios: list[Row], overall: list[Row], command: 
         _READING,
         "## All scenarios",
         _overall_table(overall),
-        f"![Share of missions mapped over time]({BESIDE}/profiles.png)",
+        f"![Share of missions mapped over time]({FILES}/profiles.png)",
         "Performance profiles: the share of missions that were mapped within a multiple of the time that "
-        f"`{YARDSTICK}` took with the same seed; missions cut off never are. Bands hold 95 %.",
-        f"![Mission times]({BESIDE}/times.png)",
+        f"`{BASELINE}` took with the same seed; missions cut off never are. Bands hold 95 %.",
+        f"![Mission times]({FILES}/times.png)",
         "Mission times, interquartile means with 95 % intervals.",
     ]
-    for name, scenario in results.entrants.scenarios.items():
+    for name, scenario in results.entries.scenarios.items():
         rows = [row for row in scenarios if row["scenario"] == name]
         parts += [f"## {name}", _about(scenario), _scenario_table(rows)]
     failed = failed_rows(results)
@@ -103,7 +103,7 @@ def _parts(results: Results, scenarios: list[Row], overall: list[Row], command: 
 
 _READING = f"""- A mission's time ends when the best map of the team reaches the entropy that the scenario
   asks for. A mission that the time limit cuts off, or that fails, counts with the limit.
-- Relative time: over the time of `{YARDSTICK}` with the same seed; below 1 is faster. Where the walk
+- Relative time: over the time of `{BASELINE}` with the same seed; below 1 is faster. Where the walk
   itself is cut off, the true ratio is smaller.
 - Figures are interquartile means, of the middle half of the missions; scans and what stands right of them
   over missions that did not fail. Intervals (…) hold 95 %: a bootstrap over seeds, within each scenario.
@@ -116,14 +116,14 @@ _READING = f"""- A mission's time ends when the best map of the team reaches the
 
 _FILES = f"""## Files
 
-[`overall.csv`]({BESIDE}/overall.csv), [`scenarios.csv`]({BESIDE}/scenarios.csv),
-[`missions.csv`]({BESIDE}/missions.csv) (a line a mission), [`profiles.csv`]({BESIDE}/profiles.csv), and
-[`timing.csv`]({BESIDE}/timing.csv): milliseconds a decision and seconds a mission on the clock; it alone
+[`overall.csv`]({FILES}/overall.csv), [`scenarios.csv`]({FILES}/scenarios.csv),
+[`missions.csv`]({FILES}/missions.csv) (a line a mission), [`profiles.csv`]({FILES}/profiles.csv), and
+[`timing.csv`]({FILES}/timing.csv): milliseconds a decision and seconds a mission on the clock; it alone
 differs from run to run."""
 
 
 def _overall_table(rows: list[Row]) -> str:
-    rivals = [rival for rival in RIVALS if f"faster_than_{rival}" in rows[0]]
+    rivals = [rival for rival in REFERENCES if f"faster_than_{rival}" in rows[0]]
     head = ["robots", "strategy", "mapped", "relative time", "relative time to 90 %"]
     shown = [
         [

@@ -12,18 +12,18 @@ from typing import Any
 
 import numpy as np
 
-from baselines.experiments.cells import Record
-from baselines.head_to_head.cells import YARDSTICK, Entrants
-from baselines.head_to_head.measures import (
-    Estimate,
+from baselines.experiments.mission import Record
+from baselines.experiments.statistics import (
+    Interval,
     Profile,
     improvement_interval,
     interquartile_mean,
     iqm_interval,
-    profile,
+    performance_profile,
 )
+from baselines.head_to_head.cells import BASELINE, Entries
 
-RIVALS = (YARDSTICK, "gradient")
+REFERENCES = (BASELINE, "gradient")
 """Who a strategy's probability of being faster is given against, where they take part."""
 MARKS = ("t50_s", "t90_s", "t99_s")
 FIGURES = (
@@ -47,60 +47,60 @@ class Results:
     """An experiment that was run.
 
     Attributes:
-        entrants: What took part.
+        entries: What took part.
         records: Cell id → records by seed: `timed_record`, or `failed_record`.
     """
 
-    entrants: Entrants
+    entries: Entries
     records: dict[str, list[Record]]
 
     def cell(self, scenario: str, robots: int, strategy: str) -> list[Record]:
         """Records by seed."""
-        return self.records[self.entrants.cell_id(scenario, robots, strategy)]
+        return self.records[self.entries.cell_id(scenario, robots, strategy)]
 
     def times_s(self, scenario: str, robots: int, strategy: str, mark: str = "t_mission_s") -> np.ndarray:
         """(N,) float64 when the missions had come so far; the time limit where they never did."""
-        limit_s = self.entrants.scenarios[scenario].ending.time_limit_s
+        limit_s = self.entries.scenarios[scenario].ending.time_limit_s
         reached = [record.get(mark) for record in self.cell(scenario, robots, strategy)]
         return np.asarray([limit_s if time_s is None else time_s for time_s in reached], float)
 
     def stacked_s(self, robots: int, strategy: str, mark: str = "t_mission_s") -> np.ndarray:
         """(S, N) float64 the same in all scenarios."""
-        return np.stack([self.times_s(name, robots, strategy, mark) for name in self.entrants.scenarios])
+        return np.stack([self.times_s(name, robots, strategy, mark) for name in self.entries.scenarios])
 
     def relative(self, robots: int, strategy: str, mark: str = "t_mission_s") -> np.ndarray:
         """(S, N) float64 times over the random walk's of the same seed."""
-        return self.stacked_s(robots, strategy, mark) / self.stacked_s(robots, YARDSTICK, mark)
+        return self.stacked_s(robots, strategy, mark) / self.stacked_s(robots, BASELINE, mark)
 
     def mapped(self, robots: int, strategy: str) -> np.ndarray:
         """(S, N) bool which missions came to their end."""
         return np.stack(
             [
                 [record.get("finished", False) for record in self.cell(name, robots, strategy)]
-                for name in self.entrants.scenarios
+                for name in self.entries.scenarios
             ]
         )
 
     def profile(self, robots: int, strategy: str, thresholds: np.ndarray) -> Profile:
         """Share of missions that were mapped within a multiple of the random walk's time."""
         reached = np.where(self.mapped(robots, strategy), self.relative(robots, strategy), np.inf)
-        return profile(reached, thresholds)
+        return performance_profile(reached, thresholds)
 
-    def contests(self) -> Iterator[tuple[str, int, str]]:
+    def comparisons(self) -> Iterator[tuple[str, int, str]]:
         """Scenario, team size and strategy of every cell."""
-        for name in self.entrants.scenarios:
-            for robots in self.entrants.robots:
-                for strategy in self.entrants.strategies:
+        for name in self.entries.scenarios:
+            for robots in self.entries.robots:
+                for strategy in self.entries.strategies:
                     yield name, robots, strategy
 
 
 def scenario_rows(results: Results) -> list[Row]:
     """A row of each strategy in each scenario and team size; ends of intervals as `…_low` and `…_high`."""
     rows = []
-    for name, robots, strategy in results.contests():
+    for name, robots, strategy in results.comparisons():
         cell = results.cell(name, robots, strategy)
         time_s = results.times_s(name, robots, strategy)
-        relative = time_s / results.times_s(name, robots, YARDSTICK)
+        relative = time_s / results.times_s(name, robots, BASELINE)
         failed = sum("failed" in record for record in cell)
         mapped = sum(record.get("finished", False) for record in cell)
         rows.append(
@@ -109,12 +109,12 @@ def scenario_rows(results: Results) -> list[Row]:
                 "robots": robots,
                 "strategy": strategy,
                 "missions": len(cell),
-                "time_limit_s": results.entrants.scenarios[name].ending.time_limit_s,
+                "time_limit_s": results.entries.scenarios[name].ending.time_limit_s,
                 "mapped": mapped,
                 "cut_off": len(cell) - mapped - failed,
                 "failed": failed,
-                **_estimate("time_s", iqm_interval(time_s[None])),
-                **_estimate("relative_time", iqm_interval(relative[None])),
+                **_with_interval("time_s", iqm_interval(time_s[None])),
+                **_with_interval("relative_time", iqm_interval(relative[None])),
                 **{mark: _iqm(results.times_s(name, robots, strategy, mark)) for mark in MARKS},
                 **{figure: _figure(cell, figure) for figure in FIGURES},
             }
@@ -125,21 +125,21 @@ def scenario_rows(results: Results) -> list[Row]:
 def overall_rows(results: Results) -> list[Row]:
     """A row of each team size and strategy over all scenarios."""
     rows = []
-    for robots in results.entrants.robots:
-        for strategy in results.entrants.strategies:
+    for robots in results.entries.robots:
+        for strategy in results.entries.strategies:
             time_s = results.stacked_s(robots, strategy)
             row: Row = {
                 "robots": robots,
                 "strategy": strategy,
                 "mapped": float(results.mapped(robots, strategy).mean()),
-                **_estimate("relative_time", iqm_interval(results.relative(robots, strategy))),
-                **_estimate("relative_t90", iqm_interval(results.relative(robots, strategy, "t90_s"))),
+                **_with_interval("relative_time", iqm_interval(results.relative(robots, strategy))),
+                **_with_interval("relative_t90", iqm_interval(results.relative(robots, strategy, "t90_s"))),
             }
-            for rival in RIVALS:
-                if rival in results.entrants.strategies:
+            for rival in REFERENCES:
+                if rival in results.entries.strategies:
                     against = None if rival == strategy else results.stacked_s(robots, rival)
-                    estimate = None if against is None else improvement_interval(time_s, against)
-                    row |= _estimate(f"faster_than_{rival}", estimate)
+                    interval = None if against is None else improvement_interval(time_s, against)
+                    row |= _with_interval(f"faster_than_{rival}", interval)
             rows.append(row)
     return rows
 
@@ -148,7 +148,7 @@ def mission_rows(results: Results) -> list[Row]:
     """A row of each mission."""
     wanted = ("world", "end_reason", "t_mission_s", *MARKS, *FIGURES)
     rows = []
-    for name, robots, strategy in results.contests():
+    for name, robots, strategy in results.comparisons():
         for seed, record in enumerate(results.cell(name, robots, strategy)):
             found = {figure: _value(record, figure) for figure in wanted}
             found["end_reason"] = "FAILED" if "failed" in record else found["end_reason"]
@@ -159,10 +159,10 @@ def mission_rows(results: Results) -> list[Row]:
 def failed_rows(results: Results) -> list[Row]:
     """Missions that failed: a row of each strategy, scenario, team size and reason, with the seeds."""
     seeds: dict[tuple[str, int, str, str], list[int]] = {}
-    for contest in results.contests():
-        for seed, record in enumerate(results.cell(*contest)):
+    for comparison in results.comparisons():
+        for seed, record in enumerate(results.cell(*comparison)):
             if "failed" in record:
-                seeds.setdefault((*contest, record["failed"]), []).append(seed)
+                seeds.setdefault((*comparison, record["failed"]), []).append(seed)
     names = ("scenario", "robots", "strategy", "reason")
     return [{**dict(zip(names, place, strict=True)), "seeds": found} for place, found in seeds.items()]
 
@@ -170,7 +170,7 @@ def failed_rows(results: Results) -> list[Row]:
 def clock_rows(results: Results) -> list[Row]:
     """What each strategy cost to compute; these figures differ from run to run."""
     rows = []
-    for name, robots, strategy in results.contests():
+    for name, robots, strategy in results.comparisons():
         clocks = [record["clock"] for record in results.cell(name, robots, strategy) if "clock" in record]
         spent_s = [clock["mission_s"] for clock in clocks]
         rows.append(
@@ -190,8 +190,8 @@ def _median(values: list[float]) -> float | None:
     return round(float(np.median(values)), 4) if values else None
 
 
-def _estimate(name: str, estimate: Estimate | None) -> Row:
-    value, low, high = (None, None, None) if estimate is None else estimate
+def _with_interval(name: str, interval: Interval | None) -> Row:
+    value, low, high = (None, None, None) if interval is None else interval
     return {name: value, f"{name}_low": low, f"{name}_high": high}
 
 

@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from baselines.head_to_head.cells import YARDSTICK
+from baselines.head_to_head.cells import BASELINE
 from baselines.head_to_head.page import ranged
 from baselines.head_to_head.rows import (
-    RIVALS,
+    REFERENCES,
     Results,
     clock_rows,
     failed_rows,
@@ -21,7 +21,7 @@ from baselines.head_to_head.rows import (
 def printed_results(results: Results) -> dict[str, Any]:
     """All rows, for JSON."""
     return {
-        "seeds": results.entrants.seeds,
+        "seeds": results.entries.seeds,
         "overall": overall_rows(results),
         "scenarios": scenario_rows(results),
         "failed": failed_rows(results),
@@ -35,9 +35,9 @@ def show_results(results: Results) -> None:
     from rich.console import Console
     from rich.table import Table
 
-    names = ", ".join(results.entrants.scenarios)
+    names = ", ".join(results.entries.scenarios)
     table = Table(
-        title=f"{names}; {results.entrants.seeds} seeds; relative time: over {YARDSTICK}'s",
+        title=f"{names}; {results.entries.seeds} seeds; relative time: over {BASELINE}'s",
         title_justify="left",
         box=box.SIMPLE_HEAD,
         padding=0,
@@ -46,7 +46,7 @@ def show_results(results: Results) -> None:
     table.add_column("robots", justify="right")
     table.add_column("strategy", no_wrap=True)
     rows = overall_rows(results)
-    rivals = [rival for rival in RIVALS if f"faster_than_{rival}" in rows[0]]
+    rivals = [rival for rival in REFERENCES if f"faster_than_{rival}" in rows[0]]
     table.add_column("mapped", justify="right")
     table.add_column("relative time", justify="right", no_wrap=True)
     for head in (*(f"beats\n{rival}" for rival in rivals), "ms a\ndecision"):

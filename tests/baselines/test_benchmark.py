@@ -20,7 +20,7 @@ from baselines.cli.arguments import run_command
 from baselines.experiments import cells as experiment
 from baselines.experiments.mission import run_mission, scripted
 from baselines.head_to_head import cells as head_to_head_cells
-from baselines.head_to_head.cells import Entrants, chosen_scenarios, chosen_strategies
+from baselines.head_to_head.cells import Entries, chosen_scenarios, chosen_strategies
 from baselines.head_to_head.page import write_page
 from baselines.head_to_head.rows import Results, failed_rows, mission_rows, overall_rows, scenario_rows
 from baselines.head_to_head.timed_mission import timed_record
@@ -288,11 +288,11 @@ def results_of(times: dict[str, list[list[float | str | None]]]) -> Results:
     names = [f"world-{number}" for number in range(len(times["random"]))]
     limited = with_settings(BOX, {"time_limit_s": 100.0})
     scenarios = {name: dataclasses.replace(limited, name=name) for name in names}
-    entrants = Entrants(scenarios, tuple(times), (1,), len(times["random"][0]))
+    entries = Entries(scenarios, tuple(times), (1,), len(times["random"][0]))
     records = {}
     for strategy, worlds in times.items():
         for name, seconds in zip(names, worlds, strict=True):
-            records[entrants.cell_id(name, 1, strategy)] = [
+            records[entries.cell_id(name, 1, strategy)] = [
                 {"failed": time_s, "limit_s": None}
                 if isinstance(time_s, str)
                 else {
@@ -306,7 +306,7 @@ def results_of(times: dict[str, list[list[float | str | None]]]) -> Results:
                 }
                 for time_s in seconds
             ]
-    return Results(entrants, records)
+    return Results(entries, records)
 
 
 BY_HAND = {

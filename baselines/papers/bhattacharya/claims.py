@@ -6,7 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from baselines.experiments.cells import Claim, mean_interval, median_interval, ratio_interval
+from baselines.experiments.claims import Claim
+from baselines.experiments.statistics import mean_interval, median_interval, ratio_interval
 from baselines.papers.bhattacharya.sweep import CONTROLS, FLOORS, Record, coverage_id, exploration_id
 
 Records = dict[str, Record]

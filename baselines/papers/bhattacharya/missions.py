@@ -8,7 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from baselines.experiments.cells import Cell, Claim, Record, markdown_table, mean_interval, ratio_interval
+from baselines.experiments.cells import Cell
+from baselines.experiments.claims import Claim
+from baselines.experiments.mission import Record
+from baselines.experiments.statistics import mean_interval, ratio_interval
+from baselines.experiments.tables import markdown_table
 from entropy_explore_env.scenario import with_settings
 from entropy_explore_env.scenarios import find_scenario
 

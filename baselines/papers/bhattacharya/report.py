@@ -11,8 +11,10 @@ import matplotlib as mpl
 import numpy as np
 
 from baselines.cli.figures import STYLE, png
-from baselines.experiments.cells import Claim, csv_table, markdown_table, median_interval
-from baselines.experiments.claims import claims_table, processor
+from baselines.experiments.claims import Claim, claims_table
+from baselines.experiments.machine import processor
+from baselines.experiments.statistics import median_interval
+from baselines.experiments.tables import csv_table, markdown_table
 from baselines.papers.bhattacharya.claims import (
     STARTS,
     Records,

@@ -6,9 +6,10 @@ from itertools import pairwise
 
 import numpy as np
 
-from baselines.experiments.cells import (
-    Claim,
-    Record,
+from baselines.experiments.claims import Claim
+from baselines.experiments.mission import Record
+from baselines.experiments.statistics import (
+    central_range,
     mean_interval,
     median_interval,
     ratio_interval,
@@ -76,13 +77,13 @@ def _single_claims(single: list[Record], name: str, who: str) -> list[Claim]:
         claims.append(Claim(f"{name}-{figure}", text, paper, mean, low, high, lowest <= paper <= highest))
     ratios = [record["t_mission_s"] / record["half_s"] for record in single if record["half_s"]]
     median, low, high = median_interval(ratios)
-    lowest, highest = np.quantile(ratios, [0.025, 0.975])
+    lowest, highest = central_range(ratios)
     text = (
         f"{who}: time to the end over time to half of the entropy; the paper shows one mission, "
         "ours lie in "
         f"{lowest:.1f} … {highest:.1f}; median"
     )
-    holds = bool(lowest <= 7.452 <= highest)
+    holds = lowest <= 7.452 <= highest
     return [*claims, Claim(f"{name}-halves", text, 7.452, median, low, high, holds)]
 
 

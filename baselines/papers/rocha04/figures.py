@@ -6,7 +6,8 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from baselines.cli.figures import COLOURS
-from baselines.experiments.cells import Record, mean_interval
+from baselines.experiments.mission import Record
+from baselines.experiments.statistics import mean_interval
 from baselines.papers.rocha04.claims import PAPER_T_MISSION_S, Records, times
 from baselines.papers.rocha04.sweep import BURSTS, I_MINS, RIVALS, STANDARD, TEAMS, rival_id, team_id
 

@@ -9,16 +9,9 @@ import matplotlib as mpl
 import numpy as np
 
 from baselines.cli.figures import STYLE, png
-from baselines.experiments.cells import (
-    Claim,
-    csv_table,
-    markdown_table,
-    mean_interval,
-    median_interval,
-    ratio_interval,
-    small_mean_range,
-)
-from baselines.experiments.claims import claims_table
+from baselines.experiments.claims import Claim, claims_table
+from baselines.experiments.statistics import mean_interval, median_interval, ratio_interval, small_mean_range
+from baselines.experiments.tables import csv_table, markdown_table
 from baselines.papers.rocha04.claims import PAPER_STARTS, Records, times
 from baselines.papers.rocha04.figures import figure_3, figure_4, figure_shared, figure_time
 from baselines.papers.rocha04.sweep import BURSTS, CHANGES, I_MINS, RIVALS, STANDARD, TEAMS, rival_id, team_id

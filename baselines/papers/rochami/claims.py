@@ -4,12 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import pairwise
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
-from scipy import stats
 
-from baselines.experiments.cells import Claim, Record, ratio_interval
+from baselines.experiments.claims import Claim
+from baselines.experiments.mission import Record
+from baselines.experiments.statistics import (
+    Interval,
+    holm,
+    interpolated_ratio_interval,
+    paired_p,
+    ratio_interval,
+)
 from baselines.papers.rochami.sweep import (
     BLOCKED,
     FILLS,
@@ -27,7 +34,6 @@ Records = dict[str, list[Record]]
 LEVEL = 0.01
 PAPER_UNCOORDINATED, PAPER_COORDINATED, PAPER_REAL = 0.81, 0.59, 0.72
 """Time of two robots over that of one: both methods, and an earlier real run without coordination."""
-_RESAMPLES = 9999
 _KNEE = 0.25
 """κ up to which distance falls at little cost in time."""
 _LEVEL_BAND = 0.1
@@ -57,24 +63,6 @@ def distances(records: Records, cell: str) -> np.ndarray:
 def teams_in(records: Records) -> tuple[int, ...]:
     """Team sizes of the main experiment that there are."""
     return tuple(n for n in TEAMS if cell_id(n, "coordinated") in records)
-
-
-def holm(p_values: Sequence[float]) -> np.ndarray:
-    """p-values corrected for their number (Holm 1979)."""
-    p = np.asarray(p_values, float)
-    order = np.argsort(p, kind="stable")
-    scaled = np.maximum.accumulate(p[order] * np.arange(len(p), 0, -1))
-    corrected = np.empty(len(p))
-    corrected[order] = np.minimum(scaled, 1.0)
-    return corrected
-
-
-def paired_p(smaller: np.ndarray, larger: np.ndarray) -> float:
-    """One-sided p of the paired Wilcoxon signed-rank test that the first are smaller; 1 if all are equal."""
-    if np.array_equal(smaller, larger):
-        return 1.0
-    result: Any = stats.wilcoxon(smaller, larger, alternative="less")  # SciPy gives it no type
-    return float(result.pvalue)
 
 
 def _faster_claims(records: Records, blocked: str) -> list[Claim]:
@@ -184,10 +172,10 @@ def _sharing_claims(records: Records) -> list[Claim]:
         if sharing_id(robots, I_MINS[0]) not in records:
             continue
         for i_min_bits in I_MINS:
-            ratio, low, high, share = steered_ratio(records, robots, i_min_bits)
+            (ratio, low, high), read_at = steered_ratio(records, robots, i_min_bits)
             text = (
                 f"Rocha04's room, {robots} robots: a steered I_min is not slower than {i_min_bits} at "
-                f"the bits that it sends ({share}); t ratio"
+                f"the bits that it sends ({read_at}); t ratio"
             )
             name = f"steered-{robots}-{i_min_bits}"
             claims.append(Claim(name, text, None, ratio, low, high, low <= 1))
@@ -199,27 +187,27 @@ def bits_sent(records: Records, cell: str) -> np.ndarray:
     return np.asarray([record["bits_sent"] / 1e6 for record in records[cell]])
 
 
-def steered_ratio(records: Records, robots: int, i_min_bits: float) -> tuple[float, float, float, str]:
-    """Time with a steered I_min, read between its fills at the bits of a fixed one, over that one's time.
+class SteeredRatio(NamedTuple):
+    """Time with a steered I_min over that with a fixed one, and where on the steered curve it was read."""
 
-    Returns:
-        Ratio of means, the ends of its 95 % bootstrap interval over seeds, and where it was read.
-    """
+    ratio: Interval
+    read_at: str
+
+
+def steered_ratio(records: Records, robots: int, i_min_bits: float) -> SteeredRatio:
+    """Time with a steered I_min, read between its fills at the bits of a fixed one, over that one's time."""
     fills = [fill for fill in FILLS if sharing_id(robots, fill=fill) in records]
     steered = [sharing_id(robots, fill=fill) for fill in fills]
     fixed = sharing_id(robots, i_min_bits)
-    time_s = np.stack([times(records, cell) for cell in [*steered, fixed]])
-    sent = np.stack([bits_sent(records, cell) for cell in [*steered, fixed]])
-    rows = np.random.default_rng(0).integers(time_s.shape[1], size=(_RESAMPLES, time_s.shape[1]))
-
-    def ratio(time_s: np.ndarray, sent: np.ndarray) -> float:
-        order = np.argsort(sent[:-1])
-        return float(np.interp(sent[-1], sent[:-1][order], time_s[:-1][order]) / time_s[-1])
-
-    drawn_s, drawn_sent = time_s[:, rows].mean(axis=2), sent[:, rows].mean(axis=2)
-    ratios = [ratio(drawn_s[:, i], drawn_sent[:, i]) for i in range(_RESAMPLES)]
-    low, high = np.quantile(ratios, (0.025, 0.975))
-    means = sent.mean(axis=1)
-    inside = means[:-1].min() <= means[-1] <= means[:-1].max()
-    where = f"{means[-1]:.2f} Mbit" + ("" if inside else ", beyond its fills: the nearest one")
-    return ratio(time_s.mean(axis=1), means), float(low), float(high), where
+    sent = np.stack([bits_sent(records, cell) for cell in steered])
+    ratio = interpolated_ratio_interval(
+        np.stack([times(records, cell) for cell in steered]),
+        sent,
+        times(records, fixed),
+        bits_sent(records, fixed),
+    )
+    there, means = bits_sent(records, fixed).mean(), sent.mean(axis=1)
+    inside = means.min() <= there <= means.max()
+    return SteeredRatio(
+        ratio, f"{there:.2f} Mbit" + ("" if inside else ", beyond its fills: the nearest one")
+    )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from baselines.experiments.cells import ratio_interval
+from baselines.experiments.statistics import ratio_interval
 from baselines.papers.rochami.claims import Records, distances, teams_in, times
 from baselines.papers.rochami.sweep import (
     CHANGES,

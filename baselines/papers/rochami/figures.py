@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from baselines.cli.figures import COLOURS
-from baselines.experiments.cells import mean_interval, median_interval, ratio_interval
+from baselines.experiments.statistics import mean_interval, median_interval, ratio_interval
 from baselines.papers.rochami.claims import (
     PAPER_COORDINATED,
     PAPER_REAL,

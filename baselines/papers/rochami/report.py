@@ -9,8 +9,10 @@ import matplotlib as mpl
 import numpy as np
 
 from baselines.cli.figures import STYLE, png
-from baselines.experiments.cells import Claim, csv_table, markdown_table, mean_interval, ratio_interval
-from baselines.papers.rochami.claims import Records, distances, holm, paired_p, teams_in, times
+from baselines.experiments.claims import Claim, claims_table
+from baselines.experiments.statistics import holm, mean_interval, paired_p, ratio_interval
+from baselines.experiments.tables import csv_table, markdown_table
+from baselines.papers.rochami.claims import Records, distances, teams_in, times
 from baselines.papers.rochami.discussion import reading
 from baselines.papers.rochami.figures import (
     figure_6,
@@ -57,10 +59,6 @@ def _text(records: Records, claims: Sequence[Claim], command: str) -> str:
     missions = sum(len(cell) for cell in records.values())
     capped = sum(not record["finished"] for cell in records.values() for record in cell)
     held = sum(claim.holds for claim in claims)
-    rows = [
-        [c.claim, _shown(c.paper), _shown(c.ours), _interval(c), "yes" if c.holds else "**no**"]
-        for c in claims
-    ]
     parts = [
         "# Rocha, coordination by mutual information, reproduced",
         f"Written by `{command}`: {missions:,} missions, {starts} paired starts and worlds a point, seeds 0, "
@@ -70,7 +68,7 @@ def _text(records: Records, claims: Sequence[Claim], command: str) -> str:
         _RULES,
         f"## Claims: {held} of {len(claims)} hold",
         _HOLDS,
-        markdown_table(["claim", "paper", "ours", "95 % interval", "holds"], rows),
+        claims_table(claims, interval_digits=3),
         "## Team sizes",
         "![Figure 6](rochami/figure-6.png)",
         *(_teams_table(records, blocked) for blocked in BLOCKED),
@@ -176,13 +174,3 @@ def _changes_table(records: Records) -> str:
         row.append(f"{p:.1g}")
     head = ["changed", "robots", "coordinated (median)", "uncoordinated (median)", "ratio", "cut off", "p"]
     return markdown_table(head, rows)
-
-
-def _shown(value: float | str | None) -> str:
-    if value is None:
-        return "-"
-    return value if isinstance(value, str) else f"{value:.4g}"
-
-
-def _interval(claim: Claim) -> str:
-    return "" if claim.low is None or claim.high is None else f"{claim.low:.3g} … {claim.high:.3g}"

@@ -7,7 +7,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from baselines.experiments.cells import Cell, Record, record_mission
+from baselines.experiments.cells import Cell
+from baselines.experiments.mission import Record, record_mission
 from baselines.papers.rochami.coverage import TeamCoverage
 from baselines.strategies import make_strategy
 from baselines.strategies.mutual_information import Coordination, MutualInformation

@@ -11,7 +11,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from baselines.experiments.cells import Claim, Record, double_ratio_interval, ratio_interval
+from baselines.experiments.claims import Claim
+from baselines.experiments.mission import Record
+from baselines.experiments.statistics import double_ratio_interval, ratio_interval
 from baselines.papers.sawhney.sweep import (
     BETAS,
     CHANGED_IN,

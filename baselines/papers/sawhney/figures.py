@@ -7,7 +7,7 @@ from matplotlib import colormaps
 from matplotlib.figure import Figure
 
 from baselines.cli.figures import COLOURS
-from baselines.experiments.cells import mean_interval
+from baselines.experiments.statistics import mean_interval
 from baselines.papers.sawhney.claims import (
     ENDS,
     PAPER_ASYNCHRONOUS,

@@ -13,7 +13,9 @@ from pathlib import Path
 
 import numpy as np
 
-from baselines.experiments.cells import Record, markdown_table, mean_interval
+from baselines.experiments.mission import Record
+from baselines.experiments.statistics import mean_interval
+from baselines.experiments.tables import markdown_table
 from baselines.papers.sawhney.mission import Run
 from baselines.strategies.frontier import Exploring
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv

@@ -15,7 +15,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from baselines.experiments.cells import Record
+from baselines.experiments.mission import Record
 from baselines.strategies.frontier import Exploring, FrontierStrategy
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.missions.view import RobotView

@@ -9,8 +9,9 @@ import matplotlib as mpl
 import numpy as np
 
 from baselines.cli.figures import STYLE, png
-from baselines.experiments.cells import Claim, csv_table, markdown_table, mean_interval
-from baselines.experiments.claims import claims_table
+from baselines.experiments.claims import Claim, claims_table
+from baselines.experiments.statistics import mean_interval
+from baselines.experiments.tables import csv_table, markdown_table
 from baselines.papers.sawhney.claims import (
     ENDS,
     PARTS,

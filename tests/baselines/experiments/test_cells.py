@@ -4,32 +4,18 @@ from __future__ import annotations
 
 import dataclasses
 import json
-import math
 import pickle
 from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy import stats
 
 from baselines.experiments import cells as experiment
 from baselines.experiments import worker_pool as workers
-from baselines.experiments.cells import (
-    Cell,
-    Claim,
-    csv_table,
-    failed_record,
-    markdown_table,
-    mean_interval,
-    median_interval,
-    mission_record,
-    ratio_interval,
-    run_cells,
-    small_mean_range,
-)
-from baselines.experiments.mission import scripted
+from baselines.experiments.cells import Cell, failed_record, run_cells
+from baselines.experiments.mission import mission_record, scripted
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
-from entropy_explore_env.errors import MissingExtraError, SettingError, WorldError
+from entropy_explore_env.errors import MissingExtraError, WorldError
 from entropy_explore_env.reports.metrics import mission_figures
 from entropy_explore_env.reports.recording import Recorder
 from entropy_explore_env.scenario import with_settings
@@ -311,106 +297,3 @@ def test_sent_by_scan_has_each_scan_of_a_single_robot_s_step(whole):
     assert record["sent_by_scan"] == batches
     assert len(batches) == figures["scans"] and sum(batches) == figures["shared_measurements"]
     assert 0 <= min(batches) and max(batches) == BOX.channel.burst
-
-
-# --- intervals
-
-
-SAMPLE = np.random.default_rng(7).gamma(2.0, 300.0, 40)
-
-
-def bootstrapped(statistic, *samples: np.ndarray) -> tuple[float, float]:
-    """SciPy's percentile bootstrap."""
-    interval = stats.bootstrap(
-        samples,
-        statistic,
-        paired=len(samples) > 1,
-        method="percentile",
-        n_resamples=9999,
-        rng=np.random.default_rng(11),
-        vectorized=True,
-    ).confidence_interval
-    return float(interval.low), float(interval.high)
-
-
-def assert_alike(ours: tuple[float, float], theirs: tuple[float, float], share: float = 0.05) -> None:
-    """Ends agree up to a small share of the interval's width: both draw at random."""
-    assert ours == pytest.approx(theirs, abs=share * (theirs[1] - theirs[0]))
-
-
-def test_the_interval_of_a_mean_is_scipy_s():
-    mean, *interval = mean_interval(SAMPLE.tolist())
-    assert mean == pytest.approx(SAMPLE.mean())
-    assert_alike((interval[0], interval[1]), bootstrapped(np.mean, SAMPLE))
-    spread = 1.96 * SAMPLE.std() / math.sqrt(40)
-    assert_alike((interval[0], interval[1]), (mean - spread, mean + spread), 0.1)
-
-
-def test_the_interval_of_a_median_is_scipy_s():
-    median, *interval = median_interval(SAMPLE)
-    assert median == pytest.approx(np.median(SAMPLE))
-    assert_alike((interval[0], interval[1]), bootstrapped(np.median, SAMPLE), 0.1)
-
-
-def test_the_interval_of_a_ratio_is_scipy_s_paired():
-    lower = SAMPLE * np.random.default_rng(8).uniform(0.8, 1.2, 40)
-    ratio, *interval = ratio_interval(SAMPLE, lower)
-    assert ratio == pytest.approx(SAMPLE.mean() / lower.mean())
-
-    def ratio_of_means(a, b, axis):
-        return a.mean(axis=axis) / b.mean(axis=axis)
-
-    assert_alike((interval[0], interval[1]), bootstrapped(ratio_of_means, SAMPLE, lower))
-    shuffled = ratio_interval(SAMPLE, np.random.default_rng(1).permutation(lower))
-    assert shuffled[2] - shuffled[1] > 2 * (interval[1] - interval[0])
-
-
-def test_pairs_that_differ_by_a_factor_have_no_spread():
-    assert ratio_interval(2.0 * SAMPLE, SAMPLE) == pytest.approx((2.0, 2.0, 2.0))
-    with pytest.raises(ValueError, match="shape"):
-        ratio_interval(SAMPLE, SAMPLE[:-1])
-
-
-def test_intervals_worked_out_by_hand():
-    """Two values 0 and 1: the resampled mean is 0, ½ or 1 with ¼, ½ and ¼; so is the median."""
-    assert mean_interval([0.0, 1.0]) == (0.5, 0.0, 1.0)
-    assert median_interval([0.0, 1.0]) == (0.5, 0.0, 1.0)
-    assert mean_interval([3]) == median_interval([3]) == (3.0, 3.0, 3.0)
-    assert ratio_interval([3.0], [2.0]) == (1.5, 1.5, 1.5)
-    # 60 coins: the share of heads has σ = 0.5/√60; 1.96 of it is 0.1265
-    assert mean_interval([0.0, 1.0] * 30) == pytest.approx((0.5, 0.3735, 0.6265), abs=0.011)
-
-
-def test_the_means_of_a_few_starts_spread_with_their_number():
-    """σ/√n around the mean."""
-    for starts in (4, 16, 64):
-        low, high = small_mean_range(np.arange(1000.0), starts)
-        spread = 1.96 * np.arange(1000.0).std() / math.sqrt(starts)
-        assert_alike((low, high), (499.5 - spread, 499.5 + spread), 0.05)
-
-
-def test_intervals_are_the_same_every_time():
-    assert mean_interval(SAMPLE) == mean_interval(SAMPLE)
-    assert small_mean_range(SAMPLE, 5) == small_mean_range(SAMPLE, 5)
-
-
-# --- claims and tables
-
-
-def test_a_claim_is_a_row_of_json():
-    row = Claim("t", "falls", "< 1", 0.5, 0.4, 0.6, True).row()
-    assert list(row) == ["id", "claim", "paper", "ours", "low", "high", "holds"]
-    assert json.loads(json.dumps(row)) == row
-    with pytest.raises(SettingError):
-        raise SettingError(*pickle.loads(pickle.dumps(("a", 1, "b"))))
-
-
-def test_tables():
-    assert csv_table({"a": [1, 2], "b": ["x", 0.5]}) == "a,b\n1,x\n2,0.5\n"
-    assert csv_table({"a": ['x, "y"']}) == 'a\n"x, ""y"""\n'
-    with pytest.raises(ValueError, match=r"shorter|longer"):
-        csv_table({"a": [1, 2], "b": [3]})
-    assert (
-        markdown_table(["a", "b"], [[1, "x"], [2, 0.5]])
-        == "| a | b |\n| --- | --- |\n| 1 | x |\n| 2 | 0.5 |\n"
-    )

@@ -16,7 +16,8 @@ from PIL import Image
 
 from baselines.cli.arguments import run_command
 from baselines.experiments import cells as experiment
-from baselines.experiments.cells import Claim, Record
+from baselines.experiments.claims import Claim
+from baselines.experiments.mission import Record
 from baselines.papers.rocha04 import __main__ as rocha04
 from baselines.papers.rocha04 import report as rocha04_report
 from baselines.papers.rocha04 import sweep as rocha04_cells

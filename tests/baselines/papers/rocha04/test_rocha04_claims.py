@@ -10,8 +10,8 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from baselines.experiments.cells import Claim, Record, mission_record
-from baselines.experiments.mission import scripted
+from baselines.experiments.claims import Claim
+from baselines.experiments.mission import Record, mission_record, scripted
 from baselines.papers.rocha04.claims import all_claims
 from baselines.papers.rocha04.sweep import BURSTS, I_MINS, TEAMS, team_id
 from baselines.papers.rocha04.sweep import experiment as cells_of

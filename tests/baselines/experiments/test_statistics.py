@@ -1,8 +1,9 @@
-"""Measures against values worked out by hand, slow references, SciPy, and what must not change them."""
+"""Statistics against values worked out by hand, slow references, SciPy, and what must not change them."""
 
 from __future__ import annotations
 
 import itertools
+import math
 
 import numpy as np
 import pytest
@@ -11,12 +12,21 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy import stats
 
-from baselines.head_to_head import measures
-from baselines.head_to_head.measures import (
+from baselines.experiments import statistics
+from baselines.experiments.statistics import (
+    double_ratio_interval,
+    holm,
     improvement_interval,
+    interpolated_ratio_interval,
     interquartile_mean,
     iqm_interval,
-    profile,
+    mean_interval,
+    median_interval,
+    median_ratio_interval,
+    paired_p,
+    performance_profile,
+    ratio_interval,
+    small_mean_range,
 )
 from tests.reference.scenes import drawn
 
@@ -55,11 +65,11 @@ def test_the_interquartile_mean_is_scipy_s(scores):
 def test_order_and_unit_do_not_matter_to_the_mean(scores, random, unit):
     shuffled = scores.ravel().copy()
     random.shuffle(shuffled)
-    estimate = iqm_interval(scores)
-    assert scores.min() <= estimate.low <= estimate.high <= scores.max()
-    assert iqm_interval(shuffled.reshape(scores.shape)).value == pytest.approx(estimate.value)
-    assert iqm_interval(unit * scores) == pytest.approx(tuple(unit * end for end in estimate))
-    assert iqm_interval(scores + unit) == pytest.approx(tuple(end + unit for end in estimate))
+    interval = iqm_interval(scores)
+    assert scores.min() <= interval.low <= interval.high <= scores.max()
+    assert iqm_interval(shuffled.reshape(scores.shape)).value == pytest.approx(interval.value)
+    assert iqm_interval(unit * scores) == pytest.approx(tuple(unit * end for end in interval))
+    assert iqm_interval(scores + unit) == pytest.approx(tuple(end + unit for end in interval))
 
 
 def test_the_interval_of_one_scenario_is_scipy_s():
@@ -140,7 +150,7 @@ def test_the_interval_of_the_probability_draws_pairs():
 
 def test_the_profile_worked_out_by_hand():
     scores = np.array([[0.5, 1.0, np.inf, 2.0]])
-    shares = profile(scores, np.array([0.4, 0.5, 1.0, 1.5, 2.0, 100.0]))
+    shares = performance_profile(scores, np.array([0.4, 0.5, 1.0, 1.5, 2.0, 100.0]))
     assert shares.share.tolist() == [0.0, 0.25, 0.5, 0.5, 0.75, 0.75]
     assert (shares.low[0], shares.high[0]) == (0.0, 0.0)
     # the share of four draws with chance ½ each: 0 and 1 have chance 1/16 > 2.5 %
@@ -151,7 +161,7 @@ def test_the_profile_worked_out_by_hand():
 @given(SCORES)
 def test_a_profile_rises_within_its_band(scores):
     thresholds = np.linspace(0.0, 41.0, 30)
-    found = profile(scores, thresholds)
+    found = performance_profile(scores, thresholds)
     np.testing.assert_allclose(found.share, [(scores <= level).mean() for level in thresholds])
     for curve in found:
         assert (np.diff(curve) >= 0).all() and curve[0] == 0.0 and curve[-1] == 1.0
@@ -160,7 +170,7 @@ def test_a_profile_rises_within_its_band(scores):
 
 def test_the_band_of_a_share_is_that_of_coins():
     scores = np.tile([1.0, 3.0], (2, 40))  # 160 coins in two scenarios
-    found = profile(scores, np.array([2.0]))
+    found = performance_profile(scores, np.array([2.0]))
     assert (found.low[0], found.high[0]) == pytest.approx(
         (0.5 - 1.96 / 2 / 160**0.5, 0.5 + 1.96 / 2 / 160**0.5), abs=0.008
     )
@@ -168,6 +178,112 @@ def test_the_band_of_a_share_is_that_of_coins():
 
 def test_draws_are_the_same_every_time():
     first = iqm_interval(OURS), improvement_interval(OURS, THEIRS)
-    measures._draws.cache_clear()
-    measures._counts.cache_clear()
+    statistics._draws.cache_clear()
+    statistics._counts.cache_clear()
     assert (iqm_interval(OURS), improvement_interval(OURS, THEIRS)) == first
+
+
+# --- intervals
+
+
+SAMPLE = np.random.default_rng(7).gamma(2.0, 300.0, 40)
+
+
+def bootstrapped(statistic, *samples: np.ndarray) -> tuple[float, float]:
+    """SciPy's percentile bootstrap."""
+    interval = stats.bootstrap(
+        samples,
+        statistic,
+        paired=len(samples) > 1,
+        method="percentile",
+        n_resamples=9999,
+        rng=np.random.default_rng(11),
+        vectorized=True,
+    ).confidence_interval
+    return float(interval.low), float(interval.high)
+
+
+def test_the_interval_of_a_mean_is_scipy_s():
+    mean, *interval = mean_interval(SAMPLE.tolist())
+    assert mean == pytest.approx(SAMPLE.mean())
+    assert_alike((interval[0], interval[1]), bootstrapped(np.mean, SAMPLE))
+    spread = 1.96 * SAMPLE.std() / math.sqrt(40)
+    assert_alike((interval[0], interval[1]), (mean - spread, mean + spread), 0.1)
+
+
+def test_the_interval_of_a_median_is_scipy_s():
+    median, *interval = median_interval(SAMPLE)
+    assert median == pytest.approx(np.median(SAMPLE))
+    assert_alike((interval[0], interval[1]), bootstrapped(np.median, SAMPLE), 0.1)
+
+
+def test_the_interval_of_a_ratio_is_scipy_s_paired():
+    lower = SAMPLE * np.random.default_rng(8).uniform(0.8, 1.2, 40)
+    ratio, *interval = ratio_interval(SAMPLE, lower)
+    assert ratio == pytest.approx(SAMPLE.mean() / lower.mean())
+
+    def ratio_of_means(a, b, axis):
+        return a.mean(axis=axis) / b.mean(axis=axis)
+
+    assert_alike((interval[0], interval[1]), bootstrapped(ratio_of_means, SAMPLE, lower))
+    shuffled = ratio_interval(SAMPLE, np.random.default_rng(1).permutation(lower))
+    assert shuffled[2] - shuffled[1] > 2 * (interval[1] - interval[0])
+
+
+def test_pairs_that_differ_by_a_factor_have_no_spread():
+    assert ratio_interval(2.0 * SAMPLE, SAMPLE) == pytest.approx((2.0, 2.0, 2.0))
+    with pytest.raises(ValueError, match="shape"):
+        ratio_interval(SAMPLE, SAMPLE[:-1])
+
+
+def test_intervals_worked_out_by_hand():
+    """Two values 0 and 1: the resampled mean is 0, ½ or 1 with ¼, ½ and ¼; so is the median."""
+    assert mean_interval([0.0, 1.0]) == (0.5, 0.0, 1.0)
+    assert median_interval([0.0, 1.0]) == (0.5, 0.0, 1.0)
+    assert mean_interval([3]) == median_interval([3]) == (3.0, 3.0, 3.0)
+    assert ratio_interval([3.0], [2.0]) == (1.5, 1.5, 1.5)
+    # 60 coins: the share of heads has σ = 0.5/√60; 1.96 of it is 0.1265
+    assert mean_interval([0.0, 1.0] * 30) == pytest.approx((0.5, 0.3735, 0.6265), abs=0.011)
+
+
+def test_the_means_of_a_few_starts_spread_with_their_number():
+    """σ/√n around the mean."""
+    for starts in (4, 16, 64):
+        low, high = small_mean_range(np.arange(1000.0), starts)
+        spread = 1.96 * np.arange(1000.0).std() / math.sqrt(starts)
+        assert_alike((low, high), (499.5 - spread, 499.5 + spread), 0.05)
+
+
+def test_intervals_are_the_same_every_time():
+    assert mean_interval(SAMPLE) == mean_interval(SAMPLE)
+    assert small_mean_range(SAMPLE, 5) == small_mean_range(SAMPLE, 5)
+
+
+def test_ratios_of_medians_and_of_ratios_by_hand():
+    """Samples of one kind have no spread; what differs by a factor has the factor."""
+    assert median_ratio_interval(3.0 * SAMPLE, SAMPLE) == pytest.approx((3.0, 3.0, 3.0))
+    assert median_ratio_interval([1.0, 2.0, 100.0], [4.0, 4.0, 4.0]).value == 0.5
+    found = double_ratio_interval(6.0 * SAMPLE, SAMPLE, 3.0 * SAMPLE, SAMPLE)
+    assert found == pytest.approx((2.0, 2.0, 2.0))
+
+
+def test_a_curve_is_read_between_its_points_and_at_its_ends():
+    ones = np.ones(5)
+    times, costs = np.outer([30.0, 10.0], ones), np.outer([4.0, 8.0], ones)
+    at = [interpolated_ratio_interval(times, costs, 10.0 * ones, cost * ones) for cost in (6.0, 1.0, 9.0)]
+    assert at[0] == pytest.approx((2.0, 2.0, 2.0))  # halfway: 20 over 10
+    assert [found.value for found in at[1:]] == [3.0, 1.0]
+    turned = interpolated_ratio_interval(times[::-1], costs[::-1], 10.0 * ones, 6.0 * ones)
+    assert turned == at[0]
+
+
+# --- tests
+
+
+def test_holm_by_hand():
+    assert holm([0.01, 0.04, 0.03, 0.005]) == pytest.approx([0.03, 0.06, 0.06, 0.02])
+    assert holm([0.5, 0.9]) == pytest.approx([1.0, 1.0])
+    assert paired_p(np.ones(5), np.ones(5)) == 1.0
+    five = np.arange(1.0, 6.0)
+    assert paired_p(np.zeros(5), five) == pytest.approx(1 / 32)  # all five signs alike
+    assert paired_p(five, np.zeros(5)) == 1.0

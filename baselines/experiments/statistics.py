@@ -1,0 +1,229 @@
+"""Statistics over missions: bootstrap intervals, paired tests, and measures across scenarios.
+
+Intervals hold 95 %: percentiles of a bootstrap over missions, which draws the same resamples in every
+call. What is compared with the same seeds is resampled in pairs. `scipy.stats.bootstrap` agrees within its
+own noise (the tests compare them); ours repeats bit for bit, also for ratios of two and of four samples.
+
+The measures across scenarios are those of Agarwal, Schwarzer, Castro, Courville and Bellemare, *Deep
+Reinforcement Learning at the Edge of the Statistical Precipice* (NeurIPS 2021). Their package rliable 1.2
+cannot be imported beside pandas 3, and resamples the missions of two strategies independently, although
+ours share their seeds. Scores are times here: smaller is better. The bootstrap draws seeds with replacement
+within every scenario (stratified), the same draws for all strategies (paired).
+
+Letters: S scenarios, N seeds, T thresholds, B resamples.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import lru_cache
+from typing import Any, NamedTuple
+
+import numpy as np
+from scipy import stats
+
+_CONFIDENCE = 0.95
+_RESAMPLES = 9999
+_STRATIFIED_RESAMPLES = 4999
+
+Sample = Sequence[float] | np.ndarray
+"""(N,) one figure of each mission, by seed where it is compared."""
+
+
+class Range(NamedTuple):
+    """Where 95 % of something lie."""
+
+    low: float
+    high: float
+
+
+class Interval(NamedTuple):
+    """A figure with the ends of its 95 % interval."""
+
+    value: float
+    low: float
+    high: float
+
+
+def mean_interval(values: Sample) -> Interval:
+    """Mean and its interval."""
+    sample = np.asarray(values, float)
+    return Interval(float(sample.mean()), *_central(_resampled(sample, len(sample)).mean(axis=1)))
+
+
+def median_interval(values: Sample) -> Interval:
+    """Median and its interval."""
+    sample = np.asarray(values, float)
+    medians = np.median(_resampled(sample, len(sample)), axis=1)
+    return Interval(float(np.median(sample)), *_central(medians))
+
+
+def small_mean_range(values: Sample, missions: int) -> Range:
+    """Where 95 % of the means of only so many missions lie."""
+    return _central(_resampled(np.asarray(values, float), missions).mean(axis=1))
+
+
+def central_range(values: Sample) -> Range:
+    """Where the central 95 % of the values themselves lie."""
+    return _central(np.asarray(values, float))
+
+
+def ratio_interval(numerator: Sample, denominator: Sample) -> Interval:
+    """Ratio of two means over the same seeds, and its interval (paired bootstrap)."""
+    pairs = np.stack([np.asarray(numerator, float), np.asarray(denominator, float)], axis=1)
+    means = _resampled(pairs, len(pairs)).mean(axis=1)
+    return Interval(float(pairs[:, 0].mean() / pairs[:, 1].mean()), *_central(means[:, 0] / means[:, 1]))
+
+
+def median_ratio_interval(numerator: Sample, denominator: Sample) -> Interval:
+    """Ratio of two medians over the same seeds, and its interval (paired bootstrap)."""
+    pairs = np.stack([np.asarray(numerator, float), np.asarray(denominator, float)], axis=1)
+    medians = np.median(_resampled(pairs, len(pairs)), axis=1)
+    ratio = float(np.median(pairs[:, 0]) / np.median(pairs[:, 1]))
+    return Interval(ratio, *_central(medians[:, 0] / medians[:, 1]))
+
+
+def double_ratio_interval(
+    numerator: Sample, denominator: Sample, numerator_before: Sample, denominator_before: Sample
+) -> Interval:
+    """A ratio of two means over the same ratio before, all over the same seeds, and its interval."""
+    samples = (numerator, denominator, numerator_before, denominator_before)
+    rows = np.stack([np.asarray(sample, float) for sample in samples], axis=1)
+    means = np.concatenate([rows.mean(axis=0)[None], _resampled(rows, len(rows)).mean(axis=1)])
+    ratios = means[:, 0] / means[:, 1] / (means[:, 2] / means[:, 3])
+    return Interval(float(ratios[0]), *_central(ratios[1:]))
+
+
+def interpolated_ratio_interval(
+    times: np.ndarray, costs: np.ndarray, time: np.ndarray, cost: np.ndarray
+) -> Interval:
+    """A curve of mean times over mean costs, read at a cost, over the mean time paid there; its interval.
+
+    Beyond the curve's ends its nearest point is read.
+
+    Args:
+        times: (K, N) of K points of the curve, by seed.
+        costs: (K, N) theirs.
+        time: (N,) of what is compared with the curve, by the same seeds.
+        cost: (N,) its own.
+    """
+    all_times, all_costs = np.concatenate([times, time[None]]), np.concatenate([costs, cost[None]])
+    rows = _resampled(np.arange(len(time)), len(time))  # (B, N)
+
+    def ratio(mean_times: np.ndarray, mean_costs: np.ndarray) -> float:
+        order = np.argsort(mean_costs[:-1])
+        read = np.interp(mean_costs[-1], mean_costs[:-1][order], mean_times[:-1][order])
+        return float(read / mean_times[-1])
+
+    drawn_times, drawn_costs = all_times[:, rows].mean(axis=2), all_costs[:, rows].mean(axis=2)
+    drawn = [ratio(drawn_times[:, row], drawn_costs[:, row]) for row in range(len(rows))]
+    return Interval(ratio(all_times.mean(axis=1), all_costs.mean(axis=1)), *_central(np.asarray(drawn)))
+
+
+def paired_p(smaller: np.ndarray, larger: np.ndarray) -> float:
+    """One-sided p of the paired Wilcoxon signed-rank test that the first are smaller; 1 if all are equal."""
+    if np.array_equal(smaller, larger):
+        return 1.0
+    result: Any = stats.wilcoxon(smaller, larger, alternative="less")  # SciPy gives it no type
+    return float(result.pvalue)
+
+
+def holm(p_values: Sequence[float]) -> np.ndarray:
+    """p-values corrected for their number (Holm 1979)."""
+    p = np.asarray(p_values, float)
+    order = np.argsort(p, kind="stable")
+    scaled = np.maximum.accumulate(p[order] * np.arange(len(p), 0, -1))
+    corrected = np.empty(len(p))
+    corrected[order] = np.minimum(scaled, 1.0)
+    return corrected
+
+
+def interquartile_mean(scores: np.ndarray) -> np.ndarray:
+    """Mean without the lowest and the highest quarter; what is less than a whole score of them stays.
+
+    Args:
+        scores: (…, n) float64.
+
+    Returns:
+        (…,) float64.
+    """
+    cut = scores.shape[-1] // 4
+    return np.sort(scores, axis=-1)[..., cut : scores.shape[-1] - cut].mean(axis=-1)
+
+
+def iqm_interval(scores: np.ndarray) -> Interval:
+    """Interquartile mean over all scenarios and seeds.
+
+    Args:
+        scores: (S, N) float64.
+    """
+    drawn = np.take_along_axis(scores[None], _draws(*scores.shape), axis=2)  # (B, S, N)
+    means = interquartile_mean(drawn.reshape(len(drawn), -1))
+    return Interval(float(interquartile_mean(scores.ravel())), *_central(means))
+
+
+def improvement_interval(ours: np.ndarray, theirs: np.ndarray) -> Interval:
+    """Probability that a mission of ours is faster than one of theirs in the same scenario.
+
+    P = 1/S Σ_s 1/N² Σ_ij [ours_si < theirs_sj], ties count ½ (Mann-Whitney's U over N²).
+
+    Args:
+        ours: (S, N) float64.
+        theirs: (S, N) float64, the same scenarios and seeds.
+    """
+    better = ours[:, :, None] < theirs[:, None, :]
+    wins = better + 0.5 * (ours[:, :, None] == theirs[:, None, :])  # (S, N, N)
+    counts = _counts(*ours.shape).transpose(1, 0, 2)
+    drawn = ((counts @ wins) * counts).sum(axis=2)  # (S, B)
+    return Interval(float(wins.mean()), *_central(drawn.mean(axis=0) / ours.shape[1] ** 2))
+
+
+class Profile(NamedTuple):
+    """Share of missions within each threshold, (T,) float64, with the ends of its pointwise 95 % interval."""
+
+    share: np.ndarray
+    low: np.ndarray
+    high: np.ndarray
+
+
+def performance_profile(scores: np.ndarray, thresholds: np.ndarray) -> Profile:
+    """The share of missions whose score is at most a threshold.
+
+    Args:
+        scores: (S, N) float64; inf = never.
+        thresholds: (T,) float64.
+    """
+    within = (scores[:, :, None] <= thresholds).reshape(scores.size, -1).astype(float)
+    drawn = _counts(*scores.shape).reshape(-1, scores.size) @ within / scores.size  # (B, T)
+    return Profile(within.mean(axis=0), *np.quantile(drawn, _ENDS, axis=0))
+
+
+_ENDS = ((1 - _CONFIDENCE) / 2, (1 + _CONFIDENCE) / 2)
+"""Quantiles that enclose the central 95 %."""
+
+
+def _central(values: np.ndarray) -> Range:
+    low, high = np.quantile(values, _ENDS)
+    return Range(float(low), float(high))
+
+
+def _resampled(sample: np.ndarray, size: int) -> np.ndarray:
+    """(B, size, …) draws with replacement, always the same ones."""
+    rows = np.random.default_rng(0).integers(len(sample), size=(_RESAMPLES, size))
+    return sample[rows]
+
+
+@lru_cache(maxsize=2)
+def _draws(scenarios: int, seeds: int) -> np.ndarray:
+    """(B, S, N) which seeds are drawn, always the same ones."""
+    return np.random.default_rng(0).integers(seeds, size=(_STRATIFIED_RESAMPLES, scenarios, seeds))
+
+
+@lru_cache(maxsize=2)
+def _counts(scenarios: int, seeds: int) -> np.ndarray:
+    """(B, S, N) float64 how often each seed is drawn; sums over whole and half numbers are exact."""
+    draws = _draws(scenarios, seeds)
+    counts = np.zeros(draws.shape)
+    drawn, scenario = np.ogrid[: len(draws), :scenarios]
+    np.add.at(counts, (drawn[..., None], scenario[..., None], draws), 1.0)
+    return counts

@@ -1,0 +1,43 @@
+"""Tables of results as text: Markdown for pages, CSV for the numbers behind figures."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Mapping, Sequence
+
+from tabulate import DataRow, TableFormat, tabulate
+
+_ROW = DataRow("| ", " | ", " |")
+
+
+def _rule(widths: Sequence[int], alignments: Sequence[str]) -> str:
+    """The line below the head."""
+    del alignments
+    return "| " + " | ".join("---" for _ in widths) + " |"
+
+
+_MARKDOWN = TableFormat(
+    lineabove=None,
+    linebelowheader=_rule,
+    linebetweenrows=None,
+    linebelow=None,
+    headerrow=_ROW,
+    datarow=_ROW,
+    padding=0,
+    with_header_hide=None,
+)
+"""Markdown without padding: a number that changes its width leaves the other lines of a page as they are."""
+
+
+def markdown_table(head: Sequence[str], rows: Sequence[Sequence[object]]) -> str:
+    """A Markdown table; cells stand in it as `str` has them."""
+    text = tabulate(rows, head, _MARKDOWN, disable_numparse=True, stralign=None, numalign=None)
+    return text + "\n"
+
+
+def csv_table(columns: Mapping[str, Sequence[object]]) -> str:
+    """Columns of equal length as CSV."""
+    text = io.StringIO()
+    csv.writer(text, lineterminator="\n").writerows([tuple(columns), *zip(*columns.values(), strict=True)])
+    return text.getvalue()
