@@ -12,7 +12,7 @@ from typing import Any, Literal
 import numpy as np
 from stable_baselines3.common.callbacks import BaseCallback
 
-from baselines.experiments.cells import csv_table
+from baselines.experiments.tables import csv_table
 from training.advantages import DecisionBuffer
 from training.validation import Validation
 
