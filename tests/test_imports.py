@@ -18,13 +18,13 @@ TRUTH = ("Missions", "World", "load_octomap", "load_world", "save_world")
 """Public names that show the truth: not for strategies."""
 HEAVY = (*PACKAGES[1:], "tests", "torch", "matplotlib", "stable_baselines3", "ray")
 """What importing the library never loads, nor what only some need."""
-FOR_SOME = ("pygame", "PIL", "av", "rerun", "octomap", "tyro", "rich", "tensorboard", "pandas")
+FOR_SOME = ("pygame", "av", "rerun", "octomap", "tyro", "rich", "tensorboard", "pandas")
 WRONG_IMPORTS = {
     f"{LIBRARY}.belief.raycast": (f"{LIBRARY}.belief.map_update", f"{LIBRARY}.robots.motion"),
     f"{LIBRARY}.belief.paths.lattice": (f"{LIBRARY}.belief.paths.planning",),
     f"{LIBRARY}.robots.channel": (f"{LIBRARY}.robots.motion", "pettingzoo"),
     f"{LIBRARY}.missions.rules": (f"{LIBRARY}.missions.tick", "torch"),
-    f"{LIBRARY}.reports.glyphs": (f"{LIBRARY}.envs.infos", "stable_baselines3"),
+    f"{LIBRARY}.reports.colours": (f"{LIBRARY}.envs.infos", "stable_baselines3"),
     f"{LIBRARY}.scenario": (f"{LIBRARY}.scenarios", "tests.reference"),
     f"{LIBRARY}.worlds.recipes.plan": (f"{LIBRARY}.worlds.load", f"{LIBRARY}.worlds.recipes.cave"),
     f"{LIBRARY}.worlds.recipes.cave": (f"{LIBRARY}.worlds.recipes.office",),

@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from entropy_explore_env.reports.glyphs import robot_colour
+from entropy_explore_env.reports.colours import robot_colour
 from entropy_explore_env.reports.painting import entropy_share
 from entropy_explore_env.reports.recording import Recorder
 from entropy_explore_env.settings import Grid

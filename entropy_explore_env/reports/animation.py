@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from PIL import Image
 
 from entropy_explore_env.errors import MissingExtraError, SettingError
 from entropy_explore_env.validation import is_whole
@@ -153,12 +154,7 @@ def animate(frames: Iterable[np.ndarray], path: Path, frame_s: float) -> None:
 
     Raises:
         SettingError: There are no pictures, or of different sizes, or their time is too short.
-        MissingExtraError: Pillow is not installed.
     """
-    try:
-        from PIL import Image
-    except ImportError as error:
-        raise MissingExtraError("pillow", "baselines") from error
     if not frame_s >= 0.02:
         raise SettingError("frame_s", frame_s, "at least 0.02 s")
     packed, usage = [], np.zeros(COLOUR_CODES, dtype=np.int64)

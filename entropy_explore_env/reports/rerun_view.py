@@ -19,7 +19,7 @@ import numpy as np
 
 from entropy_explore_env.errors import MissingExtraError
 from entropy_explore_env.missions.simulation import Missions
-from entropy_explore_env.reports.glyphs import COLOURS, robot_colour
+from entropy_explore_env.reports.colours import COLOURS, robot_colour
 from entropy_explore_env.reports.painting import entropy_share, remaining_share, world_name
 from entropy_explore_env.reports.projection import KNOWN_BELOW
 from entropy_explore_env.reports.recording import Ways, poses_now

@@ -13,17 +13,10 @@ from PIL import Image
 
 from entropy_explore_env.errors import MissingExtraError, SettingError
 from entropy_explore_env.reports.animation import Window, animate
-from entropy_explore_env.reports.glyphs import (
-    COLOURS,
-    ROBOT_COLOURS,
-    UNKNOWN_COLOUR,
-    line_pixels,
-    shortened,
-    text_mask,
-    text_width,
-    write,
-)
-from entropy_explore_env.reports.rendering import Frame, View, draw_frame, lay_out
+from entropy_explore_env.reports.annotations import Box
+from entropy_explore_env.reports.colours import COLOURS, PAPER, ROBOT_COLOURS, UNKNOWN_COLOUR
+from entropy_explore_env.reports.page_layout import View, lay_out
+from entropy_explore_env.reports.rendering import Frame, draw_frame
 
 SHAPE = (7, 11, 5)
 VOXEL_M = 0.5
@@ -55,6 +48,11 @@ def views_of(frame: Frame, width: int = 640, height: int = 480) -> dict[tuple[st
     shape, robots = frame.entropy_share.shape, len(frame.positions_m)
     layout = lay_out(shape, frame.voxel_size_m, robots, len(frame.status), width, height)
     return {(view.quantity, view.up): view for view in layout.views}
+
+
+def part(picture: np.ndarray, box: Box) -> np.ndarray:
+    """What lies inside a box of a picture; not a copy."""
+    return picture[box.top : box.bottom, box.left : box.right]
 
 
 def pixel_of(view: View, voxel: tuple[float, float, float]) -> tuple[int, int]:
@@ -148,14 +146,14 @@ def test_one_known_voxel_lights_its_own_rectangle_of_the_coverage_maps() -> None
     picture, views = draw_frame(frame), views_of(frame)
     for up in (1, 2):
         view = views["coverage", up]
-        lit = (view.of(picture) != UNKNOWN_COLOUR).any(axis=-1)
+        lit = (part(picture, view) != UNKNOWN_COLOUR).any(axis=-1)
         rows, columns = np.nonzero(lit)
         assert lit[rows.min() : rows.max() + 1, columns.min() : columns.max() + 1].all()
         edges = np.array([columns.min(), columns.max() + 1]) * SHAPE[0] / view.width
         np.testing.assert_allclose(edges, [5, 6], atol=SHAPE[0] / view.width)
         edges = (view.height - np.array([rows.max() + 1, rows.min()])) * SHAPE[up] / view.height
         np.testing.assert_allclose(edges, [voxel[up], voxel[up] + 1], atol=SHAPE[up] / view.height)
-        assert (view.of(picture)[lit] == COLOURS["coverage"][254]).all()
+        assert (part(picture, view)[lit] == COLOURS["coverage"][254]).all()
 
 
 def test_entropy_maps_show_the_mean_along_the_line_of_sight() -> None:
@@ -174,7 +172,7 @@ def test_a_wall_one_voxel_thick_stays_visible_in_a_world_larger_than_the_picture
     frame.coverage[:] = 0.0
     frame.coverage[333, 100:600] = 1.0
     view = views_of(frame)["coverage", 1]
-    dark = (view.of(draw_frame(frame)) == COLOURS["coverage"][254]).all(axis=-1)
+    dark = (part(draw_frame(frame), view) == COLOURS["coverage"][254]).all(axis=-1)
     columns = np.flatnonzero(dark.any(axis=0))
     assert len(columns) == 1
     assert abs(columns[0] - 333.5 / 1000 * view.width) <= 1
@@ -185,7 +183,7 @@ def test_entropy_is_averaged_not_sampled_in_a_world_larger_than_the_picture() ->
     frame = frame_of((1000, 700, 1), robots=0)
     frame.entropy_share[::2] = 0.0
     view = views_of(frame)["entropy", 1]
-    seen = np.unique(view.of(draw_frame(frame)).reshape(-1, 3), axis=0)
+    seen = np.unique(part(draw_frame(frame), view).reshape(-1, 3), axis=0)
     assert {tuple(colour) for colour in seen} <= {tuple(c) for c in COLOURS["entropy"][80:176]}
 
 
@@ -211,7 +209,7 @@ def test_curves_begin_at_the_upper_left_and_end_at_the_last_time() -> None:
     assert tuple(picture[box.top, box.left]) == ROBOT_COLOURS[0]
     assert tuple(picture[box.top + box.height - 1, box.left + box.width - 1]) == ROBOT_COLOURS[0]
     y, x = box.height // 2, box.width // 2
-    middle = box.of(picture)[y - 3 : y + 3, x - 3 : x + 3]
+    middle = part(picture, box)[y - 3 : y + 3, x - 3 : x + 3]
     assert (middle == ROBOT_COLOURS[0]).all(axis=-1).any()
 
 
@@ -246,30 +244,6 @@ def test_frame_and_picture_name_what_does_not_fit() -> None:
         draw_frame(frame, 640, 100)
 
 
-def test_every_printable_ascii_character_has_a_glyph_of_its_own() -> None:
-    drawn = {text_mask(chr(code)).tobytes() + bytes(text_mask(chr(code)).shape) for code in range(33, 127)}
-    assert len(drawn) == 127 - 33
-    assert text_mask("é").tobytes() == text_mask("e").tobytes()
-    assert text_mask("漢").shape == (9, 5)
-
-
-def test_text_is_cut_off_at_the_edge_and_shortened_to_fit() -> None:
-    picture = np.zeros((12, 20, 3), np.uint8)
-    for left, top in ((-30, 2), (-3, -3), (15, 8), (40, 2), (2, 40)):
-        write(picture, "Ag%", left, top, (255, 255, 255))
-    assert picture.any()
-    assert text_width("robot 0", 2) == text_mask("robot 0", 2).shape[1] == 2 * text_width("robot 0")
-    for width in (20, 50, 90):
-        assert text_width(shortened("remaining entropy", width)) <= width
-    assert shortened("short", 500) == "short"
-
-
-def test_a_line_has_no_gaps() -> None:
-    pixels = line_pixels(np.array([[0.0, 0.0], [9.5, 3.2], [np.nan, 1.0], [2.0, 30.0]]))
-    assert np.abs(np.diff(pixels, axis=0)).max() == 1
-    assert tuple(pixels[0]) == (0, 0) and tuple(pixels[-1]) == (2, 30)
-
-
 def test_window_shows_pictures_and_a_person_can_close_it(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
     window = Window(frames_per_s=None)
@@ -301,13 +275,10 @@ def test_window_holds_its_frame_rate(monkeypatch: pytest.MonkeyPatch) -> None:
     window.close()
 
 
-def test_missing_packages_name_the_extra(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_without_pygame_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "pygame", None)
-    monkeypatch.setitem(sys.modules, "PIL", None)
     with pytest.raises(MissingExtraError, match=r"\[render\]"):
         Window()
-    with pytest.raises(MissingExtraError, match=r"\[baselines\]"):
-        animate([np.zeros((4, 4, 3), np.uint8)], tmp_path / "a.gif", 0.1)
 
 
 def explored(share: float) -> np.ndarray:
@@ -366,11 +337,11 @@ def test_nothing_of_a_robot_leaves_the_map() -> None:
     )
     empty, full = draw_frame(nobody), draw_frame(frame)
     for view in views_of(frame).values():
-        inside = view.of(full)
+        inside = part(full, view)
         for robot in range(4) if view.up == 1 else (1, 3):  # from the side two hide the others
             drawn = (inside == ROBOT_COLOURS[robot]).all(axis=-1).sum()
             assert drawn > 45, "a whole disc has 49 pixels"
-        view.of(empty)[:] = view.of(full)[:] = 0
+        part(empty, view)[:] = part(full, view)[:] = 0
     np.testing.assert_array_equal(empty, full)
 
 
@@ -381,9 +352,29 @@ def test_thin_side_views_are_drawn_higher_and_say_so() -> None:
     voxel_px = above.width / 300
     assert above.height == pytest.approx(200 * voxel_px, abs=1) and above.stretch == 1.0
     assert side.height == 16 and side.stretch == pytest.approx(16 / (4 * voxel_px), rel=0.01)
-    assert side.title == f"entropy, from the side, heights × {side.stretch:.1f}"
-    assert "×" not in above.title and "×" not in views_of(frame_of())["entropy", 2].title
+    assert side.title == f"entropy, from the side, height x {side.stretch:.1f}"
+    assert "height" not in above.title + views_of(frame_of())["entropy", 2].title
     frame.entropy_share[:, :, 3] = 0.0
-    picture = side.of(draw_frame(dataclasses.replace(frame, positions_m=np.full((1, 3), np.nan))))
+    nobody = dataclasses.replace(frame, positions_m=np.full((1, 3), np.nan))
+    picture = part(draw_frame(nobody), side)
     assert (picture[:4] == COLOURS["entropy"][0]).all() and (picture[4:] == COLOURS["entropy"][255]).all()
     assert side.left + side.width <= 640 and max(v.top + v.height for v in views.values()) < 480
+
+
+def test_text_stays_in_the_picture_however_long_it_is() -> None:
+    short = dataclasses.replace(frame_of(), title="a", status=("b",) * 12)
+    long = dataclasses.replace(short, title="Größe " * 99, status=("c" * 999,) * 12)
+    assert (draw_frame(short) != draw_frame(long)).any()
+    layout = lay_out(SHAPE, VOXEL_M, 2, 8, 640, 480)
+    for frame in (short, long):
+        picture = draw_frame(frame)
+        assert (picture[:, -4:] == PAPER).all(), "nothing runs over the edge"
+        lines = part(picture, layout.status)
+        ink = (lines != PAPER).any(axis=(1, 2))
+        assert np.count_nonzero(np.diff(ink.astype(int)) == 1) == 8, "eight lines"
+
+
+def test_larger_pictures_have_larger_details() -> None:
+    small, large = lay_out(SHAPE, VOXEL_M, 2, 2, 640, 480), lay_out(SHAPE, VOXEL_M, 2, 2, 1280, 960)
+    assert (small.unit, large.unit) == (1, 2)
+    assert large.status.height == 2 * small.status.height

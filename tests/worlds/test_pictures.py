@@ -6,12 +6,11 @@ import io
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from entropy_explore_env.settings import Grid
 from entropy_explore_env.worlds.pictures import _FREE, _SOLID, _metres, _stretch, picture
 from entropy_explore_env.worlds.world import World
-
-Image = pytest.importorskip("PIL.Image", reason="pillow is not installed")
 
 
 def drawn(occupied, edge=0.5, origin=(10.0, -20.0, 3.0), name="hall"):

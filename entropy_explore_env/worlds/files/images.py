@@ -9,14 +9,14 @@ from __future__ import annotations
 
 import io
 from pathlib import Path
-from typing import Any
 
 import numpy as np
+from PIL import Image
 
 from entropy_explore_env.worlds.files.elevation import columns
 from entropy_explore_env.worlds.files.voxels import FREE, SOLID, Options, RefusedError, Voxels, content
 
-NEEDS = (("PIL.Image", "pillow"),)
+NEEDS = ()
 PIXEL_M = 0.05
 """Edge of a plan's pixel where nothing else is said: that of most maps of map_server."""
 MAX_PIXELS = 1 << 25
@@ -43,14 +43,12 @@ def read(path: Path, options: Options) -> Voxels:
     return Voxels(from_rows(labels)[:, :, None], PIXEL_M if edge_m is None else float(edge_m))
 
 
-def opened(path: Path) -> Any:  # noqa: ANN401 - Pillow is not imported at the top
+def opened(path: Path) -> Image.Image:
     """The image in a file, its pixels read; refused by the size in its header before that.
 
     Raises:
         RefusedError: It is no PNG or PGM, or has too many pixels.
     """
-    from PIL import Image
-
     if path.suffix.lower() not in _FORMATS:
         raise RefusedError("an image that is a .png or .pgm")
     picture = Image.open(io.BytesIO(content(path)), formats=[_FORMATS[path.suffix.lower()]])
@@ -62,7 +60,7 @@ def opened(path: Path) -> Any:  # noqa: ANN401 - Pillow is not imported at the t
     return picture.convert("L") if picture.mode == "1" else picture
 
 
-def shades_of(picture: Any, with_opacity: bool = False) -> tuple[np.ndarray, np.ndarray]:  # noqa: ANN401
+def shades_of(picture: Image.Image, with_opacity: bool = False) -> tuple[np.ndarray, np.ndarray]:
     """Mean of each pixel's colours and its opacity, both (rows, columns) float32 in [0, 255].
 
     Args:

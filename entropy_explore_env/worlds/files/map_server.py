@@ -32,7 +32,7 @@ from entropy_explore_env.worlds.files.voxels import (
     content,
 )
 
-NEEDS = (("yaml", "pyyaml"), ("PIL.Image", "pillow"))
+NEEDS = (("yaml", "pyyaml"),)
 MAX_YAML_BYTES = 1 << 16
 MODES = ("trinary", "scale", "raw")
 _HALF_PERCENT = 50.0

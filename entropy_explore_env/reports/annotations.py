@@ -1,0 +1,182 @@
+"""Marks and annotations of mission pictures, drawn with Pillow: robots, viewpoints, keys, legend, axes.
+
+Pixels; a point is (x, y), x to the right, y down. `unit` is the size of a picture's details: 1 in pictures of
+640 × 480, 2 from 1120 × 840 on.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from PIL import Image, ImageDraw
+
+from entropy_explore_env.picture_text import font, text_width
+from entropy_explore_env.reports.colours import (
+    COLOURS,
+    FAINT,
+    INK,
+    ROBOT_COLOURS,
+    UNKNOWN_COLOUR,
+    Colour,
+    robot_colour,
+)
+
+TEXT_SIZE = 12
+"""Of the font, in units."""
+LINE_HEIGHT = 14
+"""From one line of text to the next, in units."""
+MARK_RADIUS = 4
+"""Of the marks of robots and viewpoints, in units."""
+_SWATCH = 8
+"""Height of a colour key, in units."""
+
+
+@dataclass(frozen=True)
+class Box:
+    """A rectangle of the picture, in pixels."""
+
+    left: int
+    top: int
+    width: int
+    height: int
+
+    @property
+    def right(self) -> int:
+        """The first column beyond it."""
+        return self.left + self.width
+
+    @property
+    def bottom(self) -> int:
+        """The first row beyond it."""
+        return self.top + self.height
+
+
+def write(
+    draw: ImageDraw.ImageDraw, place: tuple[float, float], text: str, size: int, anchor: str = "la"
+) -> None:
+    """Write a line of printable text.
+
+    Args:
+        draw: Of the picture.
+        place: Where the text's anchor lies.
+        text: What to write.
+        size: Of the font in pixels.
+        anchor: Pillow's: `la` = upper left corner, `lm` / `mm` / `rm` = left, middle, right at mid-height.
+    """
+    draw.text(place, text, INK, font(size), anchor=anchor)
+
+
+def draw_disc(draw: ImageDraw.ImageDraw, centre: tuple[float, float], radius: float, colour: Colour) -> None:
+    """A filled disc with a dark edge around it, so that it stands out on any ground."""
+    draw.ellipse(_around(centre, radius + 1), INK)
+    draw.ellipse(_around(centre, radius), colour)
+
+
+def draw_ring(
+    draw: ImageDraw.ImageDraw, centre: tuple[float, float], unit: int, colour: Colour | None = None
+) -> None:
+    """The mark of a chosen viewpoint: a ring with dark edges; without a colour, all of it dark."""
+    radius = MARK_RADIUS * unit
+    if colour is None:
+        draw.ellipse(_around(centre, radius), outline=INK, width=2 * unit)
+        return
+    draw.ellipse(_around(centre, radius + 1), outline=INK, width=2 * unit + 2)
+    draw.ellipse(_around(centre, radius), outline=colour, width=2 * unit)
+
+
+def _around(centre: tuple[float, float], radius: float) -> tuple[float, float, float, float]:
+    """Corners of the square around a circle."""
+    x, y = centre
+    return x - radius, y - radius, x + radius, y + radius
+
+
+def outline(draw: ImageDraw.ImageDraw, box: Box) -> None:
+    """A dark frame of one pixel around a rectangle."""
+    draw.rectangle((box.left - 1, box.top - 1, box.right, box.bottom), outline=INK)
+
+
+def draw_key(
+    page: Image.Image, quantity: str, view: Box, unit: int, pixels_per_m: float | None = None
+) -> None:
+    """The key to the colours below a map.
+
+    Args:
+        page: Changed in place.
+        quantity: `entropy` or `coverage`.
+        view: The map.
+        unit: Size of the picture's details.
+        pixels_per_m: Scale of the map, for a scale bar; None = no scale bar.
+    """
+    draw, size, x = ImageDraw.Draw(page), TEXT_SIZE * unit, float(view.left)
+    top = view.bottom + 5 * unit
+    middle = top + _SWATCH * unit / 2
+    low, high = ("0 %", "100 %") if quantity == "entropy" else ("free", "occupied")
+    write(draw, (x, middle), low, size, "lm")
+    bar = Box(round(x + text_width(low, size)) + 4 * unit, top, 50 * unit, _SWATCH * unit)
+    levels = np.arange(bar.width) * (255 if quantity == "entropy" else 254) // (bar.width - 1)
+    ramp = Image.fromarray(np.repeat(COLOURS[quantity][levels][None], bar.height, axis=0))
+    outline(draw, bar)
+    page.paste(ramp, (bar.left, bar.top))
+    write(draw, (bar.right + 4 * unit, middle), high, size, "lm")
+    x = bar.right + 4 * unit + text_width(high, size) + 10 * unit
+    if quantity == "coverage":
+        swatch = Box(round(x), top, _SWATCH * unit, _SWATCH * unit)
+        outline(draw, swatch)
+        draw.rectangle((swatch.left, swatch.top, swatch.right - 1, swatch.bottom - 1), UNKNOWN_COLOUR)
+        write(draw, (swatch.right + 4 * unit, middle), "unknown", size, "lm")
+    if pixels_per_m is not None:
+        _draw_scale_bar(draw, (x, middle), unit, pixels_per_m)
+
+
+def _draw_scale_bar(
+    draw: ImageDraw.ImageDraw, place: tuple[float, float], unit: int, pixels_per_m: float
+) -> None:
+    """A bar of a round number of metres, with its length."""
+    x, y = place
+    length_m = _round_length(40 * unit / pixels_per_m)
+    end = x + length_m * pixels_per_m
+    for corners in (
+        (x, y, end, y),
+        (x, y - 3 * unit, x, y + 3 * unit),
+        (end, y - 3 * unit, end, y + 3 * unit),
+    ):
+        draw.line(corners, INK, unit)
+    write(draw, (end + 4 * unit, y), f"{length_m:g} m", TEXT_SIZE * unit, "lm")
+
+
+def _round_length(most: float) -> float:
+    """The longest of …, 0.5, 1, 2, 5, 10, … that is not above `most`."""
+    decade = 10.0 ** np.floor(np.log10(most))
+    return float(max(step * decade for step in (1, 2, 5) if step * decade <= most * (1 + 1e-9)))
+
+
+def legend_rows(robots: int) -> int:
+    """Lines of the legend that name robots."""
+    return (min(robots, len(ROBOT_COLOURS)) + 1) // 2
+
+
+def draw_legend(draw: ImageDraw.ImageDraw, box: Box, robots: int, unit: int) -> None:
+    """The colours of the robots, two in a row, and the mark of a chosen viewpoint."""
+    shown, inset = min(robots, len(ROBOT_COLOURS)), (MARK_RADIUS + 1) * unit
+    for robot in range(shown):
+        left = box.left + robot % 2 * box.width // 2
+        middle = box.top + (robot // 2 + 0.5) * LINE_HEIGHT * unit
+        draw_disc(draw, (left + inset, middle), MARK_RADIUS * unit, robot_colour(robot))
+        more = ", …" if robot + shown < robots else ""
+        write(draw, (left + 2 * inset + 4 * unit, middle), f"robot {robot}{more}", TEXT_SIZE * unit, "lm")
+    middle = box.top + (legend_rows(robots) + 0.5) * LINE_HEIGHT * unit
+    draw_ring(draw, (box.left + inset, middle), unit)
+    write(draw, (box.left + 2 * inset + 4 * unit, middle), "chosen viewpoint", TEXT_SIZE * unit, "lm")
+
+
+def draw_axes(draw: ImageDraw.ImageDraw, box: Box, unit: int) -> None:
+    """Axes of the entropy curves: share from 0 to 100 % over time."""
+    size = TEXT_SIZE * unit
+    write(draw, (box.left, box.top - 4 * unit), "entropy left", size, "ls")
+    for percent in (0, 50, 100):
+        y = box.top + round((1 - percent / 100) * (box.height - unit))
+        draw.rectangle((box.left, y, box.right - 1, y + unit - 1), INK if percent == 0 else FAINT)
+        write(draw, (box.left - 4 * unit, y), f"{percent} %", size, "rm")
+    draw.rectangle((box.left, box.top, box.left + unit - 1, box.bottom - 1), INK)
+    write(draw, (box.left, box.bottom + 3 * unit), "0", size, "la")
