@@ -34,7 +34,7 @@ class Args:
     scenarios: str | None = None
     """Names and world files, commas between; default: room,room-furnished,lab,office,cave."""
     strategies: str = "all"
-    """Names, commas between; random is always added, as the yardstick."""
+    """Names as in baselines.run, commas between; random is always added, as the yardstick."""
     robots: str | None = None
     """Team sizes, commas between; default: 1,2,4."""
     seeds: int | None = None

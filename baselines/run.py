@@ -34,8 +34,8 @@ class Args:
     strategy: str = "gradient"
     """Chooses viewpoints: random, gradient, gradient-plane, mutual-information, ground-gradient,
     information-rate, information-per-scan, voronoi, voronoi-gradient, voronoi-nearest, per-time-visibility,
-    nearest-frontier, coordinated-frontier; or a learned policy:
-    pretrained:room, or the folder of a run of training.ppo."""
+    nearest-frontier, coordinated-frontier; a learned policy: pretrained:room, or the folder of a run of
+    training.ppo; or a class of your own: my_package.my_module:MyStrategy, or path/to/file.py:MyStrategy."""
     robots: int = 3
     """Team size."""
     seed: int = 0

@@ -37,7 +37,7 @@ class Args:
     folder: Positional[Path] = Path("worlds")
     """Where the files lie; folders in it are looked into, too."""
     strategy: str = "gradient"
-    """How robots choose viewpoints."""
+    """How robots choose viewpoints; as in baselines.run."""
     robots: int = 2
     """Team size."""
     seed: int = 0

@@ -42,7 +42,7 @@ class Args:
     strategy: str | None = None
     """The folder of a run of training.ppo, or of one of its checkpoints."""
     against: str = "gradient,random,information-rate"
-    """Strategies, commas between."""
+    """Strategies as in baselines.run, commas between."""
     scenario: str | None = None
     """A named scenario; default: the one that the policy was trained in."""
     robots: int | None = None

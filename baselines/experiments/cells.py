@@ -167,7 +167,7 @@ def failed_record(failure: Failure, limit_s: float) -> Record:
 
 
 def _path(folder: Path, cell: Cell, seed: int) -> Path:
-    return folder / cell.id / f"seed-{seed}.json"
+    return folder / cell.id.replace("..", "__") / f"seed-{seed}.json"  # a strategy may be named by a path
 
 
 def _write(folder: Path, cell: Cell, seed: int, record: Record) -> None:

@@ -31,9 +31,14 @@ def sources_digest(strategy: str, *modules: str) -> str:
         files |= set(policies.policy_files(strategy))
         described: tuple[Any, ...] = (policies.__name__,)
     else:
-        made_by = strategies.STRATEGIES[strategy]
-        files |= {_file_of(name) for name in imported(_maker(made_by).__module__)}
-        described = _described(made_by)
+        source = strategies.strategy_module(strategy)
+        if isinstance(source, Path):
+            modules_used = _imports(ast.parse(source.read_text()))
+            files |= {source, *(_file_of(each) for name in modules_used for each in imported(name))}
+        else:
+            files |= {_file_of(name) for name in imported(source)}
+        made_by = strategies.STRATEGIES.get(strategy)
+        described = (strategy,) if made_by is None else _described(made_by)
     hasher = hashlib.sha256(_library_digest() + repr(described).encode())
     for file in sorted(files):
         hasher.update(file.read_bytes())
@@ -53,11 +58,6 @@ def _library_digest() -> bytes:
     for file in sorted(Path(entropy_explore_env.__file__).parent.rglob("*.py")):
         hasher.update(file.read_bytes())
     return hasher.digest()
-
-
-def _maker(made_by: Callable[..., Any]) -> Callable[..., Any]:
-    """The class or function behind partial calls."""
-    return _maker(made_by.func) if isinstance(made_by, partial) else made_by
 
 
 def _described(made_by: Callable[..., Any]) -> tuple[Any, ...]:

@@ -1,7 +1,8 @@
-"""The strategies by name: scripted ones, and learned policies by where they lie."""
+"""The strategies by name: those of the package, learned policies, and classes from outside."""
 
 from __future__ import annotations
 
+import difflib
 import importlib
 from collections.abc import Callable
 from functools import partial
@@ -12,6 +13,7 @@ from baselines.strategies.frontier import FrontierStrategy
 from baselines.strategies.frontier.metrics import coordinated_frontier, nearest_frontier
 from baselines.strategies.gradient import GradientStrategy
 from baselines.strategies.information_rate import InformationRate, Weighing
+from baselines.strategies.loading import entry_points, is_reference, make_referenced, module_of
 from baselines.strategies.mutual_information import Coordination, MutualInformation
 from baselines.strategies.protocol import Strategy
 from baselines.strategies.random_walk import RandomWalk
@@ -51,20 +53,52 @@ def make_strategy(name: str) -> Strategy:
     """A new strategy.
 
     Args:
-        name: One of STRATEGIES; or `pretrained:NAME`, a policy that comes with the project; or the folder of
-            a policy that was trained.
+        name: One of STRATEGIES; `pretrained:NAME`, a policy that comes with the project; the folder of a
+            policy that was trained; `module:Class` or `path/to/file.py:Class`; or a name that an installed
+            package declares (see `loading`).
 
     Raises:
-        SettingError: None has this name.
+        SettingError: No strategy has this name, or its class cannot be made.
         MissingExtraError: A policy was asked for, and what runs it is not installed.
     """
     if name in STRATEGIES:
         return STRATEGIES[name]()
     if is_learned(name):
         return learned_policies().make_policy_strategy(name)
-    raise SettingError(
-        "strategy", name, f"one of {', '.join(STRATEGIES)}, {_PRETRAINED}NAME or a policy's folder"
+    return make_referenced(_reference(name))
+
+
+def strategy_module(name: str) -> str | Path:
+    """The module that defines a scripted strategy, or the file that does.
+
+    Args:
+        name: As for `make_strategy`, but for learned policies.
+
+    Raises:
+        SettingError: No strategy has this name.
+    """
+    if name in STRATEGIES:
+        made_by = STRATEGIES[name]
+        while isinstance(made_by, partial):
+            made_by = made_by.func
+        return made_by.__module__
+    return module_of(_reference(name))
+
+
+def _reference(name: str) -> str:
+    """`module:Class` or `file.py:Class` of a strategy from outside the package."""
+    if is_reference(name):
+        return name
+    declared = entry_points()
+    if name in declared:
+        return declared[name]
+    known = [*STRATEGIES, *declared]
+    alike = difflib.get_close_matches(name, known, n=1)
+    meant = f" (did you mean {alike[0]}?)" if alike else ""
+    allowed = (
+        f"one of {', '.join(known)}, {_PRETRAINED}NAME, a policy's folder, module:Class or file.py:Class"
     )
+    raise SettingError("strategy", name, allowed + meant)
 
 
 def is_learned(name: str) -> bool:

@@ -1,0 +1,151 @@
+"""Strategies from outside the package: classes named by module or file, and installed entry points.
+
+They are named `my_package.my_module:MyStrategy` or `path/to/file.py:MyStrategy`, or have a name that an
+installed package declares in the entry-point group `entropy_explore_env.strategies`: docs/own_strategy.md.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import importlib
+import importlib.metadata
+import importlib.util
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+from baselines.strategies.protocol import Strategy
+from entropy_explore_env.errors import EntropyExploreError, SettingError
+
+ENTRY_POINTS = "entropy_explore_env.strategies"
+"""The group in which packages declare strategies."""
+_METHODS = ("reset", "choose")
+_FORM = "module:Class or path/to/file.py:Class"
+
+
+def entry_points() -> dict[str, str]:
+    """Name → `module:Class` of the strategies that installed packages declare."""
+    return {each.name: each.value for each in importlib.metadata.entry_points(group=ENTRY_POINTS)}
+
+
+def is_reference(name: str) -> bool:
+    """Whether a strategy is named by its class."""
+    return ":" in name
+
+
+def module_of(name: str) -> str | Path:
+    """Where the class of a strategy is defined: a module's name, or the path of a file.
+
+    Args:
+        name: `module:Class` or `path/to/file.py:Class`.
+    """
+    source, _ = _split(name)
+    return Path(source).resolve() if _is_file(source) else source
+
+
+def make_referenced(name: str) -> Strategy:
+    """A new strategy of a class named by its module or file.
+
+    Args:
+        name: `module:Class` or `path/to/file.py:Class`; the class, or function, is called without arguments.
+
+    Raises:
+        SettingError: There is no such module, file or class; it raises an error; what it makes is no
+            Strategy. The message says which, in one line.
+    """
+    source, attribute = _split(name)
+    module = _load(name, source)
+    make = getattr(module, attribute, None)
+    if make is None or not callable(make):
+        classes = sorted(_strategies_in(module))
+        known = (
+            f", such as {', '.join(classes)}" if classes else "; it defines no class with reset and choose"
+        )
+        raise SettingError("strategy", name, f"a class in {source}{known} ({attribute} is none)")
+    return _made(name, attribute, make)
+
+
+def _split(name: str) -> tuple[str, str]:
+    source, _, attribute = name.rpartition(":")
+    if not source or not attribute.isidentifier():
+        raise SettingError("strategy", name, _FORM)
+    return source, attribute
+
+
+def _is_file(source: str) -> bool:
+    return source.endswith(".py")
+
+
+def _load(name: str, source: str) -> ModuleType:
+    """Import the module or the file that defines a strategy."""
+    if _is_file(source):
+        path = Path(source).resolve()
+        if not path.is_file():
+            raise SettingError("strategy", name, f"{_FORM}; there is no file {source}")
+    elif not all(part.isidentifier() for part in source.split(".")):
+        raise SettingError("strategy", name, f"{_FORM}; {source} is neither a module's name nor a .py file")
+    try:
+        return _import_file(path) if _is_file(source) else importlib.import_module(source)
+    except EntropyExploreError:
+        raise
+    except ModuleNotFoundError as error:
+        if error.name is not None and source.startswith(error.name):
+            raise SettingError("strategy", name, f"{_FORM}; there is no module {error.name}") from None
+        raise SettingError("strategy", name, f"code that can be imported ({error})") from error
+    except Exception as error:
+        raise SettingError("strategy", name, f"code that can be imported ({_said(error)})") from error
+
+
+def _import_file(path: Path) -> ModuleType:
+    """Import a file once a process, as a module of its own; its neighbours can be imported from it."""
+    number = hashlib.sha256(str(path).encode()).hexdigest()[:8]
+    module_name = f"strategy_file_{path.stem}_{number}"
+    if module_name in sys.modules:
+        return sys.modules[module_name]
+    spec = importlib.util.spec_from_file_location(module_name, path)
+    if spec is None or spec.loader is None:
+        raise ImportError(f"{path.name} is no Python file")
+    if str(path.parent) not in sys.path:
+        sys.path.append(str(path.parent))
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[module_name] = module
+    try:
+        spec.loader.exec_module(module)
+    except BaseException:
+        del sys.modules[module_name]
+        raise
+    return module
+
+
+def _made(name: str, attribute: str, make: Callable[[], Any]) -> Strategy:
+    """Call the class, and check that it makes a Strategy."""
+    try:
+        strategy = make()
+    except EntropyExploreError:
+        raise
+    except Exception as error:
+        allowed = f"a class that can be made without arguments; {attribute}() raised {_said(error)}"
+        raise SettingError("strategy", name, allowed) from error
+    missing = [method for method in _METHODS if not callable(getattr(strategy, method, None))]
+    if missing:
+        allowed = f"a Strategy, with the methods reset and choose; {' and '.join(missing)} missing"
+        raise SettingError("strategy", name, allowed)
+    return strategy
+
+
+def _strategies_in(module: ModuleType) -> list[str]:
+    """Classes of a module that have the methods of a Strategy."""
+    return [
+        name
+        for name, thing in vars(module).items()
+        if isinstance(thing, type)
+        and thing.__module__ == module.__name__
+        and all(callable(getattr(thing, method, None)) for method in _METHODS)
+    ]
+
+
+def _said(error: BaseException) -> str:
+    """An error's kind and message in one line."""
+    return " ".join(f"{type(error).__name__}: {error}".split())

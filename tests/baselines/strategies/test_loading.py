@@ -1,0 +1,147 @@
+"""Strategies from outside the package: by file, by module and by entry point, in every command."""
+
+from __future__ import annotations
+
+import importlib.metadata
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from baselines.experiments.provenance import sources_digest
+from baselines.strategies import STRATEGIES, make_strategy, strategy_module
+from baselines.strategies.gradient import GradientStrategy
+from entropy_explore_env.errors import SettingError
+
+ROOT = Path(__file__).parents[3]
+EXAMPLE = ROOT / "docs/examples/own_strategy.py"
+SOURCE = """
+class Own:
+    def reset(self, scenario, rng): pass
+    def choose(self, views): return [view.pose for view in views]
+
+class Deaf:
+    def reset(self, scenario, rng): pass
+
+class Needy(Own):
+    def __init__(self, colour): pass
+
+class Broken(Own):
+    def __init__(self): raise RuntimeError("no\\nway")
+
+def settings(): return Own()
+NUMBER = 3
+"""
+
+
+@pytest.fixture
+def file(tmp_path):
+    (tmp_path / "mine.py").write_text(SOURCE)
+    return tmp_path / "mine.py"
+
+
+def command(folder, *words):
+    environment = {**os.environ, "PYTHONPATH": f"{ROOT}:{folder}"}
+    ran = subprocess.run(
+        [sys.executable, "-m", *words], cwd=folder, env=environment, capture_output=True, text=True
+    )
+    assert ran.returncode == 0, ran.stderr
+    return json.loads(ran.stdout)
+
+
+def test_the_example_runs_and_is_benchmarked_from_a_folder_outside(tmp_path):
+    (tmp_path / "own_strategy.py").write_text(EXAMPLE.read_text())
+    by_file, by_module = "own_strategy.py:NearestUnknown", "own_strategy:NearestUnknown"
+    limit = "--ending.time-limit-s", "6"
+    ran = command(
+        tmp_path, "baselines.run", "box-7x11x5", "--strategy", by_file, *limit, "--json", "--robots", "2"
+    )
+    assert ran["strategy"] == by_file and ran["scans"] > 2
+    assert ran["entropy_end_bits"] < ran["entropy_start_bits"] and ran["blocked_moves"] <= ran["scans"]
+    entries = "--scenarios", "box-7x11x5", "--strategies", f"{by_file},{by_module}"
+    sizes = "--robots", "2", "--seeds", "1", "--time-limit-s", "6", "--jobs", "2"
+    command(tmp_path, "baselines.benchmark", *entries, *sizes, "--json", "--out", "out")
+    kept = [json.loads(path.read_text()) for path in sorted((tmp_path / "out/runs").rglob("seed-0.json"))]
+    assert len(kept) == 3  # each class, and random
+    assert all(name in (tmp_path / "out/head-to-head.md").read_text() for name in (by_file, by_module))
+
+
+def test_the_page_shows_the_example_as_it_is():
+    assert EXAMPLE.read_text() in (ROOT / "docs/own_strategy.md").read_text()
+    assert len(EXAMPLE.read_text().splitlines()) <= 30
+
+
+def test_a_class_and_a_function_of_a_file_are_made(file):
+    assert type(make_strategy(f"{file}:Own")).__name__ == "Own"
+    assert type(make_strategy(f"{file}:settings")) is type(make_strategy(f"{file}:Own"))  # imported once
+
+
+def test_a_class_of_a_module_is_made():
+    assert isinstance(make_strategy("baselines.strategies.gradient:GradientStrategy"), GradientStrategy)
+
+
+def test_a_file_imports_its_neighbours(file, monkeypatch):
+    monkeypatch.setattr(sys, "path", sys.path.copy())
+    (file.parent / "beside.py").write_text("from mine import Own\nclass Beside(Own): pass\n")
+    assert make_strategy(f"{file.parent}/beside.py:Beside").choose([]) == []
+
+
+def test_an_entry_point_is_a_name(monkeypatch):
+    declared = importlib.metadata.EntryPoint(
+        "uphill", "baselines.strategies.gradient:GradientStrategy", "entropy_explore_env.strategies"
+    )
+    found = {"entropy_explore_env.strategies": (declared,)}
+    monkeypatch.setattr(importlib.metadata, "entry_points", lambda group: found.get(group, ()))
+    assert isinstance(make_strategy("uphill"), GradientStrategy)
+    assert strategy_module("uphill") == "baselines.strategies.gradient"
+    with pytest.raises(SettingError, match=r"did you mean uphill\?"):
+        make_strategy("uphil")
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("gradeint", "did you mean gradient?"),
+        ("nonsense", "one of random, gradient"),
+        ("no_such_module:Own", "there is no module no_such_module"),
+        ("baselines.strategies.nothing:Own", "there is no module baselines.strategies.nothing"),
+        ("baselines:", "module:Class or path/to/file.py:Class"),
+        ("no way:Own", "neither a module's name nor a .py file"),
+        ("nowhere.py:Own", "there is no file nowhere.py"),
+        ("{file}:Nothing", "such as Broken, Needy, Own (Nothing is none)"),
+        ("{file}:NUMBER", "NUMBER is none"),
+        ("{file}:Deaf", "choose missing"),
+        ("{file}:Needy", "TypeError"),
+        ("{file}:Broken", "Broken() raised RuntimeError: no way"),
+        ("{syntax}:Own", "code that can be imported (SyntaxError"),
+        ("{lacking}:Own", "No module named 'no_such_thing'"),
+    ],
+)
+def test_what_is_refused_says_why_in_one_line(file, name, said):
+    (file.parent / "syntax.py").write_text("class Own(:\n")
+    (file.parent / "lacking.py").write_text("import no_such_thing\n")
+    name = name.format(file=file, syntax=file.parent / "syntax.py", lacking=file.parent / "lacking.py")
+    with pytest.raises(SettingError) as raised:
+        make_strategy(name)
+    assert raised.value.field == "strategy" and said in str(raised.value)
+    assert "\n" not in str(raised.value)
+
+
+def test_the_digest_covers_the_file_and_what_it_imports(file):
+    first = sources_digest(f"{file}:Own")
+    assert first == sources_digest(f"{file}:Own")
+    file.write_text(SOURCE.replace("view.pose for", "view.target for"))
+    changed = sources_digest(f"{file}:Own")
+    assert changed != first
+    file.write_text(SOURCE + "import baselines.strategies.gradient\n")
+    assert sources_digest(f"{file}:Own") not in (first, changed)
+
+
+def test_where_strategies_are_defined(file):
+    assert strategy_module("gradient-plane") == "baselines.strategies.gradient"
+    assert strategy_module(f"{file}:Own") == file.resolve()
+    assert strategy_module("my_package.mine:Own") == "my_package.mine"
+    assert all(str(strategy_module(name)).startswith("baselines.strategies.") for name in STRATEGIES)
