@@ -36,7 +36,7 @@ from entropy_explore_env.errors import SettingError
 from entropy_explore_env.scenario import Scenario, with_settings
 from entropy_explore_env.scenarios import find_scenario
 from entropy_explore_env.settings import Channel
-from entropy_explore_env.validation import check_whole, is_whole
+from entropy_explore_env.validation import check_whole
 from entropy_explore_env.writing import write_atomically
 from training.advantages import DecisionBuffer, DiscountUnit
 from training.best_mission import draw_best_mission
@@ -44,6 +44,7 @@ from training.checkpoints import PolicySettings, checkpoint_name, forget_later, 
 from training.errors import NotFiniteError
 from training.networks import policy_class, policy_settings
 from training.normalisation import Normaliser
+from training.options import check_options, check_share
 from training.policy import normalise_observations, weights_of
 from training.progress import MissionFigures, Progress
 from training.resuming import TrainingState, checkpoint_to_resume, restore_state, save_policy, save_state
@@ -166,21 +167,12 @@ def main(words: Sequence[str]) -> int:
 
 def check(args: Args) -> None:
     """Raise a SettingError where an option is out of its range."""
-    for name in ("missions", "total_steps", "threads", "rollout_steps", "epochs", "batch"):
+    check_options(args)
+    for name in ("threads", "rollout_steps", "validate_every", "validation_missions"):
         check_whole(name, getattr(args, name), 1)
-    for name in ("validate_every", "validation_missions", "checkpoint_every"):
-        check_whole(name, getattr(args, name), 1)
-    check_whole("seed", args.seed, 0)
-    for name in ("gamma", "gae_lambda"):
-        if not 0.0 < getattr(args, name) <= 1.0:
-            raise SettingError(name, getattr(args, name), "a number above 0, at most 1")
-    for name in ("learning_rate", "clip"):
-        if not 0.0 < getattr(args, name) < np.inf:
-            raise SettingError(name, getattr(args, name), "a number above 0")
+    check_share("gamma", args.gamma)
     if not 0.0 <= args.entropy < np.inf:
         raise SettingError("entropy", args.entropy, "a number ≥ 0")
-    if not args.hidden or not all(is_whole(units, 1) for units in args.hidden):
-        raise SettingError("hidden", args.hidden, "whole numbers ≥ 1")
     if args.patch and args.features != "maps":
         raise SettingError("patch", args.patch, "used with --features maps, whose networks read it")
 

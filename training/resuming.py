@@ -12,7 +12,6 @@ import torch
 from stable_baselines3 import PPO
 
 from entropy_explore_env.envs.robot_vec_env import RobotVecEnv
-from entropy_explore_env.errors import SettingError
 from training.advantages import DecisionBuffer
 from training.checkpoints import (
     Checkpoint,
@@ -24,6 +23,7 @@ from training.checkpoints import (
 )
 from training.errors import CheckpointError
 from training.normalisation import Normaliser
+from training.options import check_new_or_resumed
 from training.policy import load_weights, weights_of
 from training.progress import Progress
 
@@ -157,8 +157,7 @@ def checkpoint_to_resume(
         CheckpointError: The run was started with other options, or its checkpoint is broken.
     """
     used = [path for pattern in ("step-*", "best-*", "curve.csv") for path in folder.glob(pattern)]
-    if used and not resume:
-        raise SettingError("out", str(folder), "a new folder, or --resume to continue the run in it")
+    check_new_or_resumed(folder, bool(used), resume)
     try:
         latest = latest_checkpoint(folder, "step")
     except CheckpointError:

@@ -14,7 +14,7 @@ from baselines.cli.arguments import run_command
 from entropy_explore_env import SettingError
 from training import rllib_ppo
 from training.errors import NotFiniteError
-from training.rllib_ppo import Args, last_checkpoint, loop, main
+from training.rllib_ppo import Args, iterate, last_checkpoint, main
 
 
 @pytest.mark.parametrize(
@@ -27,6 +27,9 @@ from training.rllib_ppo import Args, last_checkpoint, loop, main
         ("--total-steps 0", "total_steps = 0"),
         ("--minibatch 64 --batch 32", "minibatch = 64: allowed is at most the batch, 32"),
         ("--learning-rate nan", "learning_rate = nan"),
+        ("--discount 1.1", "discount = 1.1"),
+        ("--entropy-bonus -1", "entropy_bonus = -1"),
+        ("--hidden 0", "hidden = [0]"),
         ("--address somewhere", "HOST:PORT of a Ray cluster"),
         ("--resume", "a folder with a checkpoint"),
         ("--no-such-option 1", "no-such-option"),
@@ -90,7 +93,7 @@ def args_for(folder: Path, steps: int) -> Args:
 
 
 def test_checkpoints_come_and_go(tmp_path, capsys):
-    loop(args_for(tmp_path, 500), Scripted([0.1] * 5), begun=0)
+    iterate(args_for(tmp_path, 500), Scripted([0.1] * 5), iteration=0)
     assert [path.name for path in tmp_path.glob("*checkpoint*")] == ["checkpoint-000005"]
     rows = (tmp_path / "progress.csv").read_text().splitlines()
     assert rows[0].startswith("iteration,decisions,return,t_mission_s,finished") and len(rows) == 6
@@ -101,33 +104,33 @@ def test_checkpoints_come_and_go(tmp_path, capsys):
 @pytest.mark.parametrize("bad", [math.nan, math.inf])
 def test_a_loss_that_is_not_finite_stops_and_keeps_the_last_checkpoint(bad, tmp_path):
     with pytest.raises(NotFiniteError, match=r"vf_loss = (nan|inf) after 400 steps"):
-        loop(args_for(tmp_path, 900), Scripted([0.1, 0.1, 0.1, bad]), begun=0)
+        iterate(args_for(tmp_path, 900), Scripted([0.1, 0.1, 0.1, bad]), iteration=0)
     kept = last_checkpoint(tmp_path)
     assert kept is not None and (kept / "iteration").read_text() == "2"
 
 
 def test_a_full_disk_keeps_the_last_checkpoint(tmp_path):
     with pytest.raises(OSError, match="No space left"):
-        loop(args_for(tmp_path, 900), Scripted([0.1] * 9, disk_full_at=4), begun=0)
+        iterate(args_for(tmp_path, 900), Scripted([0.1] * 9, disk_full_at=4), iteration=0)
     kept = last_checkpoint(tmp_path)
     assert kept is not None and (kept / "iteration").read_text() == "2"
-    loop(args_for(tmp_path, 400), Scripted([0.1] * 4), begun=2)  # what was left unfinished is no hindrance
+    iterate(args_for(tmp_path, 400), Scripted([0.1] * 4), iteration=2)  # despite what was left unfinished
     assert last_checkpoint(tmp_path) == tmp_path / "checkpoint-000006"
 
 
 def test_resuming_wants_a_whole_checkpoint(tmp_path):
     (tmp_path / "unfinished-checkpoint").mkdir()
     with pytest.raises(SettingError, match="a folder with a checkpoint"):
-        rllib_ppo.check(Args(out=tmp_path, resume=True))
+        rllib_ppo.prepare_folder(Args(out=tmp_path, resume=True))
 
 
 def test_a_folder_with_a_run_is_gone_on_with_and_not_begun_anew(tmp_path):
-    rllib_ppo.check(Args(out=tmp_path))
+    rllib_ppo.prepare_folder(Args(out=tmp_path))
     (tmp_path / "checkpoint-000010").mkdir()
     before = (tmp_path / "settings.json").read_text()
-    with pytest.raises(SettingError, match="or --resume to go on"):
-        rllib_ppo.check(Args(out=tmp_path))
+    with pytest.raises(SettingError, match="or --resume to continue"):
+        rllib_ppo.prepare_folder(Args(out=tmp_path))
     with pytest.raises(SettingError, match="scenario"):
-        rllib_ppo.check(Args(out=tmp_path, resume=True, robots=2))
+        rllib_ppo.prepare_folder(Args(out=tmp_path, resume=True, robots=2))
     assert (tmp_path / "settings.json").read_text() == before
-    assert rllib_ppo.check(Args(out=tmp_path, resume=True))["decision_period_s"] is None
+    assert rllib_ppo.prepare_folder(Args(out=tmp_path, resume=True))["decision_period_s"] is None

@@ -15,8 +15,8 @@ pytest.importorskip("ray.rllib", reason="ray[rllib] is not installed: make test-
 from ray.rllib.env.multi_agent_env_runner import MultiAgentEnvRunner
 
 from baselines.cli.arguments import run_command
-from training import rllib_ppo
-from training.rllib_ppo import Args, check, configure, main
+from training import ray_cluster
+from training.rllib_ppo import Args, configure, main, prepare_folder
 
 pytestmark = [  # RLlib's own
     pytest.mark.filterwarnings("ignore::DeprecationWarning"),
@@ -52,9 +52,9 @@ def test_it_trains_with_two_runners_and_resumes(tmp_path):
     assert [path.name for path in (tmp_path / "run").glob("checkpoint-*")] == ["checkpoint-000003"]
 
 
-def missions_of(args: Args, begun: int) -> list[tuple[int, bytes]]:
+def missions_of(args: Args, iterations: int) -> list[tuple[int, bytes]]:
     """Seed and first robot's start of every mission of every runner."""
-    config, missions = configure(args, check(args), begun), []
+    config, missions = configure(args, prepare_folder(args), iterations), []
     for worker in range(1, args.runners + 1):
         runner = MultiAgentEnvRunner(config=config, worker_index=worker, num_workers=args.runners)
         runner.sample(num_timesteps=0, random_actions=True)
@@ -68,14 +68,14 @@ def missions_of(args: Args, begun: int) -> list[tuple[int, bytes]]:
 def test_runners_explore_different_missions_and_repeat_them(tmp_path):
     """Runners as Ray starts them, one after the other in this process; those of a resumed run differ, too."""
     args = Args("box-7x11x5", missions=2, runners=2, batch=40, minibatch=20, hidden=[8], out=tmp_path)
-    first, resumed = missions_of(args, begun=0), missions_of(args, begun=5)
+    first, resumed = missions_of(args, iterations=0), missions_of(args, iterations=5)
     assert len({seed for seed, _ in [*first, *resumed]}) == 8
     assert len({start for _, start in [*first, *resumed]}) == 8
-    assert missions_of(args, begun=0) == first
+    assert missions_of(args, iterations=0) == first
 
 
 def test_nobody_at_the_address(tmp_path, capsys, monkeypatch):
-    monkeypatch.setattr(rllib_ppo, "REACHED_WITHIN_S", 3.0)
+    monkeypatch.setattr(ray_cluster, "ANSWER_TIMEOUT_S", 3.0)
     assert run_command(main, ["--address", "127.0.0.1:9", "--out", str(tmp_path)]) == 2
     said = capsys.readouterr().err
     assert said == "error: address = '127.0.0.1:9': allowed is that of a Ray cluster that answers\n"
