@@ -1,9 +1,8 @@
-"""A learned policy beside the strategies: `python -m training.evaluate --pretrained room`.
+"""Compare a learned policy with the strategies: `python -m training.evaluate --pretrained room`.
 
-Runs the policy and its rivals on the same seeds, in worlds of the test split that no training has seen, and
-prints how long their missions take. `--strategy runs/room-3` takes the best policy of a run instead. In
-`baselines.run` and `baselines.benchmark` the same names, `pretrained:room` and `runs/room-3`, are strategies
-like any other.
+Runs the policy and its rivals on the same seeds, in worlds of the test split, which no training uses, and
+prints how long their missions take. `--strategy runs/room-3` takes the best policy of a run instead.
+`baselines.run` and `baselines.benchmark` know both as strategies: `pretrained:room` and `runs/room-3`.
 """
 
 from __future__ import annotations
@@ -30,29 +29,29 @@ from training.checkpoints import PolicySettings, latest_checkpoint, load_checkpo
 from training.policy import POLICIES, PREFIX, policy_folder
 
 SIMPLE = ("gradient", "random")
-"""A policy must beat the better one of these, whatever else it is put beside."""
+"""A policy must beat the better one of these, whatever else it is compared with."""
 
 
 @dataclass
 class Args:
-    """Put a learned policy beside the strategies."""
+    """Compare a learned policy with the strategies."""
 
     pretrained: str | None = None
     """A policy that comes with the project: room."""
     strategy: str | None = None
     """The folder of a run of training.ppo, or of one of its checkpoints."""
     against: str = "gradient,random,information-rate"
-    """Strategies as in baselines.run, commas between."""
+    """Strategies to compare with, as in baselines.run, separated by commas."""
     scenario: str | None = None
-    """A named scenario; default: the one that the policy was trained in."""
+    """Named scenario; default: that of training."""
     robots: int | None = None
-    """Team size; default: the one that the policy was trained with."""
+    """Robots in a team; default: as in training."""
     seeds: int = 100
-    """Missions of each."""
+    """Missions of each strategy, with the seeds 0, 1, …"""
     jobs: int | None = None
-    """Processes; default: one a processor."""
+    """Processes; default: one for each processor."""
     runs: Path = Path("results/evaluation-runs")
-    """Folder that keeps the missions: what was stopped goes on where it was."""
+    """Folder where missions are kept: a stopped evaluation continues where it was."""
     json: bool = False
     """Print one JSON object and nothing else."""
 
@@ -85,16 +84,16 @@ def main(words: Sequence[str]) -> int:
 def evaluation_scenario(
     trained: PolicySettings, name: str | None = None, robots: int | None = None
 ) -> Scenario:
-    """Where a policy is tested: a scenario as its name says, with the channel of training, test worlds.
+    """The scenario of a test: as its name says, with test worlds and the channel of training.
 
     Args:
         trained: The policy's settings.
         name: Of the scenario; None = that of training.
         robots: Team size; None = that of training.
     """
-    there = find_scenario(trained.scenario.name if name is None else name)
+    scenario = find_scenario(trained.scenario.name if name is None else name)
     size = trained.scenario.robots if robots is None else robots
-    return with_settings(there, {"robots": size, "split": "test", "channel": trained.scenario.channel})
+    return with_settings(scenario, {"robots": size, "split": "test", "channel": trained.scenario.channel})
 
 
 def compare(
@@ -105,9 +104,9 @@ def compare(
     Args:
         policy: Name of the policy as a strategy.
         rivals: Names of strategies.
-        scenario: Where.
+        scenario: The missions' scenario.
         seeds: Missions of each.
-        runs: Folder that keeps the missions.
+        runs: Folder where missions are kept.
         jobs: Processes.
         quiet: Whether to show no progress.
 
@@ -119,8 +118,8 @@ def compare(
         `better_rival` is the one of SIMPLE with the smaller median, `faster_than_simple` on how many seeds
         the policy beat all of these that took part.
     """
-    place = f"{scenario.name}/robots-{scenario.robots}"
-    cells = [Cell(f"{place}/{name}", scenario, name, seeds) for name in (policy, *rivals)]
+    folder = f"{scenario.name}/robots-{scenario.robots}"
+    cells = [Cell(f"{folder}/{name}", scenario, name, seeds) for name in (policy, *rivals)]
     records = run_cells(cells, runs, jobs, "evaluation", quiet=quiet)
     found = {name: records[cell.id] for name, cell in zip((policy, *rivals), cells, strict=True)}
     times = {name: np.array([record["t_mission_s"] for record in own]) for name, own in found.items()}
@@ -142,7 +141,7 @@ def compare(
 def _row(
     name: str, records: Sequence[Record], times: np.ndarray, ours: np.ndarray, is_policy: bool
 ) -> dict[str, Any]:
-    """A strategy's line of the table."""
+    """A strategy's row of the table."""
     median, low, high = median_interval(times)
     row: dict[str, Any] = {
         "strategy": name,
@@ -183,7 +182,7 @@ def show(compared: dict[str, Any]) -> None:
 
 
 def table_cells(row: dict[str, Any], seeds: int) -> list[str]:
-    """A row as a person reads it."""
+    """A row as text."""
     cells = [
         row["strategy"],
         f"{row['median_s']:,.0f} s ({row['low_s']:,.0f} … {row['high_s']:,.0f})",

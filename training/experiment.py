@@ -1,27 +1,29 @@
 """What a policy learns, measured: `python -m training.experiment --out docs/results`.
 
-Trains what is missing of the runs below, puts the policies beside the strategies on 100 test starts, and
-writes `ppo.md` with its figures. Runs and missions are kept, so that whatever was stopped goes on where it
-was. `--quick` shrinks everything to some minutes and shows that it works, not what can be learned.
+Trains the runs below, compares their policies with the strategies on 100 test starts, and writes `ppo.md`
+with its figures. Runs and missions are kept: whatever was stopped continues where it was. `--quick` shrinks
+everything to some minutes, to see that it works.
 """
 
 from __future__ import annotations
 
+import contextlib
 import csv
+import io
 import os
-import subprocess
 import sys
-import threading
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from baselines.cli.arguments import make_folder, parse, print_json, run_command
+from baselines.experiments.worker_pool import Failure, run_each
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.validation import check_whole
+from training import ppo
 from training.checkpoints import latest_checkpoint, load_checkpoint
 from training.errors import CheckpointError
 from training.evaluate import SIMPLE, compare, evaluation_scenario
@@ -29,18 +31,18 @@ from training.policy import POLICIES
 
 RIVALS = (*SIMPLE, "information-rate")
 SEEDS = 3
-"""Runs of each kind, with the seeds 0, 1, …"""
+"""Runs of each ablation, with the seeds 0, 1, …"""
 
 
 @dataclass(frozen=True)
 class Task:
-    """A scenario that policies learn.
+    """A scenario to learn.
 
     Attributes:
         scenario: Its name.
-        steps: Of a run.
-        seeds: Runs.
-        goal: The policy's median mission time is to be at most this share of the better simple rival's.
+        steps: Steps of a run.
+        seeds: Runs, with the seeds 0, 1, …
+        goal: The policy's median mission time is to be at most this share of the better simple strategy's.
     """
 
     scenario: str
@@ -53,29 +55,42 @@ class Task:
         return f"{self.scenario}-3-seed-{seed}"
 
 
+class Ablation(NamedTuple):
+    """Runs with one thing changed.
+
+    Attributes:
+        change: What is changed, as a sentence.
+        options: Options of `training.ppo` that change it.
+        reference: The ablation that it differs from in this one thing.
+    """
+
+    change: str
+    options: tuple[str, ...] = ()
+    reference: str = "default"
+
+
 TASKS = (Task("room", 2_500_000, SEEDS, 0.45), Task("room-furnished", 2_500_000, 1, 0.6))
-ABLATIONS: dict[str, tuple[str, tuple[str, ...]]] = {
-    "default": ("as in the long runs", ()),
-    "team-reward": ("the reward is the team's, not the robot's own", ("--reward", "team")),
-    "overview": (
+ABLATIONS = {
+    "default": Ablation("as in the long runs"),
+    "team-reward": Ablation("the reward is the team's, not the robot's own", ("--reward", "team")),
+    "overview": Ablation(
         "the whole map, pooled to 8 × 8 × 4 cells, is observed, too",
         ("--overview", "--features", "maps"),
+        reference="vector",
     ),
-    "vector": ("an MLP alone, which overview is to be compared with", ("--features", "vector")),
-    "3-pitches": ("gazes and panorama with 3 pitches instead of 7", ("--pitches", "3")),
-    "no-announcements": ("robots do not say where they go", ("--channel.no-announcements",)),
-    "burst-32": ("at most 32 measurements a batch instead of 64", ("--channel.burst", "32")),
-    "burst-128": ("at most 128 measurements a batch", ("--channel.burst", "128")),
-    "i-min-0.6215": ("only measurements of 0.6215 bits or more are sent", ("--channel.i-min-bits", "0.6215")),
-    "i-min-0.0291": ("those of 0.0291 bits are, too", ("--channel.i-min-bits", "0.0291")),
-    "per-decision": (
-        "the future shrinks with every decision, not every second",
-        ("--discount", "decisions", "--gamma", "0.9"),
+    "vector": Ablation("an MLP alone, which overview is to be compared with", ("--features", "vector")),
+    "3-pitches": Ablation("gazes and panorama with 3 pitches instead of 7", ("--pitches", "3")),
+    "no-announcements": Ablation("robots do not say where they go", ("--channel.no-announcements",)),
+    "burst-32": Ablation("at most 32 measurements a batch instead of 64", ("--channel.burst", "32")),
+    "burst-128": Ablation("at most 128 measurements a batch", ("--channel.burst", "128")),
+    "i-min-0.6215": Ablation(
+        "only measurements of 0.6215 bits or more are sent", ("--channel.i-min-bits", "0.6215")
+    ),
+    "i-min-0.0291": Ablation("those of 0.0291 bits are, too", ("--channel.i-min-bits", "0.0291")),
+    "per-decision": Ablation(
+        "the discount is counted in decisions, not in seconds", ("--discount", "decisions", "--gamma", "0.9")
     ),
 }
-"""What is changed, one thing at a time: a sentence, and the options."""
-BESIDE = {name: "vector" if name == "overview" else "default" for name in ABLATIONS}
-"""The run that each differs from in that one thing."""
 ABLATION_STEPS = 200_000
 
 
@@ -84,42 +99,49 @@ class Args:
     """Train, evaluate, and write docs/results/ppo.md."""
 
     out: Path = Path("results/ppo")
-    """Folder for ppo.md and, in ppo, its figures and tables."""
+    """Folder for ppo.md; its figures and tables go into ppo in it."""
     runs: Path = Path("results/ppo-runs")
-    """Folder that keeps runs and missions."""
+    """Folder where runs and missions are kept."""
     jobs: int | None = None
-    """Runs at a time, each on one thread; default: one a processor."""
+    """Runs at a time, each on one thread; default: one for each processor."""
     seeds: int = 100
     """Test starts."""
     quick: bool = False
-    """A few thousand steps a run and 3 test starts."""
+    """A few thousand steps in each run and 3 test starts."""
     only_train: str | None = None
-    """Train the runs whose names begin so, and write nothing."""
+    """Only train the runs whose names begin like this; write no page."""
     no_training: bool = False
-    """Write the page of what is there; changes that lack runs are left out."""
+    """Write the page from the runs that are there; ablations are left out unless all of theirs are."""
     json: bool = False
     """Print one JSON object and nothing else."""
 
 
 @dataclass(frozen=True)
-class Found:
-    """What the experiment came to.
+class ExperimentResults:
+    """What the page shows.
 
     Attributes:
         tasks: The scenarios.
-        compared: Scenario → what `evaluate.compare` found of its first run's policy.
+        comparisons: Scenario → what `evaluate.compare` returned for its first run's policy.
         curves: Run → rows of its curve.
-        spent: Run → its progress: steps and seconds.
+        progress: Run → its progress in the end: steps and seconds.
         ablations: Name → curves of its runs; empty while runs are missing.
-        steps: Of an ablation's run.
+        ablation_steps: Steps of an ablation's run.
     """
 
     tasks: Sequence[Task]
-    compared: dict[str, dict[str, Any]]
+    comparisons: dict[str, dict[str, Any]]
     curves: dict[str, list[dict[str, float]]]
-    spent: dict[str, dict[str, Any]]
+    progress: dict[str, dict[str, Any]]
     ablations: dict[str, list[list[dict[str, float]]]] = field(default_factory=dict)
-    steps: int = ABLATION_STEPS
+    ablation_steps: int = ABLATION_STEPS
+
+
+class TrainingRun(NamedTuple):
+    """A run of `training.ppo`, its folder and options."""
+
+    folder: Path
+    options: tuple[str, ...]
 
 
 def main(words: Sequence[str]) -> int:
@@ -139,19 +161,19 @@ def main(words: Sequence[str]) -> int:
     if args.only_train is not None:
         return 0
     make_folder("out", args.out)
-    found = gather(tasks, steps, args.runs, starts, jobs, args.json)
+    results = gather(tasks, steps, args.runs, starts, jobs, args.json)
     from training.experiment_page import write_page  # matplotlib: after the help
 
-    page = write_page(args.out, found, "python -m training.experiment --out docs/results")
+    page = write_page(args.out, results, "python -m training.experiment --out docs/results")
     if args.json:
-        print_json({"compared": found.compared, "page": str(page)})
+        print_json({"compared": results.comparisons, "page": str(page)})
     else:
-        print(f"written: {page}, its figures beside it", file=sys.stderr)
+        print(f"written: {page} and its figures", file=sys.stderr)
     return 0
 
 
 def planned_runs(tasks: Sequence[Task], steps: int, quick: bool) -> dict[str, list[str]]:
-    """Run → options of `training.ppo`, the first seed of everything first."""
+    """Run → options of `training.ppo`, in the order of seeds."""
     small = (
         "--missions 4 --rollout-steps 32 --validation-missions 2 --time-limit-s 60".split() if quick else []
     )
@@ -161,9 +183,9 @@ def planned_runs(tasks: Sequence[Task], steps: int, quick: bool) -> dict[str, li
             if seed < task.seeds:
                 runs[task.run(seed)] = _options(task.scenario, task.steps, seed) + small
     for seed in range(SEEDS):
-        for name, (_, options) in ABLATIONS.items():
-            own = [*_options("room", steps, seed), *options, *small, "--no-video"]
-            runs[f"ablations/{name}-{seed}"] = own
+        for name, ablation in ABLATIONS.items():
+            usual = _options("room", steps, seed)
+            runs[f"ablations/{name}-{seed}"] = [*usual, *ablation.options, *small, "--no-video"]
     return runs
 
 
@@ -171,42 +193,36 @@ def _options(scenario: str, steps: int, seed: int) -> list[str]:
     return ["--scenario", scenario, "--robots", "3", "--total-steps", str(steps), "--seed", str(seed)]
 
 
-def train(runs: dict[str, list[str]], folder: Path, jobs: int, quiet: bool) -> None:
-    """Train what is missing, each run in a process of its own, on one thread.
+def train(runs: Mapping[str, Sequence[str]], folder: Path, jobs: int, quiet: bool) -> None:
+    """Train what is missing, each run on one thread.
+
+    Args:
+        runs: Run → options of `training.ppo`.
+        folder: Of all runs.
+        jobs: Processes.
+        quiet: Whether to print nothing.
 
     Raises:
-        SettingError: A run failed; the others are done or can be gone on with.
+        SettingError: A run failed; start again to continue the others.
     """
-    waiting = [name for name, options in runs.items() if not _done(folder / name, options)]
-    failed: list[str] = []
-    lock = threading.Lock()
+    missing = [name for name, options in runs.items() if not _done(folder / name, options)]
+    todo = [TrainingRun(folder / name, tuple(runs[name])) for name in missing]
+    for done, (run, result) in enumerate(run_each(_train, todo, jobs), 1):
+        name = run.folder.relative_to(folder).as_posix()
+        if isinstance(result, Failure):
+            raise SettingError("runs", f"{name}: {result.reason}", "runs that end well")
+        if not quiet:
+            print(f"trained {name}, {len(todo) - done} more runs to come", file=sys.stderr, flush=True)
 
-    def work() -> None:
-        while True:
-            with lock:
-                if not waiting or failed:
-                    return
-                name = waiting.pop(0)
-            if not quiet:
-                print(f"training {name}, {len(waiting)} more to come …", file=sys.stderr, flush=True)
-            words = [sys.executable, "-m", "training.ppo", *runs[name], "--threads", "1", "--resume"]
-            done = subprocess.run(
-                [*words, "--json", "--out", str(folder / name)], capture_output=True, text=True, check=False
-            )
-            if done.returncode:
-                failed.append(f"{name}: {done.stderr.strip().splitlines()[-1:]}")
 
-    threads = [threading.Thread(target=work) for _ in range(jobs)]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
-    if failed:
-        raise SettingError("runs", failed[0], "runs that end well")
+def _train(run: TrainingRun) -> None:
+    """Begin or continue a run in this process."""
+    with contextlib.redirect_stdout(io.StringIO()):
+        ppo.main([*run.options, "--threads", "1", "--resume", "--json", "--out", str(run.folder)])
 
 
 def _done(run: Path, options: Sequence[str]) -> bool:
-    """Whether a run has done all its steps."""
+    """Whether a run has done all of its steps."""
     steps = int(options[options.index("--total-steps") + 1])
     try:
         return load_checkpoint(latest_checkpoint(run, "step")).progress["steps"] >= steps
@@ -214,33 +230,35 @@ def _done(run: Path, options: Sequence[str]) -> bool:
         return False
 
 
-def gather(tasks: Sequence[Task], steps: int, folder: Path, starts: int, jobs: int, quiet: bool) -> Found:
+def gather(
+    tasks: Sequence[Task], steps: int, folder: Path, starts: int, jobs: int, quiet: bool
+) -> ExperimentResults:
     """Evaluate the first policy of each task, and read all curves."""
-    compared = {}
+    comparisons = {}
     for task in tasks:
         policy = folder / task.run(0)
         trained = load_checkpoint(latest_checkpoint(policy, *POLICIES)).settings
         scenario = evaluation_scenario(trained)
         others = [str(folder / task.run(seed)) for seed in range(1, task.seeds)]
-        compared[task.scenario] = compare(
+        comparisons[task.scenario] = compare(
             str(policy), [*RIVALS, *others], scenario, starts, folder / "missions", jobs, quiet
         )
     names = [task.run(seed) for task in tasks for seed in range(task.seeds)]
-    changed = {name: [folder / f"ablations/{name}-{seed}" for seed in range(SEEDS)] for name in ABLATIONS}
-    unfinished = [run for runs in changed.values() for run in runs if not (run / "curve.csv").is_file()]
+    ablations = {name: [folder / f"ablations/{name}-{seed}" for seed in range(SEEDS)] for name in ABLATIONS}
+    unfinished = [run for runs in ablations.values() for run in runs if not (run / "curve.csv").is_file()]
     last = {name: load_checkpoint(latest_checkpoint(folder / name, "step")).progress for name in names}
-    return Found(
+    return ExperimentResults(
         tasks,
-        compared,
+        comparisons,
         {name: read_curve(folder / name) for name in names},
         last,
-        {} if unfinished else {name: [read_curve(run) for run in runs] for name, runs in changed.items()},
+        {} if unfinished else {name: [read_curve(run) for run in runs] for name, runs in ablations.items()},
         steps,
     )
 
 
 def read_curve(run: Path) -> list[dict[str, float]]:
-    """The rows of a run's curve; what was not there is not a number."""
+    """The rows of a run's curve; empty cells are NaN."""
     with (run / "curve.csv").open(encoding="utf-8", newline="") as file:
         return [
             {name: float(cell) if cell else np.nan for name, cell in row.items()}

@@ -82,7 +82,7 @@ class Args:
     """Print one JSON object and nothing else."""
 
     reward: Literal["individual", "team"] = "individual"
-    """A robot's reward: bits that its own map loses by its scans, or that the maps of the team lose."""
+    """individual: bits that the robot's own scans take from its map; team: bits that the team's maps lose."""
     cost_per_s: float = 0.01
     """Cost of a second, as a share of all bits that the mission has to gain."""
     decision_period_s: float | None = None
@@ -92,8 +92,8 @@ class Args:
     channel: Channel = dataclasses.field(default_factory=Channel)
 
     features: Literal["gazes", "vector", "maps"] = "gazes"
-    """Networks that read observations. vector: an MLP over panorama, own state and team; gazes: also one
-    small network for all gazes, over the panorama around each; maps: the MLP, and convolutions over maps."""
+    """Networks that read observations. vector: an MLP; gazes: also one small network that scores every
+    gaze by the panorama around it; maps: an MLP and convolutions over maps."""
     overview: bool = False
     """Observe the whole belief, pooled to a few cells; with vector features as plain numbers."""
     patch: bool = False

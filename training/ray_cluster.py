@@ -15,7 +15,7 @@ from entropy_explore_env.errors import EntropyExploreError, MissingExtraError, S
 ANSWER_TIMEOUT_S = 20.0
 """How long to wait for the answer of a cluster."""
 _START_ATTEMPTS = 3
-"""Ray gives up a start when a part of it takes more than 15 s, as on busy machines (ray-project/ray#65983)."""
+"""Ray gives up a start of which a part takes over 15 s, as on busy machines (ray-project/ray#65983)."""
 
 
 def check_address(address: str | None) -> None:

@@ -13,7 +13,16 @@ from baselines.cli.arguments import parse
 from entropy_explore_env.command import BAD_INPUT
 from entropy_explore_env.errors import SettingError
 from training import experiment, ppo
-from training.experiment import ABLATIONS, SEEDS, TASKS, Found, Task, planned_runs, read_curve, train
+from training.experiment import (
+    ABLATIONS,
+    SEEDS,
+    TASKS,
+    ExperimentResults,
+    Task,
+    planned_runs,
+    read_curve,
+    train,
+)
 from training.experiment_page import write_page
 
 CURVE = [
@@ -32,7 +41,7 @@ def rival(strategy: str, median_s: float, ratio: float, faster: int) -> dict[str
     return row(strategy, median_s, ratio=ratio, ratio_low=ratio - 0.1, ratio_high=ratio + 0.1, faster=faster)
 
 
-def found(ratio: float, faster: int) -> Found:
+def results(ratio: float, faster: int) -> ExperimentResults:
     task = Task("room", 200, 1, 0.45)
     rows = [
         row("runs/room-3-seed-0", 50.0),
@@ -52,12 +61,12 @@ def found(ratio: float, faster: int) -> Found:
     changed = {name: [[{**CURVE[1], "mean_s": 60.0 + seed}] for seed in range(SEEDS)] for name in ABLATIONS}
     changed["burst-32"] = [[{**CURVE[1], "mean_s": 70.0 - seed}] for seed in range(SEEDS)]
     run = "room-3-seed-0"
-    return Found([task], {"room": compared}, {run: CURVE}, {run: SPENT}, changed, 100)
+    return ExperimentResults([task], {"room": compared}, {run: CURVE}, {run: SPENT}, changed, 100)
 
 
 @pytest.mark.parametrize(("ratio", "faster", "said"), [(0.4, 19, "yes"), (0.5, 18, "no")])
 def test_goals_are_judged_by_what_was_found(tmp_path: Path, ratio: float, faster: int, said: str) -> None:
-    page = write_page(tmp_path, found(ratio, faster), "the command").read_text()
+    page = write_page(tmp_path, results(ratio, faster), "the command").read_text()
     assert f"| {ratio:.2f} ({ratio - 0.1:.2f} … {ratio + 0.1:.2f}) | {said} |" in page
     assert f"| faster than both on at least 19 of 20 starts | {faster} | {said} |" in page
     assert "| stretch: median at most 0.9 × that of information-rate | 1.25 (1.15 … 1.35) | no |" in page
@@ -71,7 +80,7 @@ def test_goals_are_judged_by_what_was_found(tmp_path: Path, ratio: float, faster
 
 def test_changes_are_told_seed_by_seed(tmp_path: Path) -> None:
     """60, 61, 62 s by default and 70, 69, 68 s with short batches: 8 s apart on average, from 6 to 10."""
-    page = write_page(tmp_path, found(0.4, 20), "the command").read_text()
+    page = write_page(tmp_path, results(0.4, 20), "the command").read_text()
     line = next(line for line in page.splitlines() if line.startswith("| burst-32 "))
     assert line.endswith("| 70.0, 69.0, 68.0 | default | +8.0 | +6.0 … +10.0 |")
 
@@ -81,10 +90,11 @@ def test_every_run_is_its_own_and_its_options_are_ppo_s() -> None:
     assert len(runs) == sum(task.seeds for task in TASKS) + SEEDS * len(ABLATIONS)
     assert len({tuple(options) for options in runs.values()}) == len(runs)
     default = vars(parse(ppo.Args, runs["ablations/default-1"]))
-    for name, (_, options) in ABLATIONS.items():
+    for name, ablation in ABLATIONS.items():
         changed = vars(parse(ppo.Args, runs[f"ablations/{name}-1"]))
         different = [field for field, value in changed.items() if value != default[field]]
-        assert (len(different) >= 1) is bool(options)
+        assert (len(different) >= 1) is bool(ablation.options)
+        assert ablation.reference in ABLATIONS
         ppo.training_scenario(ppo.Args(**changed))
 
 
