@@ -21,6 +21,7 @@ from pettingzoo.test import (
 
 import entropy_explore_env
 from entropy_explore_env import env, environment_id, parallel_env
+from tests.envs.pairwise import params
 from tests.reference.scenes import SMALL
 
 PARTS: dict[str, dict[str, Any]] = {
@@ -31,15 +32,9 @@ PARTS: dict[str, dict[str, Any]] = {
     "flat": {"patch": True, "overview": True, "action_mask": True, "flat": True},
 }
 KINDS = ("continuous", "discrete")
-TEAMS = [
-    pytest.param(scenario, robots, kind, id=f"{scenario}-{robots}-{kind}")
-    for scenario, robots, kind in itertools.product(SMALL, range(1, 6), KINDS)
-]
-SINGLES = [
-    pytest.param(scenario, kind, parts, id=f"{scenario}-{kind}-{parts}")
-    for scenario, kind, parts in itertools.product(SMALL, KINDS, PARTS)
-    if parts != "nothing"  # Gymnasium does not allow an empty observation space
-]
+TEAMS = (SMALL, range(1, 6), KINDS)
+SINGLES = (SMALL, KINDS, [parts for parts in PARTS if parts != "nothing"])
+"""Without `nothing`: Gymnasium does not allow an empty observation space."""
 
 # PettingZoo wants arrays; ours is a Dict of parts, as PettingZoo's own games with an action mask
 # have it. `flat` gives an array, and is checked without this exception.
@@ -53,32 +48,34 @@ def settings(robots: int, kind: str, parts: str) -> dict[str, Any]:
     return {"robots": robots, "action": {"kind": kind}, "observation": PARTS[parts]}
 
 
-@pytest.mark.parametrize("parts", ["nothing", "default", "everything", "flat"])
-@pytest.mark.parametrize(("scenario", "robots", "kind"), TEAMS)
+@pytest.mark.parametrize(
+    ("scenario", "robots", "kind", "parts"), params(*TEAMS, ("nothing", "default", "everything", "flat"))
+)
 def test_pettingzoo_parallel_api(scenario: str, robots: int, kind: str, parts: str) -> None:
     parallel_api_test(parallel_env(scenario, max_cycles=8, **settings(robots, kind, parts)), num_cycles=10)
 
 
 @pytest.mark.filterwarnings(*OBSERVATIONS_ARE_DICTS)
-@pytest.mark.parametrize("parts", ["nothing", "default", "everything"])
-@pytest.mark.parametrize(("scenario", "robots", "kind"), TEAMS)
+@pytest.mark.parametrize(
+    ("scenario", "robots", "kind", "parts"), params(*TEAMS, ("nothing", "default", "everything"))
+)
 def test_pettingzoo_api(scenario: str, robots: int, kind: str, parts: str) -> None:
     api_test(env(scenario, max_cycles=8, **settings(robots, kind, parts)), num_cycles=10 * robots)
 
 
-@pytest.mark.parametrize(("scenario", "robots", "kind"), TEAMS)
+@pytest.mark.parametrize(("scenario", "robots", "kind"), params(*TEAMS))
 def test_pettingzoo_api_with_flat_observations(scenario: str, robots: int, kind: str) -> None:
     api_test(env(scenario, max_cycles=8, **settings(robots, kind, "flat")), num_cycles=10 * robots)
 
 
-@pytest.mark.parametrize(("scenario", "robots", "kind"), TEAMS)
+@pytest.mark.parametrize(("scenario", "robots", "kind"), params(*TEAMS))
 def test_pettingzoo_seeds(scenario: str, robots: int, kind: str) -> None:
     given = settings(robots, kind, "everything")
     parallel_seed_test(functools.partial(parallel_env, scenario, **given), num_cycles=10)
     seed_test(functools.partial(env, scenario, **given), num_cycles=10)
 
 
-@pytest.mark.parametrize(("scenario", "robots", "kind"), TEAMS)
+@pytest.mark.parametrize(("scenario", "robots", "kind"), params(*TEAMS))
 def test_pettingzoo_max_cycles(scenario: str, robots: int, kind: str) -> None:
     made = [
         functools.partial(make, scenario, **settings(robots, kind, "default")) for make in (parallel_env, env)
@@ -90,8 +87,7 @@ def test_pettingzoo_max_cycles_of_the_package() -> None:
     max_cycles_test(entropy_explore_env)
 
 
-@pytest.mark.parametrize("robots", range(1, 6))
-@pytest.mark.parametrize("scenario", SMALL)
+@pytest.mark.parametrize(("scenario", "robots"), list(zip(itertools.cycle(SMALL), range(1, 6), strict=False)))
 def test_pettingzoo_rendering(scenario: str, robots: int) -> None:
     shapes = []
 
@@ -103,7 +99,7 @@ def test_pettingzoo_rendering(scenario: str, robots: int) -> None:
     assert shapes == [(480, 640, 3)] * 5
 
 
-@pytest.mark.parametrize(("scenario", "kind", "parts"), SINGLES)
+@pytest.mark.parametrize(("scenario", "kind", "parts"), params(*SINGLES))
 def test_gymnasium_check_env(scenario: str, kind: str, parts: str) -> None:
     made = gymnasium.make(
         environment_id(scenario),
@@ -115,7 +111,7 @@ def test_gymnasium_check_env(scenario: str, kind: str, parts: str) -> None:
     made.close()
 
 
-@pytest.mark.parametrize(("scenario", "kind", "parts"), SINGLES)
+@pytest.mark.parametrize(("scenario", "kind", "parts"), params(*SINGLES))
 def test_gymnasium_passive_checker_has_nothing_to_say(scenario: str, kind: str, parts: str) -> None:
     made = gymnasium.make(environment_id(scenario), max_cycles=5, **settings(1, kind, parts))
     made.reset(seed=0)
