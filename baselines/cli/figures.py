@@ -79,14 +79,14 @@ def mission_picture(recorder: Recorder, title: str, strategy: str) -> bytes:
 def _slice(figure: Figure, axes: Axes, recorder: Recorder, entropy: bool) -> None:
     """The layer of the map that the robots scanned from most, and the ways over it."""
     missions, grid = recorder.missions, recorder.missions.grid
-    layer = _busiest_layer(recorder.places_m, grid)
+    layer = _busiest_layer(recorder.scan_positions_m, grid)
     share = entropy_share(missions, 0, 0)[:, :, layer]
     shown = share if entropy else np.ma.masked_where(share > 0.9, missions.mean[0, 0][:, :, layer])
     colours = mpl.colormaps["magma" if entropy else "Greys"].with_extremes(bad="#c9d6e8")
     image = axes.imshow(
         shown.T, origin="lower", extent=extent_of(grid), cmap=colours, vmin=0, vmax=1, aspect="equal"
     )
-    for robot, way in enumerate(recorder.ways_m):
+    for robot, way in enumerate(recorder.paths_m):
         colour = COLOURS[robot % len(COLOURS)]
         axes.plot(way[:, 0], way[:, 1], color=colour, linewidth=0.9)
         edge = "white" if entropy else "black"

@@ -182,7 +182,7 @@ class MissionLog:
         from baselines.cli.figures import mission_picture
 
         recorder = self.recorder
-        rows = recorder.spread(_SERIES_POINTS)
+        rows = recorder.sampled_moments(_SERIES_POINTS)
         series = {
             "time_s": recorder.time_s[rows].tolist(),
             "entropy_bits": recorder.entropy_bits[rows].tolist(),

@@ -104,7 +104,7 @@ def record_mission(
     best = recorder.entropy_bits.min(axis=1)
     middle = 0.5 * (figures["entropy_start_bits"] + figures["entropy_threshold_bits"])
     halved = np.flatnonzero(best <= middle)
-    rows = recorder.spread(_SERIES_POINTS)
+    rows = recorder.sampled_moments(_SERIES_POINTS)
     single = np.flatnonzero(np.diff(recorder.scans) == 1)
     scanned = np.diff(recorder.robot_scans, axis=0)[single].argmax(axis=1)
     return {
@@ -112,7 +112,7 @@ def record_mission(
         "half_s": float(recorder.time_s[halved[0]]) if len(halved) else None,
         "sent_by_scan": np.diff(recorder.shared)[single].tolist(),
         "depth_by_scan_m": np.round(recorder.depths_m[1:][single, scanned], 3).tolist(),
-        "apart_m": round(_mean_distance_apart_m(recorder.places_m[1:]), 3),
+        "apart_m": round(_mean_distance_apart_m(recorder.scan_positions_m[1:]), 3),
         "series": {
             "time_s": np.round(recorder.time_s[rows], 3).tolist(),
             "entropy_bits": np.round(best[rows], 1).tolist(),

@@ -221,7 +221,7 @@ class EntropyExploreVectorEnv(VectorEnv[Any, Any, Any]):
     def render(self) -> Any:  # noqa: ANN401 - Gymnasium's signature
         """For `rgb_array` a picture of each mission, E of (480, 640, 3) uint8; `human` shows the first.
 
-        Ways and curves are those of the missions since their reset.
+        Paths and curves begin at the missions' reset.
         """
         if self.render_mode != "rgb_array":
             return None

@@ -1,4 +1,4 @@
-"""Pictures one after the other: in a window, as an animated GIF, or as a video."""
+"""Sequences of pictures: in a window, as an animated GIF, or as a video."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from entropy_explore_env.validation import is_whole
 from entropy_explore_env.writing import write_atomically
 
 COLOUR_CODES = 1 << 15
-"""Colours are counted to 5 bits a channel: no eye sees the difference, and ours fit into one palette."""
+"""Colours are reduced to 5 bits a channel: not a visible difference, and pictures fit into one palette."""
 
 
 def colour_codes(picture: np.ndarray) -> np.ndarray:
@@ -48,10 +48,10 @@ def shared_palette(usage: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 class Film:
-    """Pictures spread evenly over a mission, however long it becomes; kept compressed."""
+    """Pictures that are spread evenly over a mission of any length; kept compressed in memory."""
 
     def __init__(self, most: int) -> None:
-        """Keep at most `most` pictures (≥ 2), at least half as many where there were so many moments."""
+        """Keep at most `most` pictures (≥ 2), and at least half as many once that many were added."""
         self._most = most
         self._kept: list[tuple[float, bytes]] = []
         self._shape: tuple[int, ...] = ()
@@ -62,7 +62,7 @@ class Film:
         return time_s >= self._due_s
 
     def add(self, time_s: float, picture: np.ndarray) -> None:
-        """Keep a picture (H, W, 3) uint8; of too many, every other one is dropped."""
+        """Keep a picture (H, W, 3) uint8; if there are too many, every other one is dropped."""
         self._shape = picture.shape
         self._kept.append((time_s, zlib.compress(picture.tobytes(), 1)))
         while len(self._kept) > self._most:
@@ -79,7 +79,7 @@ class Film:
         return len(self._kept)
 
     def pictures(self, last: int) -> Iterator[np.ndarray]:
-        """The pictures in order, each (H, W, 3) uint8; the last one as often as `last` says."""
+        """The pictures in order, each (H, W, 3) uint8; the last one `last` times."""
         picture = np.zeros(0, np.uint8)
         for _, packed in self._kept:
             picture = np.frombuffer(zlib.decompress(packed), np.uint8).reshape(self._shape)
@@ -91,15 +91,15 @@ class Film:
 class Window:
     """Shows pictures on the screen, with pygame-ce.
 
-    Once a person closes the window, later pictures are not shown.
+    Once the user closes the window, later pictures are not shown.
     """
 
     def __init__(self, title: str = "entropy_explore_env", frames_per_s: float | None = 30.0) -> None:
-        """Open nothing yet.
+        """Prepare a window, which opens with the first picture.
 
         Args:
             title: Of the window.
-            frames_per_s: `show` waits so that there are at most so many; None = it never waits.
+            frames_per_s: `show` waits so that it does not exceed this rate; None = it never waits.
 
         Raises:
             MissingExtraError: pygame-ce is not installed.
@@ -144,8 +144,9 @@ class Window:
 def animate(frames: Iterable[np.ndarray], path: Path, frame_s: float) -> None:
     """Write pictures as an animated GIF that repeats for ever; the file appears only when complete.
 
-    All pictures share one palette of 256 colours, made from all of them, so that colours do not
-    flicker. GIF counts time in 1/100 s; pictures that equal the one before only make it last longer.
+    All pictures share one palette of 256 colours, made from all of them: with a palette for each picture,
+    as Pillow makes them, colours flicker. GIF counts time in 1/100 s; a picture that equals the one before
+    only makes that one last longer.
 
     Args:
         frames: (H, W, 3) uint8 each, all of one size.
@@ -185,7 +186,7 @@ def animate(frames: Iterable[np.ndarray], path: Path, frame_s: float) -> None:
 
 
 def write_video(frames: Iterable[np.ndarray], path: Path, frames_per_s: int) -> None:
-    """Write pictures as an MP4: H.264 where the machine's PyAV can, MPEG-4 otherwise.
+    """Write pictures as an MP4: H.264 where the installed PyAV has it, MPEG-4 otherwise.
 
     The same pictures give the same file. It appears only when complete.
 
@@ -214,7 +215,9 @@ def write_video(frames: Iterable[np.ndarray], path: Path, frames_per_s: int) -> 
                 stream = video.add_stream(codec, rate=frames_per_s)
                 stream.height, stream.width = shape[0] - shape[0] % 2, shape[1] - shape[1] % 2
                 stream.pix_fmt = "yuv420p"
-                stream.thread_count = 1  # more of them cut the picture into slices: another file
+                stream.thread_count = (
+                    1  # with more threads, slices and so the file would depend on their number
+                )
                 stream.options = {"crf": "18", "preset": "medium"} if codec == "libx264" else {"qscale": "3"}
             if picture.shape != shape:
                 raise SettingError("frames", picture.shape, f"pictures of one shape, {shape}")

@@ -68,7 +68,7 @@ def write(
 
 
 def draw_disc(draw: ImageDraw.ImageDraw, centre: tuple[float, float], radius: float, colour: Colour) -> None:
-    """A filled disc with a dark edge around it, so that it stands out on any ground."""
+    """A filled disc with a dark edge around it, so that it stands out on any background."""
     draw.ellipse(_around(centre, radius + 1), INK)
     draw.ellipse(_around(centre, radius), colour)
 

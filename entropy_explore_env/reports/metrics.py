@@ -1,4 +1,4 @@
-"""Figures of one mission, as every table, every record and every JSON object shows them."""
+"""The figures of one mission that tables, records and JSON objects show."""
 
 from __future__ import annotations
 
@@ -20,27 +20,27 @@ _STEEPEST_RAD = math.pi / 4
 
 
 def mission_figures(missions: Missions, mission: int, floor: bool | None = None) -> dict[str, Any]:
-    """What a mission came to.
+    """The figures of a mission.
 
-    Entropies are those of the best-informed robot's map unless they say otherwise; counts are sums over
-    the team; what cannot be said is None.
+    Entropies are those of the best-informed robot's map unless stated otherwise; counts are sums over the
+    team; undefined figures are None.
 
     Args:
         missions: The missions.
         mission: Which.
-        floor: Whether `scans_over_floor` is wanted; the floor takes some milliseconds a world. None = where
-            the scenario is scored.
+        floor: Whether `scans_over_floor` is computed, which takes some milliseconds a world; None = only
+            where the scenario tracks the truth.
 
     Returns:
         `scenario`, `world`, `robots`, `seed`, `finished`, `end_reason`; `t_mission_s`, and `t50_s`, `t90_s`,
         `t99_s`: when the best map had lost that share of the bits that the mission asks for; `scans`, and
         `scans_over_floor`: over `information_floor`; `measurements`, `shared_measurements`, `overlap`:
-        the share of measurements that brought their own robot less than I_min; `bits_sent`,
+        the share of measurements that added their own robot less than I_min; `bits_sent`,
         `bits_received`, `bits_gained_per_bit_sent`: taken from teammates' maps over sent;
         `messages_lost`; `entropy_start_bits`, `entropy_threshold_bits`, `entropy_end_bits`,
         `entropy_mean_bits` over the team; `balance`: the coefficient of variation of the bits that the
-        robots gained themselves; `distance_m`, `blocked_moves`; `per_robot`: a list of the robots' own
-        counts. Of a scored scenario also `joint`: see `joint_figures`.
+        robots gained themselves; `distance_m`, `blocked_moves`; `per_robot`: a list of the counts of
+        each robot. If the scenario tracks the truth, also `joint`: see `joint_figures`.
     """
     clock, robots = missions.state.missions[mission], missions.state.robots[mission]
     end, world = missions.over(mission), missions.worlds[mission]
@@ -79,17 +79,17 @@ def mission_figures(missions: Missions, mission: int, floor: bool | None = None)
 
 
 def _reached(clock: np.void, place: int) -> float | None:
-    """Time at which a share of PROGRESS was reached."""
+    """Time at which one of the shares in PROGRESS was reached; None = it was not."""
     time_s = float(clock["reached_s"][place])
     return None if time_s < 0.0 else time_s
 
 
 def joint_figures(missions: Missions, mission: int) -> dict[str, float | int | None]:
-    """The map that fuses everything measured, against the truth.
+    """The map that fuses all measurements of the team, compared with the truth.
 
     Returns:
-        `entropy_bits`; `explored`: share of the voxels that can be seen from where robots can be that were
-        measured at all; `error`: mean |expected - true coverage| over the measured voxels; `wrong`: share of
+        `entropy_bits`; `explored`: share of the voxels that robots can observe at all that were
+        measured; `error`: mean |expected - true coverage| over the measured voxels; `wrong`: share of
         them on the wrong side of ½; None where nothing was measured.
     """
     clock = missions.state.missions[mission]
@@ -104,34 +104,34 @@ def joint_figures(missions: Missions, mission: int) -> dict[str, float | int | N
 
 @lru_cache(maxsize=8)
 def information_floor(scenario: Scenario, world: World) -> float:
-    """Fewer scans than this cannot map the world: what voxels need over what a scan brings.
+    """Least number of scans that can map the world: the precision that voxels need over that of one scan.
 
-    A voxel needs 1/σ_end² - 1/σ_prior² of precision; a ray brings 1/σ(d)² to each voxel that it crosses
-    (Rocha04, eqs. 5 and 17). What a scan can bring is the best of 256 scans from random places where robots
-    may start, in random directions up to 45° up or down; seeing a voxel more often than it needs, which no
-    team can avoid, does not count.
+    A voxel needs 1/σ_end² - 1/σ_prior² of precision; a ray adds 1/σ(d)² to each voxel that it crosses
+    (Rocha04, eqs. 5 and 17). One scan is taken to add as much as the best of 256 scans from random voxels
+    where robots may start, in random directions up to 45° up or down. Measuring a voxel more often than
+    needed, which no team can avoid, is not taken into account.
 
     Args:
         scenario: The task.
         world: The true world.
     """
-    brought = max(_most_brought(scenario, kind, world) for kind in scenario.kinds)
+    added = max(_most_added(scenario, kind, world) for kind in scenario.kinds)
     needed = scenario.ending.sigma_end**-2 - scenario.sigma_prior**-2
-    return max(world.visible_voxels(scenario) * needed / brought, 1.0)
+    return max(world.visible_voxels(scenario) * needed / added, 1.0)
 
 
-def _most_brought(scenario: Scenario, kind: RobotKind, world: World) -> float:
-    """Precision, over all voxels, that the best of some scans of a kind of robot brings."""
+def _most_added(scenario: Scenario, kind: RobotKind, world: World) -> float:
+    """Precision, summed over all voxels, that the best of some scans of a kind of robot adds."""
     rng, grid, sensor = np.random.default_rng(0), world.grid, kind.sensor
     layout, model = world.layout(scenario, kind), sensor_model(sensor)
-    scan, chance = new_scan(grid, [sensor], sensor.rays, 1), np.zeros(1, np.uint64)
-    truth, brought = world.occupied.ravel().astype(np.float32), 0.0
+    scan, rng_state = new_scan(grid, [sensor], sensor.rays, 1), np.zeros(1, np.uint64)
+    truth, added = world.occupied.ravel().astype(np.float32), 0.0
     voxels = np.stack(np.unravel_index(rng.choice(layout.starts, _FLOOR_SCANS), grid.shape), axis=-1)
     steepest = _STEEPEST_RAD if scenario.layer_of(kind.robot) is None else 0.0
     for voxel in voxels + 0.5:
         start, yaw = tuple(voxel.tolist()), rng.uniform(-math.pi, math.pi)
         pitch = rng.uniform(-steepest, steepest)
-        take_scan(scan, model, truth, grid.shape, grid.voxel_size_m, start, yaw, pitch, 0, chance)
+        take_scan(scan, model, truth, grid.shape, grid.voxel_size_m, start, yaw, pitch, 0, rng_state)
         measured = scan.rays["returned"] != int(Return.NOTHING)
-        brought = max(brought, float((scan.rays["voxels"] * scan.rays["measured"])[measured].sum()))
-    return brought
+        added = max(added, float((scan.rays["voxels"] * scan.rays["measured"])[measured].sum()))
+    return added

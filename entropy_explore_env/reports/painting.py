@@ -1,4 +1,4 @@
-"""From missions to pictures: what a Frame shows of a mission, and when."""
+"""Pictures of running missions: what a Frame shows of a mission, and when one is drawn."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from entropy_explore_env.errors import CallOrderError, SettingError
 from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.reports.animation import Window
 from entropy_explore_env.reports.projection import shares_left
-from entropy_explore_env.reports.recording import Ways, poses_now
+from entropy_explore_env.reports.recording import DrivenPaths, poses_now
 from entropy_explore_env.reports.rendering import Frame, draw_frame
 from entropy_explore_env.worlds.given import GIVEN
 from entropy_explore_env.worlds.recipes.catalogue import RECIPES
@@ -26,20 +26,20 @@ def check_render_mode(render_mode: str | None) -> None:
 
 
 def entropy_share(missions: Missions, mission: int, robot: int) -> np.ndarray:
-    """(X, Y, Z) float32: how much of each voxel's entropy is left, 1 at the prior, 0 at σ_end."""
+    """(X, Y, Z) float32: the share of each voxel's entropy that is left, 1 at the prior, 0 at σ_end."""
     known, prior = (float(missions.rules.numbers[name][0]) for name in ("end_precision", "prior_precision"))
     return shares_left(missions.precision[mission, robot], prior, known)
 
 
 def remaining_share(missions: Missions, mission: int) -> np.ndarray:
-    """(A,) how much is left of the bits that the mission asks each robot's map for, 1 … 0."""
+    """(A,) the share that is left of the bits that the mission asks each robot's map for, from 1 to 0."""
     clock = missions.state.missions[mission]
     start, end = clock["entropy_start_bits"], clock["entropy_end_bits"]
     return (missions.state.robots[mission]["entropy_bits"] - end) / (start - end)
 
 
 def world_name(missions: Missions, mission: int) -> str:
-    """What a mission's world is called: the scenario's name, or that of the world's file or of the World."""
+    """Name of a mission's world: the scenario's, or that of the world's file or of the given World."""
     name, world = missions.scenario.world, missions.worlds[mission]
     if name == GIVEN and world is not None:
         return world.name
@@ -47,19 +47,19 @@ def world_name(missions: Missions, mission: int) -> str:
 
 
 class Painter:
-    """Follows one of some missions and makes pictures of it; idle without a render mode."""
+    """Follows one of some missions and draws it; does nothing without a render mode."""
 
     def __init__(self, render_mode: str | None, number: int = 0) -> None:
-        """Take the mode (None, `human` or `rgb_array`) and which mission to follow."""
+        """Take the mode (None, `human` or `rgb_array`) and the number of the mission to follow."""
         self._mode, self._number = render_mode, number
         self._window: Window | None = None
         self._mission: tuple[int, int] | None = None
         self._times: list[float] = []
         self._shares: list[np.ndarray] = []
-        self._ways = Ways(0)
+        self._paths = DrivenPaths(0)
 
     def watch(self, missions: Missions) -> None:
-        """Note the moment after a reset or a step; a `human` sees it at once."""
+        """Record the moment after a reset or a step; mode `human` shows it at once."""
         if self._mode is None:
             return
         time_s = float(missions.state.missions[self._number]["time_s"])
@@ -67,18 +67,18 @@ class Painter:
         if mission != self._mission or time_s == 0.0:
             self._mission = mission
             self._times, self._shares = [], []
-            self._ways = Ways(missions.scenario.robots, self._number)
-        if not self._times or time_s > self._times[-1]:  # else it stands still: others were reset
+            self._paths = DrivenPaths(missions.scenario.robots, self._number)
+        if not self._times or time_s > self._times[-1]:  # otherwise only other missions advanced
             self._times.append(time_s)
             self._shares.append(remaining_share(missions, self._number))
-            self._ways.note(missions)
+            self._paths.update(missions)
         if self._mode == "human":
             if self._window is None:
                 self._window = Window(frames_per_s=float(FRAMES_PER_S))
             self._window.show(self.paint(missions))
 
     def picture(self, missions: Missions) -> np.ndarray | None:
-        """The picture of this moment for `rgb_array`, (480, 640, 3) uint8; else None.
+        """The picture of this moment, (480, 640, 3) uint8, in mode `rgb_array`; otherwise None.
 
         Raises:
             CallOrderError: The mission was not reset yet.
@@ -90,14 +90,14 @@ class Painter:
         return self.paint(missions)
 
     def __getstate__(self) -> dict[str, object]:
-        """All but the window, which cannot be copied; a copy opens its own."""
+        """All but the window, which cannot be copied; a copy opens a window of its own."""
         return {**self.__dict__, "_window": None}
 
     def paint(self, missions: Missions) -> np.ndarray:
         """Draw this moment of the mission: the belief of robot_0, and the whole team.
 
         Args:
-            missions: Has to be watched, for the curves and the ways behind the robots.
+            missions: The curves and the driven paths show the moments at which they were watched.
 
         Returns:
             (480, 640, 3) uint8.
@@ -110,7 +110,7 @@ class Painter:
             f"time {time_s:,.0f} s",
             f"entropy left {max(remaining_share(missions, self._number).min(), 0.0):.1%}",
             f"scans {robots['scans'].sum():,}",
-            f"shared {robots['measurements_sent'].sum():,}",
+            f"rays sent {robots['measurements_sent'].sum():,}",
             f"driven {robots['distance_m'].sum():,.1f} m",
         )
         frame = Frame(
@@ -121,10 +121,10 @@ class Painter:
             positions_m=poses[:, :3],
             gazes_rad=poses[:, 3:],
             targets_m=robots["target"][:, :3],
-            paths_m=self._ways.so_far(missions) if self._times else [],
+            paths_m=self._paths.to_now(missions) if self._times else [],
             curve_s=np.asarray(self._times),
             curve_share=shares,
-            title=f"{world_name(missions, self._number)}: what robot_0 knows",
+            title=f"{world_name(missions, self._number)}: belief of robot_0",
             status=status,
         )
         return draw_frame(frame)

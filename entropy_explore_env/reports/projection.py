@@ -1,6 +1,6 @@
-"""Beliefs as seen along a line of sight, from above and from the side: shares of entropy, and coverage.
+"""Beliefs projected along a line of sight, from above and from the side: shares of entropy, and coverage.
 
-One pass over the voxels, whatever the world's size; nothing as large as the world is made on the way.
+One pass over the voxels; no temporary array is as large as the world.
 """
 
 from __future__ import annotations
@@ -12,11 +12,11 @@ import numpy as np
 from entropy_explore_env.compilation.kernels import lean_kernel
 
 KNOWN_BELOW = 0.9
-"""A voxel with less than this share of its entropy left counts as known."""
+"""A voxel counts as known when less than this share of its entropy is left."""
 
 
 class Projection(NamedTuple):
-    """A world seen along one axis; (N, M) cells are left of (X, Y, Z)."""
+    """A belief (X, Y, Z) projected along one axis to (N, M) cells."""
 
     entropy: np.ndarray
     """(N, M) floating-point, mean share of entropy."""
@@ -25,13 +25,13 @@ class Projection(NamedTuple):
 
 
 def projections(share: np.ndarray, coverage: np.ndarray) -> tuple[Projection, ...]:
-    """A belief seen from above, (X, Y), and from the side, along y, (X, Z); 2-D ones from above only.
+    """Project a belief along z, to (X, Y), and along y, to (X, Z); a 2-D one along z only.
 
     The cubic mean, (Σc³/n)^⅓, lies between the mean, in which the top of a box fades, and the greatest, in
     which floor and ceiling hide the halls between them.
 
     Args:
-        share: (X, Y, Z) float32, how much of each voxel's entropy is left; not changed.
+        share: (X, Y, Z) float32, the share of each voxel's entropy that is left; not changed.
         coverage: (X, Y, Z) float32, expected coverage in [0, 1]; not changed.
     """
     x, y, z = share.shape
@@ -66,7 +66,7 @@ def _project(share, coverage, entropy_above, cover_above, known_above, entropy_s
 
 
 def shares_left(precision: np.ndarray, prior: float, known: float) -> np.ndarray:
-    """How much of each voxel's entropy is left, float32: 1 at the precision `prior`, 0 at `known` and above.
+    """The share of each voxel's entropy that is left, float32: 1 at the precision `prior`, 0 from `known` on.
 
     Args:
         precision: float32 of any shape, 1/σ² of each voxel; not changed.

@@ -1,8 +1,9 @@
-"""A mission as it went: time series noted step by step."""
+"""Time series of a mission, recorded step by step: entropies, scans, poses and driven paths."""
 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -11,130 +12,143 @@ from entropy_explore_env.missions.simulation import Missions
 
 
 def poses_now(missions: Missions, mission: int) -> np.ndarray:
-    """(A, 5) float64 where the robots of a mission are, under way or not: x, y, z, yaw, pitch."""
+    """(A, 5) float64 current poses of a mission's robots, driving or not: x, y, z, yaw, pitch."""
     time_s = float(missions.state.missions[mission]["time_s"])
     numbers, robots = missions.rules.numbers, missions.state.robots[mission]
     return np.stack([np.array(pose_at(numbers[a], robot, time_s)) for a, robot in enumerate(robots)])
 
 
-class Ways:
-    """The ways that the robots of a mission drive, corner by corner; to be noted after every step.
+class DrivenPaths:
+    """The paths that the robots of a mission drive, corner by corner; to be updated after every step.
 
     Attributes:
         passed_m: For each robot the points (3,) that it has passed: where drives began, and their corners.
     """
 
     def __init__(self, robots: int, mission: int = 0) -> None:
-        """Follow so many robots of a mission; nothing is noted yet."""
+        """Follow the robots of a mission, from its reset on."""
         self._mission = mission
         self.passed_m: list[list[np.ndarray]] = [[] for _ in range(robots)]
         self._departed_s = [-math.inf] * robots
-        self._behind = [0] * robots
+        self._corners_passed = [0] * robots
         self._ahead: list[np.ndarray] = [np.zeros((0, 3))] * robots
 
-    def note(self, missions: Missions) -> None:
-        """Note what was passed up to this moment."""
+    def update(self, missions: Missions) -> None:
+        """Add the points that were passed since the last update."""
         time_s = float(missions.state.missions[self._mission]["time_s"])
         numbers, robots = missions.rules.numbers, missions.state.robots[self._mission]
         for number, robot in enumerate(robots):
             points = self.passed_m[number]
             if robot["depart_s"] != self._departed_s[number]:
                 points += [*self._ahead[number], robot["origin"][:3].copy()]
-                self._departed_s[number], self._behind[number] = float(robot["depart_s"]), 0
+                self._departed_s[number], self._corners_passed[number] = float(robot["depart_s"]), 0
             passed = int(place_at(numbers[number], robot, time_s)[3])
-            points += list(robot["way"][self._behind[number] : passed].copy())
+            points += list(robot["way"][self._corners_passed[number] : passed].copy())
             self._ahead[number] = robot["way"][passed : robot["corners"]].copy()
-            self._behind[number] = passed
+            self._corners_passed[number] = passed
 
-    def so_far(self, missions: Missions) -> list[np.ndarray]:
-        """For each robot (N, 3) float64: the way to where it is now."""
+    def to_now(self, missions: Missions) -> list[np.ndarray]:
+        """For each robot (N, 3) float64: the path from its start to its current position."""
         here = poses_now(missions, self._mission)[:, :3]
         return [np.stack([*points, place]) for points, place in zip(self.passed_m, here, strict=True)]
 
 
+class Moment(NamedTuple):
+    """What is recorded of a mission at one moment."""
+
+    time_s: float
+    entropy_bits: np.ndarray
+    """(A,) float64 entropy of each robot's map."""
+    scans: np.ndarray
+    """(A,) int64 scans of each robot since the reset."""
+    shared: int
+    """Measurements that the team has sent since the reset."""
+    scan_positions_m: np.ndarray
+    """(A, 3) float64 where each robot took its latest scan."""
+    poses: np.ndarray
+    """(A, 5) float64 of each robot: x, y, z, yaw, pitch."""
+    depth_m: np.ndarray
+    """(A,) float64 mean measured distance of each robot's latest scan."""
+
+
 class Recorder:
-    """Notes the first of some missions after every step.
+    """Records the first of some missions, moment by moment.
 
     Attributes:
-        missions: Those missions; their state is what was noted last.
+        missions: Those missions; their state is that of the latest moment.
     """
 
     def __init__(self, missions: Missions) -> None:
-        """Follow these missions; nothing is noted yet."""
+        """Follow these missions; nothing is recorded yet."""
         self.missions = missions
-        self._times: list[float] = []
-        self._entropies: list[np.ndarray] = []
-        self._scans: list[int] = []
-        self._robot_scans: list[np.ndarray] = []
-        self._sent: list[int] = []
-        self._places: list[np.ndarray] = []
-        self._poses: list[np.ndarray] = []
-        self._depths: list[np.ndarray] = []
-        self._ways = Ways(missions.scenario.robots)
+        self._moments: list[Moment] = []
+        self._paths = DrivenPaths(missions.scenario.robots)
 
     def note(self) -> None:
-        """Note this moment."""
+        """Record this moment, after a reset or a step."""
         robots = self.missions.state.robots[0]
-        self._times.append(float(self.missions.state.missions[0]["time_s"]))
-        self._entropies.append(robots["entropy_bits"].copy())
-        self._scans.append(int(robots["scans"].sum()))
-        self._robot_scans.append(robots["scans"].copy())
-        self._sent.append(int(robots["measurements_sent"].sum()))
-        self._places.append(robots["scan_pose"][:, :3].copy())
-        self._poses.append(poses_now(self.missions, 0))
-        self._depths.append(robots["depth_m"].copy())
-        self._ways.note(self.missions)
+        moment = Moment(
+            time_s=float(self.missions.state.missions[0]["time_s"]),
+            entropy_bits=robots["entropy_bits"].copy(),
+            scans=robots["scans"].copy(),
+            shared=int(robots["measurements_sent"].sum()),
+            scan_positions_m=robots["scan_pose"][:, :3].copy(),
+            poses=poses_now(self.missions, 0),
+            depth_m=robots["depth_m"].copy(),
+        )
+        self._moments.append(moment)
+        self._paths.update(self.missions)
 
-    def spread(self, points: int) -> np.ndarray:
-        """(≤ points,) int64 which moments to keep of a long series: the ends, and evenly in between."""
-        return np.unique(np.linspace(0, len(self._times) - 1, points).round().astype(np.int64))
+    def sampled_moments(self, most: int) -> np.ndarray:
+        """(≤ most,) int64 numbers of evenly spaced moments, the first and the last among them."""
+        return np.unique(np.linspace(0, len(self._moments) - 1, most).round().astype(np.int64))
 
     @property
     def latest_s(self) -> float:
-        """The time noted last."""
-        return self._times[-1]
+        """Time of the latest moment."""
+        return self._moments[-1].time_s
 
     @property
     def time_s(self) -> np.ndarray:
-        """(T,) float64 times noted."""
-        return np.asarray(self._times)
+        """(T,) float64 times of the moments."""
+        return np.array([moment.time_s for moment in self._moments])
 
     @property
     def entropy_bits(self) -> np.ndarray:
         """(T, A) float64 entropy of each robot's map."""
-        return np.stack(self._entropies)
+        return np.stack([moment.entropy_bits for moment in self._moments])
 
     @property
     def scans(self) -> np.ndarray:
-        """(T,) int64 scans of the team so far."""
-        return np.asarray(self._scans)
-
-    @property
-    def shared(self) -> np.ndarray:
-        """(T,) int64 measurements that the team has sent so far."""
-        return np.asarray(self._sent)
+        """(T,) int64 scans of the team since the reset."""
+        return self.robot_scans.sum(axis=1)
 
     @property
     def robot_scans(self) -> np.ndarray:
-        """(T, A) int64 scans of each robot so far."""
-        return np.stack(self._robot_scans)
+        """(T, A) int64 scans of each robot since the reset."""
+        return np.stack([moment.scans for moment in self._moments])
+
+    @property
+    def shared(self) -> np.ndarray:
+        """(T,) int64 measurements that the team has sent since the reset."""
+        return np.array([moment.shared for moment in self._moments])
 
     @property
     def depths_m(self) -> np.ndarray:
         """(T, A) float64 mean measured distance of each robot's latest scan."""
-        return np.stack(self._depths)
+        return np.stack([moment.depth_m for moment in self._moments])
 
     @property
-    def places_m(self) -> np.ndarray:
+    def scan_positions_m(self) -> np.ndarray:
         """(T, A, 3) float64 where each robot took its latest scan."""
-        return np.stack(self._places)
+        return np.stack([moment.scan_positions_m for moment in self._moments])
 
     @property
-    def ways_m(self) -> list[np.ndarray]:
-        """For each robot (N, 3) float64: the way that it drove, corner by corner."""
-        return self._ways.so_far(self.missions)
+    def paths_m(self) -> list[np.ndarray]:
+        """For each robot (N, 3) float64: the path that it has driven, corner by corner."""
+        return self._paths.to_now(self.missions)
 
     @property
     def poses(self) -> np.ndarray:
-        """(T, A, 5) float64 where each robot was: x, y, z, yaw, pitch."""
-        return np.stack(self._poses)
+        """(T, A, 5) float64 pose of each robot: x, y, z, yaw, pitch."""
+        return np.stack([moment.poses for moment in self._moments])

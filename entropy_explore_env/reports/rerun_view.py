@@ -1,9 +1,9 @@
 """A mission on a timeline for Rerun's viewer, an `.rrd`: simulated seconds; map frame, metres, z up.
 
-Entities: `world/entropy/*` and `world/coverage/*`, what robot_0 knows, by blocks of voxels; of each robot
-`world/robots/*` (pose), `world/paths/*`, `world/cones/*` (what its latest scan could see), `world/shared/*`
-(the rays that it sent to teammates); `entropy_left/*` and `shared_measurements` as curves. A block is
-written again only when a good part of it changed: the file grows with what was learnt, not with time.
+Entities: `world/entropy/*` and `world/coverage/*`, the belief of robot_0 by blocks of voxels; of each robot
+`world/robots/*` (pose), `world/paths/*`, `world/cones/*` (field of view of the latest scan) and
+`world/shared/*` (rays that it sent to teammates); `entropy_left/*` and `shared_measurements` as curves. A
+block is written again only when much of it has changed: the file grows with new information, not with time.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.reports.colours import COLOURS, robot_colour
 from entropy_explore_env.reports.painting import entropy_share, remaining_share, world_name
 from entropy_explore_env.reports.projection import KNOWN_BELOW
-from entropy_explore_env.reports.recording import Ways, poses_now
+from entropy_explore_env.reports.recording import DrivenPaths, poses_now
 from entropy_explore_env.robots.channel import select_measurements
 from entropy_explore_env.robots.range_sensor import Return, sensor_model
 from entropy_explore_env.settings import RangeSensor
@@ -36,17 +36,17 @@ _CHANGED = 0.1
 """A block is written again when this share of its cells changed."""
 _VOXELS_EVERY_S = 1.0
 _LEVELS = 16
-"""Steps of entropy that are told apart."""
+"""Levels of entropy that are distinguished."""
 _UNKNOWN = 127
 _PART = 64
 """Points of a path that are written together."""
 
 
 class RerunView:
-    """Follows the first of some missions and writes it to a file; a context: unfinished, nothing is left."""
+    """Writes the first of some missions to a file; as a context manager it removes an unfinished file."""
 
     def __init__(self, missions: Missions, path: Path) -> None:
-        """Begin a recording of a mission that has just been reset.
+        """Start a recording of a mission that has just been reset.
 
         Args:
             missions: To follow.
@@ -76,7 +76,7 @@ class RerunView:
         robots = missions.scenario.robots
         self._scans = np.zeros(robots, np.int64)
         self._sent = np.zeros(robots, np.int64)
-        self._ways, self._passed = Ways(robots), [0] * robots
+        self._driven, self._passed = DrivenPaths(robots), [0] * robots
         self._paths: list[list[np.ndarray]] = [[] for _ in range(robots)]
         self._log_static()
 
@@ -91,7 +91,7 @@ class RerunView:
             self._temporary.unlink(missing_ok=True)
 
     def finish(self) -> None:
-        """Write what is left; the file is there, whole, when this returns."""
+        """Write the rest; the file exists and is complete when this returns."""
         assert self._temporary is not None
         self._log_voxels(least=0.0)
         self._stream.flush()
@@ -109,14 +109,14 @@ class RerunView:
         self._stream.set_time(TIMELINE, duration=time_s)
         poses, left = poses_now(missions, 0), remaining_share(missions, 0)
         robots = missions.state.robots[0]
-        self._ways.note(missions)
+        self._driven.update(missions)
         for robot, (x, y, z, yaw, pitch) in enumerate(poses.tolist()):
-            quaternion = rr.Quaternion(xyzw=_turned(yaw, pitch))
+            quaternion = rr.Quaternion(xyzw=_quaternion(yaw, pitch))
             pose = rr.Transform3D(translation=(x, y, z), quaternion=quaternion)
             self._stream.log(f"world/robots/robot_{robot}", pose)
-            for place_m in [*self._ways.passed_m[robot][self._passed[robot] :], poses[robot, :3]]:
-                self._log_way(robot, place_m)
-            self._passed[robot] = len(self._ways.passed_m[robot])
+            for position_m in [*self._driven.passed_m[robot][self._passed[robot] :], poses[robot, :3]]:
+                self._log_path(robot, position_m)
+            self._passed[robot] = len(self._driven.passed_m[robot])
             self._stream.log(f"entropy_left/robot_{robot}", rr.Scalars(float(left[robot])))
         sent = int(robots["measurements_sent"].sum())
         self._stream.log("shared_measurements", rr.Scalars(float(sent)))
@@ -145,19 +145,19 @@ class RerunView:
             line = rr.SeriesLines(colors=[colour], names=[f"robot_{robot}"])
             self._stream.log(f"entropy_left/robot_{robot}", line, static=True)
 
-    def _log_way(self, robot: int, place_m: np.ndarray) -> None:
+    def _log_path(self, robot: int, position_m: np.ndarray) -> None:
         """Add a point to a robot's path, and write the part of the path that it belongs to."""
-        way = self._paths[robot]
-        if way and np.array_equal(way[-1], place_m):
+        path = self._paths[robot]
+        if path and np.array_equal(path[-1], position_m):
             return
-        way.append(place_m.copy())
-        part = max(len(way) - 2, 0) // _PART
-        points = np.stack(way[part * _PART :])  # begins where the part before it ends
+        path.append(position_m.copy())
+        part = max(len(path) - 2, 0) // _PART
+        points = np.stack(path[part * _PART :])  # starts at the last point of the part before
         strip = self._rr.LineStrips3D([points], colors=[robot_colour(robot)])
         self._stream.log(f"world/paths/robot_{robot}/{part:04}", strip)
 
     def _log_scan(self, robot: int) -> None:
-        """What a robot's latest scan could see, and which of its rays were sent."""
+        """Field of view of a robot's latest scan, and the rays that were sent."""
         rr, missions, colour = self._rr, self._missions, robot_colour(robot)
         own, sensor = missions.state.robots[0, robot], missions.scenario.kind_of(robot).sensor
         pose, depth_m = own["scan_pose"], max(float(own["depth_m"]), missions.grid.voxel_size_m)
@@ -189,7 +189,7 @@ class RerunView:
 
 
 class _Cells:
-    """What is shown of each cell of the world, and what was written of it last."""
+    """The cells of the world as they were written last."""
 
     def __init__(self, shape: tuple[int, int, int]) -> None:
         self.stride = next(
@@ -241,7 +241,7 @@ def _block_sums(cells: np.ndarray) -> np.ndarray:
 
 
 def cone_edges(sensor: RangeSensor, yaw: float, pitch: float) -> list[np.ndarray]:
-    """Polylines (N, 3) around what a sensor at (0, 0, 0) sees, 1 m away: its outline and its edges."""
+    """Polylines (N, 3) around the field of view of a sensor at (0, 0, 0), 1 m away: outline and edges."""
     model = sensor_model(sensor)
     yaws = np.linspace(model.yaw_offsets[0], model.yaw_offsets[-1], 17) + yaw
     low, high = (np.stack(_gazes(yaws, pitch + model.pitch_offsets[end]), axis=-1) for end in (-1, 0))
@@ -250,7 +250,7 @@ def cone_edges(sensor: RangeSensor, yaw: float, pitch: float) -> list[np.ndarray
 
 
 def shared_ends_m(missions: Missions, robot: int) -> np.ndarray:
-    """(N, 3) float64 where those measurements of a robot's latest scan end that it sent, best first."""
+    """(N, 3) float64 end points of the measurements of a robot's latest scan that it sent, best first."""
     scenario, state = missions.scenario, missions.state
     own, sensor = state.robots[0, robot], scenario.kind_of(robot).sensor
     model = sensor_model(sensor)
@@ -270,7 +270,7 @@ def _gazes(yaw: Any, pitch: Any) -> tuple[np.ndarray, ...]:  # noqa: ANN401 - nu
     return np.broadcast_arrays(np.cos(yaw) * np.cos(pitch), np.sin(yaw) * np.cos(pitch), -np.sin(pitch))
 
 
-def _turned(yaw: float, pitch: float) -> tuple[float, float, float, float]:
+def _quaternion(yaw: float, pitch: float) -> tuple[float, float, float, float]:
     """Quaternion (x, y, z, w) of a gaze: pitch about y, then yaw about z."""
     sin_yaw, cos_yaw = math.sin(0.5 * yaw), math.cos(0.5 * yaw)
     sin_pitch, cos_pitch = math.sin(0.5 * pitch), math.cos(0.5 * pitch)
@@ -283,7 +283,7 @@ def _blueprint() -> Any:  # noqa: ANN401 - Rerun's
 
     views = [
         rrb.Spatial3DView(origin="/world", name=name, contents=["+ /world/**", f"- /world/{hidden}/**"])
-        for name, hidden in (("entropy, as robot_0 knows it", "coverage"), ("coverage", "entropy"))
+        for name, hidden in (("entropy of robot_0's belief", "coverage"), ("coverage", "entropy"))
     ]
     curves = [
         rrb.TimeSeriesView(origin="/entropy_left", name="entropy left"),

@@ -134,7 +134,7 @@ def test_a_picture_shows_the_first_mission_as_robot_0_knows_it(changes, frames):
     assert "box-7x11x5" in frame.title and "robot_0" in frame.title
     said = " ".join(frame.status)
     assert f"time {times[-1]:,.0f} s" in said and f"scans {robots['scans'].sum():,}" in said
-    assert f"shared {robots['measurements_sent'].sum():,}" in said
+    assert f"rays sent {robots['measurements_sent'].sum():,}" in said
 
 
 def test_pictures_name_the_world_of_their_own_mission(frames):

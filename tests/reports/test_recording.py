@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from entropy_explore_env.reports.recording import Recorder, Ways, poses_now
+from entropy_explore_env.reports.recording import DrivenPaths, Recorder, poses_now
 from entropy_explore_env.settings import Robot, RobotKind
 from tests.reference.scenes import free_box, random_actions, started
 
@@ -36,17 +36,19 @@ def recorded(steps: int, robots: int = 3):
 
 def test_a_recorder_keeps_every_moment_as_it_was():
     recorder, said = recorded(25)
-    time_s, entropy_bits, scans, shared, places_m = (np.asarray(column) for column in zip(*said, strict=True))
+    time_s, entropy_bits, scans, shared, scan_positions_m = (
+        np.asarray(column) for column in zip(*said, strict=True)
+    )
     assert (recorder.time_s.shape, recorder.time_s.dtype) == ((26,), np.float64)
     assert (recorder.entropy_bits.shape, recorder.entropy_bits.dtype) == ((26, 3), np.float64)
-    assert (recorder.places_m.shape, recorder.places_m.dtype) == ((26, 3, 3), np.float64)
+    assert (recorder.scan_positions_m.shape, recorder.scan_positions_m.dtype) == ((26, 3, 3), np.float64)
     assert recorder.scans.shape == recorder.shared.shape == (26,)
     assert recorder.scans.dtype.kind == recorder.shared.dtype.kind == "i"
     np.testing.assert_array_equal(recorder.time_s, time_s)
     np.testing.assert_array_equal(recorder.entropy_bits, entropy_bits)
     np.testing.assert_array_equal(recorder.scans, scans)
     np.testing.assert_array_equal(recorder.shared, shared)
-    np.testing.assert_array_equal(recorder.places_m, places_m)
+    np.testing.assert_array_equal(recorder.scan_positions_m, scan_positions_m)
     assert recorder.scans[-1] > 20 and recorder.shared[-1] > 0
     assert len(np.unique(recorder.entropy_bits[:, 0])) > 5
 
@@ -54,7 +56,8 @@ def test_a_recorder_keeps_every_moment_as_it_was():
 def test_one_moment_of_one_robot_has_the_same_axes():
     recorder, _ = recorded(0, robots=1)
     shapes = [
-        getattr(recorder, name).shape for name in ("time_s", "entropy_bits", "scans", "shared", "places_m")
+        getattr(recorder, name).shape
+        for name in ("time_s", "entropy_bits", "scans", "shared", "scan_positions_m")
     ]
     assert shapes == [(1,), (1, 1), (1,), (1,), (1, 1, 3)]
 
@@ -70,7 +73,7 @@ def test_a_recorder_follows_the_first_mission_only():
         recorder.note()
         alone.note()
     np.testing.assert_array_equal(recorder.entropy_bits, alone.entropy_bits)
-    np.testing.assert_array_equal(recorder.places_m, alone.places_m)
+    np.testing.assert_array_equal(recorder.scan_positions_m, alone.scan_positions_m)
 
 
 WANDERERS = {
@@ -86,20 +89,20 @@ WANDERERS = {
 
 @pytest.mark.parametrize("period_s", [None, 0.3, 5.0])
 @pytest.mark.parametrize("kind", WANDERERS)
-def test_ways_are_those_that_were_driven(kind, period_s):
+def test_paths_are_those_that_were_driven(kind, period_s):
     """As long as the odometer says whenever a robot stands, through free space only, corners and all."""
     missions = started(
         free_box(robots=3, decision_period_s=period_s, ending={"sigma_end": 1e-3}, **WANDERERS[kind]), seed=6
     )
-    ways, stood, drives, rng = Ways(3), 0, set(), np.random.default_rng(2)
-    ways.note(missions)
+    paths, stood, drives, rng = DrivenPaths(3), 0, set(), np.random.default_rng(2)
+    paths.update(missions)
     for _ in range(60):
         missions.step(*random_actions(missions, rng))
-        ways.note(missions)
+        paths.update(missions)
         robots = missions.state.robots[0]
         drives |= set(enumerate(robots["depart_s"].tolist())) | {(robot, 0.0) for robot in range(3)}
-        for robot, way in enumerate(ways.so_far(missions)):
-            driven_m = np.linalg.norm(np.diff(way, axis=0), axis=1).sum()
+        for robot, path in enumerate(paths.to_now(missions)):
+            driven_m = np.linalg.norm(np.diff(path, axis=0), axis=1).sum()
             if robots["deciding"][robot]:
                 assert driven_m == pytest.approx(robots["distance_m"][robot], abs=1e-9)
                 stood += 1
@@ -107,9 +110,9 @@ def test_ways_are_those_that_were_driven(kind, period_s):
                 assert driven_m <= robots["distance_m"][robot] + 1e-9
     assert stood > 15
     truth = missions.worlds[0].occupied
-    for robot, way in enumerate(ways.so_far(missions)):
-        np.testing.assert_array_equal(way[-1], poses_now(missions, 0)[robot, :3])
+    for robot, path in enumerate(paths.to_now(missions)):
+        np.testing.assert_array_equal(path[-1], poses_now(missions, 0)[robot, :3])
         shares = np.linspace(0.0, 1.0, 50)[:, None, None]
-        between = way[:-1] + shares * (way[1:] - way[:-1])
+        between = path[:-1] + shares * (path[1:] - path[:-1])
         assert not truth[tuple(np.moveaxis(missions.grid.voxel_of(between), -1, 0))].any()
-    assert (sum(map(len, ways.passed_m)) > len(drives)) == (kind == "planned")  # corners
+    assert (sum(map(len, paths.passed_m)) > len(drives)) == (kind == "planned")  # corners

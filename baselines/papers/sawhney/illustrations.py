@@ -26,7 +26,7 @@ from baselines.strategies.frontier import FrontierStrategy, Metric
 from baselines.strategies.frontier.candidates import Chart
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.missions.view import RobotView
-from entropy_explore_env.reports.recording import Ways
+from entropy_explore_env.reports.recording import DrivenPaths
 from entropy_explore_env.settings import Grid
 
 TEAM = 3
@@ -168,18 +168,18 @@ def _options_on_the_way() -> tuple[np.ndarray, np.ndarray]:
 def snapshots(cell: Cell, seed: int, marks: Sequence[float] = _MARKS) -> list[Snapshot]:
     """A mission of a cell when shares but for the last were explored, as far as they were, and its end."""
     env, explorer = _environment(cell), FrontierStrategy(_run(cell).exploring)
-    ways, taken, grid = Ways(cell.scenario.robots), list[Snapshot](), cell.scenario.grid
+    ways, taken, grid = DrivenPaths(cell.scenario.robots), list[Snapshot](), cell.scenario.grid
 
     def snap(time_s: float, share: float, targets: Sequence[np.ndarray]) -> None:
         candidates, finished = explorer.allotter_of(0).candidates, all(explorer.idle)
         expected = np.zeros(grid.shape[:2], bool)
         for target in () if finished else targets:
             expected |= candidates.expected(grid.in_grid_units(target)[:3])
-        way = ways.so_far(env.missions)
+        way = ways.to_now(env.missions)
         taken.append(Snapshot(time_s, share, candidates.chart(), expected, way, finished))
 
     def look(share: float, views: Sequence[RobotView], chosen: Sequence[np.ndarray]) -> None:
-        ways.note(env.missions)
+        ways.update(env.missions)
         if len(taken) < len(marks) - 1 and share >= marks[len(taken)]:
             targets = list(env.missions.state.robots[0]["target"])
             for view, viewpoint in zip(views, chosen, strict=True):
@@ -187,7 +187,7 @@ def snapshots(cell: Cell, seed: int, marks: Sequence[float] = _MARKS) -> list[Sn
             snap(views[0].time_s, share, targets)
 
     times_s, shares = followed(env, explorer, seed, look)
-    ways.note(env.missions)
+    ways.update(env.missions)
     snap(times_s[-1], shares[-1], list(env.missions.state.robots[0]["target"]))
     return taken
 
