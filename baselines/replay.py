@@ -11,7 +11,6 @@ import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -19,7 +18,14 @@ from baselines.cli.arguments import OmitArgPrefixes, Positional, parse, run_comm
 from baselines.cli.mission_outputs import MissionLog, Outputs, Wanted, show_results
 from baselines.cli.progress import progress_bar
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
-from entropy_explore_env.reports.mission_record import MissionRecord, check_world, load_record, same_end
+from entropy_explore_env.reports.mission_record import (
+    MissionRecord,
+    check_world,
+    given_worlds_of,
+    load_record,
+    reset_options_of,
+    same_end,
+)
 from entropy_explore_env.version import VERSION
 
 _DIFFERS = 1
@@ -66,11 +72,9 @@ def _replayed(
     record: MissionRecord, log: MissionLog, show: Callable[[EntropyExploreEnv], None]
 ) -> EntropyExploreEnv:
     """The environment after the commands of the record, or after the mission's end if that came earlier."""
-    world: dict[str, Any] = {} if record.world is None else {"world": record.world}
-    env = EntropyExploreEnv(record.scenario, **world)
-    env.reset(seed=record.seed)
-    for _ in range(record.episode):
-        env.reset()
+    env = EntropyExploreEnv(record.scenario, **given_worlds_of(record))
+    env.missions.seeds[0], env.missions.episodes[0] = record.seed, record.episode - 1
+    env.reset(seed=None if record.episode else record.seed, options=reset_options_of(record))
     check_world(record, env.missions)
     log.note(env)
     show(env)

@@ -15,6 +15,7 @@ from pathlib import Path
 from baselines.cli.arguments import OmitArgPrefixes, Positional, parse, run_command
 from baselines.cli.mission_outputs import MissionLog, Outputs, Wanted, show_results
 from baselines.cli.progress import progress_bar
+from baselines.cli.start_options import reset_options
 from baselines.cli.world_options import Reading, world_settings
 from baselines.experiments.mission import run_mission, scripted
 from baselines.strategies import make_strategy
@@ -42,6 +43,11 @@ class Args:
     """Of the world, the starts and every other draw."""
     world: str | None = None
     """A world file in place of the scenario's world; entropy_explore_env.worlds lists the kinds."""
+    world_number: int | None = None
+    """The world with this number of the scenario's recipe; default: drawn by the seed."""
+    starts: str | None = None
+    """Poses of all robots as JSON, or a file of it: [[x, y, z, yaw, pitch], ...] in metres and radians,
+    of planar robots also [x, y, yaw]; default: drawn by the seed."""
     voxel_size_m: float | None = None
     """Resample the world file's voxels to this size; default: the scenario's."""
     world_file: OmitArgPrefixes[Reading] = dataclasses.field(default_factory=Reading)
@@ -63,6 +69,7 @@ def main(words: Sequence[str]) -> int:
     strategy = make_strategy(args.strategy)
     check_whole("seed", args.seed, 0)
     env = _env(args)
+    options = reset_options(args.starts, args.world_number, env.scenario)
     wanted = Wanted(args.output, args.out, args.record)
     wanted.prepare()
     title = f"{args.scenario}, {args.strategy}"
@@ -72,7 +79,7 @@ def main(words: Sequence[str]) -> int:
             log.note(env)
             show(env)
 
-        run_mission(env, strategy, args.seed, after_step, log.command)
+        run_mission(env, strategy, args.seed, after_step, log.command, options)
         figures, written = log.finish(args.strategy)
     show_results(env, figures, written, args.output.json)
     return 0

@@ -19,6 +19,7 @@ from entropy_explore_env.compilation.kernels import forget_stale_kernels
 forget_stale_kernels(Path(__file__).parent)
 
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv, env, parallel_env  # noqa: E402
+from entropy_explore_env.envs.rewards import StepFigures  # noqa: E402
 from entropy_explore_env.envs.single_env import SingleRobotEnv  # noqa: E402
 from entropy_explore_env.envs.vector_env import EntropyExploreVectorEnv  # noqa: E402
 from entropy_explore_env.errors import (  # noqa: E402
@@ -80,6 +81,7 @@ __all__ = [
     "Scenario",
     "SettingError",
     "SingleRobotEnv",
+    "StepFigures",
     "World",
     "WorldError",
     "env",

@@ -9,6 +9,8 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, Literal, TypeVar
 
+import numpy as np
+
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.settings import (
     Action,
@@ -175,6 +177,11 @@ class Scenario:
             return 0
         layers = robot.sensor_height_m / self.grid.voxel_size_m
         return int(layers + 1e-9) if robot.motion == "planar" else None  # 0.3 / 0.1 is 3
+
+    def plane_m(self, robot: int) -> float | None:
+        """Height z, in the map frame, of the plane in which a robot of the team stays; None if it flies."""
+        layer = self.layer_of(self.kind_of(robot).robot)
+        return None if layer is None else float(self.grid.centre_of(np.array([0, 0, layer]))[2])
 
     @cached_property
     def agents(self) -> tuple[str, ...]:

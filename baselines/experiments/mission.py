@@ -35,6 +35,7 @@ def run_mission(
     seed: int,
     after_step: Callable[[EntropyExploreEnv], None] | None = None,
     before_step: Callable[[Mapping[str, Any]], None] | None = None,
+    options: dict[str, Any] | None = None,
 ) -> None:
     """Reset the environment and let a strategy act until the mission is over.
 
@@ -44,8 +45,9 @@ def run_mission(
         seed: Of the mission.
         after_step: Called after the reset and after every step.
         before_step: Called with the actions before every step.
+        options: Of the reset: where the robots start, and in which world.
     """
-    env.reset(seed=seed)
+    env.reset(seed=seed, options=options)
     strategy.reset(env.scenario, env.strategy_generator())
     actions = {agent: _idle_action(env, agent) for agent in env.agents}
     if after_step is not None:

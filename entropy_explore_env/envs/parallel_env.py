@@ -14,8 +14,10 @@ from pettingzoo.utils.conversions import parallel_to_aec_wrapper
 
 from entropy_explore_env.envs.checks import ActionChecker
 from entropy_explore_env.envs.infos import robot_infos
+from entropy_explore_env.envs.rewards import RewardFunction, StepRewards
 from entropy_explore_env.errors import ActionError, CallOrderError, SettingError
 from entropy_explore_env.missions.action import action_space
+from entropy_explore_env.missions.reset_options import mission_options, named_options
 from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.missions.state import MissionEnd
 from entropy_explore_env.missions.view import RobotView, view_of
@@ -42,13 +44,19 @@ class EntropyExploreEnv(ParallelEnv[str, Any, Any]):
     }
 
     def __init__(
-        self, scenario: str | Scenario = "room", render_mode: str | None = None, **settings: object
+        self,
+        scenario: str | Scenario = "room",
+        render_mode: str | None = None,
+        *,
+        reward_function: RewardFunction | None = None,
+        **settings: object,
     ) -> None:
         """Make the environment; `reset` starts a mission.
 
         Args:
             scenario: A scenario's name, or a Scenario.
             render_mode: None, "human" or "rgb_array".
+            reward_function: Rewards the robots in place of the scenario's reward; see `envs.rewards`.
             **settings: Fields of the Scenario to change; `world` may also be a World, a sequence of
                 them, or a mapping of a file's `path` and options: see `worlds.given`.
 
@@ -58,7 +66,9 @@ class EntropyExploreEnv(ParallelEnv[str, Any, Any]):
         """
         check_render_mode(render_mode)
         asked, given = with_given_worlds(find_scenario(scenario), settings)
+        self._rewards = StepRewards(reward_function)
         self.missions = Missions(asked, given=given)
+        self.missions.reward_function = self._rewards.name
         self.scenario = self.missions.scenario
         self.render_mode = render_mode
         self.possible_agents = list(self.scenario.agents)
@@ -129,17 +139,20 @@ class EntropyExploreEnv(ParallelEnv[str, Any, Any]):
 
         Args:
             seed: Of all random streams; None goes on to the next mission of the last seed.
-            options: Not used.
+            options: `starts`, (A, 5), and `world`, a world number or a World, instead of drawn ones: see
+                `missions.reset_options`. They hold for this mission; the next reset draws again. What
+                PettingZoo's checkers send, an option named `options`, means nothing.
 
         Returns:
             Observations and infos by agent.
 
         Raises:
-            SettingError: The seed is not a whole number ≥ 0.
-            WorldError: The world has too little room for the team.
+            SettingError: The seed is not a whole number ≥ 0, an option is unknown, or robots cannot be
+                where they were put. Nothing has changed then.
+            WorldError: The world has too little room for the team, or another grid.
         """
-        del options
-        self.missions.reset(0, seed)
+        given = named_options(options, ignored="options")
+        self.missions.reset(0, seed, mission_options(given, self.scenario))
         self.agents = list(self.possible_agents)
         self._painter.watch(self.missions)
         return self._observations(), self._infos()
@@ -161,9 +174,11 @@ class EntropyExploreEnv(ParallelEnv[str, Any, Any]):
                 its space. Nothing has changed then.
         """
         boxes, numbers = self._checker.batch(self._in_order(actions))
+        before = self._rewards.before(self.missions)
         self.missions.step(boxes[None], numbers[None])
+        earned = self._rewards.after(self.missions, before)[0]
         observations, infos = self._observations(), self._infos()
-        rewards = dict(zip(self.agents, self.missions.state.robots[0]["reward"].tolist(), strict=True))
+        rewards = dict(zip(self.agents, earned.tolist(), strict=True))
         end = self.missions.over(0)
         terminations = dict.fromkeys(self.agents, end is MissionEnd.MAPPED)
         truncations = dict.fromkeys(self.agents, end in (MissionEnd.TIME_UP, MissionEnd.CYCLES_UP))
@@ -207,20 +222,25 @@ class EntropyExploreEnv(ParallelEnv[str, Any, Any]):
 
 
 def parallel_env(
-    scenario: str | Scenario = "room", render_mode: str | None = None, **settings: object
+    scenario: str | Scenario = "room",
+    render_mode: str | None = None,
+    *,
+    reward_function: RewardFunction | None = None,
+    **settings: object,
 ) -> EntropyExploreEnv:
     """A team's mission as a ParallelEnv: see `EntropyExploreEnv`.
 
     Args:
         scenario: A scenario's name (`entropy_explore_env.SCENARIOS`), or a Scenario.
         render_mode: None, `rgb_array` or `human`.
+        reward_function: Rewards the robots in place of the scenario's reward; see `envs.rewards`.
         **settings: Fields of the Scenario to change: `robots`, `world` (a recipe, a file, a World, or
             several Worlds dealt to missions in turn: see `worlds.given`),
             `decision_period_s`, `max_cycles`, `time_limit_s`, and its parts `grid`, `robot`, `sensor`,
             `channel` (`{"burst": 32, "i_min_bits": 0.3}`), `ending`, `reward`, `action`, `observation`,
             each a mapping of some of its fields or a whole object: see `help` of Scenario, Channel, …
     """
-    return EntropyExploreEnv(scenario, render_mode, **settings)
+    return EntropyExploreEnv(scenario, render_mode, reward_function=reward_function, **settings)
 
 
 class TurnTakingEnv(OrderEnforcingWrapper[str, Any, Any]):
@@ -254,7 +274,11 @@ class TurnTakingEnv(OrderEnforcingWrapper[str, Any, Any]):
 
 
 def env(
-    scenario: str | Scenario = "room", render_mode: str | None = None, **settings: object
+    scenario: str | Scenario = "room",
+    render_mode: str | None = None,
+    *,
+    reward_function: RewardFunction | None = None,
+    **settings: object,
 ) -> TurnTakingEnv:
     """The same as an AECEnv: robots act in turn, and the step is taken when all have."""
-    return TurnTakingEnv(parallel_env(scenario, render_mode, **settings))
+    return TurnTakingEnv(parallel_env(scenario, render_mode, reward_function=reward_function, **settings))

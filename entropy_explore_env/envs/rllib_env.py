@@ -43,9 +43,9 @@ class EntropyExploreMultiAgentEnv(MultiAgentEnv):
         """Make the environment; `reset` starts a mission.
 
         Args:
-            settings: What RLlib calls `env_config`: `scenario` and fields of it to change, as
-                `parallel_env` takes them; `seed`, of the training run. RLlib's own EnvContext adds which
-                runner of how many this is.
+            settings: What RLlib calls `env_config`: `scenario`, `reward_function` and fields of the scenario
+                to change, as `parallel_env` takes them; `seed`, of the training run. RLlib's own
+                EnvContext adds which runner of how many this is.
 
         Raises:
             SettingError: A setting is unknown or out of its range.
@@ -79,7 +79,7 @@ class EntropyExploreMultiAgentEnv(MultiAgentEnv):
             seed: Of all random streams; None goes on to the next mission of the last seed. Where the
                 settings hold the `seed` of a run, RLlib's number only tells the environments of one
                 runner apart: see `runner_seed`.
-            options: Not used.
+            options: As for `EntropyExploreEnv.reset`.
 
         Returns:
             Observations and infos of all robots: they all have to decide.

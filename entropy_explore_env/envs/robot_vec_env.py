@@ -12,9 +12,16 @@ from typing import Any
 import numpy as np
 from gymnasium.vector import AutoresetMode
 
+from entropy_explore_env.envs.rewards import RewardFunction
 from entropy_explore_env.envs.vector_env import EntropyExploreVectorEnv
 from entropy_explore_env.errors import MissingExtraError, SettingError
 from entropy_explore_env.missions.action import action_space
+from entropy_explore_env.missions.reset_options import (
+    ResetOptions,
+    batch_options,
+    mission_options,
+    named_options,
+)
 from entropy_explore_env.missions.snapshot import check_array, restore, snapshot
 from entropy_explore_env.missions.state import MissionEnd
 from entropy_explore_env.scenario import Scenario
@@ -56,6 +63,7 @@ class RobotVecEnv(VecEnv):
         *,
         threads: int | None = 1,
         seeds: Sequence[int] | None = None,
+        reward_function: RewardFunction | None = None,
         **settings: Any,  # noqa: ANN401 - whatever a setting may be
     ) -> None:
         """Make the missions.
@@ -65,6 +73,7 @@ class RobotVecEnv(VecEnv):
             missions: E.
             threads: That share the missions; None = one a processor. Results are the same.
             seeds: (E,) of the missions' first reset, whatever `seed` says; None = that, else fresh ones.
+            reward_function: Rewards the robots in place of the scenario's reward; see `envs.rewards`.
             **settings: Fields of the Scenario to change.
 
         Raises:
@@ -77,6 +86,7 @@ class RobotVecEnv(VecEnv):
             threads=threads,
             autoreset_mode=AutoresetMode.SAME_STEP,
             action_masks=False,
+            reward_function=reward_function,
             **settings,
         )
         if seeds is not None and (len(seeds) != missions or not all(is_whole(seed, 0) for seed in seeds)):
@@ -96,13 +106,21 @@ class RobotVecEnv(VecEnv):
     def reset(self) -> Any:  # noqa: ANN401 - an array, or a dict of them
         """Start all missions.
 
+        `set_options` gives `starts` and `world` for this reset, as `EntropyExploreVectorEnv.reset` takes
+        them; options given row by row are those of one mission each, the same for all of its rows.
+
         Returns:
             Observations of the rows, (N, ...).
+
+        Raises:
+            SettingError: An option is unknown or not allowed. Nothing has changed then.
+            WorldError: A world has too little room for the team, or another grid.
         """
         seeds: Any = self._first_seeds
         if seeds is None and self._seeds[0] is not None:
             seeds = [self._seeds[row] for row in range(0, self.num_envs, self._robots)]
-        observations, infos = self.vector_env.reset(seed=seeds)
+        seeds = [None] * self._team[0] if seeds is None else seeds
+        observations, infos = self.vector_env.reset_missions(range(self._team[0]), seeds, self._fixed())
         self._reset_seeds()
         self._reset_options()
         self._first_seeds = None
@@ -110,6 +128,14 @@ class RobotVecEnv(VecEnv):
         self.deciding = infos["deciding"].reshape(-1)
         self._returns[:], self._steps[:], self._time_s[:] = 0.0, 0, 0.0
         return self._rows(observations)
+
+    def _fixed(self) -> list[ResetOptions]:
+        """What `set_options` gave for the missions."""
+        scenario, missions = self.scenario, self._team[0]
+        if all(row is self._options[0] for row in self._options):
+            return batch_options(named_options(self._options[0]), scenario, missions)
+        each = [self._options[row] for row in range(0, self.num_envs, self._robots)]
+        return [mission_options(named_options(options), scenario) for options in each]
 
     def step_async(self, actions: np.ndarray) -> None:
         """Take the rows' actions, (N,) or (N, K)."""

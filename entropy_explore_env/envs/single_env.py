@@ -9,8 +9,10 @@ import numpy as np
 
 from entropy_explore_env.envs.checks import ActionChecker
 from entropy_explore_env.envs.infos import robot_infos
+from entropy_explore_env.envs.rewards import RewardFunction, StepRewards
 from entropy_explore_env.errors import CallOrderError, SettingError
 from entropy_explore_env.missions.action import action_space
+from entropy_explore_env.missions.reset_options import mission_options, named_options
 from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.missions.state import MissionEnd
 from entropy_explore_env.missions.view import RobotView, view_of
@@ -27,13 +29,19 @@ class SingleRobotEnv(gymnasium.Env[Any, Any]):
     metadata = {"render_modes": list(RENDER_MODES), "render_fps": FRAMES_PER_S}  # noqa: RUF012 - Gymnasium's form
 
     def __init__(
-        self, scenario: str | Scenario = "room", render_mode: str | None = None, **settings: object
+        self,
+        scenario: str | Scenario = "room",
+        render_mode: str | None = None,
+        *,
+        reward_function: RewardFunction | None = None,
+        **settings: object,
     ) -> None:
         """Make the environment; `reset` starts a mission.
 
         Args:
             scenario: A scenario's name, or a Scenario; its team size is set to 1.
             render_mode: None, "human" or "rgb_array".
+            reward_function: Rewards the robots in place of the scenario's reward; see `envs.rewards`.
             **settings: Fields of the Scenario to change; `world` may also be a World, a sequence of
                 them, or a mapping of a file's `path` and options: see `worlds.given`.
 
@@ -45,7 +53,9 @@ class SingleRobotEnv(gymnasium.Env[Any, Any]):
         if settings.get("robots", 1) != 1:
             raise SettingError("robots", settings["robots"], "1; parallel_env() takes a team")
         asked, given = with_given_worlds(find_scenario(scenario), {**settings, "robots": 1})
+        self._rewards = StepRewards(reward_function)
         self.missions = Missions(asked, given=given)
+        self.missions.reward_function = self._rewards.name
         self.scenario = self.missions.scenario
         self.render_mode = render_mode
         space = action_space(self.scenario)
@@ -58,9 +68,10 @@ class SingleRobotEnv(gymnasium.Env[Any, Any]):
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Any, dict[str, Any]]:
         """Start a mission; see `EntropyExploreEnv.reset`."""
+        given = mission_options(named_options(options), self.scenario)
+        drawn = self.missions.draw([0], [seed], [given])
         super().reset(seed=None if seed is None else check_seed(seed))
-        del options
-        self.missions.reset(0, seed)
+        self.missions.begin(drawn)
         self._painter.watch(self.missions)
         return self._observation(), robot_infos(self.missions, 0)[0]
 
@@ -71,11 +82,12 @@ class SingleRobotEnv(gymnasium.Env[Any, Any]):
         if self.missions.over(0) is not MissionEnd.RUNNING:
             raise CallOrderError("step after the mission's end: call reset() first")
         boxes, numbers = self._checker.one("robot_0", action)
+        before = self._rewards.before(self.missions)
         self.missions.step(boxes[None], numbers[None])
+        reward = float(self._rewards.after(self.missions, before)[0, 0])
         self._painter.watch(self.missions)
         end = self.missions.over(0)
         truncated = end in (MissionEnd.TIME_UP, MissionEnd.CYCLES_UP)
-        reward = float(self.missions.state.robots[0, 0]["reward"])
         return (
             self._observation(),
             reward,

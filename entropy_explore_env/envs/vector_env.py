@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -11,8 +11,10 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
 from entropy_explore_env.envs.checks import ActionChecker
+from entropy_explore_env.envs.rewards import RewardFunction, StepRewards
 from entropy_explore_env.errors import CallOrderError, SettingError
 from entropy_explore_env.missions.action import action_space
+from entropy_explore_env.missions.reset_options import NAMES, ResetOptions, batch_options, named_options
 from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.missions.state import MissionEnd
 from entropy_explore_env.randomness import check_seed
@@ -48,6 +50,7 @@ class EntropyExploreVectorEnv(VectorEnv[Any, Any, Any]):
         autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
         render_mode: str | None = None,
         action_masks: bool = True,
+        reward_function: RewardFunction | None = None,
         **settings: object,
     ) -> None:
         """Make the missions; `reset` starts them.
@@ -60,6 +63,7 @@ class EntropyExploreVectorEnv(VectorEnv[Any, Any, Any]):
                 is ignored), within the same step, or never.
             render_mode: None, "human" or "rgb_array", of the first mission.
             action_masks: Whether infos hold the masks of discrete actions; without them steps are faster.
+            reward_function: Rewards the robots in place of the scenario's reward; see `envs.rewards`.
             **settings: Fields of the Scenario to change; `world` may also be a World, a sequence of
                 them, or a mapping of a file's `path` and options: see `worlds.given`.
 
@@ -75,7 +79,9 @@ class EntropyExploreVectorEnv(VectorEnv[Any, Any, Any]):
             allowed = "one of " + ", ".join(mode.value for mode in AutoresetMode)
             raise SettingError("autoreset_mode", autoreset_mode, allowed) from None
         asked, given = with_given_worlds(find_scenario(scenario), settings)
+        self._rewards = StepRewards(reward_function)
         self.missions = Missions(asked, num_envs, threads, given)
+        self.missions.reward_function = self._rewards.name
         self.scenario = self.missions.scenario
         self.num_envs = self.missions.count
         self.metadata = {
@@ -102,30 +108,42 @@ class EntropyExploreVectorEnv(VectorEnv[Any, Any, Any]):
 
         Args:
             seed: A number, of which mission e takes `seed + e`; or one number (or None) a mission.
-            options: May hold a reset mask.
+            options: May hold `reset_mask`; `starts`, (A, 5) or (E, A, 5), and `world`, a world number,
+                a World or a list of E of them, instead of drawn ones: see `missions.reset_options`. They hold
+                for the missions that start now; those that start anew by themselves draw again.
 
         Returns:
             Observations and infos.
 
         Raises:
-            SettingError: The seeds or the mask do not fit.
-            WorldError: A world has too little room for the team.
+            SettingError: The seeds or the mask do not fit, an option is unknown, or robots cannot be
+                where they were put. Nothing has changed then.
+            WorldError: A world has too little room for the team, or another grid.
         """
-        if options is not None and not isinstance(options, Mapping):
-            raise SettingError("options", options, "a dict, or None")
-        for name in options or ():
-            if name != "reset_mask":
-                raise SettingError("options", name, "nothing but reset_mask")
-        given = (options or {}).get("reset_mask", np.ones(self.num_envs, bool))
+        asked = named_options(options, ("reset_mask", *NAMES))
+        fixed = batch_options(asked, self.scenario, self.num_envs)
+        given = asked.get("reset_mask", np.ones(self.num_envs, bool))
         mask = given if isinstance(given, np.ndarray) else np.zeros(0)
         if mask.shape != (self.num_envs,) or mask.dtype != np.bool_ or not mask.any():
             allowed = f"a bool array of shape ({self.num_envs},), not all False"
             raise SettingError("reset_mask", given, allowed)
-        seeds = self._seeds(seed)
         if min(self.missions.episodes) < 0 and not mask.all():
             raise CallOrderError("reset_mask before the first reset: reset all missions once")
-        chosen = np.flatnonzero(mask).tolist()
-        self.missions.reset_some(chosen, [seeds[mission] for mission in chosen])
+        return self.reset_missions(np.flatnonzero(mask).tolist(), self._seeds(seed), fixed)
+
+    def reset_missions(
+        self, chosen: Sequence[int], seeds: Sequence[int | None], fixed: Sequence[ResetOptions]
+    ) -> tuple[Any, dict[str, Any]]:
+        """Start some missions; see `reset`.
+
+        Args:
+            chosen: Which of the E.
+            seeds: (E,) of all missions.
+            fixed: (E,) what is given instead of being drawn.
+        """
+        self.missions.reset_some(
+            chosen, [seeds[mission] for mission in chosen], [fixed[mission] for mission in chosen]
+        )
         for painter in self._painters:
             painter.watch(self.missions)
         return self._observations(), self._infos()
@@ -154,7 +172,7 @@ class EntropyExploreVectorEnv(VectorEnv[Any, Any, Any]):
         """
         if min(self.missions.episodes) < 0:
             raise CallOrderError("step before reset: call reset() first")
-        clocks, robots = self.missions.state.missions, self.missions.state.robots
+        clocks = self.missions.state.missions
         boxes, numbers = self._checker.table(actions, self.num_envs, self.scenario.robots)
         over = np.flatnonzero(clocks["end"] != _RUNNING)
         if len(over) and self.autoreset_mode is AutoresetMode.DISABLED:
@@ -162,18 +180,19 @@ class EntropyExploreVectorEnv(VectorEnv[Any, Any, Any]):
                 f"step after the end of missions {over.tolist()}: reset them with a reset_mask"
             )
         drawn = self.missions.draw(over.tolist(), [None] * len(over))
+        before = self._rewards.before(self.missions)
         self.missions.step(boxes, numbers)
-        rewards = robots["reward"].mean(axis=1)
-        rewards[over] = 0.0
+        earned = self._rewards.after(self.missions, before)
+        earned[over] = 0.0
         self.missions.begin(drawn)
         terminations, truncations = clocks["end"] == _MAPPED, clocks["end"] > _MAPPED
-        infos = self._infos()
+        infos = self._infos(earned)
         ended = np.flatnonzero(terminations | truncations)
         if len(ended) and self.autoreset_mode is AutoresetMode.SAME_STEP:
             infos = self._reset_within(ended, infos)
         for painter in self._painters:
             painter.watch(self.missions)
-        return self._observations(), rewards, terminations, truncations, infos
+        return self._observations(), earned.mean(axis=1), terminations, truncations, infos
 
     def _reset_within(self, ended: np.ndarray, last: dict[str, Any]) -> dict[str, Any]:
         """Start missions that have just ended anew; their last observation and info are kept."""
@@ -202,12 +221,13 @@ class EntropyExploreVectorEnv(VectorEnv[Any, Any, Any]):
     def _observations(self) -> np.ndarray | dict[str, np.ndarray]:
         return self.missions.layout.split(self._of_robots(self.missions.observations.copy()))
 
-    def _infos(self) -> dict[str, Any]:
+    def _infos(self, earned: np.ndarray | None = None) -> dict[str, Any]:
+        """The infos of this moment; `earned`, (E, A), are the rewards of a step, a reset brings none."""
         clocks, robots = self.missions.state.missions, self.missions.state.robots
         infos: dict[str, Any] = {name: clocks[name].copy() for name in ("time_s", "end")}
         for name in ("deciding", "entropy_bits", "own_bits", "received_bits"):
             infos[name] = self._of_robots(robots[name]).copy()
-        infos["reward_robots"] = self._of_robots(robots["reward"]).copy()
+        infos["reward_robots"] = self._of_robots(np.zeros(robots.shape) if earned is None else earned)
         if self._masks:
             infos["action_mask"] = self._of_robots(self.missions.action_masks())
         infos.update({f"_{name}": np.ones(self.num_envs, bool) for name in list(infos)})

@@ -76,3 +76,23 @@ def pose_at(numbers, robot, time_s):
         yaw = origin[3] + min(max(short_way, -most), most)
         pitch = origin[4] + min(max(goal[4] - origin[4], -most), most)
     return x, y, z, yaw, pitch
+
+
+@lean_kernel
+def driven_metres(team, missions, robots, out):
+    """Fill (E, A): metres that robots have driven up to now; `distance_m` counts a drive when it begins.
+
+    Args:
+        team: (A,) NUMBERS.
+        missions: (E,) MISSION.
+        robots: (E, A) ROBOT.
+        out: (E, A) float64.
+    """
+    for mission in range(robots.shape[0]):
+        time_s = missions[mission].time_s
+        for index in range(robots.shape[1]):
+            numbers, robot = team[index], robots[mission, index]
+            share, elapsed_s = 1.0, time_s - robot.depart_s
+            if time_s < robot.ready_s - numbers.scan_time_s:
+                share = driven_share(elapsed_s, robot.way_m, numbers.max_speed_m_s, numbers.acceleration_m_s2)
+            out[mission, index] = robot.distance_m - (1.0 - share) * robot.way_m

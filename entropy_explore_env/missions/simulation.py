@@ -6,17 +6,19 @@ import math
 import os
 from collections.abc import Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from typing import TypeAlias
+from typing import NamedTuple
 
 import numpy as np
 
 from entropy_explore_env.belief.entropy import map_entropy_bits
 from entropy_explore_env.belief.map_update import PRIOR_MEAN
 from entropy_explore_env.belief.pooling import fresh_sums
-from entropy_explore_env.errors import CallOrderError, WorldError
+from entropy_explore_env.errors import CallOrderError
 from entropy_explore_env.missions.navigation import plan_missions
 from entropy_explore_env.missions.observation import ObservationLayout, observation_rules, observe_mission
+from entropy_explore_env.missions.reset_options import DRAWN, ResetOptions
 from entropy_explore_env.missions.rules import rules_of
+from entropy_explore_env.missions.starts import checked_starts, start_poses
 from entropy_explore_env.missions.state import MissionEnd, MissionState, check_memory, new_state
 from entropy_explore_env.missions.tick import mask_missions, step_missions
 from entropy_explore_env.randomness import Stream, check_seed, generator, splitmix_states
@@ -26,16 +28,26 @@ from entropy_explore_env.scenario import Scenario
 from entropy_explore_env.settings import Grid, gaussian_entropy_bits
 from entropy_explore_env.validation import check_whole
 from entropy_explore_env.worlds.given import checked_worlds, in_given_worlds, world_in_turn
-from entropy_explore_env.worlds.load import make_world, with_world
+from entropy_explore_env.worlds.load import make_world, with_world, world_with_number
 from entropy_explore_env.worlds.world import World
 
 _CHUNKS_PER_THREAD = 4
 """Missions differ in work; smaller chunks even it out."""
 _ENDS = list(MissionEnd)
-_PLACING_ATTEMPTS = 64
-"""Random places tried for a robot before all are."""
-Start: TypeAlias = tuple[int, int, int, World, np.ndarray]
-"""Mission, seed, episode, world and (A, 5) start poses."""
+
+
+class Start(NamedTuple):
+    """What a mission starts with."""
+
+    mission: int
+    seed: int
+    episode: int
+    """How many resets without a seed it is behind the seed's own."""
+    world: World
+    poses: np.ndarray
+    """(A, 5) float64."""
+    options: ResetOptions
+    """What of it was given."""
 
 
 class Missions:
@@ -50,6 +62,9 @@ class Missions:
         count: Number of missions E.
         state: All that changes, as arrays.
         worlds: The true world of each mission; None before its first reset.
+        options: What was given to the latest reset of each mission, instead of drawing it.
+        reward_function: Name of the function that rewards the robots in place of the scenario's reward, for
+            records; empty = none. Missions themselves always reward by the scenario.
         layout: What an observation is made of.
         observations: (E, A, F) float32 of the latest step or reset.
     """
@@ -83,6 +98,8 @@ class Missions:
         self.state: MissionState = new_state(scenario, self.count, self.rules.cells)
         self._closed = np.zeros((self.count * int(self.rules.numbers["radii"][0]), 0), np.bool_)
         self.worlds: list[World | None] = [None] * self.count
+        self.options = [DRAWN] * self.count
+        self.reward_function = ""
         self.seeds = [0] * self.count
         self.episodes = [-1] * self.count
         self.observations = np.zeros((self.count, scenario.robots, self.layout.size), np.float32)
@@ -117,47 +134,77 @@ class Missions:
         """(E, A, X, Y, Z) float32 1/σ² by each robot's belief; a view."""
         return self.state.precision.reshape(self.count, self.scenario.robots, *self.grid.shape)
 
-    def reset(self, mission: int, seed: int | None = None) -> None:
+    def reset(self, mission: int, seed: int | None = None, options: ResetOptions = DRAWN) -> None:
         """Start a mission anew: world, starts and random streams drawn, beliefs at the prior.
 
         Args:
             mission: Which of the E.
             seed: Of all its random streams. None goes on to the next episode of the last seed.
+            options: What is given instead of being drawn, in this reset only.
 
         Raises:
-            SettingError: The seed is not a whole number ≥ 0.
+            SettingError: The seed is not a whole number ≥ 0, or robots cannot be where they were put.
             WorldError: The world has too little room for the team. Nothing has changed then.
         """
-        self.reset_some([mission], [seed])
+        self.reset_some([mission], [seed], [options])
 
-    def reset_some(self, missions: Iterable[int], seeds: Sequence[int | None]) -> None:
+    def reset_some(
+        self,
+        missions: Iterable[int],
+        seeds: Sequence[int | None],
+        options: Sequence[ResetOptions] | None = None,
+    ) -> None:
         """Start some missions anew: all of them, or none if one cannot be; see `reset`."""
-        self.begin(self.draw(missions, seeds))
+        self.begin(self.draw(missions, seeds, options))
 
-    def draw(self, missions: Iterable[int], seeds: Sequence[int | None]) -> list[Start]:
+    def draw(
+        self,
+        missions: Iterable[int],
+        seeds: Sequence[int | None],
+        options: Sequence[ResetOptions] | None = None,
+    ) -> list[Start]:
         """What missions would start with after a reset; nothing changes. See `reset`."""
-        return [self._draw(mission, seed) for mission, seed in zip(missions, seeds, strict=True)]
+        given = [DRAWN] * len(seeds) if options is None else options
+        return [
+            self._draw(mission, *self._episode(mission, seed), fixed)
+            for mission, seed, fixed in zip(missions, seeds, given, strict=True)
+        ]
 
     def begin(self, drawn: Iterable[Start]) -> None:
         """Start missions with what was drawn for them."""
         for start in drawn:
-            self._begin(*start)
+            self._begin(start)
 
-    def _draw(self, mission: int, seed: int | None) -> Start:
+    def start_episode(self, mission: int, seed: int, episode: int, options: ResetOptions = DRAWN) -> None:
+        """Start a mission as an episode of a seed, without those before it; see `reset`."""
+        self.begin([self._draw(mission, seed, episode, options)])
+
+    def _episode(self, mission: int, seed: int | None) -> tuple[int, int]:
+        """Seed and episode of a mission after a reset."""
         if seed is not None or self.episodes[mission] < 0:
-            number, episode = check_seed(seed), 0
-        else:
-            number, episode = self.seeds[mission], self.episodes[mission] + 1
-        if self.given:
-            world = world_in_turn(self.given, number, episode)
-        else:
-            world = make_world(self.scenario, generator(number, episode, Stream.WORLD))
-        poses = start_poses(self.scenario, world, generator(number, episode, Stream.STARTS))
-        return mission, number, episode, world, poses
+            return check_seed(seed), 0
+        return self.seeds[mission], self.episodes[mission] + 1
 
-    def _begin(self, mission: int, number: int, episode: int, world: World, poses: np.ndarray) -> None:
+    def _draw(self, mission: int, seed: int, episode: int, options: ResetOptions) -> Start:
+        if options.world is not None:
+            world = options.world
+        elif options.world_number is not None:
+            world = world_with_number(self.scenario, options.world_number)
+        elif self.given:
+            world = world_in_turn(self.given, seed, episode)
+        else:
+            world = make_world(self.scenario, generator(seed, episode, Stream.WORLD))
+        if options.starts is not None:
+            poses = checked_starts(self.scenario, world, options.starts)
+        else:
+            poses = start_poses(self.scenario, world, generator(seed, episode, Stream.STARTS))
+        return Start(mission, seed, episode, world, poses, options)
+
+    def _begin(self, start: Start) -> None:
         """Put the mission into its world, with beliefs at the prior, and observe."""
+        mission, number, episode, world, poses, options = start
         self.seeds[mission], self.episodes[mission] = number, episode
+        self.options[mission] = options
         if world.ceiling is not None and self.state.blocked is self.state.truth:
             self.state = self.state._replace(blocked=self.state.truth.copy())
         state = self.state
@@ -294,50 +341,3 @@ class Missions:
         self.__dict__.update(kept)
         self._make_working_space()
         self._pool = None
-
-
-def start_poses(scenario: Scenario, world: World, rng: np.random.Generator) -> np.ndarray:
-    """Draw where robots start: voxel centres with room, apart from each other, any yaw, level.
-
-    Robots are placed one after the other, so a smaller team starts like the first of a larger one;
-    where the scenario says so, near the first one.
-
-    Args:
-        scenario: The task.
-        world: The true world.
-        rng: The stream of starts.
-
-    Returns:
-        (A, 5) float64 poses.
-
-    Raises:
-        WorldError: The bodies find no room.
-    """
-    grid = world.grid
-    radii_m = np.array([scenario.kind_of(robot).robot.body_radius_m for robot in range(scenario.robots)])
-    poses = np.zeros((scenario.robots, 5))
-    for robot in range(scenario.robots):
-        starts = world.layout(scenario, scenario.kind_of(robot)).starts
-        if robot > 0 and scenario.start_radius_m < np.inf:
-            centres = grid.centre_of(np.stack(np.unravel_index(starts, grid.shape), axis=-1))
-            starts = starts[np.linalg.norm(centres - poses[0, :3], axis=1) <= scenario.start_radius_m]
-        apart_m = radii_m[robot] + radii_m[:robot] + 1e-3 * grid.voxel_size_m
-        tried = starts[rng.integers(len(starts), size=_PLACING_ATTEMPTS)] if len(starts) else starts
-        place = _first_apart(grid, tried, poses[:robot, :3], apart_m)
-        if place is None:
-            place = _first_apart(grid, rng.permutation(starts), poses[:robot, :3], apart_m)
-        if place is None:
-            nearest_m = float(apart_m.min()) if robot else 0.0
-            allowed = f"at most {robot}, for whose bodies, {nearest_m:.3g} m apart, the world has room"
-            raise WorldError("Scenario.robots", scenario.robots, allowed)
-        poses[robot, :3] = place
-        poses[robot, 3] = rng.uniform(-np.pi, np.pi)
-    return poses
-
-
-def _first_apart(grid: Grid, tried: np.ndarray, taken: np.ndarray, apart_m: np.ndarray) -> np.ndarray | None:
-    """(3,) centre of the first of the voxels (N,) that is as far as (K,) asks from those taken (K, 3)."""
-    centres = grid.centre_of(np.stack(np.unravel_index(tried, grid.shape), axis=-1))
-    gaps = np.sqrt(((centres[:, None] - taken) ** 2).sum(axis=-1))
-    clear = np.flatnonzero((gaps >= apart_m).all(axis=1))
-    return centres[clear[0]] if len(clear) else None

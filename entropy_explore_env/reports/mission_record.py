@@ -127,6 +127,7 @@ class CommandRecorder:
         missions = self._missions
         if missions.episodes[0] < 0:
             raise CallOrderError("record before reset: call reset() first")
+        starts, number, world = missions.options[0]
         return MissionRecord(
             scenario=missions.scenario,
             seed=missions.seeds[0],
@@ -137,7 +138,10 @@ class CommandRecorder:
             digest=state_digest(missions, 0),
             world_digest=world_digest(missions, 0),
             strategy=strategy,
-            world=missions.worlds[0] if missions.given else None,
+            world=missions.worlds[0] if missions.given else world,
+            world_number=number,
+            starts=None if starts is None else starts.copy(),
+            reward_function=missions.reward_function,
         )
 
     def _table(self) -> np.ndarray:
@@ -151,6 +155,18 @@ class CommandRecorder:
         for row, action in zip(table, given, strict=True):
             row[: action.size] = action
         return table.reshape(-1, robots, longest)
+
+
+def given_worlds_of(record: MissionRecord) -> dict[str, Any]:
+    """What an environment for the record takes beside the scenario: the world, where it was given to it."""
+    return {"world": record.world} if record.scenario.world == GIVEN else {}
+
+
+def reset_options_of(record: MissionRecord) -> dict[str, Any]:
+    """The options of `reset` that start the record's mission; empty where all was drawn."""
+    world = record.world_number if record.scenario.world == GIVEN or record.world is None else record.world
+    options = {"starts": record.starts, "world": world}
+    return {name: given for name, given in options.items() if given is not None}
 
 
 def same_end(record: MissionRecord, missions: Missions) -> bool:

@@ -210,7 +210,7 @@ def make_world(scenario: Scenario, rng: np.random.Generator) -> World:
 
 
 def world_with_number(scenario: Scenario, number: int) -> World:
-    """The world that a recipe makes from a world number.
+    """The world that a recipe makes from a world number; without chance in it, the same for all.
 
     Args:
         scenario: Its `world` names a recipe, its `grid` the workspace; nothing else matters.
@@ -224,6 +224,8 @@ def world_with_number(scenario: Scenario, number: int) -> World:
         raise SettingError("Scenario.world", scenario.world, "a recipe: " + ", ".join(RECIPES))
     if not is_whole(number, 0):
         raise SettingError("number", number, "a whole number ≥ 0")
+    if scenario.world == "empty":
+        return _empty_world(scenario)
     return RECIPES[scenario.world](scenario.grid, world_generator(number))
 
 

@@ -215,6 +215,45 @@ def test_a_world_file_is_read_as_asked_and_replayed_from_the_record(floor, comma
     assert json.loads(capsys.readouterr().out)["replayed"]["same"] is True
 
 
+def test_starts_and_a_world_number_are_taken_recorded_and_replayed(command, capsys, tmp_path):
+    record, file = tmp_path / "r.npz", tmp_path / "starts.json"
+    poses = [[0.75, 0.75, 0.75, 0.5, 0.1], [0.75, 3.75, 0.75, -2.0, -0.1]]
+    file.write_text(json.dumps(poses))
+    words = ("box-7x11x5", "--world-number", "12", "--record", str(record), "--json", *SHORT)
+    ran = [json.loads(command(*words, "--starts", given).out) for given in (json.dumps(poses), str(file))]
+    assert [each.pop("wall_s") >= 0.0 for each in ran] == [True] * 2 and ran[0] == ran[1]
+    kept = load_record(record)
+    assert kept.starts.tolist() == poses and kept.world_number == 12
+    assert run_command(replay.main, [str(record), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["replayed"]["same"] is True
+    planar = ("--robot.motion", "planar", "--starts", "[[0.75, 0.75, 0.5], [0.75, 3.75, -2]]")
+    command(*words, *planar)
+    assert load_record(record).starts.tolist() == [
+        [0.75, 0.75, 0.75, 0.5, 0.0],
+        [0.75, 3.75, 0.75, -2.0, 0.0],
+    ]
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (["--starts", "nowhere.json"], ["starts", "nowhere.json"]),
+        (["--starts", "[[1, 2"], ["starts", "JSON"]),
+        (["--starts", "[1, 2]"], ["starts", "JSON"]),
+        (["--starts", "[[1, 2, 0.5], [1, 2, 0.5]]"], ["starts[0]", "flies"]),
+        (["--starts", "[[1, 2, 1, 0, 0]]"], ["starts", "(2, 5)"]),
+        (["--starts", "[[1, 2, 1, 0, 0], [1, 2, 1, 0, 0]]"], ["starts[1]", "robot_0"]),
+        (["--world-number", "-1"], ["world = -1", "0 to 2147483647"]),
+        (["--world", "FLOOR", "--world-number", "1"], ["world = 1", "only the worlds of recipes"]),
+    ],
+)
+def test_starts_and_worlds_that_cannot_be_are_one_line_and_code_2(options, said, floor, command):
+    words = [str(floor) if word == "FLOOR" else word for word in options]
+    ran = command("box-7x11x5", "--robots", "2", *words, *SHORT)
+    assert ran.code == 2 and ran.err.count("\n") == 1
+    assert all(word in ran.err for word in said), ran.err
+
+
 def test_a_file_without_options_stays_a_setting_of_the_scenario(floor, command, tmp_path):
     record = tmp_path / "r.npz"
     assert command("office", "--world", str(floor), "--record", str(record), "--json", *SHORT).code == 0

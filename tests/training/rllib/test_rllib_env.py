@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from entropy_explore_env import ActionError, CallOrderError, SettingError, parallel_env
+from entropy_explore_env import ActionError, CallOrderError, SettingError, StepFigures, parallel_env
 from entropy_explore_env.envs.conformance import leaves, require_same
 
 pytest.importorskip("ray.rllib", reason="ray[rllib] is not installed: make test-rllib")
@@ -240,3 +240,39 @@ def test_unknown_settings_are_refused():
         EntropyExploreMultiAgentEnv({"scenario": "unknown"})
     with pytest.raises(SettingError, match="seed"):
         EntropyExploreMultiAgentEnv({"seed": -1})
+
+
+EARNED: list[np.ndarray] = []
+
+
+def noted(figures: StepFigures) -> np.ndarray:
+    """A reward of one's own: a figure or two of the step."""
+    EARNED.append(figures.gained_bits - 3.0 * figures.elapsed_s - 50.0 * figures.distance_m)
+    return EARNED[-1]
+
+
+def test_rewards_of_one_s_own_add_up_until_a_robot_decides() -> None:
+    apart = EntropyExploreMultiAgentEnv({**BOX, "decision_period_s": None, "reward_function": noted})
+    observations = apart.reset(seed=0)[0]
+    given = dict.fromkeys(apart.possible_agents, 0.0)
+    EARNED.clear()
+    for step in range(12):
+        actions = {agent: np.int64((7 * step + 11) % apart.action_spaces[agent].n) for agent in observations}
+        observations, rewards, *_ = apart.step(actions)
+        for agent, reward in rewards.items():
+            given[agent] += reward
+        totals = np.sum(EARNED, axis=0)[0]
+        for agent in observations:
+            assert given[agent] == pytest.approx(totals[apart.possible_agents.index(agent)])
+    assert len(EARNED) >= 12 and len(set(given.values())) == 3
+
+
+def test_starts_are_given_in_the_options() -> None:
+    apart = EntropyExploreMultiAgentEnv(BOX)
+    starts = np.array(
+        [[0.75, 0.75, 0.75, 0.5, 0.1], [0.75, 3.75, 0.75, -2.0, -0.1], [2.75, 2.25, 1.25, 0, 0]]
+    )
+    apart.reset(seed=0, options={"starts": starts})
+    np.testing.assert_array_equal(apart.team.missions.state.robots[0]["origin"], starts)
+    with pytest.raises(SettingError, match="did you mean starts"):
+        apart.reset(seed=0, options={"start": starts})

@@ -1,0 +1,156 @@
+"""What a reset may fix instead of drawing it: where the robots start, and the world.
+
+Options of `reset`, in every adapter (A robots, E missions):
+
+    starts  (A, 5), or of several missions (E, A, 5): the robots' poses x, y, z, yaw, pitch; map frame,
+            metres, radians. Checked by `checked_starts`.
+    world   a world number of the scenario's split (worlds/splits.py), or a World of the same grid; of
+            several missions also a list of E of them, None = drawn.
+
+The random streams stay as they are: what is given is not drawn, everything else is drawn as without it.
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Collection, Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from entropy_explore_env.errors import SettingError, WorldError
+from entropy_explore_env.scenario import Scenario
+from entropy_explore_env.validation import is_whole
+from entropy_explore_env.worlds.recipes.catalogue import RECIPES
+from entropy_explore_env.worlds.splits import WORLD_NUMBERS
+from entropy_explore_env.worlds.world import World
+
+NAMES = ("starts", "world")
+"""The options of every adapter."""
+
+
+class ResetOptions(NamedTuple):
+    """What is given for one mission; None = drawn."""
+
+    starts: np.ndarray | None = None
+    """(A, 5) float64, finite."""
+    world_number: int | None = None
+    world: World | None = None
+
+
+DRAWN = ResetOptions()
+"""Nothing is given."""
+
+
+def named_options(
+    options: object, allowed: Collection[str] = NAMES, ignored: str | None = None
+) -> dict[str, Any]:
+    """Options of a reset, by name.
+
+    Args:
+        options: As given to `reset`.
+        allowed: Their names.
+        ignored: A name that is taken and means nothing.
+
+    Raises:
+        SettingError: They are no mapping, or one of them is unknown.
+    """
+    if options is None:
+        return {}
+    if not isinstance(options, Mapping):
+        raise SettingError("options", options, "a dict, or None")
+    for name in options:
+        if name not in allowed and (ignored is None or name != ignored):
+            near = difflib.get_close_matches(str(name), allowed, 1)
+            meant = f"; did you mean {near[0]}?" if near else ""
+            raise SettingError("options", name, "nothing but " + ", ".join(allowed) + meant)
+    return dict(options)
+
+
+def mission_options(options: Mapping[str, Any], scenario: Scenario) -> ResetOptions:
+    """What is given for one mission.
+
+    Args:
+        options: As `named_options` gives them; other names than these are left alone.
+        scenario: The task.
+
+    Raises:
+        SettingError: The starts are no (A, 5) finite numbers, or the world is no number that the scenario
+            has, nor a World.
+        WorldError: The World has another grid.
+    """
+    starts, world = options.get("starts"), options.get("world")
+    shape = (scenario.robots, 5)
+    return ResetOptions(
+        None if starts is None else _finite_poses(starts, shape, f"{shape}"),
+        _world_number(world, scenario) if world is not None and not isinstance(world, World) else None,
+        _fitting_world(world, scenario) if isinstance(world, World) else None,
+    )
+
+
+def batch_options(options: Mapping[str, Any], scenario: Scenario, missions: int) -> list[ResetOptions]:
+    """What is given for each of E missions.
+
+    Args:
+        options: As for `mission_options`; one value for all missions, or E values.
+        scenario: The task.
+        missions: E.
+
+    Raises:
+        SettingError: As for `mission_options`, or there are not E values.
+        WorldError: A World has another grid.
+    """
+    starts, world = options.get("starts"), options.get("world")
+    each = [dict(options) for _ in range(missions)]
+    if starts is not None:
+        shape = (scenario.robots, 5)
+        if np.ndim(_as_numbers(starts)) == 3:
+            shape = (missions, *shape)
+        poses = _finite_poses(starts, shape, f"{(scenario.robots, 5)} or {(missions, scenario.robots, 5)}")
+        for mission in range(missions):
+            each[mission]["starts"] = poses[mission] if poses.ndim == 3 else poses
+    if isinstance(world, list | tuple | np.ndarray):
+        if len(world) != missions:
+            raise SettingError("world", world, f"one world, or {missions} of them")
+        for mission in range(missions):
+            each[mission]["world"] = world[mission]
+    return [mission_options(given, scenario) for given in each]
+
+
+def _as_numbers(starts: object) -> np.ndarray:
+    """An array of whatever was given; one of objects where it is no array of numbers."""
+    try:
+        return np.asarray(starts)
+    except ValueError:  # lists of different lengths
+        return np.asarray(None)
+
+
+def _finite_poses(starts: object, shape: tuple[int, ...], shapes: str) -> np.ndarray:
+    """A new float64 array of this shape, or an error that names the shapes allowed."""
+    poses = _as_numbers(starts)
+    if poses.shape != shape or poses.dtype.kind not in "fiu" or not np.isfinite(poses).all():
+        allowed = f"finite numbers of shape {shapes}: x, y, z, yaw, pitch of each robot"
+        raise SettingError("starts", starts, allowed)
+    return poses.astype(np.float64)
+
+
+def _world_number(number: object, scenario: Scenario) -> int:
+    """A world number, if the scenario has worlds by number and this one in its split."""
+    if scenario.world not in RECIPES:
+        allowed = "a World of the scenario's grid: only the worlds of recipes have numbers"
+        raise SettingError("world", number, allowed)
+    numbers = WORLD_NUMBERS[scenario.split]
+    if not is_whole(number, numbers.start, numbers.stop - 1):
+        allowed = f"a World, or a world number of the split '{scenario.split}': "
+        allowed += f"a whole number from {numbers.start} to {numbers.stop - 1}"
+        for split, others in WORLD_NUMBERS.items():
+            if is_whole(number, others.start, others.stop - 1):
+                allowed += f"; {number} is of the split '{split}'"
+        raise SettingError("world", number, allowed)
+    return int(number)
+
+
+def _fitting_world(world: World, scenario: Scenario) -> World:
+    if world.grid != scenario.grid:
+        raise WorldError("world.grid", world.grid, f"that of the scenario, {scenario.grid}")
+    return world
