@@ -2,7 +2,7 @@
 
     list [FOLDER]                      scenarios and names, or the files of a folder that can be read
     show NAME_OR_FILE --out world.png  a picture with metres
-    convert IN OUT.npz                 a world that loads fast and without loss
+    convert IN OUT.npz                 a file that loads fast, without loss
 
 Results go to standard output, errors in one line to standard error. Exit codes: 0 done, 2 bad input, 130
 interrupted.
@@ -30,11 +30,11 @@ from entropy_explore_env.writing import write_atomically
 _METRES = {
     "voxel-size-m": "edge of the voxels; default: the file's own",
     "height-m": "extrude a plan to this height",
-    "resolution-m": "edge of an image's pixel, or spacing of a height map that does not say it",
+    "resolution-m": "edge of an image's pixel, or spacing of a height map that does not state it",
     "elevation-step-m": "height of one count of a 16-bit image",
     "clearance-m": "free space above a height map, or around a mesh",
     "ceiling-m": "height of the exposure surface above the ground of a height map",
-    "read-limit-s": "seconds of computing that reading may take",
+    "read-limit-s": "limit of the processor time for reading",
 }
 """Options of `load_world` that are numbers."""
 
@@ -75,8 +75,12 @@ def _parser() -> argparse.ArgumentParser:
     for command in (show, convert):
         for name, text in _METRES.items():
             command.add_argument(f"--{name}", type=float, help=text)
-        command.add_argument("--negate", action="store_true", default=None, help="images: bright is solid")
-        command.add_argument("--hollow", action="store_true", help="meshes: do not fill what they shut in")
+        command.add_argument(
+            "--negate", action="store_true", default=None, help="images: bright pixels are solid"
+        )
+        command.add_argument(
+            "--hollow", action="store_true", help="meshes: do not fill the space that they enclose"
+        )
         command.add_argument("--seed", type=int, default=0, help="scenarios: of the mission in this world")
         command.add_argument("--split", default="train", help="scenarios: train, validation or test")
     return parser

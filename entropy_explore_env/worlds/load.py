@@ -48,7 +48,7 @@ FORMATS = {
     ".tif": _GEOTIFF,
     ".tiff": _GEOTIFF,
 }
-"""How a file is read, by its suffix, whatever its case."""
+"""Suffix in lower case → how the file is read."""
 
 
 def load_world(
@@ -69,8 +69,8 @@ def load_world(
     By suffix: OctoMap (`.bt`, `.ot`), map_server (`.yaml`, `.yml`), plans as images and 16-bit height maps
     (`.png`, `.pgm`), point clouds (`.pcd`, `.ply`), meshes (`.obj`, `.stl`, `.glb`, `.ply`), height maps
     (`.npz`, `.tif`, `.tiff`), worlds of `save_world` (`.npz`); and matplotlib's elevation model by the name
-    `jacksboro`. What each means is said in its file in `worlds/files`. A setting that means nothing for a
-    file is refused.
+    `jacksboro`. Each format is described in its file in `worlds/files`. Settings that do not apply to a
+    file are refused.
 
     Args:
         path: The file, or `jacksboro`.
@@ -78,18 +78,18 @@ def load_world(
             Where voxels are resampled, one is free if at least half of it is known to be free and less than
             a quarter of it is occupied, so that thin walls stay.
         height_m: Plans are extruded to this height; None = they stay 2-D.
-        resolution_m: Edge of an image's pixel (None = 0.05); spacing of a height map that does not say it.
-        negate: Images: what is bright is solid.
+        resolution_m: Edge of an image's pixel (None = 0.05); spacing of a height map that does not state it.
+        negate: Images: bright pixels are solid.
         elevation_step_m: 16-bit images: height of one count; None = 1.
         clearance_m: Height maps: sky above the highest ground (None = 5 voxels, or up to the ceiling);
             meshes: free space around them (None = none).
         ceiling_m: Height maps: the exposure surface above the ground (World.ceiling); None = none.
-        fill: Meshes: make solid what the surface shuts in; None = yes.
-        read_limit_s: Seconds of computing that reading may take; None = 1.5, and 20 more for each MiB.
+        fill: Meshes: whether the space that the surface encloses is solid; None = yes.
+        read_limit_s: Limit of the processor time for reading; None = 1.5 s, and 20 s for each MiB.
 
     Raises:
         WorldError: The file is missing, too large, broken, of no known kind or has no free space.
-        SettingError: A setting is out of its range, missing, or means nothing for this file.
+        SettingError: A setting is out of its range, missing, or does not apply to this file.
         MissingExtraError: The package that reads this format is not installed.
     """
     options = {
@@ -111,8 +111,8 @@ def load_world(
     return _world(read_apart(form, path.absolute(), options, read_limit_s), str(path), options, height_m)
 
 
-LOADING = tuple(inspect.signature(load_world).parameters)[1:]
-"""Options of `load_world`."""
+LOAD_OPTIONS = tuple(inspect.signature(load_world).parameters)[1:]
+"""The names of the options of `load_world`."""
 
 
 def load_octomap(path: Path | str, voxel_size_m: float | None = None) -> World:
@@ -123,7 +123,7 @@ def load_octomap(path: Path | str, voxel_size_m: float | None = None) -> World:
 
 
 def save_world(world: World, path: Path) -> None:
-    """Write a world to an `.npz` that `load_world` gives back without loss.
+    """Write a world to an `.npz`, from which `load_world` restores it without loss.
 
     Raises:
         OSError: The file cannot be written.
@@ -132,7 +132,7 @@ def save_world(world: World, path: Path) -> None:
 
 
 def world_bytes(world: World) -> bytes:
-    """What `save_world` writes."""
+    """The content of the file that `save_world` writes."""
     voxels = Voxels(
         world.occupied.view(np.int8),
         world.grid.voxel_size_m,
@@ -145,7 +145,7 @@ def world_bytes(world: World) -> bytes:
 
 
 def world_from_bytes(data: bytes) -> World:
-    """The world that `world_bytes` wrote. Nothing in it is executed.
+    """Restore a world from `world_bytes`. Nothing in the bytes is executed.
 
     Raises:
         RefusedError: It is no saved world. A broken archive raises whatever zipfile and NumPy raise.
@@ -154,7 +154,7 @@ def world_from_bytes(data: bytes) -> World:
 
 
 def _check(options: dict[str, Any]) -> None:
-    """Numbers are > 0 and finite, flags are flags."""
+    """Check that numbers are > 0 and finite, and flags booleans."""
     for name, value in options.items():
         if value is None:
             continue
@@ -192,11 +192,11 @@ def _world(voxels: Voxels, path: str, options: dict[str, Any], height_m: float |
 def make_world(scenario: Scenario, rng: np.random.Generator) -> World:
     """The true world of a mission.
 
-    Worlds without chance in them are made once and shared.
+    Worlds without random elements are made once and shared.
 
     Args:
         scenario: Its `world` names a recipe or a file.
-        rng: The stream of worlds; recipes with chance take one draw of it, the world number.
+        rng: The stream of worlds; random recipes take one draw from it, the world number.
 
     Raises:
         SettingError: Neither a recipe nor a file has this name.
@@ -235,7 +235,7 @@ def _empty_world(scenario: Scenario) -> World:
 
 
 def world_from_file(path: Path, voxel_size_m: float, **options: Any) -> World:  # noqa: ANN401 - as load_world's
-    """The world in a file, its voxels resampled; kept, so that many missions read it once.
+    """The world in a file, resampled; cached, so that many missions read it once.
 
     Args:
         path: As for `load_world`.
@@ -251,32 +251,32 @@ def world_from_file(path: Path, voxel_size_m: float, **options: Any) -> World:  
         allowed = f"a recipe ({', '.join(RECIPES)}), a file ({files}) or, to an environment, a World"
         raise SettingError("Scenario.world", str(path), allowed)
     for name, value in options.items():
-        if name not in LOADING:
-            raise SettingError(name, value, "one of the options " + ", ".join(LOADING))
+        if name not in LOAD_OPTIONS:
+            raise SettingError(name, value, "one of the options " + ", ".join(LOAD_OPTIONS))
     _check(options)
     path = path if str(path) == JACKSBORO else path.resolve()
-    return _kept_world(path, _written(path), voxel_size_m, tuple(sorted(options.items())))
+    return _cached_world(path, _file_version(path), voxel_size_m, tuple(sorted(options.items())))
 
 
-def _written(path: Path) -> tuple[int, int]:
-    """When a file was written last, and its size: of another one the world is read anew."""
+def _file_version(path: Path) -> tuple[int, int]:
+    """Time of the last change of a file, and its size: a changed file is read again."""
     try:
         about = path.stat()
-    except OSError:  # a name, or a file that reading will miss
+    except OSError:  # a name, or a missing file, which reading reports
         return 0, 0
     return about.st_mtime_ns, about.st_size
 
 
 @lru_cache(maxsize=4)
-def _kept_world(
-    path: Path, written: tuple[int, int], voxel_size_m: float, options: tuple[tuple[str, Any], ...]
+def _cached_world(
+    path: Path, version: tuple[int, int], voxel_size_m: float, options: tuple[tuple[str, Any], ...]
 ) -> World:
-    del written
+    del version  # part of the key of the cache
     return load_world(path, voxel_size_m, **dict(options))
 
 
 def with_world(scenario: Scenario) -> Scenario:
-    """The scenario with the grid of its world's file; as it is where the world is a recipe.
+    """The scenario with the grid of its world's file; unchanged where the world is a recipe.
 
     The scenario's voxel size is kept: the file's voxels are resampled to it.
 

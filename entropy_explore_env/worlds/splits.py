@@ -40,5 +40,5 @@ def draw_world_number(split: str, rng: np.random.Generator) -> int:
 
 
 def world_generator(number: int) -> np.random.Generator:
-    """What a recipe draws the world with this number from."""
+    """The random generator that a recipe draws the world with this number from."""
     return np.random.default_rng(np.random.SeedSequence(number))

@@ -28,7 +28,7 @@ from entropy_explore_env.reports.metrics import mission_figures
 from entropy_explore_env.reports.mission_record import load_record
 from entropy_explore_env.scenario import with_settings
 from entropy_explore_env.scenarios import BOX
-from entropy_explore_env.worlds.load import LOADING
+from entropy_explore_env.worlds.load import LOAD_OPTIONS
 from tests.worlds.samples import pgm
 
 ROOT = Path(__file__).parents[2]
@@ -289,7 +289,7 @@ def test_the_table_leaves_out_what_means_nothing(command):
         (["--height-m", "2"], ["height_m", "--world"]),
         (["--negate"], ["negate", "--world"]),
         (["--hollow"], ["hollow", "--world"]),
-        (["--world", "FLOOR", "--ceiling-m", "2"], ["ceiling_m", "means nothing"]),
+        (["--world", "FLOOR", "--ceiling-m", "2"], ["ceiling_m", "does not apply"]),
         (["--world", "FLOOR", "--height-m", "-2"], ["height_m", "a number > 0"]),
         (["--world", "FLOOR", "--height-m", "tall"], ["--height-m"]),
         (["--world", "office", "--height-m", "2"], ["a file"]),
@@ -304,7 +304,7 @@ def test_options_that_a_world_does_not_take_are_refused(words, said, floor, comm
 
 def test_every_option_of_load_world_is_an_option_of_the_command():
     options = {field.name for field in dataclasses.fields(Reading)}
-    assert options - {"hollow"} | {"fill", "voxel_size_m"} == set(LOADING)
+    assert options - {"hollow"} | {"fill", "voxel_size_m"} == set(LOAD_OPTIONS)
     asked = Reading(1.0, 2.0, True, 3.0, 4.0, 5.0, True, 6.0).options()
     assert (
         asked.pop("fill") is False

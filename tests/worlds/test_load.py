@@ -68,7 +68,7 @@ def test_settings_that_mean_nothing_for_a_file_are_refused(tmp_path):
     path = tmp_path / "plan.pgm"
     path.write_bytes(pgm(plan()))
     with pytest.raises(
-        SettingError, match=r"ceiling_m = 2\.0: allowed is None: it means nothing for PNG or PGM"
+        SettingError, match=r"ceiling_m = 2\.0: allowed is None: it does not apply to PNG or PGM"
     ):
         load_world(path, ceiling_m=2.0)
     hills = tmp_path / "hills.npz"

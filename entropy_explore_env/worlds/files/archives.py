@@ -76,7 +76,7 @@ def restored(data: bytes) -> Voxels:
 
 
 def arrays(data: bytes) -> dict[str, np.ndarray]:
-    """The arrays of an archive, each no larger than what its header and the archive agree on.
+    """The arrays of an archive, whose sizes in header and archive must agree.
 
     Raises:
         RefusedError: They are too many or too large, or hold objects. A broken archive raises whatever
@@ -120,7 +120,7 @@ def _world(entries: dict[str, np.ndarray]) -> Voxels:
 
 
 def _fits(ceiling: np.ndarray, shape: tuple[int, int, int]) -> bool:
-    """Whether it has a layer for each column."""
+    """Whether a ceiling has a valid layer for each column."""
     if ceiling.dtype != np.int32 or ceiling.shape != shape[:2]:
         return False
     return bool(ceiling.min() >= 0 and ceiling.max() <= shape[2])

@@ -1,8 +1,9 @@
 """Height maps as voxels, metres: solid columns below the surface, sky above it, a ceiling on request.
 
-A sample stands for the rectangle around it. A column is as high as the highest sample that it meets, so
-that ridges stay when voxels are larger than samples. A voxel is solid if its centre lies below the surface;
-under the lowest ground there is one solid layer. Columns that meet a sample without a value are unknown.
+A sample stands for the rectangle around it. A column is as high as the highest sample that it overlaps, so
+that ridges remain where voxels are larger than samples. A voxel is solid if its centre lies below the
+surface; under the lowest ground there is one solid layer. Columns that overlap a sample without a value are
+unknown.
 """
 
 from __future__ import annotations
@@ -77,13 +78,13 @@ def columns(
 
 
 def _layers_below(height_m: np.ndarray, floor_m: float, voxel_m: float, most: int) -> np.ndarray:
-    """(X, Y) int32 how many layers have their centres below a surface (X, Y); all where it is NaN."""
+    """(X, Y) int32 number of layers whose centres lie below a surface (X, Y); all where it is NaN."""
     layers = np.ceil((height_m - floor_m) / voxel_m - 0.5 - 1e-9)
     return np.clip(np.where(np.isnan(layers), most, layers), 1, most).astype(np.int32)
 
 
 def _highest(samples: np.ndarray, rows: int, width: float) -> np.ndarray:
-    """(rows, …) the highest of the samples (N, …) that each row, `width` samples wide, meets."""
+    """(rows, …) the highest of the samples (N, …) that each row, `width` samples wide, overlaps."""
     last = len(samples)
     found = np.empty((rows, *samples.shape[1:]))
     for row in range(rows):

@@ -1,4 +1,4 @@
-"""Plans drawn as images, `.png` and `.pgm` without a YAML, read with Pillow: what is dark is solid.
+"""Plans drawn as images, `.png` and `.pgm` without a YAML, read with Pillow: dark pixels are solid.
 
 A pixel is solid where the mean of its colours is below half of white, or where it is transparent; the
 first row of the image lies at the largest y. A 16-bit greyscale PNG is a height map (`elevation`): a
@@ -18,7 +18,7 @@ from entropy_explore_env.worlds.files.voxels import FREE, SOLID, Options, Refuse
 
 NEEDS = ()
 PIXEL_M = 0.05
-"""Edge of a plan's pixel where nothing else is said: that of most maps of map_server."""
+"""Edge of a plan's pixel unless given otherwise: that of most maps of map_server."""
 MAX_PIXELS = 1 << 25
 _FORMATS = {".png": "PNG", ".pgm": "PPM"}
 _WHITE = 255.0

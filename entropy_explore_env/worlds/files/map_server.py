@@ -4,8 +4,8 @@ The rules are those of http://wiki.ros.org/map_server (and of nav2_map_server, w
 of shade x in [0, 255] has the occupancy p = (255 - x)/255, or x/255 with `negate`.
 
     trinary  solid where p > occupied_thresh, free where p < free_thresh, unknown between
-    scale    the same, but between the thresholds 1 to 99 % by how far p is between them; what is
-             transparent at all is unknown
+    scale    the same, but between the thresholds 1 to 99 % by how far p is between them; pixels that
+             are transparent at all are unknown
     raw      x itself in percent, whatever `negate`; above 100 unknown
 
 Shades are means over the colours; in trinary mode over colours and opacity. A world knows solid and free
@@ -86,7 +86,7 @@ def labels_of(
 
 
 def _about(path: Path) -> dict[str, Any]:
-    """What the YAML says; aliases and tags are refused unread, since a map has no use for them."""
+    """The entries of the YAML; aliases and tags, which no map needs, are refused before they are read."""
     import yaml
 
     data = content(path)

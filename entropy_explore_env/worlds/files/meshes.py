@@ -1,7 +1,7 @@
 """Meshes in metres, OBJ, STL, GLB and PLY, read and made voxels of with trimesh.
 
-A voxel is solid if the surface passes through it, and, with `fill`, if the surface shuts it in. All else in
-the mesh's box is free; `clearance_m` adds free space around it. A mesh has no resolution of its own. OBJ,
+A voxel is solid if the surface passes through it, and, with `fill`, if the surface encloses it. All others
+in the mesh's box are free; `clearance_m` adds free space around it. A mesh has no resolution of its own. OBJ,
 STL and PLY are taken as they are, z up; GLB has y up (glTF 2.0, section 3.4) and is turned upright.
 Nothing beside the file is read: no materials, no textures.
 """
@@ -28,9 +28,9 @@ from entropy_explore_env.worlds.files.voxels import (
 
 NEEDS = (("trimesh", "trimesh"), ("scipy.ndimage", "scipy"))
 _INWARDS = 1e-6
-"""Surfaces move so many voxels inwards: one between two voxels belongs to the solid's side."""
+"""Surfaces are moved inwards by this many voxels: one between two voxels belongs to the solid's side."""
 _MOST_HALVINGS = 64
-"""Of edges: it ends long before that. trimesh's own estimate is too low for long thin triangles."""
+"""Limit of the subdivisions of an edge, never reached: trimesh's own is too low for long thin triangles."""
 
 
 def read(path: Path, options: Options) -> Voxels:

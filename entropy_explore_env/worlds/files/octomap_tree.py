@@ -1,6 +1,6 @@
 """OctoMap trees (Hornung et al. 2013), `.bt` and `.ot`, read with octomap-python.
 
-A node is solid from the tree's own occupancy threshold on; what no leaf covers is unknown.
+A node is solid from the tree's own occupancy threshold on; space that no leaf covers is unknown.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from entropy_explore_env.worlds.files.voxels import (
 NEEDS = (("octomap", "octomap-python"),)
 _DEPTH = 16
 _VOXELS_PER_BYTE = 4096
-"""A leaf, at least two bits of the file, may stand for many voxels; beyond so many it is absurd."""
+"""Limit of the voxels for each byte of the file: a leaf, at least two bits, may cover many."""
 
 
 def read(path: Path, options: Options) -> Voxels:
@@ -46,7 +46,7 @@ def read(path: Path, options: Options) -> Voxels:
 
 
 def _tree(data: bytes) -> Any:  # noqa: ANN401 - octomap has no types
-    """The tree in the bytes; whole, since the C++ reader takes zeros for what is missing."""
+    """The tree in the bytes; truncated ones are refused, since the C++ reader fills in zeros."""
     import octomap
 
     binary = data.startswith(b"# Octomap OcTree binary file")

@@ -1,7 +1,7 @@
 """Point clouds in metres, z up: PCD (ASCII, binary, compressed) read with pypcd4, PLY with trimesh.
 
-A voxel is solid if a point lies in it. A cloud does not say what is free: all else in its box counts as
-free. It has no resolution of its own. A PLY with faces is a mesh (`meshes`).
+A voxel is solid if a point lies in it. A cloud has no information about free space: all other
+voxels in its box count as free. It has no resolution of its own. A PLY with faces is a mesh (`meshes`).
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from entropy_explore_env.worlds.files.voxels import (
 
 NEEDS = (("pypcd4", "pypcd4"),)
 _MAX_SHRINKING = 64
-"""LZF makes at most about this many bytes of one; a header that promises more lies."""
+"""LZF expands by about this factor at most; a header that states more is wrong."""
 
 
 def read(path: Path, options: Options) -> Voxels:
@@ -38,7 +38,7 @@ def read(path: Path, options: Options) -> Voxels:
 
 
 def _check_header(data: bytes) -> None:
-    """Refuse a PCD that promises more points than its bytes can hold, before room is made for them."""
+    """Refuse a PCD whose header states more points than its bytes can hold, before memory is allocated."""
     head = data[:4096].partition(b"\nDATA")[0].decode("ascii", "replace")
     words = {line.split()[0]: line.split()[1:] for line in head.splitlines() if line.strip()}
     points = int(words["POINTS"][0])

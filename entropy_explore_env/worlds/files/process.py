@@ -1,8 +1,8 @@
-"""Files are read in a process of their own, so that a broken one can only break that process.
+"""Files are read in a separate process, so that a broken file can break only that process.
 
-Most readers are other people's; a hostile file may crash them, keep them busy or make them eat memory. The
-process (`worker`) reads one file after another and is started anew when it has died; each file has limits in
-seconds of computing and in bytes. Usually it lives for one file; `kept_reader` keeps it for many.
+Most readers are third-party packages, which a hostile file may crash, keep busy or make use too much memory.
+The process (`worker`) reads one file after another and is restarted when it has died; each file has limits of
+processor time and memory. Usually the process reads one file; `kept_reader` keeps it for many.
 """
 
 from __future__ import annotations
@@ -26,13 +26,13 @@ from entropy_explore_env.errors import MissingExtraError, SettingError, WorldErr
 from entropy_explore_env.worlds.files.voxels import MAX_FILE_BYTES, MAX_FILE_VOXELS, Voxels
 
 MEMORY_BYTES = 448 << 20
-"""What the process may hold, its own 80 to 140 MiB among it; larger files get some more."""
+"""Memory limit of the process, including its own 80 to 140 MiB; higher for larger files."""
 CPU_S = 1.5
 CPU_S_PER_MIB = 20.0
-"""Seconds of computing that a file may take, and more for each MiB of it."""
+"""Processor time that a file may take, and in addition for each MiB of it."""
 _MEMORY_PER_BYTE = 16
 _PATIENCE = 10.0
-"""Seconds on the clock, in seconds of computing, after which a process that waits is given up."""
+"""Elapsed time per allowed processor time after which a process that waits is ended."""
 _START_S = 60.0
 _HEADER_BYTES = 1 << 16
 _BOOT = """
@@ -48,22 +48,22 @@ serve()
 
 
 class Format(NamedTuple):
-    """A kind of file: the module that reads it, and what it is called in errors."""
+    """A file format: the module that reads it, and its name in errors."""
 
     reader: str
     kind: str
 
 
 class ReaderProcess:
-    """A process that reads files; started when it is first needed, and again after it has died.
+    """A process that reads files; started at the first file, and again after it has died.
 
     Attributes:
-        cost: Of the latest answer, or None if the process died: `cpu_s`, seconds of computing since its
-            start, and `peak_kib`, the most memory that it has held.
+        cost: Of the latest answer, or None if the process died: `cpu_s`, processor time since its
+            start, and `peak_kib`, its peak memory.
     """
 
     def __init__(self) -> None:
-        """Nothing runs yet."""
+        """Start nothing yet."""
         self._process: subprocess.Popen[bytes] | None = None
         self.cost: dict[str, float] | None = None
 
@@ -73,14 +73,14 @@ class ReaderProcess:
         """The voxels in a file.
 
         Args:
-            form: Which reader.
+            form: The file's format.
             path: The file.
             options: Settings for the reader; None = not given.
-            cpu_s: Seconds of computing allowed; None = by the file's size.
+            cpu_s: Limit of the processor time; None = by the file's size.
 
         Raises:
             WorldError: The file is missing, too large, broken, or takes too long.
-            SettingError: A setting is missing or means nothing for this format.
+            SettingError: A setting is missing or does not apply to this format.
             MissingExtraError: The package that reads it is not installed.
         """
         size = _size(path)
@@ -139,7 +139,7 @@ class ReaderProcess:
         return self._process
 
     def _cause_of_death(self, form: Format, allowed_s: float) -> str:
-        """What a file would have to be for the process to live on."""
+        """What is allowed, in the terms of an error: a file that does not end the process."""
         assert self._process is not None
         code = self._process.wait()
         self.close()
@@ -151,7 +151,7 @@ class ReaderProcess:
 
 
 def _size(path: Path | str) -> int:
-    """Bytes of a file, 0 for a name that is none.
+    """Bytes of a file; 0 for a name.
 
     Raises:
         WorldError: It is missing or too large.
@@ -207,7 +207,7 @@ _KEPT: ContextVar[ReaderProcess | None] = ContextVar("_KEPT", default=None)
 
 @contextlib.contextmanager
 def kept_reader() -> Iterator[ReaderProcess]:
-    """Read all files inside this block in one process, which spares its start; yields that process."""
+    """Read all files inside this block in one process, which saves its starts; yields that process."""
     reader = ReaderProcess()
     token = _KEPT.set(reader)
     try:
@@ -220,7 +220,7 @@ def kept_reader() -> Iterator[ReaderProcess]:
 def read_apart(
     form: Format, path: Path | str, options: Mapping[str, Any], cpu_s: float | None = None
 ) -> Voxels:
-    """As ReaderProcess.read, in the process that is kept or else in one for this file."""
+    """Read a file in the process of `kept_reader`, or in one for this file; see ReaderProcess.read."""
     kept = _KEPT.get()
     if kept is not None:
         return kept.read(form, path, options, cpu_s)

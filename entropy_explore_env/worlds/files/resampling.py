@@ -1,4 +1,4 @@
-"""Voxels of another size, and plans extruded: which new voxels are solid, by volume. Thin walls stay."""
+"""Resampling to another voxel size, by volumes such that thin walls stay solid, and extrusion of plans."""
 
 from __future__ import annotations
 
@@ -17,8 +17,9 @@ _ROUNDING = 1e-9
 def resampled(voxels: Voxels, voxel_size_m: float | None) -> tuple[np.ndarray, np.ndarray | None]:
     """Which voxels of a wanted size are solid, and the ceiling counted in them.
 
-    At the file's own size, all that is not known to be free is solid. Otherwise a voxel is free if at least
-    half of it is known to be free and less than a quarter of it is occupied. A plan stays one voxel high.
+    At the file's own size, all voxels that are not known to be free are solid. Otherwise a voxel is free if
+    at least half of it is known to be free and less than a quarter of it is occupied. A plan stays one voxel
+    high.
 
     Args:
         voxels: A file's content.
@@ -49,7 +50,7 @@ def resampled(voxels: Voxels, voxel_size_m: float | None) -> tuple[np.ndarray, n
 
 @lean_kernel
 def _pool(labels, scale, solid):
-    """Judge new voxels by the volumes of the old ones that they overlap.
+    """Label new voxels by the volumes of the old ones that they overlap.
 
     Args:
         labels: (X, Y, Z) int8.
@@ -83,7 +84,7 @@ def _lower(ceiling, scale, none, new_none, lowered):
     """The lowest ceiling over each new column, in whole new voxels.
 
     Args:
-        ceiling: (X, Y) int32 first closed layer; `none` = all are open.
+        ceiling: (X, Y) int32, lowest layer of the no-fly zone; `none` = no such layer.
         scale: Edge of a new voxel in old ones.
         none: Layers of the old voxels.
         new_none: Layers of the new ones.
@@ -99,5 +100,5 @@ def _lower(ceiling, scale, none, new_none, lowered):
 
 
 def extruded(plan: np.ndarray, layers: int) -> np.ndarray:
-    """(X, Y, layers) bool, contiguous: a plan (X, Y, 1) so many layers high."""
+    """A plan (X, Y, 1) repeated in all layers: (X, Y, layers) bool, contiguous."""
     return np.repeat(plan, layers, axis=2)

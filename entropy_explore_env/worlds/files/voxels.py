@@ -1,6 +1,6 @@
-"""What a reader hands back: labelled voxels, metres and radians, in the frame of the file.
+"""What a reader returns: labelled voxels in the frame of the file, metres and radians.
 
-The readers beside this file run in a process of their own (`worker`); they import little, to start fast.
+The readers in this folder run in a separate process (`worker`), and import little so that it starts fast.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ MAX_FILE_VOXELS = 130_000_000
 
 
 class RefusedError(Exception):
-    """A reader cannot use the file; the message says what is allowed."""
+    """A reader cannot use the file; the message states what is allowed."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,9 +35,9 @@ class Voxels:
         labels: (X, Y, Z) int8: UNKNOWN, FREE or SOLID; Z = 1 is a 2-D plan.
         voxel_size_m: Edge of a voxel.
         origin_m: Lower corner of voxel (0, 0, 0) in the file's frame.
-        yaw_rad: How the voxels' axes are turned against the file's frame, about `origin_m`.
-        ceiling: (X, Y) int32 first closed layer of each column, or None.
-        name: Of the world, where the file says so.
+        yaw_rad: Rotation of the voxels' axes against the file's frame, about `origin_m`.
+        ceiling: (X, Y) int32, the lowest layer of the no-fly zone in each column, or None.
+        name: Of the world, where the file states one.
     """
 
     labels: np.ndarray
@@ -49,10 +49,10 @@ class Voxels:
 
 
 class Options:
-    """Settings for a reader; those that it never asks for are refused, not ignored."""
+    """Settings for a reader; those that it does not use are refused, not ignored."""
 
     def __init__(self, given: Mapping[str, Any]) -> None:
-        """Take those that are not None."""
+        """Keep those that are not None."""
         self._given = {name: value for name, value in given.items() if value is not None}
         self._asked = {"voxel_size_m"}  # every file can be resampled
 
@@ -69,21 +69,21 @@ class Options:
         """
         value = self.get(name)
         if value is None:
-            raise SettingError(name, None, f"a number > 0: {kind} does not say it")
+            raise SettingError(name, None, f"a number > 0: {kind} does not state it")
         return float(value)
 
     def refuse_unused(self, kind: str) -> None:
-        """Raise a SettingError for the first setting that the reader had no use for."""
+        """Raise a SettingError for the first setting that the reader did not use."""
         for name, value in self._given.items():
             if name not in self._asked:
-                raise SettingError(name, value, f"None: it means nothing for {kind}")
+                raise SettingError(name, value, f"None: it does not apply to {kind}")
 
 
 def content(path: Path) -> bytes:
-    """All bytes of a file that a reader needs beside its own.
+    """All bytes of a file.
 
     Raises:
-        RefusedError: It is no file or too large.
+        RefusedError: It does not exist or is too large.
     """
     if not path.is_file():
         raise RefusedError(f"a map whose file {path.name} exists")
@@ -93,7 +93,7 @@ def content(path: Path) -> bytes:
 
 
 def checked_shape(extent: Sequence[float] | np.ndarray) -> tuple[int, int, int]:
-    """Whole voxels that cover an extent (3,), in voxels; refused before anything is made of that size.
+    """The shape that covers an extent (3,), in voxels; checked before an array of that size is made.
 
     Raises:
         RefusedError: It is not finite, or too many voxels.

@@ -2,9 +2,9 @@
 
 A request is a line of JSON: reader, path, options, `cpu_s` and `memory_bytes`. The answer is a line of JSON
 with the numbers of a Voxels, or with the error to raise, and after it the bytes of its arrays. A reader that
-needs more time is ended by the system's timer, one that needs more memory by its limit; a broken file can
-break this process only, which can write no file. What it imports is small: not the package's own `__init__`
-(`process` says how).
+needs more time is ended by the system's timer, one that needs more memory by its limit. A broken file can
+break only this process, which cannot write files. To start fast it does not import the package's own
+`__init__` (see `process`).
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ _READERS = "entropy_explore_env.worlds.files."
 
 
 def serve() -> None:
-    """Answer requests on standard input; what a reader prints itself goes nowhere."""
+    """Answer requests on standard input; what readers print is discarded."""
     answers = os.fdopen(os.dup(1), "wb")
     nowhere = os.open(os.devnull, os.O_WRONLY)
     os.dup2(nowhere, 1)
@@ -67,7 +67,7 @@ def _answer(request: dict[str, Any]) -> tuple[dict[str, Any], list[np.ndarray]]:
 
 
 def _import(module: str, package: str) -> None:
-    """Import what a reader stands on, before its time counts."""
+    """Import what a reader needs, before its time is measured."""
     try:
         importlib.import_module(module)
     except ImportError:
@@ -91,18 +91,18 @@ def _read(reader: Any, request: dict[str, Any]) -> Voxels:  # noqa: ANN401 - a m
 
 
 def _limit_memory(most_bytes: int) -> None:
-    """Let this process hold no more than so much; any amount where the system does not tell what it holds."""
+    """Limit the memory of this process, where the system tells how much it uses."""
     try:
         mapped, resident = (int(pages) for pages in Path("/proc/self/statm").read_text().split()[:2])
     except OSError:
         return
-    page = resource.getpagesize()  # what is mapped but not resident was never asked for: libraries
+    page = resource.getpagesize()  # mapped but not resident: libraries
     most = mapped * page + max(most_bytes - resident * page, 0)
     resource.setrlimit(resource.RLIMIT_AS, (most, resource.getrlimit(resource.RLIMIT_AS)[1]))
 
 
 def _peak_kib() -> int:
-    """The most memory that this process has held; `ru_maxrss` counts that of who started it, too."""
+    """Peak memory of this process; `ru_maxrss` would include that of the process which started it."""
     try:
         status = Path("/proc/self/status").read_text()
     except OSError:  # not every system has it
@@ -111,7 +111,7 @@ def _peak_kib() -> int:
 
 
 def _send(answers: BinaryIO, header: dict[str, Any], arrays: list[np.ndarray]) -> None:
-    """One answer, with what it cost so far."""
+    """Write an answer, with the processor time and memory used so far."""
     usage = resource.getrusage(resource.RUSAGE_SELF)
     header |= {"cpu_s": usage.ru_utime + usage.ru_stime, "peak_kib": _peak_kib()}
     answers.write(json.dumps(header).encode() + b"\n")

@@ -11,7 +11,7 @@ from scipy import ndimage
 
 from entropy_explore_env.settings import Grid
 from entropy_explore_env.worlds.recipes.connectivity import fill_pockets
-from entropy_explore_env.worlds.recipes.convex import strew
+from entropy_explore_env.worlds.recipes.convex import scatter
 from entropy_explore_env.worlds.recipes.plan import Plan, Rectangle, bare_plan, extruded, require_size, voxels
 from entropy_explore_env.worlds.world import World
 
@@ -22,7 +22,7 @@ _RADII_M = (0.4, 1.6)
 _SHARE = 0.08
 _TRIES = 20
 _FREE_BEFORE_DOORS_M = 1.0
-"""Beyond the way through: no obstacle can reach from wall to wall around a door in a corner."""
+"""Around the passage through a door, so that no obstacle blocks a door in a corner."""
 
 
 def bhattacharya_cluttered(grid: Grid, rng: np.random.Generator) -> World:
@@ -42,14 +42,14 @@ def bhattacharya_cluttered(grid: Grid, rng: np.random.Generator) -> World:
     plan = bare_plan(grid.shape, grid.voxel_size_m, _WALL_M)
     _split(plan, plan.whole, rng)
     around = 2 * voxels(_FREE_BEFORE_DOORS_M, grid.voxel_size_m) + 1
-    closed = ndimage.maximum_filter(plan.clear, around)
-    strew(plan.solid, closed, _RADII_M, _SHARE, grid.voxel_size_m, rng)
+    excluded = ndimage.maximum_filter(plan.clear, around)
+    scatter(plan.solid, excluded, _RADII_M, _SHARE, grid.voxel_size_m, rng)
     occupied = extruded(grid, fill_pockets(plan.solid, grid.voxel_size_m))
     return World(grid, occupied, "bhattacharya-cluttered")
 
 
 def _split(plan: Plan, space: Rectangle, rng: np.random.Generator) -> None:
-    """Part a space by a wall with doors, and its halves in turn, until rooms are small enough."""
+    """Divide a space by a wall with doors, and its halves in turn, until rooms are small enough."""
     axis = 0 if space.extent(0) >= space.extent(1) else 1
     least = voxels(_LEAST_ROOM_M, plan.voxel_size_m)
     length, wall = space.extent(axis), plan.wall

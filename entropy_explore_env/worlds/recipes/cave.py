@@ -1,8 +1,8 @@
 """A cave or mine: halls, and winding tunnels between them, in rough rock.
 
-No paper gives one. Halls are ellipsoids with semi-axes of 1.8-3.6 m, about one for 75 m² of plan; tunnels
-follow a minimum spanning tree of the halls and a few more short ways, with radii of 0.5 m and 1.8 voxels
-to 0.8 m more; fractal noise roughens the walls.
+No paper describes one. Halls are ellipsoids with semi-axes of 1.8-3.6 m, about one for 75 m² of plan;
+tunnels follow a minimum spanning tree of the halls and a few more short connections. Their radii are 0.5 m
+plus 1.8 voxels, and up to 0.8 m more; fractal noise roughens the walls.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ _LOOPS = 0.15
 
 
 def cave(grid: Grid, rng: np.random.Generator) -> World:
-    """Halls and tunnels in rock, hollow at all heights in 3-D; a plan of them in 2-D.
+    """Halls and tunnels in rock, at all heights in 3-D; a plan of them in 2-D.
 
     All free space in which a body of 0.3 m radius fits is connected.
 
@@ -52,7 +52,7 @@ def cave(grid: Grid, rng: np.random.Generator) -> World:
     halls, radii = _halls(room_m, narrowest, rng)
     for centre, radius in zip(halls, radii, strict=True):
         _hollow(beyond, centre, radius, grid.voxel_size_m)
-    for one, other in _ways(halls, rng):
+    for one, other in _tunnel_ends(halls, rng):
         for point, radius in _tunnel(halls[one], halls[other], narrowest, room_m, rng):
             _hollow(beyond, point, np.full(axes, radius), grid.voxel_size_m)
     rough = np.clip(_ROUGH_M * fractal_noise(beyond.shape, 0.2, rng), -0.2, 2.0 * _ROUGH_M)
@@ -75,22 +75,22 @@ def _halls(room_m: np.ndarray, narrowest: float, rng: np.random.Generator) -> tu
     return np.array(centres), np.clip(radii, narrowest, np.maximum(0.3 * room_m, narrowest))
 
 
-def _ways(halls: np.ndarray, rng: np.random.Generator) -> list[tuple[int, int]]:
+def _tunnel_ends(halls: np.ndarray, rng: np.random.Generator) -> list[tuple[int, int]]:
     """Pairs of halls with a tunnel between them."""
     lengths = np.linalg.norm(halls[:, None] - halls, axis=2)
     tree = minimum_spanning_tree(lengths).tocoo()
-    ways = {(min(i, j), max(i, j)) for i, j in zip(tree.row.tolist(), tree.col.tolist(), strict=True)}
+    pairs = {(min(i, j), max(i, j)) for i, j in zip(tree.row.tolist(), tree.col.tolist(), strict=True)}
     near = 1.6 * float(np.median(tree.data))
     for i, j in np.argwhere(np.triu(lengths < near, 1)).tolist():
         if rng.random() < _LOOPS:
-            ways.add((i, j))
-    return sorted(ways)
+            pairs.add((i, j))
+    return sorted(pairs)
 
 
 def _tunnel(
     start: np.ndarray, end: np.ndarray, narrowest: float, room_m: np.ndarray, rng: np.random.Generator
 ) -> list[tuple[np.ndarray, float]]:
-    """Points along a winding way, half the narrowest radius apart or less, and the radius at each."""
+    """Points along a winding tunnel, at most half the narrowest radius apart, and the radius at each."""
     length = float(np.linalg.norm(end - start))
     steps = max(2, math.ceil(2.5 * length / narrowest))
     share = np.linspace(0.0, 1.0, steps)
@@ -107,10 +107,10 @@ def _tunnel(
 
 
 def _hollow(beyond: np.ndarray, centre: np.ndarray, radii: np.ndarray, voxel_size_m: float) -> None:
-    """Take an ellipsoid into the distance to the nearest hollow: metres, below 0 inside; in place.
+    """Hollow out an ellipsoid.
 
     Args:
-        beyond: (X, Y, Z) or (X, Y) float64.
+        beyond: (X, Y, Z) or (X, Y) float64, metres to the nearest hollow, negative inside; changed in place.
         centre: (axes,) metres.
         radii: (axes,) semi-axes in metres.
         voxel_size_m: Edge of a voxel.

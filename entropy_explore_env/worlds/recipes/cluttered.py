@@ -9,7 +9,7 @@ import numpy as np
 
 from entropy_explore_env.settings import Grid
 from entropy_explore_env.worlds.recipes.connectivity import fill_pockets
-from entropy_explore_env.worlds.recipes.convex import strew
+from entropy_explore_env.worlds.recipes.convex import scatter
 from entropy_explore_env.worlds.recipes.plan import require_size
 from entropy_explore_env.worlds.world import World
 
@@ -19,7 +19,7 @@ _HEIGHTS_M = (0.5, 3.0)
 
 
 def cluttered(grid: Grid, rng: np.random.Generator) -> World:
-    """Obstacles strewn over a floor; in 3-D each has a height of its own.
+    """Obstacles scattered over a floor; in 3-D each has a height of its own.
 
     All free space in which a body of 0.3 m radius fits is connected.
 
@@ -45,5 +45,5 @@ def cluttered_plan(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Solid voxels (X, Y) bool, and the number of the obstacle in each voxel, (X, Y) int32."""
     solid = np.zeros(shape, bool)
-    numbers = strew(solid, np.zeros(shape, bool), _RADII_M, _SHARE, voxel_size_m, rng)
+    numbers = scatter(solid, np.zeros(shape, bool), _RADII_M, _SHARE, voxel_size_m, rng)
     return fill_pockets(solid, voxel_size_m), numbers

@@ -1,4 +1,4 @@
-"""Connected free space: which places a body can be in, ways cut between parts, pockets filled."""
+"""Connected free space: where a body fits, gates cut between regions of a plan, pockets filled."""
 
 from __future__ import annotations
 
@@ -13,7 +13,8 @@ from entropy_explore_env.worlds.components import connected_components, largest_
 from entropy_explore_env.worlds.recipes.plan import BODY_RADIUS_M, passage_voxels
 from entropy_explore_env.worlds.world import Collision, World
 
-_ROUNDS = 20
+_MAX_ROUNDS = 20
+"""Filling pockets may cut off others: repeated at most this often."""
 
 
 def body_room(occupied: np.ndarray, voxel_size_m: float) -> np.ndarray:
@@ -42,24 +43,24 @@ def cut_gates(
     voxel_size_m: float,
     rng: np.random.Generator,
 ) -> None:
-    """Cut ways where two parts of a plan are closest, or little farther apart than there.
+    """Cut gates where two regions of a plan are closest, or farther apart by at most half a metre.
 
-    A way runs along x, then along y.
+    A gate runs along x, then along y.
 
     Args:
         solid: (X, Y) bool; changed in place.
-        one: (X, Y) bool, where a body is in one part.
-        other: (X, Y) bool, the same in the other part.
+        one: (X, Y) bool, where a body fits in one region.
+        other: (X, Y) bool, the same in the other region.
         gates: How many; they may overlap.
-        width_m: Of the ways.
+        width_m: Of the gates.
         voxel_size_m: Edge of a voxel.
-        rng: Draws the places.
+        rng: Draws where they are.
     """
-    away, nearest = cast(
+    distances, nearest = cast(
         "tuple[np.ndarray, np.ndarray]", ndimage.distance_transform_edt(~other, return_indices=True)
     )
-    far = np.where(one, away, np.inf)
-    candidates = np.argwhere(far <= far.min() + 0.5 / voxel_size_m)
+    distances = np.where(one, distances, np.inf)
+    candidates = np.argwhere(distances <= distances.min() + 0.5 / voxel_size_m)
     half = passage_voxels(width_m, voxel_size_m) // 2
     for start in candidates[rng.integers(0, len(candidates), gates)]:
         end = nearest[:, start[0], start[1]]
@@ -71,30 +72,30 @@ def cut_gates(
 
 
 def fill_pockets(occupied: np.ndarray, voxel_size_m: float) -> np.ndarray:
-    """Free space in which bodies hang together: pockets that none can leave are filled.
+    """Fill the pockets of free space that a body cannot leave, until its free space is connected.
 
     Args:
         occupied: (X, Y, Z) or (X, Y) bool.
         voxel_size_m: Edge of a voxel.
 
     Returns:
-        The same shape, bool: no less occupied; the places where a body of `BODY_RADIUS_M` fits, and
-        the free voxels, are one face-connected part each.
+        The same shape, bool, with at least the same voxels occupied. The voxels where a body of
+        `BODY_RADIUS_M` fits are one face-connected component, and so are the free voxels.
 
     Raises:
         WorldError: A body fits nowhere.
     """
     occupied = occupied.copy()
-    for _ in range(_ROUNDS):
-        room = body_room(occupied, voxel_size_m)
-        main = largest_component(room)
+    for _ in range(_MAX_ROUNDS):
+        fits = body_room(occupied, voxel_size_m)
+        main = largest_component(fits)
         if not main.any():
             break
-        free, parts = connected_components(~occupied)
-        if parts > 1:
-            occupied |= free != free[tuple(np.argwhere(main)[0])]
+        labels, count = connected_components(~occupied)
+        if count > 1:
+            occupied |= labels != labels[tuple(np.argwhere(main)[0])]
             continue
-        pockets = room & ~main
+        pockets = fits & ~main
         if not pockets.any():
             return occupied
         occupied |= pockets

@@ -1,4 +1,4 @@
-"""Convex obstacles strewn over a floor plan, so far apart that a body passes between each two."""
+"""Convex obstacles scattered over a floor plan, far enough apart for a body to pass between them."""
 
 from __future__ import annotations
 
@@ -8,33 +8,33 @@ import numpy as np
 
 from entropy_explore_env.worlds.recipes.plan import BODY_RADIUS_M
 
-_TRIES_IN_VAIN = 60
-"""So many places in a row that are taken, and the plan counts as full."""
+_MAX_FAILURES = 60
+"""After this many failures in a row the plan counts as full."""
 
 
 def clearance_voxels(voxel_size_m: float) -> float:
-    """Distance of solid voxels' centres that leaves a body a way, along any direction."""
+    """Distance between the centres of solid voxels that lets a body pass in any direction, in voxel edges."""
     return 2.0 * BODY_RADIUS_M / voxel_size_m + 2.5
 
 
-def strew(
+def scatter(
     solid: np.ndarray,
-    closed: np.ndarray,
+    excluded: np.ndarray,
     radii_m: tuple[float, float],
     share: float,
     voxel_size_m: float,
     rng: np.random.Generator,
 ) -> np.ndarray:
-    """Put convex polygons on a plan until they cover a share of it, or no place is found.
+    """Put convex polygons on a plan until they cover a share of it, or there is no room for another.
 
     Each polygon has 3-8 corners on an ellipse, one semi-axis from `radii_m`, the other half as long or
-    longer. Polygons keep the clearance from each other, not from what is solid before: they may lean
-    on walls.
+    longer. Polygons keep the clearance from each other, but not from voxels that are solid already: they
+    may touch walls.
 
     Args:
         solid: (X, Y) bool; changed in place.
-        closed: (X, Y) bool, where no polygon may be.
-        radii_m: Least and largest semi-axis.
+        excluded: (X, Y) bool, where no polygon may be.
+        radii_m: Smallest and largest semi-axis.
         share: Of the free area, at least 0 and below about 0.3.
         voxel_size_m: Edge of a voxel.
         rng: Draws the polygons.
@@ -43,10 +43,10 @@ def strew(
         (X, Y) int32: number of the polygon, from 1; 0 elsewhere.
     """
     numbers = np.zeros(solid.shape, np.int32)
-    wanted, covered, in_vain = share * (~solid).sum(), 0, 0
+    wanted, covered, failures = share * (~solid).sum(), 0, 0
     clearance = clearance_voxels(voxel_size_m)
-    while covered < wanted and in_vain < _TRIES_IN_VAIN:
-        in_vain += 1
+    while covered < wanted and failures < _MAX_FAILURES:
+        failures += 1
         longest = rng.uniform(*radii_m) / voxel_size_m
         centre = rng.uniform(0.0, solid.shape)
         middle = int(centre[0]), int(centre[1])
@@ -62,12 +62,12 @@ def strew(
         for normal, offset in zip(normals, offsets, strict=True):
             np.maximum(outside, normal[0] * x[:, None] + normal[1] * y - offset, out=outside)
         inside = outside <= 0.0
-        if numbers[window][outside <= clearance].any() or closed[window][inside].any():
+        if numbers[window][outside <= clearance].any() or excluded[window][inside].any():
             continue
         inside &= ~solid[window]
         if inside.any():
             numbers[window][inside] = numbers.max() + 1
-            covered, in_vain = covered + int(inside.sum()), 0
+            covered, failures = covered + int(inside.sum()), 0
     solid |= numbers > 0
     return numbers
 

@@ -13,26 +13,26 @@ from entropy_explore_env.worlds.world import World
 
 _ATTEMPTS = 100
 _FURNITURE_SHARE = 0.08
-"""Share of the floor plan that furniture covers, about."""
+"""Approximate share of the floor that furniture covers."""
 
 
 def furnished(grid: Grid, rng: np.random.Generator) -> World:
     """A room with boxes on its floor, against each other or alone.
 
-    Its free space is connected, and with it that of bodies up to half a voxel in radius; larger ones may
-    find parts of it closed, and start in the largest.
+    Its free space is connected, also for bodies with a radius of up to half a voxel; larger ones may not
+    reach all of it, and start in the largest component.
 
     Args:
         grid: The workspace.
-        rng: Draws number, size and place of the boxes.
+        rng: Draws number, size and position of the boxes.
 
     Raises:
-        WorldError: The grid is too small for a box and a way around it.
+        WorldError: The grid is too small for a box and a passage around it.
     """
     for _ in range(_ATTEMPTS):
         occupied = _boxes(grid, rng)
-        _, parts = connected_components(~occupied)
-        if parts == 1 and occupied.any():
+        _, count = connected_components(~occupied)
+        if count == 1 and occupied.any():
             return World(grid, occupied, "furnished")
     raise WorldError("Grid.shape", grid.shape, "a workspace with room for furniture")
 

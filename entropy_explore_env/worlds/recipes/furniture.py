@@ -43,18 +43,18 @@ def furnish(
     area_a_piece_m2: float,
     rng: np.random.Generator,
 ) -> None:
-    """Put furniture into a room and leave ways for a body of `BODY_RADIUS_M` around it.
+    """Put furniture into a room, with passages for a body of `BODY_RADIUS_M` around it.
 
-    A piece touches a wall or leaves a passage to it, and leaves a passage to every other piece: boxes
-    that keep this rule never part the room, at any height. Ways through doors stay clear.
+    A piece touches a wall or leaves a passage to it, and leaves a passage to every other piece. Boxes
+    placed by this rule never divide the room, at any height. Passages through doors stay clear.
 
     Args:
         occupied: (X, Y, Z) bool; changed in place.
         plan: The floor plan.
-        room: Where.
-        kinds: What.
-        area_a_piece_m2: Floor for each piece.
-        rng: Draws pieces and places.
+        room: Of the plan.
+        kinds: The furniture to choose from.
+        area_a_piece_m2: Floor area for each piece.
+        rng: Draws pieces and positions.
     """
     edge_m = plan.voxel_size_m
     passage = passage_voxels(_PASSAGE_M, edge_m) + 1
@@ -66,7 +66,7 @@ def furnish(
         kind = kinds[int(rng.integers(len(kinds)))]
         box = _place(room, kind, edge_m, rng)
         fits = box is not None and not plan.clear[box.window].any()
-        if box is None or not fits or not _leaves_ways(box, room, placed, passage):
+        if box is None or not fits or not _leaves_passages(box, room, placed, passage):
             continue
         placed.append(box)
         height = min(voxels(kind.height_m, edge_m), occupied.shape[2] - 1)
@@ -74,7 +74,7 @@ def furnish(
 
 
 def _place(room: Rectangle, kind: Piece, voxel_size_m: float, rng: np.random.Generator) -> Rectangle | None:
-    """Somewhere in the room, its long side along the wall it touches; None if the room is too small."""
+    """A random position in the room, the long side along a wall; None if the room is too small."""
     axis = int(rng.integers(2))
     size = [0, 0]
     size[axis], size[1 - axis] = voxels(kind.length_m, voxel_size_m), voxels(kind.depth_m, voxel_size_m)
@@ -87,16 +87,16 @@ def _place(room: Rectangle, kind: Piece, voxel_size_m: float, rng: np.random.Gen
     return Rectangle((low[0], low[1]), (low[0] + size[0], low[1] + size[1]))
 
 
-def _leaves_ways(box: Rectangle, room: Rectangle, placed: list[Rectangle], passage: int) -> bool:
-    """Whether every gap to walls is nothing or a passage, and there is a passage to every other piece."""
-    touched = []
+def _leaves_passages(box: Rectangle, room: Rectangle, placed: list[Rectangle], passage: int) -> bool:
+    """Whether every gap to a wall is zero or a passage, and every gap to another piece is a passage."""
+    at_walls = []
     for axis in (0, 1):
         for gap in (box.low[axis] - room.low[axis], room.high[axis] - box.high[axis]):
             if 0 < gap < passage:
                 return False
-            touched.append(gap == 0)
-    if (touched[0] and touched[1]) or (touched[2] and touched[3]):
-        return False  # from wall to wall
+            at_walls.append(gap == 0)
+    if (at_walls[0] and at_walls[1]) or (at_walls[2] and at_walls[3]):
+        return False  # it would reach from wall to wall
     for other in placed:
         gaps = [max(box.low[i] - other.high[i], other.low[i] - box.high[i]) for i in (0, 1)]
         if max(gaps) < passage:

@@ -45,14 +45,14 @@ def hybrid(grid: Grid, rng: np.random.Generator) -> World:
             draw = office_plan if kind == "office" else corridor_plan
             part = draw(shape, grid.voxel_size_m, rng).solid
         plan.solid[region.window] = part
-    rooms = [_room_in(plan.solid, region, grid.voxel_size_m) for region in regions]
+    rooms = [_free_component(plan.solid, region, grid.voxel_size_m) for region in regions]
     for one, other in ((0, 1), (0, 2), (1, 2)):
         cut_gates(plan.solid, rooms[one], rooms[other], _GATES, _GATE_M, grid.voxel_size_m, rng)
     return World(grid, extruded(grid, fill_pockets(plan.solid, grid.voxel_size_m)), "hybrid")
 
 
 def _regions(whole: Rectangle, wall: int, rng: np.random.Generator) -> list[Rectangle]:
-    """About a half of the plan, and the other half in two."""
+    """About a half of the plan, and the two quarters of the other half."""
     axis = 0 if whole.extent(0) >= whole.extent(1) else 1
     cut = round(whole.extent(axis) * rng.uniform(0.46, 0.54))
     across = round(whole.extent(1 - axis) * rng.uniform(0.46, 0.54))
@@ -66,8 +66,8 @@ def _regions(whole: Rectangle, wall: int, rng: np.random.Generator) -> list[Rect
     ]
 
 
-def _room_in(solid: np.ndarray, region: Rectangle, voxel_size_m: float) -> np.ndarray:
-    """(X, Y) bool, where a body is in the largest part of a region, walled by its edge."""
+def _free_component(solid: np.ndarray, region: Rectangle, voxel_size_m: float) -> np.ndarray:
+    """(X, Y) bool, the largest component of where a body fits in a region, whose edge counts as wall."""
     room = np.zeros_like(solid)
     room[region.window] = largest_component(body_room(solid[region.window], voxel_size_m))
     return room

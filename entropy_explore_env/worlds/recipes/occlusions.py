@@ -10,7 +10,7 @@ import numpy as np
 
 from entropy_explore_env.settings import Grid
 from entropy_explore_env.worlds.recipes.connectivity import fill_pockets
-from entropy_explore_env.worlds.recipes.convex import strew
+from entropy_explore_env.worlds.recipes.convex import scatter
 from entropy_explore_env.worlds.recipes.plan import extruded, require_size
 from entropy_explore_env.worlds.world import World
 
@@ -33,8 +33,8 @@ def occlusions(grid: Grid, rng: np.random.Generator) -> World:
         WorldError: The grid is too small.
     """
     require_size(grid, "occlusions of up to 16 m", 40.0, 40.0)
-    away = [np.arange(n) + 0.5 - 0.5 * n for n in grid.shape[:2]]
-    middle = np.hypot(away[0][:, None], away[1]) * grid.voxel_size_m <= _OPEN_MIDDLE_M
+    offsets = [np.arange(n) + 0.5 - 0.5 * n for n in grid.shape[:2]]
+    middle = np.hypot(offsets[0][:, None], offsets[1]) * grid.voxel_size_m <= _OPEN_MIDDLE_M
     solid = np.zeros(grid.shape[:2], bool)
-    strew(solid, middle, _RADII_M, _SHARE, grid.voxel_size_m, rng)
+    scatter(solid, middle, _RADII_M, _SHARE, grid.voxel_size_m, rng)
     return World(grid, extruded(grid, fill_pockets(solid, grid.voxel_size_m)), "occlusions")

@@ -1,7 +1,7 @@
 """Floor plans in voxels: rectangles, walls, rooms in a row, doors; lengths are given in metres.
 
-A plan is the lower layer of an indoor world. Doors and corridors let a body of `BODY_RADIUS_M` pass; on
-a grid so coarse that this takes more than their width in metres they are that much wider.
+A plan is the lowest layer of an indoor world. Doors and corridors let a body of `BODY_RADIUS_M` pass: on
+coarse grids, where the body needs more voxels than their width in metres, they are wider.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ _CONNECTING_DOORS = 0.2
 
 
 class Rectangle(NamedTuple):
-    """Voxels from `low` up to, but not with, `high`: (x, y) each."""
+    """The voxels from `low` (inclusive) to `high` (exclusive), (x, y) each."""
 
     low: tuple[int, int]
     high: tuple[int, int]
@@ -41,7 +41,7 @@ class Rectangle(NamedTuple):
         return self.high[axis] - self.low[axis]
 
     def within(self, axis: int, low: int, high: int) -> Rectangle:
-        """The same, but for its extent along one axis."""
+        """The same rectangle with another extent along one axis."""
         lows, highs = list(self.low), list(self.high)
         lows[axis], highs[axis] = low, high
         return Rectangle((lows[0], lows[1]), (highs[0], highs[1]))
@@ -53,11 +53,11 @@ class Plan:
 
     Attributes:
         solid: (X, Y) bool, walls and obstacles.
-        clear: (X, Y) bool, ways through doors, where nothing may be put.
+        clear: (X, Y) bool, passages through doors, where nothing may be placed.
         voxel_size_m: Edge of a voxel.
         wall_m: Thickness of walls.
-        rooms: Insides of rooms.
-        doors: Openings in walls.
+        rooms: The interiors of rooms.
+        doors: The openings in walls.
     """
 
     solid: np.ndarray
@@ -84,20 +84,20 @@ class Plan:
     def cut_door(self, wall: Rectangle, axis: int, rng: np.random.Generator) -> None:
         """Open a door somewhere in a piece of wall that runs along an axis.
 
-        The way through is kept clear as far as the door is wide, on both sides.
+        The passage is kept clear on both sides, as far as the door is wide.
         """
         width = min(passage_voxels(DOOR_M, self.voxel_size_m), wall.extent(axis))
         start = int(rng.integers(wall.low[axis], wall.high[axis] - width + 1))
         door = wall.within(axis, start, start + width)
         across = 1 - axis
-        way = door.within(across, max(0, door.low[across] - width), door.high[across] + width)
+        passage = door.within(across, max(0, door.low[across] - width), door.high[across] + width)
         self.solid[door.window] = False
-        self.clear[way.window] = True
+        self.clear[passage.window] = True
         self.doors.append(door)
 
 
 def bare_plan(shape: tuple[int, ...], voxel_size_m: float, wall_m: float = WALL_M) -> Plan:
-    """A plan (X, Y) without anything in it."""
+    """An empty plan (X, Y)."""
     return Plan(np.zeros(shape[:2], bool), np.zeros(shape[:2], bool), voxel_size_m, wall_m)
 
 
@@ -113,7 +113,7 @@ def passage_voxels(width_m: float, voxel_size_m: float, body_radius_m: float = B
 
 
 def require_size(grid: Grid, kind: str, *edges_m: float) -> None:
-    """A workspace at least so long along its edges, the longest first, and high enough for a body.
+    """Check that a workspace has edges of at least these lengths, the longest first, and room for a body.
 
     Raises:
         WorldError: It is smaller.
@@ -127,14 +127,14 @@ def require_size(grid: Grid, kind: str, *edges_m: float) -> None:
 
 
 def divided(low: int, high: int, part: float, gap: int, rng: np.random.Generator) -> list[tuple[int, int]]:
-    """An interval cut into parts of about the same length, a gap between each two.
+    """An interval divided into parts of about equal length, with gaps between them.
 
     Args:
         low: First voxel.
         high: Voxel after the last.
-        part: Wanted length of a part.
+        part: Desired length of a part.
         gap: Voxels between two parts.
-        rng: Moves each cut by up to a fifth of a part.
+        rng: Displaces each cut by up to a fifth of a part.
 
     Returns:
         The parts, (low, high) each.
@@ -149,14 +149,14 @@ def divided(low: int, high: int, part: float, gap: int, rng: np.random.Generator
 def put_rooms(
     plan: Plan, band: Rectangle, axis: int, doors_high: bool, room_m: float, rng: np.random.Generator
 ) -> None:
-    """Rooms side by side in a band beside a corridor, each with a door to it, some with one between them.
+    """Put rooms side by side into a band along a corridor, each with a door to it, some with doors between.
 
     Args:
         plan: Changed in place.
-        band: Where; with the wall between the rooms and the corridor.
+        band: Where, including the wall between the rooms and the corridor.
         axis: The corridor's direction.
-        doors_high: Whether the corridor is at the band's high side.
-        room_m: About the width of a room.
+        doors_high: Whether the corridor is at the band's upper side.
+        room_m: Approximate width of a room.
         rng: Draws walls and doors.
     """
     across, wall = 1 - axis, plan.wall
@@ -176,7 +176,7 @@ def put_rooms(
 
 
 def extruded(grid: Grid, solid: np.ndarray, doors: Sequence[Rectangle] = ()) -> np.ndarray:
-    """A plan raised to the height of the grid; above doors, from `DOOR_HEIGHT_M` on, there is wall.
+    """A plan extruded to the height of the grid, with wall above its doors from `DOOR_HEIGHT_M` on.
 
     Args:
         grid: The workspace.

@@ -36,7 +36,7 @@ def rough_terrain(grid: Grid, rng: np.random.Generator) -> World:
 
 
 def terrain(grid: Grid, rng: np.random.Generator) -> World:
-    """Hills and valleys with a ceiling for robots above them; the rest up to the top is open sky.
+    """Hills and valleys below a ceiling for robots, with open sky above it.
 
     The space between ground and ceiling in which a body of 0.3 m radius fits is connected, and so is
     all free space.
@@ -71,17 +71,17 @@ def _ground(grid: Grid, rng: np.random.Generator, hurst: float, name: str) -> Wo
 
 
 def exposure_surface(ground: np.ndarray, layers: int, air: int, voxel_size_m: float) -> np.ndarray:
-    """First layer of each column that is closed to robots.
+    """The lowest layer of each column that robots must not enter.
 
     Args:
         ground: (X, Y) int32, solid layers of each column.
-        layers: Z, that the surface stays below or at.
+        layers: Z, an upper limit of the surface.
         air: Least number of free layers between ground and surface.
         voxel_size_m: Edge of a voxel.
 
     Returns:
-        (X, Y) int32: at least `air` above the ground of the columns around, so far as a body reaches
-        from two neighbouring columns, so that a way over every pass stays open.
+        (X, Y) int32: at least `air` above the ground of all columns that a body reaches from two
+        neighbouring columns, so that robots can fly over every pass.
     """
     reach = int(np.ceil(BODY_RADIUS_M / voxel_size_m - 0.5 - 1e-9))
     needed = ndimage.maximum_filter(ground, 4 * max(reach, 0) + 3, mode="nearest") + air

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
-from entropy_explore_env.worlds.recipes.convex import clearance_voxels, strew
+from entropy_explore_env.worlds.recipes.convex import clearance_voxels, scatter
 
 SHAPE = (170, 130)
 
@@ -20,7 +20,7 @@ def distances(free):
 def test_polygons_are_convex_and_leave_ways(edge_m, radii_m):
     for seed in range(3):
         solid = np.zeros(SHAPE, bool)
-        numbers = strew(solid, np.zeros(SHAPE, bool), radii_m, 0.12, edge_m, np.random.default_rng(seed))
+        numbers = scatter(solid, np.zeros(SHAPE, bool), radii_m, 0.12, edge_m, np.random.default_rng(seed))
         np.testing.assert_array_equal(solid, numbers > 0)
         assert numbers.max() > 5
         assert 0.12 <= solid.mean() < 0.12 + np.pi * (radii_m[1] / edge_m) ** 2 / solid.size
@@ -40,18 +40,18 @@ def test_polygons_are_convex_and_leave_ways(edge_m, radii_m):
 
 def test_walls_may_be_leaned_on_and_closed_places_stay_free():
     for seed in range(4):
-        solid, closed = np.zeros(SHAPE, bool), np.zeros(SHAPE, bool)
+        solid, excluded = np.zeros(SHAPE, bool), np.zeros(SHAPE, bool)
         solid[80:83] = True
-        closed[20:60, 20:60] = True
-        numbers = strew(solid, closed, (0.3, 1.5), 0.1, 0.1, np.random.default_rng(seed))
+        excluded[20:60, 20:60] = True
+        numbers = scatter(solid, excluded, (0.3, 1.5), 0.1, 0.1, np.random.default_rng(seed))
         assert not (numbers > 0)[80:83].any() and solid[80:83].all()
-        assert not numbers[closed].any()
+        assert not numbers[excluded].any()
         assert (numbers > 0).sum() >= 0.1 * (SHAPE[0] - 3) * SHAPE[1]
 
 
 def test_a_plan_that_is_full_ends_the_search():
     solid = np.zeros((40, 30), bool)
-    strew(solid, np.zeros((40, 30), bool), (0.3, 0.6), 0.9, 0.1, np.random.default_rng(0))
+    scatter(solid, np.zeros((40, 30), bool), (0.3, 0.6), 0.9, 0.1, np.random.default_rng(0))
     assert 0.0 < solid.mean() < 0.5
-    closed = np.ones((40, 30), bool)
-    assert not strew(solid, closed, (0.3, 0.6), 0.9, 0.1, np.random.default_rng(0)).any()
+    excluded = np.ones((40, 30), bool)
+    assert not scatter(solid, excluded, (0.3, 0.6), 0.9, 0.1, np.random.default_rng(0)).any()
