@@ -113,17 +113,17 @@ def compare(
     Returns:
         `scenario`, `robots`, `seeds`, and `rows`: of each strategy its name, `median_s` with its 95 %
         interval (`low_s`, `high_s`), `mean_s`, `finished` of the missions, `scans` (median); of rivals also
-        `ratio`, the policy's median over theirs, with its paired interval, and `faster`: on how many seeds
-        the policy was.
-        `better_rival` is the one of SIMPLE with the smaller median, `faster_than_simple` on how many seeds
-        the policy beat all of these that took part.
+        `ratio`, the policy's median over theirs, with its paired interval, and `faster`, the number of seeds
+        on which the policy was faster.
+        `better_rival` is the one of SIMPLE with the smaller median, `faster_than_simple` the number of seeds
+        on which the policy was faster than all of SIMPLE among the rivals.
     """
     folder = f"{scenario.name}/robots-{scenario.robots}"
     cells = [Cell(f"{folder}/{name}", scenario, name, seeds) for name in (policy, *rivals)]
     records = run_cells(cells, runs, jobs, "evaluation", quiet=quiet)
-    found = {name: records[cell.id] for name, cell in zip((policy, *rivals), cells, strict=True)}
-    times = {name: np.array([record["t_mission_s"] for record in own]) for name, own in found.items()}
-    rows = [_row(name, found[name], times[name], times[policy], name == policy) for name in found]
+    missions = {name: records[cell.id] for name, cell in zip((policy, *rivals), cells, strict=True)}
+    times = {name: np.array([record["t_mission_s"] for record in own]) for name, own in missions.items()}
+    rows = [_row(name, missions[name], times[name], times[policy], name == policy) for name in missions]
     simple = [name for name in SIMPLE if name in rivals]
     return {
         "scenario": scenario.name,
@@ -166,18 +166,18 @@ def show(compared: dict[str, Any]) -> None:
     seeds = compared["seeds"]
     table = Table(title=f"{compared['scenario']}, {compared['robots']} robots, {seeds} test missions each")
     table.add_column("strategy", overflow="fold", min_width=17)
-    for head in ("mission time", "finished", "scans", "share", "faster"):
+    for head in ("mission time", "finished", "scans", "ratio", "faster"):
         table.add_column(head, justify="right")
     for row in compared["rows"]:
         name, median, _, *others = table_cells(row, seeds)
         table.add_row(name, *(cell.replace(" (", "\n(") for cell in (median, *others)))
     Console(highlight=False).print(table)
-    print("mission time: median; share: the policy's median over theirs (95 % intervals);")
-    print("faster: on how many starts the policy was")
+    print("mission time: median; ratio: the policy's median over the strategy's (95 % intervals);")
+    print("faster: starts on which the policy was faster")
     if compared["better_rival"] is not None:
         print(
-            f"better of {' and '.join(SIMPLE)}: {compared['better_rival']}; "
-            f"the policy beats those there on {compared['faster_than_simple']} of {seeds} starts"
+            f"better one of {' and '.join(SIMPLE)}: {compared['better_rival']}; "
+            f"faster than all of them in the table: on {compared['faster_than_simple']} of {seeds} starts"
         )
 
 

@@ -92,8 +92,7 @@ class Args:
     channel: Channel = dataclasses.field(default_factory=Channel)
 
     features: Literal["gazes", "vector", "maps"] = "gazes"
-    """Networks that read observations. vector: an MLP; gazes: also one small network that scores every
-    gaze by the panorama around it; maps: an MLP and convolutions over maps."""
+    """vector: an MLP; gazes: also a small network for gazes, over the panorama; maps: also convolutions."""
     overview: bool = False
     """Observe the whole belief, pooled to a few cells; with vector features as plain numbers."""
     patch: bool = False
@@ -249,6 +248,7 @@ def train(args: Args, state: TrainingState, bar: TrainingBar) -> None:
     assert isinstance(model, DecisionPPO)
     model.set_logger(Logger(None, [TensorBoardOutputFormat(str(args.out))]))
     callback = model.start(args.total_steps, MissionFigures(args.robots))
+    bar.show_steps(model.num_timesteps)
     scenario = state.settings.scenario
     with closing(envs), closing(Validator(scenario, args.validation_missions, args.threads)) as validator:
         while model.num_timesteps < args.total_steps:

@@ -57,8 +57,7 @@ class Args:
     resume: bool = False
     """Continue from the latest checkpoint in the folder."""
     address: str | None = None
-    """HOST:PORT of a Ray cluster, or auto for the one that this machine belongs to; by default this machine
-    alone."""
+    """HOST:PORT of a Ray cluster, or auto for that of this machine; by default this machine alone."""
     runners: int = 2
     """Processes that collect experience; 0: the trainer itself does."""
     missions: int = 8

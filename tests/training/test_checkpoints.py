@@ -1,4 +1,4 @@
-"""Checkpoints come back as they were; what is broken, foreign or of something else is named."""
+"""Checkpoints come back as they were; what is broken, foreign or made for something else is named."""
 
 from __future__ import annotations
 
@@ -171,7 +171,7 @@ def test_loading_runs_no_code(saved):
 
 
 def test_a_policy_is_a_strategy_like_any_other(saved, tmp_path):
-    """Same seed, same mission; through any form of actions; a run's folder or a checkpoint's."""
+    """The same seed gives the same mission, from a run's folder or a checkpoint's, with any action form."""
     ends = []
     for name, action in ((saved, {}), (saved.parent, {}), (saved.parent, FORM["action"])):
         settings = {"robots": 2, "decision_period_s": None, "time_limit_s": 60.0, "action": action}
@@ -233,7 +233,7 @@ def test_evaluate_puts_a_policy_beside_strategies(saved, tmp_path, capsys):
     assert theirs["ratio"] == pytest.approx(ours["median_s"] / theirs["median_s"])
     assert 0 <= theirs["faster"] <= 3 and found["better_rival"] in ("random", "gradient")
     assert evaluate.run_command(evaluate.main, words) == 0  # from what is kept
-    assert "the policy beats those there on" in capsys.readouterr().out
+    assert "better one of gradient and random" in capsys.readouterr().out
     assert evaluate.run_command(evaluate.main, [*words, "--robots", "3"]) == BAD_INPUT
     assert "robots = 3" in capsys.readouterr().err
     shutil.rmtree(saved.parent)
@@ -247,7 +247,7 @@ def test_evaluation_takes_worlds_that_training_never_sees():
 
 
 def test_the_policy_that_comes_with_the_project_maps_the_room():
-    """Far sooner than the random walk, which takes some hundred seconds."""
+    """In far less time than the random walk, which takes some hundred seconds."""
     env = EntropyExploreEnv("room", robots=3, decision_period_s=None, observation=Observation(panorama=False))
     run_mission(env, make_strategy("pretrained:room"), 0)
     figures = mission_figures(env.missions, 0)

@@ -1,4 +1,4 @@
-"""Learning from one command: end to end, killed and resumed, and what it says to bad input."""
+"""training.ppo from start to end, killed and resumed, and its errors."""
 
 from __future__ import annotations
 
@@ -39,34 +39,34 @@ def learn(out: Path, *more: str, steps: int = 384) -> int:
     return ppo.run_command(ppo.main, [*TINY, "--out", str(out), "--total-steps", str(steps), *more])
 
 
-def whole(out: Path) -> dict[str, bytes]:
-    """Every number of the latest checkpoint, bit for bit, but for how long it took."""
+def checkpoint_bits(out: Path) -> dict[str, bytes]:
+    """Every number of the latest checkpoint, bit for bit, except seconds on the clock."""
     kept = load_checkpoint(latest_checkpoint(out, "step"), training=True)
     trainer = kept.trainer
     assert trainer is not None
     tensors = {name: each.numpy() for name, each in (kept.weights | trainer.tensors).items()}
-    bits = {name: numbers(each) for name, each in (tensors | kept.normalisation | trainer.arrays).items()}
+    bits = {name: array_bits(each) for name, each in (tensors | kept.normalisation | trainer.arrays).items()}
     return bits | {"chance": json.dumps(trainer.counters["chance"]).encode()}
 
 
-def numbers(array: np.ndarray) -> bytes:
-    """The bits of an array, without those between the fields of a structured one."""
+def array_bits(array: np.ndarray) -> bytes:
+    """The bits of an array, without the padding of a structured one."""
     if array.dtype.names is None:
         return array.tobytes()
-    return b"".join(numbers(array[name]) for name in array.dtype.names)
+    return b"".join(array_bits(array[name]) for name in array.dtype.names)
 
 
 @pytest.fixture(scope="module")
-def straight(tmp_path_factory):
+def uninterrupted(tmp_path_factory):
     """A run that nothing interrupted, and what it printed."""
-    out, printed = tmp_path_factory.mktemp("straight") / "run", io.StringIO()
+    out, printed = tmp_path_factory.mktemp("uninterrupted") / "run", io.StringIO()
     with contextlib.redirect_stdout(printed):
         assert learn(out) == 0
     return out, printed.getvalue()
 
 
-def test_a_run_learns_and_leaves_what_it_should(straight):
-    out, printed = straight
+def test_a_run_changes_all_weights_and_writes_its_files(uninterrupted):
+    out, printed = uninterrupted
     said = json.loads(printed)
     assert said["steps"] == 384 and set(said["best"]) >= {"steps", "mean_s", "finished"}
     with (out / "curve.csv").open() as file:
@@ -94,11 +94,11 @@ def test_missions_get_shorter_than_those_of_fresh_weights(tmp_path):
     assert int(after["steps"]) == 6144 and float(after["mean_s"]) < 0.8 * before.mean_s
 
 
-def test_a_resumed_run_ends_bitwise_like_one_that_nothing_interrupted(straight, tmp_path, monkeypatch):
+def test_a_resumed_run_ends_bitwise_like_an_uninterrupted_one(uninterrupted, tmp_path, monkeypatch):
     out = tmp_path / "run"
 
     class Killed(BaseException):
-        """Stands for a kill: nothing of ours catches it."""
+        """Stands for a kill: no code of ours catches it."""
 
     compute, rollouts = DecisionBuffer.compute_returns_and_advantage, []
 
@@ -115,18 +115,18 @@ def test_a_resumed_run_ends_bitwise_like_one_that_nothing_interrupted(straight, 
     begun = latest_checkpoint(out, "step").name
     assert 0 < int(begun.rpartition("-")[2]) < 384
     assert learn(out, "--resume") == 0
-    assert whole(out) == whole(straight[0])
+    assert checkpoint_bits(out) == checkpoint_bits(uninterrupted[0])
     columns = ("steps", "mean_s", "median_s", "finished", "bits_per_bit")
     curves = []
-    for run in (out, straight[0]):
+    for run in (out, uninterrupted[0]):
         with (run / "curve.csv").open() as file:
             curves.append([[row[name] for name in columns] for row in csv.DictReader(file)])
     assert curves[0] == curves[1]
     assert load_checkpoint(latest_checkpoint(out, "best")).weights.keys()
 
 
-def test_a_run_that_is_killed_outright_goes_on(tmp_path, straight):
-    """With a real signal, at a moment that nobody chose."""
+def test_a_run_killed_by_a_signal_can_be_resumed(tmp_path, uninterrupted):
+    """At an arbitrary moment after its first checkpoint."""
     out = tmp_path / "run"
     words = [sys.executable, "-m", "training.ppo", *TINY, "--out", str(out), "--total-steps", "384"]
     with subprocess.Popen(words, cwd=ROOT, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as process:
@@ -135,19 +135,19 @@ def test_a_run_that_is_killed_outright_goes_on(tmp_path, straight):
             time.sleep(0.005)
         process.send_signal(signal.SIGKILL)
     assert learn(out, "--resume") == 0
-    assert whole(out) == whole(straight[0])
+    assert checkpoint_bits(out) == checkpoint_bits(uninterrupted[0])
 
 
-def test_resuming_nothing_begins(tmp_path):
+def test_resuming_in_an_empty_folder_starts_a_run(tmp_path):
     assert learn(tmp_path / "run", "--resume", steps=96) == 0
 
 
-def test_a_run_is_not_written_over_and_not_mixed_with_another(straight, capsys):
-    assert learn(straight[0]) == BAD_INPUT
+def test_a_run_is_neither_overwritten_nor_continued_with_other_options(uninterrupted, capsys):
+    assert learn(uninterrupted[0]) == BAD_INPUT
     assert "--resume to continue" in capsys.readouterr().err
-    assert learn(straight[0], "--resume", "--gamma", "0.5") == BAD_INPUT
+    assert learn(uninterrupted[0], "--resume", "--gamma", "0.5") == BAD_INPUT
     assert capsys.readouterr().err.startswith("error: gamma = 0.5: allowed is 0.9, as in the run")
-    assert learn(straight[0], "--resume", "--channel.burst", "3") == BAD_INPUT
+    assert learn(uninterrupted[0], "--resume", "--channel.burst", "3") == BAD_INPUT
     assert len(capsys.readouterr().err.splitlines()) == 1
 
 
@@ -236,8 +236,8 @@ def test_the_error_names_tensor_and_step():
     )
 
 
-def test_a_folder_with_a_run_is_not_begun_anew_and_later_best_policies_go(tmp_path, capsys):
-    """Between the first validation and the first checkpoint a kill leaves a best policy alone."""
+def test_a_best_policy_without_a_checkpoint_counts_as_a_run_and_a_resumed_run_removes_it(tmp_path, capsys):
+    """A run killed between its first validation and its first checkpoint leaves only a best policy."""
     out = tmp_path / "run"
     assert learn(out, "--checkpoint-every", "99999", "--no-video", steps=192) == 0
     capsys.readouterr()
