@@ -1,6 +1,6 @@
-"""The form that all commands share: errors are one line on standard error, exit codes the same.
+"""What all commands have in common: errors as one line on standard error, and the exit codes.
 
-Exit codes: 0 done, 1 what the command checks does not hold, 2 bad input, 130 interrupted.
+Exit codes: 0 done, 1 a check of the command failed, 2 bad input, 130 interrupted.
 """
 
 from __future__ import annotations
@@ -19,11 +19,11 @@ INTERRUPTED = 130
 
 
 class UsageError(EntropyExploreError):
-    """The words of a command line do not fit its options."""
+    """The arguments of a command line do not fit its options."""
 
 
 class LineParser(argparse.ArgumentParser):
-    """Says in one line what does not fit."""
+    """An argument parser whose errors are one line."""
 
     def error(self, message: str) -> NoReturn:
         """Raise a UsageError, for `run_command` to print."""
@@ -34,15 +34,15 @@ def run_command(main: Callable[[Sequence[str]], int], words: Sequence[str] | Non
     """Run a command's main function; its errors become one line on standard error and an exit code.
 
     Args:
-        main: Takes the words of the command line, returns an exit code.
-        words: None = those of the process.
+        main: Takes the arguments of the command line, returns an exit code.
+        words: The arguments; None = those of the process.
     """
     try:
         return main(sys.argv[1:] if words is None else words)
     except EntropyExploreError as error:
         print("error: " + " ".join(str(error).split()), file=sys.stderr)
         return BAD_INPUT
-    except BrokenPipeError:  # whoever read our output has seen enough
+    except BrokenPipeError:  # the reader of our output has closed it
         sys.stdout = Path(os.devnull).open("w")
         return 0
     except OSError as error:

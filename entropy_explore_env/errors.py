@@ -1,20 +1,20 @@
-"""The named errors of the package: each says the field, the value it had and what is allowed."""
+"""The errors of the package: each names a field, its value and what is allowed."""
 
 from __future__ import annotations
 
 _LONGEST_VALUE = 200
-"""A message shows so many characters of a value."""
+"""Characters of a value that a message shows at most."""
 
 
 class EntropyExploreError(ValueError):
-    """Anything that the caller asked for and cannot have; the message is one line."""
+    """A request of the caller that cannot be met; the message is one line."""
 
 
 class SettingError(EntropyExploreError):
     """A setting is unknown, of the wrong kind or out of its range."""
 
     def __init__(self, field: str, value: object, allowed: str) -> None:
-        """Name the field, show the value, say what is allowed."""
+        """Name the field, its value and what is allowed."""
         shown = " ".join(repr(value).split())
         if len(shown) > _LONGEST_VALUE:
             shown = shown[:_LONGEST_VALUE] + " …"
@@ -22,7 +22,7 @@ class SettingError(EntropyExploreError):
         self.field, self.value, self.allowed = field, value, allowed
 
     def __reduce__(self) -> tuple[type, tuple[str, object, str]]:
-        """Survive the way back from a worker process."""
+        """Restore the error in another process."""
         return type(self), (self.field, self.value, self.allowed)
 
 
@@ -35,7 +35,7 @@ class WorldError(SettingError):
 
 
 class RecordError(SettingError):
-    """A mission record cannot be used: missing, broken, changed by hand or of another format."""
+    """A mission record cannot be used: missing, broken, edited or of another format."""
 
 
 class CallOrderError(EntropyExploreError):
@@ -51,5 +51,5 @@ class MissingExtraError(EntropyExploreError, ImportError):
         self.package, self.extra = package, extra
 
     def __reduce__(self) -> tuple[type, tuple[str, str]]:
-        """Survive the way back from a worker process."""
+        """Restore the error in another process."""
         return type(self), (self.package, self.extra)

@@ -1,7 +1,7 @@
-"""Named random streams: every kind of draw has its own, all spawned from one seed.
+"""Named random streams: every kind of draw has a stream of its own, all spawned from one seed.
 
 Python code draws from NumPy generators; compiled code from SplitMix64 (Steele, Lea & Flood 2014),
-whose whole state is one 64-bit number in an array.
+the state of which is one 64-bit number in an array.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from entropy_explore_env.validation import is_whole
 
 
 class Stream(enum.IntEnum):
-    """What a random draw is for; switching one kind on leaves the others as they were."""
+    """The purpose of a random draw; drawing from one stream does not change the others."""
 
     WORLD = 0
     STARTS = 1
@@ -27,7 +27,7 @@ class Stream(enum.IntEnum):
 
 
 def seed_sequence(seed: int, episode: int, stream: Stream) -> np.random.SeedSequence:
-    """The seed of one stream in the `episode`-th mission after a reset with `seed`."""
+    """The seed of one stream in episode number `episode` after a reset with `seed`."""
     return np.random.SeedSequence(entropy=seed, spawn_key=(episode, int(stream)))
 
 
@@ -37,12 +37,12 @@ def generator(seed: int, episode: int, stream: Stream) -> np.random.Generator:
 
 
 def splitmix_states(seed: int, episode: int, stream: Stream, robots: int) -> np.ndarray:
-    """(robots,) uint64 start states for compiled draws, one a robot."""
+    """(robots,) uint64 initial states for compiled draws, one for each robot."""
     return seed_sequence(seed, episode, stream).generate_state(robots, np.uint64)
 
 
 def check_seed(seed: object) -> int:
-    """The seed as an int; a fresh one from the operating system where it is None.
+    """The seed as an int; if it is None, a new one from the operating system.
 
     Raises:
         SettingError: It is neither None nor a whole number ≥ 0.

@@ -1,4 +1,4 @@
-"""Checks of a dataclass's fields: what is not allowed raises a SettingError that says what is."""
+"""Checks of a dataclass's fields; a value that is not allowed raises a SettingError that states what is."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from entropy_explore_env.errors import SettingError
 
 
 def is_number(value: object) -> TypeGuard[float]:
-    """Whether it is a number that a float64 can hold; NaN and booleans are none, ±inf is one."""
+    """Whether it is a number that a float64 can hold: ±inf is one, NaN and booleans are not."""
     if isinstance(value, bool) or not isinstance(value, int | float | np.integer | np.floating):
         return False
     try:
@@ -22,20 +22,20 @@ def is_number(value: object) -> TypeGuard[float]:
 
 
 def is_whole(value: object, least: int, most: int | None = None) -> TypeGuard[int]:
-    """Whether it is a whole number in a range; booleans are none."""
+    """Whether it is a whole number in a range; booleans are not."""
     if isinstance(value, bool) or not isinstance(value, int | np.integer):
         return False
     return bool(least <= value and (most is None or value <= most))
 
 
 def check_whole(name: str, value: object, least: int) -> None:
-    """Raise a SettingError unless a value that is no field is a whole number ≥ `least`."""
+    """Raise a SettingError unless a value, not a field, is a whole number ≥ `least`."""
     if not is_whole(value, least):
         raise SettingError(name, value, f"a whole number ≥ {least}")
 
 
 def check(settings: object, name: str, allowed: str, accepts: Callable[[Any], bool]) -> None:
-    """Raise a SettingError unless the field is a number that `accepts` takes; NaN never is."""
+    """Raise a SettingError unless the field is a number, not NaN, that `accepts` returns True for."""
     value = getattr(settings, name)
     if not is_number(value) or not accepts(value):
         raise SettingError(f"{type(settings).__name__}.{name}", value, allowed)

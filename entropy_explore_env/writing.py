@@ -1,4 +1,4 @@
-"""Files that are there whole or not at all."""
+"""Files that are written completely or not at all."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from pathlib import Path
 
 
 def write_atomically(path: Path, content: bytes | str) -> None:
-    """Write a file so that it is there whole or not at all: temporary file, fsync, rename.
+    """Write a file completely or not at all: temporary file, fsync, rename.
 
     Args:
-        path: Where; its folder is made if it is missing.
+        path: The file; its folder is made if it is missing.
         content: What; text is written as UTF-8.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
