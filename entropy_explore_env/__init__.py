@@ -9,20 +9,14 @@ Importing registers, for every scenario (room → Room-v0), `gymnasium.make`, `g
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import gymnasium
 import pettingzoo
 
-from entropy_explore_env.compilation.kernels import forget_stale_kernels
-
-forget_stale_kernels(Path(__file__).parent)
-
-from entropy_explore_env.envs.parallel_env import EntropyExploreEnv, env, parallel_env  # noqa: E402
-from entropy_explore_env.envs.rewards import StepFigures  # noqa: E402
-from entropy_explore_env.envs.single_env import SingleRobotEnv  # noqa: E402
-from entropy_explore_env.envs.vector_env import EntropyExploreVectorEnv  # noqa: E402
-from entropy_explore_env.errors import (  # noqa: E402
+from entropy_explore_env.envs.parallel_env import EntropyExploreEnv, env, parallel_env
+from entropy_explore_env.envs.rewards import StepFigures
+from entropy_explore_env.envs.single_env import SingleRobotEnv
+from entropy_explore_env.envs.vector_env import EntropyExploreVectorEnv
+from entropy_explore_env.errors import (
     ActionError,
     CallOrderError,
     EntropyExploreError,
@@ -31,14 +25,14 @@ from entropy_explore_env.errors import (  # noqa: E402
     SettingError,
     WorldError,
 )
-from entropy_explore_env.missions.simulation import Missions  # noqa: E402
-from entropy_explore_env.missions.state import MissionEnd  # noqa: E402
-from entropy_explore_env.missions.view import RobotView  # noqa: E402
-from entropy_explore_env.robots.channel import Delivery  # noqa: E402
-from entropy_explore_env.robots.motion import MoveEnd  # noqa: E402
-from entropy_explore_env.scenario import Scenario, with_settings  # noqa: E402 - kernels are imported from here on
-from entropy_explore_env.scenarios import SCENARIOS, find_scenario  # noqa: E402
-from entropy_explore_env.settings import (  # noqa: E402 - kernels are imported from here on
+from entropy_explore_env.missions.simulation import Missions
+from entropy_explore_env.missions.state import MissionEnd
+from entropy_explore_env.missions.view import RobotView
+from entropy_explore_env.robots.channel import Delivery
+from entropy_explore_env.robots.motion import MoveEnd
+from entropy_explore_env.scenario import Scenario, with_settings
+from entropy_explore_env.scenarios import SCENARIOS, find_scenario
+from entropy_explore_env.settings import (
     Action,
     Channel,
     Ending,
@@ -49,9 +43,9 @@ from entropy_explore_env.settings import (  # noqa: E402 - kernels are imported 
     Robot,
     RobotKind,
 )
-from entropy_explore_env.version import VERSION  # noqa: E402
-from entropy_explore_env.worlds.load import load_octomap, load_world, save_world  # noqa: E402
-from entropy_explore_env.worlds.world import World  # noqa: E402
+from entropy_explore_env.version import VERSION
+from entropy_explore_env.worlds.load import load_octomap, load_world, save_world
+from entropy_explore_env.worlds.world import World
 
 __version__ = VERSION
 

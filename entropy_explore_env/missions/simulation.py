@@ -13,6 +13,7 @@ import numpy as np
 from entropy_explore_env.belief.entropy import map_entropy_bits
 from entropy_explore_env.belief.map_update import PRIOR_MEAN
 from entropy_explore_env.belief.pooling import fresh_sums
+from entropy_explore_env.compilation.announcement import end_of_step
 from entropy_explore_env.errors import CallOrderError
 from entropy_explore_env.missions.navigation import plan_missions
 from entropy_explore_env.missions.observation import ObservationLayout, observation_rules, observe_mission
@@ -281,6 +282,7 @@ class Missions:
             self._step_range(0, 0, self.count, boxes, numbers)
         else:
             self._step_threaded(boxes, numbers)
+        end_of_step()
         return self.observations
 
     def _step_range(self, thread: int, first: int, last: int, boxes: np.ndarray, numbers: np.ndarray) -> None:

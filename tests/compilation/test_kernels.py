@@ -1,4 +1,4 @@
-"""Compiled code on disk is forgotten as soon as a source file that it may come from changes."""
+"""Compiled code on disk is that of the sources as a process imported them, wherever kernels are and call."""
 
 from __future__ import annotations
 
@@ -11,67 +11,180 @@ import numpy as np
 import pytest
 from numba.core.errors import NumbaError
 
-from entropy_explore_env.compilation.kernels import forget_stale_kernels, lean_kernel
+from entropy_explore_env.compilation.kernels import lean_kernel
 
-LEAF = """from entropy_explore_env.compilation.kernels import inlined_kernel
+LEAF = """import numpy as np
+from entropy_explore_env.compilation.kernels import {decorator}
+
+CONSTANT = {constant}
 
 
-@inlined_kernel
+@{decorator}
 def leaf(x):
-    return x + {}
+    return x + CONSTANT
 """
-CALLER = """import pathlib
-
-import entropy_explore_env.compilation.kernels as compilation
-
-compilation.forget_stale_kernels(pathlib.Path(__file__).parent)
-from kernels.leaf import leaf
+CALLER = """
+from entropy_explore_env.compilation.kernels import lean_kernel
+from {package}.leaf import leaf
 
 
-@compilation.lean_kernel
+@lean_kernel
 def caller(x):
     return leaf(x)
-
-
-print(caller(1.0))
 """
+CALL = "from entropy_explore_env.compilation.announcement import compiled_kernels\n"
+CALL += "from {package}.caller import caller; print(caller(1.0), len(compiled_kernels()))"
+ROOT = Path(__file__).parents[2]
 
 
-def answer(folder: Path) -> str:
-    environment = {name: value for name, value in os.environ.items() if name != "NUMBA_CACHE_DIR"}
-    paths = os.pathsep.join([str(folder), str(Path(__file__).parents[2])])
-    command = [sys.executable, "-c", "import kernels.caller"]
-    done = subprocess.run(
-        command, env={**environment, "PYTHONPATH": paths}, capture_output=True, text=True, check=True
+def package(folder: Path, name: str = "mine", constant: str = "10.0", decorator: str = "lean_kernel") -> Path:
+    made = folder / name
+    made.mkdir(parents=True, exist_ok=True)
+    (made / "__init__.py").write_text("")
+    (made / "leaf.py").write_text(LEAF.format(constant=constant, decorator=decorator))
+    (made / "caller.py").write_text(CALLER.format(package=name))
+    return made
+
+
+def start(code: str, folder: Path, **environment: str | None) -> subprocess.Popen[str]:
+    named = {**os.environ, "NUMBA_CACHE_DIR": str(folder / "cache"), "PYTHONDONTWRITEBYTECODE": "1"}
+    named |= {"PYTHONPATH": os.pathsep.join([str(folder), str(ROOT)]), **environment}
+    kept = {name: value for name, value in named.items() if value is not None}
+    pipe = subprocess.PIPE
+    return subprocess.Popen(
+        [sys.executable, "-c", code], env=kept, stdin=pipe, stdout=pipe, stderr=pipe, text=True, cwd=folder
     )
-    return done.stdout.strip()
 
 
-def test_a_kernel_is_compiled_anew_when_one_that_it_calls_changes(tmp_path):
-    package = tmp_path / "kernels"
-    package.mkdir()
-    (package / "__init__.py").write_text("")
-    (package / "leaf.py").write_text(LEAF.format("10.0"))
-    (package / "caller.py").write_text(CALLER)
-    assert answer(tmp_path) == "11.0"
-    assert list(package.rglob("*.nbi"))
-    (package / "leaf.py").write_text(LEAF.format("20.0"))
-    assert answer(tmp_path) == "21.0"
+def run(code: str, folder: Path, **environment: str | None) -> str:
+    process = start(code, folder, **environment)
+    out, err = process.communicate(timeout=120)
+    assert process.returncode == 0, err
+    return out.strip()
 
 
-def test_nothing_is_dropped_while_nothing_changes(tmp_path):
-    package, other = tmp_path / "kernels", tmp_path / "other"
-    index = package / "__pycache__" / "caller.nbi"
-    index.parent.mkdir(parents=True)
-    other.mkdir()
-    (package / "caller.py").write_text("")
-    forget_stale_kernels(package, other)
-    index.write_bytes(b"compiled")
-    forget_stale_kernels(package, other)
-    assert index.exists()
-    (other / "leaf.py").write_text("")  # a package that it builds on
-    forget_stale_kernels(package, other)
-    assert not index.exists()
+def kernels(folder: Path) -> set[str]:
+    return {file.name for file in folder.rglob("*.kernel")}
+
+
+@pytest.mark.parametrize("decorator", ["lean_kernel", "inlined_kernel", "kernel"])
+def test_a_kernel_changes_when_one_that_it_calls_changes_and_only_then(tmp_path, decorator):
+    call = CALL.format(package="mine")
+    package(tmp_path, decorator=decorator)
+    assert run(call, tmp_path) == "11.0 1"
+    assert run(call, tmp_path) == "11.0 0"  # from disk
+    leaf = package(tmp_path, constant="20.0", decorator=decorator) / "leaf.py"
+    assert run(call, tmp_path) == "21.0 1"
+    leaf.write_text("# what it is for\n\n\n" + leaf.read_text())
+    assert run(call, tmp_path) == "21.0 0"
+    package(tmp_path, constant="10.0", decorator=decorator)
+    assert run(call, tmp_path) == "11.0 0"  # what was compiled first is still there
+
+
+def test_nothing_is_written_into_packages(tmp_path):
+    """In a test folder, and where a package cannot be written; the user's cache folder takes it all."""
+    for name, mode in (("tests_of_mine", 0o755), ("installed", 0o555)):
+        made = package(tmp_path, name)
+        made.chmod(mode)
+        before = {file: file.stat().st_mtime_ns for file in tmp_path.rglob("*.py")}
+        home = tmp_path / f"home of {name}"
+        environment = {"NUMBA_CACHE_DIR": None, "XDG_CACHE_HOME": None, "HOME": str(home)}
+        environment |= {"LOCALAPPDATA": str(home)}
+        assert run(CALL.format(package=name), tmp_path, **environment) == "11.0 1"
+        assert {file.name for file in made.iterdir()} == {"__init__.py", "leaf.py", "caller.py"}
+        assert {file: file.stat().st_mtime_ns for file in tmp_path.rglob("*.py")} == before
+        assert len(kernels(home)) == 2  # the caller for Python, the leaf for the caller
+        made.chmod(0o755)
+        package(tmp_path, name, constant="20.0")
+        made.chmod(mode)
+        assert run(CALL.format(package=name), tmp_path, **environment) == "21.0 1"
+        made.chmod(0o755)
+
+
+def test_a_kernel_of_ones_own_may_call_one_of_the_library(tmp_path):
+    made = tmp_path / "mine"
+    made.mkdir()
+    (made / "__init__.py").write_text("")
+    code = (
+        "from entropy_explore_env.belief.coverage_map import measurement_precision\n"
+        "from entropy_explore_env.compilation.kernels import kernel\n\n\n"
+        "@kernel\ndef caller(x):\n    return measurement_precision(x, 0.5, 0.0) + {}\n"
+    )
+    call = CALL.format(package="mine")
+    (made / "caller.py").write_text(code.format("0.0"))
+    assert run(call, tmp_path) == "4.0 1"
+    library = {name for name in kernels(tmp_path) if name.startswith("entropy_explore_env.belief")}
+    (made / "caller.py").write_text(code.format("1.0"))
+    assert run(call, tmp_path) == "5.0 1"
+    assert {name for name in kernels(tmp_path) if name.startswith("entropy_explore_env.belief")} == library
+
+
+def test_a_long_run_keeps_the_code_that_it_imported(tmp_path):
+    """It compiles after an edit on disk; what it writes is not taken for the code of the new file."""
+    made = package(tmp_path)
+    late = "from mine.caller import caller\nprint('imported', flush=True)\ninput()\nprint(caller(1.0))"
+    process = start(late, tmp_path)
+    assert process.stdout is not None and process.stdout.readline() == "imported\n"
+    package(tmp_path, constant="20.0")
+    assert (made / "leaf.py").read_text().count("20.0") == 1
+    out, err = process.communicate("\n", timeout=120)
+    assert (process.returncode, out) == (0, "11.0\n"), err
+    assert run(CALL.format(package="mine"), tmp_path) == "21.0 1"
+    package(tmp_path, constant="10.0")
+    assert run(CALL.format(package="mine"), tmp_path) == "11.0 0"
+
+
+def test_where_nothing_can_be_written_kernels_work_and_one_line_says_so(tmp_path):
+    package(tmp_path)
+    (tmp_path / "file").write_text("not a folder")
+    code = CALL.format(package="mine") + "\nprint(caller(1))"
+    process = start(code, tmp_path, NUMBA_CACHE_DIR=str(tmp_path / "file"))
+    out, err = process.communicate(timeout=120)
+    assert (process.returncode, out) == (0, "11.0 1\n11.0\n"), err
+    assert err.count("are not kept") == 1 and "NUMBA_CACHE_DIR" in err and "Traceback" not in err
+
+
+def test_processes_may_compile_the_same_at_once(tmp_path):
+    package(tmp_path)
+    call = "from mine.caller import caller; print(caller({}), caller({}))"
+    processes = [
+        start(call.format(*pair), tmp_path) for pair in (("1.0", "1"), ("1", "1.0"), ("1.0", "True"))
+    ]
+    outs = [process.communicate(timeout=120) for process in processes]
+    assert [out for out, _ in outs] == ["11.0 11.0\n"] * 3, outs
+    assert not list(tmp_path.rglob("*.part"))
+    assert len(kernels(tmp_path)) == 6  # for three types, the caller and the leaf
+    assert run(call.format("1", "1.0"), tmp_path) == "11.0 11.0"
+
+
+def test_a_damaged_file_is_compiled_anew(tmp_path):
+    package(tmp_path)
+    call = CALL.format(package="mine")
+    assert run(call, tmp_path) == "11.0 1"
+    (file,) = tmp_path.rglob("mine.caller.caller-*.kernel")
+    whole = file.read_bytes()
+    file.write_bytes(whole[: len(whole) // 2])
+    assert run(call, tmp_path) == "11.0 1"
+    assert run(call, tmp_path) == "11.0 0"
+
+
+def test_bounds_are_checked_although_code_without_checks_is_on_disk(tmp_path):
+    made = tmp_path / "mine"
+    made.mkdir()
+    (made / "__init__.py").write_text("")
+    (made / "caller.py").write_text(
+        "from entropy_explore_env.compilation.kernels import lean_kernel\n\n\n"
+        "@lean_kernel\ndef inner(x, i):\n    return x[i]\n\n\n"
+        "@lean_kernel\ndef caller(x, i):\n    return inner(x, i)\n"
+    )
+    call = "import numpy\nfrom mine.caller import caller\ncaller(numpy.zeros(9)[:3], {})\n"
+    run(call.format(3), tmp_path, NUMBA_BOUNDSCHECK=None)  # reads beyond the end without a word
+    run(call.format(2), tmp_path, NUMBA_BOUNDSCHECK="1")
+    for _ in range(2):  # compiled, and from disk
+        process = start(call.format(3), tmp_path, NUMBA_BOUNDSCHECK="1")
+        _, err = process.communicate(timeout=120)
+        assert process.returncode == 1 and "IndexError" in err
+    run(call.format(3), tmp_path, NUMBA_BOUNDSCHECK="0")
 
 
 def test_a_lean_kernel_makes_no_array():
@@ -83,15 +196,7 @@ def test_a_lean_kernel_makes_no_array():
         careless()
 
 
-def test_compiled_code_has_a_file_of_its_own(tmp_path):
-    """Two processes that save at the same time must not write to one file: none is a number alone."""
-    package = tmp_path / "kernels"
-    package.mkdir()
-    (package / "__init__.py").write_text("")
-    (package / "leaf.py").write_text(LEAF.format("10.0"))
-    (package / "caller.py").write_text(CALLER + "print(caller(1))\n")
-    assert answer(tmp_path) == "11.0\n11.0"
-    files = [file.name for file in package.rglob("*.nbc") if ".caller-" in file.name]
-    assert len(files) == 2 and len({name.split(".")[0] for name in files}) == 2
-    assert answer(tmp_path) == "11.0\n11.0"
-    assert sorted(files) == sorted(file.name for file in package.rglob("*.nbc") if ".caller-" in file.name)
+def test_without_numba_kernels_are_functions(tmp_path):
+    package(tmp_path)
+    code = "from mine.caller import caller; print(caller(1.0), type(caller).__name__)"
+    assert run(code, tmp_path, NUMBA_DISABLE_JIT="1") == "11.0 function"

@@ -1,0 +1,92 @@
+"""What compiling says: one line when it begins, one when it is done.
+
+They are warnings of the logger `entropy_explore_env`, which Python prints on standard error unless a
+program says otherwise: `logging.getLogger("entropy_explore_env").setLevel(logging.ERROR)` makes them silent.
+Processes that `multiprocessing` started are silent.
+"""
+
+from __future__ import annotations
+
+import logging
+import multiprocessing
+import time
+from pathlib import Path
+
+_LOGGER = logging.getLogger("entropy_explore_env")
+
+
+class _Progress:
+    """What this process has compiled, and said of it."""
+
+    def __init__(self) -> None:
+        self.compiled: list[str] = []
+        self.began_s: float | None = None
+        self.spent_s = 0.0
+        self.pending = False
+        self.announced = False
+        self.said_why_not_kept = False
+
+
+_progress = _Progress()
+
+
+def compiled_kernels() -> tuple[str, ...]:
+    """Kernels that this process has compiled for Python, once for each combination of types."""
+    return tuple(_progress.compiled)
+
+
+def begin_compiling(name: str, folder: Path | None) -> None:
+    """A kernel that Python calls is not on disk."""
+    _progress.compiled.append(name)
+    _progress.began_s = time.perf_counter()
+    if not _progress.announced:
+        _progress.announced = _progress.pending = True
+        kept = "" if folder is None else f"; they are kept in {_short(folder)}"
+        _say(f"entropy_explore_env: compiling kernels, about 10 s{kept}")
+
+
+def end_compiling() -> None:
+    """It is compiled."""
+    if _progress.began_s is not None:
+        _progress.spent_s += time.perf_counter() - _progress.began_s
+        _progress.began_s = None
+
+
+def end_of_step() -> None:
+    """A mission has advanced: what it needs is compiled."""
+    if _progress.pending:
+        _progress.pending = False
+        _say(f"entropy_explore_env: compiled {len(_progress.compiled)} kernels in {_progress.spent_s:.0f} s")
+
+
+def explain_not_kept(folder: Path | None, error: OSError | None) -> None:
+    """Compiled code cannot be written; said once."""
+    if _progress.said_why_not_kept:
+        return
+    _progress.said_why_not_kept = True
+    where = "the user has no home folder" if folder is None else f"{_short(folder)}: {_reason(error)}"
+    _say(
+        f"entropy_explore_env: compiled kernels are not kept ({where}), each process compiles them anew; "
+        "NUMBA_CACHE_DIR names another folder"
+    )
+
+
+def explain_no_stamp(reason: str) -> None:
+    """A kernel is compiled in each process; for those who wonder why."""
+    logging.getLogger("entropy_explore_env.compilation").info("compiled kernel is not kept: %s", reason)
+
+
+def _say(line: str) -> None:
+    if multiprocessing.parent_process() is None:
+        _LOGGER.warning(line)
+
+
+def _short(folder: Path) -> str:
+    try:
+        return f"~/{folder.relative_to(Path.home()).as_posix()}"
+    except (ValueError, RuntimeError):
+        return str(folder)
+
+
+def _reason(error: OSError | None) -> str:
+    return "" if error is None else error.strerror or str(error)

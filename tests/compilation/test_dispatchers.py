@@ -1,0 +1,224 @@
+"""Numba still does what the two forms of a kernel build on, and leaves other people's functions alone."""
+
+from __future__ import annotations
+
+import inspect
+import pickle
+
+import llvmlite.binding as llvm
+import numba
+import numpy as np
+import pytest
+from numba.core import caching, compiler, config
+from numba.core.codegen import JITCodeLibrary
+from numba.core.errors import NumbaError
+from numba.core.registry import CPUDispatcher
+from numba.core.typed_passes import NativeLowering
+
+from entropy_explore_env.compilation import cache, stamps
+from entropy_explore_env.compilation.dispatchers import InnerKernel, InnerLibrary, Kernel
+from entropy_explore_env.compilation.kernels import inlined_kernel, kernel, lean_kernel
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path, monkeypatch):
+    monkeypatch.setattr(config, "CACHE_DIR", str(tmp_path))
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    return tmp_path
+
+
+@inlined_kernel
+def squared(x):
+    return x * x
+
+
+@lean_kernel
+def cubed(x):
+    return x * squared(x)
+
+
+@kernel
+def refused(x):
+    if x > 2:
+        raise ValueError("too large")
+    return x
+
+
+@kernel
+def root(x):
+    out = np.zeros(3)
+    out[0] = squared(x)
+    out[1] = cubed(2)
+    out[2] = refused(x)
+    return out
+
+
+def test_inner_kernels_are_intermediate_code_that_the_outermost_holds():
+    assert root(2.0).tolist() == [4.0, 8.0, 2.0]
+    for inner in (squared.inner, cubed.inner, refused.inner):
+        assert isinstance(inner, InnerKernel)
+        for result in inner.overloads.values():
+            assert isinstance(result.library, InnerLibrary)
+            defined = [function.name for function in result.library.get_defined_functions()]
+            assert result.fndesc.llvm_func_name in defined
+            assert not any("cpython" in name or "cfunc" in name for name in defined)
+    assert isinstance(root, Kernel) and not squared.overloads and not cubed.overloads
+    (result,) = root.overloads.values()
+    defined = [function.name for function in result.library.get_defined_functions()]
+    assert any("cpython" in name for name in defined) and not any("cfunc" in name for name in defined)
+
+
+def test_python_may_call_what_kernels_call():
+    assert root(1.0)[0] == 1.0
+    assert squared(3.0) == 9.0 and cubed(3) == 27
+    assert list(squared.overloads) == [(numba.float64,)]
+
+
+def test_a_kernel_that_raises_does_so_in_python():
+    with pytest.raises(ValueError, match="too large"):
+        root(3.0)
+    with pytest.raises(ValueError, match="too large"):
+        refused(3)
+
+
+def test_kernels_that_call_themselves_are_refused():
+    @lean_kernel
+    def factorial(n):
+        if n < 2:
+            return 1
+        return n * factorial(n - 1)
+
+    @lean_kernel
+    def calling(n):
+        return factorial(n)
+
+    for refused_kernel in (factorial, calling, factorial):
+        with pytest.raises(NumbaError, match="factorial calls itself"):
+            refused_kernel(3)
+
+
+def test_a_kernel_may_be_an_argument_and_is_not_kept_then(folder):
+    @lean_kernel
+    def applied(function, x):
+        return function(x)
+
+    assert applied(squared, 3.0) == 9.0
+    assert applied(cubed, 3.0) == 27.0
+    assert not any("applied" in file.name for file in folder.rglob("*.kernel"))
+
+
+def test_inlined_kernels_are_not_kept_others_are(folder):
+    @inlined_kernel
+    def within(x):
+        return x + 1.0
+
+    @lean_kernel
+    def called(x):
+        return within(x)
+
+    @kernel
+    def calling(x):
+        return called(x)
+
+    assert calling(1.0) == 2.0
+    names = sorted(file.name.rpartition("-")[0].rpartition(".")[2] for file in folder.rglob("*.kernel"))
+    assert names == ["called", "calling"]
+
+
+def test_a_kernel_goes_to_another_process_and_back():
+    assert pickle.loads(pickle.dumps(root)) is root
+
+
+def test_functions_of_others_are_compiled_as_ever(folder):
+    @numba.njit
+    def others(x):
+        return squared(x) + 1.0
+
+    @numba.njit(cache=False)
+    def plain(x):
+        return x
+
+    @kernel
+    def calling(x):
+        return plain(x)
+
+    assert others(2.0) == 5.0 and calling(2.0) == 2.0
+    assert type(others) is CPUDispatcher and type(others._cache) is caching.NullCache
+    (result,) = others.overloads.values()
+    assert type(result.library) is JITCodeLibrary and result.library.get_asm_str()
+
+
+def test_symbols_are_named_after_what_they_were_compiled_from():
+    """Numba counts functions in each process: two of one name, from two processes, would be one symbol."""
+
+    def made(number):
+        @lean_kernel
+        def one(x):
+            return x + number
+
+        return one
+
+    kernels = [made(1.0), made(2.0), made(1.0)]
+    assert [one(1.0) for one in kernels] == [2.0, 3.0, 2.0]
+    names = [next(iter(one.overloads.values())).fndesc.mangled_name for one in kernels]
+    assert names[0] == names[2] != names[1]
+
+
+@pytest.mark.parametrize(
+    "owner, names",
+    [
+        (CPUDispatcher, ("compile", "add_overload", "_numba_type_", "_reduce_states", "_rebuild")),
+        (JITCodeLibrary, ("_optimize_final_module", "_finalize_final_module", "_finalize_dynamic_globals")),
+        (JITCodeLibrary, ("serialize_using_bitcode", "serialize_using_object_code", "enable_object_caching")),
+        (compiler.CompileResult, ("_reduce", "_rebuild", "_find_referenced_environments")),
+        (compiler.Compiler, ("define_pipelines",)),
+        (NativeLowering, ("run_pass",)),
+        (llvm, ("parse_bitcode",)),
+    ],
+)
+def test_what_is_overridden_or_called_exists(owner, names):
+    assert [name for name in names if not hasattr(owner, name)] == []
+
+
+def test_what_is_called_takes_what_it_is_given():
+    def parameters(function):
+        return list(inspect.signature(function).parameters)
+
+    assert parameters(CPUDispatcher.__init__)[1:] == ["py_func", "locals", "targetoptions", "pipeline_class"]
+    assert parameters(compiler.CompileResult._rebuild)[1:] == [
+        "libdata",
+        "fndesc",
+        "env",
+        "signature",
+        "objectmode",
+        "lifted",
+        "typeann",
+        "reload_init",
+        "referenced_envs",
+    ]
+    assert parameters(CPUDispatcher.compile) == ["self", "sig"]
+    assert caching._Cache.__abstractmethods__ == {
+        "cache_path",
+        "load_overload",
+        "save_overload",
+        "enable",
+        "disable",
+        "flush",
+    }
+
+
+def test_settings_of_numba_that_change_code_are_known():
+    assert [name for name in cache._SETTINGS if not hasattr(config, name)] == []
+
+
+@pytest.mark.parametrize("setting", ["OPT", "BOUNDSCHECK", "LOOP_VECTORIZE"])
+def test_settings_of_numba_are_part_of_the_name(setting, monkeypatch):
+    stamps.forget_parts()
+    types = (numba.float64,)
+    before = squared._cache.name_of(types, squared.targetctx)
+    monkeypatch.setattr(config, setting, 1 if getattr(config, setting) != 1 else 0)
+    assert squared._cache.name_of(types, squared.targetctx) != before
+    monkeypatch.undo()
+    assert squared._cache.name_of(types, squared.targetctx) == before
+    assert squared.inner._cache.name_of(types, squared.targetctx) != before
+    assert squared._cache.name_of((numba.float32,), squared.targetctx) != before
