@@ -173,6 +173,8 @@ def _rebuild_outer(target_context: Any, reduced: tuple[Any, ...]) -> compiler.Co
 class InnerKernel(CPUDispatcher):
     """A kernel as other kernels call it."""
 
+    _compiler: Any
+
     def __init__(self, kernel: Kernel) -> None:
         options = {**kernel.targetoptions, **_NO_WRAPPERS}
         super().__init__(kernel.py_func, {}, options, InnerKernelCompiler)

@@ -27,8 +27,9 @@ def kernel_folder() -> Path | None:
     Returns:
         None where the system names no folder for the user.
     """
-    if config.CACHE_DIR:
-        return Path(config.CACHE_DIR) / FOLDER
+    named = getattr(config, "CACHE_DIR", "")  # Numba sets its settings by name
+    if named:
+        return Path(named) / FOLDER
     try:
         home = Path.home()
     except RuntimeError:

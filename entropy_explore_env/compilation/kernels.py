@@ -17,7 +17,7 @@ def _compiled(**options: Any) -> Callable[[Callable[..., Any]], Any]:  # noqa: A
     """As `njit`, in the form that `dispatchers` describes."""
 
     def decorate(function: Callable[..., Any]) -> Any:  # noqa: ANN401
-        if config.DISABLE_JIT:
+        if getattr(config, "DISABLE_JIT", False):
             return function
         return Kernel(function, targetoptions=dict(options))
 
