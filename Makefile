@@ -7,6 +7,8 @@ VENV := .venv
 RUN := $(VENV)/bin/python -m
 STAMP := $(VENV)/installed-
 VENV_RLLIB := .venv-rllib
+STYLE := $(RUN) ruff check . && $(RUN) ruff format --check . && $(VENV)/bin/lint-imports --no-cache
+WARM := $(RUN) entropy_explore_env.envs.conformance box-7x11x5 --robots 2 --steps 3
 
 .PHONY: help demo test test-long test-rllib lint bench reproduce clean
 .NOTPARALLEL:
@@ -24,7 +26,10 @@ help:
 demo: $(STAMP)baselines
 	$(RUN) baselines.run room --strategy gradient --robots 3 --seed 0 --out results/demo
 
-test: lint
+# The environments' kernels are compiled once, by one process, while pyright has the other core.
+test: $(STAMP)dev
+	$(STYLE)
+	$(RUN) pyright & types=$$!; $(WARM) && wait $$types
 	$(RUN) pytest -n auto --maxprocesses 4 --dist worksteal
 
 test-long: $(STAMP)dev
@@ -34,10 +39,8 @@ test-rllib: $(VENV_RLLIB)/installed
 	$(VENV_RLLIB)/bin/python -m pytest tests/training/rllib tests/training/test_rllib_refusals.py
 
 lint: $(STAMP)dev
-	$(RUN) ruff check .
-	$(RUN) ruff format --check .
+	$(STYLE)
 	$(RUN) pyright
-	$(VENV)/bin/lint-imports --no-cache
 
 bench: $(STAMP)training $(STAMP)bench
 	$(RUN) benchmarks.speed

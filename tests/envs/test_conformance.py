@@ -31,7 +31,6 @@ from tests.reference.scenes import SMALL
 BOX = SCENARIOS["box-7x11x5"]
 PARTS = {"patch": True, "overview": True, "action_mask": True}
 KINDS = ("continuous", "discrete")
-IN_PROCESS = tuple(check for check in conformance.CHECKS if check is not conformance.check_processes)
 
 
 def conform(scenario: str, robots: int, kind: str) -> int:
@@ -50,10 +49,8 @@ def conform(scenario: str, robots: int, kind: str) -> int:
 
 
 @pytest.mark.parametrize(("scenario", "robots", "kind"), pairwise(SMALL, (1, 2, 5), KINDS))
-def test_scenarios_conform(monkeypatch: pytest.MonkeyPatch, scenario: str, robots: int, kind: str) -> None:
-    """Without fresh processes, which take most of the time: the command's tests below have them."""
-    monkeypatch.setattr(conformance, "CHECKS", IN_PROCESS)
-    assert conform(scenario, robots, kind) == len(IN_PROCESS) == 8
+def test_scenarios_conform(in_this_process: int, scenario: str, robots: int, kind: str) -> None:
+    assert conform(scenario, robots, kind) == in_this_process == 8
 
 
 @pytest.mark.long
@@ -77,8 +74,8 @@ def test_scenarios_conform_in_fresh_processes_too(scenario: str, robots: int, ki
         },
     ],
 )
-def test_scenarios_of_one_s_own_conform(monkeypatch: pytest.MonkeyPatch, settings: dict[str, Any]) -> None:
-    monkeypatch.setattr(conformance, "CHECKS", IN_PROCESS)
+@pytest.mark.usefixtures("in_this_process")
+def test_scenarios_of_one_s_own_conform(settings: dict[str, Any]) -> None:
     check_conformance(with_settings(BOX, settings), steps=None if "time_limit_s" in settings else 25, seed=3)
 
 
@@ -106,8 +103,9 @@ def task(kind: str = "continuous", **settings: Any) -> Task:
     )
 
 
+@pytest.mark.usefixtures("in_this_process")
 def test_every_check_holds_for_the_tasks_below() -> None:
-    for check in IN_PROCESS:
+    for check in conformance.CHECKS:
         check(task("discrete"))
         check(task())
 
@@ -402,14 +400,14 @@ def test_the_command_refuses_bad_input_in_words(
 
 
 def test_the_command_s_results_as_one_object(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    in_this_process: int, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(conformance, "CHECKS", IN_PROCESS)
     assert conformance.main(["box-7x11x5", "--steps", "3", "--json"]) == 0
     said = json.loads(capsys.readouterr().out)
-    assert said["broken"] is None and len(said["held"]) == len(IN_PROCESS)
+    assert said["broken"] is None and len(said["held"]) == in_this_process
 
 
+@pytest.mark.usefixtures("in_this_process")
 def test_a_mission_that_reaches_its_threshold_conforms() -> None:
     quick = with_settings(BOX, {"decision_period_s": None, "ending": {"sigma_end": 25.0}})
     env = EntropyExploreEnv(quick)

@@ -171,8 +171,8 @@ def test_walls_make_the_scenarios_plan():
         ("room-furnished", 3, "continuous"),
     ],
 )
-def test_teams_that_plan_conform(scenario, robots, kind):
-    reach = {"reach_m": 1.0} if kind == "discrete" else {}
+def test_teams_that_plan_conform(in_this_process, scenario, robots, kind):
+    reach, said = {"reach_m": 1.0} if kind == "discrete" else {}, []
     check_conformance(
         scenario,
         steps=20,
@@ -181,7 +181,9 @@ def test_teams_that_plan_conform(scenario, robots, kind):
         robot={**PLANNED, **reach},
         sensor={"scan_every_m": 0.5},
         action={"kind": kind},
+        report=said.append,
     )
+    assert len(said) == in_this_process
 
 
 @pytest.mark.parametrize("world", ["terrain", "terrain-rough"])
