@@ -507,8 +507,10 @@ def test_files_are_whole_or_not_there_when_writing_is_interrupted(done, command,
 
 
 def process(*words: str, **environment: str) -> subprocess.Popen[str]:
+    """A process that heeds Ctrl-C, also where the tests run in the background, which ignores it."""
     return subprocess.Popen(
         [sys.executable, "-m", "baselines.run", *words],
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
         cwd=ROOT,
         env={**os.environ, **environment},
         stdout=subprocess.PIPE,
@@ -541,7 +543,10 @@ def test_an_interrupted_process_ends_with_130_and_leaves_nothing(tmp_path):
         shown = started.stderr.read(40)
         time.sleep(0.3)
         started.send_signal(signal.SIGINT)
-        out, err = started.communicate(timeout=60)
+        try:
+            out, err = started.communicate(timeout=60)
+        finally:
+            started.kill()
     assert (started.returncode, out) == (130, "")
     assert err.endswith("interrupted\n") and "Traceback" not in shown + err
     assert [path for path in tmp_path.rglob("*") if path.is_file()] == []
