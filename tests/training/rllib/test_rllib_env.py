@@ -252,7 +252,7 @@ def noted(figures: StepFigures) -> np.ndarray:
 
 
 def test_rewards_of_one_s_own_add_up_until_a_robot_decides() -> None:
-    apart = EntropyExploreMultiAgentEnv({**BOX, "decision_period_s": None, "reward_function": noted})
+    apart: Any = EntropyExploreMultiAgentEnv({**BOX, "decision_period_s": None, "reward_function": noted})
     observations = apart.reset(seed=0)[0]
     given = dict.fromkeys(apart.possible_agents, 0.0)
     EARNED.clear()
