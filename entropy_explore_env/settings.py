@@ -154,6 +154,9 @@ class RangeSensor:
         scan_time_s: A scan takes this long, standing still.
         scan_every_m: A scan is also taken under way, whenever so much of the way is driven: the robot
             drives on, and the scan takes no time. inf = only on arrival.
+        min_range_m: Nearest return, as of a depth camera that is blind close by: a return whose measured
+            distance is shorter brings no measurement, and nothing is learned along its ray. Of farther
+            returns, and of rays without one, all that the ray crossed is known to be free, also close by.
     """
 
     field_of_view_rad: tuple[float, float] = (math.pi / 6, math.pi / 12)
@@ -165,6 +168,7 @@ class RangeSensor:
     voxels_behind: int = 1
     scan_time_s: float = 0.5
     scan_every_m: float = math.inf
+    min_range_m: float = 0.0
 
     def __post_init__(self) -> None:
         """Check every field."""
@@ -183,6 +187,7 @@ class RangeSensor:
         check(self, "angular_step_rad", "a finite number ≥ 1e-6", lambda v: 1e-6 <= v < math.inf)
         check_positive(self, "max_range_m", finite=False)
         check_not_negative(self, "sigma_slope_per_m", "range_noise_m")
+        check(self, "min_range_m", "a number ≥ 0 below max_range_m", lambda v: 0 <= v < self.max_range_m)
         check(self, "sigma_min", "a number from 1e-4 to 1e4", lambda v: 1e-4 <= v <= 1e4)
         check_count(self, "voxels_behind", 0, 1000)
         if self.rays > 1_000_000:

@@ -18,7 +18,7 @@ import math
 import numpy as np
 
 from entropy_explore_env.belief.measurement_model import measurement_precision
-from entropy_explore_env.belief.raycast import STOP_AT_COVERED, cast_ray
+from entropy_explore_env.belief.raycast import OPEN, STOP_AT_COVERED, cast_ray
 from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel
 
 CONE = np.dtype(
@@ -35,6 +35,7 @@ CONE = np.dtype(
 SIGHT = np.dtype(
     [
         ("max_range_m", "f8"),
+        ("min_range_m", "f8"),
         ("sigma_min", "f8"),
         ("sigma_slope_per_m", "f8"),
         ("voxels_behind", "i8"),
@@ -232,7 +233,8 @@ def expected_scan_bits(
 ):
     """Bits that a scan from a viewpoint is expected to take from the robot's map.
 
-    Rays go through the belief like those of a scan, until something believed covered. A voxel that nobody
+    Rays go through the belief like those of a scan, until something believed covered; where that is too
+    near for the sensor, they bring nothing. A voxel that nobody
     has measured stops a ray with the probability `blocking`, so what lies behind counts for less. What all
     rays add to a voxel counts once,
 
@@ -267,7 +269,7 @@ def expected_scan_bits(
             angle = viewpoint[4] + pitch_offsets[row]
             level = math.cos(angle)
             direction = (along * level, across * level, -math.sin(angle))
-            length, n, _ = cast_ray(
+            length, n, end = cast_ray(
                 mean,
                 STOP_AT_COVERED,
                 size,
@@ -280,6 +282,8 @@ def expected_scan_bits(
                 entered,
             )
             range_m = length * voxel_size_m
+            if end != OPEN and range_m < sight.min_range_m:
+                continue
             gain = sight.rays * measurement_precision(range_m, sight.sigma_min, sight.sigma_slope_per_m)
             for i in range(n):
                 voxel = np.uint32(crossed[i])

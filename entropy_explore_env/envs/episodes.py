@@ -132,8 +132,9 @@ def snapshot(env: EntropyExploreEnv | EntropyExploreVectorEnv) -> Leaves:
     """All that a call may change."""
     missions: Missions = env.missions
     kept = {"seeds": missions.seeds, "episodes": missions.episodes, "observations": missions.observations}
+    given = {"starts": [options.starts for options in missions.options], "worlds": missions.worlds}
     agents = env.agents if isinstance(env, EntropyExploreEnv) else []
-    return leaves({**missions.state._asdict(), **kept, "agents": agents})
+    return leaves({**missions.state._asdict(), **kept, **given, "agents": agents})
 
 
 def play(env: EntropyExploreEnv, task: Task, mission: int = 0) -> Iterator[tuple[str, dict[str, Any]]]:

@@ -16,6 +16,7 @@ from entropy_explore_env.envs.checks import ActionChecker
 from entropy_explore_env.envs.infos import robot_infos
 from entropy_explore_env.envs.rewards import RewardFunction, StepRewards
 from entropy_explore_env.errors import ActionError, CallOrderError, SettingError
+from entropy_explore_env.missions import observation
 from entropy_explore_env.missions.action import action_space
 from entropy_explore_env.missions.reset_options import mission_options, named_options
 from entropy_explore_env.missions.simulation import Missions
@@ -25,6 +26,9 @@ from entropy_explore_env.reports.painting import FRAMES_PER_S, RENDER_MODES, Pai
 from entropy_explore_env.scenario import Scenario
 from entropy_explore_env.scenarios import find_scenario
 from entropy_explore_env.worlds.given import with_given_worlds
+
+_PARTS = (observation.__doc__ or "").partition("\n\n")[2]
+"""The parts of an observation, their shapes and units, as `missions.observation` describes them."""
 
 
 class EntropyExploreEnv(ParallelEnv[str, Any, Any]):
@@ -241,6 +245,9 @@ def parallel_env(
             each a mapping of some of its fields or a whole object: see `help` of Scenario, Channel, …
     """
     return EntropyExploreEnv(scenario, render_mode, reward_function=reward_function, **settings)
+
+
+parallel_env.__doc__ = f"{parallel_env.__doc__}\n\nWhat a robot observes. {_PARTS}"
 
 
 class TurnTakingEnv(OrderEnforcingWrapper[str, Any, Any]):

@@ -3,8 +3,9 @@
 Parts, in this order, each only if the scenario's settings ask for it (D directions, A robots):
 
     panorama  (2, D)       utility in bits that a ray would bring by the robot's own belief (or
-                           log2(1 + bits)), and the metres that it would go before something
-                           believed covered; directions in the order of `gaze_set`
+                           log2(1 + bits)), 0 where its return would be too near for the sensor; and
+                           the metres that it would go before something believed covered;
+                           directions in the order of `gaze_set`
     self      (10 + K,)    position in the workspace, -1…1 (x, y, z); cos and sin of yaw, cos and
                            sin of pitch; share of the time limit gone (0 without one); share of
                            the map's entropy left, counting every voxel; 1 while it decides; in
@@ -218,6 +219,8 @@ def observe_panorama(rules, robot, start, mean, precision, scan, out):
         range_m = sensor.max_range_m if end == OPEN else length * numbers.voxel_size_m
         measured = measurement_precision(range_m, sensor.sigma_min, sensor.sigma_slope_per_m)
         bits = expected_utility(precision, scan.crossed[0], n, measured)
+        if end != OPEN and range_m < sensor.min_range_m:
+            bits = 0.0
         out[ray] = math.log2(1.0 + bits) if numbers.panorama_log else bits
         out[directions + ray] = range_m
 

@@ -19,9 +19,11 @@ from entropy_explore_env.settings import RobotKind
 from entropy_explore_env.worlds.world import no_fly_mask
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ScanView:
     """A robot's latest scan, R rays. Before the first one, all `returned` are 0.
+
+    Equal only to itself, as other views.
 
     Attributes:
         pose: (5,) where it was taken: x, y, z, yaw, pitch.
@@ -36,9 +38,11 @@ class ScanView:
     utility_bits: np.ndarray
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class TeammateView:
     """What a robot last heard of a teammate; times are -1 and the rest 0 if it never heard.
+
+    Equal only to itself, as other views.
 
     Attributes:
         heard_s: When the last message was sent that reached the robot.
@@ -57,9 +61,11 @@ class TeammateView:
     half_angle_rad: float
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class RobotView:
     """What one robot knows. Arrays are read-only and change as the mission goes on.
+
+    A view is a moment's look at a mission: it is equal only to itself, and hashes by identity.
 
     Attributes:
         robot: Its number.

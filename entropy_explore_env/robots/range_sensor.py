@@ -31,7 +31,7 @@ class Return(enum.IntEnum):
     """What came back along a ray."""
 
     NOTHING = 0
-    """A teammate's body was in the way: no measurement."""
+    """A teammate's body was in the way, or the return was too near for the sensor: no measurement."""
     FREE = 1
     """No return within the sensor's range: all that the ray crossed is free."""
     HIT = 2
@@ -60,6 +60,7 @@ RAY = np.dtype(
 SENSOR_NUMBERS = np.dtype(
     [
         ("max_range_m", "f8"),
+        ("min_range_m", "f8"),
         ("noise_m", "f8"),
         ("sigma_min", "f8"),
         ("sigma_slope_per_m", "f8"),
@@ -121,6 +122,7 @@ def sensor_model(sensor: RangeSensor) -> SensorModel:
     """What compiled code needs of the sensor's settings."""
     numbers = np.zeros(1, SENSOR_NUMBERS)
     numbers["max_range_m"], numbers["noise_m"] = sensor.max_range_m, sensor.range_noise_m
+    numbers["min_range_m"] = sensor.min_range_m
     numbers["sigma_min"], numbers["sigma_slope_per_m"] = sensor.sigma_min, sensor.sigma_slope_per_m
     numbers["voxels_behind"] = sensor.voxels_behind
     numbers["columns"], numbers["rows"] = sensor.columns, sensor.rows
@@ -339,6 +341,9 @@ def take_scan(scan, model, truth, size, voxel_size_m, start, yaw, pitch, bodies,
         else:
             ray.length = min(max(length + error / voxel_size_m, _NEAREST), reach)
             trace_measurement(scan, index, numbers, size, voxel_size_m, start, truth)
+        if ray.returned == _HIT and ray.range_m < numbers.min_range_m:
+            ray.returned = _NOTHING
+            ray.range_m = 0.0
 
 
 @lean_kernel

@@ -37,11 +37,15 @@ class World:
 
     Attributes:
         grid: The voxel grid.
-        occupied: (X, Y, Z) bool, read-only; whether a voxel is solid.
+        occupied: (X, Y, Z) bool, read-only; whether a voxel is solid. A copy, unless the array that was given
+            is read-only already.
         name: Of the recipe or the file that it was made from.
-        ceiling: (X, Y) int32, read-only, or None: in each column the lowest layer of the no-fly zone, which
-            robots must not enter and rays may cross (an exposure surface over terrain); Z = no such layer.
+        ceiling: (X, Y) int32, read-only and copied likewise, or None: in each column the lowest layer of the
+            no-fly zone, which robots must not enter and rays may cross (an exposure surface over terrain);
+            Z = no such layer.
         yaw_rad: Rotation of the grid's frame against the frame of the file.
+
+    Worlds compare and hash by identity: to compare what they hold, compare their arrays.
     """
 
     grid: Grid
@@ -51,7 +55,7 @@ class World:
     yaw_rad: float = 0.0
 
     def __post_init__(self) -> None:
-        """Check the arrays and make them read-only."""
+        """Check the arrays and keep read-only copies of them."""
         kinds = {"grid": (Grid, "a Grid"), "occupied": (np.ndarray, "a NumPy array"), "name": (str, "a text")}
         for name, (kind, allowed) in kinds.items():
             if not isinstance(getattr(self, name), kind):
@@ -61,7 +65,7 @@ class World:
             raise WorldError("World.occupied", found, f"{self.grid.shape} bool")
         if self.occupied.all():
             raise WorldError("World.occupied", self.name, "at least one free voxel")
-        self.occupied.setflags(write=False)
+        object.__setattr__(self, "occupied", _kept(self.occupied))
         if self.ceiling is not None:
             if self.ceiling.shape != self.grid.shape[:2] or self.ceiling.dtype != np.int32:
                 found = f"{self.ceiling.shape} {self.ceiling.dtype}"
@@ -69,6 +73,13 @@ class World:
             if self.ceiling.min() < 0 or self.ceiling.max() > self.grid.shape[2]:
                 found = f"{self.ceiling.min()} … {self.ceiling.max()}"
                 raise WorldError("World.ceiling", found, f"layers from 0 to {self.grid.shape[2]}")
+            object.__setattr__(self, "ceiling", _kept(self.ceiling))
+
+    def __setstate__(self, kept: dict[str, object]) -> None:
+        """Take the fields back; arrays that were pickled are read-only again."""
+        self.__dict__.update(kept)
+        self.occupied.setflags(write=False)
+        if self.ceiling is not None:
             self.ceiling.setflags(write=False)
 
     def __repr__(self) -> str:
@@ -185,6 +196,14 @@ class World:
         needed = np.maximum(rises_m, 0.0) / max(math.tan(view.steepest_rad), 1e-9) / edge_m
         range_ = view.max_range_m / edge_m
         return (farthest[:, :, None] >= needed) & (np.maximum(nearest[:, :, None], needed) <= range_)
+
+
+def _kept(array: np.ndarray) -> np.ndarray:
+    """The array itself if nobody can write through it, else a read-only copy."""
+    if array.flags.writeable:
+        array = array.copy()
+        array.setflags(write=False)
+    return array
 
 
 class _LevelView(NamedTuple):

@@ -46,7 +46,7 @@ def inside(cones, x, y, z):
 
 def sight(blocking=0.0, known=0.0, rays=1.0, sensor=SENSOR):
     one = np.zeros(1, SIGHT)
-    for name in ("max_range_m", "sigma_min", "sigma_slope_per_m", "voxels_behind"):
+    for name in ("max_range_m", "min_range_m", "sigma_min", "sigma_slope_per_m", "voxels_behind"):
         one[name] = getattr(sensor, name)
     one["known"], one["blocking"], one["rays"] = known, blocking, rays
     return one[0]
@@ -85,16 +85,14 @@ def expected(mean, precision, viewpoint, how, cones=NOBODY, sensor=SENSOR, edge=
     st.floats(-1.2, 1.2),
     st.integers(0, 2),
     st.sampled_from([2.0, math.inf]),
+    st.sampled_from([0.0, 1.1]),
 )
 def test_a_scan_brings_what_was_expected_where_the_belief_is_right_about_obstacles(
-    seed, yaw, pitch, behind, reach
+    seed, yaw, pitch, behind, reach, min_range_m
 ):
-    rng, sensor = (
-        np.random.default_rng(seed),
-        RangeSensor(
-            SENSOR.field_of_view_rad, SENSOR.angular_step_rad, reach, 0.1, 0.05, voxels_behind=behind
-        ),
-    )
+    rng = np.random.default_rng(seed)
+    view = (SENSOR.field_of_view_rad, SENSOR.angular_step_rad, reach, 0.1, 0.05)
+    sensor = RangeSensor(*view, voxels_behind=behind, min_range_m=min_range_m)
     truth = random_cover(SIZE, 0.1, seed)
     precision = rng.uniform(0.01, 50.0, SIZE).astype(np.float32)
     start = rng.uniform(0.5, np.array(SIZE) - 0.5)

@@ -155,23 +155,23 @@ def float64(before: Fault, env: EntropyExploreEnv) -> Any:
     }
 
 
-def no_seed(before: Fault, missions: Missions, mission: int, seed: int | None = None) -> None:
+def no_seed(before: Fault, missions: Missions, mission: int, seed: int | None, *_: Any) -> None:
     before(missions, mission, None)
 
 
-def one_seed(before: Fault, missions: Missions, mission: int, seed: int | None = None) -> None:
+def one_seed(before: Fault, missions: Missions, mission: int, seed: int | None, *_: Any) -> None:
     before(missions, mission, 0 if seed is not None else None)
 
 
-def hash_of_text(before: Fault, missions: Missions, mission: int, seed: int | None = None) -> None:
+def hash_of_text(before: Fault, missions: Missions, mission: int, seed: int | None, *_: Any) -> None:
     before(missions, mission, None if seed is None else seed + hash("a text") % 1000)
 
 
-def number_of_missions(before: Fault, missions: Missions, mission: int, seed: int | None = None) -> Any:
+def number_of_missions(before: Fault, missions: Missions, mission: int, seed: int | None) -> Any:
     return before(missions, mission, None if seed is None else seed + missions.count)
 
 
-def same_episode_again(before: Fault, missions: Missions, mission: int, seed: int | None = None) -> None:
+def same_episode_again(before: Fault, missions: Missions, mission: int, seed: int | None, *_: Any) -> None:
     before(missions, mission, missions.seeds[mission] if seed is None else seed)
 
 
@@ -290,7 +290,7 @@ FAULTS: list[tuple[Any, str, Fault, str, str]] = [
     (Missions, "reset", one_seed, "check_repeatable", "begin alike"),
     (Missions, "reset", same_episode_again, "check_repeatable", "begin alike"),
     (Missions, "reset", hash_of_text, "check_processes", "process 1"),
-    (Missions, "_draw", number_of_missions, "check_batches", "batch of one"),
+    (Missions, "_episode", number_of_missions, "check_batches", "batch of one"),
     (EntropyExploreVectorEnv, "_observations", shuffled_missions, "check_batches", "observations"),
     (Missions, "step", threads_matter, "check_batches", "two threads"),
     (Missions, "__getstate__", shared_copy, "check_copies", "the original"),

@@ -5,6 +5,8 @@ from __future__ import annotations
 import copy
 import math
 import pickle
+import pydoc
+import re
 from typing import Any
 
 import numpy as np
@@ -393,3 +395,16 @@ def test_robots_stand_in_free_voxels_of_the_workspace(scenario: str, kind: str) 
             assert not world.occupied[tuple(voxel)], f"in something solid: {where}"
             stopped.add(info["move_end"])
     assert {"ARRIVED", "WALL"} <= stopped
+
+
+def test_help_shows_every_part_of_an_observation_with_its_shape() -> None:
+    text = pydoc.render_doc(parallel_env, renderer=pydoc.plaintext)
+    everything = {"patch": True, "overview": True, "action_mask": True}
+    team = parallel_env("box-7x11x5", action={"kind": "discrete"}, observation=everything)
+    parts = team.missions.layout.parts
+    assert len(parts) == 6
+    for name, part in parts.items():
+        line = next(line for line in text.splitlines() if re.match(rf"\s*{name} +\(", line))
+        shape = line.split("(", 1)[1].split(")", 1)[0]
+        assert len([axis for axis in shape.split(",") if axis.strip()]) == len(part.shape), name
+    assert "metres" in text and "utility in bits" in text

@@ -40,6 +40,13 @@ def test_nothing_can_be_changed_through_a_view():
     assert [array.tobytes() for array in missions.state] == before
 
 
+def test_views_are_compared_and_hashed_by_identity():
+    missions = started(free_box(robots=2))
+    view, other = view_of(missions, 0, 0), view_of(missions, 0, 0)
+    for one, two in ((view, other), (view.scan, other.scan), (view.teammates[1], other.teammates[1])):
+        assert one == one and one != two and len({one, one, two}) == 2
+
+
 def test_a_view_before_anything_was_measured_or_heard():
     view = view_of(started(free_box()), 0, 0)
     assert (view.scan.returned == 0).all()

@@ -144,6 +144,11 @@ def distance_to_ball(start: Vector, direction: Vector, centre: Vector, radius: f
 # --- Sensor model (eqs. 3-5)
 
 
+def is_blind(hit: bool, measured_m: float, min_range_m: float) -> bool:
+    """Whether a sensor that sees nothing nearer than this gives no reading, whatever is behind."""
+    return hit and measured_m < min_range_m
+
+
 def measured_mean(voxel_distance_m: float, measured_m: float, voxel_size_m: float) -> float:
     """μ(dˡ, d): coverage that a measured distance says of a voxel at dˡ (eq. 4)."""
     if voxel_distance_m - measured_m < -voxel_size_m / 2.0:

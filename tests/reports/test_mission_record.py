@@ -82,6 +82,11 @@ def test_a_record_comes_back_exactly_and_its_commands_lead_to_the_same_state(cha
     assert back.commands.dtype == (np.float32 if continuous else np.int64)
 
 
+def test_records_are_compared_and_hashed_by_identity():
+    record, same = recorded(2)[0], recorded(2)[0]
+    assert record == record and record != same and len({record, record, same}) == 2
+
+
 def test_the_same_mission_gives_the_same_file(tmp_path):
     (tmp_path / "again").mkdir()
     first, again = (saved(recorded()[0], folder).read_bytes() for folder in (tmp_path, tmp_path / "again"))

@@ -134,6 +134,52 @@ def test_a_scan_is_what_the_reference_measures(size, seed, voxel_size_m, max_ran
         assert coverage == pytest.approx(np.zeros(len(means)) if free else means, abs=1e-6)
 
 
+@drawn(60)
+@given(st.sampled_from(SHAPES), seeds, st.floats(0.0, 2.5), st.sampled_from([0.0, 0.4]))
+def test_returns_nearer_than_the_least_range_measure_nothing_and_all_others_as_before(
+    size, seed, min_range_m, noise_m
+):
+    """Judged by the measured distance; the noise of other rays is the same."""
+    rng = np.random.default_rng(seed)
+    truth, start = random_cover(size, 0.15, seed), rng.uniform(0.1, 0.9, 3) + rng.integers(0, size)
+    gaze = (rng.uniform(-math.pi, math.pi), 0.0)
+    view = (COARSE.field_of_view_rad[0], COARSE.field_of_view_rad[1] * (size[2] > 1))
+    settings = {"range_noise_m": noise_m, "max_range_m": 3.0}
+    before = scan_of(truth, start, *gaze, RangeSensor(view, math.pi / 12, **settings))
+    scan = scan_of(truth, start, *gaze, RangeSensor(view, math.pi / 12, **settings, min_range_m=min_range_m))
+    maps = [random_belief(size, seed) for _ in range(2)]
+    for each, (mean, precision) in zip((scan, before), maps, strict=True):
+        each.order[:] = np.arange(len(each.rays))
+        if each is before:
+            for ray in each.rays:
+                if rocha04.is_blind(ray["returned"] == Return.HIT, ray["range_m"], min_range_m):
+                    ray["returned"], ray["range_m"] = Return.NOTHING, 0.0
+        fuse_scan(each, len(each.rays), mean.ravel(), precision.ravel())
+    for name in ("returned", "range_m"):
+        np.testing.assert_array_equal(scan.rays[name], before.rays[name])
+    for ours, theirs in zip(*maps, strict=True):
+        np.testing.assert_array_equal(ours, theirs)
+
+
+def test_a_blind_sensor_learns_nothing_from_a_near_wall_and_free_space_from_a_far_one():
+    """A wall 0.75 m ahead in voxels of 0.5 m, from the middle of one: nearer than 0.8 m, not than 0.7 m."""
+    truth = np.zeros(SIZE, np.float32)
+    truth[2] = 1.0
+    for min_range_m, returned in ((0.8, Return.NOTHING), (0.75, Return.HIT), (0.7, Return.HIT)):
+        sensor = RangeSensor((0.0, 0.0), 0.1, min_range_m=min_range_m)
+        scan = scan_of(truth, (0.5, 5.5, 2.5), sensor=sensor)
+        assert scan.rays[0]["returned"] == returned
+        mean = np.full(SIZE, 0.5, np.float32)
+        precision = np.full(SIZE, 1e-3, np.float32)
+        scan.order[0] = 0
+        bits = fuse_scan(scan, 1, mean.ravel(), precision.ravel())
+        learned = mean[:3, 5, 2].round(3).tolist()
+        if returned == Return.NOTHING:
+            assert (bits, scan.rays[0]["range_m"], learned) == (0.0, 0.0, [0.5, 0.5, 0.5])
+        else:
+            assert bits > 0.0 and learned[0] < 0.01 < 0.9 < learned[2], "free also before the least range"
+
+
 @drawn(40)
 @given(st.sampled_from(SHAPES), seeds)
 def test_a_fused_scan_is_the_reference_s_map_and_utility(size, seed):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import pickle
 from collections import deque
 
 import numpy as np
@@ -255,6 +256,29 @@ def test_worlds_that_are_none_are_refused(occupied):
 def test_the_truth_cannot_be_written():
     with pytest.raises(ValueError, match="read-only"):
         world_of(np.zeros(SIZE, bool)).occupied[0, 0, 0] = True
+
+
+def test_a_world_keeps_a_copy_unless_nobody_can_write_through_what_it_is_given():
+    solid, ceiling = np.zeros(SIZE, bool), np.full(SIZE[:2], 3, np.int32)
+    world = World(Grid(SIZE, 0.5), solid, "room", ceiling)
+    solid[:], ceiling[:] = True, 0
+    assert not world.occupied.any() and (world.ceiling == 3).all()
+    again = World(world.grid, world.occupied, "again", world.ceiling)
+    assert again.occupied is world.occupied and again.ceiling is world.ceiling
+    for array in (world.ceiling, *pickled_arrays(world)):
+        assert not array.flags.writeable
+
+
+def pickled_arrays(world: World) -> tuple[np.ndarray, np.ndarray]:
+    """Of the world as it comes out of a pickle."""
+    back = pickle.loads(pickle.dumps(world))
+    np.testing.assert_array_equal(back.occupied, world.occupied)
+    return back.occupied, back.ceiling
+
+
+def test_worlds_are_compared_and_hashed_by_identity():
+    world, same = (world_of(np.zeros(SIZE, bool)) for _ in range(2))
+    assert world == world and world != same and len({world, world, same}) == 2
 
 
 def test_a_body_that_fits_nowhere():

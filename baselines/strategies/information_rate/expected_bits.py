@@ -50,7 +50,7 @@ def build_of(scenario: Scenario, kind: RobotKind, thinning: int = 2, blocking: f
         blocking: Probability that an unknown voxel stops a ray.
     """
     grid, sensor, sight = scenario.grid, kind.sensor, np.zeros(1, SIGHT)
-    for name in ("max_range_m", "sigma_min", "sigma_slope_per_m", "voxels_behind"):
+    for name in ("max_range_m", "min_range_m", "sigma_min", "sigma_slope_per_m", "voxels_behind"):
         sight[name] = getattr(sensor, name)
     sight["known"], sight["blocking"] = KNOWN_RATIO / scenario.sigma_prior**2, blocking
     step, edge = sensor.angular_step_rad, grid.voxel_size_m

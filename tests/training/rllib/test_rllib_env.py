@@ -255,9 +255,10 @@ def test_rewards_of_one_s_own_add_up_until_a_robot_decides() -> None:
     apart: Any = EntropyExploreMultiAgentEnv({**BOX, "decision_period_s": None, "reward_function": noted})
     observations = apart.reset(seed=0)[0]
     given = dict.fromkeys(apart.possible_agents, 0.0)
+    choices: int = apart.action_spaces["robot_0"].n  # type: ignore[attr-defined]
     EARNED.clear()
     for step in range(12):
-        actions = {agent: np.int64((7 * step + 11) % apart.action_spaces[agent].n) for agent in observations}
+        actions = {agent: np.int64((7 * step + 11) % choices) for agent in observations}
         observations, rewards, *_ = apart.step(actions)
         for agent, reward in rewards.items():
             given[agent] += reward
