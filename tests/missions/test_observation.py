@@ -8,7 +8,14 @@ import numpy as np
 import pytest
 
 from entropy_explore_env.belief.entropy import map_entropy_bits
-from entropy_explore_env.robots.range_sensor import RangeSensor, fuse_scan, new_scan, sensor_model, take_scan
+from entropy_explore_env.robots.range_sensor import (
+    RangeSensor,
+    Return,
+    fuse_scan,
+    new_scan,
+    sensor_model,
+    take_scan,
+)
 from entropy_explore_env.settings import Grid, gaussian_entropy_bits
 from tests.reference import rocha04
 from tests.reference.scenes import as_reference, free_box, put, started, wander
@@ -270,7 +277,7 @@ def test_panorama_is_what_a_scan_there_would_bring_if_the_belief_were_the_truth(
             if rocha04.is_generic(start, rocha04.gaze(*gaze), grid.shape, math.inf, margin=1e-4):
                 assert bits == pytest.approx(brought, rel=1e-4, abs=1e-4)
                 if scan.rays["returned"][0] != Return.NOTHING:
-                assert range_m == pytest.approx(scan.rays["range_m"][0], rel=1e-4)
+                    assert range_m == pytest.approx(scan.rays["range_m"][0], rel=1e-4)
 
 
 def test_parts_left_out_leave_no_numbers():
