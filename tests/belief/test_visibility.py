@@ -221,7 +221,7 @@ def test_a_cone_marks_the_voxels_of_the_reference(seed):
             assert marks[number] == rochami.inside(cone, voxel), (cone, voxel)
 
 
-@drawn(60)
+@drawn(25)
 @given(seeds, st.integers(1, 4), st.booleans())
 def test_entropies_and_mutual_information_are_those_of_the_reference(seed, teammates, occluded):
     rng = np.random.default_rng(seed)
