@@ -41,7 +41,7 @@ def begin_compiling(name: str, folder: Path | None) -> None:
     _progress.began_s = time.perf_counter()
     if not _progress.announced:
         _progress.announced = _progress.pending = True
-        kept = "" if folder is None else f"; they are kept in {_short(folder)}"
+        kept = "" if folder is None else f"; they are kept in {short_path(folder)}"
         _say(f"entropy_explore_env: compiling kernels, about 10 s{kept}")
 
 
@@ -64,7 +64,7 @@ def explain_not_kept(folder: Path | None, error: OSError | None) -> None:
     if _progress.said_why_not_kept:
         return
     _progress.said_why_not_kept = True
-    where = "the user has no home folder" if folder is None else f"{_short(folder)}: {_reason(error)}"
+    where = "the user has no home folder" if folder is None else f"{short_path(folder)}: {_reason(error)}"
     _say(
         f"entropy_explore_env: compiled kernels are not kept ({where}), each process compiles them anew; "
         "NUMBA_CACHE_DIR names another folder"
@@ -81,7 +81,8 @@ def _say(line: str) -> None:
         _LOGGER.warning(line)
 
 
-def _short(folder: Path) -> str:
+def short_path(folder: Path) -> str:
+    """A path that begins with ~ where it lies in the home folder."""
     try:
         return f"~/{folder.relative_to(Path.home()).as_posix()}"
     except (ValueError, RuntimeError):
