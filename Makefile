@@ -10,13 +10,14 @@ VENV_RLLIB := .venv-rllib
 STYLE := $(RUN) ruff check . && $(RUN) ruff format --check . && $(VENV)/bin/lint-imports --no-cache
 WARM := $(RUN) entropy_explore_env.envs.conformance box-7x11x5 --robots 2 --steps 3
 
-.PHONY: help demo test test-long test-rllib lint bench reproduce clean
+.PHONY: help demo test test-long boundscheck test-rllib lint bench reproduce clean
 .NOTPARALLEL:
 
 help:
 	@echo "make demo       run one mission of three robots and show it in results/demo"
 	@echo "make test       lint, then the tests"
 	@echo "make test-long  also the long ones, and more and other drawn examples: an hour"
+	@echo "make boundscheck the kernels' own tests, with every index checked"
 	@echo "make test-rllib the tests of the trainer with RLlib"
 	@echo "make lint       ruff, pyright and the contracts of imports"
 	@echo "make bench      speed against peers"
@@ -34,6 +35,11 @@ test: $(STAMP)dev
 
 test-long: $(STAMP)dev
 	$(RUN) pytest -n auto --maxprocesses 4 --dist worksteal -m "long or not long" --hypothesis-profile=long
+
+# Checks are part of what compiled kernels are named after: those without stay as they are.
+boundscheck: $(STAMP)dev
+	NUMBA_BOUNDSCHECK=1 $(RUN) pytest -n auto --maxprocesses 4 --dist worksteal \
+		tests/belief tests/robots tests/missions tests/baselines/strategies
 
 test-rllib: $(VENV_RLLIB)/installed
 	$(VENV_RLLIB)/bin/python -m pytest tests/training/rllib tests/training/test_rllib_refusals.py

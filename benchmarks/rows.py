@@ -49,6 +49,7 @@ class Effort:
         batch_steps: The same for vector environments, if that many missions need no more.
         batches: Missions E of the vector environments.
         starts: Fresh processes, with everything cached.
+        cold_starts: Fresh processes of two versions, with nothing cached.
     """
 
     scans: int = 400
@@ -58,10 +59,11 @@ class Effort:
     batch_steps: int = 40
     batches: tuple[int, ...] = (1, 16, 64, 256)
     starts: int = 5
+    cold_starts: int = 3
 
 
 FULL = Effort()
-QUICK = Effort(scans=200, rounds=7, long_rounds=3, steps=200, batch_steps=10, starts=1)
+QUICK = Effort(scans=200, rounds=7, long_rounds=3, steps=200, batch_steps=10, starts=1, cold_starts=1)
 
 
 @dataclass(frozen=True)

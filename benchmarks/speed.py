@@ -74,6 +74,8 @@ class Args:
     """Exit with 1 if a goal does not hold."""
     plan: Path | None = None
     """A plan's file, such as warehouse.yaml, for three robots to explore as well."""
+    before: Path | None = None
+    """The checkout of another version, for its first step beside ours; it runs with the same Python."""
     out: Path | None = None
     """A Markdown file for the table."""
 
@@ -83,6 +85,8 @@ def main(words: Sequence[str]) -> int:
     args = parse(Args, words, description=__doc__)
     if args.out is not None and (args.out.is_dir() or not _parent_exists(args.out)):
         raise SettingError("out", str(args.out), "a file in a folder that exists")
+    if args.before is not None and not (args.before / "entropy_explore_env" / "__init__.py").is_file():
+        raise SettingError("before", str(args.before), "a checkout, with the folder entropy_explore_env")
     plan = None if args.plan is None else load_world(args.plan)
     jobs = [(title, job) for title, job in JOBS if args.only is None or args.only in title]
     if not jobs:
@@ -93,7 +97,8 @@ def main(words: Sequence[str]) -> int:
     rows: list[Row] = []
     for number, (title, job) in enumerate(jobs, start=1):
         print(f"[{number}/{len(jobs)}] {title} …", file=sys.stderr, flush=True)
-        rows += job(QUICK if args.quick else FULL)
+        effort = QUICK if args.quick else FULL
+        rows += startup_rows(effort, args.before) if job is startup_rows else job(effort)
         if job is exploring_rows and args.plan is not None and plan is not None:
             rows.append(mission_row(args.plan.stem, plan))
     about = {**machine(), "command": " ".join(["python -m benchmarks.speed", *words])}

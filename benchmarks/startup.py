@@ -9,7 +9,7 @@ import tempfile
 from pathlib import Path
 
 import entropy_explore_env
-from benchmarks.rows import Effort, Goal, Row, alone, timed
+from benchmarks.rows import Effort, Goal, Row, alone, compared, timed
 
 _FIRST_STEP = """
 import sys, time
@@ -24,39 +24,57 @@ assert "torch" not in sys.modules, "torch was imported"
 print(imported - began, stepped - imported)
 """
 _TIMEOUT_S = 300.0
+_OURS = Path(entropy_explore_env.__file__).parents[1]
 
 
-def startup_rows(effort: Effort) -> list[Row]:
-    """Import, reset and first step of `room`, interpreter start included: cached, and from nothing."""
+def startup_rows(effort: Effort, before: Path | None = None) -> list[Row]:
+    """Import, reset and first step of `room`, interpreter start included: cached, and from nothing.
+
+    Args:
+        effort: How much is measured.
+        before: The checkout of another version, whose first step takes turns with ours.
+    """
     first_step()
     warm = [first_step() for _ in range(effort.starts)]
-    with tempfile.TemporaryDirectory() as empty:
-        cold = [first_step(empty)]
+    ours, theirs = [], []
+    for _ in range(1 if before is None else effort.cold_starts):
+        ours.append(_cold_step(_OURS))
+        if before is not None:
+            theirs.append(_cold_step(before))
     rows = []
     for starts, how, most_s in (
-        (warm, "compiled code cached, no torch", 2.0),
-        (cold, "nothing cached", 20.0),
+        (warm, "compiled code cached, no torch", 1.5),
+        (ours, "nothing cached", 12.0),
     ):
         whole, imports, steps = (list(column) for column in zip(*starts, strict=True))
         rows += [
-            alone(f"python start, import, reset, first step, {how}", whole, "s", Goal("<", most_s, "s")),
+            alone(f"python start, import, reset, first step, {how}", whole, "s", Goal("≤", most_s, "s")),
             alone(f"of that the import, {how}", imports, "s"),
             alone(f"of that the first reset and step, {how}", steps, "s"),
         ]
+    if before is not None:
+        job, peer = "first step of all, nothing compiled", "version before"
+        whole, earlier = [taken for taken, _, _ in ours], [taken for taken, _, _ in theirs]
+        rows.append(compared(job, peer, whole, earlier, "s", Goal("≤", 0.5)))
     return rows
 
 
-def first_step(cache: str | None = None) -> tuple[float, float, float]:
+def _cold_step(root: Path) -> tuple[float, float, float]:
+    with tempfile.TemporaryDirectory() as empty:
+        return first_step(empty, root)
+
+
+def first_step(cache: str | None = None, root: Path = _OURS) -> tuple[float, float, float]:
     """Seconds by the wall clock that a fresh process takes: in all, to import, to reset and step.
 
     Args:
         cache: Folder of compiled code; None = the one that this process uses.
+        root: The checkout whose code runs.
 
     Raises:
         RuntimeError: The process failed; the message is its last line.
     """
-    root = str(Path(entropy_explore_env.__file__).parents[1])
-    paths = [root, *filter(None, [os.environ.get("PYTHONPATH")])]
+    paths = [str(root), *filter(None, [os.environ.get("PYTHONPATH")])]
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(paths)}
     if cache is not None:
         environment["NUMBA_CACHE_DIR"] = cache

@@ -1,7 +1,7 @@
 """Compile ahead of time what missions need: `python -m entropy_explore_env.warm [SCENARIO ...]`.
 
-Without scenarios, all of them, which takes no longer than their different kernels. Compiled kernels are kept in
-NUMBA_CACHE_DIR, or in the user's cache folder. Strategies compile their own at their first decision.
+Without scenarios, all of them. Compiled kernels are kept in NUMBA_CACHE_DIR, or in the user's cache folder.
+Strategies compile their own at their first decision.
 
 What was compiled goes to standard output, errors in one line to standard error. Exit codes: 0 done, 2 bad
 input, 130 interrupted.
