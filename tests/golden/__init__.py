@@ -1,0 +1,1 @@
+"""Golden missions: recorded results that code must give again."""
