@@ -12,12 +12,12 @@ from types import MappingProxyType, ModuleType
 from baselines.strategies.frontier import FrontierStrategy
 from baselines.strategies.frontier.metrics import coordinated_frontier, nearest_frontier
 from baselines.strategies.gradient import GradientStrategy
-from baselines.strategies.information_rate import InformationRate, Weighing
+from baselines.strategies.information_rate import InformationRate, InformationRateConfig
 from baselines.strategies.loading import entry_points, is_reference, make_referenced, module_of
-from baselines.strategies.mutual_information import Coordination, MutualInformation
+from baselines.strategies.mutual_information import MutualInformation, MutualInformationConfig
 from baselines.strategies.protocol import Strategy
 from baselines.strategies.random_walk import RandomWalk
-from baselines.strategies.voronoi import Coverage, VoronoiCoverage
+from baselines.strategies.voronoi import VoronoiConfig, VoronoiCoverage
 from entropy_explore_env.errors import MissingExtraError, SettingError
 
 STRATEGIES: MappingProxyType[str, Callable[[], Strategy]] = MappingProxyType(
@@ -26,17 +26,19 @@ STRATEGIES: MappingProxyType[str, Callable[[], Strategy]] = MappingProxyType(
         "gradient": GradientStrategy,
         "gradient-plane": partial(GradientStrategy, motion_plane=True),
         "mutual-information": MutualInformation,
-        "ground-gradient": partial(MutualInformation, Coordination(coordinated=False)),
+        "ground-gradient": partial(MutualInformation, MutualInformationConfig(coordinated=False)),
         "information-rate": InformationRate,
-        "information-per-scan": partial(InformationRate, Weighing(per_scan=True, candidates=120)),
+        "information-per-scan": partial(
+            InformationRate, InformationRateConfig(per_scan=True, candidates=120)
+        ),
         "per-time-visibility": FrontierStrategy,
         "nearest-frontier": nearest_frontier,
         "coordinated-frontier": coordinated_frontier,
         "voronoi": VoronoiCoverage,
-        "voronoi-gradient": partial(VoronoiCoverage, Coverage(control="gradient-search")),
+        "voronoi-gradient": partial(VoronoiCoverage, VoronoiConfig(control="gradient-search")),
         "voronoi-nearest": partial(
             VoronoiCoverage,
-            Coverage(control="nearest", metric="length", known="deviation", tau=0.02, tau_floor=0.01),
+            VoronoiConfig(control="nearest", metric="length", known="deviation", tau=0.02, tau_floor=0.01),
         ),
     }
 )

@@ -18,7 +18,7 @@ _REACH_TOLERANCE = 1e-6
 
 
 class GradientStrategy:
-    """Goes to the voxel within reach with the steepest entropy that is likely free, and looks uphill.
+    """Goes to the voxel within reach with the steepest entropy that is likely free; looks along the gradient.
 
     Free-flying robots follow eqs. 33-34, planar ones the projection on their motion plane, eqs.
     38-40. A robot wanders (a random viewpoint) where the chosen gradient vanishes, as the paper
@@ -100,8 +100,8 @@ def steepest_viewpoint(
     for i in range(low_x, high_x):
         for j in range(low_y, high_y):
             for k in range(low_z, high_z):
-                way = (i + 0.5 - position[0], j + 0.5 - position[1], k + 0.5 - position[2])
-                length = math.sqrt(way[0] ** 2 + way[1] ** 2 + way[2] ** 2)
+                step = (i + 0.5 - position[0], j + 0.5 - position[1], k + 0.5 - position[2])
+                length = math.sqrt(step[0] ** 2 + step[1] ** 2 + step[2] ** 2)
                 if length > reach * (1.0 + _REACH_TOLERANCE):
                     continue
                 slope = entropy_gradient(precision, i, j, k, 1.0)
@@ -109,8 +109,8 @@ def steepest_viewpoint(
                 if projected:
                     slope = _on_plane(slope, ahead, left)
                     if length > 0.0:
-                        way = _on_plane(way, ahead, left)
-                        reachable = math.sqrt(way[0] ** 2 + way[1] ** 2 + way[2] ** 2) / length
+                        step = _on_plane(step, ahead, left)
+                        reachable = math.sqrt(step[0] ** 2 + step[1] ** 2 + step[2] ** 2) / length
                 steepness = math.sqrt(slope[0] ** 2 + slope[1] ** 2 + slope[2] ** 2)
                 score = reachable * steepness * (1.0 - mean[i, j, k])
                 if score > best:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from typing import Protocol
 
@@ -10,8 +9,7 @@ import numpy as np
 
 from entropy_explore_env.missions.view import RobotView
 from entropy_explore_env.scenario import Scenario
-
-_DRAWS = 64
+from entropy_explore_env.viewpoints.drawing import uniform_viewpoint
 
 
 class Strategy(Protocol):
@@ -43,7 +41,7 @@ class Strategy(Protocol):
 
 
 class Stopwatch:
-    """A strategy, and how long its decisions take, in milliseconds a robot."""
+    """A strategy whose decisions are timed, in milliseconds a robot."""
 
     def __init__(self, strategy: Strategy, clock: Callable[[], float]) -> None:
         """Nothing is measured yet; `clock` tells seconds."""
@@ -55,7 +53,7 @@ class Stopwatch:
         self._strategy.reset(scenario, rng)
 
     def choose(self, views: Sequence[RobotView]) -> list[np.ndarray]:
-        """What the strategy chooses; how long a view took it is noted."""
+        """What the strategy chooses; notes the time that it took for each view."""
         started = self._clock()
         chosen = self._strategy.choose(views)
         self.decisions_ms.append(1e3 * (self._clock() - started) / max(len(views), 1))
@@ -63,29 +61,5 @@ class Stopwatch:
 
 
 def random_viewpoint(view: RobotView, rng: np.random.Generator) -> np.ndarray:
-    """A viewpoint drawn uniformly within reach, inside the workspace; the gaze in any direction.
-
-    Args:
-        view: Of the robot; planar robots stay in their plane and look level.
-        rng: To draw from.
-
-    Returns:
-        (5,) viewpoint.
-    """
-    grid, reach_m = view.scenario.grid, view.kind.robot.reach_m
-    low = np.asarray(grid.origin_m)
-    high = low + grid.size_m
-    axes = 2 if view.planar else 3
-    viewpoint = view.pose.copy()
-    here = view.pose[:axes]
-    if math.isinf(reach_m):  # actions reach from the centre of the first voxel to that of the last
-        low, high = low + 0.5 * grid.voxel_size_m, high - 0.5 * grid.voxel_size_m
-    lowest, highest = np.maximum(low[:axes], here - reach_m), np.minimum(high[:axes], here + reach_m)
-    for _ in range(_DRAWS):
-        place = rng.uniform(lowest, highest)
-        if ((place - here) ** 2).sum() <= reach_m**2:
-            viewpoint[:axes] = place
-            break
-    viewpoint[3] = rng.uniform(-math.pi, math.pi)
-    viewpoint[4] = 0.0 if view.planar else math.asin(rng.uniform(-1.0, 1.0))
-    return viewpoint
+    """(5,) a viewpoint drawn uniformly within a robot's reach, the gaze in any direction."""
+    return uniform_viewpoint(view.scenario.grid, view.kind.robot.reach_m, view.pose, view.planar, rng)

@@ -1,4 +1,4 @@
-"""Cones of sight, and what a scan is expected to bring, against what scans do bring."""
+"""Cones of view and what they cover, against the slow reference and by hand."""
 
 from __future__ import annotations
 
@@ -9,20 +9,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from entropy_explore_env.belief.raycast import longest_crossing
 from entropy_explore_env.belief.visibility import (
     CONE,
-    SIGHT,
+    Occlusion,
     cone_of,
-    expected_scan_bits,
     in_cones,
     mark_cone,
     marked_bits,
     visible_bits,
 )
 from entropy_explore_env.compilation.kernels import lean_kernel
-from entropy_explore_env.robots.range_sensor import fuse_scan, new_scan, sensor_model, take_scan
-from entropy_explore_env.settings import Grid, RangeSensor
 from tests.reference import rochami
 from tests.reference.scenes import (
     as_reference,
@@ -35,106 +31,12 @@ from tests.reference.scenes import (
 )
 
 SIZE = (7, 11, 5)
-NOBODY = np.zeros(0, CONE)
-SENSOR = RangeSensor((math.pi / 3, math.pi / 4), math.pi / 24, sigma_min=0.1, sigma_slope_per_m=0.05)
+NO_CONES = np.zeros(0, CONE)
 
 
 @lean_kernel
 def inside(cones, x, y, z):
     return in_cones(cones, x, y, z)
-
-
-def sight(blocking=0.0, known=0.0, rays=1.0, sensor=SENSOR):
-    one = np.zeros(1, SIGHT)
-    for name in ("max_range_m", "min_range_m", "sigma_min", "sigma_slope_per_m", "voxels_behind"):
-        one[name] = getattr(sensor, name)
-    one["known"], one["blocking"], one["rays"] = known, blocking, rays
-    return one[0]
-
-
-def expected(mean, precision, viewpoint, how, cones=NOBODY, sensor=SENSOR, edge=0.5):
-    model = sensor_model(sensor)
-    places = longest_crossing(*SIZE, math.inf, sensor.voxels_behind)
-    added = np.zeros(mean.size, np.float32)
-    scratch = (
-        added,
-        np.zeros(mean.size, np.int32),
-        np.zeros(places, np.int32),
-        np.zeros(places, np.int64),
-    )
-    bits = expected_scan_bits(
-        mean.ravel(),
-        precision.ravel(),
-        SIZE,
-        edge,
-        np.asarray(viewpoint, float),
-        model.yaw_offsets,
-        model.pitch_offsets,
-        how,
-        cones,
-        scratch,
-    )
-    assert not added.any()
-    return bits
-
-
-@drawn(40)
-@given(
-    seeds,
-    st.floats(-math.pi, math.pi),
-    st.floats(-1.2, 1.2),
-    st.integers(0, 2),
-    st.sampled_from([2.0, math.inf]),
-    st.sampled_from([0.0, 1.1]),
-)
-def test_a_scan_brings_what_was_expected_where_the_belief_is_right_about_obstacles(
-    seed, yaw, pitch, behind, reach, min_range_m
-):
-    rng = np.random.default_rng(seed)
-    view = (SENSOR.field_of_view_rad, SENSOR.angular_step_rad, reach, 0.1, 0.05)
-    sensor = RangeSensor(*view, voxels_behind=behind, min_range_m=min_range_m)
-    truth = random_cover(SIZE, 0.1, seed)
-    precision = rng.uniform(0.01, 50.0, SIZE).astype(np.float32)
-    start = rng.uniform(0.5, np.array(SIZE) - 0.5)
-    viewpoint = (*start, yaw, pitch)
-    hoped = expected(truth, precision, viewpoint, sight(sensor=sensor), sensor=sensor)
-    scan = new_scan(Grid(SIZE, 0.5), [sensor], sensor.rays, 1)
-    chance = np.zeros(1, np.uint64)
-    take_scan(scan, sensor_model(sensor), truth.ravel(), SIZE, 0.5, tuple(start), yaw, pitch, 0, chance)
-    scan.order[:] = np.arange(sensor.rays)
-    brought = fuse_scan(scan, sensor.rays, truth.ravel().copy(), precision.ravel().copy())
-    assert hoped == pytest.approx(brought, rel=2e-4)
-
-
-def test_one_ray_by_hand():
-    """Along x from the middle of voxel 1: voxels 1 … 6, 2.75 m to the wall, σ = 0.1 + 0.05 · 2.75."""
-    one = RangeSensor((0.0, 0.0), 0.1, sigma_min=0.1, sigma_slope_per_m=0.05)
-    mean, precision = np.zeros(SIZE, np.float32), np.full(SIZE, 4.0, np.float32)
-    viewpoint = (1.5, 5.5, 2.5, 0.0, 0.0)
-    gain = 1.0 / 0.2375**2
-    bits = expected(mean, precision, viewpoint, sight(sensor=one), sensor=one)
-    assert bits == pytest.approx(6 * 0.5 * math.log2(1 + gain / 4.0), rel=1e-5)
-    # Unknown voxels let half of it through: the first gets all, the second a half, the third a quarter.
-    half = expected(mean, precision, viewpoint, sight(0.5, known=5.0, sensor=one), sensor=one)
-    assert half == pytest.approx(sum(0.5 * math.log2(1 + gain * 0.5**i / 4.0) for i in range(6)), rel=1e-5)
-    twice = expected(mean, precision, viewpoint, sight(rays=2.0, sensor=one), sensor=one)
-    assert twice == pytest.approx(6 * 0.5 * math.log2(1 + 2 * gain / 4.0), rel=1e-5)
-    mean[4, 5, 2] = 0.9  # stops it after 1.25 m, one voxel behind counts
-    near = 1.0 / (0.1 + 0.05 * 1.25) ** 2
-    stopped = expected(mean, precision, viewpoint, sight(sensor=one), sensor=one)
-    assert stopped == pytest.approx(4 * 0.5 * math.log2(1 + near / 4.0), rel=1e-5)
-
-
-def test_what_others_will_see_counts_nothing():
-    mean, precision = np.zeros(SIZE, np.float32), np.full(SIZE, 0.01, np.float32)
-    viewpoint = (1.5, 5.5, 2.5, 0.0, 0.0)
-    all_of_it = expected(mean, precision, viewpoint, sight())
-    everywhere = np.array([cone_of(np.array([3.5, 5.5, 2.5, 0.0, 0.0]), 100.0, math.pi)])
-    assert expected(mean, precision, viewpoint, sight(), everywhere) == 0.0
-    beside = np.array([cone_of(np.array([1.5, 5.5, 2.5, math.pi, 0.0]), 100.0, 0.1)])
-    assert expected(mean, precision, viewpoint, sight(), beside) == pytest.approx(all_of_it, rel=0.05)
-    short = np.array([cone_of(np.array([1.5, 5.5, 2.5, 0.0, 0.0]), 2.0, math.pi / 2)])
-    assert 0.0 < expected(mean, precision, viewpoint, sight(), short) < all_of_it
 
 
 def test_cones_by_hand():
@@ -151,7 +53,7 @@ def test_cones_by_hand():
         ((1.0, 2.0, 3.0), True),  # the apex
     ):
         assert inside(cones, *point) is is_in, point
-    assert not inside(NOBODY, 1.0, 2.0, 3.0)
+    assert not inside(NO_CONES, 1.0, 2.0, 3.0)
 
 
 @drawn(100)
@@ -177,14 +79,14 @@ def covered(cones, belief, occluded=False, size=SIZE):
     """H(C⁰), I(C⁰; T⁰), H(T⁰), H(T) and the marks of all cones, the first of which is the robot's own."""
     mean, precision = belief[0].ravel(), belief[1].ravel()
     space = ray_space(size, behind=1)
-    sight = (mean, *space) if occluded else None
+    occlusion = Occlusion(mean, *space) if occluded else None
     mine = np.array([cone_of(np.array([*c.apex, c.yaw, c.pitch]), c.radius, c.half_angle) for c in cones])
     marks = np.zeros(mean.size, np.uint8)
     for cone in mine[1:]:
-        mark_cone(cone, size, sight, marks)
+        mark_cone(cone, size, occlusion, marks)
     team = marked_bits(precision, KNOWN, marks)
-    own, shared = visible_bits(mine[0], size, precision, KNOWN, sight, marks)
-    mark_cone(mine[0], size, sight, marks)
+    own, shared = visible_bits(mine[0], size, precision, KNOWN, occlusion, marks)
+    mark_cone(mine[0], size, occlusion, marks)
     return own, shared, team, marked_bits(precision, KNOWN, marks), marks
 
 

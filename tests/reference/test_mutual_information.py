@@ -9,14 +9,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from baselines.strategies.mutual_information.candidates import (
-    CANDIDATE,
-    FACTORS,
-    MATE,
-    best_candidate,
-    steep_voxels,
-)
+from baselines.strategies.mutual_information.candidates import FACTORS, MATE, Body, Team, best_candidate
+from entropy_explore_env.belief.fields import Belief
 from entropy_explore_env.belief.visibility import CONE, cone_of, mark_cone
+from entropy_explore_env.viewpoints.gradient_candidates import CANDIDATE, find_gradient_candidates
 from tests.reference import rochami
 from tests.reference.scenes import as_reference, drawn, random_belief, ray_space, seeds
 
@@ -32,7 +28,7 @@ def ours(belief, position, radius, cone, mates, weights, planar, ranked=None):
     candidates = np.zeros(mean.size, CANDIDATE)
     layer = int(position[2]) if planar else -1
     known = weights.sigma_known**-2
-    count = steep_voxels(precision, known, np.asarray(position), radius, layer, candidates)
+    count = find_gradient_candidates(precision, known, np.asarray(position), radius, layer, candidates)
     candidates = candidates[:count]
     marks = np.zeros(mean.size, np.uint8)
     heard = np.zeros(len(mates), MATE)
@@ -55,13 +51,11 @@ def ours(belief, position, radius, cone, mates, weights, planar, ranked=None):
     best = best_candidate(
         candidates,
         order,
-        (mean.ravel(), precision.ravel(), SIZE),
-        (np.asarray(position), radius, 0.0, OUR_BALL),
-        heard,
+        Belief(mean.ravel(), precision.ravel(), SIZE),
+        Body(tuple(map(float, position)), radius, 0.0, OUR_BALL, *ray_space(SIZE, behind=1)),
+        Team(heard, marks),
         own,
         None,
-        marks,
-        ray_space(SIZE, behind=1),
         factors[0],
     )
     return candidates, best

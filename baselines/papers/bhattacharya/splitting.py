@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from baselines.strategies.voronoi.controls import LN2
+from entropy_explore_env.belief.entropy import LN2
 from entropy_explore_env.belief.paths.geodesic_cells import new_tessellation, tessellate
 
 SHAPE = (200, 121, 1)

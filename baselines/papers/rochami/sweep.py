@@ -11,7 +11,7 @@ from baselines.experiments.cells import Cell
 from baselines.experiments.mission import Record, record_mission
 from baselines.papers.rochami.coverage import TeamCoverage
 from baselines.strategies import make_strategy
-from baselines.strategies.mutual_information import Coordination, MutualInformation
+from baselines.strategies.mutual_information import MutualInformation, MutualInformationConfig
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.scenario import Scenario, with_settings
 from entropy_explore_env.scenarios import LAB, ROOM
@@ -25,7 +25,7 @@ KAPPA_CHANGES: dict[str, tuple[str, dict[str, Any], dict[str, Any]]] = {
     "reach": ("candidates at most 1 m away", {"robot": {"reach_m": 1.0}}, {}),
     "bodies": ("bodies off", {"robot": {"body_radius_m": 0.0}}, {"teammates_block": False}),
 }
-"""What is changed under κ = 0, ¼ and 1: a text, settings of the scenario, fields of Coordination."""
+"""What is changed under κ = 0, ¼ and 1: a text, settings of the scenario, fields of the strategy's config."""
 KAPPAS = (0.0, 0.0625, 0.125, 0.25, 0.375, 0.5, 0.75, 1.0)
 COVERED = (4, 8)
 """Team sizes of which H(T) and I are followed."""
@@ -48,7 +48,7 @@ _BASE: dict[str, Any] = {
 class Run:
     """Runs a mission of a cell: with a coordination of its own, and with the team's coverage if wanted."""
 
-    coordination: Coordination | None = None
+    coordination: MutualInformationConfig | None = None
     covered: bool = False
 
     def __call__(self, env: EntropyExploreEnv, strategy: str, seed: int) -> Record:
@@ -68,7 +68,7 @@ class Change:
     Attributes:
         text: What it is.
         settings: Of the scenario.
-        coordination: Fields of Coordination.
+        coordination: Fields of MutualInformationConfig.
         both: Whether it concerns the uncoordinated method, too; else it is compared with that as it is.
         starts: At most so many, where missions seldom end.
     """
@@ -196,7 +196,9 @@ def _cell(
     coordinated = method == "coordinated"
     if not coordinated:
         settings = _merged(settings, {"channel": {"announcements": False}})
-    run: Callable[..., Record] = Run(Coordination(**{"coordinated": coordinated, **(weighed or {})}), covered)
+    run: Callable[..., Record] = Run(
+        MutualInformationConfig(**{"coordinated": coordinated, **(weighed or {})}), covered
+    )
     strategy = "mutual-information" if coordinated else "ground-gradient"
     return Cell(name, _lab(settings), strategy, starts, run)
 

@@ -1,10 +1,10 @@
 """The strategy `information-rate`: the viewpoint whose scan is expected to bring most bits per second.
 
-Ours, not a paper's: viewpoints are drawn within reach, half of them turns on the spot, and each is weighed by
-the bits that its scan should take from the robot's own map (belief/visibility.py) per second of driving,
-turning and scanning. Where nothing nearby is worth much, the robot travels to an uncertain place farther
-away, along the shortest way by its belief, scanning at each stop. What teammates have announced that they
-will see is left to them.
+Ours, not a paper's: viewpoints are drawn within reach, half of them turns on the spot, and each is evaluated
+by the bits that its scan should take from the robot's own map (viewpoints/expected_scan.py) per second of
+driving, turning and scanning. Where nothing nearby is worth much, the robot travels to an uncertain place
+farther away, along the shortest path by its belief, scanning at each stop. Voxels that teammates have
+announced to see are left to them.
 """
 
 from __future__ import annotations
@@ -15,65 +15,73 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from baselines.strategies.information_rate.expected_bits import (
-    Build,
-    announced_cone,
-    build_of,
-    free_by_belief,
-    new_scratch,
-    weigh_viewpoints,
-)
+from baselines.strategies.knowledge import announced_cones, belief_of
 from entropy_explore_env.belief.paths.lattice import belief_costs
 from entropy_explore_env.belief.paths.planning import ANY_GOAL, search_paths
 from entropy_explore_env.belief.paths.search import cost_to, extract_path, new_search
 from entropy_explore_env.belief.paths.string_pulling import string_pulled
 from entropy_explore_env.belief.raycast import STOP_AT_COVERED
-from entropy_explore_env.belief.visibility import CONE
 from entropy_explore_env.missions.view import RobotView
 from entropy_explore_env.robots.motion import driving_time
 from entropy_explore_env.scenario import Scenario
+from entropy_explore_env.viewpoints.drawing import (
+    draw_gazes,
+    draw_places,
+    surroundings,
+    vary_gazes,
+    vary_places,
+)
+from entropy_explore_env.viewpoints.evaluation import (
+    Outlook,
+    RobotModel,
+    expected_outlook,
+    is_line_free,
+    new_scratch,
+    robot_model,
+)
 
-_KEPT = 3
-"""Viewpoints around which others are drawn."""
+_BEST = 3
+"""Number of viewpoints around which others are drawn."""
 _PATIENCE = 4
-"""Decisions that a robot stays where it is after it has found nothing better elsewhere."""
-_LOTS, _GAZES = 32, 4
-"""Random voxels for each uncertain place that is weighed, and gazes there."""
+"""Decisions until a robot that found nothing better farther away searches there again."""
+_VOXELS_PER_PLACE, _GAZES = 32, 4
+"""Voxels that are drawn for each uncertain place that is evaluated, and gazes there."""
 
 
 @dataclass(frozen=True)
-class Weighing:
-    """How viewpoints are drawn and weighed.
+class InformationRateConfig:
+    """How viewpoints are drawn and evaluated.
 
     Attributes:
         per_scan: Bits per scan instead of bits per second.
         candidates: Viewpoints that are drawn for a decision; half of them turn on the spot.
-        thinning: Of the columns and rows of the sensor's rays every so many-th is imagined.
         refinements: How often viewpoints around the best ones are drawn, a quarter as many each time.
-        blocking: Probability that an unknown voxel stops a ray.
-        poor: A best viewpoint with less than this share of the best ever expected makes the robot look
-            farther away.
-        places: Uncertain places farther away that are weighed then.
-        unknown_cost: What a metre of way through unknown space costs, in metres of known space.
+        thinning: One in this many columns, and rows, of the sensor's rays is imagined.
+        stop_probability: Probability that an unknown voxel stops a ray.
+        poor: Share of the most bits ever expected; if the best viewpoint brings less, the robot looks for
+            a place farther away.
+        places: Uncertain places farther away that are evaluated then.
+        unknown_cost: Traversal cost of unknown space, relative to known free space.
     """
 
     per_scan: bool = False
     candidates: int = 80
     refinements: int = 3
     thinning: int = 2
-    blocking: float = 0.02
+    stop_probability: float = 0.02
     poor: float = 0.1
     places: int = 12
     unknown_cost: float = 2.0
 
 
 @dataclass
-class _Journey:
+class _TravelPlan:
     """What a robot remembers from one decision to the next."""
 
     best_bits: float = 0.0
+    """Most bits ever expected of a viewpoint nearby."""
     patience: int = 0
-    """Decisions until it looks farther away again."""
+    """Decisions until it looks for a place farther away again."""
     stops: list[np.ndarray] = field(default_factory=list)
     """Places (3,) in grid units that are still ahead."""
 
@@ -81,166 +89,123 @@ class _Journey:
 class InformationRate:
     """Chooses viewpoints by expected bits per second, or per scan."""
 
-    def __init__(self, weighing: Weighing | None = None) -> None:
-        """Take the settings."""
-        self.weighing = weighing or Weighing()
+    def __init__(self, config: InformationRateConfig | None = None) -> None:
+        """Take the settings; None = the defaults."""
+        self.config = config or InformationRateConfig()
 
     def reset(self, scenario: Scenario, rng: np.random.Generator) -> None:
         """A new mission begins."""
-        grid = scenario.grid
-        self._rng, self._journeys = rng, [_Journey() for _ in range(scenario.robots)]
-        self._builds = [
-            build_of(scenario, kind, self.weighing.thinning, self.weighing.blocking)
-            for kind in scenario.kinds
+        config = self.config
+        self._rng, self._plans = rng, [_TravelPlan() for _ in range(scenario.robots)]
+        self._models = [
+            robot_model(scenario, kind, config.thinning, config.stop_probability) for kind in scenario.kinds
         ]
-        self._scratch = new_scratch(grid, self._builds)
-        self._search = new_search(grid.voxels)
+        self._scratch = new_scratch(scenario.grid, self._models)
+        self._search = new_search(scenario.grid.voxels)
 
-    def _build_of(self, view: RobotView) -> Build:
-        return self._builds[view.robot % len(self._builds)]
+    def _model_of(self, view: RobotView) -> RobotModel:
+        return self._models[view.robot % len(self._models)]
 
     def choose(self, views: Sequence[RobotView]) -> list[np.ndarray]:
         """The viewpoint of each view, by its own belief and what it has heard."""
         return [self._choose(view) for view in views]
 
     def _choose(self, view: RobotView) -> np.ndarray:
-        journey = self._journeys[view.robot]
+        plan, config = self._plans[view.robot], self.config
         here = view.scenario.grid.in_grid_units(view.pose)
-        cones = self._cones(view)
-        if journey.stops and not _in_sight(view, here[:3], journey.stops[0], self._scratch):
-            journey.stops = []
-        drawn = self._drawn(view, here, journey.stops[0] if journey.stops else None)
-        bits, seconds = self._weighed(view, here, drawn, cones)
-        for _ in range(self.weighing.refinements):
-            best = np.argsort(self._worth(journey, bits, seconds))[-_KEPT:]
-            near = self._nearby(view, here, drawn[best], moving=not journey.stops)
-            near_bits, near_seconds = self._weighed(view, here, near, cones)
+        cones = announced_cones(view)
+        if plan.stops and not self._can_drive_straight(view, here[:3], plan.stops[0]):
+            plan.stops = []
+        drawn = self._drawn(view, here, plan.stops[0] if plan.stops else None)
+        bits, seconds = self._outlook(view, here, drawn, cones)
+        for _ in range(config.refinements):
+            best = np.argsort(self._values(plan, bits, seconds))[-_BEST:]
+            near = self._varied(view, here, drawn[best], moving=not plan.stops)
+            near_bits, near_seconds = self._outlook(view, here, near, cones)
             drawn = np.concatenate([drawn[best], near])
             bits = np.concatenate([bits[best], near_bits])
             seconds = np.concatenate([seconds[best], near_seconds])
-        best = int(np.argmax(self._worth(journey, bits, seconds)))
-        if journey.stops:
-            journey.stops.pop(0)
+        best = int(np.argmax(self._values(plan, bits, seconds)))
+        if plan.stops:
+            plan.stops.pop(0)
         else:
-            journey.best_bits = max(journey.best_bits, float(bits[best]))
-            journey.patience -= 1
-            if bits[best] < self.weighing.poor * journey.best_bits and journey.patience <= 0:
-                rate = float(self._worth(journey, bits, seconds)[best])
-                journey.stops = self._way_to_somewhere_better(view, here, cones, rate)
-                if journey.stops and _in_sight(view, here[:3], journey.stops[0], self._scratch):
+            plan.best_bits = max(plan.best_bits, float(bits[best]))
+            plan.patience -= 1
+            if bits[best] < config.poor * plan.best_bits and plan.patience <= 0:
+                value = float(self._values(plan, bits, seconds)[best])
+                plan.stops = self._stops_to_a_better_place(view, here, cones, value)
+                if plan.stops and self._can_drive_straight(view, here[:3], plan.stops[0]):
                     return self._choose(view)
-                journey.stops, journey.patience = [], _PATIENCE
+                plan.stops, plan.patience = [], _PATIENCE
         viewpoint, grid = drawn[best], view.scenario.grid
         viewpoint[:3] = np.asarray(grid.origin_m) + viewpoint[:3] * grid.voxel_size_m
         return viewpoint
 
-    def _worth(self, journey: _Journey, bits: np.ndarray, seconds: np.ndarray) -> np.ndarray:
-        """(K,) what viewpoints are worth: bits per second, or bits where all take as long or time is free."""
-        return bits if self.weighing.per_scan or journey.stops else bits / seconds
+    def _values(self, plan: _TravelPlan, bits: np.ndarray, seconds: np.ndarray) -> np.ndarray:
+        """(K,) bits per second of viewpoints; bits if scans count, or if all viewpoints are at one stop."""
+        return bits if self.config.per_scan or plan.stops else bits / seconds
 
-    def _cones(self, view: RobotView) -> np.ndarray:
-        """(M,) CONE of what teammates have announced, in grid units."""
-        heard = [mate for mate in view.teammates.values() if mate.announced_s >= 0.0 and mate.depth_m > 0.0]
-        cones = np.zeros(len(heard), CONE)
-        for place, mate in enumerate(heard):
-            cones[place] = announced_cone(view.scenario.grid, mate)
-        return cones
+    def _can_drive_straight(self, view: RobotView, here: np.ndarray, there: np.ndarray) -> bool:
+        """Whether the straight line between two places (3,) is free by the belief."""
+        radius = self._model_of(view).drive.body_radius
+        return is_line_free(belief_of(view), here, there - here, radius, self._scratch)
 
     def _drawn(self, view: RobotView, here: np.ndarray, stop: np.ndarray | None) -> np.ndarray:
         """(K, 5) viewpoints in grid units: half on the spot, half within reach; or all at a stop."""
-        count, planar, rng = self.weighing.candidates, view.planar, self._rng
-        drawn = np.tile(here, (count, 1))
-        drawn[:, 3] = rng.uniform(-math.pi, math.pi, count)
-        drawn[:, 4] = 0.0 if planar else np.arcsin(rng.uniform(-1.0, 1.0, count))
+        count = self.config.candidates
+        drawn = draw_gazes(here, count, view.planar, self._rng)
         if stop is not None:
             drawn[:, :3] = stop
             return drawn
-        (axes, reach, inside), moved = _nearby_space(view), count // 2
-        way = rng.normal(size=(moved, axes))
-        way *= (reach * rng.uniform(size=moved) ** (1 / axes) / np.linalg.norm(way, axis=1))[:, None]
-        drawn[:moved, :axes] = np.clip(here[:axes] + way, 0.5, inside)
+        within = surroundings(view.scenario.grid, view.kind.robot, view.planar)
+        drawn[: count // 2, : within.axes] = draw_places(here, count // 2, within, self._rng)
         return drawn
 
-    def _nearby(self, view: RobotView, here: np.ndarray, best: np.ndarray, moving: bool) -> np.ndarray:
-        """(N, 5) viewpoints around the best ones, in grid units; their gazes stray by half the view."""
-        planar, rng, build = view.planar, self._rng, self._build_of(view)
-        near = best.repeat(max(self.weighing.candidates // (4 * len(best)), 1), axis=0)
-        spread = 0.5 * max(float(np.ptp(build.yaws)), float(np.ptp(build.pitches)), 0.1)
-        near[:, 3] += spread * rng.normal(size=len(near))
-        near[:, 3] = (near[:, 3] + math.pi) % (2.0 * math.pi) - math.pi
-        if not planar:
-            tilted = near[:, 4] + spread * rng.normal(size=len(near))
-            near[:, 4] = np.clip(tilted, -0.5 * math.pi, 0.5 * math.pi)
+    def _varied(self, view: RobotView, here: np.ndarray, best: np.ndarray, moving: bool) -> np.ndarray:
+        """(N, 5) viewpoints around the best ones, in grid units; gazes vary by half the field of view."""
+        scan = self._model_of(view).scan
+        near = best.repeat(max(self.config.candidates // (4 * len(best)), 1), axis=0)
+        spread = 0.5 * max(float(np.ptp(scan.yaws)), float(np.ptp(scan.pitches)), 0.1)
+        vary_gazes(near, spread, view.planar, self._rng)
         if moving:
-            axes, reach, inside = _nearby_space(view)
-            way = near[:, :axes] - here[:axes]
-            away = np.linalg.norm(way, axis=1) > 0.0  # turns on the spot stay turns on the spot
-            way[away] += 0.25 * reach * rng.normal(size=(int(away.sum()), axes))
-            length = np.maximum(np.linalg.norm(way, axis=1) / reach, 1.0)
-            near[:, :axes] = np.clip(here[:axes] + way / length[:, None], 0.5, inside)
+            within = surroundings(view.scenario.grid, view.kind.robot, view.planar)
+            vary_places(near, here, within, self._rng)
         return near
 
-    def _weighed(
+    def _outlook(
         self,
         view: RobotView,
         here: np.ndarray,
-        drawn: np.ndarray,
+        viewpoints: np.ndarray,
         cones: np.ndarray,
-        anywhere: bool = False,
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """(K,) expected bits and seconds of each viewpoint; 0 bits where the straight way is not free.
+        line_must_be_free: bool = True,
+    ) -> Outlook:
+        """Expected bits and seconds of (K, 5) viewpoints."""
+        model = self._model_of(view)
+        model = model._replace(drive=model.drive._replace(line_must_be_free=line_must_be_free))
+        return expected_outlook(belief_of(view), model, here, viewpoints, cones, self._scratch)
 
-        With `anywhere` the way does not matter.
-        """
-        scenario, robot, build = view.scenario, view.kind.robot, self._build_of(view)
-        limits = (
-            robot.max_speed_m_s,
-            robot.acceleration_m_s2,
-            robot.turn_rate_rad_s,
-            view.kind.sensor.scan_time_s,
-            robot.body_radius_m / scenario.grid.voxel_size_m,
-        )
-        bits, seconds = np.zeros(len(drawn)), np.zeros(len(drawn))
-        weigh_viewpoints(
-            view.mean.reshape(-1),
-            view.precision.reshape(-1),
-            scenario.grid.shape,
-            scenario.grid.voxel_size_m,
-            here,
-            drawn,
-            build.yaws,
-            build.pitches,
-            build.sight,
-            cones,
-            limits,
-            anywhere,
-            self._scratch,
-            bits,
-            seconds,
-        )
-        return bits, seconds
-
-    def _way_to_somewhere_better(
-        self, view: RobotView, here: np.ndarray, cones: np.ndarray, rate: float
+    def _stops_to_a_better_place(
+        self, view: RobotView, here: np.ndarray, cones: np.ndarray, value: float
     ) -> list[np.ndarray]:
-        """Stops on the way to the uncertain place that is worth most, if it is worth more than staying.
+        """Stops on the path to the most valuable uncertain place, if that is worth more than staying here.
 
-        Ways are sought only if there is a place that would be worth it on the straight line.
+        Paths are searched only if a place would be worth more if the straight line there were free.
         """
-        grid, robot, lattice = view.scenario.grid, view.kind.robot, self._build_of(view).lattice
+        grid, robot, lattice = view.scenario.grid, view.kind.robot, self._model_of(view).lattice
         reach = min(robot.reach_m / grid.voxel_size_m, float(sum(grid.shape)))
         limits = robot.max_speed_m_s, robot.acceleration_m_s2
         hop_s = driving_time(reach * grid.voxel_size_m, *limits) + view.kind.sensor.scan_time_s
-        each = 1.0 if self.weighing.per_scan else hop_s
-        closed = view.no_fly_mask()
-        drawn = self._drawn_voxels(view, here, closed)
+        each = 1.0 if self.config.per_scan else hop_s
+        no_fly = view.no_fly_mask()
+        drawn = self._drawn_voxels(view, here, no_fly)
         places = self._places(view, here, drawn)
-        bits, _ = self._weighed(view, places[0], places, cones, anywhere=True)
+        bits, _ = self._outlook(view, places[0], places, cones, line_must_be_free=False)
         straight = np.linalg.norm(places[:, :3] - here[:3], axis=1)
-        if (bits / (np.maximum(straight / reach, 1.0) * each)).max() <= rate:
+        if (bits / (np.maximum(straight / reach, 1.0) * each)).max() <= value:
             return []
         prior = view.scenario.sigma_prior**-2
-        costs = belief_costs(view.mean, view.precision, prior, self.weighing.unknown_cost, closed)
+        costs = belief_costs(view.mean, view.precision, prior, self.config.unknown_cost, no_fly)
         start = np.ravel_multi_index(tuple(here[:3].astype(int)), grid.shape)
         search_paths(self._search, lattice, costs, np.array([start], np.int32), ANY_GOAL, math.inf)
         cost = np.array([cost_to(self._search, int(voxel)) for voxel in drawn])
@@ -248,12 +213,12 @@ class InformationRate:
         if not reached.any():
             return []
         places = self._places(view, here, drawn[reached])
-        bits, _ = self._weighed(view, places[0], places, cones, anywhere=True)
+        bits, _ = self._outlook(view, places[0], places, cones, line_must_be_free=False)
         goals = np.asarray(np.ravel_multi_index(tuple(places[:, :3].astype(int).T), grid.shape))
         cost = np.array([cost_to(self._search, int(goal)) for goal in goals])
-        worth = bits / (np.maximum(cost / reach, 1.0) * each)
-        best = int(np.argmax(worth))
-        if worth[best] <= rate:
+        values = bits / (np.maximum(cost / reach, 1.0) * each)
+        best = int(np.argmax(values))
+        if values[best] <= value:
             return []
         goal, none = int(goals[best]), np.empty(0, np.int32)
         path = np.empty(extract_path(self._search, lattice, goal, none), np.int32)
@@ -261,33 +226,26 @@ class InformationRate:
         points = string_pulled(self._search, lattice, costs, path, here[:3].copy(), places[best, :3].copy())
         return _stops(here[:3], points, reach)
 
-    def _drawn_voxels(self, view: RobotView, here: np.ndarray, closed: np.ndarray | None) -> np.ndarray:
-        """(N,) random voxels that are neither closed nor believed covered; of a planar robot's layer."""
+    def _drawn_voxels(self, view: RobotView, here: np.ndarray, no_fly: np.ndarray | None) -> np.ndarray:
+        """(N,) random voxels, neither in the no-fly mask nor believed covered; of a planar robot's layer."""
         grid = view.scenario.grid
-        drawn = self._rng.integers(0, grid.voxels, _LOTS * self.weighing.places)
+        drawn = self._rng.integers(0, grid.voxels, _VOXELS_PER_PLACE * self.config.places)
         if view.planar:
             drawn += int(here[2]) - drawn % grid.shape[2]
         free = view.mean.reshape(-1)[drawn] <= STOP_AT_COVERED
-        if closed is not None:
-            free &= ~closed.reshape(-1)[drawn]
+        if no_fly is not None:
+            free &= ~no_fly.reshape(-1)[drawn]
         return drawn[free] if free.any() else drawn
 
     def _places(self, view: RobotView, here: np.ndarray, voxels: np.ndarray) -> np.ndarray:
-        """(K, 5) viewpoints in grid units at the least known of some voxels, a few gazes each."""
-        least = np.argsort(view.precision.reshape(-1)[voxels], kind="stable")[: self.weighing.places]
+        """(K, 5) viewpoints in grid units at the least certain of some voxels, a few gazes each."""
+        least = np.argsort(view.precision.reshape(-1)[voxels], kind="stable")[: self.config.places]
         places = np.stack(np.unravel_index(voxels[least], view.scenario.grid.shape), axis=-1) + 0.5
         viewpoints = np.repeat(np.concatenate([places, np.zeros((len(places), 2))], axis=1), _GAZES, axis=0)
         viewpoints[:, 3] = self._rng.uniform(-math.pi, math.pi, len(viewpoints))
         if view.planar:
             viewpoints[:, 2] = here[2]
         return viewpoints
-
-
-def _nearby_space(view: RobotView) -> tuple[int, float, np.ndarray]:
-    """Axes along which viewpoints are drawn, how far off, and the last place along each, in grid units."""
-    grid, axes = view.scenario.grid, 2 if view.planar else 3
-    reach = min(view.kind.robot.reach_m / grid.voxel_size_m, 0.25 * float(max(grid.shape)))
-    return axes, reach, np.asarray(grid.shape[:axes]) - 0.5
 
 
 def _stops(start: np.ndarray, points: np.ndarray, reach: float) -> list[np.ndarray]:
@@ -298,15 +256,3 @@ def _stops(start: np.ndarray, points: np.ndarray, reach: float) -> list[np.ndarr
         stops += [at + (point - at) * (hop + 1) / hops for hop in range(hops)]
         at = point
     return stops
-
-
-def _in_sight(view: RobotView, here: np.ndarray, there: np.ndarray, scratch: tuple[np.ndarray, ...]) -> bool:
-    """Whether the straight way to a place is free by the belief."""
-    way = there - here
-    length = float(np.linalg.norm(way))
-    if length < 1e-9:
-        return True
-    mean, size = view.mean.reshape(-1), view.scenario.grid.shape
-    x, y, z = (way / length).tolist()
-    radius = view.kind.robot.body_radius_m / view.scenario.grid.voxel_size_m
-    return bool(free_by_belief(mean, size, here, (x, y, z), length, radius, scratch))

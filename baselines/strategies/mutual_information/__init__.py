@@ -4,15 +4,15 @@ A robot goes to the voxel l near it that maximises eq. 13 and looks along the en
 
     ‖∇H(l)‖_N · λ(l) · ρ(x, l) · η(l) - κ · ϑ(x, l)
 
-`ground-gradient` is the uncoordinated method, λ = η = 1 and nothing heard of teammates in ρ. What the paper
-leaves open, both share:
+`ground-gradient` is the uncoordinated method: λ = η = 1, and ρ ignores teammates. What the paper leaves open
+is the same in both:
 
 - H is never negative (belief/visibility.py): gradients between voxels that count as known are 0.
 - ‖·‖_N divides by the steepest gradient among the candidates; of equal voxels chance takes one.
 - ρ is 1 - max μ over the voxels on the straight line but the last, and 0 where the body would touch
   something that is believed covered, or does not fit at its end.
-- Where no candidate is worth anything, and behind a teammate if robots do not wait there, the robot wanders:
-  a random viewpoint within reach. So it does where it would choose a viewpoint once too often (a trap).
+- The robot wanders, to a random viewpoint within reach, where no candidate has a gain above 0, behind a
+  teammate if robots do not wait there, and where it would choose the same viewpoint too often (a trap).
 """
 
 from __future__ import annotations
@@ -25,46 +25,42 @@ from typing import NamedTuple
 
 import numpy as np
 
-from baselines.strategies.information_rate.expected_bits import announced_cone
-from baselines.strategies.mutual_information.candidates import (
-    CANDIDATE,
-    FACTORS,
-    MATE,
-    best_candidate,
-    steep_voxels,
-)
+from baselines.strategies.knowledge import announced_cone, belief_of
+from baselines.strategies.mutual_information.candidates import FACTORS, MATE, Body, Team, best_candidate
 from baselines.strategies.protocol import random_viewpoint
 from entropy_explore_env.belief.paths.lattice import new_lattice
 from entropy_explore_env.belief.raycast import longest_crossing
-from entropy_explore_env.belief.visibility import CONE, mark_cone
+from entropy_explore_env.belief.visibility import CONE, Occlusion, mark_cone
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.missions.view import RobotView
 from entropy_explore_env.robots.motion import MoveEnd
 from entropy_explore_env.scenario import Scenario
 from entropy_explore_env.settings import RobotKind, gaussian_entropy_bits
 from entropy_explore_env.validation import check, check_kind, check_not_negative, check_positive
+from entropy_explore_env.viewpoints.gradient_candidates import CANDIDATE, find_gradient_candidates
 
 _ALIKE_RAD = math.radians(15.0)
 
 
 @dataclass(frozen=True)
-class Coordination:
+class MutualInformationConfig:
     """How viewpoints are weighed (RochaMI, eq. 13).
 
     Attributes:
-        coordinated: Whether what teammates announce counts: in λ, η and ρ.
-        overlap: Whether λ does (eq. 12); else 1.
+        coordinated: Whether λ, η and ρ use what teammates announce.
+        overlap: Whether λ does (eq. 12); else it is 1.
         overlap_scale: ξ, as a share of what the robot's cone would hold if nothing were known in it.
         interference: η for each teammate in the candidate's cone, in ]0, 1]; 1 = they do not count.
         teammates_block: Whether ρ is 0 where a teammate stands or drives.
-        static_reach: Whether ρ heeds what is believed covered; else it is 1.
+        static_reach: Whether ρ depends on what is believed covered; else it is 1.
         occlusion: Whether obstacles hide voxels of cones; the paper's ignore them.
         distance_cost: κ.
-        least_radius_m: Candidates lie within r̂ of the latest scan, but at least this far …
-        most_radius_m: … and at most this far; never beyond the robot's reach.
+        least_radius_m: Lower bound of the radius of the neighbourhood in which candidates lie, which is r̂ of
+            the latest scan.
+        most_radius_m: Upper bound of that radius; the robot's reach is another.
         known_sigma: σ of a voxel that counts as known, H = 0; None = the mission's σ_end.
-        repeats: A viewpoint chosen so often among the latest decisions is a trap.
-        memory: So many decisions.
+        repeats: A viewpoint that was chosen this often among the latest decisions is a trap.
+        memory: Number of latest decisions that are remembered.
     """
 
     coordinated: bool = True
@@ -94,23 +90,27 @@ class Coordination:
         for name in ("repeats", "memory"):
             check(self, name, "a whole number ≥ 1", lambda v: v >= 1 and v == int(v))
         if self.most_radius_m < self.least_radius_m:
-            raise SettingError("Coordination.most_radius_m", self.most_radius_m, "at least least_radius_m")
+            raise SettingError(
+                "MutualInformationConfig.most_radius_m", self.most_radius_m, "at least least_radius_m"
+            )
 
 
-class _Build(NamedTuple):
-    """What a kind of robot is, for kernels."""
+class _KindModel(NamedTuple):
+    """A kind of robot, for kernels."""
 
-    ball: np.ndarray
-    """(B, 3) int64, voxels that its body touches, by axis."""
+    footprint: np.ndarray
+    """(B, 3) int64 index offsets of the voxels that its body touches."""
     half_angle_rad: float
-    """Of its sensor's widest ray, before it has scanned."""
-    space: tuple[np.ndarray, np.ndarray]
-    """What `cast_ray` needs."""
+    """Of its sensor's widest ray; used before the first scan."""
+    crossed: np.ndarray
+    """(L,) int32, scratch space of `cast_ray`."""
+    entered: np.ndarray
+    """(L,) int64."""
 
 
 @dataclass
 class _Memory:
-    """Viewpoints that a robot chose lately."""
+    """The latest viewpoints that a robot chose."""
 
     chosen: deque[np.ndarray] = field(default_factory=deque)
 
@@ -119,22 +119,22 @@ class MutualInformation:
     """Chooses viewpoints by eq. 13; coordinated or not.
 
     Attributes:
-        coordination: The settings.
-        decisions: How many of this mission's decisions followed the rule, and why others wandered: a teammate
-            was in the way, no candidate was worth anything, or it was a trap.
+        config: The settings.
+        decisions: How many of this mission's decisions followed the rule, and why the others wandered: a
+            teammate was in the way, no candidate had a gain, or it was a trap.
     """
 
-    def __init__(self, coordination: Coordination | None = None) -> None:
-        """Take the settings."""
-        self.coordination = coordination or Coordination()
+    def __init__(self, config: MutualInformationConfig | None = None) -> None:
+        """Take the settings; None = the defaults."""
+        self.config = config or MutualInformationConfig()
 
     def reset(self, scenario: Scenario, rng: np.random.Generator) -> None:
         """A new mission begins."""
-        grid, settings = scenario.grid, self.coordination
+        grid, settings = scenario.grid, self.config
         self._rng = rng
         self.decisions = {"rule": 0, "blocked": 0, "nothing": 0, "trap": 0}
         self._memories = [_Memory(deque(maxlen=settings.memory)) for _ in range(scenario.robots)]
-        self._builds = [self._build(scenario, kind) for kind in scenario.kinds]
+        self._models = [_kind_model(scenario, kind) for kind in scenario.kinds]
         self._marks = np.zeros(grid.voxels, np.uint8)
         self._candidates = np.zeros(0, CANDIDATE)
         self._cone = np.zeros(1, CONE)
@@ -146,17 +146,6 @@ class MutualInformation:
         self._factors["interference"] = settings.interference if settings.coordinated else 1.0
         unknown_bits = gaussian_entropy_bits(scenario.sigma_prior) - gaussian_entropy_bits(sigma)
         self._unknown_bits = max(unknown_bits, 0.0)
-
-    def _build(self, scenario: Scenario, kind: RobotKind) -> _Build:
-        grid, sensor = scenario.grid, kind.sensor
-        radius = kind.robot.body_radius_m / grid.voxel_size_m
-        widest = 0.5 * sensor.angular_step_rad * math.hypot(sensor.columns - 1, sensor.rows - 1)
-        places = longest_crossing(*grid.shape, math.inf, 1)
-        return _Build(
-            ball=new_lattice(grid.shape, radius, scenario.layer_of(kind.robot)).footprint,
-            half_angle_rad=min(widest, math.pi),
-            space=(np.zeros(places, np.int32), np.zeros(places, np.int64)),
-        )
 
     def choose(self, views: Sequence[RobotView]) -> list[np.ndarray]:
         """The viewpoint of each view, by its own belief and what it has heard."""
@@ -170,7 +159,7 @@ class MutualInformation:
             self.decisions["blocked" if blocked else "nothing"] += 1
             return random_viewpoint(view, self._rng)
         alike = sum(_alike(viewpoint, earlier, grid.voxel_size_m) for earlier in memory.chosen)
-        if alike >= self.coordination.repeats:
+        if alike >= self.config.repeats:
             memory.chosen.clear()
             self.decisions["trap"] += 1
             return random_viewpoint(view, self._rng)
@@ -179,8 +168,8 @@ class MutualInformation:
         return viewpoint
 
     def _best(self, view: RobotView) -> np.ndarray | None:
-        """(5,) the viewpoint of eq. 13, map frame; None if no candidate is worth anything."""
-        grid, settings = view.scenario.grid, self.coordination
+        """(5,) the viewpoint of eq. 13, map frame; None if no candidate has a gain above 0."""
+        grid, settings = view.scenario.grid, self.config
         edge, origin = grid.voxel_size_m, np.asarray(grid.origin_m)
         position = grid.in_grid_units(view.pose)[:3]
         depth_m = max(view.depth_m, settings.least_radius_m)
@@ -190,16 +179,16 @@ class MutualInformation:
         if len(candidates) == 0:
             return None
         cone = self._own_cone(view, depth_m / edge)
+        x, y, z = position.tolist()
+        model, body_radius = self._model_of(view), view.kind.robot.body_radius_m / edge
         best = best_candidate(
             candidates,
-            self._ranked(candidates, radius),
-            (view.mean.reshape(-1), view.precision.reshape(-1), grid.shape),
-            (position, radius, view.kind.robot.body_radius_m / edge, self._builds[self._kind(view)].ball),
-            self._heard(view),
+            self._order(candidates, radius),
+            belief_of(view),
+            Body((x, y, z), radius, body_radius, model.footprint, model.crossed, model.entered),
+            Team(self._heard(view), self._marks),
             cone,
-            self._sight(view) if settings.occlusion else None,
-            self._marks,
-            self._builds[self._kind(view)].space,
+            self._occlusion(view) if settings.occlusion else None,
             self._factors[0],
         )
         if best < 0:
@@ -207,8 +196,8 @@ class MutualInformation:
         chosen = candidates[best]
         return np.array([*(origin + chosen["place"] * edge), chosen["yaw"], chosen["pitch"]])
 
-    def _kind(self, view: RobotView) -> int:
-        return view.robot % len(self._builds)
+    def _model_of(self, view: RobotView) -> _KindModel:
+        return self._models[view.robot % len(self._models)]
 
     def _near(self, view: RobotView, position: np.ndarray, radius: float) -> np.ndarray:
         """(K,) CANDIDATE with a gradient."""
@@ -220,39 +209,40 @@ class MutualInformation:
             self._candidates = np.zeros(most, CANDIDATE)
         known = self._factors["known_precision"][0]
         flat = -1 if layer is None else layer
-        count = steep_voxels(view.precision, known, position, radius, flat, self._candidates)
+        count = find_gradient_candidates(view.precision, known, position, radius, flat, self._candidates)
         return self._candidates[:count]
 
-    def _ranked(self, candidates: np.ndarray, radius: float) -> np.ndarray:
-        """(K,) the candidates, those first that could be worth most; equals in an order of chance."""
+    def _order(self, candidates: np.ndarray, radius: float) -> np.ndarray:
+        """(K,) numbers of the candidates by the upper bound of their value, highest first; ties at random."""
         most = candidates["steepness"] / candidates["steepness"].max()
-        if self.coordination.distance_cost > 0.0:
-            most = most - self.coordination.distance_cost * candidates["distance"] / radius
+        if self.config.distance_cost > 0.0:
+            most = most - self.config.distance_cost * candidates["distance"] / radius
         shuffled = self._rng.permutation(len(candidates))
         return shuffled[np.argsort(-most[shuffled], kind="stable")]
 
-    def _sight(self, view: RobotView) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        return view.mean.reshape(-1), *self._builds[self._kind(view)].space
+    def _occlusion(self, view: RobotView) -> Occlusion:
+        model = self._model_of(view)
+        return Occlusion(view.mean.reshape(-1), model.crossed, model.entered)
 
     def _own_cone(self, view: RobotView, depth: float) -> np.ndarray:
-        """The robot's cone, still without a place; ξ goes with what it could hold."""
-        angle = view.half_angle_rad or self._builds[self._kind(view)].half_angle_rad
+        """The robot's cone, without an apex yet; sets ξ, which is relative to the bits that it could hold."""
+        angle = view.half_angle_rad or self._model_of(view).half_angle_rad
         self._cone["radius"], self._cone["cosine"] = depth, math.cos(angle)
         voxels = 2.0 / 3.0 * math.pi * depth**3 * (1.0 - math.cos(angle))
-        scale_bits = self.coordination.overlap_scale * voxels * self._unknown_bits
-        heeded = self.coordination.coordinated and self.coordination.overlap
-        self._factors["scale_bits"] = max(scale_bits, 1e-9) if heeded else math.inf
+        scale_bits = self.config.overlap_scale * voxels * self._unknown_bits
+        counts = self.config.coordinated and self.config.overlap
+        self._factors["scale_bits"] = max(scale_bits, 1e-9) if counts else math.inf
         return self._cone[0]
 
     def _heard(self, view: RobotView) -> np.ndarray:
-        """(M,) MATE of whom the robot has heard; their cones are marked."""
-        settings, grid = self.coordination, view.scenario.grid
+        """(M,) MATE, the teammates that the robot has heard; marks the voxels of their cones."""
+        settings, grid = self.config, view.scenario.grid
         mates = [number for number, mate in view.teammates.items() if mate.heard_s >= 0.0]
         if not settings.coordinated or not mates:
             return np.zeros(0, MATE)
         heard = np.zeros(len(mates), MATE)
         self._marks[:] = 0
-        sight = self._sight(view) if settings.occlusion else None
+        occlusion = self._occlusion(view) if settings.occlusion else None
         own_m = view.kind.robot.body_radius_m
         for place, number in enumerate(mates):
             mate = view.teammates[number]
@@ -262,8 +252,21 @@ class MutualInformation:
             heard[place]["end"] = grid.in_grid_units(mate.viewpoint if under_way else mate.pose)[:3]
             heard[place]["touching"] = touching_m / grid.voxel_size_m if settings.teammates_block else -1.0
             if settings.overlap and mate.announced_s >= 0.0 and mate.depth_m > 0.0:
-                mark_cone(announced_cone(grid, mate), grid.shape, sight, self._marks)
+                mark_cone(announced_cone(grid, mate), grid.shape, occlusion, self._marks)
         return heard
+
+
+def _kind_model(scenario: Scenario, kind: RobotKind) -> _KindModel:
+    grid, sensor = scenario.grid, kind.sensor
+    radius = kind.robot.body_radius_m / grid.voxel_size_m
+    widest = 0.5 * sensor.angular_step_rad * math.hypot(sensor.columns - 1, sensor.rows - 1)
+    longest = longest_crossing(*grid.shape, math.inf, 1)
+    return _KindModel(
+        footprint=new_lattice(grid.shape, radius, scenario.layer_of(kind.robot)).footprint,
+        half_angle_rad=min(widest, math.pi),
+        crossed=np.zeros(longest, np.int32),
+        entered=np.zeros(longest, np.int64),
+    )
 
 
 def _alike(one: np.ndarray, other: np.ndarray, voxel_size_m: float) -> bool:

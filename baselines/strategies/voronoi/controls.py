@@ -13,9 +13,6 @@ import numpy as np
 from entropy_explore_env.belief.paths.geodesic_cells import UNREACHED, Tessellation, tessellate
 from entropy_explore_env.compilation.kernels import lean_kernel
 
-LN2 = math.log(2.0)
-"""Entropy of a voxel that nobody has measured, in nats."""
-
 
 def projected_centroids(
     cells: np.ndarray, density: np.ndarray, threshold: float, sources: int
@@ -26,7 +23,7 @@ def projected_centroids(
         there are any, else of all voxels of the cell.
 
     Args:
-        cells: (X, Y, Z) int32, whose each voxel is; UNREACHED = nobody's.
+        cells: (X, Y, Z) int32, the cell of each voxel; UNREACHED = none.
         density: (X, Y, Z) float32, φ > 0.
         threshold: τ.
         sources: How many cells S there are.
@@ -37,14 +34,14 @@ def projected_centroids(
     sums, nearest = np.zeros((sources, 4)), np.full((sources, 2), np.inf)
     targets = np.full((sources, 2), UNREACHED, np.int64)
     uncertain = np.zeros(sources, np.int64)
-    _sum_up(cells, density, threshold, sums, uncertain)
+    _sum_moments(cells, density, threshold, sums, uncertain)
     _project(cells, density, threshold, sums, nearest, targets)
     return np.where(targets[:, 0] == UNREACHED, targets[:, 1], targets[:, 0]), uncertain
 
 
 @lean_kernel
 def step_is_free(coverage: np.ndarray, size: tuple[int, int, int], here: int, there: int) -> bool:
-    """Whether one step leads from a voxel to another, past nothing covered.
+    """Whether one step leads from a voxel to another without cutting a covered corner.
 
     Args:
         coverage: (V,) float32, above ½ = covered.
@@ -67,7 +64,7 @@ def step_is_free(coverage: np.ndarray, size: tuple[int, int, int], here: int, th
 
 
 @lean_kernel
-def _sum_up(
+def _sum_moments(
     cells: np.ndarray, density: np.ndarray, threshold: float, sums: np.ndarray, uncertain: np.ndarray
 ) -> None:
     """Add up φ, xφ, yφ and zφ of each cell, and count where φ ≥ τ."""
@@ -93,19 +90,19 @@ def _project(
     nearest: np.ndarray,
     targets: np.ndarray,
 ) -> None:
-    """Fill (S, 2) voxels nearest to the centroids: with φ ≥ τ, and of the others."""
+    """Fill (S, 2) with the voxels nearest to the centroids: of those with φ ≥ τ, and of the others."""
     voxel = 0
     for x in range(cells.shape[0]):
         for y in range(cells.shape[1]):
             for z in range(cells.shape[2]):
                 cell = cells[x, y, z]
                 if cell >= 0:
-                    total, rest = sums[cell, 0], 0 if density[x, y, z] >= threshold else 1
+                    total, kind = sums[cell, 0], 0 if density[x, y, z] >= threshold else 1
                     away_x, away_y = x - sums[cell, 1] / total, y - sums[cell, 2] / total
                     away_z = z - sums[cell, 3] / total
                     away = away_x * away_x + away_y * away_y + away_z * away_z
-                    if away < nearest[cell, rest]:
-                        nearest[cell, rest], targets[cell, rest] = away, voxel
+                    if away < nearest[cell, kind]:
+                        nearest[cell, kind], targets[cell, kind] = away, voxel
                 voxel += 1
 
 
@@ -114,12 +111,12 @@ def nearest_uncertain(
 ) -> np.ndarray:
     """(S,) int64: of each cell the voxel with φ ≥ τ that costs least to reach; UNREACHED = it has none."""
     cheapest, targets = np.full(sources, np.inf), np.full(sources, UNREACHED, np.int64)
-    _seek_uncertain(cells, costs, density, threshold, cheapest, targets)
+    _find_nearest_uncertain(cells, costs, density, threshold, cheapest, targets)
     return targets
 
 
 @lean_kernel
-def _seek_uncertain(
+def _find_nearest_uncertain(
     cells: np.ndarray,
     costs: np.ndarray,
     density: np.ndarray,
@@ -159,35 +156,38 @@ def _add_functionals(
                     functionals[cell] += cost * cost * np.float64(density[x, y, z])
 
 
-class CellSearch:
-    """What the functional of one robot's cell would be if the robot stood elsewhere in it (eq. 3)."""
+class CellFunctional:
+    """The coverage functional of one robot's cell, for any place of the robot in it (eq. 3)."""
 
-    def __init__(self, space: Tessellation, rates: np.ndarray, density: np.ndarray, cell: int) -> None:
-        """Search in the cell alone: distances are those of ways that do not leave it.
+    def __init__(
+        self, space: Tessellation, traversal_cost: np.ndarray, density: np.ndarray, cell: np.ndarray
+    ) -> None:
+        """Consider the cell alone: paths do not leave it.
 
         Args:
-            space: Working space; overwritten.
-            rates: (X, Y, Z) float32, as the tessellation had them.
+            space: Memory for tessellations; overwritten.
+            traversal_cost: (X, Y, Z) float32, as the tessellation had it.
             density: (X, Y, Z) float32, φ.
             cell: (X, Y, Z) bool, the cell.
         """
         self._space, self._density = space, density
-        self._rates = np.where(cell, rates, np.float32(np.inf))
+        self._traversal_cost = np.where(cell, traversal_cost, np.float32(np.inf))
 
-    def functional(self, voxel: int, length_cost: float, by_length: bool) -> float:
-        """H of the cell for a robot in this voxel; inf where part of the cell would be out of reach."""
-        tessellate(self._space, self._rates, np.array([voxel]), length_cost, by_length)
-        if np.count_nonzero(self._space.cell == 0) < np.count_nonzero(np.isfinite(self._rates)):
+    def value(self, voxel: int, length_cost: float, by_length: bool) -> float:
+        """H of the cell for a robot in this voxel; inf if a part of the cell cannot be reached from there."""
+        tessellate(self._space, self._traversal_cost, np.array([voxel]), length_cost, by_length)
+        reached = np.count_nonzero(self._space.cell == 0)
+        if reached < np.count_nonzero(np.isfinite(self._traversal_cost)):
             return math.inf
         return float(coverage_functionals(self._space.cells, self._space.costs, self._density, 1)[0])
 
 
 def neighbours(free: np.ndarray, voxel: int) -> list[int]:
-    """Voxels to which one step leads: up to 8, or 26, none past a corner; by number.
+    """Voxels to which one step leads without cutting a corner: up to 8, or 26; in the order of numbers.
 
     Args:
         free: (X, Y, Z) bool.
-        voxel: From where.
+        voxel: Where the step begins.
     """
     place, size = np.unravel_index(voxel, free.shape), free.shape
     found = []
@@ -201,20 +201,20 @@ def neighbours(free: np.ndarray, voxel: int) -> list[int]:
 
 
 def gradient_step(
-    search: CellSearch, cell: np.ndarray, voxel: int, length_cost: float, by_length: bool
+    functional: CellFunctional, cell: np.ndarray, voxel: int, length_cost: float, by_length: bool
 ) -> int:
     """The neighbour in its own cell at which the robot's functional is least; itself if none is less (eq. 3).
 
     Args:
-        search: Of the robot's cell.
+        functional: Of the robot's cell.
         cell: (X, Y, Z) bool, the cell.
         voxel: Where the robot is.
         length_cost: As the tessellation had it.
         by_length: Likewise.
     """
-    best, least = voxel, search.functional(voxel, length_cost, by_length)
+    best, least = voxel, functional.value(voxel, length_cost, by_length)
     for near in neighbours(cell, voxel):
-        functional = search.functional(near, length_cost, by_length)
-        if functional < least:
-            best, least = near, functional
+        value = functional.value(near, length_cost, by_length)
+        if value < least:
+            best, least = near, value
     return best

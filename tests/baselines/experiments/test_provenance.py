@@ -16,7 +16,7 @@ from baselines.strategies import gradient, random_walk
 from baselines.strategies.frontier import Exploring
 from baselines.strategies.frontier.metrics import Nearest
 from baselines.strategies.gradient import GradientStrategy
-from baselines.strategies.information_rate import InformationRate, Weighing
+from baselines.strategies.information_rate import InformationRate, InformationRateConfig
 from baselines.strategies.random_walk import RandomWalk
 from entropy_explore_env.scenarios import find_scenario
 
@@ -56,8 +56,8 @@ def test_settings_of_a_strategy_are_part_of_its_digest(entered):
         a=GradientStrategy,
         b=partial(GradientStrategy, motion_plane=True),
         c=partial(GradientStrategy, motion_plane=False),
-        d=partial(InformationRate, Weighing(candidates=80)),
-        e=partial(InformationRate, Weighing(candidates=81)),
+        d=partial(InformationRate, InformationRateConfig(candidates=80)),
+        e=partial(InformationRate, InformationRateConfig(candidates=81)),
     )
     assert len({sources_digest(name) for name in "abcde"}) == 5
 

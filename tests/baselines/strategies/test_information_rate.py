@@ -1,4 +1,4 @@
-"""The strategy `information-rate`: what it weighs, where it can go, and how soon it is done."""
+"""The strategy `information-rate`: where it can go, and how soon it is done."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ import pytest
 
 from baselines.experiments.mission import run_mission, scripted
 from baselines.strategies import information_rate
-from baselines.strategies.information_rate import InformationRate, Weighing, _stops
-from baselines.strategies.information_rate.expected_bits import free_by_belief
+from baselines.strategies.information_rate import InformationRate, InformationRateConfig, _stops
+from baselines.strategies.knowledge import announced_cones
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.missions.view import view_of
 from entropy_explore_env.reports.metrics import mission_figures
@@ -35,7 +35,7 @@ def test_the_empty_room_is_mapped_many_times_faster_than_by_the_gradient():
 
 
 def test_per_scan_it_needs_fewer_scans():
-    figures = figures_of(InformationRate(Weighing(per_scan=True, candidates=120)), robots=1)
+    figures = figures_of(InformationRate(InformationRateConfig(per_scan=True, candidates=120)), robots=1)
     assert figures["finished"] and figures["scans"] <= 140
 
 
@@ -55,34 +55,6 @@ def test_teams_are_faster():
     assert four < 0.6 * one
 
 
-def way_is_free(mean, start, finish, radius):
-    scratch = (None, None, np.zeros(60, np.int32), np.zeros(60, np.int64))
-    way = np.asarray(finish, float) - start
-    length = float(np.linalg.norm(way))
-    return free_by_belief(
-        mean.ravel(),
-        SIZE,
-        np.asarray(start, float),
-        tuple(way / length),
-        length,
-        radius,
-        (np.zeros(0), np.zeros(0), scratch[2], scratch[3]),
-    )
-
-
-def test_ways_leave_room_for_the_body():
-    mean = np.zeros(SIZE, np.float32)
-    mean[3, 6, 2] = 0.9
-    south, north = (3.5, 2.5, 2.5), (3.5, 9.5, 2.5)
-    assert not way_is_free(mean, south, north, 0.2)
-    aside = [(2.2, 2.5, 2.5), (2.2, 9.5, 2.5)]  # 0.8 before the face of the solid voxel
-    assert way_is_free(mean, *aside, 0.2) and way_is_free(mean, *aside, 0.7)
-    assert not way_is_free(mean, *aside, 0.9)
-    assert way_is_free(mean, south, (3.5, 4.5, 2.5), 1.2)  # ends 1.5 before it
-    assert not way_is_free(mean, south, (3.5, 5.0, 2.5), 1.2)
-    assert not way_is_free(mean, (0.5, 2.5, 2.5), (0.5, 9.5, 2.5), 0.6)  # along the wall, into it
-
-
 def test_stops_lie_within_reach_of_each_other():
     points = np.array([[4.0, 0.5, 0.5], [4.0, 2.0, 0.5]])
     stops = _stops(np.array([0.5, 0.5, 0.5]), points, 1.0)
@@ -94,39 +66,37 @@ def test_stops_lie_within_reach_of_each_other():
 
 def test_what_a_teammate_announced_is_left_to_it():
     missions = started(free_box(robots=2), seed=3)
-    strategy = InformationRate()
-    strategy.reset(missions.scenario, np.random.default_rng(0))
-    alone = strategy._cones(view_of(missions, 0, 0))
+    alone = announced_cones(view_of(missions, 0, 0))
     assert len(alone) == 0  # nothing was heard
     heard = missions.state.heard[0, 0, 1]
     heard["announced_s"], heard["announced"] = 0.0, (1.75, 2.75, 1.25, 0.5, 0.1, 2.0, math.pi / 4)
-    (cone,) = strategy._cones(view_of(missions, 0, 0))
+    (cone,) = announced_cones(view_of(missions, 0, 0))
     assert cone["apex"] == pytest.approx((3.5, 5.5, 2.5))
     assert (cone["radius"], cone["cosine"]) == pytest.approx((4.0, math.cos(math.pi / 4)))
 
 
-def test_a_way_whose_first_stop_is_out_of_sight_is_not_taken(monkeypatch):
-    """Once it was looked for again and again."""
-    monkeypatch.setattr(information_rate, "_in_sight", lambda *_: False)
+def test_a_path_whose_first_stop_is_out_of_sight_is_not_taken(monkeypatch):
+    """Once it was searched again and again."""
+    monkeypatch.setattr(information_rate, "is_line_free", lambda *_: False)
     env = EntropyExploreEnv(scripted(with_settings(ROOM, {"robots": 1})))
     env.reset(seed=0)
     strategy = InformationRate()
     strategy.reset(env.scenario, env.strategy_generator())
     asked = []
 
-    def way(*_):
+    def stops(*_):
         asked.append(1)
         return [np.array([3.5, 3.5, 3.5, 0.0, 0.0])]
 
-    monkeypatch.setattr(strategy, "_way_to_somewhere_better", way)
-    strategy._journeys[0].best_bits, strategy._journeys[0].patience = 1e9, 0
+    monkeypatch.setattr(strategy, "_stops_to_a_better_place", stops)
+    strategy._plans[0].best_bits, strategy._plans[0].patience = 1e9, 0
     (viewpoint,) = strategy.choose([env.view("robot_0")])
     assert asked == [1] and np.isfinite(viewpoint).all()
-    assert strategy._journeys[0].stops == [] and strategy._journeys[0].patience > 0
+    assert strategy._plans[0].stops == [] and strategy._plans[0].patience > 0
 
 
 def test_it_does_not_fly_into_the_ceiling_that_it_knows():
-    """Ways to somewhere better, planned by the strategy itself for robots that drive straight."""
+    """Paths to a better place, planned by the strategy itself for robots that drive straight."""
     settings = {
         "grid": Grid((30, 24, 16), 1.0),
         "robots": 1,
@@ -137,10 +107,10 @@ def test_it_does_not_fly_into_the_ceiling_that_it_knows():
     env = EntropyExploreEnv(with_settings(find_scenario("terrain"), settings))
     env.reset(seed=0)
     view = env.view("robot_0")
-    world, closed = env.missions.worlds[0], view.no_fly_mask()
-    assert world is not None and closed is not None
-    np.testing.assert_array_equal(closed, world.no_fly_mask(0.8))
+    world, no_fly = env.missions.worlds[0], view.no_fly_mask()
+    assert world is not None and no_fly is not None
+    np.testing.assert_array_equal(no_fly, world.no_fly_mask(0.8))
     strategy = InformationRate()
     strategy.reset(env.scenario, env.strategy_generator())
-    drawn = strategy._drawn_voxels(view, view.pose[:3], closed)
-    assert len(drawn) > 0 and not closed.reshape(-1)[drawn].any()
+    drawn = strategy._drawn_voxels(view, view.pose[:3], no_fly)
+    assert len(drawn) > 0 and not no_fly.reshape(-1)[drawn].any()

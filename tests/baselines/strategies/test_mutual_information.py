@@ -9,7 +9,7 @@ import pytest
 
 from baselines.experiments.mission import run_mission, scripted
 from baselines.strategies import STRATEGIES, make_strategy
-from baselines.strategies.mutual_information import Coordination, MutualInformation
+from baselines.strategies.mutual_information import MutualInformation, MutualInformationConfig
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.missions.state import MissionEnd
@@ -77,31 +77,35 @@ def test_what_a_teammate_announced_to_see_is_left_to_it_unless_it_was_lost():
     assert (coordinated[:, 1] < 2.75).all()
     lost = chosen(frontier(), heard=None)
     assert {bool(y > 2.75) for y in lost[:, 1]} == {True, False}
-    alone = chosen(frontier(), Coordination(coordinated=False), heard=looks_up)
+    alone = chosen(frontier(), MutualInformationConfig(coordinated=False), heard=looks_up)
     assert {bool(y > 2.75) for y in alone[:, 1]} == {True, False}
     np.testing.assert_array_equal(alone, lost)
 
 
 def test_each_factor_can_be_left_out():
     looks_up = hear((0.75, 3.25, 1.25, math.pi / 2, 0.0))
-    without = Coordination(overlap=False, interference=1.0, teammates_block=False)
+    without = MutualInformationConfig(overlap=False, interference=1.0, teammates_block=False)
     assert (chosen(frontier(), without, heard=looks_up)[:, 1] > 2.75).any()
     in_the_way = hear((1.75, 3.5, 1.25, 0.0, 0.0), depth_m=0.0)
     settings = {"robot": {"body_radius_m": 0.25}}
     for teammates_block in (True, False):
-        coordination = Coordination(overlap=False, interference=1.0, teammates_block=teammates_block)
+        coordination = MutualInformationConfig(
+            overlap=False, interference=1.0, teammates_block=teammates_block
+        )
         straight_up = chosen(frontier(**settings), coordination, 60, heard=in_the_way)
         ahead = (np.abs(straight_up[:, 0] - 1.75) < 0.3) & (straight_up[:, 1] > 3.5)
         assert ahead.any() != teammates_block
     watched = hear((1.75, 5.25, 1.25, 0.0, 0.0), depth_m=0.0)
-    shy = Coordination(overlap=False, interference=1e-3, teammates_block=False)
+    shy = MutualInformationConfig(overlap=False, interference=1e-3, teammates_block=False)
     for viewpoint in chosen(frontier(), shy, 40, heard=watched):
         assert viewpoint[1] < 2.75 or abs(viewpoint[0] - 1.75) > 0.3
 
 
 def test_distance_costs():
     near, far = (
-        np.linalg.norm(chosen(frontier(1), Coordination(distance_cost=k))[:, :2] - (1.75, 2.75), axis=1)
+        np.linalg.norm(
+            chosen(frontier(1), MutualInformationConfig(distance_cost=k))[:, :2] - (1.75, 2.75), axis=1
+        )
         for k in (1.0, 0.0)
     )
     assert near.max() <= far.min() + 1e-9 < far.max()
@@ -111,14 +115,14 @@ def test_candidates_lie_within_the_mean_depth_but_for_a_floor_and_a_cap():
     missions = frontier(1)
     missions.precision[0, 0][:] = np.random.default_rng(0).uniform(1e-3, 1.0, (7, 11, 5))
     for coordination, most_m in (
-        (Coordination(), 2.0),
-        (Coordination(most_radius_m=0.7), 0.7),
-        (Coordination(least_radius_m=0.5), 2.0),
+        (MutualInformationConfig(), 2.0),
+        (MutualInformationConfig(most_radius_m=0.7), 0.7),
+        (MutualInformationConfig(least_radius_m=0.5), 2.0),
     ):
         away = np.linalg.norm(chosen(missions, coordination)[:, :2] - (1.75, 2.75), axis=1)
         assert away.max() <= most_m + 1e-6
     missions.state.robots[0, 0]["depth_m"] = 0.1
-    strategy = MutualInformation(Coordination(least_radius_m=0.8))
+    strategy = MutualInformation(MutualInformationConfig(least_radius_m=0.8))
     strategy.reset(missions.scenario, np.random.default_rng(0))
     viewpoint = strategy.choose([view_of(missions, 0, 0)])[0]
     assert 0.1 < np.linalg.norm(viewpoint[:2] - (1.75, 2.75)) <= 0.8 + 1e-6
@@ -128,7 +132,7 @@ def test_nobody_goes_through_or_into_what_is_believed_covered():
     missions = frontier(1)
     missions.mean[0, 0][:, 8] = 0.9
     assert (chosen(missions)[:, 1] < 2.75).all()
-    assert (chosen(missions, Coordination(static_reach=False), 60)[:, 1] > 2.75).any()
+    assert (chosen(missions, MutualInformationConfig(static_reach=False), 60)[:, 1] > 2.75).any()
 
 
 def test_where_nothing_is_steep_and_behind_a_teammate_it_wanders():
@@ -145,7 +149,7 @@ def test_where_nothing_is_steep_and_behind_a_teammate_it_wanders():
 
 def test_a_viewpoint_chosen_too_often_is_a_trap():
     missions = frontier(1, robot={"reach_m": 0.5})
-    strategy = MutualInformation(Coordination(repeats=2, memory=50, least_radius_m=0.4))
+    strategy = MutualInformation(MutualInformationConfig(repeats=2, memory=50, least_radius_m=0.4))
     strategy.reset(missions.scenario, np.random.default_rng(0))
     missions.precision[0, 0][:] = 1e4
     missions.precision[0, 0][3, 5, 2] = 1.0
@@ -213,5 +217,5 @@ def test_one_robot_is_not_coordinated_with_anybody():
     ],
 )
 def test_settings_out_of_range_are_refused(name, value):
-    with pytest.raises(SettingError, match=f"Coordination.{name} = {value!r}"):
-        Coordination(**{name: value})
+    with pytest.raises(SettingError, match=f"MutualInformationConfig.{name} = {value!r}"):
+        MutualInformationConfig(**{name: value})

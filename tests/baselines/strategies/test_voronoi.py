@@ -11,14 +11,9 @@ from scipy import stats
 
 from baselines.experiments.mission import run_mission, scripted
 from baselines.strategies import make_strategy
-from baselines.strategies.voronoi import Coverage, VoronoiCoverage
-from baselines.strategies.voronoi.controls import LN2
-from baselines.strategies.voronoi.occupancy_entropy import (
-    close_voxels,
-    fill_deviation_entropy,
-    fill_occupancy_entropy,
-    filtered,
-)
+from baselines.strategies.voronoi import VoronoiConfig, VoronoiCoverage
+from baselines.strategies.voronoi.uncertainty import fill_deviation_entropy, filtered, inflate_obstacles
+from entropy_explore_env.belief.entropy import LN2, fill_occupancy_entropy
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.missions.view import view_of
@@ -68,7 +63,7 @@ def test_where_a_body_does_not_fit_by_hand():
     mean[2, 3] = 1.0
     cross = np.array([(0, 0, 0), (1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0)])
     rates = np.ones((5, 7, 1), np.float32)
-    close_voxels(mean, cross, (1, 1, 0), 0, (2, 2, 0), rates)
+    inflate_obstacles(mean, cross, (1, 1, 0), 0, (2, 2, 0), rates)
     closed = np.isinf(rates[:, :, 0])
     assert closed[0].all() and closed[:, 6].all() and closed[2, 3] and closed[1, 3] and closed[2, 4]
     assert not closed[2, 2] and not closed[2, 1] and not closed[1, 2]  # its start, and what it touches there
@@ -118,8 +113,11 @@ def chosen(missions, coverage):
 
 
 def test_robots_that_know_all_spread_to_the_middles_of_their_halves():
-    assert chosen(corridor_missions((1, 3)), Coverage()) == [1, 6]  # cells 1-2 and 3-9, ties to the first
-    assert chosen(corridor_missions((2, 7)), Coverage()) == [2, 7]
+    assert chosen(corridor_missions((1, 3)), VoronoiConfig()) == [
+        1,
+        6,
+    ]  # cells 1-2 and 3-9, ties to the first
+    assert chosen(corridor_missions((2, 7)), VoronoiConfig()) == [2, 7]
 
 
 @pytest.mark.parametrize("control", ["projected-centroid", "nearest"])
@@ -129,7 +127,7 @@ def test_each_goes_to_what_is_uncertain_in_its_own_half(control):
         for y in (1, 9):
             missions.mean[0, robot][2:5, max(y - 1, 0) : y + 2, 1:4] = 0.5
             missions.precision[0, robot][2:5, max(y - 1, 0) : y + 2, 1:4] = 1e-3
-    first, second = chosen(missions, Coverage(control=control))
+    first, second = chosen(missions, VoronoiConfig(control=control))
     assert first < 3 and second > 6
 
 
@@ -147,5 +145,5 @@ def test_each_goes_to_what_is_uncertain_in_its_own_half(control):
 )
 def test_what_is_refused(settings, field):
     with pytest.raises(SettingError) as raised:
-        Coverage(**settings)
+        VoronoiConfig(**settings)
     assert raised.value.field == field

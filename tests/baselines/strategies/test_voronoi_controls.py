@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from baselines.strategies.voronoi.controls import (
-    CellSearch,
+    CellFunctional,
     coverage_functionals,
     gradient_step,
     nearest_uncertain,
@@ -144,9 +144,9 @@ def test_gradient_search_walks_to_the_middle_of_a_corridor():
     size = (9, 1, 1)
     rates, space = np.ones(size, np.float32), new_tessellation(size)
     density, cell = np.ones(size, np.float32), np.ones(size, bool)
-    search, place, path = CellSearch(space, rates, density, cell), 1, [1]
-    assert search.functional(1, 0.0, True) == 1 + sum(k * k for k in range(8))
-    while (step := gradient_step(search, cell, place, 0.0, True)) != place:
+    functional, place, path = CellFunctional(space, rates, density, cell), 1, [1]
+    assert functional.value(1, 0.0, True) == 1 + sum(k * k for k in range(8))
+    while (step := gradient_step(functional, cell, place, 0.0, True)) != place:
         place = step
         path.append(step)
     assert path == [1, 2, 3, 4]
@@ -155,5 +155,5 @@ def test_gradient_search_walks_to_the_middle_of_a_corridor():
 def test_a_place_from_which_the_cell_cannot_be_reached_whole_is_worth_nothing():
     size = (5, 1, 1)
     rates, cell = np.ones(size, np.float32), np.array([1, 1, 0, 1, 1], bool).reshape(size)
-    search = CellSearch(new_tessellation(size), rates, np.ones(size, np.float32), cell)
-    assert search.functional(0, 0.0, True) == math.inf
+    functional = CellFunctional(new_tessellation(size), rates, np.ones(size, np.float32), cell)
+    assert functional.value(0, 0.0, True) == math.inf

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from baselines.strategies.voronoi.controls import LN2
+from entropy_explore_env.belief.entropy import LN2
 from entropy_explore_env.belief.raycast import OBSTACLE, cast_ray, longest_crossing
 from entropy_explore_env.compilation.kernels import lean_kernel
 from entropy_explore_env.validation import check, check_kind

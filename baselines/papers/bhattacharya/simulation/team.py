@@ -24,7 +24,7 @@ from baselines.papers.bhattacharya.simulation.belief import (
     Sensor,
 )
 from baselines.strategies.voronoi.controls import (
-    CellSearch,
+    CellFunctional,
     coverage_functionals,
     gradient_step,
     nearest_uncertain,
@@ -154,15 +154,15 @@ class Mind:
         if not cell.any():  # another robot is in the same place, and comes first
             return place
         if self.rules.control == "gradient-search":
-            search = CellSearch(self._scratch, self.rates, self.density, cell)
-            return gradient_step(search, cell, place, *self._metric)
+            functional = CellFunctional(self._scratch, self.rates, self.density, cell)
+            return gradient_step(functional, cell, place, *self._metric)
         way = self.way(int(self.targets[robot]))
         if len(way) < 2:
             return place
         step = int(way[1])
         if self.rules.guarded:
-            search = CellSearch(self._scratch, self.rates, self.density, cell)
-            if search.functional(step, *self._metric) >= float(self.functionals()[robot]):
+            functional = CellFunctional(self._scratch, self.rates, self.density, cell)
+            if functional.value(step, *self._metric) >= float(self.functionals()[robot]):
                 return place
         return step
 

@@ -30,10 +30,10 @@ from baselines.strategies.frontier.terrain.visibility import (
 )
 from baselines.strategies.frontier.voxel.map import EDGE, NONE
 from baselines.strategies.frontier.voxel.visibility import new_tally
-from baselines.strategies.information_rate.expected_bits import sees_all_around
 from entropy_explore_env.missions.view import RobotView
 from entropy_explore_env.scenario import Scenario
 from entropy_explore_env.settings import RobotKind
+from entropy_explore_env.viewpoints.evaluation import sees_all_around
 
 
 class TerrainCandidates(Candidates[TerrainMap]):

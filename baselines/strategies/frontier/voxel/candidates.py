@@ -35,10 +35,10 @@ from baselines.strategies.frontier.voxel.visibility import (
     rays_around,
     rays_towards,
 )
-from baselines.strategies.information_rate.expected_bits import sees_all_around
 from entropy_explore_env.missions.view import RobotView
 from entropy_explore_env.scenario import Scenario
 from entropy_explore_env.settings import RobotKind
+from entropy_explore_env.viewpoints.evaluation import sees_all_around
 
 _ROWS = 15
 """Rows of imagined rays for robots that look up and down."""

@@ -1,0 +1,1 @@
+"""Drawing candidate viewpoints, and what scans from them should bring: by a robot's own belief."""

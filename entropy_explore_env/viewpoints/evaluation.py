@@ -1,0 +1,213 @@
+"""What viewpoints are worth to a robot: expected bits, seconds, and whether the line there is free."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from entropy_explore_env.belief.fields import Belief
+from entropy_explore_env.belief.paths.lattice import KNOWN_RATIO, Lattice, new_lattice
+from entropy_explore_env.belief.raycast import OPEN, STOP_AT_COVERED, cast_ray, longest_crossing
+from entropy_explore_env.compilation.kernels import lean_kernel
+from entropy_explore_env.robots.motion import driving_time, turning_time
+from entropy_explore_env.scenario import Scenario
+from entropy_explore_env.settings import Grid, RangeSensor, RobotKind, centred_angles
+from entropy_explore_env.viewpoints.expected_scan import (
+    ScanModel,
+    ScanScratch,
+    expected_scan_bits,
+    new_scan_scratch,
+)
+
+
+class DriveModel(NamedTuple):
+    """How long a straight drive and the scan at its end take, and whether the line has to be free."""
+
+    max_speed_m_s: float
+    acceleration_m_s2: float
+    turn_rate_rad_s: float
+    scan_time_s: float
+    body_radius: float
+    """Voxel edges."""
+    line_must_be_free: bool = True
+    """Whether a viewpoint behind something believed covered is worth nothing."""
+
+
+class RobotModel(NamedTuple):
+    """A kind of robot, as its viewpoints are evaluated."""
+
+    scan: ScanModel
+    drive: DriveModel
+    lattice: Lattice
+    """Its steps between voxel centres."""
+    longest_ray: int
+    """Largest number of voxels that one of its rays crosses."""
+
+
+class Outlook(NamedTuple):
+    """What is expected of K viewpoints."""
+
+    bits: np.ndarray
+    """(K,) float64 of a scan there; 0 where the line is not free."""
+    seconds: np.ndarray
+    """(K,) float64 until the scan is taken."""
+
+
+def sees_all_around(sensor: RangeSensor) -> bool:
+    """Whether a sensor's rays leave no gap around it, so that its yaw does not matter."""
+    return sensor.field_of_view_rad[0] > 2.0 * math.pi - 1.5 * sensor.angular_step_rad
+
+
+def robot_model(
+    scenario: Scenario, kind: RobotKind, thinning: int = 2, stop_probability: float = 0.02
+) -> RobotModel:
+    """The model of a kind of robot.
+
+    Args:
+        scenario: The mission's settings.
+        kind: The kind.
+        thinning: One in this many columns, and rows, of the sensor's rays is imagined.
+        stop_probability: Probability that an unknown voxel stops a ray.
+    """
+    grid, sensor, robot = scenario.grid, kind.sensor, kind.robot
+    step, edge = sensor.angular_step_rad, grid.voxel_size_m
+    columns, rows = (max(n // thinning, 1) for n in (sensor.columns, sensor.rows))
+    scan = ScanModel(
+        yaws=centred_angles(columns, step) * sensor.columns / columns,
+        pitches=centred_angles(rows, step) * sensor.rows / rows,
+        sensor_rays=float(sensor.rays / (columns * rows)),
+        voxel_size_m=float(edge),
+        max_range_m=float(sensor.max_range_m),
+        min_range_m=float(sensor.min_range_m),
+        sigma_min=float(sensor.sigma_min),
+        sigma_slope_per_m=float(sensor.sigma_slope_per_m),
+        voxels_behind=int(sensor.voxels_behind),
+        known_precision=float(KNOWN_RATIO / scenario.sigma_prior**2),
+        stop_probability=float(stop_probability),
+    )
+    drive = DriveModel(
+        max_speed_m_s=float(robot.max_speed_m_s),
+        acceleration_m_s2=float(robot.acceleration_m_s2),
+        turn_rate_rad_s=float(robot.turn_rate_rad_s),
+        scan_time_s=float(sensor.scan_time_s),
+        body_radius=float(robot.body_radius_m / edge),
+    )
+    return RobotModel(
+        scan,
+        drive,
+        lattice=new_lattice(grid.shape, robot.body_radius_m / edge, scenario.layer_of(robot)),
+        longest_ray=longest_crossing(*grid.shape, sensor.max_range_m / edge, sensor.voxels_behind + 1),
+    )
+
+
+def new_scratch(grid: Grid, models: Sequence[RobotModel]) -> ScanScratch:
+    """Scratch space to evaluate viewpoints of robots of these kinds."""
+    return new_scan_scratch(grid.voxels, max(model.longest_ray for model in models) + sum(grid.shape))
+
+
+@lean_kernel
+def line_is_free(belief, start, direction, length, body_radius, scratch):
+    """Whether a ball-shaped body meets nothing believed covered on a straight line, and no boundary.
+
+    Tested along the line of its centre and, for bodies larger than half a voxel, of four points at its sides.
+
+    Args:
+        belief: A Belief.
+        start: (x, y, z) in grid units.
+        direction: (x, y, z), unit vector.
+        length: Of the line, voxel edges.
+        body_radius: Voxel edges.
+        scratch: A ScanScratch.
+    """
+    size = belief.size
+    x, y, z = direction
+    level = math.sqrt(x * x + y * y)
+    side = (-y / level, x / level, 0.0) if level > 1e-9 else (1.0, 0.0, 0.0)
+    over = (y * side[2] - z * side[1], z * side[0] - x * side[2], x * side[1] - y * side[0])
+    wide = body_radius > 0.5 + 1e-9
+    for point in range(5 if wide else 1):
+        by_side = body_radius * (1.0 if point == 1 else -1.0 if point == 2 else 0.0)
+        by_over = body_radius * (1.0 if point == 3 else -1.0 if point == 4 else 0.0)
+        if point > 2 and size[2] == 1:
+            continue
+        begin = (
+            start[0] + by_side * side[0] + by_over * over[0],
+            start[1] + by_side * side[1] + by_over * over[1],
+            start[2] + by_side * side[2] + by_over * over[2],
+        )
+        for axis in range(3):
+            if not 0.0 <= begin[axis] <= size[axis]:
+                return False
+        reach = length + (body_radius if wide and point == 0 else 0.0)
+        _, _, end = cast_ray(
+            belief.mean,
+            STOP_AT_COVERED,
+            size,
+            begin,
+            direction,
+            reach,
+            False,
+            0,
+            scratch.crossed,
+            scratch.entered,
+        )
+        if end != OPEN:
+            return False
+    return True
+
+
+def is_line_free(
+    belief: Belief, start: np.ndarray, extent: np.ndarray, body_radius: float, scratch: ScanScratch
+) -> bool:
+    """Whether the straight line from a place (3,) along an extent (3,), grid units, is free by the belief."""
+    length = float(np.linalg.norm(extent))
+    if length < 1e-9:
+        return True
+    x, y, z = (extent / length).tolist()
+    return bool(line_is_free(belief, start, (x, y, z), length, body_radius, scratch))
+
+
+@lean_kernel
+def evaluate_viewpoints(belief, scan, drive, here, viewpoints, cones, scratch, outlook):
+    """Fill in the expected bits of a scan at each viewpoint, and the seconds until it is taken.
+
+    Args:
+        belief: A Belief.
+        scan: A ScanModel.
+        drive: A DriveModel.
+        here: (5,) the robot, in grid units.
+        viewpoints: (K, 5) in grid units.
+        cones: (M,) CONE, which are left to teammates.
+        scratch: A ScanScratch.
+        outlook: An Outlook, filled in.
+    """
+    for k in range(len(viewpoints)):
+        viewpoint = viewpoints[k]
+        x, y, z = viewpoint[0] - here[0], viewpoint[1] - here[1], viewpoint[2] - here[2]
+        length = math.sqrt(x * x + y * y + z * z)
+        drive_s = driving_time(length * scan.voxel_size_m, drive.max_speed_m_s, drive.acceleration_m_s2)
+        turn_s = turning_time(here[3], here[4], viewpoint[3], viewpoint[4], drive.turn_rate_rad_s)
+        outlook.seconds[k] = max(drive_s, turn_s) + drive.scan_time_s
+        outlook.bits[k] = 0.0
+        if length > 1e-9 and drive.line_must_be_free:
+            direction = (x / length, y / length, z / length)
+            if not line_is_free(belief, here, direction, length, drive.body_radius, scratch):
+                continue
+        outlook.bits[k] = expected_scan_bits(belief, scan, viewpoint, cones, scratch)
+
+
+def expected_outlook(
+    belief: Belief,
+    model: RobotModel,
+    here: np.ndarray,
+    viewpoints: np.ndarray,
+    cones: np.ndarray,
+    scratch: ScanScratch,
+) -> Outlook:
+    """What is expected of (K, 5) viewpoints; see `evaluate_viewpoints`."""
+    outlook = Outlook(np.zeros(len(viewpoints)), np.zeros(len(viewpoints)))
+    evaluate_viewpoints(belief, model.scan, model.drive, here, viewpoints, cones, scratch, outlook)
+    return outlook

@@ -1,0 +1,139 @@
+"""The bits that a scan from a viewpoint is expected to take from a robot's own map."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from entropy_explore_env.belief.measurement_model import measurement_precision
+from entropy_explore_env.belief.raycast import OPEN, STOP_AT_COVERED, cast_ray
+from entropy_explore_env.belief.visibility import in_cones
+from entropy_explore_env.belief.voxel_index import grid_index
+from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel
+
+_FOLD_ABOVE = 1e250
+"""A product of ratios is folded into bits, by its logarithm, before it could leave a float64."""
+
+
+class ScanModel(NamedTuple):
+    """How a scan is imagined: with fewer rays than the sensor's."""
+
+    yaws: np.ndarray
+    """(columns,) radians from the gaze."""
+    pitches: np.ndarray
+    """(rows,) radians from the gaze."""
+    sensor_rays: float
+    """Rays of the sensor that each imagined ray stands for."""
+    voxel_size_m: float
+    max_range_m: float
+    min_range_m: float
+    sigma_min: float
+    sigma_slope_per_m: float
+    voxels_behind: int
+    known_precision: float
+    """Voxels with less precision are unknown."""
+    stop_probability: float
+    """Probability that an unknown voxel stops a ray."""
+
+
+class ScanScratch(NamedTuple):
+    """Scratch space of `expected_scan_bits` for V voxels and rays across L of them."""
+
+    added: np.ndarray
+    """(V,) float32, zeros, which it is again afterwards."""
+    touched: np.ndarray
+    """(V,) int32."""
+    crossed: np.ndarray
+    """(L,) int32, see `cast_ray`."""
+    entered: np.ndarray
+    """(L,) int64."""
+
+
+def new_scan_scratch(voxels: int, longest_ray: int) -> ScanScratch:
+    """Scratch space for a grid, and rays that cross at most so many of its voxels."""
+    return ScanScratch(
+        np.zeros(voxels, np.float32),
+        np.zeros(voxels, np.int32),
+        np.zeros(longest_ray, np.int32),
+        np.zeros(longest_ray, np.int64),
+    )
+
+
+@lean_kernel
+def expected_scan_bits(belief, scan, viewpoint, cones, scratch):
+    """Bits that a scan from a viewpoint is expected to take from the robot's map.
+
+    Rays go through the belief like those of a scan, until something believed covered; where that is too near
+    for the sensor, they bring nothing. A voxel that was never measured stops a ray with the probability
+    `stop_probability`, so what lies behind counts for less. What all rays add to a voxel counts once,
+
+        I = Σ ½ log2(1 + Σ_rays w/σ(d)² / p),
+
+    with p the voxel's precision, d the ray's length and w the probability that it gets there (Rocha04, eqs.
+    5, 17 and 27). Voxels whose centres lie in one of the cones are left to teammates, and count nothing.
+
+    Args:
+        belief: A Belief.
+        scan: A ScanModel.
+        viewpoint: (5,) x, y, z in grid units, yaw, pitch.
+        cones: (M,) CONE.
+        scratch: A ScanScratch.
+
+    Returns:
+        Bits ≥ 0.
+    """
+    start, count = (viewpoint[0], viewpoint[1], viewpoint[2]), 0
+    reach = scan.max_range_m / scan.voxel_size_m
+    for column in range(len(scan.yaws)):
+        yaw = viewpoint[3] + scan.yaws[column]
+        along, across = math.cos(yaw), math.sin(yaw)
+        for row in range(len(scan.pitches)):
+            pitch = viewpoint[4] + scan.pitches[row]
+            level = math.cos(pitch)
+            direction = (along * level, across * level, -math.sin(pitch))
+            length, n, end = cast_ray(
+                belief.mean,
+                STOP_AT_COVERED,
+                belief.size,
+                start,
+                direction,
+                reach,
+                False,
+                scan.voxels_behind,
+                scratch.crossed,
+                scratch.entered,
+            )
+            range_m = length * scan.voxel_size_m
+            if end != OPEN and range_m < scan.min_range_m:
+                continue
+            gain = scan.sensor_rays * measurement_precision(range_m, scan.sigma_min, scan.sigma_slope_per_m)
+            for i in range(n):
+                voxel = np.uint32(scratch.crossed[i])
+                if scratch.added[voxel] == 0.0:
+                    scratch.touched[count] = scratch.crossed[i]
+                    count += 1
+                scratch.added[voxel] += np.float32(gain)
+                if belief.precision[voxel] < scan.known_precision:
+                    gain *= 1.0 - scan.stop_probability
+    return _gathered_bits(belief, cones, scratch, count)
+
+
+@inlined_kernel
+def _gathered_bits(belief, cones, scratch, count):
+    """Σ ½ log2(1 + added/p) over the touched voxels outside the cones; what was added is cleared."""
+    bits, growth = 0.0, 1.0
+    for i in range(count):
+        voxel = np.uint32(scratch.touched[i])
+        share = np.float64(scratch.added[voxel]) / np.float64(belief.precision[voxel])
+        scratch.added[voxel] = 0.0
+        if len(cones) > 0:
+            x, y, z = grid_index(belief.size, scratch.touched[i])
+            if in_cones(cones, x + 0.5, y + 0.5, z + 0.5):
+                continue
+        growth *= 1.0 + share
+        if growth > _FOLD_ABOVE:
+            bits += math.log2(growth)
+            growth = 1.0
+    return 0.5 * (bits + math.log2(growth))

@@ -1,0 +1,110 @@
+"""The bits that a scan is expected to bring, against a scan, and by hand."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from entropy_explore_env.belief.fields import Belief
+from entropy_explore_env.belief.raycast import longest_crossing
+from entropy_explore_env.belief.visibility import CONE, cone_of
+from entropy_explore_env.robots.range_sensor import fuse_scan, new_scan, sensor_model, take_scan
+from entropy_explore_env.settings import Grid, RangeSensor
+from entropy_explore_env.viewpoints.expected_scan import ScanModel, expected_scan_bits, new_scan_scratch
+from tests.reference.scenes import (
+    drawn,
+    random_cover,
+    seeds,
+)
+
+SIZE = (7, 11, 5)
+NO_CONES = np.zeros(0, CONE)
+SENSOR = RangeSensor((math.pi / 3, math.pi / 4), math.pi / 24, sigma_min=0.1, sigma_slope_per_m=0.05)
+
+
+def model(stop_probability=0.0, known_precision=0.0, rays=1.0, sensor=SENSOR):
+    offsets = sensor_model(sensor)
+    return ScanModel(
+        offsets.yaw_offsets,
+        offsets.pitch_offsets,
+        rays,
+        0.5,
+        sensor.max_range_m,
+        sensor.min_range_m,
+        sensor.sigma_min,
+        sensor.sigma_slope_per_m,
+        sensor.voxels_behind,
+        known_precision,
+        stop_probability,
+    )
+
+
+def expected(mean, precision, viewpoint, scan, cones=NO_CONES):
+    scratch = new_scan_scratch(mean.size, longest_crossing(*SIZE, math.inf, scan.voxels_behind))
+    belief = Belief(mean.ravel(), precision.ravel(), SIZE)
+    bits = expected_scan_bits(belief, scan, np.asarray(viewpoint, float), cones, scratch)
+    assert not scratch.added.any()
+    return bits
+
+
+@drawn(40)
+@given(
+    seeds,
+    st.floats(-math.pi, math.pi),
+    st.floats(-1.2, 1.2),
+    st.integers(0, 2),
+    st.sampled_from([2.0, math.inf]),
+    st.sampled_from([0.0, 1.1]),
+)
+def test_a_scan_brings_what_was_expected_where_the_belief_is_right_about_obstacles(
+    seed, yaw, pitch, behind, reach, min_range_m
+):
+    rng = np.random.default_rng(seed)
+    view = (SENSOR.field_of_view_rad, SENSOR.angular_step_rad, reach, 0.1, 0.05)
+    sensor = RangeSensor(*view, voxels_behind=behind, min_range_m=min_range_m)
+    truth = random_cover(SIZE, 0.1, seed)
+    precision = rng.uniform(0.01, 50.0, SIZE).astype(np.float32)
+    start = rng.uniform(0.5, np.array(SIZE) - 0.5)
+    viewpoint = (*start, yaw, pitch)
+    hoped = expected(truth, precision, viewpoint, model(sensor=sensor))
+    scan = new_scan(Grid(SIZE, 0.5), [sensor], sensor.rays, 1)
+    chance = np.zeros(1, np.uint64)
+    take_scan(scan, sensor_model(sensor), truth.ravel(), SIZE, 0.5, tuple(start), yaw, pitch, 0, chance)
+    scan.order[:] = np.arange(sensor.rays)
+    brought = fuse_scan(scan, sensor.rays, truth.ravel().copy(), precision.ravel().copy())
+    assert hoped == pytest.approx(brought, rel=2e-4)
+
+
+def test_one_ray_by_hand():
+    """Along x from the middle of voxel 1: voxels 1 … 6, 2.75 m to the wall, σ = 0.1 + 0.05 · 2.75."""
+    one = RangeSensor((0.0, 0.0), 0.1, sigma_min=0.1, sigma_slope_per_m=0.05)
+    mean, precision = np.zeros(SIZE, np.float32), np.full(SIZE, 4.0, np.float32)
+    viewpoint = (1.5, 5.5, 2.5, 0.0, 0.0)
+    gain = 1.0 / 0.2375**2
+    bits = expected(mean, precision, viewpoint, model(sensor=one))
+    assert bits == pytest.approx(6 * 0.5 * math.log2(1 + gain / 4.0), rel=1e-5)
+    # Unknown voxels let half of it through: the first gets all, the second a half, the third a quarter.
+    half = expected(mean, precision, viewpoint, model(0.5, known_precision=5.0, sensor=one))
+    assert half == pytest.approx(sum(0.5 * math.log2(1 + gain * 0.5**i / 4.0) for i in range(6)), rel=1e-5)
+    twice = expected(mean, precision, viewpoint, model(rays=2.0, sensor=one))
+    assert twice == pytest.approx(6 * 0.5 * math.log2(1 + 2 * gain / 4.0), rel=1e-5)
+    mean[4, 5, 2] = 0.9  # stops it after 1.25 m, one voxel behind counts
+    near = 1.0 / (0.1 + 0.05 * 1.25) ** 2
+    stopped = expected(mean, precision, viewpoint, model(sensor=one))
+    assert stopped == pytest.approx(4 * 0.5 * math.log2(1 + near / 4.0), rel=1e-5)
+
+
+def test_voxels_left_to_teammates_count_nothing():
+    mean, precision = np.zeros(SIZE, np.float32), np.full(SIZE, 0.01, np.float32)
+    viewpoint = (1.5, 5.5, 2.5, 0.0, 0.0)
+    all_of_it = expected(mean, precision, viewpoint, model())
+    everywhere = np.array([cone_of(np.array([3.5, 5.5, 2.5, 0.0, 0.0]), 100.0, math.pi)])
+    assert expected(mean, precision, viewpoint, model(), everywhere) == 0.0
+    beside = np.array([cone_of(np.array([1.5, 5.5, 2.5, math.pi, 0.0]), 100.0, 0.1)])
+    assert expected(mean, precision, viewpoint, model(), beside) == pytest.approx(all_of_it, rel=0.05)
+    short = np.array([cone_of(np.array([1.5, 5.5, 2.5, 0.0, 0.0]), 2.0, math.pi / 2)])
+    assert 0.0 < expected(mean, precision, viewpoint, model(), short) < all_of_it
