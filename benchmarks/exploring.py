@@ -11,11 +11,11 @@ from baselines.experiments.mission import scripted
 from baselines.papers.sawhney.mission import Run, followed
 from baselines.papers.sawhney.sweep import world_cell
 from baselines.strategies.frontier import FrontierStrategy, Metric
-from baselines.strategies.frontier.allocation import Allotter
-from baselines.strategies.frontier.candidates import Looking
+from baselines.strategies.frontier.allocation import Allocator
+from baselines.strategies.frontier.candidates import FrontierConfig
 from baselines.strategies.frontier.voxel.map import COVERED, UNEXPLORED, UNMAPPED
 from baselines.strategies.frontier.voxel.ray_tree import grow_tree
-from baselines.strategies.frontier.voxel.visibility import count_from, new_tally, rays_around
+from baselines.strategies.frontier.voxel.visibility import count_from, new_counter, rays_around
 from benchmarks.planning import FLOOR, cluttered
 from benchmarks.rows import Effort, Goal, Row, alone, compared, timed
 from entropy_explore_env.belief.paths.search import new_search
@@ -89,8 +89,8 @@ def rooms_plan(side: int = _SIDE) -> tuple[Scenario, np.ndarray]:
 class Deciding:
     """Decisions among some 200 candidates, 500 × 1000 cells of a plan known, the others not.
 
-    Between decisions the robot scans: a decision takes the new belief in, seeks ways, and counts; lazily as
-    far as the choice needs it, else ways to all candidates and V of each.
+    Between decisions the robot scans: a decision takes the new belief in, searches paths, and counts; lazily
+    as far as the choice needs it, else ways to all candidates and V of each.
     """
 
     def __init__(self, lazy: bool, side: int = _SIDE) -> None:
@@ -99,7 +99,9 @@ class Deciding:
         self._missions, self._scans = _half_known(scenario, solid), 0
         self._view, kind = view_of(self._missions, 0, 0), scenario.kind_of(0)
         search = new_search(scenario.grid.voxels)
-        self.allotter = Allotter(scenario, kind, Looking(spacing_m=3.0), Metric(), search, None, lazy)
+        self.allocator = Allocator(
+            scenario, kind, FrontierConfig(spacing_m=3.0), Metric(), search, None, lazy
+        )
 
     def decide_ms(self) -> float:
         """Milliseconds of the next decision."""
@@ -110,8 +112,8 @@ class Deciding:
         precision[455 + scan : 475 + scan, 455:475] += 1.0
         mean[500 + scan, 400:420], precision[500 + scan, 400:420] = 0.1, 100.0 + self._scans
         started = time.thread_time()
-        self.allotter.candidates.update(self._view, 0.5)
-        self.allotter.allot(self._view, [], [])
+        self.allocator.candidates.update(self._view, 0.5)
+        self.allocator.allocate(self._view, [], [])
         return 1e3 * (time.thread_time() - started)
 
 
@@ -134,7 +136,7 @@ def decision_row(effort: Effort, lazy: bool) -> Row:
     """Milliseconds a decision on 1000 × 1000 cells."""
     deciding = Deciding(lazy)
     taken = [deciding.decide_ms() for _ in range(effort.rounds + 2)]
-    count = len(deciding.allotter.candidates.found()[0])
+    count = len(deciding.allocator.candidates.listed()[0])
     job = f"a decision of per-time-visibility, 1000 × 1000, {count} candidates, "
     job += "as far as the choice needs" if lazy else "ways to all and V of each"
     return alone(job, taken[2:], "ms", Goal("<", 50.0, "ms"))
@@ -157,13 +159,13 @@ def visibility_row(effort: Effort) -> Row:
     state[solid] = COVERED
     free = np.flatnonzero(~solid)
     voxels = rng.choice(free, _PLACES).astype(np.int32)
-    directions, tally = rays_around(30.0, np.zeros(1)), new_tally(state.size, shape)
+    directions, counter = rays_around(30.0, np.zeros(1)), new_counter(state.size, shape)
     tree = grow_tree(directions, 30.0, shape)
     met = np.empty(tree.cells, np.int32)
     seen, weighed = np.empty(_PLACES), np.empty(_PLACES)
 
     def work() -> None:
-        count_from(tally, state.reshape(-1), shape, voxels, tree, met, seen, weighed)
+        count_from(counter, state.reshape(-1), shape, voxels, tree, met, seen, weighed)
 
     work()
     rays = 1e-6 * _PLACES * len(directions)

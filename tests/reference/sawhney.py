@@ -1,4 +1,4 @@
-"""Sawhney 2009 in plain Python, slow, from its equations: frontiers, expected visibility, allotment."""
+"""Sawhney 2009 in plain Python, slow, from its equations: frontiers, expected visibility, allocation."""
 
 from __future__ import annotations
 
@@ -143,7 +143,7 @@ def seen_columns(
     return found
 
 
-def allotted(
+def allocated(
     robots: Sequence[int],
     places: Sequence[int],
     value: Callable[[int, int, dict[tuple[int, ...], int]], float],
@@ -153,7 +153,7 @@ def allotted(
     """The paper's inner loop: the best pair first, what is seen from there promised, then the next.
 
     Args:
-        robots: Who is allotted something.
+        robots: Who is allocated something.
         places: Candidates.
         value: Of a robot, a candidate and the promises so far.
         sees: Points that are seen from a candidate.

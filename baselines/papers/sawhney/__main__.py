@@ -1,6 +1,6 @@
 """Sawhney 2009 reproduced: `python -m baselines.papers.sawhney [--quick] [--out DIR] [--json]`.
 
-Explores plans and terrains by visibility per time, V/t, against V - βt, synchronous allotment, naive
+Explores plans and terrains by visibility per time, V/t, against V - βt, synchronous allocation, naive
 visibility and other rules of frontiers; times to 95 %, to 99 % and to no frontier side by side. Missions are
 kept under `--runs`: a stopped experiment goes on where it was.
 """

@@ -95,7 +95,7 @@ def figure_times(records: Records, part: str) -> tuple[Figure, Table]:
     left.set_ylabel("simulated seconds to 95 %")
     left.set_title("V - βt and V/t: fig. " + ("6" if part == "plans" else "8"), fontsize=9)
     right.set_title(
-        "allotment and V: " + ("sect. 4.1" if part == "plans" else "sect. 4.1 and fig. 10"), fontsize=9
+        "allocation and V: " + ("sect. 4.1" if part == "plans" else "sect. 4.1 and fig. 10"), fontsize=9
     )
     figure.suptitle(f"{PARTS[part]}: mean times over all worlds", fontsize=10)
     return figure, table
@@ -137,7 +137,7 @@ def figure_teams(records: Records, part: str) -> tuple[Figure, Table]:
     panels[0].set_ylabel("time over that of asynchronous V/t (dashed)")
     figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=4, frameon=False)
     figure.suptitle(
-        f"{PARTS[part]}, by team size; dotted: the paper's synchronous allotment ({paper:.2f})", fontsize=10
+        f"{PARTS[part]}, by team size; dotted: the paper's synchronous allocation ({paper:.2f})", fontsize=10
     )
     return figure, table
 

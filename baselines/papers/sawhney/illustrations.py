@@ -159,10 +159,10 @@ def _options_on_the_way() -> tuple[np.ndarray, np.ndarray]:
     def look(share: float, views: Sequence[RobotView], _: Sequence[np.ndarray]) -> None:
         latest[:] = views
         if share >= 0.5 and not found:
-            found.append(explorer.allotter_of(0).options(views[0]))
+            found.append(explorer.allocator_of(0).options(views[0]))
 
     followed(_environment(cell), explorer, 0, look)
-    return found[0] if found else explorer.allotter_of(0).options(latest[0])
+    return found[0] if found else explorer.allocator_of(0).options(latest[0])
 
 
 def snapshots(cell: Cell, seed: int, marks: Sequence[float] = _MARKS) -> list[Snapshot]:
@@ -171,7 +171,7 @@ def snapshots(cell: Cell, seed: int, marks: Sequence[float] = _MARKS) -> list[Sn
     ways, taken, grid = DrivenPaths(cell.scenario.robots), list[Snapshot](), cell.scenario.grid
 
     def snap(time_s: float, share: float, targets: Sequence[np.ndarray]) -> None:
-        candidates, finished = explorer.allotter_of(0).candidates, all(explorer.idle)
+        candidates, finished = explorer.allocator_of(0).candidates, all(explorer.idle)
         expected = np.zeros(grid.shape[:2], bool)
         for target in () if finished else targets:
             expected |= candidates.expected(grid.in_grid_units(target)[:3])
@@ -269,7 +269,7 @@ def figure_section(cell: Cell) -> Figure:
     """Figs. 2-4: a section along x through a UAV: ground and surface, what is known, seen and assumed."""
     now, world = snapshots(cell, 0, (0.2, 1.0))[0], _world_of(cell)
     grid, edge = world.grid, world.grid.voxel_size_m
-    reach_m, patch_m = cell.scenario.sensor.max_range_m, _run(cell).exploring.looking.patch_m
+    reach_m, patch_m = cell.scenario.sensor.max_range_m, _run(cell).exploring.frontiers.patch_m
     x, y, z = (int(i) for i in grid.voxel_of(now.ways_m[0][-1]))
     across = grid.centre_of(np.stack([np.arange(grid.shape[0]), *np.zeros((2, grid.shape[0]))], -1))[:, 0]
     ground, known = edge * ground_of(world)[:, y], edge * now.chart.ground[:, y]

@@ -17,7 +17,7 @@ from baselines.experiments.mission import Record
 from baselines.experiments.statistics import mean_interval
 from baselines.experiments.tables import markdown_table
 from baselines.papers.sawhney.mission import Run
-from baselines.strategies.frontier import Exploring
+from baselines.strategies.frontier import ExplorationConfig
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.scenario import Scenario
 
@@ -35,7 +35,7 @@ class MapRun:
         world: The file.
     """
 
-    exploring: Exploring
+    exploring: ExplorationConfig
     world: str
 
     def __call__(self, env: EntropyExploreEnv, strategy: str, seed: int) -> Record:

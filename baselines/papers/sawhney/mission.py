@@ -16,7 +16,7 @@ from functools import lru_cache
 import numpy as np
 
 from baselines.experiments.mission import Record
-from baselines.strategies.frontier import Exploring, FrontierStrategy
+from baselines.strategies.frontier import ExplorationConfig, FrontierStrategy
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.missions.view import RobotView
 from entropy_explore_env.reports.metrics import joint_figures, mission_figures
@@ -38,7 +38,7 @@ class Run:
         ceiling_m: Of the exposure surface above it.
     """
 
-    exploring: Exploring
+    exploring: ExplorationConfig
     world: str | None = None
     ceiling_m: float = 4.0
 

@@ -44,7 +44,7 @@ from baselines.papers.sawhney.sweep import (
     TIME_LIMIT_S,
     cell_id,
 )
-from baselines.strategies.frontier.candidates import Looking
+from baselines.strategies.frontier.candidates import FrontierConfig
 from entropy_explore_env.writing import write_atomically
 
 PAPER_RUNS = {"plans": 160, "terrains": 120}
@@ -177,7 +177,7 @@ def _pictures_text(drawn: Sequence[str], means: Sequence[OptionMeans]) -> str:
     return "\n" + "\n\n".join(parts) + "\n"
 
 
-_LOOKING = Looking()
+_FRONTIERS = FrontierConfig()
 _RULES = f"""Plans are the scenarios of these names: cells of 0.1 m, robots without bodies at 0.5 m/s and
 0.5 m/s² with a laser of 360 rays all around up to 3 m; a scan takes 2 s. Terrains are 96 × 72 m of fractal
 ground with up to 18 m of relief, Hurst exponents 0.95, 0.8 and 0.5, under an exposure surface at least 4 m
@@ -188,13 +188,13 @@ Everybody hears every measurement and announcement at once: the centralised form
 these numbers.
 
 A cell of a plan, or the surface of a column of ground, is explored once its σ has fallen below {SIGMA:g}.
-Candidates lie a sixth of the sensor's range apart, over terrain in height as well; γ = {_LOOKING.gamma:g},
-z_av is the mean ground within {_LOOKING.patch_m:g} m, and candidates higher above it than
-{_LOOKING.too_high:g} of the range are dropped. "95 %" is a share of the cells that can be seen from where
+Candidates lie a sixth of the sensor's range apart, over terrain in height as well; γ = {_FRONTIERS.gamma:g},
+z_av is the mean ground within {_FRONTIERS.patch_m:g} m, and candidates higher above it than
+{_FRONTIERS.too_high:g} of the range are dropped. "95 %" is a share of the cells that can be seen from where
 robots can be, measured at all; over terrain a share of all columns. t takes ways along the grid; robots
 drive them pulled straight, up to 8 % shorter in plans and 11 % in the air. What somebody under way has
 promised to see is worked out anew from its target at each decision, by the map as it is then; in the paper
-the marks stay those of the allotment.
+the marks stay those of the allocation.
 
 V is the area of unexplored cells, or of columns of ground (times the height factor, metres), t the seconds
 of the drive from rest to rest on the shortest way and of the scan. The paper counts V in terrain points

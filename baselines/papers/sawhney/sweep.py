@@ -1,4 +1,4 @@
-"""The experiment of Sawhney 2009 as cells: world, team size, metric and allotment of each point.
+"""The experiment of Sawhney 2009 as cells: world, team size, metric and allocation of each point.
 
 β of V - βt goes with the units of V and t. The paper's β ∈ [1, 70] count its own terrain points; here a point
 is taken to be 0.05 m² of plan, and 4 m³ over terrain (m² of ground times the height factor): so the paper's
@@ -19,8 +19,8 @@ from baselines.papers.sawhney.map_files import STARTS as MAP_STARTS
 from baselines.papers.sawhney.map_files import TEAM as MAP_TEAM
 from baselines.papers.sawhney.map_files import MapRun, map_world
 from baselines.papers.sawhney.mission import Run
-from baselines.strategies.frontier import Exploring, Metric
-from baselines.strategies.frontier.candidates import Looking
+from baselines.strategies.frontier import ExplorationConfig, Metric
+from baselines.strategies.frontier.candidates import FrontierConfig
 from baselines.strategies.frontier.metrics import Coordinated, Nearest
 from entropy_explore_env.scenario import Scenario, with_settings
 from entropy_explore_env.scenarios import find_scenario
@@ -65,12 +65,12 @@ _ALL: dict[str, Any] = {
 
 @dataclass(frozen=True)
 class Change:
-    """One thing that is changed: settings of the scenario, fields of Exploring, fields of its Looking."""
+    """One change: settings of the scenario, of the ExplorationConfig, or of its FrontierConfig."""
 
     text: str
     settings: dict[str, Any] = field(default_factory=dict)
     exploring: dict[str, Any] = field(default_factory=dict)
-    looking: dict[str, Any] = field(default_factory=dict)
+    frontiers: dict[str, Any] = field(default_factory=dict)
 
 
 _SCAN_SHORT = Change("a scan takes 0.5 s", {"sensor": {"scan_time_s": 0.5}})
@@ -88,7 +88,7 @@ CHANGES: dict[str, dict[str, Change]] = {
         "scan-short": _SCAN_SHORT,
         "scan-long": _SCAN_LONG,
         "range": Change("the sensor sees half as far", {"sensor": {"max_range_m": 10.0}}),
-        "level": Change("unexplored ground is taken to be level", looking={"unexplored_ground": "level"}),
+        "level": Change("unexplored ground is taken to be level", frontiers={"unexplored_ground": "level"}),
         "corners": Change("UAVs stop and scan at every corner", {"robot": {"navigator": "straight"}}),
         "unpromised": _UNPROMISED,
     },
@@ -108,20 +108,20 @@ def part_of(world: str) -> str:
 
 
 def methods(part: str, quick: bool) -> dict[str, dict[str, Any]]:
-    """Name of a method → fields of Exploring."""
+    """Name of a method → fields of ExplorationConfig."""
     betas = (*(QUICK_BETAS if quick else BETAS), *FARTHER_BETAS[part])
-    looking = {"looking": Looking(sigma=SIGMA, visibility="naive")}
+    frontiers = {"frontiers": FrontierConfig(sigma=SIGMA, visibility="naive")}
     found: dict[str, dict[str, Any]] = {
         "ptv": {},
-        "sync": {"allotment": "synchronous"},
+        "sync": {"allocation": "synchronous"},
         **{f"beta-{beta}": {"metric": Metric(beta * POINT[part])} for beta in betas},
-        "naive": looking,
+        "naive": frontiers,
         "finish": {"metric": Metric(bonus=BONUS[part])},
         "nearest": {"metric": Nearest(), "promises": False},
         "coordinated": {"metric": Coordinated()},
     }
     if part == "terrains":
-        found["no-height"] = {"looking": Looking(sigma=SIGMA, gamma=None)}
+        found["no-height"] = {"frontiers": FrontierConfig(sigma=SIGMA, gamma=None)}
     return found
 
 
@@ -170,8 +170,8 @@ def experiment(
             for world in (QUICK_CHANGED_IN if quick else CHANGED_IN)[part]:
                 for method in CHANGED_METHODS[part]:
                     exploring = {**methods(part, False)[method], **change.exploring}
-                    looking = exploring.get("looking", Looking(sigma=SIGMA))
-                    exploring["looking"] = replace(looking, **change.looking)
+                    frontiers = exploring.get("frontiers", FrontierConfig(sigma=SIGMA))
+                    exploring["frontiers"] = replace(frontiers, **change.frontiers)
                     cell = _cell(world, CHANGED_TEAM, method, exploring, seeds, None, change.settings, name)
                     cells.append(cell)
     return cells
@@ -199,9 +199,9 @@ def _cell(
     return Cell(name, _scenario(world, robots, settings or {}), STRATEGY, seeds, run)
 
 
-def _exploring(fields: dict[str, Any]) -> Exploring:
+def _exploring(fields: dict[str, Any]) -> ExplorationConfig:
     """How robots share frontiers: the experiment's settings, and some of a method."""
-    return Exploring(**{"looking": Looking(sigma=SIGMA), "finest_sigma": SIGMA, **fields})
+    return ExplorationConfig(**{"frontiers": FrontierConfig(sigma=SIGMA), "finest_sigma": SIGMA, **fields})
 
 
 def _scenario(world: str, robots: int, settings: dict[str, Any]) -> Scenario:

@@ -1,13 +1,13 @@
-"""Who goes to which frontier candidate: synchronous and asynchronous allotment (Sawhney 2009, sect. 3.2).
+"""Which robot goes to which candidate: synchronous and asynchronous allocation (Sawhney 2009, sect. 3.2).
 
-The pair of a robot and a candidate with the greatest value is allotted first; what is seen from there is
-promised, and the next pair is sought with what is left. Asynchronously only stopped robots take part, and
-promises of those under way stand until they have scanned; synchronously all wait for one another and take
-part together. Each robot allots from its own belief and from what reached it (poses, announcements): it
-works out the others' turns as they would, and takes its own. With perfect messages that is the paper's
-central procedure; of teammates of another kind it takes them to see and to fit in like itself. A robot counts
-as stopped if it was heard since it announced its latest viewpoint, that is, its scan arrived; or if nothing
-was heard of it for longer than any drive takes.
+The pair of a robot and a candidate with the greatest value is allocated first. The points that are seen from
+there count as promised, and the next pair is chosen by what remains. Asynchronously only stopped robots take
+part, and the promises of robots under way hold until they have scanned; synchronously all robots wait for
+each other and take part together. Each robot allocates by its own belief and the messages that reached it
+(poses, announcements): it simulates the choices of the others, and makes its own. With perfect messages that
+is the paper's central procedure. Teammates of another kind are assumed to have the robot's own sensor and
+body. A robot counts as stopped if it was heard since it announced its latest viewpoint, that is, its scan
+arrived; or if nothing was heard of it for longer than any drive takes.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from typing import Protocol
 
 import numpy as np
 
-from baselines.strategies.frontier.candidates import Candidates, Looking
+from baselines.strategies.frontier.candidates import Candidates, FrontierConfig
 from baselines.strategies.frontier.terrain.candidates import TerrainCandidates
 from baselines.strategies.frontier.voxel.candidates import VoxelCandidates
 from entropy_explore_env.belief.paths.lattice import Lattice, costs_of, new_lattice
@@ -33,13 +33,13 @@ from entropy_explore_env.scenario import Scenario
 from entropy_explore_env.settings import RobotKind
 
 _LOST_AFTER = 2.0
-"""Times a drive along all sides of the workspace: as long nobody is under way without being heard."""
-_WIDER = 1.4
-"""Ways are searched as far as the sensor sees, and then so many times as far until that is enough."""
+"""A silent robot counts as under way for this many times a drive along all sides of the workspace."""
+_EXTENSION = 1.4
+"""Paths are searched up to the sensor's range, then this many times as far until that is enough."""
 
 
 class Value(Protocol):
-    """What going to candidates is worth; never more for less V, or for a longer way."""
+    """Values of candidates; never greater for less V, or for a longer path."""
 
     def __call__(
         self, seen: np.ndarray, seconds: np.ndarray, edges: np.ndarray, taken: np.ndarray
@@ -49,20 +49,20 @@ class Value(Protocol):
         Args:
             seen: (K,) V·(height factor) in points' size.
             seconds: (K,) travel and scan.
-            edges: (K,) length of the way in voxel edges.
-            taken: (K,) how much of a frontier is taken by robots that go near it, ≥ 0 (Burgard 2005).
+            edges: (K,) length of the path in voxel edges.
+            taken: (K,) share of a frontier's utility that robots take which go near it, ≥ 0 (Burgard 2005).
         """
         ...
 
 
 @dataclass(frozen=True)
 class Choice:
-    """A candidate that was allotted to a robot."""
+    """A candidate that was allocated to a robot."""
 
     slot: int
     """Of the candidate in its map."""
     voxel: int
-    """In which it lies."""
+    """The voxel in which it lies."""
     value: float
     """By the metric."""
     seconds: float
@@ -70,25 +70,25 @@ class Choice:
 
 
 @dataclass(frozen=True)
-class _Ways:
-    """Ways of a robot to all candidates."""
+class _PathCosts:
+    """Lengths of a robot's paths to all candidates."""
 
     start: np.ndarray
-    """(3,) where they begin, grid units."""
+    """(3,) where they start, grid units."""
     reach: float
-    """How far they were searched, in voxel edges."""
+    """Up to which length they were searched, in voxel edges."""
     edges: np.ndarray
-    """(B,) float64, lengths by the candidates' slots; inf = none within reach."""
+    """(B,) float64, lengths by the candidates' slots; inf = no path up to that length."""
     search: int
-    """Number of their search, which can be gone on with as long as it is the latest."""
+    """Number of their search, which can be resumed as long as it is the latest."""
 
 
-class Allotter:
-    """Candidates of one robot's belief, and their allotment.
+class Allocator:
+    """Candidates of one robot's belief, and their allocation.
 
     Attributes:
-        candidates: See frontier_candidates.py.
-        search: Working space for ways, shared with others.
+        candidates: See candidates.py.
+        search: Memory of path searches, shared with other robots.
         counted: How many candidates were counted in all.
     """
 
@@ -96,7 +96,7 @@ class Allotter:
         self,
         scenario: Scenario,
         kind: RobotKind,
-        looking: Looking,
+        frontiers: FrontierConfig,
         value: Value,
         search: Search,
         ceiling: np.ndarray | None,
@@ -107,9 +107,9 @@ class Allotter:
         Args:
             scenario: The mission's settings.
             kind: Of the robot.
-            looking: Where candidates lie, and how V is counted.
+            frontiers: Where candidates lie, and how V is counted.
             value: The metric.
-            search: Working space for ways.
+            search: Memory of path searches.
             ceiling: (X, Y) the exposure surface in layers; None = candidates are voxels.
             lazy: Whether candidates are counted only as far as a choice needs.
         """
@@ -118,41 +118,41 @@ class Allotter:
         layer = scenario.layer_of(kind.robot)
         self.lattice: Lattice = new_lattice(scenario.grid.shape, 0.0, layer)
         self.candidates: Candidates = (
-            VoxelCandidates(scenario, kind, looking)
+            VoxelCandidates(scenario, kind, frontiers)
             if ceiling is None
-            else TerrainCandidates(scenario, kind, looking, ceiling)
+            else TerrainCandidates(scenario, kind, frontiers, ceiling)
         )
-        self.costs = costs_of(self.candidates.rates, 1.0)
+        self.costs = costs_of(self.candidates.traversal_cost, 1.0)
         self.counted = 0
 
-    def allot(
+    def allocate(
         self, view: RobotView, stopped: Sequence[int], targets: Sequence[np.ndarray], everybody: bool = False
     ) -> dict[int, Choice]:
-        """The candidates that fall to a robot and to those before it.
+        """The candidates that are allocated to a robot and to those before it.
 
         Args:
-            view: Of the robot; its belief was taken in.
-            stopped: Teammates that are allotted something at the same time.
-            targets: (3,) places in grid units that others are under way to.
-            everybody: Whether those after it are wanted, too.
+            view: Of the robot; the candidates are up to date with its belief.
+            stopped: Teammates that are allocated something at the same time.
+            targets: (3,) places in grid units to which others are under way.
+            everybody: Whether the allocation continues after this robot's turn.
 
         Returns:
-            Robot → candidate. It is not among them if nothing that is unexplored can be seen from any
-            candidate that it reaches.
+            Robot → candidate. The robot is missing if from no candidate that it reaches anything unexplored
+            can be seen.
         """
         candidates, taken = self.candidates, list(targets)
         for target in targets:
             candidates.promise(target)
-        waiting, found = [view.robot, *sorted(stopped)], dict[int, Choice]()
-        ways: dict[int, _Ways] = {}
-        while waiting:
-            choices = {robot: self._best(view, robot, ways, taken) for robot in waiting}
-            best = max(sorted(waiting), key=lambda robot: _worth(choices[robot]))
+        unassigned, found = [view.robot, *sorted(stopped)], dict[int, Choice]()
+        path_costs: dict[int, _PathCosts] = {}
+        while unassigned:
+            choices = {robot: self._best(view, robot, path_costs, taken) for robot in unassigned}
+            best = max(sorted(unassigned), key=lambda robot: _value_of(choices[robot]))
             choice = choices[best]
             if choice is None:
                 break
             found[best] = choice
-            waiting.remove(best)
+            unassigned.remove(best)
             if best == view.robot and not everybody:
                 break
             place = self.place_of(choice.voxel)
@@ -164,14 +164,14 @@ class Allotter:
     def options(self, view: RobotView) -> tuple[np.ndarray, np.ndarray]:
         """What the robot can choose from now: (K,) seconds and (K,) V·(height factor) of each candidate.
 
-        Nothing is promised; the belief was taken in.
+        The candidates must be up to date with the belief; no promises count.
         """
-        ways = self._ways(view.pose, math.inf)
-        slots, voxels = self.candidates.found()
-        reached = np.isfinite(ways.edges[slots])
+        path_costs = self._path_costs(view.pose, math.inf)
+        slots, voxels = self.candidates.listed()
+        reached = np.isfinite(path_costs.edges[slots])
         slots, voxels = slots[reached], voxels[reached]
         seen = self.candidates.count(slots, voxels) * self.candidates.point
-        return self.seconds(view.robot, ways.edges[slots]), seen
+        return self.seconds(view.robot, path_costs.edges[slots]), seen
 
     def place_of(self, voxel: int) -> np.ndarray:
         """(3,) centre of a voxel, grid units."""
@@ -185,14 +185,14 @@ class Allotter:
             place[2] = self.lattice.layer
         return int(np.ravel_multi_index(tuple(place), grid.shape))
 
-    def seek(self, pose: np.ndarray, goal: int) -> None:
-        """Search the way from a pose to a voxel, through the mapped region."""
-        with self._start_opened(pose) as source:
+    def search_path(self, pose: np.ndarray, goal: int) -> None:
+        """Search the path from a pose to a voxel, through the mapped region."""
+        with self._passable_start(pose) as source:
             search_paths(self.search, self.lattice, self.costs, source, goal, math.inf)
 
     @contextmanager
-    def _start_opened(self, pose: np.ndarray) -> Iterator[np.ndarray]:
-        """(1,) int32, the voxel of a pose; meanwhile it can be left, though it may be closed."""
+    def _passable_start(self, pose: np.ndarray) -> Iterator[np.ndarray]:
+        """(1,) int32, the voxel of a pose, which is made passable meanwhile."""
         start = self.start_of(pose)
         opened = self.candidates.open_start(start)
         try:
@@ -200,59 +200,63 @@ class Allotter:
         finally:
             self.candidates.close(opened)
 
-    def _ways(self, pose: np.ndarray, reach: float, before: _Ways | None = None) -> _Ways:
-        """From where a robot is, or was heard; those found before, less far, are gone on with if possible."""
+    def _path_costs(self, pose: np.ndarray, reach: float, before: _PathCosts | None = None) -> _PathCosts:
+        """Shortest-path costs from a robot's last known pose; extends `before` where it can."""
         arrays = self.search, self.lattice, self.costs
-        with self._start_opened(pose) as source:
+        with self._passable_start(pose) as source:
             if before is None or before.search != self.search.searches[0]:
                 start_search(*arrays, source)
             resume_search(*arrays, reach)
         voxels = self.candidates.voxels_of(slice(None))
         edges = np.full(len(voxels), np.inf)
         ask_costs(self.search, voxels, reach, edges)
-        return _Ways(self.place_of(int(source[0])), reach, edges, int(self.search.searches[0]))
+        return _PathCosts(self.place_of(int(source[0])), reach, edges, int(self.search.searches[0]))
 
     def _best(
-        self, view: RobotView, robot: int, ways: dict[int, _Ways], taken: Sequence[np.ndarray]
+        self, view: RobotView, robot: int, path_costs: dict[int, _PathCosts], taken: Sequence[np.ndarray]
     ) -> Choice | None:
-        """The best candidate of a robot; ways are searched, and kept, no farther than is needed."""
+        """The best candidate of a robot; paths are searched, and stored, no farther than is needed."""
         pose = view.pose if robot == view.robot else view.teammates[robot].pose
         whole = float(sum(self._scenario.grid.shape))
-        if robot not in ways:
+        if robot not in path_costs:
             near = self.candidates.reach if self._lazy else math.inf
-            ways[robot] = self._ways(pose, near if near < whole else math.inf)
-        weighed = np.full(len(ways[robot].edges), np.nan)
-        choice, sure = self._best_of(robot, ways[robot], taken, weighed)
+            path_costs[robot] = self._path_costs(pose, near if near < whole else math.inf)
+        weighed = np.full(len(path_costs[robot].edges), np.nan)
+        choice, sure = self._best_of(robot, path_costs[robot], taken, weighed)
         while not sure:
-            farther = _WIDER * ways[robot].reach
-            ways[robot] = self._ways(pose, farther if farther < whole else math.inf, ways[robot])
-            choice, sure = self._best_of(robot, ways[robot], taken, weighed)
+            farther = _EXTENSION * path_costs[robot].reach
+            path_costs[robot] = self._path_costs(
+                pose, farther if farther < whole else math.inf, path_costs[robot]
+            )
+            choice, sure = self._best_of(robot, path_costs[robot], taken, weighed)
         if choice is None and robot == view.robot:
-            whole_map = self._ways(pose, math.inf, ways[robot])
+            whole_map = self._path_costs(pose, math.inf, path_costs[robot])
             everywhere = np.empty(self._scenario.grid.voxels)
             costs_to_all(self.search, everywhere)
-            self.candidates.other_of(everywhere)
-            ways.clear()  # candidates have moved
-            ways[robot] = self._ways(pose, math.inf, whole_map)
-            choice, _ = self._best_of(robot, ways[robot], taken, np.full_like(weighed, np.nan))
+            self.candidates.replace_unreached(everywhere)
+            path_costs.clear()  # candidates have moved
+            path_costs[robot] = self._path_costs(pose, math.inf, whole_map)
+            choice, _ = self._best_of(robot, path_costs[robot], taken, np.full_like(weighed, np.nan))
         return choice
 
     def _best_of(
-        self, robot: int, ways: _Ways, taken: Sequence[np.ndarray], weighed: np.ndarray
+        self, robot: int, path_costs: _PathCosts, taken: Sequence[np.ndarray], weighed: np.ndarray
     ) -> tuple[Choice | None, bool]:
         """The best of the candidates that were reached, and whether none beyond can be better.
 
-        What is counted is kept in `weighed`, (B,) by slot; NaN = not counted yet.
+        Counts are stored in `weighed`, (B,) by slot; NaN = not counted yet.
         """
-        slots, voxels = self.candidates.found(all_of_them=not self._lazy)
-        edges, point = ways.edges[slots], self.candidates.point
+        slots, voxels = self.candidates.listed(all_of_them=not self._lazy)
+        edges, point = path_costs.edges[slots], self.candidates.point
         reached = np.isfinite(edges)
         beyond = slots[~reached]
         slots, voxels, edges = slots[reached], voxels[reached], edges[reached]
         seconds = self.seconds(robot, edges)
         takes = self._taken(voxels, taken)
-        most = self.candidates.most(slots) if self._lazy else np.full(len(slots), np.inf)
-        bound = self._value(np.minimum(most, self.candidates.limit()) * point, seconds, edges, takes)
+        most = self.candidates.upper_bounds(slots) if self._lazy else np.full(len(slots), np.inf)
+        bound = self._value(
+            np.minimum(most, self.candidates.greatest_visibility()) * point, seconds, edges, takes
+        )
         order = np.argsort(-bound, kind="stable")
         value = np.full(len(slots), -np.inf)
         size = self.candidates.batch
@@ -267,9 +271,9 @@ class Allotter:
         choice = None
         if best >= 0 and value[best] > -np.inf:
             choice = Choice(int(slots[best]), int(voxels[best]), float(value[best]), float(seconds[best]))
-        if len(beyond) == 0 or math.isinf(ways.reach):
+        if len(beyond) == 0 or math.isinf(path_costs.reach):
             return choice, True
-        return choice, choice is not None and self._none_is_better(robot, beyond, ways, choice, weighed)
+        return choice, choice is not None and self._none_is_better(robot, beyond, path_costs, choice, weighed)
 
     def _seen(self, slots: np.ndarray, weighed: np.ndarray) -> np.ndarray:
         """(K,) V·(height factor) of candidates in points' size; `weighed` as in `_best_of`."""
@@ -279,30 +283,30 @@ class Allotter:
         return weighed[slots] * self.candidates.point
 
     def _none_is_better(
-        self, robot: int, slots: np.ndarray, ways: _Ways, choice: Choice, weighed: np.ndarray
+        self, robot: int, slots: np.ndarray, path_costs: _PathCosts, choice: Choice, weighed: np.ndarray
     ) -> bool:
-        """Whether no candidate that was not reached can be worth as much as one that was found.
+        """Whether no candidate beyond the search's reach can have the value of one that was found.
 
-        It lies beyond the search's reach, and not nearer than in a straight line. The most promising ones are
-        counted, since that costs less than to search farther; `weighed` as in `_best_of`.
+        Its path is longer than the reach, and than the straight line. The most promising ones are counted,
+        since that takes less time than a longer search; `weighed` as in `_best_of`.
         """
-        apart = np.linalg.norm(self._places(self.candidates.voxels_of(slots)) - ways.start, axis=1)
-        edges = np.maximum(ways.reach, apart - 2.0)  # ways lead from centre to centre
-        seconds, nobody = self.seconds(robot, edges), np.zeros(len(slots))
-        most = np.minimum(self.candidates.most(slots), self.candidates.limit())
-        bound = self._value(most * self.candidates.point, seconds, edges, nobody)
+        apart = np.linalg.norm(self._places(self.candidates.voxels_of(slots)) - path_costs.start, axis=1)
+        edges = np.maximum(path_costs.reach, apart - 2.0)  # paths lead from centre to centre
+        seconds, none_taken = self.seconds(robot, edges), np.zeros(len(slots))
+        most = np.minimum(self.candidates.upper_bounds(slots), self.candidates.greatest_visibility())
+        bound = self._value(most * self.candidates.point, seconds, edges, none_taken)
         better = np.flatnonzero(bound >= choice.value)
         order, size = better[np.argsort(-bound[better], kind="stable")], self.candidates.batch
         for first in range(0, len(order), size):
             batch = order[first : first + size]
             seen = self._seen(slots[batch], weighed)
-            worth = self._value(seen, seconds[batch], edges[batch], nobody[batch])
+            worth = self._value(seen, seconds[batch], edges[batch], none_taken[batch])
             if (worth[seen > 0.0] >= choice.value).any():
                 return False
         return True
 
     def seconds(self, robot: int, edges: np.ndarray) -> np.ndarray:
-        """(K,) seconds of the drive along ways of so many voxel edges, and of the scans at its stops."""
+        """(K,) seconds of the drives along paths of these lengths, and of the scans at their stops."""
         kind = self._scenario.kind_of(robot)
         length_m = edges * self._edge
         stops = np.maximum(np.ceil(length_m / kind.robot.reach_m), 1.0)
@@ -326,7 +330,7 @@ class Allotter:
 
 @lean_kernel
 def ask_costs(search: Search, voxels: np.ndarray, reach: float, out: np.ndarray) -> None:
-    """Fill (K,) with the costs of (K,) voxels in the latest search, inf over the reach; who is none stays."""
+    """Fill (K,) with the costs of (K,) voxels in the latest search, inf above the reach; skips NONE."""
     for place in range(len(voxels)):
         if voxels[place] >= 0:
             cost = cost_to(search, voxels[place])
@@ -337,22 +341,23 @@ def ask_costs(search: Search, voxels: np.ndarray, reach: float, out: np.ndarray)
 def fill_driving_times(
     lengths_m: np.ndarray, max_speed_m_s: float, acceleration_m_s2: float, out: np.ndarray
 ) -> None:
-    """Fill (K,) with the seconds of drives from rest to rest; of ways that do not end inf."""
+    """Fill (K,) with the seconds of drives from rest to rest; inf for infinite lengths."""
     for place in range(len(lengths_m)):
         out[place] = math.inf
         if lengths_m[place] < math.inf:
             out[place] = driving_time(lengths_m[place], max_speed_m_s, acceleration_m_s2)
 
 
-def _worth(choice: Choice | None) -> float:
+def _value_of(choice: Choice | None) -> float:
     return -math.inf if choice is None else choice.value
 
 
 def under_way(view: RobotView, mate: TeammateView, robot: int) -> bool:
     """Whether a teammate, by what was heard of it, is on its way to the viewpoint that it announced.
 
-    It is until a scan from there has been heard, or for so long that it cannot be any more: it is out of the
-    channel's range, or its messages were lost. Scans under way, where sensors take them, do not count.
+    It is until a scan from there is heard, or until so much time has passed that it must have arrived: then
+    it is out of the channel's range, or its messages were lost. Scans that are taken during a drive do not
+    count.
     """
     if mate.announced_s < 0.0:
         return False
@@ -367,6 +372,6 @@ def under_way(view: RobotView, mate: TeammateView, robot: int) -> bool:
 
 
 def stays(view: RobotView, mate: TeammateView) -> bool:
-    """Whether the viewpoint that a teammate announced is where it was already: it waits."""
+    """Whether a teammate waits: the viewpoint that it announced is where it was before."""
     apart_m = float(np.linalg.norm(mate.pose[:3] - mate.viewpoint[:3]))
     return apart_m < 0.5 * view.scenario.grid.voxel_size_m

@@ -1,6 +1,6 @@
 """Candidates of a robot's own belief, and what is expected to be seen from them: one form for all kinds.
 
-Two kinds: voxel_candidates.py, in plans and in any 3-D space, and terrain_candidates.py, over a height field.
+Two kinds: voxel/candidates.py, in plans and in any 3-D space, and terrain/candidates.py, over a height field.
 """
 
 from __future__ import annotations
@@ -12,12 +12,12 @@ from typing import Generic, Literal, NamedTuple, Protocol, TypeVar
 import numpy as np
 
 from baselines.strategies.frontier.voxel.map import (
+    EXCLUDED,
     NONE,
-    SPENT,
-    put_block,
+    queue_block,
 )
 from baselines.strategies.frontier.voxel.visibility import (
-    Tally,
+    VisibilityCounter,
     clear_promises,
 )
 from entropy_explore_env.missions.view import RobotView
@@ -28,26 +28,26 @@ from entropy_explore_env.validation import check, check_choice, check_positive
 Visibility = Literal["ray-cast", "naive"]
 UnexploredGround = Literal["falling", "level"]
 BATCH_CELLS = 7500
-"""Cells that are walked in about the time that a call takes."""
+"""Cells that are visited in about the time of a Python call."""
 
 
 @dataclass(frozen=True)
-class Looking:
+class FrontierConfig:
     """What counts as explored, where candidates lie, and how V is counted.
 
     Attributes:
         sigma: σ at which a voxel is explored, and mapped.
-        spacing_m: Candidates lie about so far apart; never nearer than a voxel. None = a sixth of the range.
-        rise_m: The same above each other, over terrain; None = a sixth of the range.
+        spacing_m: Distance between candidates, at least a voxel; None = a sixth of the range.
+        rise_m: Vertical distance between candidates, over terrain; None = a sixth of the range.
         visibility: `ray-cast`, or the `naive` count of all unexplored points in a ball.
         gamma: γ of the height factor: relative height against absolute height. None = no height factor.
         patch_m: Half the width of the patch whose mean ground is z_av.
-        unexplored_ground: Over terrain, what is assumed of ground that is not explored: `falling` from z_av
+        unexplored_ground: Over terrain, the assumed shape of unexplored ground: `falling` from z_av
             at the candidate to the workspace's floor where the range ends (sect. 3.4), or `level` at z_av.
         too_high: Candidates higher above z_av than this share of the range are dropped.
 
     Raises:
-        SettingError: A field is none of these.
+        SettingError: A field has another value.
     """
 
     sigma: float = 0.5
@@ -72,7 +72,7 @@ class Looking:
         check_positive(self, "patch_m", "too_high")
 
     def levels(self, sigma: float, prior_precision: float) -> tuple[np.float32, np.float32]:
-        """What `take_in` takes, where σ is the level that counts as explored now."""
+        """The precisions from which on a voxel counts as explored now, at σ, and as mapped."""
         explored, mapped = (
             np.float32(max(level**-2, prior_precision * (1.0 + 1e-6))) for level in (sigma, self.sigma)
         )
@@ -93,11 +93,11 @@ class Chart(NamedTuple):
 
 
 class BlockMap(Protocol):
-    """What candidates of all kinds need of their map; B slots, V voxels."""
+    """What candidates of both kinds need of their map; B slots, V voxels."""
 
     @property
-    def rates(self) -> np.ndarray:
-        """(V,) float32, what ways cost."""
+    def traversal_cost(self) -> np.ndarray:
+        """(V,) float32 traversal costs."""
         ...
 
     @property
@@ -107,7 +107,7 @@ class BlockMap(Protocol):
 
     @property
     def seen(self) -> np.ndarray:
-        """(B,) float32, no fewer points than can be seen from it."""
+        """(B,) float32, upper bounds of the points that can be seen from it."""
         ...
 
 
@@ -115,40 +115,40 @@ Map = TypeVar("Map", bound=BlockMap)
 
 
 class Candidates(ABC, Generic[Map]):
-    """Candidates of one robot's belief, a few slots for each block of its map, and V of each: points seen.
+    """Candidates of one robot's belief, in a few slots for each block of its map, and their V in points.
 
     Attributes:
         reach: Of the sensor, in voxel edges; no more than the workspace is wide.
         point: Size of a point: m² in plans and over terrain, else m³.
-        batch: How many candidates are worth counting at once; changes no result.
-        rates: (V,) float32, what ways cost in the mapped region; read-only.
+        batch: How many candidates are counted in one call; it changes no result.
+        traversal_cost: (V,) float32, 1 in the mapped region, else inf; read-only.
     """
 
     _map: Map
     _size: tuple[int, int, int]
-    _tally: Tally
-    _spent: np.ndarray
-    """(V,) uint8, SPENT where a scan was taken."""
+    _counter: VisibilityCounter
+    _excluded: np.ndarray
+    """(V,) uint8, EXCLUDED where a scan was taken."""
     point: float
     batch: int
 
-    def __init__(self, scenario: Scenario, kind: RobotKind, looking: Looking) -> None:
+    def __init__(self, scenario: Scenario, kind: RobotKind, frontiers: FrontierConfig) -> None:
         """Nothing is explored yet."""
         grid = scenario.grid
-        self._looking, self._size = looking, grid.shape
+        self._config, self._size = frontiers, grid.shape
         self._prior = scenario.sigma_prior**-2
         self.reach = min(kind.sensor.max_range_m / grid.voxel_size_m, float(sum(grid.shape)))
 
     @property
-    def rates(self) -> np.ndarray:
+    def traversal_cost(self) -> np.ndarray:
         """See above."""
-        view = self._map.rates.view()
+        view = self._map.traversal_cost.view()
         view.setflags(write=False)
         return view
 
     @abstractmethod
     def update(self, view: RobotView, sigma: float) -> None:
-        """Take the belief in; σ is the level that counts as explored now."""
+        """Bring the candidates up to date with the belief; σ is the level that counts as explored now."""
 
     @abstractmethod
     def mapped_share(self) -> float:
@@ -156,89 +156,89 @@ class Candidates(ABC, Generic[Map]):
 
     @abstractmethod
     def chart(self) -> Chart:
-        """What is known, in space all heights laid over each other."""
+        """What is known, seen from above; in 3-D the union over all heights."""
 
     @abstractmethod
-    def most(self, slots: np.ndarray) -> np.ndarray:
-        """(K,) no fewer points than V·(height factor) of each; inf = nothing is known of it yet."""
+    def upper_bounds(self, slots: np.ndarray) -> np.ndarray:
+        """(K,) upper bounds of V·(height factor) in points; inf = unknown."""
 
     @abstractmethod
-    def limit(self) -> float:
-        """No V·(height factor) is more than this, from anywhere."""
+    def greatest_visibility(self) -> float:
+        """An upper bound of V·(height factor) of any place."""
 
     @abstractmethod
     def count(self, slots: np.ndarray, voxels: np.ndarray) -> np.ndarray:
-        """(K,) V·(height factor): points expected to be seen, weighed by promises; 0 = nothing at all."""
+        """(K,) V·(height factor): points expected to be seen, weighted by promises."""
 
     @abstractmethod
     def promise(self, place: np.ndarray) -> None:
-        """Somebody will scan at (3,), grid units: what is seen from there is promised once more."""
+        """Note that a robot will scan at (3,), grid units: it promises to see the points visible there."""
 
     @abstractmethod
-    def other_of(self, cost: np.ndarray) -> None:
-        """Blocks whose candidate was not reached may have one that was; (V,) float64 costs, inf = not."""
+    def replace_unreached(self, cost: np.ndarray) -> None:
+        """Replace candidates that no path reaches by others of their blocks; (V,) float64 path costs."""
 
     @abstractmethod
     def gaze(self, place: np.ndarray, view: RobotView) -> tuple[float, float]:
-        """(yaw, pitch) in which most is seen from (3,), grid units; as it is for who sees all around."""
+        """(yaw, pitch) in which most is seen from (3,), grid units; unchanged if it does not matter."""
 
     @abstractmethod
     def _block_of(self, x: int, y: int, z: int) -> int:
         """Number of the block of a voxel."""
 
     @abstractmethod
-    def _look_at(self, count: int) -> None:
-        """Choose the candidates of the blocks that were put first in line."""
+    def _update_blocks(self, count: int) -> None:
+        """Update the candidates of the first `count` queued blocks."""
 
-    def found(self, all_of_them: bool = False) -> tuple[np.ndarray, np.ndarray]:
-        """(K,) slots of the candidates, and (K,) int32 their voxels; those that show nothing if asked for."""
+    def listed(self, all_of_them: bool = False) -> tuple[np.ndarray, np.ndarray]:
+        """(K,) slots of the candidates, and (K,) int32 their voxels; not those from which nothing is seen."""
         slots = np.flatnonzero((self._map.voxel != NONE) & (all_of_them | (self._map.seen > 0.0)))
         return slots, self._map.voxel[slots]
 
     def voxels_of(self, slots: np.ndarray | slice) -> np.ndarray:
-        """(K,) int32, voxels of some candidates; NONE = there is none."""
+        """(K,) int32, voxels of the candidates in some slots; NONE = there is none."""
         return self._map.voxel[slots]
 
     def expected(self, place: np.ndarray) -> np.ndarray:
-        """(X, Y) bool, what is expected to be seen from (3,), grid units, above or below each other."""
+        """(X, Y) bool, columns with points that are expected to be seen from (3,), grid units."""
         self.promise(place)
-        found = np.zeros(self._tally.stamp.size, bool)
-        found[self._tally.marked[: self._tally.numbers[1]]] = True
+        found = np.zeros(self._counter.stamp.size, bool)
+        found[self._counter.promised_points[: self._counter.promised_count[0]]] = True
         self.release()
         return np.asarray(found.reshape(*self._size[:2], -1).any(2))
 
     def release(self) -> None:
         """Forget all promises."""
-        clear_promises(self._tally)
+        clear_promises(self._counter)
 
-    def spend(self, voxel: int) -> None:
+    def exclude(self, voxel: int) -> None:
         """A scan was taken in a voxel: it is no candidate any more."""
-        self._spent[voxel] |= SPENT
-        self._look_at(put_block(self._map, self._block_of(*self._axes_of(voxel)), 0))
+        self._excluded[voxel] |= EXCLUDED
+        self._update_blocks(queue_block(self._map, self._block_of(*self._axes_of(voxel)), 0))
 
-    def unspend(self) -> None:
-        """Any place may be a candidate again: more is asked for from now on."""
-        spent, count = np.flatnonzero(self._spent & SPENT), 0
-        self._spent[spent] &= np.uint8(~SPENT & 0xFF)
-        for voxel in spent:
-            count = put_block(self._map, self._block_of(*self._axes_of(int(voxel))), count)
-        self._look_at(count)
+    def readmit(self) -> None:
+        """Let all excluded places be candidates again, for a finer level."""
+        excluded, count = np.flatnonzero(self._excluded & EXCLUDED), 0
+        self._excluded[excluded] &= np.uint8(~EXCLUDED & 0xFF)
+        for voxel in excluded:
+            count = queue_block(self._map, self._block_of(*self._axes_of(int(voxel))), count)
+        self._update_blocks(count)
 
     def open_start(self, voxel: int) -> list[int]:
-        """Let a robot leave the place where it stands: voxels by number that were closed."""
+        """Make the place where a robot stands passable; returns the numbers of the voxels that were not."""
         del voxel
         return []
 
     def close(self, voxels: list[int]) -> None:
-        """Close what `open_start` opened."""
-        self._map.rates[voxels] = np.inf
+        """Make the voxels of `open_start` impassable again."""
+        self._map.traversal_cost[voxels] = np.inf
 
     def _axes_of(self, voxel: int) -> tuple[int, int, int]:
         x, y, z = np.unravel_index(voxel, self._size)
         return int(x), int(y), int(z)
 
     def _spacing(self, wanted_m: float | None, edge_m: float) -> int:
-        """Voxels from a candidate to the next: so many metres, or None = a sixth of the range."""
+        """Voxels between candidates for a distance in metres; None = a sixth of the range."""
         return max(round((wanted_m or self.reach * edge_m / 6.0) / edge_m), 1)
 
 

@@ -1,6 +1,6 @@
 """The strategies `nearest-frontier` (Yamauchi 1998) and `coordinated-frontier` (Burgard et al. 2005).
 
-They share the candidates of `per-time-visibility`, and go to none from which nothing unexplored can be seen.
+They use the candidates of `per-time-visibility`, and ignore those from which nothing unexplored can be seen.
 """
 
 from __future__ import annotations
@@ -10,13 +10,13 @@ from functools import partial
 
 import numpy as np
 
-from baselines.strategies.frontier import Exploring, FrontierStrategy
+from baselines.strategies.frontier import ExplorationConfig, FrontierStrategy
 from entropy_explore_env.validation import check_not_negative
 
 
 @dataclass(frozen=True)
 class Nearest:
-    """The candidate with the shortest way (Yamauchi 1998)."""
+    """The candidate with the shortest path (Yamauchi 1998)."""
 
     def __call__(
         self, seen: np.ndarray, seconds: np.ndarray, edges: np.ndarray, taken: np.ndarray
@@ -28,12 +28,12 @@ class Nearest:
 
 @dataclass(frozen=True)
 class Coordinated:
-    """Utility less cost, U - β·way; U falls near the frontiers of others (Burgard et al. 2005, eqs. 5-7).
+    """Utility minus cost, U - β·length; U falls near others' frontiers (Burgard et al. 2005, eqs. 5-7).
 
     U = 1 - Σ P(d), with P(d) = 1 - d/range within the range of a frontier that another robot goes to.
 
     Attributes:
-        beta: β, a voxel edge of way; the paper finds 0.01 … 50 alike.
+        beta: β, cost of a voxel edge of path; the paper finds 0.01 … 50 alike.
 
     Raises:
         SettingError: β is no number ≥ 0.
@@ -53,7 +53,7 @@ class Coordinated:
         return 1.0 - taken - self.beta * edges
 
 
-nearest_frontier = partial(FrontierStrategy, Exploring(metric=Nearest(), promises=False))
-"""Uncoordinated: nobody heeds where others go."""
-coordinated_frontier = partial(FrontierStrategy, Exploring(metric=Coordinated()))
-"""Coordinated by what is announced."""
+nearest_frontier = partial(FrontierStrategy, ExplorationConfig(metric=Nearest(), promises=False))
+"""Uncoordinated: where teammates go does not count."""
+coordinated_frontier = partial(FrontierStrategy, ExplorationConfig(metric=Coordinated()))
+"""Coordinated by what teammates announce."""

@@ -13,7 +13,7 @@ from baselines.experiments.cells import Cell
 from baselines.experiments.provenance import imported, sources_digest
 from baselines.papers.sawhney.map_files import MapRun
 from baselines.strategies import gradient, random_walk
-from baselines.strategies.frontier import Exploring
+from baselines.strategies.frontier import ExplorationConfig
 from baselines.strategies.frontier.metrics import Nearest
 from baselines.strategies.gradient import GradientStrategy
 from baselines.strategies.information_rate import InformationRate, InformationRateConfig
@@ -87,7 +87,7 @@ def test_what_a_record_is_made_by_counts(entered, monkeypatch, tmp_path):
     world.write_bytes(b"one")
 
     def digest(metric=None):
-        exploring = Exploring() if metric is None else Exploring(metric=metric)
+        exploring = ExplorationConfig() if metric is None else ExplorationConfig(metric=metric)
         return Cell("cell", find_scenario("room"), "walk", 1, MapRun(exploring, str(world))).digest
 
     before = digest()

@@ -134,13 +134,13 @@ def test_each_goes_to_what_is_uncertain_in_its_own_half(control):
 @pytest.mark.parametrize(
     ("settings", "field"),
     [
-        ({"control": "frontier"}, "Coverage.control"),
-        ({"metric": "time"}, "Coverage.metric"),
-        ({"known": "no"}, "Coverage.known"),
-        ({"eta": 0.0}, "Coverage.eta"),
-        ({"tau": 0.7}, "Coverage.tau"),
-        ({"tau_floor": 0.35}, "Coverage.tau_floor"),
-        ({"steps": 0}, "Coverage.steps"),
+        ({"control": "frontier"}, "VoronoiConfig.control"),
+        ({"metric": "time"}, "VoronoiConfig.metric"),
+        ({"known": "no"}, "VoronoiConfig.known"),
+        ({"eta": 0.0}, "VoronoiConfig.eta"),
+        ({"tau": 0.7}, "VoronoiConfig.tau"),
+        ({"tau_floor": 0.35}, "VoronoiConfig.tau_floor"),
+        ({"steps": 0}, "VoronoiConfig.steps"),
     ],
 )
 def test_what_is_refused(settings, field):

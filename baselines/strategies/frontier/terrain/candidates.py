@@ -1,6 +1,6 @@
 """Candidates of a robot's belief of a height field, and the columns of ground to be seen from them.
 
-What was counted is kept, and still right where nothing changed within range.
+Counts are reused as long as nothing changes within range.
 """
 
 from __future__ import annotations
@@ -9,17 +9,17 @@ import math
 
 import numpy as np
 
-from baselines.strategies.frontier.candidates import BATCH_CELLS, Candidates, Chart, Looking, as_tuple
+from baselines.strategies.frontier.candidates import BATCH_CELLS, Candidates, Chart, FrontierConfig, as_tuple
 from baselines.strategies.frontier.terrain.map import (
     TerrainMap,
     choose_reached_columns,
-    forget_seen,
-    look_at_columns,
     new_terrain_map,
-    survey,
+    reset_bounds,
+    update_columns,
+    update_terrain,
 )
 from baselines.strategies.frontier.terrain.visibility import (
-    Look,
+    ViewModel,
     bound_columns,
     count_below,
     count_columns_from,
@@ -29,7 +29,7 @@ from baselines.strategies.frontier.terrain.visibility import (
     sum_rows,
 )
 from baselines.strategies.frontier.voxel.map import EDGE, NONE
-from baselines.strategies.frontier.voxel.visibility import new_tally
+from baselines.strategies.frontier.voxel.visibility import new_counter
 from entropy_explore_env.missions.view import RobotView
 from entropy_explore_env.scenario import Scenario
 from entropy_explore_env.settings import RobotKind
@@ -39,40 +39,42 @@ from entropy_explore_env.viewpoints.evaluation import sees_all_around
 class TerrainCandidates(Candidates[TerrainMap]):
     """Candidates and counts above a height field; the points of V are columns of ground."""
 
-    def __init__(self, scenario: Scenario, kind: RobotKind, looking: Looking, ceiling: np.ndarray) -> None:
+    def __init__(
+        self, scenario: Scenario, kind: RobotKind, frontiers: FrontierConfig, ceiling: np.ndarray
+    ) -> None:
         """Nothing is explored yet."""
-        super().__init__(scenario, kind, looking)
+        super().__init__(scenario, kind, frontiers)
         (x, y, _), edge = self._size, scenario.grid.voxel_size_m
-        apart = self._spacing(looking.spacing_m, edge), self._spacing(looking.rise_m, edge)
+        apart = self._spacing(frontiers.spacing_m, edge), self._spacing(frontiers.rise_m, edge)
         self._map = new_terrain_map(self._size, kind.robot.body_radius_m / edge, *apart, ceiling)
-        self._spent = self._map.spent
-        self._tally = new_tally(x * y, self._size)
+        self._excluded = self._map.excluded
+        self._counter = new_counter(x * y, self._size)
         turns = min(math.ceil(2.0 * math.pi * self.reach), 720)
         angles = (np.arange(turns) + 0.5) * (2.0 * math.pi / turns)
         self._azimuths = np.stack([np.cos(angles), np.sin(angles)], axis=-1)
         self._tilt = kind.sensor.field_of_view_rad[1]
-        self._look = Look(
+        self._view_model = ViewModel(
             self.reach,
-            flattest=math.tan(min(max(0.5 * math.pi - self._tilt, 0.0), 1.5)),
-            patch=max(round(looking.patch_m / edge), 0),
-            gamma=looking.gamma or 0.0,
-            highest=looking.too_high * self.reach,
-            fade=self.reach if looking.unexplored_ground == "falling" else math.inf,
+            min_tangent=math.tan(min(max(0.5 * math.pi - self._tilt, 0.0), 1.5)),
+            patch=max(round(frontiers.patch_m / edge), 0),
+            gamma=frontiers.gamma or 0.0,
+            highest=frontiers.too_high * self.reach,
+            fade=self.reach if frontiers.unexplored_ground == "falling" else math.inf,
         )
         self.point = edge**2
         self._factors = np.ones(len(self._map.voxel))
         self._sums = np.zeros((x, y + 1), np.int32)
         self._widths = half_widths(self.reach)
         self.batch = 1 + BATCH_CELLS // max(math.ceil(turns * self.reach), 1)
-        self._unit = edge if looking.gamma is not None else 1.0
+        self._unit = edge if frontiers.gamma is not None else 1.0
 
     def update(self, view: RobotView, sigma: float) -> None:
         """See `Candidates`."""
-        levels = self._looking.levels(sigma, self._prior)
-        survey(self._map, view.mean.reshape(-1), view.precision.reshape(-1), levels)
+        levels = self._config.levels(sigma, self._prior)
+        update_terrain(self._map, view.mean.reshape(-1), view.precision.reshape(-1), levels)
         sum_rows(self._map, self._sums)
-        wide = self.reach + self._look.patch
-        forget_seen(self._map.changed, self._size, self._map.voxel, self._map.seen, wide)
+        wide = self.reach + self._view_model.patch
+        reset_bounds(self._map.changed, self._size, self._map.voxel, self._map.seen, wide)
 
     def mapped_share(self) -> float:
         """See `Candidates`."""
@@ -84,29 +86,29 @@ class TerrainCandidates(Candidates[TerrainMap]):
         ground = np.where(mapped, self._map.ground.astype(float), np.nan)
         return Chart(mapped, np.zeros_like(mapped), edge, ground)
 
-    def most(self, slots: np.ndarray) -> np.ndarray:
-        """See `Candidates`; of those not counted yet what is unexplored in range of them."""
+    def upper_bounds(self, slots: np.ndarray) -> np.ndarray:
+        """See `Candidates`; for those that are not counted yet, the unexplored columns in range."""
         most, factor = self._map.seen[slots].astype(np.float64), self._factors[slots]
         fresh = np.isinf(most)
         if fresh.any():
             voxels = self._map.voxel[slots[fresh]]
             bound, factor_there = np.empty(len(voxels)), np.empty(len(voxels))
-            bound_columns(self._map, self._sums, self._widths, voxels, self._look, bound, factor_there)
+            bound_columns(self._map, self._sums, self._widths, voxels, self._view_model, bound, factor_there)
             most[fresh], factor[fresh] = bound, self._in_metres(factor_there)
         return most * factor
 
-    def limit(self) -> float:
+    def greatest_visibility(self) -> float:
         """See `Candidates`."""
-        factor = 1.0 if self._looking.gamma is None else self._unit * self._size[2]
+        factor = 1.0 if self._config.gamma is None else self._unit * self._size[2]
         within = math.pi * (self.reach + 2.0) ** 2
-        return float(min(within, self._tally.stamp.size)) * factor
+        return float(min(within, self._counter.stamp.size)) * factor
 
     def count(self, slots: np.ndarray, voxels: np.ndarray) -> np.ndarray:
         """See `Candidates`."""
         seen, weighed, factor = (np.empty(len(slots)) for _ in range(3))
-        naive = self._looking.visibility == "naive"
+        naive = self._config.visibility == "naive"
         count_columns_from(
-            self._tally, self._map, voxels, self._azimuths, self._look, naive, seen, weighed, factor
+            self._counter, self._map, voxels, self._azimuths, self._view_model, naive, seen, weighed, factor
         )
         factor = self._in_metres(factor)
         self._map.seen[slots], self._factors[slots] = seen, np.maximum(factor, 1e-12)
@@ -114,44 +116,44 @@ class TerrainCandidates(Candidates[TerrainMap]):
 
     def _in_metres(self, factor: np.ndarray) -> np.ndarray:
         """(K,) height factors; without, 1 where a candidate is low enough to be one."""
-        return (factor > 0.0).astype(float) if self._looking.gamma is None else factor * self._unit
+        return (factor > 0.0).astype(float) if self._config.gamma is None else factor * self._unit
 
     def promise(self, place: np.ndarray) -> None:
         """See `Candidates`."""
-        arrays = self._tally, self._map, *self._from(place)
-        if self._looking.visibility == "naive":
-            count_columns_in_ball(*arrays, self._look, True)
+        arrays = self._counter, self._map, *self._from(place)
+        if self._config.visibility == "naive":
+            count_columns_in_ball(*arrays, self._view_model, True)
         else:
-            count_below(*arrays, self._azimuths, self._look, True)
+            count_below(*arrays, self._azimuths, self._view_model, True)
 
     def _from(self, place: np.ndarray) -> tuple[tuple[float, float, float], float]:
         """An eye at (3,), grid units, and z_av there."""
         eye = as_tuple(place)
-        return eye, mean_ground(self._map, int(eye[0]), int(eye[1]), self._look.patch)
+        return eye, mean_ground(self._map, int(eye[0]), int(eye[1]), self._view_model.patch)
 
     def _block_of(self, x: int, y: int, z: int) -> int:
         """See `Candidates`."""
         del z
         return x // self._map.spacing * self._map.rows + y // self._map.spacing
 
-    def _look_at(self, count: int) -> None:
+    def _update_blocks(self, count: int) -> None:
         """See `Candidates`."""
-        look_at_columns(self._map, count)
+        update_columns(self._map, count)
 
-    def other_of(self, cost: np.ndarray) -> None:
+    def replace_unreached(self, cost: np.ndarray) -> None:
         """See `Candidates`."""
         choose_reached_columns(self._map, cost)
 
     def gaze(self, place: np.ndarray, view: RobotView) -> tuple[float, float]:
-        """Down: the lowest rays straight down; who does not see all around turns to where most is seen."""
+        """Down, with the lowest rays straight down; a sensor with a gap turns to where most is seen."""
         yaw, turn = float(view.pose[3]), view.kind.sensor.field_of_view_rad[0]
         if not sees_all_around(view.kind.sensor):
             (eye, average), best, first = self._from(place), -1, yaw
-            for way in range(16):
-                heading = first + way * (2.0 * math.pi / 16)
+            for turn_index in range(16):
+                heading = first + turn_index * (2.0 * math.pi / 16)
                 ahead = self._azimuths @ (math.cos(heading), math.sin(heading)) >= math.cos(turn / 2)
-                arrays = self._tally, self._map, eye, average, self._azimuths[ahead]
-                points, _ = count_below(*arrays, self._look, False)
+                arrays = self._counter, self._map, eye, average, self._azimuths[ahead]
+                points, _ = count_below(*arrays, self._view_model, False)
                 if points > best:
                     best, yaw = points, (heading + math.pi) % (2.0 * math.pi) - math.pi
         return yaw, 0.5 * math.pi - 0.5 * self._tilt

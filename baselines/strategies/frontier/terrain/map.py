@@ -1,10 +1,10 @@
 """Frontiers of a height field below an exposure surface (Sawhney 2009).
 
 Points are columns. A column is explored once the voxel of its surface is: the highest one that is known and
-believed covered, with a known free one above it. Robots may be between the ground and the exposure surface of
-explored columns, whether or not a ray went through that air. On the edge lie explored columns beside
-unexplored ones (see frontier_map.py); of each block of columns the candidate nearest to its middle stands for
-all, at several heights (sect. 3.2). Grid units: heights are in layers.
+believed covered, with a known free voxel above it. Robots may be between the ground and the exposure surface
+of explored columns, whether or not a ray went through that air. On the edge lie explored columns beside
+unexplored ones (see voxel/map.py). Each block of columns is represented by the candidate nearest to its
+middle, at several heights (sect. 3.2). Grid units: heights are in layers.
 """
 
 from __future__ import annotations
@@ -22,13 +22,14 @@ from baselines.strategies.frontier.voxel.map import (
     UNEXPLORED,
     UNMAPPED,
     new_frontier_map,
-    put_block,
+    queue_block,
     state_of,
 )
+from entropy_explore_env.belief.voxel_index import flat_index
 from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel
 
 TILE = 8
-"""Changes are noted by square tiles, so many columns wide."""
+"""Width in columns of the square tiles by which changes are noted."""
 
 
 class TerrainMap(NamedTuple):
@@ -36,30 +37,30 @@ class TerrainMap(NamedTuple):
 
     state: np.ndarray
     """(V,) uint8, flags as in a FrontierMap."""
-    spent: np.ndarray
-    """(V,) uint8, SPENT where a scan was taken."""
+    excluded: np.ndarray
+    """(V,) uint8, EXCLUDED where a scan was taken."""
     ground: np.ndarray
     """(X, Y) int32, solid layers of a mapped column; NONE = not mapped."""
     unexplored: np.ndarray
-    """(X·Y,) uint8, whether a column's surface is not known as well as is asked for now."""
+    """(X·Y,) uint8, whether a column's surface is unexplored at the level that counts now."""
     flags: np.ndarray
     """(X·Y,) uint8: EDGE, CANDIDATE."""
-    rates: np.ndarray
-    """(V,) float32, what ways cost: 1 where the body may be, else inf."""
+    traversal_cost: np.ndarray
+    """(V,) float32, 1 where the body may be, else inf."""
     column: np.ndarray
     """(B,) int32, the candidate column of a block; NONE = it has none."""
     voxel: np.ndarray
     """(B·H,) int32, its candidates; NONE = none at this height."""
     seen: np.ndarray
-    """(B·H,) float32, points that can be seen from it; inf = not looked at since something changed nearby."""
+    """(B·H,) float32, points that can be seen from it; inf = not counted since a change nearby."""
     dirty: np.ndarray
-    """(B,) uint8."""
-    waiting: np.ndarray
-    """(B,) int32."""
+    """(B,) uint8, whether a block has to be updated."""
+    queued: np.ndarray
+    """(B,) int32, the blocks that have to be updated."""
     changed: np.ndarray
     """(X / TILE, Y / TILE) uint8, where ground was found."""
     ceiling: np.ndarray
-    """(X, Y) int32, first layer that is closed to robots."""
+    """(X, Y) int32, lowest layer of the no-fly zone."""
     size: tuple[int, int, int]
     spacing: int
     rise: int
@@ -68,32 +69,32 @@ class TerrainMap(NamedTuple):
     """H."""
     rows: int
     """Blocks along y."""
-    ball: np.ndarray
-    """(N, 3) int64, voxels that the body touches."""
+    footprint: np.ndarray
+    """(N, 3) int64 index offsets of the voxels that the body touches."""
     reach: int
-    """Columns that it reaches to."""
+    """Largest of these offsets."""
 
 
 def new_terrain_map(
     shape: tuple[int, int, int], body_radius: float, spacing: int, rise: int, ceiling: np.ndarray
 ) -> TerrainMap:
     """A map of which nothing is explored; arguments as of `new_frontier_map`."""
-    ball = new_frontier_map((3, 3, 3), body_radius, None, 1).ball
+    footprint = new_frontier_map((3, 3, 3), body_radius, None, 1).footprint
     columns, voxels, heights = shape[0] * shape[1], math.prod(shape), math.ceil(shape[2] / rise)
     rows = math.ceil(shape[1] / spacing)
     count = math.ceil(shape[0] / spacing) * rows
     return TerrainMap(
         state=np.full(voxels, UNEXPLORED | UNMAPPED, np.uint8),
-        spent=np.zeros(voxels, np.uint8),
+        excluded=np.zeros(voxels, np.uint8),
         ground=np.full(shape[:2], NONE, np.int32),
         unexplored=np.ones(columns, np.uint8),
         flags=np.zeros(columns, np.uint8),
-        rates=np.full(voxels, np.inf, np.float32),
+        traversal_cost=np.full(voxels, np.inf, np.float32),
         column=np.full(count, NONE, np.int32),
         voxel=np.full(count * heights, NONE, np.int32),
         seen=np.full(count * heights, np.inf, np.float32),
         dirty=np.zeros(count, np.uint8),
-        waiting=np.zeros(count, np.int32),
+        queued=np.zeros(count, np.int32),
         changed=np.zeros((shape[0] // TILE + 1, shape[1] // TILE + 1), np.uint8),
         ceiling=np.ascontiguousarray(ceiling, np.int32).copy(),
         size=(int(shape[0]), int(shape[1]), int(shape[2])),
@@ -101,13 +102,13 @@ def new_terrain_map(
         rise=rise,
         heights=heights,
         rows=rows,
-        ball=ball,
-        reach=int(np.abs(ball).max()),
+        footprint=footprint,
+        reach=int(np.abs(footprint).max()),
     )
 
 
 @inlined_kernel
-def _has_changed(state, mean, precision, levels, first, last):
+def _differs(state, mean, precision, levels, first, last):
     """Whether the flags of voxels `first` … `last` - 1 are not those of the belief."""
     different = np.uint8(0)
     for voxel in range(first, last):
@@ -116,44 +117,44 @@ def _has_changed(state, mean, precision, levels, first, last):
 
 
 @lean_kernel
-def survey(terrain, mean, precision, levels):
-    """Bring the map up to date with a belief, voxel by voxel; arguments as of `frontier_map.take_in`."""
+def update_terrain(terrain, mean, precision, levels):
+    """Bring the map up to date with a belief, voxel by voxel; arguments as of `update_frontiers`."""
     size, count = terrain.size, 0
     for column in range(size[0] * size[1]):
         first, last = column * size[2], (column + 1) * size[2]
-        if _has_changed(terrain.state, mean, precision, levels, first, last):
+        if _differs(terrain.state, mean, precision, levels, first, last):
             for voxel in range(first, last):
                 terrain.state[voxel] = state_of(mean[voxel], precision[voxel], levels)
             x, y = column // size[1], column % size[1]
             if find_ground(terrain, x, y):
                 terrain.changed[x // TILE, y // TILE] = 1
-            count = _put_around(terrain, x, y, terrain.reach + 2, count)
-    look_at_columns(terrain, count)
+            count = _queue_around(terrain, x, y, terrain.reach + 2, count)
+    update_columns(terrain, count)
 
 
 @lean_kernel
-def look_at_columns(terrain, count):
-    """Find edge, room and candidates of the blocks that wait."""
+def update_columns(terrain, count):
+    """Find the edge, the free space and the candidates of the queued blocks."""
     for place in range(count):
-        _look_for_edge(terrain, terrain.waiting[place])
+        _mark_edge(terrain, terrain.queued[place])
     for place in range(count):
-        _look_for_candidates(terrain, terrain.waiting[place])
-        terrain.dirty[terrain.waiting[place]] = 0
+        _choose_candidates(terrain, terrain.queued[place])
+        terrain.dirty[terrain.queued[place]] = 0
 
 
 @lean_kernel
-def _put_around(terrain, x, y, reach, count):
-    """Note the blocks that have a column within `reach` along both axes."""
+def _queue_around(terrain, x, y, reach, count):
+    """Queue the blocks that have a column within `reach` along both axes."""
     size, wide = terrain.size, terrain.spacing
     for i in range(max(x - reach, 0) // wide, min(x + reach, size[0] - 1) // wide + 1):
         for j in range(max(y - reach, 0) // wide, min(y + reach, size[1] - 1) // wide + 1):
-            count = put_block(terrain, i * terrain.rows + j, count)
+            count = queue_block(terrain, i * terrain.rows + j, count)
     return count
 
 
 @lean_kernel
 def find_ground(terrain, x, y):
-    """Read a column's ground off its voxels' states; returns whether it, or how well it is known, changed."""
+    """Find a column's ground from its voxels' states; returns whether its state changed."""
     size, state = terrain.size, terrain.state
     column = x * size[1] + y
     ground, unexplored = NONE, 1
@@ -186,7 +187,7 @@ def _apart(terrain, block, x, y):
 
 
 @lean_kernel
-def _look_for_edge(terrain, block):
+def _mark_edge(terrain, block):
     """Set EDGE in a block: mapped columns that are, or are beside, unexplored ones."""
     size, ground, unexplored = terrain.size, terrain.ground, terrain.unexplored
     i0, i1, j0, j1 = _span(terrain, block)
@@ -207,23 +208,23 @@ def _look_for_edge(terrain, block):
 
 @lean_kernel
 def may_fly(terrain, x, y, z):
-    """Whether all that a body touches is above mapped ground, below the ceiling and not covered."""
+    """Whether a body's footprint is above mapped ground, below the ceiling and not covered."""
     size = terrain.size
-    for offset in terrain.ball:
+    for offset in terrain.footprint:
         i, j, k = x + offset[0], y + offset[1], z + offset[2]
         if not (0 <= i < size[0] and 0 <= j < size[1] and 0 <= k < size[2]):
             return False
         ground = terrain.ground[i, j]
         if ground == NONE or k < ground or k >= terrain.ceiling[i, j]:
             return False
-        if terrain.state[(i * size[1] + j) * size[2] + k] & COVERED:
+        if terrain.state[flat_index(size, i, j, k)] & COVERED:
             return False
     return True
 
 
 @lean_kernel
-def _look_for_candidates(terrain, block):
-    """Set rates and CANDIDATE in a block, choose its column, and the heights above it."""
+def _choose_candidates(terrain, block):
+    """Set traversal costs and CANDIDATE in a block, choose its column, and the heights above it."""
     size = terrain.size
     i0, i1, j0, j1 = _span(terrain, block)
     best, nearest = NONE, math.inf
@@ -231,7 +232,7 @@ def _look_for_candidates(terrain, block):
         for y in range(j0, j1):
             column = x * size[1] + y
             for z in range(size[2]):
-                terrain.rates[column * size[2] + z] = 1.0 if may_fly(terrain, x, y, z) else math.inf
+                terrain.traversal_cost[column * size[2] + z] = 1.0 if may_fly(terrain, x, y, z) else math.inf
             terrain.flags[column] &= EDGE
             if _near_edge(terrain, x, y) and _has_room(terrain, column):
                 terrain.flags[column] |= CANDIDATE
@@ -248,7 +249,7 @@ def _at_height(terrain, column, height):
     if layer >= terrain.size[2]:
         return NONE
     voxel = column * terrain.size[2] + layer
-    return NONE if math.isinf(terrain.rates[voxel]) or terrain.spent[voxel] else voxel
+    return NONE if math.isinf(terrain.traversal_cost[voxel]) or terrain.excluded[voxel] else voxel
 
 
 @inlined_kernel
@@ -264,7 +265,7 @@ def _has_room(terrain, column):
 
 @lean_kernel
 def _take_column(terrain, block, column):
-    """Let a column, or NONE, have the candidates of a block."""
+    """Set the candidate column of a block, or NONE, and its candidates."""
     changed = column != terrain.column[block]
     terrain.column[block] = column
     for height in range(terrain.heights):
@@ -277,7 +278,7 @@ def _take_column(terrain, block, column):
 
 @lean_kernel
 def choose_reached_columns(terrain, cost):
-    """Let blocks whose candidates were not reached have a column with one that was; (V,) costs, inf = not."""
+    """Choose another column for blocks whose candidates no path reaches; (V,) path costs, inf = none."""
     size = terrain.size
     for block in range(len(terrain.column)):
         if terrain.column[block] == NONE or _is_reached(terrain, terrain.column[block], cost):
@@ -306,7 +307,7 @@ def _is_reached(terrain, column, cost):
 
 @inlined_kernel
 def _near_edge(terrain, x, y):
-    """Whether a column of the edge is so near that a body in this one touches it, or one beside it."""
+    """Whether a column of the edge is within the body's reach of this one."""
     size, reach = terrain.size, terrain.reach
     for i in range(max(x - reach, 0), min(x + reach, size[0] - 1) + 1):
         for j in range(max(y - reach, 0), min(y + reach, size[1] - 1) + 1):
@@ -316,8 +317,8 @@ def _near_edge(terrain, x, y):
 
 
 @lean_kernel
-def forget_seen(changed, size, voxels, seen, reach):
-    """Forget how much can be seen from candidates within reach of a tile that changed; none is changed then.
+def reset_bounds(changed, size, voxels, seen, reach):
+    """Reset the counts of candidates within reach of a changed tile, and clear the changes.
 
     Args:
         changed: (TX, TY) uint8, cleared.

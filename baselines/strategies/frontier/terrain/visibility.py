@@ -1,9 +1,9 @@
 """What is expected to be seen of a height field from above: V of Sawhney 2009 in 3-D (sects. 3.3-3.4).
 
-Points are the columns of a TerrainMap. Unexplored ground is taken to slope down from the mean height z_av of
-the ground around the place, to z = (1 - dist / range) z_av above the workspace's floor. A column is seen if a
-ray from the place meets its top: along every direction the steepest slope to what was passed is carried on.
-Grid units: heights are in layers.
+Points are the columns of a TerrainMap. Unexplored ground is assumed to slope down from the mean height z_av
+of the ground around the place: z = (1 - dist / range) z_av above the workspace's floor. A column is seen if a
+ray from the place meets its top: along every direction the steepest slope to the columns passed is the
+horizon. Grid units: heights are in layers.
 """
 
 from __future__ import annotations
@@ -14,25 +14,25 @@ from typing import NamedTuple
 import numpy as np
 
 from baselines.strategies.frontier.voxel.map import NONE
-from baselines.strategies.frontier.voxel.visibility import begin_count, count_point, place_in
+from baselines.strategies.frontier.voxel.visibility import count_point, grid_indices, start_count
 from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel
 
 
-class Look(NamedTuple):
-    """How columns are looked at from candidates; lengths in columns and layers."""
+class ViewModel(NamedTuple):
+    """How columns are seen from candidates; lengths in columns and layers."""
 
     reach: float
     """Of the sensor, > 0."""
-    flattest: float
-    """Tangent of the angle below the horizon from which on the sensor looks down."""
+    min_tangent: float
+    """Tangent of the smallest angle below the horizon at which the sensor sees."""
     patch: int
     """Half the width of the patch whose mean ground is z_av."""
     gamma: float
-    """Of the height factor."""
+    """γ of the height factor."""
     highest: float
     """The greatest z_f - z_av of a candidate."""
     fade: float
-    """How far away unexplored ground is taken to have come down to the floor; inf = it is level."""
+    """Distance at which unexplored ground is assumed to reach the floor; inf = it is level."""
 
 
 @lean_kernel
@@ -57,20 +57,20 @@ def height_at(terrain, x, y, eye, average, fade):
 
 
 @lean_kernel
-def count_below(tally, terrain, eye, average, azimuths, look, marking):
+def count_below(counter, terrain, eye, average, azimuths, view_model, marking):
     """Unexplored columns that are seen from a place: (all, weighed by promises).
 
     Args:
-        tally: Working space.
+        counter: The counter.
         terrain: The map.
         eye: (x, y, z) of the place.
         average: z_av there.
         azimuths: (D, 2) float64 unit vectors.
-        look: Reach, flattest and fade matter.
-        marking: Whether the columns are promised from now on.
+        view_model: Reach, min_tangent and fade matter.
+        marking: Whether the robot promises to see these columns.
     """
-    number, points, weighed = begin_count(tally), 0, 0.0
-    size, reach = terrain.size, look.reach
+    number, points, weighed = start_count(counter), 0, 0.0
+    size, reach = terrain.size, view_model.reach
     for direction in azimuths:
         x, y = int(eye[0]), int(eye[1])
         step_x, step_y = 1 if direction[0] > 0.0 else -1, 1 if direction[1] > 0.0 else -1
@@ -81,18 +81,18 @@ def count_below(tally, terrain, eye, average, azimuths, look, marking):
         enters, horizon = 0.0, -math.inf
         while enters <= reach:
             leaves = min(face_x, face_y)
-            height = height_at(terrain, x, y, eye, average, look.fade)
+            height = height_at(terrain, x, y, eye, average, view_model.fade)
             drop = eye[2] - height
             if drop <= 0.0:
-                break  # it hides the tops of all that is lower than the eye
+                break  # it hides the tops of all lower columns behind it
             slope = -drop / leaves
             column = x * size[1] + y
             near = enters * enters + drop * drop <= reach * reach
-            if slope > horizon and near and drop >= look.flattest * enters:
-                if terrain.unexplored[column] and tally.stamp[column] != number:
-                    tally.stamp[column] = number
+            if slope > horizon and near and drop >= view_model.min_tangent * enters:
+                if terrain.unexplored[column] and counter.stamp[column] != number:
+                    counter.stamp[column] = number
                     points += 1
-                    weighed += count_point(tally, column, marking)
+                    weighed += count_point(counter, column, marking)
             horizon = max(horizon, slope)
             enters = leaves
             if face_x <= face_y:
@@ -105,61 +105,61 @@ def count_below(tally, terrain, eye, average, azimuths, look, marking):
 
 
 @lean_kernel
-def count_columns_in_ball(tally, terrain, eye, average, look, marking):
+def count_columns_in_ball(counter, terrain, eye, average, view_model, marking):
     """The naive V: unexplored columns whose tops, extrapolated, lie in a ball, seen or not."""
-    points, weighed, size, reach = 0, 0.0, terrain.size, look.reach
+    points, weighed, size, reach = 0, 0.0, terrain.size, view_model.reach
     wide = min(reach, size[0] + size[1])
     for x in range(max(int(eye[0] - wide - 0.5), 0), min(int(eye[0] + wide + 1.0), size[0])):
         for y in range(max(int(eye[1] - wide - 0.5), 0), min(int(eye[1] + wide + 1.0), size[1])):
             column = x * size[1] + y
             if not terrain.unexplored[column]:
                 continue
-            drop = eye[2] - height_at(terrain, x, y, eye, average, look.fade)
+            drop = eye[2] - height_at(terrain, x, y, eye, average, view_model.fade)
             dx, dy = x + 0.5 - eye[0], y + 0.5 - eye[1]
             if dx * dx + dy * dy + drop * drop <= reach * reach:
                 points += 1
-                weighed += count_point(tally, column, marking)
+                weighed += count_point(counter, column, marking)
     return points, weighed
 
 
 @lean_kernel
-def count_columns_from(tally, terrain, voxels, azimuths, look, naive, seen, weighed, factor):
+def count_columns_from(counter, terrain, voxels, azimuths, view_model, naive, seen, weighed, factor):
     """Fill (K,) with the columns seen from K voxels, weighed by promises, and the height factor of each.
 
     The factor is (z_f - z_av)^γ z_f^(1 - γ), heights above the workspace's floor in layers (sect. 3.3); 0 for
-    who is so high above the ground that little of it can be seen, and is no candidate.
+    places so high above the ground that little of it can be seen, which are no candidates.
 
     Args:
-        tally: Working space.
+        counter: The counter.
         terrain: The map.
         voxels: (K,) int32.
         azimuths: (D, 2) float64.
-        look: How they are looked at.
+        view_model: How columns are seen.
         naive: Whether columns in a ball are counted.
         seen: (K,) filled in.
         weighed: (K,) filled in.
         factor: (K,) filled in.
     """
     for place in range(len(voxels)):
-        x, y, z = place_in(terrain.size, voxels[place])
+        x, y, z = grid_indices(terrain.size, voxels[place])
         eye = (x + 0.5, y + 0.5, z + 0.5)
-        average = mean_ground(terrain, x, y, look.patch)
+        average = mean_ground(terrain, x, y, view_model.patch)
         seen[place], weighed[place] = 0.0, 0.0
-        factor[place] = _height_factor(eye[2], average, look)
+        factor[place] = _height_factor(eye[2], average, view_model)
         if factor[place] == 0.0:
             continue
         if naive:
-            points, value = count_columns_in_ball(tally, terrain, eye, average, look, False)
+            points, value = count_columns_in_ball(counter, terrain, eye, average, view_model, False)
         else:
-            points, value = count_below(tally, terrain, eye, average, azimuths, look, False)
+            points, value = count_below(counter, terrain, eye, average, azimuths, view_model, False)
         seen[place], weighed[place] = points, value
 
 
 @inlined_kernel
-def _height_factor(height, average, look):
+def _height_factor(height, average, view_model):
     """(z_f - z_av)^γ z_f^(1 - γ); 0 where z_f - z_av is too much. See `count_columns_from`."""
-    above, gamma = height - average, look.gamma
-    return 0.0 if above > look.highest else max(above, 1e-3) ** gamma * height ** (1.0 - gamma)
+    above, gamma = height - average, view_model.gamma
+    return 0.0 if above > view_model.highest else max(above, 1e-3) ** gamma * height ** (1.0 - gamma)
 
 
 @lean_kernel
@@ -181,7 +181,7 @@ def half_widths(reach: float) -> np.ndarray:
 
 
 @lean_kernel
-def bound_columns(terrain, sums, widths, voxels, look, most, factor):
+def bound_columns(terrain, sums, widths, voxels, view_model, most, factor):
     """Fill (K,) with the unexplored columns in range of K voxels, seen or not, and the height factors.
 
     No more than this can be seen from there.
@@ -191,14 +191,14 @@ def bound_columns(terrain, sums, widths, voxels, look, most, factor):
         sums: (X, Y + 1) of `sum_rows`.
         widths: (W,) of `half_widths`, for the sensor's reach.
         voxels: (K,) int32.
-        look: How they are looked at.
+        view_model: How columns are seen.
         most: (K,) filled in.
         factor: (K,) filled in.
     """
     size, last = terrain.size, len(widths) - 1
     for place in range(len(voxels)):
-        x, y, z = place_in(size, voxels[place])
-        factor[place] = _height_factor(z + 0.5, mean_ground(terrain, x, y, look.patch), look)
+        x, y, z = grid_indices(size, voxels[place])
+        factor[place] = _height_factor(z + 0.5, mean_ground(terrain, x, y, view_model.patch), view_model)
         found = 0
         for i in range(max(x - last, 0), min(x + last, size[0] - 1) + 1):
             wide = widths[abs(i - x)]

@@ -1,8 +1,7 @@
 """Candidates of a robot's own belief, in plans and in any 3-D space, and the voxels to be seen from them.
 
-What was counted is kept: as no more voxels can be seen from a candidate than before while the map grows, it
-is an upper bound of what a new count would give. Only through walls that turned out free more may be seen,
-which is added.
+Counts are reused as upper bounds: while the map grows, no more unexplored voxels can be seen from a candidate
+than before. Only voxels that turn free may open new views, and those are added to the bounds.
 """
 
 from __future__ import annotations
@@ -11,18 +10,18 @@ import math
 
 import numpy as np
 
-from baselines.strategies.frontier.candidates import BATCH_CELLS, Candidates, Chart, Looking, as_tuple
+from baselines.strategies.frontier.candidates import BATCH_CELLS, Candidates, Chart, FrontierConfig, as_tuple
 from baselines.strategies.frontier.voxel.map import (
     COVERED,
     EDGE,
+    MAX_TRACKED_OPENINGS,
     NONE,
-    OPENED,
     UNMAPPED,
     FrontierMap,
     choose_reached,
-    look_at_blocks,
     new_frontier_map,
-    take_in,
+    update_blocks,
+    update_frontiers,
 )
 from baselines.strategies.frontier.voxel.ray_tree import grow_tree
 from baselines.strategies.frontier.voxel.visibility import (
@@ -31,7 +30,7 @@ from baselines.strategies.frontier.voxel.visibility import (
     count_from,
     count_in_ball,
     count_in_balls,
-    new_tally,
+    new_counter,
     rays_around,
     rays_towards,
 )
@@ -47,15 +46,15 @@ _ROWS = 15
 class VoxelCandidates(Candidates[FrontierMap]):
     """Candidates and counts in a map of voxels; the points of V are voxels."""
 
-    def __init__(self, scenario: Scenario, kind: RobotKind, looking: Looking) -> None:
+    def __init__(self, scenario: Scenario, kind: RobotKind, frontiers: FrontierConfig) -> None:
         """Nothing is explored yet."""
-        super().__init__(scenario, kind, looking)
+        super().__init__(scenario, kind, frontiers)
         grid, layer = scenario.grid, scenario.layer_of(kind.robot)
         edge = grid.voxel_size_m
-        spacing = self._spacing(looking.spacing_m, edge)
+        spacing = self._spacing(frontiers.spacing_m, edge)
         self._map = new_frontier_map(grid.shape, kind.robot.body_radius_m / edge, layer, spacing)
-        self._spent = self._map.flags
-        self._tally = new_tally(grid.voxels, grid.shape)
+        self._excluded = self._map.flags
+        self._counter = new_counter(grid.voxels, grid.shape)
         self._pitches = _pitches(kind, layer is None)
         self._directions = rays_around(self.reach, self._pitches)
         self._tree = grow_tree(self._directions, self.reach, grid.shape)
@@ -66,14 +65,14 @@ class VoxelCandidates(Candidates[FrontierMap]):
     def update(self, view: RobotView, sigma: float) -> None:
         """See `Candidates`."""
         mean, precision = view.mean.reshape(-1), view.precision.reshape(-1)
-        take_in(self._map, mean, precision, self._looking.levels(sigma, self._prior))
+        update_frontiers(self._map, mean, precision, self._config.levels(sigma, self._prior))
         count, bounds = int(self._map.opened_count[0]), self._map.seen
         self._map.opened_count[0] = 0
-        if count > OPENED:
+        if count > MAX_TRACKED_OPENINGS:
             bounds[:] = math.inf
-        elif count > 0 and self._looking.visibility == "ray-cast":
+        elif count > 0 and self._config.visibility == "ray-cast":
             arrays = self._map.opened[:count], self._map.voxel, self._tree, self._met
-            add_opened(self._tally, self._map.state, self._size, *arrays, bounds)
+            add_opened(self._counter, self._map.state, self._size, *arrays, bounds)
 
     def mapped_share(self) -> float:
         """See `Candidates`."""
@@ -88,21 +87,21 @@ class VoxelCandidates(Candidates[FrontierMap]):
         mapped, covered, edge = (np.asarray(a.any(2)) for a in (mapped, covered, edge))
         return Chart(mapped, covered, edge, np.full(self._size[:2], np.nan))
 
-    def most(self, slots: np.ndarray) -> np.ndarray:
+    def upper_bounds(self, slots: np.ndarray) -> np.ndarray:
         """See `Candidates`."""
         return self._map.seen[slots].astype(np.float64)
 
-    def limit(self) -> float:
+    def greatest_visibility(self) -> float:
         """See `Candidates`."""
         wide = self.reach + 2.0
         within = math.pi * wide**2 if self._size[2] == 1 else 4.0 / 3.0 * math.pi * wide**3
-        return float(min(within, self._tally.stamp.size))
+        return float(min(within, self._counter.stamp.size))
 
     def count(self, slots: np.ndarray, voxels: np.ndarray) -> np.ndarray:
         """See `Candidates`."""
         seen, weighed = np.empty(len(slots)), np.empty(len(slots))
-        arrays = self._tally, self._map.state, self._size, voxels
-        if self._looking.visibility == "naive":
+        arrays = self._counter, self._map.state, self._size, voxels
+        if self._config.visibility == "naive":
             count_in_balls(*arrays, self.reach, seen, weighed)
         else:
             count_from(*arrays, self._tree, self._met, seen, weighed)
@@ -112,21 +111,23 @@ class VoxelCandidates(Candidates[FrontierMap]):
     def promise(self, place: np.ndarray) -> None:
         """See `Candidates`."""
         start = as_tuple(place)
-        if self._looking.visibility == "naive":
-            count_in_ball(self._tally, self._map.state, self._size, start, self.reach, True)
+        if self._config.visibility == "naive":
+            count_in_ball(self._counter, self._map.state, self._size, start, self.reach, True)
         else:
-            count_crossed(self._tally, self._map.state, self._size, start, self._directions, self.reach, True)
+            count_crossed(
+                self._counter, self._map.state, self._size, start, self._directions, self.reach, True
+            )
 
     def _block_of(self, x: int, y: int, z: int) -> int:
         """See `Candidates`."""
         across, blocks = self._map.across, self._map.blocks
         return (x // across[0] * blocks[1] + y // across[1]) * blocks[2] + z // across[2]
 
-    def _look_at(self, count: int) -> None:
+    def _update_blocks(self, count: int) -> None:
         """See `Candidates`."""
-        look_at_blocks(self._map, count)
+        update_blocks(self._map, count)
 
-    def other_of(self, cost: np.ndarray) -> None:
+    def replace_unreached(self, cost: np.ndarray) -> None:
         """See `Candidates`."""
         for slot in np.flatnonzero(self._map.voxel != NONE):
             if math.isfinite(cost[self._map.voxel[slot]]):
@@ -138,16 +139,16 @@ class VoxelCandidates(Candidates[FrontierMap]):
     def open_start(self, voxel: int) -> list[int]:
         """See `Candidates`."""
         opened, (x, y, z) = [], self._axes_of(voxel)
-        for offset in self._map.ball:
+        for offset in self._map.footprint:
             place = x + offset[0], y + offset[1], z + offset[2]
             if all(0 <= i < n for i, n in zip(place, self._size, strict=True)):
                 beside = int(np.ravel_multi_index(place, self._size))
                 if (
-                    math.isinf(self._map.rates[beside])
+                    math.isinf(self._map.traversal_cost[beside])
                     and self._map.state[beside] & (UNMAPPED | COVERED) == 0
                 ):
                     opened.append(beside)
-        self._map.rates[opened] = 1.0
+        self._map.traversal_cost[opened] = 1.0
         return opened
 
     def gaze(self, place: np.ndarray, view: RobotView) -> tuple[float, float]:
@@ -160,18 +161,18 @@ class VoxelCandidates(Candidates[FrontierMap]):
         best, gaze = -1, (yaw, 0.0)
         for pitch in (0.0,) if view.planar else (0.0, -0.7, 0.7):
             pitches = self._pitches if view.planar else np.linspace(pitch - tilt / 2, pitch + tilt / 2, 5)
-            for way in range(1 if all_around else 16):
-                heading = yaw + way * (2.0 * math.pi / 16)
+            for turn_index in range(1 if all_around else 16):
+                heading = yaw + turn_index * (2.0 * math.pi / 16)
                 rays = rays_towards(np.linspace(heading - turn / 2, heading + turn / 2, 24), pitches)
                 arrays = self._map.state, self._size, as_tuple(place), rays
-                points, _ = count_crossed(self._tally, *arrays, self.reach, False)
+                points, _ = count_crossed(self._counter, *arrays, self.reach, False)
                 if points > best:
                     best, gaze = points, ((heading + math.pi) % (2.0 * math.pi) - math.pi, pitch)
         return gaze
 
 
 def _pitches(kind: RobotKind, flies: bool) -> np.ndarray:
-    """(rows,) pitches of imagined rays: all for who flies, those of the sensor for who looks level."""
+    """(rows,) pitches of imagined rays: all of them for flying robots, else the sensor's."""
     tilt = kind.sensor.field_of_view_rad[1]
     if flies:
         return (np.arange(_ROWS) + 0.5) * (math.pi / _ROWS) - math.pi / 2

@@ -1,11 +1,11 @@
 """Frontier candidates of a belief, kept up to date as it changes: where mapped space ends (Yamauchi 1998).
 
-A voxel is explored once its σ has fallen to a stated level. A body may stand where all that it touches is
-explored at the first such level and believed free: the mapped region, whose connected part is left to the
-search for ways. On its edge lie free voxels beside unexplored ones; where a finer level counts now, also
-those that are unexplored themselves. A candidate is a voxel in which the body may stand and touches the
-edge. Of each block of voxels, as wide as the sampling's spacing, the candidate nearest to its middle stands
-for all. Grid units; voxels by number, C order.
+A voxel is explored once its σ has fallen to a stated level. A body may stand where its whole footprint is
+explored at the first such level and believed free; this is the mapped region, and the path search finds its
+connected part. Its edge consists of free voxels next to unexplored ones; at a finer level, also of voxels
+that are unexplored themselves. A candidate is a voxel in which the body may stand and whose footprint meets
+the edge. Each block of voxels, as wide as the sampling's spacing, is represented by the candidate nearest to
+its middle. Grid units; voxels by number, C order.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ import numpy as np
 
 from entropy_explore_env.belief.paths.lattice import new_lattice
 from entropy_explore_env.belief.raycast import STOP_AT_COVERED
+from entropy_explore_env.belief.voxel_index import flat_index
 from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel
 
 UNEXPLORED = 1
@@ -31,14 +32,14 @@ STOPS_RAYS = 3
 EDGE = 1
 """Mapped and free, and itself unexplored at the level that counts now, or beside such a voxel."""
 CANDIDATE = 2
-SPENT = 4
+EXCLUDED = 4
 """A scan was taken here: no candidate any more."""
 
-OPENED = 256
-"""Of so many voxels at once it is noted that they turned out free: with more, all is counted anew as fast."""
+MAX_TRACKED_OPENINGS = 256
+"""At most this many newly freed voxels are tracked between updates; beyond that, recounting is as fast."""
 NONE = -1
-GLANCE = 128
-"""Voxels that are looked at together for whether anything was measured."""
+BLOCK_VOXELS = 128
+"""Voxels that are checked together for new measurements."""
 
 
 class FrontierMap(NamedTuple):
@@ -47,31 +48,31 @@ class FrontierMap(NamedTuple):
     state: np.ndarray
     """(V,) uint8, flags: UNEXPLORED, UNMAPPED, COVERED."""
     flags: np.ndarray
-    """(V,) uint8: EDGE, CANDIDATE, SPENT."""
-    rates: np.ndarray
-    """(V,) float32, what ways cost: 1 where the body may stand, else inf."""
+    """(V,) uint8: EDGE, CANDIDATE, EXCLUDED."""
+    traversal_cost: np.ndarray
+    """(V,) float32, 1 where the body may stand, else inf."""
     voxel: np.ndarray
     """(B,) int32, the candidate of a block; NONE = it has none."""
     seen: np.ndarray
-    """(B,) float32, no fewer points than can be seen from it; inf = nothing is known, or not any more."""
+    """(B,) float32, upper bound of the points that can be seen from the candidate; inf = unknown."""
     dirty: np.ndarray
-    """(B,) uint8, whether a block has to be looked at again."""
-    waiting: np.ndarray
-    """(B,) int32, those blocks."""
+    """(B,) uint8, whether a block has to be updated."""
+    queued: np.ndarray
+    """(B,) int32, the blocks that have to be updated."""
     sums: np.ndarray
-    """(V / GLANCE,) uint64, sums of precisions as bits, of so many voxels at a time, when taken in."""
+    """(V / BLOCK_VOXELS,) uint64, sums of the bit patterns of precisions at the latest update."""
     levels: np.ndarray
-    """(2,) float32, levels at that time; NaN = nothing was taken in."""
+    """(2,) float32, levels at the latest update; NaN = there was none."""
     opened: np.ndarray
-    """(OPENED,) int32, voxels that turned out free: past them more may be seen than before …"""
+    """(MAX_TRACKED_OPENINGS,) int32, newly freed voxels, past which more may be visible than before."""
     opened_count: np.ndarray
-    """(1,) int64, … how many; more than OPENED = more may be seen anywhere."""
+    """(1,) int64, number of them; above MAX_TRACKED_OPENINGS more may be visible from anywhere."""
     size: tuple[int, int, int]
     across: tuple[int, int, int]
     """Voxels of a block along each axis."""
     blocks: tuple[int, int, int]
-    ball: np.ndarray
-    """(N, 3) int64, voxels that the body touches; its own first."""
+    footprint: np.ndarray
+    """(N, 3) int64 index offsets of the voxels that the body touches; its own first."""
     layer: int
     """The only layer of planar robots; -1 = all."""
 
@@ -84,11 +85,11 @@ def new_frontier_map(
     Args:
         shape: (X, Y, Z) voxels.
         body_radius: In voxel edges.
-        layer: The only one that is looked at (planar robots); None = all.
+        layer: The only one with candidates (planar robots); None = all.
         spacing: Voxels along the edge of a block.
     """
-    touched = [tuple(offset) for offset in new_lattice(shape, body_radius, layer).footprint.tolist()]
-    ball = [(0, 0, 0), *(offset for offset in touched if any(offset))]
+    body = [tuple(offset) for offset in new_lattice(shape, body_radius, layer).footprint.tolist()]
+    footprint = [(0, 0, 0), *(offset for offset in body if any(offset))]
     flat = shape[2] == 1 or layer is not None
     across = (spacing, spacing, shape[2] if flat else spacing)
     blocks = tuple(math.ceil(n / width) for n, width in zip(shape, across, strict=True))
@@ -96,26 +97,26 @@ def new_frontier_map(
     return FrontierMap(
         state=np.full(voxels, UNEXPLORED | UNMAPPED, np.uint8),
         flags=np.zeros(voxels, np.uint8),
-        rates=np.full(voxels, np.inf, np.float32),
+        traversal_cost=np.full(voxels, np.inf, np.float32),
         voxel=np.full(count, NONE, np.int32),
         seen=np.full(count, np.inf, np.float32),
         dirty=np.zeros(count, np.uint8),
-        waiting=np.zeros(count, np.int32),
-        sums=np.zeros(math.ceil(voxels / GLANCE), np.uint64),
+        queued=np.zeros(count, np.int32),
+        sums=np.zeros(math.ceil(voxels / BLOCK_VOXELS), np.uint64),
         levels=np.full(2, np.nan, np.float32),
-        opened=np.zeros(OPENED, np.int32),
+        opened=np.zeros(MAX_TRACKED_OPENINGS, np.int32),
         opened_count=np.zeros(1, np.int64),
         size=(int(shape[0]), int(shape[1]), int(shape[2])),
         across=across,
         blocks=(blocks[0], blocks[1], blocks[2]),
-        ball=np.array(ball, np.int64),
+        footprint=np.array(footprint, np.int64),
         layer=-1 if layer is None else int(layer),
     )
 
 
 @inlined_kernel
 def state_of(mean, precision, levels):
-    """Flags of a voxel from its belief; `levels` as in `take_in`."""
+    """Flags of a voxel from its belief; `levels` as in `update_frontiers`."""
     unexplored, unmapped = np.uint8(precision < levels[0]), np.uint8(precision < levels[1])
     covered = (
         np.uint8(mean > np.float32(STOP_AT_COVERED)) & ~unmapped
@@ -124,63 +125,63 @@ def state_of(mean, precision, levels):
 
 
 @lean_kernel
-def put_block(frontiers, block, count):
-    """Note that a block has to be looked at again; returns how many do."""
+def queue_block(frontiers, block, count):
+    """Queue a block for its update; returns the number of queued blocks."""
     if frontiers.dirty[block] == 0:
         frontiers.dirty[block] = 1
-        frontiers.waiting[count] = block
+        frontiers.queued[count] = block
         count += 1
     return count
 
 
 @lean_kernel
-def _put_around(frontiers, x, y, z, reach, count):
-    """Note the blocks that have a voxel within `reach` along every axis."""
+def _queue_around(frontiers, x, y, z, reach, count):
+    """Queue the blocks that have a voxel within `reach` along every axis."""
     size, across, blocks = frontiers.size, frontiers.across, frontiers.blocks
     for i in range(max(x - reach, 0) // across[0], min(x + reach, size[0] - 1) // across[0] + 1):
         for j in range(max(y - reach, 0) // across[1], min(y + reach, size[1] - 1) // across[1] + 1):
             for k in range(max(z - reach, 0) // across[2], min(z + reach, size[2] - 1) // across[2] + 1):
-                count = put_block(frontiers, (i * blocks[1] + j) * blocks[2] + k, count)
+                count = queue_block(frontiers, flat_index(blocks, i, j, k), count)
     return count
 
 
 @inlined_kernel
 def _note_opened(frontiers, voxel):
-    """Note that a voxel turned out free."""
+    """Note that a voxel turned free."""
     count = frontiers.opened_count[0]
-    if count < OPENED:
+    if count < MAX_TRACKED_OPENINGS:
         frontiers.opened[count] = voxel
-    if count <= OPENED:
+    if count <= MAX_TRACKED_OPENINGS:
         frontiers.opened_count[0] = count + 1
 
 
 @lean_kernel
-def take_in(frontiers, mean, precision, levels):
+def update_frontiers(frontiers, mean, precision, levels):
     """Bring the map up to date with a belief: sums over all voxels, and work where something changed.
 
-    A measurement of a voxel raises its precision, and with it the number that its bits make, so the sum over
-    some voxels is what it was only if none of them was measured. (One too weak to raise a float32 does not
-    move the mean either.)
+    A measurement raises a voxel's precision, and with it the integer that its bit pattern represents. So the
+    sum over some voxels is unchanged only if none of them was measured. (A measurement too weak to raise a
+    float32 does not change the mean either.)
 
     Args:
         frontiers: Of the robot.
-        mean: (V,) float32, changed only where the precision was raised since it was taken in.
-        precision: (V,) float32 1/σ², nowhere less than it was then.
+        mean: (V,) float32, changed since the latest update only where the precision was raised.
+        precision: (V,) float32 1/σ², nowhere less than at the latest update.
         levels: (explored, mapped): precisions from which on a voxel is explored, and mapped.
     """
     size, layer, state = frontiers.size, frontiers.layer, frontiers.state
     reach, count, bits = 2, 0, precision.view(np.uint32)
     as_before = frontiers.levels[0] == levels[0] and frontiers.levels[1] == levels[1]
     frontiers.levels[0], frontiers.levels[1] = levels[0], levels[1]
-    for offset in frontiers.ball:
+    for offset in frontiers.footprint:
         reach = max(reach, abs(offset[0]) + 2)
-    for first in range(0, len(state), GLANCE):
-        last, total = min(first + GLANCE, len(state)), np.uint64(0)
+    for first in range(0, len(state), BLOCK_VOXELS):
+        last, total = min(first + BLOCK_VOXELS, len(state)), np.uint64(0)
         for voxel in range(first, last):
             total += np.uint64(bits[voxel])
-        if as_before and total == frontiers.sums[first // GLANCE]:
+        if as_before and total == frontiers.sums[first // BLOCK_VOXELS]:
             continue
-        frontiers.sums[first // GLANCE] = total
+        frontiers.sums[first // BLOCK_VOXELS] = total
         for voxel in range(first, last):
             now = state_of(mean[voxel], precision[voxel], levels)
             before = state[voxel]
@@ -191,21 +192,21 @@ def take_in(frontiers, mean, precision, levels):
             x, y, z = column // size[1], column % size[1], voxel % size[2]
             if before & COVERED > now & COVERED:
                 _note_opened(frontiers, voxel)
-            if before & UNEXPLORED < now & UNEXPLORED:  # more is asked for: a level has been changed
-                frontiers.opened_count[0] = OPENED + 1
+            if before & UNEXPLORED < now & UNEXPLORED:  # a finer level counts now
+                frontiers.opened_count[0] = MAX_TRACKED_OPENINGS + 1
             if layer < 0 or abs(z - layer) <= reach:
-                count = _put_around(frontiers, x, y, z, reach, count)
-    look_at_blocks(frontiers, count)
+                count = _queue_around(frontiers, x, y, z, reach, count)
+    update_blocks(frontiers, count)
 
 
 @lean_kernel
-def look_at_blocks(frontiers, count):
-    """Find the edge, the standing places and the candidates of the blocks that wait."""
+def update_blocks(frontiers, count):
+    """Find the edge, the places to stand and the candidates of the queued blocks."""
     for place in range(count):
-        _look_for_edge(frontiers, frontiers.waiting[place])
+        _mark_edge(frontiers, frontiers.queued[place])
     for place in range(count):
-        block = frontiers.waiting[place]
-        _look_for_candidate(frontiers, block)
+        block = frontiers.queued[place]
+        _choose_candidate(frontiers, block)
         frontiers.dirty[block] = 0
 
 
@@ -229,7 +230,7 @@ def _span(frontiers, block):
 def _at(size, x, y, z):
     """Number of a voxel; NONE = outside."""
     if 0 <= x < size[0] and 0 <= y < size[1] and 0 <= z < size[2]:
-        return (x * size[1] + y) * size[2] + z
+        return flat_index(size, x, y, z)
     return NONE
 
 
@@ -251,14 +252,14 @@ def _beside_unexplored(frontiers, x, y, z):
 
 
 @lean_kernel
-def _look_for_edge(frontiers, block):
+def _mark_edge(frontiers, block):
     """Set EDGE in a block."""
     low, high = _span(frontiers, block)
     for x in range(low[0], high[0]):
         for y in range(low[1], high[1]):
             for z in range(low[2], high[2]):
                 voxel = _at(frontiers.size, x, y, z)
-                frontiers.flags[voxel] &= CANDIDATE | SPENT
+                frontiers.flags[voxel] &= CANDIDATE | EXCLUDED
                 free = frontiers.state[voxel] & (UNMAPPED | COVERED) == 0
                 if free and (frontiers.state[voxel] & UNEXPLORED or _beside_unexplored(frontiers, x, y, z)):
                     frontiers.flags[voxel] |= EDGE
@@ -266,11 +267,11 @@ def _look_for_edge(frontiers, block):
 
 @lean_kernel
 def may_stand(frontiers, x, y, z):
-    """Whether all that the body touches is mapped and believed free, inside the workspace."""
-    for offset in frontiers.ball:
+    """Whether the body's footprint is mapped, believed free and inside the workspace."""
+    for offset in frontiers.footprint:
         up = z + offset[2]
         if frontiers.layer >= 0 and not 0 <= up < frontiers.size[2]:
-            continue  # the boundary above and below is no wall for who stays in a layer
+            continue  # the boundary above and below does not limit bodies that stay in a layer
         near = _at(frontiers.size, x + offset[0], y + offset[1], up)
         if near == NONE or frontiers.state[near] & (UNMAPPED | COVERED):
             return False
@@ -278,8 +279,8 @@ def may_stand(frontiers, x, y, z):
 
 
 @lean_kernel
-def _look_for_candidate(frontiers, block):
-    """Set rates and CANDIDATE in a block, and choose its candidate."""
+def _choose_candidate(frontiers, block):
+    """Set traversal costs and CANDIDATE in a block, and choose its candidate."""
     low, high = _span(frontiers, block)
     best, nearest = NONE, math.inf
     for x in range(low[0], high[0]):
@@ -287,11 +288,11 @@ def _look_for_candidate(frontiers, block):
             for z in range(low[2], high[2]):
                 voxel = _at(frontiers.size, x, y, z)
                 stands = frontiers.state[voxel] & (UNMAPPED | COVERED) == 0 and may_stand(frontiers, x, y, z)
-                frontiers.rates[voxel] = 1.0 if stands else math.inf
-                frontiers.flags[voxel] &= EDGE | SPENT
-                if not stands or frontiers.flags[voxel] & SPENT:
+                frontiers.traversal_cost[voxel] = 1.0 if stands else math.inf
+                frontiers.flags[voxel] &= EDGE | EXCLUDED
+                if not stands or frontiers.flags[voxel] & EXCLUDED:
                     continue
-                for offset in frontiers.ball:
+                for offset in frontiers.footprint:
                     near = _at(frontiers.size, x + offset[0], y + offset[1], z + offset[2])
                     if near != NONE and frontiers.flags[near] & EDGE:
                         frontiers.flags[voxel] |= CANDIDATE
@@ -314,7 +315,7 @@ def _apart(low, high, x, y, z):
 
 @lean_kernel
 def choose_reached(frontiers, cost, block):
-    """Another candidate of a block, of those that a search reached (cost of way finite); NONE if none was."""
+    """Another candidate of a block that a search reached, with a finite path cost; NONE = there is none."""
     low, high = _span(frontiers, block)
     best, nearest = NONE, math.inf
     for x in range(low[0], high[0]):

@@ -1,8 +1,8 @@
 """Rays of all directions from the centre of a voxel, merged where they cross the same voxels.
 
-From every centre the same rays cross the same voxels, a step away. Rays that lie close to each other begin
-alike: as branches of a tree, what they share is walked once, and where something stops a branch all rays in
-it end. Nodes are in depth-first order. Grid units.
+From every voxel's centre the rays cross the same pattern of voxels. Rays that lie close to each other start
+with the same voxels. As branches of a tree, what they share is traversed once, and where something stops a
+branch all its rays end. Nodes are in depth-first order. Grid units.
 """
 
 from __future__ import annotations
@@ -26,25 +26,25 @@ class RayTree(NamedTuple):
     cell: np.ndarray
     """(N,) uint32, number of the voxel among those that the tree's rays cross; several nodes may have one."""
     after: np.ndarray
-    """(N,) uint32, the node to go on with where this one stops its rays."""
+    """(N,) uint32, the next node if this one stops its rays."""
     cells: int
-    """How many voxels there are, each once."""
+    """Number of different voxels C."""
     box: np.ndarray
-    """(C,) int64, their numbers in a box around the first, `margin` wide on either side of it; ascending."""
+    """(C,) int64, their numbers in a box that extends `margin` to all sides of the first voxel; ascending."""
     margin: tuple[int, int, int]
     """See `box`."""
     nodes: np.ndarray
     """(N,) uint32, nodes in the order of their cells."""
     first: np.ndarray
-    """(C + 1,) int64, where the nodes of each cell begin in `nodes`, and where the last one's end."""
+    """(C + 1,) int64, index in `nodes` of each cell's first node, and one past the last cell's last."""
     low: tuple[int, int, int]
-    """Smallest steps along the axes …"""
+    """Smallest steps along the axes."""
     high: tuple[int, int, int]
-    """… and largest ones: where all these voxels lie inside, no ray leaves the workspace."""
+    """Largest steps along the axes. Where all voxels between lie inside, no ray leaves the workspace."""
 
 
 def grow_tree(directions: np.ndarray, reach: float, size: tuple[int, int, int]) -> RayTree:
-    """The tree of the voxels that `cast_ray` notes where nothing stops it.
+    """The tree of the voxels that rays cross where nothing stops them.
 
     Args:
         directions: (D, 3) float64 unit vectors, D ≥ 1.

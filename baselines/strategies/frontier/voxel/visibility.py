@@ -1,9 +1,10 @@
 """How many unexplored points are expected to be seen from a place: the V of Sawhney 2009, sects. 3.4-3.5.
 
 In a map of voxels rays go out until something believed covered stops them, or to the sensor's range; each
-unexplored voxel that they cross counts once. Over a height field (`terrain_view`) points are columns. A point
-that n robots have promised to see weighs 1/(1 + n). (The paper's 1/n would make the first promise free.) The
-naive V, for comparison, counts all unexplored points in a ball as large as the range. Grid units.
+unexplored voxel that they cross counts once. Over a height field (terrain/visibility.py) points are columns.
+A point that n robots have promised to see has the weight 1/(1 + n). (The paper's 1/n would not reduce the
+weight for the first promise.) The naive V, for comparison, counts all unexplored points in a ball whose
+radius is the range. Grid units.
 """
 
 from __future__ import annotations
@@ -16,36 +17,40 @@ import numpy as np
 from baselines.strategies.frontier.voxel.map import NONE, STOPS_RAYS, UNEXPLORED
 from baselines.strategies.frontier.voxel.ray_tree import cell_at
 from entropy_explore_env.belief.raycast import cast_ray, longest_crossing
+from entropy_explore_env.belief.voxel_index import flat_index
 from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel
 
 MOST_RAYS = 720
 
 
-class Tally(NamedTuple):
-    """Working space of counts, and what teammates promised to see; N points."""
+class VisibilityCounter(NamedTuple):
+    """Counts visible points, and notes which ones robots promised to see; N points."""
 
     stamp: np.ndarray
-    """(N,) int32, number of the count that met a point last."""
+    """(N,) int32, number of the latest count that met a point."""
     promised: np.ndarray
-    """(N,) uint8, robots that will see a point."""
-    marked: np.ndarray
-    """(N,) int32, points with promises …"""
-    numbers: np.ndarray
-    """(2,) int64: number of the latest count, and how many points are marked."""
+    """(N,) uint8, number of robots that will see a point."""
+    promised_points: np.ndarray
+    """(N,) int32, points with promises; the first `promised_count`."""
+    promised_count: np.ndarray
+    """(1,) int64."""
+    latest: np.ndarray
+    """(1,) int64, number of the latest count."""
     crossed: np.ndarray
-    """(L,) int32, for `cast_ray`, as is …"""
+    """(L,) int32, scratch space of `cast_ray`."""
     entered: np.ndarray
-    """(L,) int64."""
+    """(L,) int64, scratch space of `cast_ray`."""
 
 
-def new_tally(points: int, shape: tuple[int, int, int]) -> Tally:
-    """Working space for a map of this shape."""
+def new_counter(points: int, shape: tuple[int, int, int]) -> VisibilityCounter:
+    """A counter for a map of this shape, without promises."""
     longest = longest_crossing(*shape, math.inf, 2)
-    return Tally(
+    return VisibilityCounter(
         np.zeros(points, np.int32),
         np.zeros(points, np.uint8),
         np.zeros(points, np.int32),
-        np.zeros(2, np.int64),
+        np.zeros(1, np.int64),
+        np.zeros(1, np.int64),
         np.zeros(longest, np.int32),
         np.zeros(longest, np.int64),
     )
@@ -71,82 +76,82 @@ def rays_towards(yaws: np.ndarray, pitches: np.ndarray) -> np.ndarray:
 
 @inlined_kernel
 def weight(promises):
-    """Of a point that so many robots have promised to see."""
+    """Weight of a point that this many robots have promised to see."""
     return 1.0 / (1.0 + promises)
 
 
 _WEIGHTS = 1.0 / (1.0 + np.arange(256))
-"""The same by number of promises."""
+"""Weights by number of promises."""
 
 
 @inlined_kernel
-def begin_count(tally):
-    """Number of a new count."""
-    tally.numbers[0] += 1
-    if tally.numbers[0] > 2**31 - 2:  # once in a lifetime
-        for point in range(len(tally.stamp)):
-            tally.stamp[point] = 0
-        tally.numbers[0] = 1
-    return np.int32(tally.numbers[0])
+def start_count(counter):
+    """Start a new count; returns its number."""
+    counter.latest[0] += 1
+    if counter.latest[0] > 2**31 - 2:  # once in a lifetime
+        for point in range(len(counter.stamp)):
+            counter.stamp[point] = 0
+        counter.latest[0] = 1
+    return np.int32(counter.latest[0])
 
 
 @inlined_kernel
-def promise(tally, point):
+def promise(counter, point):
     """Note that one more robot will see a point."""
-    if tally.promised[point] == 0:
-        tally.marked[tally.numbers[1]] = point
-        tally.numbers[1] += 1
-    tally.promised[point] = min(np.int64(tally.promised[point]) + 1, 255)
+    if counter.promised[point] == 0:
+        counter.promised_points[counter.promised_count[0]] = point
+        counter.promised_count[0] += 1
+    counter.promised[point] = min(np.int64(counter.promised[point]) + 1, 255)
 
 
 @inlined_kernel
-def count_point(tally, point, marking):
-    """What a point that is seen counts; if `marking` it is promised from now on."""
-    value = weight(tally.promised[point])
+def count_point(counter, point, marking):
+    """Weight of a visible point; if `marking`, one more robot promises to see it."""
+    value = weight(counter.promised[point])
     if marking:
-        promise(tally, point)
+        promise(counter, point)
     return value
 
 
 @lean_kernel
-def clear_promises(tally):
+def clear_promises(counter):
     """Release all promises."""
-    for place in range(tally.numbers[1]):
-        tally.promised[tally.marked[place]] = 0
-    tally.numbers[1] = 0
+    for place in range(counter.promised_count[0]):
+        counter.promised[counter.promised_points[place]] = 0
+    counter.promised_count[0] = 0
 
 
 @lean_kernel
-def count_crossed(tally, state, size, start, directions, reach, marking):
+def count_crossed(counter, state, size, start, directions, reach, marking):
     """Unexplored voxels that rays from a place cross: (all, weighed by promises).
 
     Args:
-        tally: Working space.
+        counter: The counter.
         state: (V,) uint8 of a FrontierMap.
         size: (X, Y, Z) voxels.
         start: (3,) float64, the place.
         directions: (D, 3) float64 unit vectors.
         reach: Of the rays, in voxel edges; inf allowed.
-        marking: Whether the voxels are promised from now on.
+        marking: Whether the robot promises to see these voxels.
     """
-    number, points, weighed = begin_count(tally), 0, 0.0
+    number, points, weighed = start_count(counter), 0, 0.0
     begin = (start[0], start[1], start[2])
     for ray in range(len(directions)):
         direction = (directions[ray, 0], directions[ray, 1], directions[ray, 2])
         _, n, _ = cast_ray(
-            state, STOPS_RAYS, size, begin, direction, reach, False, 1, tally.crossed, tally.entered
+            state, STOPS_RAYS, size, begin, direction, reach, False, 1, counter.crossed, counter.entered
         )
         for place in range(n):
-            voxel = np.uint32(tally.crossed[place])
-            if state[voxel] & UNEXPLORED and tally.stamp[voxel] != number:
-                tally.stamp[voxel] = number
+            voxel = np.uint32(counter.crossed[place])
+            if state[voxel] & UNEXPLORED and counter.stamp[voxel] != number:
+                counter.stamp[voxel] = number
                 points += 1
-                weighed += count_point(tally, voxel, marking)
+                weighed += count_point(counter, voxel, marking)
     return points, weighed
 
 
 @lean_kernel
-def count_in_ball(tally, state, size, start, reach, marking):
+def count_in_ball(counter, state, size, start, reach, marking):
     """The naive V: unexplored voxels with their centres within reach of a place, seen or not."""
     points, weighed = 0, 0.0
     wide = min(reach, size[0] + size[1] + size[2])
@@ -154,32 +159,39 @@ def count_in_ball(tally, state, size, start, reach, marking):
         for y in range(max(int(start[1] - wide - 0.5), 0), min(int(start[1] + wide + 1.0), size[1])):
             for z in range(max(int(start[2] - wide - 0.5), 0), min(int(start[2] + wide + 1.0), size[2])):
                 dx, dy, dz = x + 0.5 - start[0], y + 0.5 - start[1], z + 0.5 - start[2]
-                voxel = (x * size[1] + y) * size[2] + z
+                voxel = flat_index(size, x, y, z)
                 if dx * dx + dy * dy + dz * dz <= wide * wide and state[voxel] & UNEXPLORED:
                     points += 1
-                    weighed += count_point(tally, voxel, marking)
+                    weighed += count_point(counter, voxel, marking)
     return points, weighed
 
 
 @lean_kernel
-def count_from(tally, state, size, voxels, tree, met, seen, weighed):
-    """Fill (K,) with the points seen from K voxels' centres, and with them weighed by promises.
+def count_from(counter, state, size, voxels, tree, met, seen, weighed):
+    """Fill (K,) `seen` with the points seen from K voxels' centres, (K,) `weighed` with the sums of weights.
 
-    What `count_crossed` finds, with the rays as a RayTree of C cells; `met` is (C,) int32 scratch space.
+    The same as `count_crossed` finds, with the rays as a RayTree of C cells; `met` is (C,) int32 scratch
+    space.
     """
     for cell in range(len(met)):
         met[cell] = -1
-    promises, nodes = tally.numbers[1] > 0, len(tree.offset)
+    promises, nodes = counter.promised_count[0] > 0, len(tree.offset)
     for place in range(len(voxels)):
         voxel = np.int64(voxels[place])
-        at = place_in(size, voxel)
+        at = grid_indices(size, voxel)
         inside = _inside(tree, size, at)
         if inside and not promises:
-            points, value = _climb(tally, state, size, voxel, tree, at, met, place, 0, nodes, True, False)
+            points, value = _count_branches(
+                counter, state, size, voxel, tree, at, met, place, 0, nodes, True, False
+            )
         elif inside:
-            points, value = _climb(tally, state, size, voxel, tree, at, met, place, 0, nodes, True, True)
+            points, value = _count_branches(
+                counter, state, size, voxel, tree, at, met, place, 0, nodes, True, True
+            )
         else:
-            points, value = _climb(tally, state, size, voxel, tree, at, met, place, 0, nodes, False, True)
+            points, value = _count_branches(
+                counter, state, size, voxel, tree, at, met, place, 0, nodes, False, True
+            )
         seen[place], weighed[place] = points, value
 
 
@@ -193,11 +205,11 @@ def _inside(tree, size, at):
 
 
 @inlined_kernel
-def _climb(tally, state, size, voxel, tree, at, met, place, first, last, inside, promises):
+def _count_branches(counter, state, size, voxel, tree, at, met, place, first, last, inside, promises):
     """Count along the tree's branches, its nodes `first` … `last` - 1: (all, weighed). See `count_from`.
 
-    The rays start in a voxel, given by its number and by axis, the `place`-th that is counted from; they
-    leave the workspace nowhere (`inside`) or perhaps; there are `promises` or none.
+    The rays start in a voxel, given by its number and its indices `at`, which is the `place`-th of the call.
+    With `inside` no ray leaves the workspace, and without `promises` all weights are 1: both save time.
     """
     points, weighed, node = 0, 0.0, np.uint32(first)
     while node < np.uint32(last):
@@ -212,7 +224,7 @@ def _climb(tally, state, size, voxel, tree, at, met, place, first, last, inside,
         met[cell] = place
         points += np.int64(fresh)
         if promises and fresh:
-            weighed += _WEIGHTS[tally.promised[there]]
+            weighed += _WEIGHTS[counter.promised[there]]
         if flags > STOPS_RAYS and node > 0:
             node = tree.after[node]
         else:
@@ -221,20 +233,20 @@ def _climb(tally, state, size, voxel, tree, at, met, place, first, last, inside,
 
 
 @lean_kernel
-def add_opened(tally, state, size, opened, voxels, tree, met, seen):
-    """Add to (K,) bounds of what is seen from K voxels what is seen now through voxels that turned out free.
+def add_opened(counter, state, size, opened, voxels, tree, met, seen):
+    """Add to upper bounds of what is seen from K voxels what becomes visible through newly freed voxels.
 
-    So they stay bounds, though rays go on where they ended before: nothing else shows more than it did.
+    So the bounds stay valid: nothing else can make more visible than before.
 
     Args:
-        tally: As `count_from` takes it; it stays as it is.
-        state: (V,) uint8, as it is now.
+        counter: The counter; not changed.
+        state: (V,) uint8 of a FrontierMap.
         size: (X, Y, Z) voxels.
-        opened: (N,) int32, voxels that were covered when bounds were last added to, and are not now.
-        voxels: (K,) int32; NONE = there is none.
-        tree: A RayTree of C cells, by which the bounds were found.
+        opened: (N,) int32, voxels that turned free since the bounds were last updated.
+        voxels: (K,) int32; NONE = no voxel.
+        tree: The RayTree of C cells with which the bounds were counted.
         met: (C,) int32 scratch space.
-        seen: (K,) float32, changed in place; inf = there is no bound, and will be none.
+        seen: (K,) float32 bounds, changed in place; inf = unknown, and stays so.
     """
     for cell in range(len(met)):
         met[cell] = -1
@@ -242,9 +254,9 @@ def add_opened(tally, state, size, opened, voxels, tree, met, seen):
         if voxels[place] == NONE or math.isinf(seen[place]):
             continue
         voxel = np.int64(voxels[place])
-        at = place_in(size, voxel)
+        at = grid_indices(size, voxel)
         for other in opened:
-            x, y, z = place_in(size, other)
+            x, y, z = grid_indices(size, other)
             cell = cell_at(tree, x - at[0], y - at[1], z - at[2])
             if cell < 0:
                 continue
@@ -252,8 +264,8 @@ def add_opened(tally, state, size, opened, voxels, tree, met, seen):
                 node = np.int64(tree.nodes[number])
                 if node > 0 and _is_reached(state, voxel, tree, node):
                     first, last = node + 1, tree.after[node]
-                    seen[place] += _climb(
-                        tally,
+                    seen[place] += _count_branches(
+                        counter,
                         state,
                         size,
                         voxel,
@@ -284,22 +296,22 @@ def _is_reached(state, voxel, tree, node):
 
 
 @lean_kernel
-def count_in_balls(tally, state, size, voxels, reach, seen, weighed):
+def count_in_balls(counter, state, size, voxels, reach, seen, weighed):
     """`count_from` with the naive V."""
     for place in range(len(voxels)):
         start = centre_of(size, voxels[place])
-        seen[place], weighed[place] = count_in_ball(tally, state, size, start, reach, False)
+        seen[place], weighed[place] = count_in_ball(counter, state, size, start, reach, False)
 
 
 @inlined_kernel
 def centre_of(size, voxel):
     """(x, y, z) of a voxel's centre."""
-    x, y, z = place_in(size, voxel)
+    x, y, z = grid_indices(size, voxel)
     return x + 0.5, y + 0.5, z + 0.5
 
 
 @inlined_kernel
-def place_in(size, voxel):
+def grid_indices(size, voxel):
     """(x, y, z) of a voxel, whole numbers."""
     column = voxel // size[2]
     return column // size[1], column % size[1], voxel - column * size[2]

@@ -96,7 +96,7 @@ def test_expected_is_what_those_who_choose_now_will_see():
 
     def look(share, views, chosen):
         place = env.missions.grid.in_grid_units(chosen[0])[:3]
-        chosen_at[views[0].time_s] = explorer.allotter_of(0).candidates.expected(place)
+        chosen_at[views[0].time_s] = explorer.allocator_of(0).candidates.expected(place)
 
     followed(env, explorer, 0, look)
     taken = snapshots(cell, 0)

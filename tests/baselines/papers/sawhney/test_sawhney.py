@@ -34,7 +34,7 @@ from baselines.papers.sawhney.sweep import (
 )
 from baselines.papers.sawhney.sweep import experiment as cells_of
 from baselines.papers.sawhney.terrain_model import write_model
-from baselines.strategies.frontier import Exploring, Metric
+from baselines.strategies.frontier import ExplorationConfig, Metric
 from baselines.strategies.frontier.metrics import Nearest
 from entropy_explore_env.scenario import with_settings
 from entropy_explore_env.settings import Grid
@@ -52,10 +52,10 @@ def test_the_cells_are_the_experiment_s():
                 assert (cell.scenario.robots, cell.scenario.world) == (n, world)
                 assert cell.seeds == (40 if world in PLANS else 30)
             assert cells[cell_id(world, n, "ptv")].record.exploring.metric == Metric()
-            assert cells[cell_id(world, n, "sync")].record.exploring.allotment == "synchronous"
-            assert cells[cell_id(world, n, "naive")].record.exploring.looking.visibility == "naive"
+            assert cells[cell_id(world, n, "sync")].record.exploring.allocation == "synchronous"
+            assert cells[cell_id(world, n, "naive")].record.exploring.frontiers.visibility == "naive"
             assert cells[cell_id(world, n, "nearest")].record.exploring.metric == Nearest()
-    assert cells[cell_id("terrain", 2, "no-height")].record.exploring.looking.gamma is None
+    assert cells[cell_id("terrain", 2, "no-height")].record.exploring.frontiers.gamma is None
     for part, world in (("plans", "office"), ("terrains", "terrain-rough")):
         for change in CHANGES[part]:
             for method in CHANGED_METHODS[part]:
@@ -237,7 +237,7 @@ def test_what_is_refused(words, complaint, capsys):
 def test_methods_differ_in_plans_and_over_terrain():
     farther = {f"beta-{beta}" for beta in sawhney_cells.FARTHER_BETAS["terrains"]}
     assert set(methods("terrains", True)) - set(methods("plans", True)) == {"no-height", *farther}
-    assert Run(Exploring()) == Run(Exploring()) and sawhney_cells.TIME_LIMIT_S == 3600.0
+    assert Run(ExplorationConfig()) == Run(ExplorationConfig()) and sawhney_cells.TIME_LIMIT_S == 3600.0
 
 
 def test_the_model_of_jacksboro_is_a_world_to_fly_over(tmp_path):

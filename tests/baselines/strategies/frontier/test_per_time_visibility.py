@@ -1,4 +1,4 @@
-"""The strategies of frontiers: how they allot, that lazily is as eagerly, and how missions end."""
+"""The strategies of frontiers: how they allocate, that lazily is as eagerly, and how missions end."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ import pytest
 from baselines.experiments.mission import run_mission, scripted
 from baselines.papers.sawhney.mission import followed
 from baselines.strategies import make_strategy
-from baselines.strategies.frontier import Exploring, FrontierStrategy, Metric
+from baselines.strategies.frontier import ExplorationConfig, FrontierStrategy, Metric
 from baselines.strategies.frontier.allocation import under_way
-from baselines.strategies.frontier.candidates import Looking
+from baselines.strategies.frontier.candidates import FrontierConfig
 from baselines.strategies.frontier.metrics import Coordinated, Nearest
 from baselines.strategies.frontier.voxel.candidates import VoxelCandidates
 from baselines.strategies.frontier.voxel.map import COVERED, NONE
@@ -65,18 +65,18 @@ def small_terrain(**settings):
     return with_settings(base, {**changes, **settings})
 
 
-def explored(scenario, seed=0, **exploring):
+def explored(scenario, seed=0, **config):
     """A mission up to no frontier: environment, strategy, and what was done."""
-    explorer = FrontierStrategy(Exploring(**{"finest_sigma": ONCE, **exploring}))
+    explorer = FrontierStrategy(ExplorationConfig(**{"finest_sigma": ONCE, **config}))
     env = EntropyExploreEnv(scenario)
     times_s, shares = followed(env, explorer, seed)
     return env, explorer, (list(times_s), list(shares), mission_figures(env.missions, 0)["distance_m"])
 
 
 @pytest.mark.parametrize("metric", [Metric(), Metric(0.5), Metric(bonus=0.5), Nearest(), Coordinated()])
-@pytest.mark.parametrize("allotment", ["asynchronous", "synchronous"])
-def test_lazily_is_as_eagerly_in_plans(metric, allotment):
-    settings = {"metric": metric, "allotment": allotment}
+@pytest.mark.parametrize("allocation", ["asynchronous", "synchronous"])
+def test_lazily_is_as_eagerly_in_plans(metric, allocation):
+    settings = {"metric": metric, "allocation": allocation}
     _, lazy, done = explored(small_plan(), 1, **settings)
     _, eager, same = explored(small_plan(), 1, lazy=False, **settings)
     assert done == same and lazy.counted() < eager.counted()
@@ -87,10 +87,10 @@ def test_lazily_is_as_eagerly_in_plans(metric, allotment):
     "settings",
     [
         {},
-        {"looking": Looking(gamma=None)},
+        {"frontiers": FrontierConfig(gamma=None)},
         {"metric": Metric(60.0)},
-        {"looking": Looking(visibility="naive")},
-        {"looking": Looking(unexplored_ground="level")},
+        {"frontiers": FrontierConfig(visibility="naive")},
+        {"frontiers": FrontierConfig(unexplored_ground="level")},
     ],
 )
 def test_lazily_is_as_eagerly_over_terrain(settings):
@@ -118,22 +118,22 @@ def test_bounds_stay_bounds_through_a_noisy_mission(monkeypatch, seed, finest):
 
     monkeypatch.setattr(VoxelCandidates, "update", checked)
     noisy = {"max_range_m": 1.5, "angular_step_rad": math.pi / 90, "scan_time_s": 2.0, "range_noise_m": 0.3}
-    explored(small_plan(sensor=noisy), seed, allotment="synchronous", finest_sigma=finest)
+    explored(small_plan(sensor=noisy), seed, allocation="synchronous", finest_sigma=finest)
     assert max(opened) > 5 and len(levels) > 1
 
 
-@pytest.mark.parametrize("allotment", ["asynchronous", "synchronous"])
-def test_all_is_explored_with_lost_and_unheard_messages(allotment):
+@pytest.mark.parametrize("allocation", ["asynchronous", "synchronous"])
+def test_all_is_explored_with_lost_and_unheard_messages(allocation):
     """Decentralised: a third of the messages lost, none heard beyond 3 m, few measurements in each."""
     channel = {"burst": 30, "i_min_bits": 0.0, "loss_probability": 0.3, "range_m": 3.0}
-    env, explorer, done = explored(small_plan(channel=channel), 4, allotment=allotment)
+    env, explorer, done = explored(small_plan(channel=channel), 4, allocation=allocation)
     assert all(explorer.idle) and done[1][-1] > 0.97
     assert mission_figures(env.missions, 0)["t_mission_s"] < 900.0
 
 
-@pytest.mark.parametrize("allotment", ["asynchronous", "synchronous"])
-def test_terrain_is_mapped_below_the_exposure_surface(allotment):
-    env, explorer, done = explored(small_terrain(), 3, allotment=allotment)
+@pytest.mark.parametrize("allocation", ["asynchronous", "synchronous"])
+def test_terrain_is_mapped_below_the_exposure_surface(allocation):
+    env, explorer, done = explored(small_terrain(), 3, allocation=allocation)
     assert all(explorer.idle) and done[1][-1] > 0.97
     truth = env.missions.state.truth[0].reshape(env.missions.grid.shape)
     view = view_of(env.missions, 0, 0)
@@ -148,7 +148,7 @@ def test_synchronous_robots_over_terrain_wait_for_this_journey_and_no_other(navi
     """Who waits scans on the spot, 0.5 s each time: it leaves soon after the last one has scanned."""
     robot = {"reach_m": math.inf, "body_radius_m": 0.0, "navigator": navigator, "unknown_cost": 1e4}
     scenario = small_terrain(robots=3, robot=robot)
-    _, explorer, _ = explored(scenario, 1, allotment="synchronous")
+    _, explorer, _ = explored(scenario, 1, allocation="synchronous")
     late_s = []
     for before, after in itertools.pairwise(rounds(explorer)):
         ended_s = max(end for _, end in before)
@@ -158,33 +158,33 @@ def test_synchronous_robots_over_terrain_wait_for_this_journey_and_no_other(navi
 
 
 def rounds(explorer):
-    """(left, ended) of the journeys of each round, s."""
+    """(left, ended) of the trips of each round, s."""
     by_round: dict[int, list[tuple[float, float]]] = {}
-    for journey in explorer.journeys:
-        by_round.setdefault(journey.number, []).append((journey.ended_s - journey.seconds, journey.ended_s))
+    for trip in explorer.trips:
+        by_round.setdefault(trip.number, []).append((trip.ended_s - trip.seconds, trip.ended_s))
     return [by_round[number] for number in sorted(by_round)]
 
 
 @pytest.mark.parametrize("scenario", [small_plan(), small_terrain()])
 def test_where_a_robot_scanned_is_a_candidate_again_once_more_is_asked_for(scenario):
     env, explorer, _ = explored(scenario, 2)
-    candidates = explorer._allotters[0].candidates
+    candidates = explorer._allocators[0].candidates
     view = view_of(env.missions, 0, 0)
-    candidates.unspend()
+    candidates.readmit()
     candidates.update(view, 0.5)
-    before = set(candidates.found()[1].tolist())
+    before = set(candidates.listed()[1].tolist())
     candidates.update(view, 1e-3)
-    voxels = candidates.found()[1].tolist()
+    voxels = candidates.listed()[1].tolist()
     assert voxels and set(voxels) - before
-    candidates.spend(voxels[0])
-    assert voxels[0] not in candidates.found()[1]
-    candidates.unspend()
-    assert voxels[0] in candidates.found()[1]
+    candidates.exclude(voxels[0])
+    assert voxels[0] not in candidates.listed()[1]
+    candidates.readmit()
+    assert voxels[0] in candidates.listed()[1]
 
 
 def test_synchronous_robots_leave_together():
-    """Nobody sets out on its next journey before all have ended their latest one."""
-    _, explorer, _ = explored(small_plan(), 4, allotment="synchronous")
+    """Nobody sets out on its next trip before all have ended their latest one."""
+    _, explorer, _ = explored(small_plan(), 4, allocation="synchronous")
     found = rounds(explorer)
     assert len(found) > 5
     for before, after in itertools.pairwise(found):
@@ -218,14 +218,14 @@ def corridor(places, heard=True):
     return missions
 
 
-def sent(missions, **exploring):
+def sent(missions, **config):
     """Layers along y to which robots go that have scanned once."""
     strategy = FrontierStrategy(
-        Exploring(**{"finest_sigma": ONCE, "looking": Looking(spacing_m=0.5), **exploring})
+        ExplorationConfig(**{"finest_sigma": ONCE, "frontiers": FrontierConfig(spacing_m=0.5), **config})
     )
     strategy.reset(missions.scenario, np.random.default_rng(0))
-    for errand in strategy._errands:
-        errand.scanned = True
+    for assignment in strategy._assignments:
+        assignment.scanned = True
     views = [view_of(missions, 0, robot) for robot in range(missions.scenario.robots)]
     return [int(missions.grid.voxel_of(v[:3])[1]) for v in strategy.choose(views)]
 
@@ -287,17 +287,17 @@ def test_allotment_is_the_paper_s_loop():
 
 
 def check_against_reference(missions, known):
-    strategy = FrontierStrategy(Exploring(finest_sigma=ONCE, looking=Looking(spacing_m=1.0)))
+    strategy = FrontierStrategy(ExplorationConfig(finest_sigma=ONCE, frontiers=FrontierConfig(spacing_m=1.0)))
     strategy.reset(missions.scenario, np.random.default_rng(0))
     views = [view_of(missions, 0, robot) for robot in range(3)]
-    for errand in strategy._errands:
-        errand.scanned = True
+    for assignment in strategy._assignments:
+        assignment.scanned = True
     places = [tuple(missions.grid.voxel_of(v[:3]).tolist()) for v in strategy.choose(views)]
-    allotter = strategy._allotters[0]
-    assert isinstance(allotter.candidates, VoxelCandidates)
-    _, voxels = allotter.candidates.found()
+    allocator = strategy._allocators[0]
+    assert isinstance(allocator.candidates, VoxelCandidates)
+    _, voxels = allocator.candidates.listed()
     state = np.where(known, 0, 3)
-    directions, reach = allotter.candidates._directions, allotter.candidates.reach
+    directions, reach = allocator.candidates._directions, allocator.candidates.reach
     shape, edge = known.shape, missions.grid.voxel_size_m
     where = {int(v): np.stack(np.unravel_index(int(v), shape)) for v in voxels}
     sees = {v: reference.seen_voxels(state, place + 0.5, directions, reach) for v, place in where.items()}
@@ -312,7 +312,7 @@ def check_against_reference(missions, known):
         seen = reference.weighed(sees[place], promised)
         return seen / (drive_s + kind.sensor.scan_time_s) if seen else -math.inf
 
-    wanted = reference.allotted(range(3), list(where), value, sees.__getitem__, {})
+    wanted = reference.allocated(range(3), list(where), value, sees.__getitem__, {})
     assert places == [tuple(where[wanted[robot]].tolist()) for robot in range(3)]
 
 
@@ -339,7 +339,7 @@ def test_bodies_and_a_short_reach_explore_an_office():
     env = EntropyExploreEnv(
         with_settings(scripted(find_scenario("office")), {"robots": 2, "track_truth": True})
     )
-    explorer = FrontierStrategy(Exploring(finest_sigma=ONCE))
+    explorer = FrontierStrategy(ExplorationConfig(finest_sigma=ONCE))
     followed(env, explorer, 1)
     assert all(explorer.idle) or env.missions.over(0) is MissionEnd.MAPPED
     explored = joint_figures(env.missions, 0)["explored"]
@@ -352,18 +352,18 @@ def test_bodies_and_a_short_reach_explore_an_office():
         (Metric, {"beta": -1.0}, "Metric.beta"),
         (Metric, {"bonus": -0.1}, "Metric.bonus"),
         (Coordinated, {"beta": math.nan}, "Coordinated.beta"),
-        (Exploring, {"allotment": "central"}, "Exploring.allotment"),
-        (Exploring, {"finest_sigma": 0.6}, "Exploring.finest_sigma"),
-        (Exploring, {"promises": 1}, "Exploring.promises"),
-        (Exploring, {"metric": None}, "Exploring.metric"),
-        (Exploring, {"metric": "V/t"}, "Exploring.metric"),
-        (Exploring, {"metric": Metric}, "Exploring.metric"),
-        (FrontierStrategy, {"exploring": "V/t"}, "exploring"),
-        (Looking, {"sigma": 0.0}, "Looking.sigma"),
-        (Looking, {"spacing_m": 0.0}, "Looking.spacing_m"),
-        (Looking, {"visibility": "all"}, "Looking.visibility"),
-        (Looking, {"gamma": 1.5}, "Looking.gamma"),
-        (Looking, {"too_high": 0.0}, "Looking.too_high"),
+        (ExplorationConfig, {"allocation": "central"}, "ExplorationConfig.allocation"),
+        (ExplorationConfig, {"finest_sigma": 0.6}, "ExplorationConfig.finest_sigma"),
+        (ExplorationConfig, {"promises": 1}, "ExplorationConfig.promises"),
+        (ExplorationConfig, {"metric": None}, "ExplorationConfig.metric"),
+        (ExplorationConfig, {"metric": "V/t"}, "ExplorationConfig.metric"),
+        (ExplorationConfig, {"metric": Metric}, "ExplorationConfig.metric"),
+        (FrontierStrategy, {"config": "V/t"}, "config"),
+        (FrontierConfig, {"sigma": 0.0}, "FrontierConfig.sigma"),
+        (FrontierConfig, {"spacing_m": 0.0}, "FrontierConfig.spacing_m"),
+        (FrontierConfig, {"visibility": "all"}, "FrontierConfig.visibility"),
+        (FrontierConfig, {"gamma": 1.5}, "FrontierConfig.gamma"),
+        (FrontierConfig, {"too_high": 0.0}, "FrontierConfig.too_high"),
     ],
 )
 def test_what_is_refused(kind, settings, field):

@@ -12,13 +12,13 @@ from hypothesis import strategies as st
 from baselines.strategies.frontier.terrain.map import (
     TILE,
     choose_reached_columns,
-    forget_seen,
-    look_at_columns,
     new_terrain_map,
-    survey,
+    reset_bounds,
+    update_columns,
+    update_terrain,
 )
 from baselines.strategies.frontier.terrain.visibility import (
-    Look,
+    ViewModel,
     bound_columns,
     count_below,
     count_columns_from,
@@ -27,8 +27,8 @@ from baselines.strategies.frontier.terrain.visibility import (
     mean_ground,
     sum_rows,
 )
-from baselines.strategies.frontier.voxel.map import NONE, put_block
-from baselines.strategies.frontier.voxel.visibility import new_tally
+from baselines.strategies.frontier.voxel.map import NONE, queue_block
+from baselines.strategies.frontier.voxel.visibility import new_counter
 from tests.reference import sawhney as reference
 from tests.reference.scenes import drawn, seeds
 
@@ -47,7 +47,7 @@ def known_ground(ground, shape=SHAPE, ceiling=CEILING, radius=0.0, spacing=2, ri
 def survey_ground(terrain, ground, shape=SHAPE):
     mean = np.where(np.arange(shape[2]) < ground[:, :, None], 0.9, 0.1).astype(np.float32)
     precision = np.where(ground[:, :, None] < 0, 0.1, 9.0) * np.ones(shape)
-    survey(terrain, mean.reshape(-1), precision.astype(np.float32).reshape(-1), LEVELS)
+    update_terrain(terrain, mean.reshape(-1), precision.astype(np.float32).reshape(-1), LEVELS)
 
 
 def hills(seed, known=0.7, shape=SHAPE):
@@ -64,14 +64,14 @@ def test_ground_is_the_known_covered_voxel_below_a_known_free_one(seed):
     mean = np.where(rng.random(SHAPE) < 0.5, 0.9, 0.1).astype(np.float32)
     precision = np.where(rng.random(SHAPE) < 0.3, 0.1, 9.0).astype(np.float32)
     terrain = new_terrain_map(SHAPE, 0.0, 3, 2, np.full(SHAPE[:2], CEILING, np.int32))
-    survey(terrain, mean.reshape(-1), precision.reshape(-1), LEVELS)
+    update_terrain(terrain, mean.reshape(-1), precision.reshape(-1), LEVELS)
     state = np.where(precision < 4.0, 3, 0) | np.where((mean > 0.5) & (precision >= 4.0), 4, 0)
     np.testing.assert_array_equal(terrain.ground, reference.ground_of(state))
 
 
 @given(seeds, st.floats(0.5, 7.5), st.floats(3.0, 12.0), st.sampled_from([0.0, 0.3]), st.booleans())
 @drawn(60)
-def test_columns_are_those_whose_tops_rays_meet(seed, height, reach, flattest, level):
+def test_columns_are_those_whose_tops_rays_meet(seed, height, reach, min_tangent, level):
     ground, rng = hills(seed)
     x, y = int(rng.integers(0, 9)), int(rng.integers(0, 13))
     ground[x, y] = 0 if ground[x, y] == NONE else min(ground[x, y], int(height))
@@ -83,19 +83,22 @@ def test_columns_are_those_whose_tops_rays_meet(seed, height, reach, flattest, l
     fade = math.inf if level else reach
     heights = reference.surface(terrain.ground, eye, average, fade)
     unexplored = terrain.ground == NONE
-    wanted = reference.seen_columns(heights, unexplored, eye, azimuths, reach, flattest)
-    tally = new_tally(9 * 13, SHAPE)
-    look = Look(reach, flattest, 2, 0.5, math.inf, fade)
-    points, value = count_below(tally, terrain, eye, average, azimuths, look, True)
-    marked = {tuple(map(int, np.unravel_index(c, (9, 13)))) for c in tally.marked[: tally.numbers[1]]}
+    wanted = reference.seen_columns(heights, unexplored, eye, azimuths, reach, min_tangent)
+    counter = new_counter(9 * 13, SHAPE)
+    view_model = ViewModel(reach, min_tangent, 2, 0.5, math.inf, fade)
+    points, value = count_below(counter, terrain, eye, average, azimuths, view_model, True)
+    marked = {
+        tuple(map(int, np.unravel_index(c, (9, 13))))
+        for c in counter.promised_points[: counter.promised_count[0]]
+    }
     assert (points, value, marked) == (len(wanted), len(wanted), wanted)
-    assert count_below(tally, terrain, eye, average, azimuths, look, False)[1] == len(wanted) / 2
+    assert count_below(counter, terrain, eye, average, azimuths, view_model, False)[1] == len(wanted) / 2
     ball = {
         (i, j)
         for i, j in np.argwhere(unexplored).tolist()
         if math.dist((i + 0.5, j + 0.5, heights[i, j]), eye) <= reach
     }
-    assert count_columns_in_ball(tally, terrain, eye, average, look, False)[0] == len(ball)
+    assert count_columns_in_ball(counter, terrain, eye, average, view_model, False)[0] == len(ball)
 
 
 def test_a_ridge_hides_the_valley_behind_it_by_hand():
@@ -103,19 +106,19 @@ def test_a_ridge_hides_the_valley_behind_it_by_hand():
     ground = np.ones((9, 3), np.int32)
     ground[4], ground[6:] = 4, NONE
     east = np.array([[1.0, 0.0]])
-    tally, look = new_tally(27, (9, 3, 8)), Look(10.0, 0.0, 2, 0.5, math.inf, fade=10.0)
+    counter, view_model = new_counter(27, (9, 3, 8)), ViewModel(10.0, 0.0, 2, 0.5, math.inf, fade=10.0)
     terrain = known_ground(ground, (9, 3, 8))
     for height, wanted in ((3.5, 0), (5.5, 1), (7.5, 2)):
         # z_av = 1: extrapolated 1 - d/10. From 5.5 over the ridge's far edge at d = 4.5: slope -1/3, which
         # meets height 0.4 … at d ≈ 15; from 7.5 slope -7/9: 0.2 … 0.4 at d ≈ 9; the last tops end at d = 8.5
         eye = (0.5, 1.5, height)
-        found = count_below(tally, terrain, eye, 1.0, east, look, False)[0]
+        found = count_below(counter, terrain, eye, 1.0, east, view_model, False)[0]
         heights = reference.surface(ground, eye, 1.0, 10.0)
         assert found == len(reference.seen_columns(heights, ground < 0, eye, east, 10.0, 0.0))
         assert found <= wanted
     ground[4] = 1
     flat = known_ground(ground, (9, 3, 8))
-    assert count_below(tally, flat, (0.5, 1.5, 5.5), 1.0, east, look, False)[0] == 3
+    assert count_below(counter, flat, (0.5, 1.5, 5.5), 1.0, east, view_model, False)[0] == 3
 
 
 def test_candidates_hang_above_the_edge_between_ground_and_ceiling():
@@ -125,9 +128,9 @@ def test_candidates_hang_above_the_edge_between_ground_and_ceiling():
     found = np.stack(np.unravel_index(terrain.voxel[terrain.voxel != NONE], SHAPE), axis=-1)
     assert set(found[:, 0]) == {4} and set(found[:, 1]) == set(range(13))
     assert set(found[:, 2]) == {2, 4, 6}  # a layer of air below, two apart, and below layer 7
-    rates = terrain.rates.reshape(SHAPE)
-    assert np.isfinite(rates[:5, :, 1:7]).all() and np.isinf(rates[5:]).all()
-    assert np.isinf(rates[:, :, 0]).all() and np.isinf(rates[:, :, 7]).all()
+    traversal_cost = terrain.traversal_cost.reshape(SHAPE)
+    assert np.isfinite(traversal_cost[:5, :, 1:7]).all() and np.isinf(traversal_cost[5:]).all()
+    assert np.isinf(traversal_cost[:, :, 0]).all() and np.isinf(traversal_cost[:, :, 7]).all()
     ground[5:7] = 2
     survey_ground(terrain, ground)
     found = np.stack(np.unravel_index(terrain.voxel[terrain.voxel != NONE], SHAPE), axis=-1)
@@ -149,11 +152,11 @@ def test_a_block_gives_a_column_that_was_reached_or_has_room_left():
     choose_reached_columns(terrain, cost)
     assert terrain.column[0] == far and np.isinf(terrain.seen).all()
     assert set(terrain.voxel[terrain.voxel != NONE] // 8) == {far}
-    terrain.spent[near * 8 :][:8] = 1
-    look_at_columns(terrain, put_block(terrain, 0, 0))
+    terrain.excluded[near * 8 :][:8] = 1
+    update_columns(terrain, queue_block(terrain, 0, 0))
     assert terrain.column[0] == far  # nothing is left above the middle one
-    terrain.spent[far * 8 :][:8] = 1
-    look_at_columns(terrain, put_block(terrain, 0, 0))
+    terrain.excluded[far * 8 :][:8] = 1
+    update_columns(terrain, queue_block(terrain, 0, 0))
     assert terrain.column[0] == NONE and (terrain.voxel == NONE).all()
 
 
@@ -165,13 +168,13 @@ def test_the_height_factor_by_hand():
     voxels = np.array([(4 * 13 + 5) * 8 + z for z in (3, 6)], np.int32)  # z_f = 3.5 and 6.5, z_av = 2
     seen, value, factor = np.empty(2), np.empty(2), np.empty(2)
     azimuths = np.array([[1.0, 0.0]])
-    tally = new_tally(9 * 13, SHAPE)
-    look = Look(10.0, 0.0, patch=1, gamma=0.5, highest=9.0, fade=10.0)
-    count_columns_from(tally, terrain, voxels, azimuths, look, False, seen, value, factor)
+    counter = new_counter(9 * 13, SHAPE)
+    view_model = ViewModel(10.0, 0.0, patch=1, gamma=0.5, highest=9.0, fade=10.0)
+    count_columns_from(counter, terrain, voxels, azimuths, view_model, False, seen, value, factor)
     assert factor.tolist() == pytest.approx([math.sqrt(1.5 * 3.5), math.sqrt(4.5 * 6.5)])
     assert seen.tolist() == [1.0, 2.0]  # from 3.5 one ends on the line of sight over the edge
-    look = look._replace(gamma=1.0, highest=4.0)
-    count_columns_from(tally, terrain, voxels, azimuths, look, False, seen, value, factor)
+    view_model = view_model._replace(gamma=1.0, highest=4.0)
+    count_columns_from(counter, terrain, voxels, azimuths, view_model, False, seen, value, factor)
     assert factor.tolist() == pytest.approx([1.5, 0.0]) and seen[1] == 0.0
 
 
@@ -182,12 +185,15 @@ def test_no_more_is_seen_than_lies_in_range(seed, reach, naive):
     terrain = known_ground(ground)
     voxels = rng.integers(0, math.prod(SHAPE), 20).astype(np.int32)
     angles = 0.05 + np.arange(40) * (2 * math.pi / 40)
-    azimuths, look = np.stack([np.cos(angles), np.sin(angles)], axis=-1), Look(reach, 0.0, 2, 0.4, 5.0, reach)
+    azimuths, view_model = (
+        np.stack([np.cos(angles), np.sin(angles)], axis=-1),
+        ViewModel(reach, 0.0, 2, 0.4, 5.0, reach),
+    )
     seen, weighed, factor, most, same = (np.empty(20) for _ in range(5))
-    tally, sums = new_tally(9 * 13, SHAPE), np.empty((9, 14), np.int32)
-    count_columns_from(tally, terrain, voxels, azimuths, look, naive, seen, weighed, factor)
+    counter, sums = new_counter(9 * 13, SHAPE), np.empty((9, 14), np.int32)
+    count_columns_from(counter, terrain, voxels, azimuths, view_model, naive, seen, weighed, factor)
     sum_rows(terrain, sums)
-    bound_columns(terrain, sums, half_widths(reach), voxels, look, most, same)
+    bound_columns(terrain, sums, half_widths(reach), voxels, view_model, most, same)
     np.testing.assert_array_equal(same, factor)
     assert (seen <= most).all()
     for voxel, bound in zip(voxels.tolist(), most, strict=True):
@@ -201,11 +207,11 @@ def test_what_was_seen_is_forgotten_near_new_ground_and_nowhere_else():
     voxels = np.array([0, 20 * 30 + 15, NONE, 39 * 30 + 29], np.int32)
     seen = np.array([5.0, 6.0, 7.0, 8.0], np.float32)
     changed = np.zeros((40 // TILE + 1, 30 // TILE + 1), np.uint8)
-    forget_seen(changed, size, voxels, seen, 5.0)
+    reset_bounds(changed, size, voxels, seen, 5.0)
     assert seen.tolist() == [5.0, 6.0, 7.0, 8.0]
     changed[0, 0] = 1
-    forget_seen(changed, size, voxels, seen, 5.0)
+    reset_bounds(changed, size, voxels, seen, 5.0)
     assert seen.tolist() == [math.inf, 6.0, 7.0, 8.0] and not changed.any()
     changed[2, 1] = 1  # x 16 … 23, y 8 … 15
-    forget_seen(changed, size, voxels, seen, 100.0)
+    reset_bounds(changed, size, voxels, seen, 100.0)
     assert np.isinf(seen[[0, 1, 3]]).all() and seen[2] == 7.0

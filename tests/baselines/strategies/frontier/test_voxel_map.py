@@ -9,12 +9,12 @@ from hypothesis import strategies as st
 from baselines.strategies.frontier.voxel.map import (
     CANDIDATE,
     COVERED,
+    MAX_TRACKED_OPENINGS,
     NONE,
-    OPENED,
     UNEXPLORED,
     UNMAPPED,
     new_frontier_map,
-    take_in,
+    update_frontiers,
 )
 from tests.reference import sawhney as reference
 from tests.reference.scenes import drawn, seeds
@@ -37,7 +37,7 @@ def state_of(mean, precision, levels=LEVELS):
 
 
 def updated(frontiers, mean, precision, levels=LEVELS):
-    take_in(frontiers, mean.reshape(-1), precision.reshape(-1), levels)
+    update_frontiers(frontiers, mean.reshape(-1), precision.reshape(-1), levels)
 
 
 @given(st.sampled_from(SHAPES), st.sampled_from([0.0, 1.0, 1.3]), st.integers(1, 4), seeds)
@@ -51,9 +51,9 @@ def test_candidates_and_rates_are_those_of_the_definition_after_every_change(sha
         updated(frontiers, mean, precision, levels)
         state = state_of(mean, precision, levels)
         np.testing.assert_array_equal(frontiers.state.reshape(shape), state)
-        ball = frontiers.ball.tolist()
+        ball = frontiers.footprint.tolist()
         np.testing.assert_array_equal(
-            np.isfinite(frontiers.rates.reshape(shape)), reference.standing(state, ball)
+            np.isfinite(frontiers.traversal_cost.reshape(shape)), reference.standing(state, ball)
         )
         wanted = reference.candidates(state, ball)
         np.testing.assert_array_equal((frontiers.flags & CANDIDATE > 0).reshape(shape), wanted)
@@ -104,24 +104,26 @@ def test_what_turned_out_free_is_noted_by_hand():
     shape = (4, 3, 1)
     mean, precision = np.full(12, 0.9, np.float32), np.full(12, 9.0, np.float32)
     frontiers = new_frontier_map(shape, 0.0, 0, 2)
-    take_in(frontiers, mean, precision, LEVELS)
+    update_frontiers(frontiers, mean, precision, LEVELS)
     assert frontiers.opened_count[0] == 0
     mean[7], precision[7] = 0.1, 10.0
-    take_in(frontiers, mean, precision, LEVELS)
+    update_frontiers(frontiers, mean, precision, LEVELS)
     assert frontiers.opened_count[0] == 1 and frontiers.opened[0] == 7
-    take_in(frontiers, mean, precision, (np.float32(16.0), np.float32(1.0)))
-    assert frontiers.opened_count[0] > OPENED  # all is unexplored again: more may be seen anywhere
+    update_frontiers(frontiers, mean, precision, (np.float32(16.0), np.float32(1.0)))
+    assert (
+        frontiers.opened_count[0] > MAX_TRACKED_OPENINGS
+    )  # all is unexplored again: more may be seen anywhere
 
 
 def test_more_openings_than_are_noted():
     shape = (70, 61, 1)
     mean, precision = np.full(70 * 61, 0.9, np.float32), np.full(70 * 61, 9.0, np.float32)
     frontiers = new_frontier_map(shape, 0.0, 0, 8)
-    take_in(frontiers, mean, precision, LEVELS)
-    mean[:OPENED], precision[:OPENED] = 0.1, 10.0
-    take_in(frontiers, mean, precision, LEVELS)
-    assert frontiers.opened_count[0] == OPENED
-    np.testing.assert_array_equal(frontiers.opened, np.arange(OPENED))
-    mean[OPENED], precision[OPENED] = 0.1, 10.0
-    take_in(frontiers, mean, precision, LEVELS)
-    assert frontiers.opened_count[0] == OPENED + 1
+    update_frontiers(frontiers, mean, precision, LEVELS)
+    mean[:MAX_TRACKED_OPENINGS], precision[:MAX_TRACKED_OPENINGS] = 0.1, 10.0
+    update_frontiers(frontiers, mean, precision, LEVELS)
+    assert frontiers.opened_count[0] == MAX_TRACKED_OPENINGS
+    np.testing.assert_array_equal(frontiers.opened, np.arange(MAX_TRACKED_OPENINGS))
+    mean[MAX_TRACKED_OPENINGS], precision[MAX_TRACKED_OPENINGS] = 0.1, 10.0
+    update_frontiers(frontiers, mean, precision, LEVELS)
+    assert frontiers.opened_count[0] == MAX_TRACKED_OPENINGS + 1

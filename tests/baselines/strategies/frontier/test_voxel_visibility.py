@@ -18,7 +18,7 @@ from baselines.strategies.frontier.voxel.visibility import (
     count_from,
     count_in_ball,
     count_in_balls,
-    new_tally,
+    new_counter,
     rays_around,
     rays_towards,
 )
@@ -48,10 +48,13 @@ def rays(shape, count=17):
 def test_points_are_those_that_rays_cross(shape, reach, seed):
     state, start, _ = scene(shape, seed)
     wanted = reference.seen_voxels(state, start, rays(shape), reach)
-    tally = new_tally(state.size, shape)
-    points, value = count_crossed(tally, state.reshape(-1), shape, start, rays(shape), reach, True)
+    counter = new_counter(state.size, shape)
+    points, value = count_crossed(counter, state.reshape(-1), shape, start, rays(shape), reach, True)
     assert (points, value) == (len(wanted), len(wanted))
-    marked = {tuple(map(int, np.unravel_index(v, shape))) for v in tally.marked[: tally.numbers[1]]}
+    marked = {
+        tuple(map(int, np.unravel_index(v, shape)))
+        for v in counter.promised_points[: counter.promised_count[0]]
+    }
     assert marked == wanted
 
 
@@ -59,19 +62,19 @@ def test_points_are_those_that_rays_cross(shape, reach, seed):
 @drawn(30)
 def test_promises_weigh_one_over_one_and_their_number(shape, seed):
     state, start, rng = scene(shape, seed)
-    tally, flat, directions = new_tally(state.size, shape), state.reshape(-1), rays(shape)
+    counter, flat, directions = new_counter(state.size, shape), state.reshape(-1), rays(shape)
     promised: dict[tuple[int, ...], int] = {}
     for _ in range(int(rng.integers(1, 4))):
         other = tuple(int(rng.integers(0, n)) + 0.5 for n in shape)
-        count_crossed(tally, flat, shape, other, directions, 6.0, True)
+        count_crossed(counter, flat, shape, other, directions, 6.0, True)
         for point in reference.seen_voxels(state, other, directions, 6.0):
             promised[point] = promised.get(point, 0) + 1
     wanted = reference.seen_voxels(state, start, directions, 5.0)
-    _, value = count_crossed(tally, flat, shape, start, directions, 5.0, False)
+    _, value = count_crossed(counter, flat, shape, start, directions, 5.0, False)
     assert value == pytest.approx(reference.weighed(wanted, promised))
-    clear_promises(tally)
-    points, value = count_crossed(tally, flat, shape, start, directions, 5.0, False)
-    assert points == value == len(wanted) and not tally.promised.any()
+    clear_promises(counter)
+    points, value = count_crossed(counter, flat, shape, start, directions, 5.0, False)
+    assert points == value == len(wanted) and not counter.promised.any()
 
 
 def test_by_hand():
@@ -79,22 +82,22 @@ def test_by_hand():
     state = np.full((6, 3, 1), UNEXPLORED, np.uint8)
     state[0, 1], state[3, 1] = 0, COVERED
     east = np.array([[1.0, 0.0, 0.0]])
-    tally, start = new_tally(18, (6, 3, 1)), (0.5, 1.5, 0.5)
+    counter, start = new_counter(18, (6, 3, 1)), (0.5, 1.5, 0.5)
     for value in (2.0, 1.0, 2.0 / 3.0):
-        assert count_crossed(tally, state.reshape(-1), (6, 3, 1), start, east, 9.0, True) == (
+        assert count_crossed(counter, state.reshape(-1), (6, 3, 1), start, east, 9.0, True) == (
             2,
             pytest.approx(value),
         )
-    assert count_crossed(tally, state.reshape(-1), (6, 3, 1), start, east, 1.0, False)[0] == 1
-    assert count_in_ball(tally, state.reshape(-1), (6, 3, 1), start, 1.0, False)[0] == 3  # behind no wall
+    assert count_crossed(counter, state.reshape(-1), (6, 3, 1), start, east, 1.0, False)[0] == 1
+    assert count_in_ball(counter, state.reshape(-1), (6, 3, 1), start, 1.0, False)[0] == 3  # behind no wall
 
 
 def test_more_that_is_mapped_never_shows_more():
     """What makes a count an upper bound of later ones."""
     state, start, rng = scene((9, 12, 1), 5, covered=0.0)
-    tally, flat, before = new_tally(state.size, state.shape), state.reshape(-1), math.inf
+    counter, flat, before = new_counter(state.size, state.shape), state.reshape(-1), math.inf
     for _ in range(40):
-        points, _ = count_crossed(tally, flat, state.shape, start, rays(state.shape, 40), 7.0, False)
+        points, _ = count_crossed(counter, flat, state.shape, start, rays(state.shape, 40), 7.0, False)
         assert points <= before
         before = points
         voxel = int(rng.choice(np.flatnonzero(flat & UNEXPLORED)))
@@ -104,14 +107,14 @@ def test_more_that_is_mapped_never_shows_more():
 def test_rays_around_miss_no_voxel_within_reach():
     shape, reach = (41, 43, 1), 18.0
     state = np.full(shape, UNEXPLORED, np.uint8)
-    tally, start = new_tally(state.size, shape), (20.5, 21.5, 0.5)
+    counter, start = new_counter(state.size, shape), (20.5, 21.5, 0.5)
     directions = rays_around(reach, np.zeros(1))
-    seen, _ = count_crossed(tally, state.reshape(-1), shape, start, directions, reach, False)
-    inside, _ = count_in_ball(tally, state.reshape(-1), shape, start, reach - 0.75, False)
+    seen, _ = count_crossed(counter, state.reshape(-1), shape, start, directions, reach, False)
+    inside, _ = count_in_ball(counter, state.reshape(-1), shape, start, reach - 0.75, False)
     assert seen >= inside
     many, values = np.empty(2), np.empty(2)
     voxels, tree = np.array([0, 20 * 43 + 21], np.int32), grow_tree(directions, reach, shape)
-    count_from(tally, state.reshape(-1), shape, voxels, tree, np.empty(tree.cells, np.int32), many, values)
+    count_from(counter, state.reshape(-1), shape, voxels, tree, np.empty(tree.cells, np.int32), many, values)
     assert many[1] == seen and many[0] < seen / 3
 
 
@@ -119,16 +122,16 @@ def test_rays_around_miss_no_voxel_within_reach():
 @drawn(60)
 def test_a_tree_of_rays_sees_from_every_voxel_what_the_rays_see(shape, reach, promised, seed):
     state, _, rng = scene(shape, seed)
-    tally, flat, directions = new_tally(state.size, shape), state.reshape(-1), rays(shape)
+    counter, flat, directions = new_counter(state.size, shape), state.reshape(-1), rays(shape)
     for _ in range(2 * promised):
         other = tuple(int(rng.integers(0, n)) + 0.5 for n in shape)
-        count_crossed(tally, flat, shape, other, directions, 6.0, True)
+        count_crossed(counter, flat, shape, other, directions, 6.0, True)
     voxels, seen, weighed = np.arange(state.size, dtype=np.int32), *np.empty((2, state.size))
     tree = grow_tree(directions, reach, shape)
-    count_from(tally, flat, shape, voxels, tree, np.empty(tree.cells, np.int32), seen, weighed)
+    count_from(counter, flat, shape, voxels, tree, np.empty(tree.cells, np.int32), seen, weighed)
     for voxel, points, value in zip(voxels, seen, weighed, strict=True):
         start = tuple(int(i) + 0.5 for i in np.unravel_index(voxel, shape))
-        wanted = count_crossed(tally, flat, shape, start, directions, reach, False)
+        wanted = count_crossed(counter, flat, shape, start, directions, reach, False)
         assert (points, value) == (wanted[0], pytest.approx(wanted[1]))
 
 
@@ -149,28 +152,32 @@ def test_what_rays_share_is_walked_once():
 
 def test_naive_counts_from_many_places():
     state, _, _ = scene((9, 6, 1), 3)
-    tally, voxels = new_tally(54, (9, 6, 1)), np.array([0, 29], np.int32)
+    counter, voxels = new_counter(54, (9, 6, 1)), np.array([0, 29], np.int32)
     seen, weighed = np.empty(2), np.empty(2)
-    count_in_balls(tally, state.reshape(-1), (9, 6, 1), voxels, 3.0, seen, weighed)
+    count_in_balls(counter, state.reshape(-1), (9, 6, 1), voxels, 3.0, seen, weighed)
     for voxel, points in zip(((0.5, 0.5, 0.5), (4.5, 5.5, 0.5)), seen, strict=True):
-        assert points == count_in_ball(tally, state.reshape(-1), (9, 6, 1), voxel, 3.0, False)[0]
+        assert points == count_in_ball(counter, state.reshape(-1), (9, 6, 1), voxel, 3.0, False)[0]
 
 
 @given(st.sampled_from(SHAPES), st.floats(0.6, 9.0) | st.just(math.inf), seeds)
 @drawn(80)
 def test_bounds_stay_bounds_when_walls_turn_out_free(shape, reach, seed):
     state, _, rng = scene(shape, seed, covered=0.4)
-    tally, flat, tree = new_tally(state.size, shape), state.reshape(-1), grow_tree(rays(shape), reach, shape)
+    counter, flat, tree = (
+        new_counter(state.size, shape),
+        state.reshape(-1),
+        grow_tree(rays(shape), reach, shape),
+    )
     voxels, met = np.arange(-1, state.size, dtype=np.int32), np.empty(tree.cells, np.int32)
     counted, now, _ = np.empty((3, state.size))
-    count_from(tally, flat, shape, voxels[1:], tree, met, counted, _)
+    count_from(counter, flat, shape, voxels[1:], tree, met, counted, _)
     seen = np.concatenate([[5.0], counted]).astype(np.float32)
     seen[3] = math.inf
     walls = np.flatnonzero(flat & COVERED)
     opened = rng.choice(walls, min(int(rng.integers(0, 4)), len(walls)), replace=False).astype(np.int32)
     flat[opened] &= ~np.uint8(COVERED)
-    add_opened(tally, flat, shape, opened, voxels, tree, met, seen)
-    count_from(tally, flat, shape, voxels[1:], tree, met, now, _)
+    add_opened(counter, flat, shape, opened, voxels, tree, met, seen)
+    count_from(counter, flat, shape, voxels[1:], tree, met, now, _)
     assert (seen[1:] >= now).all()
     assert seen[0] == 5.0 and math.isinf(seen[3])
     same = np.delete(np.arange(state.size), 2)
@@ -182,9 +189,9 @@ def _reached_through(state, shape, opened, voxels, directions, reach):
     """Whether a ray from each voxel passes one that was opened, and so may show more."""
     marked = np.zeros_like(state)
     marked[opened] = UNEXPLORED
-    tally, free = new_tally(state.size, shape), (state & COVERED) | marked
+    counter, free = new_counter(state.size, shape), (state & COVERED) | marked
     starts = [tuple(int(i) + 0.5 for i in np.unravel_index(voxel, shape)) for voxel in voxels]
-    passed = [count_crossed(tally, free, shape, start, directions, reach, False)[0] for start in starts]
+    passed = [count_crossed(counter, free, shape, start, directions, reach, False)[0] for start in starts]
     return np.array(passed) > 0
 
 
@@ -193,11 +200,11 @@ def test_behind_a_wall_that_turned_out_free_by_hand():
     state = np.full(6, UNEXPLORED, np.uint8)
     state[0], state[3] = 0, COVERED
     shape, east = (6, 1, 1), np.array([[1.0, 0.0, 0.0]])
-    tree, tally, seen = grow_tree(east, 9.0, shape), new_tally(6, shape), np.array([2.0, 0.0], np.float32)
+    tree, counter, seen = grow_tree(east, 9.0, shape), new_counter(6, shape), np.array([2.0, 0.0], np.float32)
     voxels, met, wall = np.array([0, 4], np.int32), np.empty(tree.cells, np.int32), np.array([3], np.int32)
     state[3] = 0
-    add_opened(tally, state, shape, wall, voxels, tree, met, seen)
+    add_opened(counter, state, shape, wall, voxels, tree, met, seen)
     assert seen.tolist() == [4.0, 0.0]
     state[2] = COVERED  # something nearer hides the hole
-    add_opened(tally, state, shape, wall, voxels, tree, met, seen)
+    add_opened(counter, state, shape, wall, voxels, tree, met, seen)
     assert seen.tolist() == [4.0, 0.0]
