@@ -8,7 +8,7 @@ RUN := $(VENV)/bin/python -m
 STAMP := $(VENV)/installed-
 VENV_RLLIB := .venv-rllib
 STYLE := $(RUN) ruff check . && $(RUN) ruff format --check . && $(VENV)/bin/lint-imports --no-cache
-WARM := $(RUN) entropy_explore_env.envs.conformance box-7x11x5 --robots 2 --steps 3
+WARM := $(RUN) entropy_explore_env.warm --processes 1
 
 .PHONY: help demo test test-long boundscheck test-rllib lint bench reproduce clean
 .NOTPARALLEL:

@@ -134,7 +134,7 @@ def test_a_world_file_that_changed_is_refused_and_one_that_moved_is_found(comman
 
 def forget_worlds() -> None:
     """A process reads a file once."""
-    load._kept_world.cache_clear()
+    load._cached_world.cache_clear()
 
 
 def test_videos_and_recordings_of_any_run_and_of_a_replay(command, tmp_path):

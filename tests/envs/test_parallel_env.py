@@ -398,7 +398,7 @@ def test_robots_stand_in_free_voxels_of_the_workspace(scenario: str, kind: str) 
 
 
 def test_help_shows_every_part_of_an_observation_with_its_shape() -> None:
-    text = pydoc.render_doc(parallel_env, renderer=pydoc.plaintext)
+    text = pydoc.plain(pydoc.render_doc(parallel_env))
     everything = {"patch": True, "overview": True, "action_mask": True}
     team = parallel_env("box-7x11x5", action={"kind": "discrete"}, observation=everything)
     parts = team.missions.layout.parts
