@@ -14,3 +14,8 @@ def test_the_suite_draws_the_same_examples_every_time_and_the_long_run_more():
     inside = settings.default
     assert drawn(30).max_examples == 30 * inside.max_examples // suite.max_examples
     assert drawn(30).derandomize == inside.derandomize
+
+
+def test_tests_are_called_the_same_in_every_process(request):
+    """An address in a name would stop pytest-xdist: its processes would collect different tests."""
+    assert [item.nodeid for item in request.session.items if " at 0x" in item.nodeid] == []

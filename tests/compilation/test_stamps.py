@@ -174,7 +174,11 @@ class Thing:
     pass
 
 
-@pytest.mark.parametrize("value", [Thing(), Thing, lambda x: x, np.array([None])], ids=str)
+@pytest.mark.parametrize(
+    "value",
+    [Thing(), Thing, lambda x: x, np.array([None])],
+    ids=["object", "class", "lambda", "array of objects"],
+)
 def test_what_is_not_known_has_no_stamp(value):
     space: dict[str, Any] = {"VALUE": value, "__name__": "mine"}
     exec("def f(x):\n    return VALUE\n", space)
