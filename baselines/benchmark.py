@@ -34,7 +34,7 @@ class Args:
     scenarios: str | None = None
     """Names and world files, commas between; default: room,room-furnished,lab,office,cave."""
     strategies: str = "all"
-    """Names as in baselines.run, commas between; random is always added, as the yardstick."""
+    """Names as in baselines.run, commas between; random is always added, as the baseline."""
     robots: str | None = None
     """Team sizes, commas between; default: 1,2,4."""
     seeds: int | None = None
@@ -42,7 +42,7 @@ class Args:
     quick: bool = False
     """What is not given shrinks: scenarios room,office, team sizes 1,2, 5 seeds."""
     world_scenario: str | None = None
-    """Whose robots and sensors explore world files; default: office for plans, room for other worlds."""
+    """Scenario that gives robots and sensors for world files; default: office for plans, else room."""
     time_limit_s: float | None = None
     """Simulated time after which missions are cut off; default: each scenario's own."""
     wall_limit_s: float = 600.0
@@ -89,7 +89,7 @@ def main(words: Sequence[str]) -> int:
 
 
 def _entries(args: Args) -> Entries:
-    """What takes part.
+    """The entries that the options ask for.
 
     Raises:
         SettingError: An option has a value that is not allowed.

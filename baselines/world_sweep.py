@@ -6,7 +6,6 @@ A mission ends when the map is known or its time is up; the table says which, an
 
 from __future__ import annotations
 
-import dataclasses
 import sys
 import time
 from collections.abc import Sequence
@@ -14,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from baselines.cli.arguments import Positional, parse, print_json, run_command
+from baselines.cli.arguments import Positional, given_options, parse, print_json, run_command
 from baselines.cli.world_options import Reading, world_settings
 from baselines.experiments.mission import run_mission, scripted
 from baselines.experiments.tables import markdown_table
@@ -69,7 +68,9 @@ def main(words: Sequence[str]) -> int:
             print(f"{number + 1} of {len(files)}: {path.name}", file=sys.stderr, flush=True)
         rows.append(explore(path, args))
     if args.out is not None:
-        about = f"Made by `{_command(args)}`: strategy {args.strategy}, {args.robots} robots, "
+        options = given_options(args, leave_out=("folder", "out", "json"))
+        command = " ".join(["python -m baselines.world_sweep", args.folder.name, *options])
+        about = f"Made by `{command}`: strategy {args.strategy}, {args.robots} robots, "
         about += f"seed {args.seed}; missions are cut off after {args.time_limit_s:g} s."
         write_atomically(args.out, f"# Worlds explored\n\n{about}\n\n{table(rows)}\n")
     if args.json:
@@ -77,18 +78,6 @@ def main(words: Sequence[str]) -> int:
     else:
         print(table(rows), end="")
     return 0
-
-
-def _command(args: Args) -> str:
-    """What makes the same table again: the options that were given."""
-    words = ["python -m baselines.world_sweep", args.folder.name]
-    for field in dataclasses.fields(args):
-        value = getattr(args, field.name)
-        if field.name not in ("folder", "out", "json") and value != field.default:
-            option = "--" + field.name.replace("_", "-")
-            said = f"{value:g}" if isinstance(value, float) else str(value)
-            words += [option] if value is True else [option, said]
-    return " ".join(words)
 
 
 def world_files(folder: Path) -> list[Path]:

@@ -8,7 +8,7 @@ import time
 import numpy as np
 
 from baselines.experiments.mission import scripted
-from baselines.papers.sawhney.mission import Run, followed
+from baselines.papers.sawhney.mission import Run, explore_until_done
 from baselines.papers.sawhney.sweep import world_cell
 from baselines.strategies.frontier import FrontierStrategy, Metric
 from baselines.strategies.frontier.allocation import Allocator
@@ -200,5 +200,5 @@ def mission_s(world: World) -> float:
     scenario = with_settings(scripted(cell.scenario), settings)
     env, explorer = EntropyExploreEnv(scenario, world=world), FrontierStrategy(cell.record.exploring)
     started = time.perf_counter()
-    followed(env, explorer, 0)
+    explore_until_done(env, explorer, 0)
     return time.perf_counter() - started

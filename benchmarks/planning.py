@@ -171,13 +171,13 @@ def iteration_row(shape: tuple[int, int, int], effort: Effort) -> Row:
     simulation = Simulation(covered, starts.tolist(), Rules(sensor=Sensor(100.0)))
     for _ in range(3):
         simulation.step(functional=False)
-    mind, places = simulation.minds[0], simulation.places
+    planner, places = simulation.planners[0], simulation.places
 
     def iterate() -> None:
-        mind.belief.version += 1  # as after a scan
-        mind.update(places)
-        for target in mind.targets:
-            mind.way(int(target))
+        planner.belief.version += 1  # as after a scan
+        planner.update(places)
+        for target in planner.targets:
+            planner.path_to(int(target))
 
     iterate()
     taken = [timed(iterate).cpu_s for _ in range(effort.long_rounds)]

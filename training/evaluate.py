@@ -18,7 +18,7 @@ import numpy as np
 
 from baselines.cli.arguments import make_folder, parse, print_json, run_command
 from baselines.experiments.cells import Cell, run_cells
-from baselines.experiments.mission import Record
+from baselines.experiments.outcome import Record
 from baselines.experiments.statistics import median_interval, median_ratio_interval
 from baselines.strategies import make_strategy
 from entropy_explore_env.errors import SettingError

@@ -195,8 +195,6 @@ def make_policy_strategy(name: str) -> LearnedPolicy:
 
 
 def policy_files(name: str) -> list[Path]:
-    """The files that determine what a learned policy does: its checkpoint, and the modules that run it."""
+    """The files that determine, with the code, what a learned policy does: those of its checkpoint."""
     checkpoint = latest_checkpoint(policy_folder(name), *POLICIES)
-    modules = ("policy", "networks", "distributions", "checkpoints", "normalisation")
-    code = [Path(__file__).with_name(f"{module}.py") for module in modules]
-    return [checkpoint / "policy.json", checkpoint / "policy.safetensors", *code]
+    return [checkpoint / "policy.json", checkpoint / "policy.safetensors"]

@@ -7,6 +7,7 @@ are those of `entropy_explore_env.command`; 1: a claim or goal does not hold whe
 from __future__ import annotations
 
 import contextlib
+import dataclasses
 import io
 import json
 import re
@@ -85,11 +86,11 @@ def parse(
 def _program() -> str:
     """How the command was started, as one types it."""
     module = getattr(sys.modules["__main__"], "__spec__", None)
-    return Path(sys.argv[0]).name if module is None else f"python -m {module.name}"
+    return Path(sys.argv[0]).name if module is None else f"python -m {module.name.removesuffix('.__main__')}"
 
 
 def _one_line(complaint: str) -> str:
-    """The parser's framed message as one line."""
+    """The parser's framed message as one line; tyro 1.0 has errors as values in a private module only."""
     words = " ".join(_FRAME.sub(" ", complaint).split())
     words = _TITLE.sub("", words)
     return words.split(" For full helptext")[0] or "the arguments do not fit; see --help"
@@ -127,3 +128,27 @@ def make_folder(option: str, folder: Path) -> None:
 def print_json(results: dict[str, Any]) -> None:
     """Print exactly one JSON object on standard output."""
     print(json.dumps(results, indent=2, allow_nan=False))
+
+
+def given_options(args: Any, leave_out: Sequence[str] = ()) -> list[str]:  # noqa: ANN401 - any dataclass
+    """The options that differ from their defaults as words of a command line; of paths, the file's name.
+
+    Args:
+        args: A dataclass of options.
+        leave_out: Names of fields.
+    """
+    words: list[str] = []
+    for each in dataclasses.fields(args):
+        value = getattr(args, each.name)
+        if each.name in leave_out or value == each.default:
+            continue
+        words.append("--" + each.name.replace("_", "-"))
+        if value is not True:
+            words += [_word(part) for part in (value if isinstance(value, tuple) else (value,))]
+    return words
+
+
+def _word(value: object) -> str:
+    if isinstance(value, Path):
+        return value.name
+    return f"{value:g}" if isinstance(value, float) else str(value)

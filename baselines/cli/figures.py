@@ -1,4 +1,4 @@
-"""Figures of a mission for reading: curves, and slices of the map with the ways of the robots."""
+"""Figures of a mission: curves, and slices of the map with the robots' paths."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def png(figure: Figure, dots_per_inch: int = 110) -> bytes:
 
 
 def mission_picture(recorder: Recorder, title: str, strategy: str) -> bytes:
-    """Entropy curves, shared measurements, and slices of robot_0's map with all robots' ways.
+    """Entropy curves, shared measurements, and slices of robot_0's map with all robots' paths.
 
     Args:
         recorder: Of a mission that has ended.
@@ -77,7 +77,7 @@ def mission_picture(recorder: Recorder, title: str, strategy: str) -> bytes:
 
 
 def _slice(figure: Figure, axes: Axes, recorder: Recorder, entropy: bool) -> None:
-    """The layer of the map that the robots scanned from most, and the ways over it."""
+    """The layer of the map from which the robots scanned most, and the paths over it."""
     missions, grid = recorder.missions, recorder.missions.grid
     layer = _busiest_layer(recorder.scan_positions_m, grid)
     share = entropy_share(missions, 0, 0)[:, :, layer]
@@ -86,14 +86,14 @@ def _slice(figure: Figure, axes: Axes, recorder: Recorder, entropy: bool) -> Non
     image = axes.imshow(
         shown.T, origin="lower", extent=extent_of(grid), cmap=colours, vmin=0, vmax=1, aspect="equal"
     )
-    for robot, way in enumerate(recorder.paths_m):
+    for robot, path_m in enumerate(recorder.paths_m):
         colour = COLOURS[robot % len(COLOURS)]
-        axes.plot(way[:, 0], way[:, 1], color=colour, linewidth=0.9)
+        axes.plot(path_m[:, 0], path_m[:, 1], color=colour, linewidth=0.9)
         edge = "white" if entropy else "black"
-        axes.plot(*way[0, :2], marker="o", color=colour, markersize=5, markeredgecolor=edge)
-        axes.plot(*way[-1, :2], marker="s", color=colour, markersize=5, markeredgecolor=edge)
+        axes.plot(*path_m[0, :2], marker="o", color=colour, markersize=5, markeredgecolor=edge)
+        axes.plot(*path_m[-1, :2], marker="s", color=colour, markersize=5, markeredgecolor=edge)
     height_m = grid.centre_of(np.array([0, 0, layer]))[2]
-    height = "" if grid.flat else f"z = {height_m:.2f} m; ways at all heights, "
+    height = "" if grid.flat else f"z = {height_m:.2f} m; paths at all heights, "
     axes.set(xlabel="x (m)", ylabel="y (m)")
     axes.set_title(f"What robot_0 knows\n{height}○ start, □ end", fontsize=8)
     label = "share of the entropy left" if entropy else "coverage; blue: unknown"

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from baselines.experiments.outcome import Record
 from baselines.strategies import make_strategy
 from baselines.strategies.protocol import Strategy
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
@@ -17,9 +18,6 @@ from entropy_explore_env.settings import Observation
 
 NOTHING_OBSERVED = Observation(panorama=False, self_state=False, team=False)
 """Strategies read RobotViews: an observation for networks would cost time for nothing."""
-
-Record = dict[str, Any]
-"""What is kept of a mission; JSON."""
 
 _SERIES_POINTS = 200
 

@@ -1,6 +1,7 @@
-"""Tasks one after the other in a few processes: none can take the others down, each has a limit on the clock.
+"""Tasks in a few processes: none can take the others down, each may have a limit on the clock.
 
-A task that raises, runs past its limit or ends its process is a Failure in its place.
+A task that raises, runs past its limit or ends its process is a Failure in its place. The processes are a
+pool of pebble's, which ends and replaces those that are late or gone.
 """
 
 from __future__ import annotations
@@ -13,23 +14,22 @@ import os
 import pickle
 import signal
 import threading
-import time
 import traceback
-from collections import deque
 from collections.abc import Callable, Generator, Iterator, Sequence
+from concurrent.futures import Future
+from concurrent.futures import TimeoutError as FutureTimeoutError  # another one in Python 3.10
 from dataclasses import dataclass
-from multiprocessing.connection import Connection, wait
-from multiprocessing.context import SpawnProcess
+from queue import SimpleQueue
 from types import FrameType
 from typing import Any, TypeVar
+
+from pebble import ProcessExpired, ProcessPool
 
 Task = TypeVar("Task")
 Result = TypeVar("Result")
 
-_GRACE_S = 30.0
-"""A process that is this much later than its limit, starting included, hangs and is ended from outside."""
 _AGAIN_S = 1.0
-"""The alarm rings again so often, should somebody have missed it."""
+"""The alarm rings again so often, should a task have swallowed it."""
 
 
 @dataclass(frozen=True)
@@ -53,55 +53,86 @@ class Failure:
         raise (self.error or RuntimeError(self.reason)) from RuntimeError(self.trace or self.reason)
 
 
-class _LateError(BaseException):
-    """The alarm; no Exception, so that nobody takes it for an error of theirs."""
-
-
 def run_each(
     work: Callable[[Task], Result], tasks: Sequence[Task], jobs: int, limit_s: float = math.inf
 ) -> Generator[tuple[Task, Result | Failure], None, None]:
     """Do the work for every task, and yield results as they come.
 
-    With one job the work is done in this process. Its limit is an alarm there, which rings between
-    Python's instructions: compiled code that never returns is ended with two jobs or more only.
+    With one job the work is done in this process, under an alarm: ending a late process would cost the next
+    task 3-5 s of imports and kernels. The alarm rings between Python's instructions: compiled code that never
+    returns is ended with two jobs or more only.
 
     Args:
         work: A function at the top of a module; what it returns can be pickled.
         tasks: What it takes, likewise.
         jobs: Processes.
-        limit_s: Of every task, on the clock; inf = none.
+        limit_s: Of every task, on the clock from when it is begun; inf = none.
     """
     if jobs == 1:
-        yield from ((task, _attempt(work, task, limit_s)) for task in tasks)
+        yield from ((task, _attempt_in_time(work, task, limit_s)) for task in tasks)
     elif tasks:
         yield from _run_in_processes(work, tasks, min(jobs, len(tasks)), limit_s)
 
 
-def _attempt(work: Callable[[Any], Any], task: object, limit_s: float) -> Any:  # noqa: ANN401 - the work's
-    """The result of a task, or why there is none."""
+def _run_in_processes(
+    work: Callable[[Any], Any], tasks: Sequence[Task], jobs: int, limit_s: float
+) -> Generator[tuple[Task, Any], None, None]:
+    pool = ProcessPool(jobs, initializer=_follow_parent, context=multiprocessing.get_context("spawn"))
+    done: SimpleQueue[Future[bytes]] = SimpleQueue()
+    timeout = None if math.isinf(limit_s) else limit_s
     try:
-        with _alarm(limit_s):
-            return work(task)
-    except _LateError:
+        waiting: dict[Future[bytes], Task] = {
+            pool.schedule(_attempt_packed, (work, task), timeout=timeout): task for task in tasks
+        }
+        for future in waiting:
+            future.add_done_callback(done.put)
+        for _ in tasks:
+            future = done.get()
+            yield waiting[future], _outcome(future, limit_s)
+    finally:
+        pool.stop()
+        pool.join()
+
+
+def _outcome(future: Future[bytes], limit_s: float) -> Any:  # noqa: ANN401 - whatever the work returns
+    """What came of a task."""
+    try:
+        return pickle.loads(future.result())
+    except FutureTimeoutError:
         return _late(limit_s)
-    except (Exception, SystemExit) as error:
-        kept = error if isinstance(error, Exception) else None
-        return Failure(_one_line(error), error=kept, trace=traceback.format_exc())
+    except ProcessExpired as error:
+        return Failure(_ending(error.exitcode))
+    except Exception as error:  # the task cannot be passed on, or its result not be read
+        return Failure(_one_line(error), error=error)
 
 
-def _one_line(error: BaseException) -> str:
-    """Kind and message of an error."""
-    said = " ".join(str(error).split())
-    return f"{type(error).__name__}: {said}" if said else type(error).__name__
+def _ending(code: int) -> str:
+    """How a process ended, from its exit code."""
+    if code < 0:
+        return f"its process was ended by {signal.Signals(-code).name}"
+    return f"its process ended with exit code {code}"
 
 
 def _late(limit_s: float) -> Failure:
     return Failure(f"ran past {limit_s:g} s on the clock", late=True)
 
 
+def _attempt_in_time(work: Callable[[Any], Any], task: object, limit_s: float) -> Any:  # noqa: ANN401
+    """The result of a task in this process, or why there is none."""
+    try:
+        with _alarm(limit_s):
+            return _attempt(work, task)
+    except _AlarmError:
+        return _late(limit_s)
+
+
+class _AlarmError(BaseException):
+    """The time is up; no Exception, so that no task takes it for an error of its own."""
+
+
 @contextlib.contextmanager
 def _alarm(limit_s: float) -> Iterator[None]:
-    """Raise a _LateError in what runs inside once the time is up, where the system has such an alarm."""
+    """Raise an _AlarmError in what runs inside once the time is up, where the system has such an alarm."""
     main = threading.current_thread() is threading.main_thread()
     if math.isinf(limit_s) or not main or not hasattr(signal, "setitimer"):
         yield
@@ -110,7 +141,7 @@ def _alarm(limit_s: float) -> Iterator[None]:
     def ring(number: int, frame: FrameType | None) -> None:
         del number, frame
         if running:
-            raise _LateError
+            raise _AlarmError
 
     before, running = signal.signal(signal.SIGALRM, ring), True
     try:
@@ -124,103 +155,41 @@ def _alarm(limit_s: float) -> Iterator[None]:
         signal.signal(signal.SIGALRM, before)
 
 
-class _Worker:
-    """A process that does tasks, and the task that it is at."""
-
-    def __init__(self, work: Callable[[Any], Any], limit_s: float) -> None:
-        """Start the process."""
-        context = multiprocessing.get_context("spawn")
-        self.connection, theirs = context.Pipe()
-        self.limit_s = limit_s
-        self.process: SpawnProcess = context.Process(target=_serve, args=(theirs, work, limit_s), daemon=True)
-        self.process.start()
-        theirs.close()
-
-    def give(self, task: Any) -> None:  # noqa: ANN401 - the work's
-        """Let it do a task."""
-        self.task = task
-        self.due = time.monotonic() + self.limit_s + _GRACE_S
-        with contextlib.suppress(OSError):  # it has ended: `outcome` will say so
-            self.connection.send(task)
-
-    def outcome(self) -> Any:  # noqa: ANN401 - whatever the work returns
-        """What came of the task; a process that is late is ended."""
-        try:
-            if self.connection.poll():
-                return self.connection.recv()
-        except (EOFError, OSError):
-            self.process.join()
-            return Failure(_ending(self.process.exitcode))
-        self.end()
-        return _late(self.limit_s)
-
-    def end(self) -> None:
-        """End the process, whatever it is at."""
-        self.process.kill()
-        self.process.join()
-        self.connection.close()
+def _attempt(work: Callable[[Any], Any], task: object) -> Any:  # noqa: ANN401 - the work's
+    """The result of a task, or why there is none."""
+    try:
+        return work(task)
+    except (Exception, SystemExit) as error:
+        kept = error if isinstance(error, Exception) else None
+        return Failure(_one_line(error), error=kept, trace=traceback.format_exc())
 
 
-def _ending(code: int | None) -> str:
-    """How a process ended, from its exit code."""
-    if code is not None and code < 0:
-        return f"its process was ended by {signal.Signals(-code).name}"
-    return f"its process ended with exit code {code}"
+def _one_line(error: BaseException) -> str:
+    """Kind and message of an error."""
+    said = " ".join(str(error).split())
+    return f"{type(error).__name__}: {said}" if said else type(error).__name__
 
 
-def _serve(connection: Connection, work: Callable[[Any], Any], limit_s: float) -> None:
-    """Do tasks until nobody gives any more: what a worker's process runs."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the process that started this one ends it
+def _attempt_packed(work: Callable[[Any], Any], task: object) -> bytes:
+    """The same in a worker, pickled: what cannot be pickled, or read again, would break pebble's pool."""
+    outcome = _attempt(work, task)
+    try:
+        packed = pickle.dumps(outcome)
+        if isinstance(outcome, Failure):
+            pickle.loads(packed)
+    except Exception as error:
+        bare = Failure(_one_line(error)) if not isinstance(outcome, Failure) else outcome
+        packed = pickle.dumps(dataclasses.replace(bare, error=None))
+    return packed
+
+
+def _follow_parent() -> None:
+    """See to it that this process ends, whatever it is at, once the one that started it is gone."""
     threading.Thread(target=_leave_with_parent, daemon=True).start()
-    with contextlib.suppress(EOFError, BrokenPipeError):
-        while True:
-            connection.send(_portable(_attempt(work, connection.recv(), limit_s)))
 
 
 def _leave_with_parent() -> None:
-    """End this process, whatever it is at, once the one that started it is gone: killed, for instance."""
     parent = multiprocessing.parent_process()
     if parent is not None:
         parent.join()
         os._exit(1)
-
-
-def _portable(outcome: Any) -> Any:  # noqa: ANN401 - whatever the work returns
-    """The outcome, without the error where an error cannot be pickled and read again."""
-    if isinstance(outcome, Failure):
-        try:
-            pickle.loads(pickle.dumps(outcome.error))
-        except Exception:
-            return dataclasses.replace(outcome, error=None)
-    return outcome
-
-
-def _run_in_processes(
-    work: Callable[[Any], Any], tasks: Sequence[Task], jobs: int, limit_s: float
-) -> Generator[tuple[Task, Any], None, None]:
-    """Yield every task with its outcome as they come; a process that ends is replaced."""
-    queue = deque(tasks)
-    busy: list[_Worker] = []
-    try:
-        for _ in range(jobs):
-            busy.append(_Worker(work, limit_s))
-            busy[-1].give(queue.popleft())
-        while busy:
-            due_s = min(worker.due for worker in busy) - time.monotonic()
-            timeout = None if math.isinf(due_s) else max(due_s, 0.0)
-            ready = set(wait([worker.connection for worker in busy], timeout))
-            for worker in list(busy):
-                if worker.connection not in ready and time.monotonic() < worker.due:
-                    continue
-                task, outcome = worker.task, worker.outcome()
-                busy.remove(worker)
-                alive = worker.process.is_alive()
-                if not (queue and alive):
-                    worker.end()
-                if queue:
-                    busy.append(worker if alive else _Worker(work, limit_s))
-                    busy[-1].give(queue.popleft())
-                yield task, outcome
-    finally:
-        for worker in busy:
-            worker.end()

@@ -1,1 +1,1 @@
-"""Strategies head to head, run by `python -m baselines.benchmark`: cells, measures, tables, figures, page."""
+"""Strategies head to head, run by `python -m baselines.benchmark`: cells, rows, figures, page."""

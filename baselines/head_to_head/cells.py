@@ -1,4 +1,4 @@
-"""What runs head to head: every strategy in every scenario and team size, on the same seeds."""
+"""The entries of a head-to-head: every strategy in every scenario and team size, on the same seeds."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from entropy_explore_env.scenario import Scenario, with_settings
 from entropy_explore_env.scenarios import SCENARIOS, find_scenario
 
 BASELINE = "random"
-"""The strategy that every other one is measured by; it is always part of the table."""
+"""The strategy that relative times are relative to; it is always part of the table."""
 
 
 @dataclass(frozen=True)
@@ -75,8 +75,8 @@ def chosen_scenarios(
 
     Args:
         words: Names and paths.
-        world_scenario: Whose robots, sensors and voxel size explore the files; None = those of `office` for
-            plans, of `room` for other worlds.
+        world_scenario: Name of the scenario that gives robots, sensors and voxel size for the files; None =
+            `office` for plans, `room` for other worlds.
         time_limit_s: Of all missions; None = those of the scenarios.
 
     Returns:

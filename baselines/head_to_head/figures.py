@@ -14,7 +14,7 @@ from baselines.head_to_head.cells import BASELINE
 from baselines.head_to_head.rows import Results, Row
 
 _INK = ((0.0, 0.0, 0.0), *(COLOURS[place] for place in (5, 3, 2, 0, 4, 1)))
-"""Of the strategies by their place, black the yardstick's; yellow and grey are too pale for lines."""
+"""Colours of the strategies by place; black is the baseline's. Yellow and grey are too pale for lines."""
 _LINES = ("-", "--", ":")
 _MARKS = "oDs^vPX"
 _THRESHOLDS = 2.0 ** (np.arange(-6 * 24, 4 * 24 + 1) / 24)

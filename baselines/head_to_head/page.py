@@ -123,7 +123,7 @@ differs from run to run."""
 
 
 def _overall_table(rows: list[Row]) -> str:
-    rivals = [rival for rival in REFERENCES if f"faster_than_{rival}" in rows[0]]
+    references = [reference for reference in REFERENCES if f"faster_than_{reference}" in rows[0]]
     head = ["robots", "strategy", "mapped", "relative time", "relative time to 90 %"]
     shown = [
         [
@@ -132,11 +132,11 @@ def _overall_table(rows: list[Row]) -> str:
             f"{row['mapped']:.0%}",
             ranged(row, "relative_time", ".2f"),
             ranged(row, "relative_t90", ".2f"),
-            *(ranged(row, f"faster_than_{rival}", ".2f") for rival in rivals),
+            *(ranged(row, f"faster_than_{reference}", ".2f") for reference in references),
         ]
         for row in rows
     ]
-    return markdown_table([*head, *(f"faster than `{rival}`" for rival in rivals)], shown)
+    return markdown_table([*head, *(f"faster than `{reference}`" for reference in references)], shown)
 
 
 def _scenario_table(rows: list[Row]) -> str:

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from baselines.experiments.mission import Record
+from baselines.experiments.outcome import Record
 from baselines.experiments.statistics import (
     Interval,
     Profile,
@@ -24,7 +24,7 @@ from baselines.experiments.statistics import (
 from baselines.head_to_head.cells import BASELINE, Entries
 
 REFERENCES = (BASELINE, "gradient")
-"""Who a strategy's probability of being faster is given against, where they take part."""
+"""Strategies against which the probability of being faster is given, where they take part."""
 MARKS = ("t50_s", "t90_s", "t99_s")
 FIGURES = (
     "scans",
@@ -47,7 +47,7 @@ class Results:
     """An experiment that was run.
 
     Attributes:
-        entries: What took part.
+        entries: The cells of the experiment.
         records: Cell id → records by seed: `timed_record`, or `failed_record`.
     """
 
@@ -135,11 +135,11 @@ def overall_rows(results: Results) -> list[Row]:
                 **_with_interval("relative_time", iqm_interval(results.relative(robots, strategy))),
                 **_with_interval("relative_t90", iqm_interval(results.relative(robots, strategy, "t90_s"))),
             }
-            for rival in REFERENCES:
-                if rival in results.entries.strategies:
-                    against = None if rival == strategy else results.stacked_s(robots, rival)
+            for reference in REFERENCES:
+                if reference in results.entries.strategies:
+                    against = None if reference == strategy else results.stacked_s(robots, reference)
                     interval = None if against is None else improvement_interval(time_s, against)
-                    row |= _with_interval(f"faster_than_{rival}", interval)
+                    row |= _with_interval(f"faster_than_{reference}", interval)
             rows.append(row)
     return rows
 

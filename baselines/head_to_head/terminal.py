@@ -46,10 +46,10 @@ def show_results(results: Results) -> None:
     table.add_column("robots", justify="right")
     table.add_column("strategy", no_wrap=True)
     rows = overall_rows(results)
-    rivals = [rival for rival in REFERENCES if f"faster_than_{rival}" in rows[0]]
+    references = [reference for reference in REFERENCES if f"faster_than_{reference}" in rows[0]]
     table.add_column("mapped", justify="right")
     table.add_column("relative time", justify="right", no_wrap=True)
-    for head in (*(f"beats\n{rival}" for rival in rivals), "ms a\ndecision"):
+    for head in (*(f"beats\n{reference}" for reference in references), "ms a\ndecision"):
         table.add_column(head, justify="right")
     clocks = clock_rows(results)
     last = None
@@ -63,7 +63,7 @@ def show_results(results: Results) -> None:
             row["strategy"],
             f"{row['mapped']:.0%}",
             ranged(row, "relative_time", ".2f"),
-            *(_shown(row[f"faster_than_{rival}"]) for rival in rivals),
+            *(_shown(row[f"faster_than_{reference}"]) for reference in references),
             _shown(float(np.mean(spent)) if spent else None),
         )
     console = Console()

@@ -6,7 +6,8 @@ import time
 
 import numpy as np
 
-from baselines.experiments.mission import Record, run_mission
+from baselines.experiments.mission import run_mission
+from baselines.experiments.outcome import Record
 from baselines.strategies import make_strategy
 from baselines.strategies.protocol import Stopwatch
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv

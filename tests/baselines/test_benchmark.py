@@ -17,7 +17,7 @@ from scipy import stats
 
 from baselines import benchmark, strategies
 from baselines.cli.arguments import run_command
-from baselines.experiments import cells as experiment
+from baselines.experiments import runner
 from baselines.experiments.mission import run_mission, scripted
 from baselines.head_to_head import cells as head_to_head_cells
 from baselines.head_to_head.cells import Entries, chosen_scenarios, chosen_strategies
@@ -156,7 +156,7 @@ def test_a_finished_experiment_says_the_same_again_without_a_mission(pair, capsy
         assert not tasks, "missions were run"
         return []
 
-    monkeypatch.setattr(experiment, "run_each", nothing_to_do)
+    monkeypatch.setattr(runner, "run_each", nothing_to_do)
     assert run_command(benchmark.main, [*PAIR, "--out", str(folder), "--json"]) == 0
     said = capsys.readouterr()
     results = json.loads(said.out, parse_constant=pytest.fail)

@@ -7,8 +7,10 @@ from typing import Any
 import numpy as np
 
 from baselines.experiments.claims import Claim
+from baselines.experiments.outcome import Record
 from baselines.experiments.statistics import mean_interval, median_interval, ratio_interval
-from baselines.papers.bhattacharya.sweep import CONTROLS, FLOORS, Record, coverage_id, exploration_id
+from baselines.papers.bhattacharya.sweep import CONTROLS, FLOORS, coverage_id, exploration_id
+from baselines.papers.bhattacharya.timing import Seconds
 
 Records = dict[str, Record]
 STARTS = ("random", "cluster")
@@ -38,7 +40,7 @@ def exploring(records: Records, floor: str, variant: str, range_cells: float) ->
     return found
 
 
-def all_claims(records: Records, splits: dict[str, Any], timing: tuple[float, float]) -> list[Claim]:
+def all_claims(records: Records, splits: dict[str, Any], timing: Seconds) -> list[Claim]:
     """Every claim of the runs; see `bhattacharya_missions` for the others.
 
     Args:
@@ -120,7 +122,7 @@ def _exploration_claims(records: Records, floor: str, variant: str, range_cells:
     return claims
 
 
-def _time_claims(records: Records, timing: tuple[float, float]) -> list[Claim]:
+def _time_claims(records: Records, timing: Seconds) -> list[Claim]:
     floor = first_floor(records, "paper")
     found = exploring(records, floor, "paper", FLOORS[floor].middle)
     seconds = [record["seconds_with_tessellation"] for record in found]
@@ -130,8 +132,10 @@ def _time_claims(records: Records, timing: tuple[float, float]) -> list[Claim]:
     mean = float(np.mean([record["seconds_an_iteration"] for record in found]))
     text = "(b) the same, mean of all iterations: a robot under way to its target needs no cells"
     claims.append(Claim("seconds-mean", text, 1.7, mean, None, None, mean <= 1.7))
-    text = f"(b) SciPy's Dijkstra over our tessellation of the plan ({timing[1]:.3f} s, {timing[0]:.3f} s)"
-    ratio = timing[1] / timing[0]
+    text = (
+        f"(b) SciPy's Dijkstra over our tessellation of the plan ({timing.scipy:.3f} s, {timing.ours:.3f} s)"
+    )
+    ratio = timing.scipy / timing.ours
     return [*claims, Claim("scipy", text, None, ratio, None, None, ratio > 1.0)]
 
 

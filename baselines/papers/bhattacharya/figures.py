@@ -11,8 +11,9 @@ from matplotlib.figure import Figure
 from scipy import ndimage
 
 from baselines.cli.figures import COLOURS
+from baselines.experiments.outcome import Record
+from baselines.papers.bhattacharya.run import Run, start_cells
 from baselines.papers.bhattacharya.splitting import SHAPE, robot_cells, split, unknown_region
-from baselines.papers.bhattacharya.sweep import Record, Run, start_cells
 from entropy_explore_env.belief.paths.geodesic_cells import new_tessellation, tessellate
 
 _PALE = 0.72
@@ -35,7 +36,7 @@ def _tessellated(occupied: np.ndarray, places: list[int]) -> np.ndarray:
     return space.cells[:, :, 0]
 
 
-def _ways(axes: Axes, places: np.ndarray, width: int) -> None:
+def _draw_paths(axes: Axes, places: np.ndarray, width: int) -> None:
     """Trajectories (T, A) of cells, start hollow, end filled."""
     for robot in range(places.shape[1]):
         x, y = places[:, robot] // width, places[:, robot] % width
@@ -60,14 +61,14 @@ def figure_2(office: Run) -> Figure:
         places = start_cells(occupied, "random", run.robots, 0)
         cells = _tessellated(occupied, places)
         axes.imshow(_cell_picture(occupied[:, :, 0], cells), origin="lower", interpolation="nearest")
-        _ways(axes, np.array([places]), occupied.shape[1])
+        _draw_paths(axes, np.array([places]), occupied.shape[1])
         _bare(axes, f"{run.shape[0]} × {run.shape[1]} cells, {run.robots} robots")
     figure.suptitle("Fig. 2: geodesic cells", x=0.01, ha="left")
     return figure
 
 
 def figure_3(rows: list[tuple[str, Run, Record]]) -> Figure:
-    """Cells and ways along the convergence, a row a control (fig. 3)."""
+    """Cells and paths along the convergence, a row a control (fig. 3)."""
     moments = 4
     figure = Figure(figsize=(9.6, 2.9 * len(rows)), layout="constrained")
     axes = figure.subplots(len(rows), moments, squeeze=False)
@@ -77,7 +78,7 @@ def figure_3(rows: list[tuple[str, Run, Record]]) -> Figure:
             last = round(share * (len(places) - 1))
             cells = _tessellated(occupied, places[last].tolist())
             picture.imshow(_cell_picture(occupied[:, :, 0], cells), origin="lower", interpolation="nearest")
-            _ways(picture, places[: last + 1], occupied.shape[1])
+            _draw_paths(picture, places[: last + 1], occupied.shape[1])
             _bare(picture, f"{name}, iteration {last}")
     figure.suptitle("Fig. 3: five robots cover a known office", x=0.01, ha="left")
     return figure
@@ -105,7 +106,7 @@ def figure_4() -> Figure:
 
 
 def figure_6(run: Run, record: Record, maps: dict[str, np.ndarray], title: str) -> Figure:
-    """Entropy, cells and ways along an exploration; green = uncertain, dark = believed occupied."""
+    """Entropy, cells and paths along an exploration; green = uncertain, dark = believed occupied."""
     moments = sum(name.startswith("entropy_") for name in maps)
     figure = Figure(figsize=(10.2, 2.9 * math.ceil(moments / 3)), layout="constrained")
     places, width = np.array(record["places"]), run.shape[1]
@@ -119,7 +120,7 @@ def figure_6(run: Run, record: Record, maps: dict[str, np.ndarray], title: str) 
         picture[maps[f"occupied_{number}"]] = 0.1
         picture[_borders(cells)] = _BORDER
         axes.imshow(picture.transpose(1, 0, 2), origin="lower", interpolation="nearest")
-        _ways(axes, places[:iteration], width)
+        _draw_paths(axes, places[:iteration], width)
         _bare(axes, f"iteration {iteration}")
     for axes in all_axes[moments:]:
         axes.set_visible(False)

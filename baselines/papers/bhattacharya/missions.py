@@ -10,7 +10,7 @@ import numpy as np
 
 from baselines.experiments.cells import Cell
 from baselines.experiments.claims import Claim
-from baselines.experiments.mission import Record
+from baselines.experiments.outcome import Record
 from baselines.experiments.statistics import mean_interval, ratio_interval
 from baselines.experiments.tables import markdown_table
 from entropy_explore_env.scenario import with_settings

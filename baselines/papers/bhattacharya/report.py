@@ -34,16 +34,17 @@ from baselines.papers.bhattacharya.discussion import (
 from baselines.papers.bhattacharya.figures import figure_2, figure_3, figure_4, figure_6, figure_progress
 from baselines.papers.bhattacharya.missions import Records as MissionRecords
 from baselines.papers.bhattacharya.missions import channel_table, flying_table
+from baselines.papers.bhattacharya.run import Run
 from baselines.papers.bhattacharya.sweep import (
     CONTROLS,
     FLOORS,
     FUSIONS,
     PICTURED,
     VARIANTS,
-    Run,
     coverage_id,
     exploration_id,
 )
+from baselines.papers.bhattacharya.timing import Seconds
 from entropy_explore_env.writing import write_atomically
 
 
@@ -54,7 +55,7 @@ class Results:
     runs: list[Run]
     records: Records
     splits: dict[str, Any]
-    timing: tuple[float, float]
+    timing: Seconds
     changed: float
     """Share of cells whose cost or owner changes from one tessellation to the next."""
     missions: MissionRecords

@@ -6,6 +6,7 @@ import math
 import statistics
 import time
 from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 from scipy.sparse import csr_matrix
@@ -15,16 +16,19 @@ from baselines.papers.bhattacharya.simulation.team import Simulation
 from entropy_explore_env.belief.paths.geodesic_cells import UNREACHED, new_tessellation, tessellate
 
 
-def cost_graph(rates: np.ndarray, length_cost: float = 0.0, by_length: bool = True) -> csr_matrix:
+def cost_graph(costs_per_cell: np.ndarray, length_cost: float = 0.0, by_length: bool = True) -> csr_matrix:
     """(V, V) what steps between the cells of a plan cost, as `tessellate` has it; none past a corner.
 
     Args:
-        rates: (X, Y, 1) float32; inf = impassable.
+        costs_per_cell: (X, Y, 1) float32, traversal cost of a cell; inf = impassable.
         length_cost: Cost of a voxel edge of path in addition.
-        by_length: Whether diagonal steps pay the rates of their whole length.
+        by_length: Whether diagonal steps pay the costs_per_cell of their whole length.
     """
-    size_x, size_y, _ = rates.shape
-    plane, numbers = rates[:, :, 0].astype(np.float64), np.arange(rates.size).reshape(size_x, size_y)
+    size_x, size_y, _ = costs_per_cell.shape
+    plane, numbers = (
+        costs_per_cell[:, :, 0].astype(np.float64),
+        np.arange(costs_per_cell.size).reshape(size_x, size_y),
+    )
     free, rows, columns, costs = np.isfinite(plane), [], [], []
 
     def moved(field: np.ndarray, x: int, y: int, by: tuple[int, int]) -> np.ndarray:
@@ -40,24 +44,31 @@ def cost_graph(rates: np.ndarray, length_cost: float = 0.0, by_length: bool = Tr
         columns.append(moved(numbers, x, y, (x, y))[legal])
         costs.append(mean * (length if by_length else 1.0) + length_cost * length)
     ends = (np.concatenate(rows), np.concatenate(columns))
-    return csr_matrix((np.concatenate(costs), ends), shape=(rates.size, rates.size))
+    return csr_matrix((np.concatenate(costs), ends), shape=(costs_per_cell.size, costs_per_cell.size))
 
 
-def beside_scipy(rates: np.ndarray, sources: np.ndarray, rounds: int = 5) -> tuple[float, float]:
+class Seconds(NamedTuple):
+    """Seconds of processor time of a tessellation; SciPy's without the owners of cells."""
+
+    ours: float
+    scipy: float
+
+
+def beside_scipy(costs_per_cell: np.ndarray, sources: np.ndarray, rounds: int = 5) -> Seconds:
     """Seconds of processor time of a tessellation, ours and SciPy's (`min_only`, costs alone); medians.
 
     Raises:
         RuntimeError: The costs differ.
     """
-    graph, space = cost_graph(rates), new_tessellation(rates.shape)
-    tessellate(space, rates, sources)
+    graph, space = cost_graph(costs_per_cell), new_tessellation(costs_per_cell.shape)
+    tessellate(space, costs_per_cell, sources)
     if not np.allclose(space.costs.ravel(), dijkstra(graph, indices=sources, min_only=True), rtol=1e-6):
         raise RuntimeError("our costs are not SciPy's")
     ours, theirs = [], []
     for _ in range(rounds):
-        ours.append(_timed(lambda: tessellate(space, rates, sources)))
+        ours.append(_timed(lambda: tessellate(space, costs_per_cell, sources)))
         theirs.append(_timed(lambda: dijkstra(graph, indices=sources, min_only=True)))
-    return statistics.median(ours), statistics.median(theirs)
+    return Seconds(statistics.median(ours), statistics.median(theirs))
 
 
 def changed_share(simulation: Simulation, iterations: int) -> float:
@@ -69,12 +80,12 @@ def changed_share(simulation: Simulation, iterations: int) -> float:
         simulation: With perfect messages; goes on from where it is.
         iterations: How many.
     """
-    space, shares = simulation.minds[0].space, list[float]()
+    space, shares = simulation.planners[0].space, list[float]()
     costs, cells = space.costs.copy(), space.cells.copy()
     for _ in range(iterations):
-        before = simulation.minds[0].tessellations
+        before = simulation.planners[0].tessellations
         simulation.step(functional=False)
-        if simulation.minds[0].tessellations > before:
+        if simulation.planners[0].tessellations > before:
             changed = (space.costs != costs) | (space.cells != cells)
             shares.append(float(changed[space.cells != UNREACHED].mean()))
             costs, cells = space.costs.copy(), space.cells.copy()

@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 
 from baselines.experiments.claims import Claim
-from baselines.experiments.mission import Record
+from baselines.experiments.outcome import Record
 from baselines.experiments.statistics import (
     central_range,
     mean_interval,
@@ -15,7 +15,7 @@ from baselines.experiments.statistics import (
     ratio_interval,
     small_mean_range,
 )
-from baselines.papers.rocha04.sweep import BURSTS, I_MINS, STANDARD, TEAMS, rival_id, team_id
+from baselines.papers.rocha04.sweep import BURSTS, I_MINS, STANDARD, TEAMS, alternative_id, team_id
 
 Records = dict[str, list[Record]]
 
@@ -62,7 +62,7 @@ def _exact_claims(records: Records) -> list[Claim]:
     ]
 
 
-def _single_claims(single: list[Record], name: str, who: str) -> list[Claim]:
+def _single_claims(single: list[Record], name: str, subject: str) -> list[Claim]:
     """One robot: our mean, and whether the paper's is one that 10 of our starts could have given."""
     claims = []
     for figure, field, paper in (
@@ -73,13 +73,15 @@ def _single_claims(single: list[Record], name: str, who: str) -> list[Claim]:
         values = [record[field] for record in single]
         mean, low, high = mean_interval(values)
         lowest, highest = small_mean_range(values, PAPER_STARTS)
-        text = f"{who}: mean {field}; means of {PAPER_STARTS} starts lie in {lowest:,.0f} … {highest:,.0f}"
+        text = (
+            f"{subject}: mean {field}; means of {PAPER_STARTS} starts lie in {lowest:,.0f} … {highest:,.0f}"
+        )
         claims.append(Claim(f"{name}-{figure}", text, paper, mean, low, high, lowest <= paper <= highest))
     ratios = [record["t_mission_s"] / record["half_s"] for record in single if record["half_s"]]
     median, low, high = median_interval(ratios)
     lowest, highest = central_range(ratios)
     text = (
-        f"{who}: time to the end over time to half of the entropy; the paper shows one mission, "
+        f"{subject}: time to the end over time to half of the entropy; the paper shows one mission, "
         "ours lie in "
         f"{lowest:.1f} … {highest:.1f}; median"
     )
@@ -99,7 +101,7 @@ def _team_size_claims(records: Records) -> list[Claim]:
         )
         for burst, i_min_bits in channels
     ]
-    plane = [rival_id(robots, "gradient-plane") for robots in (1, *TEAMS)]
+    plane = [alternative_id(robots, "gradient-plane") for robots in (1, *TEAMS)]
     return [*claims, _team_size_claim(records, "plane", "motion plane, burst 64, I_min 0.3219", plane)]
 
 
@@ -186,7 +188,7 @@ def _random_claims(records: Records) -> list[Claim]:
     """Not the paper's: the gradient rule against a random walk from the same starts."""
     claims = []
     for robots in (1, *TEAMS):
-        walk = times(records, rival_id(robots, "random"))
+        walk = times(records, alternative_id(robots, "random"))
         ratio, low, high = ratio_interval(times(records, team_id(robots, *STANDARD)), walk)
         text = (
             f"ours, {robots} robot{'s' if robots > 1 else ''}: gradient is faster than a random walk; ratio"

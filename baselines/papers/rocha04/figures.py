@@ -6,10 +6,18 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from baselines.cli.figures import COLOURS
-from baselines.experiments.mission import Record
+from baselines.experiments.outcome import Record
 from baselines.experiments.statistics import mean_interval
 from baselines.papers.rocha04.claims import PAPER_T_MISSION_S, Records, times
-from baselines.papers.rocha04.sweep import BURSTS, I_MINS, RIVALS, STANDARD, TEAMS, rival_id, team_id
+from baselines.papers.rocha04.sweep import (
+    ALTERNATIVES,
+    BURSTS,
+    I_MINS,
+    STANDARD,
+    TEAMS,
+    alternative_id,
+    team_id,
+)
 
 _LABELS = {
     "random": "random walk",
@@ -106,8 +114,10 @@ def figure_time(records: Records, what: str) -> tuple[Figure, dict[str, list[obj
         table["robots"] += [1, *TEAMS]
         for name, column in (("mean_s", mean), ("low_s", low), ("high_s", high)):
             table[name] += column.round(2).tolist()
-    for rival, marker, shift in zip(RIVALS, "xd^", (-0.1, 0.1, 0.15), strict=True):
-        points = [mean_interval(times(records, rival_id(robots, rival))) for robots in (1, *TEAMS)]
+    for alternative, marker, shift in zip(ALTERNATIVES, "xd^", (-0.1, 0.1, 0.15), strict=True):
+        points = [
+            mean_interval(times(records, alternative_id(robots, alternative))) for robots in (1, *TEAMS)
+        ]
         mean, low, high = (np.asarray(column) for column in zip(*points, strict=True))
         axes.errorbar(
             np.asarray([1, *TEAMS]) + shift,
@@ -116,8 +126,8 @@ def figure_time(records: Records, what: str) -> tuple[Figure, dict[str, list[obj
             linestyle=":",
             marker=marker,
             capsize=3,
-            color={"random": "0.4", "gradient-plane": "0.65"}.get(rival, "0.1"),
-            label=f"{_LABELS[rival]}, 64, 0.3219",
+            color={"random": "0.4", "gradient-plane": "0.65"}.get(alternative, "0.1"),
+            label=f"{_LABELS[alternative]}, 64, 0.3219",
         )
     axes.plot([1], [PAPER_T_MISSION_S], "k*", label="the paper's mean of 10 starts")
     axes.set(

@@ -14,7 +14,16 @@ from baselines.experiments.statistics import mean_interval, median_interval, rat
 from baselines.experiments.tables import csv_table, markdown_table
 from baselines.papers.rocha04.claims import PAPER_STARTS, Records, times
 from baselines.papers.rocha04.figures import figure_3, figure_4, figure_shared, figure_time
-from baselines.papers.rocha04.sweep import BURSTS, CHANGES, I_MINS, RIVALS, STANDARD, TEAMS, rival_id, team_id
+from baselines.papers.rocha04.sweep import (
+    ALTERNATIVES,
+    BURSTS,
+    CHANGES,
+    I_MINS,
+    STANDARD,
+    TEAMS,
+    alternative_id,
+    team_id,
+)
 from entropy_explore_env.scenario import Scenario
 from entropy_explore_env.scenarios import ROOM
 from entropy_explore_env.writing import write_atomically
@@ -114,7 +123,10 @@ def _team_table(records: Records) -> str:
     """Strategies beside each other for every team size, burst 64 and I_min 0.3219."""
     rows = []
     for robots in (1, *TEAMS):
-        cells = {"gradient": team_id(robots, *STANDARD), **{r: rival_id(robots, r) for r in RIVALS}}
+        cells = {
+            "gradient": team_id(robots, *STANDARD),
+            **{name: alternative_id(robots, name) for name in ALTERNATIVES},
+        }
         for strategy, cell in cells.items():
             found = records[cell]
             scans = np.asarray([record["scans"] for record in found]) / robots
@@ -158,7 +170,10 @@ def _sharing_text(records: Records) -> str:
 def _single_table(records: Records) -> str:
     """Gradient and random walk beside each other: the paper's figures of merit."""
     rows = []
-    for name, cell in (("gradient", "single"), *((rival, f"single-{rival}") for rival in RIVALS)):
+    for name, cell in (
+        ("gradient", "single"),
+        *((alternative, f"single-{alternative}") for alternative in ALTERNATIVES),
+    ):
         found = records[cell]
         time_s = times(records, cell)
         rows.append(

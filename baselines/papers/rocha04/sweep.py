@@ -14,8 +14,8 @@ BURSTS = (32, 64, 128)
 I_MINS = (0.6215, 0.3219, 0.0291)
 STANDARD = (64, 0.3219)
 """burst and I_min of figure 4."""
-RIVALS = ("random", "gradient-plane", "information-rate")
-"""What stands beside eqs. 33-34 for every team size: a random walk, the motion-plane rule, and ours."""
+ALTERNATIVES = ("random", "gradient-plane", "information-rate")
+"""Strategies compared with eqs. 33-34 for every team size: a random walk, the motion-plane rule, and ours."""
 
 CHANGES: dict[str, tuple[str, dict[str, Any], str]] = {
     "scan-0": ("scan time 0.001 s instead of 0.5 s", {"sensor": {"scan_time_s": 0.001}}, "gradient"),
@@ -43,8 +43,8 @@ def team_id(robots: int, burst: int, i_min_bits: float) -> str:
     return "single" if robots == 1 else f"team-{robots}-burst-{burst}-imin-{i_min_bits}"
 
 
-def rival_id(robots: int, strategy: str) -> str:
-    """Name of the cell in which another strategy stands beside `team_id(robots, *STANDARD)`."""
+def alternative_id(robots: int, strategy: str) -> str:
+    """Name of the cell with another strategy and the settings of `team_id(robots, *STANDARD)`."""
     return f"single-{strategy}" if robots == 1 else f"team-{robots}-{strategy}"
 
 
@@ -59,14 +59,14 @@ def experiment(starts: int, single_starts: int, changes: bool) -> list[Cell]:
     single = with_settings(ROOM, {"robots": 1})
     cells = [
         Cell("single", single, "gradient", single_starts),
-        *(Cell(f"single-{strategy}", single, strategy, single_starts) for strategy in RIVALS),
+        *(Cell(f"single-{strategy}", single, strategy, single_starts) for strategy in ALTERNATIVES),
     ]
     for robots in TEAMS:
         for burst in BURSTS:
             for i_min_bits in I_MINS:
                 scenario = _team(robots, burst, i_min_bits)
                 cells.append(Cell(team_id(robots, burst, i_min_bits), scenario, "gradient", starts))
-        for strategy in RIVALS:
+        for strategy in ALTERNATIVES:
             cells.append(Cell(f"team-{robots}-{strategy}", _team(robots, *STANDARD), strategy, starts))
     if changes:
         for name, (_, settings, strategy) in CHANGES.items():

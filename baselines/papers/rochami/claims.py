@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from baselines.experiments.claims import Claim
-from baselines.experiments.mission import Record
+from baselines.experiments.outcome import Record
 from baselines.experiments.statistics import (
     Interval,
     holm,
@@ -130,17 +130,17 @@ def _kappa_claims(records: Records) -> list[Claim]:
     """What the cost of distance does to two robots."""
     kappas = [kappa for kappa in KAPPAS if kappa_id(kappa) in records]
     time_s = {kappa: times(records, kappa_id(kappa)) for kappa in kappas}
-    way_m = {kappa: distances(records, kappa_id(kappa)) for kappa in kappas}
-    both = {kappa: time_s[kappa] * way_m[kappa] for kappa in kappas}
+    path_m = {kappa: distances(records, kappa_id(kappa)) for kappa in kappas}
+    both = {kappa: time_s[kappa] * path_m[kappa] for kappa in kappas}
     last = kappas[-1]
-    shown = [", ".join(f"{values[kappa].mean():,.0f}" for kappa in kappas) for values in (time_s, way_m)]
+    shown = [", ".join(f"{values[kappa].mean():,.0f}" for kappa in kappas) for values in (time_s, path_m)]
     asked = f"κ = {', '.join(f'{kappa:g}' for kappa in kappas)}"
     rises = all(time_s[b].mean() > time_s[a].mean() for a, b in pairwise(kappas))
     ratio, low, high = ratio_interval(time_s[last], time_s[0.0])
     text = f"2 robots: t rises with κ ({shown[0]} s for {asked}); t({last:g})/t(0)"
     claims = [Claim("kappa-time", text, "> 1, monotone", ratio, low, high, rises and low > 1)]
-    falls = all(way_m[b].mean() < way_m[a].mean() for a, b in pairwise(kappas))
-    ratio, low, high = ratio_interval(way_m[last], way_m[0.0])
+    falls = all(path_m[b].mean() < path_m[a].mean() for a, b in pairwise(kappas))
+    ratio, low, high = ratio_interval(path_m[last], path_m[0.0])
     text = f"2 robots: the distance driven falls with κ ({shown[1]} m); d({last:g})/d(0)"
     claims.append(Claim("kappa-distance", text, "< 1, monotone", ratio, low, high, falls and high < 1))
     middle = min(kappas, key=lambda kappa: abs(kappa - _KNEE))

@@ -15,7 +15,7 @@ _POINTS = 100
 class TeamCoverage:
     """Notes, by the best map, what the cones of the chosen viewpoints cover together, and twice.
 
-    The cones are those that robots announce, whether or not they do: V(Yˢ, r̂, α̂).
+    The cones are those of announcements, V(Yˢ, r̂, α̂), also where nothing is announced.
     """
 
     def __init__(self, missions: Any) -> None:  # noqa: ANN401 - for figures only, see reports/recording.py

@@ -131,8 +131,8 @@ def _on_kappa(records: Records) -> list[str]:
             continue
         cells = [kappa_id(kappa, name) for kappa in (0.0, 0.25, 1.0)]
         time_s = " → ".join(f"{times(records, cell).mean():,.0f}" for cell in cells)
-        way_m = " → ".join(f"{distances(records, cell).mean():,.1f}" for cell in cells)
-        lines.append(f"κ = 0, 0.25, 1, and {text}: t {time_s} s, d {way_m} m.")
+        path_m = " → ".join(f"{distances(records, cell).mean():,.1f}" for cell in cells)
+        lines.append(f"κ = 0, 0.25, 1, and {text}: t {time_s} s, d {path_m} m.")
     return lines
 
 

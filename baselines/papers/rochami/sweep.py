@@ -1,4 +1,4 @@
-"""The experiment of RochaMI as cells: scenario, weighing and number of starts of each point."""
+"""The experiment of RochaMI as cells: scenario, coordination and number of starts of each point."""
 
 from __future__ import annotations
 
@@ -8,11 +8,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from baselines.experiments.cells import Cell
-from baselines.experiments.mission import Record, record_mission
-from baselines.papers.rochami.coverage import TeamCoverage
-from baselines.strategies import make_strategy
-from baselines.strategies.mutual_information import MutualInformation, MutualInformationConfig
-from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
+from baselines.experiments.outcome import Record
+from baselines.papers.rochami.mission import Run
+from baselines.strategies.mutual_information import MutualInformationConfig
 from entropy_explore_env.scenario import Scenario, with_settings
 from entropy_explore_env.scenarios import LAB, ROOM
 
@@ -42,23 +40,6 @@ _BASE: dict[str, Any] = {
     "robot": {"reach_m": 4.0, "when_blocked": "wait"},
     "ending": {"sigma_end": END_SIGMA, "time_limit_s": TIME_LIMIT_S},
 }
-
-
-@dataclass(frozen=True)
-class Run:
-    """Runs a mission of a cell: with a coordination of its own, and with the team's coverage if wanted."""
-
-    coordination: MutualInformationConfig | None = None
-    covered: bool = False
-
-    def __call__(self, env: EntropyExploreEnv, strategy: str, seed: int) -> Record:
-        """Run the mission; its record has the `decisions` and, if wanted, H(T) and I in `coverage`."""
-        coverage = TeamCoverage(env.missions) if self.covered else None
-        made = make_strategy(strategy) if self.coordination is None else MutualInformation(self.coordination)
-        record = record_mission(env, made, seed, None if coverage is None else coverage.note)
-        if isinstance(made, MutualInformation):
-            record["decisions"] = made.decisions
-        return record if coverage is None else {**record, "coverage": coverage.series()}
 
 
 @dataclass(frozen=True)
@@ -165,14 +146,14 @@ def experiment(starts: int, quick: bool) -> list[Cell]:
                 cells.append(_cell(name, settings, method, starts, covered=covered))
         short = _merged({"robots": robots}, _changed(reach_m=1.0))
         cells.append(_cell(f"n{robots}-random-1m", short, "random", starts))
-    for name, (_, settings, weighed) in () if quick else KAPPA_CHANGES.items():
+    for name, (_, settings, coordination_settings) in () if quick else KAPPA_CHANGES.items():
         for kappa in (0.0, 0.25, 1.0):
             changed = _merged({"robots": 2}, settings)
-            cost = {**weighed, "distance_cost": kappa}
+            cost = {**coordination_settings, "distance_cost": kappa}
             cells.append(_cell(kappa_id(kappa, name), changed, "coordinated", starts, cost))
     for kappa in QUICK_KAPPAS if quick else KAPPAS[1:]:
-        weighed = {"distance_cost": kappa}
-        cells.append(_cell(kappa_id(kappa), {"robots": 2}, "coordinated", starts, weighed))
+        coordination_settings = {"distance_cost": kappa}
+        cells.append(_cell(kappa_id(kappa), {"robots": 2}, "coordinated", starts, coordination_settings))
     for name in ("bodies", "reach") if quick else CHANGES:
         for robots in FEW:
             for method in METHODS[:2] if CHANGES[name].both else METHODS[:1]:
@@ -188,7 +169,7 @@ def _cell(
     settings: dict[str, Any],
     method: str,
     starts: int,
-    weighed: dict[str, Any] | None = None,
+    coordination_settings: dict[str, Any] | None = None,
     covered: bool = False,
 ) -> Cell:
     if method == "random":
@@ -197,7 +178,7 @@ def _cell(
     if not coordinated:
         settings = _merged(settings, {"channel": {"announcements": False}})
     run: Callable[..., Record] = Run(
-        MutualInformationConfig(**{"coordinated": coordinated, **(weighed or {})}), covered
+        MutualInformationConfig(**{"coordinated": coordinated, **(coordination_settings or {})}), covered
     )
     strategy = "mutual-information" if coordinated else "ground-gradient"
     return Cell(name, _lab(settings), strategy, starts, run)

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from baselines.experiments.claims import Claim
-from baselines.experiments.mission import Record
+from baselines.experiments.outcome import Record
 from baselines.experiments.statistics import double_ratio_interval, ratio_interval
 from baselines.papers.sawhney.sweep import (
     BETAS,
@@ -151,7 +151,7 @@ def _part_claims(records: Records, part: str) -> list[Claim]:
     for end, text in ENDS.items():
         claims += _extreme_claims(records, part, end, f"{name}, {text}")
     claims += [_no_single_beta(records, part, end) for end in ENDS]
-    claims += _way_claims(records, part, name)
+    claims += _distance_claims(records, part, name)
     for other, what in (
         ("naive", "ray-cast V is faster than naive V"),
         ("no-height", "the height factor helps"),
@@ -215,31 +215,33 @@ def _no_single_beta(records: Records, part: str, end: str) -> Claim:
     )
 
 
-def _way_claims(records: Records, part: str, name: str) -> list[Claim]:
-    """To explore all, V/t visits nearly as many points as the best β, on shorter ways (abstract)."""
+def _distance_claims(records: Records, part: str, name: str) -> list[Claim]:
+    """To explore all, V/t visits nearly as many points as the best β, on shorter paths (abstract)."""
     best = best_beta(records, part, "t_none_s")
-    scans, ways = (compared(records, part, "ptv", f"beta-{best}", what) for what in ("scans", "distance_m"))
+    scans, lengths = (
+        compared(records, part, "ptv", f"beta-{best}", what) for what in ("scans", "distance_m")
+    )
     alike = scans[1] > 1.0 - _ALIKE and scans[2] < 1.0 + _ALIKE
     text = f"{name}, to no frontier: V/t scans from nearly as many points as the best β ({best}); ratio"
     shorter = f"{name}, to no frontier: ways of V/t are shorter than those of the best β ({best}); ratio"
     return [
         Claim(f"{part}-points", text, "about 1", *scans, alike),
-        _faster(f"{part}-ways", shorter, "< 1", ways),
+        _faster(f"{part}-ways", shorter, "< 1", lengths),
     ]
 
 
 def _our_claims(records: Records, part: str, name: str) -> list[Claim]:
-    """Not the paper's: the finishing rule, the rivals, and the gain over the best β by team size."""
+    """Not the paper's: the finishing rule, other rules, and the gain over the best β by team size."""
     claims = []
     for end in ENDS:
         ratio = compared(records, part, "finish", "ptv", end)
         text = f"ours, {name}, {ENDS[end]}: (V + bonus)/t is faster than V/t; t ratio"
         claims.append(_faster(f"{part}-finish-{end}", text, None, ratio))
-    for rival in ("nearest", "coordinated"):
+    for other in ("nearest", "coordinated"):
         for end in ("t95_s", "t_none_s"):
-            ratio = compared(records, part, "ptv", rival, end)
-            text = f"ours, {name}, {ENDS[end]}: V/t is faster than `{rival}-frontier`; t ratio"
-            claims.append(_faster(f"{part}-{rival}-{end}", text, None, ratio))
+            ratio = compared(records, part, "ptv", other, end)
+            text = f"ours, {name}, {ENDS[end]}: V/t is faster than `{other}-frontier`; t ratio"
+            claims.append(_faster(f"{part}-{other}-{end}", text, None, ratio))
     for n in teams_in(records, part):
         if n > 1:
             ratio = compared(records, part, "ptv", "sync", "t95_s", (n,))

@@ -20,7 +20,7 @@ from matplotlib.patches import Patch
 from baselines.cli.figures import COLOURS, extent_of
 from baselines.experiments.cells import Cell
 from baselines.experiments.mission import scripted
-from baselines.papers.sawhney.mission import Run, followed
+from baselines.papers.sawhney.mission import Run, explore_until_done
 from baselines.papers.sawhney.sweep import PLANS, POINT, TERRAINS, world_cell
 from baselines.strategies.frontier import FrontierStrategy, Metric
 from baselines.strategies.frontier.candidates import Chart
@@ -71,8 +71,8 @@ class Snapshot:
     share: float
     chart: Chart
     expected: np.ndarray
-    """(X, Y) bool, what robots on their ways to viewpoints, or about to leave for them, expect to see."""
-    ways_m: list[np.ndarray]
+    """(X, Y) bool, what robots driving to viewpoints, or about to, expect to see."""
+    paths_m: list[np.ndarray]
     finished: bool
     """Whether no frontier was left."""
 
@@ -84,9 +84,9 @@ def pictures(parts: Sequence[str], dem: Path | None) -> tuple[dict[str, Figure],
         drawn["options"], means = figure_options()
         team = world_cell("office", TEAM, "ptv")
         drawn["plan-mission"] = figure_plan(team, f"Fig. 7: {TEAM} robots in `office`, V/t")
-        rival = Metric(PAPER_BETA * POINT["plans"])
-        ways = [("V/t", "ptv"), (f"V - {PAPER_BETA}t", rival)]
-        drawn["ways"] = figure_ways([(name, world_cell("cluttered", 1, method)) for name, method in ways])
+        other = Metric(PAPER_BETA * POINT["plans"])
+        ways = [("V/t", "ptv"), (f"V - {PAPER_BETA}t", other)]
+        drawn["ways"] = figure_paths([(name, world_cell("cluttered", 1, method)) for name, method in ways])
     if "terrains" in parts:
         team = world_cell("terrain", TEAM, "ptv")
         drawn["terrain-mission"] = figure_terrain(team, f"Fig. 9: {TEAM} UAVs over `terrain`, V/t")
@@ -161,33 +161,33 @@ def _options_on_the_way() -> tuple[np.ndarray, np.ndarray]:
         if share >= 0.5 and not found:
             found.append(explorer.allocator_of(0).options(views[0]))
 
-    followed(_environment(cell), explorer, 0, look)
+    explore_until_done(_environment(cell), explorer, 0, look)
     return found[0] if found else explorer.allocator_of(0).options(latest[0])
 
 
 def snapshots(cell: Cell, seed: int, marks: Sequence[float] = _MARKS) -> list[Snapshot]:
     """A mission of a cell when shares but for the last were explored, as far as they were, and its end."""
     env, explorer = _environment(cell), FrontierStrategy(_run(cell).exploring)
-    ways, taken, grid = DrivenPaths(cell.scenario.robots), list[Snapshot](), cell.scenario.grid
+    driven, taken, grid = DrivenPaths(cell.scenario.robots), list[Snapshot](), cell.scenario.grid
 
     def snap(time_s: float, share: float, targets: Sequence[np.ndarray]) -> None:
         candidates, finished = explorer.allocator_of(0).candidates, all(explorer.idle)
         expected = np.zeros(grid.shape[:2], bool)
         for target in () if finished else targets:
             expected |= candidates.expected(grid.in_grid_units(target)[:3])
-        way = ways.to_now(env.missions)
-        taken.append(Snapshot(time_s, share, candidates.chart(), expected, way, finished))
+        paths_m = driven.to_now(env.missions)
+        taken.append(Snapshot(time_s, share, candidates.chart(), expected, paths_m, finished))
 
     def look(share: float, views: Sequence[RobotView], chosen: Sequence[np.ndarray]) -> None:
-        ways.update(env.missions)
+        driven.update(env.missions)
         if len(taken) < len(marks) - 1 and share >= marks[len(taken)]:
             targets = list(env.missions.state.robots[0]["target"])
             for view, viewpoint in zip(views, chosen, strict=True):
                 targets[view.robot] = viewpoint
             snap(views[0].time_s, share, targets)
 
-    times_s, shares = followed(env, explorer, seed, look)
-    ways.update(env.missions)
+    times_s, shares = explore_until_done(env, explorer, seed, look)
+    driven.update(env.missions)
     snap(times_s[-1], shares[-1], list(env.missions.state.robots[0]["target"]))
     return taken
 
@@ -197,7 +197,7 @@ def figure_plan(cell: Cell, title: str) -> Figure:
     grid, taken = cell.scenario.grid, snapshots(cell, 0)
     figure, panels = _panels(len(taken), grid.size_m)
     for axes, now in zip(panels, taken, strict=True):
-        _show(axes, _plan_colours(now.chart), cell.scenario.grid, now.ways_m)
+        _show(axes, _plan_colours(now.chart), cell.scenario.grid, now.paths_m)
         axes.set_title(f"{now.time_s:.0f} s, {now.share:.0%} explored", fontsize=8)
     figure.suptitle(title, fontsize=10)
     _explain(figure, _PLAN_KEY)
@@ -224,20 +224,20 @@ def figure_terrain(cell: Cell, title: str) -> Figure:
         picture = np.where(now.chart.mapped[..., None], green, 0.25 + 0.5 * grey)
         picture[now.expected & ~now.chart.mapped] = to_rgb(_EXPECTED)
         picture[now.chart.edge] = to_rgb(_EDGE)
-        _show(axes, picture, grid, now.ways_m)
+        _show(axes, picture, grid, now.paths_m)
         axes.set_title(f"{now.time_s:.0f} s, {now.share:.0%} explored", fontsize=8)
     figure.suptitle(title, fontsize=10)
     _explain(figure, _TERRAIN_KEY)
     return figure
 
 
-def figure_ways(cells: Sequence[tuple[str, Cell]]) -> Figure:
-    """Figs. 11 and 12: the ways of one robot by several metrics in the same plan, to 95 % and to the end."""
+def figure_paths(cells: Sequence[tuple[str, Cell]]) -> Figure:
+    """Figs. 11 and 12: paths of one robot by several metrics in the same plan, to 95 % and to the end."""
     figure, panels = _panels(2 * len(cells), cells[0][1].scenario.grid.size_m)
     for number, (name, cell) in enumerate(cells):
         for axes, now in zip(panels[number :: len(cells)], snapshots(cell, 0, (0.95, 1.0)), strict=False):
-            _show(axes, _plan_colours(now.chart), cell.scenario.grid, now.ways_m)
-            length_m = float(np.linalg.norm(np.diff(now.ways_m[0], axis=0), axis=1).sum())
+            _show(axes, _plan_colours(now.chart), cell.scenario.grid, now.paths_m)
+            length_m = float(np.linalg.norm(np.diff(now.paths_m[0], axis=0), axis=1).sum())
             until = "no frontier" if now.finished else f"{now.share:.0%}"
             axes.set_title(f"{name}, to {until}: {now.time_s:.0f} s, {length_m:.0f} m", fontsize=8)
     figure.suptitle("Figs. 11-12: the way of one robot", fontsize=10)
@@ -270,7 +270,7 @@ def figure_section(cell: Cell) -> Figure:
     now, world = snapshots(cell, 0, (0.2, 1.0))[0], _world_of(cell)
     grid, edge = world.grid, world.grid.voxel_size_m
     reach_m, patch_m = cell.scenario.sensor.max_range_m, _run(cell).exploring.frontiers.patch_m
-    x, y, z = (int(i) for i in grid.voxel_of(now.ways_m[0][-1]))
+    x, y, z = (int(i) for i in grid.voxel_of(now.paths_m[0][-1]))
     across = grid.centre_of(np.stack([np.arange(grid.shape[0]), *np.zeros((2, grid.shape[0]))], -1))[:, 0]
     ground, known = edge * ground_of(world)[:, y], edge * now.chart.ground[:, y]
     patch = round(patch_m / edge)
@@ -369,13 +369,13 @@ def _panels(count: int, size_m: np.ndarray, width: float = 2.7) -> tuple[Figure,
     return figure, figure.subplots(1, count, squeeze=False)[0]
 
 
-def _show(axes: Axes, picture: np.ndarray, grid: Grid, ways_m: Sequence[np.ndarray] = ()) -> None:
-    """Draw (X, Y, 3) seen from above in metres, with ways over it."""
+def _show(axes: Axes, picture: np.ndarray, grid: Grid, paths_m: Sequence[np.ndarray] = ()) -> None:
+    """Draw (X, Y, 3) seen from above in metres, with paths over it."""
     axes.imshow(np.swapaxes(picture, 0, 1), origin="lower", extent=extent_of(grid), interpolation="nearest")
-    for robot, way in enumerate(ways_m):
+    for robot, path_m in enumerate(paths_m):
         colour = COLOURS[robot % len(COLOURS)]
-        axes.plot(way[:, 0], way[:, 1], color=colour, linewidth=0.9)
-        for place, marker in ((way[0], "o"), (way[-1], "s")):
+        axes.plot(path_m[:, 0], path_m[:, 1], color=colour, linewidth=0.9)
+        for place, marker in ((path_m[0], "o"), (path_m[-1], "s")):
             style: dict[str, Any] = {"color": colour, "markeredgecolor": "k", "markeredgewidth": 0.5}
             axes.plot(*place[:2], marker=marker, markersize=4, **style)
     axes.tick_params(labelsize=7)

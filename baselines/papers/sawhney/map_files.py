@@ -1,54 +1,22 @@
-"""Plans from files, explored by the methods of Sawhney's experiment: who is how fast, and what it costs.
+"""Plans from files, explored by the methods of Sawhney's experiment: mission times and computing time.
 
 Real plans have what drawn ones lack: racks, clutter, and gaps that no robot gets through.
 """
 
 from __future__ import annotations
 
-import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
 
-from baselines.experiments.mission import Record
+from baselines.experiments.outcome import Record
 from baselines.experiments.statistics import mean_interval
 from baselines.experiments.tables import markdown_table
-from baselines.papers.sawhney.mission import Run
-from baselines.strategies.frontier import ExplorationConfig
-from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
-from entropy_explore_env.scenario import Scenario
 
 TEAM, STARTS = 3, 5
 METHODS = ("ptv", "beta-1", "beta-10", "beta-40", "finish", "nearest", "coordinated")
 _MARK = "map-"
-
-
-@dataclass(frozen=True)
-class MapRun:
-    """Runs a mission in the plan of a file.
-
-    Attributes:
-        exploring: Of the robots.
-        world: The file.
-    """
-
-    exploring: ExplorationConfig
-    world: str
-
-    def __call__(self, env: EntropyExploreEnv, strategy: str, seed: int) -> Record:
-        """Run the mission: what `Run` gives, and `clock_s`, seconds of computing."""
-        there, began = _in_plan(env.scenario, self.world), time.process_time()
-        record = Run(self.exploring)(there, strategy, seed)
-        return {**record, "clock_s": round(time.process_time() - began, 3)}
-
-
-@lru_cache(maxsize=1)
-def _in_plan(scenario: Scenario, world: str) -> EntropyExploreEnv:
-    """An environment in the plan, kept for the next mission."""
-    return EntropyExploreEnv(scenario, world={"path": world})
 
 
 def map_world(file: Path) -> str:

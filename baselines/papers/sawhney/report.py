@@ -273,13 +273,13 @@ def _causes_table(records: Records, part: str) -> str:
     rows, changes = [], changes_in(records, part)
     everywhere = next(iter(changes.values()))
     for end, text in ENDS.items():
-        plain = _rivals(records, part, None, end, everywhere)
+        plain = _other_methods(records, part, None, end, everywhere)
         for name, method in plain.items():
             ratio, causes = changed_ratio(records, None, method, end, everywhere), []
             for change, worlds in changes.items():
-                rival = _rivals(records, part, change, end, worlds)[name]
-                then = changed_ratio(records, change, rival, end, worlds)
-                moved = changed_from(records, change, (rival, method), end, worlds)
+                other = _other_methods(records, part, change, end, worlds)[name]
+                then = changed_ratio(records, change, other, end, worlds)
+                moved = changed_from(records, change, (other, method), end, worlds)
                 if then[2] < 1.0 and moved[2] < 1.0:
                     causes.append(f"{CHANGES[part][change].text}: {_interval(then)}")
             listed = "; ".join(causes) or "none that was tried"
@@ -294,13 +294,13 @@ def _changed_worlds_table(records: Records, part: str) -> str:
     for change in (None, *changes):
         found = []
         for world in worlds:
-            rival = next(iter(_rivals(records, part, change, "t95_s", (world,)).values()))
-            found.append(_interval(changed_ratio(records, change, rival, "t95_s", (world,))))
+            other = next(iter(_other_methods(records, part, change, "t95_s", (world,)).values()))
+            found.append(_interval(changed_ratio(records, change, other, "t95_s", (world,))))
         rows.append(["as it is" if change is None else CHANGES[part][change].text, *found])
     return markdown_table([f"{PARTS[part]}, V/t over the faster β, to 95 %", *worlds], rows)
 
 
-def _rivals(
+def _other_methods(
     records: Records, part: str, change: str | None, end: str, worlds: Sequence[str]
 ) -> dict[str, str]:
     """Name → method that V/t is compared with; of the two β that are changed, too, the faster one."""

@@ -17,8 +17,8 @@ from baselines.experiments.cells import Cell
 from baselines.papers.sawhney.map_files import METHODS as MAP_METHODS
 from baselines.papers.sawhney.map_files import STARTS as MAP_STARTS
 from baselines.papers.sawhney.map_files import TEAM as MAP_TEAM
-from baselines.papers.sawhney.map_files import MapRun, map_world
-from baselines.papers.sawhney.mission import Run
+from baselines.papers.sawhney.map_files import map_world
+from baselines.papers.sawhney.mission import MapRun, Run
 from baselines.strategies.frontier import ExplorationConfig, Metric
 from baselines.strategies.frontier.candidates import FrontierConfig
 from baselines.strategies.frontier.metrics import Coordinated, Nearest

@@ -1,4 +1,4 @@
-"""Experiments: resumable, the same whatever the number of processes; intervals that can be checked."""
+"""Experiments: resumable, the same whatever the number of processes."""
 
 from __future__ import annotations
 
@@ -10,10 +10,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from baselines.experiments import cells as experiment
-from baselines.experiments import worker_pool as workers
-from baselines.experiments.cells import Cell, failed_record, run_cells
+from baselines.experiments import runner
+from baselines.experiments.cells import Cell, CellMission, run_cells
 from baselines.experiments.mission import mission_record, scripted
+from baselines.experiments.runner import failed_record
+from baselines.experiments.worker_pool import Failure
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.errors import MissingExtraError, WorldError
 from entropy_explore_env.reports.metrics import mission_figures
@@ -30,6 +31,14 @@ CELLS = (Cell("walk", SHORT, "random", 7), Cell("steep", SHORT, "gradient", 2))
 
 def record_file(folder: Path, cell: str, seed: int) -> Path:
     return folder / cell / f"seed-{seed}.json"
+
+
+def kept_under(cell: Cell) -> str:
+    return runner.result_digest(CellMission(cell, 0), cell.code_digest())
+
+
+def kept_record(folder: Path, cell: Cell, seed: int) -> dict | None:
+    return runner.read_record(folder, CellMission(cell, seed), cell.code_digest())
 
 
 def stamps(folder: Path) -> dict[Path, tuple[int, int]]:
@@ -94,7 +103,7 @@ def test_a_finished_experiment_runs_nothing(finished, monkeypatch, capsys):
         assert not tasks, "missions were run"
         return []
 
-    monkeypatch.setattr(experiment, "run_each", nothing_to_do)
+    monkeypatch.setattr(runner, "run_each", nothing_to_do)
     before = stamps(folder)
     assert run_cells(CELLS, folder, 2, "test", quiet=True) == records
     assert capsys.readouterr() == ("", "")
@@ -113,8 +122,8 @@ def test_a_finished_experiment_runs_nothing(finished, monkeypatch, capsys):
 def test_json_that_is_no_record_counts_as_missing(content, tmp_path):
     path = record_file(tmp_path, "walk", 0)
     path.parent.mkdir()
-    path.write_text(content.replace("DIGEST", CELLS[0].digest))
-    assert experiment._read(tmp_path, CELLS[0], 0) is None
+    path.write_text(content.replace("DIGEST", kept_under(CELLS[0])))
+    assert kept_record(tmp_path, CELLS[0], 0) is None
 
 
 def test_a_mission_leaves_its_file_before_the_next_begins(tmp_path):
@@ -153,10 +162,10 @@ def test_a_record_changed_by_hand_is_run_again(finished, tmp_path):
     path.parent.mkdir()
     content = json.loads(record_file(folder, "walk", 0).read_text())
     path.write_text(json.dumps(content))
-    assert experiment._read(tmp_path, CELLS[0], 0) == records["walk"][0]
+    assert kept_record(tmp_path, CELLS[0], 0) == records["walk"][0]
     content["record"]["scans"] -= 1
     path.write_text(json.dumps(content))
-    assert experiment._read(tmp_path, CELLS[0], 0) is None
+    assert kept_record(tmp_path, CELLS[0], 0) is None
 
 
 @pytest.mark.parametrize("jobs", [1, 2])
@@ -168,7 +177,7 @@ def test_failures_are_records_where_they_are_kept(jobs, tmp_path):
         assert record["failed"].startswith("WorldError: ") and "900" in record["failed"]
         assert record["limit_s"] is None and "cell.record(" in record["trace"]
     assert [record["seed"] for record in records["walk"]] == [0, 1]
-    assert experiment._read(tmp_path, crowd, 1) == records["crowd"][1]
+    assert kept_record(tmp_path, crowd, 1) == records["crowd"][1]
 
 
 def test_a_mission_ended_by_its_limit_is_run_again_under_a_longer_one_only(tmp_path):
@@ -193,10 +202,10 @@ def test_a_mission_ended_by_its_limit_is_run_again_under_a_longer_one_only(tmp_p
 
 
 def test_reasons_are_short_and_the_same_in_every_process():
-    failure = workers.Failure("TypeError: <Plan object at 0x7f12ab> " + "x" * 500)
+    failure = Failure("TypeError: <Plan object at 0x7f12ab> " + "x" * 500)
     reason = failed_record(failure, 9.0)["failed"]
     assert reason.startswith("TypeError: <Plan object at 0x…> xxx") and len(reason) < 210
-    assert failed_record(workers.Failure("late", late=True), 9.0)["limit_s"] == 9.0
+    assert failed_record(Failure("late", late=True), 9.0)["limit_s"] == 9.0
 
 
 def test_an_error_in_a_process_comes_back_by_its_name(tmp_path):
@@ -212,11 +221,11 @@ def test_an_error_of_a_missing_package_comes_back_too():
 
 
 def test_the_digest_is_of_what_decides_the_results():
-    cell, same = CELLS[0], CELLS[0].digest
-    assert dataclasses.replace(cell, id="other", seeds=99).digest == same
+    cell, same = CELLS[0], kept_under(CELLS[0])
+    assert kept_under(dataclasses.replace(cell, id="other", seeds=99)) == same
     unseen = with_settings(SHORT, {"decision_period_s": 3.0, "observation": {"patch": True}})
-    assert dataclasses.replace(cell, scenario=unseen).digest == same
-    assert pickle.loads(pickle.dumps(cell)).digest == same
+    assert kept_under(dataclasses.replace(cell, scenario=unseen)) == same
+    assert kept_under(pickle.loads(pickle.dumps(cell))) == same
     others = [
         dataclasses.replace(cell, strategy="gradient"),
         *(
@@ -230,7 +239,7 @@ def test_the_digest_is_of_what_decides_the_results():
             )
         ),
     ]
-    assert len({same, *(other.digest for other in others)}) == len(others) + 1
+    assert len({same, *map(kept_under, others)}) == len(others) + 1
 
 
 # --- what a record holds

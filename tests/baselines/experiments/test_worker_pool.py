@@ -13,7 +13,6 @@ from pathlib import Path
 
 import pytest
 
-from baselines.experiments import worker_pool as workers
 from baselines.experiments.worker_pool import Failure, run_each
 from entropy_explore_env.errors import SettingError
 
@@ -36,6 +35,10 @@ def work(task):
             raise SettingError("field", 3, "less")
         case "particular", _:
             raise ParticularError("one", "two  words")
+        case "stubborn", _:
+            raise StubbornError
+        case "lambda", _:
+            return lambda: None
         case "leave", _:
             sys.exit(3)
         case "swallow", _:
@@ -83,6 +86,22 @@ def test_errors_are_failures_in_their_place(jobs):
         found["leave", 0].throw()
 
 
+class StubbornError(Exception):
+    """Cannot be pickled at all."""
+
+    def __init__(self) -> None:
+        super().__init__("stubborn")
+        self.kept = lambda: None
+
+
+def test_what_cannot_be_passed_on_is_a_failure_of_its_task_alone():
+    """A result or an error that cannot be pickled, and a task that cannot be."""
+    found = outcomes([("stubborn", 0), ("lambda", 0), SQUARES[2], SQUARES[4]], 2)
+    assert found["stubborn", 0].reason == "StubbornError: stubborn" and found["stubborn", 0].error is None
+    assert "pickle" in found["lambda", 0].reason
+    assert (found[SQUARES[2]], found[SQUARES[4]]) == (4, 16)
+
+
 @pytest.mark.parametrize("jobs", [1, 2])
 def test_a_task_that_runs_past_its_limit_is_ended_even_if_it_catches_all_errors(jobs):
     found = outcomes([SQUARES[2], ("swallow", 0), SQUARES[3]], jobs, 0.3)
@@ -97,8 +116,7 @@ def test_the_alarm_is_off_after_a_task():
     assert signal.getsignal(signal.SIGALRM) is before
 
 
-def test_a_process_that_hangs_or_ends_is_replaced(monkeypatch):
-    monkeypatch.setattr(workers, "_GRACE_S", 10.0)  # a busy machine takes seconds to start a process
+def test_a_process_that_hangs_or_ends_is_replaced():
     tasks = [("hang", 0), ("die", 7), ("kill", int(signal.SIGSEGV)), ("kill", int(signal.SIGKILL)), *SQUARES]
     started = time.monotonic()
     found = outcomes(tasks, 2, 1.0)
@@ -121,8 +139,8 @@ def test_who_stops_asking_leaves_no_process_behind():
 
 ORPHANED = """
 import multiprocessing, os, signal, sys
-sys.path.insert(0, "tests/baselines")
-from test_workers import work
+sys.path.insert(0, "tests/baselines/experiments")
+from test_worker_pool import work
 from baselines.experiments.worker_pool import run_each
 
 if __name__ == "__main__":

@@ -11,7 +11,8 @@ from pathlib import Path
 
 import pytest
 
-from baselines.experiments.provenance import sources_digest
+from baselines.experiments import provenance
+from baselines.experiments.provenance import code_digest
 from baselines.strategies import STRATEGIES, make_strategy, strategy_module
 from baselines.strategies.gradient import GradientStrategy
 from entropy_explore_env.errors import SettingError
@@ -131,13 +132,23 @@ def test_what_is_refused_says_why_in_one_line(file, name, said):
 
 
 def test_the_digest_covers_the_file_and_what_it_imports(file):
-    first = sources_digest(f"{file}:Own")
-    assert first == sources_digest(f"{file}:Own")
-    file.write_text(SOURCE.replace("view.pose for", "view.target for"))
-    changed = sources_digest(f"{file}:Own")
+    """In a process that has not imported it yet: what was imported stays as it was."""
+
+    def digest(source):
+        file.write_text(source)
+        provenance.imported.cache_clear()
+        provenance._module.cache_clear()
+        return code_digest(strategy=f"{file}:Own")
+
+    first = digest(SOURCE)
+    assert digest(SOURCE + "# the same") == first
+    changed = digest(SOURCE.replace("view.pose for", "view.target for"))
     assert changed != first
-    file.write_text(SOURCE + "import baselines.strategies.gradient\n")
-    assert sources_digest(f"{file}:Own") not in (first, changed)
+    assert digest(SOURCE + "import baselines.strategies.gradient\n") not in (first, changed)
+    (file.parent / "own_neighbour.py").write_text("A = 1\n")
+    beside = digest(SOURCE + "import own_neighbour\n")
+    (file.parent / "own_neighbour.py").write_text("A = 2\n")
+    assert digest(SOURCE + "import own_neighbour\n") != beside
 
 
 def test_where_strategies_are_defined(file):

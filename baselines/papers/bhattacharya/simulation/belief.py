@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -74,7 +75,7 @@ class Fusion:
 
 
 class Readings:
-    """What was read of cells since it was emptied: a robot's buffer."""
+    """A robot's buffer: what it read of cells since the buffer was cleared."""
 
     def __init__(self, cells: int) -> None:
         """Room for a map of this many cells."""
@@ -92,12 +93,12 @@ class Readings:
         return self.changed[: self.count]
 
     def clear(self) -> None:
-        """Empty it."""
+        """Clear the buffer."""
         self.total[self.cells], self.times[self.cells] = 0.0, 0
         self._count[0] = 0
 
     def add(self, scan: tuple[np.ndarray, np.ndarray], fusion: Fusion) -> None:
-        """Take a scan in: (N,) cells, each once, and (N,) float32 what was read, u."""
+        """Add a scan: (N,) cells, each once, and (N,) float32 what was read, u."""
         cells, read = scan
         _add_readings(
             self.total,
@@ -112,7 +113,7 @@ class Readings:
 
 
 class GridBelief:
-    """What a robot holds of the cells of a plan; all arrays by number of the cell, C order.
+    """A robot's belief of the cells of a plan; arrays by number of the cell, C order.
 
     Attributes:
         probability: (V,) float32, p, that a cell is occupied; ½ at first.
@@ -129,15 +130,15 @@ class GridBelief:
         self._total, self._times = np.zeros(cells, np.float32), np.zeros(cells, np.int32)
         self._window = np.zeros(4, np.int64)
         self.version = 0
-        """Counts what was taken in."""
+        """Counts the fusions."""
 
     @property
     def occupied(self) -> np.ndarray:
         """(X, Y, 1) bool, believed occupied: p > ½."""
         return (self.probability > 0.5).reshape(self.shape)
 
-    def take(self, cells: np.ndarray, total: np.ndarray, times: np.ndarray) -> None:
-        """Fuse readings, and filter the entropies anew where they may have changed, nowhere else.
+    def fuse(self, cells: np.ndarray, total: np.ndarray, times: np.ndarray) -> None:
+        """Fuse readings, and filter the entropies again where they may have changed.
 
         Args:
             cells: (N,) int32, each once.
@@ -159,17 +160,17 @@ class GridBelief:
         _filter(self._raw.reshape(self.shape), self.entropy, self._window)
         self.version += 1
 
-    def take_readings(self, readings: Readings) -> None:
+    def fuse_readings(self, readings: Readings) -> None:
         """Fuse a teammate's buffer."""
         cells = readings.cells
-        self.take(cells, readings.total[cells], readings.times[cells])
+        self.fuse(cells, readings.total[cells], readings.times[cells])
 
-    def take_scan(self, scan: tuple[np.ndarray, np.ndarray]) -> None:
+    def fuse_scan(self, scan: tuple[np.ndarray, np.ndarray]) -> None:
         """Fuse a scan: (N,) cells, each once, and (N,) float32 what was read, u."""
         cells, read = scan
         total = np.empty_like(read)
         _transform(read, total, self.fusion.exponent, self.fusion.most_confident)
-        self.take(cells, total, np.ones(len(cells), np.int32))
+        self.fuse(cells, total, np.ones(len(cells), np.int32))
 
 
 @lean_kernel
@@ -252,29 +253,55 @@ def _filter(raw: np.ndarray, entropy: np.ndarray, window: np.ndarray) -> None:
             entropy[x, y, 0] = least
 
 
+class SensorModel(NamedTuple):
+    """A sensor as kernels take it: R, s_n and s_f."""
+
+    range_cells: float
+    near: float
+    far: float
+
+
+class ScanScratch(NamedTuple):
+    """Arrays that a scan works in."""
+
+    crossed: np.ndarray
+    """(L,) int32, cells of a ray."""
+    entered: np.ndarray
+    """(L,) int64, how each was entered."""
+    seen: np.ndarray
+    """(V,) int64, number of the last scan that read a cell."""
+    cells: np.ndarray
+    """(V,) int32, cells that were read."""
+    read: np.ndarray
+    """(V,) float32, u of each."""
+
+
 class Scanner:
     """Reads the cells of a true plan that can be seen from a cell, each once; no noise."""
 
     def __init__(self, occupied: np.ndarray, sensor: Sensor) -> None:
         """Look at a plan (X, Y, 1) bool."""
-        self.sensor, self._shape = sensor, occupied.shape
+        self._shape = occupied.shape
         self._truth = occupied.astype(np.float32).reshape(-1)
         rays = math.ceil(2.0 * math.pi * sensor.range_cells * _RAYS_A_CELL)
         angles = np.arange(rays) * (2.0 * math.pi / rays)
         self._rays = np.stack([np.cos(angles), np.sin(angles), np.zeros(rays)], axis=1)
         x, y, z = occupied.shape
         places = longest_crossing(x, y, z, sensor.range_cells, 1)
-        self._crossed, self._entered = np.empty(places, np.int32), np.empty(places, np.int64)
-        self._seen, self._scans = np.zeros(occupied.size, np.int64), 0
-        self._cells, self._read = np.empty(occupied.size, np.int32), np.empty(occupied.size, np.float32)
+        self._model, self._scans = SensorModel(sensor.range_cells, sensor.near, sensor.far), 0
+        self._scratch = ScanScratch(
+            np.empty(places, np.int32),
+            np.empty(places, np.int64),
+            np.zeros(occupied.size, np.int64),
+            np.empty(occupied.size, np.int32),
+            np.empty(occupied.size, np.float32),
+        )
 
     def scan(self, cell: int) -> tuple[np.ndarray, np.ndarray]:
         """(N,) int32 cells and (N,) float32 readings u of them, from the centre of a cell."""
         self._scans += 1
-        sensor = (self.sensor.range_cells, self.sensor.near, self.sensor.far)
-        space = (self._crossed, self._entered, self._seen, self._cells, self._read)
-        count = _scan(self._truth, self._shape, cell, self._rays, sensor, space, self._scans)
-        return self._cells[:count].copy(), self._read[:count].copy()
+        count = _scan(self._truth, self._shape, cell, self._rays, self._model, self._scratch, self._scans)
+        return self._scratch.cells[:count].copy(), self._scratch.read[:count].copy()
 
 
 @lean_kernel
@@ -283,12 +310,12 @@ def _scan(
     shape: tuple[int, int, int],
     cell: int,
     rays: np.ndarray,
-    sensor: tuple[float, float, float],
-    space: tuple[np.ndarray, ...],
+    sensor: SensorModel,
+    scratch: ScanScratch,
     number: int,
 ) -> int:
     """Cast the rays; returns how many cells were read."""
-    crossed, entered, seen, cells, read = space
+    crossed, entered, seen, cells, read = scratch
     reach, near, far = sensor
     at_x, at_y, count = cell // shape[1], cell % shape[1], 0
     start = (at_x + 0.5, at_y + 0.5, 0.5)

@@ -1,8 +1,8 @@
 """Bhattacharya's simulation: point robots on the cells of a plan, a step an iteration (sect. 4.3 and 5).
 
-In an iteration every robot scans, tells the others, tessellates its own belief from the positions it last
-heard, and takes one step. With perfect messages all beliefs are the same one, and a robot that knows what
-the others know needs no other code: that is the centralised run. Distances are in cells.
+In an iteration every robot scans, broadcasts, tessellates its own belief from the last positions that it
+received, and takes one step. With perfect messages all robots have the same belief, so one belief and one
+tessellation serve all: the centralised run. Distances are in cells.
 """
 
 from __future__ import annotations
@@ -51,15 +51,15 @@ class Rules:
     Attributes:
         control: `projected-centroid` (eqs. 6-8), `gradient-search` (eq. 3), or `nearest`: the uncertain cell
             of the robot's own region that costs least to reach (ours; without one, the projected centroid).
-        metric: What ways cost while there is something to explore: `entropy` (sect. 5.2) or `length`.
-        eta: η, what a cell of way costs besides its entropy. In unknown space a diagonal step costs hardly
-            more than a straight one: the entropy part does not know lengths.
+        metric: What paths cost while there is something to explore: `entropy` (sect. 5.2) or `length`.
+        eta: η, what a cell of a path costs in addition to its entropy. In unknown space a diagonal step costs
+            hardly more than a straight one: the entropy part does not know lengths.
         tau: τ, an entropy in nats from which on a cell counts as uncertain.
         tau_floor: τ′, the least density; below τ, so that a constant density counts as explored.
-        keeps_targets: While exploring, a robot goes to its target until it is there, or sees it, or finds the
-            way blocked; else it takes one step and chooses anew.
+        keeps_targets: While exploring, a robot keeps its target until it arrives, sees it, or finds the path
+            blocked; else it chooses a new one after every step.
         guarded: While covering, a robot moves only if its own functional falls (ours).
-        perfect: All know at once what one reads, and where all are: one belief.
+        perfect: Every reading and position is known to all robots at once: one belief.
         phase: Iterations of a phase of the broadcast.
         loss: Probability that a message does not reach a robot.
     """
@@ -91,7 +91,7 @@ class Rules:
         check(self, "loss", "a number from 0 to 1", lambda v: v <= 1.0)
 
 
-class Mind:
+class Planner:
     """A belief with the tessellation and the targets that follow from it."""
 
     def __init__(self, belief: GridBelief, rules: Rules, robots: int) -> None:
@@ -120,11 +120,11 @@ class Mind:
         self.density = np.maximum(self.belief.entropy, np.float32(rules.tau_floor))
         while True:
             length_cost, by_length = self._metric
-            rates = np.ones_like(self.density) if by_length else self.belief.entropy.copy()
-            rates[self.belief.occupied] = np.inf
-            rates.reshape(-1)[places] = np.minimum(rates.reshape(-1)[places], 1.0)
-            self.rates = rates
-            tessellate(self.space, rates, places, length_cost, by_length)
+            cell_costs = np.ones_like(self.density) if by_length else self.belief.entropy.copy()
+            cell_costs[self.belief.occupied] = np.inf
+            cell_costs.reshape(-1)[places] = np.minimum(cell_costs.reshape(-1)[places], 1.0)
+            self.cell_costs = cell_costs
+            tessellate(self.space, cell_costs, places, length_cost, by_length)
             self.tessellations += 1
             found = projected_centroids(self.space.cells, self.density, rules.tau, self._robots)
             self.targets, self.uncertain = found
@@ -144,39 +144,39 @@ class Mind:
             self._functionals = coverage_functionals(*arrays, self._robots)
         return self._functionals
 
-    def way(self, voxel: int) -> np.ndarray:
-        """(N,) the way from its robot to a voxel."""
-        return extract_path(self.space, self.rates, voxel, *self._metric)
+    def path_to(self, voxel: int) -> np.ndarray:
+        """(N,) the cells of the shortest path from its robot to a voxel."""
+        return extract_path(self.space, self.cell_costs, voxel, *self._metric)
 
     def covering_step(self, robot: int, place: int) -> int:
-        """Where a robot steps that explores no more."""
+        """The next cell of a robot that covers a region without uncertain cells."""
         cell = self.space.cells == robot
         if not cell.any():  # another robot is in the same place, and comes first
             return place
         if self.rules.control == "gradient-search":
-            functional = CellFunctional(self._scratch, self.rates, self.density, cell)
+            functional = CellFunctional(self._scratch, self.cell_costs, self.density, cell)
             return gradient_step(functional, cell, place, *self._metric)
-        way = self.way(int(self.targets[robot]))
-        if len(way) < 2:
+        path = self.path_to(int(self.targets[robot]))
+        if len(path) < 2:
             return place
-        step = int(way[1])
+        step = int(path[1])
         if self.rules.guarded:
-            functional = CellFunctional(self._scratch, self.rates, self.density, cell)
+            functional = CellFunctional(self._scratch, self.cell_costs, self.density, cell)
             if functional.value(step, *self._metric) >= float(self.functionals()[robot]):
                 return place
         return step
 
 
 @dataclass
-class Tally:
-    """What a run leaves, an entry an iteration."""
+class Trace:
+    """What is recorded of a run, an entry an iteration."""
 
     places: list[list[int]] = field(default_factory=list)
     """Cells of the robots at its beginning."""
     uncertain: list[int] = field(default_factory=list)
-    """Cells that can be reached and are uncertain, by the belief of the robot that knows least."""
+    """Cells that can be reached and are uncertain, in the belief of the robot with the most of them."""
     functional: list[float] = field(default_factory=list)
-    """The coverage functional, where it was worked out; else NaN."""
+    """The coverage functional, where it was computed; else NaN."""
     entropy: list[float] = field(default_factory=list)
     """Entropy of robot 0's map in nats, after the filter."""
     seconds: list[float] = field(default_factory=list)
@@ -197,7 +197,7 @@ class Simulation:
     def __init__(
         self, occupied: np.ndarray, starts: Sequence[int], rules: Rules, known: bool = False, seed: int = 0
     ) -> None:
-        """Put the robots down.
+        """Place the robots at their starts.
 
         Args:
             occupied: (X, Y, 1) bool, the truth.
@@ -214,142 +214,144 @@ class Simulation:
         self.occupied, self.rules, self.known = occupied, rules, known
         self.places = np.array(starts, np.int64)
         robots = len(self.places)
-        minds = 1 if rules.perfect or known else robots
-        self.minds = [Mind(GridBelief(occupied.shape, rules.fusion), rules, robots) for _ in range(minds)]
+        count = 1 if rules.perfect or known else robots
+        beliefs = [GridBelief(occupied.shape, rules.fusion) for _ in range(count)]
+        self.planners = [Planner(belief, rules, robots) for belief in beliefs]
         self._scanner = Scanner(occupied, rules.sensor)
         self._truth = occupied.astype(np.float32).reshape(-1)
-        self._quiet = 0
-        self._heard = np.tile(self.places, (robots, 1))
-        self._ways: list[np.ndarray] = [np.zeros(0, np.int64)] * robots
+        self._still_iterations = 0
+        self._last_heard_at = np.tile(self.places, (robots, 1))
+        self._paths: list[np.ndarray] = [np.zeros(0, np.int64)] * robots
         self._wants_to_see = [False] * robots
         self._rng = np.random.default_rng(seed)
-        buffers = 0 if minds == 1 else robots
+        buffers = 0 if count == 1 else robots
         self._sensing = [Readings(occupied.size) for _ in range(buffers)]
         self._broadcast = [Readings(occupied.size) for _ in range(buffers)]
-        self._has = np.ones((robots, robots), bool)
-        self.tally, self._bits = Tally(), 0
+        self._received = np.ones((robots, robots), bool)
+        self.trace, self._bits = Trace(), 0
         if known:
-            belief = self.minds[0].belief
+            belief = self.planners[0].belief
             belief.probability[:] = occupied.reshape(-1)
             belief.entropy[:] = 0.0
 
-    def run(self, limit: int, every: int = 0) -> Tally:
-        """Iterate until nobody moves any more, a known plan's positions come again, or the limit.
+    def run(self, limit: int, every: int = 0) -> Trace:
+        """Iterate until no robot moves any more, positions in a known plan repeat, or the limit is reached.
 
         Args:
             limit: Most iterations.
-            every: So often the coverage functional is noted where it would have to be worked out extra; 0 =
-            never.
+            every: Iterations between entries of the coverage functional, which costs extra; 0 = none.
         """
         seen: dict[tuple[int, ...], int] = {}
         for iteration in range(limit):
             if self.known:
                 key = tuple(self.places.tolist())
                 if key in seen:
-                    self.tally.ended, self.tally.cycle = "cycle", iteration - seen[key]
+                    self.trace.ended, self.trace.cycle = "cycle", iteration - seen[key]
                     break
                 seen[key] = iteration
             if not self.step(bool(every) and iteration % every == 0):
-                self.tally.ended = "converged"
+                self.trace.ended = "converged"
                 break
-        return self.tally
+        return self.trace
 
     def step(self, functional: bool = True) -> bool:
-        """One iteration; returns False where all is explored and nobody has moved for long enough."""
-        tally, before = self.tally, sum(mind.tessellations for mind in self.minds)
-        tally.places.append(self.places.tolist())
+        """One iteration; False once all is explored and no robot has moved for long enough."""
+        trace, before = self.trace, sum(planner.tessellations for planner in self.planners)
+        trace.places.append(self.places.tolist())
         if not self.known:
-            self._scan_and_tell(len(tally.places) - 1)
+            self._scan_and_broadcast(len(trace.places) - 1)
         started = time.thread_time()
         steps = np.array([self._step_of(robot) for robot in range(len(self.places))])
-        tally.seconds.append(time.thread_time() - started)
-        tally.tessellations.append(sum(mind.tessellations for mind in self.minds) - before)
+        trace.seconds.append(time.thread_time() - started)
+        trace.tessellations.append(sum(planner.tessellations for planner in self.planners) - before)
         moved = bool((steps != self.places).any())
         if functional:
-            self.minds[0].update(self._known_places(0))
-            tally.functional.append(float(self.minds[0].functionals().sum()))
+            self.planners[0].update(self._known_places(0))
+            trace.functional.append(float(self.planners[0].functionals().sum()))
         else:
-            tally.functional.append(float("nan"))
+            trace.functional.append(float("nan"))
         self.places = steps
-        explored = all(mind.explored for mind in self.minds)
-        if explored and tally.explored_at is None:
-            tally.explored_at = len(tally.places) - 1
-        counts = [int(mind.uncertain.sum()) for mind in self.minds]
-        tally.uncertain.append(max(counts))
-        tally.entropy.append(float(self.minds[0].belief.entropy.sum(dtype=np.float64)))
-        tally.bits.append(self._bits)
-        self._quiet = 0 if moved or not explored else self._quiet + 1
-        return self._quiet < (
-            1 if len(self.minds) == 1 else 2 * self.rules.phase
-        )  # messages may be under way
+        explored = all(planner.explored for planner in self.planners)
+        if explored and trace.explored_at is None:
+            trace.explored_at = len(trace.places) - 1
+        counts = [int(planner.uncertain.sum()) for planner in self.planners]
+        trace.uncertain.append(max(counts))
+        trace.entropy.append(float(self.planners[0].belief.entropy.sum(dtype=np.float64)))
+        trace.bits.append(self._bits)
+        self._still_iterations = 0 if moved or not explored else self._still_iterations + 1
+        return self._still_iterations < (
+            1 if len(self.planners) == 1 else 2 * self.rules.phase
+        )  # messages may be in flight
 
     def _known_places(self, robot: int) -> np.ndarray:
-        """(A,) where a robot believes all to be."""
-        if len(self.minds) == 1:
+        """(A,) where a robot believes the team to be."""
+        if len(self.planners) == 1:
             return self.places
-        self._heard[robot, robot] = self.places[robot]
-        return self._heard[robot]
+        self._last_heard_at[robot, robot] = self.places[robot]
+        return self._last_heard_at[robot]
 
-    def _scan_and_tell(self, iteration: int) -> None:
+    def _scan_and_broadcast(self, iteration: int) -> None:
         """All robots scan, and broadcast in phases where messages are not perfect."""
         robots = len(self.places)
-        if iteration % self.rules.phase == 0 and len(self.minds) > 1:
-            for robot in range(robots):  # the buffers change places
+        if iteration % self.rules.phase == 0 and len(self.planners) > 1:
+            for robot in range(robots):  # swap the buffers
                 self._broadcast[robot].clear()
                 both = self._sensing[robot], self._broadcast[robot]
                 self._broadcast[robot], self._sensing[robot] = both
-                self._has[robot] = self._broadcast[robot].count == 0
+                self._received[robot] = self._broadcast[robot].count == 0
         for robot in range(robots):
             scan = self._scanner.scan(int(self.places[robot]))
-            self.minds[robot if len(self.minds) > 1 else 0].belief.take_scan(scan)
-            if len(self.minds) > 1:
+            self.planners[robot if len(self.planners) > 1 else 0].belief.fuse_scan(scan)
+            if len(self.planners) > 1:
                 self._sensing[robot].add(scan, self.rules.fusion)
-        if len(self.minds) > 1:
+        if len(self.planners) > 1:
             for robot in range(robots):
-                self._tell(robot)
+                self._send(robot)
 
-    def _tell(self, sender: int) -> None:
-        """Broadcast a buffer and a position; who has the buffer already ignores it."""
+    def _send(self, sender: int) -> None:
+        """Broadcast a buffer and a position; a robot that has received the buffer ignores it."""
         message = self._broadcast[sender]
         self._bits += BITS_PER_MESSAGE + message.count * BITS_PER_CELL
         for mate in range(len(self.places)):
             if mate == sender or self._rng.random() < self.rules.loss:
                 continue
-            self._heard[mate, sender] = self.places[sender]
-            if not self._has[sender, mate]:
-                self.minds[mate].belief.take_readings(message)
-                self._has[sender, mate] = True
+            self._last_heard_at[mate, sender] = self.places[sender]
+            if not self._received[sender, mate]:
+                self.planners[mate].belief.fuse_readings(message)
+                self._received[sender, mate] = True
 
     def _step_of(self, robot: int) -> int:
-        """Where a robot goes in this iteration."""
-        mind, place = self.minds[robot if len(self.minds) > 1 else 0], int(self.places[robot])
-        if self.rules.keeps_targets and not mind.explored and self._goes_on(mind, robot):
-            step = int(self._ways[robot][0])
+        """The cell to which a robot steps in this iteration."""
+        planner, place = self.planners[robot if len(self.planners) > 1 else 0], int(self.places[robot])
+        if self.rules.keeps_targets and not planner.explored and self._keeps_target(planner, robot):
+            step = int(self._paths[robot][0])
         else:
-            mind.update(self._known_places(robot))
-            if mind.explored or self.rules.control == "gradient-search":
-                step = mind.covering_step(robot, place)
+            planner.update(self._known_places(robot))
+            if planner.explored or self.rules.control == "gradient-search":
+                step = planner.covering_step(robot, place)
             else:
-                target = int(mind.targets[robot])
-                self._ways[robot] = mind.way(target)[1:] if target != UNREACHED else self._ways[robot][:0]
-                self._wants_to_see[robot] = target != UNREACHED and self._uncertain(mind, target)
-                step = int(self._ways[robot][0]) if len(self._ways[robot]) else place
+                target = int(planner.targets[robot])
+                self._paths[robot] = (
+                    planner.path_to(target)[1:] if target != UNREACHED else self._paths[robot][:0]
+                )
+                self._wants_to_see[robot] = target != UNREACHED and self._uncertain(planner, target)
+                step = int(self._paths[robot][0]) if len(self._paths[robot]) else place
         if step != place and not step_is_free(self._truth, self.occupied.shape, place, step):
-            step = place  # what is right beside it is not known yet
-            self._ways[robot] = self._ways[robot][:0]
+            step = place  # the next cell was not known to be occupied
+            self._paths[robot] = self._paths[robot][:0]
         if step != place:
-            self._ways[robot] = self._ways[robot][1:]
+            self._paths[robot] = self._paths[robot][1:]
         return step
 
-    def _uncertain(self, mind: Mind, cell: int) -> bool:
-        return bool(mind.belief.entropy.reshape(-1)[cell] >= self.rules.tau)
+    def _uncertain(self, planner: Planner, cell: int) -> bool:
+        return bool(planner.belief.entropy.reshape(-1)[cell] >= self.rules.tau)
 
-    def _goes_on(self, mind: Mind, robot: int) -> bool:
-        """Whether a robot's target stands: still ahead, not yet seen if that was wanted, and not blocked."""
-        way = self._ways[robot]
-        if len(way) == 0 or (self._wants_to_see[robot] and not self._uncertain(mind, int(way[-1]))):
+    def _keeps_target(self, planner: Planner, robot: int) -> bool:
+        """Whether a robot keeps its target: not reached, not seen yet if that is the aim, and not blocked."""
+        path = self._paths[robot]
+        if len(path) == 0 or (self._wants_to_see[robot] and not self._uncertain(planner, int(path[-1]))):
             return False
-        if (mind.belief.probability[way] > 0.5).any():
+        if (planner.belief.probability[path] > 0.5).any():
             return False
-        probability, size = mind.belief.probability, self.occupied.shape
-        return bool(step_is_free(probability, size, int(self.places[robot]), int(way[0])))
+        probability, size = planner.belief.probability, self.occupied.shape
+        return bool(step_is_free(probability, size, int(self.places[robot]), int(path[0])))

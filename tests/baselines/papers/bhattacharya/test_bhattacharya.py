@@ -14,11 +14,11 @@ from hypothesis import given
 
 from baselines.cli.arguments import run_command
 from baselines.papers.bhattacharya import __main__ as bhattacharya
-from baselines.papers.bhattacharya import sweep as bhattacharya_runs
+from baselines.papers.bhattacharya.run import Run, start_cells
 from baselines.papers.bhattacharya.simulation.belief import Fusion, GridBelief, Readings, Scanner, Sensor
 from baselines.papers.bhattacharya.simulation.team import Rules, Simulation
 from baselines.papers.bhattacharya.splitting import split
-from baselines.papers.bhattacharya.sweep import FLOORS, all_runs, start_cells
+from baselines.papers.bhattacharya.sweep import FLOORS, KeptRun, all_runs
 from baselines.papers.bhattacharya.timing import changed_share
 from entropy_explore_env.errors import SettingError
 from tests.reference.scenes import drawn, seeds
@@ -53,9 +53,9 @@ def test_fusion_by_hand(fusion, expected):
     one, other, buffer = GridBelief(SHAPE, fusion), GridBelief(SHAPE, fusion), Readings(math.prod(SHAPE))
     for read in (0.1, 0.3):
         scan = np.array([20], np.int32), np.array([read], np.float32)
-        one.take_scan(scan)
+        one.fuse_scan(scan)
         buffer.add(scan, fusion)
-    other.take_readings(buffer)
+    other.fuse_readings(buffer)
     for belief in (one, other):
         assert belief.probability[20] == pytest.approx(expected, rel=1e-5)
         assert (np.delete(belief.probability, 20) == 0.5).all()
@@ -70,7 +70,7 @@ def test_entropies_are_filtered_only_where_they_may_change(seed):
     rng, belief = np.random.default_rng(seed), GridBelief(SHAPE, Fusion())
     for _ in range(4):
         cells = rng.choice(math.prod(SHAPE), rng.integers(1, 9), replace=False).astype(np.int32)
-        belief.take_scan((cells, rng.uniform(0.01, 0.99, len(cells)).astype(np.float32)))
+        belief.fuse_scan((cells, rng.uniform(0.01, 0.99, len(cells)).astype(np.float32)))
     p = belief.probability.astype(float).reshape(SHAPE[:2])
     raw = -p * np.log(p) - (1 - p) * np.log(1 - p)
     for x, y in np.ndindex(*SHAPE[:2]):
@@ -103,9 +103,9 @@ def test_the_functional_of_guarded_robots_falls_until_they_converge(control):
         occupied = plan(seed)
         rules = Rules(control=control, keeps_targets=False)
         simulation = Simulation(occupied, start_cells(occupied, "random", 3, seed), rules, known=True)
-        tally = simulation.run(400, 1)
-        assert tally.ended == "converged"
-        assert (np.diff(tally.functional) <= 1e-9 * np.array(tally.functional[:-1])).all()
+        trace = simulation.run(400, 1)
+        assert trace.ended == "converged"
+        assert (np.diff(trace.functional) <= 1e-9 * np.array(trace.functional[:-1])).all()
 
 
 def test_robots_step_to_free_neighbours_and_explore_all_that_can_be_reached():
@@ -114,14 +114,14 @@ def test_robots_step_to_free_neighbours_and_explore_all_that_can_be_reached():
         starts = start_cells(occupied, "corner", 3, seed)
         rules = Rules(sensor=Sensor(6.0), perfect=perfect, phase=3)
         simulation = Simulation(occupied, starts, rules, seed=seed)
-        tally = simulation.run(600)
-        assert tally.ended == "converged" and tally.uncertain[-1] == 0
-        places = np.array(tally.places)
+        trace = simulation.run(600)
+        assert trace.ended == "converged" and trace.uncertain[-1] == 0
+        places = np.array(trace.places)
         assert not occupied.reshape(-1)[places].any()
         steps = np.abs(np.diff(np.stack([places // 23, places % 23]), axis=1)).max(axis=0)
         assert steps.max() == 1
-        for mind in simulation.minds:
-            believed = mind.belief.occupied
+        for planner in simulation.planners:
+            believed = planner.belief.occupied
             assert not believed[~occupied].any() and believed.any()
 
 
@@ -142,7 +142,7 @@ def test_a_phase_reaches_everybody_once_whatever_is_repeated():
     simulation = Simulation(occupied, starts, Rules(sensor=Sensor(5.0), perfect=False, phase=4))
     for _ in range(9):  # swaps before iterations 0, 4 and 8: what was read in 0-7 is everywhere
         simulation.step(False)
-    times = [mind.belief._times.copy() for mind in simulation.minds]
+    times = [planner.belief._times.copy() for planner in simulation.planners]
     waiting = [buffer.times for buffer in simulation._sensing]
     common = [own - wait for own, wait in zip(times, waiting, strict=True)]
     np.testing.assert_array_equal(common[0], common[1])
@@ -157,7 +157,7 @@ def test_lost_messages_come_again():
     simulation = Simulation(occupied, starts, rules, seed=1)
     for _ in range(16):
         simulation.step(False)
-    assert simulation._has[~np.eye(3, dtype=bool)].all()  # whoever sent it has it anyway
+    assert simulation._received[~np.eye(3, dtype=bool)].all()  # whoever sent it has it anyway
 
 
 def test_a_start_in_a_wall_is_refused():
@@ -206,7 +206,7 @@ def test_the_command_writes_its_report_and_goes_on_where_it_was(tmp_path, monkey
         with contextlib.redirect_stdout(out):
             assert run_command(bhattacharya.main, words) == 0
         printed.append(json.loads(out.getvalue()))
-        monkeypatch.setattr(bhattacharya_runs, "carried_out", None)  # nothing must be run again
+        monkeypatch.setattr(Run, "carry_out", None)  # nothing must be run again
     claims = [
         [{**claim, "ours": 0} if claim["id"] == "scipy" else claim for claim in p["claims"]] for p in printed
     ]
@@ -223,13 +223,13 @@ def test_changed_share_by_hand():
     occupied = np.zeros((9, 1, 1), bool)
     simulation = Simulation(occupied, [0], Rules(), known=True)
     assert changed_share(simulation, 4) == 1.0  # to the middle
-    assert simulation.tally.places[-1] == [3]
+    assert simulation.trace.places[-1] == [3]
     assert math.isnan(changed_share(Simulation(occupied, [4], Rules(), known=True), 4))
 
 
 def test_runs_differ_by_what_decides_their_results():
     runs = all_runs(2, 1, 2)
-    assert len({run.id for run in runs}) == len(runs) == len({run.digest() for run in runs})
+    assert len({run.id for run in runs}) == len(runs) == len({KeptRun(run).settings_digest for run in runs})
     assert {run.rules.control for run in runs} == {"projected-centroid", "gradient-search", "nearest"}
 
 

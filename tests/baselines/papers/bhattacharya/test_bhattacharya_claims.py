@@ -18,6 +18,7 @@ from baselines.papers.bhattacharya.missions import (
 )
 from baselines.papers.bhattacharya.report import _sweep_reading
 from baselines.papers.bhattacharya.sweep import CONTROLS, FLOORS, coverage_id, exploration_id
+from baselines.papers.bhattacharya.timing import Seconds
 
 SPLITS = {"band": {"plain": 0.2, "0.01": 1.05}, "patch": {"plain": 1.0, "0.01": 0.4}}
 
@@ -67,7 +68,7 @@ def claim(claims, name):
 
 
 def test_every_claim_has_a_name_of_its_own(records):
-    claims = all_claims(records, SPLITS, (0.01, 0.05))
+    claims = all_claims(records, SPLITS, Seconds(0.01, 0.05))
     assert len({claim.id for claim in claims}) == len(claims)
     assert claim(claims, "scipy").ours == pytest.approx(5.0)
     assert [claim(claims, f"split-{name}").holds for name in ("band", "patch")] == [True, False]
@@ -77,12 +78,12 @@ def test_every_claim_has_a_name_of_its_own(records):
 def test_iterations_count_against_the_paper_s_only_where_all_runs_end(records):
     small = [exploration_id("small", "paper", 35.0, seed) for seed in range(2)]
     records[small[0]], records[small[1]] = run(800), run(1000)
-    found = claim(all_claims(records, SPLITS, (1.0, 1.0)), "within-paper-small-35")
+    found = claim(all_claims(records, SPLITS, Seconds(1.0, 1.0)), "within-paper-small-35")
     assert found.ours == 900 and found.holds
     records[small[1]] = run(1100)
-    assert not claim(all_claims(records, SPLITS, (1.0, 1.0)), "within-paper-small-35").holds
+    assert not claim(all_claims(records, SPLITS, Seconds(1.0, 1.0)), "within-paper-small-35").holds
     records[small[1]] = run(4000, None, "cut off")
-    claims = all_claims(records, SPLITS, (1.0, 1.0))
+    claims = all_claims(records, SPLITS, Seconds(1.0, 1.0))
     assert claim(claims, "explores-paper-small-35").ours == 0.5
     assert not claim(claims, "explores-paper-small-35").holds
     assert "within-paper-small-35" not in {claim.id for claim in claims}
@@ -92,7 +93,7 @@ def test_variants_are_compared_plan_by_plan(records):
     for seed in range(2):
         records[exploration_id("small", "length", 35.0, seed)] = run(1000, 600)
     records[exploration_id("small", "phases", 35.0, 1)] = run(1800, None, "cut off")
-    claims = all_claims(records, SPLITS, (1.0, 1.0))
+    claims = all_claims(records, SPLITS, Seconds(1.0, 1.0))
     metric, phases = claim(claims, "variant-metric-small"), claim(claims, "variant-phases-small")
     assert metric.ours == pytest.approx(1.5) and not metric.holds
     assert phases.ours == pytest.approx(1800 / 2700)  # what never ended counts with all its iterations

@@ -15,13 +15,13 @@ import pytest
 from PIL import Image
 
 from baselines.cli.arguments import run_command
-from baselines.experiments import cells as experiment
+from baselines.experiments import runner
 from baselines.experiments.claims import Claim
-from baselines.experiments.mission import Record
+from baselines.experiments.outcome import Record
 from baselines.papers.rocha04 import __main__ as rocha04
 from baselines.papers.rocha04 import report as rocha04_report
 from baselines.papers.rocha04 import sweep as rocha04_cells
-from baselines.papers.rocha04.sweep import BURSTS, CHANGES, I_MINS, RIVALS, TEAMS, team_id
+from baselines.papers.rocha04.sweep import ALTERNATIVES, BURSTS, CHANGES, I_MINS, TEAMS, team_id
 from baselines.papers.rocha04.sweep import experiment as cells_of
 from entropy_explore_env.scenario import with_settings
 from entropy_explore_env.scenarios import BOX, ROOM
@@ -35,8 +35,8 @@ FIGURES = [f"figure-{number}" for number in range(3, 9)]
 
 def test_the_cells_are_the_paper_s():
     cells = {cell.id: cell for cell in cells_of(30, 100, changes=True)}
-    assert len(cells) == 1 + 3 * 9 + 4 * len(RIVALS) + len(CHANGES)
-    assert len({cell.digest for cell in cells.values()}) == len(cells)
+    assert len(cells) == 1 + 3 * 9 + 4 * len(ALTERNATIVES) + len(CHANGES)
+    assert len({cell.settings_digest for cell in cells.values()}) == len(cells)
     for name in ("single", "single-random"):
         assert cells[name].scenario.robots == 1 and cells[name].seeds == 100
     for robots in TEAMS:
@@ -96,7 +96,7 @@ def no_process(monkeypatch):
         assert not tasks, "missions were run"
         return []
 
-    monkeypatch.setattr(experiment, "run_each", nothing_to_do)
+    monkeypatch.setattr(runner, "run_each", nothing_to_do)
 
 
 def ran(words: list[str], capsys) -> tuple[int, str, str]:

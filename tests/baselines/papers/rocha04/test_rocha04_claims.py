@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 from baselines.experiments.claims import Claim
-from baselines.experiments.mission import Record, mission_record, scripted
+from baselines.experiments.mission import mission_record, scripted
+from baselines.experiments.outcome import Record
 from baselines.papers.rocha04.claims import all_claims
 from baselines.papers.rocha04.sweep import BURSTS, I_MINS, TEAMS, team_id
 from baselines.papers.rocha04.sweep import experiment as cells_of

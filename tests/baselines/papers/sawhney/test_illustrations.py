@@ -15,15 +15,15 @@ from baselines.papers.sawhney import illustrations as sawhney_pictures
 from baselines.papers.sawhney import report as sawhney_report
 from baselines.papers.sawhney.illustrations import (
     example_options,
+    figure_paths,
     figure_plan,
     figure_section,
     figure_terrain,
-    figure_ways,
     first_options,
     ground_of,
     snapshots,
 )
-from baselines.papers.sawhney.mission import followed
+from baselines.papers.sawhney.mission import explore_until_done
 from baselines.papers.sawhney.sweep import PLANS, TERRAINS, world_cell
 from baselines.papers.sawhney.terrain_model import write_model
 from baselines.strategies.frontier import FrontierStrategy, Metric
@@ -74,7 +74,7 @@ def test_snapshots_are_of_one_mission_as_it_goes_on(world):
     assert shares == sorted(shares) and shares[-1] > 0.95 and taken[0].time_s < taken[-1].time_s
     for before, after in itertools.pairwise(taken):
         assert (before.chart.mapped <= after.chart.mapped).mean() > 0.99
-        assert [len(way) for way in before.ways_m] <= [len(way) for way in after.ways_m]
+        assert [len(way) for way in before.paths_m] <= [len(way) for way in after.paths_m]
     for now in taken[:-1]:
         assert now.expected.any() and not (now.expected & now.chart.mapped).any()
         assert now.chart.edge.any() and now.chart.mapped[now.chart.edge].all()
@@ -85,7 +85,7 @@ def test_snapshots_are_of_one_mission_as_it_goes_on(world):
         assert right.mean() > 0.95 and np.isnan(known.ground[~known.mapped]).all()
     else:
         assert truth.occupied[:, :, 0][known.covered].all()
-    for robot, way in enumerate(taken[0].ways_m):
+    for robot, way in enumerate(taken[0].paths_m):
         np.testing.assert_allclose(way[0], env.view(f"robot_{robot}").pose[:3])
 
 
@@ -98,7 +98,7 @@ def test_expected_is_what_those_who_choose_now_will_see():
         place = env.missions.grid.in_grid_units(chosen[0])[:3]
         chosen_at[views[0].time_s] = explorer.allocator_of(0).candidates.expected(place)
 
-    followed(env, explorer, 0, look)
+    explore_until_done(env, explorer, 0, look)
     taken = snapshots(cell, 0)
     assert len(taken) == 4
     for now in taken[:-1]:
@@ -111,7 +111,7 @@ def test_a_mission_that_is_cut_off_is_drawn_as_far_as_it_came():
         for cell in (small_cell("office", 1), small_cell("terrain", 1))
     )
     assert not snapshots(plan, 0)[-1].finished
-    for figure in (figure_plan(plan, "plan"), figure_section(terrain), figure_ways([("V/t", plan)] * 2)):
+    for figure in (figure_plan(plan, "plan"), figure_section(terrain), figure_paths([("V/t", plan)] * 2)):
         assert len(png(figure)) > 4000
 
 
@@ -135,7 +135,7 @@ def test_pictures_of_small_missions(monkeypatch):
         figure_plan(plan, "plan"),
         figure_terrain(terrain, "terrain"),
         figure_section(small_cell("terrain", 1)),
-        figure_ways([("V/t", plan), ("V/t again", plan)]),
+        figure_paths([("V/t", plan), ("V/t again", plan)]),
     ):
         assert len(png(figure)) > 5000
     monkeypatch.setattr(sawhney_pictures, "world_cell", lambda *_: plan)

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 from baselines.cli.arguments import run_command
-from baselines.experiments import cells as experiment
+from baselines.experiments.cells import Cell
 from baselines.papers.sawhney import __main__ as sawhney
 from baselines.papers.sawhney import report as sawhney_report
 from baselines.papers.sawhney import sweep as sawhney_cells
@@ -43,7 +43,7 @@ from entropy_explore_env.worlds.load import load_world
 
 def test_the_cells_are_the_experiment_s():
     cells = {cell.id: cell for cell in cells_of(40, 30, quick=False, dem=None)}
-    assert len({cell.digest for cell in cells.values()}) == len(cells)
+    assert len({cell.settings_digest for cell in cells.values()}) == len(cells)
     for world in (*PLANS, *TERRAINS):
         for n in TEAMS:
             for beta in BETAS:
@@ -176,7 +176,7 @@ def tiny_cells(starts, flights, quick, dem, maps=(), teams=()):
             },
         )
         if world in ("office", "terrain") and "-" not in method.replace("beta-", "").replace("no-", ""):
-            found.append(experiment.Cell(cell.id, scenario, cell.strategy, starts, cell.record))
+            found.append(Cell(cell.id, scenario, cell.strategy, starts, cell.record))
     return found
 
 

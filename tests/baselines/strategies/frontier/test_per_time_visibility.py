@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from baselines.experiments.mission import run_mission, scripted
-from baselines.papers.sawhney.mission import followed
+from baselines.papers.sawhney.mission import explore_until_done
 from baselines.strategies import make_strategy
 from baselines.strategies.frontier import ExplorationConfig, FrontierStrategy, Metric
 from baselines.strategies.frontier.allocation import under_way
@@ -69,7 +69,7 @@ def explored(scenario, seed=0, **config):
     """A mission up to no frontier: environment, strategy, and what was done."""
     explorer = FrontierStrategy(ExplorationConfig(**{"finest_sigma": ONCE, **config}))
     env = EntropyExploreEnv(scenario)
-    times_s, shares = followed(env, explorer, seed)
+    times_s, shares = explore_until_done(env, explorer, seed)
     return env, explorer, (list(times_s), list(shares), mission_figures(env.missions, 0)["distance_m"])
 
 
@@ -340,7 +340,7 @@ def test_bodies_and_a_short_reach_explore_an_office():
         with_settings(scripted(find_scenario("office")), {"robots": 2, "track_truth": True})
     )
     explorer = FrontierStrategy(ExplorationConfig(finest_sigma=ONCE))
-    followed(env, explorer, 1)
+    explore_until_done(env, explorer, 1)
     assert all(explorer.idle) or env.missions.over(0) is MissionEnd.MAPPED
     explored = joint_figures(env.missions, 0)["explored"]
     assert explored is not None and explored > 0.97
