@@ -67,7 +67,7 @@ def _cone(apex, yaw, pitch, radius, half_angle):
     return cones[0]
 
 
-@drawn(30)
+@drawn(15)
 @given(seeds, st.booleans(), st.integers(0, 3), st.sampled_from([0.0, 0.2, 1.0]))
 def test_the_choice_is_the_best_of_equation_13(seed, planar, teammates, kappa):
     rng = np.random.default_rng(seed)
