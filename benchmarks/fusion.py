@@ -13,13 +13,12 @@ import numpy as np
 
 from benchmarks.peers import OctoMapTree
 from benchmarks.rows import Effort, Goal, Row, compared, interleave, timed
-from entropy_explore_env.belief.map_update import PRIOR_MEAN
-from entropy_explore_env.belief.measurement_model import measurement_precision
+from entropy_explore_env.belief.map_update import PRIOR_MEAN, Scan, fuse_scan
+from entropy_explore_env.belief.measurement_model import Return, measurement_precision
 from entropy_explore_env.compilation.kernels import lean_kernel
 from entropy_explore_env.robots.range_sensor import (
-    Return,
-    Scan,
-    fuse_scan,
+    Scene,
+    SensorPose,
     new_scan,
     sensor_model,
     take_scan,
@@ -59,13 +58,14 @@ def measure_room(grid: Grid, sensor: RangeSensor, scans: int, seed: int = 0) -> 
     starts = rng.uniform(0.5, np.asarray(grid.shape) - 0.5, (scans, 3))
     yaws = rng.uniform(-math.pi, math.pi, scans)
     pitches = rng.uniform(-_STEEPEST_RAD, _STEEPEST_RAD, scans)
-    truth, model, chance = np.zeros(grid.voxels, np.float32), sensor_model(sensor), np.zeros(1, np.uint64)
-    scan = new_scan(grid, [sensor], sensor.rays, 1)
+    truth, model, rng_state = np.zeros(grid.voxels, np.float32), sensor_model(sensor), np.zeros(1, np.uint64)
+    scene = Scene(truth, grid.shape, grid.voxel_size_m, np.zeros((0, 4)))
+    scan = new_scan(grid, [sensor], sensor.rays)
     positions = np.asarray(grid.origin_m) + starts * grid.voxel_size_m
     ends = np.zeros((scans, sensor.rays, 3))
     for i in range(scans):
-        size, edge = grid.shape, grid.voxel_size_m
-        take_scan(scan, model, truth, size, edge, starts[i], yaws[i], pitches[i], 0, chance)
+        x, y, z = starts[i].tolist()
+        take_scan(scan, model, scene, SensorPose((x, y, z), yaws[i], pitches[i]), rng_state)
         ends[i] = positions[i] + scan.rays["direction"] * scan.rays["range_m"][:, None]
     return Measurements(positions, ends)
 
@@ -162,10 +162,10 @@ class Fusion:
     def __init__(self, grid: Grid, sensor: RangeSensor, measurements: Measurements) -> None:
         """Start at the prior; one pass warms the map, the caches and the compiler."""
         self.measurements = measurements
-        self.scan = new_scan(grid, [sensor], sensor.rays, 1)
+        self.scan = new_scan(grid, [sensor], sensor.rays)
         self.mean = np.full(grid.voxels, PRIOR_MEAN, np.float32)
         self.precision = np.full(grid.voxels, ROOM.sigma_prior**-2, np.float32)
-        self._numbers = sensor_model(sensor).numbers[0]
+        self._params = sensor_model(sensor).params[0]
         self._grid = (grid.shape, grid.voxel_size_m, np.asarray(grid.origin_m, np.float64))
         self.voxels = self.fuse()
 
@@ -173,7 +173,7 @@ class Fusion:
         """Fuse some of the scans; returns how many voxels they crossed."""
         positions, ends = self.measurements.positions_m[first:last], self.measurements.ends_m[first:last]
         return fuse_measurements(
-            self.scan, self._numbers, self._grid, positions, ends, self.mean, self.precision
+            self.scan, self._params, self._grid, positions, ends, self.mean, self.precision
         )
 
 

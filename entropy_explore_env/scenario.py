@@ -107,7 +107,7 @@ class Scenario:
             self._check_kind(kind.robot)
         rays = max(kind.sensor.rays for kind in self.kinds)
         allowed = f"so short that at most {MAX_IN_FLIGHT} measurements are under way at once"
-        if self.mail_places * max(min(self.channel.burst, rays), 1) > MAX_IN_FLIGHT:
+        if self.message_slots * max(min(self.channel.burst, rays), 1) > MAX_IN_FLIGHT:
             raise SettingError("Channel.delay_s", self.channel.delay_s, allowed)
         if 2 * self.robots * self.phase_batches * max(min(self.channel.burst, rays), 1) > MAX_IN_FLIGHT:
             raise SettingError("Channel.phase_s", self.channel.phase_s, allowed)
@@ -141,7 +141,7 @@ class Scenario:
         return self.kinds[robot % len(self.kinds)]
 
     @property
-    def mail_places(self) -> int:
+    def message_slots(self) -> int:
         """Messages that can be under way at once: two a scan and robot, while the delay lasts.
 
         Between two scans a robot stands still for the latter or drives to it, at most at top speed.

@@ -18,7 +18,7 @@ from torch import nn
 
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.missions.action import action_space
-from entropy_explore_env.missions.observation import ObservationLayout, Part
+from entropy_explore_env.missions.observation.layout import ObservationLayout, Part
 from entropy_explore_env.scenario import Scenario
 from training.distributions import MoveAndGaze
 

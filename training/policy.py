@@ -12,7 +12,7 @@ from torch.distributions import Categorical, Normal
 
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.missions.action import action_space
-from entropy_explore_env.missions.observation import ObservationLayout
+from entropy_explore_env.missions.observation.layout import ObservationLayout
 from entropy_explore_env.missions.view import RobotView
 from entropy_explore_env.missions.view_observation import ViewObserver
 from entropy_explore_env.scenario import Scenario

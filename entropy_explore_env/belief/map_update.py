@@ -7,10 +7,14 @@ of a voxel, in [0, 1]; information is in bits.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
-from entropy_explore_env.compilation.kernels import inlined_kernel
+from entropy_explore_env.belief.measurement_model import Return
+from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel
+
+_NOTHING = int(Return.NOTHING)
 
 PRIOR_MEAN = 0.5
 """Expected coverage of a voxel that nobody has measured: no preference."""
@@ -20,6 +24,39 @@ _FOLD_BELOW = 1e-250
 
 Settings keep a ratio above 1e-16, so that a product that is not yet below stays above 1e-266.
 """
+
+
+RAY = np.dtype(
+    [
+        ("direction", "f8", (3,)),  # unit vector, map frame
+        ("cos_pitch", "f8"),  # of that direction
+        ("length", "f8"),  # measured distance in grid units
+        ("range_m", "f8"),  # the same in metres; 0 if nothing was measured
+        ("returned", "i8"),  # a Return
+        ("precision", "f8"),  # of the measured coverage, 1/σ(d)²
+        ("free", "i8"),  # leading voxels that measure coverage 0
+        ("voxels", "i8"),  # voxels on the ray
+    ],
+    align=True,
+)
+"""One ray of a scan, as it is processed."""
+
+
+class Scan(NamedTuple):
+    """Working space of one scan, or of one batch of received measurements; R rays, L voxels per ray."""
+
+    rays: np.ndarray
+    """(R,) RAY."""
+    utility: np.ndarray
+    """(R,) float64 bits that the measurement brought to the map that fused it last (Rocha04, eq. 27)."""
+    crossed: np.ndarray
+    """(R, L) int32 voxels on each ray."""
+    entered: np.ndarray
+    """(L,) int64 ticks at which the latest ray entered its voxels."""
+    coverage: np.ndarray
+    """(R, L) float32 measured coverage, from index `free` on."""
+    order: np.ndarray
+    """(R,) int64 rays in the order in which they are fused or sent."""
 
 
 @inlined_kernel
@@ -86,3 +123,29 @@ def expected_utility(precision, crossed, n, measured):
             bits += math.log2(growth)
             growth = 1.0
     return 0.5 * (bits + math.log2(growth))
+
+
+@lean_kernel
+def fuse_scan(scan, count, mean, precision):
+    """Fuse measurements into a belief, ray by ray (Rocha04, eqs. 17-18, 27 and 29).
+
+    Args:
+        scan: Scan with crossings filled in; its `utility` is filled with the bits of each ray.
+        count: How many rays of `scan.order`, in this order; those that measured nothing bring 0.
+        mean: (V,) float32 expected coverage, changed in place.
+        precision: (V,) float32 1/σ², changed in place.
+
+    Returns:
+        Bits taken from the map's entropy in all.
+    """
+    total = 0.0
+    for i in range(count):
+        index = scan.order[i]
+        ray = scan.rays[index]
+        scan.utility[index] = 0.0
+        if ray.returned != _NOTHING:
+            crossed, coverage = scan.crossed[index], scan.coverage[index]
+            bits = fuse_ray(mean, precision, crossed, coverage, ray.free, ray.voxels, ray.precision)
+            scan.utility[index] = bits
+            total += bits
+    return total

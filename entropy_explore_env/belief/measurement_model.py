@@ -5,10 +5,24 @@ Coverage is the covered share of a voxel, in [0, 1].
 
 from __future__ import annotations
 
+import enum
 import math
 
 from entropy_explore_env.belief.raycast import TICKS
+from entropy_explore_env.belief.voxel_index import grid_index
 from entropy_explore_env.compilation.kernels import inlined_kernel
+
+
+class Return(enum.IntEnum):
+    """What came back along a ray."""
+
+    NOTHING = 0
+    """A teammate's body was in the way, or the return was too near for the sensor: no measurement."""
+    FREE = 1
+    """No return within the sensor's range: all that the ray crossed is free."""
+    HIT = 2
+    """The distance of an obstacle or of the workspace's boundary."""
+
 
 _EDGE = 0.5 + 0.8660254037844387
 """A voxel entered earlier than this before the hit is free by eq. 4: half an edge, half a diagonal."""
@@ -22,37 +36,31 @@ def measurement_precision(range_m, sigma_min, sigma_slope_per_m):
 
 
 @inlined_kernel
-def measured_coverage(start, length, size, crossed, entered, n, coverage):
+def measured_coverage(start, length, size, crossing, n, coverage):
     """Coverage that a hit at `length` says of the voxels on its ray (Rocha04, eq. 4).
 
         μ(dˡ, d) = clip(½ + (dˡ - d)/vsz, 0, 1)
 
-    with dˡ the distance from the sensor to the voxel's centre. Voxels well before the hit measure
-    0; only those near it are worked out.
+    with dˡ the distance from the sensor to the voxel's centre. Voxels well before the hit measure 0; only
+    those near it are computed.
 
     Args:
         start: (x, y, z), the sensor in grid units.
         length: Measured distance in voxel edges.
         size: (X, Y, Z) voxels.
-        crossed: (L,) int32, voxels of the ray; `n` of them, in order.
-        entered: (L,) int64, ticks at which each was entered.
-        n: Crossed voxels.
+        crossing: Crossing of the ray.
+        n: Number of crossed voxels.
         coverage: (L,) float32, filled from the returned index on.
 
     Returns:
         Index of the first voxel whose measured coverage may be above 0.
     """
-    size_y, size_z = size[1], size[2]
-    per_y, per_z = 1.0 / size_y, 1.0 / size_z
+    crossed, entered = crossing.voxels, crossing.entered
     first, near = n, int((length - _EDGE) * TICKS)
     while first > 0 and (first == n or entered[first] > near):
         first -= 1
-        # (v + ½)/Z is at least ½/Z away from a whole number: its floor is exact, and no division.
-        column = int((crossed[first] + 0.5) * per_z)
-        row = int((column + 0.5) * per_y)
-        x = row + 0.5 - start[0]
-        y = column - row * size_y + 0.5 - start[1]
-        z = crossed[first] - column * size_z + 0.5 - start[2]
+        i, j, k = grid_index(size, crossed[first])
+        x, y, z = i + 0.5 - start[0], j + 0.5 - start[1], k + 0.5 - start[2]
         beyond = 0.5 + math.sqrt(x * x + y * y + z * z) - length
         coverage[first] = min(max(beyond, 0.0), 1.0)
     return first

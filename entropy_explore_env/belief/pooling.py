@@ -1,7 +1,7 @@
 """A belief pooled to a coarse grid of cells, carried along as rays change it: entropy and coverage.
 
 Normalised entropy is 1 at the prior and 0 at the voxel entropy that ends a mission, clipped in between.
-A cell holds sums over its voxels; whoever wants means divides by how many there are.
+A cell holds sums over its voxels; means are these divided by how many there are.
 """
 
 from __future__ import annotations
@@ -12,7 +12,10 @@ from typing import NamedTuple
 import numpy as np
 
 from entropy_explore_env.belief.map_update import PRIOR_MEAN, fuse_ray
+from entropy_explore_env.belief.measurement_model import Return
 from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel
+
+_NOTHING = int(Return.NOTHING)
 
 
 class Cells(NamedTuple):
@@ -44,6 +47,12 @@ def new_cells(size: tuple[int, int, int], shape: tuple[int, int, int]) -> Cells:
     )
 
 
+def no_cells(size: tuple[int, int, int]) -> Cells:
+    """No cells at all: nothing is pooled."""
+    none = np.zeros(0, np.int64)
+    return Cells(size, none, none, none, np.zeros(0))
+
+
 def fresh_sums(cells: Cells) -> np.ndarray:
     """(2, C) float64 sums of a belief that nothing has measured: normalised entropy, coverage."""
     return np.stack([cells.voxels, PRIOR_MEAN * cells.voxels])
@@ -56,17 +65,21 @@ def normalised_entropy(prior_precision, end_precision, precision):
     return min(max(math.log2(end_precision / precision) / span, 0.0), 1.0)
 
 
-@lean_kernel
-def pool_belief(cells, sums, ends, mean, precision):
-    """Fill the sums of a whole belief.
+class Pool(NamedTuple):
+    """The pooled belief of one robot."""
 
-    Args:
-        cells: The Cells.
-        sums: (2, C) float64, filled in.
-        ends: (prior, end) precision between which entropy is normalised.
-        mean: (V,) float32.
-        precision: (V,) float32.
-    """
+    cells: Cells
+    sums: np.ndarray
+    """(2, C) float64 sums over the cells: normalised entropy, coverage; changed in place."""
+    prior_precision: float
+    end_precision: float
+    """Between the two entropy is normalised."""
+
+
+@lean_kernel
+def pool_belief(pool, mean, precision):
+    """Fill the sums of a Pool from a whole belief, mean and precision (V,) float32."""
+    cells, sums = pool.cells, pool.sums
     for cell in range(sums.shape[1]):
         sums[0, cell] = sums[1, cell] = 0.0
     voxel = 0
@@ -74,43 +87,51 @@ def pool_belief(cells, sums, ends, mean, precision):
         for j in range(cells.size[1]):
             for k in range(cells.size[2]):
                 cell = cells.x[i] + cells.y[j] + cells.z[k]
-                sums[0, cell] += normalised_entropy(ends[0], ends[1], np.float64(precision[voxel]))
+                sums[0, cell] += normalised_entropy(
+                    pool.prior_precision, pool.end_precision, np.float64(precision[voxel])
+                )
                 sums[1, cell] += np.float64(mean[voxel])
                 voxel += 1
 
 
 @lean_kernel
-def fuse_pooled_ray(cells, sums, ends, mean, precision, crossed, coverage, free, n, measured):
-    """Like `fuse_ray`; the sums of the cells that the ray crosses follow.
+def fuse_pooled_scan(scan, count, mean, precision, pool):
+    """Like `fuse_scan`; the sums of the cells that the rays cross follow.
 
     Args:
-        cells: The Cells.
-        sums: (2, C) float64, changed in place.
-        ends: (prior, end) precision between which entropy is normalised.
-        mean: (V,) float32; the rest as in `fuse_ray`.
-        precision: (V,) float32.
-        crossed: (L,) int32.
-        coverage: (L,) float32.
-        free: Leading voxels that measure 0.
-        n: Crossed voxels.
-        measured: Precision of the measurement.
+        scan: Scan with crossings filled in.
+        count: How many rays of `scan.order`.
+        mean: (V,) float32, changed in place.
+        precision: (V,) float32, changed in place.
+        pool: Pool of the same belief.
 
     Returns:
-        Utility in bits, ≥ 0.
+        Bits taken from the map's entropy in all.
     """
-    _pool_ray(cells, sums, ends, mean, precision, crossed, n, -1.0)
-    bits = fuse_ray(mean, precision, crossed, coverage, free, n, measured)
-    _pool_ray(cells, sums, ends, mean, precision, crossed, n, 1.0)
-    return bits
+    total = 0.0
+    for i in range(count):
+        index = scan.order[i]
+        ray = scan.rays[index]
+        scan.utility[index] = 0.0
+        if ray.returned != _NOTHING:
+            crossed, coverage = scan.crossed[index], scan.coverage[index]
+            _pool_ray(pool, mean, precision, crossed, ray.voxels, -1.0)
+            bits = fuse_ray(mean, precision, crossed, coverage, ray.free, ray.voxels, ray.precision)
+            _pool_ray(pool, mean, precision, crossed, ray.voxels, 1.0)
+            scan.utility[index] = bits
+            total += bits
+    return total
 
 
-@inlined_kernel
-def _pool_ray(cells, sums, ends, mean, precision, crossed, n, sign):
-    """Add (sign 1) or take away (-1) what the voxels of a ray contribute to their cells."""
+@lean_kernel
+def _pool_ray(pool, mean, precision, crossed, n, sign):
+    """Add (sign 1) or take away (-1) what the `n` voxels of a ray contribute to their cells."""
+    cells, sums = pool.cells, pool.sums
+    prior, end = pool.prior_precision, pool.end_precision
     size_y, size_z = cells.size[1], cells.size[2]
     for i in range(n):
         voxel = crossed[i]
         column = voxel // size_z
         cell = cells.x[column // size_y] + cells.y[column % size_y] + cells.z[voxel - column * size_z]
-        sums[0, cell] += sign * normalised_entropy(ends[0], ends[1], np.float64(precision[voxel]))
+        sums[0, cell] += sign * normalised_entropy(prior, end, np.float64(precision[voxel]))
         sums[1, cell] += sign * np.float64(mean[voxel])

@@ -2,15 +2,17 @@
 
 Grid units: voxel (i, j, k) is the cube [i, i+1) × [j, j+1) × [k, k+1); lengths are in voxel edges.
 Voxels are numbered in C order, z fastest. Along a ray, distances are whole numbers of ticks: sums of
-whole numbers are exact, and the processor compares and selects them without a guess.
+whole numbers are exact, and the processor compares and selects them without a branch.
 """
 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
+from entropy_explore_env.belief.voxel_index import flat_index
 from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel
 
 OPEN = 0
@@ -25,12 +27,77 @@ STOP_AT_COVERED = 0.5
 NEVER_STOP = math.inf
 """No coverage is above this: the ray goes its whole length."""
 
+OPEN_END = np.bool_(False)
+"""A ray's length is the end of its range, no measured hit. A NumPy value, like the next two, so that
+`cast_ray` compiles for one type."""
+NONE_BEHIND, ONE_BEHIND = np.int64(0), np.int64(1)
+"""Voxels to note behind an obstacle."""
+
 TICKS = 2.0**40
 """Ticks in a voxel edge: the resolution of distances along a ray."""
 _EDGES = 1.0 / TICKS
 _FAR = 2.0**21
-"""Farther than any workspace is long, in voxel edges: a face that no ray reaches."""
+"""Longer than any workspace, in voxel edges: the distance of a face that no ray reaches."""
 _FAR_TICKS = 2**61
+
+
+class Line(NamedTuple):
+    """A straight line in grid units; plain numbers, so that `cast_ray` compiles for one type."""
+
+    start: tuple[float, float, float]
+    direction: tuple[float, float, float]
+    """Unit vector."""
+    length: float
+    """Voxel edges, > 0; inf allowed."""
+
+
+class Crossing(NamedTuple):
+    """Scratch space of `cast_ray` for L voxels: see `longest_crossing`."""
+
+    voxels: np.ndarray
+    """(L,) int32, the crossed voxels in order."""
+    entered: np.ndarray
+    """(L,) int64, the ticks at which each was entered."""
+
+
+class RayEnd(NamedTuple):
+    """Where a ray ended."""
+
+    length: float
+    """Distance to the end in voxel edges."""
+    voxels: int
+    """Number of crossed voxels."""
+    reason: int
+    """OPEN, OBSTACLE or WALL."""
+
+
+class _Axes(NamedTuple):
+    """A whole number for each axis."""
+
+    x: int
+    y: int
+    z: int
+
+
+class _AxisStart(NamedTuple):
+    """Start of the traversal along one axis."""
+
+    index: int
+    """Of the voxel."""
+    step: int
+    """-1, 0 or 1."""
+    face: int
+    """Ticks to the first face."""
+    gap: int
+    """Ticks between faces."""
+    last: int
+    """Ticks to the workspace's boundary."""
+
+
+@inlined_kernel
+def point(array):
+    """(x, y, z), the first three numbers of an array, as a tuple."""
+    return array[0], array[1], array[2]
 
 
 @lean_kernel
@@ -52,21 +119,17 @@ def longest_crossing(size_x, size_y, size_z, length, voxels_behind):
 
 @inlined_kernel
 def _axis(position, direction, size):
-    """Start of the traversal along one axis.
-
-    Returns:
-        Voxel index, step (-1, 0, 1), ticks to the first face, between faces, and to the last face.
-    """
+    """The _AxisStart of a ray at `position` with a component `direction`, in a grid of `size` voxels."""
     index = min(max(int(position), 0), size - 1)  # inside: no need to call floor, which is slow
     if direction == 0.0:
-        return index, 0, _FAR_TICKS, _FAR_TICKS, _FAR_TICKS
+        return _AxisStart(index, 0, _FAR_TICKS, _FAR_TICKS, _FAR_TICKS)
     ahead = direction > 0.0
     edge = 1.0 / abs(direction)
     face = _ticks((index + 1 - position if ahead else position - index) * edge)
     gap = _ticks(edge)
     left = size - 1 - index if ahead else index
     last = face + left * gap if left * edge < _FAR else _FAR_TICKS
-    return index, 1 if ahead else -1, face, gap, last
+    return _AxisStart(index, 1 if ahead else -1, face, gap, last)
 
 
 @inlined_kernel
@@ -76,65 +139,70 @@ def _ticks(length):
 
 
 @inlined_kernel
-def _next_voxel(voxel, step_x, face_x, gap_x, step_y, face_y, gap_y, step_z, face_z, gap_z):
+def _next_voxel(voxel, steps, faces, gaps):
     """Cross the nearest face, x before y before z where the ray meets an edge.
 
-    Nothing but selects: which face comes next is as good as random, and a wrong guess costs more.
+    Selects only, no branches: which face comes next cannot be predicted, and a misprediction costs more.
+
+    Args:
+        voxel: Number of the present voxel.
+        steps: _Axes, what a step along each axis adds to it.
+        faces: _Axes, ticks to the next face of each axis.
+        gaps: _Axes, ticks between faces.
+
+    Returns:
+        (voxel, ticks, faces): the next voxel, the ticks at which it is entered, and the next faces.
     """
-    by_x = face_x <= face_y
-    nearest = face_x if by_x else face_y
-    by_z = face_z < nearest
-    step = step_x if by_x else step_y
+    by_x = faces.x <= faces.y
+    nearest = faces.x if by_x else faces.y
+    by_z = faces.z < nearest
+    step = steps.x if by_x else steps.y
     return (
-        voxel + (step_z if by_z else step),
-        face_z if by_z else nearest,
-        face_x + (gap_x if by_x & (not by_z) else 0),
-        face_y + (gap_y if (not by_x) & (not by_z) else 0),
-        face_z + (gap_z if by_z else 0),
+        voxel + (steps.z if by_z else step),
+        faces.z if by_z else nearest,
+        _Axes(
+            faces.x + (gaps.x if by_x & (not by_z) else 0),
+            faces.y + (gaps.y if (not by_x) & (not by_z) else 0),
+            faces.z + (gaps.z if by_z else 0),
+        ),
     )
 
 
 @inlined_kernel
-def cast_ray(coverage, stop_above, size, start, direction, length, hit_at_length, behind, crossed, entered):
-    """Walk along a ray, and note the voxels that it crosses, until something ends it.
+def cast_ray(coverage, size, line, stop_above, hit_at_length, behind, crossing):
+    """Walk along a line, and note the voxels that it crosses, until something ends it.
 
     The ray ends at the face of the first voxel whose coverage is above `stop_above` (the voxel that
-    it starts in never stops it), at the boundary of the workspace, or after `length`. Where it ends
+    it starts in never stops it), at the boundary of the workspace, or at the line's length. Where it ends
     at an obstacle (a covered voxel, or its length if `hit_at_length`), the next `behind` voxels on
     its line are noted, too.
 
     Args:
         coverage: (V,) float32, the truth or a belief's mean.
-        stop_above: Coverage that stops the ray; NEVER_STOP to fuse a measurement that is known.
         size: (X, Y, Z) voxels.
-        start: (x, y, z) in grid units, inside the workspace.
-        direction: (3,) float64 unit vector.
-        length: Longest way in voxel edges, > 0; inf allowed.
+        line: Line; it starts inside the workspace.
+        stop_above: Coverage that stops the ray; NEVER_STOP to trace a measurement that is known.
         hit_at_length: Whether the ray's length is a measured hit rather than the end of its range.
         behind: Voxels to note behind an obstacle.
-        crossed: (L,) int32, filled with the crossed voxels in order (see `longest_crossing`).
-        entered: (L,) int64, filled with the ticks at which each was entered (those of the end, behind it).
+        crossing: Crossing, filled with the crossed voxels; those behind the end are entered at its ticks.
 
     Returns:
-        (length, n, end): distance to the end in voxel edges, number of crossed voxels, and OPEN,
-        OBSTACLE or WALL.
+        RayEnd.
     """
-    size_x, size_y, size_z = size
-    ix, step_x, face_x, gap_x, last_x = _axis(start[0], direction[0], size_x)
-    iy, step_y, face_y, gap_y, last_y = _axis(start[1], direction[1], size_y)
-    iz, step_z, face_z, gap_z, last_z = _axis(start[2], direction[2], size_z)
-    voxel = (ix * size_y + iy) * size_z + iz
-    step_x *= size_y * size_z
-    step_y *= size_z
-    leaves = min(last_x, last_y, last_z)
-    stops = _ticks(length)
+    crossed, entered = crossing.voxels, crossing.entered
+    x = _axis(line.start[0], line.direction[0], size[0])
+    y = _axis(line.start[1], line.direction[1], size[1])
+    z = _axis(line.start[2], line.direction[2], size[2])
+    voxel = flat_index(size, x.index, y.index, z.index)
+    steps = _Axes(x.step * (size[1] * size[2]), y.step * size[2], z.step)
+    faces, gaps = _Axes(x.face, y.face, z.face), _Axes(x.gap, y.gap, z.gap)
+    leaves = min(x.last, y.last, z.last)
+    stops = _ticks(line.length)
     until = min(leaves, stops)
     crossed[0], entered[0] = voxel, 0
     n, end = 1, WALL
     while True:
-        voxel, at, face_x, face_y, face_z = _next_voxel(
-            voxel, step_x, face_x, gap_x, step_y, face_y, gap_y, step_z, face_z, gap_z
-        )
+        voxel, at, faces = _next_voxel(voxel, steps, faces, gaps)
         if at >= until:
             break
         if coverage[np.uint64(voxel)] > stop_above:
@@ -145,7 +213,7 @@ def cast_ray(coverage, stop_above, size, start, direction, length, hit_at_length
         n += 1
     reached, ends = at * _EDGES, min(at, stops)
     if end == WALL and at >= stops:
-        reached, end = length, OBSTACLE if hit_at_length else OPEN
+        reached, end = line.length, OBSTACLE if hit_at_length else OPEN
     if end == OBSTACLE:
         for _ in range(behind):
             if at >= leaves:
@@ -153,7 +221,5 @@ def cast_ray(coverage, stop_above, size, start, direction, length, hit_at_length
             crossed[np.uint32(n)] = voxel
             entered[np.uint32(n)] = ends
             n += 1
-            voxel, at, face_x, face_y, face_z = _next_voxel(
-                voxel, step_x, face_x, gap_x, step_y, face_y, gap_y, step_z, face_z, gap_z
-            )
-    return reached, n, end
+            voxel, at, faces = _next_voxel(voxel, steps, faces, gaps)
+    return RayEnd(reached, n, end)

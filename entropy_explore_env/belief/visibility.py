@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from entropy_explore_env.belief.raycast import STOP_AT_COVERED, cast_ray
+from entropy_explore_env.belief.raycast import ONE_BEHIND, OPEN_END, STOP_AT_COVERED, Crossing, Line, cast_ray
 from entropy_explore_env.belief.voxel_index import flat_index
 from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel
 
@@ -128,7 +128,15 @@ def _unobstructed(cone, size, i, j, k, occlusion):
     if length <= 1.0:
         return True
     start, direction = (cone.apex[0], cone.apex[1], cone.apex[2]), (x / length, y / length, z / length)
-    _, n, _ = cast_ray(mean, STOP_AT_COVERED, size, start, direction, length, False, 1, crossed, entered)
+    _, n, _ = cast_ray(
+        mean,
+        size,
+        Line(start, direction, length),
+        STOP_AT_COVERED,
+        OPEN_END,
+        ONE_BEHIND,
+        Crossing(crossed, entered),
+    )
     return crossed[n - 1] == flat_index(size, i, j, k)
 
 

@@ -60,7 +60,7 @@ class Task:
     def choices(self) -> int:
         """Number of discrete actions."""
         rules = rules_of(self.scenario)
-        return len(rules.moves) * len(rules.gazes)
+        return len(rules.actions.moves) * len(rules.actions.gazes)
 
     def actions(self, mission: int, episode: int, step: int, kind: int = 0) -> np.ndarray:
         """A team's actions, (A, N) float32 or (A,) int64; another `kind` gives other ones."""

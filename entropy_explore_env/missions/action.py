@@ -21,13 +21,12 @@ import math
 import numpy as np
 from gymnasium import spaces
 
-from entropy_explore_env.belief.raycast import STOP_AT_COVERED
 from entropy_explore_env.compilation.kernels import lean_kernel
 from entropy_explore_env.errors import ActionError
 from entropy_explore_env.missions.rules import Rules, rules_of
 from entropy_explore_env.scenario import Scenario
 
-_ROUNDING = 1e-6
+ROUNDING = 1e-6
 """A displacement may exceed the reach by this share: the rounding of float32 actions."""
 
 
@@ -36,81 +35,51 @@ def action_space(scenario: Scenario) -> spaces.Box | spaces.Discrete:
     if scenario.action.kind == "continuous":
         return spaces.Box(-1.0, 1.0, (3 if scenario.planar else 5,), np.float32)
     rules = rules_of(scenario)
-    return spaces.Discrete(len(rules.moves) * len(rules.gazes))
+    return spaces.Discrete(len(rules.actions.moves) * len(rules.actions.gazes))
 
 
 @lean_kernel
-def decode_action(rules, robot, pose, box, number, viewpoint):
+def decode_action(params, actions, pose, continuous, discrete, viewpoint):
     """Turn an action into a viewpoint.
 
     Args:
-        rules: The scenario.
-        robot: The robot's number.
+        params: PARAMS of the robot.
+        actions: ActionSet.
         pose: (5,) float64, its pose.
-        box: (N,) float64 continuous action; not read where actions are discrete.
-        number: Discrete action; not read where they are continuous.
+        continuous: (N,) float64 action; not read where actions are discrete.
+        discrete: Number of the action; not read where actions are continuous.
         viewpoint: (5,) float64, filled in; within reach of the pose.
     """
-    settings = rules.numbers[robot]
-    axes = 2 if settings.planar else 3
+    axes = 2 if params.planar else 3
     for i in range(5):
         viewpoint[i] = pose[i]
-    if settings.discrete:
-        move, gaze = rules.moves[number // len(rules.gazes)], rules.gazes[number % len(rules.gazes)]
+    if params.discrete:
+        move, gaze = (
+            actions.moves[discrete // len(actions.gazes)],
+            actions.gazes[discrete % len(actions.gazes)],
+        )
         for axis in range(axes):
-            voxel = math.floor((pose[axis] - settings.origin_m[axis]) / settings.voxel_size_m) + move[axis]
-            viewpoint[axis] = settings.origin_m[axis] + (voxel + 0.5) * settings.voxel_size_m
-        viewpoint[3], viewpoint[4] = gaze[0], 0.0 if settings.planar else gaze[1]
+            voxel = math.floor((pose[axis] - params.origin_m[axis]) / params.voxel_size_m) + move[axis]
+            viewpoint[axis] = params.origin_m[axis] + (voxel + 0.5) * params.voxel_size_m
+        viewpoint[3], viewpoint[4] = gaze[0], 0.0 if params.planar else gaze[1]
     else:
         for axis in range(axes):
-            if math.isinf(settings.reach_m):
-                share = 0.5 * (box[axis] + 1.0)
-                voxels = 0.5 + share * (settings.size[axis] - 1)
-                viewpoint[axis] = settings.origin_m[axis] + voxels * settings.voxel_size_m
+            if math.isinf(params.reach_m):
+                share = 0.5 * (continuous[axis] + 1.0)
+                voxels = 0.5 + share * (params.size[axis] - 1)
+                viewpoint[axis] = params.origin_m[axis] + voxels * params.voxel_size_m
             else:
-                viewpoint[axis] = pose[axis] + box[axis] * settings.reach_m
-        viewpoint[3] = box[settings.action_axes] * math.pi
-        viewpoint[4] = 0.0 if settings.planar else box[settings.action_axes + 1] * math.pi / 2.0
-    if not math.isinf(settings.reach_m):
+                viewpoint[axis] = pose[axis] + continuous[axis] * params.reach_m
+        viewpoint[3] = continuous[params.action_axes] * math.pi
+        viewpoint[4] = 0.0 if params.planar else continuous[params.action_axes + 1] * math.pi / 2.0
+    if not math.isinf(params.reach_m):
         length = 0.0
         for axis in range(axes):
             length += (viewpoint[axis] - pose[axis]) ** 2
         length = math.sqrt(length)
-        if length > settings.reach_m * (1.0 + _ROUNDING):
+        if length > params.reach_m * (1.0 + ROUNDING):
             for axis in range(axes):
-                viewpoint[axis] = pose[axis] + (viewpoint[axis] - pose[axis]) * settings.reach_m / length
-
-
-@lean_kernel
-def write_mask(rules, robot, start, mean, out):
-    """Mark the discrete actions that make sense by the robot's own belief.
-
-    A move makes sense if it ends inside the workspace, within reach, in a voxel that is not
-    believed covered; to stay always does. Planar robots have no use for moves up and down, nor for more
-    than one of the gazes of a yaw.
-
-    Args:
-        rules: The scenario.
-        robot: The robot's number.
-        start: (x, y, z), the robot in grid units.
-        mean: (V,) float32, its expected coverage.
-        out: (K·D,) filled with 0 and 1.
-    """
-    settings, gazes = rules.numbers[robot], len(rules.gazes)
-    for move in range(len(rules.moves)):
-        inside, voxel, apart = True, 0, 0.0
-        for axis in range(3):
-            index = math.floor(start[axis]) + rules.moves[move, axis]
-            inside = inside and 0 <= index < settings.size[axis]
-            voxel = voxel * settings.size[axis] + index
-            if axis < 2 or not settings.planar:
-                apart += (index + 0.5 - start[axis]) ** 2
-        near = math.sqrt(apart) * settings.voxel_size_m <= settings.reach_m * (1.0 + _ROUNDING)
-        near = near and not (settings.planar and rules.moves[move, 2] != 0)
-        sensible = move == 0 or (inside and near and mean[voxel] <= STOP_AT_COVERED)
-        for gaze in range(gazes):
-            level = gaze % settings.pitches == (settings.pitches - 1) // 2
-            out[move * gazes + gaze] = 1 if sensible and (level or not settings.planar) else 0
+                viewpoint[axis] = pose[axis] + (viewpoint[axis] - pose[axis]) * params.reach_m / length
 
 
 def encode_viewpoint(
@@ -137,25 +106,25 @@ def encode_viewpoint(
     wanted = np.asarray(viewpoint, dtype=np.float64)
     if wanted.shape != (5,) or not np.isfinite(wanted).all():
         raise ActionError("viewpoint", viewpoint, "five finite numbers (x, y, z, yaw, pitch)")
-    settings = rules.numbers[robot]
+    settings = rules.params[robot]
     axes = 2 if settings["planar"] else 3
     if not settings["discrete"]:
         return _encoded_box(settings, pose, wanted, axes)
     corner = np.floor((pose[:axes] - settings["origin_m"][:axes]) / settings["voxel_size_m"])
-    lengths = np.linalg.norm(rules.moves, axis=1) * settings["voxel_size_m"]  # the nearest come first
-    moves = rules.moves[lengths <= settings["reach_m"] + 1e-9 * settings["voxel_size_m"], :axes]
+    lengths = np.linalg.norm(rules.actions.moves, axis=1) * settings["voxel_size_m"]  # the nearest come first
+    moves = rules.actions.moves[lengths <= settings["reach_m"] + 1e-9 * settings["voxel_size_m"], :axes]
     ends = settings["origin_m"][:axes] + (corner + moves + 0.5) * settings["voxel_size_m"]
     move = int(np.argmin(((ends - wanted[:axes]) ** 2).sum(axis=1)))
     pitches = settings["pitches"]
     if settings["planar"]:
-        yaws = rules.gazes[::pitches, 0]
+        yaws = rules.actions.gazes[::pitches, 0]
         gaze = int(np.argmax(np.cos(yaws - wanted[3]))) * pitches + (pitches - 1) // 2
     else:
-        yaw, pitch = rules.gazes[:, 0], rules.gazes[:, 1]
+        yaw, pitch = rules.actions.gazes[:, 0], rules.actions.gazes[:, 1]
         toward = math.cos(wanted[4])
         alike = np.cos(pitch) * toward * np.cos(yaw - wanted[3]) + np.sin(pitch) * math.sin(wanted[4])
         gaze = int(np.argmax(alike))
-    return np.int64(move * len(rules.gazes) + gaze)
+    return np.int64(move * len(rules.actions.gazes) + gaze)
 
 
 def _encoded_box(settings: np.void, pose: np.ndarray, wanted: np.ndarray, axes: int) -> np.ndarray:

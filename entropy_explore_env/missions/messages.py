@@ -3,73 +3,91 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
-from entropy_explore_env.belief.pooling import fuse_pooled_ray
+from entropy_explore_env.belief.map_update import fuse_scan
+from entropy_explore_env.belief.pooling import Cells, Pool, fuse_pooled_scan
+from entropy_explore_env.belief.raycast import point
 from entropy_explore_env.compilation.kernels import lean_kernel
-from entropy_explore_env.missions.poses import copy_numbers, grid_position, pose_at
+from entropy_explore_env.missions.poses import (
+    copy_numbers,
+    distance_between,
+    grid_size,
+    pose_at,
+    to_grid_units,
+)
+from entropy_explore_env.missions.state import Beliefs
 from entropy_explore_env.robots.channel import (
     BITS_PER_ANNOUNCEMENT,
     BITS_PER_BATCH,
     BITS_PER_MEASUREMENT,
     Delivery,
-    deliver,
+    draw_delivery,
 )
-from entropy_explore_env.robots.range_sensor import Return, fuse_scan, trace_measurement
+from entropy_explore_env.robots.range_sensor import trace_measurement
 
-_NOTHING = int(Return.NOTHING)
-_HEARD, _OUT_OF_RANGE, _LOST = (delivery.code for delivery in Delivery)
+_OUT_OF_RANGE, _LOST = Delivery.OUT_OF_RANGE.code, Delivery.LOST.code
 _ANNOUNCEMENT = np.int64(-1)
-"""In place of a number of measurements. A NumPy integer, so that `send` compiles for one type."""
+"""In place of a number of measurements. A NumPy integer, so that callees compile for one type."""
+
+
+class Team(NamedTuple):
+    """The robots of one mission."""
+
+    params: np.ndarray
+    """(A,) PARAMS."""
+    robots: np.ndarray
+    """(A,) ROBOT."""
+    heard: np.ndarray
+    """(A, A) HEARD."""
+
+
+class Tracer(NamedTuple):
+    """What it takes to trace measurements of teammates again."""
+
+    sensors: np.ndarray
+    """(A,) SENSOR_PARAMS."""
+    coverage: np.ndarray
+    """(V,) float32, any map of the workspace; what it holds does not matter."""
+
+
+class Maps(NamedTuple):
+    """The beliefs of one mission's robots, and the cells that they are pooled to."""
+
+    beliefs: Beliefs
+    cells: Cells
 
 
 @lean_kernel
-def fuse_measurements(rules, cells, state, scan, mission, index, count):
+def fuse_measurements(team, maps, scan, index, count):
     """Fuse `count` measurements of `scan.order` into a robot's belief; returns the bits of `fuse_scan`."""
-    mean, precision = state.mean[mission, index], state.precision[mission, index]
-    if cells is None:  # known while compiling: nothing of the rest is compiled
+    mean, precision = maps.beliefs.mean[index], maps.beliefs.precision[index]
+    if len(maps.cells.voxels) == 0:
         return fuse_scan(scan, count, mean, precision)
-    ends = (rules.numbers[0].prior_precision, rules.numbers[0].end_precision)
-    total = 0.0
-    for i in range(count):
-        place = scan.order[i]
-        ray = scan.rays[place]
-        scan.utility[place] = 0.0
-        if ray.returned != _NOTHING:
-            scan.utility[place] = fuse_pooled_ray(
-                cells,
-                state.pooled[mission, index],
-                ends,
-                mean,
-                precision,
-                scan.crossed[place],
-                scan.coverage[place],
-                ray.free,
-                ray.voxels,
-                ray.measured,
-            )
-            total += scan.utility[place]
-    return total
+    shared = team.params[0]
+    pool = Pool(maps.cells, maps.beliefs.pooled[index], shared.prior_precision, shared.end_precision)
+    return fuse_pooled_scan(scan, count, mean, precision, pool)
 
 
 @lean_kernel
-def hear_batch(rules, state, scan, mission, index, count):
+def hear_batch(team, maps, scan, index, count):
     """Fuse received measurements as if the robot had taken them itself (Rocha04, sect. 5)."""
-    bits = fuse_measurements(rules, rules.cells, state, scan, mission, index, count)
-    state.robots[mission, index].entropy_bits -= bits
-    state.robots[mission, index].received_bits += bits
-    state.robots[mission, index].heard_bits += bits
+    robot, bits = team.robots[index], fuse_measurements(team, maps, scan, index, count)
+    robot.entropy_bits -= bits
+    robot.received_bits += bits
+    robot.heard_bits += bits
 
 
 @lean_kernel
-def note_message(robot, heard, pose, sent_s, count):
+def note_message(robot, heard, position, sent_s, count):
     """Count a message that a robot hears, and note where its sender was."""
     robot.messages_received += 1
     robot.measurements_received += max(count, 0)
     robot.bits_received += message_bits(count)
     heard.heard_s = sent_s
-    copy_numbers(pose, heard.pose, 5)
+    copy_numbers(position, heard.pose, 5)
     if count < 0:
         heard.announced_s = sent_s
 
@@ -91,123 +109,188 @@ def message_bits(count):
 
 
 @lean_kernel
-def post_letter(delayed, numbers, state, scan, mission, index, count):
-    """Put a message into a free place of the mail; returns the place. There is none if `delayed` is None."""
-    if delayed is None:
-        return -1
-    clock, robot, mail = state.missions[mission], state.robots[mission, index], state.mail[mission]
-    place = 0
-    while not math.isinf(mail[place].due_s):
-        place += 1
-    letter = mail[place]
-    letter.sent_s = clock.time_s
-    letter.due_s = clock.time_s + numbers.delay_s
-    letter.serial = clock.letters
-    clock.letters += 1
-    letter.sender = index
-    letter.count = count
-    for mate in range(state.robots.shape[1]):
-        state.mail_to[mission, place, mate] = False
-    copy_numbers(robot.origin if count < 0 else robot.scan_pose, letter.pose, 5)
-    write_announcement(robot, letter.announced)
-    pack_measurements(scan, count, state.mail_rays[mission, place])
-    return place
+def transmit(team, index, place, time_s, recipients):
+    """Draw whom a broadcast reaches, and count whom it does not.
+
+    Args:
+        team: Team.
+        index: The sender.
+        place: (x, y, z), where it sends from.
+        time_s: When.
+        recipients: (A,) bool, filled in.
+    """
+    robot, shared = team.robots[index], team.params[0]
+    for mate in range(len(team.robots)):
+        recipients[mate] = False
+        if mate == index:
+            continue
+        apart_m = 0.0
+        if not math.isinf(shared.channel_range_m):
+            apart_m = distance_between(place, point(pose_at(team.params[mate], team.robots[mate], time_s)))
+        code = draw_delivery(apart_m, shared.channel_range_m, shared.loss_probability, robot.channel_rng)
+        if code == _LOST:
+            robot.messages_lost += 1
+        elif code == _OUT_OF_RANGE:
+            robot.messages_out_of_range += 1
+        else:
+            recipients[mate] = True
+
+
+@lean_kernel
+def enqueue(clock, robot, in_flight, index, count, delay_s):
+    """Put a message into a free slot; returns the slot.
+
+    Args:
+        clock: MISSION.
+        robot: ROBOT of the sender.
+        in_flight: InFlight.
+        index: The sender's number.
+        count: Measurements in it; -1 = an announcement.
+        delay_s: How long it is under way.
+    """
+    slot = 0
+    while not math.isinf(in_flight.messages[slot].due_s):
+        slot += 1
+    message = in_flight.messages[slot]
+    message.sent_s = clock.time_s
+    message.due_s = clock.time_s + delay_s
+    message.serial = clock.enqueued
+    clock.enqueued += 1
+    message.sender = index
+    message.count = count
+    copy_numbers(robot.origin if count < 0 else robot.scan_pose, message.pose, 5)
+    write_announcement(robot, message.announced)
+    return slot
 
 
 @lean_kernel
 def pack_measurements(scan, count, packed):
     """Fill (B, 5) with the first `count` measurements of `scan.order`: direction, distance, Return."""
     for i in range(count):
-        ray, mailed = scan.rays[scan.order[i]], packed[i]
-        copy_numbers(ray.direction, mailed, 3)
-        mailed[3] = ray.length
-        mailed[4] = ray.returned
+        ray, stored = scan.rays[scan.order[i]], packed[i]
+        copy_numbers(ray.direction, stored, 3)
+        stored[3] = ray.length
+        stored[4] = ray.returned
 
 
 @lean_kernel
-def unpack_measurements(rules, state, scan, mission, sender, pose, packed, count):
-    """Put packed measurements into a scan as if it had been taken at the sender's pose."""
-    numbers = rules.numbers[0]
-    size = (numbers.size[0], numbers.size[1], numbers.size[2])
-    start, sensor = grid_position(numbers, pose), rules.sensors.numbers[sender]
+def unpack_measurements(params, tracer, sender, scan, pose, packed, count):
+    """Put packed measurements into a scan as if it had been taken at the sender's pose.
+
+    Args:
+        params: PARAMS of any robot.
+        tracer: Tracer.
+        sender: Who measured.
+        scan: Scan, filled in.
+        pose: (5,) where the measurements were taken.
+        packed: (B, 5), see `pack_measurements`.
+        count: How many there are.
+    """
+    size, start, sensor = grid_size(params), to_grid_units(params, pose), tracer.sensors[sender]
     for i in range(count):
-        ray, mailed = scan.rays[i], packed[i]
+        ray, stored = scan.rays[i], packed[i]
         scan.order[i] = i
-        copy_numbers(mailed, ray.direction, 3)
-        ray.length = mailed[3]
-        ray.returned = int(mailed[4])
-        trace_measurement(scan, i, sensor, size, numbers.voxel_size_m, start, state.truth[mission])
+        copy_numbers(stored, ray.direction, 3)
+        ray.length = stored[3]
+        ray.returned = int(stored[4])
+        trace_measurement(scan, i, sensor, size, params.voxel_size_m, start, tracer.coverage)
 
 
 @lean_kernel
-def send(rules, state, scan, mission, index, count):
-    """Broadcast a batch of `count` measurements (`scan.order`), or an announcement (count = -1)."""
-    numbers, clock, robot = rules.numbers[0], state.missions[mission], state.robots[mission, index]
-    here = robot.origin if count < 0 else robot.scan_pose
+def send_batch(team, maps, clock, in_flight, scan, index, count, recipients):
+    """Broadcast `count` measurements of `scan.order`, which teammates fuse at once or after the delay.
+
+    Args:
+        team: Team.
+        maps: Maps.
+        clock: MISSION.
+        in_flight: InFlight.
+        scan: Scan of the sender.
+        index: The sender.
+        count: How many measurements.
+        recipients: (A,) bool, scratch space.
+    """
+    robot, shared = team.robots[index], team.params[0]
+    count_sent(robot, count)
+    transmit(team, index, point(robot.scan_pose), clock.time_s, recipients)
+    slot = -1
+    for mate in range(len(team.robots)):
+        if not recipients[mate]:
+            continue
+        if shared.delay_s > 0.0:
+            if slot < 0:
+                slot = enqueue(clock, robot, in_flight, index, count, shared.delay_s)
+                copy_numbers(recipients, in_flight.recipients[slot], len(recipients))
+                pack_measurements(scan, count, in_flight.rays[slot])
+        else:
+            note_message(team.robots[mate], team.heard[mate, index], robot.scan_pose, clock.time_s, count)
+            hear_batch(team, maps, scan, mate, count)
+
+
+@lean_kernel
+def announce(team, clock, in_flight, index, recipients):
+    """Tell the teammates the chosen viewpoint with r̂ and α̂ (RochaMI), if robots do so."""
+    robot, shared = team.robots[index], team.params[0]
+    if len(team.robots) == 1 or not shared.announcements:
+        return
+    count_sent(robot, _ANNOUNCEMENT)
+    transmit(team, index, point(robot.origin), clock.time_s, recipients)
+    slot = -1
+    for mate in range(len(team.robots)):
+        if not recipients[mate]:
+            continue
+        if shared.delay_s > 0.0:
+            if slot < 0:
+                slot = enqueue(clock, robot, in_flight, index, _ANNOUNCEMENT, shared.delay_s)
+                copy_numbers(recipients, in_flight.recipients[slot], len(recipients))
+        else:
+            heard = team.heard[mate, index]
+            note_message(team.robots[mate], heard, robot.origin, clock.time_s, _ANNOUNCEMENT)
+            write_announcement(robot, heard.announced)
+
+
+@lean_kernel
+def count_sent(robot, count):
+    """Count a message that a robot sends: a batch of `count` measurements, or an announcement (-1)."""
     robot.messages_sent += 1
     robot.measurements_sent += max(count, 0)
     robot.bits_sent += message_bits(count)
-    letter = -1
-    for mate in range(state.robots.shape[1]):
-        if mate == index:
-            continue
-        apart_m = 0.0
-        if not math.isinf(numbers.channel_range_m):
-            there = pose_at(rules.numbers[mate], state.robots[mission, mate], clock.time_s)
-            apart_m = math.sqrt(
-                (here[0] - there[0]) ** 2 + (here[1] - there[1]) ** 2 + (here[2] - there[2]) ** 2
-            )
-        code = deliver(apart_m, numbers.channel_range_m, numbers.loss_probability, robot.channel_chance)
-        if code == _LOST:
-            robot.messages_lost += 1
-        elif code == _OUT_OF_RANGE:
-            robot.messages_out_of_range += 1
-        elif numbers.delay_s > 0.0:
-            if letter < 0:
-                letter = post_letter(rules.delayed, numbers, state, scan, mission, index, count)
-            state.mail_to[mission, letter, mate] = True
-        else:
-            heard = state.heard[mission, mate, index]
-            note_message(state.robots[mission, mate], heard, here, clock.time_s, count)
-            if count < 0:
-                write_announcement(robot, heard.announced)
+
+
+@lean_kernel
+def receive(team, maps, in_flight, slot, tracer, scan):
+    """A delayed message arrives: its recipients fuse it, or note what it announces; its slot is free again.
+
+    Args:
+        team: Team.
+        maps: Maps.
+        in_flight: InFlight.
+        slot: Of the message.
+        tracer: Tracer.
+        scan: Scan, scratch space.
+    """
+    message = in_flight.messages[slot]
+    message.due_s = math.inf
+    packed, sender = in_flight.rays[slot], message.sender
+    unpack_measurements(team.params[0], tracer, sender, scan, message.pose, packed, message.count)
+    for mate in range(len(team.robots)):
+        if in_flight.recipients[slot, mate]:
+            heard = team.heard[mate, sender]
+            note_message(team.robots[mate], heard, message.pose, message.sent_s, message.count)
+            if message.count < 0:
+                copy_numbers(message.announced, heard.announced, 7)
             else:
-                hear_batch(rules, state, scan, mission, mate, count)
+                hear_batch(team, maps, scan, mate, message.count)
 
 
 @lean_kernel
-def announce(rules, state, scan, mission, robot):
-    """Tell the teammates the chosen viewpoint with r̂ and α̂ (RochaMI)."""
-    if state.robots.shape[1] > 1 and rules.numbers[0].announcements:
-        send(rules, state, scan, mission, robot, _ANNOUNCEMENT)
-
-
-@lean_kernel
-def open_letter(delayed, rules, state, scan, mission, place):
-    """A message arrives: its hearers fuse it, or note what it announces; its place is free again."""
-    if delayed is None:
-        return
-    letter, packed = state.mail[mission, place], state.mail_rays[mission, place]
-    letter.due_s = math.inf
-    unpack_measurements(rules, state, scan, mission, letter.sender, letter.pose, packed, letter.count)
-    for robot in range(state.robots.shape[1]):
-        if state.mail_to[mission, place, robot]:
-            heard = state.heard[mission, robot, letter.sender]
-            note_message(state.robots[mission, robot], heard, letter.pose, letter.sent_s, letter.count)
-            if letter.count < 0:
-                copy_numbers(letter.announced, heard.announced, 7)
-            else:
-                hear_batch(rules, state, scan, mission, robot, letter.count)
-
-
-@lean_kernel
-def next_letter(mail):
-    """(place, time) of the next message that arrives, the earlier sent first; time inf if none."""
+def next_message(messages):
+    """(slot, time) of the next message that arrives, the earlier sent first; time inf if none."""
     soonest, due_s = 0, math.inf
-    for letter in range(len(mail)):
-        due = mail[letter].due_s
+    for slot in range(len(messages)):
+        due = messages[slot].due_s
         if due < due_s or (
-            due == due_s and not math.isinf(due) and mail[letter].serial < mail[soonest].serial
+            due == due_s and not math.isinf(due) and messages[slot].serial < messages[soonest].serial
         ):
-            soonest, due_s = letter, due
+            soonest, due_s = slot, due
     return soonest, due_s

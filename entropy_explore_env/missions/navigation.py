@@ -1,13 +1,18 @@
-"""Path planning for the robots that have a navigator: before a step, in a call of its own.
+"""Where robots with a navigator plan their paths: before a step, in a call of its own.
 
-So planning is compiled only for missions in which robots plan.
+So planning is compiled only where somebody plans.
 """
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
+import numpy as np
+
 from entropy_explore_env.compilation.kernels import lean_kernel
 from entropy_explore_env.missions.action import decode_action
-from entropy_explore_env.missions.poses import grid_position
+from entropy_explore_env.missions.poses import to_grid_units
+from entropy_explore_env.missions.rules import ActionSet
 from entropy_explore_env.missions.state import MissionEnd
 from entropy_explore_env.robots.motion import MoveEnd
 from entropy_explore_env.robots.navigator import plan_path
@@ -16,43 +21,59 @@ _RUNNING = MissionEnd.RUNNING.code
 _ARRIVED = MoveEnd.ARRIVED.code
 
 
+class Planning(NamedTuple):
+    """What plans are made from: parts of Rules and MissionState, of E missions."""
+
+    params: np.ndarray
+    """(A,) PARAMS."""
+    actions: ActionSet
+    missions: np.ndarray
+    """(E,) MISSION."""
+    robots: np.ndarray
+    """(E, A) ROBOT; targets and paths are filled in."""
+    mean: np.ndarray
+    """(E, A, V) float32."""
+    precision: np.ndarray
+    """(E, A, V) float32."""
+    no_fly: np.ndarray
+    """(E·N, V) bool, for the N radii of bodies as in MissionState.collision: where a body would reach above
+    the ceiling, which robots that plan know; (E·N, 0) = no mission has one."""
+
+
 @lean_kernel
-def plan_missions(rules, state, closed, navigator, kind, boxes, numbers, first, last):
+def plan_missions(planning, navigator, kind, continuous, discrete, first, last):
     """Plan the paths of the robots of one kind that decide, each through its own belief.
 
     Args:
-        rules: The scenario.
-        state: The MissionState of E missions; targets and ways are filled in.
-        closed: (E·N, V) bool, for the N radii of bodies as in `blocked`, where one would reach above the
-            ceiling, which those who plan know; (E·N, 0) = no mission has one.
+        planning: Planning.
         navigator: Working space for this kind, not shared with another thread.
         kind: Its number.
-        boxes: (E, A, N) float64 continuous actions.
-        numbers: (E, A) int64 discrete actions.
+        continuous: (E, A, N) float64 actions.
+        discrete: (E, A) int64 actions.
         first: The first mission.
         last: One past the last.
     """
     for mission in range(first, last):
-        if state.missions[mission].end == _RUNNING:
-            for index in range(state.robots.shape[1]):
-                robot = state.robots[mission, index]
-                own = rules.numbers[index]
+        if planning.missions[mission].end == _RUNNING:
+            for index in range(planning.robots.shape[1]):
+                robot, own = planning.robots[mission, index], planning.params[index]
                 if robot.deciding and own.kind == kind:
-                    box, number = boxes[mission, index], numbers[mission, index]
-                    decode_action(rules, index, robot.goal, box, number, robot.target)
-                    mean, precision = state.mean[mission, index], state.precision[mission, index]
-                    there = closed[mission * own.radii + own.barriers]
-                    plan_drive(own, navigator, mean, precision, there, robot)
+                    chosen, number = continuous[mission, index], discrete[mission, index]
+                    decode_action(own, planning.actions, robot.goal, chosen, number, robot.target)
+                    mean, precision = planning.mean[mission, index], planning.precision[mission, index]
+                    no_fly = planning.no_fly[mission * own.radii + own.radius_number]
+                    plan_drive(own, navigator, mean, precision, no_fly, robot)
 
 
 @lean_kernel
-def plan_drive(numbers, navigator, mean, precision, no_fly, robot):
-    """Write a robot's path to its target: waypoints in metres, and how its drive ends if nothing stops it."""
-    start, goal = grid_position(numbers, robot.goal), grid_position(numbers, robot.target)
-    robot.waypoints, robot.way_end = plan_path(navigator, mean, precision, no_fly, start, goal, robot.way)
-    for point in range(robot.waypoints):
+def plan_drive(params, navigator, mean, precision, no_fly, robot):
+    """Write a robot's path to its target: waypoints in metres, and how it ends if nothing stops it."""
+    start, goal = to_grid_units(params, robot.goal), to_grid_units(params, robot.target)
+    path, origin = robot.path, params.origin_m
+    robot.waypoints, robot.path_end = plan_path(navigator, mean, precision, no_fly, start, goal, path)
+    for number in range(robot.waypoints):
         for axis in range(3):
-            robot.way[point, axis] = numbers.origin_m[axis] + robot.way[point, axis] * numbers.voxel_size_m
-    if robot.way_end == _ARRIVED:  # not up to rounding
+            path[number, axis] = origin[axis] + path[number, axis] * params.voxel_size_m
+    if robot.path_end == _ARRIVED:  # not up to rounding
         for axis in range(3):
-            robot.way[robot.waypoints - 1, axis] = robot.target[axis]
+            path[robot.waypoints - 1, axis] = robot.target[axis]

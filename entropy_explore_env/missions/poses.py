@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from entropy_explore_env.belief.raycast import point
 from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel
 from entropy_explore_env.robots.motion import driven_share, turning_time
 
@@ -15,21 +16,27 @@ def copy_numbers(source, target, count):
         target[i] = source[i]
 
 
-@lean_kernel
-def grid_position(numbers, pose):
-    """(x, y, z) in grid units; a tuple, which costs no memory."""
-    low, edge = numbers.origin_m, numbers.voxel_size_m
-    return (pose[0] - low[0]) / edge, (pose[1] - low[1]) / edge, (pose[2] - low[2]) / edge
+@inlined_kernel
+def to_grid_units(params, position):
+    """(x, y, z) in grid units from (x, y, z) in metres, map frame."""
+    low, edge = params.origin_m, params.voxel_size_m
+    return (position[0] - low[0]) / edge, (position[1] - low[1]) / edge, (position[2] - low[2]) / edge
 
 
 @inlined_kernel
-def way_point(robot, number):
+def grid_size(params):
+    """(X, Y, Z) voxels of the workspace."""
+    return params.size[0], params.size[1], params.size[2]
+
+
+@inlined_kernel
+def path_point(robot, number):
     """(x, y, z) of a point on a drive: 0 its origin, then its corners, then its goal."""
     if number > robot.corners:
-        return robot.goal[0], robot.goal[1], robot.goal[2]
+        return point(robot.goal)
     if number > 0:
-        return robot.way[number - 1, 0], robot.way[number - 1, 1], robot.way[number - 1, 2]
-    return robot.origin[0], robot.origin[1], robot.origin[2]
+        return point(robot.path[number - 1])
+    return point(robot.origin)
 
 
 @inlined_kernel
@@ -39,22 +46,22 @@ def distance_between(a, b):
 
 
 @lean_kernel
-def place_at(numbers, robot, time_s):
+def place_at(params, robot, time_s):
     """(x, y, z, corners): where a robot is at a time as in `pose_at`, and how many corners it has passed."""
-    end, passed = way_point(robot, robot.corners + 1), robot.corners
-    if time_s >= robot.ready_s - numbers.scan_time_s:
+    end, passed = path_point(robot, robot.corners + 1), robot.corners
+    if time_s >= robot.ready_s - params.scan_time_s:
         return end[0], end[1], end[2], passed
     elapsed_s = time_s - robot.depart_s
-    left = 1.0 - driven_share(elapsed_s, robot.way_m, numbers.max_speed_m_s, numbers.acceleration_m_s2)
-    while True:  # from the end of the way, which is so met exactly; `left` is a share of the whole way
-        begin = way_point(robot, passed)
+    left = 1.0 - driven_share(elapsed_s, robot.path_m, params.max_speed_m_s, params.acceleration_m_s2)
+    while True:  # from the end of the path, which is so met exactly; `left` is a share of the whole path
+        begin = path_point(robot, passed)
         leg_m = distance_between(begin, end)
-        if passed == 0 or left * robot.way_m <= leg_m:
+        if passed == 0 or left * robot.path_m <= leg_m:
             break
-        left -= leg_m / robot.way_m
+        left -= leg_m / robot.path_m
         end = begin
         passed -= 1
-    left = min(left * (robot.way_m / leg_m), 1.0) if leg_m > 0.0 else 0.0
+    left = min(left * (robot.path_m / leg_m), 1.0) if leg_m > 0.0 else 0.0
     return (
         end[0] - left * (end[0] - begin[0]),
         end[1] - left * (end[1] - begin[1]),
@@ -64,26 +71,26 @@ def place_at(numbers, robot, time_s):
 
 
 @lean_kernel
-def pose_at(numbers, robot, time_s):
+def pose_at(params, robot, time_s):
     """Pose (x, y, z, yaw, pitch) of a robot at a time between its departure and its next one."""
     origin, goal = robot.origin, robot.goal
-    x, y, z, _ = place_at(numbers, robot, time_s)
+    x, y, z, _ = place_at(params, robot, time_s)
     yaw, pitch, elapsed_s = goal[3], goal[4], time_s - robot.depart_s
-    turn_s = turning_time(origin[3], origin[4], goal[3], goal[4], numbers.turn_rate_rad_s)
-    if elapsed_s < turn_s and time_s < robot.ready_s - numbers.scan_time_s:
-        short_way = (goal[3] - origin[3] + math.pi) % (2.0 * math.pi) - math.pi
-        most = elapsed_s * numbers.turn_rate_rad_s
-        yaw = origin[3] + min(max(short_way, -most), most)
+    turn_s = turning_time(origin[3], origin[4], goal[3], goal[4], params.turn_rate_rad_s)
+    if elapsed_s < turn_s and time_s < robot.ready_s - params.scan_time_s:
+        shortest = (goal[3] - origin[3] + math.pi) % (2.0 * math.pi) - math.pi
+        most = elapsed_s * params.turn_rate_rad_s
+        yaw = origin[3] + min(max(shortest, -most), most)
         pitch = origin[4] + min(max(goal[4] - origin[4], -most), most)
     return x, y, z, yaw, pitch
 
 
 @lean_kernel
-def driven_metres(team, missions, robots, out):
+def driven_metres(params, missions, robots, out):
     """Fill (E, A): metres that robots have driven up to now; `distance_m` counts a drive when it begins.
 
     Args:
-        team: (A,) NUMBERS.
+        params: (A,) PARAMS.
         missions: (E,) MISSION.
         robots: (E, A) ROBOT.
         out: (E, A) float64.
@@ -91,8 +98,8 @@ def driven_metres(team, missions, robots, out):
     for mission in range(robots.shape[0]):
         time_s = missions[mission].time_s
         for index in range(robots.shape[1]):
-            numbers, robot = team[index], robots[mission, index]
+            own, robot = params[index], robots[mission, index]
             share, elapsed_s = 1.0, time_s - robot.depart_s
-            if time_s < robot.ready_s - numbers.scan_time_s:
-                share = driven_share(elapsed_s, robot.way_m, numbers.max_speed_m_s, numbers.acceleration_m_s2)
-            out[mission, index] = robot.distance_m - (1.0 - share) * robot.way_m
+            if time_s < robot.ready_s - own.scan_time_s:
+                share = driven_share(elapsed_s, robot.path_m, own.max_speed_m_s, own.acceleration_m_s2)
+            out[mission, index] = robot.distance_m - (1.0 - share) * robot.path_m

@@ -1,4 +1,4 @@
-"""The numbers of a scenario that compiled code needs, in one tuple."""
+"""A scenario as compiled code takes it: parameters, sensors, actions."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from entropy_explore_env.belief.pooling import Cells, new_cells
+from entropy_explore_env.belief.pooling import Cells, new_cells, no_cells
 from entropy_explore_env.robots.range_sensor import TeamSensors, team_sensors
 from entropy_explore_env.scenario import Scenario
 from entropy_explore_env.settings import Observation, Robot
 
-NUMBERS = np.dtype(
+PARAMS = np.dtype(
     [
         ("size", "i8", (3,)),  # X, Y, Z voxels
         ("voxel_size_m", "f8"),
@@ -20,12 +20,16 @@ NUMBERS = np.dtype(
         ("prior_precision", "f8"),
         ("end_precision", "f8"),
         ("discrete", "?"),
-        ("action_axes", "i8"),  # places in an action that say where to go: 2 if the whole team is planar
+        (
+            "action_axes",
+            "i8",
+        ),  # components of an action that are a displacement: 2 if the whole team is planar
         ("pitches", "i8"),  # of discrete gazes
         # of the robot
         ("kind", "i8"),  # the number of its kind
-        ("barriers", "i8"),  # the number of its radius among `barrier_radii_m`
+        ("radius_number", "i8"),  # the number of its radius among `collision_radii_m`
         ("planar", "?"),
+        ("planned", "?"),  # whether it plans its paths
         ("reach_m", "f8"),
         ("max_speed_m_s", "f8"),
         ("acceleration_m_s2", "f8"),
@@ -36,7 +40,7 @@ NUMBERS = np.dtype(
         ("scan_every_m", "f8"),
         ("rays", "i8"),  # R of its sensor
         # of all
-        ("radii", "i8"),  # of `barrier_radii_m`
+        ("radii", "i8"),  # how many `collision_radii_m` there are
         ("burst", "i8"),
         ("i_min_bits", "f8"),
         ("i_min_fill", "f8"),  # 0 = I_min stays as it is
@@ -58,27 +62,29 @@ NUMBERS = np.dtype(
     ],
     align=True,
 )
-"""The numbers of a scenario for one of its robots, in the units of `settings`; inf means "never" or "all"."""
+"""The parameters of a scenario for one of its robots, in the units of `settings`; inf = never, or all."""
 
 _NEVER = 2**62
 
 
-class Rules(NamedTuple):
-    """A scenario for compiled code; D gazes or directions."""
+class ActionSet(NamedTuple):
+    """The discrete actions: K moves × D gazes."""
 
-    numbers: np.ndarray
-    """(A,) NUMBERS; what is not the robot's own is the same in all."""
-    sensors: TeamSensors
     moves: np.ndarray
-    """(K, 3) int64, discrete moves in voxels."""
+    """(K, 3) int64, in voxels."""
     gazes: np.ndarray
-    """(D, 2) float64, discrete gazes: yaw, pitch."""
-    delayed: int | None
-    """None where messages arrive at once: then nothing of the mail is compiled."""
-    phased: int | None
-    """None where batches are sent at once: then nothing of the broadcast in phases is compiled."""
-    cells: Cells | None
-    """Of the overview; None without it."""
+    """(D, 2) float64: yaw, pitch."""
+
+
+class Rules(NamedTuple):
+    """A scenario for compiled code."""
+
+    params: np.ndarray
+    """(A,) PARAMS; what is not the robot's own is the same in all."""
+    sensors: TeamSensors
+    actions: ActionSet
+    cells: Cells
+    """Of the overview; none without it."""
     panorama: np.ndarray
     """(D, 3) float64 unit vectors of the panorama's rays; D = 0 without it."""
 
@@ -86,7 +92,7 @@ class Rules(NamedTuple):
 def rules_of(scenario: Scenario) -> Rules:
     """The rules of a scenario."""
     ending, channel = scenario.ending, scenario.channel
-    radii = barrier_radii_m(scenario)
+    radii = collision_radii_m(scenario)
     shared = {
         "size": scenario.grid.shape,
         "voxel_size_m": scenario.grid.voxel_size_m,
@@ -116,38 +122,38 @@ def rules_of(scenario: Scenario) -> Rules:
         "track_truth": scenario.track_truth,
         "panorama_log": scenario.observation.panorama_utility == "log2",
     }
-    numbers = np.zeros(scenario.robots, NUMBERS)
+    params = np.zeros(scenario.robots, PARAMS)
     for name, value in shared.items():
-        numbers[name] = value
+        params[name] = value
     for number in range(scenario.robots):
         robot, sensor = scenario.kind_of(number).robot, scenario.kind_of(number).sensor
-        own = numbers[number]
+        own = params[number]
         own["kind"] = number % len(scenario.kinds)
-        own["barriers"] = radii.index(_barrier_radius_m(scenario, robot))
+        own["radius_number"] = radii.index(_collision_radius_m(scenario, robot))
         own["planar"] = scenario.layer_of(robot) is not None
+        own["planned"] = robot.navigator == "planned"
         for name in ("reach_m", "max_speed_m_s", "acceleration_m_s2", "turn_rate_rad_s", "body_radius_m"):
             own[name] = getattr(robot, name)
         own["blocked_wait_s"] = robot.blocked_wait_s if robot.when_blocked == "wait" else 0.0
         for name in ("scan_time_s", "scan_every_m", "rays"):
             own[name] = getattr(sensor, name)
+    overview, size = overview_shape(scenario), scenario.grid.shape
+    pitches = 1 if scenario.planar else scenario.action.pitches
     return Rules(
-        numbers=numbers,
+        params=params,
         sensors=team_sensors([scenario.kind_of(number).sensor for number in range(scenario.robots)]),
-        moves=discrete_moves(scenario),
-        gazes=gaze_set(scenario.action.yaws, 1 if scenario.planar else scenario.action.pitches),
-        delayed=1 if channel.delay_s > 0.0 else None,
-        phased=1 if channel.phase_s > 0.0 else None,
-        cells=None if (shape := overview_shape(scenario)) is None else new_cells(scenario.grid.shape, shape),
+        actions=ActionSet(discrete_moves(scenario), gaze_set(scenario.action.yaws, pitches)),
+        cells=no_cells(size) if overview is None else new_cells(size, overview),
         panorama=panorama_directions(scenario),
     )
 
 
-def barrier_radii_m(scenario: Scenario) -> list[float]:
-    """The radii of the team's bodies that meet different barriers, each once; 0 = only the voxel it is in."""
-    return list(dict.fromkeys(_barrier_radius_m(scenario, kind.robot) for kind in scenario.kinds))
+def collision_radii_m(scenario: Scenario) -> list[float]:
+    """The radii of the team's bodies that need a collision mask of their own; 0 = only the voxel it is in."""
+    return list(dict.fromkeys(_collision_radius_m(scenario, kind.robot) for kind in scenario.kinds))
 
 
-def _barrier_radius_m(scenario: Scenario, robot: Robot) -> float:
+def _collision_radius_m(scenario: Scenario, robot: Robot) -> float:
     small = robot.body_radius_m <= 0.5 * scenario.grid.voxel_size_m + 1e-9
     return 0.0 if small else robot.body_radius_m
 

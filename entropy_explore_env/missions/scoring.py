@@ -1,7 +1,7 @@
-"""How far a mission has come, measured as it goes: times on the way, and the joint map against the truth.
+"""How far a mission has come: times on the way, and the joint map against the truth.
 
 The joint map fuses every measurement that any robot takes, at once and without loss. Nobody acts on it;
-it is kept where the scenario is scored. Voxels are weighed as rays cross them, never all of them.
+it is kept where the scenario tracks the truth. Its figures are updated ray by ray, never from all voxels.
 """
 
 from __future__ import annotations
@@ -9,9 +9,9 @@ from __future__ import annotations
 import numpy as np
 
 from entropy_explore_env.belief.map_update import fuse_ray
-from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel
+from entropy_explore_env.belief.measurement_model import Return
+from entropy_explore_env.compilation.kernels import lean_kernel
 from entropy_explore_env.missions.state import PROGRESS
-from entropy_explore_env.robots.range_sensor import Return
 
 _NOTHING = int(Return.NOTHING)
 
@@ -29,32 +29,33 @@ def note_progress(clock, robots):
 
 
 @lean_kernel
-def score_scan(state, scan, mission, prior_precision):
+def score_scan(clock, joint, truth, scan, prior_precision):
     """Fuse a scan into the joint map, and carry its entropy, coverage and errors (see MISSION).
 
     Args:
-        state: The MissionState of a scored scenario.
-        scan: With crossings and weights filled in.
-        mission: Which mission.
+        clock: MISSION, changed in place.
+        joint: JointMap, changed in place.
+        truth: (V,) float32.
+        scan: Scan with crossings and precisions filled in.
         prior_precision: 1/σ² of a voxel that nobody has measured.
     """
-    clock, truth, visible = state.missions[mission], state.truth[mission], state.visible[mission]
-    mean, precision = state.joint_mean[mission], state.joint_precision[mission]
     prior = np.float32(prior_precision)
     for index in range(len(scan.rays)):
         ray, crossed = scan.rays[index], scan.crossed[index]
         if ray.returned == _NOTHING:
             continue
-        weigh_voxels(clock, truth, visible, mean, precision, prior, crossed, ray.voxels, -1)
+        score_voxels(clock, joint, truth, prior, crossed, ray.voxels, -1)
+        coverage = scan.coverage[index]
         clock.joint_bits -= fuse_ray(
-            mean, precision, crossed, scan.coverage[index], ray.free, ray.voxels, ray.measured
+            joint.mean, joint.precision, crossed, coverage, ray.free, ray.voxels, ray.precision
         )
-        weigh_voxels(clock, truth, visible, mean, precision, prior, crossed, ray.voxels, 1)
+        score_voxels(clock, joint, truth, prior, crossed, ray.voxels, 1)
 
 
-@inlined_kernel
-def weigh_voxels(clock, truth, visible, mean, precision, prior, crossed, n, sign):
+@lean_kernel
+def score_voxels(clock, joint, truth, prior, crossed, n, sign):
     """Add (sign 1) or take away (-1) what `n` voxels contribute to the figures of the joint map."""
+    mean, precision, visible = joint.mean, joint.precision, joint.visible
     for i in range(n):
         voxel = np.uint32(crossed[i])
         if precision[voxel] > prior:

@@ -1,8 +1,7 @@
-"""Robots in worlds, many missions at once: the arrays, how they are reset, and the one tick."""
+"""Robots in worlds, many missions at once: the arrays, how they are reset, and a step's compiled calls."""
 
 from __future__ import annotations
 
-import math
 import os
 from collections.abc import Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -13,18 +12,21 @@ import numpy as np
 from entropy_explore_env.belief.entropy import map_entropy_bits
 from entropy_explore_env.belief.map_update import PRIOR_MEAN
 from entropy_explore_env.belief.pooling import fresh_sums
+from entropy_explore_env.belief.raycast import Crossing
 from entropy_explore_env.compilation.announcement import end_of_step
 from entropy_explore_env.errors import CallOrderError
-from entropy_explore_env.missions.navigation import plan_missions
-from entropy_explore_env.missions.observation import ObservationLayout, observation_rules, observe_mission
+from entropy_explore_env.missions.navigation import Planning, plan_missions
+from entropy_explore_env.missions.observation.layout import ObservationLayout, part_offsets
+from entropy_explore_env.missions.observation.mask import mask_missions
+from entropy_explore_env.missions.observation.observe import Observed, observe_missions
 from entropy_explore_env.missions.reset_options import DRAWN, ResetOptions
 from entropy_explore_env.missions.rules import rules_of
 from entropy_explore_env.missions.starts import checked_starts, start_poses
 from entropy_explore_env.missions.state import MissionEnd, MissionState, check_memory, new_state
-from entropy_explore_env.missions.tick import mask_missions, step_missions
+from entropy_explore_env.missions.tick import step_missions
+from entropy_explore_env.missions.workspace import Workspace, new_workspace
 from entropy_explore_env.randomness import Stream, check_seed, generator, splitmix_states
-from entropy_explore_env.robots.navigator import footprints, new_navigators
-from entropy_explore_env.robots.range_sensor import Scan, new_scan
+from entropy_explore_env.robots.navigator import new_navigators
 from entropy_explore_env.scenario import Scenario
 from entropy_explore_env.settings import Grid, gaussian_entropy_bits
 from entropy_explore_env.validation import check_whole
@@ -95,9 +97,9 @@ class Missions:
         self.threads = min(self.count, threads or os.cpu_count() or 1)
         self.rules = rules_of(scenario)
         self.layout = ObservationLayout(scenario)
-        self._parts = observation_rules(scenario, self.layout)
+        self._offsets = part_offsets(scenario, self.layout)
         self.state: MissionState = new_state(scenario, self.count, self.rules.cells)
-        self._closed = np.zeros((self.count * int(self.rules.numbers["radii"][0]), 0), np.bool_)
+        self._no_fly = np.zeros((self.count * int(self.rules.params["radii"][0]), 0), np.bool_)
         self.worlds: list[World | None] = [None] * self.count
         self.options = [DRAWN] * self.count
         self.reward_function = ""
@@ -108,17 +110,11 @@ class Missions:
         self._pool: ThreadPoolExecutor | None = None
 
     def _make_working_space(self) -> None:
-        """A scan a thread and, where robots plan, navigators; what they hold is nobody's state."""
-        kinds = self.scenario.kinds
-        sensors, robots = [kind.sensor for kind in kinds], [kind.robot for kind in kinds]
-        rays = max(sensor.rays for sensor in sensors)
-        longest_m = max(math.inf if robot.navigator == "planned" else robot.reach_m for robot in robots)
-        self._scans: list[Scan] = [
-            new_scan(self.grid, sensors, rays, self.scenario.robots, longest_m) for _ in range(self.threads)
-        ]
+        """Scratch memory for each thread and, where robots plan, navigators; none of it is state."""
         self._navigators = [new_navigators(self.scenario) for _ in range(self.threads)]
-        planning = self._navigators[0]
-        self._balls = footprints(planning, len(kinds)) if planning else None
+        self._work: list[Workspace] = [
+            new_workspace(self.scenario, navigators) for navigators in self._navigators
+        ]
 
     @property
     def grid(self) -> Grid:
@@ -206,24 +202,23 @@ class Missions:
         mission, number, episode, world, poses, options = start
         self.seeds[mission], self.episodes[mission] = number, episode
         self.options[mission] = options
-        if world.ceiling is not None and self.state.blocked is self.state.truth:
-            self.state = self.state._replace(blocked=self.state.truth.copy())
+        if world.ceiling is not None and self.state.collision is self.state.truth:
+            self.state = self.state._replace(collision=self.state.truth.copy())
         state = self.state
-        if world.ceiling is not None and not self._closed.size and self._navigators[0]:
-            self._closed = np.zeros((len(self._closed), self.grid.voxels), np.bool_)
+        if world.ceiling is not None and not self._no_fly.size and self._navigators[0]:
+            self._no_fly = np.zeros((len(self._no_fly), self.grid.voxels), np.bool_)
         if world is not self.worlds[mission]:
             self.worlds[mission] = world
             state.truth[mission] = world.occupied.ravel()
-            self._set_barriers(mission, world)
+            self._set_collision_masks(mission, world)
         for array in state[4:]:
             array[mission] = np.zeros((), array.dtype)
         state.mean[mission] = PRIOR_MEAN
-        state.precision[mission] = self.rules.numbers["prior_precision"][0]
-        if self.rules.cells is not None:
-            state.pooled[mission] = fresh_sums(self.rules.cells)
+        state.precision[mission] = self.rules.params["prior_precision"][0]
+        state.pooled[mission] = fresh_sums(self.rules.cells)
         if self.scenario.track_truth:
             state.joint_mean[mission] = PRIOR_MEAN
-            state.joint_precision[mission] = self.rules.numbers["prior_precision"][0]
+            state.joint_precision[mission] = self.rules.params["prior_precision"][0]
             state.visible[mission] = world.visible(self.scenario).ravel()
         state.missions[mission]["reached_s"] = -1.0
         self._set_entropies(mission, world.visible_voxels(self.scenario))
@@ -232,25 +227,24 @@ class Missions:
             robots[field] = poses
         robots["deciding"] = True
         robots["i_min_bits"] = robots["next_i_min_bits"] = self.scenario.channel.i_min_bits
-        robots["sensor_chance"][:, 0] = splitmix_states(number, episode, Stream.SENSOR, len(robots))
-        robots["channel_chance"][:, 0] = splitmix_states(number, episode, Stream.CHANNEL, len(robots))
+        robots["sensor_rng"][:, 0] = splitmix_states(number, episode, Stream.SENSOR, len(robots))
+        robots["channel_rng"][:, 0] = splitmix_states(number, episode, Stream.CHANNEL, len(robots))
         state.heard[mission]["heard_s"] = state.heard[mission]["announced_s"] = -1.0
-        state.mail[mission]["due_s"] = np.inf
-        out = self.observations[mission]
-        observe_mission(self.rules, self._parts, state, self._scans[0], mission, out)
+        state.in_flight[mission]["due_s"] = np.inf
+        self._observe(0, mission, mission + 1)
 
-    def _set_barriers(self, mission: int, world: World) -> None:
+    def _set_collision_masks(self, mission: int, world: World) -> None:
         """What is in the way of the team's bodies."""
         for robot in range(min(len(self.scenario.kinds), self.scenario.robots)):
-            numbers, kind = self.rules.numbers[robot], self.scenario.kind_of(robot)
-            row = mission * numbers["radii"] + numbers["barriers"]
-            self.state.blocked[row] = world.layout(self.scenario, kind).collision_mask.ravel()
-            if self._closed.size:
-                self._closed[row] = world.no_fly_mask(kind.robot.body_radius_m).ravel()
+            params, kind = self.rules.params[robot], self.scenario.kind_of(robot)
+            row = mission * params["radii"] + params["radius_number"]
+            self.state.collision[row] = world.layout(self.scenario, kind).collision_mask.ravel()
+            if self._no_fly.size:
+                self._no_fly[row] = world.no_fly_mask(kind.robot.body_radius_m).ravel()
 
     def _set_entropies(self, mission: int, visible_voxels: int) -> None:
         """H(0) by eq. 25, and H_th: voxels that can be seen at σ_end, the others at the prior."""
-        prior = np.full((1, 1, 1), self.rules.numbers["prior_precision"][0], np.float32)
+        prior = np.full((1, 1, 1), self.rules.params["prior_precision"][0], np.float32)
         voxel_bits = float(map_entropy_bits(prior))
         known_bits = gaussian_entropy_bits(self.scenario.ending.sigma_end)
         hidden = self.grid.voxels - visible_voxels
@@ -263,12 +257,12 @@ class Missions:
         """The random stream of whoever chooses the actions in this mission's episode."""
         return generator(self.seeds[mission], self.episodes[mission], Stream.STRATEGY)
 
-    def step(self, boxes: np.ndarray, numbers: np.ndarray) -> np.ndarray:
+    def step(self, continuous: np.ndarray, discrete: np.ndarray) -> np.ndarray:
         """Advance every mission that is not over by one step.
 
         Args:
-            boxes: (E, A, N) float64 continuous actions; ignored where actions are discrete.
-            numbers: (E, A) int64 discrete actions; ignored where they are continuous.
+            continuous: (E, A, N) float64 actions; ignored where actions are discrete.
+            discrete: (E, A) int64 actions; ignored where they are continuous.
 
         Returns:
             (E, A, F) float32 observations; overwritten by the next call.
@@ -279,29 +273,43 @@ class Missions:
         if min(self.episodes) < 0:
             raise CallOrderError("step before reset: call reset() first")
         if self.threads == 1:
-            self._step_range(0, 0, self.count, boxes, numbers)
+            self._step_range(0, 0, self.count, continuous, discrete)
         else:
-            self._step_threaded(boxes, numbers)
+            self._step_threaded(continuous, discrete)
         end_of_step()
         return self.observations
 
-    def _step_range(self, thread: int, first: int, last: int, boxes: np.ndarray, numbers: np.ndarray) -> None:
-        for kind, navigator in self._navigators[thread].items():
-            plan_missions(self.rules, self.state, self._closed, navigator, kind, boxes, numbers, first, last)
-        step_missions(
-            self.rules,
-            self._parts,
-            self.state,
-            self._scans[thread],
-            self._balls,
-            boxes,
-            numbers,
-            first,
-            last,
-            self.observations,
-        )
+    def _step_range(
+        self, thread: int, first: int, last: int, continuous: np.ndarray, discrete: np.ndarray
+    ) -> None:
+        rules, state, work = self.rules, self.state, self._work[thread]
+        if self._navigators[thread]:
+            planning = Planning(
+                rules.params,
+                rules.actions,
+                state.missions,
+                state.robots,
+                state.mean,
+                state.precision,
+                self._no_fly,
+            )
+            for kind, navigator in self._navigators[thread].items():
+                plan_missions(planning, navigator, kind, continuous, discrete, first, last)
+        step_missions(rules, state, work, continuous, discrete, first, last)
+        self._observe(thread, first, last)
 
-    def _step_threaded(self, boxes: np.ndarray, numbers: np.ndarray) -> None:
+    def _observe(self, thread: int, first: int, last: int) -> None:
+        """Write the observations of the missions `first` … `last` - 1."""
+        if not self.layout.size:
+            return
+        state, scan = self.state, self._work[thread].scan
+        observed = Observed(
+            state.missions, state.robots, state.heard, state.mean, state.precision, state.pooled
+        )
+        crossing = Crossing(scan.crossed[0], scan.entered)
+        observe_missions(self.rules, self._offsets, observed, crossing, first, last, self.observations)
+
+    def _step_threaded(self, continuous: np.ndarray, discrete: np.ndarray) -> None:
         """Share the missions among threads: each takes the next chunk as soon as it is free."""
         if self._pool is None:
             self._pool = ThreadPoolExecutor(self.threads, "missions")
@@ -310,16 +318,17 @@ class Missions:
 
         def work(thread: int) -> None:
             for first in chunks:
-                self._step_range(thread, first, min(first + size, self.count), boxes, numbers)
+                self._step_range(thread, first, min(first + size, self.count), continuous, discrete)
 
         for done in [self._pool.submit(work, thread) for thread in range(self.threads)]:
             done.result()
 
     def action_masks(self) -> np.ndarray:
         """(E, A, N) int8: 1 for each discrete action that makes sense by the robot's own belief."""
-        actions = len(self.rules.moves) * len(self.rules.gazes)
+        rules, state = self.rules, self.state
+        actions = len(rules.actions.moves) * len(rules.actions.gazes)
         masks = np.empty((self.count, self.scenario.robots, actions), np.int8)
-        mask_missions(self.rules, self.state, masks)
+        mask_missions(rules.params, rules.actions, state.missions, state.robots, state.mean, masks)
         return masks
 
     def over(self, mission: int) -> MissionEnd:
@@ -335,7 +344,7 @@ class Missions:
     def __getstate__(self) -> dict[str, object]:
         """All but the threads and their scratch space."""
         kept = dict(self.__dict__)
-        del kept["_pool"], kept["_scans"], kept["_navigators"], kept["_balls"]
+        del kept["_pool"], kept["_work"], kept["_navigators"]
         return kept
 
     def __setstate__(self, kept: dict[str, object]) -> None:

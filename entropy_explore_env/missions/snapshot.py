@@ -11,7 +11,7 @@ from entropy_explore_env.missions.reset_options import ResetOptions
 from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.worlds.load import world_bytes, world_from_bytes
 
-_DRAWN = ("truth", "blocked", "visible")
+_DRAWN = ("truth", "collision", "visible")
 """State that follows from a mission's seed and episode."""
 
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from entropy_explore_env.belief.pooling import Cells
 from entropy_explore_env.errors import SettingError
-from entropy_explore_env.missions.rules import barrier_radii_m
+from entropy_explore_env.missions.rules import collision_radii_m
 from entropy_explore_env.scenario import Scenario
 
 
@@ -41,9 +41,9 @@ MISSION = np.dtype(
         ("time_s", "f8"),
         ("cycles", "i8"),  # steps so far
         ("end", "i8"),  # code of a MissionEnd
-        ("letters", "i8"),  # delayed messages sent so far
+        ("enqueued", "i8"),  # delayed messages sent so far
         ("reached_s", "f8", (4,)),  # when the best map had lost each of PROGRESS; -1 = not yet
-        # of the joint map, where the scenario is scored
+        # of the joint map, where the truth is tracked
         ("joint_bits", "f8"),  # its entropy
         ("explored", "i8"),  # voxels measured at all
         ("explored_visible", "i8"),  # of those that can be seen from where robots can be
@@ -57,7 +57,7 @@ PROGRESS = (0.5, 0.9, 0.99, 1.0)
 """Shares of the bits that the mission asks for, at which the time is taken."""
 
 WAYPOINTS = 32
-"""Most points that a planned way leads to, one after the other."""
+"""Most points that a planned path leads to, one after the other."""
 
 ROBOT = np.dtype(
     [
@@ -68,14 +68,14 @@ ROBOT = np.dtype(
         ("goal", "f8", (5,)),  # pose at which it ends, or ended
         ("target", "f8", (5,)),  # viewpoint that was chosen, whether or not the drive ends there
         ("scan_pose", "f8", (5,)),  # pose of the latest scan
-        ("way", "f8", (WAYPOINTS, 3)),  # points to which it meant to drive straight, one after the other
+        ("path", "f8", (WAYPOINTS, 3)),  # points to which it meant to drive straight, one after the other
         ("waypoints", "i8"),  # how many there are; 0 = straight to the target
-        ("way_end", "i8"),  # code of a MoveEnd: how the drive ends if nothing stops it; ways only
+        ("path_end", "i8"),  # code of a MoveEnd: how a planned drive ends if nothing stops it
         ("corners", "i8"),  # how many of the points the drive passes before its goal
-        ("way_m", "f8"),  # length of the drive
+        ("path_m", "f8"),  # length of the drive
         ("depart_s", "f8"),  # start of the drive
         ("next_scan_s", "f8"),  # when it scans next: under way, or at `ready_s`
-        ("way_scans", "i8"),  # scans that it took under way in this drive
+        ("scans_under_way", "i8"),  # that it took in this drive
         ("ready_s", "f8"),  # end of the scan after it; of the wait, while it is waiting
         ("move_end", "i8"),  # code of a MoveEnd of the latest drive
         ("depth_m", "f8"),  # r̂ of the latest scan (RochaMI, eq. 4)
@@ -85,8 +85,8 @@ ROBOT = np.dtype(
         ("own_bits", "f8"),  # taken from its map by its own scans in the latest step
         ("received_bits", "f8"),  # taken from its map by teammates' measurements in the latest step
         ("reward", "f8"),  # of the latest step
-        ("sensor_chance", "u8", (1,)),  # random state of range noise
-        ("channel_chance", "u8", (1,)),  # random state of message loss
+        ("sensor_rng", "u8", (1,)),  # random state of range noise
+        ("channel_rng", "u8", (1,)),  # random state of message loss
         # counted from the mission's start
         ("distance_m", "f8"),
         ("scans", "i8"),
@@ -120,9 +120,9 @@ HEARD = np.dtype(
     align=True,
 )
 
-LETTER = np.dtype(
+MESSAGE = np.dtype(
     [
-        ("due_s", "f8"),  # when it arrives; inf = a free place
+        ("due_s", "f8"),  # when it arrives; inf = a free slot
         ("sent_s", "f8"),
         ("serial", "i8"),  # order of sending
         ("sender", "i8"),
@@ -151,13 +151,13 @@ BATCH = np.dtype(
 
 
 class MissionState(NamedTuple):
-    """Everything about E missions of A robots; V voxels, R rays of a scan, Q places for messages."""
+    """Everything about E missions of A robots; V voxels, R rays of a scan, Q slots for messages."""
 
     truth: np.ndarray
     """(E, V) float32 true coverage, 0 or 1."""
-    blocked: np.ndarray
-    """(E·N, V) float32, a Collision each for the N radii of bodies that meet different ones, mission by
-    mission; `truth` itself where all are small and there is no ceiling."""
+    collision: np.ndarray
+    """(E·N, V) float32 collision masks, a Barrier each, for the N radii of bodies that need one, mission by
+    mission; `truth` itself where all bodies are small and there is no ceiling."""
     mean: np.ndarray
     """(E, A, V) float32 expected coverage by each robot's belief."""
     precision: np.ndarray
@@ -165,7 +165,7 @@ class MissionState(NamedTuple):
     pooled: np.ndarray
     """(E, A, 2, C) float64 sums over the cells of the overview: see belief/pooling.py."""
     joint_mean: np.ndarray
-    """(E, V) float32, the mean of the joint map; (E, 0) where the scenario is not scored."""
+    """(E, V) float32, the mean of the joint map; (E, 0) where the truth is not tracked."""
     joint_precision: np.ndarray
     """(E, V) float32, its 1/σ²."""
     visible: np.ndarray
@@ -182,22 +182,80 @@ class MissionState(NamedTuple):
     """(E, A, R) int8, a Return each."""
     scan_utility_bits: np.ndarray
     """(E, A, R) float64 utility of each ray of the latest scan."""
-    mail: np.ndarray
-    """(E, Q) LETTER: messages in flight."""
-    mail_to: np.ndarray
+    in_flight: np.ndarray
+    """(E, Q) MESSAGE: delayed messages that have not arrived."""
+    in_flight_to: np.ndarray
     """(E, Q, A) bool: who will hear them."""
-    mail_rays: np.ndarray
+    in_flight_rays: np.ndarray
     """(E, Q, B, 5) float64: direction (3), distance in grid units, Return."""
     phases: np.ndarray
-    """(E,) PHASES; (E, 0) and all that follows likewise where batches are sent at once."""
-    phase_waiting: np.ndarray
-    """(E, A, 2) int64, batches in each of a robot's two buffers."""
+    """(E,) PHASES."""
+    phase_counts: np.ndarray
+    """(E, A, 2) int64, batches in each of a robot's two buffers; empty, like all that follows, where batches
+    are sent at once."""
     phase_batches: np.ndarray
     """(E, A, 2, S) BATCH."""
     phase_rays: np.ndarray
-    """(E, A, 2, S, B, 5) float64, as in the mail."""
+    """(E, A, 2, S, B, 5) float64, as in `in_flight_rays`."""
     phase_heard: np.ndarray
     """(E, A, A) int8: whether b has what a broadcasts; see `missions/phases.py`."""
+
+
+class Beliefs(NamedTuple):
+    """The beliefs of one mission's robots: slices of MissionState."""
+
+    mean: np.ndarray
+    """(A, V) float32."""
+    precision: np.ndarray
+    """(A, V) float32."""
+    pooled: np.ndarray
+    """(A, 2, C) float64."""
+
+
+class JointMap(NamedTuple):
+    """The joint map of one mission and what it is compared with: slices of MissionState."""
+
+    mean: np.ndarray
+    """(V,) float32."""
+    precision: np.ndarray
+    """(V,) float32."""
+    visible: np.ndarray
+    """(V,) bool."""
+
+
+class LatestScans(NamedTuple):
+    """The latest scans of one mission's robots: slices of MissionState."""
+
+    range_m: np.ndarray
+    """(A, R) float64."""
+    returned: np.ndarray
+    """(A, R) int8."""
+    utility_bits: np.ndarray
+    """(A, R) float64."""
+
+
+class InFlight(NamedTuple):
+    """The delayed messages of one mission: slices of MissionState."""
+
+    messages: np.ndarray
+    """(Q,) MESSAGE."""
+    recipients: np.ndarray
+    """(Q, A) bool."""
+    rays: np.ndarray
+    """(Q, B, 5) float64."""
+
+
+class PhaseBuffers(NamedTuple):
+    """The buffers of one mission's broadcast in phases: slices of MissionState."""
+
+    counts: np.ndarray
+    """(A, 2) int64."""
+    batches: np.ndarray
+    """(A, 2, S) BATCH."""
+    rays: np.ndarray
+    """(A, 2, S, B, 5) float64."""
+    heard: np.ndarray
+    """(A, A) int8."""
 
 
 def check_memory(scenario: Scenario, missions: int) -> None:
@@ -214,33 +272,33 @@ def check_memory(scenario: Scenario, missions: int) -> None:
         raise SettingError("missions, robots, voxels", size, f"what fits into {there_is >> 30} GiB of memory")
 
 
-def new_state(scenario: Scenario, missions: int, cells: Cells | None) -> MissionState:
+def new_state(scenario: Scenario, missions: int, cells: Cells) -> MissionState:
     """Arrays for E missions of a scenario, not yet reset; beliefs are pooled to the cells."""
     e, a, r = missions, scenario.robots, max(kind.sensor.rays for kind in scenario.kinds)
-    v, q, b = scenario.grid.voxels, scenario.mail_places, min(scenario.channel.burst, r)
+    v, q, b = scenario.grid.voxels, scenario.message_slots, min(scenario.channel.burst, r)
     s = scenario.phase_batches
-    truth, scored = np.zeros((e, v), np.float32), v if scenario.track_truth else 0
-    radii = barrier_radii_m(scenario)
+    truth, tracked = np.zeros((e, v), np.float32), v if scenario.track_truth else 0
+    radii = collision_radii_m(scenario)
     return MissionState(
         truth=truth,
-        blocked=truth if radii == [0.0] else np.zeros((e * len(radii), v), np.float32),
+        collision=truth if radii == [0.0] else np.zeros((e * len(radii), v), np.float32),
         mean=np.zeros((e, a, v), np.float32),
         precision=np.zeros((e, a, v), np.float32),
-        pooled=np.zeros((e, a, 2, 0 if cells is None else len(cells.voxels))),
-        joint_mean=np.zeros((e, scored), np.float32),
-        joint_precision=np.zeros((e, scored), np.float32),
-        visible=np.zeros((e, scored), np.bool_),
+        pooled=np.zeros((e, a, 2, len(cells.voxels))),
+        joint_mean=np.zeros((e, tracked), np.float32),
+        joint_precision=np.zeros((e, tracked), np.float32),
+        visible=np.zeros((e, tracked), np.bool_),
         missions=np.zeros(e, MISSION),
         robots=np.zeros((e, a), ROBOT),
         heard=np.zeros((e, a, a), HEARD),
         scan_range_m=np.zeros((e, a, r)),
         scan_returned=np.zeros((e, a, r), np.int8),
         scan_utility_bits=np.zeros((e, a, r)),
-        mail=np.zeros((e, q), LETTER),
-        mail_to=np.zeros((e, q, a), np.bool_),
-        mail_rays=np.zeros((e, q, b if q else 0, 5)),
-        phases=np.zeros((e,) if s else (e, 0), PHASES),
-        phase_waiting=np.zeros((e, a if s else 0, 2), np.int64),
+        in_flight=np.zeros((e, q), MESSAGE),
+        in_flight_to=np.zeros((e, q, a), np.bool_),
+        in_flight_rays=np.zeros((e, q, b if q else 0, 5)),
+        phases=np.zeros(e, PHASES),
+        phase_counts=np.zeros((e, a if s else 0, 2), np.int64),
         phase_batches=np.zeros((e, a if s else 0, 2, s), BATCH),
         phase_rays=np.zeros((e, a if s else 0, 2, s, b, 5)),
         phase_heard=np.zeros((e, a if s else 0, a), np.int8),

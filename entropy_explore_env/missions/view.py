@@ -78,7 +78,7 @@ class RobotView:
         entropy_bits: Entropy of its map.
         move_end: Why its latest drive ended where it did.
         target: (5,) the viewpoint that it chose last.
-        way: (N, 3) points to which it still means to drive straight, one after the other; none while
+        path: (N, 3) points to which it still means to drive straight, one after the other; none while
             it chooses. Where it plans it is its plan, at whose end the target need not be.
         depth_m, half_angle_rad: r̂ and α̂ of its latest scan.
         scan: Its latest scan.
@@ -97,7 +97,7 @@ class RobotView:
     entropy_bits: float
     move_end: MoveEnd
     target: np.ndarray
-    way: np.ndarray
+    path: np.ndarray
     depth_m: float
     half_angle_rad: float
     scan: ScanView
@@ -132,20 +132,20 @@ def view_of(missions: Missions, mission: int, robot: int) -> RobotView:
     state, rules, shape = missions.state, missions.rules, missions.grid.shape
     time_s = float(state.missions[mission]["time_s"])
     own, here = state.robots[mission, robot], (mission, robot)
-    heard, rays = state.heard[here], int(rules.numbers[robot]["rays"])
+    heard, rays = state.heard[here], int(rules.params[robot]["rays"])
     world = missions.worlds[mission]
     return RobotView(
         robot=robot,
         scenario=missions.scenario,
         time_s=time_s,
         deciding=bool(own["deciding"]),
-        pose=np.array(pose_at(rules.numbers[robot], own, time_s)),
+        pose=np.array(pose_at(rules.params[robot], own, time_s)),
         mean=read_only(state.mean[here].reshape(shape)),
         precision=read_only(state.precision[here].reshape(shape)),
         entropy_bits=float(own["entropy_bits"]),
         move_end=list(MoveEnd)[own["move_end"]],
         target=own["target"].copy(),
-        way=_way_ahead(rules.numbers[robot], own, time_s),
+        path=_path_ahead(rules.params[robot], own, time_s),
         depth_m=float(own["depth_m"]),
         half_angle_rad=float(own["half_angle_rad"]),
         scan=ScanView(
@@ -160,14 +160,14 @@ def view_of(missions: Missions, mission: int, robot: int) -> RobotView:
     )
 
 
-def _way_ahead(numbers: np.void, own: np.void, time_s: float) -> np.ndarray:
+def _path_ahead(params: np.void, own: np.void, time_s: float) -> np.ndarray:
     """(N, 3) where a robot means to drive, whatever will stop it."""
     if own["deciding"]:
         return np.zeros((0, 3))
     if own["waypoints"] == 0:
         return own["target"][None, :3].copy()
-    passed = place_at(numbers, own, time_s)[3]
-    return own["way"][passed : own["waypoints"]].copy()
+    passed = place_at(params, own, time_s)[3]
+    return own["path"][passed : own["waypoints"]].copy()
 
 
 def _teammate(heard: np.void) -> TeammateView:

@@ -7,9 +7,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from entropy_explore_env.belief.pooling import pool_belief
+from entropy_explore_env.belief.pooling import Pool, pool_belief
+from entropy_explore_env.belief.raycast import Crossing
 from entropy_explore_env.missions.action import decode_action
-from entropy_explore_env.missions.observation import ObservationLayout, observation_rules, observe_robot
+from entropy_explore_env.missions.observation.layout import ObservationLayout, part_offsets
+from entropy_explore_env.missions.observation.observe import Known, observe_robot
 from entropy_explore_env.missions.rules import rules_of
 from entropy_explore_env.missions.state import HEARD
 from entropy_explore_env.missions.view import RobotView
@@ -37,11 +39,11 @@ class ViewObserver:
         self.scenario = with_settings(scenario, {"observation": observation, "action": action})
         self.layout = ObservationLayout(self.scenario)
         self._rules = rules_of(self.scenario)
-        self._parts = observation_rules(self.scenario, self.layout)
+        self._offsets = part_offsets(self.scenario, self.layout)
         sensors = [kind.sensor for kind in scenario.kinds]
-        self._scan = new_scan(scenario.grid, sensors, 1, scenario.robots)
-        cells = self._rules.cells
-        self._pooled = np.zeros((2, 0 if cells is None else len(cells.voxels)))
+        scan = new_scan(scenario.grid, sensors, 1)
+        self._crossing = Crossing(scan.crossed[0], scan.entered)
+        self._pooled = np.zeros((2, len(self._rules.cells.voxels)))
 
     def observe(self, view: RobotView) -> np.ndarray:
         """The flat observation of a robot.
@@ -52,20 +54,15 @@ class ViewObserver:
         Returns:
             (F,) float32.
         """
-        mean, precision, out = (
-            view.mean.ravel(),
-            view.precision.ravel(),
-            np.zeros(self.layout.size, np.float32),
-        )
-        numbers = self._rules.numbers[view.robot]
-        if self._rules.cells is not None:
-            ends = (float(numbers["prior_precision"]), float(numbers["end_precision"]))
-            pool_belief(self._rules.cells, self._pooled, ends, mean, precision)
-        observe_robot(
-            self._rules,
-            self._parts,
-            view.robot,
-            tuple(view.pose.tolist()),
+        mean, precision = _writable(view.mean), _writable(view.precision)
+        out = np.zeros(self.layout.size, np.float32)
+        params = self._rules.params[view.robot]
+        if len(self._rules.cells.voxels):
+            ends = (float(params["prior_precision"]), float(params["end_precision"]))
+            pool_belief(Pool(self._rules.cells, self._pooled, *ends), mean, precision)
+        x, y, z, yaw, pitch = view.pose.tolist()
+        known = Known(
+            (x, y, z, yaw, pitch),
             view.time_s,
             view.entropy_bits,
             view.deciding,
@@ -73,9 +70,8 @@ class ViewObserver:
             mean,
             precision,
             self._pooled,
-            self._scan,
-            out,
         )
+        observe_robot(self._rules, self._offsets, view.robot, known, self._crossing, out)
         return out
 
     def viewpoint(self, view: RobotView, action: np.ndarray | int) -> np.ndarray:
@@ -89,9 +85,13 @@ class ViewObserver:
             (5,) viewpoint: x, y, z, yaw, pitch; map frame, metres, radians.
         """
         discrete = self.scenario.action.kind == "discrete"
-        box = np.zeros(5) if discrete else np.asarray(action, np.float64)
-        viewpoint = np.zeros(5)
-        decode_action(self._rules, view.robot, view.pose, box, int(action) if discrete else 0, viewpoint)
+        continuous = np.zeros(5) if discrete else np.asarray(action, np.float64)
+        viewpoint, params, number = (
+            np.zeros(5),
+            self._rules.params[view.robot],
+            int(action) if discrete else 0,
+        )
+        decode_action(params, self._rules.actions, view.pose, continuous, number, viewpoint)
         return viewpoint
 
 
@@ -107,3 +107,10 @@ def _heard(view: RobotView, robots: int) -> np.ndarray:
             (*mate.viewpoint, mate.depth_m, mate.half_angle_rad),
         )
     return heard
+
+
+def _writable(array: np.ndarray) -> np.ndarray:
+    """(V,) an array of a view as kernels of missions take it: read-only arrays are another type to Numba."""
+    flat = array.reshape(-1).view()
+    flat.setflags(write=True)
+    return flat

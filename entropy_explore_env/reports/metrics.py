@@ -10,7 +10,14 @@ import numpy as np
 
 from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.missions.state import COUNTED, MissionEnd
-from entropy_explore_env.robots.range_sensor import Return, new_scan, sensor_model, take_scan
+from entropy_explore_env.robots.range_sensor import (
+    Return,
+    Scene,
+    SensorPose,
+    new_scan,
+    sensor_model,
+    take_scan,
+)
 from entropy_explore_env.scenario import Scenario
 from entropy_explore_env.settings import RobotKind
 from entropy_explore_env.worlds.world import World
@@ -124,14 +131,15 @@ def _most_added(scenario: Scenario, kind: RobotKind, world: World) -> float:
     """Precision, summed over all voxels, that the best of some scans of a kind of robot adds."""
     rng, grid, sensor = np.random.default_rng(0), world.grid, kind.sensor
     layout, model = world.layout(scenario, kind), sensor_model(sensor)
-    scan, rng_state = new_scan(grid, [sensor], sensor.rays, 1), np.zeros(1, np.uint64)
+    scan, rng_state = new_scan(grid, [sensor], sensor.rays), np.zeros(1, np.uint64)
     truth, added = world.occupied.ravel().astype(np.float32), 0.0
+    scene = Scene(truth, grid.shape, grid.voxel_size_m, np.zeros((0, 4)))
     voxels = np.stack(np.unravel_index(rng.choice(layout.starts, _FLOOR_SCANS), grid.shape), axis=-1)
     steepest = _STEEPEST_RAD if scenario.layer_of(kind.robot) is None else 0.0
     for voxel in voxels + 0.5:
         start, yaw = tuple(voxel.tolist()), rng.uniform(-math.pi, math.pi)
         pitch = rng.uniform(-steepest, steepest)
-        take_scan(scan, model, truth, grid.shape, grid.voxel_size_m, start, yaw, pitch, 0, rng_state)
+        take_scan(scan, model, scene, SensorPose(start, yaw, pitch), rng_state)
         measured = scan.rays["returned"] != int(Return.NOTHING)
-        added = max(added, float((scan.rays["voxels"] * scan.rays["measured"])[measured].sum()))
+        added = max(added, float((scan.rays["voxels"] * scan.rays["precision"])[measured].sum()))
     return added

@@ -109,7 +109,7 @@ class CommandRecorder:
     def note(self) -> None:
         """Note which robots have scanned in the step that was just taken."""
         robots, time_s = self._missions.state.robots[0], float(self._missions.state.missions[0]["time_s"])
-        numbers = self._missions.rules.numbers
+        numbers = self._missions.rules.params
         for robot in np.flatnonzero(robots["scans"] > self._scans):
             waited_s = numbers[robot]["blocked_wait_s"] if robots[robot]["waiting"] else 0.0
             ended_s = min(float(robots[robot]["ready_s"] - waited_s), time_s)  # later: it has left since

@@ -27,7 +27,7 @@ def check_render_mode(render_mode: str | None) -> None:
 
 def entropy_share(missions: Missions, mission: int, robot: int) -> np.ndarray:
     """(X, Y, Z) float32: the share of each voxel's entropy that is left, 1 at the prior, 0 at σ_end."""
-    known, prior = (float(missions.rules.numbers[name][0]) for name in ("end_precision", "prior_precision"))
+    known, prior = (float(missions.rules.params[name][0]) for name in ("end_precision", "prior_precision"))
     return shares_left(missions.precision[mission, robot], prior, known)
 
 

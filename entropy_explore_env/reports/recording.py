@@ -14,7 +14,7 @@ from entropy_explore_env.missions.simulation import Missions
 def poses_now(missions: Missions, mission: int) -> np.ndarray:
     """(A, 5) float64 current poses of a mission's robots, driving or not: x, y, z, yaw, pitch."""
     time_s = float(missions.state.missions[mission]["time_s"])
-    numbers, robots = missions.rules.numbers, missions.state.robots[mission]
+    numbers, robots = missions.rules.params, missions.state.robots[mission]
     return np.stack([np.array(pose_at(numbers[a], robot, time_s)) for a, robot in enumerate(robots)])
 
 
@@ -36,15 +36,15 @@ class DrivenPaths:
     def update(self, missions: Missions) -> None:
         """Add the points that were passed since the last update."""
         time_s = float(missions.state.missions[self._mission]["time_s"])
-        numbers, robots = missions.rules.numbers, missions.state.robots[self._mission]
+        numbers, robots = missions.rules.params, missions.state.robots[self._mission]
         for number, robot in enumerate(robots):
             points = self.passed_m[number]
             if robot["depart_s"] != self._departed_s[number]:
                 points += [*self._ahead[number], robot["origin"][:3].copy()]
                 self._departed_s[number], self._corners_passed[number] = float(robot["depart_s"]), 0
             passed = int(place_at(numbers[number], robot, time_s)[3])
-            points += list(robot["way"][self._corners_passed[number] : passed].copy())
-            self._ahead[number] = robot["way"][passed : robot["corners"]].copy()
+            points += list(robot["path"][self._corners_passed[number] : passed].copy())
+            self._ahead[number] = robot["path"][passed : robot["corners"]].copy()
             self._corners_passed[number] = passed
 
     def to_now(self, missions: Missions) -> list[np.ndarray]:

@@ -18,7 +18,7 @@ from entropy_explore_env.missions.state import MissionState
 _ARRAYS: Mapping[str, Callable[[MissionState], np.ndarray]] = MappingProxyType(
     {
         "truth": lambda state: state.truth,
-        "blocked": lambda state: state.blocked,
+        "blocked": lambda state: state.collision,
         "mean": lambda state: state.mean,
         "precision": lambda state: state.precision,
         "pooled": lambda state: state.pooled,
@@ -31,11 +31,11 @@ _ARRAYS: Mapping[str, Callable[[MissionState], np.ndarray]] = MappingProxyType(
         "scan_range_m": lambda state: state.scan_range_m,
         "scan_returned": lambda state: state.scan_returned,
         "scan_utility_bits": lambda state: state.scan_utility_bits,
-        "mail": lambda state: state.mail,
-        "mail_to": lambda state: state.mail_to,
-        "mail_rays": lambda state: state.mail_rays,
+        "mail": lambda state: state.in_flight,
+        "mail_to": lambda state: state.in_flight_to,
+        "mail_rays": lambda state: state.in_flight_rays,
         "phases": lambda state: state.phases,
-        "phase_waiting": lambda state: state.phase_waiting,
+        "phase_waiting": lambda state: state.phase_counts,
         "phase_batches": lambda state: state.phase_batches,
         "phase_rays": lambda state: state.phase_rays,
         "phase_heard": lambda state: state.phase_heard,
@@ -65,7 +65,17 @@ _FIELDS: Mapping[str, tuple[str, ...]] = MappingProxyType(
 )
 """Name in records → the fields of this array, by their names in records, in the order of the digest."""
 
-_FIELDS_TODAY: Mapping[str, str] = MappingProxyType({})
+_FIELDS_TODAY: Mapping[str, str] = MappingProxyType(
+    {
+        "missions.letters": "enqueued",
+        "robots.way": "path",
+        "robots.way_end": "path_end",
+        "robots.way_m": "path_m",
+        "robots.way_scans": "scans_under_way",
+        "robots.sensor_chance": "sensor_rng",
+        "robots.channel_chance": "channel_rng",
+    }
+)
 """`array.field` in records → the field's name today, where it is another one."""
 
 FOLLOWS_FROM_WORLD = ("blocked", "visible")
@@ -89,7 +99,7 @@ def state_values(missions: Missions, mission: int) -> dict[str, np.ndarray]:
     """
     values: dict[str, np.ndarray] = {}
     for name, read in _ARRAYS.items():
-        if name.startswith("phase") and missions.rules.phased is None:
+        if name.startswith("phase") and missions.scenario.channel.phase_s == 0.0:
             continue
         array = read(missions.state)
         for field in _FIELDS.get(name, ()):

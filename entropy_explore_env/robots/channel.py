@@ -93,16 +93,16 @@ def steered_i_min(i_min_bits, utility, burst, fill, gain):
 
 
 @lean_kernel
-def deliver(apart_m, range_m, loss_probability, chance):
+def draw_delivery(apart_m, range_m, loss_probability, rng):
     """Whether a message reaches a teammate: the code of a Delivery.
 
     Args:
         apart_m: Distance between the two when it is sent.
         range_m: Reach of the channel.
         loss_probability: Of losing it.
-        chance: (1,) uint64 random state of the sender; drawn from only if a loss is possible.
+        rng: (1,) uint64 random state of the sender; drawn from only if a loss is possible.
     """
-    lost = loss_probability > 0.0 and draw_uniform(chance) < loss_probability
+    lost = loss_probability > 0.0 and draw_uniform(rng) < loss_probability
     if apart_m > range_m:
         return _OUT_OF_RANGE
     return _LOST if lost else _HEARD

@@ -1,7 +1,7 @@
 """Motion: a drive from rest to rest, stopped short by obstacles and teammates' bodies.
 
-Its way is a straight line, or a polyline that is driven without stopping at its corners. Lengths in
-metres where the name says so, else in grid units (voxel edges); times in seconds. A drive that has
+Its path is a straight line, or a polyline that is driven without stopping at its corners. Lengths are in
+metres where the name says so, else in grid units (voxel edges); times are in seconds. A drive that has
 begun is never changed, but may end early: every robot owns the tube that its body sweeps until it
 arrives, and others stop before it. So bodies never overlap, whatever the timing.
 """
@@ -11,7 +11,18 @@ from __future__ import annotations
 import enum
 import math
 
-from entropy_explore_env.belief.raycast import OBSTACLE, OPEN, STOP_AT_COVERED, TICKS, cast_ray
+from entropy_explore_env.belief.raycast import (
+    NONE_BEHIND,
+    OBSTACLE,
+    ONE_BEHIND,
+    OPEN,
+    OPEN_END,
+    STOP_AT_COVERED,
+    TICKS,
+    Line,
+    cast_ray,
+)
+from entropy_explore_env.belief.voxel_index import flat_index
 from entropy_explore_env.compilation.kernels import lean_kernel
 
 
@@ -23,10 +34,10 @@ class MoveEnd(enum.Enum):
     GROUND = "The terrain was in the way: the robot stands in the last voxel in which its body fits."
     CEILING = "The ceiling was in the way: the robot stands in the last voxel below it on its way."
     WALL = "The workspace ends there: the robot stands in its last voxel on the way."
-    TEAMMATE = "A teammate's body, or the way that it still has to drive, was in the way."
-    NO_PATH = "No way to the viewpoint was known: the robot stands as near to it as it knew to get."
-    CORNERS = "The way had more corners than a drive may have: the robot stands at the last of them."
-    SEEN = "A scan under way showed that the rest of the way is blocked: the robot stands where it was."
+    TEAMMATE = "A teammate's body, or the path that it still has to drive, was in the way."
+    NO_PATH = "No path to the viewpoint was known: the robot stands as near to it as it knew to get."
+    CORNERS = "The path had more corners than a drive may have: the robot stands at the last of them."
+    SEEN = "A scan under way showed that the rest of the path is blocked: the robot stands where it was."
 
     @property
     def code(self) -> int:
@@ -59,26 +70,26 @@ def driven_share(elapsed_s, length_m, max_speed_m_s, acceleration_m_s2):
         return 1.0
     ramp = min(max_speed_m_s / acceleration_m_s2, duration / 2.0)
     if elapsed_s <= ramp:
-        way = 0.5 * acceleration_m_s2 * elapsed_s * elapsed_s
+        driven_m = 0.5 * acceleration_m_s2 * elapsed_s * elapsed_s
     elif elapsed_s >= duration - ramp:
         left = duration - elapsed_s
-        way = length_m - 0.5 * acceleration_m_s2 * left * left
+        driven_m = length_m - 0.5 * acceleration_m_s2 * left * left
     else:
-        way = acceleration_m_s2 * ramp * (elapsed_s - 0.5 * ramp)
-    return min(max(way / length_m, 0.0), 1.0)
+        driven_m = acceleration_m_s2 * ramp * (elapsed_s - 0.5 * ramp)
+    return min(max(driven_m / length_m, 0.0), 1.0)
 
 
 @lean_kernel
-def time_of_way(way_m, length_m, max_speed_m_s, acceleration_m_s2):
-    """Seconds from the start of a drive until `way_m` of its length are driven: see `driven_share`."""
+def time_after(driven_m, length_m, max_speed_m_s, acceleration_m_s2):
+    """Seconds from the start of a drive until `driven_m` of its length are driven: see `driven_share`."""
     duration = driving_time(length_m, max_speed_m_s, acceleration_m_s2)
     ramp = min(max_speed_m_s / acceleration_m_s2, duration / 2.0)
     ramp_m = 0.5 * acceleration_m_s2 * ramp * ramp
-    if way_m <= ramp_m:
-        return math.sqrt(2.0 * way_m / acceleration_m_s2)
-    if way_m >= length_m - ramp_m:
-        return duration - math.sqrt(2.0 * max(length_m - way_m, 0.0) / acceleration_m_s2)
-    return ramp + (way_m - ramp_m) / max_speed_m_s
+    if driven_m <= ramp_m:
+        return math.sqrt(2.0 * driven_m / acceleration_m_s2)
+    if driven_m >= length_m - ramp_m:
+        return duration - math.sqrt(2.0 * max(length_m - driven_m, 0.0) / acceleration_m_s2)
+    return ramp + (driven_m - ramp_m) / max_speed_m_s
 
 
 @lean_kernel
@@ -90,40 +101,39 @@ def turning_time(yaw, pitch, new_yaw, new_pitch, turn_rate_rad_s):
 
 
 @lean_kernel
-def line_believed_blocked(mean, size, ball, radius, start, finish, crossed, entered):
+def line_believed_blocked(mean, size, footprint, radius, start, finish, crossing):
     """Whether a body that drives on a line would touch something that is believed covered.
 
-    The voxel in which it is does not count, nor does what it touches from there keep it from leaving:
+    The voxel that it is in does not count, nor do voxels that its body touches there keep it from leaving:
     voxels that the body reaches into already count as free if they are not covered themselves.
 
     Args:
         mean: (V,) float32 expected coverage.
         size: (X, Y, Z) voxels.
-        ball: (B, 3) int64, voxels that a body touches, by axis; empty = its own.
+        footprint: (B, 3) int64, offsets of the voxels that a body touches, by axis; empty = its own.
         radius: Of the body, in grid units.
         start: (x, y, z) in grid units.
         finish: (x, y, z), likewise.
-        crossed: (L,) int32 scratch space of `cast_ray`.
-        entered: (L,) int64, likewise.
+        crossing: Crossing, scratch space.
     """
     x, y, z = finish[0] - start[0], finish[1] - start[1], finish[2] - start[2]
     length = math.sqrt(x * x + y * y + z * z)
     if length <= 0.0:
         return False
-    direction = (x / length, y / length, z / length)
-    _, n, end = cast_ray(mean, STOP_AT_COVERED, size, start, direction, length, False, 0, crossed, entered)
+    line = Line(start, (x / length, y / length, z / length), length)
+    _, n, end = cast_ray(mean, size, line, STOP_AT_COVERED, OPEN_END, NONE_BEHIND, crossing)
     if end == OBSTACLE:
         return True
     leaving = 0.0
     for step in range(n):
-        if step > 0 and entered[step] < leaving:
+        if step > 0 and crossing.entered[step] < leaving:
             continue
-        touches, voxel = False, crossed[step]
-        for offset in ball:
+        touches, voxel = False, crossing.voxels[step]
+        for offset in footprint:
             i = voxel // (size[1] * size[2]) + offset[0]
             j, k = voxel // size[2] % size[1] + offset[1], voxel % size[2] + offset[2]
             if 0 <= i < size[0] and 0 <= j < size[1] and 0 <= k < size[2]:
-                touches = touches or mean[(i * size[1] + j) * size[2] + k] > STOP_AT_COVERED
+                touches = touches or mean[flat_index(size, i, j, k)] > STOP_AT_COVERED
         if touches and step > 0:
             return True
         if touches:
@@ -132,40 +142,37 @@ def line_believed_blocked(mean, size, ball, radius, start, finish, crossed, ente
 
 
 @lean_kernel
-def free_way(blocked, size, start, finish, direction, length, crossed, entered):
+def free_distance(collision, size, line, finish, crossing):
     """How far a body can drive on a line before something solid.
 
     Args:
-        blocked: (V,) float32, a Collision each: above ½ the body does not fit.
+        collision: (V,) float32, a Barrier each: above ½ the body does not fit.
         size: (X, Y, Z) voxels.
-        start: (x, y, z) in grid units.
-        finish: (x, y, z), where the drive is to end.
-        direction: (x, y, z), a unit vector from start to finish.
-        length: Way between them.
-        crossed: (L,) int32 scratch space of `cast_ray`.
-        entered: (L,) int64, likewise.
+        line: Line of the drive.
+        finish: (x, y, z), where the drive is to end, the line's end.
+        crossing: Crossing, scratch space.
 
     Returns:
-        (way, code): the way in grid units (to the middle of the last voxel's crossing, if blocked)
+        (distance, code): in grid units (to the middle of the last voxel's crossing, if blocked)
         and the code of a MoveEnd.
     """
-    if length <= 0.0:
+    if line.length <= 0.0:
         return 0.0, _ARRIVED
-    # A little farther, and the last voxel by itself: who stands on a face or an edge stands in the
+    # A little farther, and the last voxel by itself: a body on a face or an edge is in the
     # voxel above it, through which the line need not go, and which must be free, too.
-    at, n, end = cast_ray(
-        blocked, STOP_AT_COVERED, size, start, direction, length + _TOUCH, False, 1, crossed, entered
-    )
+    farther = Line(line.start, line.direction, line.length + _TOUCH)
+    at, n, end = cast_ray(collision, size, farther, STOP_AT_COVERED, OPEN_END, ONE_BEHIND, crossing)
+    crossed, entered = crossing.voxels, crossing.entered
     code = _WALL
     if end == OBSTACLE:
         n -= 1
-        code = _ENDS_AT[int(blocked[crossed[n]])]
+        code = _ENDS_AT[int(collision[crossed[n]])]
     elif end == OPEN:
         x, y, z = min(int(finish[0]), size[0] - 1), min(int(finish[1]), size[1] - 1), int(finish[2])
-        voxel = (x * size[1] + y) * size[2] + min(z, size[2] - 1)
-        if voxel == crossed[0] or blocked[voxel] <= STOP_AT_COVERED:
-            return length, _ARRIVED
-        at, code = length, _ENDS_AT[int(blocked[voxel])]
+        voxel = flat_index(size, x, y, min(z, size[2] - 1))
+        if voxel == crossed[0] or collision[voxel] <= STOP_AT_COVERED:
+            return line.length, _ARRIVED
+        at, code = line.length, _ENDS_AT[int(collision[voxel])]
     last = n - 1
     while last > 0 and at - entered[last] / TICKS <= _TOUCH:  # a voxel that the line meets at its edge only
         at = entered[last] / TICKS
@@ -175,23 +182,23 @@ def free_way(blocked, size, start, finish, direction, length, crossed, entered):
 
 
 @lean_kernel
-def _gap(start, direction, way, begin, finish):
-    """Distance between the point `way` along a line and the segment from `begin` to `finish`."""
+def _gap(start, direction, distance, begin, finish):
+    """Distance between the point `distance` along a line and the segment from `begin` to `finish`."""
     along, length = 0.0, 0.0
     for axis in range(3):
         edge = finish[axis] - begin[axis]
-        along += (start[axis] + way * direction[axis] - begin[axis]) * edge
+        along += (start[axis] + distance * direction[axis] - begin[axis]) * edge
         length += edge * edge
     share = min(max(along / length, 0.0), 1.0) if length > 0.0 else 0.0
     gap = 0.0
     for axis in range(3):
         nearest = begin[axis] + share * (finish[axis] - begin[axis])
-        gap += (start[axis] + way * direction[axis] - nearest) ** 2
+        gap += (start[axis] + distance * direction[axis] - nearest) ** 2
     return math.sqrt(gap)
 
 
 @lean_kernel
-def way_to_teammate(start, direction, way, begin, finish, touching):
+def distance_to_teammate(start, direction, distance, begin, finish, touching):
     """How far a body can drive before it touches a teammate or the tube that it still sweeps.
 
     Bodies that touch already may only part.
@@ -202,18 +209,18 @@ def way_to_teammate(start, direction, way, begin, finish, touching):
     Args:
         start: (x, y, z) in grid units.
         direction: (x, y, z), a unit vector.
-        way: Wanted way in grid units.
+        distance: Wanted distance in grid units.
         begin: (x, y, z), where the teammate is.
         finish: (x, y, z), where its drive ends.
         touching: Sum of the two radii.
 
     Returns:
-        The way in grid units, at most `way`.
+        The distance in grid units, at most `distance`.
     """
     apart = touching + _TOUCH
-    if _gap(start, direction, 0.5 * way, begin, finish) - 0.5 * way > apart + _TOUCH:
-        return way  # no point of the line is nearer than that
-    low, high = 0.0, way
+    if _gap(start, direction, 0.5 * distance, begin, finish) - 0.5 * distance > apart + _TOUCH:
+        return distance  # no point of the line is nearer than that
+    low, high = 0.0, distance
     for _ in range(_HALVINGS):
         third = (high - low) / 3.0
         if _gap(start, direction, low + third, begin, finish) <= _gap(
@@ -223,9 +230,9 @@ def way_to_teammate(start, direction, way, begin, finish, touching):
         else:
             low += third
     if _gap(start, direction, low, begin, finish) >= apart:
-        return way
+        return distance
     if _gap(start, direction, 0.0, begin, finish) < apart:
-        return way if low <= _TOUCH else 0.0
+        return distance if low <= _TOUCH else 0.0
     near, high = 0.0, low
     for _ in range(_HALVINGS):
         middle = 0.5 * (near + high)

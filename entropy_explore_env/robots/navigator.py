@@ -74,9 +74,9 @@ def new_navigators(scenario: Scenario) -> dict[int, Navigator]:
 
 
 def footprints(navigators: Mapping[int, Navigator], kinds: int) -> np.ndarray:
-    """(K, B, 3) int64 footprints of each kind's body as index offsets, padded with (0, 0, 0)."""
+    """(K, B, 3) int64 index offsets of each kind's footprint, padded with zeros; B = 0 if no kind plans."""
     each = {kind: navigator.lattice.footprint for kind, navigator in navigators.items()}
-    padded = np.zeros((kinds, max(len(footprint) for footprint in each.values()), 3), np.int64)
+    padded = np.zeros((kinds, max((len(footprint) for footprint in each.values()), default=0), 3), np.int64)
     for kind, footprint in each.items():
         padded[kind, : len(footprint)] = footprint
     return padded

@@ -6,58 +6,34 @@ downwards (REP-103). Positions in grid units come from the map frame by (p - ori
 
 from __future__ import annotations
 
-import enum
 import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
-from entropy_explore_env.belief.map_update import fuse_ray
-from entropy_explore_env.belief.measurement_model import measured_coverage, measurement_precision
+from entropy_explore_env.belief.map_update import RAY, Scan
+from entropy_explore_env.belief.measurement_model import Return, measured_coverage, measurement_precision
 from entropy_explore_env.belief.raycast import (
     NEVER_STOP,
     OPEN,
+    OPEN_END,
     STOP_AT_COVERED,
+    Crossing,
+    Line,
     cast_ray,
     longest_crossing,
+    point,
 )
 from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel
 from entropy_explore_env.randomness import draw_gaussian
 from entropy_explore_env.settings import Grid, RangeSensor, centred_angles
 
-
-class Return(enum.IntEnum):
-    """What came back along a ray."""
-
-    NOTHING = 0
-    """A teammate's body was in the way, or the return was too near for the sensor: no measurement."""
-    FREE = 1
-    """No return within the sensor's range: all that the ray crossed is free."""
-    HIT = 2
-    """The distance of an obstacle or of the workspace's boundary."""
-
-
 _NOTHING, _FREE, _HIT = int(Return.NOTHING), int(Return.FREE), int(Return.HIT)
 _NEAREST = 1e-3
 """Noise makes no measurement shorter than this, in voxel edges."""
 
-
-RAY = np.dtype(
-    [
-        ("direction", "f8", (3,)),  # unit vector, map frame
-        ("length", "f8"),  # measured distance in grid units
-        ("range_m", "f8"),  # the same in metres; 0 if nothing was measured
-        ("returned", "i8"),  # a Return
-        ("measured", "f8"),  # precision of the measured coverage
-        ("free", "i8"),  # leading voxels that measure coverage 0
-        ("voxels", "i8"),  # voxels on the ray
-    ],
-    align=True,
-)
-"""One ray of a scan, as it is worked on."""
-
-SENSOR_NUMBERS = np.dtype(
+SENSOR_PARAMS = np.dtype(
     [
         ("max_range_m", "f8"),
         ("min_range_m", "f8"),
@@ -70,30 +46,7 @@ SENSOR_NUMBERS = np.dtype(
     ],
     align=True,
 )
-"""The numbers of a RangeSensor."""
-
-
-class Scan(NamedTuple):
-    """Working space of one scan, or of one batch of received measurements; R rays, L voxels a ray."""
-
-    rays: np.ndarray
-    """(R,) RAY."""
-    utility: np.ndarray
-    """(R,) float64 bits that the measurement brought to the map that fused it last (Rocha04, eq. 27)."""
-    crossed: np.ndarray
-    """(R, L) int32 voxels on the ray."""
-    coverage: np.ndarray
-    """(R, L) float32 measured coverage, from index `free` on."""
-    entered: np.ndarray
-    """(L,) int64 ticks at which the latest ray entered its voxels."""
-    way: np.ndarray
-    """(W,) int32 voxels on the longest drive."""
-    way_entered: np.ndarray
-    """(W,) int64 ticks at which a drive enters them."""
-    order: np.ndarray
-    """(R,) int64 rays in the order in which they are fused or sent."""
-    bodies: np.ndarray
-    """(A, 4) float64 teammates' bodies: centre and radius in grid units."""
+"""The parameters of a RangeSensor."""
 
 
 class SensorModel(NamedTuple):
@@ -103,8 +56,8 @@ class SensorModel(NamedTuple):
     """(columns,) float64, relative to the gaze."""
     pitch_offsets: np.ndarray
     """(rows,) float64."""
-    numbers: np.ndarray
-    """(1,) SENSOR_NUMBERS."""
+    params: np.ndarray
+    """(1,) SENSOR_PARAMS."""
 
 
 class TeamSensors(NamedTuple):
@@ -114,20 +67,41 @@ class TeamSensors(NamedTuple):
     """(A, columns) float64, relative to the gaze."""
     pitch_offsets: np.ndarray
     """(A, rows) float64."""
-    numbers: np.ndarray
-    """(A,) SENSOR_NUMBERS."""
+    params: np.ndarray
+    """(A,) SENSOR_PARAMS."""
+
+
+class SensorPose(NamedTuple):
+    """Where a sensor is and looks."""
+
+    start: tuple[float, float, float]
+    """Grid units."""
+    yaw: float
+    pitch: float
+
+
+class Scene(NamedTuple):
+    """What a sensor scans: the true world, and the teammates' bodies in it."""
+
+    occupied: np.ndarray
+    """(V,) float32 true coverage."""
+    size: tuple[int, int, int]
+    """(X, Y, Z) voxels."""
+    voxel_size_m: float
+    bodies: np.ndarray
+    """(B, 4) float64: centre and radius in grid units of each body that may be seen."""
 
 
 def sensor_model(sensor: RangeSensor) -> SensorModel:
     """What compiled code needs of the sensor's settings."""
-    numbers = np.zeros(1, SENSOR_NUMBERS)
-    numbers["max_range_m"], numbers["noise_m"] = sensor.max_range_m, sensor.range_noise_m
-    numbers["min_range_m"] = sensor.min_range_m
-    numbers["sigma_min"], numbers["sigma_slope_per_m"] = sensor.sigma_min, sensor.sigma_slope_per_m
-    numbers["voxels_behind"] = sensor.voxels_behind
-    numbers["columns"], numbers["rows"] = sensor.columns, sensor.rows
+    params = np.zeros(1, SENSOR_PARAMS)
+    params["max_range_m"], params["noise_m"] = sensor.max_range_m, sensor.range_noise_m
+    params["min_range_m"] = sensor.min_range_m
+    params["sigma_min"], params["sigma_slope_per_m"] = sensor.sigma_min, sensor.sigma_slope_per_m
+    params["voxels_behind"] = sensor.voxels_behind
+    params["columns"], params["rows"] = sensor.columns, sensor.rows
     step = sensor.angular_step_rad
-    return SensorModel(centred_angles(sensor.columns, step), centred_angles(sensor.rows, step), numbers)
+    return SensorModel(centred_angles(sensor.columns, step), centred_angles(sensor.rows, step), params)
 
 
 def team_sensors(sensors: Sequence[RangeSensor]) -> TeamSensors:
@@ -138,17 +112,17 @@ def team_sensors(sensors: Sequence[RangeSensor]) -> TeamSensors:
     for robot, model in enumerate(models):
         yaws[robot, : len(model.yaw_offsets)] = model.yaw_offsets
         pitches[robot, : len(model.pitch_offsets)] = model.pitch_offsets
-    return TeamSensors(yaws, pitches, np.concatenate([model.numbers for model in models]))
+    return TeamSensors(yaws, pitches, np.concatenate([model.params for model in models]))
 
 
 @inlined_kernel
 def sensor_of(sensors, robot):
     """The SensorModel of one robot of a team."""
-    numbers = sensors.numbers[robot]
+    params = sensors.params[robot]
     return SensorModel(
-        sensors.yaw_offsets[robot, : numbers.columns],
-        sensors.pitch_offsets[robot, : numbers.rows],
-        sensors.numbers[robot : robot + 1],
+        sensors.yaw_offsets[robot, : params.columns],
+        sensors.pitch_offsets[robot, : params.rows],
+        sensors.params[robot : robot + 1],
     )
 
 
@@ -159,34 +133,25 @@ def first_rays(scan, count):
         scan.rays[:count],
         scan.utility[:count],
         scan.crossed,
-        scan.coverage,
         scan.entered,
-        scan.way,
-        scan.way_entered,
+        scan.coverage,
         scan.order[:count],
-        scan.bodies,
     )
 
 
-def new_scan(
-    grid: Grid, sensors: Sequence[RangeSensor], rays: int, robots: int, reach_m: float = 0.0
-) -> Scan:
-    """Working space for up to `rays` rays of any of the sensors, and for drives of at most `reach_m`."""
+def new_scan(grid: Grid, sensors: Sequence[RangeSensor], rays: int) -> Scan:
+    """Working space for up to `rays` rays of any of the sensors."""
     longest = max(
         longest_crossing(*grid.shape, sensor.max_range_m / grid.voxel_size_m, sensor.voxels_behind)
         for sensor in sensors
     )
-    farthest = longest_crossing(*grid.shape, reach_m / grid.voxel_size_m, 1)
     return Scan(
         rays=np.zeros(rays, RAY),
         utility=np.zeros(rays),
         crossed=np.zeros((rays, longest), np.int32),
-        coverage=np.zeros((rays, longest), np.float32),
         entered=np.zeros(longest, np.int64),
-        way=np.zeros(farthest, np.int32),
-        way_entered=np.zeros(farthest, np.int64),
+        coverage=np.zeros((rays, longest), np.float32),
         order=np.zeros(rays, np.int64),
-        bodies=np.zeros((robots, 4)),
     )
 
 
@@ -198,31 +163,31 @@ def point_rays(model, yaw, pitch, rays):
         turn = yaw + model.yaw_offsets[column]
         along, across = math.cos(turn), math.sin(turn)
         for row in range(rows):
-            direction = rays[column * rows + row].direction
+            ray = rays[column * rows + row]
             if column == 0:
                 angle = pitch + model.pitch_offsets[row]
-                level, down = math.cos(angle), math.sin(angle)
-                rays[row].measured = level
-                rays[row].range_m = down
+                ray.cos_pitch = math.cos(angle)
+                ray.direction[2] = -math.sin(angle)
             else:
-                level, down = rays[row].measured, rays[row].range_m
-            direction[0], direction[1], direction[2] = along * level, across * level, -down
+                ray.cos_pitch = rays[row].cos_pitch
+                ray.direction[2] = rays[row].direction[2]
+            ray.direction[0], ray.direction[1] = along * ray.cos_pitch, across * ray.cos_pitch
 
 
 @lean_kernel
-def in_view(model, yaw, pitch, start, body):
-    """Whether a body may be hit by a ray of the bundle around a gaze; True rather too often.
+def in_view(model, pose, body):
+    """Whether a body may be hit by a ray of the bundle around a gaze.
 
-    A ray's angle from the gaze is at most the bundle's half diagonal in yaw and pitch.
+    Conservative: may be True for bodies outside the view. A ray's angle from the gaze is at most the bundle's
+    half diagonal in yaw and pitch.
 
     Args:
-        model: The SensorModel.
-        yaw: Of the gaze, radians.
-        pitch: Of the gaze, radians.
-        start: (x, y, z), the sensor in grid units.
+        model: SensorModel.
+        pose: SensorPose.
         body: (4,) float64 centre and radius in grid units.
     """
-    x, y, z = body[0] - start[0], body[1] - start[1], body[2] - start[2]
+    yaw, pitch = pose.yaw, pose.pitch
+    x, y, z = body[0] - pose.start[0], body[1] - pose.start[1], body[2] - pose.start[2]
     distance = math.sqrt(x * x + y * y + z * z)
     if distance <= body[3]:
         return True
@@ -233,10 +198,10 @@ def in_view(model, yaw, pitch, start, body):
 
 
 @inlined_kernel
-def body_distance(start, direction, bodies, count):
-    """Distance in grid units to the first of `count` balls (x, y, z, radius) on a ray; inf if none."""
+def body_distance(start, direction, bodies):
+    """Distance in grid units to the first of the balls (B, 4) on a ray (see Scene); inf if none."""
     nearest = math.inf
-    for body in range(count):
+    for body in range(len(bodies)):
         along, apart = 0.0, 0.0
         for axis in range(3):
             offset = bodies[body, axis] - start[axis]
@@ -249,127 +214,84 @@ def body_distance(start, direction, bodies, count):
 
 
 @inlined_kernel
-def weigh_measurement(scan, index, numbers, size, start):
-    """Measured coverage (eq. 4) and its precision (eq. 5) for a ray whose crossing is filled in."""
+def weigh_measurement(scan, index, params, size, start):
+    """Measured coverage (eq. 4) and its precision (eq. 5) for a ray with its crossing filled in."""
     ray = scan.rays[index]
-    ray.measured = measurement_precision(ray.range_m, numbers.sigma_min, numbers.sigma_slope_per_m)
+    ray.precision = measurement_precision(ray.range_m, params.sigma_min, params.sigma_slope_per_m)
     ray.free = ray.voxels
     if ray.returned == _HIT:
-        ray.free = measured_coverage(
-            start,
-            ray.length,
-            size,
-            scan.crossed[index],
-            scan.entered,
-            ray.voxels,
-            scan.coverage[index],
-        )
+        crossing = Crossing(scan.crossed[index], scan.entered)
+        ray.free = measured_coverage(start, ray.length, size, crossing, ray.voxels, scan.coverage[index])
 
 
-@inlined_kernel
-def trace_measurement(scan, index, numbers, size, voxel_size_m, start, coverage):
-    """Voxels and measured coverage of a measurement whose distance is known.
+@lean_kernel
+def trace_measurement(scan, index, params, size, voxel_size_m, start, coverage):
+    """Voxels and measured coverage of a measurement with a known distance.
 
     Args:
         scan: Holds direction, length and Return of the ray; the rest is filled in.
         index: Which ray.
-        numbers: SENSOR_NUMBERS.
+        params: SENSOR_PARAMS.
         size: (X, Y, Z) voxels.
         voxel_size_m: Edge of a voxel.
         start: (x, y, z), the sensor in grid units.
-        coverage: (V,) float32, any map of the workspace; it does not matter what it holds.
+        coverage: (V,) float32, any map of the workspace; what it holds does not matter.
     """
     ray = scan.rays[index]
     ray.range_m = ray.length * voxel_size_m
-    _, ray.voxels, _ = cast_ray(
+    ray.voxels = cast_ray(
         coverage,
-        NEVER_STOP,
         size,
-        start,
-        ray.direction,
-        ray.length,
+        Line(start, point(ray.direction), ray.length),
+        NEVER_STOP,
         ray.returned == _HIT,
-        numbers.voxels_behind,
-        scan.crossed[index],
-        scan.entered,
-    )
-    weigh_measurement(scan, index, numbers, size, start)
+        params.voxels_behind,
+        Crossing(scan.crossed[index], scan.entered),
+    ).voxels
+    weigh_measurement(scan, index, params, size, start)
 
 
 @lean_kernel
-def take_scan(scan, model, truth, size, voxel_size_m, start, yaw, pitch, bodies, chance):
+def take_scan(scan, model, scene, pose, rng):
     """Cast the bundle through the true world: what the sensor measures.
 
     Args:
-        scan: Its rays and their crossings are filled in.
-        model: The SensorModel.
-        truth: (V,) float32 true coverage.
-        size: (X, Y, Z) voxels.
-        voxel_size_m: Edge of a voxel.
-        start: (x, y, z), the sensor in grid units.
-        yaw: Of the gaze, radians.
-        pitch: Of the gaze, radians, downwards.
-        bodies: How many of `scan.bodies` stand in the way.
-        chance: (1,) uint64 random state; drawn from only where range noise is on.
+        scan: Scan; its rays and their crossings are filled in.
+        model: SensorModel.
+        scene: Scene.
+        pose: SensorPose.
+        rng: (1,) uint64 random state; drawn from only where range noise is on.
     """
-    numbers = model.numbers[0]
-    point_rays(model, yaw, pitch, scan.rays)
-    reach = numbers.max_range_m / voxel_size_m
+    params, start = model.params[0], pose.start
+    point_rays(model, pose.yaw, pose.pitch, scan.rays)
+    reach = params.max_range_m / scene.voxel_size_m
     for index in range(len(scan.rays)):
         ray = scan.rays[index]
+        direction = point(ray.direction)
         length, ray.voxels, end = cast_ray(
-            truth,
+            scene.occupied,
+            scene.size,
+            Line(start, direction, reach),
             STOP_AT_COVERED,
-            size,
-            start,
-            ray.direction,
-            reach,
-            False,
-            numbers.voxels_behind,
-            scan.crossed[index],
-            scan.entered,
+            OPEN_END,
+            params.voxels_behind,
+            Crossing(scan.crossed[index], scan.entered),
         )
         ray.length = length
-        ray.range_m = length * voxel_size_m
-        error = numbers.noise_m * draw_gaussian(chance) if numbers.noise_m > 0.0 else 0.0
+        ray.range_m = length * scene.voxel_size_m
+        error = params.noise_m * draw_gaussian(rng) if params.noise_m > 0.0 else 0.0
         ray.returned = _FREE if end == OPEN else _HIT
-        if bodies > 0 and body_distance(start, ray.direction, scan.bodies, bodies) < length:
+        if len(scene.bodies) > 0 and body_distance(start, direction, scene.bodies) < length:
             ray.returned = _NOTHING
             ray.range_m = 0.0
         elif end == OPEN or error == 0.0:
-            weigh_measurement(scan, index, numbers, size, start)
+            weigh_measurement(scan, index, params, scene.size, start)
         else:
-            ray.length = min(max(length + error / voxel_size_m, _NEAREST), reach)
-            trace_measurement(scan, index, numbers, size, voxel_size_m, start, truth)
-        if ray.returned == _HIT and ray.range_m < numbers.min_range_m:
+            ray.length = min(max(length + error / scene.voxel_size_m, _NEAREST), reach)
+            trace_measurement(scan, index, params, scene.size, scene.voxel_size_m, start, scene.occupied)
+        if ray.returned == _HIT and ray.range_m < params.min_range_m:
             ray.returned = _NOTHING
             ray.range_m = 0.0
-
-
-@lean_kernel
-def fuse_scan(scan, count, mean, precision):
-    """Fuse measurements into a belief, ray by ray (Rocha04, eqs. 17-18, 27 and 29).
-
-    Args:
-        scan: With crossings filled in; its `utility` is filled with the bits of each ray.
-        count: How many rays of `scan.order`, in this order; those that measured nothing bring 0.
-        mean: (V,) float32 expected coverage, changed in place.
-        precision: (V,) float32 1/σ², changed in place.
-
-    Returns:
-        Bits taken from the map's entropy in all.
-    """
-    total = 0.0
-    for i in range(count):
-        index = scan.order[i]
-        ray = scan.rays[index]
-        scan.utility[index] = 0.0
-        if ray.returned != _NOTHING:
-            scan.utility[index] = fuse_ray(
-                mean, precision, scan.crossed[index], scan.coverage[index], ray.free, ray.voxels, ray.measured
-            )
-            total += scan.utility[index]
-    return total
 
 
 @lean_kernel

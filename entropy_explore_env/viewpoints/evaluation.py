@@ -10,7 +10,16 @@ import numpy as np
 
 from entropy_explore_env.belief.fields import Belief
 from entropy_explore_env.belief.paths.lattice import KNOWN_RATIO, Lattice, new_lattice
-from entropy_explore_env.belief.raycast import OPEN, STOP_AT_COVERED, cast_ray, longest_crossing
+from entropy_explore_env.belief.raycast import (
+    NONE_BEHIND,
+    OPEN,
+    OPEN_END,
+    STOP_AT_COVERED,
+    Crossing,
+    Line,
+    cast_ray,
+    longest_crossing,
+)
 from entropy_explore_env.compilation.kernels import lean_kernel
 from entropy_explore_env.robots.motion import driving_time, turning_time
 from entropy_explore_env.scenario import Scenario
@@ -144,15 +153,12 @@ def line_is_free(belief, start, direction, length, body_radius, scratch):
         reach = length + (body_radius if wide and point == 0 else 0.0)
         _, _, end = cast_ray(
             belief.mean,
-            STOP_AT_COVERED,
             size,
-            begin,
-            direction,
-            reach,
-            False,
-            0,
-            scratch.crossed,
-            scratch.entered,
+            Line(begin, direction, reach),
+            STOP_AT_COVERED,
+            OPEN_END,
+            NONE_BEHIND,
+            Crossing(scratch.crossed, scratch.entered),
         )
         if end != OPEN:
             return False

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from entropy_explore_env.belief.measurement_model import measurement_precision
-from entropy_explore_env.belief.raycast import OPEN, STOP_AT_COVERED, cast_ray
+from entropy_explore_env.belief.raycast import OPEN, OPEN_END, STOP_AT_COVERED, Crossing, Line, cast_ray
 from entropy_explore_env.belief.visibility import in_cones
 from entropy_explore_env.belief.voxel_index import grid_index
 from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel
@@ -95,15 +95,12 @@ def expected_scan_bits(belief, scan, viewpoint, cones, scratch):
             direction = (along * level, across * level, -math.sin(pitch))
             length, n, end = cast_ray(
                 belief.mean,
-                STOP_AT_COVERED,
                 belief.size,
-                start,
-                direction,
-                reach,
-                False,
+                Line(start, direction, reach),
+                STOP_AT_COVERED,
+                OPEN_END,
                 scan.voxels_behind,
-                scratch.crossed,
-                scratch.entered,
+                Crossing(scratch.crossed, scratch.entered),
             )
             range_m = length * scan.voxel_size_m
             if end != OPEN and range_m < scan.min_range_m:

@@ -144,7 +144,7 @@ def test_messages_of_scans_under_way_find_room_in_the_mail():
     """A robot may then send far more often than it arrives."""
     settings = {"sensor": {"scan_every_m": 0.05}, "channel": {"delay_s": 3.0}}
     missions = started(with_settings(WANDERERS, settings))
-    assert missions.scenario.mail_places == 2 * 3 * (30 + 2)  # 0.05 m at 0.5 m/s is 0.1 s
+    assert missions.scenario.message_slots == 2 * 3 * (30 + 2)  # 0.05 m at 0.5 m/s is 0.1 s
     wander(missions, 30, 0)
     assert (missions.state.robots["scans"] > 100).all()
 

@@ -11,11 +11,18 @@ from typing import NamedTuple
 
 import numpy as np
 
-from entropy_explore_env.belief.raycast import STOP_AT_COVERED, cast_ray
+from entropy_explore_env.belief.raycast import (
+    NONE_BEHIND,
+    OPEN_END,
+    STOP_AT_COVERED,
+    Crossing,
+    Line,
+    cast_ray,
+)
 from entropy_explore_env.belief.visibility import in_cone, visible_bits
 from entropy_explore_env.belief.voxel_index import flat_index
 from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel
-from entropy_explore_env.robots.motion import line_believed_blocked, way_to_teammate
+from entropy_explore_env.robots.motion import distance_to_teammate, line_believed_blocked
 
 MATE = np.dtype([("begin", "f8", (3,)), ("end", "f8", (3,)), ("touching", "f8")], align=True)
 """Where a teammate was heard to be, and to drive to, in grid units; `touching`: sum of the two radii."""
@@ -88,11 +95,19 @@ def reachability(belief, body, end):
         return 1.0
     if not fits(belief, body.footprint, end):
         return 0.0
-    if line_believed_blocked(mean, size, body.footprint, body.radius, begin, end, body.crossed, body.entered):
+    if line_believed_blocked(
+        mean, size, body.footprint, body.radius, begin, end, Crossing(body.crossed, body.entered)
+    ):
         return 0.0
     direction = (x / length, y / length, z / length)
     _, n, _ = cast_ray(
-        mean, STOP_AT_COVERED, size, begin, direction, length, False, 0, body.crossed, body.entered
+        mean,
+        size,
+        Line(begin, direction, length),
+        STOP_AT_COVERED,
+        OPEN_END,
+        NONE_BEHIND,
+        Crossing(body.crossed, body.entered),
     )
     covered = 0.0
     for step in range(1, n - 1):
@@ -109,7 +124,7 @@ def _teammate_on_line(mates, begin, end, length):
     for mate in mates:
         if mate.touching > 0.0:
             frm, to = (mate.begin[0], mate.begin[1], mate.begin[2]), (mate.end[0], mate.end[1], mate.end[2])
-            if way_to_teammate(begin, direction, length, frm, to, mate.touching) < length:
+            if distance_to_teammate(begin, direction, length, frm, to, mate.touching) < length:
                 return True
     return False
 

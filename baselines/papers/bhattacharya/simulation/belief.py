@@ -15,7 +15,16 @@ from typing import NamedTuple
 import numpy as np
 
 from entropy_explore_env.belief.entropy import LN2
-from entropy_explore_env.belief.raycast import OBSTACLE, cast_ray, longest_crossing
+from entropy_explore_env.belief.raycast import (
+    OBSTACLE,
+    ONE_BEHIND,
+    OPEN_END,
+    Crossing,
+    Line,
+    cast_ray,
+    longest_crossing,
+    point,
+)
 from entropy_explore_env.compilation.kernels import lean_kernel
 from entropy_explore_env.validation import check, check_kind
 
@@ -320,7 +329,15 @@ def _scan(
     at_x, at_y, count = cell // shape[1], cell % shape[1], 0
     start = (at_x + 0.5, at_y + 0.5, 0.5)
     for ray in range(len(rays)):
-        _, n, end = cast_ray(truth, 0.5, shape, start, rays[ray], reach, False, 1, crossed, entered)
+        _, n, end = cast_ray(
+            truth,
+            shape,
+            Line(start, point(rays[ray]), reach),
+            0.5,
+            OPEN_END,
+            ONE_BEHIND,
+            Crossing(crossed, entered),
+        )
         for i in range(n):
             there = np.int64(crossed[i])
             if seen[there] == number:

@@ -12,7 +12,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from entropy_explore_env.belief.raycast import cast_ray, longest_crossing
+from entropy_explore_env.belief.raycast import (
+    NONE_BEHIND,
+    OPEN_END,
+    Crossing,
+    Line,
+    cast_ray,
+    longest_crossing,
+)
 from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel
 
 
@@ -103,7 +110,8 @@ def _walk(empty, size, start, directions, reach, crossed, entered, voxels):
     begin = (start[0], start[1], start[2])
     for ray in range(len(directions)):
         direction = (directions[ray, 0], directions[ray, 1], directions[ray, 2])
-        _, n, _ = cast_ray(empty, 1, size, begin, direction, reach, False, 0, crossed, entered)
+        line, crossing = Line(begin, direction, reach), Crossing(crossed, entered)
+        _, n, _ = cast_ray(empty, size, line, 1, OPEN_END, NONE_BEHIND, crossing)
         for place in range(n):
             voxels[ray, place] = crossed[place]
 

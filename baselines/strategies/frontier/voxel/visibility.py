@@ -16,7 +16,14 @@ import numpy as np
 
 from baselines.strategies.frontier.voxel.map import NONE, STOPS_RAYS, UNEXPLORED
 from baselines.strategies.frontier.voxel.ray_tree import cell_at
-from entropy_explore_env.belief.raycast import cast_ray, longest_crossing
+from entropy_explore_env.belief.raycast import (
+    ONE_BEHIND,
+    OPEN_END,
+    Crossing,
+    Line,
+    cast_ray,
+    longest_crossing,
+)
 from entropy_explore_env.belief.voxel_index import flat_index
 from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel
 
@@ -139,7 +146,13 @@ def count_crossed(counter, state, size, start, directions, reach, marking):
     for ray in range(len(directions)):
         direction = (directions[ray, 0], directions[ray, 1], directions[ray, 2])
         _, n, _ = cast_ray(
-            state, STOPS_RAYS, size, begin, direction, reach, False, 1, counter.crossed, counter.entered
+            state,
+            size,
+            Line(begin, direction, reach),
+            STOPS_RAYS,
+            OPEN_END,
+            ONE_BEHIND,
+            Crossing(counter.crossed, counter.entered),
         )
         for place in range(n):
             voxel = np.uint32(counter.crossed[place])

@@ -1,0 +1,177 @@
+"""What a robot observes: parts of one flat float32 vector, written by compiled code.
+
+Parts, in this order, each only if the scenario's settings ask for it (D directions, A robots):
+
+    panorama  (2, D)       utility in bits that a ray would bring by the robot's own belief (or
+                           log2(1 + bits)), 0 where its return would be too near for the sensor; and
+                           the metres that it would go before something believed covered;
+                           directions in the order of `gaze_set`
+    self      (10 + K,)    position in the workspace, -1…1 (x, y, z); cos and sin of yaw, cos and
+                           sin of pitch; share of the time limit gone (0 without one); share of
+                           the map's entropy left, counting every voxel; 1 while it decides; in
+                           teams of K > 1 kinds of robots 1 for its kind, 0 for the others
+    team      (A-1, 19)    per teammate, in the order of their numbers: 1 if ever heard; where it
+                           was, relative, in workspace sizes (3); cos and sin of its yaw and of its
+                           pitch (4); seconds since then as s/(s + 60); 1 if an announcement was
+                           heard; its viewpoint in the same way (7); r̂ in workspace diagonals; α̂/π;
+                           zeros if unheard
+    patch     (4, x, y, z) belief around the robot: expected coverage, normalised entropy, 1
+                           outside the workspace, 1 where a teammate was last heard
+    overview  (2, x, y, z) the whole belief, averaged over blocks: normalised entropy, expected
+                           coverage
+    action_mask (N,)       1 for each discrete action that makes sense
+
+Normalised entropy is 1 at the prior and 0 at the voxel entropy that ends a mission (clipped).
+A busy robot observes from where it is under way, or zeros if the scenario says so. Only a robot's own
+belief and what it heard over the channel enter.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from gymnasium import spaces
+
+from entropy_explore_env.belief.raycast import longest_crossing
+from entropy_explore_env.missions.observation.overview import OVERVIEW_CHANNELS
+from entropy_explore_env.missions.observation.own_state import SELF_VALUES
+from entropy_explore_env.missions.observation.patch import PATCH_CHANNELS
+from entropy_explore_env.missions.observation.team import TEAMMATE_VALUES
+from entropy_explore_env.missions.rules import Rules, overview_shape, rules_of
+from entropy_explore_env.scenario import Scenario
+
+
+class Part(NamedTuple):
+    """Where a part lies in the flat vector, and what it looks like."""
+
+    start: int
+    stop: int
+    shape: tuple[int, ...]
+    low: float
+    high: np.ndarray
+    """Broadcast to `shape`."""
+
+
+class ObservationLayout:
+    """The parts of a scenario's observation, and the spaces made of them."""
+
+    def __init__(self, scenario: Scenario) -> None:
+        """Lay out the parts that the scenario asks for."""
+        self.parts = _parts(scenario)
+        self.size = max((part.stop for part in self.parts.values()), default=0)
+        self.flat = scenario.observation.flat
+        self.low = np.concatenate([np.full(p.stop - p.start, p.low) for p in self.parts.values()] or [[]])
+        self.high = np.concatenate(
+            [np.broadcast_to(p.high, p.shape).ravel() for p in self.parts.values()] or [[]]
+        )
+
+    def space(self) -> spaces.Space:
+        """A new space object of one robot's observation: a Dict of parts, or one Box."""
+        if self.flat:
+            return self.flat_space()
+        return spaces.Dict({name: _part_space(name, part) for name, part in self.parts.items()})
+
+    def flat_space(self, robots: int | None = None) -> spaces.Box:
+        """One robot's observation as a Box, or that of a whole team one after the other."""
+        low, high = self.low.astype(np.float32), self.high.astype(np.float32)
+        if robots is not None:
+            low, high = np.tile(low, robots), np.tile(high, robots)
+        return spaces.Box(low, high, dtype=np.float32)
+
+    def split(self, vectors: np.ndarray) -> np.ndarray | dict[str, np.ndarray]:
+        """An observation from flat vectors (..., size) float32; parts are views of them."""
+        if self.flat:
+            return vectors
+        parts: dict[str, np.ndarray] = {}
+        for name, part in self.parts.items():
+            values = vectors[..., part.start : part.stop].reshape(vectors.shape[:-1] + part.shape)
+            parts[name] = values.astype(np.int8) if name == "action_mask" else values
+        return parts
+
+    def split_rows(self, rows: np.ndarray) -> list[np.ndarray] | list[dict[str, np.ndarray]]:
+        """The observations of robots one by one, from their flat vectors (A, size) float32."""
+        together = self.split(rows)
+        if isinstance(together, np.ndarray):
+            return list(together)
+        return [{name: values[row] for name, values in together.items()} for row in range(len(rows))]
+
+
+def _part_space(name: str, part: Part) -> spaces.Box:
+    if name == "action_mask":
+        return spaces.Box(0, 1, part.shape, np.int8)
+    high = np.broadcast_to(part.high, part.shape).astype(np.float32)
+    return spaces.Box(np.full(part.shape, part.low, np.float32), high, dtype=np.float32)
+
+
+def _parts(scenario: Scenario) -> dict[str, Part]:
+    """Shapes and bounds of the parts, one after the other."""
+    settings, rules = scenario.observation, rules_of(scenario)
+    limits: dict[str, tuple[tuple[int, ...], float, np.ndarray]] = {}
+    one = np.ones(1)
+    if settings.panorama:
+        most = _most_utility_bits(scenario, rules)
+        farthest = min(
+            max(kind.sensor.max_range_m for kind in scenario.kinds),
+            float(np.linalg.norm(scenario.grid.size_m)),
+        )
+        high = np.asarray(
+            [[math.log2(1 + most) if rules.params[0]["panorama_log"] else most], [farthest]]
+        ) * (1 + 1e-6)
+        limits["panorama"] = ((2, len(rules.panorama)), 0.0, high)
+    if settings.self_state:
+        kinds = len(scenario.kinds)
+        limits["self"] = ((SELF_VALUES + (kinds if kinds > 1 else 0),), -1.0, one)
+    if settings.team and scenario.robots > 1:
+        limits["team"] = ((scenario.robots - 1, TEAMMATE_VALUES), -1.0, one)
+    if settings.patch:
+        limits["patch"] = ((PATCH_CHANNELS, *settings.patch_shape), 0.0, one)
+    if (cells := overview_shape(scenario)) is not None:
+        limits["overview"] = ((OVERVIEW_CHANNELS, *cells), 0.0, one)
+    if settings.action_mask and scenario.action.kind == "discrete":
+        limits["action_mask"] = ((len(rules.actions.moves) * len(rules.actions.gazes),), 0.0, one)
+    parts, start = {}, 0
+    for name, (shape, low, high) in limits.items():
+        stop = start + math.prod(shape)
+        parts[name] = Part(start, stop, shape, low, high)
+        start = stop
+    return parts
+
+
+def _most_utility_bits(scenario: Scenario, rules: Rules) -> float:
+    """More than any ray can bring: the longest one, over voxels that nobody has measured."""
+    most, prior = 0.0, float(rules.params[0]["prior_precision"])
+    for kind in scenario.kinds:
+        length = kind.sensor.max_range_m / scenario.grid.voxel_size_m
+        voxels = longest_crossing(*scenario.grid.shape, length, kind.sensor.voxels_behind)
+        most = max(most, voxels * 0.5 * math.log2(1.0 + 1.0 / kind.sensor.sigma_min**2 / prior))
+    return most
+
+
+class PartOffsets(NamedTuple):
+    """The layout for compiled code: where each part begins, -1 if it is left out."""
+
+    panorama: int
+    self_state: int
+    team: int
+    patch: int
+    overview: int
+    action_mask: int
+    patch_shape: tuple[int, int, int]
+    kinds: int
+    """K, of robots; 0 if all are alike."""
+    while_busy: bool
+    """Whether robots that do not decide observe, too."""
+
+
+def part_offsets(scenario: Scenario, layout: ObservationLayout) -> PartOffsets:
+    """What compiled code needs of a layout."""
+    begin = {name: part.start for name, part in layout.parts.items()}
+    patch = scenario.observation.patch_shape
+    return PartOffsets(
+        *(begin.get(name, -1) for name in ("panorama", "self", "team", "patch", "overview", "action_mask")),
+        patch_shape=(int(patch[0]), int(patch[1]), int(patch[2])),
+        kinds=len(scenario.kinds) if len(scenario.kinds) > 1 else 0,
+        while_busy=scenario.observation.while_busy,
+    )

@@ -1,0 +1,115 @@
+"""Observations of robots, put together from their parts."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from entropy_explore_env.compilation.kernels import lean_kernel
+from entropy_explore_env.missions.observation.mask import write_mask
+from entropy_explore_env.missions.observation.overview import observe_overview
+from entropy_explore_env.missions.observation.own_state import observe_self
+from entropy_explore_env.missions.observation.panorama import observe_panorama
+from entropy_explore_env.missions.observation.patch import observe_patch
+from entropy_explore_env.missions.observation.team import observe_team
+from entropy_explore_env.missions.poses import pose_at, to_grid_units
+
+
+class Known(NamedTuple):
+    """What one robot knows, as its observation is made from it."""
+
+    pose: tuple[float, float, float, float, float]
+    """x, y, z, yaw, pitch."""
+    time_s: float
+    entropy_bits: float
+    """Entropy of its map."""
+    deciding: bool
+    heard: np.ndarray
+    """(A,) HEARD, what it heard of each teammate."""
+    mean: np.ndarray
+    """(V,) float32, its expected coverage."""
+    precision: np.ndarray
+    """(V,) float32, 1/σ² of it."""
+    pooled: np.ndarray
+    """(2, C) float64, sums over the cells of the overview."""
+
+
+class Observed(NamedTuple):
+    """What observations of E missions are made from: arrays of MissionState."""
+
+    missions: np.ndarray
+    """(E,) MISSION."""
+    robots: np.ndarray
+    """(E, A) ROBOT."""
+    heard: np.ndarray
+    """(E, A, A) HEARD."""
+    mean: np.ndarray
+    """(E, A, V) float32."""
+    precision: np.ndarray
+    """(E, A, V) float32."""
+    pooled: np.ndarray
+    """(E, A, 2, C) float64."""
+
+
+@lean_kernel
+def observe_robot(rules, offsets, robot, known, crossing, out):
+    """Fill the flat observation of one robot.
+
+    Args:
+        rules: Rules.
+        offsets: PartOffsets.
+        robot: The robot's number.
+        known: Known of the robot.
+        crossing: Crossing, scratch space.
+        out: (F,) float32, filled in.
+    """
+    params, sensor = rules.params[robot], rules.sensors.params[robot]
+    start = to_grid_units(params, known.pose)
+    if offsets.panorama >= 0:
+        part = out[offsets.panorama :]
+        observe_panorama(params, sensor, rules.panorama, start, known, crossing, part)
+    if offsets.self_state >= 0:
+        observe_self(params, offsets.kinds, known, out[offsets.self_state :])
+    if offsets.team >= 0:
+        observe_team(params, robot, known, out[offsets.team :])
+    if offsets.patch >= 0:
+        observe_patch(params, offsets.patch_shape, robot, start, known, out[offsets.patch :])
+    if offsets.overview >= 0:
+        observe_overview(rules.cells, known.pooled, out[offsets.overview :])
+    if offsets.action_mask >= 0:
+        write_mask(params, rules.actions, start, known.mean, out[offsets.action_mask :])
+
+
+@lean_kernel
+def observe_missions(rules, offsets, observed, crossing, first, last, out):
+    """Fill the flat observations of missions' robots, each from where it is now.
+
+    Args:
+        rules: Rules.
+        offsets: PartOffsets.
+        observed: Observed.
+        crossing: Crossing, scratch space.
+        first: The first mission.
+        last: One past the last.
+        out: (E, A, F) float32, filled in.
+    """
+    for mission in range(first, last):
+        clock = observed.missions[mission]
+        for robot in range(observed.robots.shape[1]):
+            own, row = observed.robots[mission, robot], out[mission, robot]
+            if not (offsets.while_busy or own.deciding or clock.end != 0):
+                for place in range(len(row)):
+                    row[place] = 0.0
+                continue
+            known = Known(
+                pose_at(rules.params[robot], own, clock.time_s),
+                clock.time_s,
+                own.entropy_bits,
+                own.deciding,
+                observed.heard[mission, robot],
+                observed.mean[mission, robot],
+                observed.precision[mission, robot],
+                observed.pooled[mission, robot],
+            )
+            observe_robot(rules, offsets, robot, known, crossing, row)

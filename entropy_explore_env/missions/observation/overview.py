@@ -1,0 +1,22 @@
+"""The part `overview`: the whole belief, averaged over the cells of a coarse grid."""
+
+from __future__ import annotations
+
+from entropy_explore_env.compilation.kernels import lean_kernel
+
+OVERVIEW_CHANNELS = 2
+
+
+@lean_kernel
+def observe_overview(cells, sums, out):
+    """Fill (2·C,): normalised entropy and expected coverage, averaged over each of the Cells.
+
+    Args:
+        cells: Cells.
+        sums: (2, C) float64 over them.
+        out: Filled in.
+    """
+    count = len(cells.voxels)
+    for cell in range(count):
+        out[cell] = min(max(sums[0, cell] / cells.voxels[cell], 0.0), 1.0)
+        out[count + cell] = min(max(sums[1, cell] / cells.voxels[cell], 0.0), 1.0)

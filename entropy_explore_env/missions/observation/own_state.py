@@ -1,0 +1,35 @@
+"""The part `self`: the robot's pose, the time, the entropy of its map, whether it decides, its kind."""
+
+from __future__ import annotations
+
+import math
+
+from entropy_explore_env.compilation.kernels import lean_kernel
+
+SELF_VALUES = 10
+"""Without the kinds of a mixed team."""
+
+
+@lean_kernel
+def observe_self(params, kinds, known, out):
+    """Fill (10 + K,): the robot's pose, the time, the entropy left, whether it decides, and its kind.
+
+    Args:
+        params: PARAMS of the robot.
+        kinds: K; 0 if all robots are alike.
+        known: Known of the robot.
+        out: Filled in.
+    """
+    for axis in range(3):
+        extent = params.size[axis] * params.voxel_size_m
+        out[axis] = min(max(2.0 * (known.pose[axis] - params.origin_m[axis]) / extent - 1.0, -1.0), 1.0)
+    out[3], out[4] = math.cos(known.pose[3]), math.sin(known.pose[3])
+    out[5], out[6] = math.cos(known.pose[4]), math.sin(known.pose[4])
+    out[7] = min(known.time_s / params.time_limit_s, 1.0)
+    voxels = params.size[0] * params.size[1] * params.size[2]
+    least = 0.5 * voxels * math.log2(2.0 * math.pi * math.e / params.end_precision)
+    span = 0.5 * voxels * math.log2(params.end_precision / params.prior_precision)
+    out[8] = min(max((known.entropy_bits - least) / span, 0.0), 1.0)
+    out[9] = 1.0 if known.deciding else 0.0
+    for kind in range(kinds):
+        out[SELF_VALUES + kind] = 1.0 if kind == params.kind else 0.0

@@ -1,0 +1,46 @@
+"""Scratch memory of a step, one for each thread: nothing in it is state."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+
+from entropy_explore_env.belief.map_update import Scan
+from entropy_explore_env.belief.raycast import Crossing, longest_crossing
+from entropy_explore_env.robots.navigator import Navigator, footprints
+from entropy_explore_env.robots.range_sensor import new_scan
+from entropy_explore_env.scenario import Scenario
+
+
+class Workspace(NamedTuple):
+    """Scratch memory of one thread."""
+
+    scan: Scan
+    drive: Crossing
+    """Voxels on the longest drive."""
+    bodies: np.ndarray
+    """(A, 4) float64, teammates' bodies: centre and radius in grid units."""
+    recipients: np.ndarray
+    """(A,) bool, whom a message reaches."""
+    footprints: np.ndarray
+    """(K, B, 3) int64, offsets of the voxels that bodies of each kind of robot touch; B = 0 if none plans."""
+
+
+def new_workspace(scenario: Scenario, navigators: Mapping[int, Navigator]) -> Workspace:
+    """Scratch memory for steps of a scenario, with the navigators of its kinds of robots that plan."""
+    kinds, grid = scenario.kinds, scenario.grid
+    sensors, robots = [kind.sensor for kind in kinds], [kind.robot for kind in kinds]
+    longest_m = max(math.inf if robot.navigator == "planned" else robot.reach_m for robot in robots)
+    longest = longest_crossing(*grid.shape, longest_m / grid.voxel_size_m, 1)
+    return Workspace(
+        scan=new_scan(grid, sensors, max(sensor.rays for sensor in sensors)),
+        drive=Crossing(np.zeros(longest, np.int32), np.zeros(longest, np.int64)),
+        bodies=np.zeros((scenario.robots, 4)),
+        recipients=np.zeros(scenario.robots, np.bool_),
+        footprints=footprints(navigators, len(kinds))
+        if navigators
+        else np.zeros((len(kinds), 0, 3), np.int64),
+    )
