@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from entropy_explore_env.belief.entropy import map_entropy_bits
 from entropy_explore_env.belief.map_update import expected_utility, fuse_ray
 from entropy_explore_env.belief.measurement_model import measured_coverage, measurement_precision
-from entropy_explore_env.belief.raycast import NEVER_STOP, cast_ray
+from entropy_explore_env.belief.raycast import NEVER_STOP, Line, cast_ray
 from entropy_explore_env.settings import gaussian_entropy_bits
 from tests.reference import rocha04
 from tests.reference.scenes import (
@@ -33,16 +33,21 @@ def precision_of(range_m, sensor=SENSOR):
     return measurement_precision(float(range_m), sensor.sigma_min, sensor.zeta_per_m)
 
 
-def crossing(size, start, direction, length, behind=1):
-    """Voxels of a measured hit, their distances of entry and their number."""
-    crossed, entered = ray_space(size, length, behind)
+def cross(size, start, direction, length, behind=1):
+    """The Crossing of a measured hit, and how many voxels it has."""
+    crossing = ray_space(size, length, behind)
     cover = np.zeros(math.prod(size), np.float32)
-    _, n, _ = cast_ray(cover, NEVER_STOP, size, start, direction, length, True, behind, crossed, entered)
-    return crossed, entered, n
+    line = Line(tuple(start.tolist()), tuple(direction.tolist()), length)
+    return crossing, cast_ray(cover, size, line, NEVER_STOP, True, behind, crossing).voxels
 
 
-def fuse(mean, precision, crossed, coverage, free, n, measured):
-    return fuse_ray(mean.ravel(), precision.ravel(), crossed, coverage, free, n, measured)
+def measured(start, length, size, crossing, n, coverage):
+    """Fill the coverage that a hit measures; returns its first voxel that may be covered."""
+    return measured_coverage(tuple(start.tolist()), length, size, crossing, n, coverage)
+
+
+def fuse(mean, precision, crossed, coverage, free, n, gain):
+    return fuse_ray(mean.ravel(), precision.ravel(), crossed, coverage, free, n, gain)
 
 
 @drawn(40)
@@ -58,9 +63,9 @@ def test_the_coverage_of_a_measurement_is_that_of_equation_4(ray, length, behind
     size, start, direction = ray
     assume(rocha04.is_generic(start, direction, size, length))
     voxels = rocha04.trace(lambda v: False, start, direction, size, length, behind, True).voxels
-    crossed, entered, n = crossing(size, start, direction, length, behind)
-    coverage = np.full(len(crossed), np.nan, np.float32)
-    free = measured_coverage(start, length, size, crossed, entered, n, coverage)
+    crossing, n = cross(size, start, direction, length, behind)
+    coverage = np.full(len(crossing.voxels), np.nan, np.float32)
+    free = measured(start, length, size, crossing, n, coverage)
     assert 0 <= free <= n
     coverage[:free] = 0.0
     expected = [rocha04.measured_mean(rocha04.centre_distance(start, voxel), length, 1.0) for voxel in voxels]
@@ -71,10 +76,10 @@ def test_the_coverage_of_a_measurement_is_that_of_equation_4(ray, length, behind
 def test_the_coverage_of_a_measurement_along_an_axis():
     """From x = 0.5 the centres are 0, 1, 2, … away; a hit at 2.25 leaves voxel 2 a quarter covered."""
     start, direction = np.array([0.5, 5.5, 2.5]), np.array([1.0, 0.0, 0.0])
-    crossed, entered, n = crossing((7, 11, 5), start, direction, 2.25, 2)
-    coverage = np.zeros(len(crossed), np.float32)
-    measured_coverage(start, 2.25, (7, 11, 5), crossed, entered, n, coverage)
-    assert crossed[:n].tolist() == flat_index([(x, 5, 2) for x in range(5)], (7, 11, 5))
+    crossing, n = cross((7, 11, 5), start, direction, 2.25, 2)
+    coverage = np.zeros(len(crossing.voxels), np.float32)
+    measured(start, 2.25, (7, 11, 5), crossing, n, coverage)
+    assert crossing.voxels[:n].tolist() == flat_index([(x, 5, 2) for x in range(5)], (7, 11, 5))
     assert coverage[:n].tolist() == [0.0, 0.0, 0.25, 1.0, 1.0]
 
 
@@ -89,11 +94,11 @@ def test_fusing_a_ray_is_the_product_of_gaussians(ray, seed, length, behind, hit
     range_m = length * SENSOR.voxel_size_m
     expected_bits = rocha04.integrate(beliefs, voxels, start, range_m, hit, SENSOR)
 
-    crossed, entered, n = crossing(size, start, direction, length, behind)
-    coverage = np.full(len(crossed), np.nan, np.float32)
-    free = measured_coverage(start, length, size, crossed, entered, n, coverage) if hit else n
-    promised = expected_utility(precision.ravel(), crossed, n, precision_of(range_m))
-    bits = fuse(mean, precision, crossed, coverage, free, n, precision_of(range_m))
+    crossing, n = cross(size, start, direction, length, behind)
+    coverage = np.full(len(crossing.voxels), np.nan, np.float32)
+    free = measured(start, length, size, crossing, n, coverage) if hit else n
+    promised = expected_utility(precision.ravel(), crossing.voxels, n, precision_of(range_m))
+    bits = fuse(mean, precision, crossing.voxels, coverage, free, n, precision_of(range_m))
 
     expected_mean, expected_precision = as_arrays(beliefs, size)
     np.testing.assert_allclose(mean, expected_mean, rtol=0, atol=2e-6)
@@ -105,7 +110,7 @@ def test_fusing_a_ray_is_the_product_of_gaussians(ray, seed, length, behind, hit
     )
     assert bits == pytest.approx(drop, rel=1e-4, abs=1e-3)
     off_the_ray = np.ones(size, bool)
-    off_the_ray.ravel()[crossed[:n]] = False
+    off_the_ray.ravel()[crossing.voxels[:n]] = False
     assert (precision[off_the_ray] == before[off_the_ray]).all()
     assert (precision >= before).all()
     assert (mean >= 0.0).all()
@@ -165,10 +170,10 @@ def test_the_order_of_measurements_does_not_matter_to_the_belief(seed):
     for _ in range(12):
         direction = np.array(rocha04.gaze(rng.uniform(-3, 3), rng.uniform(-1.5, 1.5)))
         length = float(rng.uniform(1.0, 8.0))
-        crossed, entered, n = crossing(size, start, direction, length)
-        coverage = np.zeros(len(crossed), np.float32)
-        free = measured_coverage(start, length, size, crossed, entered, n, coverage)
-        rays_taken.append((crossed, coverage, free, n, precision_of(length * 0.25)))
+        crossing, n = cross(size, start, direction, length)
+        coverage = np.zeros(len(crossing.voxels), np.float32)
+        free = measured(start, length, size, crossing, n, coverage)
+        rays_taken.append((crossing.voxels, coverage, free, n, precision_of(length * 0.25)))
     results = []
     for order in (range(12), rng.permutation(12)):
         mean, precision = random_belief(size, seed)

@@ -2,13 +2,24 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from entropy_explore_env.belief.map_update import fuse_ray
-from entropy_explore_env.belief.pooling import fresh_sums, fuse_pooled_ray, new_cells, normalised_entropy
+from entropy_explore_env.belief.map_update import RAY, Scan, fuse_scan
+from entropy_explore_env.belief.measurement_model import Return
+from entropy_explore_env.belief.pooling import (
+    Pool,
+    fresh_sums,
+    fuse_pooled_scan,
+    new_cells,
+    no_cells,
+    normalised_entropy,
+    pool_belief,
+)
 from tests.reference.scenes import drawn, seeds
 
 SIZE = (7, 11, 5)
@@ -40,19 +51,20 @@ def test_normalised_entropy_at_its_ends():
 @drawn(40)
 @given(seeds, st.sampled_from([(1, 1, 1), (3, 4, 2), (7, 2, 5)]), st.integers(1, 60))
 def test_sums_are_those_of_the_whole_belief(seed, shape, rays):
-    rng, voxels = np.random.default_rng(seed), np.prod(SIZE)
+    rng, voxels = np.random.default_rng(seed), math.prod(SIZE)
     cells, mean = new_cells(SIZE, shape), np.full(voxels, 0.5, np.float32)
     precision = np.full(voxels, PRIOR, np.float32)
     sums, twin = fresh_sums(cells), (mean.copy(), precision.copy())
-    for _ in range(rays):
-        n = int(rng.integers(1, 20))
-        crossed = rng.choice(voxels, n, replace=False).astype(np.int32)
-        coverage, free = rng.random(n, np.float32), int(rng.integers(0, n + 1))
-        measured = float(rng.uniform(1.0, 300.0))
-        bits = fuse_pooled_ray(
-            cells, sums, (PRIOR, END), mean, precision, crossed, coverage, free, n, measured
-        )
-        assert bits == fuse_ray(*twin, crossed, coverage, free, n, measured)
+    scan = random_scan(rng, rays)
+    fused_first = int(rng.integers(0, rays + 1))
+    pool = Pool(cells, sums, PRIOR, END)
+    for count in (fused_first, rays):  # the first rays twice, in two calls
+        bits = fuse_pooled_scan(scan, count, mean, precision, pool)
+        utility = scan.utility.copy()
+        assert bits == fuse_scan(scan, count, *twin)
+        np.testing.assert_array_equal(utility, scan.utility)
+    assert (utility[scan.rays["returned"] == Return.NOTHING] == 0.0).all()
+    assert (utility[scan.rays["returned"] != Return.NOTHING] > 0.0).all()
     np.testing.assert_array_equal((mean, precision), twin)
     x, y, z = np.unravel_index(np.arange(voxels), SIZE)
     cell = [(i + 1) * c - 1 for i, c in zip((x, y, z), shape, strict=True)]
@@ -62,3 +74,32 @@ def test_sums_are_those_of_the_whole_belief(seed, shape, rays):
     for channel, values in enumerate((share, mean)):
         whole = np.bincount(number, values, minlength=len(cells.voxels))
         np.testing.assert_allclose(sums[channel], whole, rtol=0, atol=1e-9 * voxels)
+    anew = Pool(cells, np.full_like(sums, np.nan), PRIOR, END)
+    pool_belief(anew, mean, precision)
+    np.testing.assert_allclose(anew.sums, sums, rtol=0, atol=1e-9 * voxels)
+
+
+def random_scan(rng, rays):
+    """Rays over up to 19 random voxels each, in random order; some measured nothing."""
+    scan = Scan(
+        rays=np.zeros(rays, RAY),
+        utility=np.full(rays, np.nan),
+        crossed=np.full((rays, 19), -1, np.int32),
+        entered=np.zeros(19, np.int64),
+        coverage=rng.random((rays, 19), np.float32),
+        order=rng.permutation(rays),
+    )
+    for number, ray in enumerate(scan.rays):
+        ray["voxels"] = rng.integers(1, 20)
+        ray["free"] = rng.integers(0, ray["voxels"] + 1)
+        ray["precision"] = rng.uniform(1.0, 300.0)
+        ray["returned"] = rng.choice([Return.NOTHING, Return.FREE, Return.HIT], p=[0.1, 0.3, 0.6])
+        crossed = rng.choice(math.prod(SIZE), ray["voxels"], replace=False)
+        scan.crossed[number, : ray["voxels"]] = crossed
+    return scan
+
+
+def test_no_cells_hold_nothing():
+    cells = no_cells(SIZE)
+    assert cells.size == SIZE
+    assert fresh_sums(cells).shape == (2, 0)

@@ -16,6 +16,7 @@ from entropy_explore_env.belief.raycast import (
     STOP_AT_COVERED,
     TICKS,
     WALL,
+    Line,
     cast_ray,
     longest_crossing,
 )
@@ -30,13 +31,14 @@ NOTHING = np.zeros(SIZE, np.float32)
 def cast(cover, start, direction, length=math.inf, behind=0, hit_at_length=False, stop=STOP_AT_COVERED):
     """The library's ray as a reference Trace (voxels by number), and the distances of entry."""
     size = cover.shape
-    crossed, entered = ray_space(size, length, behind)
-    start, direction = np.asarray(start, np.float64), np.asarray(direction, np.float64)
-    way, n, end = cast_ray(
-        cover.ravel(), stop, size, start, direction, float(length), hit_at_length, behind, crossed, entered
-    )
-    assert (crossed[n:] == -1).all()
-    return rocha04.Trace(way, crossed[:n].tolist(), ENDS[end]), entered[:n] / TICKS
+    crossing = ray_space(size, length, behind)
+    start, direction = (tuple(np.asarray(place, np.float64).tolist()) for place in (start, direction))
+    line = Line(start, direction, float(length))
+    ray = cast_ray(cover.ravel(), size, line, stop, hit_at_length, behind, crossing)
+    n = ray.voxels
+    assert (crossing.voxels[n:] == -1).all()
+    trace = rocha04.Trace(ray.length, crossing.voxels[:n].tolist(), ENDS[ray.reason])
+    return trace, crossing.entered[:n] / TICKS
 
 
 @drawn(400)

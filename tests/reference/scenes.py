@@ -13,7 +13,7 @@ import numpy as np
 from hypothesis import settings
 from hypothesis import strategies as st
 
-from entropy_explore_env.belief.raycast import longest_crossing
+from entropy_explore_env.belief.raycast import Crossing, longest_crossing
 from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.scenario import Scenario, with_settings
 from entropy_explore_env.scenarios import BOX
@@ -78,12 +78,10 @@ def as_arrays(
     return mean, precision
 
 
-def ray_space(
-    size: rocha04.Voxel, length: float = math.inf, behind: int = 0
-) -> tuple[np.ndarray, np.ndarray]:
+def ray_space(size: rocha04.Voxel, length: float = math.inf, behind: int = 0) -> Crossing:
     """Scratch space of a ray, filled with what must not be taken for a result."""
     places = longest_crossing(*size, length, behind)
-    return np.full(places, -1, np.int32), np.full(places, -1, np.int64)
+    return Crossing(np.full(places, -1, np.int32), np.full(places, -1, np.int64))
 
 
 def free_box(**changes: Any) -> Scenario:
@@ -104,7 +102,7 @@ def random_actions(missions: Missions, rng: np.random.Generator) -> tuple[np.nda
     robots, rules = missions.scenario.robots, missions.rules
     axes = 3 if missions.scenario.planar else 5
     boxes = rng.uniform(-1.0, 1.0, (missions.count, robots, axes)).astype(np.float32).astype(np.float64)
-    numbers = rng.integers(0, len(rules.moves) * len(rules.gazes), (missions.count, robots))
+    numbers = rng.integers(0, len(rules.actions.moves) * len(rules.actions.gazes), (missions.count, robots))
     return boxes, numbers
 
 

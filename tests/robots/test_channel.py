@@ -14,7 +14,7 @@ from entropy_explore_env.robots.channel import (
     BITS_PER_BATCH,
     BITS_PER_MEASUREMENT,
     Delivery,
-    deliver,
+    draw_delivery,
     select_measurements,
     steered_i_min,
 )
@@ -91,9 +91,9 @@ def test_selections_by_hand():
     assert select([-1.0, 0.0, -1.0], 3, 0.0) == [1]
 
 
-def reached(distance, range_m, loss, chance=None):
-    chance = np.array([1], np.uint64) if chance is None else chance
-    return list(Delivery)[deliver(distance, range_m, loss, chance)]
+def reached(distance, range_m, loss, rng=None):
+    rng = np.array([1], np.uint64) if rng is None else rng
+    return list(Delivery)[draw_delivery(distance, range_m, loss, rng)]
 
 
 def test_a_message_reaches_as_far_as_the_channel():
@@ -103,12 +103,12 @@ def test_a_message_reaches_as_far_as_the_channel():
     assert reached(0.0, 1e-9, 0.0) is Delivery.HEARD
 
 
-def test_chance_is_drawn_only_where_a_message_can_be_lost():
-    chance = np.array([9], np.uint64)
-    reached(1.0, 5.0, 0.0, chance)
-    assert chance[0] == 9
-    reached(1.0, 5.0, 0.5, chance)
-    assert chance[0] != 9
+def test_random_numbers_are_drawn_only_where_a_message_can_be_lost():
+    rng = np.array([9], np.uint64)
+    reached(1.0, 5.0, 0.0, rng)
+    assert rng[0] == 9
+    reached(1.0, 5.0, 0.5, rng)
+    assert rng[0] != 9
     in_range, out_of_range = np.array([9], np.uint64), np.array([9], np.uint64)
     reached(1.0, 5.0, 0.5, in_range)
     reached(9.0, 5.0, 0.5, out_of_range)
@@ -117,17 +117,17 @@ def test_chance_is_drawn_only_where_a_message_can_be_lost():
 
 @pytest.mark.parametrize("loss", [0.1, 0.5, 0.9])
 def test_messages_are_lost_as_often_as_asked(loss):
-    chance = np.array([123], np.uint64)
-    lost = sum(reached(1.0, 5.0, loss, chance) is Delivery.LOST for _ in range(4000))
+    rng = np.array([123], np.uint64)
+    lost = sum(reached(1.0, 5.0, loss, rng) is Delivery.LOST for _ in range(4000))
     assert abs(lost / 4000 - loss) < 4 * math.sqrt(loss * (1 - loss) / 4000)
 
 
 @drawn(20)
 @given(seeds)
 def test_a_loss_probability_of_1_loses_everything(seed):
-    chance = np.array([seed], np.uint64)
-    assert all(reached(1.0, 5.0, 1.0, chance) is Delivery.LOST for _ in range(50))
-    assert reached(9.0, 5.0, 1.0, chance) is Delivery.OUT_OF_RANGE
+    rng = np.array([seed], np.uint64)
+    assert all(reached(1.0, 5.0, 1.0, rng) is Delivery.LOST for _ in range(50))
+    assert reached(9.0, 5.0, 1.0, rng) is Delivery.OUT_OF_RANGE
 
 
 def test_what_messages_cost():

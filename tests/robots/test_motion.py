@@ -9,13 +9,14 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
+from entropy_explore_env.belief.raycast import Line
 from entropy_explore_env.robots.motion import (
     MoveEnd,
+    distance_to_teammate,
     driven_share,
     driving_time,
-    free_way,
+    free_distance,
     turning_time,
-    way_to_teammate,
 )
 from tests.reference import rocha04
 from tests.reference.scenes import drawn, random_cover, ray_space, rays, seeds
@@ -54,7 +55,7 @@ def test_the_driven_share_rises_from_0_to_1(length_m, speed, acceleration):
     assert middle == pytest.approx(0.5)  # the trapezoid is symmetric
 
 
-def test_no_way_takes_no_time_and_is_driven_at_once():
+def test_no_distance_takes_no_time_and_is_driven_at_once():
     assert driving_time(0.0, 0.25, 0.25) == 0.0
     assert driven_share(0.0, 0.0, 0.25, 0.25) == 1.0
 
@@ -78,19 +79,12 @@ def test_turning_goes_the_short_way_round(yaw, new_yaw, pitch, new_pitch, turn):
 
 
 def drive(blocked, start, direction, length, finish=None):
-    crossed, entered = ray_space(blocked.shape, behind=1)
+    crossing = ray_space(blocked.shape, behind=1)
     start, direction = np.asarray(start, np.float64), np.asarray(direction, np.float64)
-    way, code = free_way(
-        blocked.ravel(),
-        blocked.shape,
-        start,
-        start + length * direction if finish is None else finish,
-        direction,
-        float(length),
-        crossed,
-        entered,
-    )
-    return way, list(MoveEnd)[code]
+    finish = start + length * direction if finish is None else finish
+    line = Line(tuple(start.tolist()), tuple(direction.tolist()), float(length))
+    driven, code = free_distance(blocked.ravel(), blocked.shape, line, tuple(finish.tolist()), crossing)
+    return driven, list(MoveEnd)[code]
 
 
 @drawn(200)
@@ -99,15 +93,15 @@ def test_a_drive_ends_in_the_last_voxel_in_which_the_body_fits(ray, seed, length
     size, start, direction = ray
     assume(rocha04.is_generic(start, direction, size, length))
     blocked = random_cover(size, share, seed)
-    way, end = drive(blocked, start, direction, length)
+    driven, end = drive(blocked, start, direction, length)
     theirs = rocha04.trace(lambda v: blocked[v] > 0.5, start, direction, size, length, 0)
     if theirs.end == rocha04.OPEN:
-        assert (way, end) == (length, MoveEnd.ARRIVED)
+        assert (driven, end) == (length, MoveEnd.ARRIVED)
         return
     assert end is (MoveEnd.OBSTACLE if theirs.end == rocha04.HIT else MoveEnd.WALL)
     last = rocha04.pieces_of(start, direction, size)[len(theirs.voxels) - 1]
     expected = 0.5 * (last.entered + last.left) if len(theirs.voxels) > 1 else 0.0
-    assert way == pytest.approx(expected, rel=1e-9, abs=1e-9)
+    assert driven == pytest.approx(expected, rel=1e-9, abs=1e-9)
 
 
 def test_drives_by_hand():
@@ -126,14 +120,14 @@ def test_a_drive_that_would_end_on_the_face_of_a_solid_voxel_stops_before_it():
     """The face x = 5 belongs to voxel 5: whoever stands there stands in it."""
     blocked = np.zeros(SIZE, np.float32)
     blocked[5, 5, 2] = 1.0
-    way, end = drive(blocked, (1.5, 5.5, 2.5), (1.0, 0.0, 0.0), 3.5)
-    assert (way, end) == (3.0, MoveEnd.OBSTACLE)
+    driven, end = drive(blocked, (1.5, 5.5, 2.5), (1.0, 0.0, 0.0), 3.5)
+    assert (driven, end) == (3.0, MoveEnd.OBSTACLE)
 
 
 def test_a_drive_that_would_end_on_the_upper_boundary_stops_before_it():
     """The boundary x = 7 belongs to voxel 7, which there is not."""
-    way, end = drive(np.zeros(SIZE, np.float32), (1.5, 5.5, 2.5), (1.0, 0.0, 0.0), 5.5)
-    assert way < 5.5
+    driven, end = drive(np.zeros(SIZE, np.float32), (1.5, 5.5, 2.5), (1.0, 0.0, 0.0), 5.5)
+    assert driven < 5.5
     assert end is MoveEnd.WALL
 
 
@@ -150,10 +144,10 @@ def test_wherever_a_drive_ends_the_body_fits(seed, size, share):
         if length == 0.0 or blocked[tuple(start.astype(int))] > 0.5:
             continue
         direction = (target - start) / length
-        way, end = drive(blocked, start, direction, length, target)
-        place = target if end is MoveEnd.ARRIVED else start + way * direction
+        driven, end = drive(blocked, start, direction, length, target)
+        place = target if end is MoveEnd.ARRIVED else start + driven * direction
         voxel = np.floor(place).astype(int)
-        assert 0.0 <= way <= length
+        assert 0.0 <= driven <= length
         assert ((voxel >= 0) & (voxel < size)).all(), (start, target)
         assert blocked[tuple(voxel)] < 0.5, (start, target)
 
@@ -164,47 +158,52 @@ def distance_to_segment(points, begin, finish):
     return np.array([np.sqrt(((places - point) ** 2).sum(axis=1)).min() for point in points])
 
 
+def clear(start, direction, wanted, begin, finish, touching):
+    """How far a body gets before it touches a teammate."""
+    start, direction, begin, finish = (tuple(p.tolist()) for p in (start, direction, begin, finish))
+    return distance_to_teammate(start, direction, wanted, begin, finish, touching)
+
+
 @drawn(60)
 @given(seeds, st.booleans(), st.floats(0.1, 1.5))
-def test_the_way_to_a_teammate_by_brute_force(seed, moving, touching):
+def test_the_distance_to_a_teammate_by_brute_force(seed, moving, touching):
     rng = np.random.default_rng(seed)
     start, begin = rng.uniform(0, 6, 3), rng.uniform(0, 6, 3)
     finish = begin + rng.uniform(-3, 3, 3) if moving else begin.copy()
     direction = rng.normal(size=3) + 0.7 * (begin - start)  # towards the teammate, more or less
     direction /= np.linalg.norm(direction)
     wanted = float(rng.uniform(0.1, 8.0))
-    ours = way_to_teammate(start, direction, wanted, begin, finish, touching)
-    ways = np.linspace(0.0, wanted, 300)
-    gaps = distance_to_segment(start + ways[:, None] * direction, begin, finish)
+    ours = clear(start, direction, wanted, begin, finish, touching)
+    distances = np.linspace(0.0, wanted, 300)
+    gaps = distance_to_segment(start + distances[:, None] * direction, begin, finish)
     assume(abs(gaps[0] - touching) > 1e-3)
     assert 0.0 <= ours <= wanted
     if gaps[0] < touching:  # they touch already: they may part, and nothing else
         parting = (np.diff(gaps) >= -1e-9).all()
         assert ours == (wanted if parting else 0.0)
         return
-    assert (gaps[ways <= ours] >= touching - 1e-3).all()
+    assert (gaps[distances <= ours] >= touching - 1e-3).all()
     if ours < wanted:
         at = distance_to_segment((start + ours * direction)[None], begin, finish)[0]
         assert at == pytest.approx(touching, abs=1e-3)
         assert at >= touching
 
 
-def test_ways_to_a_teammate_by_hand():
+def test_distances_to_a_teammate_by_hand():
     start, east = np.array([1.0, 1.0, 1.0]), np.array([1.0, 0.0, 0.0])
 
-    def way(begin, finish, touching=0.5, wanted=9.0, direction=east):
-        begin, finish = np.array(begin, np.float64), np.array(finish, np.float64)
-        return way_to_teammate(start, direction, wanted, begin, finish, touching)
+    def free(begin, finish, touching=0.5, wanted=9.0, direction=east):
+        return clear(start, direction, wanted, np.array(begin), np.array(finish), touching)
 
     ahead, aside, crossing = (5.0, 1.0, 1.0), (5.0, 1.6, 1.0), ((5.0, -3.0, 1.0), (5.0, 4.0, 1.0))
-    assert way(ahead, ahead) == pytest.approx(3.5, abs=1e-5)
-    assert way(ahead, ahead) < 3.5
-    assert way(ahead, ahead, wanted=3.0) == 3.0
-    assert way(aside, aside) == 9.0
-    assert way((5.0, 1.3, 1.0), (5.0, 1.3, 1.0)) == pytest.approx(3.6, abs=1e-5)
-    assert way(*crossing) == pytest.approx(3.5, abs=1e-5)  # it owns the whole way that it still drives
-    assert way((8.0, 1.0, 1.0), ahead) == pytest.approx(3.5, abs=1e-5)
-    assert way((1.0, 2.0, 1.0), (9.0, 2.0, 1.0)) == 9.0  # side by side
-    assert way((0.6, 1.0, 1.0), (0.6, 1.0, 1.0)) == 9.0  # touching: parting is free
-    assert way((1.4, 1.0, 1.0), (1.4, 1.0, 1.0)) == 0.0  # … coming closer is not
-    assert way((-3.0, 1.0, 1.0), (-3.0, 1.0, 1.0)) == 9.0
+    assert free(ahead, ahead) == pytest.approx(3.5, abs=1e-5)
+    assert free(ahead, ahead) < 3.5
+    assert free(ahead, ahead, wanted=3.0) == 3.0
+    assert free(aside, aside) == 9.0
+    assert free((5.0, 1.3, 1.0), (5.0, 1.3, 1.0)) == pytest.approx(3.6, abs=1e-5)
+    assert free(*crossing) == pytest.approx(3.5, abs=1e-5)  # it owns the whole path that it still drives
+    assert free((8.0, 1.0, 1.0), ahead) == pytest.approx(3.5, abs=1e-5)
+    assert free((1.0, 2.0, 1.0), (9.0, 2.0, 1.0)) == 9.0  # side by side
+    assert free((0.6, 1.0, 1.0), (0.6, 1.0, 1.0)) == 9.0  # touching: parting is free
+    assert free((1.4, 1.0, 1.0), (1.4, 1.0, 1.0)) == 0.0  # … coming closer is not
+    assert free((-3.0, 1.0, 1.0), (-3.0, 1.0, 1.0)) == 9.0

@@ -17,7 +17,7 @@ from entropy_explore_env.robots.motion import (
     driven_share,
     driving_time,
     line_believed_blocked,
-    time_of_way,
+    time_after,
 )
 from entropy_explore_env.robots.navigator import lattice_of, new_navigator, plan_path
 from entropy_explore_env.settings import Grid
@@ -65,13 +65,13 @@ def test_around_a_wall():
     assert (points.tolist(), end) == ([[2.5, 9.5, 0.5], [4.5, 9.5, 0.5], [5.2, 1.9, 0.5]], MoveEnd.ARRIVED)
 
 
-def test_a_way_with_more_corners_than_places_ends_at_the_last_of_them():
+def test_a_path_with_more_corners_than_places_ends_at_the_last_of_them():
     points, end = plan(planner(), wall(), (1.5, 1.5, 0.5), (5.5, 1.5, 0.5), places=2)
     assert (points.tolist(), end) == ([[2.5, 9.5, 0.5], [4.5, 9.5, 0.5]], MoveEnd.CORNERS)
 
 
 @pytest.mark.parametrize(("cost", "corners"), [(1.0, 0), (3.0, 0), (6.0, 2)])
-def test_unknown_space_is_passed_where_the_way_around_costs_more(cost, corners):
+def test_unknown_space_is_passed_where_the_path_around_costs_more(cost, corners):
     """Two unknown columns on the line of four edges cost 2·cost + 2; around them it is about 10."""
     known = np.ones(FLAT.shape, bool)
     known[3, :6] = False
@@ -92,7 +92,7 @@ def test_unknown_space_is_passed_where_the_way_around_costs_more(cost, corners):
         ((1.5, 13.0, 0.5), (1.5, 10.5, 0.5)),
     ],
 )
-def test_where_no_way_is_known_it_leads_to_the_nearest_place(goal, nearest):
+def test_where_no_path_is_known_it_leads_to_the_nearest_place(goal, nearest):
     points, end = plan(planner(), wall(open_from=11), (1.5, 1.5, 0.5), goal)
     assert end is MoveEnd.NO_PATH
     assert points[-1].tolist() == list(nearest)
@@ -159,7 +159,7 @@ def test_a_body_keeps_away_from_walls():
 
 @drawn(150)
 @given(seeds, st.sampled_from([(7, 11, 1), (7, 11, 5)]), st.sampled_from([0.2, 0.3, 0.55]))
-def test_who_knows_the_world_meets_nothing_and_gets_wherever_a_way_leads(seed, shape, radius):
+def test_who_knows_the_world_meets_nothing_and_gets_wherever_a_path_leads(seed, shape, radius):
     """Random worlds, known by heart: a plan is driven to its end, through voxels in which the body fits."""
     rng = np.random.default_rng(seed)
     scenario = planner(Grid(shape, 0.5), body_radius_m=radius)
@@ -178,7 +178,7 @@ def test_who_knows_the_world_meets_nothing_and_gets_wherever_a_way_leads(seed, s
     connected = parts[tuple(here)] == parts[tuple(there)]
     assert (end is MoveEnd.ARRIVED) == connected
     corners = np.vstack([start, points])
-    crossed, entered = ray_space(shape)
+    crossing = ray_space(shape)
     for begin, finish in itertools.pairwise(corners):
         for share in np.linspace(0.0, 1.0, 41):
             place = np.minimum((begin + share * (finish - begin)).astype(int), np.array(shape) - 1)
@@ -188,10 +188,9 @@ def test_who_knows_the_world_meets_nothing_and_gets_wherever_a_way_leads(seed, s
             shape,
             lattice_of(scenario, scenario.robot).footprint,
             radius / 0.5,
-            tuple(begin),
-            tuple(finish),
-            crossed,
-            entered,
+            tuple(begin.tolist()),
+            tuple(finish.tolist()),
+            crossing,
         )
     if not connected:
         reached = np.argwhere(parts == parts[tuple(here)])
@@ -202,7 +201,7 @@ def test_who_knows_the_world_meets_nothing_and_gets_wherever_a_way_leads(seed, s
 def test_what_lies_within_the_body_s_reach_blocks_a_line():
     """A body of 1.2 edges on a line along y through x = 3: covered voxels one and two columns beside it."""
     size = (7, 11, 1)
-    crossed, entered = ray_space(size)
+    crossing = ray_space(size)
     wide = planner(body_radius_m=0.6)
     ball = lattice_of(wide, wide.robot).footprint
 
@@ -210,7 +209,7 @@ def test_what_lies_within_the_body_s_reach_blocks_a_line():
         mean = np.full(size, 0.5, np.float32)
         mean[covered] = 0.51
         return line_believed_blocked(
-            mean.ravel(), size, ball, 1.2, (3.5, begin_y, 0.5), (3.5, 8.5, 0.5), crossed, entered
+            mean.ravel(), size, ball, 1.2, (3.5, begin_y, 0.5), (3.5, 8.5, 0.5), crossing
         )
 
     assert blocked((3, 6, 0), 1.5)
@@ -226,7 +225,7 @@ def test_what_lies_within_the_body_s_reach_blocks_a_line():
 
 @drawn(100)
 @given(st.floats(1e-3, 50.0), st.floats(0.0, 1.0), st.floats(0.1, 3.0), st.floats(0.1, 3.0))
-def test_the_time_of_a_place_on_the_way_is_when_the_robot_is_there(length, share, speed, acceleration):
-    time_s = time_of_way(share * length, length, speed, acceleration)
+def test_the_time_of_a_place_on_the_path_is_when_the_robot_is_there(length, share, speed, acceleration):
+    time_s = time_after(share * length, length, speed, acceleration)
     assert 0.0 <= time_s <= driving_time(length, speed, acceleration) + 1e-9
     assert driven_share(time_s, length, speed, acceleration) == pytest.approx(share, abs=1e-6)

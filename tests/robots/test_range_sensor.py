@@ -9,10 +9,12 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
+from entropy_explore_env.belief.map_update import fuse_scan
+from entropy_explore_env.belief.measurement_model import Return
 from entropy_explore_env.robots.range_sensor import (
-    Return,
+    Scene,
+    SensorPose,
     body_distance,
-    fuse_scan,
     in_view,
     new_scan,
     sensor_model,
@@ -31,21 +33,15 @@ COARSE = RangeSensor((math.pi / 2, math.pi / 3), math.pi / 12)
 def scan_of(truth, start, yaw=0.0, pitch=0.0, sensor=COARSE, voxel_size_m=0.5, bodies=(), seed=1):
     """What a sensor measures in a world; start and bodies in grid units."""
     grid = Grid(truth.shape, voxel_size_m)
-    scan = new_scan(grid, [sensor], sensor.rays, 1 + len(bodies))
-    scan.bodies[: len(bodies)] = bodies if len(bodies) else 0.0
-    take_scan(
-        scan,
-        sensor_model(sensor),
-        truth.ravel(),
-        truth.shape,
-        voxel_size_m,
-        np.asarray(start, np.float64),
-        float(yaw),
-        float(pitch),
-        len(bodies),
-        np.array([seed], np.uint64),
-    )
+    scan = new_scan(grid, [sensor], sensor.rays)
+    balls = np.array(bodies, np.float64).reshape(-1, 4)
+    scene = Scene(truth.ravel(), truth.shape, voxel_size_m, balls)
+    take_scan(scan, sensor_model(sensor), scene, pose_at(start, yaw, pitch), np.array([seed], np.uint64))
     return scan
+
+
+def pose_at(start, yaw, pitch):
+    return SensorPose(tuple(np.asarray(start, np.float64).tolist()), float(yaw), float(pitch))
 
 
 def directions_of(sensor, yaw, pitch):
@@ -124,7 +120,7 @@ def test_a_scan_is_what_the_reference_measures(size, seed, voxel_size_m, max_ran
         assert ray["range_m"] == pytest.approx(theirs.length * voxel_size_m, rel=1e-9)
         assert voxels_on(scan, index) == flat_index(theirs.voxels, size)
         sigma = rocha04.measured_sigma(theirs.length * voxel_size_m, 0.05, 0.02)
-        assert ray["measured"] == pytest.approx(sigma**-2, rel=1e-9)
+        assert ray["precision"] == pytest.approx(sigma**-2, rel=1e-9)
         coverage = np.where(
             np.arange(ray["voxels"]) < ray["free"], 0.0, scan.coverage[index, : ray["voxels"]]
         )
@@ -227,7 +223,8 @@ def test_the_first_body_on_a_ray(seed, count):
         expected = min(
             rocha04.distance_to_ball(start, direction, body[:3], body[3]) for body in bodies[:count]
         )
-        assert body_distance(start, direction, bodies, count) == pytest.approx(expected, rel=1e-7, abs=1e-7)
+        first = body_distance(tuple(start.tolist()), tuple(direction.tolist()), bodies[:count])
+        assert first == pytest.approx(expected, rel=1e-7, abs=1e-7)
 
 
 @drawn(60)
@@ -244,17 +241,17 @@ def test_a_body_that_a_ray_hits_is_in_view(seed):
             rocha04.distance_to_ball(start, ray["direction"], body[:3], body[3]) < math.inf
             for ray in scan.rays
         )
-        assert in_view(model, yaw, pitch, start, body) or not hit
+        assert in_view(model, pose_at(start, yaw, pitch), body) or not hit
 
 
 def test_a_body_behind_or_far_aside_is_not_in_view():
     model, start = sensor_model(RangeSensor()), np.array([3.5, 5.5, 2.5])
-    assert in_view(model, 0.0, 0.0, start, np.array([5.5, 5.5, 2.5, 0.1]))
-    assert not in_view(model, 0.0, 0.0, start, np.array([1.5, 5.5, 2.5, 0.1]))
-    assert not in_view(model, 0.0, 0.0, start, np.array([3.5, 7.5, 2.5, 0.1]))
-    assert in_view(model, math.pi / 2, 0.0, start, np.array([3.5, 7.5, 2.5, 0.1]))
-    assert in_view(model, 0.0, math.pi / 4, start, np.array([5.5, 5.5, 0.5, 0.1]))
-    assert not in_view(model, 0.0, -math.pi / 4, start, np.array([5.5, 5.5, 0.5, 0.1]))
+    assert in_view(model, pose_at(start, 0.0, 0.0), np.array([5.5, 5.5, 2.5, 0.1]))
+    assert not in_view(model, pose_at(start, 0.0, 0.0), np.array([1.5, 5.5, 2.5, 0.1]))
+    assert not in_view(model, pose_at(start, 0.0, 0.0), np.array([3.5, 7.5, 2.5, 0.1]))
+    assert in_view(model, pose_at(start, math.pi / 2, 0.0), np.array([3.5, 7.5, 2.5, 0.1]))
+    assert in_view(model, pose_at(start, 0.0, math.pi / 4), np.array([5.5, 5.5, 0.5, 0.1]))
+    assert not in_view(model, pose_at(start, 0.0, -math.pi / 4), np.array([5.5, 5.5, 0.5, 0.1]))
 
 
 def scene_with_a_teammate():
@@ -334,7 +331,7 @@ def test_a_noisy_measurement_says_what_its_noisy_distance_says(seed):
         assume(rocha04.is_generic(start, ray["direction"], SIZE, length))
         theirs = rocha04.trace(lambda v: False, start, ray["direction"], SIZE, length, 1, hit_at_longest=True)
         assert voxels_on(scan, index) == flat_index(theirs.voxels, SIZE)
-        assert ray["measured"] == pytest.approx(rocha04.measured_sigma(length * 0.5, 0.08, 0.006) ** -2)
+        assert ray["precision"] == pytest.approx(rocha04.measured_sigma(length * 0.5, 0.08, 0.006) ** -2)
 
 
 @pytest.mark.parametrize("voxel_size_m", [0.5, 0.25, 0.1, 0.08, 0.3])
@@ -344,12 +341,12 @@ def test_a_measurement_retold_influences_the_voxels_that_it_influenced_first(vox
     truth, start = random_cover(SIZE, 0.1, 1), np.array([3.4, 5.3, 2.6])
     scan = scan_of(truth, start, 0.3, 0.1, sensor, voxel_size_m)
     grid = Grid(SIZE, voxel_size_m)
-    told = new_scan(grid, [sensor], sensor.rays, 1)
+    told = new_scan(grid, [sensor], sensor.rays)
     for name in ("direction", "length", "returned"):
         told.rays[name] = scan.rays[name]
-    numbers = sensor_model(sensor).numbers[0]
+    params, place = sensor_model(sensor).params[0], tuple(start.tolist())
     for index in range(sensor.rays):
-        trace_measurement(told, index, numbers, SIZE, voxel_size_m, start, truth.ravel())
+        trace_measurement(told, index, params, SIZE, voxel_size_m, place, truth.ravel())
         assert voxels_on(told, index) == voxels_on(scan, index)
         assert told.rays[index]["free"] == scan.rays[index]["free"]
         assert told.coverage[index] == pytest.approx(scan.coverage[index], abs=1e-6)
