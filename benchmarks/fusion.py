@@ -73,7 +73,7 @@ def measure_room(grid: Grid, sensor: RangeSensor, scans: int, seed: int = 0) -> 
 @lean_kernel
 def fuse_measurements(
     scan: Scan,
-    numbers: np.void,
+    params: np.void,
     grid: tuple[tuple[int, int, int], float, np.ndarray],
     positions_m: np.ndarray,
     ends_m: np.ndarray,
@@ -84,7 +84,7 @@ def fuse_measurements(
 
     Args:
         scan: Working space for R rays.
-        numbers: SENSOR_NUMBERS.
+        params: SENSOR_PARAMS.
         grid: ((X, Y, Z) voxels, voxel edge in metres, (3,) origin in metres).
         positions_m: (S, 3) float64.
         ends_m: (S, R, 3) float64.
@@ -110,7 +110,7 @@ def fuse_measurements(
             ray.direction[0], ray.direction[1], ray.direction[2] = x / range_m, y / range_m, z / range_m
             ray.length = range_m / voxel_size_m
             ray.returned = _HIT
-            trace_measurement(scan, index, numbers, size, voxel_size_m, start, mean)
+            trace_measurement(scan, index, params, size, voxel_size_m, start, mean)
             voxels += ray.voxels
             scan.order[index] = index
         fuse_scan(scan, ends_m.shape[1], mean, precision)
