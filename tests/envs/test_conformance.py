@@ -194,7 +194,7 @@ def from_stash(before: Fault, missions: Missions, kept: dict[str, Any]) -> None:
 
 def lost_stream(before: Fault, missions: Missions, kept: dict[str, Any]) -> None:
     before(missions, kept)
-    missions.state.robots["sensor_chance"][:] = 1
+    missions.state.robots["sensor_rng"][:] = 1
 
 
 def busy_robots_listen(before: Fault, missions: Missions, boxes: np.ndarray, numbers: np.ndarray) -> Any:
@@ -210,12 +210,12 @@ def steps_before_reset(before: Fault, env: EntropyExploreEnv, actions: Any) -> A
 
 
 def counts_before_checking(before: Fault, env: EntropyExploreEnv, actions: Any) -> Any:
-    env.missions.state.missions["letters"] += 1
+    env.missions.state.missions["enqueued"] += 1
     try:
         found = before(env, actions)
     finally:
         pass
-    env.missions.state.missions["letters"] -= 1
+    env.missions.state.missions["enqueued"] -= 1
     return found
 
 
@@ -298,9 +298,9 @@ FAULTS: list[tuple[Any, str, Fault, str, str]] = [
     (EntropyExploreVectorEnv, "_observations", same_batch, "check_fresh", "vector call"),
     (Missions, "step", busy_robots_listen, "check_busy", "other actions"),
     (EntropyExploreEnv, "step", steps_before_reset, "check_call_order", "step before reset"),
-    (EntropyExploreEnv, "step", counts_before_checking, "check_call_order", "letters"),
+    (EntropyExploreEnv, "step", counts_before_checking, "check_call_order", "enqueued"),
     (EntropyExploreVectorEnv, "step", steps_after_the_end, "check_call_order", "after the end"),
-    (EntropyExploreEnv, "step", counts_before_checking, "check_bad_actions", "letters"),
+    (EntropyExploreEnv, "step", counts_before_checking, "check_bad_actions", "enqueued"),
     (ActionChecker, "batch", clips, "check_bad_actions", "accepted"),
     (ActionChecker, "table", clips_table, "check_bad_actions", "vector"),
     (ActionChecker, "batch", names_nobody, "check_bad_actions", "not named"),

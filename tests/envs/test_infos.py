@@ -21,12 +21,12 @@ FLAT_GRID = Grid((9, 6, 1), 0.5, (-1.0, 2.0, 0.0))
 def sensible_moves(view: RobotView) -> list[bool]:
     """Slowly, by the definition: inside, within reach, not believed covered; to stay always is."""
     grid, sensible = view.scenario.grid, []
-    for move in view.rules.moves:
+    for move in view.rules.actions.moves:
         voxel = grid.voxel_of(view.pose[:3]) + move
         inside = bool((voxel >= 0).all() and (voxel < grid.shape).all())
-        way = grid.centre_of(voxel) - view.pose[:3]
+        offset = grid.centre_of(voxel) - view.pose[:3]
         near = (
-            math.sqrt(float((way[: 2 if view.scenario.planar else 3] ** 2).sum()))
+            math.sqrt(float((offset[: 2 if view.scenario.planar else 3] ** 2).sum()))
             <= view.scenario.robot.reach_m + 1e-6
         )
         stays = not move.any()
@@ -88,9 +88,9 @@ def test_masked_moves_arrive_in_an_empty_world_and_others_do_not(settings: dict[
     while env.agents:
         view, action = env.view("robot_0"), sampled(env, rng, infos, masked=len(ends) % 2 == 0)["robot_0"]
         allowed = infos["robot_0"]["action_mask"][action]
-        grid, gazes = view.scenario.grid, len(view.rules.gazes)
-        voxel = grid.voxel_of(view.pose[:3]) + view.rules.moves[action // gazes]
-        expected = np.array([*grid.centre_of(voxel), *view.rules.gazes[action % gazes]])
+        grid, gazes = view.scenario.grid, len(view.rules.actions.gazes)
+        voxel = grid.voxel_of(view.pose[:3]) + view.rules.actions.moves[action // gazes]
+        expected = np.array([*grid.centre_of(voxel), *view.rules.actions.gazes[action % gazes]])
         if view.scenario.planar:
             expected[2] = view.pose[2]
         infos = env.step({"robot_0": action})[4]
@@ -113,7 +113,9 @@ def test_masks_rule_out_what_is_believed_covered() -> None:
         infos = env.step(sampled(env, rng, infos, masked=True))[4]
         view, world = env.view("robot_0"), env.missions.worlds[0]
         assert world is not None
-        for move, allowed in zip(view.rules.moves, infos["robot_0"]["action_mask"][::15], strict=True):
+        for move, allowed in zip(
+            view.rules.actions.moves, infos["robot_0"]["action_mask"][::15], strict=True
+        ):
             voxel = view.scenario.grid.voxel_of(view.pose[:3]) + move
             if ((voxel >= 0) & (voxel < view.scenario.grid.shape)).all() and world.occupied[tuple(voxel)]:
                 solid += 1

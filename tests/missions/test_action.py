@@ -11,7 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from entropy_explore_env.errors import ActionError
-from entropy_explore_env.missions.action import action_space, decode_action, encode_viewpoint, write_mask
+from entropy_explore_env.missions.action import action_space, decode_action, encode_viewpoint
+from entropy_explore_env.missions.observation.mask import write_mask
 from entropy_explore_env.missions.rules import rules_of
 from entropy_explore_env.scenario import with_settings
 from entropy_explore_env.scenarios import BOX
@@ -27,9 +28,10 @@ def decode(rules, pose, action):
     viewpoint = np.full(5, np.nan)
     pose = np.asarray(pose, np.float64)
     if np.ndim(action) == 0:
-        decode_action(rules, 0, pose, np.zeros(5), int(action), viewpoint)
+        continuous, discrete = np.zeros(5), int(action)
     else:
-        decode_action(rules, 0, pose, np.asarray(action).astype(np.float64), 0, viewpoint)
+        continuous, discrete = np.asarray(action).astype(np.float64), 0
+    decode_action(rules.params[0], rules.actions, pose, continuous, discrete, viewpoint)
     return viewpoint
 
 
@@ -49,8 +51,8 @@ def test_continuous_actions_hold_a_viewpoint_up_to_rounding(seed, motion, reach_
     if planar:
         wanted[2] = pose[2]
     if math.isfinite(reach_m):
-        way = wanted[:3] - pose[:3]
-        wanted[:3] = pose[:3] + way / np.linalg.norm(way) * rng.uniform(0.0, reach_m)
+        move = wanted[:3] - pose[:3]
+        wanted[:3] = pose[:3] + move / np.linalg.norm(move) * rng.uniform(0.0, reach_m)
     else:  # from the centre of the first voxel to that of the last
         low, half = np.asarray(ODD_GRID.origin_m), 0.5 * ODD_GRID.voxel_size_m
         axes = slice(0, 2 if planar else 3)
@@ -80,13 +82,15 @@ def test_a_continuous_action_never_reaches_beyond_the_reach(seed, motion):
     pose = a_pose(ODD_GRID, rng, motion == "planar")
     for box in (np.sign(rng.uniform(-1, 1, space.shape)), rng.uniform(-1, 1, space.shape)):
         got = decode(rules, pose, box)
-        way, axes = got[:3] - pose[:3], len(box) - (1 if motion == "planar" else 2)
-        assert np.linalg.norm(way) <= 0.7 * (1 + 2e-6)
-        along = way[:axes] @ box[:axes]
-        assert along == pytest.approx(np.linalg.norm(way) * np.linalg.norm(box[:axes]))  # the same direction
+        driven, axes = got[:3] - pose[:3], len(box) - (1 if motion == "planar" else 2)
+        assert np.linalg.norm(driven) <= 0.7 * (1 + 2e-6)
+        along = driven[:axes] @ box[:axes]
+        assert along == pytest.approx(
+            np.linalg.norm(driven) * np.linalg.norm(box[:axes])
+        )  # the same direction
         assert got[3] == pytest.approx(box[axes] * math.pi)
         if motion == "planar":
-            assert (way[2], got[4]) == (0.0, 0.0)
+            assert (driven[2], got[4]) == (0.0, 0.0)
     # A viewpoint farther away is pulled onto the reach.
     wanted = pose + np.array([2.0, -1.0, 0.0, 0.0, 0.0])
     got = decode(rules, pose, encode_viewpoint(rules, pose, wanted))
@@ -209,33 +213,35 @@ def test_the_mask_marks_moves_to_voxels_inside_within_reach_and_not_believed_cov
     gazes = 3 if motion == "planar" else 6
     mean = rng.choice(np.array([0.0, 0.5, 0.51, 1.0], np.float32), grid.shape)
     start = np.array([rng.uniform(0, n) for n in grid.shape])
-    mask = np.full(len(rules.moves) * gazes, 7, np.float32)
-    write_mask(rules, 0, start, mean.ravel(), mask)
+    mask = np.full(len(rules.actions.moves) * gazes, 7, np.float32)
+    write_mask(rules.params[0], rules.actions, tuple(start.tolist()), mean.ravel(), mask)
     pose = np.array([*start * 0.5, 0.0, 0.0])
     for move, marks in enumerate(mask.reshape(-1, gazes)):
-        voxel = np.floor(start).astype(int) + rules.moves[move]
+        voxel = np.floor(start).astype(int) + rules.actions.moves[move]
         inside = (voxel >= 0).all() and (voxel < grid.shape).all()
-        way = (voxel + 0.5 - start) * 0.5
+        offset = (voxel + 0.5 - start) * 0.5
         if motion == "planar":
-            way[2] = 0.0
-        near = np.linalg.norm(way) <= 1.0 + 1e-6
+            offset[2] = 0.0
+        near = np.linalg.norm(offset) <= 1.0 + 1e-6
         sensible = move == 0 or bool(inside and near and mean[tuple(voxel)] <= 0.5)
         assert marks.tolist() == [float(sensible)] * gazes
         if sensible and move > 0:  # … and it leads to that voxel's centre
             got = decode(rules, pose, move * gazes)
             assert np.floor(got[:3] / 0.5).tolist() == voxel.tolist()
-    assert (rules.moves[0] == 0).all()
+    assert (rules.actions.moves[0] == 0).all()
 
 
 def test_moves_along_the_axes_are_to_stay_and_the_farthest_each_way():
     """7 × 11 × 5 voxels of 0.5 m: 1 m is two voxels; in a plane nobody changes height."""
     scenario = with_settings(BOX, {"action": {"kind": "discrete", "moves": "axes"}})
-    moves = {tuple(move) for move in rules_of(scenario).moves.tolist()}
+    moves = {tuple(move) for move in rules_of(scenario).actions.moves.tolist()}
     assert moves == {(0, 0, 0), (2, 0, 0), (-2, 0, 0), (0, 2, 0), (0, -2, 0), (0, 0, 2), (0, 0, -2)}
-    assert rules_of(scenario).moves[0].tolist() == [0, 0, 0]
+    assert rules_of(scenario).actions.moves[0].tolist() == [0, 0, 0]
     planar = with_settings(scenario, {"robot": {"motion": "planar"}})
-    assert {tuple(move) for move in rules_of(planar).moves.tolist()} == {
+    assert {tuple(move) for move in rules_of(planar).actions.moves.tolist()} == {
         move for move in moves if move[2] == 0
     }
     far = with_settings(scenario, {"robot": {"reach_m": 1000.0}})
-    assert (np.abs(rules_of(far).moves).max(axis=0) == [6, 10, 4]).all() and len(rules_of(far).moves) == 7
+    assert (np.abs(rules_of(far).actions.moves).max(axis=0) == [6, 10, 4]).all() and len(
+        rules_of(far).actions.moves
+    ) == 7

@@ -1,4 +1,4 @@
-"""Drives on planned ways by hand: poses and times, scans under way, what ends a drive early."""
+"""Drives on planned paths by hand: poses and times, scans under way, what ends a drive early."""
 
 from __future__ import annotations
 
@@ -71,19 +71,19 @@ def end_of(robot):
     return list(MoveEnd)[robot["move_end"]]
 
 
-def test_a_way_around_a_wall_is_driven_without_stopping_at_its_corners():
+def test_a_path_around_a_wall_is_driven_without_stopping_at_its_corners():
     """At 0.5 m/s and 0.5 m/s²: 1 s up, (L - ½)/½ s along, 1 s down; then 0.5 s for the scan."""
     missions = at_the_wall()
     robots = toward(missions, BEHIND)
-    robot, numbers = robots[0], missions.rules.numbers[0]
+    robot, params = robots[0], missions.rules.params[0]
     length = 2 * LEG + 1.0
     assert end_of(robot) is MoveEnd.ARRIVED
     assert (robot["waypoints"], robot["corners"], robot["blocked_moves"]) == (3, 2, 0)
-    assert robot["way"][:3] == pytest.approx(
+    assert robot["path"][:3] == pytest.approx(
         np.array([[1.25, 4.75, 0.25], [2.25, 4.75, 0.25], BEHIND[:3]]), abs=1e-6
     )
     assert robot["goal"] == pytest.approx(BEHIND, abs=1e-6)
-    assert robot["distance_m"] == pytest.approx(robot["way_m"]) == pytest.approx(length)
+    assert robot["distance_m"] == pytest.approx(robot["path_m"]) == pytest.approx(length)
     assert missions.state.missions[0]["time_s"] == pytest.approx(2.0 * length + 1.0 + 0.5)
     places = {
         0.0: (START[:2], 0),
@@ -96,15 +96,15 @@ def test_a_way_around_a_wall_is_driven_without_stopping_at_its_corners():
         2.0 * length + 1.5: (BEHIND[:2], 2),
     }
     for time_s, (place, passed) in places.items():
-        assert pose_at(numbers, robot, time_s)[:2] == pytest.approx(place, abs=1e-6), time_s
+        assert pose_at(params, robot, time_s)[:2] == pytest.approx(place, abs=1e-6), time_s
         if passed is not None:
-            assert place_at(numbers, robot, time_s)[3] == passed, time_s
+            assert place_at(params, robot, time_s)[3] == passed, time_s
 
 
 def test_scans_under_way_are_taken_after_so_many_metres_and_counted():
     """Every 2 m of 9.06 m: at 4.5, 8.5, 12.5 and 16.5 s, and on arrival after 19.12 + 0.5 s."""
     missions = at_the_wall(decision_period_s=0.25, sensor={**ALL_ROUND, "scan_every_m": 2.0})
-    robot, numbers, scans, poses = missions.state.robots[0, 0], missions.rules.numbers[0], [], []
+    robot, params, scans, poses = missions.state.robots[0, 0], missions.rules.params[0], [], []
     while not (robot["scans"] and robot["deciding"]):
         before = robot["scans"]
         assert missions.state.missions[0]["time_s"] < 25.0
@@ -117,7 +117,7 @@ def test_scans_under_way_are_taken_after_so_many_metres_and_counted():
     assert scans == [4.5, 8.5, 12.5, 16.5, 19.75]
     assert robot["ready_s"] == pytest.approx(2.0 * (2 * LEG + 1.0) + 1.5)
     for time_s, pose in zip(scans, poses, strict=True):
-        assert pose == pytest.approx(pose_at(numbers, robot, time_s))
+        assert pose == pytest.approx(pose_at(params, robot, time_s))
     along = np.array([0.5, 4.0]) / LEG
     assert poses[0][:2] == pytest.approx(np.array([0.75, 0.75]) + 2.0 * along)
     assert robot["gained_bits"] == pytest.approx(
@@ -164,7 +164,7 @@ def test_a_wall_seen_under_way_ends_the_drive_there_and_the_robot_decides_anew()
     assert robot["goal"] == pytest.approx([1.75, 1.75, 0.25, 0.5, 0.0])
     assert robot["target"] == pytest.approx(beyond, abs=1e-6)
     assert (robot["deciding"], robot["scans"], robot["blocked_moves"]) == (True, 1, 1)
-    assert robot["distance_m"] == pytest.approx(1.0) == pytest.approx(robot["way_m"])
+    assert robot["distance_m"] == pytest.approx(1.0) == pytest.approx(robot["path_m"])
     assert view_of(missions, 0, 0).pose == pytest.approx(robot["goal"])
     for _ in range(8):
         if end_of(toward(missions, beyond)[0]) is MoveEnd.ARRIVED:
@@ -173,7 +173,7 @@ def test_a_wall_seen_under_way_ends_the_drive_there_and_the_robot_decides_anew()
     assert end_of(robot) is MoveEnd.ARRIVED
 
 
-def test_the_end_of_a_way_counts_though_an_unseen_wall_ends_the_drive_before():
+def test_the_end_of_a_path_counts_though_an_unseen_wall_ends_the_drive_before():
     """The wall is where the plan leads, not where the drive would stop."""
     missions = started(planner(sensor={**ALL_ROUND, "scan_every_m": 1.0}))
     solid = np.zeros(FLAT.shape, bool)
@@ -182,12 +182,12 @@ def test_the_end_of_a_way_counts_though_an_unseen_wall_ends_the_drive_before():
     put(missions, 0, (1.75, 0.75, 0.25, 0.0, 0.0))
     beyond = (1.75, 5.25, 0.25, 0.5, 0.0)
     assert end_of(toward(missions, beyond)[0]) is MoveEnd.SEEN
-    robot = toward(missions, beyond)[0]  # now it knows that there is no way: up to the wall
+    robot = toward(missions, beyond)[0]  # now it knows that there is no path: up to the wall
     assert end_of(robot) is MoveEnd.NO_PATH
     assert robot["goal"][:3] == pytest.approx([1.75, 3.75, 0.25])
     assert robot["blocked_moves"] == 2
     robot = toward(missions, beyond)[0]  # nearer it cannot get
-    assert (end_of(robot), robot["way_m"]) == (MoveEnd.NO_PATH, 0.0)
+    assert (end_of(robot), robot["path_m"]) == (MoveEnd.NO_PATH, 0.0)
     assert robot["goal"] == pytest.approx([1.75, 3.75, 0.25, 0.5, 0.0])
 
 
@@ -202,7 +202,7 @@ def test_who_drives_straight_does_not_look_ahead():
     assert robot["goal"][1] == pytest.approx(3.75)
 
 
-def test_a_way_ends_before_what_the_robot_did_not_know_of():
+def test_a_path_ends_before_what_the_robot_did_not_know_of():
     missions = at_the_wall()
     solid = wall_with_a_gap()
     solid[5, 4] = True  # on the last leg: x = 5 there from y = 5.5 on
@@ -212,14 +212,14 @@ def test_a_way_ends_before_what_the_robot_did_not_know_of():
     assert (robot["corners"], robot["blocked_moves"]) == (2, 1)
     # It leaves (4.5, 9.5) towards (5.5, 1.5), enters x = 5 at y = 5.5, and voxel (5, 4) at y = 5.
     assert robot["goal"][:2] == pytest.approx([2.5 + 0.25 / 16, 2.5 + 0.25 / 2])
-    assert robot["way_m"] == pytest.approx(LEG + 1.0 + 4.25 / 8.0 * LEG)
-    assert robot["distance_m"] == pytest.approx(robot["way_m"])
+    assert robot["path_m"] == pytest.approx(LEG + 1.0 + 4.25 / 8.0 * LEG)
+    assert robot["distance_m"] == pytest.approx(robot["path_m"])
 
 
 @pytest.mark.parametrize(
     ("goal", "end", "height"), [(1.75, MoveEnd.NO_PATH, 1.25), (0.25, MoveEnd.GROUND, 0.75)]
 )
-def test_unknown_ground_ends_a_way_by_name_and_a_ceiling_is_known(monkeypatch, goal, end, height):
+def test_unknown_ground_ends_a_path_by_name_and_a_ceiling_is_known(monkeypatch, goal, end, height):
     """Ground that nobody knows of up to z = 0.5, and a ceiling at z = 1.5; the plan leads around a pillar."""
     grid = Grid((7, 11, 5), 0.5)
     ground = np.zeros(grid.shape, bool)
@@ -235,10 +235,10 @@ def test_unknown_ground_ends_a_way_by_name_and_a_ceiling_is_known(monkeypatch, g
     assert robot["waypoints"] > 1
     assert end_of(robot) is end
     assert robot["goal"][2] == pytest.approx(height, abs=0.25)
-    assert not missions.state.blocked[0].reshape(grid.shape)[tuple(grid.voxel_of(robot["goal"][:3]))]
+    assert not missions.state.collision[0].reshape(grid.shape)[tuple(grid.voxel_of(robot["goal"][:3]))]
 
 
-def test_a_teammate_on_a_later_leg_ends_the_way_before_it():
+def test_a_teammate_on_a_later_leg_ends_the_path_before_it():
     missions = started(planner(robots=2, robot={"body_radius_m": 0.2}))
     build(missions, wall_with_a_gap())
     know(missions, wall_with_a_gap())
@@ -251,7 +251,7 @@ def test_a_teammate_on_a_later_leg_ends_the_way_before_it():
 
 
 @pytest.mark.parametrize(("after_s", "end"), [(1.0, MoveEnd.TEAMMATE), (12.0, MoveEnd.ARRIVED)])
-def test_the_way_that_a_teammate_still_drives_is_closed_and_what_it_has_driven_is_free(after_s, end):
+def test_the_path_that_a_teammate_still_drives_is_closed_and_what_it_has_driven_is_free(after_s, end):
     """Robot 0 is sent around the wall and passes its second corner after 10.56 s; 1 wants to the first."""
     missions = started(planner(robots=2, robot={"body_radius_m": 0.2}, decision_period_s=0.5))
     build(missions, wall_with_a_gap())
@@ -270,22 +270,22 @@ def test_the_way_that_a_teammate_still_drives_is_closed_and_what_it_has_driven_i
         assert abs(x * 4.0 - y * 0.5) / LEG == pytest.approx(0.4, abs=1e-5)
 
 
-def test_a_view_shows_the_way_ahead_as_it_was_planned():
+def test_a_view_shows_the_path_ahead_as_it_was_planned():
     missions = at_the_wall(decision_period_s=2.0)
     solid = wall_with_a_gap()
     solid[5, 4] = True
     missions.state.truth[0] = solid.ravel()  # the drive will end early, which the robot does not know
-    assert view_of(missions, 0, 0).way.shape == (0, 3)
+    assert view_of(missions, 0, 0).path.shape == (0, 3)
     points = np.array([[1.25, 4.75, 0.25], [2.25, 4.75, 0.25], BEHIND[:3]])
     ahead = []
     for _ in range(8):
         toward(missions, BEHIND)
         view = view_of(missions, 0, 0)
-        ahead.append(len(view.way))
-        assert view.way == pytest.approx(points[3 - len(view.way) :], abs=1e-6)
-        view.way[...] = 7.0
+        ahead.append(len(view.path))
+        assert view.path == pytest.approx(points[3 - len(view.path) :], abs=1e-6)
+        view.path[...] = 7.0
     assert ahead == [3, 3, 3, 3, 2, 1, 1, 0]  # corners after 8.56 and 10.56 s; it decides at 15.8 s
     straight = started(free_box(decision_period_s=0.25))
     put(straight, 0, (1.75, 1.75, 1.25, 0.0, 0.0))
     toward(straight, (1.75, 2.75, 1.25, 0.0, 0.0), (0.25, 0.25, 0.25, 0.0, 0.0))
-    assert view_of(straight, 0, 0).way == pytest.approx(np.array([[1.75, 2.75, 1.25]]), abs=1e-6)
+    assert view_of(straight, 0, 0).path == pytest.approx(np.array([[1.75, 2.75, 1.25]]), abs=1e-6)

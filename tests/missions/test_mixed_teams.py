@@ -165,20 +165,20 @@ def test_bodies_of_two_sizes_by_hand():
         missions.worlds[0].layout(missions.scenario, kind).collision_mask for kind in missions.scenario.kinds
     ]
     assert not blocked[0].any() and blocked[1][0].all() and not blocked[1][1:-1, 1:-1, 1:-1].any()
-    np.testing.assert_array_equal(missions.state.blocked, [each.ravel() for each in blocked])
+    np.testing.assert_array_equal(missions.state.collision, [each.ravel() for each in blocked])
 
 
 @pytest.mark.parametrize("navigator", ["straight", "planned"])
 def test_bodies_of_many_sizes_never_overlap(navigator):
     kinds = [
-        RobotKind(dataclasses.replace(kind.robot, navigator=way, max_speed_m_s=speed), kind.sensor)
-        for kind, way, speed in zip(
+        RobotKind(dataclasses.replace(kind.robot, navigator=navigates, max_speed_m_s=speed), kind.sensor)
+        for kind, navigates, speed in zip(
             with_bodies(0.1, 0.24, 0.45), (navigator, "straight", navigator), (0.3, 0.9, 0.5), strict=True
         )
     ]
     missions = started(box_of(kinds, robots=6, world="furnished", decision_period_s=0.6), seed=5)
     radii = np.array([missions.scenario.kind_of(robot).robot.body_radius_m for robot in range(6)])
-    world, grid, numbers = missions.worlds[0], missions.grid, missions.rules.numbers
+    world, grid, params = missions.worlds[0], missions.grid, missions.rules.params
     blocked = [
         world.layout(missions.scenario, missions.scenario.kind_of(robot)).collision_mask > 0
         for robot in range(6)
@@ -188,7 +188,7 @@ def test_bodies_of_many_sizes_never_overlap(navigator):
     def look(_step):
         now_s, robots = missions.state.missions[0]["time_s"], missions.state.robots[0]
         for time_s in np.linspace(before_s[0], now_s, 5):
-            places = np.array([pose_at(numbers[a], robot, time_s)[:3] for a, robot in enumerate(robots)])
+            places = np.array([pose_at(params[a], robot, time_s)[:3] for a, robot in enumerate(robots)])
             apart = np.linalg.norm(places[:, None] - places[None], axis=-1) - radii[:, None] - radii
             closest[0] = min(closest[0], apart[np.triu_indices(6, 1)].min())
             for robot, voxel in enumerate(grid.voxel_of(places)):
@@ -211,11 +211,11 @@ def test_the_mask_and_the_actions_of_each_kind():
         missions, rules = started(scenario, seed=2), rules_of(scenario)
         for robot in range(2):
             put(missions, robot, [*missions.grid.centre_of([3, 5, 1 + robot]).tolist(), 0.0, 0.0])
-        masks = missions.action_masks()[0].reshape(2, len(rules.moves), 4, pitches)
+        masks = missions.action_masks()[0].reshape(2, len(rules.actions.moves), 4, pitches)
         ground, scout = masks
         assert ground.sum() == 5 * 4  # to stay, or a voxel ahead, back, left or right; a gaze a yaw
-        lengths = np.linalg.norm(rules.moves, axis=1)
-        assert not ground[(lengths > 1.0) | (rules.moves[:, 2] != 0)].any()
+        lengths = np.linalg.norm(rules.actions.moves, axis=1)
+        assert not ground[(lengths > 1.0) | (rules.actions.moves[:, 2] != 0)].any()
         assert scout.sum() == scout.shape[0] * 4 * pitches == 33 * 4 * pitches
         for robot, mask in enumerate(masks.reshape(2, -1)):
             view = view_of(missions, 0, robot)

@@ -57,7 +57,7 @@ CROWDS = {
 
 
 @pytest.mark.parametrize("crowd", CROWDS)
-def test_bodies_never_overlap_on_planned_ways(crowd):
+def test_bodies_never_overlap_on_planned_paths(crowd):
     """At any time within a step; with scans under way, which may end a drive, when a step ends."""
     missions = started(with_settings(CROWDS[crowd], {"ending": ENDLESS, "observation": NO_PARTS}), seed=6)
     grid, radius = missions.grid, missions.scenario.robot.body_radius_m
@@ -69,7 +69,7 @@ def test_bodies_never_overlap_on_planned_ways(crowd):
         nonlocal before_s, corners
         now_s = missions.state.missions[0]["time_s"]
         for time_s in np.linspace(now_s, before_s, looks, endpoint=False):
-            places = np.array([pose_at(missions.rules.numbers[0], robot, time_s)[:3] for robot in robots])
+            places = np.array([pose_at(missions.rules.params[0], robot, time_s)[:3] for robot in robots])
             apart = np.linalg.norm(places[:, None] - places[None], axis=-1)[np.triu_indices(len(places), 1)]
             closest[0] = min(closest[0], apart.min())
             assert apart.min() >= 2 * radius
@@ -88,7 +88,7 @@ def test_bodies_never_overlap_on_planned_ways(crowd):
 
 @pytest.mark.parametrize("radius_m", [0.0, 0.06])
 @pytest.mark.parametrize(("shape", "motion"), [((23, 31, 1), "planar"), ((13, 17, 9), "free")])
-def test_who_knows_the_world_is_stopped_by_nothing_on_a_planned_way(shape, motion, radius_m):
+def test_who_knows_the_world_is_stopped_by_nothing_on_a_planned_path(shape, motion, radius_m):
     """Also where voxel centres are not exact in metres: no rounding leads through a corner."""
     ends = Counter()
     robot = {**PLANNED, "motion": motion, "reach_m": math.inf, "body_radius_m": radius_m}
@@ -137,10 +137,11 @@ def test_the_memory_of_plans_is_not_pickled_and_taken_only_where_robots_plan():
     missions = started(WANDERERS)
     assert "_navigators" not in missions.__getstate__()
     straight = started(with_settings(WANDERERS, {"robot": {"navigator": "straight"}}))
-    assert not straight._navigators[0] and straight._balls is None
+    assert not straight._navigators[0] and straight._work[0].footprints.size == 0
+    assert missions._work[0].footprints.size > 0
 
 
-def test_messages_of_scans_under_way_find_room_in_the_mail():
+def test_messages_of_scans_under_way_find_free_slots():
     """A robot may then send far more often than it arrives."""
     settings = {"sensor": {"scan_every_m": 0.05}, "channel": {"delay_s": 3.0}}
     missions = started(with_settings(WANDERERS, settings))
@@ -188,7 +189,7 @@ def test_teams_that_plan_conform(in_this_process, scenario, robots, kind):
 
 @pytest.mark.parametrize("world", ["terrain", "terrain-rough"])
 def test_whoever_plans_knows_the_exposure_surface_and_never_meets_it(world):
-    """Flights to anywhere: those above the surface end below it with no way, and no drive runs into it."""
+    """Flights to anywhere: those above the surface end below it with no path, and no drive runs into it."""
     settings = {
         "grid": Grid((40, 30, 20), 1.0),
         "world": world,

@@ -8,15 +8,10 @@ import numpy as np
 import pytest
 
 from entropy_explore_env.belief.entropy import map_entropy_bits
-from entropy_explore_env.robots.range_sensor import (
-    RangeSensor,
-    Return,
-    fuse_scan,
-    new_scan,
-    sensor_model,
-    take_scan,
-)
-from entropy_explore_env.settings import Grid, gaussian_entropy_bits
+from entropy_explore_env.belief.map_update import fuse_scan
+from entropy_explore_env.belief.measurement_model import Return
+from entropy_explore_env.robots.range_sensor import Scene, SensorPose, new_scan, sensor_model, take_scan
+from entropy_explore_env.settings import Grid, RangeSensor, gaussian_entropy_bits
 from tests.reference import rocha04
 from tests.reference.scenes import as_reference, free_box, put, started, wander
 
@@ -233,9 +228,9 @@ def test_panorama_is_what_the_paper_s_equations_promise(mission):
             ray = rocha04.trace(
                 lambda v, mean=mean: mean[v] > 0.5, start, direction, size, longest, sensor.voxels_behind
             )
-            numbers = rocha04.Sensor(edge, sensor.sigma_min, sensor.sigma_slope_per_m)
+            reference = rocha04.Sensor(edge, sensor.sigma_min, sensor.sigma_slope_per_m)
             beliefs = as_reference(mean, precision)
-            promised = rocha04.integrate(beliefs, ray.voxels, start, ray.length * edge, True, numbers)
+            promised = rocha04.integrate(beliefs, ray.voxels, start, ray.length * edge, True, reference)
             if rocha04.is_blind(ray.end != rocha04.OPEN, ray.length * edge, sensor.min_range_m):
                 promised = 0.0
             if missions.scenario.observation.panorama_utility == "log2":
@@ -258,17 +253,16 @@ def test_panorama_is_what_a_scan_there_would_bring_if_the_belief_were_the_truth(
         voxels_behind=settings.voxels_behind,
         min_range_m=settings.min_range_m,
     )
-    model, scan = sensor_model(one_ray), new_scan(grid, [one_ray], 1, 1)
+    model, scan = sensor_model(one_ray), new_scan(grid, [one_ray], 1)
     for robot, part in enumerate(parts):
         start = (pose_of(missions, robot)[:3] - grid.origin_m) / grid.voxel_size_m
         truth = missions.mean[0, robot].ravel().copy()
+        scene, place = Scene(truth, grid.shape, grid.voxel_size_m, np.zeros((0, 4))), tuple(start.tolist())
         for gaze, bits, range_m in zip(
             panorama_gazes(missions), *part["panorama"].astype(float), strict=True
         ):
             mean, precision = truth.copy(), missions.precision[0, robot].ravel().copy()
-            take_scan(
-                scan, model, truth, grid.shape, grid.voxel_size_m, start, *gaze, 0, np.zeros(1, np.uint64)
-            )
+            take_scan(scan, model, scene, SensorPose(place, *map(float, gaze)), np.zeros(1, np.uint64))
             scan.order[0] = 0
             brought = fuse_scan(scan, 1, mean, precision)
             if missions.scenario.observation.panorama_utility == "log2":

@@ -79,7 +79,7 @@ def test_repeats_make_up_for_lost_messages():
 def test_a_lossless_broadcast_brings_what_sending_at_once_brings():
     """After the last phase all three hold the same measurements, in another order."""
     at_once, phased = played(80), played(80, phase_s=0.25)
-    unsent = phased.state.phase_waiting[0].sum()
+    unsent = phased.state.phase_counts[0].sum()
     assert unsent <= 6
     np.testing.assert_allclose(
         robots_of(at_once, "entropy_bits"), robots_of(phased, "entropy_bits"), rtol=0.02
@@ -93,8 +93,10 @@ def test_no_loss_is_drawn_twice_and_the_same_seed_gives_the_same_mission():
 
 def test_without_phases_no_state_is_kept_for_them():
     missions = started(free_box(robots=3))
-    assert missions.rules.phased is None
-    for name in ("phases", "phase_waiting", "phase_batches", "phase_rays", "phase_heard"):
+    wander(missions, 10, 0)
+    assert missions.rules.params["phase_s"].tolist() == [0.0] * 3
+    assert missions.state.phases.tolist() == [(0, 0)]
+    for name in ("phase_counts", "phase_batches", "phase_rays", "phase_heard"):
         assert getattr(missions.state, name).size == 0
 
 

@@ -22,7 +22,7 @@ def test_the_joint_map_is_scored_as_if_it_were_looked_at_whole(settings):
     for step in range(5):
         wander(missions, 12, step)
         mean, precision, truth = state.joint_mean[0], state.joint_precision[0], state.truth[0]
-        measured = precision > missions.rules.numbers[0]["prior_precision"]
+        measured = precision > missions.rules.params[0]["prior_precision"]
         whole = map_entropy_bits(precision.reshape(1, *missions.grid.shape))[0]
         assert clock["joint_bits"] == pytest.approx(whole, rel=1e-6)
         assert clock["explored"] == measured.sum() > 0
@@ -38,7 +38,7 @@ def test_the_joint_map_knows_what_all_robots_measured_and_no_more():
     """Without a channel it is the product of all robots' maps, one prior counted once."""
     missions = started(free_box(track_truth=True, channel={"burst": 0}), seed=2)
     wander(missions, 30, 0)
-    state, prior = missions.state, missions.rules.numbers[0]["prior_precision"]
+    state, prior = missions.state, missions.rules.params[0]["prior_precision"]
     together = state.precision[0].astype(np.float64).sum(axis=0) - (missions.scenario.robots - 1) * prior
     np.testing.assert_allclose(state.joint_precision[0], together, rtol=1e-5)
     assert clock_bits(missions) <= state.robots[0]["entropy_bits"].min()

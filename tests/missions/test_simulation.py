@@ -247,9 +247,9 @@ class Watch:
             assert (robots[field][~departed] == self.robots[field][~departed]).all()
         longest = robots["ready_s"] - robots["depart_s"]
         assert (longest >= self.missions.scenario.sensor.scan_time_s).all()
-        way = np.linalg.norm((robots["goal"] - robots["origin"])[:, :3], axis=1)
+        apart = np.linalg.norm((robots["goal"] - robots["origin"])[:, :3], axis=1)
         more = robots["distance_m"] - self.robots["distance_m"]
-        assert more == pytest.approx(np.where(departed, way, 0.0), abs=1e-9)
+        assert more == pytest.approx(np.where(departed, apart, 0.0), abs=1e-9)
         assert (robots["scans"] - self.robots["scans"])[robots["deciding"]].tolist() == [1] * robots[
             "deciding"
         ].sum()
@@ -281,7 +281,9 @@ class Watch:
         """Every message is heard once by each teammate, lost, out of range, or still under way."""
         waiting = sum(
             state["due_s"] < math.inf and to
-            for state, row in zip(self.missions.state.mail[0], self.missions.state.mail_to[0], strict=True)
+            for state, row in zip(
+                self.missions.state.in_flight[0], self.missions.state.in_flight_to[0], strict=True
+            )
             for to in row
         )
         arrived = robots["messages_received"].sum()
@@ -388,7 +390,7 @@ def test_bodies_never_overlap_and_never_stand_in_solid_voxels(crowd):
         nonlocal before_s
         now_s = missions.state.missions[0]["time_s"]
         for time_s in np.linspace(before_s, now_s, 9):
-            places = np.array([pose_at(missions.rules.numbers[0], robot, time_s)[:3] for robot in robots])
+            places = np.array([pose_at(missions.rules.params[0], robot, time_s)[:3] for robot in robots])
             apart = np.linalg.norm(places[:, None] - places[None], axis=-1)[np.triu_indices(len(places), 1)]
             closest[0] = min(closest[0], apart.min())
             assert apart.min() >= 2 * radius
@@ -420,8 +422,8 @@ def test_the_scratch_space_holds_the_farthest_drive():
     sensor = {"max_range_m": 0.3, "field_of_view_rad": (0.0, 0.0)}
     missions = Missions(free_box(robot={"reach_m": math.inf}, sensor=sensor))
     needed = longest_crossing(*missions.grid.shape, math.inf, 1)
-    for scan in missions._scans:
-        assert min(len(scan.way), len(scan.way_entered)) >= needed
+    for work in missions._work:
+        assert min(len(work.drive.voxels), len(work.drive.entered)) >= needed
 
 
 def test_starts_are_voxel_centres_with_room_apart_from_each_other():

@@ -131,8 +131,8 @@ def test_range_noise_changes_neither_world_nor_starts_nor_loss():
     # As many messages were sent (whatever they are worth), so the same ones were lost.
     assert (both[0]["messages_sent"] == both[1]["messages_sent"]).all()
     assert (both[0]["messages_lost"] == both[1]["messages_lost"]).all()
-    assert (both[0]["channel_chance"] == both[1]["channel_chance"]).all()
-    assert (both[0]["sensor_chance"] != both[1]["sensor_chance"]).all()
+    assert (both[0]["channel_rng"] == both[1]["channel_rng"]).all()
+    assert (both[0]["sensor_rng"] != both[1]["sensor_rng"]).all()
 
 
 def test_episodes_after_a_reset_without_a_seed_go_on_from_the_last_seed():

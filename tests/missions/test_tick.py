@@ -39,9 +39,9 @@ def test_a_drive_takes_its_time_and_scans_at_its_end():
     assert missions.state.missions[0]["time_s"] == pytest.approx(3.5)
     assert robots["goal"][0] == pytest.approx([1.75, 2.75, 1.25, 1.0, -0.5], abs=1e-6)
     assert robots["distance_m"][0] == pytest.approx(1.0)
-    for time_s, way_m in ((0.0, 0.0), (1.0, 0.25), (1.5, 0.5), (2.0, 0.75), (3.0, 1.0), (3.5, 1.0)):
-        pose = pose_at(missions.rules.numbers[0], robots[0], time_s)
-        assert pose[:3] == pytest.approx([1.75, 1.75 + way_m, 1.25], abs=1e-6)
+    for time_s, driven_m in ((0.0, 0.0), (1.0, 0.25), (1.5, 0.5), (2.0, 0.75), (3.0, 1.0), (3.5, 1.0)):
+        pose = pose_at(missions.rules.params[0], robots[0], time_s)
+        assert pose[:3] == pytest.approx([1.75, 1.75 + driven_m, 1.25], abs=1e-6)
 
 
 def test_turning_happens_while_driving_and_may_take_longer():
@@ -50,10 +50,10 @@ def test_turning_happens_while_driving_and_may_take_longer():
     robots = toward(missions, (1.75, 2.75, 1.25, -2.0, 0.25))  # 1.2832 rad through straight behind
     turn_s = (2 * math.pi - 5.0) / 0.5
     assert missions.state.missions[0]["time_s"] == pytest.approx(max(turn_s, 3.0) + 0.5)
-    assert pose_at(missions.rules.numbers[0], robots[0], 0.2)[3] == pytest.approx(3.1)
-    assert pose_at(missions.rules.numbers[0], robots[0], 0.2)[4] == pytest.approx(0.1)
-    assert pose_at(missions.rules.numbers[0], robots[0], 0.5)[4] == pytest.approx(0.25)
-    yaw = pose_at(missions.rules.numbers[0], robots[0], 1.0)[3]
+    assert pose_at(missions.rules.params[0], robots[0], 0.2)[3] == pytest.approx(3.1)
+    assert pose_at(missions.rules.params[0], robots[0], 0.2)[4] == pytest.approx(0.1)
+    assert pose_at(missions.rules.params[0], robots[0], 0.5)[4] == pytest.approx(0.25)
+    yaw = pose_at(missions.rules.params[0], robots[0], 1.0)[3]
     assert (yaw - 3.5) % (2 * math.pi) == pytest.approx(0.0, abs=1e-9)
     slow = started(free_box(robots=1, robot={"turn_rate_rad_s": 0.1}))
     put(slow, 0, (1.75, 1.75, 1.25, 0.0, 0.0))
@@ -100,7 +100,7 @@ def test_a_robot_stays_between_ground_and_ceiling_and_says_which_of_them_stopped
     assert missions.state.scan_range_m[0, 0] == pytest.approx(1.75, rel=0.05)  # … and pass the ceiling
 
 
-def test_a_robot_stops_before_a_teammate_and_before_the_way_that_it_still_drives():
+def test_a_robot_stops_before_a_teammate_and_before_the_path_that_it_still_drives():
     missions = started(free_box(robot={"body_radius_m": 0.2}))
     put(missions, 0, (1.75, 1.25, 1.25, 0.0, 0.0))
     put(missions, 1, (1.75, 2.75, 1.25, 0.0, 0.0))
@@ -274,7 +274,7 @@ def test_delayed_messages_bring_what_immediate_ones_bring_but_later(world, senso
     assert all(late <= soon for soon, late in zip(soon_received, late_received, strict=True))
     assert soon_received[3] > late_received[3] > 0
     assert late_received[-1] == soon_received[-1] > 150
-    assert (late.state.mail["due_s"] == np.inf).all()
+    assert (late.state.in_flight["due_s"] == np.inf).all()
     for counted in ("messages_received", "measurements_received", "bits_received", "messages_sent"):
         assert (soon.state.robots[counted] == late.state.robots[counted]).all()
     np.testing.assert_allclose(late.precision, soon.precision, rtol=1e-5)

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from entropy_explore_env.belief.pooling import fresh_sums, new_cells, pool_belief
+from entropy_explore_env.belief.pooling import Pool, fresh_sums, new_cells, pool_belief
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.missions.view_observation import ViewObserver
 from entropy_explore_env.settings import Action, Observation
@@ -56,7 +56,7 @@ def test_pooling_a_whole_belief_adds_up() -> None:
     mean = rng.uniform(0, 1, size).astype(np.float32)
     precision = (10 ** rng.uniform(-4, 5, size)).astype(np.float32)
     sums, ends = np.full((2, 6), 7.0), (1e-3, 1e3)
-    pool_belief(cells, sums, ends, mean.ravel(), precision.ravel())
+    pool_belief(Pool(cells, sums, *ends), mean.ravel(), precision.ravel())
     expected = np.zeros((2, 6))
     for x, y, z in np.ndindex(size):
         cell = int(cells.x[x] + cells.y[y] + cells.z[z])
@@ -65,5 +65,5 @@ def test_pooling_a_whole_belief_adds_up() -> None:
         expected[1, cell] += mean[x, y, z]
     assert np.allclose(sums, expected)
     fresh = np.zeros((2, 6))
-    pool_belief(cells, fresh, ends, np.full(60, 0.5, np.float32), np.full(60, ends[0], np.float32))
+    pool_belief(Pool(cells, fresh, *ends), np.full(60, 0.5, np.float32), np.full(60, ends[0], np.float32))
     assert np.allclose(fresh, fresh_sums(cells))

@@ -1,4 +1,4 @@
-"""Robots whose way a teammate blocks: they decide anew at once, or stand still first; and what they send."""
+"""Robots whose path a teammate blocks: they decide anew at once, or stand still first; and what they send."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def test_a_robot_behind_a_teammate_scans_waits_and_then_decides():
     assert scans == [0, 0, 0, 0, 1, 1, 1, 1, 1]  # at 2.5 s, and no second one
     assert (robots["waiting"].tolist(), robots["blocked_moves"][0]) == ([True, False], 1)
     for time_s in (2.6, 3.0, 4.4, 4.5):
-        place = pose_at(missions.rules.numbers[0], robots[0], time_s)
+        place = pose_at(missions.rules.params[0], robots[0], time_s)
         assert place == pytest.approx((1.75, 3.25, 1.25, 0.0, 0.0), abs=1e-5)
     robots = toward(missions, HERE, STAY)
     assert not robots["waiting"][0]

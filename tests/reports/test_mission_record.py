@@ -46,7 +46,7 @@ def recorded(steps: int = 12, seed: int = 5, **changes) -> tuple[MissionRecord, 
     recorder.note()
     for _ in range(steps):
         boxes, numbers = random_actions(missions, rng)
-        given = numbers[0] if missions.rules.numbers[0]["discrete"] else boxes[0].astype(np.float32)
+        given = numbers[0] if missions.rules.params[0]["discrete"] else boxes[0].astype(np.float32)
         recorder.command(dict(zip(missions.scenario.agents, given, strict=True)))
         missions.step(boxes, numbers)
         recorder.note()

@@ -10,7 +10,7 @@ import pytest
 import torch
 
 from entropy_explore_env.errors import SettingError
-from entropy_explore_env.missions.observation import ObservationLayout
+from entropy_explore_env.missions.observation.layout import ObservationLayout
 from entropy_explore_env.scenario import Scenario, with_settings
 from entropy_explore_env.scenarios import find_scenario
 from training.checkpoints import PolicySettings
