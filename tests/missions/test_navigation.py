@@ -136,9 +136,10 @@ def test_threads_batches_and_pickling_change_nothing():
 def test_the_memory_of_plans_is_not_pickled_and_taken_only_where_robots_plan():
     missions = started(WANDERERS)
     assert "_navigators" not in missions.__getstate__()
-    straight = started(with_settings(WANDERERS, {"robot": {"navigator": "straight"}}))
+    wide = with_settings(WANDERERS, {"robot": {"body_radius_m": 0.4}})
+    assert Missions(wide)._work[0].footprints.size > 0
+    straight = Missions(with_settings(wide, {"robot": {"navigator": "straight"}}))
     assert not straight._navigators[0] and straight._work[0].footprints.size == 0
-    assert missions._work[0].footprints.size > 0
 
 
 def test_messages_of_scans_under_way_find_free_slots():
