@@ -10,9 +10,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from entropy_explore_env.belief.fields import Belief
+from entropy_explore_env.belief.map_update import fuse_scan
 from entropy_explore_env.belief.raycast import longest_crossing
 from entropy_explore_env.belief.visibility import CONE, cone_of
-from entropy_explore_env.robots.range_sensor import fuse_scan, new_scan, sensor_model, take_scan
+from entropy_explore_env.robots.range_sensor import Scene, SensorPose, new_scan, sensor_model, take_scan
 from entropy_explore_env.settings import Grid, RangeSensor
 from entropy_explore_env.viewpoints.expected_scan import ScanModel, expected_scan_bits, new_scan_scratch
 from tests.reference.scenes import (
@@ -71,9 +72,10 @@ def test_a_scan_brings_what_was_expected_where_the_belief_is_right_about_obstacl
     start = rng.uniform(0.5, np.array(SIZE) - 0.5)
     viewpoint = (*start, yaw, pitch)
     hoped = expected(truth, precision, viewpoint, model(sensor=sensor))
-    scan = new_scan(Grid(SIZE, 0.5), [sensor], sensor.rays, 1)
-    chance = np.zeros(1, np.uint64)
-    take_scan(scan, sensor_model(sensor), truth.ravel(), SIZE, 0.5, tuple(start), yaw, pitch, 0, chance)
+    scan = new_scan(Grid(SIZE, 0.5), [sensor], sensor.rays)
+    rng_state = np.zeros(1, np.uint64)
+    scene = Scene(truth.ravel(), SIZE, 0.5, np.zeros((0, 4)))
+    take_scan(scan, sensor_model(sensor), scene, SensorPose(tuple(start.tolist()), yaw, pitch), rng_state)
     scan.order[:] = np.arange(sensor.rays)
     brought = fuse_scan(scan, sensor.rays, truth.ravel().copy(), precision.ravel().copy())
     assert hoped == pytest.approx(brought, rel=2e-4)
