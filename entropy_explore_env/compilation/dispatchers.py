@@ -11,6 +11,7 @@ of them disappears, and pyproject.toml bounds Numba's versions to those that wer
 
 from __future__ import annotations
 
+import gc
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -58,15 +59,23 @@ def _compiling(function: Callable[..., Any], cache: KernelCache, sig: Any, targe
     Raises:
         numba.core.errors.TypingError: The kernel calls itself.
     """
-    if not _stack.kernels:
+    outermost = not _stack.kernels
+    if outermost:
         forget_parts()
     if any(compiling.function is function for compiling in _stack.kernels):
         raise errors.TypingError(f"kernel {function.__qualname__} calls itself; Numba's own njit allows that")
     _stack.kernels.append(_Compiling(function, cache.name_of(sig, target)))
+    collecting = outermost and gc.isenabled()
+    if (
+        collecting
+    ):  # a compiler makes many objects and few cycles: collecting them takes an eighth of its time
+        gc.disable()
     try:
         yield
     finally:
         _stack.kernels.pop()
+        if collecting:
+            gc.enable()
 
 
 class KernelCompiler(compiler.Compiler):

@@ -14,6 +14,8 @@ from entropy_explore_env.compilation.kernels import lean_kernel
 from entropy_explore_env.missions.state import PROGRESS
 
 _NOTHING = int(Return.NOTHING)
+_ADD, _REMOVE = np.int64(1), np.int64(-1)
+"""NumPy integers, so that `score_voxels` compiles for one type."""
 
 
 @lean_kernel
@@ -44,17 +46,17 @@ def score_scan(clock, joint, truth, scan, prior_precision):
         ray, crossed = scan.rays[index], scan.crossed[index]
         if ray.returned == _NOTHING:
             continue
-        score_voxels(clock, joint, truth, prior, crossed, ray.voxels, -1)
+        score_voxels(clock, joint, truth, prior, crossed, ray.voxels, _REMOVE)
         coverage = scan.coverage[index]
         clock.joint_bits -= fuse_ray(
             joint.mean, joint.precision, crossed, coverage, ray.free, ray.voxels, ray.precision
         )
-        score_voxels(clock, joint, truth, prior, crossed, ray.voxels, 1)
+        score_voxels(clock, joint, truth, prior, crossed, ray.voxels, _ADD)
 
 
 @lean_kernel
 def score_voxels(clock, joint, truth, prior, crossed, n, sign):
-    """Add (sign 1) or take away (-1) what `n` voxels contribute to the figures of the joint map."""
+    """Add (sign _ADD) or remove (_REMOVE) what `n` voxels contribute to the figures of the joint map."""
     mean, precision, visible = joint.mean, joint.precision, joint.visible
     for i in range(n):
         voxel = np.uint32(crossed[i])

@@ -106,7 +106,7 @@ def test_a_kernel_of_ones_own_may_call_one_of_the_library(tmp_path):
     made.mkdir()
     (made / "__init__.py").write_text("")
     code = (
-        "from entropy_explore_env.belief.coverage_map import measurement_precision\n"
+        "from entropy_explore_env.belief.measurement_model import measurement_precision\n"
         "from entropy_explore_env.compilation.kernels import kernel\n\n\n"
         "@kernel\ndef caller(x):\n    return measurement_precision(x, 0.5, 0.0) + {}\n"
     )

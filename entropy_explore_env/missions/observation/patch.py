@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from entropy_explore_env.belief.pooling import normalised_entropy
 from entropy_explore_env.belief.voxel_index import flat_index
 from entropy_explore_env.compilation.kernels import lean_kernel
@@ -38,7 +40,9 @@ def observe_patch(params, shape, robot, start, known, out):
                 inside = 0 <= x < size[0] and 0 <= y < size[1] and 0 <= z < size[2]
                 voxel = flat_index(size, x, y, z) if inside else 0
                 out[cell] = known.mean[voxel] if inside else 1.0
-                out[cells + cell] = normalised_entropy(prior, end, known.precision[voxel]) if inside else 0.0
+                out[cells + cell] = (
+                    normalised_entropy(prior, end, np.float64(known.precision[voxel])) if inside else 0.0
+                )
                 out[2 * cells + cell] = 0.0 if inside else 1.0
                 out[3 * cells + cell] = 0.0
     for mate in range(len(known.heard)):
