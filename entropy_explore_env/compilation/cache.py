@@ -30,7 +30,7 @@ from entropy_explore_env.compilation.folder import (
     partial_name,
     remove_old_kernels,
 )
-from entropy_explore_env.compilation.stamps import NoStampError, describe_types, stamp
+from entropy_explore_env.compilation.stamps import NoStampError, describe_type, stamp
 
 _FORMAT = 1
 """Of the files, and of what is done to a kernel; to be raised when `dispatchers` compiles in another way."""
@@ -76,7 +76,8 @@ class KernelCache(_Cache):
     def name_of(self, sig: Any, target_context: Any) -> str | None:  # noqa: ANN401
         """A digest of what the code for these types depends on; None = that is not known."""
         try:
-            described = [stamp(self._kernel), describe_types(sig)]
+            args, returned = _normal(sig)
+            described = [stamp(self._kernel), *map(describe_type, args), str(returned)]
         except NoStampError as error:
             announcement.explain_no_stamp(str(error))
             return None

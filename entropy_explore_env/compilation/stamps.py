@@ -18,6 +18,7 @@ import sys
 import types
 import weakref
 from collections.abc import Iterator
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -91,14 +92,15 @@ def _part(kernel: Dispatcher) -> _Part:
     return _Part(digest, description.calls)
 
 
-def describe_types(signature: Any) -> str:  # noqa: ANN401 - types of arguments, or a signature
-    """The types for which a kernel is compiled; NamedTuples and Enums with what they are made of.
+@lru_cache(maxsize=4096)
+def describe_type(kind: numba_types.Type) -> str:
+    """One of the types for which a kernel is compiled; NamedTuples and Enums with what they are made of.
 
     Raises:
         NoStampError: A class cannot be described.
     """
     description = _Description()
-    description.add_type(signature)
+    description.add_type(kind)
     return "\n".join(description.words)
 
 

@@ -16,7 +16,7 @@ from numba.core.dispatcher import Dispatcher
 
 import entropy_explore_env
 from entropy_explore_env.compilation import stamps
-from entropy_explore_env.compilation.stamps import NoStampError, describe_types, forget_parts, stamp
+from entropy_explore_env.compilation.stamps import NoStampError, describe_type, forget_parts, stamp
 
 SOURCE = '''"""A module."""
 import math
@@ -196,7 +196,7 @@ def test_types_are_described_with_what_they_are_made_of():
             "__name__": "mine",
         }
         exec(source, space)
-        return describe_types((numba.typeof(eval(value, space)),))
+        return describe_type(numba.typeof(eval(value, space)))
 
     point = "class Point(NamedTuple):\n    {}: float\n    {}: float\n"
     described = types_of(point.format("x", "y"), "Point(1.0, 2.0)")

@@ -150,14 +150,14 @@ def _most_utility_bits(scenario: Scenario, rules: Rules) -> float:
 
 
 class PartOffsets(NamedTuple):
-    """The layout for compiled code: where each part begins, -1 if it is left out."""
+    """The layout for compiled code: where each part begins; None if it is left out, and not compiled then."""
 
-    panorama: int
-    self_state: int
-    team: int
-    patch: int
-    overview: int
-    action_mask: int
+    panorama: int | None
+    self_state: int | None
+    team: int | None
+    patch: int | None
+    overview: int | None
+    action_mask: int | None
     patch_shape: tuple[int, int, int]
     kinds: int
     """K, of robots; 0 if all are alike."""
@@ -170,7 +170,7 @@ def part_offsets(scenario: Scenario, layout: ObservationLayout) -> PartOffsets:
     begin = {name: part.start for name, part in layout.parts.items()}
     patch = scenario.observation.patch_shape
     return PartOffsets(
-        *(begin.get(name, -1) for name in ("panorama", "self", "team", "patch", "overview", "action_mask")),
+        *(begin.get(name) for name in ("panorama", "self", "team", "patch", "overview", "action_mask")),
         patch_shape=(int(patch[0]), int(patch[1]), int(patch[2])),
         kinds=len(scenario.kinds) if len(scenario.kinds) > 1 else 0,
         while_busy=scenario.observation.while_busy,

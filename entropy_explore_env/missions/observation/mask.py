@@ -43,6 +43,23 @@ def write_mask(params, actions, start, mean, out):
 
 
 @lean_kernel
+def observe_mask(begin, params, actions, start, mean, row):
+    """Fill (K·D,): the mask as part of an observation.
+
+    Args:
+        begin: Where the part begins in `row`; None = it is left out.
+        params: PARAMS of the robot.
+        actions: ActionSet.
+        start: (x, y, z), the robot in grid units.
+        mean: (V,) float32, its expected coverage.
+        row: (F,) float32, the whole observation; the part is filled in.
+    """
+    if begin is None:  # known while compiling: nothing of the rest is compiled
+        return
+    write_mask(params, actions, start, mean, row[begin:])
+
+
+@lean_kernel
 def mask_missions(params, actions, missions, robots, mean, out):
     """Fill (E, A, N) int8, the masks of all robots' discrete actions.
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from entropy_explore_env.compilation.kernels import lean_kernel
-from entropy_explore_env.missions.observation.mask import write_mask
+from entropy_explore_env.missions.observation.mask import observe_mask
 from entropy_explore_env.missions.observation.overview import observe_overview
 from entropy_explore_env.missions.observation.own_state import observe_self
 from entropy_explore_env.missions.observation.panorama import observe_panorama
@@ -66,19 +66,12 @@ def observe_robot(rules, offsets, robot, known, crossing, out):
     """
     params, sensor = rules.params[robot], rules.sensors.params[robot]
     start = to_grid_units(params, known.pose)
-    if offsets.panorama >= 0:
-        part = out[offsets.panorama :]
-        observe_panorama(params, sensor, rules.panorama, start, known, crossing, part)
-    if offsets.self_state >= 0:
-        observe_self(params, offsets.kinds, known, out[offsets.self_state :])
-    if offsets.team >= 0:
-        observe_team(params, robot, known, out[offsets.team :])
-    if offsets.patch >= 0:
-        observe_patch(params, offsets.patch_shape, robot, start, known, out[offsets.patch :])
-    if offsets.overview >= 0:
-        observe_overview(rules.cells, known.pooled, out[offsets.overview :])
-    if offsets.action_mask >= 0:
-        write_mask(params, rules.actions, start, known.mean, out[offsets.action_mask :])
+    observe_panorama(offsets.panorama, params, sensor, rules.panorama, start, known, crossing, out)
+    observe_self(offsets.self_state, params, offsets.kinds, known, out)
+    observe_team(offsets.team, params, robot, known, out)
+    observe_patch(offsets.patch, params, offsets.patch_shape, robot, start, known, out)
+    observe_overview(offsets.overview, rules.cells, known.pooled, out)
+    observe_mask(offsets.action_mask, params, rules.actions, start, known.mean, out)
 
 
 @lean_kernel

@@ -8,14 +8,18 @@ OVERVIEW_CHANNELS = 2
 
 
 @lean_kernel
-def observe_overview(cells, sums, out):
+def observe_overview(begin, cells, sums, row):
     """Fill (2·C,): normalised entropy and expected coverage, averaged over each of the Cells.
 
     Args:
+        begin: Where the part begins in `row`; None = it is left out.
         cells: Cells.
         sums: (2, C) float64 over them.
-        out: Filled in.
+        row: (F,) float32, the whole observation; the part is filled in.
     """
+    if begin is None:  # known while compiling: nothing of the rest is compiled
+        return
+    out = row[begin:]
     count = len(cells.voxels)
     for cell in range(count):
         out[cell] = min(max(sums[0, cell] / cells.voxels[cell], 0.0), 1.0)

@@ -11,15 +11,19 @@ SELF_VALUES = 10
 
 
 @lean_kernel
-def observe_self(params, kinds, known, out):
+def observe_self(begin, params, kinds, known, row):
     """Fill (10 + K,): the robot's pose, the time, the entropy left, whether it decides, and its kind.
 
     Args:
+        begin: Where the part begins in `row`; None = it is left out.
         params: PARAMS of the robot.
         kinds: K; 0 if all robots are alike.
         known: Known of the robot.
-        out: Filled in.
+        row: (F,) float32, the whole observation; the part is filled in.
     """
+    if begin is None:  # known while compiling: nothing of the rest is compiled
+        return
+    out = row[begin:]
     for axis in range(3):
         extent = params.size[axis] * params.voxel_size_m
         out[axis] = min(max(2.0 * (known.pose[axis] - params.origin_m[axis]) / extent - 1.0, -1.0), 1.0)

@@ -15,17 +15,21 @@ PATCH_CHANNELS = 4
 
 
 @lean_kernel
-def observe_patch(params, shape, robot, start, known, out):
+def observe_patch(begin, params, shape, robot, start, known, row):
     """Fill (4·x·y·z,): the belief around the robot's voxel; outside the workspace it is covered.
 
     Args:
+        begin: Where the part begins in `row`; None = it is left out.
         params: PARAMS of the robot.
         shape: (x, y, z) voxels of the patch.
         robot: Its number.
         start: (x, y, z), the robot in grid units.
         known: Known of the robot.
-        out: Filled in.
+        row: (F,) float32, the whole observation; the part is filled in.
     """
+    if begin is None:  # known while compiling: nothing of the rest is compiled
+        return
+    out = row[begin:]
     size = grid_size(params)
     prior, end = params.prior_precision, params.end_precision
     cells = shape[0] * shape[1] * shape[2]

@@ -12,15 +12,19 @@ _HALF_LIFE_S = 60.0
 
 
 @lean_kernel
-def observe_team(params, robot, known, out):
+def observe_team(begin, params, robot, known, row):
     """Fill ((A-1)·19,): where teammates were last heard, and what they announced.
 
     Args:
+        begin: Where the part begins in `row`; None = it is left out.
         params: PARAMS of the robot.
         robot: Its number.
         known: Known of the robot.
-        out: Filled in.
+        row: (F,) float32, the whole observation; the part is filled in.
     """
+    if begin is None:  # known while compiling: nothing of the rest is compiled
+        return
+    out = row[begin:]
     for number in range((len(known.heard) - 1) * TEAMMATE_VALUES):
         out[number] = 0.0
     diagonal = 0.0
