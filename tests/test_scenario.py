@@ -85,6 +85,7 @@ REFUSED = {
     ),
     (RangeSensor, "angular_step_rad"): (*POSITIVE, INF, 1e-5, 1e-320),
     (RangeSensor, "max_range_m"): POSITIVE,
+    (RangeSensor, "min_range_m"): (*NOT_NEGATIVE, INF),
     (RangeSensor, "sigma_min"): (*POSITIVE, INF, 0.9e-4, 1.1e4),
     (RangeSensor, "sigma_slope_per_m"): NOT_NEGATIVE,
     (RangeSensor, "range_noise_m"): NOT_NEGATIVE,

@@ -32,7 +32,7 @@ from entropy_explore_env.compilation.folder import (
 )
 from entropy_explore_env.compilation.stamps import NoStampError, describe_type, stamp
 
-_FORMAT = 1
+_FORMAT = 2
 """Of the files, and of what is done to a kernel; to be raised when `dispatchers` compiles in another way."""
 _DIGEST_BYTES = 32
 _SETTINGS = ("OPT", "BOUNDSCHECK", "LOOP_VECTORIZE", "SLP_VECTORIZE", "DEBUGINFO_DEFAULT", "ENABLE_PROFILING")

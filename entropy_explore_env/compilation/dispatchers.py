@@ -3,7 +3,7 @@
 Numba makes machine code and two wrappers of each function, also of those which only other compiled functions
 call. For a tree of a hundred kernels that is more than half of the time to compile it. So a kernel has two
 forms. `Kernel` is what Python calls. Where another kernel calls it, Numba is given its `InnerKernel`, which
-stops at LLVM's unoptimised intermediate code. The outermost kernel is optimised and translated as a whole.
+stops at LLVM's intermediate code. The outermost kernel is optimised and translated as a whole.
 
 This builds on parts of Numba which it does not document. tests/compilation/test_dispatchers.py fails when one
 of them disappears, and pyproject.toml bounds Numba's versions to those that were tested.
@@ -106,13 +106,27 @@ class InnerKernelCompiler(KernelCompiler):
 
 
 class InnerLibrary(JITCodeLibrary):
-    """The intermediate code of an inner kernel and of all that it calls: not optimised, not translated."""
+    """The intermediate code of an inner kernel and of all that it calls: not translated.
+
+    It is optimised with the outermost kernel. Inlined kernels, the innermost loops, are optimised before
+    that, too: code that was optimised once traces rays 10 % slower.
+    """
+
+    optimised = False
+    """Whether it is an inlined kernel."""
 
     def enable_object_caching(self) -> None:
         """There is no object code."""
 
+    def _optimize_functions(self, ll_module: Any) -> None:  # noqa: ANN401
+        if self.optimised:
+            super()._optimize_functions(ll_module)
+        else:
+            ll_module.data_layout = self._codegen._data_layout
+
     def _optimize_final_module(self) -> None:
-        """The outermost kernel is optimised, and this with it."""
+        if self.optimised:
+            super()._optimize_final_module()
 
     def _finalize_final_module(self) -> None:
         self._finalize_dynamic_globals()
@@ -141,6 +155,7 @@ class InnerLowering(NativeLowering):
     def run_pass(self, state: Any) -> bool:  # noqa: ANN401 - Numba's bag of everything
         """Lower, and give the result an entry point that is only a name for it."""
         state.library = InnerLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
+        state.library.optimised = state.flags.forceinline
         state.flags.no_compile = True
         super().run_pass(state)
         state.library._ensure_finalized()

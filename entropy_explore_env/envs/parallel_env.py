@@ -16,8 +16,8 @@ from entropy_explore_env.envs.checks import ActionChecker
 from entropy_explore_env.envs.infos import robot_infos
 from entropy_explore_env.envs.rewards import RewardFunction, StepRewards
 from entropy_explore_env.errors import ActionError, CallOrderError, SettingError
-from entropy_explore_env.missions import observation
 from entropy_explore_env.missions.action import action_space
+from entropy_explore_env.missions.observation import layout
 from entropy_explore_env.missions.reset_options import mission_options, named_options
 from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.missions.state import MissionEnd
@@ -27,14 +27,14 @@ from entropy_explore_env.scenario import Scenario
 from entropy_explore_env.scenarios import find_scenario
 from entropy_explore_env.worlds.given import with_given_worlds
 
-_PARTS = (observation.__doc__ or "").partition("\n\n")[2]
-"""The parts of an observation, their shapes and units, as `missions.observation` describes them."""
+_PARTS = (layout.__doc__ or "").partition("\n\n")[2]
+"""The parts of an observation, their shapes and units, as `missions.observation.layout` describes them."""
 
 
 class EntropyExploreEnv(ParallelEnv[str, Any, Any]):
     """One mission of a team; agents are robot_0, robot_1 and so on.
 
-    Every robot has the same spaces (see `missions.observation` and `missions.action`). A robot that
+    Every robot has the same spaces (see `missions.observation.layout` and `missions.action`). A robot that
     is driving or scanning is busy: its action is ignored, and `infos[agent]["deciding"]` says for
     the next step whether it will count. All robots end together: terminated when the map's entropy
     reached the threshold, truncated at the limit of time or steps. `envs.infos` lists the infos.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import NamedTuple
 
@@ -14,7 +14,8 @@ from entropy_explore_env.belief.map_update import PRIOR_MEAN
 from entropy_explore_env.belief.pooling import fresh_sums
 from entropy_explore_env.belief.raycast import Crossing
 from entropy_explore_env.compilation.announcement import end_of_step
-from entropy_explore_env.errors import CallOrderError
+from entropy_explore_env.compilation.kernels import entry_point
+from entropy_explore_env.errors import ActionError, CallOrderError
 from entropy_explore_env.missions.navigation import Planning, plan_missions
 from entropy_explore_env.missions.observation.layout import ObservationLayout, part_offsets
 from entropy_explore_env.missions.observation.mask import mask_missions
@@ -53,8 +54,19 @@ class Start(NamedTuple):
     """What of it was given."""
 
 
+class _Calls(NamedTuple):
+    """The compiled calls of a step, bound to the arrays of their missions."""
+
+    state: MissionState
+    planning: Planning
+    observed: Observed
+    step: Callable[..., None] | None
+    """None = not called yet, like the next one."""
+    observe: Callable[..., None] | None
+
+
 class Missions:
-    """E missions of one scenario, advanced together by one compiled call.
+    """E missions of one scenario, advanced together by compiled calls.
 
     A single mission is a batch of one. Results do not depend on how many missions there are, on
     the number of threads, or on what other missions do.
@@ -111,6 +123,7 @@ class Missions:
 
     def _make_working_space(self) -> None:
         """Scratch memory for each thread and, where robots plan, navigators; none of it is state."""
+        self._calls: _Calls | None = None
         self._navigators = [new_navigators(self.scenario) for _ in range(self.threads)]
         self._work: list[Workspace] = [
             new_workspace(self.scenario, navigators) for navigators in self._navigators
@@ -261,17 +274,25 @@ class Missions:
         """Advance every mission that is not over by one step.
 
         Args:
-            continuous: (E, A, N) float64 actions; ignored where actions are discrete.
-            discrete: (E, A) int64 actions; ignored where they are continuous.
+            continuous: (E, A, N) actions; ignored where actions are discrete.
+            discrete: (E, A) actions; ignored where they are continuous.
 
         Returns:
             (E, A, F) float32 observations; overwritten by the next call.
 
         Raises:
             CallOrderError: A mission was never reset.
+            ActionError: The shapes are others.
         """
         if min(self.episodes) < 0:
             raise CallOrderError("step before reset: call reset() first")
+        continuous = np.ascontiguousarray(continuous, np.float64)
+        discrete = np.ascontiguousarray(discrete, np.int64)
+        team = (self.count, self.scenario.robots)
+        if continuous.ndim != 3 or continuous.shape[:2] != team or discrete.shape != team:
+            raise ActionError(
+                "actions", (continuous.shape, discrete.shape), f"shapes {team} (, N) and {team}"
+            )
         if self.threads == 1:
             self._step_range(0, 0, self.count, continuous, discrete)
         else:
@@ -282,32 +303,36 @@ class Missions:
     def _step_range(
         self, thread: int, first: int, last: int, continuous: np.ndarray, discrete: np.ndarray
     ) -> None:
-        rules, state, work = self.rules, self.state, self._work[thread]
-        if self._navigators[thread]:
-            planning = Planning(
-                rules.params,
-                rules.actions,
-                state.missions,
-                state.robots,
-                state.mean,
-                state.precision,
-                self._no_fly,
-            )
-            for kind, navigator in self._navigators[thread].items():
-                plan_missions(planning, navigator, kind, continuous, discrete, first, last)
-        step_missions(rules, state, work, continuous, discrete, first, last)
+        calls, work = self._bound_calls(), self._work[thread]
+        for kind, navigator in self._navigators[thread].items():
+            plan_missions(calls.planning, navigator, kind, continuous, discrete, first, last)
+        if calls.step is None:
+            arguments = (self.rules, self.state, work, continuous, discrete, first, last)
+            self._calls = calls = calls._replace(step=entry_point(step_missions, *arguments))
+        calls.step(self.rules, self.state, work, continuous, discrete, first, last)
         self._observe(thread, first, last)
 
     def _observe(self, thread: int, first: int, last: int) -> None:
         """Write the observations of the missions `first` … `last` - 1."""
         if not self.layout.size:
             return
-        state, scan = self.state, self._work[thread].scan
-        observed = Observed(
-            state.missions, state.robots, state.heard, state.mean, state.precision, state.pooled
-        )
+        calls, scan = self._bound_calls(), self._work[thread].scan
         crossing = Crossing(scan.crossed[0], scan.entered)
-        observe_missions(self.rules, self._offsets, observed, crossing, first, last, self.observations)
+        arguments = (self.rules, self._offsets, calls.observed, crossing, first, last, self.observations)
+        if calls.observe is None:
+            self._calls = calls = calls._replace(observe=entry_point(observe_missions, *arguments))
+        calls.observe(*arguments)
+
+    def _bound_calls(self) -> _Calls:
+        """What a step calls, for the arrays as they are: some are replaced when a world has a ceiling."""
+        calls, state = self._calls, self.state
+        if calls is None or calls.state is not state or calls.planning.no_fly is not self._no_fly:
+            params, actions = self.rules.params, self.rules.actions
+            shown = (state.missions, state.robots)
+            planning = Planning(params, actions, *shown, state.mean, state.precision, self._no_fly)
+            observed = Observed(*shown, state.heard, state.mean, state.precision, state.pooled)
+            self._calls = calls = _Calls(state, planning, observed, None, None)
+        return calls
 
     def _step_threaded(self, continuous: np.ndarray, discrete: np.ndarray) -> None:
         """Share the missions among threads: each takes the next chunk as soon as it is free."""
@@ -344,7 +369,7 @@ class Missions:
     def __getstate__(self) -> dict[str, object]:
         """All but the threads and their scratch space."""
         kept = dict(self.__dict__)
-        del kept["_pool"], kept["_work"], kept["_navigators"]
+        del kept["_pool"], kept["_work"], kept["_navigators"], kept["_calls"]
         return kept
 
     def __setstate__(self, kept: dict[str, object]) -> None:

@@ -86,7 +86,7 @@ def test_a_path_whose_first_stop_is_out_of_sight_is_not_taken(monkeypatch):
 
     def stops(*_):
         asked.append(1)
-        return [np.array([3.5, 3.5, 3.5, 0.0, 0.0])]
+        return [np.array([3.5, 3.5, 3.5])]
 
     monkeypatch.setattr(strategy, "_stops_to_a_better_place", stops)
     strategy._plans[0].best_bits, strategy._plans[0].patience = 1e9, 0
