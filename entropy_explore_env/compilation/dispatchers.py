@@ -108,8 +108,8 @@ class InnerKernelCompiler(KernelCompiler):
 class InnerLibrary(JITCodeLibrary):
     """The intermediate code of an inner kernel and of all that it calls: not translated.
 
-    It is optimised with the outermost kernel. Inlined kernels, the innermost loops, are optimised before
-    that, too: code that was optimised once traces rays 10 % slower.
+    It is simplified function by function, and optimised with the outermost kernel. Inlined kernels, the
+    innermost loops, are optimised before that, too: code that was optimised once traces rays 10 % slower.
     """
 
     optimised = False
@@ -117,12 +117,6 @@ class InnerLibrary(JITCodeLibrary):
 
     def enable_object_caching(self) -> None:
         """There is no object code."""
-
-    def _optimize_functions(self, ll_module: Any) -> None:  # noqa: ANN401
-        if self.optimised:
-            super()._optimize_functions(ll_module)
-        else:
-            ll_module.data_layout = self._codegen._data_layout
 
     def _optimize_final_module(self) -> None:
         if self.optimised:
