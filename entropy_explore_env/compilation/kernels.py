@@ -49,4 +49,5 @@ def entry_point(compiled: Any, *arguments: Any) -> Callable[..., Any]:  # noqa: 
         return compiled
     types = tuple(typeof(argument) for argument in arguments)
     known = compiled.overloads.get(types)
-    return compiled.compile(types) if known is None else known.entry_point
+    found: Any = compiled.compile(types) if known is None else known.entry_point
+    return found

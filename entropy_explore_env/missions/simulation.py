@@ -306,10 +306,11 @@ class Missions:
         calls, work = self._bound_calls(), self._work[thread]
         for kind, navigator in self._navigators[thread].items():
             plan_missions(calls.planning, navigator, kind, continuous, discrete, first, last)
-        if calls.step is None:
-            arguments = (self.rules, self.state, work, continuous, discrete, first, last)
-            self._calls = calls = calls._replace(step=entry_point(step_missions, *arguments))
-        calls.step(self.rules, self.state, work, continuous, discrete, first, last)
+        arguments, step = (self.rules, self.state, work, continuous, discrete, first, last), calls.step
+        if step is None:
+            step = entry_point(step_missions, *arguments)
+            self._calls = calls._replace(step=step)
+        step(*arguments)
         self._observe(thread, first, last)
 
     def _observe(self, thread: int, first: int, last: int) -> None:
@@ -319,9 +320,11 @@ class Missions:
         calls, scan = self._bound_calls(), self._work[thread].scan
         crossing = Crossing(scan.crossed[0], scan.entered)
         arguments = (self.rules, self._offsets, calls.observed, crossing, first, last, self.observations)
-        if calls.observe is None:
-            self._calls = calls = calls._replace(observe=entry_point(observe_missions, *arguments))
-        calls.observe(*arguments)
+        observe = calls.observe
+        if observe is None:
+            observe = entry_point(observe_missions, *arguments)
+            self._calls = calls._replace(observe=observe)
+        observe(*arguments)
 
     def _bound_calls(self) -> _Calls:
         """What a step calls, for the arrays as they are: some are replaced when a world has a ceiling."""
