@@ -11,15 +11,19 @@ EXAMPLES = re.findall(r"```python\n(.*?)```", README, flags=re.DOTALL)
 
 
 def test_there_is_an_example_for_each_interface():
-    assert len(EXAMPLES) == 5
+    assert len(EXAMPLES) == 6
     assert "parallel_env" in EXAMPLES[0]
     assert "gymnasium.make(" in EXAMPLES[1]
     assert "gymnasium.make_vec(" in EXAMPLES[2]
-    assert "RobotKind(" in EXAMPLES[3]
-    assert "world=world" in EXAMPLES[4]
+    assert "reward_function=" in EXAMPLES[3]
+    assert "RobotKind(" in EXAMPLES[4]
+    assert "world=world" in EXAMPLES[5]
 
 
-@pytest.mark.parametrize("example", EXAMPLES, ids=["pettingzoo", "gymnasium", "vector", "mixed", "world"])
+NAMES = ("pettingzoo", "gymnasium", "vector", "reward", "mixed", "world")
+
+
+@pytest.mark.parametrize("example", EXAMPLES, ids=NAMES)
 def test_example_runs(example, capsys):
     exec(compile(example, "README.md", "exec"), {})  # the README is ours
     assert capsys.readouterr().out
