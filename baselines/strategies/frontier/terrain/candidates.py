@@ -19,6 +19,7 @@ from baselines.strategies.frontier.terrain.map import (
     update_terrain,
 )
 from baselines.strategies.frontier.terrain.visibility import (
+    ColumnCounts,
     ViewModel,
     bound_columns,
     count_below,
@@ -105,14 +106,12 @@ class TerrainCandidates(Candidates[TerrainMap]):
 
     def count(self, slots: np.ndarray, voxels: np.ndarray) -> np.ndarray:
         """See `Candidates`."""
-        seen, weighed, factor = (np.empty(len(slots)) for _ in range(3))
+        counts = ColumnCounts(*(np.empty(len(slots)) for _ in range(3)))
         naive = self._config.visibility == "naive"
-        count_columns_from(
-            self._counter, self._map, voxels, self._azimuths, self._view_model, naive, seen, weighed, factor
-        )
-        factor = self._in_metres(factor)
-        self._map.seen[slots], self._factors[slots] = seen, np.maximum(factor, 1e-12)
-        return weighed * factor
+        count_columns_from(self._counter, self._map, voxels, self._azimuths, self._view_model, naive, counts)
+        factor = self._in_metres(counts.factor)
+        self._map.seen[slots], self._factors[slots] = counts.seen, np.maximum(factor, 1e-12)
+        return counts.weighed * factor
 
     def _in_metres(self, factor: np.ndarray) -> np.ndarray:
         """(K,) height factors; without, 1 where a candidate is low enough to be one."""

@@ -18,6 +18,17 @@ from baselines.strategies.frontier.voxel.visibility import count_point, grid_ind
 from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel
 
 
+class ColumnCounts(NamedTuple):
+    """What is seen from K places."""
+
+    seen: np.ndarray
+    """(K,) float64, columns."""
+    weighed: np.ndarray
+    """(K,) float64, columns weighed by promises."""
+    factor: np.ndarray
+    """(K,) float64, the height factor."""
+
+
 class ViewModel(NamedTuple):
     """How columns are seen from candidates; lengths in columns and layers."""
 
@@ -123,8 +134,8 @@ def count_columns_in_ball(counter, terrain, eye, average, view_model, marking):
 
 
 @lean_kernel
-def count_columns_from(counter, terrain, voxels, azimuths, view_model, naive, seen, weighed, factor):
-    """Fill (K,) with the columns seen from K voxels, weighed by promises, and the height factor of each.
+def count_columns_from(counter, terrain, voxels, azimuths, view_model, naive, counts):
+    """Count the columns seen from K voxels, also weighed by promises, and the height factor of each.
 
     The factor is (z_f - z_av)^γ z_f^(1 - γ), heights above the workspace's floor in layers (sect. 3.3); 0 for
     places so high above the ground that little of it can be seen, which are no candidates.
@@ -136,10 +147,9 @@ def count_columns_from(counter, terrain, voxels, azimuths, view_model, naive, se
         azimuths: (D, 2) float64.
         view_model: How columns are seen.
         naive: Whether columns in a ball are counted.
-        seen: (K,) filled in.
-        weighed: (K,) filled in.
-        factor: (K,) filled in.
+        counts: ColumnCounts, filled in.
     """
+    seen, weighed, factor = counts.seen, counts.weighed, counts.factor
     for place in range(len(voxels)):
         x, y, z = grid_indices(terrain.size, voxels[place])
         eye = (x + 0.5, y + 0.5, z + 0.5)

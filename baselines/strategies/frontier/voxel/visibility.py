@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from baselines.strategies.frontier.voxel.map import NONE, STOPS_RAYS, UNEXPLORED
-from baselines.strategies.frontier.voxel.ray_tree import cell_at
+from baselines.strategies.frontier.voxel.ray_tree import RayTree, cell_at
 from entropy_explore_env.belief.raycast import (
     ONE_BEHIND,
     OPEN_END,
@@ -179,6 +179,28 @@ def count_in_ball(counter, state, size, start, reach, marking):
     return points, weighed
 
 
+class _Rays(NamedTuple):
+    """Rays from any voxel, and what they go through."""
+
+    state: np.ndarray
+    """(V,) uint8 of a FrontierMap."""
+    size: tuple[int, int, int]
+    """(X, Y, Z) voxels."""
+    tree: RayTree
+    met: np.ndarray
+    """(C,) int32, the latest start whose rays met each cell of the tree."""
+
+
+class _Start(NamedTuple):
+    """The voxel in which rays start."""
+
+    voxel: np.int64
+    at: tuple[int, int, int]
+    """Its indices."""
+    place: int
+    """Its number in the call."""
+
+
 @lean_kernel
 def count_from(counter, state, size, voxels, tree, met, seen, weighed):
     """Fill (K,) `seen` with the points seen from K voxels' centres, (K,) `weighed` with the sums of weights.
@@ -188,23 +210,17 @@ def count_from(counter, state, size, voxels, tree, met, seen, weighed):
     """
     for cell in range(len(met)):
         met[cell] = -1
-    promises, nodes = counter.promised_count[0] > 0, len(tree.offset)
+    promises, nodes, rays = counter.promised_count[0] > 0, len(tree.offset), _Rays(state, size, tree, met)
     for place in range(len(voxels)):
         voxel = np.int64(voxels[place])
         at = grid_indices(size, voxel)
-        inside = _inside(tree, size, at)
+        inside, start = _inside(tree, size, at), _Start(voxel, at, place)
         if inside and not promises:
-            points, value = _count_branches(
-                counter, state, size, voxel, tree, at, met, place, 0, nodes, True, False
-            )
+            points, value = _count_branches(counter, rays, start, 0, nodes, True, False)
         elif inside:
-            points, value = _count_branches(
-                counter, state, size, voxel, tree, at, met, place, 0, nodes, True, True
-            )
+            points, value = _count_branches(counter, rays, start, 0, nodes, True, True)
         else:
-            points, value = _count_branches(
-                counter, state, size, voxel, tree, at, met, place, 0, nodes, False, True
-            )
+            points, value = _count_branches(counter, rays, start, 0, nodes, False, True)
         seen[place], weighed[place] = points, value
 
 
@@ -218,12 +234,13 @@ def _inside(tree, size, at):
 
 
 @inlined_kernel
-def _count_branches(counter, state, size, voxel, tree, at, met, place, first, last, inside, promises):
+def _count_branches(counter, rays, start, first, last, inside, promises):
     """Count along the tree's branches, its nodes `first` … `last` - 1: (all, weighed). See `count_from`.
 
-    The rays start in a voxel, given by its number and its indices `at`, which is the `place`-th of the call.
     With `inside` no ray leaves the workspace, and without `promises` all weights are 1: both save time.
     """
+    state, size, tree, met = rays.state, rays.size, rays.tree, rays.met
+    voxel, at, place = start.voxel, start.at, start.place
     points, weighed, node = 0, 0.0, np.uint32(first)
     while node < np.uint32(last):
         if not inside:
@@ -261,6 +278,7 @@ def add_opened(counter, state, size, opened, voxels, tree, met, seen):
         met: (C,) int32 scratch space.
         seen: (K,) float32 bounds, changed in place; inf = unknown, and stays so.
     """
+    rays = _Rays(state, size, tree, met)
     for cell in range(len(met)):
         met[cell] = -1
     for place in range(len(voxels)):
@@ -268,6 +286,7 @@ def add_opened(counter, state, size, opened, voxels, tree, met, seen):
             continue
         voxel = np.int64(voxels[place])
         at = grid_indices(size, voxel)
+        start = _Start(voxel, at, place)
         for other in opened:
             x, y, z = grid_indices(size, other)
             cell = cell_at(tree, x - at[0], y - at[1], z - at[2])
@@ -277,20 +296,7 @@ def add_opened(counter, state, size, opened, voxels, tree, met, seen):
                 node = np.int64(tree.nodes[number])
                 if node > 0 and _is_reached(state, voxel, tree, node):
                     first, last = node + 1, tree.after[node]
-                    seen[place] += _count_branches(
-                        counter,
-                        state,
-                        size,
-                        voxel,
-                        tree,
-                        at,
-                        met,
-                        place,
-                        first,
-                        last,
-                        inside=False,
-                        promises=False,
-                    )[0]
+                    seen[place] += _count_branches(counter, rays, start, first, last, False, False)[0]
 
 
 @lean_kernel

@@ -18,6 +18,7 @@ from baselines.strategies.frontier.terrain.map import (
     update_terrain,
 )
 from baselines.strategies.frontier.terrain.visibility import (
+    ColumnCounts,
     ViewModel,
     bound_columns,
     count_below,
@@ -166,15 +167,16 @@ def test_the_height_factor_by_hand():
     ground[7:] = NONE
     terrain = known_ground(ground)
     voxels = np.array([(4 * 13 + 5) * 8 + z for z in (3, 6)], np.int32)  # z_f = 3.5 and 6.5, z_av = 2
-    seen, value, factor = np.empty(2), np.empty(2), np.empty(2)
+    counts = ColumnCounts(np.empty(2), np.empty(2), np.empty(2))
+    seen, factor = counts.seen, counts.factor
     azimuths = np.array([[1.0, 0.0]])
     counter = new_counter(9 * 13, SHAPE)
     view_model = ViewModel(10.0, 0.0, patch=1, gamma=0.5, highest=9.0, fade=10.0)
-    count_columns_from(counter, terrain, voxels, azimuths, view_model, False, seen, value, factor)
+    count_columns_from(counter, terrain, voxels, azimuths, view_model, False, counts)
     assert factor.tolist() == pytest.approx([math.sqrt(1.5 * 3.5), math.sqrt(4.5 * 6.5)])
     assert seen.tolist() == [1.0, 2.0]  # from 3.5 one ends on the line of sight over the edge
     view_model = view_model._replace(gamma=1.0, highest=4.0)
-    count_columns_from(counter, terrain, voxels, azimuths, view_model, False, seen, value, factor)
+    count_columns_from(counter, terrain, voxels, azimuths, view_model, False, counts)
     assert factor.tolist() == pytest.approx([1.5, 0.0]) and seen[1] == 0.0
 
 
@@ -189,9 +191,10 @@ def test_no_more_is_seen_than_lies_in_range(seed, reach, naive):
         np.stack([np.cos(angles), np.sin(angles)], axis=-1),
         ViewModel(reach, 0.0, 2, 0.4, 5.0, reach),
     )
-    seen, weighed, factor, most, same = (np.empty(20) for _ in range(5))
+    most, same, counts = np.empty(20), np.empty(20), ColumnCounts(*(np.empty(20) for _ in range(3)))
+    seen, factor = counts.seen, counts.factor
     counter, sums = new_counter(9 * 13, SHAPE), np.empty((9, 14), np.int32)
-    count_columns_from(counter, terrain, voxels, azimuths, view_model, naive, seen, weighed, factor)
+    count_columns_from(counter, terrain, voxels, azimuths, view_model, naive, counts)
     sum_rows(terrain, sums)
     bound_columns(terrain, sums, half_widths(reach), voxels, view_model, most, same)
     np.testing.assert_array_equal(same, factor)
