@@ -14,15 +14,15 @@ WARM := $(RUN) entropy_explore_env.warm --processes 1
 .NOTPARALLEL:
 
 help:
-	@echo "make demo       run one mission of three robots and show it in results/demo"
-	@echo "make test       lint, then the tests"
-	@echo "make test-long  also the long ones, and more and other drawn examples: an hour"
-	@echo "make boundscheck the kernels' own tests, with every index checked"
-	@echo "make test-rllib the tests of the trainer with RLlib"
-	@echo "make lint       ruff, pyright and the contracts of imports"
-	@echo "make bench      speed against peers"
-	@echo "make reproduce  the experiments of Rocha04, RochaMI, Bhattacharya and Sawhney, into docs/results: many hours"
-	@echo "make clean      remove the environments, builds and caches; results stay"
+	@echo "make demo         run one mission of three robots and show it in results/demo"
+	@echo "make test         lint, then the tests"
+	@echo "make test-long    also the long ones, and more and other drawn examples: an hour"
+	@echo "make boundscheck  the kernels' own tests, with every index checked"
+	@echo "make test-rllib   the tests of the trainer with RLlib"
+	@echo "make lint         ruff, pyright and the contracts of imports"
+	@echo "make bench        speed against peers"
+	@echo "make reproduce    the experiments of Rocha04, RochaMI, Bhattacharya and Sawhney, into docs/results: many hours"
+	@echo "make clean        remove the environments, builds and caches; results stay"
 
 demo: $(STAMP)baselines
 	$(RUN) baselines.run room --strategy gradient --robots 3 --seed 0 --out results/demo

@@ -90,7 +90,7 @@ class Deciding:
     """Decisions among some 200 candidates, 500 × 1000 cells of a plan known, the others not.
 
     Between decisions the robot scans: a decision takes the new belief in, searches paths, and counts; lazily
-    as far as the choice needs it, else ways to all candidates and V of each.
+    as far as the choice needs it, else paths to all candidates and V of each.
     """
 
     def __init__(self, lazy: bool, side: int = _SIDE) -> None:
@@ -138,7 +138,7 @@ def decision_row(effort: Effort, lazy: bool) -> Row:
     taken = [deciding.decide_ms() for _ in range(effort.rounds + 2)]
     count = len(deciding.allocator.candidates.listed()[0])
     job = f"a decision of per-time-visibility, 1000 × 1000, {count} candidates, "
-    job += "as far as the choice needs" if lazy else "ways to all and V of each"
+    job += "as far as the choice needs" if lazy else "paths to all and V of each"
     return alone(job, taken[2:], "ms", Goal("<", 50.0, "ms"))
 
 

@@ -1,7 +1,7 @@
-"""Shortest ways: geodesic Voronoi cells beside SciPy's Dijkstra, and plans across a large floor.
+"""Shortest paths: geodesic Voronoi cells beside SciPy's Dijkstra, and plans across a large floor.
 
 Both sides get the same steps at the same costs. SciPy's graph is made before the clock starts; ours
-is the field of rates, or the belief, itself.
+is the field of traversal costs, or the belief, itself.
 """
 
 from __future__ import annotations
@@ -64,28 +64,28 @@ def rooms(shape: tuple[int, int, int], seed: int = 0) -> np.ndarray:
 
 
 def maze(shape: tuple[int, int, int], seed: int = 0) -> np.ndarray:
-    """(X, Y, 1) bool, corridors one cell wide with one way between any two places (a depth-first maze)."""
+    """(X, Y, 1) bool, corridors one cell wide with one path between any two places (a depth-first maze)."""
     rng, covered = np.random.default_rng(seed), np.ones(shape, bool)
     size, at = ((shape[0] - 1) // 2, (shape[1] - 1) // 2), (0, 0)
-    way, seen = [at], np.zeros(size, bool)
+    path, seen = [at], np.zeros(size, bool)
     seen[at] = True
     covered[1, 1] = False
-    while way:
-        x, y = way[-1]
+    while path:
+        x, y = path[-1]
         around = [(x + 1, y), (x - 1, y), (x, y + 1), (x, y - 1)]
         fresh = [n for n in around if 0 <= n[0] < size[0] and 0 <= n[1] < size[1] and not seen[n]]
         if not fresh:
-            way.pop()
+            path.pop()
             continue
         i, j = fresh[int(rng.integers(len(fresh)))]
         seen[i, j] = True
         covered[2 * i + 1, 2 * j + 1] = covered[x + i + 1, y + j + 1] = False
-        way.append((i, j))
+        path.append((i, j))
     return covered
 
 
 def noise(shape: tuple[int, int, int], seed: int = 0) -> np.ndarray:
-    """(X, Y, 1) float32, rates drawn from 0.05 to 1 for each voxel by itself."""
+    """(X, Y, 1) float32, traversal costs drawn from 0.05 to 1 for each voxel by itself."""
     return np.random.default_rng(seed).uniform(0.05, 1.0, shape).astype(np.float32)
 
 
@@ -112,30 +112,30 @@ class Search:
 def planning_rows(effort: Effort) -> list[Row]:
     """Voronoi cells of four sources beside SciPy, an iteration of coverage, and a plan across a floor."""
     maps = {
-        "boxes": cost_rates(cluttered(MAP, _MAP_SHARE)),
-        "rooms": cost_rates(rooms(MAP)),
-        "a maze": cost_rates(maze(MAP)),
+        "boxes": traversal_costs(cluttered(MAP, _MAP_SHARE)),
+        "rooms": traversal_costs(rooms(MAP)),
+        "a maze": traversal_costs(maze(MAP)),
         "white-noise costs": noise(MAP),
     }
-    rows = [voronoi_row(name, rates, effort) for name, rates in maps.items()]
+    rows = [voronoi_row(name, costs, effort) for name, costs in maps.items()]
     return [*rows, iteration_row(MAP, effort), crossing_row(FLOOR, effort)]
 
 
-def cost_rates(covered: np.ndarray) -> np.ndarray:
+def traversal_costs(covered: np.ndarray) -> np.ndarray:
     """(X, Y, 1) float32, 1 where it is free, inf elsewhere."""
     return np.where(covered, np.inf, 1.0).astype(np.float32)
 
 
-def voronoi_row(name: str, rates: np.ndarray, effort: Effort) -> Row:
+def voronoi_row(name: str, costs: np.ndarray, effort: Effort) -> Row:
     """Maps a second with the cells of SOURCES sources; SciPy gives the costs, and no cells."""
-    free, shape = np.flatnonzero(np.isfinite(rates)), rates.shape
+    free, shape = np.flatnonzero(np.isfinite(costs)), costs.shape
     sources = np.random.default_rng(1).choice(free, SOURCES, replace=False).astype(np.int32)
-    graph, ours = cost_graph(rates), new_tessellation((shape[0], shape[1], 1))
-    tessellate(ours, rates, sources)
+    graph, ours = cost_graph(costs), new_tessellation((shape[0], shape[1], 1))
+    tessellate(ours, costs, sources)
     check_tessellation(ours, graph, sources)
     taken = interleave(
         {
-            "ours": lambda _: timed(lambda: tessellate(ours, rates, sources)),
+            "ours": lambda _: timed(lambda: tessellate(ours, costs, sources)),
             "scipy": lambda _: timed(lambda: dijkstra(graph, indices=sources, min_only=True)),
         },
         effort.long_rounds,
@@ -181,7 +181,7 @@ def iteration_row(shape: tuple[int, int, int], effort: Effort) -> Row:
 
     iterate()
     taken = [timed(iterate).cpu_s for _ in range(effort.long_rounds)]
-    job = f"cells, targets and ways of {SOURCES} exploring robots, {shape[0]} × {shape[1]}"
+    job = f"cells, targets and paths of {SOURCES} exploring robots, {shape[0]} × {shape[1]}"
     return alone(job, [1e3 * cpu_s for cpu_s in taken], "ms", Goal("≤", 1700.0 / 25.0, "ms"))
 
 
@@ -193,7 +193,7 @@ def crossing_row(shape: tuple[int, int, int], effort: Effort) -> Row:
     ours, place = Search(covered, 2.5), corner // 2
     ends = place * shape[1] + place, (shape[0] - place) * shape[1] - place
     if math.isinf(ours.cost(*ends)):
-        raise RuntimeError("there is no way across the floor")
+        raise RuntimeError("there is no path across the floor")
     taken = [timed(lambda: ours.cost(*ends)).cpu_s for _ in range(effort.rounds)]
     job = f"plan across {shape[0]} × {shape[1]}, {_FLOOR_SHARE:.0%} covered, body of 2.5 cells"
     return alone(job, [1e3 * cpu_s for cpu_s in taken], "ms", Goal("<", 50.0, "ms"))

@@ -38,7 +38,7 @@ JOBS: tuple[tuple[str, Callable[[Effort], list[Row]]], ...] = (
     ("ParallelEnv beside mpe2 simple_spread", spread_rows),
     ("VectorEnv beside the ParallelEnv, on one and two threads", vector_rows),
     ("where a step's time goes", profile_rows),
-    ("shortest ways beside SciPy", planning_rows),
+    ("shortest paths beside SciPy", planning_rows),
     ("decisions of strategies", deciding_rows),
     ("learning", learning_rows),
     ("exploring plans", exploring_rows),

@@ -83,7 +83,7 @@ class SingleTeam:
         """
         env, named = self.env, by_agent(actions)
 
-        def go_on() -> None:
+        def advance() -> None:
             for action in named[_WARMING_STEPS:]:
                 if not env.agents:
                     env.reset()
@@ -92,7 +92,7 @@ class SingleTeam:
         env.reset(seed=seed)
         for action in named[:_WARMING_STEPS]:
             env.step(action)
-        taken = timed(go_on)
+        taken = timed(advance)
         check_bursts(env.missions.state.robots, env.scenario.channel.burst)
         return taken
 
@@ -127,15 +127,15 @@ class Fleet:
         """
         named = list(zip(*(by_agent(actions[:, e]) for e in range(len(self.envs))), strict=True))
 
-        def go_on(steps: list[tuple[dict[str, np.ndarray], ...]]) -> None:
+        def advance(steps: list[tuple[dict[str, np.ndarray], ...]]) -> None:
             for step in steps:
                 for env, action in zip(self.envs, step, strict=True):
                     env.step(action)
 
         for seed, env in enumerate(self.envs):
             env.reset(seed=seed)
-        go_on(named[:_WARMING_STEPS])
-        return timed(lambda: go_on(named[_WARMING_STEPS:]))
+        advance(named[:_WARMING_STEPS])
+        return timed(lambda: advance(named[_WARMING_STEPS:]))
 
 
 class Batch:
@@ -153,13 +153,13 @@ class Batch:
             actions: (steps, E, A, 5) float32.
         """
 
-        def go_on(steps: np.ndarray) -> None:
+        def advance(steps: np.ndarray) -> None:
             for action in steps:
                 self.env.step(action)
 
         self.env.reset(seed=0)
-        go_on(actions[:_WARMING_STEPS])
-        taken = timed(lambda: go_on(actions[_WARMING_STEPS:]))
+        advance(actions[:_WARMING_STEPS])
+        taken = timed(lambda: advance(actions[_WARMING_STEPS:]))
         check_bursts(self.env.missions.state.robots, ENDLESS.channel.burst)
         return taken
 

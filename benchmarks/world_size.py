@@ -56,11 +56,11 @@ class Walk:
     def run(self, _round: int) -> Taken:
         """What the steps take."""
 
-        def go_on() -> None:
+        def advance() -> None:
             for action in self._actions:
                 self.env.step(action)
 
-        return timed(go_on)
+        return timed(advance)
 
 
 def size_rows(effort: Effort) -> list[Row]:

@@ -54,7 +54,7 @@ class Scenario:
         robot, sensor: How robots move and what they sense.
         extra_kinds: Further kinds of robots, for a mixed team: of K kinds in all, the first being `robot`
             with `sensor`, robot a is of kind a mod K. All share one form of action and observation
-            (missions/action.py, missions/observation.py).
+            (missions/action.py, missions/observation/layout.py).
         start_radius_m: Robots start at most so far from where the first one does; inf = anywhere.
         sigma_prior: Standard deviation of coverage before any measurement; the mean is ½.
         decision_period_s: A step lasts this long; None = until the next robot has to decide.

@@ -56,7 +56,9 @@ def end_of_step() -> None:
     """A mission has advanced: what it needs is compiled."""
     if _progress.pending:
         _progress.pending = False
-        _say(f"entropy_explore_env: compiled {len(_progress.compiled)} kernels in {_progress.spent_s:.0f} s")
+        number = len(_progress.compiled)
+        kernels = "1 kernel" if number == 1 else f"{number} kernels"
+        _say(f"entropy_explore_env: compiled {kernels} in {_progress.spent_s:.0f} s")
 
 
 def explain_not_kept(folder: Path | None, error: OSError | None) -> None:

@@ -31,9 +31,21 @@ from entropy_explore_env.compilation.folder import (
     remove_old_kernels,
 )
 from entropy_explore_env.compilation.stamps import NoStampError, describe_type, stamp
+from entropy_explore_env.version import VERSION
 
-_FORMAT = 2
-"""Of the files, and of what is done to a kernel; to be raised when `dispatchers` compiles in another way."""
+
+def _sources_digest() -> str:
+    """A digest of the files that say how kernels are compiled, as they are when they are imported."""
+    hasher = hashlib.sha256()
+    for name in ("dispatchers.py", "kernels.py", "cache.py"):
+        try:
+            hasher.update(Path(__file__).with_name(name).read_bytes())
+        except OSError:  # imported from an archive
+            hasher.update(f"{name} {VERSION}".encode())
+    return hasher.hexdigest()
+
+
+_COMPILED_BY = _sources_digest()
 _DIGEST_BYTES = 32
 _SETTINGS = ("OPT", "BOUNDSCHECK", "LOOP_VECTORIZE", "SLP_VECTORIZE", "DEBUGINFO_DEFAULT", "ENABLE_PROFILING")
 """Of Numba's, by environment variables, those which change the code that it makes."""
@@ -131,7 +143,7 @@ class KernelCache(_Cache):
 def _environment() -> list[str]:
     """What else the code depends on."""
     versions = (
-        _FORMAT,
+        _COMPILED_BY,
         numba.__version__,
         llvmlite.__version__,
         np.__version__,

@@ -66,9 +66,8 @@ def _compiling(function: Callable[..., Any], cache: KernelCache, sig: Any, targe
         raise errors.TypingError(f"kernel {function.__qualname__} calls itself; Numba's own njit allows that")
     _stack.kernels.append(_Compiling(function, cache.name_of(sig, target)))
     collecting = outermost and gc.isenabled()
-    if (
-        collecting
-    ):  # a compiler makes many objects and few cycles: collecting them takes an eighth of its time
+    # A compiler makes many objects and few cycles: looking for them takes an eighth of its time.
+    if collecting:
         gc.disable()
     try:
         yield
@@ -253,7 +252,7 @@ class Kernel(CPUDispatcher):
         return self.inner._numba_type_
 
     def compile(self, sig: Any) -> object:  # noqa: ANN401
-        """As Numba's."""
+        """See Numba's `Dispatcher.compile`."""
         with global_compiler_lock, _compiling(self.py_func, self._cache, sig, self.targetctx):
             return super().compile(sig)
 

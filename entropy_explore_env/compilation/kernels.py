@@ -40,10 +40,10 @@ Kernels that call it are kept on disk, it is not.
 
 
 def entry_point(compiled: Any, *arguments: Any) -> Callable[..., Any]:  # noqa: ANN401 - a kernel and its arguments
-    """The machine code of a kernel for arguments of these types, which looks at types no more.
+    """The machine code of a kernel for arguments of these types, which does not check types.
 
-    For calls that happen every step: it is called in a tenth of the time. The caller makes sure that all
-    arguments have these types ever after; others would be misread.
+    For calls that happen every step: the call takes a tenth of the time. The caller makes sure that all later
+    arguments have these types; others would be misread.
     """
     if not isinstance(compiled, Kernel):  # compiling is switched off
         return compiled

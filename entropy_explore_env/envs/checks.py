@@ -43,18 +43,18 @@ class ActionChecker:
         Raises:
             ActionError: An action has the wrong shape or type, is not finite or outside its space.
         """
-        boxes, numbers = np.zeros((len(actions), self.width)), np.zeros(len(actions), np.int64)
+        continuous, discrete = np.zeros((len(actions), self.width)), np.zeros(len(actions), np.int64)
         for row, (agent, action) in enumerate(actions):
             if self._discrete:
-                numbers[row] = self._number(agent, action)
+                discrete[row] = self._checked_discrete(agent, action)
             else:
-                boxes[row] = self._box(agent, action)
-        inside = np.abs(boxes) <= 1.0 + _ROUNDING
+                continuous[row] = self._checked_continuous(agent, action)
+        inside = np.abs(continuous) <= 1.0 + _ROUNDING
         if not inside.all():
             row = int(np.argmin(inside.all(axis=1)))
             allowed = "finite numbers from -1 to 1"
-            raise ActionError(f"actions[{actions[row][0]}]", boxes[row].tolist(), allowed)
-        return boxes, numbers
+            raise ActionError(f"actions[{actions[row][0]}]", continuous[row].tolist(), allowed)
+        return continuous, discrete
 
     def table(self, actions: object, missions: int, robots: int) -> tuple[np.ndarray, np.ndarray]:
         """Actions of many missions as arrays.
@@ -85,16 +85,16 @@ class ActionChecker:
         inside = np.abs(given) <= 1.0 + _ROUNDING
         if not inside.all():
             raise ActionError("actions", given[~inside][0], "finite numbers from -1 to 1")
-        boxes = np.ascontiguousarray(given.reshape(missions, robots, self.width), np.float64)
-        return boxes, np.zeros((missions, robots), np.int64)
+        continuous = np.ascontiguousarray(given.reshape(missions, robots, self.width), np.float64)
+        return continuous, np.zeros((missions, robots), np.int64)
 
-    def _number(self, agent: str, action: object) -> int:
+    def _checked_discrete(self, agent: str, action: object) -> int:
         number: Any = action.item() if isinstance(action, np.ndarray) and action.shape == () else action
         if not is_whole(number, 0, self._count - 1):
             raise ActionError(f"actions[{agent}]", action, f"a whole number from 0 to {self._count - 1}")
         return int(number)
 
-    def _box(self, agent: str, action: object) -> np.ndarray:
+    def _checked_continuous(self, agent: str, action: object) -> np.ndarray:
         array = _as_array(f"actions[{agent}]", action)
         if array.shape != (self.width,) or array.dtype.kind != "f":
             allowed = f"{self.width} floating-point numbers from -1 to 1"

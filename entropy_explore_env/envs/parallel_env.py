@@ -177,9 +177,9 @@ class EntropyExploreEnv(ParallelEnv[str, Any, Any]):
             ActionError: An action is missing, of the wrong shape or type, not finite or outside
                 its space. Nothing has changed then.
         """
-        boxes, numbers = self._checker.batch(self._in_order(actions))
+        continuous, discrete = self._checker.batch(self._in_order(actions))
         before = self._rewards.before(self.missions)
-        self.missions.step(boxes[None], numbers[None])
+        self.missions.step(continuous[None], discrete[None])
         earned = self._rewards.after(self.missions, before)[0]
         observations, infos = self._observations(), self._infos()
         rewards = dict(zip(self.agents, earned.tolist(), strict=True))

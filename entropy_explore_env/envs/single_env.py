@@ -81,9 +81,9 @@ class SingleRobotEnv(gymnasium.Env[Any, Any]):
             raise CallOrderError("step before reset: call reset() first")
         if self.missions.over(0) is not MissionEnd.RUNNING:
             raise CallOrderError("step after the mission's end: call reset() first")
-        boxes, numbers = self._checker.one("robot_0", action)
+        continuous, discrete = self._checker.one("robot_0", action)
         before = self._rewards.before(self.missions)
-        self.missions.step(boxes[None], numbers[None])
+        self.missions.step(continuous[None], discrete[None])
         reward = float(self._rewards.after(self.missions, before)[0, 0])
         self._painter.watch(self.missions)
         end = self.missions.over(0)

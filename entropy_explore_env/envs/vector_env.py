@@ -173,7 +173,7 @@ class EntropyExploreVectorEnv(VectorEnv[Any, Any, Any]):
         if min(self.missions.episodes) < 0:
             raise CallOrderError("step before reset: call reset() first")
         clocks = self.missions.state.missions
-        boxes, numbers = self._checker.table(actions, self.num_envs, self.scenario.robots)
+        continuous, discrete = self._checker.table(actions, self.num_envs, self.scenario.robots)
         over = np.flatnonzero(clocks["end"] != _RUNNING)
         if len(over) and self.autoreset_mode is AutoresetMode.DISABLED:
             raise CallOrderError(
@@ -181,7 +181,7 @@ class EntropyExploreVectorEnv(VectorEnv[Any, Any, Any]):
             )
         drawn = self.missions.draw(over.tolist(), [None] * len(over))
         before = self._rewards.before(self.missions)
-        self.missions.step(boxes, numbers)
+        self.missions.step(continuous, discrete)
         earned = self._rewards.after(self.missions, before)
         earned[over] = 0.0
         self.missions.begin(drawn)

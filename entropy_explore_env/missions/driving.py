@@ -39,7 +39,7 @@ def start_drive(params, collision, robots, index, time_s, crossing):
 
     Args:
         params: (A,) PARAMS.
-        collision: (V,) float32, a Barrier each, for its body.
+        collision: (V,) float32, a Collision each, for its body.
         robots: (A,) ROBOT.
         index: Which robot.
         time_s: When it departs.
@@ -107,7 +107,7 @@ def drive_leg(params, collision, robots, index, time_s, crossing):
 
     Args:
         params: (A,) PARAMS.
-        collision: (V,) float32, a Barrier each, for its body.
+        collision: (V,) float32, a Collision each, for its body.
         robots: (A,) ROBOT.
         index: Which robot.
         time_s: When it departs.

@@ -286,8 +286,7 @@ class Missions:
         """
         if min(self.episodes) < 0:
             raise CallOrderError("step before reset: call reset() first")
-        continuous = np.ascontiguousarray(continuous, np.float64)
-        discrete = np.ascontiguousarray(discrete, np.int64)
+        continuous, discrete = _for_kernels(continuous, np.float64), _for_kernels(discrete, np.int64)
         team = (self.count, self.scenario.robots)
         if continuous.ndim != 3 or continuous.shape[:2] != team or discrete.shape != team:
             raise ActionError(
@@ -380,3 +379,9 @@ class Missions:
         self.__dict__.update(kept)
         self._make_working_space()
         self._pool = None
+
+
+def _for_kernels(actions: np.ndarray, dtype: type[np.generic]) -> np.ndarray:
+    """Actions in the one kind of array for which a step is compiled: copied where they are of another."""
+    array = np.ascontiguousarray(actions, dtype)
+    return array if array.flags.writeable and array.flags.aligned else array.copy()

@@ -156,7 +156,7 @@ class MissionState(NamedTuple):
     truth: np.ndarray
     """(E, V) float32 true coverage, 0 or 1."""
     collision: np.ndarray
-    """(E·N, V) float32 collision masks, a Barrier each, for the N radii of bodies that need one, mission by
+    """(E·N, V) float32 collision masks, a Collision each, for the N radii of bodies that need one, mission by
     mission; `truth` itself where all bodies are small and there is no ceiling."""
     mean: np.ndarray
     """(E, A, V) float32 expected coverage by each robot's belief."""

@@ -110,7 +110,7 @@ def _heard(view: RobotView, robots: int) -> np.ndarray:
 
 
 def _writable(array: np.ndarray) -> np.ndarray:
-    """(V,) an array of a view as kernels of missions take it: read-only arrays are another type to Numba."""
+    """(V,) an array of a view in the one type for which observing is compiled; nothing writes to it."""
     flat = array.reshape(-1).view()
     flat.setflags(write=True)
     return flat

@@ -146,7 +146,7 @@ def free_distance(collision, size, line, finish, crossing):
     """How far a body can drive on a line before something solid.
 
     Args:
-        collision: (V,) float32, a Barrier each: above ½ the body does not fit.
+        collision: (V,) float32, a Collision each: above ½ the body does not fit.
         size: (X, Y, Z) voxels.
         line: Line of the drive.
         finish: (x, y, z), where the drive is to end, the line's end.

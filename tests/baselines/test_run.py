@@ -49,7 +49,7 @@ NAMED = (
     "blocked_moves",
     "wall_s",
 )
-"""Keys that the README and issue 2 promise."""
+"""Keys that the README and README promises."""
 FILES = ["mission.gif", "mission.json", "mission.npz", "mission.png"]
 SHORT = ("--ending.time-limit-s", "8")
 

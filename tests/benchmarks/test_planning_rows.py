@@ -1,4 +1,4 @@
-"""The rows of shortest ways are measured, and both sides find the same costs."""
+"""The rows of shortest paths are measured, and both sides find the same costs."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from benchmarks.planning import (
     Search,
     check_tessellation,
     cluttered,
-    cost_rates,
+    traversal_costs,
     crossing_row,
     iteration_row,
     maze,
@@ -31,7 +31,7 @@ def test_both_sides_have_the_same_steps():
     covered = cluttered((70, 53, 1), 0.2)
     free = np.flatnonzero(~covered)
     ours = Search(covered)
-    expected = dijkstra(cost_graph(cost_rates(covered)), indices=int(free[0]))
+    expected = dijkstra(cost_graph(traversal_costs(covered)), indices=int(free[0]))
     for goal in free[:: len(free) // 7]:
         cost = ours.cost(int(free[0]), int(goal))
         assert cost == expected[goal] or math.isclose(cost, expected[goal], rel_tol=1e-8)
@@ -41,9 +41,9 @@ def test_both_sides_have_the_same_steps():
 def test_rows_are_measured():
     shape = (90, 61, 1)
     for name, rates in (
-        ("boxes", cost_rates(cluttered(shape, 0.2))),
-        ("rooms", cost_rates(rooms(shape))),
-        ("a maze", cost_rates(maze(shape))),
+        ("boxes", traversal_costs(cluttered(shape, 0.2))),
+        ("rooms", traversal_costs(rooms(shape))),
+        ("a maze", traversal_costs(maze(shape))),
         ("noise", noise(shape)),
     ):
         voronoi = voronoi_row(name, rates, TINY)
@@ -58,7 +58,7 @@ def test_rows_are_measured():
 def test_all_of_a_maze_and_of_rooms_is_connected():
     for covered in (rooms((90, 61, 1)), maze((91, 61, 1))):
         free = np.flatnonzero(~covered)
-        reached = np.isfinite(dijkstra(cost_graph(cost_rates(covered)), indices=int(free[0])))
+        reached = np.isfinite(dijkstra(cost_graph(traversal_costs(covered)), indices=int(free[0])))
         assert reached[free].all() and 0.2 < covered.mean() + 0.2 < 0.8
 
 

@@ -222,3 +222,18 @@ def test_settings_of_numba_are_part_of_the_name(setting, monkeypatch):
     assert squared._cache.name_of(types, squared.targetctx) == before
     assert squared.inner._cache.name_of(types, squared.targetctx) != before
     assert squared._cache.name_of((numba.float32,), squared.targetctx) != before
+
+
+def test_what_is_compiled_in_another_way_has_another_name(folder, monkeypatch):
+    """An edit of this package forgets what it compiled before."""
+
+    @lean_kernel
+    def named(x):
+        return x + 2.0
+
+    assert named(1.0) == 3.0
+    sig = named.signatures[0]
+    before = named._cache.name_of(sig, named.targetctx)
+    assert any(before in file.name for file in folder.rglob("*.kernel"))
+    monkeypatch.setattr(cache, "_COMPILED_BY", "an edit")
+    assert named._cache.name_of(sig, named.targetctx) != before

@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import itertools
 import math
+import pickle
 
 import numpy as np
 import pytest
 
 from entropy_explore_env.belief.entropy import map_entropy_bits
 from entropy_explore_env.belief.raycast import longest_crossing
-from entropy_explore_env.errors import CallOrderError, SettingError, WorldError
+from entropy_explore_env.errors import ActionError, CallOrderError, SettingError, WorldError
 from entropy_explore_env.missions.poses import pose_at
 from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.missions.state import MissionEnd
+from entropy_explore_env.missions.tick import step_missions
 from entropy_explore_env.robots.range_sensor import Return
 from entropy_explore_env.scenario import with_settings
 from entropy_explore_env.scenarios import ROOM, ROOM_FURNISHED
@@ -534,3 +536,38 @@ def test_a_reset_forgets_everything_of_the_mission_before():
     for name, one, other in zip(used.state._fields, used.state, fresh.state, strict=True):
         assert one.tobytes() == other.tobytes(), name
     np.testing.assert_array_equal(used.observations, fresh.observations)
+
+
+def test_read_only_and_other_kinds_of_actions_need_no_other_kernel():
+    """A step is compiled for one kind of array; what else is given is copied."""
+    missions, twin = started(free_box(), seed=3), started(free_box(), seed=3)
+    continuous = np.random.default_rng(0).uniform(-1.0, 1.0, (1, 2, 5))
+    discrete = np.zeros((1, 2), np.int64)
+    for _ in range(3):
+        missions.step(continuous, discrete)
+    compiled = len(step_missions.signatures)
+    shown = np.broadcast_to(continuous, continuous.shape)
+    assert not shown.flags.writeable
+    for _ in range(3):
+        twin.step(shown, np.broadcast_to(discrete.astype(np.int32), discrete.shape))
+    assert len(step_missions.signatures) == compiled
+    np.testing.assert_array_equal(missions.state.mean, twin.state.mean)
+    with pytest.raises(ActionError, match="actions"):
+        missions.step(continuous[0], discrete)
+    with pytest.raises(ActionError, match="actions"):
+        missions.step(continuous, discrete[:, :1])
+
+
+def test_a_step_goes_on_with_arrays_that_were_replaced():
+    """A step is bound to its arrays; a world with a ceiling replaces one, and pickling all."""
+    missions = started(free_box(), seed=3)
+    twin = started(free_box(), seed=3)
+    wander(missions, 2, 1)
+    wander(twin, 2, 1)
+    missions.state = missions.state._replace(mean=missions.state.mean.copy())
+    again = pickle.loads(pickle.dumps(missions))
+    for each in (missions, again, twin):
+        wander(each, 3, 2)
+    np.testing.assert_array_equal(missions.state.mean, twin.state.mean)
+    np.testing.assert_array_equal(again.state.mean, twin.state.mean)
+    np.testing.assert_array_equal(again.observations, twin.observations)
