@@ -86,16 +86,24 @@ def _writable_folder() -> Path:
     folder = kernel_folder()
     if folder is None:
         raise SettingError("NUMBA_CACHE_DIR", None, "a folder, where the user has no home folder")
-    folder.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryFile(dir=folder):
-        return folder
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            return folder
+    except OSError as error:
+        allowed = f"a folder that can be written ({error.strerror}); compiled kernels would not be kept"
+        raise SettingError("NUMBA_CACHE_DIR", str(folder), allowed) from None
 
 
 def _in_processes(names: list[str], processes: int) -> list[Warmed]:
-    """Warm scenarios, in processes of their own; whichever is done first comes first."""
+    """Warm scenarios, in processes of their own; whichever is done first comes first.
+
+    The first scenario is warmed before the others: they find the kernels that all share.
+    """
     fresh = multiprocessing.get_context("spawn")
     with ProcessPoolExecutor(processes, mp_context=fresh) as pool:
-        return [future.result() for future in as_completed([pool.submit(warm, name) for name in names])]
+        done = [pool.submit(warm, names[0]).result()]
+        return done + [future.result() for future in as_completed([pool.submit(warm, n) for n in names[1:]])]
 
 
 def warm(name: str) -> Warmed:

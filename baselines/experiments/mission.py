@@ -11,6 +11,7 @@ from baselines.experiments.outcome import Record
 from baselines.strategies import make_strategy
 from baselines.strategies.protocol import Strategy
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
+from entropy_explore_env.errors import ActionError
 from entropy_explore_env.reports.metrics import mission_figures
 from entropy_explore_env.reports.recording import Recorder
 from entropy_explore_env.scenario import Scenario, with_settings
@@ -52,7 +53,10 @@ def run_mission(
         after_step(env)
     while env.agents:
         views = [env.view(agent) for agent in env.deciding_agents()]
-        for view, viewpoint in zip(views, strategy.choose(views), strict=True):
+        chosen = list(strategy.choose(views))
+        if len(chosen) != len(views):
+            raise ActionError("viewpoints chosen", len(chosen), f"one for each of {len(views)} views")
+        for view, viewpoint in zip(views, chosen, strict=True):
             actions[env.agents[view.robot]] = view.action_for(viewpoint)
         if before_step is not None:
             before_step(actions)

@@ -24,6 +24,6 @@ class NearestUnknown:
             return random_viewpoint(view, self._rng)  # something was in the way, or all is known
         apart = grid.centre_of(unknown) - here
         nearest = apart[np.argmin((apart**2).sum(axis=1))]
-        step = nearest * min(1.0, view.kind.robot.reach_m / np.linalg.norm(nearest))
+        step = nearest * min(1.0, view.kind.robot.reach_m / max(np.linalg.norm(nearest), 1e-9))
         yaw = np.arctan2(nearest[1], nearest[0])
         return np.array([*(here + step), yaw, 0.0])

@@ -42,7 +42,7 @@ def begin_compiling(name: str, folder: Path | None) -> None:
     if not _progress.announced:
         _progress.announced = _progress.pending = True
         kept = "" if folder is None else f"; they are kept in {short_path(folder)}"
-        _say(f"entropy_explore_env: compiling kernels, about 10 s{kept}")
+        _say(f"entropy_explore_env: compiling kernels, up to about 10 s{kept}")
 
 
 def end_compiling() -> None:
@@ -69,7 +69,7 @@ def explain_not_kept(folder: Path | None, error: OSError | None) -> None:
     where = "the user has no home folder" if folder is None else f"{short_path(folder)}: {_reason(error)}"
     _say(
         f"entropy_explore_env: compiled kernels are not kept ({where}), each process compiles them anew; "
-        "NUMBA_CACHE_DIR names another folder"
+        "set NUMBA_CACHE_DIR to a folder that can be written"
     )
 
 

@@ -13,12 +13,12 @@ from benchmarks.planning import (
     Search,
     check_tessellation,
     cluttered,
-    traversal_costs,
     crossing_row,
     iteration_row,
     maze,
     noise,
     rooms,
+    traversal_costs,
     voronoi_row,
 )
 from benchmarks.rows import Effort

@@ -44,5 +44,5 @@ def test_what_cannot_be_done_is_said(words, message):
 def test_a_folder_that_cannot_be_written_is_an_error(tmp_path, monkeypatch):
     (tmp_path / "file").write_text("")
     monkeypatch.setattr(config, "CACHE_DIR", str(tmp_path / "file"))
-    with pytest.raises(OSError):
+    with pytest.raises(SettingError, match=r"NUMBA_CACHE_DIR = .*can be written"):
         main(["room"])

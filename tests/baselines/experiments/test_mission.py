@@ -11,6 +11,7 @@ from baselines.experiments.mission import run_mission, scripted
 from baselines.strategies import make_strategy
 from baselines.strategies.protocol import random_viewpoint
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
+from entropy_explore_env.errors import ActionError
 from entropy_explore_env.missions.state import MissionEnd
 from entropy_explore_env.missions.view import RobotView
 from entropy_explore_env.scenario import Scenario
@@ -82,3 +83,10 @@ def test_scripted_scenarios_step_from_decision_to_decision_and_observe_nothing()
     assert changed.decision_period_s is None
     assert EntropyExploreEnv(changed).missions.layout.size == 0
     assert (changed.robot, changed.channel, changed.grid) == (BOX.robot, BOX.channel, BOX.grid)
+
+
+def test_a_strategy_that_chooses_for_too_few_robots_is_refused():
+    strategy = Noting()
+    strategy.choose = lambda views: []
+    with pytest.raises(ActionError, match="one for each of 3 views"):
+        run_mission(EntropyExploreEnv(scripted(BOX), robots=3), strategy, 4)
