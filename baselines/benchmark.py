@@ -1,7 +1,7 @@
 """Strategies head to head: `python -m baselines.benchmark --scenarios room,office --seeds 30 --out DIR`.
 
 Runs every strategy in every scenario and team size on the same seeds, and writes a page with tables and
-figures. Missions are kept, a file each: whatever was stopped goes on where it was and ends with the same
+figures. Missions are kept, a file each: an interrupted run resumes and ends with the same
 page, byte for byte. A mission that raises an error or runs past its limit is a row with the reason.
 """
 

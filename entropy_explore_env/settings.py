@@ -100,7 +100,7 @@ class Robot:
         navigator: `straight` drives straight to the viewpoint; `planned` takes the cheapest way through
             the robot's own belief, below the ceiling where the world has one (all robots know where it
             is), without stopping at its corners.
-        unknown_cost: Planned ways: what a metre through unknown voxels costs, in metres through
+        unknown_cost: Planned paths: what a metre through unknown voxels costs, in metres through
             known ones; ≥ 1.
         reach_m: Largest displacement of one decision (ξ of Rocha04, eq. 32); inf = the workspace.
         max_speed_m_s: Top speed.

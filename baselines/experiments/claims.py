@@ -82,7 +82,7 @@ def print_claims(claims: Sequence[Claim], paper: str) -> None:
 def report_claims(
     paper: str, claims: Sequence[Claim], report: Path, started: float, as_json: bool, strict: bool
 ) -> int:
-    """Show what a reproduction came to, the way its command was asked to.
+    """Print the results of a reproduction in the requested form.
 
     Args:
         paper: Short name.

@@ -184,7 +184,7 @@ def _attempt_packed(work: Callable[[Any], Any], task: object) -> bytes:
 
 
 def _follow_parent() -> None:
-    """See to it that this process ends, whatever it is at, once the one that started it is gone."""
+    """End this process as soon as the one that started it is gone."""
     threading.Thread(target=_leave_with_parent, daemon=True).start()
 
 

@@ -1,6 +1,6 @@
 """Where robots with a navigator plan their paths: before a step, in a call of its own.
 
-So planning is compiled only where somebody plans.
+So planning is compiled only where a robot plans.
 """
 
 from __future__ import annotations
