@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import pickle
+import pkgutil
 import re
 import sys
 from collections.abc import Callable
@@ -31,18 +32,13 @@ from entropy_explore_env.compilation.folder import (
     remove_old_kernels,
 )
 from entropy_explore_env.compilation.stamps import NoStampError, describe_type, stamp
-from entropy_explore_env.version import VERSION
 
 
 def _sources_digest() -> str:
     """A digest of the files that say how kernels are compiled, as they are when they are imported."""
-    hasher = hashlib.sha256()
-    for name in ("dispatchers.py", "kernels.py", "cache.py"):
-        try:
-            hasher.update(Path(__file__).with_name(name).read_bytes())
-        except OSError:  # imported from an archive
-            hasher.update(f"{name} {VERSION}".encode())
-    return hasher.hexdigest()
+    names = ("dispatchers.py", "kernels.py", "cache.py")
+    sources = [pkgutil.get_data(__package__ or "", name) or b"" for name in names]
+    return hashlib.sha256(b"".join(sources)).hexdigest()
 
 
 _COMPILED_BY = _sources_digest()

@@ -114,7 +114,7 @@ def _ask_child(task: Task, hash_seed: str) -> Leaves:
 
 
 def answer_parent() -> None:
-    """Play the episode read from standard input and write what happened: what a child of `check_processes` does."""
+    """Play the episode from standard input and write what happened: a child of `check_processes` does."""
     task = Task(*pickle.load(sys.stdin.buffer))
     sys.stdout.buffer.write(pickle.dumps(story(play(task.env(), task))))
 
