@@ -84,6 +84,7 @@ def first_step(cache: str | None = None, root: Path = _OURS) -> FirstStep:
     Raises:
         RuntimeError: The process failed; the message is its last line.
     """
+    root = root.resolve()
     paths = [str(root), *filter(None, [os.environ.get("PYTHONPATH")])]
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(paths)}
     if cache is not None:
@@ -93,7 +94,9 @@ def first_step(cache: str | None = None, root: Path = _OURS) -> FirstStep:
     def start() -> None:
         command = [sys.executable, "-c", _FIRST_STEP]
         done.append(
-            subprocess.run(command, env=environment, capture_output=True, text=True, timeout=_TIMEOUT_S)
+            subprocess.run(
+                command, cwd=root, env=environment, capture_output=True, text=True, timeout=_TIMEOUT_S
+            )
         )
 
     taken = timed(start).wall_s

@@ -74,6 +74,9 @@ def _compiling(function: Callable[..., Any], cache: KernelCache, sig: Any, targe
     finally:
         _stack.kernels.pop()
         if collecting:
+            if not gc.get_freeze_count():  # what is left joins the oldest objects unexamined
+                gc.freeze()
+                gc.unfreeze()
             gc.enable()
 
 
