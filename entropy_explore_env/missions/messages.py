@@ -110,7 +110,7 @@ def message_bits(count):
 
 @lean_kernel
 def transmit(team, index, place, time_s, recipients):
-    """Draw whom a broadcast reaches, and count whom it does not.
+    """Draw whom a broadcast reaches, and count whom it does not; returns whether it reaches anybody.
 
     Args:
         team: Team.
@@ -119,7 +119,7 @@ def transmit(team, index, place, time_s, recipients):
         time_s: When.
         recipients: (A,) bool, filled in.
     """
-    robot, shared = team.robots[index], team.params[0]
+    robot, shared, heard = team.robots[index], team.params[0], False
     for mate in range(len(team.robots)):
         recipients[mate] = False
         if mate == index:
@@ -133,11 +133,12 @@ def transmit(team, index, place, time_s, recipients):
         elif code == _OUT_OF_RANGE:
             robot.messages_out_of_range += 1
         else:
-            recipients[mate] = True
+            recipients[mate] = heard = True
+    return heard
 
 
 @lean_kernel
-def enqueue(clock, robot, in_flight, index, count, delay_s):
+def enqueue(clock, robot, in_flight, index, count, recipients, delay_s):
     """Put a message into a free slot; returns the slot.
 
     Args:
@@ -146,6 +147,7 @@ def enqueue(clock, robot, in_flight, index, count, delay_s):
         in_flight: InFlight.
         index: The sender's number.
         count: Measurements in it; -1 = an announcement.
+        recipients: (A,) bool, who will hear it.
         delay_s: How long it is under way.
     """
     slot = 0
@@ -160,6 +162,7 @@ def enqueue(clock, robot, in_flight, index, count, delay_s):
     message.count = count
     copy_numbers(robot.origin if count < 0 else robot.scan_pose, message.pose, 5)
     write_announcement(robot, message.announced)
+    copy_numbers(recipients, in_flight.recipients[slot], len(recipients))
     return slot
 
 
@@ -210,19 +213,15 @@ def send_batch(team, maps, clock, in_flight, scan, index, count, recipients):
         count: How many measurements.
         recipients: (A,) bool, scratch space.
     """
-    robot, shared = team.robots[index], team.params[0]
+    robot, delay_s = team.robots[index], team.params[0].delay_s
     count_sent(robot, count)
-    transmit(team, index, point(robot.scan_pose), clock.time_s, recipients)
-    slot = -1
+    reached = transmit(team, index, point(robot.scan_pose), clock.time_s, recipients)
+    if reached and delay_s > 0.0:
+        slot = enqueue(clock, robot, in_flight, index, count, recipients, delay_s)
+        pack_measurements(scan, count, in_flight.rays[slot])
+        return
     for mate in range(len(team.robots)):
-        if not recipients[mate]:
-            continue
-        if shared.delay_s > 0.0:
-            if slot < 0:
-                slot = enqueue(clock, robot, in_flight, index, count, shared.delay_s)
-                copy_numbers(recipients, in_flight.recipients[slot], len(recipients))
-                pack_measurements(scan, count, in_flight.rays[slot])
-        else:
+        if recipients[mate]:
             note_message(team.robots[mate], team.heard[mate, index], robot.scan_pose, clock.time_s, count)
             hear_batch(team, maps, scan, mate, count)
 
@@ -234,16 +233,12 @@ def announce(team, clock, in_flight, index, recipients):
     if len(team.robots) == 1 or not shared.announcements:
         return
     count_sent(robot, _ANNOUNCEMENT)
-    transmit(team, index, point(robot.origin), clock.time_s, recipients)
-    slot = -1
+    reached = transmit(team, index, point(robot.origin), clock.time_s, recipients)
+    if reached and shared.delay_s > 0.0:
+        enqueue(clock, robot, in_flight, index, _ANNOUNCEMENT, recipients, shared.delay_s)
+        return
     for mate in range(len(team.robots)):
-        if not recipients[mate]:
-            continue
-        if shared.delay_s > 0.0:
-            if slot < 0:
-                slot = enqueue(clock, robot, in_flight, index, _ANNOUNCEMENT, shared.delay_s)
-                copy_numbers(recipients, in_flight.recipients[slot], len(recipients))
-        else:
+        if recipients[mate]:
             heard = team.heard[mate, index]
             note_message(team.robots[mate], heard, robot.origin, clock.time_s, _ANNOUNCEMENT)
             write_announcement(robot, heard.announced)
