@@ -14,8 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from baselines.strategies.frontier.voxel.map import NONE
-from baselines.strategies.frontier.voxel.visibility import count_point, start_count
-from entropy_explore_env.belief.voxel_index import grid_index
+from baselines.strategies.frontier.voxel.visibility import count_point, grid_indices, start_count
 from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel
 
 
@@ -152,7 +151,7 @@ def count_columns_from(counter, terrain, voxels, azimuths, view_model, naive, co
     """
     seen, weighed, factor = counts.seen, counts.weighed, counts.factor
     for place in range(len(voxels)):
-        x, y, z = grid_index(terrain.size, voxels[place])
+        x, y, z = grid_indices(terrain.size, voxels[place])
         eye = (x + 0.5, y + 0.5, z + 0.5)
         average = mean_ground(terrain, x, y, view_model.patch)
         seen[place], weighed[place] = 0.0, 0.0
@@ -208,7 +207,7 @@ def bound_columns(terrain, sums, widths, voxels, view_model, most, factor):
     """
     size, last = terrain.size, len(widths) - 1
     for place in range(len(voxels)):
-        x, y, z = grid_index(size, voxels[place])
+        x, y, z = grid_indices(size, voxels[place])
         factor[place] = _height_factor(z + 0.5, mean_ground(terrain, x, y, view_model.patch), view_model)
         found = 0
         for i in range(max(x - last, 0), min(x + last, size[0] - 1) + 1):
