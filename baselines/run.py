@@ -18,7 +18,7 @@ from baselines.cli.progress import progress_bar
 from baselines.cli.start_options import reset_options
 from baselines.cli.world_options import Reading, world_settings
 from baselines.experiments.mission import run_mission, scripted
-from baselines.strategies import make_strategy
+from baselines.strategies import make_strategy, resolved
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.scenario import Scenario
 from entropy_explore_env.scenarios import ROOM, find_scenario
@@ -33,10 +33,11 @@ class Args:
     scenario: Positional[str] = "room"
     """A named scenario: room, office, cave, … (the README lists them)."""
     strategy: str = "gradient"
-    """Chooses viewpoints: random, gradient, gradient-plane, mutual-information, ground-gradient,
-    information-rate, information-per-scan, voronoi, voronoi-gradient, voronoi-nearest, per-time-visibility,
-    nearest-frontier, coordinated-frontier; a learned policy: pretrained:room, or the folder of a run of
-    training.ppo; or a class of your own: my_package.my_module:MyStrategy, or path/to/file.py:MyStrategy."""
+    """Chooses viewpoints: best (the one that we recommend), random, gradient, gradient-plane,
+    mutual-information, ground-gradient, information-rate-v0, information-per-scan, voronoi, voronoi-gradient,
+    voronoi-nearest, per-time-visibility, nearest-frontier, coordinated-frontier; a learned policy:
+    pretrained:room, or the folder of a run of training.ppo; or a class of your own:
+    my_package.my_module:MyStrategy, or path/to/file.py:MyStrategy."""
     robots: int = 3
     """Team size."""
     seed: int = 0
@@ -66,13 +67,14 @@ def main(words: Sequence[str]) -> int:
     """Run the command."""
     named = parse(Args, words, default=_defaults(ROOM), description=__doc__).scenario
     args = parse(Args, words, default=_defaults(find_scenario(named)), description=__doc__)
-    strategy = make_strategy(args.strategy)
+    name = resolved(args.strategy)
+    strategy = make_strategy(name)
     check_whole("seed", args.seed, 0)
     env = _env(args)
     options = reset_options(args.starts, args.world_number, env.scenario)
     wanted = Wanted(args.output, args.out, args.record)
     wanted.prepare()
-    title = f"{args.scenario}, {args.strategy}"
+    title = f"{args.scenario}, {name}"
     with MissionLog(wanted) as log, progress_bar(title, hidden=args.output.json) as show:
 
         def after_step(env: EntropyExploreEnv) -> None:
@@ -80,7 +82,7 @@ def main(words: Sequence[str]) -> int:
             show(env)
 
         run_mission(env, strategy, args.seed, after_step, log.command, options)
-        figures, written = log.finish(args.strategy)
+        figures, written = log.finish(name)
     show_results(env, figures, written, args.output.json)
     return 0
 

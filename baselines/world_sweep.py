@@ -17,7 +17,7 @@ from baselines.cli.arguments import Positional, given_options, parse, print_json
 from baselines.cli.world_options import Reading, world_settings
 from baselines.experiments.mission import run_mission, scripted
 from baselines.experiments.tables import markdown_table
-from baselines.strategies import make_strategy
+from baselines.strategies import make_strategy, resolved
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.errors import SettingError, WorldError
 from entropy_explore_env.reports.metrics import mission_figures
@@ -70,7 +70,7 @@ def main(words: Sequence[str]) -> int:
     if args.out is not None:
         options = given_options(args, leave_out=("folder", "out", "json"))
         command = " ".join(["python -m baselines.world_sweep", args.folder.name, *options])
-        about = f"Made by `{command}`: strategy {args.strategy}, {args.robots} robots, "
+        about = f"Made by `{command}`: strategy {resolved(args.strategy)}, {args.robots} robots, "
         about += f"seed {args.seed}; missions are cut off after {args.time_limit_s:g} s."
         write_atomically(args.out, f"# Worlds explored\n\n{about}\n\n{table(rows)}\n")
     if args.json:

@@ -25,7 +25,7 @@ _SIGMA_KNOWN = 0.2
 def deciding_rows(effort: Effort) -> list[Row]:
     """Mutual information in the laboratory, and a decision of each strategy that has a limit."""
     rows = [mutual_information_row(effort)]
-    for scenario, robots, strategy in ((ROOM, 3, "information-rate"), (LAB, 10, "mutual-information")):
+    for scenario, robots, strategy in ((ROOM, 3, "information-rate-v0"), (LAB, 10, "mutual-information")):
         rows.append(decision_row(scenario, robots, strategy, effort.steps))
     return rows
 

@@ -20,7 +20,7 @@ from baselines.cli.arguments import make_folder, parse, print_json, run_command
 from baselines.experiments.cells import Cell, run_cells
 from baselines.experiments.outcome import Record
 from baselines.experiments.statistics import median_interval, median_ratio_interval
-from baselines.strategies import make_strategy
+from baselines.strategies import make_strategy, resolved
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.scenario import Scenario, with_settings
 from entropy_explore_env.scenarios import find_scenario
@@ -40,7 +40,7 @@ class Args:
     """A policy that comes with the project: room."""
     strategy: str | None = None
     """The folder of a run of training.ppo, or of one of its checkpoints."""
-    against: str = "gradient,random,information-rate"
+    against: str = "gradient,random,information-rate-v0"
     """Strategies to compare with, as in baselines.run, separated by commas."""
     scenario: str | None = None
     """Named scenario; default: that of training."""
@@ -67,7 +67,7 @@ def main(words: Sequence[str]) -> int:
     assert policy is not None
     trained = load_checkpoint(latest_checkpoint(policy_folder(policy), *POLICIES)).settings
     scenario = evaluation_scenario(trained, args.scenario, args.robots)
-    rivals = list(dict.fromkeys(args.against.split(",")))
+    rivals = list(dict.fromkeys(map(resolved, args.against.split(","))))
     for name in (policy, *rivals):
         make_strategy(name).reset(scenario, np.random.default_rng(0))
     make_folder("runs", args.runs)

@@ -29,7 +29,7 @@ from training.errors import CheckpointError
 from training.evaluate import SIMPLE, compare, evaluation_scenario
 from training.policy import POLICIES
 
-RIVALS = (*SIMPLE, "information-rate")
+RIVALS = (*SIMPLE, "information-rate-v0")
 SEEDS = 3
 """Runs of each ablation, with the seeds 0, 1, …"""
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from baselines.experiments.cells import Cell
 from baselines.experiments.mission import scripted
 from baselines.head_to_head.timed_mission import timed_record
-from baselines.strategies import STRATEGIES, make_strategy
+from baselines.strategies import STRATEGIES, make_strategy, resolved
 from baselines.world_sweep import is_plan
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.errors import SettingError
@@ -65,7 +65,7 @@ def chosen_strategies(words: str) -> tuple[str, ...]:
     names = list(STRATEGIES) if words == "all" else words.split(",")
     for name in names:
         make_strategy(name)
-    return tuple(dict.fromkeys([BASELINE, *names]))
+    return tuple(dict.fromkeys([BASELINE, *map(resolved, names)]))
 
 
 def chosen_scenarios(

@@ -12,7 +12,7 @@ from types import MappingProxyType, ModuleType
 from baselines.strategies.frontier import FrontierStrategy
 from baselines.strategies.frontier.metrics import coordinated_frontier, nearest_frontier
 from baselines.strategies.gradient import GradientStrategy
-from baselines.strategies.information_rate import InformationRate, InformationRateConfig
+from baselines.strategies.information_rate_v0 import InformationRate, InformationRateConfig
 from baselines.strategies.loading import entry_points, is_reference, make_referenced, module_of
 from baselines.strategies.mutual_information import MutualInformation, MutualInformationConfig
 from baselines.strategies.protocol import Strategy
@@ -27,7 +27,7 @@ STRATEGIES: MappingProxyType[str, Callable[[], Strategy]] = MappingProxyType(
         "gradient-plane": partial(GradientStrategy, motion_plane=True),
         "mutual-information": MutualInformation,
         "ground-gradient": partial(MutualInformation, MutualInformationConfig(coordinated=False)),
-        "information-rate": InformationRate,
+        "information-rate-v0": InformationRate,
         "information-per-scan": partial(
             InformationRate, InformationRateConfig(per_scan=True, candidates=120)
         ),
@@ -44,6 +44,11 @@ STRATEGIES: MappingProxyType[str, Callable[[], Strategy]] = MappingProxyType(
 )
 """Name → a function that makes the strategy."""
 
+ALIASES: MappingProxyType[str, str] = MappingProxyType(
+    {"best": "information-rate-v0", "information-rate": "information-rate-v0"}
+)
+"""Other name → the name that records and tables hold: of what we recommend, and of former versions."""
+
 
 _LEARNED = "training.policy"
 """Makes strategies of learned policies. It is looked up when one is asked for, so that strategies need
@@ -55,19 +60,25 @@ def make_strategy(name: str) -> Strategy:
     """A new strategy.
 
     Args:
-        name: One of STRATEGIES; `pretrained:NAME`, a policy that comes with the project; the folder of a
-            policy that was trained; `module:Class` or `path/to/file.py:Class`; or a name that an installed
-            package declares (see `loading`).
+        name: One of STRATEGIES or ALIASES; `pretrained:NAME`, a policy that comes with the project; the
+            folder of a policy that was trained; `module:Class` or `path/to/file.py:Class`; or a name that an
+            installed package declares (see `loading`).
 
     Raises:
         SettingError: No strategy has this name, or its class cannot be made.
         MissingExtraError: A policy was asked for, and what runs it is not installed.
     """
+    name = resolved(name)
     if name in STRATEGIES:
         return STRATEGIES[name]()
     if is_learned(name):
         return learned_policies().make_policy_strategy(name)
     return make_referenced(_reference(name))
+
+
+def resolved(name: str) -> str:
+    """The name that records and tables hold of a strategy that is asked for by this name."""
+    return ALIASES.get(name, name)
 
 
 def strategy_module(name: str) -> str | Path:
@@ -79,6 +90,7 @@ def strategy_module(name: str) -> str | Path:
     Raises:
         SettingError: No strategy has this name.
     """
+    name = resolved(name)
     if name in STRATEGIES:
         made_by = STRATEGIES[name]
         while isinstance(made_by, partial):
@@ -94,7 +106,7 @@ def _reference(name: str) -> str:
     declared = entry_points()
     if name in declared:
         return declared[name]
-    known = [*STRATEGIES, *declared]
+    known = [*STRATEGIES, *ALIASES, *declared]
     alike = difflib.get_close_matches(name, known, n=1)
     meant = f" (did you mean {alike[0]}?)" if alike else ""
     allowed = (
@@ -105,7 +117,7 @@ def _reference(name: str) -> str:
 
 def is_learned(name: str) -> bool:
     """Whether a name means a learned policy."""
-    return name not in STRATEGIES and (name.startswith(_PRETRAINED) or Path(name).is_dir())
+    return resolved(name) not in STRATEGIES and (name.startswith(_PRETRAINED) or Path(name).is_dir())
 
 
 def learned_policies() -> ModuleType:

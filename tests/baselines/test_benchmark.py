@@ -368,7 +368,10 @@ def test_a_page_where_all_failed_is_a_page(tmp_path):
 def test_random_is_always_there_and_first():
     assert chosen_strategies("gradient,random") == ("random", "gradient")
     assert set(chosen_strategies("all")) == set(strategies.STRATEGIES)
-    assert chosen_strategies("information-rate,gradient")[1:] == ("information-rate", "gradient")
+    assert chosen_strategies("voronoi,gradient")[1:] == ("voronoi", "gradient")
+    former = ("random", "information-rate-v0")
+    assert chosen_strategies("information-rate,information-rate-v0") == former
+    assert chosen_strategies("best") == ("random", strategies.ALIASES["best"])
 
 
 def test_scenarios_are_names_and_files(tmp_path):

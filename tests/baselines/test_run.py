@@ -21,7 +21,7 @@ from baselines.cli import mission_outputs as mission_log
 from baselines.cli.arguments import run_command
 from baselines.cli.world_options import Reading
 from baselines.experiments.mission import run_mission, scripted
-from baselines.strategies import make_strategy
+from baselines.strategies import ALIASES, STRATEGIES, make_strategy
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.missions.state import MissionEnd
 from entropy_explore_env.reports.metrics import mission_figures
@@ -104,6 +104,13 @@ def test_the_same_seed_gives_the_same_figures_but_for_the_wall_clock(figures):
     first, again, other = (figures("--seed", seed) for seed in ("3", "3", "4"))
     assert without_clock(first) == without_clock(again)
     assert without_clock(first) != without_clock(other)
+
+
+@pytest.mark.parametrize("name", ALIASES)
+def test_an_alias_runs_what_it_stands_for_and_says_so(figures, name):
+    printed = figures("--strategy", name, *SHORT)
+    assert printed["strategy"] == ALIASES[name] in STRATEGIES
+    assert without_clock(printed) == without_clock(figures("--strategy", ALIASES[name], *SHORT))
 
 
 def test_what_is_not_said_is_the_scenario_s_own(figures):

@@ -22,7 +22,7 @@ from baselines.papers.sawhney.mission import MapRun
 from baselines.strategies.frontier import ExplorationConfig
 from baselines.strategies.frontier.metrics import Nearest
 from baselines.strategies.gradient import GradientStrategy
-from baselines.strategies.information_rate import InformationRate, InformationRateConfig
+from baselines.strategies.information_rate_v0 import InformationRate, InformationRateConfig
 from baselines.strategies.random_walk import RandomWalk
 from entropy_explore_env.scenarios import find_scenario
 

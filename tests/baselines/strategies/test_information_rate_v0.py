@@ -1,4 +1,4 @@
-"""The strategy `information-rate`: where it can go, and how soon it is done."""
+"""The strategy `information-rate-v0`: where it can go, and how soon it is done."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from baselines.experiments.mission import run_mission, scripted
-from baselines.strategies import information_rate
-from baselines.strategies.information_rate import InformationRate, InformationRateConfig, _stops
+from baselines.strategies import information_rate_v0
+from baselines.strategies.information_rate_v0 import InformationRate, InformationRateConfig, _stops
 from baselines.strategies.knowledge import announced_cones
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.missions.view import view_of
@@ -77,7 +77,7 @@ def test_what_a_teammate_announced_is_left_to_it():
 
 def test_a_path_whose_first_stop_is_out_of_sight_is_not_taken(monkeypatch):
     """Once it was searched again and again."""
-    monkeypatch.setattr(information_rate, "is_line_free", lambda *_: False)
+    monkeypatch.setattr(information_rate_v0, "is_line_free", lambda *_: False)
     env = EntropyExploreEnv(scripted(with_settings(ROOM, {"robots": 1})))
     env.reset(seed=0)
     strategy = InformationRate()

@@ -1,4 +1,4 @@
-"""The strategy `information-rate`: the viewpoint whose scan is expected to bring most bits per second.
+"""The strategy `information-rate-v0`: the viewpoint whose scan is expected to bring most bits per second.
 
 Ours, not a paper's: viewpoints are drawn within reach, half of them turns on the spot, and each is evaluated
 by the bits that its scan should take from the robot's own map (viewpoints/expected_scan.py) per second of
