@@ -119,12 +119,16 @@ class Scenario:
         if self.action.kind == "discrete" and robot.reach_m < self.grid.voxel_size_m:
             allowed = f"at least a voxel ({self.grid.voxel_size_m} m) for discrete actions"
             raise SettingError("Robot.reach_m", robot.reach_m, allowed)
-        if self.action.kind == "discrete":
+        if self.action.kind == "discrete" and self.action.moves == "all":  # along the axes there are few
             steps = math.floor(robot.reach_m / self.grid.voxel_size_m + 1e-9)
             axes = self.grid.shape[:2] if self.planar else self.grid.shape
             moves = math.prod(2 * min(steps, n - 1) + 1 for n in axes)
-            if moves * self.action.yaws * self.action.pitches > MAX_ACTIONS:
-                allowed = f"so short that there are at most {MAX_ACTIONS} discrete actions"
+            actions = moves * self.action.yaws * self.action.pitches
+            if actions > MAX_ACTIONS:
+                allowed = (
+                    f"so short that there are at most {MAX_ACTIONS:,} discrete actions (not {actions:,}), "
+                )
+                allowed += "or moves along the axes alone: Action.moves = 'axes'"
                 raise SettingError("Robot.reach_m", robot.reach_m, allowed)
         layer = self.layer_of(robot)
         if layer is not None and layer >= self.grid.shape[2]:

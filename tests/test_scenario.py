@@ -237,6 +237,9 @@ def test_settings_that_do_not_fit_each_other_are_refused():
     ):
         assert refusal(lambda changes=settings: with_settings(BOX, changes)).field == field
     assert with_settings(BOX, {**discrete, "robot": {"reach_m": 0.5}}).action.kind == "discrete"
+    far = {"grid": Grid((70, 80, 60), 0.5), "robot": {"reach_m": 30.0}, "action": {"kind": "discrete"}}
+    far["action"]["moves"] = "axes"  # seven, however far
+    assert with_settings(BOX, far).robot.reach_m == 30.0
     flat = {"grid": Grid((7, 11, 1), 0.1), "robot": {"motion": "planar", "sensor_height_m": 2.5}}
     assert with_settings(BOX, flat).planar  # in a 2-D world there is no height
     level = with_settings(BOX, {"grid": Grid((7, 11, 1), 0.1)}).sensor

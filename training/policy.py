@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import torch
@@ -114,6 +115,46 @@ def choose_actions(
         return actions.clamp(-1.0, 1.0).numpy()
 
 
+class Misfit(NamedTuple):
+    """Why a policy cannot act in a scenario: what differs, in the scenario and in that of training."""
+
+    what: str
+    given: object
+    trained: object
+
+
+def misfit(scenario: Scenario, trained: Scenario) -> Misfit | None:
+    """The first reason why observations or actions of a scenario are not those of training; None = they are.
+
+    Args:
+        scenario: With the observation and the action of training.
+        trained: The scenario of training.
+    """
+    offered, wanted = ObservationLayout(scenario).parts, ObservationLayout(trained).parts
+    shapes = {
+        name: [parts[name].shape if name in parts else None for parts in (offered, wanted)]
+        for name in (*wanted, *offered)
+    }
+    differing = {name: pair for name, pair in shapes.items() if pair[0] != pair[1]}
+    kinds = [len(each.kinds) for each in (scenario, trained)]
+    if "team" in differing:
+        return Misfit("robots", scenario.robots, trained.robots)
+    if scenario.planar != trained.planar:  # so that the panorama, the gazes and the moves differ
+        return Misfit("motion of the robots", _motion(scenario), _motion(trained))
+    if "self" in differing and kinds[0] != kinds[1]:
+        return Misfit("kinds of robots", *kinds)
+    if "overview" in differing:
+        return Misfit("world's voxels", scenario.grid.shape, f"{trained.grid.shape}, of which it saw all")
+    for name, (given, fits) in differing.items():
+        return Misfit(f"observation {name}", given, fits)
+    actions = [action_space(each) for each in (scenario, trained)]
+    return Misfit("actions", *actions) if actions[0] != actions[1] else None
+
+
+def _motion(scenario: Scenario) -> str:
+    return "in a plane, looking level" if scenario.planar else "flying"
+
+
 class LearnedPolicy:
     """The strategy of a checkpoint: every robot's policy observes that robot's own RobotView.
 
@@ -143,21 +184,12 @@ class LearnedPolicy:
         """
         trained = self._checkpoint.settings.scenario
         self._observer = ViewObserver(scenario, trained.observation, trained.action)
-        offered, wanted = self._observer.layout.parts, ObservationLayout(trained).parts
-        for name in wanted.keys() | offered.keys():
-            shapes = [parts[name].shape if name in parts else None for parts in (offered, wanted)]
-            if shapes[0] != shapes[1]:
-                what = "robots" if name == "team" else f"observation {name}"
-                given = scenario.robots if name == "team" else shapes[0]
-                fits = trained.robots if name == "team" else shapes[1]
-                raise CheckpointError(f"{self._folder}: {what}", given, f"{fits}, as the policy was trained")
-        actions = [action_space(each) for each in (self._observer.scenario, trained)]
-        if actions[0] != actions[1]:
-            raise CheckpointError(f"{self._folder}: actions", actions[0], f"{actions[1]}, as it was trained")
-        if scenario.action.kind == "discrete" and scenario.action != trained.action:
-            raise CheckpointError(
-                f"{self._folder}: Scenario.action", scenario.action, f"continuous, or {trained.action}"
-            )
+        reason = misfit(self._observer.scenario, trained)
+        if reason is None and scenario.action.kind == "discrete" and scenario.action != trained.action:
+            reason = Misfit("Scenario.action", scenario.action, f"continuous, or {trained.action}")
+        if reason is not None:
+            allowed = f"{reason.trained}, as the policy was trained"
+            raise CheckpointError(f"{self._folder}: {reason.what}", reason.given, allowed)
         self._rng = torch.Generator().manual_seed(int(rng.integers(2**63)))
 
     def choose(self, views: Sequence[RobotView]) -> list[np.ndarray]:

@@ -188,15 +188,26 @@ def discrete_moves(scenario: Scenario) -> np.ndarray:
     farthest = [min(math.floor(reach), n - 1) for n in scenario.grid.shape]
     if scenario.planar:
         farthest[2] = 0
-    steps = [np.arange(-most, most + 1) for most in farthest]
-    offsets = np.stack(np.meshgrid(*steps, indexing="ij"), axis=-1).reshape(-1, 3)
+    axes_only = scenario.action.moves == "axes"
+    offsets = _along_axes(farthest) if axes_only else _within_box(farthest)
     lengths = np.sqrt((offsets**2).sum(axis=1))
-    wanted = lengths <= reach
-    if scenario.action.moves == "axes":
-        wanted &= ((offsets == 0) | (np.abs(offsets) == farthest)).all(axis=1)
-        wanted &= (offsets != 0).sum(axis=1) <= 1
-    offsets, lengths = offsets[wanted], lengths[wanted]
+    offsets, lengths = offsets[lengths <= reach], lengths[lengths <= reach]
     return np.ascontiguousarray(offsets[np.argsort(lengths, kind="stable")], np.int64)
+
+
+def _along_axes(farthest: list[int]) -> np.ndarray:
+    """(K, 3) offsets: to stay, and so far along each axis, both ways; in lexicographic order."""
+    offsets = {(0, 0, 0)}
+    for axis, most in enumerate(farthest):
+        for step in (-most, most):
+            offsets.add((*(0,) * axis, step, *(0,) * (2 - axis)))
+    return np.array(sorted(offsets))
+
+
+def _within_box(farthest: list[int]) -> np.ndarray:
+    """(K, 3) offsets up to so far along each axis, in lexicographic order."""
+    steps = [np.arange(-most, most + 1) for most in farthest]
+    return np.stack(np.meshgrid(*steps, indexing="ij"), axis=-1).reshape(-1, 3)
 
 
 def panorama_directions(scenario: Scenario) -> np.ndarray:

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from entropy_explore_env.errors import ActionError
 from entropy_explore_env.missions.action import action_space, decode_action, encode_viewpoint
 from entropy_explore_env.missions.observation.mask import write_mask
-from entropy_explore_env.missions.rules import rules_of
+from entropy_explore_env.missions.rules import discrete_moves, rules_of
 from entropy_explore_env.scenario import with_settings
 from entropy_explore_env.scenarios import BOX
 from entropy_explore_env.settings import Grid
@@ -155,6 +155,21 @@ def test_discrete_actions_hold_every_centre_within_reach_and_every_gaze_exactly(
                 assert encode_viewpoint(rules, pose, got) == number
                 numbers.add(int(number))
     assert numbers == set(range(int(space.n)))  # and there are no others
+
+
+@pytest.mark.parametrize("motion", ["free", "planar"])
+@pytest.mark.parametrize("reach_m", [0.5, 1.2, 3.0, 300.0])
+def test_moves_along_the_axes_are_those_of_all_moves_that_reach_farthest(motion, reach_m):
+    """The slow way: out of all moves. The box is shorter than 300 m."""
+    robot, axes = {"motion": motion, "reach_m": min(reach_m, 5.5)}, 2 if motion == "planar" else 3
+    every = discrete_moves(free_box(robot=robot, action={"kind": "discrete", "yaws": 1, "pitches": 1}))
+    along = every[(every != 0).sum(axis=1) <= 1]
+    farthest = np.abs(along).max(axis=0)
+    slow = [
+        move for move in along.tolist() if all(abs(m) in (0, f) for m, f in zip(move, farthest, strict=True))
+    ]
+    fast = free_box(robot={**robot, "reach_m": reach_m}, action={"kind": "discrete", "moves": "axes"})
+    assert discrete_moves(fast).tolist() == slow and len(slow) == 1 + 2 * axes
 
 
 @drawn(60)

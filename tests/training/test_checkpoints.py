@@ -190,7 +190,8 @@ def test_a_policy_is_a_strategy_like_any_other(saved, tmp_path):
     [
         ({"robots": 3}, "robots = 3"),
         ({"robots": 2, "action": {"kind": "discrete"}}, "Scenario.action"),
-        ({"robots": 2, "extra_kinds": find_scenario("office-mixed").extra_kinds}, "observation self"),
+        ({"robots": 2, "extra_kinds": find_scenario("office-mixed").extra_kinds}, "kinds of robots = 2"),
+        ({"robots": 2, "robot": {"motion": "planar"}}, "motion of the robots = 'in a plane"),
     ],
 )
 def test_a_policy_for_something_else_is_named(saved, settings, named):
@@ -204,7 +205,7 @@ def test_a_policy_of_one_grid_is_named_where_maps_differ(tmp_path):
     settings = PolicySettings(with_settings(find_scenario("box-7x11x5"), form), "maps", (4,))
     save_checkpoint(tmp_path / "step-1", fresh(settings))
     policy, wider = LearnedPolicy(tmp_path), with_settings(find_scenario("room"), {"robots": 2})
-    with pytest.raises(CheckpointError, match="overview"):
+    with pytest.raises(CheckpointError, match=r"world's voxels = .41, 41, 17."):
         policy.reset(wider, np.random.default_rng(0))
 
 

@@ -1,0 +1,42 @@
+"""training.ppo starts in every named scenario with its defaults."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from baselines.cli.arguments import parse
+from entropy_explore_env.scenarios import SCENARIOS
+from training import ppo
+
+FEW = (
+    "--missions 2 --rollout-steps 4 --batch 8 --epochs 1 --validation-missions 1 --time-limit-s 3 "
+    "--no-video --json"
+).split()
+LONG = ("bhattacharya-cluttered", "lab", "terrain-smooth", "terrain-rough")
+
+
+@pytest.mark.parametrize("name", SCENARIOS)
+def test_the_defaults_make_a_policy_for_every_named_scenario(name):
+    args = parse(ppo.Args, ["--scenario", name, "--missions", "1"])
+    ppo.check(args)
+    scenario = ppo.training_scenario(args)
+    state = ppo.set_up(args, scenario)
+    moves = 5 if scenario.planar else 7
+    gazes = args.yaws * (1 if scenario.planar else args.pitches)
+    assert state.envs.action_space.n == moves * gazes
+    assert state.model.policy.observation_space == state.envs.observation_space
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=pytest.mark.long if name in LONG else ()) for name in SCENARIOS]
+)
+def test_training_begins_in_every_named_scenario(name, tmp_path, capsys):
+    """Three rollouts and updates, a validation and a checkpoint."""
+    robots = ppo.training_scenario(parse(ppo.Args, ["--scenario", name])).robots
+    steps = 3 * 4 * 2 * robots
+    words = [*FEW, "--scenario", name, "--total-steps", str(steps), "--out", str(tmp_path / "run")]
+    assert ppo.run_command(ppo.main, words) == 0
+    assert json.loads(capsys.readouterr().out)["steps"] == steps
+    assert list((tmp_path / "run").glob("step-*"))
