@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from typing import Any
 
@@ -9,6 +10,13 @@ from numba import typeof
 from numba.core import config
 
 from entropy_explore_env.compilation.dispatchers import Kernel
+
+ASSERTING = os.environ.get("ENTROPY_EXPLORE_ASSERT", "0") != "0"
+"""Whether kernels assert what holds unless they are wrong, such as that every event of a mission is used up.
+
+Of a process, by the variable ENTROPY_EXPLORE_ASSERT=1. It is a constant of the kernels that name it: without
+it nothing of an assertion is compiled, and code with assertions is kept beside that without.
+"""
 
 _OPTIONS: dict[str, Any] = {"nopython": True, "nogil": True, "error_model": "numpy", "boundscheck": None}
 _LEAN_OPTIONS: dict[str, Any] = {**_OPTIONS, "_nrt": False}

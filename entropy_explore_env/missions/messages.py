@@ -141,6 +141,8 @@ def transmit(team, index, place, time_s, recipients):
 def enqueue(clock, robot, in_flight, index, count, recipients, delay_s):
     """Put a message into a free slot; returns the slot.
 
+    There is one: `Scenario.message_slots` counts how many messages can be under way at once.
+
     Args:
         clock: MISSION.
         robot: ROBOT of the sender.

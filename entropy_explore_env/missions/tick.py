@@ -1,7 +1,7 @@
 """One step of one mission, compiled: choose → drive → scan → fuse → select → send → fuse → account.
 
-The events of a mission (a robot has driven and scanned; a message arrives) are processed in the order of
-simulated time; of events at the same instant messages come first, then robots by number.
+The events of a mission (a message arrives; the robots broadcast; a robot scans, or has waited) are processed
+in the order of simulated time. `next_event` alone says which is next, also of those at one instant.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from entropy_explore_env.compilation.kernels import lean_kernel
+from entropy_explore_env.compilation.kernels import ASSERTING, lean_kernel
 from entropy_explore_env.missions.action import decode_action
 from entropy_explore_env.missions.driving import continue_drive, next_decision, start_drive, stop
 from entropy_explore_env.missions.messages import (
@@ -50,6 +50,18 @@ from entropy_explore_env.robots.range_sensor import (
 
 _RUNNING, _MAPPED, _TIME_UP, _CYCLES_UP = (end.code for end in MissionEnd)
 _NOTHING = int(Return.NOTHING)
+_NO_EVENT, _MESSAGE, _BROADCAST, _ROBOT = range(4)
+
+
+class Event(NamedTuple):
+    """What happens next in a mission."""
+
+    kind: int
+    """A message arrives, the robots broadcast, or a robot scans or has waited; or nothing is due."""
+    number: int
+    """The slot of the message, or the number of the robot; 0 for others."""
+    time_s: float
+    """When; inf = never."""
 
 
 class Mission(NamedTuple):
@@ -160,38 +172,34 @@ def advance(mission, sensors, work):
     """
     clock, team, maps, scan = mission.clock, mission.team, mission.maps, work.scan
     params, robots, tracer = team.params, team.robots, Tracer(sensors.params, mission.truth)
-    shared = params[0]
+    shared, messages = params[0], mission.in_flight.messages
     target_s = clock.time_s + shared.period_s
     if math.isinf(target_s):
         target_s = next_decision(params, robots)
     stop_s = min(target_s, shared.time_limit_s)
     while clock.end == _RUNNING:
-        slot, due_s = next_message(mission.in_flight.messages)
-        robot, scan_s = next_scan(robots)
-        broadcast_s = next_broadcast(shared, mission.phases)
-        if min(due_s, scan_s, broadcast_s) > stop_s:
+        event = next_event(shared, robots, messages, mission.phases)
+        if event.kind == _NO_EVENT or event.time_s > stop_s:
             break
-        if due_s <= scan_s:
-            clock.time_s = max(clock.time_s, due_s)
-            receive(team, maps, mission.in_flight, slot, tracer, scan)
-        elif broadcast_s <= scan_s:
-            clock.time_s = max(clock.time_s, broadcast_s)
+        handled, earlier_s = (
+            events_handled(robots, messages, mission.phases) if ASSERTING else 0,
+            clock.time_s,
+        )
+        clock.time_s = max(clock.time_s, event.time_s)
+        if event.kind == _MESSAGE:
+            receive(team, maps, mission.in_flight, event.number, tracer, scan)
+        elif event.kind == _BROADCAST:
             broadcast_all(team, maps, mission.buffers, mission.phases, clock.time_s, tracer, scan)
+        elif robots[event.number].waiting:
+            robots[event.number].deciding = True
         else:
-            clock.time_s = scan_s
-            own = robots[robot]
-            if own.waiting:
-                own.deciding = True
-            else:
-                scan_and_share(mission, sensor_of(sensors, robot), robot, work)
-                if scan_s >= own.ready_s:
-                    stop(params[robot], own, scan_s)
-                else:
-                    footprint = work.footprints[params[robot].kind]
-                    mean = maps.beliefs.mean[robot]
-                    continue_drive(params[robot], footprint, mean, own, scan_s, work.drive)
-                    if math.isinf(shared.period_s):
-                        stop_s = min(next_decision(params, robots), shared.time_limit_s)
+            scan_at(mission, sensors, event.number, work)
+            if math.isinf(shared.period_s):
+                stop_s = min(next_decision(params, robots), shared.time_limit_s)
+        if ASSERTING and clock.time_s < earlier_s:
+            raise AssertionError("time ran backwards")
+        if ASSERTING and events_handled(robots, messages, mission.phases) <= handled:
+            raise AssertionError("an event was not used up")
         note_progress(clock, robots)
         if mapped(robots, clock.entropy_end_bits, shared.all_maps):
             clock.end = _MAPPED
@@ -199,6 +207,66 @@ def advance(mission, sensors, work):
         clock.time_s = max(clock.time_s, stop_s)
         if stop_s >= shared.time_limit_s:
             clock.end = _TIME_UP
+
+
+@lean_kernel
+def next_event(shared, robots, messages, phases):
+    """The earliest Event.
+
+    Of those at one instant messages come first, in the order of sending; then the broadcast of all robots;
+    then robots by number.
+
+    Args:
+        shared: PARAMS of any robot.
+        robots: (A,) ROBOT.
+        messages: (Q,) MESSAGE.
+        phases: PHASES of the mission.
+    """
+    slot, due_s = next_message(messages)
+    broadcast_s = next_broadcast(shared, phases)
+    robot, scan_s = next_scan(robots)
+    soonest_s = min(due_s, broadcast_s, scan_s)
+    if math.isinf(soonest_s):
+        return Event(_NO_EVENT, 0, soonest_s)
+    if due_s == soonest_s:
+        return Event(_MESSAGE, slot, soonest_s)
+    if broadcast_s == soonest_s:
+        return Event(_BROADCAST, 0, soonest_s)
+    return Event(_ROBOT, robot, soonest_s)
+
+
+@lean_kernel
+def events_handled(robots, messages, phases):
+    """A number that every event makes greater, so that none is met twice: asserted in debug builds.
+
+    A message frees its slot. A broadcast is counted. A robot counts its scan, which may send one message, or
+    has waited and decides. Arguments as those of `next_event`.
+    """
+    handled = phases.broadcasts
+    for robot in robots:
+        handled += 2 * robot.scans + int(robot.deciding)
+    for message in messages:
+        handled -= int(not math.isinf(message.due_s))
+    return handled
+
+
+@lean_kernel
+def scan_at(mission, sensors, index, work):
+    """A robot scans at the mission's time, and then stops, drives on, or ends its drive.
+
+    Args:
+        mission: Mission, changed in place.
+        sensors: TeamSensors.
+        index: The robot's number.
+        work: Workspace.
+    """
+    time_s, params, own = mission.clock.time_s, mission.team.params[index], mission.team.robots[index]
+    scan_and_share(mission, sensor_of(sensors, index), index, work)
+    if time_s >= own.ready_s:
+        stop(params, own, time_s)
+    else:
+        footprint, mean = work.footprints[params.kind], mission.maps.beliefs.mean[index]
+        continue_drive(params, footprint, mean, own, time_s, work.drive)
 
 
 @lean_kernel

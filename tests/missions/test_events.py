@@ -1,0 +1,103 @@
+"""Which event of a mission is next, and that each is used up, so that no step lasts for ever."""
+
+from __future__ import annotations
+
+import math
+import os
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from entropy_explore_env.missions.rules import PARAMS
+from entropy_explore_env.missions.state import MESSAGE, PHASES, ROBOT
+from entropy_explore_env.missions.tick import events_handled, next_event
+from tests.reference.scenes import free_box, started
+
+NOTHING, MESSAGES, BROADCAST, ROBOTS = range(4)
+NEVER = math.inf
+
+
+def event(due_s=(), serials=None, broadcasts=None, scans_s=(), deciding=()):
+    """The next event of three messages and four robots at most; broadcasts every 2 s, if at all."""
+    messages, robots = np.zeros(3, MESSAGE), np.zeros(4, ROBOT)
+    messages["due_s"], robots["next_scan_s"] = NEVER, NEVER
+    messages["due_s"][: len(due_s)], robots["next_scan_s"][: len(scans_s)] = due_s, scans_s
+    messages["serial"] = range(3) if serials is None else serials
+    robots["deciding"][list(deciding)] = True
+    shared, phases = np.zeros(1, PARAMS), np.zeros(1, PHASES)
+    if broadcasts is not None:
+        shared["phase_s"], shared["repeats"], phases["broadcasts"] = 6.0, 3, broadcasts
+    return tuple(next_event(shared[0], robots, messages, phases[0]))
+
+
+@pytest.mark.parametrize(
+    ("given", "expected"),
+    [
+        ({}, (NOTHING, 0, NEVER)),
+        ({"scans_s": (1.0, 1.0), "deciding": (0, 1)}, (NOTHING, 0, NEVER)),
+        ({"due_s": (NEVER, 5.0)}, (MESSAGES, 1, 5.0)),
+        ({"due_s": (7.0, 5.0, 6.0), "scans_s": (5.5,)}, (MESSAGES, 1, 5.0)),
+        ({"due_s": (5.0, 5.0, 6.0), "serials": (4, 3, 2)}, (MESSAGES, 1, 5.0)),
+        ({"due_s": (5.0, 5.0, 5.0), "serials": (4, 3, 2), "scans_s": (5.0,)}, (MESSAGES, 2, 5.0)),
+        ({"due_s": (5.0,), "scans_s": (6.0, 4.9)}, (ROBOTS, 1, 4.9)),
+        ({"scans_s": (3.0, 2.5, 2.5, 4.0)}, (ROBOTS, 1, 2.5)),
+        ({"scans_s": (3.0, 2.5, 2.5, 4.0), "deciding": (1,)}, (ROBOTS, 2, 2.5)),
+        ({"broadcasts": 0}, (BROADCAST, 0, 2.0)),  # all decide and nothing else is due
+        ({"broadcasts": 4, "scans_s": (9.0,), "deciding": (0,)}, (BROADCAST, 0, 10.0)),
+        ({"broadcasts": 4, "scans_s": (10.0,)}, (BROADCAST, 0, 10.0)),
+        ({"broadcasts": 4, "scans_s": (9.5, 9.75)}, (ROBOTS, 0, 9.5)),
+        ({"broadcasts": 4, "scans_s": (10.25,)}, (BROADCAST, 0, 10.0)),
+        ({"broadcasts": 1, "due_s": (4.0,), "scans_s": (4.0,)}, (MESSAGES, 0, 4.0)),
+        ({"broadcasts": 1, "due_s": (4.5,), "scans_s": (5.0,)}, (BROADCAST, 0, 4.0)),
+    ],
+)
+def test_the_earliest_event_is_next_and_ties_have_an_order(given, expected):
+    assert event(**given) == expected
+
+
+PHASES_WITHOUT_EVENTS = """
+import numpy as np
+from tests.reference.scenes import free_box, started, wander
+missions = started(free_box(robots=3, channel={"phase_s": 3.0}, decision_period_s=1.0))
+wander(missions, 60, 0)
+broadcasts, times = missions.state.phases["broadcasts"][0], missions.state.missions["time_s"][0]
+assert missions.state.robots["deciding"].any()
+print(times, broadcasts)
+"""
+
+
+def test_a_broadcast_is_due_while_all_robots_decide():
+    """In a process of its own, which can be ended if it hangs; assertions of kernels are compiled in."""
+    done = subprocess.run(
+        [sys.executable, "-c", PHASES_WITHOUT_EVENTS],
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path), "ENTROPY_EXPLORE_ASSERT": "1"},
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=True,
+    )
+    assert done.stdout.split() == ["60.0", "20"], done.stderr
+
+
+def test_every_kind_of_event_counts_as_handled():
+    missions = started(free_box(robots=3, channel={"delay_s": 1.0, "burst": 2}))
+    state = missions.state
+
+    def handled():
+        return events_handled(state.robots[0], state.in_flight[0], state.phases[0])
+
+    begun = handled()
+    assert begun == 3  # all decide
+    state.in_flight["due_s"][0, :2] = 3.0, 2.0
+    assert handled() == begun - 2
+    state.in_flight["due_s"][0, 1] = NEVER  # heard
+    assert handled() == begun - 1
+    state.phases["broadcasts"][0] += 1
+    assert handled() == begun
+    state.robots["scans"][0, 2] += 1
+    state.in_flight["due_s"][0, 1] = 5.0  # a scan of which something is sent
+    assert handled() == begun + 1
+    state.robots["deciding"][0, 0] = False
+    assert handled() == begun
