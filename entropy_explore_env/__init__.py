@@ -89,8 +89,12 @@ __all__ = [
 
 
 def environment_id(scenario: str) -> str:
-    """The id of a named scenario: `room-furnished` → `entropy_explore_env/RoomFurnished-v0`."""
-    words = scenario.split("-")
+    """The id of a named scenario: `room-furnished` → `entropy_explore_env/RoomFurnished-v0`.
+
+    Raises:
+        SettingError: No scenario has this name.
+    """
+    words = find_scenario(scenario).name.split("-")
     return "entropy_explore_env/" + "".join(word[:1].upper() + word[1:] for word in words) + "-v0"
 
 

@@ -6,6 +6,15 @@ _LONGEST_VALUE = 200
 """Characters of a value that a message shows at most."""
 
 
+def shown(value: object) -> str:
+    """A value in one line of a message; of one that cannot be shown, what kind it is."""
+    try:
+        text = " ".join(repr(value).split())
+    except Exception:  # a repr of somebody else's, or a whole number of too many digits
+        text = f"<{type(value).__name__}>"
+    return text if len(text) <= _LONGEST_VALUE else text[:_LONGEST_VALUE] + " …"
+
+
 class EntropyExploreError(ValueError):
     """A request of the caller that cannot be met; the message is one line."""
 
@@ -15,10 +24,7 @@ class SettingError(EntropyExploreError):
 
     def __init__(self, field: str, value: object, allowed: str) -> None:
         """Name the field, its value and what is allowed."""
-        shown = " ".join(repr(value).split())
-        if len(shown) > _LONGEST_VALUE:
-            shown = shown[:_LONGEST_VALUE] + " …"
-        super().__init__(f"{field} = {shown}: allowed is {allowed}")
+        super().__init__(f"{field} = {shown(value)}: allowed is {allowed}")
         self.field, self.value, self.allowed = field, value, allowed
 
     def __reduce__(self) -> tuple[type, tuple[str, object, str]]:

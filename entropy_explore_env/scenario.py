@@ -27,6 +27,7 @@ from entropy_explore_env.validation import (
     check,
     check_choice,
     check_count,
+    check_instance,
     check_kind,
     check_positive,
 )
@@ -221,6 +222,9 @@ def with_settings(scenario: Scenario, settings: Mapping[str, Any]) -> Scenario:
     Raises:
         SettingError: A name is unknown or a value is not allowed.
     """
+    check_instance("scenario", scenario, Scenario)
+    if not isinstance(settings, Mapping):
+        raise SettingError("settings", settings, "a mapping from names of settings to values")
     changes = dict(settings)
     for name in ("max_cycles", "time_limit_s"):
         if name in changes:

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any, TypeGuard, get_args
 
 import numpy as np
@@ -32,6 +34,27 @@ def check_whole(name: str, value: object, least: int) -> None:
     """Raise a SettingError unless a value, not a field, is a whole number ≥ `least`."""
     if not is_whole(value, least):
         raise SettingError(name, value, f"a whole number ≥ {least}")
+
+
+def check_instance(name: str, value: object, kind: type, error: type[SettingError] = SettingError) -> None:
+    """Raise an error unless a value, not a field, is an instance of a class."""
+    if not isinstance(value, kind):
+        raise error(name, value, f"a {kind.__name__}")
+
+
+def checked_path(name: str, value: object, allowed: str = "the path of a file") -> Path:
+    """A path from outside, with `~` at its beginning as the home folder that it stands for.
+
+    Raises:
+        SettingError: It is no path, or there is no such home folder.
+    """
+    text = os.fspath(value) if isinstance(value, str | os.PathLike) else None
+    if not isinstance(text, str) or "\0" in text:
+        raise SettingError(name, value, allowed)
+    try:
+        return Path(text).expanduser()
+    except RuntimeError:
+        raise SettingError(name, value, "a path below a home folder that exists") from None
 
 
 def check(settings: object, name: str, allowed: str, accepts: Callable[[Any], bool]) -> None:

@@ -70,7 +70,7 @@ class ActionChecker:
         Raises:
             ActionError: As for `batch`.
         """
-        given = _as_array("actions", actions)
+        given = as_array("actions", actions)
         leading = (missions,) if robots == 1 else (missions, robots)
         shape = leading if self._discrete else (*leading, self.width)
         wanted = "whole numbers" if self._discrete else "floating-point numbers"
@@ -95,16 +95,16 @@ class ActionChecker:
         return int(number)
 
     def _checked_continuous(self, agent: str, action: object) -> np.ndarray:
-        array = _as_array(f"actions[{agent}]", action)
+        array = as_array(f"actions[{agent}]", action)
         if array.shape != (self.width,) or array.dtype.kind != "f":
             allowed = f"{self.width} floating-point numbers from -1 to 1"
             raise ActionError(f"actions[{agent}]", action, allowed)
         return array
 
 
-def _as_array(name: str, action: object) -> np.ndarray:
+def as_array(name: str, action: object) -> np.ndarray:
     """An array of whatever was given; what cannot be one is an ActionError."""
     try:
         return np.asarray(action)
-    except (ValueError, TypeError):
+    except Exception:  # lists of different lengths, or an __array__ of somebody else's
         raise ActionError(name, action, "numbers in the shape of the action space") from None

@@ -27,6 +27,8 @@ from entropy_explore_env.scenario import Scenario
 from entropy_explore_env.scenarios import find_scenario
 from entropy_explore_env.worlds.given import with_given_worlds
 
+_SENT_BY_CHECKERS = {"options": 1}
+"""What `parallel_api_test` and `api_test` of PettingZoo reset with."""
 _PARTS = (layout.__doc__ or "").partition("\n\n")[2]
 """The parts of an observation, their shapes and units, as `missions.observation.layout` describes them."""
 
@@ -133,7 +135,11 @@ class EntropyExploreEnv(ParallelEnv[str, Any, Any]):
         return [agent for agent, decides in zip(self.agents, deciding, strict=False) if decides]
 
     def strategy_generator(self) -> np.random.Generator:
-        """The mission's random stream for whoever chooses the actions."""
+        """The mission's random stream for whoever chooses the actions.
+
+        Raises:
+            CallOrderError: There was no reset yet.
+        """
         return self.missions.strategy_generator(0)
 
     def reset(
@@ -145,7 +151,7 @@ class EntropyExploreEnv(ParallelEnv[str, Any, Any]):
             seed: Of all random streams; None goes on to the next mission of the last seed.
             options: `starts`, (A, 5), and `world`, a world number or a World, instead of drawn ones: see
                 `missions.reset_options`. They hold for this mission; the next reset draws again. What
-                PettingZoo's checkers send, an option named `options`, means nothing.
+                PettingZoo's checkers send, `{"options": 1}`, means nothing.
 
         Returns:
             Observations and infos by agent.
@@ -155,7 +161,7 @@ class EntropyExploreEnv(ParallelEnv[str, Any, Any]):
                 where they were put. Nothing has changed then.
             WorldError: The world has too little room for the team, or another grid.
         """
-        given = named_options(options, ignored="options")
+        given = named_options(options, ignored=_SENT_BY_CHECKERS)
         self.missions.reset(0, seed, mission_options(given, self.scenario))
         self.agents = list(self.possible_agents)
         self._painter.watch(self.missions)
@@ -203,9 +209,7 @@ class EntropyExploreEnv(ParallelEnv[str, Any, Any]):
         if not isinstance(actions, Mapping):
             raise ActionError("actions", actions, "a dict from agent to action")
         if len(actions) != len(self.agents) or any(agent not in actions for agent in self.agents):
-            raise ActionError(
-                "actions", sorted(map(str, actions)), "one for each of " + ", ".join(self.agents)
-            )
+            raise ActionError("actions", list(actions), "one for each of " + ", ".join(self.agents))
         return [(agent, actions[agent]) for agent in self.agents]
 
     def _observations(self) -> dict[str, Any]:
@@ -261,6 +265,15 @@ class TurnTakingEnv(OrderEnforcingWrapper[str, Any, Any]):
     def view(self, agent: str) -> RobotView:
         """What a robot knows; see `EntropyExploreEnv.view`."""
         return self._team.view(agent)
+
+    def observe(self, agent: str) -> Any:  # noqa: ANN401 - PettingZoo's signature
+        """What a robot observes.
+
+        Raises:
+            SettingError: No robot has this name.
+        """
+        self._team.observation_space(agent)
+        return super().observe(agent)
 
     def step(self, action: Any) -> None:  # noqa: ANN401 - PettingZoo's signature
         """Take the action of the robot whose turn it is; see `EntropyExploreEnv.step`.

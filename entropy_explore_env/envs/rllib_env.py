@@ -15,6 +15,7 @@ from gymnasium import spaces
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.errors import ActionError, MissingExtraError
 from entropy_explore_env.randomness import check_seed
+from entropy_explore_env.validation import check_instance
 
 if TYPE_CHECKING:
     from gymnasium import Env as MultiAgentEnv
@@ -51,6 +52,8 @@ class EntropyExploreMultiAgentEnv(MultiAgentEnv):
             SettingError: A setting is unknown or out of its range.
             WorldError: The world cannot be used.
         """
+        if settings is not None:
+            check_instance("settings", settings, Mapping)
         asked = dict(settings or {})
         run = asked.pop("seed", None)
         self._run = None if run is None else check_seed(run)
@@ -106,10 +109,10 @@ class EntropyExploreMultiAgentEnv(MultiAgentEnv):
             ActionError: Other robots than those that decide act, or an action cannot be taken.
         """
         deciding = self.team.deciding_agents()
+        if not isinstance(action_dict, Mapping):
+            raise ActionError("action_dict", action_dict, "a dict from agent to action")
         if self.team.agents and set(action_dict) != set(deciding):
-            raise ActionError(
-                "action_dict", sorted(map(str, action_dict)), "one for each of " + ", ".join(deciding)
-            )
+            raise ActionError("action_dict", list(action_dict), "one for each of " + ", ".join(deciding))
         ignored = dict.fromkeys(self.team.agents, self._ignored)
         actions = {**ignored, **action_dict}
         while True:

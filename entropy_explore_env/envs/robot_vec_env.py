@@ -6,15 +6,17 @@ is busy is ignored, and the transition says so.
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from gymnasium.vector import AutoresetMode
 
+from entropy_explore_env.envs.checks import as_array
 from entropy_explore_env.envs.rewards import RewardFunction
 from entropy_explore_env.envs.vector_env import EntropyExploreVectorEnv
-from entropy_explore_env.errors import MissingExtraError, SettingError
+from entropy_explore_env.errors import ActionError, MissingExtraError, SettingError
 from entropy_explore_env.missions.action import action_space
 from entropy_explore_env.missions.reset_options import (
     ResetOptions,
@@ -24,8 +26,9 @@ from entropy_explore_env.missions.reset_options import (
 )
 from entropy_explore_env.missions.snapshot import check_array, restore, snapshot
 from entropy_explore_env.missions.state import MissionEnd
+from entropy_explore_env.randomness import check_seed
 from entropy_explore_env.scenario import Scenario
-from entropy_explore_env.validation import is_whole
+from entropy_explore_env.validation import check_instance, is_whole
 
 try:
     from stable_baselines3.common.vec_env import VecEnv
@@ -89,8 +92,10 @@ class RobotVecEnv(VecEnv):
             reward_function=reward_function,
             **settings,
         )
-        if seeds is not None and (len(seeds) != missions or not all(is_whole(seed, 0) for seed in seeds)):
-            raise SettingError("seeds", list(seeds), f"{missions} whole numbers ≥ 0")
+        if seeds is not None:
+            counted = isinstance(seeds, Sequence | np.ndarray) and np.shape(seeds) == (missions,)
+            if not counted or not all(is_whole(seed, 0) for seed in seeds):
+                raise SettingError("seeds", seeds, f"{missions} whole numbers ≥ 0")
         self.scenario = self.vector_env.scenario
         self._first_seeds = None if seeds is None else [int(seed) for seed in seeds]
         self._robots = self.scenario.robots
@@ -120,7 +125,9 @@ class RobotVecEnv(VecEnv):
         if seeds is None and self._seeds[0] is not None:
             seeds = [self._seeds[row] for row in range(0, self.num_envs, self._robots)]
         seeds = [None] * self._team[0] if seeds is None else seeds
-        observations, infos = self.vector_env.reset_missions(range(self._team[0]), seeds, self._fixed())
+        observations, infos = self.vector_env.reset_missions(
+            range(self._team[0]), seeds, self._fixed(self._options)
+        )
         self._reset_seeds()
         self._reset_options()
         self._first_seeds = None
@@ -129,17 +136,48 @@ class RobotVecEnv(VecEnv):
         self._returns[:], self._steps[:], self._time_s[:] = 0.0, 0, 0.0
         return self._rows(observations)
 
-    def _fixed(self) -> list[ResetOptions]:
-        """What `set_options` gave for the missions."""
+    def set_options(self, options: list[dict[str, Any]] | dict[str, Any] | None = None) -> None:
+        """Options of the next reset: see `reset`.
+
+        Raises:
+            SettingError: An option is unknown or not allowed. Nothing has changed then.
+            WorldError: A World has another grid.
+        """
+        if isinstance(options, list):
+            if len(options) != self.num_envs:
+                raise SettingError("options", options, f"a dict, or {self.num_envs} of them, one a row")
+            kept = [copy.deepcopy(named_options(row)) for row in options]
+        else:
+            kept = [copy.deepcopy(named_options(options))] * self.num_envs
+        self._fixed(kept)
+        self._options = kept
+
+    def _fixed(self, rows: list[dict[str, Any]]) -> list[ResetOptions]:
+        """What options of the rows are for the missions."""
         scenario, missions = self.scenario, self._team[0]
-        if all(row is self._options[0] for row in self._options):
-            return batch_options(named_options(self._options[0]), scenario, missions)
-        each = [self._options[row] for row in range(0, self.num_envs, self._robots)]
-        return [mission_options(named_options(options), scenario) for options in each]
+        if all(row is rows[0] for row in rows):
+            return batch_options(rows[0], scenario, missions)
+        return [mission_options(options, scenario) for options in rows[:: self._robots]]
+
+    def seed(self, seed: int | None = None) -> Sequence[int | None]:
+        """Seeds of the missions at the next reset, consecutive from this one; None = fresh ones.
+
+        Raises:
+            SettingError: It is no whole number ≥ 0.
+        """
+        return super().seed(None if seed is None else check_seed(seed))
 
     def step_async(self, actions: np.ndarray) -> None:
-        """Take the rows' actions, (N,) or (N, K)."""
-        self._actions = actions
+        """Take the rows' actions, (N,) or (N, K).
+
+        Raises:
+            ActionError: They are not an action a row.
+        """
+        given = as_array("actions", actions)
+        if given.shape[:1] != (self.num_envs,):
+            allowed = f"an action for each of the {self.num_envs} rows"
+            raise ActionError("actions", f"{given.dtype} {given.shape}", allowed)
+        self._actions = given
 
     def step_wait(self) -> tuple[Any, np.ndarray, np.ndarray, list[dict[str, Any]]]:
         """Advance all missions by one step.
@@ -147,7 +185,7 @@ class RobotVecEnv(VecEnv):
         Returns:
             Observations (N, ...), rewards (N,) float32, dones (N,) bool, infos.
         """
-        actions = np.asarray(self._actions)
+        actions = self._actions
         shape = self._team if self._robots > 1 else self._team[:1]
         actions = actions.reshape(shape + actions.shape[1:])
         observations, _, _, _, infos = self.vector_env.step(actions)
@@ -230,7 +268,12 @@ class RobotVecEnv(VecEnv):
         self.vector_env.close()
 
     def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:  # noqa: ANN401 - SB3's signature
-        """An attribute of the missions, once for each row asked for."""
+        """An attribute of the missions, once for each row asked for.
+
+        Raises:
+            AttributeError: They have none of this name, as Stable-Baselines3 has it.
+        """
+        check_instance("attr_name", attr_name, str)
         value = None if attr_name == "render_mode" else getattr(self.vector_env, attr_name)
         return [value for _ in self._get_indices(indices)]
 

@@ -20,6 +20,7 @@ from entropy_explore_env.randomness import check_seed
 from entropy_explore_env.reports.painting import FRAMES_PER_S, RENDER_MODES, Painter, check_render_mode
 from entropy_explore_env.scenario import Scenario
 from entropy_explore_env.scenarios import find_scenario
+from entropy_explore_env.validation import is_whole
 from entropy_explore_env.worlds.given import with_given_worlds
 
 
@@ -50,7 +51,7 @@ class SingleRobotEnv(gymnasium.Env[Any, Any]):
             WorldError: The world cannot be used.
         """
         check_render_mode(render_mode)
-        if settings.get("robots", 1) != 1:
+        if not is_whole(settings.get("robots", 1), 1, 1):
             raise SettingError("robots", settings["robots"], "1; parallel_env() takes a team")
         asked, given = with_given_worlds(find_scenario(scenario), {**settings, "robots": 1})
         self._rewards = StepRewards(reward_function)

@@ -22,7 +22,7 @@ from entropy_explore_env.reports.metrics import mission_figures
 from entropy_explore_env.reports.painting import FRAMES_PER_S, RENDER_MODES, Painter, check_render_mode
 from entropy_explore_env.scenario import Scenario
 from entropy_explore_env.scenarios import find_scenario
-from entropy_explore_env.validation import check_whole
+from entropy_explore_env.validation import check_instance, check_whole
 from entropy_explore_env.worlds.given import with_given_worlds
 
 _RUNNING, _MAPPED = MissionEnd.RUNNING.code, MissionEnd.MAPPED.code
@@ -73,6 +73,7 @@ class EntropyExploreVectorEnv(VectorEnv[Any, Any, Any]):
         """
         check_render_mode(render_mode)
         check_whole("num_envs", num_envs, 1)
+        check_instance("action_masks", action_masks, bool)
         try:
             self.autoreset_mode = AutoresetMode(autoreset_mode)
         except ValueError:

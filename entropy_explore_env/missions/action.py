@@ -103,9 +103,13 @@ def encode_viewpoint(
     Raises:
         ActionError: The viewpoint has the wrong shape or is not finite.
     """
-    wanted = np.asarray(viewpoint, dtype=np.float64)
-    if wanted.shape != (5,) or not np.isfinite(wanted).all():
+    try:
+        wanted = np.asarray(viewpoint)
+    except Exception:  # lists of different lengths, or an __array__ of somebody else's
+        wanted = np.asarray(None)
+    if wanted.shape != (5,) or wanted.dtype.kind not in "fiu" or not np.isfinite(wanted).all():
         raise ActionError("viewpoint", viewpoint, "five finite numbers (x, y, z, yaw, pitch)")
+    wanted = wanted.astype(np.float64)
     settings = rules.params[robot]
     axes = 2 if settings["planar"] else 3
     if not settings["discrete"]:

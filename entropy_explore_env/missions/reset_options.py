@@ -13,7 +13,8 @@ The random streams stay as they are: what is given is not drawn, everything else
 from __future__ import annotations
 
 import difflib
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -43,14 +44,14 @@ DRAWN = ResetOptions()
 
 
 def named_options(
-    options: object, allowed: Collection[str] = NAMES, ignored: str | None = None
+    options: object, allowed: Collection[str] = NAMES, ignored: Mapping[str, object] = MappingProxyType({})
 ) -> dict[str, Any]:
     """Options of a reset, by name.
 
     Args:
         options: As given to `reset`.
         allowed: Their names.
-        ignored: A name that is taken and means nothing.
+        ignored: Options that are taken and mean nothing, with the value that they must have.
 
     Raises:
         SettingError: They are no mapping, or one of them is unknown.
@@ -59,8 +60,8 @@ def named_options(
         return {}
     if not isinstance(options, Mapping):
         raise SettingError("options", options, "a dict, or None")
-    for name in options:
-        if name not in allowed and (ignored is None or name != ignored):
+    for name, value in options.items():
+        if name not in allowed and not (name in ignored and value is ignored[name]):
             near = difflib.get_close_matches(str(name), allowed, 1)
             meant = f"; did you mean {near[0]}?" if near else ""
             raise SettingError("options", name, "nothing but " + ", ".join(allowed) + meant)
@@ -109,8 +110,8 @@ def batch_options(options: Mapping[str, Any], scenario: Scenario, missions: int)
         poses = _finite_poses(starts, shape, f"{(scenario.robots, 5)} or {(missions, scenario.robots, 5)}")
         for mission in range(missions):
             each[mission]["starts"] = poses[mission] if poses.ndim == 3 else poses
-    if isinstance(world, list | tuple | np.ndarray):
-        if len(world) != missions:
+    if isinstance(world, Sequence | np.ndarray) and not isinstance(world, str | bytes):
+        if (isinstance(world, np.ndarray) and world.ndim != 1) or len(world) != missions:
             raise SettingError("world", world, f"one world, or {missions} of them")
         for mission in range(missions):
             each[mission]["world"] = world[mission]
@@ -121,7 +122,7 @@ def _as_numbers(starts: object) -> np.ndarray:
     """An array of whatever was given; one of objects where it is no array of numbers."""
     try:
         return np.asarray(starts)
-    except ValueError:  # lists of different lengths
+    except Exception:  # lists of different lengths, or an __array__ of somebody else's
         return np.asarray(None)
 
 

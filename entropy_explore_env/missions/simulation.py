@@ -15,7 +15,7 @@ from entropy_explore_env.belief.pooling import fresh_sums
 from entropy_explore_env.belief.raycast import Crossing
 from entropy_explore_env.compilation.announcement import end_of_step
 from entropy_explore_env.compilation.kernels import entry_point
-from entropy_explore_env.errors import ActionError, CallOrderError
+from entropy_explore_env.errors import ActionError, CallOrderError, SettingError
 from entropy_explore_env.missions.navigation import Planning, plan_missions
 from entropy_explore_env.missions.observation.layout import ObservationLayout, part_offsets
 from entropy_explore_env.missions.observation.mask import mask_missions
@@ -30,13 +30,14 @@ from entropy_explore_env.randomness import Stream, check_seed, generator, splitm
 from entropy_explore_env.robots.navigator import new_navigators
 from entropy_explore_env.scenario import Scenario
 from entropy_explore_env.settings import Grid, gaussian_entropy_bits
-from entropy_explore_env.validation import check_whole
+from entropy_explore_env.validation import check_instance, check_whole, is_whole
 from entropy_explore_env.worlds.given import checked_worlds, in_given_worlds, world_in_turn
 from entropy_explore_env.worlds.load import make_world, with_world, world_with_number
 from entropy_explore_env.worlds.world import World
 
 _CHUNKS_PER_THREAD = 4
 """Missions differ in work; smaller chunks even it out."""
+_MOST_MISSIONS = 2**31 - 1
 _ENDS = list(MissionEnd)
 
 
@@ -100,8 +101,12 @@ class Missions:
             SettingError: A count is not a whole number ≥ 1, or all maps do not fit into memory.
             WorldError: The world's file cannot be used, or the given ones differ in their grids.
         """
-        for name, value in (("missions", count), ("threads", 1 if threads is None else threads)):
-            check_whole(name, value, 1)
+        check_whole("threads", 1 if threads is None else threads, 1)
+        if not is_whole(count, 1, _MOST_MISSIONS):
+            raise SettingError("missions", count, f"a whole number ≥ 1, at most {_MOST_MISSIONS}")
+        check_instance("scenario", scenario, Scenario)
+        if not isinstance(given, list | tuple):
+            raise SettingError("given", given, "a sequence of Worlds")
         scenario = in_given_worlds(scenario, given) if given else with_world(scenario)
         check_memory(scenario, int(count))
         self.scenario, self.given = scenario, checked_worlds(given) if given else ()
@@ -156,7 +161,13 @@ class Missions:
             SettingError: The seed is not a whole number ≥ 0, or robots cannot be where they were put.
             WorldError: The world has too little room for the team. Nothing has changed then.
         """
-        self.reset_some([mission], [seed], [options])
+        self.reset_some([self._checked(mission)], [seed], [options])
+
+    def _checked(self, mission: int) -> int:
+        """The number of a mission, if there is one."""
+        if not is_whole(mission, 0, self.count - 1):
+            raise SettingError("mission", mission, f"a whole number from 0 to {self.count - 1}")
+        return int(mission)
 
     def reset_some(
         self,
@@ -267,7 +278,14 @@ class Missions:
         self.state.robots[mission]["entropy_bits"] = clock["entropy_start_bits"]
 
     def strategy_generator(self, mission: int) -> np.random.Generator:
-        """The random stream of whoever chooses the actions in this mission's episode."""
+        """The random stream of whoever chooses the actions in this mission's episode.
+
+        Raises:
+            SettingError: There is no such mission.
+            CallOrderError: The mission was never reset.
+        """
+        if self.episodes[self._checked(mission)] < 0:
+            raise CallOrderError("strategy_generator before reset: call reset() first")
         return generator(self.seeds[mission], self.episodes[mission], Stream.STRATEGY)
 
     def step(self, continuous: np.ndarray, discrete: np.ndarray) -> np.ndarray:
@@ -360,7 +378,7 @@ class Missions:
 
     def over(self, mission: int) -> MissionEnd:
         """Why the mission is over, or MissionEnd.RUNNING."""
-        return _ENDS[self.state.missions["end"][mission]]
+        return _ENDS[self.state.missions["end"][self._checked(mission)]]
 
     def close(self) -> None:
         """End the threads; the missions can still be stepped."""
@@ -383,5 +401,8 @@ class Missions:
 
 def _for_kernels(actions: np.ndarray, dtype: type[np.generic]) -> np.ndarray:
     """Actions in the one kind of array for which a step is compiled: copied where they are of another."""
-    array = np.ascontiguousarray(actions, dtype)
+    try:
+        array = np.ascontiguousarray(actions, dtype)
+    except Exception:  # whatever was given in place of numbers
+        raise ActionError("actions", actions, "arrays of numbers") from None
     return array if array.flags.writeable and array.flags.aligned else array.copy()

@@ -21,7 +21,7 @@ FRAMES_PER_S = 10
 
 def check_render_mode(render_mode: str | None) -> None:
     """Raise a SettingError unless the mode is None or known."""
-    if render_mode is not None and render_mode not in RENDER_MODES:
+    if render_mode is not None and (not isinstance(render_mode, str) or render_mode not in RENDER_MODES):
         raise SettingError("render_mode", render_mode, "None, " + " or ".join(RENDER_MODES))
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from entropy_explore_env.errors import SettingError, WorldError
 from entropy_explore_env.scenario import Scenario
 from entropy_explore_env.settings import Grid
-from entropy_explore_env.validation import is_number, is_whole
+from entropy_explore_env.validation import check_instance, checked_path, is_number, is_whole
 from entropy_explore_env.worlds.files.archives import restored, saved
 from entropy_explore_env.worlds.files.jacksboro import NAME as JACKSBORO
 from entropy_explore_env.worlds.files.process import Format, read_apart
@@ -102,9 +102,9 @@ def load_world(
         "fill": fill,
     }
     _check({**options, "height_m": height_m, "read_limit_s": read_limit_s})
+    path = checked_path("world file", path)
     if str(path) == JACKSBORO:
         return _world(read_apart(_JACKSBORO, JACKSBORO, options, read_limit_s), JACKSBORO, options, height_m)
-    path = Path(path)
     form = FORMATS.get(path.suffix.lower())
     if form is None:
         raise WorldError("world file", str(path), "a file of one of the kinds " + " ".join(FORMATS))
@@ -119,16 +119,19 @@ def load_octomap(path: Path | str, voxel_size_m: float | None = None) -> World:
     """The world in an OctoMap tree, whatever its suffix; see `load_world`."""
     _check({"voxel_size_m": voxel_size_m})
     options = {"voxel_size_m": voxel_size_m}
-    return _world(read_apart(_OCTOMAP, Path(path).absolute(), options), str(path), options, None)
+    path = checked_path("world file", path)
+    return _world(read_apart(_OCTOMAP, path.absolute(), options), str(path), options, None)
 
 
-def save_world(world: World, path: Path) -> None:
+def save_world(world: World, path: Path | str) -> None:
     """Write a world to an `.npz`, from which `load_world` restores it without loss.
 
     Raises:
+        SettingError: It is no World, or no path.
         OSError: The file cannot be written.
     """
-    write_atomically(path, world_bytes(world))
+    check_instance("world", world, World)
+    write_atomically(checked_path("path", path), world_bytes(world))
 
 
 def world_bytes(world: World) -> bytes:
@@ -206,7 +209,7 @@ def make_world(scenario: Scenario, rng: np.random.Generator) -> World:
         return _empty_world(scenario)
     if scenario.world in RECIPES:
         return world_with_number(scenario, draw_world_number(scenario.split, rng))
-    return world_from_file(Path(scenario.world), scenario.grid.voxel_size_m)
+    return world_from_file(scenario.world, scenario.grid.voxel_size_m)
 
 
 def world_with_number(scenario: Scenario, number: int) -> World:
@@ -234,7 +237,7 @@ def _empty_world(scenario: Scenario) -> World:
     return empty(scenario.grid, np.random.default_rng(0))
 
 
-def world_from_file(path: Path, voxel_size_m: float, **options: Any) -> World:  # noqa: ANN401 - as load_world's
+def world_from_file(path: Path | str, voxel_size_m: float, **options: Any) -> World:  # noqa: ANN401 - as load_world's
     """The world in a file, resampled; cached, so that many missions read it once.
 
     Args:
@@ -246,6 +249,7 @@ def world_from_file(path: Path, voxel_size_m: float, **options: Any) -> World:  
         SettingError: The file's kind is not known, or an option is unknown or not allowed.
         WorldError: It cannot be read.
     """
+    path = checked_path("Scenario.world", path)
     if str(path) != JACKSBORO and path.suffix.lower() not in FORMATS:
         files = ", ".join(f"*{suffix}" for suffix in FORMATS)
         allowed = f"a recipe ({', '.join(RECIPES)}), a file ({files}) or, to an environment, a World"
@@ -253,9 +257,11 @@ def world_from_file(path: Path, voxel_size_m: float, **options: Any) -> World:  
     for name, value in options.items():
         if name not in LOAD_OPTIONS:
             raise SettingError(name, value, "one of the options " + ", ".join(LOAD_OPTIONS))
+    size = {"voxel_size_m": voxel_size_m}
     _check(options)
+    _check(size)
     path = path if str(path) == JACKSBORO else path.resolve()
-    return _cached_world(path, _file_version(path), voxel_size_m, tuple(sorted(options.items())))
+    return _cached_world(path, _file_version(path), size["voxel_size_m"], tuple(sorted(options.items())))
 
 
 def _file_version(path: Path) -> tuple[int, int]:
@@ -286,5 +292,5 @@ def with_world(scenario: Scenario) -> Scenario:
     """
     if scenario.world in RECIPES:
         return scenario
-    world = world_from_file(Path(scenario.world), scenario.grid.voxel_size_m)
+    world = world_from_file(scenario.world, scenario.grid.voxel_size_m)
     return dataclasses.replace(scenario, grid=world.grid)

@@ -15,6 +15,7 @@ from scipy.spatial import ConvexHull
 from entropy_explore_env.errors import WorldError
 from entropy_explore_env.scenario import Scenario
 from entropy_explore_env.settings import Grid, RobotKind
+from entropy_explore_env.validation import check_instance, is_number
 from entropy_explore_env.worlds.components import connected_components, largest_component
 
 
@@ -66,7 +67,11 @@ class World:
         if self.occupied.all():
             raise WorldError("World.occupied", self.name, "at least one free voxel")
         object.__setattr__(self, "occupied", _kept(self.occupied))
+        if not is_number(self.yaw_rad) or not math.isfinite(self.yaw_rad):
+            raise WorldError("World.yaw_rad", self.yaw_rad, "a finite number")
         if self.ceiling is not None:
+            if not isinstance(self.ceiling, np.ndarray):
+                raise WorldError("World.ceiling", self.ceiling, "a NumPy array, or None")
             if self.ceiling.shape != self.grid.shape[:2] or self.ceiling.dtype != np.int32:
                 found = f"{self.ceiling.shape} {self.ceiling.dtype}"
                 raise WorldError("World.ceiling", found, f"{self.grid.shape[:2]} int32")
@@ -97,8 +102,11 @@ class World:
         Returns:
             (X, Y, Z) uint8, a Collision each. Where a body collides with several things, the first of
             ground, ceiling and boundary counts.
+
+        Raises:
+            WorldError: The radius is no finite number ≥ 0.
         """
-        radius = body_radius_m / self.grid.voxel_size_m
+        radius = self._in_voxels(body_radius_m)
         solid = _inflated(self.occupied, radius, boundary=True)
         if self.ceiling is None:
             return solid.view(np.uint8)
@@ -108,10 +116,21 @@ class World:
         return mask
 
     def no_fly_mask(self, body_radius_m: float) -> np.ndarray:
-        """(X, Y, Z) bool, where a spherical body would reach above the ceiling, solid voxels or not."""
+        """(X, Y, Z) bool, where a spherical body would reach above the ceiling, solid voxels or not.
+
+        Raises:
+            WorldError: The radius is no finite number ≥ 0.
+        """
+        radius = self._in_voxels(body_radius_m)
         if self.ceiling is None:
             return np.zeros(self.grid.shape, bool)
-        return no_fly_mask(self.ceiling, self.grid.shape[2], body_radius_m / self.grid.voxel_size_m)
+        return no_fly_mask(self.ceiling, self.grid.shape[2], radius)
+
+    def _in_voxels(self, body_radius_m: float) -> float:
+        """A body's radius in voxel edges."""
+        if not is_number(body_radius_m) or not 0 <= body_radius_m < math.inf:
+            raise WorldError("body_radius_m", body_radius_m, "a finite number ≥ 0")
+        return body_radius_m / self.grid.voxel_size_m
 
     @cached_property
     def _layouts(self) -> dict[tuple[float, int | None, int, _LevelView | None], Layout]:
@@ -126,7 +145,11 @@ class World:
 
         Raises:
             WorldError: No voxel has room for a robot.
+            SettingError: It is no Scenario, or no RobotKind.
         """
+        check_instance("scenario", scenario, Scenario)
+        if kind is not None:
+            check_instance("kind", kind, RobotKind)
         robot, sensor = (scenario.robot, scenario.sensor) if kind is None else (kind.robot, kind.sensor)
         layer, level_view = scenario.layer_of(robot), None
         if layer is not None and not scenario.grid.flat:
@@ -139,11 +162,13 @@ class World:
 
     def visible(self, scenario: Scenario) -> np.ndarray:
         """(X, Y, Z) bool, which voxels some robot of the team can observe at all."""
+        check_instance("scenario", scenario, Scenario)
         first, *more = (self.layout(scenario, kind).visible for kind in scenario.kinds)
         return np.logical_or.reduce([first, *more]) if more else first
 
     def visible_voxels(self, scenario: Scenario) -> int:
         """How many voxels some robot of the team can observe at all."""
+        check_instance("scenario", scenario, Scenario)
         if len(scenario.kinds) == 1:
             return self.layout(scenario).visible_voxels
         return int(self.visible(scenario).sum())

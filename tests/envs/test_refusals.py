@@ -93,3 +93,26 @@ def test_too_many_robots_are_refused_before_anything_changes() -> None:
 def test_a_body_larger_than_the_world_is_refused() -> None:
     with pytest.raises(WorldError, match="body"):
         parallel_env(BOX, robots=1, robot={"body_radius_m": 2.0}).reset(seed=0)
+
+
+def test_a_strategy_has_no_random_stream_before_the_first_reset() -> None:
+    team = parallel_env(BOX)
+    with pytest.raises(CallOrderError, match="strategy_generator before reset"):
+        team.strategy_generator()
+    team.reset(seed=0)
+    team.strategy_generator()
+
+
+@pytest.mark.parametrize("value", [2, "1", True, 1])
+def test_only_what_checkers_send_may_be_given_for_nothing(value: Any) -> None:
+    team = parallel_env(BOX)
+    if value == 1 and value is not True:
+        team.reset(seed=0, options={"options": value})
+        return
+    with pytest.raises(SettingError, match="options = 'options': allowed is nothing but starts, world"):
+        team.reset(seed=0, options={"options": value})
+
+
+def test_values_that_cannot_be_shown_are_refused_all_the_same() -> None:
+    with pytest.raises(SettingError, match="Scenario.robots = <int>: allowed is a whole number"):
+        parallel_env(BOX, robots=10**5000)

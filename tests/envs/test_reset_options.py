@@ -149,9 +149,12 @@ def test_rows_of_stable_baselines3_take_them_from_set_options() -> None:
     assert [world.name for world in rows.vector_env.missions.worlds] == ["empty", "hut"]  # type: ignore[union-attr]
     rows.reset()
     assert rows.vector_env.missions.worlds[1].name == "empty"  # type: ignore[union-attr]
-    rows.set_options({"stars": STARTS})
+    for wrong in ({"stars": STARTS}, [{"starts": STARTS}], [{}] * 3 + [{"stars": STARTS}], "starts"):
+        with pytest.raises(SettingError):
+            rows.set_options(wrong)
+    rows.reset()
     with pytest.raises(SettingError, match="stars"):
-        rows.reset()
+        rows.set_options({"stars": STARTS})
 
 
 def changed(row: int, column: int, value: float) -> np.ndarray:

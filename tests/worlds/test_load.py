@@ -10,8 +10,10 @@ import pytest
 
 import entropy_explore_env
 from entropy_explore_env.errors import SettingError, WorldError
+from entropy_explore_env.settings import Grid
 from entropy_explore_env.worlds.files.process import kept_reader
-from entropy_explore_env.worlds.load import FORMATS, load_world, with_world, world_from_file
+from entropy_explore_env.worlds.load import FORMATS, load_world, save_world, with_world, world_from_file
+from entropy_explore_env.worlds.world import World
 from tests.reference.scenes import free_box
 from tests.worlds.samples import npz, pgm, plan, samples
 
@@ -139,3 +141,18 @@ def test_the_origin_of_a_real_map_is_its_yaml_file_s():
 )
 def test_free_cells_of_real_plans(name, free):
     assert (~load_world(real(name)).occupied).sum() == free
+
+
+def test_a_path_may_be_a_text_and_begin_at_home(tmp_path, monkeypatch):
+    monkeypatch.setenv("HOME", str(tmp_path))
+    solid = np.zeros((3, 4, 2), bool)
+    solid[1, 2] = True
+    world = World(Grid(solid.shape, 0.5), solid, "corner")
+    save_world(world, "~/saved/corner.npz")
+    assert [file.name for file in (tmp_path / "saved").iterdir()] == ["corner.npz"]
+    again = load_world("~/saved/corner.npz")
+    np.testing.assert_array_equal(again.occupied, solid)
+    scenario = with_world(free_box(world="~/saved/corner.npz"))
+    assert scenario.grid.size_m.tolist() == [1.5, 2.0, 1.0]
+    with pytest.raises(SettingError, match="below a home folder that exists"):
+        load_world("~nobody-of-this-name/corner.npz")
