@@ -114,5 +114,5 @@ def test_only_what_checkers_send_may_be_given_for_nothing(value: Any) -> None:
 
 
 def test_values_that_cannot_be_shown_are_refused_all_the_same() -> None:
-    with pytest.raises(SettingError, match="Scenario.robots = <int>: allowed is a whole number"):
+    with pytest.raises(SettingError, match=r"Scenario.robots = <int>: allowed is a whole number"):
         parallel_env(BOX, robots=10**5000)
