@@ -197,11 +197,10 @@ def discrete_moves(scenario: Scenario) -> np.ndarray:
 
 def _along_axes(farthest: list[int]) -> np.ndarray:
     """(K, 3) offsets: to stay, and so far along each axis, both ways; in lexicographic order."""
-    offsets = {(0, 0, 0)}
+    offsets = np.zeros((7, 3), np.int64)
     for axis, most in enumerate(farthest):
-        for step in (-most, most):
-            offsets.add((*(0,) * axis, step, *(0,) * (2 - axis)))
-    return np.array(sorted(offsets))
+        offsets[1 + 2 * axis : 3 + 2 * axis, axis] = -most, most
+    return np.unique(offsets, axis=0)  # an axis without room adds nothing
 
 
 def _within_box(farthest: list[int]) -> np.ndarray:
