@@ -16,6 +16,7 @@ from entropy_explore_env.belief.raycast import Crossing
 from entropy_explore_env.compilation.announcement import end_of_step
 from entropy_explore_env.compilation.kernels import entry_point
 from entropy_explore_env.errors import ActionError, CallOrderError, SettingError
+from entropy_explore_env.missions.memory import Batch, check_memory
 from entropy_explore_env.missions.navigation import Planning, plan_missions
 from entropy_explore_env.missions.observation.layout import ObservationLayout, part_offsets
 from entropy_explore_env.missions.observation.mask import mask_missions
@@ -23,7 +24,7 @@ from entropy_explore_env.missions.observation.observe import Observed, observe_m
 from entropy_explore_env.missions.reset_options import DRAWN, ResetOptions
 from entropy_explore_env.missions.rules import rules_of
 from entropy_explore_env.missions.starts import checked_starts, start_poses
-from entropy_explore_env.missions.state import MissionEnd, MissionState, check_memory, new_state
+from entropy_explore_env.missions.state import MissionEnd, MissionState, new_state
 from entropy_explore_env.missions.tick import step_missions
 from entropy_explore_env.missions.workspace import Workspace, new_workspace
 from entropy_explore_env.randomness import Stream, check_seed, generator, splitmix_states
@@ -108,10 +109,10 @@ class Missions:
         if not isinstance(given, list | tuple):
             raise SettingError("given", given, "a sequence of Worlds")
         scenario = in_given_worlds(scenario, given) if given else with_world(scenario)
-        check_memory(scenario, int(count))
+        self.threads = min(int(count), threads or os.cpu_count() or 1)
+        check_memory(scenario, Batch(int(count), self.threads, tuple(given)))
         self.scenario, self.given = scenario, checked_worlds(given) if given else ()
         self.count = int(count)
-        self.threads = min(self.count, threads or os.cpu_count() or 1)
         self.rules = rules_of(scenario)
         self.layout = ObservationLayout(scenario)
         self._offsets = part_offsets(scenario, self.layout)

@@ -9,13 +9,11 @@ or viewpoint is (x, y, z, yaw, pitch).
 from __future__ import annotations
 
 import enum
-import os
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from entropy_explore_env.belief.pooling import Cells
-from entropy_explore_env.errors import SettingError
 from entropy_explore_env.missions.rules import collision_radii_m
 from entropy_explore_env.scenario import Scenario
 
@@ -258,48 +256,51 @@ class PhaseBuffers(NamedTuple):
     """(A, A) int8."""
 
 
-def check_memory(scenario: Scenario, missions: int) -> None:
-    """Raise a SettingError where the arrays of so many missions are larger than the memory there is."""
-    rays = max(kind.sensor.rays for kind in scenario.kinds) * sum(scenario.grid.shape) * 8
-    maps = scenario.robots + scenario.track_truth
-    needed = missions * scenario.grid.voxels * (4 + 8 * maps) + rays
-    try:
-        there_is = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
-    except (AttributeError, ValueError, OSError):  # not every system says
-        return
-    if needed > there_is:
-        size = f"{missions} × {scenario.robots} maps of {scenario.grid.voxels} voxels, {needed >> 30} GiB"
-        raise SettingError("missions, robots, voxels", size, f"what fits into {there_is >> 30} GiB of memory")
+def state_arrays(
+    scenario: Scenario, missions: int, cells: int
+) -> dict[str, tuple[tuple[int, ...], np.dtype[Any]]]:
+    """Shape and type of each array of a MissionState.
+
+    Args:
+        scenario: The task.
+        missions: E.
+        cells: C, of the overview.
+    """
+    e, a, r = missions, scenario.robots, max(kind.sensor.rays for kind in scenario.kinds)
+    v, q, b = scenario.grid.voxels, scenario.message_slots, min(scenario.channel.burst, r)
+    s, tracked = scenario.phase_batches, scenario.grid.voxels if scenario.track_truth else 0
+    radii, in_phases = collision_radii_m(scenario), a if scenario.phase_batches else 0
+    arrays: dict[str, tuple[tuple[int, ...], Any]] = {
+        "truth": ((e, v), np.float32),
+        "collision": ((0 if radii == [0.0] else e * len(radii), v), np.float32),
+        "mean": ((e, a, v), np.float32),
+        "precision": ((e, a, v), np.float32),
+        "pooled": ((e, a, 2, cells), np.float64),
+        "joint_mean": ((e, tracked), np.float32),
+        "joint_precision": ((e, tracked), np.float32),
+        "visible": ((e, tracked), np.bool_),
+        "missions": ((e,), MISSION),
+        "robots": ((e, a), ROBOT),
+        "heard": ((e, a, a), HEARD),
+        "scan_range_m": ((e, a, r), np.float64),
+        "scan_returned": ((e, a, r), np.int8),
+        "scan_utility_bits": ((e, a, r), np.float64),
+        "in_flight": ((e, q), MESSAGE),
+        "in_flight_to": ((e, q, a), np.bool_),
+        "in_flight_rays": ((e, q, b if q else 0, 5), np.float64),
+        "phases": ((e,), PHASES),
+        "phase_counts": ((e, in_phases, 2), np.int64),
+        "phase_batches": ((e, in_phases, 2, s), BATCH),
+        "phase_rays": ((e, in_phases, 2, s, b, 5), np.float64),
+        "phase_heard": ((e, in_phases, a), np.int8),
+    }
+    return {name: (shape, np.dtype(kind)) for name, (shape, kind) in arrays.items()}
 
 
 def new_state(scenario: Scenario, missions: int, cells: Cells) -> MissionState:
     """Arrays for E missions of a scenario, not yet reset; beliefs are pooled to the cells."""
-    e, a, r = missions, scenario.robots, max(kind.sensor.rays for kind in scenario.kinds)
-    v, q, b = scenario.grid.voxels, scenario.message_slots, min(scenario.channel.burst, r)
-    s = scenario.phase_batches
-    truth, tracked = np.zeros((e, v), np.float32), v if scenario.track_truth else 0
-    radii = collision_radii_m(scenario)
-    return MissionState(
-        truth=truth,
-        collision=truth if radii == [0.0] else np.zeros((e * len(radii), v), np.float32),
-        mean=np.zeros((e, a, v), np.float32),
-        precision=np.zeros((e, a, v), np.float32),
-        pooled=np.zeros((e, a, 2, len(cells.voxels))),
-        joint_mean=np.zeros((e, tracked), np.float32),
-        joint_precision=np.zeros((e, tracked), np.float32),
-        visible=np.zeros((e, tracked), np.bool_),
-        missions=np.zeros(e, MISSION),
-        robots=np.zeros((e, a), ROBOT),
-        heard=np.zeros((e, a, a), HEARD),
-        scan_range_m=np.zeros((e, a, r)),
-        scan_returned=np.zeros((e, a, r), np.int8),
-        scan_utility_bits=np.zeros((e, a, r)),
-        in_flight=np.zeros((e, q), MESSAGE),
-        in_flight_to=np.zeros((e, q, a), np.bool_),
-        in_flight_rays=np.zeros((e, q, b if q else 0, 5)),
-        phases=np.zeros(e, PHASES),
-        phase_counts=np.zeros((e, a if s else 0, 2), np.int64),
-        phase_batches=np.zeros((e, a if s else 0, 2, s), BATCH),
-        phase_rays=np.zeros((e, a if s else 0, 2, s, b, 5)),
-        phase_heard=np.zeros((e, a if s else 0, a), np.int8),
-    )
+    wanted = state_arrays(scenario, missions, len(cells.voxels))
+    arrays = {name: np.zeros(shape, kind) for name, (shape, kind) in wanted.items()}
+    if not arrays["collision"].size:
+        arrays["collision"] = arrays["truth"]
+    return MissionState(**arrays)

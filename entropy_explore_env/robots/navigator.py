@@ -21,6 +21,7 @@ from entropy_explore_env.belief.paths.search import (
     is_passable,
     mark_of,
     new_search,
+    search_bytes,
 )
 from entropy_explore_env.belief.paths.string_pulling import Path, line_of_sight_cost, string_pull
 from entropy_explore_env.belief.voxel_index import flat_index, grid_index
@@ -94,6 +95,11 @@ def new_navigator(scenario: Scenario, robot: Robot) -> Navigator:
         path=np.empty(scenario.grid.voxels, np.int32),
         ends=np.zeros((2, 3)),
     )
+
+
+def navigator_bytes(scenario: Scenario) -> int:
+    """Bytes of the memory of plans that a thread's navigators share, once plans have reached all voxels."""
+    return search_bytes(scenario.grid.voxels) + 4 * scenario.grid.voxels
 
 
 @lean_kernel

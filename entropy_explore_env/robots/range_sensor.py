@@ -155,6 +155,15 @@ def new_scan(grid: Grid, sensors: Sequence[RangeSensor], rays: int) -> Scan:
     )
 
 
+def scan_bytes(grid: Grid, sensors: Sequence[RangeSensor], rays: int) -> int:
+    """Bytes of the arrays of `new_scan`."""
+    longest = max(
+        longest_crossing(*grid.shape, sensor.max_range_m / grid.voxel_size_m, sensor.voxels_behind)
+        for sensor in sensors
+    )
+    return rays * (RAY.itemsize + 16 + 8 * longest) + 8 * longest
+
+
 @inlined_kernel
 def point_rays(model, yaw, pitch, rays):
     """Direct the (R,) rays of a bundle around a gaze, column by column, top row first."""

@@ -59,7 +59,7 @@ class ObservationLayout:
 
     def __init__(self, scenario: Scenario) -> None:
         """Lay out the parts that the scenario asks for."""
-        self.parts = _parts(scenario)
+        self.parts = observation_parts(scenario)
         self.size = max((part.stop for part in self.parts.values()), default=0)
         self.flat = scenario.observation.flat
         self.low = np.concatenate([np.full(p.stop - p.start, p.low) for p in self.parts.values()] or [[]])
@@ -105,8 +105,8 @@ def _part_space(name: str, part: Part) -> spaces.Box:
     return spaces.Box(np.full(part.shape, part.low, np.float32), high, dtype=np.float32)
 
 
-def _parts(scenario: Scenario) -> dict[str, Part]:
-    """Shapes and bounds of the parts, one after the other."""
+def observation_parts(scenario: Scenario) -> dict[str, Part]:
+    """Shapes and bounds of the parts, one after the other; no array as large as an observation is made."""
     settings, rules = scenario.observation, rules_of(scenario)
     limits: dict[str, tuple[tuple[int, ...], float, np.ndarray]] = {}
     one = np.ones(1)
