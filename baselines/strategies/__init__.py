@@ -9,8 +9,10 @@ from functools import partial
 from pathlib import Path
 from types import MappingProxyType, ModuleType
 
+from baselines.strategies.explorers.distance_advantage import DistanceAdvantage
+from baselines.strategies.explorers.nearest_frontier import NearestFrontier
 from baselines.strategies.frontier import FrontierStrategy
-from baselines.strategies.frontier.metrics import coordinated_frontier, nearest_frontier
+from baselines.strategies.frontier.metrics import coordinated_candidate, nearest_candidate
 from baselines.strategies.gradient import GradientStrategy
 from baselines.strategies.information_rate_v0 import InformationRate, InformationRateConfig
 from baselines.strategies.loading import entry_points, is_reference, make_referenced, module_of
@@ -32,8 +34,10 @@ STRATEGIES: MappingProxyType[str, Callable[[], Strategy]] = MappingProxyType(
             InformationRate, InformationRateConfig(per_scan=True, candidates=120)
         ),
         "per-time-visibility": FrontierStrategy,
-        "nearest-frontier": nearest_frontier,
-        "coordinated-frontier": coordinated_frontier,
+        "nearest-frontier": NearestFrontier,
+        "distance-advantage": DistanceAdvantage,
+        "nearest-candidate": nearest_candidate,
+        "coordinated-candidate": coordinated_candidate,
         "voronoi": VoronoiCoverage,
         "voronoi-gradient": partial(VoronoiCoverage, VoronoiConfig(control="gradient-search")),
         "voronoi-nearest": partial(

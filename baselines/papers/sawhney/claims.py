@@ -240,7 +240,7 @@ def _our_claims(records: Records, part: str, name: str) -> list[Claim]:
     for other in ("nearest", "coordinated"):
         for end in ("t95_s", "t_none_s"):
             ratio = compared(records, part, "ptv", other, end)
-            text = f"ours, {name}, {ENDS[end]}: V/t is faster than `{other}-frontier`; t ratio"
+            text = f"ours, {name}, {ENDS[end]}: V/t is faster than `{other}-candidate`; t ratio"
             claims.append(_faster(f"{part}-{other}-{end}", text, None, ratio))
     for n in teams_in(records, part):
         if n > 1:

@@ -110,8 +110,8 @@ def figure_teams(records: Records, part: str) -> tuple[Figure, Table]:
         "naive": "naive V",
         f"beta-{best}": f"best β ({best})",
         "finish": "finishing rule",
-        "nearest": "nearest frontier",
-        "coordinated": "coordinated frontier",
+        "nearest": "nearest candidate",
+        "coordinated": "coordinated candidate",
     }
     if part == "terrains":
         methods["no-height"] = "no height factor"

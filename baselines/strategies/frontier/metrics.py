@@ -1,6 +1,9 @@
-"""The strategies `nearest-frontier` (Yamauchi 1998) and `coordinated-frontier` (Burgard et al. 2005).
+"""The strategies `nearest-candidate` and `coordinated-candidate`: per-time visibility with other metrics.
 
-They use the candidates of `per-time-visibility`, and ignore those from which nothing unexplored can be seen.
+Their metrics are those of Yamauchi 1998 and of Burgard et al. 2005. All else is as in `per-time-visibility`:
+few candidates, one a block; those from which nothing unexplored can be seen are ignored; a robot drives to
+its candidate before it chooses again. So they are comparisons of metrics, not the rules of those papers as
+their authors run them: those are `nearest-frontier` and `coordinated-frontier`, in `explorers`.
 """
 
 from __future__ import annotations
@@ -53,7 +56,7 @@ class Coordinated:
         return 1.0 - taken - self.beta * edges
 
 
-nearest_frontier = partial(FrontierStrategy, ExplorationConfig(metric=Nearest(), promises=False))
+nearest_candidate = partial(FrontierStrategy, ExplorationConfig(metric=Nearest(), promises=False))
 """Uncoordinated: where teammates go does not count."""
-coordinated_frontier = partial(FrontierStrategy, ExplorationConfig(metric=Coordinated()))
+coordinated_candidate = partial(FrontierStrategy, ExplorationConfig(metric=Coordinated()))
 """Coordinated by what teammates announce."""

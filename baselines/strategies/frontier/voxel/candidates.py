@@ -44,7 +44,11 @@ _ROWS = 15
 
 
 class VoxelCandidates(Candidates[FrontierMap]):
-    """Candidates and counts in a map of voxels; the points of V are voxels."""
+    """Candidates and counts in a map of voxels; the points of V are voxels.
+
+    Attributes:
+        changed: How many voxels the latest update found in another state.
+    """
 
     def __init__(self, scenario: Scenario, kind: RobotKind, frontiers: FrontierConfig) -> None:
         """Nothing is explored yet."""
@@ -61,11 +65,13 @@ class VoxelCandidates(Candidates[FrontierMap]):
         self._met = np.empty(self._tree.cells, np.int32)
         self.batch = 1 + BATCH_CELLS // self._tree.cells
         self.point = edge ** (2 if grid.flat else 3)
+        self.changed = 0
 
     def update(self, view: RobotView, sigma: float) -> None:
         """See `Candidates`."""
         mean, precision = view.mean.reshape(-1), view.precision.reshape(-1)
-        update_frontiers(self._map, mean, precision, self._config.levels(sigma, self._prior))
+        levels = self._config.levels(sigma, self._prior)
+        self.changed = int(update_frontiers(self._map, mean, precision, levels))
         count, bounds = int(self._map.opened_count[0]), self._map.seen
         self._map.opened_count[0] = 0
         if count > MAX_TRACKED_OPENINGS:

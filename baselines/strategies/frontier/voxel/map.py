@@ -34,6 +34,8 @@ EDGE = 1
 CANDIDATE = 2
 EXCLUDED = 4
 """A scan was taken here: no candidate any more."""
+DROPPED = 8
+"""An edge that a scan from beside it did not explore: nothing beside it alone is a candidate."""
 
 MAX_TRACKED_OPENINGS = 256
 """At most this many newly freed voxels are tracked between updates; beyond that, recounting is as fast."""
@@ -48,7 +50,7 @@ class FrontierMap(NamedTuple):
     state: np.ndarray
     """(V,) uint8, flags: UNEXPLORED, UNMAPPED, COVERED."""
     flags: np.ndarray
-    """(V,) uint8: EDGE, CANDIDATE, EXCLUDED."""
+    """(V,) uint8: EDGE, CANDIDATE, EXCLUDED, DROPPED."""
     traversal_cost: np.ndarray
     """(V,) float32, 1 where the body may stand, else inf."""
     voxel: np.ndarray
@@ -168,9 +170,12 @@ def update_frontiers(frontiers, mean, precision, levels):
         mean: (V,) float32, changed since the latest update only where the precision was raised.
         precision: (V,) float32 1/σ², nowhere less than at the latest update.
         levels: (explored, mapped): precisions from which on a voxel is explored, and mapped.
+
+    Returns:
+        How many voxels are in another state than at the latest update.
     """
     size, layer, state = frontiers.size, frontiers.layer, frontiers.state
-    reach, count, bits = 2, 0, precision.view(np.uint32)
+    reach, count, changed, bits = 2, 0, 0, precision.view(np.uint32)
     as_before = frontiers.levels[0] == levels[0] and frontiers.levels[1] == levels[1]
     frontiers.levels[0], frontiers.levels[1] = levels[0], levels[1]
     for offset in frontiers.footprint:
@@ -188,6 +193,7 @@ def update_frontiers(frontiers, mean, precision, levels):
             if now == before:
                 continue
             state[voxel] = now
+            changed += 1
             column = voxel // size[2]
             x, y, z = column // size[1], column % size[1], voxel % size[2]
             if before & COVERED > now & COVERED:
@@ -197,6 +203,7 @@ def update_frontiers(frontiers, mean, precision, levels):
             if layer < 0 or abs(z - layer) <= reach:
                 count = _queue_around(frontiers, x, y, z, reach, count)
     update_blocks(frontiers, count)
+    return changed
 
 
 @lean_kernel
@@ -211,7 +218,7 @@ def update_blocks(frontiers, count):
 
 
 @inlined_kernel
-def _span(frontiers, block):
+def block_span(frontiers, block):
     """First voxel of a block along each axis, and one past its last."""
     size, across, blocks = frontiers.size, frontiers.across, frontiers.blocks
     k = block % blocks[2]
@@ -254,12 +261,12 @@ def _beside_unexplored(frontiers, x, y, z):
 @lean_kernel
 def _mark_edge(frontiers, block):
     """Set EDGE in a block."""
-    low, high = _span(frontiers, block)
+    low, high = block_span(frontiers, block)
     for x in range(low[0], high[0]):
         for y in range(low[1], high[1]):
             for z in range(low[2], high[2]):
                 voxel = _at(frontiers.size, x, y, z)
-                frontiers.flags[voxel] &= CANDIDATE | EXCLUDED
+                frontiers.flags[voxel] &= CANDIDATE | EXCLUDED | DROPPED
                 free = frontiers.state[voxel] & (UNMAPPED | COVERED) == 0
                 if free and (frontiers.state[voxel] & UNEXPLORED or _beside_unexplored(frontiers, x, y, z)):
                     frontiers.flags[voxel] |= EDGE
@@ -281,7 +288,7 @@ def may_stand(frontiers, x, y, z):
 @lean_kernel
 def _choose_candidate(frontiers, block):
     """Set traversal costs and CANDIDATE in a block, and choose its candidate."""
-    low, high = _span(frontiers, block)
+    low, high = block_span(frontiers, block)
     best, nearest = NONE, math.inf
     for x in range(low[0], high[0]):
         for y in range(low[1], high[1]):
@@ -289,12 +296,12 @@ def _choose_candidate(frontiers, block):
                 voxel = _at(frontiers.size, x, y, z)
                 stands = frontiers.state[voxel] & (UNMAPPED | COVERED) == 0 and may_stand(frontiers, x, y, z)
                 frontiers.traversal_cost[voxel] = 1.0 if stands else math.inf
-                frontiers.flags[voxel] &= EDGE | EXCLUDED
+                frontiers.flags[voxel] &= EDGE | EXCLUDED | DROPPED
                 if not stands or frontiers.flags[voxel] & EXCLUDED:
                     continue
                 for offset in frontiers.footprint:
                     near = _at(frontiers.size, x + offset[0], y + offset[1], z + offset[2])
-                    if near != NONE and frontiers.flags[near] & EDGE:
+                    if near != NONE and frontiers.flags[near] & (EDGE | DROPPED) == EDGE:
                         frontiers.flags[voxel] |= CANDIDATE
                         break
                 if frontiers.flags[voxel] & CANDIDATE:
@@ -316,7 +323,7 @@ def _apart(low, high, x, y, z):
 @lean_kernel
 def choose_reached(frontiers, cost, block):
     """Another candidate of a block that a search reached, with a finite path cost; NONE = there is none."""
-    low, high = _span(frontiers, block)
+    low, high = block_span(frontiers, block)
     best, nearest = NONE, math.inf
     for x in range(low[0], high[0]):
         for y in range(low[1], high[1]):

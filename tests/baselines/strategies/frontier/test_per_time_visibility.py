@@ -30,7 +30,7 @@ from entropy_explore_env.settings import Grid
 from tests.reference import sawhney as reference
 from tests.reference.scenes import build, free_box, put, started
 
-NAMES = ("per-time-visibility", "nearest-frontier", "coordinated-frontier")
+NAMES = ("per-time-visibility", "nearest-candidate", "coordinated-candidate")
 PERFECT = {"burst": 10_000, "i_min_bits": 0.0}
 ONCE = 0.5
 

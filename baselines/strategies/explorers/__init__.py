@@ -1,0 +1,1 @@
+"""Rules of exploration as their authors run them: every frontier cell counts, and each call decides anew."""

@@ -1,0 +1,98 @@
+"""The strategy `distance-advantage` (Ericson, Pedro & Jensfelt 2025): near to the robot, far from all else.
+
+    v* = argmax over frontier cells v of Adv(v),   Adv(v) = mean over u of d(u, v) - d(robot, v)
+
+u are the free cells around the robot: those that it can reach, up to a radius off along either axis. d is the
+length of the path through known free space. What would be far to come back to is taken now. Frontier cells
+count whose path is no longer than a horizon; beyond it only the nearest one, where there is none within.
+
+The mean needs a search from each frontier cell. Most are spared: since d(u, v) ≤ d(u, w) + d(w, v), a cell w
+whose mean is known bounds the advantage of every other one from above, and cells whose bounds are below the
+best advantage so far are never searched from. The choice is the same.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from baselines.strategies.explorers.explorer import Explorer, Scene
+from baselines.strategies.explorers.nearest_frontier import best_of
+from baselines.strategies.explorers.path_lengths import KnownPaths
+from entropy_explore_env.validation import check_count, check_positive
+
+
+@dataclass(frozen=True)
+class DistanceAdvantageConfig:
+    """Around which place means are taken, and which frontier cells count.
+
+    Attributes:
+        radius: Voxels, along either axis, that u may be off the robot.
+        horizon: Longest path, in voxel edges, to a frontier cell that counts though it is not the nearest.
+        detour: u that are farther from the robot than this many radii, by path, do not count; inf = all do.
+
+    Raises:
+        SettingError: One of them is not allowed.
+    """
+
+    radius: int = 60
+    horizon: float = 61.0
+    detour: float = math.inf
+
+    def __post_init__(self) -> None:
+        """Check every field."""
+        check_count(self, "radius", 1, 1_000_000)
+        check_positive(self, "horizon", "detour", finite=False)
+
+
+class DistanceAdvantage(Explorer):
+    """Goes to the frontier cell with the greatest distance advantage."""
+
+    rule = "distance-advantage"
+
+    def __init__(self, config: DistanceAdvantageConfig | None = None) -> None:
+        """Take the settings; None = the defaults."""
+        self.config = config or DistanceAdvantageConfig()
+
+    def pick(self, scene: Scene) -> int:
+        """See `Explorer`."""
+        config, paths = self.config, scene.paths
+        voxels, lengths = paths.frontiers_within(config.horizon)
+        if len(voxels) == 0:
+            voxels, lengths = paths.nearest_frontiers()
+            return best_of(voxels, -lengths, scene.target)
+        if len(voxels) == 1:
+            return int(voxels[0])
+        paths.extend(config.detour * config.radius)
+        around = paths.around(scene.here, config.radius)
+        farthest = float(paths.lengths_to(around).max(initial=0.0))
+        return best_of(voxels, advantages(paths, voxels, lengths, around, farthest), scene.target)
+
+
+def advantages(
+    paths: KnownPaths, voxels: np.ndarray, lengths: np.ndarray, around: np.ndarray, farthest: float
+) -> np.ndarray:
+    """Distance advantages of frontier cells, as far as it takes to know the greatest.
+
+    Args:
+        paths: Of the robot; the search in them is another one afterwards.
+        voxels: (K,) int32, the frontier cells.
+        lengths: (K,) of the paths from the robot to them.
+        around: (N,) int32, the free cells around the robot.
+        farthest: The longest path from the robot to one of them.
+
+    Returns:
+        (K,) in voxel edges; -inf for cells that cannot have the greatest.
+    """
+    worth, bounds = np.full(len(voxels), -np.inf), np.full(len(voxels), np.inf)
+    place = int(np.argmin(lengths))
+    while bounds[place] > worth.max():
+        least, most = abs(farthest - lengths[place]), farthest + lengths[place]
+        mean = paths.mean_length(int(voxels[place]), around, least, most)
+        worth[place] = mean - lengths[place]
+        bounds = np.minimum(bounds, mean + paths.lengths_to(voxels) - lengths)
+        bounds[np.isfinite(worth)] = -np.inf
+        place = int(np.argmax(bounds))
+    return worth

@@ -1,0 +1,255 @@
+"""What explorers share: a rule names the voxel to go to, and this drives there by way of stops.
+
+Each call decides anew, so robots follow the rule as closely as they are asked: at every stop, or at every
+scan under way (`Robot.redecide`). An unchanged map is an unchanged choice: the same viewpoint, bit by bit.
+
+Ours, where the rules say nothing:
+
+- A frontier cell from which a scan explored nothing is dropped, and what it alone touches with it, until the
+  map changes around it; so is a cell to which a drive ended early.
+- Without a frontier, a finer σ counts as known, half the one before, down to the mission's σ_end, since a
+  mission may require more than having seen everything once. Then robots go to random viewpoints.
+- A robot that a teammate stops drives around it if it knows a path; else it waits for one scan if its number
+  is the lower, and steps aside, to a random viewpoint, if it is the higher or has waited before.
+- A sensor that looks one way is turned to where most is unknown.
+"""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from baselines.strategies.explorers.frontier_cells import KNOWN_SIGMA, FrontierCells
+from baselines.strategies.explorers.path_lengths import KnownPaths
+from baselines.strategies.frontier.voxel.map import NONE
+from baselines.strategies.knowledge import voxel_of
+from baselines.strategies.protocol import random_viewpoint
+from entropy_explore_env.belief.paths.search import Search, new_search
+from entropy_explore_env.errors import SettingError
+from entropy_explore_env.missions.view import RobotView
+from entropy_explore_env.robots.motion import MoveEnd
+from entropy_explore_env.scenario import Scenario
+
+_WITHIN_REACH = 0.999
+"""Share of the reach that is used, so that rounding never moves a place towards the robot."""
+_STOPPED = (MoveEnd.OBSTACLE, MoveEnd.GROUND, MoveEnd.CEILING, MoveEnd.WALL, MoveEnd.NO_PATH)
+"""Ends of a drive to a place that cannot be reached, whatever the belief says."""
+_GAZES = 4
+"""A place is dropped after so many gazes from it."""
+
+
+@dataclass
+class Scene:
+    """What one robot knows and remembers, as a rule needs it.
+
+    Attributes:
+        view: Of the robot, now.
+        cells: Its frontier cells, up to date.
+        paths: Paths through its known free space; a search from where it stands has begun.
+        here: The voxel in which it stands.
+        target: The voxel that it chose last and has not reached, if it is a frontier cell still; else NONE.
+    """
+
+    view: RobotView
+    cells: FrontierCells
+    paths: KnownPaths
+    here: int
+    target: int
+
+
+@dataclass
+class _Memory:
+    """What is kept of a robot from one decision to the next."""
+
+    cells: FrontierCells
+    paths: KnownPaths
+    level: float = KNOWN_SIGMA
+    """σ from which on a voxel counts as known."""
+    target: int = NONE
+    viewpoint: np.ndarray | None = None
+    """(5,) that was chosen last."""
+    scanned: bool = False
+    """Whether the first scan was taken."""
+    gazes: int = 0
+    """How often it has looked from where it stands."""
+    blocked: int = 0
+    """How many drives in a row a teammate stopped."""
+
+
+class Explorer(ABC):
+    """Drives robots to where a rule wants them; see the top of the file.
+
+    A rule is a subclass with `pick`. It may read what it needs from the Scene, and change nothing in it but
+    the state of the path search.
+    """
+
+    rule = "this rule"
+    """Its name, for errors."""
+
+    @abstractmethod
+    def pick(self, scene: Scene) -> int:
+        """The voxel to go to, one in which the body may stand; NONE = no frontier can be reached."""
+
+    def reset(self, scenario: Scenario, rng: np.random.Generator) -> None:
+        """A new mission begins."""
+        self._scenario, self._rng = scenario, rng
+        self._search: Search = new_search(scenario.grid.voxels)
+        self._memories: dict[int, _Memory] = {}
+        self._finest = min(scenario.ending.sigma_end, KNOWN_SIGMA)
+
+    def choose(self, views: Sequence[RobotView]) -> list[np.ndarray]:
+        """(5,) viewpoint of each view, map frame, by its own belief and what it has heard.
+
+        Raises:
+            SettingError: The world has an exposure surface.
+        """
+        return [self._choose(view) for view in views]
+
+    def cells_of(self, robot: int) -> FrontierCells:
+        """The frontier cells of a robot; available after its first choice."""
+        return self._memories[robot].cells
+
+    def _choose(self, view: RobotView) -> np.ndarray:
+        memory = self._memory(view)
+        if not memory.scanned:
+            memory.scanned = True
+            return self._look(view, memory, view.pose)
+        memory.cells.update(view, memory.level)
+        here = voxel_of(view, view.pose)
+        stopped = self._note_end(view, memory, here)
+        if stopped is not None:
+            return stopped
+        kept = memory.target != NONE and memory.cells.is_frontier(memory.target)
+        if kept and not memory.cells.changed:
+            return self._towards(view, memory, here, memory.target)
+        target = self._pick(view, memory, here, memory.target if kept else NONE)
+        if target == NONE:
+            memory.target, memory.viewpoint = NONE, None
+            return random_viewpoint(view, self._rng)
+        return self._towards(view, memory, here, target)
+
+    def _memory(self, view: RobotView) -> _Memory:
+        """The robot's memory, made at its first choice: an exposure surface is not known before."""
+        if view.ceiling is not None:
+            raise SettingError(
+                "strategy",
+                self.rule,
+                "a world without an exposure surface: there frontiers are columns of ground, which"
+                " per-time-visibility, nearest-candidate and coordinated-candidate know",
+            )
+        if view.robot not in self._memories:
+            cells = FrontierCells(self._scenario, view.kind)
+            paths = KnownPaths(self._scenario, view.kind, cells, self._search)
+            self._memories[view.robot] = _Memory(cells, paths)
+        return self._memories[view.robot]
+
+    def _note_end(self, view: RobotView, memory: _Memory, here: int) -> np.ndarray | None:
+        """Learn from how the latest drive ended; a viewpoint where that alone decides."""
+        if memory.viewpoint is None or memory.target == NONE:
+            return None
+        if view.move_end is MoveEnd.TEAMMATE:
+            memory.blocked += 1
+            return self._give_way(view, memory)
+        memory.blocked = 0
+        if view.move_end in _STOPPED:
+            memory.cells.drop(memory.target, with_edges=False)
+        elif here == memory.target and memory.cells.is_frontier(here):
+            memory.gazes += 1
+            gaze = memory.cells.gaze(self._scenario.grid.in_grid_units(view.pose)[:3], view)
+            turned = abs(gaze[0] - view.pose[3]) + abs(gaze[1] - view.pose[4]) > 0.1
+            if turned and memory.gazes < _GAZES:
+                return np.array([*view.pose[:3], *gaze])
+            memory.cells.drop(here, with_edges=True)
+        return None
+
+    def _give_way(self, view: RobotView, memory: _Memory) -> np.ndarray | None:
+        """What a robot does that a teammate stopped; None = it goes on by its rule."""
+        near = self._nearest_mate(view)
+        if memory.blocked == 1 and near > view.robot:
+            return view.pose.copy()
+        memory.target, memory.viewpoint, memory.blocked = NONE, None, 0
+        return random_viewpoint(view, self._rng)
+
+    def _nearest_mate(self, view: RobotView) -> int:
+        """Number of the teammate that was last heard nearest; -1 = none was heard."""
+        heard = [mate for mate, seen in view.teammates.items() if seen.heard_s >= 0.0]
+        apart = [float(np.linalg.norm(view.teammates[mate].pose[:3] - view.pose[:3])) for mate in heard]
+        return heard[int(np.argmin(apart))] if heard else -1
+
+    def _pick(self, view: RobotView, memory: _Memory, here: int, target: int) -> int:
+        """What the rule picks; where there is no frontier, of those at finer levels."""
+        while True:
+            memory.paths.start(here)
+            picked = self.pick(Scene(view, memory.cells, memory.paths, here, target))
+            if picked != NONE or memory.level <= self._finest:
+                return picked
+            memory.level = max(0.5 * memory.level, self._finest)
+            memory.cells.readmit()
+            memory.cells.update(view, memory.level)
+
+    def _towards(self, view: RobotView, memory: _Memory, here: int, target: int) -> np.ndarray:
+        """The viewpoint at a target, or at a stop on the path to it that is within reach."""
+        if target != memory.target:
+            memory.target, memory.viewpoint, memory.gazes = target, None, 0
+        robot = view.kind.robot
+        at_once = robot.navigator == "planned" and math.isinf(robot.reach_m)
+        if memory.viewpoint is not None and (at_once or not self._stands_at(view, memory.viewpoint)):
+            return memory.viewpoint.copy()
+        goal = self._centre(view, target)
+        place = goal if at_once else self._stop(view, memory, here, goal)
+        return self._look(view, memory, place)
+
+    def _look(self, view: RobotView, memory: _Memory, place: np.ndarray) -> np.ndarray:
+        """The viewpoint at a place (3,), with the gaze in which most is unknown."""
+        viewpoint = view.pose.copy()
+        axes = 2 if view.planar else 3
+        viewpoint[:axes] = place[:axes]
+        viewpoint[3:] = memory.cells.gaze(self._scenario.grid.in_grid_units(viewpoint)[:3], view)
+        memory.viewpoint = viewpoint
+        return viewpoint.copy()
+
+    def _stop(self, view: RobotView, memory: _Memory, here: int, goal: np.ndarray) -> np.ndarray:
+        """(3,) the farthest place on the path to a goal (3,) to which one drive leads."""
+        grid, robot = self._scenario.grid, view.kind.robot
+        reach_m = robot.reach_m * _WITHIN_REACH
+        if robot.navigator == "planned":
+            if _apart_m(view, goal) <= reach_m:
+                return goal
+            path = memory.paths.path_to(here, memory.target)
+            places = grid.centre_of(np.stack(np.unravel_index(path, grid.shape), axis=-1))
+            axes = 2 if view.planar else 3
+            apart_m = np.linalg.norm(places[:, :axes] - view.pose[:axes], axis=1)
+            beyond = np.flatnonzero(apart_m > reach_m)
+            last = (int(beyond[0]) if len(beyond) else len(path)) - 1
+            return places[max(last, 0)] if len(path) else goal
+        path = memory.paths.path_to(here, memory.target)
+        if len(path) == 0:
+            return goal
+        start, end = (grid.in_grid_units(np.append(p, (0.0, 0.0)))[:3] for p in (view.pose[:3], goal))
+        if memory.paths.lattice.layer >= 0:
+            end[2] = start[2]
+        corners = memory.paths.corners_of(path, start, end)
+        first = np.asarray(grid.origin_m) + (corners[0] if len(corners) else end) * grid.voxel_size_m
+        apart_m = _apart_m(view, first)
+        return view.pose[:3] + (first - view.pose[:3]) * min(1.0, reach_m / max(apart_m, 1e-9))
+
+    def _stands_at(self, view: RobotView, viewpoint: np.ndarray) -> bool:
+        return _apart_m(view, viewpoint) < 0.5 * self._scenario.grid.voxel_size_m
+
+    def _centre(self, view: RobotView, voxel: int) -> np.ndarray:
+        """(3,) a voxel's centre in the map frame; of planar robots at their sensor's height."""
+        grid = self._scenario.grid
+        place = grid.centre_of(np.stack(np.unravel_index(voxel, grid.shape)))
+        if view.planar:
+            place[2] = view.pose[2]
+        return place
+
+
+def _apart_m(view: RobotView, place: np.ndarray) -> float:
+    """Straight distance from a robot to a place, map frame."""
+    axes = 2 if view.planar else 3
+    return float(np.linalg.norm(place[:axes] - view.pose[:axes]))

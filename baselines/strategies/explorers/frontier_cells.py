@@ -1,0 +1,183 @@
+"""Every frontier cell of one robot's belief, kept up to date: known free cells beside unknown ones.
+
+That is the frontier of Yamauchi 1998. A body that is larger than a voxel cannot stand in each of its cells. A
+frontier cell here is a voxel in which the body may stand and from which it touches one: its footprint meets a
+known free voxel beside an unknown one. For a point robot that is the textbook's frontier cell itself. Voxels
+lie in small blocks; of each block the cell with the shortest path stands for all of it.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+
+import numpy as np
+
+from baselines.strategies.frontier.candidates import FrontierConfig
+from baselines.strategies.frontier.voxel.candidates import VoxelCandidates
+from baselines.strategies.frontier.voxel.map import (
+    CANDIDATE,
+    DROPPED,
+    EDGE,
+    EXCLUDED,
+    NONE,
+    FrontierMap,
+    block_span,
+    queue_block,
+)
+from entropy_explore_env.belief.paths.search import Search, cost_to
+from entropy_explore_env.belief.voxel_index import flat_index, grid_index
+from entropy_explore_env.compilation.kernels import lean_kernel
+from entropy_explore_env.missions.view import RobotView
+from entropy_explore_env.scenario import Scenario
+from entropy_explore_env.settings import RobotKind
+
+BLOCK = 4
+"""Voxels along the edge of a block."""
+KNOWN_SIGMA = 0.5
+"""σ from which on a voxel is known: a single measurement of our sensors brings it far below."""
+
+
+class FrontierCells(VoxelCandidates):
+    """The frontier cells of one robot's belief, and what is expected to be seen from any voxel.
+
+    `update` takes the time of one pass over the precisions, and of what changed; `count` says how many
+    unknown voxels the sensor would see from each of K voxels.
+
+    Attributes:
+        body_reach: Voxels that the body extends beyond its own, along an axis.
+    """
+
+    def __init__(self, scenario: Scenario, kind: RobotKind) -> None:
+        """Nothing is known yet."""
+        block_m = BLOCK * scenario.grid.voxel_size_m
+        super().__init__(scenario, kind, FrontierConfig(sigma=KNOWN_SIGMA, spacing_m=block_m))
+        self.body_reach = int(np.abs(self._map.footprint).max(initial=0))
+        self._radius = self.body_reach + 2
+        self._dropped: dict[int, tuple[int, np.ndarray]] = {}
+        """Voxel → what its surroundings were when it was dropped, and which edges were dropped with it."""
+
+    def update(self, view: RobotView, sigma: float) -> None:
+        """Bring the cells up to date with a belief; dropped ones count again where the map has changed."""
+        super().update(view, sigma)
+        if self.changed:
+            for voxel in [v for v, (was, _) in self._dropped.items() if self._surroundings(v) != was]:
+                self._restore(voxel)
+
+    def is_frontier(self, voxel: int) -> bool:
+        """Whether a voxel is a frontier cell."""
+        return bool(self._map.flags[voxel] & CANDIDATE)
+
+    def is_known_free(self, voxel: int) -> bool:
+        """Whether the body may stand in a voxel, by what is known."""
+        return math.isfinite(self._map.traversal_cost[voxel])
+
+    def nearest_of_blocks(self, search: Search, reach: float) -> tuple[np.ndarray, np.ndarray]:
+        """Of each block the frontier cell that the latest search reached by the shortest path.
+
+        Args:
+            search: Of paths from a robot's place, complete up to the reach.
+            reach: Cells with longer paths are left out; inf allowed.
+
+        Returns:
+            (K,) int32 voxels and (K,) float64 lengths in voxel edges, in the order of the blocks.
+        """
+        blocks = np.flatnonzero(self._map.voxel != NONE)
+        voxels, lengths = np.empty(len(blocks), np.int32), np.empty(len(blocks))
+        fill_nearest_of_blocks(self._map, search, blocks, reach, voxels, lengths)
+        found = voxels != NONE
+        return voxels[found], lengths[found]
+
+    def drop(self, voxel: int, with_edges: bool) -> None:
+        """Take out a frontier cell until the map changes around it.
+
+        Args:
+            voxel: It could not be reached, or a scan from there did not explore what is unknown beside it.
+            with_edges: Whether cells that touch no other known free voxel beside unknown ones go with it.
+        """
+        edges = self._edges_beside(voxel) if with_edges else np.empty(0, np.int64)
+        before = self._dropped.get(voxel)
+        if before is not None:
+            edges = np.union1d(edges, before[1])
+        self._map.flags[edges] |= DROPPED
+        self._map.flags[voxel] |= EXCLUDED
+        self._dropped[voxel] = self._surroundings(voxel), edges
+        self._refresh(voxel)
+
+    def readmit(self) -> None:
+        """Let all that was dropped count again, for a finer level."""
+        for voxel in list(self._dropped):
+            self._restore(voxel)
+
+    def _restore(self, voxel: int) -> None:
+        _, edges = self._dropped.pop(voxel)
+        self._map.flags[edges] &= np.uint8(~DROPPED & 0xFF)
+        self._map.flags[voxel] &= np.uint8(~EXCLUDED & 0xFF)
+        self._refresh(voxel)
+
+    def _surroundings(self, voxel: int) -> int:
+        """A number that changes when the map changes around a voxel."""
+        return int(sum_of_states(self._map, voxel, self._radius))
+
+    def _edges_beside(self, voxel: int) -> np.ndarray:
+        """(N,) int64 voxels of the body's footprint in a voxel that lie beside unknown ones."""
+        places = np.array(self._axes_of(voxel)) + self._map.footprint
+        places = places[((places >= 0) & (places < self._size)).all(1)]
+        beside = np.ravel_multi_index(tuple(places.T), self._size)
+        return np.asarray(beside)[self._map.flags[beside] & EDGE > 0]
+
+    def _refresh(self, voxel: int) -> None:
+        """Find the frontier cells around a voxel anew."""
+        reach, at = 2 * self._radius, np.array(self._axes_of(voxel))
+        low = np.maximum(at - reach, 0) // self._map.across
+        high = np.minimum(at + reach, np.array(self._size) - 1) // self._map.across
+        count = 0
+        for block in itertools.product(*(range(a, b + 1) for a, b in zip(low, high, strict=True))):
+            count = queue_block(self._map, int(np.ravel_multi_index(block, self._map.blocks)), count)
+        self._update_blocks(count)
+
+
+@lean_kernel
+def fill_nearest_of_blocks(
+    frontiers: FrontierMap,
+    search: Search,
+    blocks: np.ndarray,
+    reach: float,
+    voxels: np.ndarray,
+    lengths: np.ndarray,
+) -> None:
+    """Fill (K,) with the frontier cell of each of K blocks that has the shortest path; NONE = none has any.
+
+    Args:
+        frontiers: FrontierMap.
+        search: The latest search.
+        blocks: (K,) int64 numbers of blocks.
+        reach: Longer paths do not count.
+        voxels: (K,) int32, filled in.
+        lengths: (K,) float64, filled in: of the paths, in voxel edges.
+    """
+    for place in range(len(blocks)):
+        low, high = block_span(frontiers, blocks[place])
+        voxels[place], lengths[place] = NONE, math.inf
+        for x in range(low[0], high[0]):
+            for y in range(low[1], high[1]):
+                for z in range(low[2], high[2]):
+                    voxel = flat_index(frontiers.size, x, y, z)
+                    if frontiers.flags[voxel] & CANDIDATE:
+                        length = cost_to(search, voxel)
+                        if length <= reach and length < lengths[place]:
+                            voxels[place], lengths[place] = voxel, length
+
+
+@lean_kernel
+def sum_of_states(frontiers: FrontierMap, voxel: int, radius: int) -> int:
+    """A sum over the voxels within a radius, along every axis, that another state of one of them changes."""
+    size, state = frontiers.size, frontiers.state
+    x, y, z = grid_index(size, voxel)
+    total, weight = np.int64(0), np.int64(1)
+    for i in range(max(x - radius, 0), min(x + radius, size[0] - 1) + 1):
+        for j in range(max(y - radius, 0), min(y + radius, size[1] - 1) + 1):
+            for k in range(max(z - radius, 0), min(z + radius, size[2] - 1) + 1):
+                total += weight * np.int64(state[flat_index(size, i, j, k)])
+                weight = (weight * 31) % 1000003
+    return int(total)
