@@ -149,11 +149,14 @@ class Scenario:
     def message_slots(self) -> int:
         """Messages that can be under way at once: two a scan and robot, while the delay lasts.
 
-        Between two scans a robot stands still for the latter or drives to it, at most at top speed.
+        Between two scans a robot stands still for the latter or drives to it, at most at top speed. A robot
+        that decides under way by time may announce so much more often.
         """
         if self.channel.delay_s == 0.0 or self.robots == 1:
             return 0
-        return 2 * self._scans_within(self.channel.delay_s) * self.robots
+        periods = [kind.robot.redecide for kind in self.kinds if not isinstance(kind.robot.redecide, str)]
+        more = math.floor(self.channel.delay_s / min(periods)) + 2 if periods else 0
+        return (2 * self._scans_within(self.channel.delay_s) + more) * self.robots
 
     @property
     def phase_batches(self) -> int:

@@ -28,6 +28,10 @@ MAX_VOXELS = 2**31 - 1
 MAX_VOXELS_ALONG_AXIS = 2**20
 """Rays measure their way in 64-bit integers."""
 
+MIN_REDECIDE_S = 0.01
+"""A shorter period between decisions under way would only cost time."""
+_REDECIDE = ("at_stop", "on_scan")
+
 
 def gaussian_entropy_bits(sigma: float) -> float:
     """Differential entropy of a Gaussian in bits, log2 √(2πe) + log2 σ (Rocha04, eq. 15)."""
@@ -112,6 +116,10 @@ class Robot:
             decides anew at once, and our strategies then wander; `wait` stands still first. Either way
             the robot scans where it stopped, as after every drive, before that.
         blocked_wait_s: `wait`: from the end of that scan until it decides; nothing else ends the wait.
+        redecide: `at_stop`: the robot decides only where it stops. It decides while it drives, too, with
+            `on_scan` at every scan under way, which its sensor must take (`RangeSensor.scan_every_m`); with a
+            number whenever so many seconds, at least 0.01, have passed since it last decided. It drives on
+            meanwhile; missions/redecision.py says what a new decision does to the drive.
     """
 
     motion: Literal["free", "planar"] = "free"
@@ -125,6 +133,7 @@ class Robot:
     sensor_height_m: float = 0.5
     when_blocked: Literal["wander", "wait"] = "wander"
     blocked_wait_s: float = 5.0
+    redecide: Literal["at_stop", "on_scan"] | float = "at_stop"
 
     def __post_init__(self) -> None:
         """Check every field."""
@@ -137,6 +146,10 @@ class Robot:
         check_not_negative(self, "body_radius_m", "sensor_height_m")
         check_choice(self, "when_blocked", Literal["wander", "wait"])
         check_positive(self, "blocked_wait_s")
+        periodic = is_number(self.redecide) and MIN_REDECIDE_S <= self.redecide < math.inf
+        if not periodic and not (isinstance(self.redecide, str) and self.redecide in _REDECIDE):
+            allowed = f"one of {', '.join(_REDECIDE)}, or a finite number of seconds ≥ {MIN_REDECIDE_S}"
+            raise SettingError("Robot.redecide", self.redecide, allowed)
 
 
 @dataclass(frozen=True)
@@ -227,6 +240,9 @@ class RobotKind:
         """Check every field."""
         check_kind(self, "robot", Robot)
         check_kind(self, "sensor", RangeSensor)
+        if self.robot.redecide == "on_scan" and math.isinf(self.sensor.scan_every_m):
+            allowed = "at_stop or a period, where RangeSensor.scan_every_m is inf"
+            raise SettingError("Robot.redecide", self.robot.redecide, allowed)
 
 
 def centred_angles(samples: int, step_rad: float) -> np.ndarray:

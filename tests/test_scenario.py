@@ -69,6 +69,7 @@ REFUSED = {
     (Robot, "sensor_height_m"): NOT_NEGATIVE,
     (Robot, "when_blocked"): KIND,
     (Robot, "blocked_wait_s"): (*POSITIVE, INF),
+    (Robot, "redecide"): (None, True, [1.0], NAN, INF, 0.0, -1.0, 0.0099, "on_scans", "AT_STOP", "1", ""),
     (Scenario, "start_radius_m"): POSITIVE,
     (RangeSensor, "field_of_view_rad"): (
         0.5,
@@ -189,6 +190,9 @@ ACCEPTED = [
     (Grid, {"shape": (np.int64(7), np.int32(11), 5), "voxel_size_m": np.float64(0.5)}),
     (Robot, {"reach_m": INF, "turn_rate_rad_s": INF, "body_radius_m": 0, "sensor_height_m": 0}),
     (Robot, {"motion": "planar", "reach_m": 3, "navigator": "planned", "unknown_cost": 1}),
+    (Robot, {"redecide": "on_scan"}),
+    (Robot, {"redecide": 0.01}),
+    (Robot, {"redecide": np.float32(1e6)}),
     (RangeSensor, {"scan_every_m": 1e-3}),
     (RangeSensor, {"scan_every_m": INF}),
     (RangeSensor, {"field_of_view_rad": (2 * math.pi, math.pi), "max_range_m": INF, "voxels_behind": 0}),
@@ -234,6 +238,8 @@ def test_settings_that_do_not_fit_each_other_are_refused():
         ({"channel": {"delay_s": 3600.0}, "sensor": {"scan_time_s": 1e-4}}, "Channel.delay_s"),
         ({"channel": {"phase_s": 3600.0}, "sensor": {"scan_time_s": 1e-4}}, "Channel.phase_s"),
         ({"channel": {"phase_s": 1.0, "delay_s": 1.0}}, "Channel.delay_s"),
+        ({"robot": {"redecide": "on_scan"}}, "Robot.redecide"),
+        ({"robot": {"redecide": 0.01}, "channel": {"delay_s": 3600.0}, "robots": 64}, "Channel.delay_s"),
     ):
         assert refusal(lambda changes=settings: with_settings(BOX, changes)).field == field
     assert with_settings(BOX, {**discrete, "robot": {"reach_m": 0.5}}).action.kind == "discrete"

@@ -54,7 +54,7 @@ def test_numbers_are_exact(size, origin, reach, limit, period, cycles):
     changes = {
         "grid": grid,
         "decision_period_s": period,
-        "robot": {"reach_m": reach, "motion": "free"},
+        "robot": {"reach_m": reach, "motion": "free", "redecide": max(period or 0.0, 0.01)},
         "ending": {"max_cycles": cycles, "time_limit_s": limit},
     }
     scenario = with_settings(BOX, changes)

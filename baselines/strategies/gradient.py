@@ -45,7 +45,7 @@ class GradientStrategy:
     def _choose(self, view: RobotView) -> np.ndarray:
         grid, robot = view.scenario.grid, view.kind.robot
         projected = view.planar if self._motion_plane is None else self._motion_plane
-        stuck = view.move_end is not MoveEnd.ARRIVED
+        stuck = view.move_end not in (MoveEnd.ARRIVED, MoveEnd.UNDER_WAY)
         position = grid.in_grid_units(view.pose)[:3]
         reach = min(robot.reach_m / grid.voxel_size_m, float(sum(grid.shape)))
         viewpoint = view.pose.copy()

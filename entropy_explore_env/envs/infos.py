@@ -10,6 +10,7 @@ from entropy_explore_env.reports.metrics import mission_figures
 from entropy_explore_env.robots.motion import MoveEnd
 
 _MOVE_ENDS = [end.name for end in MoveEnd]
+_UNDER_WAY = MoveEnd.UNDER_WAY.name
 _MISSION_ENDS = [end.name for end in MissionEnd]
 
 
@@ -31,11 +32,12 @@ def robot_infos(missions: Missions, mission: int) -> list[dict[str, Any]]:
             "entropy_bits": entropy_bits,
             "own_bits": own_bits,
             "received_bits": received_bits,
-            "move_end": _MOVE_ENDS[move_end],
+            "move_end": _UNDER_WAY if under_way else _MOVE_ENDS[move_end],
             "end": end,
         }
-        for deciding, entropy_bits, own_bits, received_bits, move_end in zip(
+        for deciding, under_way, entropy_bits, own_bits, received_bits, move_end in zip(
             robots["deciding"].tolist(),
+            robots["under_way"].tolist(),
             robots["entropy_bits"].tolist(),
             robots["own_bits"].tolist(),
             robots["received_bits"].tolist(),

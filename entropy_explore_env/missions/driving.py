@@ -15,12 +15,17 @@ from entropy_explore_env.missions.poses import (
     grid_size,
     path_point,
     place_at,
+    place_with_left,
+    profile_of,
+    share_left,
     to_grid_units,
 )
+from entropy_explore_env.missions.redecision import braking_metres, resting_place
 from entropy_explore_env.robots.motion import (
     MoveEnd,
+    SpeedProfile,
     distance_to_teammate,
-    driving_time,
+    duration_of,
     free_distance,
     line_believed_blocked,
     time_after,
@@ -34,48 +39,163 @@ _ROUNDING = 1e-6
 
 
 @lean_kernel
-def start_drive(params, collision, robots, index, time_s, crossing):
-    """Commit a robot to its target: how far it will get, why no farther, and when it has scanned.
+def start_drive(team, collision, choice, index, time_s, work):
+    """Commit a robot to what it chose: how far it will get, why no farther, and when it has scanned.
 
     Args:
-        params: (A,) PARAMS.
+        team: Team.
         collision: (V,) float32, a Collision each, for its body.
-        robots: (A,) ROBOT.
+        choice: CHOICE of the robot.
         index: Which robot.
         time_s: When it departs.
-        crossing: Crossing, scratch space.
+        work: Workspace.
     """
+    params, robots = team.params, team.robots
     own, robot = params[index], robots[index]
-    origin, goal = robot.origin, robot.goal
-    copy_numbers(goal, origin, 5)
-    copy_numbers(robot.target, goal, 5)
-    robot.depart_s = time_s
-    robot.deciding = False
-    robot.waiting = False
-    robot.path_m = 0.0
+    goal, braking_m = robot.goal, braking_metres(own, robot, time_s) if robot.under_way else 0.0
+    rests = 0
+    if robot.under_way:
+        rests = leave_path(own, robot, time_s, braking_m, work.braking)
+    else:
+        robot.scan_lead_m = 0.0
+    free = take_path(own, robot, choice, rests if choice.brakes else 0, work.braking)
+    robot.depart_s = robot.decided_s = time_s
+    robot.deciding = robot.waiting = robot.under_way = robot.path_blocked = False
     driven, code = 0.0, _ARRIVED
     for leg in range(max(robot.waypoints, 1)):
         robot.corners = leg
         if robot.waypoints > 0:
             for axis in range(3):
                 goal[axis] = robot.path[leg, axis]
-        distance, code = drive_leg(params, collision, robots, index, time_s, crossing)
+        if leg < free:
+            distance = distance_between(path_point(robot, leg), path_point(robot, leg + 1)) / own.voxel_size_m
+        else:
+            distance, code = drive_leg(params, collision, robots, index, time_s, work.drive)
         driven += distance
         robot.path_m += distance_between(path_point(robot, leg), path_point(robot, leg + 1))
         if code != _ARRIVED:
             break
     if code == _ARRIVED and robot.waypoints > 0:
         code = robot.path_end
+    robot.lead_s = math.sqrt(2.0 * braking_m / own.acceleration_m_s2)
+    if choice.brakes:
+        robot.lead_s = -robot.lead_s
+    elif robot.path_m < braking_m:
+        driven = rest_on_path(robot, rests, work.braking) / own.voxel_size_m
     if code != _ARRIVED and code != _CORNERS:
         robot.blocked_moves += 1
     robot.move_end = code
     driven_m = driven * own.voxel_size_m
     robot.distance_m += driven_m
-    drive_s = driving_time(driven_m, own.max_speed_m_s, own.acceleration_m_s2)
-    turn_s = turning_time(origin[3], origin[4], goal[3], goal[4], own.turn_rate_rad_s)
+    drive_s = duration_of(SpeedProfile(driven_m, robot.lead_s, own.max_speed_m_s, own.acceleration_m_s2))
+    turn_s = turning_time(robot.origin[3], robot.origin[4], goal[3], goal[4], own.turn_rate_rad_s)
     robot.ready_s = time_s + max(drive_s, turn_s) + own.scan_time_s
     robot.scans_under_way = 0
     plan_scan(own, robot)
+    plan_redecision(own, robot, time_s)
+
+
+@lean_kernel
+def leave_path(params, robot, time_s, braking_m, braking):
+    """Give up the rest of a robot's drive, and note how it can come to rest on it.
+
+    Args:
+        params: PARAMS of the robot.
+        robot: ROBOT; what was counted for the rest of its drive is taken back.
+        time_s: Now.
+        braking_m: Its braking distance.
+        braking: (W, 3) float64, filled in.
+
+    Returns:
+        How many points there are in `braking`: to them it drives straight, one after the other, at the last
+        of them it is at rest. 0 = it stands already.
+    """
+    left = share_left(params, robot, time_s)
+    driven_m = (1.0 - left) * robot.path_m
+    robot.distance_m -= left * robot.path_m
+    if robot.move_end != _ARRIVED and robot.move_end != _CORNERS:
+        robot.blocked_moves -= 1
+    if not math.isinf(params.scan_every_m):
+        since_m = robot.scan_lead_m + driven_m - robot.scans_under_way * params.scan_every_m
+        robot.scan_lead_m = min(max(since_m, 0.0), params.scan_every_m)
+    if braking_m == 0.0:
+        return 0
+    x, y, z, passed = resting_place(params, robot, time_s, braking_m)
+    behind = place_with_left(robot, left)[3]
+    for number in range(behind, passed):
+        copy_numbers(robot.path[number], braking[number - behind], 3)
+    copy_numbers((x, y, z), braking[passed - behind], 3)
+    return passed - behind + 1
+
+
+@lean_kernel
+def take_path(params, robot, choice, rests, braking):
+    """Put a robot on the path that it chose, behind the first `rests` points of `braking`.
+
+    Returns:
+        How many legs of the path are known to be free.
+    """
+    copy_numbers(choice.pose, robot.origin, 5)
+    copy_numbers(choice.viewpoint, robot.goal, 5)
+    copy_numbers(choice.viewpoint, robot.target, 5)
+    for number in range(rests):
+        copy_numbers(braking[number], robot.path[number], 3)
+    points = choice.waypoints
+    if rests > 0 and points == 0:
+        points = 1
+    kept = min(points, len(robot.path) - rests)
+    for number in range(kept):
+        copy_numbers(choice.path[number], robot.path[rests + number], 3)
+    robot.waypoints = rests + kept
+    robot.path_end = choice.path_end if kept == points else _CORNERS
+    robot.path_m = 0.0
+    return rests
+
+
+@lean_kernel
+def rest_on_path(robot, rests, braking):
+    """Let a drive that is too short to come to rest on end where the robot comes to rest on its old path.
+
+    Returns:
+        Its length in metres.
+    """
+    for number in range(rests):
+        copy_numbers(braking[number], robot.path[number], 3)
+    copy_numbers(braking[rests - 1], robot.goal, 3)
+    robot.waypoints, robot.corners, robot.path_m, robot.lead_s = rests, rests - 1, 0.0, -robot.lead_s
+    for leg in range(rests):
+        robot.path_m += distance_between(path_point(robot, leg), path_point(robot, leg + 1))
+    return robot.path_m
+
+
+@lean_kernel
+def keep_drive(params, robot, time_s):
+    """Let a robot that keeps its viewpoint drive on as it does."""
+    robot.deciding = robot.under_way = False
+    robot.decided_s = time_s
+    plan_redecision(params, robot, time_s)
+
+
+@lean_kernel
+def plan_redecision(params, robot, time_s):
+    """Set when a robot that has just decided does so again under way; inf where it stops before that."""
+    robot.redecide_s = math.inf
+    if params.redecide_on_scan and robot.next_scan_s < robot.ready_s:
+        robot.redecide_s = robot.next_scan_s
+    elif not math.isinf(params.redecide_every_s):
+        due_s = time_s + params.redecide_every_s
+        if time_s < due_s < robot.depart_s + duration_of(profile_of(params, robot)):
+            robot.redecide_s = due_s
+
+
+@lean_kernel
+def redecide(robot, time_s):
+    """Let a robot decide under way, where it has driven since it last decided."""
+    if time_s > robot.decided_s:
+        robot.deciding = robot.under_way = True
+        robot.redecide_s = time_s
+    else:
+        robot.redecide_s = math.inf
 
 
 @lean_kernel
@@ -85,11 +205,13 @@ def stop(params, robot, time_s):
     robot.deciding = not robot.waiting
     robot.ready_s = time_s + params.blocked_wait_s if robot.waiting else time_s
     robot.next_scan_s = robot.ready_s
+    robot.under_way = robot.path_blocked = False
+    robot.redecide_s = math.inf
 
 
 @lean_kernel
 def next_decision(params, robots):
-    """When the next robot decides: now, after the scan where its drive ends, or when it has waited.
+    """When the next robot decides: now, under way, after the scan at its drive's end, or when it has waited.
 
     A drive that something under way may still end is taken to end where it was meant to.
     """
@@ -97,7 +219,8 @@ def next_decision(params, robots):
     for index in range(len(robots)):
         robot = robots[index]
         waits = robot.move_end == _TEAMMATE and not robot.waiting
-        soonest = min(soonest, robot.ready_s + (params[index].blocked_wait_s if waits else 0.0))
+        stops_s = robot.ready_s + (params[index].blocked_wait_s if waits else 0.0)
+        soonest = min(soonest, stops_s, robot.redecide_s)
     return soonest
 
 
@@ -169,15 +292,16 @@ def distance_to_tube(params, mate, time_s, line, distance, touching):
 def plan_scan(params, robot):
     """Set when a robot scans next: after so many metres of its path, or where the drive ends."""
     robot.next_scan_s = robot.ready_s
-    scan_m = (robot.scans_under_way + 1) * params.scan_every_m
+    scan_m = (robot.scans_under_way + 1) * params.scan_every_m - robot.scan_lead_m
     if scan_m < robot.path_m * (1.0 - _ROUNDING):
-        driving_s = time_after(scan_m, robot.path_m, params.max_speed_m_s, params.acceleration_m_s2)
-        robot.next_scan_s = robot.depart_s + driving_s
+        robot.next_scan_s = robot.depart_s + time_after(scan_m, profile_of(params, robot))
 
 
 @lean_kernel
 def continue_drive(params, footprint, mean, robot, time_s, crossing):
-    """After a scan under way: end the drive if the rest of its planned path is believed blocked.
+    """After a scan under way: see whether the rest of a planned path is believed blocked.
+
+    Then the drive ends, or a robot that decides under way does so now; some do so at every such scan.
 
     Args:
         params: PARAMS of the robot.
@@ -189,10 +313,16 @@ def continue_drive(params, footprint, mean, robot, time_s, crossing):
     """
     robot.scans_under_way += 1
     plan_scan(params, robot)
+    decides = params.redecide_on_scan
     if params.planned:
         passed = place_at(params, robot, time_s)[3]
         if rest_blocked(params, footprint, mean, robot, passed, crossing):
-            end_drive(params, robot, passed, time_s)
+            if params.redecide_on_scan or not math.isinf(params.redecide_every_s):
+                robot.path_blocked = decides = True
+            else:
+                end_drive(params, robot, passed, time_s)
+    if decides:
+        redecide(robot, time_s)
 
 
 @lean_kernel

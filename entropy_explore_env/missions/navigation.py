@@ -10,8 +10,8 @@ from typing import NamedTuple
 import numpy as np
 
 from entropy_explore_env.compilation.kernels import lean_kernel
-from entropy_explore_env.missions.action import decode_action
 from entropy_explore_env.missions.poses import to_grid_units
+from entropy_explore_env.missions.redecision import decide, note_braking
 from entropy_explore_env.missions.rules import ActionSet
 from entropy_explore_env.missions.state import MissionEnd
 from entropy_explore_env.robots.motion import MoveEnd
@@ -30,7 +30,9 @@ class Planning(NamedTuple):
     missions: np.ndarray
     """(E,) MISSION."""
     robots: np.ndarray
-    """(E, A) ROBOT; targets and paths are filled in."""
+    """(E, A) ROBOT."""
+    choices: np.ndarray
+    """(E, A) CHOICE; those of robots that decide are filled in."""
     mean: np.ndarray
     """(E, A, V) float32."""
     precision: np.ndarray
@@ -54,26 +56,32 @@ def plan_missions(planning, navigator, kind, continuous, discrete, first, last):
         last: One past the last.
     """
     for mission in range(first, last):
-        if planning.missions[mission].end == _RUNNING:
+        clock = planning.missions[mission]
+        if clock.end == _RUNNING:
             for index in range(planning.robots.shape[1]):
                 robot, own = planning.robots[mission, index], planning.params[index]
                 if robot.deciding and own.kind == kind:
+                    choice = planning.choices[mission, index]
                     chosen, number = continuous[mission, index], discrete[mission, index]
-                    decode_action(own, planning.actions, robot.goal, chosen, number, robot.target)
+                    decide(own, planning.actions, robot, clock.time_s, chosen, number, choice)
                     mean, precision = planning.mean[mission, index], planning.precision[mission, index]
                     no_fly = planning.no_fly[mission * own.radii + own.radius_number]
-                    plan_drive(own, navigator, mean, precision, no_fly, robot)
+                    if choice.changed:
+                        plan_drive(own, navigator, mean, precision, no_fly, choice)
+                        note_braking(own, robot, clock.time_s, choice)
+                        if choice.brakes:
+                            plan_drive(own, navigator, mean, precision, no_fly, choice)
 
 
 @lean_kernel
-def plan_drive(params, navigator, mean, precision, no_fly, robot):
-    """Write a robot's path to its target: waypoints in metres, and how it ends if nothing stops it."""
-    start, goal = to_grid_units(params, robot.goal), to_grid_units(params, robot.target)
-    path, origin = robot.path, params.origin_m
-    robot.waypoints, robot.path_end = plan_path(navigator, mean, precision, no_fly, start, goal, path)
-    for number in range(robot.waypoints):
+def plan_drive(params, navigator, mean, precision, no_fly, choice):
+    """Write a robot's path to its viewpoint: waypoints in metres, and how it ends if nothing stops it."""
+    start, goal = to_grid_units(params, choice.start), to_grid_units(params, choice.viewpoint)
+    path, origin = choice.path, params.origin_m
+    choice.waypoints, choice.path_end = plan_path(navigator, mean, precision, no_fly, start, goal, path)
+    for number in range(choice.waypoints):
         for axis in range(3):
             path[number, axis] = origin[axis] + path[number, axis] * params.voxel_size_m
-    if robot.path_end == _ARRIVED:  # not up to rounding
+    if choice.path_end == _ARRIVED:  # not up to rounding
         for axis in range(3):
-            path[robot.waypoints - 1, axis] = robot.target[axis]
+            path[choice.waypoints - 1, axis] = choice.viewpoint[axis]

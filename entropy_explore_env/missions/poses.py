@@ -6,7 +6,7 @@ import math
 
 from entropy_explore_env.belief.raycast import point
 from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel
-from entropy_explore_env.robots.motion import driven_share, turning_time
+from entropy_explore_env.robots.motion import SpeedProfile, driven_share, speed_after, turning_time
 
 
 @lean_kernel
@@ -45,14 +45,40 @@ def distance_between(a, b):
     return math.sqrt((b[0] - a[0]) ** 2 + (b[1] - a[1]) ** 2 + (b[2] - a[2]) ** 2)
 
 
+@inlined_kernel
+def profile_of(params, robot):
+    """SpeedProfile of a robot's latest drive."""
+    return SpeedProfile(robot.path_m, robot.lead_s, params.max_speed_m_s, params.acceleration_m_s2)
+
+
+@lean_kernel
+def share_left(params, robot, time_s):
+    """Share of its path that a robot still has to drive at a time between its departure and its next one."""
+    if time_s >= robot.ready_s - params.scan_time_s:
+        return 0.0
+    return 1.0 - driven_share(time_s - robot.depart_s, profile_of(params, robot))
+
+
+@lean_kernel
+def speed_at(params, robot, time_s):
+    """Speed of a robot on its path, in m/s, at a time as in `pose_at`."""
+    if time_s >= robot.ready_s - params.scan_time_s:
+        return 0.0
+    return speed_after(time_s - robot.depart_s, profile_of(params, robot))
+
+
 @lean_kernel
 def place_at(params, robot, time_s):
     """(x, y, z, corners): where a robot is at a time as in `pose_at`, and how many corners it has passed."""
+    return place_with_left(robot, share_left(params, robot, time_s))
+
+
+@lean_kernel
+def place_with_left(robot, left):
+    """(x, y, z, corners) where this share of a robot's path is left, and how many corners are behind it."""
     end, passed = path_point(robot, robot.corners + 1), robot.corners
-    if time_s >= robot.ready_s - params.scan_time_s:
+    if left <= 0.0:
         return end[0], end[1], end[2], passed
-    elapsed_s = time_s - robot.depart_s
-    left = 1.0 - driven_share(elapsed_s, robot.path_m, params.max_speed_m_s, params.acceleration_m_s2)
     while True:  # from the end of the path, which is so met exactly; `left` is a share of the whole path
         begin = path_point(robot, passed)
         leg_m = distance_between(begin, end)
@@ -99,7 +125,4 @@ def driven_metres(params, missions, robots, out):
         time_s = missions[mission].time_s
         for index in range(robots.shape[1]):
             own, robot = params[index], robots[mission, index]
-            share, elapsed_s = 1.0, time_s - robot.depart_s
-            if time_s < robot.ready_s - own.scan_time_s:
-                share = driven_share(elapsed_s, robot.path_m, own.max_speed_m_s, own.acceleration_m_s2)
-            out[mission, index] = robot.distance_m - (1.0 - share) * robot.path_m
+            out[mission, index] = robot.distance_m - share_left(own, robot, time_s) * robot.path_m

@@ -36,6 +36,8 @@ PARAMS = np.dtype(
         ("turn_rate_rad_s", "f8"),
         ("body_radius_m", "f8"),
         ("blocked_wait_s", "f8"),  # 0 = a blocked robot decides anew at once
+        ("redecide_on_scan", "?"),
+        ("redecide_every_s", "f8"),  # inf = not by time
         ("scan_time_s", "f8"),
         ("scan_every_m", "f8"),
         ("rays", "i8"),  # R of its sensor
@@ -135,6 +137,8 @@ def rules_of(scenario: Scenario) -> Rules:
         for name in ("reach_m", "max_speed_m_s", "acceleration_m_s2", "turn_rate_rad_s", "body_radius_m"):
             own[name] = getattr(robot, name)
         own["blocked_wait_s"] = robot.blocked_wait_s if robot.when_blocked == "wait" else 0.0
+        own["redecide_on_scan"] = robot.redecide == "on_scan"
+        own["redecide_every_s"] = math.inf if isinstance(robot.redecide, str) else robot.redecide
         for name in ("scan_time_s", "scan_every_m", "rays"):
             own[name] = getattr(sensor, name)
     overview, size = overview_shape(scenario), scenario.grid.shape

@@ -21,6 +21,7 @@ from entropy_explore_env.missions.navigation import Planning, plan_missions
 from entropy_explore_env.missions.observation.layout import ObservationLayout, part_offsets
 from entropy_explore_env.missions.observation.mask import mask_missions
 from entropy_explore_env.missions.observation.observe import Observed, observe_missions
+from entropy_explore_env.missions.redecision import CHOICE
 from entropy_explore_env.missions.reset_options import DRAWN, ResetOptions
 from entropy_explore_env.missions.rules import rules_of
 from entropy_explore_env.missions.starts import checked_starts, start_poses
@@ -130,6 +131,7 @@ class Missions:
     def _make_working_space(self) -> None:
         """Scratch memory for each thread and, where robots plan, navigators; none of it is state."""
         self._calls: _Calls | None = None
+        self._choices = np.zeros((self.count, self.scenario.robots), CHOICE)
         self._navigators = [new_navigators(self.scenario) for _ in range(self.threads)]
         self._work: list[Workspace] = [
             new_workspace(self.scenario, navigators) for navigators in self._navigators
@@ -251,6 +253,7 @@ class Missions:
         for field in ("origin", "goal", "target", "scan_pose"):
             robots[field] = poses
         robots["deciding"] = True
+        robots["redecide_s"] = np.inf
         robots["i_min_bits"] = robots["next_i_min_bits"] = self.scenario.channel.i_min_bits
         robots["sensor_rng"][:, 0] = splitmix_states(number, episode, Stream.SENSOR, len(robots))
         robots["channel_rng"][:, 0] = splitmix_states(number, episode, Stream.CHANNEL, len(robots))
@@ -324,7 +327,8 @@ class Missions:
         calls, work = self._bound_calls(), self._work[thread]
         for kind, navigator in self._navigators[thread].items():
             plan_missions(calls.planning, navigator, kind, continuous, discrete, first, last)
-        arguments, step = (self.rules, self.state, work, continuous, discrete, first, last), calls.step
+        arguments = (self.rules, self.state, self._choices, work, continuous, discrete, first, last)
+        step = calls.step
         if step is None:
             step = entry_point(step_missions, *arguments)
             self._calls = calls._replace(step=step)
@@ -350,7 +354,9 @@ class Missions:
         if calls is None or calls.state is not state or calls.planning.no_fly is not self._no_fly:
             params, actions = self.rules.params, self.rules.actions
             shown = (state.missions, state.robots)
-            planning = Planning(params, actions, *shown, state.mean, state.precision, self._no_fly)
+            planning = Planning(
+                params, actions, *shown, self._choices, state.mean, state.precision, self._no_fly
+            )
             observed = Observed(*shown, state.heard, state.mean, state.precision, state.pooled)
             self._calls = calls = _Calls(state, planning, observed, None, None)
         return calls
@@ -390,7 +396,7 @@ class Missions:
     def __getstate__(self) -> dict[str, object]:
         """All but the threads and their scratch space."""
         kept = dict(self.__dict__)
-        del kept["_pool"], kept["_work"], kept["_navigators"], kept["_calls"]
+        del kept["_pool"], kept["_work"], kept["_navigators"], kept["_calls"], kept["_choices"]
         return kept
 
     def __setstate__(self, kept: dict[str, object]) -> None:

@@ -61,6 +61,8 @@ ROBOT = np.dtype(
     [
         ("entropy_bits", "f8"),  # of its map, carried by H -= I (Rocha04, eq. 29)
         ("deciding", "?"),  # whether it chooses a viewpoint in the next step
+        ("under_way", "?"),  # whether it does so while it drives on
+        ("path_blocked", "?"),  # whether a scan under way showed that the rest of its path is blocked
         ("waiting", "?"),  # whether it stands still, or stood still until it decides, since a blocked drive
         ("origin", "f8", (5,)),  # pose at which the latest drive began
         ("goal", "f8", (5,)),  # pose at which it ends, or ended
@@ -72,6 +74,10 @@ ROBOT = np.dtype(
         ("corners", "i8"),  # how many of the points the drive passes before its goal
         ("path_m", "f8"),  # length of the drive
         ("depart_s", "f8"),  # start of the drive
+        ("lead_s", "f8"),  # of its SpeedProfile
+        ("scan_lead_m", "f8"),  # metres from its latest scan to the start of the drive
+        ("decided_s", "f8"),  # when it decided last, whether or not that changed the drive
+        ("redecide_s", "f8"),  # when it decides under way, or when it could since; inf = not before it stops
         ("next_scan_s", "f8"),  # when it scans next: under way, or at `ready_s`
         ("scans_under_way", "i8"),  # that it took in this drive
         ("ready_s", "f8"),  # end of the scan after it; of the wait, while it is waiting

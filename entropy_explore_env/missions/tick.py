@@ -1,7 +1,8 @@
 """One step of one mission, compiled: choose → drive → scan → fuse → select → send → fuse → account.
 
-The events of a mission (a message arrives; the robots broadcast; a robot scans, or has waited) are processed
-in the order of simulated time. `next_event` alone says which is next, also of those at one instant.
+The events of a mission (a message arrives; the robots broadcast; a robot scans, has waited, or decides under
+way) are processed in the order of simulated time. `next_event` alone says which is next, also of those at one
+instant.
 """
 
 from __future__ import annotations
@@ -12,8 +13,14 @@ from typing import NamedTuple
 import numpy as np
 
 from entropy_explore_env.compilation.kernels import ASSERTING, lean_kernel
-from entropy_explore_env.missions.action import decode_action
-from entropy_explore_env.missions.driving import continue_drive, next_decision, start_drive, stop
+from entropy_explore_env.missions.driving import (
+    continue_drive,
+    keep_drive,
+    next_decision,
+    redecide,
+    start_drive,
+    stop,
+)
 from entropy_explore_env.missions.messages import (
     Maps,
     Team,
@@ -26,6 +33,7 @@ from entropy_explore_env.missions.messages import (
 )
 from entropy_explore_env.missions.phases import broadcast_all, collect_batch, next_broadcast
 from entropy_explore_env.missions.poses import copy_numbers, grid_size, pose_at, to_grid_units
+from entropy_explore_env.missions.redecision import decide, note_braking
 from entropy_explore_env.missions.reward import reward_robots
 from entropy_explore_env.missions.scoring import note_progress, score_scan
 from entropy_explore_env.missions.state import (
@@ -57,7 +65,7 @@ class Event(NamedTuple):
     """What happens next in a mission."""
 
     kind: int
-    """A message arrives, the robots broadcast, or a robot scans or has waited; or nothing is due."""
+    """A message arrives, the robots broadcast, a robot scans, has waited or decides under way; or nothing."""
     number: int
     """The slot of the message, or the number of the robot; 0 for others."""
     time_s: float
@@ -82,12 +90,13 @@ class Mission(NamedTuple):
 
 
 @lean_kernel
-def step_missions(rules, state, work, continuous, discrete, first, last):
+def step_missions(rules, state, choices, work, continuous, discrete, first, last):
     """Advance the missions `first` … `last` - 1 by one step; those that are over stand still.
 
     Args:
         rules: Rules.
         state: MissionState of E missions, changed in place.
+        choices: (E, A) CHOICE, scratch space; those of robots that plan are filled in.
         work: Workspace, not shared with another thread.
         continuous: (E, A, N) float64 actions.
         discrete: (E, A) int64 actions.
@@ -113,40 +122,45 @@ def step_missions(rules, state, work, continuous, discrete, first, last):
         if clock.end == _RUNNING:
             before_s = clock.time_s
             collision = state.collision[m * masks : (m + 1) * masks]
-            choose(team, clock, rules.actions, continuous[m], discrete[m])
-            depart(team, clock, mission.in_flight, collision, work.drive, work.recipients)
+            choose(team, clock, rules.actions, continuous[m], discrete[m], choices[m])
+            depart(team, clock, mission.in_flight, collision, choices[m], work)
             advance(mission, rules.sensors, work)
             finish_step(team, clock, before_s)
 
 
 @lean_kernel
-def choose(team, clock, actions, continuous, discrete):
-    """Write the targets of the robots that decide, (A, N) or (A,) actions, and begin to count the step."""
+def choose(team, clock, actions, continuous, discrete, choices):
+    """Begin to count the step, and fill in the choices, (A,) CHOICE, that were not planned before it."""
     for index in range(len(team.robots)):
         robot, own = team.robots[index], team.params[index]
         robot.own_bits = 0.0
         robot.received_bits = 0.0
-        if robot.deciding:
-            decode_action(own, actions, robot.goal, continuous[index], discrete[index], robot.target)
+        if robot.deciding and not own.planned:
+            decide(own, actions, robot, clock.time_s, continuous[index], discrete[index], choices[index])
+            note_braking(own, robot, clock.time_s, choices[index])
 
 
 @lean_kernel
-def depart(team, clock, in_flight, collision, crossing, recipients):
+def depart(team, clock, in_flight, collision, choices, work):
     """Let the robots that decide depart and announce where they go, one after the other.
+
+    Robots under way that keep their viewpoint drive on.
 
     Args:
         team: Team.
         clock: MISSION.
         in_flight: InFlight.
         collision: (N, V) float32 collision masks of this mission.
-        crossing: Crossing, scratch space.
-        recipients: (A,) bool, scratch space.
+        choices: (A,) CHOICE.
+        work: Workspace.
     """
     for index in range(len(team.robots)):
-        if team.robots[index].deciding:
-            mask = collision[team.params[index].radius_number]
-            start_drive(team.params, mask, team.robots, index, clock.time_s, crossing)
-            announce(team, clock, in_flight, index, recipients)
+        robot, own = team.robots[index], team.params[index]
+        if robot.deciding and choices[index].changed:
+            start_drive(team, collision[own.radius_number], choices[index], index, clock.time_s, work)
+            announce(team, clock, in_flight, index, work.recipients)
+        elif robot.deciding:
+            keep_drive(own, robot, clock.time_s)
 
 
 @lean_kernel
@@ -192,6 +206,8 @@ def advance(mission, sensors, work):
             broadcast_all(team, maps, mission.buffers, mission.phases, clock.time_s, tracer, scan)
         elif robots[event.number].waiting:
             robots[event.number].deciding = True
+        elif robots[event.number].next_scan_s > event.time_s:
+            redecide(robots[event.number], clock.time_s)
         else:
             scan_at(mission, sensors, event.number, work)
             if math.isinf(shared.period_s):
@@ -224,8 +240,8 @@ def next_event(shared, robots, messages, phases):
     """
     slot, due_s = next_message(messages)
     broadcast_s = next_broadcast(shared, phases)
-    robot, scan_s = next_scan(robots)
-    soonest_s = min(due_s, broadcast_s, scan_s)
+    robot, robot_s = next_robot(robots)
+    soonest_s = min(due_s, broadcast_s, robot_s)
     if math.isinf(soonest_s):
         return Event(_NO_EVENT, 0, soonest_s)
     if due_s == soonest_s:
@@ -240,7 +256,7 @@ def events_handled(robots, messages, phases):
     """A number that every event makes greater, so that none is met twice: asserted in debug builds.
 
     A message frees its slot. A broadcast is counted. A robot counts its scan, which may send one message, or
-    has waited and decides. Arguments as those of `next_event`.
+    decides: it has waited, or driven since it last decided. Arguments as those of `next_event`.
     """
     handled = phases.broadcasts
     for robot in robots:
@@ -270,13 +286,19 @@ def scan_at(mission, sensors, index, work):
 
 
 @lean_kernel
-def next_scan(robots):
-    """(robot, time) of the next that scans, under way or at its stop, or has waited; inf if all decide."""
-    soonest, scan_s = 0, math.inf
-    for robot in range(len(robots)):
-        if not robots[robot].deciding and robots[robot].next_scan_s < scan_s:
-            soonest, scan_s = robot, robots[robot].next_scan_s
-    return soonest, scan_s
+def next_robot(robots):
+    """(robot, time) of the next that scans, under way or at its stop, has waited, or may decide under way.
+
+    The time is inf if all of them stand and decide.
+    """
+    soonest, soonest_s = 0, math.inf
+    for index in range(len(robots)):
+        robot = robots[index]
+        if not robot.deciding or robot.under_way:
+            due_s = robot.next_scan_s if robot.under_way else min(robot.next_scan_s, robot.redecide_s)
+            if due_s < soonest_s:
+                soonest, soonest_s = index, due_s
+    return soonest, soonest_s
 
 
 @lean_kernel

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from entropy_explore_env.missions.action import encode_viewpoint
-from entropy_explore_env.missions.poses import place_at, pose_at
+from entropy_explore_env.missions.poses import place_at, pose_at, speed_at
 from entropy_explore_env.missions.rules import Rules
 from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.robots.motion import MoveEnd
@@ -72,14 +72,16 @@ class RobotView:
         scenario: The public settings.
         time_s: Simulated time.
         deciding: Whether it chooses a viewpoint now.
+        under_way: Whether it does so while it drives on. Where it chooses `target` again, nothing changes.
+        speed_m_s: Its speed on its path; 0 while it stands.
         pose: (5,) x, y, z, yaw, pitch: map frame, metres, radians, pitch downwards.
         mean: (X, Y, Z) float32, expected coverage.
         precision: (X, Y, Z) float32, 1/σ² of it.
         entropy_bits: Entropy of its map.
-        move_end: Why its latest drive ended where it did.
+        move_end: Why its latest drive ended where it did; UNDER_WAY where it chooses while it drives on.
         target: (5,) the viewpoint that it chose last.
         path: (N, 3) points to which it still means to drive straight, one after the other; none while
-            it chooses. Where it plans it is its plan, at whose end the target need not be.
+            it stands and chooses. Where it plans it is its plan, at whose end the target need not be.
         depth_m, half_angle_rad: r̂ and α̂ of its latest scan.
         scan: Its latest scan.
         teammates: Robot number → what it heard of it.
@@ -91,6 +93,8 @@ class RobotView:
     scenario: Scenario
     time_s: float
     deciding: bool
+    under_way: bool
+    speed_m_s: float
     pose: np.ndarray
     mean: np.ndarray
     precision: np.ndarray
@@ -139,11 +143,13 @@ def view_of(missions: Missions, mission: int, robot: int) -> RobotView:
         scenario=missions.scenario,
         time_s=time_s,
         deciding=bool(own["deciding"]),
+        under_way=bool(own["under_way"]),
+        speed_m_s=float(speed_at(rules.params[robot], own, time_s)),
         pose=np.array(pose_at(rules.params[robot], own, time_s)),
         mean=read_only(state.mean[here].reshape(shape)),
         precision=read_only(state.precision[here].reshape(shape)),
         entropy_bits=float(own["entropy_bits"]),
-        move_end=list(MoveEnd)[own["move_end"]],
+        move_end=MoveEnd.UNDER_WAY if own["under_way"] else list(MoveEnd)[own["move_end"]],
         target=own["target"].copy(),
         path=_path_ahead(rules.params[robot], own, time_s),
         depth_m=float(own["depth_m"]),
@@ -162,7 +168,7 @@ def view_of(missions: Missions, mission: int, robot: int) -> RobotView:
 
 def _path_ahead(params: np.void, own: np.void, time_s: float) -> np.ndarray:
     """(N, 3) where a robot means to drive, whatever will stop it."""
-    if own["deciding"]:
+    if own["deciding"] and not own["under_way"]:
         return np.zeros((0, 3))
     if own["waypoints"] == 0:
         return own["target"][None, :3].copy()

@@ -10,6 +10,7 @@ import numpy as np
 
 from entropy_explore_env.belief.map_update import Scan
 from entropy_explore_env.belief.raycast import Crossing, longest_crossing
+from entropy_explore_env.missions.state import WAYPOINTS
 from entropy_explore_env.robots.navigator import Navigator, footprints
 from entropy_explore_env.robots.range_sensor import new_scan
 from entropy_explore_env.scenario import Scenario
@@ -21,6 +22,8 @@ class Workspace(NamedTuple):
     scan: Scan
     drive: Crossing
     """Voxels on the longest drive."""
+    braking: np.ndarray
+    """(W, 3) float64, points on which a robot comes to rest."""
     bodies: np.ndarray
     """(A, 4) float64, teammates' bodies: centre and radius in grid units."""
     recipients: np.ndarray
@@ -38,6 +41,7 @@ def new_workspace(scenario: Scenario, navigators: Mapping[int, Navigator]) -> Wo
     return Workspace(
         scan=new_scan(grid, sensors, max(sensor.rays for sensor in sensors)),
         drive=Crossing(np.zeros(longest, np.int32), np.zeros(longest, np.int64)),
+        braking=np.zeros((WAYPOINTS, 3)),
         bodies=np.zeros((scenario.robots, 4)),
         recipients=np.zeros(scenario.robots, np.bool_),
         footprints=footprints(navigators, len(kinds))

@@ -44,7 +44,8 @@ class DrivenPaths:
                 self._departed_s[number], self._corners_passed[number] = float(robot["depart_s"]), 0
             passed = int(place_at(numbers[number], robot, time_s)[3])
             points += list(robot["path"][self._corners_passed[number] : passed].copy())
-            self._ahead[number] = robot["path"][passed : robot["corners"]].copy()
+            ahead = 0 if robot["under_way"] else robot["corners"]  # else it may leave its path here
+            self._ahead[number] = robot["path"][passed:ahead].copy()
             self._corners_passed[number] = passed
 
     def to_now(self, missions: Missions) -> list[np.ndarray]:

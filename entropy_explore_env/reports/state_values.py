@@ -65,6 +65,9 @@ _FIELDS: Mapping[str, tuple[str, ...]] = MappingProxyType(
 )
 """Name in records → the fields of this array, by their names in records, in the order of the digest."""
 
+FIELDS_UNDER_WAY = "under_way path_blocked lead_s scan_lead_m decided_s redecide_s".split()
+"""Further fields of `robots`, where some robot decides under way."""
+
 _FIELDS_TODAY: Mapping[str, str] = MappingProxyType(
     {
         "missions.letters": "enqueued",
@@ -95,7 +98,7 @@ def state_values(missions: Missions, mission: int) -> dict[str, np.ndarray]:
 
     Returns:
         Name → array, a view of the state, in the order of the digest; the phases of the broadcast only
-        where there are some.
+        where there are some, and what decisions under way need only where robots take some.
     """
     values: dict[str, np.ndarray] = {}
     for name, read in _ARRAYS.items():
@@ -107,6 +110,8 @@ def state_values(missions: Missions, mission: int) -> dict[str, np.ndarray]:
             values[f"{name}.{field}"] = array[today][mission, ...]
         if name not in _FIELDS:
             values[name] = array[mission]
+        if name == "robots" and any(kind.robot.redecide != "at_stop" for kind in missions.scenario.kinds):
+            values.update({f"robots.{field}": array[field][mission, ...] for field in FIELDS_UNDER_WAY})
     return values
 
 

@@ -1,15 +1,16 @@
-"""Motion: a drive from rest to rest, stopped short by obstacles and teammates' bodies.
+"""Motion: a drive that ends at rest, stopped short by obstacles and teammates' bodies.
 
 Its path is a straight line, or a polyline that is driven without stopping at its corners. Lengths are in
-metres where the name says so, else in grid units (voxel edges); times are in seconds. A drive that has
-begun is never changed, but may end early: every robot owns the tube that its body sweeps until it
-arrives, and others stop before it. So bodies never overlap, whatever the timing.
+metres where the name says so, else in grid units (voxel edges); times are in seconds. Every robot owns the
+tube that its body sweeps until it arrives, and others stop before it. A robot that changes its mind under way
+can always come to rest in the tube that it owns. So bodies never overlap, whatever the timing.
 """
 
 from __future__ import annotations
 
 import enum
 import math
+from typing import NamedTuple
 
 from entropy_explore_env.belief.raycast import (
     NONE_BEHIND,
@@ -23,7 +24,7 @@ from entropy_explore_env.belief.raycast import (
     cast_ray,
 )
 from entropy_explore_env.belief.voxel_index import flat_index
-from entropy_explore_env.compilation.kernels import lean_kernel
+from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel
 
 
 class MoveEnd(enum.Enum):
@@ -38,6 +39,7 @@ class MoveEnd(enum.Enum):
     NO_PATH = "No path to the viewpoint was known: the robot stands as near to it as it knew to get."
     CORNERS = "The path had more corners than a drive may have: the robot stands at the last of them."
     SEEN = "A scan under way showed that the rest of the path is blocked: the robot stands where it was."
+    UNDER_WAY = "The drive goes on: the robot decides again without stopping."
 
     @property
     def code(self) -> int:
@@ -62,34 +64,89 @@ def driving_time(length_m, max_speed_m_s, acceleration_m_s2):
     return length_m / max_speed_m_s + max_speed_m_s / acceleration_m_s2
 
 
+class SpeedProfile(NamedTuple):
+    """The speed on a path: as fast as the limits allow, from the speed at its start to rest at its end.
+
+    Corners of the path cost nothing. A drive that begins at the speed v = a·lead_s is the rest of one from
+    rest to rest that is v²/2a longer and began `lead_s` earlier. Where a robot turns too sharply to keep its
+    speed (missions/redecision.py), `lead_s` is negative: from v = -a·lead_s it brakes to rest on the first
+    v²/2a of the path, and drives what is left of it from rest to rest.
+    """
+
+    length_m: float
+    """At least v²/2a, up to rounding."""
+    lead_s: float
+    """0 = the drive begins at rest."""
+    max_speed_m_s: float
+    acceleration_m_s2: float
+
+
+@inlined_kernel
+def _run_up_m(profile):
+    """±v²/2a: by how much the drive from rest to rest is longer; negative where the robot brakes first."""
+    return 0.5 * profile.acceleration_m_s2 * profile.lead_s * abs(profile.lead_s)
+
+
+@inlined_kernel
+def _from_rest_to_rest(profile):
+    """(length, duration, time of speeding up) of the drive from rest to rest of which this one is a part."""
+    length_m = max(profile.length_m + _run_up_m(profile), 0.0)
+    duration = driving_time(length_m, profile.max_speed_m_s, profile.acceleration_m_s2)
+    return length_m, duration, min(profile.max_speed_m_s / profile.acceleration_m_s2, duration / 2.0)
+
+
 @lean_kernel
-def driven_share(elapsed_s, length_m, max_speed_m_s, acceleration_m_s2):
+def duration_of(profile):
+    """Seconds that a drive takes."""
+    _, duration, _ = _from_rest_to_rest(profile)
+    return duration - profile.lead_s
+
+
+@lean_kernel
+def driven_share(elapsed_s, profile):
     """Share in [0, 1] of a drive that is behind the robot `elapsed_s` after its start."""
-    duration = driving_time(length_m, max_speed_m_s, acceleration_m_s2)
-    if elapsed_s >= duration or length_m <= 0.0:
+    length_m, duration, ramp = _from_rest_to_rest(profile)
+    acceleration_m_s2 = profile.acceleration_m_s2
+    since_rest_s = elapsed_s + profile.lead_s
+    if since_rest_s >= duration or profile.length_m <= 0.0:
         return 1.0
-    ramp = min(max_speed_m_s / acceleration_m_s2, duration / 2.0)
-    if elapsed_s <= ramp:
-        driven_m = 0.5 * acceleration_m_s2 * elapsed_s * elapsed_s
-    elif elapsed_s >= duration - ramp:
-        left = duration - elapsed_s
+    if since_rest_s <= ramp:  # before it is at rest it brakes
+        driven_m = 0.5 * acceleration_m_s2 * since_rest_s * abs(since_rest_s)
+    elif since_rest_s >= duration - ramp:
+        left = duration - since_rest_s
         driven_m = length_m - 0.5 * acceleration_m_s2 * left * left
     else:
-        driven_m = acceleration_m_s2 * ramp * (elapsed_s - 0.5 * ramp)
-    return min(max(driven_m / length_m, 0.0), 1.0)
+        driven_m = acceleration_m_s2 * ramp * (since_rest_s - 0.5 * ramp)
+    return min(max((driven_m - _run_up_m(profile)) / profile.length_m, 0.0), 1.0)
 
 
 @lean_kernel
-def time_after(driven_m, length_m, max_speed_m_s, acceleration_m_s2):
+def speed_after(elapsed_s, profile):
+    """Speed on the path, in m/s, `elapsed_s` after the drive's start; 0 at its end and after it."""
+    _, duration, ramp = _from_rest_to_rest(profile)
+    since_rest_s = elapsed_s + profile.lead_s
+    if since_rest_s >= duration or profile.length_m <= 0.0:
+        return 0.0
+    if since_rest_s < 0.0:
+        return profile.acceleration_m_s2 * -since_rest_s
+    return profile.acceleration_m_s2 * min(since_rest_s, ramp, duration - since_rest_s)
+
+
+@lean_kernel
+def time_after(driven_m, profile):
     """Seconds from the start of a drive until `driven_m` of its length are driven: see `driven_share`."""
-    duration = driving_time(length_m, max_speed_m_s, acceleration_m_s2)
-    ramp = min(max_speed_m_s / acceleration_m_s2, duration / 2.0)
+    length_m, duration, ramp = _from_rest_to_rest(profile)
+    acceleration_m_s2 = profile.acceleration_m_s2
     ramp_m = 0.5 * acceleration_m_s2 * ramp * ramp
-    if driven_m <= ramp_m:
-        return math.sqrt(2.0 * driven_m / acceleration_m_s2)
-    if driven_m >= length_m - ramp_m:
-        return duration - math.sqrt(2.0 * max(length_m - driven_m, 0.0) / acceleration_m_s2)
-    return ramp + (driven_m - ramp_m) / max_speed_m_s
+    since_rest_m = driven_m + _run_up_m(profile)
+    if since_rest_m < 0.0:
+        return -math.sqrt(-2.0 * since_rest_m / acceleration_m_s2) - profile.lead_s
+    if since_rest_m <= ramp_m:
+        return math.sqrt(2.0 * since_rest_m / acceleration_m_s2) - profile.lead_s
+    if since_rest_m >= length_m - ramp_m:
+        left_s = math.sqrt(2.0 * max(length_m - since_rest_m, 0.0) / acceleration_m_s2)
+        return duration - left_s - profile.lead_s
+    return ramp + (since_rest_m - ramp_m) / profile.max_speed_m_s - profile.lead_s
 
 
 @lean_kernel

@@ -22,7 +22,7 @@ NEVER = math.inf
 def event(due_s=(), serials=None, broadcasts=None, scans_s=(), deciding=()):
     """The next event of three messages and four robots at most; broadcasts every 2 s, if at all."""
     messages, robots = np.zeros(3, MESSAGE), np.zeros(4, ROBOT)
-    messages["due_s"], robots["next_scan_s"] = NEVER, NEVER
+    messages["due_s"], robots["next_scan_s"], robots["redecide_s"] = NEVER, NEVER, NEVER
     messages["due_s"][: len(due_s)], robots["next_scan_s"][: len(scans_s)] = due_s, scans_s
     messages["serial"] = range(3) if serials is None else serials
     robots["deciding"][list(deciding)] = True
@@ -65,10 +65,16 @@ wander(missions, 60, 0)
 broadcasts, times = missions.state.phases["broadcasts"][0], missions.state.missions["time_s"][0]
 assert missions.state.robots["deciding"].any()
 print(times, broadcasts)
+for redecide in ("on_scan", 0.3):
+    for period_s in (None, 0.7):
+        robot, sensor = {"redecide": redecide}, {"scan_every_m": 0.2}
+        missions = started(free_box(robot=robot, sensor=sensor, decision_period_s=period_s))
+        wander(missions, 60, 0)
+        assert missions.state.missions["time_s"][0] > 5.0
 """
 
 
-def test_a_broadcast_is_due_while_all_robots_decide():
+def test_a_broadcast_is_due_while_all_robots_decide_and_decisions_under_way_are_used_up():
     """In a process of its own, which can be ended if it hangs; assertions of kernels are compiled in."""
     done = subprocess.run(
         [sys.executable, "-c", PHASES_WITHOUT_EVENTS],

@@ -12,10 +12,14 @@ from hypothesis import strategies as st
 from entropy_explore_env.belief.raycast import Line
 from entropy_explore_env.robots.motion import (
     MoveEnd,
+    SpeedProfile,
     distance_to_teammate,
     driven_share,
     driving_time,
+    duration_of,
     free_distance,
+    speed_after,
+    time_after,
     turning_time,
 )
 from tests.reference import rocha04
@@ -36,28 +40,62 @@ def test_driving_times_are_those_of_a_trapezoid_of_speed(length_m, speed, accele
 @given(st.floats(0.01, 20.0), speeds, speeds, st.floats(0.0, 1.0))
 def test_the_driven_share_is_the_integral_of_the_speed(length_m, speed, acceleration, share):
     time_s = share * driving_time(length_m, speed, acceleration)
-    driven_m = driven_share(time_s, length_m, speed, acceleration) * length_m
+    driven_m = driven_share(time_s, SpeedProfile(length_m, 0.0, speed, acceleration)) * length_m
     expected_m = rocha04.way_at_m(time_s, length_m, speed, acceleration, steps=1000)
     rounded_corners = acceleration * (time_s / 1000) ** 2
     assert driven_m == pytest.approx(expected_m, abs=rounded_corners + 1e-9)
 
 
 @drawn(40)
+@given(st.floats(0.0, 20.0), st.floats(0.0, 1.0), st.booleans(), speeds, speeds)
+def test_a_drive_from_a_speed_keeps_to_limits_and_ends_at_rest(more_m, share, brakes, speed, acceleration):
+    """Seconds, metres and speeds fit each other, whether it goes on from its speed or brakes first."""
+    begun = share * speed
+    rest_s, rest_m = begun / acceleration, 0.5 * begun * begun / acceleration
+    profile = SpeedProfile(rest_m + more_m + 1e-6, -rest_s if brakes else rest_s, speed, acceleration)
+    duration = duration_of(profile)
+    if brakes:
+        assert duration == pytest.approx(rest_s + driving_time(more_m + 1e-6, speed, acceleration))
+        assert speed_after(rest_s, profile) == pytest.approx(0.0, abs=1e-6)
+        assert driven_share(rest_s, profile) * profile.length_m == pytest.approx(rest_m, abs=1e-6)
+    else:
+        assert duration == pytest.approx(
+            driving_time(2.0 * rest_m + more_m + 1e-6, speed, acceleration) - rest_s
+        )
+    times = np.linspace(0.0, duration, 400)
+    metres = np.array([driven_share(t, profile) for t in times]) * profile.length_m
+    speed_m_s = np.array([speed_after(t, profile) for t in times])
+    assert (metres[0], metres[-1]) == pytest.approx((0.0, profile.length_m))
+    assert (speed_m_s[0], speed_m_s[-1]) == pytest.approx((begun, 0.0), abs=1e-6)
+    gap_s = duration / 399
+    assert (speed_m_s <= speed * (1 + 1e-9)).all()
+    assert (np.abs(np.diff(speed_m_s)) <= acceleration * gap_s * (1 + 1e-6) + 1e-9).all()
+    rounded = 0.5 * acceleration * gap_s**2
+    means = 0.5 * (speed_m_s[1:] + speed_m_s[:-1])
+    assert np.diff(metres) == pytest.approx(means * gap_s, abs=rounded + 1e-9)
+    for place in (1, 133, 266, 398):
+        assert time_after(metres[place], profile) == pytest.approx(times[place], abs=1e-3 * duration + 1e-4)
+
+
+@drawn(40)
 @given(st.floats(1e-6, 20.0), speeds, speeds)
 def test_the_driven_share_rises_from_0_to_1(length_m, speed, acceleration):
     duration = driving_time(length_m, speed, acceleration)
-    shares = [driven_share(t, length_m, speed, acceleration) for t in np.linspace(0.0, 1.2 * duration, 200)]
+    shares = [
+        driven_share(t, SpeedProfile(length_m, 0.0, speed, acceleration))
+        for t in np.linspace(0.0, 1.2 * duration, 200)
+    ]
     assert shares[0] == 0.0
     assert (np.diff(shares) >= 0.0).all()
-    assert driven_share(duration, length_m, speed, acceleration) == 1.0
+    assert driven_share(duration, SpeedProfile(length_m, 0.0, speed, acceleration)) == 1.0
     assert shares[-1] == 1.0
-    middle = driven_share(0.5 * duration, length_m, speed, acceleration)
+    middle = driven_share(0.5 * duration, SpeedProfile(length_m, 0.0, speed, acceleration))
     assert middle == pytest.approx(0.5)  # the trapezoid is symmetric
 
 
 def test_no_distance_takes_no_time_and_is_driven_at_once():
     assert driving_time(0.0, 0.25, 0.25) == 0.0
-    assert driven_share(0.0, 0.0, 0.25, 0.25) == 1.0
+    assert driven_share(0.0, SpeedProfile(0.0, 0.0, 0.25, 0.25)) == 1.0
 
 
 @pytest.mark.parametrize(

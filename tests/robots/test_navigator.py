@@ -14,6 +14,7 @@ from scipy import ndimage
 from entropy_explore_env.belief.paths.lattice import NO_FLY_NOWHERE
 from entropy_explore_env.robots.motion import (
     MoveEnd,
+    SpeedProfile,
     driven_share,
     driving_time,
     line_believed_blocked,
@@ -226,6 +227,8 @@ def test_what_lies_within_the_body_s_reach_blocks_a_line():
 @drawn(100)
 @given(st.floats(1e-3, 50.0), st.floats(0.0, 1.0), st.floats(0.1, 3.0), st.floats(0.1, 3.0))
 def test_the_time_of_a_place_on_the_path_is_when_the_robot_is_there(length, share, speed, acceleration):
-    time_s = time_after(share * length, length, speed, acceleration)
+    time_s = time_after(share * length, SpeedProfile(length, 0.0, speed, acceleration))
     assert 0.0 <= time_s <= driving_time(length, speed, acceleration) + 1e-9
-    assert driven_share(time_s, length, speed, acceleration) == pytest.approx(share, abs=1e-6)
+    assert driven_share(time_s, SpeedProfile(length, 0.0, speed, acceleration)) == pytest.approx(
+        share, abs=1e-6
+    )

@@ -128,7 +128,7 @@ class VoronoiCoverage:
 
     def _choose(self, view: RobotView) -> np.ndarray:
         plan, here = self._plans[view.robot], voxel_of(view, view.pose)
-        ended_early = view.move_end not in (MoveEnd.ARRIVED, MoveEnd.SEEN)
+        ended_early = view.move_end not in (MoveEnd.ARRIVED, MoveEnd.SEEN, MoveEnd.UNDER_WAY)
         plan.failures = plan.failures + 1 if ended_early else 0
         if plan.failures > 1:  # the same belief would lead to the same choice
             plan.path, plan.failures = plan.path[:0], 0

@@ -1,0 +1,342 @@
+"""Decisions under way by hand and on random drives: what they cost, what they leave as it was."""
+
+from __future__ import annotations
+
+import math
+import pickle
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from entropy_explore_env.missions.poses import driven_metres, pose_at, speed_at
+from entropy_explore_env.missions.simulation import Missions
+from entropy_explore_env.missions.snapshot import restore, snapshot
+from entropy_explore_env.missions.view import view_of
+from entropy_explore_env.reports.state_values import state_digest
+from entropy_explore_env.robots.motion import MoveEnd
+from tests.missions.test_driving import ALL_ROUND, BEHIND, LEG, end_of, planner, toward, wall_with_a_gap
+from tests.reference.scenes import build, drawn, free_box, put, random_actions, seeds, started, wander
+
+START = (0.75, 0.75, 0.25, 0.0, 0.0)
+FAR = (0.75, 4.75, 0.25, 0.0, 0.0)
+
+
+def on_the_way(after_s=2.0, **changes):
+    """A robot in the empty flat box, 0.5 m/s and 0.5 m/s², that drives up and decides again after 2 s."""
+    robot = {"redecide": after_s, "navigator": "straight", **changes.pop("robot", {})}
+    missions = started(planner(**changes, robot=robot))
+    put(missions, 0, START)
+    if missions.scenario.robots > 1:
+        put(missions, 1, (2.75, 4.75, 0.25, 0.0, 0.0))
+    robots = toward(missions, FAR, *[(2.75, 4.75, 0.25, 0.0, 0.0)] * (missions.scenario.robots - 1))
+    while not robots["deciding"][0]:
+        toward(missions, FAR, *[(2.75, 4.75, 0.25, 0.0, 0.0)] * (missions.scenario.robots - 1))
+    assert (robots["under_way"][0], robots["scans"][0]) == (True, 0)
+    assert missions.state.missions[0]["time_s"] == after_s
+    return missions
+
+
+def test_a_view_under_way_is_of_the_place_and_speed_now():
+    view = view_of(on_the_way(), 0, 0)
+    assert (view.deciding, view.under_way, view.speed_m_s, view.move_end) == (
+        True,
+        True,
+        0.5,
+        MoveEnd.UNDER_WAY,
+    )
+    assert view.pose == pytest.approx((0.75, 1.5, 0.25, 0.0, 0.0))  # ¼ m to speed up, and a second at ½ m/s
+    assert view.target == pytest.approx(FAR, abs=1e-6)
+    assert view.path == pytest.approx(np.array([FAR[:3]]), abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("wanted", "arrives_s", "length_m", "rests"),
+    [
+        ((0.75, 3.75), 7.0, 2.25, False),  # the rest of a drive of 3 m: 1 s up, 5 s along, 1 s down
+        ((0.75, 1.76), 3.02, 0.26, False),  # it can just come to rest: 1 cm at ½ m/s, and 1 s down
+        ((2.75, 3.5), 2.0 + 2 * (math.sqrt(8.0) - 0.25) + 1.0, math.sqrt(8.0), False),  # 45° away
+        ((2.75, 1.75), 3.0 + 5.0, 0.25 + 2.0, True),  # 90° from where it rests
+        ((0.75, 0.75), 3.0 + 3.0, 0.25 + 1.0, True),  # back to the start
+        ((0.75, 1.7), 3.0 + 2 * math.sqrt(0.1), 0.25 + 0.05, True),  # nearer than it can rest
+    ],
+)
+@pytest.mark.parametrize("navigator", ["straight", "planned"])
+def test_a_new_path_begins_at_the_speed_or_where_the_robot_has_braked(
+    navigator, wanted, arrives_s, length_m, rests
+):
+    missions = on_the_way(robot={"navigator": navigator, "redecide": 2.0})
+    missions.state.precision[0] = 1e4  # free space that is known
+    missions.state.mean[0] = 0.0
+    before = missions.state.missions[0]["time_s"]
+    robots = toward(missions, (*wanted, 0.25, 0.0, 0.0))
+    robot, params = robots[0], missions.rules.params[0]
+    assert robot["depart_s"] == before == 2.0
+    assert robot["path_m"] == pytest.approx(length_m, abs=1e-6)
+    assert robot["distance_m"] == pytest.approx(0.75 + length_m, abs=1e-6)
+    assert (end_of(robot), robot["blocked_moves"]) == (MoveEnd.ARRIVED, 0)
+    for _ in range(20):
+        if robots[0]["scans"]:
+            break
+        toward(missions, view_of(missions, 0, 0).target)
+    assert robots[0]["ready_s"] == pytest.approx(arrives_s + 0.5, abs=1e-6)
+    assert robots[0]["goal"][:2] == pytest.approx(wanted, abs=1e-6)
+    assert robots[0]["depart_s"] == 2.0  # what did not change did not begin anew
+    if rests:
+        assert pose_at(params, robots[0], 3.0)[:2] == pytest.approx((0.75, 1.75))
+        assert speed_at(params, robots[0], 3.0) == pytest.approx(0.0, abs=1e-6)
+        assert pose_at(params, robots[0], 2.5)[1] == pytest.approx(1.5 + 0.25 - 0.0625)
+    else:
+        assert speed_at(params, robots[0], 2.0) == pytest.approx(0.5)
+
+
+def test_a_new_drive_that_something_cuts_short_ends_where_the_robot_can_rest():
+    """A wall begins at x = 1, which it does not know: 30° to the right it would end after 0.45 m … of ½ m."""
+    missions = on_the_way()
+    solid = np.zeros(missions.grid.shape, bool)
+    solid[2:] = True  # x ≥ 1
+    build(missions, solid)
+    robots = toward(missions, (1.75, 1.5 + math.sqrt(3.0), 0.25, 0.0, 0.0))
+    robot = robots[0]
+    assert end_of(robot) is MoveEnd.OBSTACLE
+    assert (robot["blocked_moves"], robot["corners"]) == (1, 0)
+    assert robot["path_m"] == pytest.approx(0.25) and robot["goal"][:2] == pytest.approx((0.75, 1.75))
+    assert robot["ready_s"] == pytest.approx(3.5)
+    robots = toward(missions, (0.75, 2.75, 0.25, 0.0, 0.0))
+    assert (robot["blocked_moves"], robots["distance_m"][0]) == (1, pytest.approx(0.75 + 0.25 + 1.0))
+
+
+TOURS = (
+    ((0.75, 4.75), (2.75, 4.75), (2.75, 0.75), (0.75, 0.75)),
+    ((2.75, 2.25), (1.75, 2.75), (2.25, 1.75), (2.75, 3.25)),
+)
+ONLY_UNDER_WAY = ("decided_s", "redecide_s", "own_bits", "received_bits", "reward")
+"""Fields of ROBOT that decisions under way change by themselves, and those of one step."""
+
+
+def tour(missions, stops):
+    """Drive the robots to their places in turn, asked on the way or not; their states at stops, and when."""
+    robots, begun, states, times = missions.state.robots[0], [0] * missions.scenario.robots, [], []
+    while min(begun) <= stops:
+        wanted = []
+        for robot, own in enumerate(robots):
+            view = view_of(missions, 0, robot)
+            if view.deciding and not view.under_way:
+                begun[robot] += 1
+                states.append((robot, own.copy(), missions.state.mean[0, robot].copy()))
+                times.append(view.time_s)
+            x, y = TOURS[robot][begun[robot] % 4]
+            there = (x, y, view.pose[2], 0.3 * begun[robot], 0.0)
+            wanted.append(view.target if view.under_way else there)
+        toward(missions, *wanted)
+    return states, times
+
+
+@pytest.mark.parametrize(
+    "robot",
+    [
+        {"navigator": "planned"},
+        {"navigator": "straight"},
+        {"navigator": "planned", "turn_rate_rad_s": 0.2},
+        {"navigator": "straight", "reach_m": 2.5},
+    ],
+)
+@pytest.mark.parametrize("redecide", ["on_scan", 0.3])
+def test_a_decision_that_changes_nothing_leaves_drives_scans_and_messages_bit_for_bit(robot, redecide):
+    """A team whose robots keep their viewpoints at every decision, beside one that is not asked under way."""
+    sensor = {**ALL_ROUND, "scan_every_m": 0.6}
+    channel = {"delay_s": 0.7, "loss_probability": 0.2}
+    runs = []
+    for when in ("at_stop", redecide):
+        missions = started(
+            planner(robots=2, sensor=sensor, channel=channel, robot={**robot, "redecide": when}), seed=3
+        )
+        put(missions, 0, START)
+        put(missions, 1, (2.25, 1.75, 0.25, 0.0, 0.0))
+        runs.append(tour(missions, 5))
+    (stops, times), (others, other_times) = runs
+    assert len(stops) >= 12 and other_times[: len(times)] == times
+    names = [name for name in stops[0][1].dtype.names if name not in ONLY_UNDER_WAY]
+    for (robot_number, own, mean), (other_number, other, other_mean) in zip(stops, others, strict=False):
+        assert robot_number == other_number
+        assert np.array_equal(mean, other_mean)
+        for name in names:
+            assert own[name].tobytes() == other[name].tobytes(), name
+
+
+SAMPLES = 9
+"""Moments of each step at which poses are looked at."""
+
+
+class Motions:
+    """Looks at robots' poses between decisions: do they keep to the limits, and out of what is solid."""
+
+    def __init__(self, missions):
+        self.missions, self.turns, self.brakes = missions, 0, 0
+        self.last = self.motions(0.0)
+        self.time_s = 0.0
+
+    def motions(self, time_s):
+        """(A, 4): places and speeds."""
+        params, robots = self.missions.rules.params, self.missions.state.robots[0]
+        pairs = list(zip(params, robots, strict=True))
+        return np.array([(*pose_at(p, r, time_s)[:3], speed_at(p, r, time_s)) for p, r in pairs])
+
+    def check(self, decided):
+        """After a step in which the robots `decided`."""
+        missions = self.missions
+        now_s, robots = float(missions.state.missions[0]["time_s"]), missions.state.robots[0]
+        settings = missions.scenario.robot
+        gap_s = (now_s - self.time_s) / SAMPLES
+        for sample in range(SAMPLES + 1):
+            time_s = now_s if sample == SAMPLES else self.time_s + sample * gap_s
+            motions, passed_s = self.motions(time_s), gap_s if sample else 0.0
+            moved_m = np.linalg.norm((motions - self.last)[:, :3], axis=1)
+            assert (moved_m <= settings.max_speed_m_s * passed_s + 1e-6).all()
+            changed = np.abs(motions - self.last)[:, 3]
+            assert (motions[:, 3] <= settings.max_speed_m_s + 1e-9).all()
+            assert (changed <= settings.acceleration_m_s2 * passed_s + 1e-4).all()
+            self.outside_of_solid(motions[:, :3])
+            self.last = motions
+        assert (robots["decided_s"][decided] == self.time_s).all()
+        assert ((robots["decided_s"] < now_s) | ~robots["deciding"]).all()  # time has passed since
+        self.turns += (decided & (robots["lead_s"] > 0.0)).sum()
+        self.brakes += (decided & (robots["lead_s"] < 0.0)).sum()
+        self.time_s = now_s
+
+    def outside_of_solid(self, places):
+        missions = self.missions
+        voxels = missions.grid.voxel_of(places)
+        truth = missions.state.truth[0].reshape(missions.grid.shape)
+        for voxel, place in zip(voxels, places, strict=True):
+            faces = np.abs(np.mod(place / 0.5 + 0.5, 1.0) - 0.5) * 0.5
+            assert faces.min() < 1e-6 or truth[tuple(voxel)] == 0.0, place
+        apart = np.linalg.norm(places[0] - places[1])
+        assert apart >= 2.0 * missions.scenario.robot.body_radius_m - 1e-6
+
+
+MOVERS = {
+    "flying": {"reach_m": 2.0},
+    "flying by plan": {"reach_m": math.inf, "navigator": "planned"},
+    "planar": {"motion": "planar", "sensor_height_m": 0.75, "reach_m": 2.0},
+    "planar by plan": {"motion": "planar", "sensor_height_m": 0.75, "reach_m": 4.0, "navigator": "planned"},
+}
+
+
+@drawn(40)
+@given(
+    seeds,
+    st.sampled_from(sorted(MOVERS)),
+    st.sampled_from(["on_scan", 0.2, 0.9]),
+    st.sampled_from([None, 0.35]),
+)
+def test_robots_that_change_their_mind_keep_to_their_limits_and_out_of_walls_and_bodies(
+    seed, mover, redecide, period_s
+):
+    rng = np.random.default_rng(seed)
+    scenario = free_box(
+        robot={**MOVERS[mover], "redecide": redecide, "body_radius_m": 0.2},
+        sensor={"scan_every_m": 0.4, "scan_time_s": 0.2},
+        ending={"sigma_end": 1e-4},
+        decision_period_s=period_s,
+    )
+    missions = started(scenario, seed=seed)
+    solid = rng.random(scenario.grid.shape) < 0.08
+    for robot in missions.state.robots[0]:
+        solid[tuple(missions.grid.voxel_of(robot["goal"][:3]))] = False
+    build(missions, solid)
+    motions = Motions(missions)
+    robots = missions.state.robots[0]
+    for _ in range(50):
+        boxes, numbers = random_actions(missions, rng)
+        for robot in range(2):
+            view = view_of(missions, 0, robot)
+            if view.under_way and rng.random() < 0.5:
+                boxes[0, robot] = view.action_for(view.target)
+        decided = robots["deciding"].copy()
+        missions.step(boxes, numbers)
+        motions.check(decided)
+
+
+def test_a_path_that_a_scan_shows_to_be_blocked_is_planned_anew_without_a_stop():
+    """The wall at x = 1.5 is seen on the way: the robot brakes and goes around it, to the same place."""
+    sensor = {**ALL_ROUND, "scan_every_m": 0.3}
+    missions = started(planner(sensor=sensor, robot={"redecide": "on_scan", "unknown_cost": 1.0}))
+    build(missions, wall_with_a_gap())
+    put(missions, 0, START)
+    robot = toward(missions, BEHIND)[0]
+    assert (robot["scans"], robot["path_blocked"], robot["under_way"]) == (1, True, True)
+    assert robot["depart_s"] == 0.0 and robot["move_end"] == MoveEnd.OBSTACLE.code  # so it would have ended
+    assert view_of(missions, 0, 0).move_end is MoveEnd.UNDER_WAY
+    assert robot["messages_sent"] == 0
+    now_s = float(missions.state.missions[0]["time_s"])
+    robot = toward(missions, view_of(missions, 0, 0).target)[0]
+    assert (robot["depart_s"], robot["path_blocked"]) == (now_s, False)
+    assert robot["lead_s"] < 0.0 and robot["path"][0, 0] == pytest.approx(1.25, abs=1e-6)
+    for _ in range(60):
+        if not robot["under_way"]:
+            break
+        toward(missions, view_of(missions, 0, 0).target)
+    assert robot["goal"] == pytest.approx(BEHIND, abs=1e-6)
+    assert (end_of(robot), robot["blocked_moves"]) == (MoveEnd.ARRIVED, 0)
+    assert robot["distance_m"] > 2 * LEG + 0.5 and robot["scans"] >= 30
+
+
+def test_scans_under_way_are_as_far_apart_whatever_was_decided_between_them():
+    """Every ½ m of the way driven: two decisions later, and on the way to rest before it turns back."""
+    missions = on_the_way(0.9, sensor={**ALL_ROUND, "scan_every_m": 0.5})
+    robot, params = missions.state.robots[0, 0], missions.rules.params
+    scans_m, robots, ys = [], missions.state.robots, iter((3.75, 2.75, 4.25, 0.75, 0.75, 3.75))
+    for _ in range(40):
+        if not robot["under_way"]:
+            break
+        before, clock = robot["scans"], missions.state.missions
+        toward(missions, (0.75, next(ys, 3.75), 0.25, 0.0, 0.0))
+        if robot["scans"] > before:
+            driven_m = np.zeros((1, 1))
+            driven_metres(params, clock, robots, driven_m)
+            scans_m.append((int(robot["scans"]), driven_m[0, 0]))
+    assert len(scans_m) >= 6
+    assert robot["scans"] == math.ceil(robot["distance_m"] / 0.5 - 1e-6)
+    for scans, driven_m in scans_m:
+        assert scans == math.floor(driven_m / 0.5 + 1e-6) or not robot["under_way"]
+
+
+def test_a_robot_announces_a_changed_decision_only():
+    missions = on_the_way(0.9, robots=2)
+    sent = missions.state.robots[0]["messages_sent"]
+    assert sent[0] == 1
+    view = view_of(missions, 0, 0)
+    toward(missions, view.target, (2.75, 4.75, 0.25, 0.0, 0.0))
+    announced = view_of(missions, 0, 1).teammates[0]
+    assert sent[0] == 1 and announced.announced_s == 0.0
+    while not missions.state.robots[0, 0]["under_way"]:
+        toward(missions, view.target, (2.75, 4.75, 0.25, 0.0, 0.0))
+    now_s = float(missions.state.missions[0]["time_s"])
+    toward(missions, (0.75, 2.75, 0.25, 0.0, 0.0), (2.75, 4.75, 0.25, 0.0, 0.0))
+    announced = view_of(missions, 0, 1).teammates[0]
+    assert announced.announced_s == now_s
+    assert announced.viewpoint == pytest.approx((0.75, 2.75, 0.25, 0.0, 0.0), abs=1e-6)
+
+
+@pytest.mark.parametrize("redecide", ["on_scan", 0.4])
+def test_missions_with_decisions_under_way_are_kept_copied_and_run_again(redecide):
+    """Bit for bit: a batch and its snapshot, its pickle, and on two threads."""
+    scenario = free_box(
+        robot={"navigator": "planned", "redecide": redecide, "reach_m": 3.0},
+        sensor={"scan_every_m": 0.5},
+        decision_period_s=0.3,
+        ending={"sigma_end": 1e-4},
+    )
+    missions = started(scenario, missions=3)
+    wander(missions, 12, 1)
+    assert missions.state.robots["under_way"].any()
+    copied, restored = pickle.loads(pickle.dumps(missions)), Missions(scenario, 3, threads=2)
+    restore(restored, snapshot(missions))
+    for each in (missions, copied, restored):
+        wander(each, 25, 2)
+    digests = [[state_digest(each, mission) for mission in range(3)] for each in (missions, copied, restored)]
+    assert digests[0] == digests[1] == digests[2]
+    missions.state.robots["lead_s"][0, 0] += 0.125
+    assert state_digest(missions, 0) != digests[0][0]
