@@ -97,7 +97,7 @@ def summary(scenario: str, records: Sequence[Record]) -> dict[str, Any]:
 
 
 def _returns(record: Record, cost_per_s: float) -> tuple[float, float]:
-    """A mission's sum of rewards, mean over the robots: for bits gained alone, and for those heard as well."""
+    """A mission's sum of rewards, mean over robots: for bits gained alone, and for those heard as well."""
     to_gain = record["entropy_start_bits"] - record["entropy_threshold_bits"]
     gained = statistics.mean(robot["gained_bits"] for robot in record["per_robot"]) / to_gain
     lost = (record["entropy_start_bits"] - record["entropy_mean_bits"]) / to_gain

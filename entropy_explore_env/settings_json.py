@@ -9,13 +9,14 @@ import types
 import typing
 from collections.abc import Mapping
 from functools import lru_cache
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.scenario import Scenario
 
+Settings = TypeVar("Settings")
 INFINITY = "inf"
 """JSON has no infinity; where a number belongs, this text stands for it."""
 RENAMED: Mapping[str, Mapping[str, str]] = types.MappingProxyType(
@@ -46,6 +47,25 @@ def scenario_of(settings: Mapping[str, Any]) -> Scenario:
         SettingError: A setting is unknown, missing, of the wrong kind or out of its range.
     """
     return _decoded(Scenario, settings, "settings")
+
+
+def json_of(settings: Any) -> Any:  # noqa: ANN401 - a dataclass, or what one may hold
+    """Settings of any dataclass as what JSON holds; `dataclass_of` gives the same back."""
+    return _encoded(settings)
+
+
+def dataclass_of(kind: type[Settings], settings: Any, name: str = "settings") -> Settings:  # noqa: ANN401
+    """A dataclass from an object of its fields, as JSON holds it.
+
+    Args:
+        kind: The dataclass.
+        settings: As `json_of` gives them; what is missing has its default.
+        name: Of the settings, for errors.
+
+    Raises:
+        SettingError: See `scenario_of`.
+    """
+    return _decoded(kind, settings, name)
 
 
 def settings_json(scenario: Scenario) -> str:

@@ -15,8 +15,15 @@ from entropy_explore_env import settings_json as module
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.scenario import Scenario, with_settings
 from entropy_explore_env.scenarios import BOX, ROOM, SCENARIOS
-from entropy_explore_env.settings import Grid
-from entropy_explore_env.settings_json import scenario_from_json, scenario_of, settings_json, settings_of
+from entropy_explore_env.settings import Grid, RangeSensor, Robot, RobotKind
+from entropy_explore_env.settings_json import (
+    dataclass_of,
+    json_of,
+    scenario_from_json,
+    scenario_of,
+    settings_json,
+    settings_of,
+)
 from tests.reference.scenes import drawn
 
 RANGES = st.floats(1e-3, 1e6) | st.just(math.inf)
@@ -154,3 +161,10 @@ def test_settings_of_earlier_versions_load_under_their_new_names():
     assert settings_of(scenario_of(earlier)) == settings
     with pytest.raises(SettingError, match=r"Scenario\.others"):
         scenario_of({**earlier, "extra_kinds": []})
+
+
+def test_any_dataclass_of_settings_comes_back():
+    kind = RobotKind(Robot(reach_m=math.inf, motion="planar"), RangeSensor(field_of_view_rad=(1.5, 0.25)))
+    assert dataclass_of(RobotKind, json.loads(json.dumps(json_of(kind), allow_nan=False))) == kind
+    with pytest.raises(SettingError, match="RobotKind.wings"):
+        dataclass_of(RobotKind, {"wings": 2})

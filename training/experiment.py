@@ -28,6 +28,7 @@ from training.checkpoints import latest_checkpoint, load_checkpoint
 from training.errors import CheckpointError
 from training.evaluate import SIMPLE, compare, evaluation_scenario
 from training.policy import POLICIES
+from training.run_folder import FILE
 
 RIVALS = (*SIMPLE, "information-rate-v0")
 SEEDS = 3
@@ -218,7 +219,10 @@ def train(runs: Mapping[str, Sequence[str]], folder: Path, jobs: int, quiet: boo
 def _train(run: TrainingRun) -> None:
     """Begin or continue a run in this process."""
     with contextlib.redirect_stdout(io.StringIO()):
-        ppo.main([*run.options, "--threads", "1", "--resume", "--json", "--out", str(run.folder)])
+        begun = (run.folder / FILE).is_file()
+        ppo.main(
+            ["--threads", "1", "--json", *run.options, "--resume" if begun else "--out", str(run.folder)]
+        )
 
 
 def _done(run: Path, options: Sequence[str]) -> bool:

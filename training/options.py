@@ -49,7 +49,7 @@ def check_share(name: str, value: float) -> None:
         raise SettingError(name, value, "a number above 0, at most 1")
 
 
-def check_new_or_resumed(out: Path, used: bool, resume: bool) -> None:
-    """Raise a SettingError if there is a run in the folder that is not to be continued."""
-    if used and not resume:
-        raise SettingError("out", str(out), "a new folder, or --resume to continue the run in it")
+def check_new(out: Path, used: bool) -> None:
+    """Raise a SettingError if there is a run in the folder of a new one already."""
+    if used:
+        raise SettingError("out", str(out), f"a new folder; --resume {out} continues the run in it")

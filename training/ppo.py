@@ -14,23 +14,22 @@ choose; `training/advantages.py` says what is learned of its steps.
 from __future__ import annotations
 
 import dataclasses
-import json
 import shlex
 import warnings
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 import torch
-from gymnasium import spaces
 from stable_baselines3 import PPO
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import Logger, TensorBoardOutputFormat
 
-from baselines.cli.arguments import make_folder, parse, print_json, run_command
+from baselines.cli.arguments import WholeNumber, make_folder, parse, print_json, run_command
+from entropy_explore_env.command import INTERRUPTED
 from entropy_explore_env.envs.robot_vec_env import RobotVecEnv
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.scenario import Scenario, with_settings
@@ -41,19 +40,31 @@ from entropy_explore_env.writing import write_atomically
 from training.advantages import DecisionBuffer, DiscountUnit
 from training.best_mission import draw_best_mission
 from training.checkpoints import PolicySettings, checkpoint_name, forget_later, save_checkpoint
+from training.decision_ppo import DecisionPPO
 from training.errors import NotFiniteError
+from training.interruption import Interruption
 from training.networks import policy_class, policy_settings
 from training.normalisation import Normaliser
 from training.options import check_options, check_share
 from training.policy import normalise_observations, weights_of
 from training.progress import MissionFigures, Progress
-from training.resuming import TrainingState, checkpoint_to_resume, restore_state, save_policy, save_state
+from training.resuming import (
+    TrainingState,
+    check_unused,
+    checkpoint_to_resume,
+    restore_state,
+    save_policy,
+    save_state,
+)
+from training.run_folder import options_json, resume_command, resumed_options, save_options
 from training.seeds import learning_seeds
 from training.terminal import TrainingBar
 from training.validation import Validator
 
-_CHANGEABLE = frozenset(("out", "video", "resume", "threads", "json", "total_steps"))
-"""Options that a resumed run may change."""
+_MODULE = "training.ppo"
+_CHANGEABLE = frozenset(("video", "threads", "json", "total_steps", "validate_every", "checkpoint_every"))
+"""Options that may differ where a run is continued."""
+_STOPPED = "a checkpoint is written when this rollout and its update are done"
 _RETURNS_MEMORY = 2e5
 """Decisions, about, whose returns normalise: the latest ones, since returns grow as the policy learns."""
 
@@ -68,14 +79,14 @@ class Args:
     """Robots in a team."""
     missions: int = 64
     """Missions simulated at a time."""
-    total_steps: int = 2_500_000
+    total_steps: WholeNumber = 2_500_000
     """Steps to train for, counted per robot."""
     seed: int = 0
     """Seed of weights, missions and all other draws."""
-    out: Path = Path("runs/room-3")
-    """Folder of the run."""
-    resume: bool = False
-    """Continue from the latest checkpoint in the folder; start a new run if it has none."""
+    out: Path | None = None
+    """Folder of a new run; default: runs/SCENARIO-ROBOTS."""
+    resume: Path | None = None
+    """Folder of a run to continue from its latest checkpoint, with the settings that it was started with."""
     threads: int = 2
     """Threads for missions and for updates; choosing actions takes one."""
     json: bool = False
@@ -125,34 +136,49 @@ class Args:
     entropy: float = 0.003
     """Weight of the entropy bonus."""
 
-    validate_every: int = 250_000
+    validate_every: WholeNumber = 250_000
     """Steps between two validations."""
     validation_missions: int = 32
     """Missions in a validation."""
     video: bool = True
     """At the end, run a mission of the best policy and write it as a picture and an animation."""
-    checkpoint_every: int = 500_000
-    """Steps between two checkpoints; a run that is killed loses at most this many."""
+    checkpoint_every: WholeNumber = 500_000
+    """Steps between two checkpoints, the first after the first update: what a run that is killed loses at
+    most; one that Ctrl-C stops loses nothing."""
 
 
 def main(words: Sequence[str]) -> int:
     """Run the command."""
-    args = parse(Args, words, description=__doc__)
+    args, changed = parse(Args, words, description=__doc__), {}
+    if args.resume is not None:
+        args, changed = resumed_options(Args, args.resume, words, _CHANGEABLE, __doc__)
+    out = args.out = args.out or Path("runs") / f"{args.scenario}-{args.robots}"
     check(args)
     scenario = training_scenario(args)
-    make_folder("out", args.out)
-    options = {name: value for name, value in vars(args).items() if name != "channel"}  # of the scenario
-    options = json.loads(json.dumps(options | {"out": str(args.out)}))
-    checkpoint = checkpoint_to_resume(args.out, args.resume, options, _CHANGEABLE)
+    checkpoint = None
+    if args.resume is None:
+        check_unused(out)
+        make_folder("out", out)
+    else:
+        checkpoint = checkpoint_to_resume(out)
     torch.set_num_threads(args.threads)
     state = set_up(args, scenario)
-    state.options, state.command = options, shlex.join(["python", "-m", "training.ppo", *words])
-    if checkpoint is not None:
-        restore_state(state, checkpoint)
-        forget_later(args.out, "best", state.model.num_timesteps)
-    with TrainingBar(args.total_steps, hidden=args.json) as bar:
-        train(args, state, bar)
-    files = draw_best_mission(args.out, scenario) if args.video else [args.out]
+    if args.resume is None:
+        save_options(out, args, _MODULE, words)
+    state.options, state.command = options_json(args), shlex.join(["python", "-m", _MODULE, *words])
+    with (
+        TrainingBar(args.total_steps, hidden=args.json) as bar,
+        Interruption(_STOPPED) as interruption,
+    ):
+        if checkpoint is not None:
+            restore_state(state, checkpoint)
+            forget_later(out, "best", state.model.num_timesteps)
+        if args.resume is not None:
+            bar.say(beginning(out, checkpoint is not None, state.model.num_timesteps, changed))
+        train(args, state, bar, interruption)
+    if not finished(args, state):
+        return say_stopped(out, state.model.num_timesteps, args.json)
+    files = draw_best_mission(out, scenario) if args.video else [out]
     summary, best = state.summary(), state.progress.best
     if args.json:
         print_json(summary | {"best": best, "files": [str(file) for file in files]})
@@ -162,6 +188,30 @@ def main(words: Sequence[str]) -> int:
             f"{best['finished']:.0%} finished\nwritten: {', '.join(map(str, files))}"
         )
     return 0
+
+
+def finished(args: Args, state: TrainingState) -> bool:
+    """Whether all steps are done, and the last validation, too."""
+    steps = state.model.num_timesteps
+    return steps >= args.total_steps and state.progress.validated(steps)
+
+
+def beginning(out: Path, found: bool, steps: int, changed: Mapping[str, object]) -> str:
+    """What is said of a run that is continued: from where, and with which options changed."""
+    told = "".join(f"; {name} was {value}" for name, value in changed.items())
+    if not found:
+        return f"no checkpoint in {out}: from the beginning{told}"
+    return f"{out} goes on after {steps:,} steps{told}"
+
+
+def say_stopped(out: Path, steps: int, as_json: bool) -> int:
+    """Say where a run that was interrupted stands, and how to go on; its exit code."""
+    command = resume_command(_MODULE, out)
+    if as_json:
+        print_json({"interrupted": True, "steps": steps, "resume": command})
+    else:
+        print(f"stopped after {steps:,} steps, with a checkpoint in {out}; go on with\n\n    {command}\n")
+    return INTERRUPTED
 
 
 def check(args: Args) -> None:
@@ -234,65 +284,91 @@ def set_up(args: Args, scenario: Scenario) -> TrainingState:
         model,
         envs,
         Normaliser(envs.vector_env.missions.layout.size),
-        Progress(args.validate_every, args.checkpoint_every),
+        Progress(args.validate_every),
     )
 
 
-def train(args: Args, state: TrainingState, bar: TrainingBar) -> None:
-    """Learn until all steps are done: rollout, update, and at times validation and checkpoint.
+def train(args: Args, state: TrainingState, bar: TrainingBar, interruption: Interruption) -> None:
+    """Learn until all steps are done or Ctrl-C: rollout, update, and at times validation and checkpoint.
 
     Raises:
         NotFiniteError: A reward, a loss or a weight is not finite.
     """
-    model, envs, buffer, progress = state.model, state.envs, state.buffer, state.progress
-    assert isinstance(model, DecisionPPO)
-    model.set_logger(Logger(None, [TensorBoardOutputFormat(str(args.out))]))
+    model, envs, progress, out = state.model, state.envs, state.progress, args.out
+    assert isinstance(model, DecisionPPO) and out is not None
+    model.set_logger(Logger(None, [TensorBoardOutputFormat(str(out))]))
     callback = model.start(args.total_steps, MissionFigures(args.robots))
     bar.show_steps(model.num_timesteps)
     scenario = state.settings.scenario
     with closing(envs), closing(Validator(scenario, args.validation_missions, args.threads)) as validator:
-        while model.num_timesteps < args.total_steps:
-            try:
-                # The rollout; at its end the advantages of its decisions (training/advantages.py).
-                with progress.timed("collecting_s"):
-                    model.collect_rollouts(envs, callback, buffer, args.rollout_steps)
-                observations = buffer.observations[buffer.complete]
-                # Epochs of minibatches with PPO's clipped loss (stable_baselines3.PPO.train).
-                with progress.timed("learning_s"):
-                    model.update()
-            except (ValueError, RuntimeError):  # PyTorch's, of a distribution that is not finite
-                check_finite(model)
-                raise
-            check_finite(model)
-            state.observation_stats.update(observations)
-            normalise_observations(model.policy, state.observation_stats)
-
+        while True:
             steps = model.num_timesteps
-            bar.show_steps(steps)
             last = steps >= args.total_steps
-            if steps >= progress.next_validation or last:
-                progress.next_validation = steps + args.validate_every
-                validate(args, state, validator, bar)
-            if steps >= progress.next_checkpoint or last:
+            # What Ctrl-C cut short is made up for here when the run goes on.
+            if steps >= progress.next_validation or (last and not finished(args, state)):
+                if validate(args, state, Validating(validator, bar, interruption)):
+                    progress.next_validation = steps + args.validate_every
+            stop = last or interruption.asked
+            if steps and (steps >= progress.next_checkpoint or stop):
                 progress.next_checkpoint = steps + args.checkpoint_every
-                save_checkpoint(args.out / checkpoint_name("step", steps), save_state(state))
+                save_checkpoint(out / checkpoint_name("step", steps), save_state(state))
             model.dump_logs()
+            if stop:
+                return
+            rollout_and_update(args, state, callback)
+            bar.show_steps(model.num_timesteps)
 
 
-def validate(args: Args, state: TrainingState, validator: Validator, bar: TrainingBar) -> None:
-    """Add a row to the curve, and keep the policy if it is the best so far."""
-    model, progress, steps = state.model, state.progress, state.model.num_timesteps
+def rollout_and_update(args: Args, state: TrainingState, callback: BaseCallback) -> None:
+    """Collect a rollout and learn from it.
+
+    Raises:
+        NotFiniteError: A reward, a loss or a weight is not finite.
+    """
+    model, buffer, progress = state.model, state.buffer, state.progress
+    assert isinstance(model, DecisionPPO)
+    try:
+        # The rollout; at its end the advantages of its decisions (training/advantages.py).
+        with progress.timed("collecting_s"):
+            model.collect_rollouts(state.envs, callback, buffer, args.rollout_steps)
+        observations = buffer.observations[buffer.complete]
+        # Epochs of minibatches with PPO's clipped loss (stable_baselines3.PPO.train).
+        with progress.timed("learning_s"):
+            model.update()
+    except (ValueError, RuntimeError):  # PyTorch's, of a distribution that is not finite
+        check_finite(model)
+        raise
+    check_finite(model)
+    state.observation_stats.update(observations)
+    normalise_observations(model.policy, state.observation_stats)
+
+
+class Validating(NamedTuple):
+    """What a validation needs: its missions, where it is shown, and what stops it."""
+
+    validator: Validator
+    bar: TrainingBar
+    interruption: Interruption
+
+
+def validate(args: Args, state: TrainingState, needs: Validating) -> bool:
+    """Add a row to the curve, and keep the policy if it is the best so far; False if Ctrl-C cut it short."""
+    model, progress, steps, out = state.model, state.progress, state.model.num_timesteps, args.out
+    assert out is not None
     with progress.timed("validating_s"):
         model.policy.set_training_mode(False)
-        validation = validator.validate(model.policy)
+        validation = needs.validator.validate(model.policy, lambda: needs.interruption.asked)
+    if validation is None:
+        return False
     is_best = progress.add_validation(steps, validation)
-    write_atomically(args.out / "curve.csv", progress.curve_csv())
+    write_atomically(out / "curve.csv", progress.curve_csv())
     for name, value in dataclasses.asdict(validation).items():
         if value is not None:
             model.logger.record(f"validation/{name}", value)
-    bar.show_validation(steps, validation)
+    needs.bar.show_validation(steps, validation)
     if is_best:
-        save_checkpoint(args.out / checkpoint_name("best", steps), save_policy(state))
+        save_checkpoint(out / checkpoint_name("best", steps), save_policy(state))
+    return True
 
 
 def check_finite(model: PPO) -> None:
@@ -304,108 +380,6 @@ def check_finite(model: PPO) -> None:
         if not torch.isfinite(weights).all():
             value = float(weights[~torch.isfinite(weights)][0])
             raise NotFiniteError(name, value, model.num_timesteps)
-
-
-class DecisionPPO(PPO):
-    """Stable-Baselines3's PPO over a RobotVecEnv, whose policy is asked only where robots decide.
-
-    What a busy robot would choose is ignored and its value is never used: neither is computed, and no random
-    number is drawn for it. The rollout holds action 0, value 0 and log-probability 0 in its place.
-    """
-
-    def start(self, total_steps: int, callback: BaseCallback) -> BaseCallback:
-        """Prepare a loop of rollouts and updates up to so many steps, as `learn` does."""
-        _, callback = self._setup_learn(total_steps - self.num_timesteps, callback, reset_num_timesteps=False)
-        return callback
-
-    def collect_rollouts(
-        self,
-        env: Any,  # noqa: ANN401 - a RobotVecEnv; the base class has them wider
-        callback: BaseCallback,
-        rollout_buffer: Any,  # noqa: ANN401 - a DecisionBuffer
-        n_rollout_steps: int,
-    ) -> bool:
-        """Fill the buffer and compute its advantages; False if the callback stopped it.
-
-        Raises:
-            NotFiniteError: A reward is not finite.
-        """
-        threads = torch.get_num_threads()
-        torch.set_num_threads(
-            1
-        )  # a few robots at a time: more threads would only take time from the missions
-        try:
-            return self._collect(env, callback, rollout_buffer, n_rollout_steps)
-        finally:
-            torch.set_num_threads(threads)
-
-    def _collect(
-        self, env: RobotVecEnv, callback: BaseCallback, rollout_buffer: DecisionBuffer, steps: int
-    ) -> bool:
-        """As `collect_rollouts`."""
-        self.policy.set_training_mode(False)
-        rollout_buffer.reset()
-        callback.on_rollout_start()
-        for _ in range(steps):
-            before: Any = self._last_obs
-            actions, values, log_probs = self.choose(before, env.deciding)
-            within = actions
-            if isinstance(self.action_space, spaces.Box):
-                within = np.clip(actions, self.action_space.low, self.action_space.high)
-            observations: Any
-            observations, rewards, dones, infos = env.step(within)
-            self.num_timesteps += env.num_envs
-            if not np.isfinite(env.rewards).all():
-                value = env.rewards[~np.isfinite(env.rewards)][0]
-                raise NotFiniteError("reward", value, self.num_timesteps)
-            callback.update_locals(locals())
-            if not callback.on_step():
-                return False
-            self._update_info_buffer(infos, dones)
-            final_values = self._final_values(dones, infos)
-            starts = self._last_episode_starts
-            rollout_buffer.add_step(final_values, before, actions, rewards, starts, values, log_probs)
-            self._last_obs, self._last_episode_starts = observations, dones
-        with torch.no_grad():
-            values = self.policy.predict_values(torch.as_tensor(observations))
-        rollout_buffer.compute_returns_and_advantage(last_values=values, dones=dones)
-        callback.update_locals(locals())
-        callback.on_rollout_end()
-        return True
-
-    def choose(
-        self, observations: np.ndarray, deciding: np.ndarray
-    ) -> tuple[np.ndarray, torch.Tensor, torch.Tensor]:
-        """Actions (N,) or (N, K), values (N,) and log-probabilities (N,); 0 where a robot does not decide."""
-        shape: Any = self.action_space.shape
-        rows = [np.zeros((len(deciding), *shape), self.action_space.dtype)]
-        rows += [np.zeros(len(deciding), np.float32) for _ in range(2)]
-        if deciding.any():
-            with torch.no_grad():
-                chosen = self.policy(torch.as_tensor(observations[deciding]))
-            for all_rows, part in zip(rows, chosen, strict=True):
-                all_rows[deciding] = part.numpy().reshape(-1, *all_rows.shape[1:])
-        actions, values, log_probs = rows
-        return actions, torch.as_tensor(values), torch.as_tensor(log_probs)
-
-    def _final_values(self, dones: np.ndarray, infos: list[dict[str, Any]]) -> np.ndarray:
-        """(N,) values of the last observations of missions that were cut off, else 0."""
-        values = np.zeros(len(dones))
-        cut_off = [row for row in np.flatnonzero(dones) if infos[row]["TimeLimit.truncated"]]
-        if cut_off:
-            last = np.stack([infos[row]["terminal_observation"] for row in cut_off])
-            with torch.no_grad():
-                values[cut_off] = self.policy.predict_values(torch.as_tensor(last))[:, 0].numpy()
-        return values
-
-    def update(self) -> None:
-        """Learn from the rollout, at the learning rate of this moment."""
-        self._update_current_progress_remaining(self.num_timesteps, self._total_timesteps)
-        self.train()
-
-    def _excluded_save_params(self) -> list[str]:
-        """What `save` leaves out: the missions, and the buffer that refers to them."""
-        return [*super()._excluded_save_params(), "rollout_buffer_class", "rollout_buffer_kwargs"]
 
 
 if __name__ == "__main__":

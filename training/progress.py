@@ -26,14 +26,15 @@ class Progress:
     """What a run has come to.
 
     Attributes:
-        next_validation, next_checkpoint: Steps at which they are due.
+        next_validation, next_checkpoint: Steps at which they are due; the first checkpoint at once, so that a
+            run that is stopped early can be continued.
         best: Steps and validation of the best policy; empty before the first validation.
         curve: One row for each validation: steps, seconds so far, and what it found.
         seconds: On the clock, for each part of the loop; and `processor_s`, of all threads together.
     """
 
     next_validation: int
-    next_checkpoint: int
+    next_checkpoint: int = 1
     best: dict[str, Any] = field(default_factory=dict)
     curve: list[dict[str, float | None]] = field(default_factory=list)
     seconds: dict[str, float] = field(
@@ -58,6 +59,10 @@ class Progress:
             return False
         self.best = row
         return True
+
+    def validated(self, steps: int) -> bool:
+        """Whether the latest validation was after so many steps."""
+        return bool(self.curve) and self.curve[-1]["steps"] == steps
 
     def curve_csv(self) -> str:
         """The curve as a table."""

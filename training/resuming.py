@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -23,9 +22,10 @@ from training.checkpoints import (
 )
 from training.errors import CheckpointError
 from training.normalisation import Normaliser
-from training.options import check_new_or_resumed
+from training.options import check_new
 from training.policy import load_weights, weights_of
 from training.progress import Progress
+from training.run_folder import FILE
 
 _TORCH_RNG = "torch_chance"  # names in files of every version
 _SHUFFLE_RNG = "chance"
@@ -141,32 +141,21 @@ def _restore_trainer(state: TrainingState, checkpoint: Checkpoint) -> None:
     torch.set_rng_state(trainer.tensors[_TORCH_RNG])
 
 
-def checkpoint_to_resume(
-    folder: Path, resume: bool, options: Mapping[str, Any], changeable: frozenset[str]
-) -> Checkpoint | None:
-    """The checkpoint that a run continues from; None for a new run.
-
-    Args:
-        folder: Of the run.
-        resume: Whether a run that is in the folder may be continued.
-        options: Of the command, as JSON holds them.
-        changeable: Options that may differ from those that the run was started with.
+def checkpoint_to_resume(folder: Path) -> Checkpoint | None:
+    """The latest checkpoint of a run; None where it has none yet, so that it begins again.
 
     Raises:
-        SettingError: There is a run in the folder, and it is not to be continued.
-        CheckpointError: The run was started with other options, or its checkpoint is broken.
+        CheckpointError: It is broken.
     """
-    used = [path for pattern in ("step-*", "best-*", "curve.csv") for path in folder.glob(pattern)]
-    check_new_or_resumed(folder, bool(used), resume)
     try:
         latest = latest_checkpoint(folder, "step")
     except CheckpointError:
         forget_later(folder, "best", 0)
         return None
-    checkpoint = load_checkpoint(latest, training=True)
-    before = checkpoint.progress.get("args")
-    for name, value in options.items():
-        was = before.get(name) if isinstance(before, dict) else None
-        if name not in changeable and was != value:
-            raise CheckpointError(name, value, f"{was}, as in the run that {latest} belongs to")
-    return checkpoint
+    return load_checkpoint(latest, training=True)
+
+
+def check_unused(folder: Path) -> None:
+    """Raise a SettingError if there is a run in a folder that is to be a new run's."""
+    used = any(path for pattern in (FILE, "step-*", "best-*", "curve.csv") for path in folder.glob(pattern))
+    check_new(folder, used)

@@ -3,9 +3,9 @@
     python -m training.rllib_ppo --scenario room --robots 3 --runners 2 --out runs/rllib-room
 
 Runs on this machine, or with `--address HOST:PORT` on a Ray cluster (`ray start --head`). Only steps in which
-a robot chose are learned from: `envs.rllib_env` says how. The folder gets `settings.json`, `progress.csv` (a
-row for each iteration) and RLlib's checkpoints, of which `--resume` takes the latest. They are pickles: load
-only your own.
+a robot chose are learned from: `envs.rllib_env` says how. The folder gets `run.json` (the options),
+`progress.csv` (a row for each iteration) and RLlib's checkpoints, of which `--resume FOLDER` takes the
+latest, with the run's options. They are pickles: load only your own.
 """
 # pyright: reportMissingImports=false
 
@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import contextlib
 import csv
-import json
 import math
 import shutil
 import sys
@@ -23,17 +22,22 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from baselines.cli.arguments import make_folder, parse, run_command
+from baselines.cli.arguments import WholeNumber, make_folder, parse, run_command
+from entropy_explore_env.command import INTERRUPTED
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.scenario import with_settings
 from entropy_explore_env.scenarios import find_scenario
-from entropy_explore_env.settings_json import settings_of
 from entropy_explore_env.validation import check_whole
-from entropy_explore_env.writing import write_atomically
 from training.errors import NotFiniteError
-from training.options import check_new_or_resumed, check_options, check_share
+from training.interruption import Interruption
+from training.options import check_new, check_options, check_share
 from training.ray_cluster import check_address, start_ray
+from training.run_folder import FILE, resume_command, resumed_options, save_options
 
+_MODULE = "training.rllib_ppo"
+_CHANGEABLE = frozenset(("total_steps", "address", "runners", "checkpoint_every"))
+"""Options that may differ where a run is continued."""
+_STOPPED = "a checkpoint is written when this iteration is done"
 POLICY = "shared"
 LOSSES = ("total_loss", "policy_loss", "vf_loss", "entropy")
 FIGURES = ("t_mission_s", "finished", "bits_gained_per_bit_sent")
@@ -48,14 +52,14 @@ class Args:
     """Named scenario: room, room-furnished, office, … (the README lists them)."""
     robots: int = 3
     """Robots in a team."""
-    total_steps: int = 1_000_000
+    total_steps: WholeNumber = 1_000_000
     """Robots' decisions to train for."""
     seed: int = 0
     """Seed of weights, missions and all other draws."""
-    out: Path = Path("runs/rllib")
-    """Folder of the run."""
-    resume: bool = False
-    """Continue from the latest checkpoint in the folder."""
+    out: Path | None = None
+    """Folder of a new run; default: runs/rllib-SCENARIO-ROBOTS."""
+    resume: Path | None = None
+    """Folder of a run to continue from its latest checkpoint, with the settings that it was started with."""
     address: str | None = None
     """HOST:PORT of a Ray cluster, or auto for that of this machine; by default this machine alone."""
     runners: int = 2
@@ -83,20 +87,43 @@ class Args:
     epochs: int = 6
     """Passes over an iteration's decisions."""
     checkpoint_every: int = 10
-    """Iterations between two checkpoints; there is one at the end, too."""
+    """Iterations between two checkpoints; there is one after the first, and one at the end or at Ctrl-C."""
 
 
 def main(words: Sequence[str]) -> int:
     """Run the command."""
     args = parse(Args, words, description=__doc__)
+    if (resume := args.resume) is not None:
+        args, changed = resumed_options(Args, resume, words, _CHANGEABLE, __doc__)
+        said = "".join(f"; {name} was {value}" for name, value in changed.items())
+        print(f"{resume}: {_where(resume)}{said}", file=sys.stderr)
+    args.out = args.out or Path("runs") / f"rllib-{args.scenario}-{args.robots}"
     check(args)
-    env_settings = prepare_folder(args)
+    env_settings = environment_settings(args)
+    if args.resume is None:
+        check_new(args.out, (args.out / FILE).exists() or last_checkpoint(args.out) is not None)
+        make_folder("out", args.out)
     ray = start_ray(args.address, args.runners)
     try:
-        train(args, env_settings)
+        if args.resume is None:
+            save_options(args.out, args, _MODULE, words)
+        with Interruption(_STOPPED) as interruption:
+            done = train(args, env_settings, interruption)
     finally:
         ray.shutdown()
+    if not done:
+        command = resume_command(_MODULE, args.out)
+        print(f"stopped, with a checkpoint in {args.out}; go on with\n\n    {command}\n")
+        return INTERRUPTED
     return 0
+
+
+def _where(folder: Path) -> str:
+    """From where a run goes on."""
+    checkpoint = last_checkpoint(folder)
+    if checkpoint is None:
+        return "no checkpoint: from the beginning"
+    return f"goes on after {iterations_of(checkpoint)} iterations"
 
 
 def check(args: Args) -> None:
@@ -112,15 +139,11 @@ def check(args: Args) -> None:
     check_address(args.address)
 
 
-def prepare_folder(args: Args) -> dict[str, Any]:
-    """Make the run's folder with its settings.json, or check that it is that of the run to resume.
-
-    Returns:
-        The settings of the environment to learn in, RLlib's `env_config`.
+def environment_settings(args: Args) -> dict[str, Any]:
+    """The settings of the environment to learn in, RLlib's `env_config`.
 
     Raises:
-        SettingError: There is no such scenario; the folder cannot be used; or the run in it was started in
-            another scenario.
+        SettingError: There is no such scenario, or it does not allow the settings.
     """
     settings: dict[str, Any] = {
         "robots": args.robots,
@@ -130,43 +153,21 @@ def prepare_folder(args: Args) -> dict[str, Any]:
         "observation": {"flat": True, "panorama_utility": "log2"},  # what a small network learns best from
         "reward": {"cost_per_s": args.cost_per_s},
     }
-    scenario = settings_of(with_settings(find_scenario(args.scenario), settings))
-    checkpoint = last_checkpoint(args.out)
-    if args.resume and checkpoint is None:
-        raise SettingError("resume", str(args.out), "a folder with a checkpoint")
-    check_new_or_resumed(args.out, checkpoint is not None, args.resume)
-    make_folder("out", args.out)
-    if checkpoint is not None and _scenario_in(args.out / "settings.json") != scenario:
-        raise SettingError(
-            "scenario", args.scenario, "the settings that the run in the folder was started with"
-        )
-    options = {name: str(value) if isinstance(value, Path) else value for name, value in vars(args).items()}
-    text = json.dumps({"args": options, "scenario": scenario}, indent=2) + "\n"
-    try:
-        write_atomically(args.out / "settings.json", text)
-    except OSError as error:
-        raise SettingError("out", str(args.out), f"a folder that can be written ({error.strerror})") from None
+    with_settings(find_scenario(args.scenario), settings)  # checks them
     return {"scenario": args.scenario, **settings}
 
 
-def _scenario_in(file: Path) -> Any:  # noqa: ANN401 - JSON
-    """The scenario in a settings.json; None where there is none."""
-    try:
-        return json.loads(file.read_text("utf-8"))["scenario"]
-    except (OSError, ValueError, LookupError, TypeError):
-        return None
-
-
-def train(args: Args, env_settings: dict[str, Any]) -> None:
-    """Train, and write progress and checkpoints.
+def train(args: Args, env_settings: dict[str, Any], interruption: Interruption) -> bool:
+    """Train, and write progress and checkpoints; False if Ctrl-C ended it early.
 
     Raises:
         NotFiniteError: A loss is not finite; the last checkpoint stays.
     """
     from entropy_explore_env.envs.rllib_env import EntropyExploreMultiAgentEnv
 
-    checkpoint = last_checkpoint(args.out) if args.resume else None
-    iterations = 0 if checkpoint is None else int(checkpoint.name.rpartition("-")[2])
+    assert args.out is not None
+    checkpoint = last_checkpoint(args.out)
+    iterations = 0 if checkpoint is None else iterations_of(checkpoint)
     warm_up = EntropyExploreMultiAgentEnv(env_settings)  # compiles the kernels, which every runner would
     observations, _ = warm_up.reset(seed=0)
     warm_up.step({agent: warm_up.action_spaces[agent].sample() for agent in observations})
@@ -174,7 +175,7 @@ def train(args: Args, env_settings: dict[str, Any]) -> None:
     try:
         if checkpoint is not None:
             algorithm.restore_from_path(str(checkpoint.resolve()))
-        iterate(args, algorithm, iterations)
+        return iterate(args, algorithm, iterations, interruption)
     finally:
         algorithm.stop()
         with contextlib.suppress(OSError):
@@ -244,25 +245,36 @@ def _log_figures(episode: Any, metrics_logger: Any, **others: Any) -> None:  # n
             metrics_logger.log_value(name, float(figures[name]), window=100)
 
 
-def iterate(args: Args, algorithm: Any, iteration: int) -> None:  # noqa: ANN401 - RLlib's Algorithm
-    """Repeat rollout and update until all steps are done; `iteration` is how many are done already.
+def iterate(args: Args, algorithm: Any, iteration: int, interruption: Interruption) -> bool:  # noqa: ANN401
+    """Repeat rollout and update until all steps are done, or until Ctrl-C, which returns False.
+
+    Args:
+        args: The command's.
+        algorithm: RLlib's Algorithm.
+        iteration: How many are done already.
+        interruption: Says whether to stop.
 
     Raises:
         NotFiniteError: A loss is not finite.
     """
-    steps, started = 0, time.perf_counter()
+    assert args.out is not None
+    begun, steps, started = iteration, 0, time.perf_counter()
     while steps < args.total_steps:
         iteration += 1
         row = progress_row(algorithm.train(), iteration, args.robots)
         steps = int(row["decisions"])
         row["seconds"] = round(time.perf_counter() - started, 1)
         append_row(args.out / "progress.csv", row)
-        print(progress_line(row), file=sys.stderr)
+        print(progress_line(row), file=sys.stderr, flush=True)
         for name in LOSSES:
             if not math.isfinite(row[name]):
                 raise NotFiniteError(name, row[name], steps)
-        if iteration % args.checkpoint_every == 0 or steps >= args.total_steps:
+        due = iteration % args.checkpoint_every == 0 or iteration == begun + 1
+        if due or steps >= args.total_steps or interruption.asked:
             save_checkpoint(algorithm, args.out, iteration)
+        if interruption.asked and steps < args.total_steps:
+            return False
+    return True
 
 
 def progress_row(result: dict[str, Any], iteration: int, robots: int) -> dict[str, float]:
@@ -300,6 +312,11 @@ def append_row(path: Path, row: dict[str, float]) -> None:
 def last_checkpoint(folder: Path) -> Path | None:
     """The latest whole checkpoint; None where there is none."""
     return max(folder.glob("checkpoint-[0-9]*[0-9]"), default=None)
+
+
+def iterations_of(checkpoint: Path) -> int:
+    """After how many iterations a checkpoint was written."""
+    return int(checkpoint.name.rpartition("-")[2])
 
 
 def save_checkpoint(algorithm: Any, folder: Path, iteration: int) -> None:  # noqa: ANN401 - RLlib's Algorithm

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+import time
 from types import TracebackType
 
 from rich.console import Console
@@ -10,9 +11,12 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, Ti
 
 from training.validation import Validation
 
+LINE_EVERY_S = 20.0
+"""Where there is no terminal, a line says this often how far the run is."""
+
 
 class TrainingBar:
-    """Progress on standard error; the bar only where that is a terminal."""
+    """Progress on standard error: a bar where that is a terminal, else lines at times."""
 
     def __init__(self, total_steps: int, hidden: bool) -> None:
         """Make a bar, which is shown while this is used as a context."""
@@ -27,10 +31,14 @@ class TrainingBar:
             transient=True,
             disable=hidden or not self._console.is_terminal,
         )
+        self._lines = not hidden and not self._console.is_terminal
+        self._total, self._began_s, self._next_s = total_steps, 0.0, 0.0
+        self._first_steps: int | None = None
         self._task = self._progress.add_task("", total=total_steps, latest="")
 
     def __enter__(self) -> TrainingBar:
         self._progress.start()
+        self._began_s = self._next_s = time.perf_counter()
         return self
 
     def __exit__(
@@ -38,9 +46,23 @@ class TrainingBar:
     ) -> None:
         self._progress.stop()
 
+    def say(self, line: str) -> None:
+        """Print a line, above the bar."""
+        self._console.print(line, soft_wrap=True)
+
     def show_steps(self, steps: int) -> None:
-        """Move the bar to this many steps."""
+        """Move the bar to this many steps, or say so in a line, if one is due."""
         self._progress.update(self._task, completed=steps)
+        now_s = time.perf_counter()
+        if self._first_steps is None:
+            self._first_steps = steps
+        elif self._lines and now_s >= self._next_s and steps > self._first_steps:
+            self._next_s = now_s + LINE_EVERY_S
+            speed = (steps - self._first_steps) / max(now_s - self._began_s, 1e-9)
+            left_min = (self._total - steps) / max(speed, 1e-9) / 60.0
+            self.say(
+                f"{steps:>12,} steps of {self._total:,}, {speed:,.0f} a second, {left_min:,.0f} min left"
+            )
 
     def show_validation(self, steps: int, validation: Validation) -> None:
         """Print what the validation after so many steps found."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -45,13 +46,22 @@ class Validator:
         self._env = EntropyExploreVectorEnv(validation, missions, threads=threads, action_masks=False)
         self._seeds = validation_seeds(missions)
 
-    def validate(self, policy: ActorCriticPolicy) -> Validation:
-        """Run each mission to its end; the random state of training stays as it is."""
+    def validate(
+        self, policy: ActorCriticPolicy, stop: Callable[[], bool] = lambda: False
+    ) -> Validation | None:
+        """Run each mission to its end; the random state of training stays as it is.
+
+        Args:
+            policy: Chooses.
+            stop: Asked at every step whether to stop before the end; the result is None then.
+        """
         env, rng = self._env, torch.Generator().manual_seed(0)
         missions, robots = env.num_envs, env.scenario.robots
         observations, _ = env.reset(seed=self._seeds)
         figures: list[dict[str, float] | None] = [None] * missions
         while any(each is None for each in figures):
+            if stop():
+                return None
             actions = choose_actions(policy, observations.reshape(missions * robots, -1), rng)
             shape = (missions, robots) if robots > 1 else (missions,)
             observations, _, _, _, infos = env.step(actions.reshape(shape + actions.shape[1:]))

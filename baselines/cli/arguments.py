@@ -14,17 +14,47 @@ import re
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 from entropy_explore_env import command
 from entropy_explore_env.command import UsageError
 from entropy_explore_env.errors import MissingExtraError, SettingError
 
+
+def whole_number(word: str) -> int:
+    """A whole number as one types it: `2500000`, `2_500_000`, `2.5e6` or `1e6`.
+
+    Raises:
+        ValueError: It is something else.
+    """
+    for kind in (int, float):  # a float holds 2^53 and above only roughly, an int exactly
+        with contextlib.suppress(ValueError):
+            value = kind(word)
+            if value == value // 1:
+                return int(value)
+    raise ValueError(f"{word} is not a whole number")
+
+
 if TYPE_CHECKING:
     from tyro.conf import OmitArgPrefixes, Positional
+
+    WholeNumber = int
 else:
     try:
         from tyro.conf import OmitArgPrefixes, Positional
+        from tyro.constructors import PrimitiveConstructorSpec
+
+        WholeNumber = Annotated[
+            int,
+            PrimitiveConstructorSpec(
+                nargs=1,
+                metavar="INT",
+                instance_from_str=lambda words: whole_number(words[0]),
+                is_instance=lambda value: isinstance(value, int),
+                str_from_instance=lambda value: [str(value)],
+            ),
+        ]
+        """Of a field: an int that may also be typed as 1e6."""
     except ImportError:  # `parse` says what is missing
 
         class Positional:
@@ -34,7 +64,7 @@ else:
                 """The kind itself."""
                 return kind
 
-        OmitArgPrefixes = Positional
+        OmitArgPrefixes, WholeNumber = Positional, int
 
 Arguments = TypeVar("Arguments")
 

@@ -7,6 +7,7 @@ import csv
 import io
 import json
 import os
+import shlex
 import shutil
 import signal
 import subprocess
@@ -19,12 +20,13 @@ import pytest
 import torch
 
 from baselines.cli.arguments import parse
-from entropy_explore_env.command import BAD_INPUT
+from entropy_explore_env.command import BAD_INPUT, INTERRUPTED
 from entropy_explore_env.envs.robot_vec_env import RobotVecEnv
 from training import ppo
 from training.advantages import DecisionBuffer
 from training.checkpoints import checkpoint_name, latest_checkpoint, load_checkpoint
 from training.errors import NotFiniteError
+from training.interruption import Interruption
 from training.validation import Validator
 
 ROOT = Path(__file__).parents[2]
@@ -37,6 +39,11 @@ TINY = (
 def learn(out: Path, *more: str, steps: int = 384) -> int:
     """The command in this process."""
     return ppo.run_command(ppo.main, [*TINY, "--out", str(out), "--total-steps", str(steps), *more])
+
+
+def resume(out: Path, *more: str) -> int:
+    """Continue a run in this process."""
+    return ppo.run_command(ppo.main, ["--resume", str(out), *more])
 
 
 def checkpoint_bits(out: Path) -> dict[str, bytes]:
@@ -114,7 +121,7 @@ def test_a_resumed_run_ends_bitwise_like_an_uninterrupted_one(uninterrupted, tmp
             learn(out)
     begun = latest_checkpoint(out, "step").name
     assert 0 < int(begun.rpartition("-")[2]) < 384
-    assert learn(out, "--resume") == 0
+    assert resume(out) == 0
     assert checkpoint_bits(out) == checkpoint_bits(uninterrupted[0])
     columns = ("steps", "mean_s", "median_s", "finished", "bits_per_bit")
     curves = []
@@ -134,21 +141,90 @@ def test_a_run_killed_by_a_signal_can_be_resumed(tmp_path, uninterrupted):
         while not list(out.glob("step-*")) and process.poll() is None and time.monotonic() < deadline:
             time.sleep(0.005)
         process.send_signal(signal.SIGKILL)
-    assert learn(out, "--resume") == 0
+    assert resume(out) == 0
     assert checkpoint_bits(out) == checkpoint_bits(uninterrupted[0])
 
 
-def test_resuming_in_an_empty_folder_starts_a_run(tmp_path):
-    assert learn(tmp_path / "run", "--resume", steps=96) == 0
+@pytest.mark.parametrize("during", ["rollout", "validation", "last validation"])
+def test_ctrl_c_writes_a_checkpoint_and_says_how_to_go_on(
+    during, uninterrupted, tmp_path, capsys, monkeypatch
+):
+    out, interrupted = tmp_path / "run", []
+    compute, validate = DecisionBuffer.compute_returns_and_advantage, Validator.validate
+
+    def compute_interrupted(self, **given):
+        if during == "rollout" and not interrupted and list(out.glob("step-*")):
+            interrupted.append(1)
+            signal.raise_signal(signal.SIGINT)
+        return compute(self, **given)
+
+    def validate_interrupted(self, policy, stop):
+        if during != "rollout" and len(interrupted) < (2 if during == "last validation" else 1):
+            interrupted.append(1)
+            if len(interrupted) == (2 if during == "last validation" else 1):
+                signal.raise_signal(signal.SIGINT)
+        return validate(self, policy, stop)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(DecisionBuffer, "compute_returns_and_advantage", compute_interrupted)
+        patch.setattr(Validator, "validate", validate_interrupted)
+        assert learn(out) == INTERRUPTED
+    said = capsys.readouterr()
+    assert "Ctrl-C again ends at once" in said.err
+    stopped = json.loads(said.out)
+    assert stopped["steps"] == {"rollout": 192, "validation": 192, "last validation": 384}[during]
+    assert stopped["resume"] == f"python -m training.ppo --resume {out}"
+    assert latest_checkpoint(out, "step").name == checkpoint_name("step", stopped["steps"])
+    assert ppo.run_command(ppo.main, shlex.split(stopped["resume"])[3:]) == 0
+    assert checkpoint_bits(out) == checkpoint_bits(uninterrupted[0])
+    with (out / "curve.csv").open() as file:
+        assert [row["steps"] for row in csv.DictReader(file)] == ["192", "384"]
 
 
-def test_a_run_is_neither_overwritten_nor_continued_with_other_options(uninterrupted, capsys):
-    assert learn(uninterrupted[0]) == BAD_INPUT
-    assert "--resume to continue" in capsys.readouterr().err
-    assert learn(uninterrupted[0], "--resume", "--gamma", "0.5") == BAD_INPUT
-    assert capsys.readouterr().err.startswith("error: gamma = 0.5: allowed is 0.9, as in the run")
-    assert learn(uninterrupted[0], "--resume", "--channel.burst", "3") == BAD_INPUT
-    assert len(capsys.readouterr().err.splitlines()) == 1
+def test_a_second_ctrl_c_ends_at_once(capsys):
+    with Interruption("the end is written") as interruption:
+        assert not interruption.asked
+        signal.raise_signal(signal.SIGINT)
+        assert interruption.asked
+        with pytest.raises(KeyboardInterrupt):
+            signal.raise_signal(signal.SIGINT)
+    assert capsys.readouterr().err.count("\n") == 1
+    with pytest.raises(KeyboardInterrupt):  # as before
+        signal.raise_signal(signal.SIGINT)
+
+
+def test_a_run_without_a_checkpoint_begins_again_and_says_so(tmp_path, capsys):
+    """The folder alone names it; there is a checkpoint after the first update already."""
+    out, loud = tmp_path / "run", [word for word in TINY if word != "--json"]
+    words = [*loud, "--out", str(out), "--total-steps", "96", "--checkpoint-every", "9999", "--no-video"]
+    assert ppo.run_command(ppo.main, words) == 0
+    assert "          96 steps of 96, " in capsys.readouterr().err  # a line though this is no terminal
+    assert [path.name for path in out.glob("step-*")] == [checkpoint_name("step", 96)]
+    shutil.rmtree(out / checkpoint_name("step", 96))
+    assert resume(out, "--total-steps", "3e2") == 0
+    said = capsys.readouterr()
+    assert f"no checkpoint in {out}: from the beginning; total_steps was 96" in said.err
+    assert "          96 steps of 300, " in said.err
+    assert [path.name for path in out.glob("step-*")] == [checkpoint_name("step", n) for n in (96, 384)]
+    assert resume(out, "--total-steps", "400") == 0
+    assert f"{out} goes on after 384 steps; total_steps was 96" in capsys.readouterr().err
+
+
+def test_a_run_is_neither_overwritten_nor_continued_with_other_options(uninterrupted, tmp_path, capsys):
+    out = uninterrupted[0]
+    assert learn(out) == BAD_INPUT
+    assert f"--resume {out} continues the run" in capsys.readouterr().err
+    for words, said in (
+        (["--gamma", "0.5"], "error: gamma = 0.5: allowed is 0.9, as in the run"),
+        (["--channel.burst", "3"], "error: channel.burst = 3: allowed is 64, as in the run"),
+        (["--scenario", "room"], "error: scenario = 'room': allowed is box-7x11x5, as in the run"),
+        (["--out", str(tmp_path)], "error: out = "),
+    ):
+        assert resume(out, *words) == BAD_INPUT
+        told = capsys.readouterr().err
+        assert told.startswith(said) and told.count("\n") == 1
+    assert resume(tmp_path) == BAD_INPUT
+    assert "the folder of a run, with a run.json" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
@@ -227,7 +303,7 @@ def test_a_disk_that_is_full_leaves_the_last_good_checkpoint(tmp_path, capsys, m
     monkeypatch.undo()
     load_checkpoint(latest_checkpoint(out, "step"), training=True)
     assert not list(out.glob(".*.unfinished"))
-    assert learn(out, "--resume") == 0
+    assert resume(out) == 0
 
 
 def test_the_error_names_tensor_and_step():
@@ -239,7 +315,7 @@ def test_the_error_names_tensor_and_step():
 def test_a_best_policy_without_a_checkpoint_counts_as_a_run_and_a_resumed_run_removes_it(tmp_path, capsys):
     """A run killed between its first validation and its first checkpoint leaves only a best policy."""
     out = tmp_path / "run"
-    assert learn(out, "--checkpoint-every", "99999", "--no-video", steps=192) == 0
+    assert learn(out, "--no-video", steps=192) == 0
     capsys.readouterr()
     for step in out.glob("step-*"):
         shutil.rmtree(step)
@@ -248,5 +324,5 @@ def test_a_best_policy_without_a_checkpoint_counts_as_a_run_and_a_resumed_run_re
     assert learn(out, "--no-video", steps=192) == 2
     assert "--resume" in capsys.readouterr().err
     assert later.is_dir()
-    assert learn(out, "--no-video", "--resume", steps=192) == 0
+    assert resume(out) == 0
     assert not later.is_dir() and len(list(out.glob("best-*"))) >= 1

@@ -11,10 +11,11 @@ from typing import Any
 import pytest
 
 from baselines.cli.arguments import run_command
-from entropy_explore_env import SettingError
-from training import rllib_ppo
+from entropy_explore_env.command import INTERRUPTED
+from training import rllib_ppo, run_folder
 from training.errors import NotFiniteError
-from training.rllib_ppo import Args, iterate, last_checkpoint, main
+from training.interruption import Interruption
+from training.rllib_ppo import Args, last_checkpoint, main
 
 
 @pytest.mark.parametrize(
@@ -31,7 +32,7 @@ from training.rllib_ppo import Args, iterate, last_checkpoint, main
         ("--entropy-bonus -1", "entropy_bonus = -1"),
         ("--hidden 0", "hidden = [0]"),
         ("--address somewhere", "HOST:PORT of a Ray cluster"),
-        ("--resume", "a folder with a checkpoint"),
+        ("--resume nowhere", "the folder of a run"),
         ("--no-such-option 1", "no-such-option"),
     ],
 )
@@ -49,11 +50,19 @@ def test_a_folder_that_cannot_be_made(tmp_path, capsys):
     assert "a folder that can be made" in said and said.count("\n") == 1
 
 
+class Quiet:
+    """Stands in for Ray where nothing is trained."""
+
+    def shutdown(self) -> None:
+        """Nothing was started."""
+
+
 def test_a_folder_that_cannot_be_written(tmp_path, capsys, monkeypatch):
     def refuse(path: Path, content: str) -> None:
         raise PermissionError(errno.EACCES, "Permission denied", str(path))
 
-    monkeypatch.setattr(rllib_ppo, "write_atomically", refuse)
+    monkeypatch.setattr(run_folder, "write_atomically", refuse)
+    monkeypatch.setattr(rllib_ppo, "start_ray", lambda address, runners: Quiet())
     assert run_command(main, ["--out", str(tmp_path)]) == 2
     said = capsys.readouterr().err
     assert "a folder that can be written (Permission denied)" in said and said.count("\n") == 1
@@ -65,6 +74,7 @@ def test_without_ray_the_extra_is_named(tmp_path, capsys, monkeypatch):
     assert capsys.readouterr().err == (
         "error: ray[rllib] is not installed: pip install 'entropy_explore_env[rllib]'\n"
     )
+    assert not (tmp_path / run_folder.FILE).exists()  # nothing to continue
 
 
 class Scripted:
@@ -92,8 +102,14 @@ def args_for(folder: Path, steps: int) -> Args:
     return Args(out=folder, robots=2, total_steps=steps, checkpoint_every=2)
 
 
+def iterate(args: Args, algorithm: Scripted, iteration: int, asked: bool = False) -> bool:
+    interruption = Interruption("it ends")
+    interruption.asked = asked
+    return rllib_ppo.iterate(args, algorithm, iteration, interruption)
+
+
 def test_checkpoints_come_and_go(tmp_path, capsys):
-    iterate(args_for(tmp_path, 500), Scripted([0.1] * 5), iteration=0)
+    assert iterate(args_for(tmp_path, 500), Scripted([0.1] * 5), iteration=0)
     assert [path.name for path in tmp_path.glob("*checkpoint*")] == ["checkpoint-000005"]
     rows = (tmp_path / "progress.csv").read_text().splitlines()
     assert rows[0].startswith("iteration,decisions,return,t_mission_s,finished") and len(rows) == 6
@@ -118,19 +134,34 @@ def test_a_full_disk_keeps_the_last_checkpoint(tmp_path):
     assert last_checkpoint(tmp_path) == tmp_path / "checkpoint-000006"
 
 
-def test_resuming_wants_a_whole_checkpoint(tmp_path):
-    (tmp_path / "unfinished-checkpoint").mkdir()
-    with pytest.raises(SettingError, match="a folder with a checkpoint"):
-        rllib_ppo.prepare_folder(Args(out=tmp_path, resume=True))
+def test_the_first_iteration_leaves_a_checkpoint(tmp_path):
+    with pytest.raises(NotFiniteError):
+        iterate(args_for(tmp_path, 900), Scripted([0.1, math.nan]), iteration=0)
+    assert last_checkpoint(tmp_path) == tmp_path / "checkpoint-000001"
 
 
-def test_a_folder_with_a_run_is_gone_on_with_and_not_begun_anew(tmp_path):
-    rllib_ppo.prepare_folder(Args(out=tmp_path))
-    (tmp_path / "checkpoint-000010").mkdir()
-    before = (tmp_path / "settings.json").read_text()
-    with pytest.raises(SettingError, match="or --resume to continue"):
-        rllib_ppo.prepare_folder(Args(out=tmp_path))
-    with pytest.raises(SettingError, match="scenario"):
-        rllib_ppo.prepare_folder(Args(out=tmp_path, resume=True, robots=2))
-    assert (tmp_path / "settings.json").read_text() == before
-    assert rllib_ppo.prepare_folder(Args(out=tmp_path, resume=True))["decision_period_s"] is None
+def test_an_interrupted_run_ends_with_a_checkpoint(tmp_path):
+    assert not iterate(args_for(tmp_path, 900), Scripted([0.1] * 9), iteration=6, asked=True)
+    assert last_checkpoint(tmp_path) == tmp_path / "checkpoint-000007"
+
+
+def test_an_interrupted_command_says_how_to_go_on(tmp_path, capsys, monkeypatch):
+    def train(args: Args, env_settings: dict[str, Any], interruption: Interruption) -> bool:
+        assert args.out is not None
+        (args.out / "checkpoint-000003").mkdir(exist_ok=True)
+        return False
+
+    monkeypatch.setattr(rllib_ppo, "start_ray", lambda address, runners: Quiet())
+    monkeypatch.setattr(rllib_ppo, "train", train)
+    run = tmp_path / "run"
+    assert run_command(main, ["--robots", "2", "--batch", "600", "--out", str(run)]) == INTERRUPTED
+    assert f"python -m training.rllib_ppo --resume {run}\n" in capsys.readouterr().out
+    assert run_command(main, ["--out", str(run)]) == 2
+    assert f"--resume {run} continues" in capsys.readouterr().err
+    assert run_command(main, ["--resume", str(run), "--robots", "3"]) == 2
+    assert "robots = 3: allowed is 2, as in the run" in capsys.readouterr().err
+    assert run_command(main, ["--resume", str(run), "--runners", "1"]) == INTERRUPTED
+    assert f"{run}: goes on after 3 iterations; runners was 2\n" == capsys.readouterr().err
+    (run / "checkpoint-000003").rmdir()
+    assert run_command(main, ["--resume", str(run)]) == INTERRUPTED
+    assert f"{run}: no checkpoint: from the beginning\n" == capsys.readouterr().err

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from baselines.cli.arguments import parse, print_json, run_command
+from baselines.cli.arguments import WholeNumber, parse, print_json, run_command, whole_number
 from entropy_explore_env.command import BAD_INPUT, UsageError
 from entropy_explore_env.errors import MissingExtraError
 
@@ -47,6 +47,31 @@ def test_words_that_do_not_fit_are_named_in_one_line_and_print_nothing(words, sa
     assert said in str(error.value) and "\n" not in str(error.value)
     assert not set(str(error.value)) & set("│╭╮╰╯─")
     assert capsys.readouterr() == ("", "")
+
+
+@dataclass
+class Counts:
+    """Count."""
+
+    steps: WholeNumber = 3
+    """How many."""
+    most: WholeNumber | None = None
+    """At most."""
+
+
+@pytest.mark.parametrize(
+    ("word", "number"),
+    [("1e6", 10**6), ("2.5e6", 2_500_000), ("2_500", 2500), ("-3", -3), ("9007199254740993", 2**53 + 1)],
+)
+def test_a_whole_number_may_be_typed_with_an_exponent(word, number):
+    assert whole_number(word) == number
+    assert parse(Counts, ["--steps", word, "--most", word]) == Counts(number, number)
+
+
+@pytest.mark.parametrize("word", ["1.5", "1e-1", "many", "inf", "nan", "1e400", ""])
+def test_what_is_no_whole_number_is_named(word):
+    with pytest.raises(UsageError, match="--steps.*is not a whole number"):
+        parse(Counts, [f"--steps={word}"])
 
 
 def test_help_goes_to_standard_output_and_ends_well(capsys):

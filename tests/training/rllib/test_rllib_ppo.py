@@ -16,7 +16,7 @@ from ray.rllib.env.multi_agent_env_runner import MultiAgentEnvRunner
 
 from baselines.cli.arguments import run_command
 from training import ray_cluster
-from training.rllib_ppo import Args, configure, main, prepare_folder
+from training.rllib_ppo import Args, configure, environment_settings, main
 
 pytestmark = [  # RLlib's own
     pytest.mark.filterwarnings("ignore::DeprecationWarning"),
@@ -44,7 +44,7 @@ def test_it_trains_with_two_runners_and_resumes(tmp_path):
     assert [row["iteration"] for row in rows] == ["1", "2"]
     assert 480 <= float(rows[-1]["decisions"]) < 500
     assert [path.name for path in (tmp_path / "run").glob("checkpoint-*")] == ["checkpoint-000002"]
-    words = [*command[3:], "--total-steps", "720", "--resume", "--runners", "0"]
+    words = ["--resume", str(tmp_path / "run"), "--total-steps", "720", "--runners", "0"]
     assert run_command(main, words) == 0
     rows = rows_of(tmp_path / "run")
     assert [row["iteration"] for row in rows] == ["1", "2", "3"]
@@ -54,7 +54,7 @@ def test_it_trains_with_two_runners_and_resumes(tmp_path):
 
 def missions_of(args: Args, iterations: int) -> list[tuple[int, bytes]]:
     """Seed and first robot's start of every mission of every runner."""
-    config, missions = configure(args, prepare_folder(args), iterations), []
+    config, missions = configure(args, environment_settings(args), iterations), []
     for worker in range(1, args.runners + 1):
         runner = MultiAgentEnvRunner(config=config, worker_index=worker, num_workers=args.runners)
         runner.sample(num_timesteps=0, random_actions=True)
