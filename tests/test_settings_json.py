@@ -166,5 +166,5 @@ def test_settings_of_earlier_versions_load_under_their_new_names():
 def test_any_dataclass_of_settings_comes_back():
     kind = RobotKind(Robot(reach_m=math.inf, motion="planar"), RangeSensor(field_of_view_rad=(1.5, 0.25)))
     assert dataclass_of(RobotKind, json.loads(json.dumps(json_of(kind), allow_nan=False))) == kind
-    with pytest.raises(SettingError, match="RobotKind.wings"):
+    with pytest.raises(SettingError, match=r"RobotKind\.wings"):
         dataclass_of(RobotKind, {"wings": 2})

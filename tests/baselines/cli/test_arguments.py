@@ -70,7 +70,7 @@ def test_a_whole_number_may_be_typed_with_an_exponent(word, number):
 
 @pytest.mark.parametrize("word", ["1.5", "1e-1", "many", "inf", "nan", "1e400", ""])
 def test_what_is_no_whole_number_is_named(word):
-    with pytest.raises(UsageError, match="--steps.*is not a whole number"):
+    with pytest.raises(UsageError, match=r"--steps.*is not a whole number"):
         parse(Counts, [f"--steps={word}"])
 
 
