@@ -29,11 +29,15 @@ from entropy_explore_env.validation import (
     check_count,
     check_instance,
     check_kind,
-    check_positive,
+    check_within,
 )
 
 MAX_IN_FLIGHT = 2**24
 """Measurements of delayed messages that may be under way at once."""
+MAX_DRIVE_S = 1e5
+"""A robot drives straight across the workspace in this time, or less."""
+MAX_SCANS_UNDER_WAY = 20_000
+"""Scans under way, straight across the workspace."""
 MAX_ACTIONS = 2**20
 """Discrete actions, counted with those in the corners beyond reach."""
 Settings = TypeVar("Settings")
@@ -58,7 +62,7 @@ class Scenario:
             (missions/action.py, missions/observation/layout.py).
         start_radius_m: Robots start at most so far from where the first one does; inf = anywhere.
         sigma_prior: Standard deviation of coverage before any measurement; the mean is ½.
-        decision_period_s: A step lasts this long; None = until the next robot has to decide.
+        decision_period_s: A step lasts this long, 1e-3 to 1e5; None = until the next robot has to decide.
         track_truth: Whether the team's joint map, of everything measured, is kept and compared with the
             truth: for figures only, nobody acts on it. It costs one more map a mission.
     """
@@ -95,10 +99,10 @@ class Scenario:
             object.__setattr__(self, "extra_kinds", extra_kinds)
         check_choice(self, "split", Literal["train", "validation", "test"])
         check_count(self, "robots", 1, 1000)
-        check_positive(self, "start_radius_m", finite=False)
+        check_within(self, "start_radius_m", least=1e-6, most=1e6, inf=True)
         check(self, "sigma_prior", "a number from 1e-3 to 1e4", lambda v: 1e-3 <= v <= 1e4)
         if self.decision_period_s is not None:
-            check_positive(self, "decision_period_s")
+            check_within(self, "decision_period_s", least=1e-3, most=1e5)
         check_kind(self, "track_truth", bool)
         if self.ending.sigma_end >= self.sigma_prior:
             raise SettingError(
@@ -106,6 +110,7 @@ class Scenario:
             )
         for kind in self.kinds:
             self._check_kind(kind.robot)
+            self._check_drives(kind)
         rays = max(kind.sensor.rays for kind in self.kinds)
         allowed = f"so short that at most {MAX_IN_FLIGHT} measurements are under way at once"
         if self.message_slots * max(min(self.channel.burst, rays), 1) > MAX_IN_FLIGHT:
@@ -135,6 +140,27 @@ class Scenario:
         if layer is not None and layer >= self.grid.shape[2]:
             allowed = f"below the workspace's height ({self.grid.size_m[2]} m)"
             raise SettingError("Robot.sensor_height_m", robot.sensor_height_m, allowed)
+
+    def _check_drives(self, kind: RobotKind) -> None:
+        """Check that a drive takes a day at most and few scans, so that a step soon returns."""
+        across_m = float(np.linalg.norm(self.grid.size_m))
+        robot, every_m = kind.robot, kind.sensor.scan_every_m
+        if 2.0 * robot.body_radius_m > self.grid.size_m.max():
+            allowed = f"at most half the workspace's longest edge ({self.grid.size_m.max():.6g} m)"
+            raise SettingError("Robot.body_radius_m", robot.body_radius_m, allowed)
+        if across_m / robot.max_speed_m_s > MAX_DRIVE_S:
+            allowed = f"at least {across_m / MAX_DRIVE_S:.3g}: across the workspace in {MAX_DRIVE_S:g} s"
+            raise SettingError("Robot.max_speed_m_s", robot.max_speed_m_s, allowed)
+        if 2.0 * math.sqrt(across_m / robot.acceleration_m_s2) > MAX_DRIVE_S:
+            allowed = (
+                f"at least {4.0 * across_m / MAX_DRIVE_S**2:.3g}: across the workspace in {MAX_DRIVE_S:g} s"
+            )
+            raise SettingError("Robot.acceleration_m_s2", robot.acceleration_m_s2, allowed)
+        if across_m / every_m > MAX_SCANS_UNDER_WAY:
+            allowed = (
+                f"at least {across_m / MAX_SCANS_UNDER_WAY:.3g}, a share of the workspace's diagonal, or inf"
+            )
+            raise SettingError("RangeSensor.scan_every_m", every_m, allowed)
 
     @cached_property
     def kinds(self) -> tuple[RobotKind, ...]:

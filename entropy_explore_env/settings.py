@@ -15,8 +15,7 @@ from entropy_explore_env.validation import (
     check_count,
     check_counts,
     check_kind,
-    check_not_negative,
-    check_positive,
+    check_within,
     is_number,
 )
 
@@ -106,16 +105,18 @@ class Robot:
             is), without stopping at its corners.
         unknown_cost: Planned paths: what a metre through unknown voxels costs, in metres through
             known ones; ≥ 1.
-        reach_m: Largest displacement of one decision (ξ of Rocha04, eq. 32); inf = the workspace.
-        max_speed_m_s: Top speed.
-        acceleration_m_s2: Of speeding up and of braking.
-        turn_rate_rad_s: Of yaw and pitch, while driving; inf = at once.
-        body_radius_m: The body is a ball; 0 = a point that blocks nobody.
-        sensor_height_m: Planar robots: height of the sensor above the workspace's floor.
+        reach_m: Largest displacement of one decision (ξ of Rocha04, eq. 32), 1e-6 to 1e6;
+            inf = the workspace.
+        max_speed_m_s: Top speed, 1e-4 to 1e6.
+        acceleration_m_s2: Of speeding up and of braking, 1e-4 to 1e6.
+        turn_rate_rad_s: Of yaw and pitch, while driving, 1e-4 to 1e6; inf = at once.
+        body_radius_m: The body is a ball; 0 = a point that blocks nobody. At most 1e6.
+        sensor_height_m: Planar robots: height of the sensor above the workspace's floor, 0 to 1e6.
         when_blocked: After a drive that a teammate cut short (MoveEnd.TEAMMATE), who may move on: `wander`
             decides anew at once, and our strategies then wander; `wait` stands still first. Either way
             the robot scans where it stopped, as after every drive, before that.
-        blocked_wait_s: `wait`: from the end of that scan until it decides; nothing else ends the wait.
+        blocked_wait_s: `wait`: from the end of that scan until it decides, 1e-4 to 1e5; nothing else ends
+            the wait.
         redecide: `at_stop`: the robot decides only where it stops. It decides while it drives, too, with
             `on_scan` at every scan under way, which its sensor must take (`RangeSensor.scan_every_m`); with a
             number whenever so many seconds, at least 0.01, have passed since it last decided. It drives on
@@ -140,12 +141,12 @@ class Robot:
         check_choice(self, "motion", Literal["free", "planar"])
         check_choice(self, "navigator", Literal["straight", "planned"])
         check(self, "unknown_cost", "a number from 1 to 1e6", lambda v: 1.0 <= v <= 1e6)
-        check_positive(self, "max_speed_m_s", "acceleration_m_s2")
-        check_positive(self, "reach_m", "turn_rate_rad_s", finite=False)
-        check(self, "reach_m", "a number from 0 to 1e6, or inf", lambda v: v <= 1e6 or v == math.inf)
-        check_not_negative(self, "body_radius_m", "sensor_height_m")
+        check_within(self, "reach_m", least=1e-6, most=1e6, inf=True)
+        check_within(self, "max_speed_m_s", "acceleration_m_s2", least=1e-4, most=1e6)
+        check_within(self, "turn_rate_rad_s", least=1e-4, most=1e6, inf=True)
+        check_within(self, "body_radius_m", "sensor_height_m", least=0, most=1e6)
         check_choice(self, "when_blocked", Literal["wander", "wait"])
-        check_positive(self, "blocked_wait_s")
+        check_within(self, "blocked_wait_s", least=1e-4, most=1e5)
         periodic = is_number(self.redecide) and MIN_REDECIDE_S <= self.redecide < math.inf
         if not periodic and not (isinstance(self.redecide, str) and self.redecide in _REDECIDE):
             allowed = f"one of {', '.join(_REDECIDE)}, or a finite number of seconds ≥ {MIN_REDECIDE_S}"
@@ -159,14 +160,14 @@ class RangeSensor:
     Attributes:
         field_of_view_rad: Full widths (yaw, pitch); (π/6, π/12) at π/90 gives 16 × 8 rays.
         angular_step_rad: Between neighbouring rays.
-        max_range_m: Farthest return; inf = the workspace's boundary, which is a wall.
+        max_range_m: Farthest return, 1e-6 to 1e6; inf = the workspace's boundary, which is a wall.
         sigma_min: Standard deviation of coverage right before the sensor (eq. 5).
-        sigma_slope_per_m: Its growth with the measured distance, ζ (eq. 5).
-        range_noise_m: Standard deviation of the measured distance.
+        sigma_slope_per_m: Its growth with the measured distance, ζ (eq. 5), 0 to 1e6.
+        range_noise_m: Standard deviation of the measured distance, 0 to 1e6.
         voxels_behind: Voxels behind the hit that a ray still updates (as covered: eq. 4).
-        scan_time_s: A scan takes this long, standing still.
-        scan_every_m: A scan is also taken under way, whenever so much of the way is driven: the robot
-            drives on, and the scan takes no time. inf = only on arrival.
+        scan_time_s: A scan takes this long, 1e-4 to 1e5, standing still.
+        scan_every_m: A scan is also taken under way, whenever so much of the way is driven, 1e-3 to 1e6: the
+            robot drives on, and the scan takes no time. inf = only on arrival.
         min_range_m: Nearest return, as of a depth camera that is blind close by: a return whose measured
             distance is shorter brings no measurement, and nothing is learned along its ray. Of farther
             returns, and of rays without one, all that the ray crossed is known to be free, also close by.
@@ -195,11 +196,11 @@ class RangeSensor:
             raise SettingError(
                 "RangeSensor.field_of_view_rad", view, "a tuple (yaw in [0, 2π], pitch in [0, π])"
             )
-        check_positive(self, "scan_time_s")
-        check(self, "scan_every_m", "a number ≥ 1e-3, or inf", lambda v: v >= 1e-3)
+        check_within(self, "scan_time_s", least=1e-4, most=1e5)
+        check_within(self, "scan_every_m", least=1e-3, most=1e6, inf=True)
         check(self, "angular_step_rad", "a finite number ≥ 1e-6", lambda v: 1e-6 <= v < math.inf)
-        check_positive(self, "max_range_m", finite=False)
-        check_not_negative(self, "sigma_slope_per_m", "range_noise_m")
+        check_within(self, "max_range_m", least=1e-6, most=1e6, inf=True)
+        check_within(self, "sigma_slope_per_m", "range_noise_m", least=0, most=1e6)
         check(self, "min_range_m", "a number ≥ 0 below max_range_m", lambda v: 0 <= v < self.max_range_m)
         check(self, "sigma_min", "a number from 1e-4 to 1e4", lambda v: 1e-4 <= v <= 1e4)
         check_count(self, "voxels_behind", 0, 1000)
@@ -261,16 +262,17 @@ class Channel:
 
     Attributes:
         burst: Most measurements of one batch; 0 shares none.
-        i_min_bits: I_min, the least utility of a measurement that is worth sending.
+        i_min_bits: I_min, the least utility of a measurement that is worth sending, 0 to 1e6.
         i_min_fill: None keeps I_min. A number lets each robot steer its own, from i_min_bits on, so that
             on average over its scans so many bursts of measurements reach it (Rocha04, sect. 5.1.1).
         i_min_gain: How much a scan with no such measurement, or with twice as many, changes ln I_min.
-        range_m: Farthest teammate that hears; inf = all.
+        range_m: Farthest teammate that hears, 1e-9 to 1e6; inf = all.
         loss_probability: Of a message on its way to one teammate.
-        delay_s: From sending to hearing.
+        delay_s: From sending to hearing, 0 to 3600.
         announcements: Whether robots announce the viewpoints that they choose.
-        phase_s: Length of a phase of the broadcast; 0 = batches are sent at once.
-        repeats: How often a phase's batches are sent in the next phase, evenly spread over it.
+        phase_s: Length of a phase of the broadcast, 1e-3 to 3600; 0 = batches are sent at once.
+        repeats: How often a phase's batches are sent in the next phase, evenly spread over it; 1e-3 s apart
+            or more.
     """
 
     burst: int = 64
@@ -287,17 +289,19 @@ class Channel:
     def __post_init__(self) -> None:
         """Check every field."""
         check_count(self, "burst", 0, 1_000_000)
-        check_not_negative(self, "i_min_bits")
+        check_within(self, "i_min_bits", least=0, most=1e6)
         if self.i_min_fill is not None:
             check(self, "i_min_fill", "None, or a number above 0 up to 10", lambda v: 0 < v <= 10)
             check(self, "i_min_bits", "above 0 where I_min is steered", lambda v: v > 0)
         check(self, "i_min_gain", "a number above 0 up to 1", lambda v: 0 < v <= 1)
-        check_positive(self, "range_m", finite=False)
+        check_within(self, "range_m", least=1e-9, most=1e6, inf=True)
         check(self, "loss_probability", "a number from 0 to 1", lambda v: 0 <= v <= 1)
         check(self, "delay_s", "a number from 0 to 3600", lambda v: 0 <= v <= 3600)
         check_kind(self, "announcements", bool)
-        check(self, "phase_s", "0, or a number from 1e-3 to 3600", lambda v: v == 0 or 1e-3 <= v <= 3600)
+        check_within(self, "phase_s", least=1e-3, most=3600, zero=True)
         check_count(self, "repeats", 1, 1000)
+        if self.phase_s / self.repeats < 1e-3 and self.phase_s > 0.0:
+            raise SettingError("Channel.repeats", self.repeats, "so few that they are 1e-3 s apart or more")
         if self.phase_s > 0.0 and self.delay_s > 0.0:
             raise SettingError("Channel.delay_s", self.delay_s, "0 where batches are broadcast in phases")
 
@@ -312,7 +316,8 @@ class Ending:
     Attributes:
         sigma_end: Standard deviation of coverage at which a voxel counts as known.
         termination: `any` or `all`: whether one robot's map has to pass the threshold, or all robots' maps.
-        time_limit_s: Simulated time after which the mission is cut off (a truncation); inf = never.
+        time_limit_s: Simulated time after which the mission is cut off (a truncation), 1e-3 to 1e9; inf =
+            never.
         max_cycles: Steps after which it is cut off; None = never.
     """
 
@@ -325,7 +330,7 @@ class Ending:
         """Check every field."""
         check(self, "sigma_end", "a number from 1e-4 to 1e4", lambda v: 1e-4 <= v <= 1e4)
         check_choice(self, "termination", Literal["any", "all"])
-        check_positive(self, "time_limit_s", finite=False)
+        check_within(self, "time_limit_s", least=1e-3, most=1e9, inf=True)
         if self.max_cycles is not None:
             check_count(self, "max_cycles", 1, 2**62)
 
@@ -337,7 +342,7 @@ class Reward:
     Attributes:
         kind: `individual`: bits that the robot's own measurements took from its own map;
             `team`: mean decrease of the robots' map entropies.
-        cost_per_s: Subtracted for every second that passes.
+        cost_per_s: Subtracted for every second that passes, 0 to 1e6.
     """
 
     kind: Literal["individual", "team"] = "individual"
@@ -346,7 +351,7 @@ class Reward:
     def __post_init__(self) -> None:
         """Check every field."""
         check_choice(self, "kind", Literal["individual", "team"])
-        check_not_negative(self, "cost_per_s")
+        check_within(self, "cost_per_s", least=0, most=1e6)
 
 
 @dataclass(frozen=True)

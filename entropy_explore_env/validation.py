@@ -71,6 +71,21 @@ def check_positive(settings: object, *names: str, finite: bool = True) -> None:
         check(settings, name, allowed, lambda v: v > 0 and (math.isfinite(v) or not finite))
 
 
+def check_within(
+    settings: object, *names: str, least: float, most: float, zero: bool = False, inf: bool = False
+) -> None:
+    """Each field is a number in a range, both ends allowed; or 0, or inf, where these are said."""
+    others = [word for word, also in (("0", zero), ("inf", inf)) if also]
+    allowed = " or ".join([f"a number from {least:g} to {most:g}", *others])
+    for name in names:
+        check(
+            settings,
+            name,
+            allowed,
+            lambda v: least <= v <= most or (zero and v == 0) or (inf and v == math.inf),
+        )
+
+
 def check_not_negative(settings: object, *names: str) -> None:
     """Each field is a finite number ≥ 0."""
     for name in names:

@@ -29,6 +29,8 @@ NAN, INF = math.nan, math.inf
 NO_NUMBERS = ("1", None, True, [1.0], NAN)
 """Never a number > 0, nor one of another range."""
 POSITIVE = (*NO_NUMBERS, 0.0, -1.0)
+TINY, HUGE = 5e-324, 1e300
+"""Numbers with which a drive or a scan would take for ever, or a sum be infinite."""
 NOT_NEGATIVE = (*NO_NUMBERS, -1e-9, INF)
 COUNT = (*NO_NUMBERS, 1.5, -1)
 KIND = (None, 1, "free ", "FREE", NAN, [])
@@ -61,16 +63,16 @@ REFUSED = {
     (Robot, "motion"): KIND,
     (Robot, "navigator"): KIND,
     (Robot, "unknown_cost"): (*NO_NUMBERS, 0.0, 0.999, INF, 1.1e6),
-    (Robot, "reach_m"): POSITIVE,
-    (Robot, "max_speed_m_s"): (*POSITIVE, INF),
-    (Robot, "acceleration_m_s2"): (*POSITIVE, INF),
-    (Robot, "turn_rate_rad_s"): POSITIVE,
-    (Robot, "body_radius_m"): NOT_NEGATIVE,
-    (Robot, "sensor_height_m"): NOT_NEGATIVE,
+    (Robot, "reach_m"): (*POSITIVE, TINY, 0.9e-6, 1.1e6, HUGE),
+    (Robot, "max_speed_m_s"): (*POSITIVE, TINY, 0.9e-4, 1.1e6, HUGE, INF),
+    (Robot, "acceleration_m_s2"): (*POSITIVE, TINY, 0.9e-4, 1.1e6, HUGE, INF),
+    (Robot, "turn_rate_rad_s"): (*POSITIVE, TINY, 0.9e-4, 1.1e6, HUGE),
+    (Robot, "body_radius_m"): (*NOT_NEGATIVE, 1.1e6),
+    (Robot, "sensor_height_m"): (*NOT_NEGATIVE, 1.1e6),
     (Robot, "when_blocked"): KIND,
-    (Robot, "blocked_wait_s"): (*POSITIVE, INF),
+    (Robot, "blocked_wait_s"): (*POSITIVE, TINY, 0.9e-4, 1.1e5, INF),
     (Robot, "redecide"): (None, True, [1.0], NAN, INF, 0.0, -1.0, 0.0099, "on_scans", "AT_STOP", "1", ""),
-    (Scenario, "start_radius_m"): POSITIVE,
+    (Scenario, "start_radius_m"): (*POSITIVE, TINY, 1.1e6),
     (RangeSensor, "field_of_view_rad"): (
         0.5,
         (0.5,),
@@ -85,19 +87,19 @@ REFUSED = {
         None,
     ),
     (RangeSensor, "angular_step_rad"): (*POSITIVE, INF, 1e-5, 1e-320),
-    (RangeSensor, "max_range_m"): POSITIVE,
+    (RangeSensor, "max_range_m"): (*POSITIVE, TINY, 0.9e-6, 1.1e6, HUGE),
     (RangeSensor, "min_range_m"): (*NOT_NEGATIVE, INF),
     (RangeSensor, "sigma_min"): (*POSITIVE, INF, 0.9e-4, 1.1e4),
-    (RangeSensor, "sigma_slope_per_m"): NOT_NEGATIVE,
-    (RangeSensor, "range_noise_m"): NOT_NEGATIVE,
+    (RangeSensor, "sigma_slope_per_m"): (*NOT_NEGATIVE, 1.1e6, HUGE),
+    (RangeSensor, "range_noise_m"): (*NOT_NEGATIVE, 1.1e6, HUGE),
     (RangeSensor, "voxels_behind"): (*COUNT, 1001),
-    (RangeSensor, "scan_time_s"): (*POSITIVE, INF),
-    (RangeSensor, "scan_every_m"): (*POSITIVE, 0.9e-3),
+    (RangeSensor, "scan_time_s"): (*POSITIVE, TINY, 0.9e-4, 1.1e5, INF),
+    (RangeSensor, "scan_every_m"): (*POSITIVE, 0.9e-3, 1.1e6),
     (Channel, "burst"): (*COUNT, 1_000_001),
-    (Channel, "i_min_bits"): NOT_NEGATIVE,
+    (Channel, "i_min_bits"): (*NOT_NEGATIVE, 1.1e6),
     (Channel, "i_min_fill"): ("1", True, NAN, 0.0, -0.5, 10.01, INF),
     (Channel, "i_min_gain"): (*POSITIVE, 1.01, INF),
-    (Channel, "range_m"): POSITIVE,
+    (Channel, "range_m"): (*POSITIVE, TINY, 1.1e6),
     (Channel, "loss_probability"): (*NO_NUMBERS, -0.01, 1.01, INF),
     (Channel, "delay_s"): (*NO_NUMBERS, -0.01, 3601.0, INF),
     (Channel, "announcements"): SWITCH,
@@ -105,10 +107,10 @@ REFUSED = {
     (Channel, "repeats"): (*COUNT, 0, 1001),
     (Ending, "sigma_end"): (*POSITIVE, INF, 0.9e-4, 1.1e4),
     (Ending, "termination"): KIND,
-    (Ending, "time_limit_s"): POSITIVE,
+    (Ending, "time_limit_s"): (*POSITIVE, TINY, 0.9e-3, 1.1e9, HUGE),
     (Ending, "max_cycles"): ("1", True, [1], NAN, 0, -1, 1.5, 2**63),
     (Reward, "kind"): KIND,
-    (Reward, "cost_per_s"): NOT_NEGATIVE,
+    (Reward, "cost_per_s"): (*NOT_NEGATIVE, 1.1e6, HUGE),
     (Action, "kind"): KIND,
     (Action, "moves"): KIND,
     (Action, "yaws"): (*COUNT, 0, 361),
@@ -139,7 +141,7 @@ REFUSED = {
     (Scenario, "world"): (None, 1),
     (Scenario, "robots"): (*COUNT, 0, 1001),
     (Scenario, "sigma_prior"): (*POSITIVE, INF, 0.9e-3, 1.1e4),
-    (Scenario, "decision_period_s"): ("1", True, [1.0], NAN, 0.0, -1.0, INF),
+    (Scenario, "decision_period_s"): ("1", True, [1.0], NAN, 0.0, -1.0, TINY, 0.9e-3, 1.1e5, HUGE, INF),
     (Scenario, "track_truth"): SWITCH,
     (Scenario, "robot"): (None, Channel(), "free"),
     (Scenario, "sensor"): (None, Reward()),
@@ -188,17 +190,23 @@ def test_every_setting_is_in_the_list():
 ACCEPTED = [
     (Grid, {"shape": (1, 1, 1), "voxel_size_m": 1e-3, "origin_m": (-1, 2.5, 0)}),
     (Grid, {"shape": (np.int64(7), np.int32(11), 5), "voxel_size_m": np.float64(0.5)}),
+    (Robot, {"reach_m": 1e-6, "max_speed_m_s": 1e-4, "acceleration_m_s2": 1e6, "turn_rate_rad_s": 1e-4}),
+    (Robot, {"reach_m": 1e6, "max_speed_m_s": 1e6, "acceleration_m_s2": 1e-4, "blocked_wait_s": 1e-4}),
     (Robot, {"reach_m": INF, "turn_rate_rad_s": INF, "body_radius_m": 0, "sensor_height_m": 0}),
     (Robot, {"motion": "planar", "reach_m": 3, "navigator": "planned", "unknown_cost": 1}),
     (Robot, {"redecide": "on_scan"}),
     (Robot, {"redecide": 0.01}),
     (Robot, {"redecide": np.float32(1e6)}),
-    (RangeSensor, {"scan_every_m": 1e-3}),
+    (RangeSensor, {"scan_every_m": 1e-3, "scan_time_s": 1e-4, "max_range_m": 1e-6}),
+    (RangeSensor, {"scan_every_m": 1e6, "scan_time_s": 1e5, "max_range_m": 1e6, "range_noise_m": 1e6}),
     (RangeSensor, {"scan_every_m": INF}),
     (RangeSensor, {"field_of_view_rad": (2 * math.pi, math.pi), "max_range_m": INF, "voxels_behind": 0}),
     (RangeSensor, {"field_of_view_rad": (0, 0), "sigma_min": 1e-4, "sigma_slope_per_m": 0}),
     (Channel, {"burst": 0, "i_min_bits": 0, "range_m": 1e-9, "loss_probability": 1, "delay_s": 3600}),
     (Ending, {"sigma_end": 1e-4, "termination": "all", "time_limit_s": INF, "max_cycles": 1}),
+    (Ending, {"time_limit_s": 1e-3}),
+    (Channel, {"phase_s": 1.0, "repeats": 1000, "range_m": 1e6, "i_min_bits": 1e6}),
+    (Channel, {"phase_s": 1e-3, "repeats": 1}),
     (Reward, {"kind": "team", "cost_per_s": 0}),
     (Action, {"kind": "discrete", "yaws": 1, "pitches": 1}),
     (Observation, {"panorama_yaws": 1, "panorama_utility": "log2", "patch_shape": (1, 1, 1)}),
@@ -221,6 +229,7 @@ def test_a_number_that_no_float_holds_is_refused_in_a_short_line():
 
 def test_settings_that_do_not_fit_each_other_are_refused():
     discrete = {"action": {"kind": "discrete"}}
+    huge = {"grid": Grid((7, 11, 5), 2e4)}
     for settings, field in (
         ({"ending": {"sigma_end": 30.0}}, "Ending.sigma_end"),
         ({"sigma_prior": 0.01}, "Ending.sigma_end"),
@@ -240,8 +249,19 @@ def test_settings_that_do_not_fit_each_other_are_refused():
         ({"channel": {"phase_s": 1.0, "delay_s": 1.0}}, "Channel.delay_s"),
         ({"robot": {"redecide": "on_scan"}}, "Robot.redecide"),
         ({"robot": {"redecide": 0.01}, "channel": {"delay_s": 3600.0}, "robots": 64}, "Channel.delay_s"),
+        ({"channel": {"phase_s": 0.9, "repeats": 1000}}, "Channel.repeats"),
+        # The box is 3.5 × 5.5 × 2.5 m: 6.98 m across; 2 · √(6.98 / 1e-4) s = 528 s.
+        ({"robot": {"body_radius_m": 2.751}}, "Robot.body_radius_m"),
+        ({"sensor": {"scan_every_m": 0.00349}, "grid": Grid((7, 11, 5), 5.0)}, "RangeSensor.scan_every_m"),
+        ({"robot": {"max_speed_m_s": 0.0069}, "grid": Grid((7, 11, 5), 50.0)}, "Robot.max_speed_m_s"),
+        (
+            {"robot": {"max_speed_m_s": 9.0, "acceleration_m_s2": 1e-4}, "grid": Grid((7, 11, 5), 2e4)},
+            "Robot.acceleration_m_s2",
+        ),
     ):
         assert refusal(lambda changes=settings: with_settings(BOX, changes)).field == field
+    edge = {"robot": {"body_radius_m": 2.75}, "sensor": {"scan_every_m": 0.0035}}
+    assert with_settings(BOX, {**edge, "grid": Grid((7, 11, 5), 5.0)}).robot.body_radius_m == 2.75
     assert with_settings(BOX, {**discrete, "robot": {"reach_m": 0.5}}).action.kind == "discrete"
     far = {"grid": Grid((70, 80, 60), 0.5), "robot": {"reach_m": 30.0}, "action": {"kind": "discrete"}}
     far["action"]["moves"] = "axes"  # seven, however far
