@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterable, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from typing import NamedTuple
 
 import numpy as np
@@ -26,6 +25,7 @@ from entropy_explore_env.missions.reset_options import DRAWN, ResetOptions
 from entropy_explore_env.missions.rules import rules_of
 from entropy_explore_env.missions.starts import checked_starts, start_poses
 from entropy_explore_env.missions.state import MissionEnd, MissionState, new_state
+from entropy_explore_env.missions.threads import Threads
 from entropy_explore_env.missions.tick import step_missions
 from entropy_explore_env.missions.workspace import Workspace, new_workspace
 from entropy_explore_env.randomness import Stream, check_seed, generator, splitmix_states
@@ -126,10 +126,10 @@ class Missions:
         self.episodes = [-1] * self.count
         self.observations = np.zeros((self.count, scenario.robots, self.layout.size), np.float32)
         self._make_working_space()
-        self._pool: ThreadPoolExecutor | None = None
 
     def _make_working_space(self) -> None:
-        """Scratch memory for each thread and, where robots plan, navigators; none of it is state."""
+        """Threads, scratch memory for each and, where robots plan, navigators; none of it is state."""
+        self._pool = Threads(self.threads)
         self._calls: _Calls | None = None
         self._choices = np.zeros((self.count, self.scenario.robots), CHOICE)
         self._navigators = [new_navigators(self.scenario) for _ in range(self.threads)]
@@ -363,8 +363,6 @@ class Missions:
 
     def _step_threaded(self, continuous: np.ndarray, discrete: np.ndarray) -> None:
         """Share the missions among threads: each takes the next chunk as soon as it is free."""
-        if self._pool is None:
-            self._pool = ThreadPoolExecutor(self.threads, "missions")
         size = max(1, self.count // (self.threads * _CHUNKS_PER_THREAD))
         chunks = iter(range(0, self.count, size))
 
@@ -372,8 +370,7 @@ class Missions:
             for first in chunks:
                 self._step_range(thread, first, min(first + size, self.count), continuous, discrete)
 
-        for done in [self._pool.submit(work, thread) for thread in range(self.threads)]:
-            done.result()
+        self._pool.run(work)
 
     def action_masks(self) -> np.ndarray:
         """(E, A, N) int8: 1 for each discrete action that makes sense by the robot's own belief."""
@@ -389,9 +386,7 @@ class Missions:
 
     def close(self) -> None:
         """End the threads; the missions can still be stepped."""
-        if self._pool is not None:
-            self._pool.shutdown()
-            self._pool = None
+        self._pool.close()
 
     def __getstate__(self) -> dict[str, object]:
         """All but the threads and their scratch space."""
@@ -403,7 +398,6 @@ class Missions:
         """Take the arrays back and make new scratch space."""
         self.__dict__.update(kept)
         self._make_working_space()
-        self._pool = None
 
 
 def _for_kernels(actions: np.ndarray, dtype: type[np.generic]) -> np.ndarray:
