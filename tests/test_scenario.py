@@ -229,7 +229,6 @@ def test_a_number_that_no_float_holds_is_refused_in_a_short_line():
 
 def test_settings_that_do_not_fit_each_other_are_refused():
     discrete = {"action": {"kind": "discrete"}}
-    huge = {"grid": Grid((7, 11, 5), 2e4)}
     for settings, field in (
         ({"ending": {"sigma_end": 30.0}}, "Ending.sigma_end"),
         ({"sigma_prior": 0.01}, "Ending.sigma_end"),
