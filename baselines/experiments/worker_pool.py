@@ -54,21 +54,26 @@ class Failure:
 
 
 def run_each(
-    work: Callable[[Task], Result], tasks: Sequence[Task], jobs: int, limit_s: float = math.inf
+    work: Callable[[Task], Result],
+    tasks: Sequence[Task],
+    jobs: int,
+    limit_s: float = math.inf,
+    apart: bool = False,
 ) -> Generator[tuple[Task, Result | Failure], None, None]:
     """Do the work for every task, and yield results as they come.
 
     With one job the work is done in this process, under an alarm: ending a late process would cost the next
     task 3-5 s of imports and kernels. The alarm rings between Python's instructions: compiled code that never
-    returns is ended with two jobs or more only.
+    returns is ended with two jobs or more only, or apart.
 
     Args:
         work: A function at the top of a module; what it returns can be pickled.
         tasks: What it takes, likewise.
         jobs: Processes.
         limit_s: Of every task, on the clock from when it is begun; inf = none.
+        apart: Work in a process of its own also with one job.
     """
-    if jobs == 1:
+    if jobs == 1 and not apart:
         yield from ((task, _attempt_in_time(work, task, limit_s)) for task in tasks)
     elif tasks:
         yield from _run_in_processes(work, tasks, min(jobs, len(tasks)), limit_s)

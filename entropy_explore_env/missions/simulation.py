@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import os
 from collections.abc import Callable, Iterable, Sequence
 from typing import NamedTuple
@@ -34,7 +35,7 @@ from entropy_explore_env.scenario import Scenario
 from entropy_explore_env.settings import Grid, gaussian_entropy_bits
 from entropy_explore_env.validation import check_instance, check_whole, is_whole
 from entropy_explore_env.worlds.given import checked_worlds, in_given_worlds, world_in_turn
-from entropy_explore_env.worlds.load import make_world, with_world, world_with_number
+from entropy_explore_env.worlds.load import make_world, require_unchanged, world_of_file, world_with_number
 from entropy_explore_env.worlds.world import World
 
 _CHUNKS_PER_THREAD = 4
@@ -109,7 +110,11 @@ class Missions:
         check_instance("scenario", scenario, Scenario)
         if not isinstance(given, list | tuple):
             raise SettingError("given", given, "a sequence of Worlds")
-        scenario = in_given_worlds(scenario, given) if given else with_world(scenario)
+        self._read = None if given else world_of_file(scenario)
+        if given:
+            scenario = in_given_worlds(scenario, given)
+        elif self._read is not None:
+            scenario = dataclasses.replace(scenario, grid=self._read.grid)
         self.threads = min(int(count), threads or os.cpu_count() or 1)
         check_memory(scenario, Batch(int(count), self.threads, tuple(given)))
         self.scenario, self.given = scenario, checked_worlds(given) if given else ()
@@ -162,7 +167,8 @@ class Missions:
 
         Raises:
             SettingError: The seed is not a whole number ≥ 0, or robots cannot be where they were put.
-            WorldError: The world has too little room for the team. Nothing has changed then.
+            WorldError: The world has too little room for the team, or its file has changed since these
+                missions were made. Nothing has changed then.
         """
         self.reset_some([self._checked(mission)], [seed], [options])
 
@@ -216,6 +222,9 @@ class Missions:
             world = world_with_number(self.scenario, options.world_number)
         elif self.given:
             world = world_in_turn(self.given, seed, episode)
+        elif self._read is not None:
+            require_unchanged(self.scenario, self._read)
+            world = self._read
         else:
             world = make_world(self.scenario, generator(seed, episode, Stream.WORLD))
         if options.starts is not None:

@@ -290,7 +290,38 @@ def with_world(scenario: Scenario) -> Scenario:
         SettingError: Neither a recipe nor a file has this name.
         WorldError: The file cannot be used.
     """
+    world = world_of_file(scenario)
+    return scenario if world is None else dataclasses.replace(scenario, grid=world.grid)
+
+
+def world_of_file(scenario: Scenario) -> World | None:
+    """The world of the file that a scenario names; None where it names a recipe.
+
+    Raises:
+        SettingError, WorldError: As of `with_world`.
+    """
     if scenario.world in RECIPES:
+<<<<<<< HEAD
         return scenario
     world = world_from_file(scenario.world, scenario.grid.voxel_size_m)
     return dataclasses.replace(scenario, grid=world.grid)
+=======
+        return None
+    return world_from_file(Path(scenario.world), scenario.grid.voxel_size_m)
+
+
+def require_unchanged(scenario: Scenario, world: World) -> None:
+    """Check that the file which a scenario names still holds the world that was read from it.
+
+    Raises:
+        WorldError: It holds another one, or cannot be read any more.
+    """
+    found = world_of_file(scenario)
+    if found is world or found is None:
+        return
+    same = found.grid == world.grid and found.yaw_rad == world.yaw_rad
+    same = same and np.array_equal(found.occupied, world.occupied)
+    if not same or not np.array_equal(found.ceiling, world.ceiling):  # type: ignore[arg-type] - None is allowed
+        allowed = "a file that stays as it was read: make another environment to be in its new world"
+        raise WorldError("Scenario.world", scenario.world, allowed)
+>>>>>>> b0677c2 (Drawn scenarios over all settings are played with a watchdog; a changed world file is refused by name)

@@ -3,13 +3,20 @@
 from __future__ import annotations
 
 import math
+import pickle
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import entropy_explore_env
+from entropy_explore_env import EntropyExploreEnv, EntropyExploreVectorEnv
+from entropy_explore_env.envs.episodes import require_same, snapshot
 from entropy_explore_env.errors import SettingError, WorldError
+<<<<<<< HEAD
+=======
+from entropy_explore_env.scenarios import BOX
+>>>>>>> b0677c2 (Drawn scenarios over all settings are played with a watchdog; a changed world file is refused by name)
 from entropy_explore_env.settings import Grid
 from entropy_explore_env.worlds.files.process import kept_reader
 from entropy_explore_env.worlds.load import FORMATS, load_world, save_world, with_world, world_from_file
@@ -94,6 +101,60 @@ def test_a_file_that_was_written_again_is_read_again(tmp_path):
     first = world_from_file(path, 0.05)
     path.write_bytes(pgm(np.full((30, 60), 255, np.uint8)))
     assert (first.grid.shape, world_from_file(path, 0.05).grid.shape) == ((60, 40, 1), (60, 30, 1))
+
+
+def unknown_beyond(rows):
+    """A plan of 60 × 40 pixels of 0.05 m, all free in its first rows and solid beyond: 1 voxel is 0.25 m."""
+    plan = np.zeros((40, 60), np.uint8)
+    plan[:rows] = 255
+    return pgm(plan)
+
+
+CHANGED = {
+    "solid voxels": unknown_beyond(20),
+    "shape": pgm(np.full((40, 70), 255, np.uint8)),
+    "voxel count": pgm(np.full((80, 120), 255, np.uint8)),
+    "no map": b"P5 nothing",
+    "nothing": None,
+}
+
+
+@pytest.mark.parametrize("what", CHANGED)
+def test_a_file_that_changes_under_an_environment_is_refused_by_name_and_changes_nothing(tmp_path, what):
+    path = tmp_path / "plan.pgm"
+    path.write_bytes(unknown_beyond(30))
+    settings = {"world": str(path), "grid": Grid((7, 11, 5), 0.25), "robots": 2}
+    single, several = EntropyExploreEnv(BOX, **settings), EntropyExploreVectorEnv(BOX, 3, **settings)
+    envs = (single, several, pickle.loads(pickle.dumps(single)))
+    for env in envs:
+        env.reset(seed=1)
+        walk(env)
+    if CHANGED[what] is None:
+        path.unlink()
+    else:
+        path.write_bytes(CHANGED[what])
+    for env in envs:
+        before = snapshot(env)
+        with pytest.raises(WorldError) as raised:
+            env.reset(seed=2)
+        assert str(path) in str(raised.value)
+        require_same("refused", before, snapshot(env))
+        walk(env)  # the mission that is under way goes on
+    if what in ("solid voxels", "shape", "voxel count"):
+        fresh = EntropyExploreEnv(BOX, **settings)
+        fresh.reset(seed=2)
+        world, kept = fresh.missions.worlds[0], single.missions.worlds[0]
+        assert world.grid != kept.grid or (world.occupied != kept.occupied).any()
+    path.write_bytes(unknown_beyond(30))  # written again, the same
+    for env in envs:
+        env.reset(seed=2)
+        walk(env)
+
+
+def walk(env):
+    for _ in range(3):
+        space = env.action_space
+        env.step({a: space(a).sample() for a in env.agents} if callable(space) else space.sample())
 
 
 @pytest.mark.skipif(not FILES, reason=f"{REAL} is not here: it is no part of the project")

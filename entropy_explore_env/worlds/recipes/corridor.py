@@ -55,8 +55,8 @@ def corridor_plan(shape: tuple[int, int], voxel_size_m: float, rng: np.random.Ge
         [(low + high) // 2 for low, high in divided(0, n, _SPACING_M / voxel_size_m, 0, rng)] for n in shape
     ]
     nodes = [(i, j) for i in range(len(lanes[0])) for j in range(len(lanes[1]))]
-    edges = [((i, j), (i + 1, j)) for i, j in nodes if (i + 1, j) in nodes]
-    edges += [((i, j), (i, j + 1)) for i, j in nodes if (i, j + 1) in nodes]
+    edges = [((i, j), (i + 1, j)) for i, j in nodes if i + 1 < len(lanes[0])]
+    edges += [((i, j), (i, j + 1)) for i, j in nodes if j + 1 < len(lanes[1])]
     joined = {node: {node} for node in nodes}
     for number in rng.permutation(len(edges)):
         start, end = edges[number]

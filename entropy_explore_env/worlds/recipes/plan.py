@@ -21,6 +21,7 @@ BODY_RADIUS_M = 0.3
 DOOR_M = 0.9
 DOOR_HEIGHT_M = 2.1
 WALL_M = 0.1
+_LARGEST_VOXEL_M = 2.5
 _CONNECTING_DOORS = 0.2
 """Share of neighbouring rooms with a door between them."""
 
@@ -116,8 +117,10 @@ def require_size(grid: Grid, kind: str, *edges_m: float) -> None:
     """Check that a workspace has edges of at least these lengths, the longest first, and room for a body.
 
     Raises:
-        WorldError: It is smaller.
+        WorldError: It is smaller, or its voxels are so large that rooms and corridors are none any more.
     """
+    if grid.voxel_size_m > _LARGEST_VOXEL_M:
+        raise WorldError("Grid.voxel_size_m", grid.voxel_size_m, f"at most {_LARGEST_VOXEL_M:g} for {kind}")
     found = sorted(grid.size_m[:2], reverse=True)
     low = not grid.flat and grid.shape[2] < passage_voxels(0.0, grid.voxel_size_m)
     if low or any(have < want - 1e-9 for have, want in zip(found, edges_m, strict=True)):

@@ -146,6 +146,17 @@ def test_a_grid_that_is_too_small_is_refused_by_name(name):
         assert raised.value.field == "Grid.shape" and raised.value.value == shape
 
 
+@pytest.mark.parametrize("name", [name for name in SMALLEST_M if not name.startswith("terrain")])
+def test_voxels_in_which_rooms_and_ways_get_lost_are_refused_by_name(name):
+    """A net of corridors over voxels of 1,000 km was never finished."""
+    draws = np.random.default_rng(0)
+    assert RECIPES[name](Grid((60, 50, 1), 2.5), draws).occupied.any()
+    for edge_m in (2.51, 1e6):
+        with pytest.raises(WorldError) as raised:
+            RECIPES[name](Grid((60, 50, 1), edge_m), draws)
+        assert (raised.value.field, raised.value.value) == ("Grid.voxel_size_m", edge_m)
+
+
 @pytest.mark.parametrize("name", NATURAL)
 def test_a_default_world_is_made_in_a_fifth_of_a_second_and_the_largest_in_one(name):
     recipe, grid = RECIPES[NATURAL[name].world], NATURAL[name].grid

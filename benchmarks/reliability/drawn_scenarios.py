@@ -1,0 +1,254 @@
+"""Scenarios with every setting drawn at random from what is allowed, each from a number alone.
+
+A field has its default in half of the scenarios, so that others meet it; a value that people would choose in
+most of the rest; and now and then any value of its range, its ends among them. Lengths that people would
+choose are some voxels long. Worlds are small.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Callable, Mapping, Sequence
+from types import MappingProxyType
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from entropy_explore_env.scenario import Scenario
+from entropy_explore_env.settings import (
+    Action,
+    Channel,
+    Ending,
+    Grid,
+    Observation,
+    RangeSensor,
+    Reward,
+    Robot,
+    RobotKind,
+)
+from entropy_explore_env.worlds.recipes.catalogue import RECIPES
+from entropy_explore_env.worlds.world import World
+
+_DEFAULT, _USUAL = 0.5, 0.85
+_MOST_VOXELS = 4000
+_MOST_RAYS_ACROSS = 30
+
+
+class Numbers(NamedTuple):
+    """The allowed numbers of a field, and those that people would choose."""
+
+    least: float
+    most: float
+    usual_least: float
+    usual_most: float
+    whole: bool = False
+    also: tuple[Any, ...] = ()
+    """Other values, such as inf or None."""
+    voxels: bool = False
+    """Whether the usual numbers are in voxel edges."""
+
+
+def _length(least: float, most: float, usual_least: float, usual_most: float, *also: Any) -> Numbers:  # noqa: ANN401
+    return Numbers(least, most, usual_least, usual_most, also=also, voxels=True)
+
+
+def _count(least: int, most: int, usual_least: int, usual_most: int, *also: Any) -> Numbers:  # noqa: ANN401
+    return Numbers(least, most, usual_least, usual_most, whole=True, also=also)
+
+
+_SWITCH = (True, False)
+FIELDS: Mapping[type, Mapping[str, Numbers | Sequence[Any]]] = MappingProxyType(
+    {
+        Robot: {
+            "motion": ("free", "planar"),
+            "navigator": ("straight", "planned"),
+            "unknown_cost": Numbers(1.0, 1e6, 1.0, 10.0),
+            "reach_m": _length(1e-6, 1e6, 1.0, 12.0, math.inf),
+            "max_speed_m_s": _length(1e-4, 1e6, 0.2, 20.0),
+            "acceleration_m_s2": _length(1e-4, 1e6, 0.2, 20.0),
+            "turn_rate_rad_s": Numbers(1e-4, 1e6, 0.1, 10.0, also=(math.inf,)),
+            "body_radius_m": _length(1e-6, 1e6, 0.1, 2.5, 0.0),
+            "sensor_height_m": _length(1e-6, 1e6, 0.5, 4.0, 0.0),
+            "when_blocked": ("wander", "wait"),
+            "blocked_wait_s": Numbers(1e-4, 1e5, 0.1, 20.0),
+        },
+        RangeSensor: {
+            "max_range_m": _length(1e-6, 1e6, 1.0, 20.0, math.inf),
+            "sigma_min": Numbers(1e-4, 1e4, 0.01, 1.0),
+            "sigma_slope_per_m": Numbers(1e-6, 1e6, 1e-3, 0.1, also=(0.0,)),
+            "range_noise_m": _length(1e-6, 1e6, 0.01, 1.0, 0.0),
+            "voxels_behind": _count(0, 1000, 0, 4),
+            "scan_time_s": Numbers(1e-4, 1e5, 0.01, 5.0),
+            "scan_every_m": _length(1e-3, 1e6, 0.3, 5.0, math.inf),
+            "min_range_m": _length(1e-6, 1e6, 0.1, 3.0, 0.0),
+        },
+        Channel: {
+            "burst": _count(0, 1_000_000, 0, 200),
+            "i_min_bits": Numbers(1e-6, 1e6, 1e-3, 10.0, also=(0.0,)),
+            "i_min_fill": Numbers(1e-3, 10.0, 0.1, 2.0, also=(None,)),
+            "i_min_gain": Numbers(1e-6, 1.0, 0.01, 1.0),
+            "range_m": _length(1e-9, 1e6, 1.0, 20.0, math.inf),
+            "loss_probability": Numbers(1e-6, 1.0, 0.05, 0.9, also=(0.0,)),
+            "delay_s": Numbers(1e-6, 3600.0, 0.1, 20.0, also=(0.0,)),
+            "announcements": _SWITCH,
+            "phase_s": Numbers(1e-3, 3600.0, 0.5, 30.0, also=(0.0,)),
+            "repeats": _count(1, 1000, 1, 5),
+        },
+        Ending: {
+            "sigma_end": Numbers(1e-4, 1e4, 0.01, 1.0),
+            "termination": ("any", "all"),
+            "time_limit_s": Numbers(1e-3, 1e9, 1.0, 1e4, also=(math.inf,)),
+            "max_cycles": _count(1, 2**62, 1, 100, None),
+        },
+        Reward: {
+            "kind": ("individual", "team"),
+            "cost_per_s": Numbers(1e-9, 1e6, 1e-4, 1.0, also=(0.0,)),
+        },
+        Action: {
+            "kind": ("continuous", "discrete"),
+            "moves": ("all", "axes"),
+            "yaws": _count(1, 360, 1, 16),
+            "pitches": _count(1, 90, 1, 5),
+        },
+        Observation: {
+            "panorama": _SWITCH,
+            "panorama_yaws": _count(1, 360, 1, 32, None),
+            "panorama_pitches": _count(1, 90, 1, 5),
+            "panorama_utility": ("bits", "log2"),
+            "self_state": _SWITCH,
+            "team": _SWITCH,
+            "patch": _SWITCH,
+            "overview": _SWITCH,
+            "action_mask": _SWITCH,
+            "flat": _SWITCH,
+            "while_busy": _SWITCH,
+        },
+        Scenario: {
+            "split": ("train", "validation", "test"),
+            "robots": _count(1, 40, 1, 6),
+            "start_radius_m": _length(1e-6, 1e6, 2.0, 20.0, math.inf),
+            "sigma_prior": Numbers(1e-3, 1e4, 1.0, 100.0),
+            "decision_period_s": Numbers(1e-3, 1e5, 0.1, 10.0, also=(None,)),
+            "track_truth": _SWITCH,
+        },
+    }
+)
+"""Class → field → its numbers, or its choices. Other fields are drawn by `draw_scenario` itself."""
+
+_Draw = Callable[[type, str], Any]
+
+
+class Drawn(NamedTuple):
+    """A scenario, and the worlds that its missions are to be in; none where it has a recipe."""
+
+    scenario: Scenario
+    given: tuple[World, ...]
+
+
+def draw_scenario(rng: np.random.Generator, few_kernels: bool = False) -> Drawn:
+    """Draw all settings of a scenario.
+
+    Args:
+        rng: Where from.
+        few_kernels: Observations have the default parts, or all: others have kernels of their own, which
+            take seconds to compile.
+
+    Raises:
+        EntropyExploreError: Settings were drawn that do not fit each other. Draw again.
+    """
+    grid = _grid(rng)
+
+    def draw(kind: type, field: str) -> Any:  # noqa: ANN401 - whatever a setting is
+        chance = rng.random()
+        if chance < _DEFAULT:
+            return _default(kind, field)
+        return _value(rng, FIELDS[kind][field], chance < _USUAL, grid.voxel_size_m)
+
+    def part(kind: type, **own: Any) -> Any:  # noqa: ANN401 - an object of the kind
+        return kind(**{field: draw(kind, field) for field in FIELDS[kind]}, **own)
+
+    kinds = [RobotKind(part(Robot), _sensor(rng, part)) for _ in range(int(rng.choice([1, 1, 1, 2, 3])))]
+    own = {field: draw(Scenario, field) for field in FIELDS[Scenario]}
+    given = rng.random() < 0.3
+    scenario = Scenario(
+        name="drawn",
+        grid=grid,
+        world="empty" if given or rng.random() < 0.5 else str(rng.choice(sorted(RECIPES))),
+        robot=kinds[0].robot,
+        sensor=kinds[0].sensor,
+        extra_kinds=tuple(kinds[1:]),
+        channel=part(Channel),
+        ending=part(Ending),
+        reward=part(Reward),
+        action=part(Action),
+        observation=_observation(rng, part, few_kernels),
+        **own,
+    )
+    return Drawn(scenario, tuple(_world(rng, grid) for _ in range(2)) if given else ())
+
+
+def _default(kind: type, field: str) -> Any:  # noqa: ANN401
+    return next(f.default for f in dataclasses.fields(kind) if f.name == field)
+
+
+def _value(rng: np.random.Generator, drawn: Numbers | Sequence[Any], usual: bool, voxel_m: float) -> Any:  # noqa: ANN401
+    """One of a field's choices, or of its numbers: the usual ones or all, evenly by their logarithm."""
+    if not isinstance(drawn, Numbers):
+        return drawn[int(rng.integers(len(drawn)))]
+    if drawn.also and rng.random() < 0.3:
+        return drawn.also[int(rng.integers(len(drawn.also)))]
+    least, most = drawn.least, drawn.most
+    if not usual and rng.random() < 0.3:
+        return least if rng.random() < 0.5 else most
+    if usual:
+        unit = voxel_m if drawn.voxels else 1.0
+        least, most = drawn.usual_least * unit, drawn.usual_most * unit
+    if drawn.whole:
+        return round(math.exp(rng.uniform(math.log(least + 0.5), math.log(most + 0.5))))
+    return float(math.exp(rng.uniform(math.log(least), math.log(most))))
+
+
+def _grid(rng: np.random.Generator) -> Grid:
+    """A small grid, flat in a third of the cases; its voxels of any size."""
+    while True:
+        x, y, z = (int(n) for n in np.exp(rng.uniform(0.0, math.log(60.0), 3)).astype(int))
+        z = 1 if rng.random() < 0.33 else z
+        if x * y * z <= _MOST_VOXELS:
+            break
+    size_m = _value(rng, Numbers(1e-6, 1e6, 0.05, 1.0), rng.random() < 0.9, 1.0)
+    far = 1e9 if rng.random() < 0.05 else 100.0
+    origin = (0.0, 0.0, 0.0) if rng.random() < 0.5 else tuple(rng.uniform(-far, far, 3).tolist())
+    return Grid((x, y, z), size_m, origin)
+
+
+def _sensor(rng: np.random.Generator, part: Callable[..., Any]) -> RangeSensor:
+    """A sensor with up to some hundred rays."""
+    yaw, pitch = rng.uniform(0.0, 2.0 * math.pi), rng.uniform(0.0, math.pi)
+    view = [(yaw, pitch), (2.0 * math.pi, pitch), (yaw, 0.0), (0.0, 0.0)][int(rng.integers(4))]
+    step = max(max(view) / rng.integers(1, _MOST_RAYS_ACROSS), 1e-6)
+    return part(RangeSensor, field_of_view_rad=view, angular_step_rad=float(step))
+
+
+def _observation(rng: np.random.Generator, part: Callable[..., Any], few_kernels: bool) -> Observation:
+    """Parts of an observation, with a small patch and overview."""
+    patch = tuple(int(2 * n + 1) for n in rng.integers(0, 6, 3))
+    overview = tuple(int(n) for n in rng.integers(1, 12, 3))
+    drawn = part(Observation, patch_shape=patch, overview_shape=overview)
+    if not few_kernels:
+        return drawn
+    every = bool(rng.random() < 0.5)
+    names = ("panorama", "self_state", "team", "patch", "overview")
+    default = Observation()
+    return dataclasses.replace(
+        drawn, action_mask=False, **{name: every or getattr(default, name) for name in names}
+    )
+
+
+def _world(rng: np.random.Generator, grid: Grid) -> World:
+    """Solid voxels drawn one by one, in half of the cases under a ceiling."""
+    solid = rng.random(grid.shape) < rng.choice([0.02, 0.1, 0.3])
+    ceiling = None
+    if rng.random() < 0.5:
+        ceiling = rng.integers(0, grid.shape[2] + 1, grid.shape[:2]).astype(np.int32)
+    return World(grid, solid, "drawn", ceiling=ceiling)

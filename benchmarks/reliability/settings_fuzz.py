@@ -1,0 +1,130 @@
+"""Drawn scenarios, played by drawn actions: none hangs, crashes, or leaves what environments promise."""
+
+from __future__ import annotations
+
+import math
+import time
+from dataclasses import dataclass
+
+import numpy as np
+
+from benchmarks.reliability.drawn_scenarios import Drawn, draw_scenario
+from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
+from entropy_explore_env.errors import EntropyExploreError
+from entropy_explore_env.settings_json import settings_json
+
+STEPS = 50
+WATCHDOG_S = 20.0
+"""The steps of a scenario take less, compiling kernels aside."""
+_MOST_DRAWS = 10_000
+
+
+class BrokenPromiseError(AssertionError):
+    """An environment did what it never may."""
+
+
+@dataclass(frozen=True)
+class Task:
+    """One scenario to be drawn and played.
+
+    Attributes:
+        number: What everything is drawn from.
+        steps: How many steps are played, in as many episodes as it takes.
+        few_kernels: See `draw_scenario`.
+    """
+
+    number: int
+    steps: int = STEPS
+    few_kernels: bool = False
+
+
+@dataclass(frozen=True)
+class Played:
+    """What came of a scenario.
+
+    Attributes:
+        number: Of the task.
+        refused: Why scenarios that were drawn before were not allowed: names of fields.
+        seconds: Of all steps but the first, which may compile kernels.
+        episodes: How many were begun.
+        settings: Of the scenario, as JSON.
+    """
+
+    number: int
+    refused: tuple[str, ...]
+    seconds: float
+    episodes: int
+    settings: str
+
+
+def play(task: Task) -> Played:
+    """Draw scenarios until one is allowed, and play it.
+
+    Raises:
+        BrokenPromiseError: An observation is outside its space, a figure not finite, time ran backwards, or
+            the steps took longer than WATCHDOG_S.
+        Exception: Whatever an environment raises that is no EntropyExploreError.
+    """
+    refused: list[str] = []
+    for draw in range(_MOST_DRAWS):
+        rng = np.random.default_rng([task.number, draw])
+        try:
+            drawn = draw_scenario(rng, task.few_kernels)
+            env = _environment(drawn)
+            env.reset(seed=task.number)
+        except EntropyExploreError as error:
+            refused.append(str(getattr(error, "field", type(error).__name__)))
+            continue
+        seconds, episodes = _play(env, rng, task)
+        settings = settings_json(drawn.scenario)
+        if seconds > WATCHDOG_S:
+            raise BrokenPromiseError(f"{task.steps} steps took {seconds:.1f} s: {settings}")
+        return Played(task.number, tuple(refused), seconds, episodes, settings)
+    raise BrokenPromiseError(f"none of {_MOST_DRAWS} drawn scenarios was allowed")
+
+
+def _environment(drawn: Drawn) -> EntropyExploreEnv:
+    return EntropyExploreEnv(drawn.scenario, **({"world": drawn.given} if drawn.given else {}))
+
+
+def _play(env: EntropyExploreEnv, rng: np.random.Generator, task: Task) -> tuple[float, int]:
+    """Seconds of all steps but the first, and how many episodes they were in."""
+    agents, begun_s, episodes, earlier_s = env.possible_agents, math.nan, 1, 0.0
+    for agent in agents:
+        env.action_space(agent).seed(int(rng.integers(2**31)))
+    for step in range(task.steps):
+        if not env.agents:
+            _go_on(env, task.number)
+            episodes, earlier_s = episodes + 1, 0.0
+        actions = {agent: env.action_space(agent).sample() for agent in env.agents}
+        observations, rewards = env.step(actions)[:2]
+        earlier_s = _check(env, observations, rewards, earlier_s)
+        if step == 0:
+            begun_s = time.perf_counter()
+    return time.perf_counter() - begun_s, episodes
+
+
+def _go_on(env: EntropyExploreEnv, seed: int) -> None:
+    """Start the next episode, or the first again where the next world has too little room for the team."""
+    try:
+        env.reset()
+    except EntropyExploreError:
+        env.reset(seed)
+
+
+def _check(env: EntropyExploreEnv, observations: dict, rewards: dict, earlier_s: float) -> float:
+    """Check what a step gave; returns the mission's time."""
+    for agent, observed in observations.items():
+        if not env.observation_space(agent).contains(observed):
+            raise BrokenPromiseError(f"{agent} observed what is outside its space: {env.scenario}")
+    figures = {f"the reward of {agent}": reward for agent, reward in rewards.items()}
+    clock, robots = env.missions.state.missions[0], env.missions.state.robots[0]
+    figures["the time"] = time_s = float(clock["time_s"])
+    for field in ("entropy_bits", "distance_m", "origin", "goal", "scan_pose", "ready_s", "i_min_bits"):
+        figures[f"the sum of robots' {field}"] = float(robots[field].sum())
+    for name, value in figures.items():
+        if not math.isfinite(value):
+            raise BrokenPromiseError(f"{name} is {value}: {env.scenario}")
+    if time_s < earlier_s:
+        raise BrokenPromiseError(f"time ran from {earlier_s} back to {time_s} s: {env.scenario}")
+    return time_s
