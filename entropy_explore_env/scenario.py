@@ -34,6 +34,8 @@ from entropy_explore_env.validation import (
 
 MAX_IN_FLIGHT = 2**24
 """Measurements of delayed messages that may be under way at once."""
+MAX_MESSAGES = 2**18
+"""Delayed messages that may be under way at once: every event looks through all of them."""
 MAX_DRIVE_S = 1e5
 """A robot drives straight across the workspace in this time, or less."""
 MAX_SCANS_UNDER_WAY = 20_000
@@ -112,6 +114,9 @@ class Scenario:
             self._check_kind(kind.robot)
             self._check_drives(kind)
         rays = max(kind.sensor.rays for kind in self.kinds)
+        allowed = f"so short that at most {MAX_MESSAGES} messages are under way at once"
+        if self.message_slots > MAX_MESSAGES:
+            raise SettingError("Channel.delay_s", self.channel.delay_s, allowed)
         allowed = f"so short that at most {MAX_IN_FLIGHT} measurements are under way at once"
         if self.message_slots * max(min(self.channel.burst, rays), 1) > MAX_IN_FLIGHT:
             raise SettingError("Channel.delay_s", self.channel.delay_s, allowed)

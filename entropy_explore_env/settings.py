@@ -107,7 +107,7 @@ class Robot:
             known ones; ≥ 1.
         reach_m: Largest displacement of one decision (ξ of Rocha04, eq. 32), 1e-6 to 1e6;
             inf = the workspace.
-        max_speed_m_s: Top speed, 1e-4 to 1e6.
+        max_speed_m_s: Top speed, 1e-4 to 1e4.
         acceleration_m_s2: Of speeding up and of braking, 1e-4 to 1e6.
         turn_rate_rad_s: Of yaw and pitch, while driving, 1e-4 to 1e6; inf = at once.
         body_radius_m: The body is a ball; 0 = a point that blocks nobody. At most 1e6.
@@ -142,7 +142,8 @@ class Robot:
         check_choice(self, "navigator", Literal["straight", "planned"])
         check(self, "unknown_cost", "a number from 1 to 1e6", lambda v: 1.0 <= v <= 1e6)
         check_within(self, "reach_m", least=1e-6, most=1e6, inf=True)
-        check_within(self, "max_speed_m_s", "acceleration_m_s2", least=1e-4, most=1e6)
+        check_within(self, "max_speed_m_s", least=1e-4, most=1e4)
+        check_within(self, "acceleration_m_s2", least=1e-4, most=1e6)
         check_within(self, "turn_rate_rad_s", least=1e-4, most=1e6, inf=True)
         check_within(self, "body_radius_m", "sensor_height_m", least=0, most=1e6)
         check_choice(self, "when_blocked", Literal["wander", "wait"])

@@ -64,7 +64,7 @@ REFUSED = {
     (Robot, "navigator"): KIND,
     (Robot, "unknown_cost"): (*NO_NUMBERS, 0.0, 0.999, INF, 1.1e6),
     (Robot, "reach_m"): (*POSITIVE, TINY, 0.9e-6, 1.1e6, HUGE),
-    (Robot, "max_speed_m_s"): (*POSITIVE, TINY, 0.9e-4, 1.1e6, HUGE, INF),
+    (Robot, "max_speed_m_s"): (*POSITIVE, TINY, 0.9e-4, 1.1e4, HUGE, INF),
     (Robot, "acceleration_m_s2"): (*POSITIVE, TINY, 0.9e-4, 1.1e6, HUGE, INF),
     (Robot, "turn_rate_rad_s"): (*POSITIVE, TINY, 0.9e-4, 1.1e6, HUGE),
     (Robot, "body_radius_m"): (*NOT_NEGATIVE, 1.1e6),
@@ -191,7 +191,7 @@ ACCEPTED = [
     (Grid, {"shape": (1, 1, 1), "voxel_size_m": 1e-3, "origin_m": (-1, 2.5, 0)}),
     (Grid, {"shape": (np.int64(7), np.int32(11), 5), "voxel_size_m": np.float64(0.5)}),
     (Robot, {"reach_m": 1e-6, "max_speed_m_s": 1e-4, "acceleration_m_s2": 1e6, "turn_rate_rad_s": 1e-4}),
-    (Robot, {"reach_m": 1e6, "max_speed_m_s": 1e6, "acceleration_m_s2": 1e-4, "blocked_wait_s": 1e-4}),
+    (Robot, {"reach_m": 1e6, "max_speed_m_s": 1e4, "acceleration_m_s2": 1e-4, "blocked_wait_s": 1e-4}),
     (Robot, {"reach_m": INF, "turn_rate_rad_s": INF, "body_radius_m": 0, "sensor_height_m": 0}),
     (Robot, {"motion": "planar", "reach_m": 3, "navigator": "planned", "unknown_cost": 1}),
     (Robot, {"redecide": "on_scan"}),
@@ -248,6 +248,8 @@ def test_settings_that_do_not_fit_each_other_are_refused():
         ({"channel": {"phase_s": 1.0, "delay_s": 1.0}}, "Channel.delay_s"),
         ({"robot": {"redecide": "on_scan"}}, "Robot.redecide"),
         ({"robot": {"redecide": 0.01}, "channel": {"delay_s": 3600.0}, "robots": 64}, "Channel.delay_s"),
+        # A scan each 0.1 ms: two messages a scan, 65,537 scans, two robots.
+        ({"channel": {"delay_s": 6.5535, "burst": 1}, "sensor": {"scan_time_s": 1e-4}}, "Channel.delay_s"),
         ({"channel": {"phase_s": 0.9, "repeats": 1000}}, "Channel.repeats"),
         # The box is 3.5 × 5.5 × 2.5 m: 6.98 m across; 2 · √(6.98 / 1e-4) s = 528 s.
         ({"robot": {"body_radius_m": 2.751}}, "Robot.body_radius_m"),
@@ -259,6 +261,8 @@ def test_settings_that_do_not_fit_each_other_are_refused():
         ),
     ):
         assert refusal(lambda changes=settings: with_settings(BOX, changes)).field == field
+    most = {"channel": {"delay_s": 6.5533, "burst": 1}, "sensor": {"scan_time_s": 1e-4}}
+    assert with_settings(BOX, most).message_slots == 4 * 65_535
     edge = {"robot": {"body_radius_m": 2.75}, "sensor": {"scan_every_m": 0.0035}}
     assert with_settings(BOX, {**edge, "grid": Grid((7, 11, 5), 5.0)}).robot.body_radius_m == 2.75
     assert with_settings(BOX, {**discrete, "robot": {"reach_m": 0.5}}).action.kind == "discrete"

@@ -65,7 +65,7 @@ FIELDS: Mapping[type, Mapping[str, Numbers | Sequence[Any]]] = MappingProxyType(
             "navigator": ("straight", "planned"),
             "unknown_cost": Numbers(1.0, 1e6, 1.0, 10.0),
             "reach_m": _length(1e-6, 1e6, 1.0, 12.0, math.inf),
-            "max_speed_m_s": _length(1e-4, 1e6, 0.2, 20.0),
+            "max_speed_m_s": _length(1e-4, 1e4, 0.2, 20.0),
             "acceleration_m_s2": _length(1e-4, 1e6, 0.2, 20.0),
             "turn_rate_rad_s": Numbers(1e-4, 1e6, 0.1, 10.0, also=(math.inf,)),
             "body_radius_m": _length(1e-6, 1e6, 0.1, 2.5, 0.0),
