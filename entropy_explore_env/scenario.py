@@ -38,6 +38,8 @@ MAX_MESSAGES = 2**18
 """Delayed messages that may be under way at once: every event looks through all of them."""
 MAX_DRIVE_S = 1e5
 """A robot drives straight across the workspace in this time, or less."""
+MAX_BROADCASTS = 200_000
+"""Broadcasts in phases within a step."""
 MAX_SCANS_UNDER_WAY = 20_000
 """Scans under way, straight across the workspace."""
 MAX_ACTIONS = 2**20
@@ -113,6 +115,7 @@ class Scenario:
         for kind in self.kinds:
             self._check_kind(kind.robot)
             self._check_drives(kind)
+        self._check_broadcasts()
         rays = max(kind.sensor.rays for kind in self.kinds)
         allowed = f"so short that at most {MAX_MESSAGES} messages are under way at once"
         if self.message_slots > MAX_MESSAGES:
@@ -156,16 +159,31 @@ class Scenario:
         if across_m / robot.max_speed_m_s > MAX_DRIVE_S:
             allowed = f"at least {across_m / MAX_DRIVE_S:.3g}: across the workspace in {MAX_DRIVE_S:g} s"
             raise SettingError("Robot.max_speed_m_s", robot.max_speed_m_s, allowed)
-        if 2.0 * math.sqrt(across_m / robot.acceleration_m_s2) > MAX_DRIVE_S:
-            allowed = (
-                f"at least {4.0 * across_m / MAX_DRIVE_S**2:.3g}: across the workspace in {MAX_DRIVE_S:g} s"
-            )
+        least = 4.0 * across_m / MAX_DRIVE_S**2
+        if robot.acceleration_m_s2 < least:
+            allowed = f"at least {least:.3g}: across the workspace in {MAX_DRIVE_S:g} s"
             raise SettingError("Robot.acceleration_m_s2", robot.acceleration_m_s2, allowed)
         if across_m / every_m > MAX_SCANS_UNDER_WAY:
             allowed = (
                 f"at least {across_m / MAX_SCANS_UNDER_WAY:.3g}, a share of the workspace's diagonal, or inf"
             )
             raise SettingError("RangeSensor.scan_every_m", every_m, allowed)
+
+    def _check_broadcasts(self) -> None:
+        """Check that a step, as long as the slowest robot may take to decide again, has few broadcasts."""
+        step_s = self.decision_period_s or max(
+            driving_time_s(kind.robot, float(np.linalg.norm(self.grid.size_m)))
+            + math.pi / kind.robot.turn_rate_rad_s
+            + kind.sensor.scan_time_s
+            + kind.robot.blocked_wait_s
+            for kind in self.kinds
+        )
+        least_s = min(step_s, self.ending.time_limit_s) / MAX_BROADCASTS
+        if 0.0 < self.channel.phase_s / self.channel.repeats < least_s:
+            allowed = (
+                f"0, or at least {least_s * self.channel.repeats:.3g}: {MAX_BROADCASTS} broadcasts a step"
+            )
+            raise SettingError("Channel.phase_s", self.channel.phase_s, allowed)
 
     @cached_property
     def kinds(self) -> tuple[RobotKind, ...]:
@@ -226,6 +244,12 @@ class Scenario:
     def agents(self) -> tuple[str, ...]:
         """Names of the robots: robot_0, robot_1 and so on."""
         return tuple(f"robot_{a}" for a in range(self.robots))
+
+
+def driving_time_s(robot: Robot, length_m: float) -> float:
+    """Seconds from rest to rest at most: up to top speed, and down again, with or without time between."""
+    ramp_s = min(robot.max_speed_m_s / robot.acceleration_m_s2, math.sqrt(length_m / robot.acceleration_m_s2))
+    return length_m / robot.max_speed_m_s + ramp_s
 
 
 def _level(sensor: RangeSensor) -> RangeSensor:

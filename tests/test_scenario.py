@@ -154,6 +154,8 @@ REFUSED = {
     (Scenario, "action"): (None, Reward(), "discrete"),
     (Scenario, "observation"): (None, Reward()),
 }
+SLOW_TURNS = {"robot": {"turn_rate_rad_s": 0.009}}
+"""Half a turn takes 349 s, a drive across the box 14 s and 1 s, a scan 0.5 s, a wait 5 s: 369.5 s in all."""
 DEFAULTS = {Grid: {"shape": (7, 11, 5), "voxel_size_m": 0.5}, Scenario: {"name": "a", "grid": BOX.grid}}
 CASES = [(kind, name, value) for (kind, name), values in REFUSED.items() for value in values]
 
@@ -249,8 +251,15 @@ def test_settings_that_do_not_fit_each_other_are_refused():
         ({"robot": {"redecide": "on_scan"}}, "Robot.redecide"),
         ({"robot": {"redecide": 0.01}, "channel": {"delay_s": 3600.0}, "robots": 64}, "Channel.delay_s"),
         # A scan each 0.1 ms: two messages a scan, 65,537 scans, two robots.
-        ({"channel": {"delay_s": 6.5535, "burst": 1}, "sensor": {"scan_time_s": 1e-4}}, "Channel.delay_s"),
+        ({"channel": {"delay_s": 6.55352, "burst": 1}, "sensor": {"scan_time_s": 1e-4}}, "Channel.delay_s"),
         ({"channel": {"phase_s": 0.9, "repeats": 1000}}, "Channel.repeats"),
+        # 200,000 broadcasts in a step: of 1,000 s; at most 369.5 s; and of 300 s in all.
+        ({"channel": {"phase_s": 0.0049}, "decision_period_s": 1000.0}, "Channel.phase_s"),
+        ({"channel": {"phase_s": 0.0018}, "decision_period_s": None, **SLOW_TURNS}, "Channel.phase_s"),
+        (
+            {"channel": {"phase_s": 0.0014}, "decision_period_s": 1e5, "time_limit_s": 300.0},
+            "Channel.phase_s",
+        ),
         # The box is 3.5 × 5.5 × 2.5 m: 6.98 m across; 2 · √(6.98 / 1e-4) s = 528 s.
         ({"robot": {"body_radius_m": 2.751}}, "Robot.body_radius_m"),
         ({"sensor": {"scan_every_m": 0.00349}, "grid": Grid((7, 11, 5), 5.0)}, "RangeSensor.scan_every_m"),
@@ -261,7 +270,13 @@ def test_settings_that_do_not_fit_each_other_are_refused():
         ),
     ):
         assert refusal(lambda changes=settings: with_settings(BOX, changes)).field == field
-    most = {"channel": {"delay_s": 6.5533, "burst": 1}, "sensor": {"scan_time_s": 1e-4}}
+    for few in (
+        {"channel": {"phase_s": 0.0051}, "decision_period_s": 1000.0},
+        {"channel": {"phase_s": 0.0038, "repeats": 2}, "decision_period_s": None, **SLOW_TURNS},
+        {"channel": {"phase_s": 0.0016}, "decision_period_s": 1e5, "time_limit_s": 300.0},
+    ):
+        assert with_settings(BOX, few).channel.phase_s > 0.0
+    most = {"channel": {"delay_s": 6.55332, "burst": 1}, "sensor": {"scan_time_s": 1e-4}}
     assert with_settings(BOX, most).message_slots == 4 * 65_535
     edge = {"robot": {"body_radius_m": 2.75}, "sensor": {"scan_every_m": 0.0035}}
     assert with_settings(BOX, {**edge, "grid": Grid((7, 11, 5), 5.0)}).robot.body_radius_m == 2.75

@@ -84,7 +84,9 @@ def play(task: Task) -> Played:
 
 
 def _environment(drawn: Drawn) -> EntropyExploreEnv:
-    return EntropyExploreEnv(drawn.scenario, **({"world": drawn.given} if drawn.given else {}))
+    if not drawn.given:
+        return EntropyExploreEnv(drawn.scenario)
+    return EntropyExploreEnv(drawn.scenario, world=drawn.given)
 
 
 def _play(env: EntropyExploreEnv, rng: np.random.Generator, task: Task) -> tuple[float, int]:

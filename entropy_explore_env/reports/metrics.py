@@ -65,7 +65,7 @@ def mission_figures(missions: Missions, mission: int, floor: bool | None = None)
         "t_mission_s": float(clock["time_s"]),
         **{f"t{mark}_s": _reached(clock, place) for place, mark in enumerate((50, 90, 99))},
         "scans": scans,
-        "scans_over_floor": None if least is None else scans / least,
+        "scans_over_floor": None if least is None or math.isinf(least) else scans / least,
         "measurements": measurements,
         "shared_measurements": int(robots["measurements_sent"].sum()),
         "overlap": int(robots["redundant"].sum()) / measurements if measurements else None,
@@ -116,7 +116,7 @@ def information_floor(scenario: Scenario, world: World) -> float:
     A voxel needs 1/σ_end² - 1/σ_prior² of precision; a ray adds 1/σ(d)² to each voxel that it crosses
     (Rocha04, eqs. 5 and 17). One scan is taken to add as much as the best of 256 scans from random voxels
     where robots may start, in random directions up to 45° up or down. Measuring a voxel more often than
-    needed, which no team can avoid, is not taken into account.
+    needed, which no team can avoid, is not taken into account. inf = none of them measured anything.
 
     Args:
         scenario: The task.
@@ -124,7 +124,7 @@ def information_floor(scenario: Scenario, world: World) -> float:
     """
     added = max(_most_added(scenario, kind, world) for kind in scenario.kinds)
     needed = scenario.ending.sigma_end**-2 - scenario.sigma_prior**-2
-    return max(world.visible_voxels(scenario) * needed / added, 1.0)
+    return max(world.visible_voxels(scenario) * needed / added, 1.0) if added > 0.0 else math.inf
 
 
 def _most_added(scenario: Scenario, kind: RobotKind, world: World) -> float:

@@ -301,13 +301,8 @@ def world_of_file(scenario: Scenario) -> World | None:
         SettingError, WorldError: As of `with_world`.
     """
     if scenario.world in RECIPES:
-<<<<<<< HEAD
-        return scenario
-    world = world_from_file(scenario.world, scenario.grid.voxel_size_m)
-    return dataclasses.replace(scenario, grid=world.grid)
-=======
         return None
-    return world_from_file(Path(scenario.world), scenario.grid.voxel_size_m)
+    return world_from_file(scenario.world, scenario.grid.voxel_size_m)
 
 
 def require_unchanged(scenario: Scenario, world: World) -> None:
@@ -324,4 +319,3 @@ def require_unchanged(scenario: Scenario, world: World) -> None:
     if not same or not np.array_equal(found.ceiling, world.ceiling):  # type: ignore[arg-type] - None is allowed
         allowed = "a file that stays as it was read: make another environment to be in its new world"
         raise WorldError("Scenario.world", scenario.world, allowed)
->>>>>>> b0677c2 (Drawn scenarios over all settings are played with a watchdog; a changed world file is refused by name)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 
 import numpy as np
 import pytest
@@ -144,3 +145,13 @@ def test_one_robot_does_not_beat_the_floor():
         wander(missions, 3000, seed)
         assert missions.over(0) is MissionEnd.MAPPED
         assert mission_figures(missions, 0, floor=True)["scans_over_floor"] >= 1.0
+
+
+def test_a_sensor_that_is_blind_everywhere_has_no_floor():
+    """The box is 6.98 m across. This divided by zero."""
+    missions = started(free_box(sensor={"min_range_m": 6.99}, track_truth=True))
+    wander(missions, 3, 0)
+    figures = mission_figures(missions, 0)
+    assert missions.worlds[0] is not None
+    assert information_floor(missions.scenario, missions.worlds[0]) == math.inf
+    assert figures["scans_over_floor"] is None and figures["scans"] > 0
