@@ -19,6 +19,7 @@ from pathlib import Path
 from baselines.cli.arguments import make_folder, parse, print_json, run_command
 from baselines.experiments.cells import run_cells
 from baselines.head_to_head.cells import Entries, chosen_scenarios, chosen_strategies
+from entropy_explore_env.command import allow_read_memory
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.scenarios import SCENARIOS
 from entropy_explore_env.validation import check_whole
@@ -43,6 +44,8 @@ class Args:
     """What is not given shrinks: scenarios room,office, team sizes 1,2, 5 seeds."""
     world_scenario: str | None = None
     """Scenario that gives robots and sensors for world files; default: office for plans, else room."""
+    read_memory_mib: float | None = None
+    """MiB of memory that reading a world file may take; default: by the file's size."""
     time_limit_s: float | None = None
     """Simulated time after which missions are cut off; default: each scenario's own."""
     wall_limit_s: float = 600.0
@@ -60,6 +63,7 @@ class Args:
 def main(words: Sequence[str]) -> int:
     """Run the command."""
     args = parse(Args, words, description=__doc__)
+    allow_read_memory(args.read_memory_mib)
     entries = _entries(args)
     from baselines.head_to_head.page import write_page  # matplotlib: after the help
     from baselines.head_to_head.rows import Results

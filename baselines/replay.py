@@ -17,6 +17,7 @@ import numpy as np
 from baselines.cli.arguments import OmitArgPrefixes, Positional, parse, run_command
 from baselines.cli.mission_outputs import MissionLog, Outputs, Wanted, show_results
 from baselines.cli.progress import progress_bar
+from entropy_explore_env.command import allow_read_memory
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.reports.mission_record import (
     MissionRecord,
@@ -39,6 +40,8 @@ class Args:
     """A mission record, mission.npz."""
     world: str | None = None
     """Where the world's file lies now, if it was moved."""
+    read_memory_mib: float | None = None
+    """MiB of memory that reading a world file may take; default: by the file's size."""
     out: Path | None = None
     """Folder for mission.json, mission.png and mission.gif."""
     output: OmitArgPrefixes[Outputs] = field(default_factory=Outputs)
@@ -47,6 +50,7 @@ class Args:
 def main(words: Sequence[str]) -> int:
     """Run the command."""
     args = parse(Args, words, description=__doc__)
+    allow_read_memory(args.read_memory_mib)
     record = load_record(args.record)
     if args.world is not None:
         record = replace(record, scenario=replace(record.scenario, world=args.world), world=None)

@@ -18,6 +18,7 @@ from baselines.cli.world_options import Reading, world_settings
 from baselines.experiments.mission import run_mission, scripted
 from baselines.experiments.tables import markdown_table
 from baselines.strategies import make_strategy, resolved
+from entropy_explore_env.command import allow_read_memory
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.errors import SettingError, WorldError
 from entropy_explore_env.reports.metrics import mission_figures
@@ -49,6 +50,8 @@ class Args:
     """Edge of a pixel of the images that have no YAML; default: 0.05."""
     negate: bool = False
     """In the images that have no YAML bright is solid."""
+    read_memory_mib: float | None = None
+    """MiB of memory that reading a world file may take; default: by the file's size."""
     time_limit_s: float = 600.0
     """Simulated time after which a mission is cut off."""
     out: Path | None = None
@@ -60,6 +63,7 @@ class Args:
 def main(words: Sequence[str]) -> int:
     """Run the command."""
     args = parse(Args, words, description=__doc__)
+    allow_read_memory(args.read_memory_mib)
     files = world_files(args.folder)
     make_strategy(args.strategy)
     rows = []

@@ -6,16 +6,34 @@ Exit codes: 0 done, 1 a check of the command failed, 2 bad input, 130 interrupte
 from __future__ import annotations
 
 import argparse
+import math
 import os
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import NoReturn
 
-from entropy_explore_env.errors import EntropyExploreError
+from entropy_explore_env.errors import EntropyExploreError, SettingError
 
 BAD_INPUT = 2
 INTERRUPTED = 130
+
+
+READ_MEMORY_VARIABLE = "ENTROPY_EXPLORE_READ_MEMORY_MIB"
+"""Variable of the environment with the memory limit, in MiB, of reading world files that are given none."""
+
+
+def allow_read_memory(read_memory_mib: float | None) -> None:
+    """Let this process, and those that it starts, take so much memory to read a world file; None = as it was.
+
+    Raises:
+        SettingError: It is no finite number > 0.
+    """
+    if read_memory_mib is None:
+        return
+    if not 0 < read_memory_mib < math.inf:
+        raise SettingError("read_memory_mib", read_memory_mib, "a number of MiB > 0")
+    os.environ[READ_MEMORY_VARIABLE] = str(read_memory_mib)
 
 
 class UsageError(EntropyExploreError):

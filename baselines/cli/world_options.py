@@ -29,6 +29,8 @@ class Reading:
     """Meshes: do not fill what they shut in."""
     read_limit_s: float | None = None
     """Seconds of computing that reading may take."""
+    read_memory_mib: float | None = None
+    """MiB of memory that reading may take; default: by the file's size."""
 
     def asked(self) -> dict[str, Any]:
         """What was asked for."""

@@ -35,6 +35,7 @@ _METRES = {
     "clearance-m": "free space above a height map, or around a mesh",
     "ceiling-m": "height of the exposure surface above the ground of a height map",
     "read-limit-s": "limit of the processor time for reading",
+    "read-memory-mib": "limit of the memory for reading; default: by the file's size",
 }
 """Options of `load_world` that are numbers."""
 

@@ -17,7 +17,7 @@ from entropy_explore_env.settings import Grid
 from entropy_explore_env.validation import check_instance, checked_path, is_number, is_whole
 from entropy_explore_env.worlds.files.archives import restored, saved
 from entropy_explore_env.worlds.files.jacksboro import NAME as JACKSBORO
-from entropy_explore_env.worlds.files.process import Format, read_apart
+from entropy_explore_env.worlds.files.process import Format, Limits, read_apart
 from entropy_explore_env.worlds.files.resampling import extruded, resampled
 from entropy_explore_env.worlds.files.voxels import MAX_FILE_VOXELS, RefusedError, Voxels
 from entropy_explore_env.worlds.recipes.catalogue import RECIPES
@@ -26,7 +26,7 @@ from entropy_explore_env.worlds.splits import draw_world_number, world_generator
 from entropy_explore_env.worlds.world import World
 from entropy_explore_env.writing import write_atomically
 
-_OCTOMAP = Format("octomap_tree", "OctoMap tree")
+_OCTOMAP = Format("octomap_tree", "OctoMap tree", memory_per_byte=512)  # octomap's own nodes take 230
 _MAP_SERVER = Format("map_server", "YAML of map_server with its image")
 _IMAGE = Format("images", "PNG or PGM image")
 _GEOTIFF = Format("geotiff", "GeoTIFF height map")
@@ -63,6 +63,7 @@ def load_world(
     ceiling_m: float | None = None,
     fill: bool | None = None,
     read_limit_s: float | None = None,
+    read_memory_mib: float | None = None,
 ) -> World:
     """The world in a file; its voxels lie in the file's frame, in metres. Unknown space is solid.
 
@@ -86,6 +87,8 @@ def load_world(
         ceiling_m: Height maps: the exposure surface above the ground (World.ceiling); None = none.
         fill: Meshes: whether the space that the surface encloses is solid; None = yes.
         read_limit_s: Limit of the processor time for reading; None = 1.5 s, and 20 s for each MiB.
+        read_memory_mib: Limit of the memory of the process that reads; None = 448 MiB, and 16 for each MiB
+            of the file, of OctoMaps 512, up to 4096 in all. Voxels are only made at the wanted size.
 
     Raises:
         WorldError: The file is missing, too large, broken, of no known kind or has no free space.
@@ -101,26 +104,36 @@ def load_world(
         "ceiling_m": ceiling_m,
         "fill": fill,
     }
-    _check({**options, "height_m": height_m, "read_limit_s": read_limit_s})
+    _check(
+        {**options, "height_m": height_m, "read_limit_s": read_limit_s, "read_memory_mib": read_memory_mib}
+    )
+    limits = Limits(read_limit_s, read_memory_mib)
     path = checked_path("world file", path)
     if str(path) == JACKSBORO:
-        return _world(read_apart(_JACKSBORO, JACKSBORO, options, read_limit_s), JACKSBORO, options, height_m)
+        return _world(read_apart(_JACKSBORO, JACKSBORO, options, limits), JACKSBORO, options, height_m)
     form = FORMATS.get(path.suffix.lower())
     if form is None:
         raise WorldError("world file", str(path), "a file of one of the kinds " + " ".join(FORMATS))
-    return _world(read_apart(form, path.absolute(), options, read_limit_s), str(path), options, height_m)
+    return _world(read_apart(form, path.absolute(), options, limits), str(path), options, height_m)
 
 
 LOAD_OPTIONS = tuple(inspect.signature(load_world).parameters)[1:]
 """The names of the options of `load_world`."""
 
 
-def load_octomap(path: Path | str, voxel_size_m: float | None = None) -> World:
+def load_octomap(
+    path: Path | str, voxel_size_m: float | None = None, *, read_memory_mib: float | None = None
+) -> World:
     """The world in an OctoMap tree, whatever its suffix; see `load_world`."""
-    _check({"voxel_size_m": voxel_size_m})
+    _check({"voxel_size_m": voxel_size_m, "read_memory_mib": read_memory_mib})
     options = {"voxel_size_m": voxel_size_m}
     path = checked_path("world file", path)
-    return _world(read_apart(_OCTOMAP, path.absolute(), options), str(path), options, None)
+    return _world(
+        read_apart(_OCTOMAP, path.absolute(), options, Limits(None, read_memory_mib)),
+        str(path),
+        options,
+        None,
+    )
 
 
 def save_world(world: World, path: Path | str) -> None:

@@ -1,17 +1,23 @@
 """OctoMap trees (Hornung et al. 2013), `.bt` and `.ot`, read with octomap-python.
 
-A node is solid from the tree's own occupancy threshold on; space that no leaf covers is unknown.
+A node is solid from the tree's own occupancy threshold on; space that no leaf covers is unknown. The leaves
+are summed up in voxels of the wanted size, a slab of the map after the other: memory follows the result, and
+the grid of the tree's own resolution is never made.
 """
 
 from __future__ import annotations
 
+import itertools
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from entropy_explore_env.worlds.files.voxels import (
     FREE,
+    FREE_AT_LEAST,
+    OCCUPIED_BELOW,
+    ROUNDING,
     SOLID,
     UNKNOWN,
     Options,
@@ -25,24 +31,43 @@ NEEDS = (("octomap", "octomap-python"),)
 _DEPTH = 16
 _VOXELS_PER_BYTE = 4096
 """Limit of the voxels for each byte of the file: a leaf, at least two bits, may cover many."""
+_LEAVES_AT_ONCE = 1 << 16
+_SLAB_VOXELS = 1 << 21
+"""Voxels of a slab, in which leaves are summed up."""
+
+
+class _Leaves(NamedTuple):
+    """The N leaves of a tree: cubes, in voxels of its own resolution from its lower corner."""
+
+    corner: np.ndarray
+    """(N, 3) int32, lower corner."""
+    width: np.ndarray
+    """(N,) int32, edge."""
+    solid: np.ndarray
+    """(N,) bool; the others are free."""
 
 
 def read(path: Path, options: Options) -> Voxels:
-    """The tree's voxels at its own resolution."""
-    del options
+    """The tree's voxels at the wanted size, or at its own resolution."""
     data = content(path)
     tree = _tree(data)
-    edge = tree.getResolution()
+    edge = float(tree.getResolution())
     low, high = np.array(tree.getMetricMin()), np.array(tree.getMetricMax())
     if not (edge > 0 and np.isfinite(low).all() and np.isfinite(high).all()):
         raise RefusedError("an OctoMap with a resolution > 0 and finite bounds")
     extent = np.rint((high - low) / edge)
     if (extent < 1).any():
         raise RefusedError("an OctoMap with a resolution > 0 and finite bounds")
-    shape = checked_shape(extent)
+    voxel_m = options.get("voxel_size_m")
+    own = voxel_m is None or abs(voxel_m - edge) < 1e-9 * edge
+    scale = 1.0 if own else voxel_m / edge
+    shape = checked_shape(extent / scale)
     if np.prod(shape) > 1_000_000 + _VOXELS_PER_BYTE * len(data):
         raise RefusedError(f"an OctoMap whose box holds at most {_VOXELS_PER_BYTE} voxels a byte")
-    return Voxels(_labels(tree, low, edge, shape), float(edge), (float(low[0]), float(low[1]), float(low[2])))
+    leaves = _leaves(tree, low, edge, extent)
+    del tree
+    labels = _own_labels(leaves, shape) if own else _summed_labels(leaves, scale, shape)
+    return Voxels(labels, edge if own else voxel_m, (float(low[0]), float(low[1]), float(low[2])))
 
 
 def _tree(data: bytes) -> Any:  # noqa: ANN401 - octomap has no types
@@ -68,21 +93,99 @@ def _binary_tree(octomap: Any, data: bytes) -> Any:  # noqa: ANN401 - octomap ha
     return tree
 
 
-def _labels(tree: Any, low: np.ndarray, edge: float, shape: tuple[int, int, int]) -> np.ndarray:  # noqa: ANN401
-    """(X, Y, Z) int8: every leaf is a cube of 2^(16 - depth) voxels."""
-    leaves = [
+def _leaves(tree: Any, low: np.ndarray, edge: float, extent: np.ndarray) -> _Leaves:  # noqa: ANN401
+    """All leaves, every one a cube of 2^(16 - depth) voxels, in a compact form: 17 bytes each."""
+    rows = (
         (leaf.getX(), leaf.getY(), leaf.getZ(), leaf.getDepth(), tree.isNodeOccupied(leaf))
         for leaf in tree.begin_leafs()
-    ]
-    table = np.array(leaves, np.float64).reshape(-1, 5)
-    width = np.left_shift(1, _DEPTH - table[:, 3].astype(np.int64))
-    corner = np.rint((table[:, :3] - low) / edge - 0.5 * width[:, None]).astype(np.int64)
-    label = np.where(table[:, 4] > 0.5, SOLID, FREE).astype(np.int8)
-    if not ((corner >= 0).all() and (corner + width[:, None] <= shape).all()):
-        raise RefusedError("an OctoMap whose leaves lie inside its bounds")
+    )
+    parts = []
+    while some := list(itertools.islice(rows, _LEAVES_AT_ONCE)):
+        table = np.array(some, np.float64)
+        width = np.left_shift(1, _DEPTH - table[:, 3].astype(np.int64))
+        corner = np.rint((table[:, :3] - low) / edge - 0.5 * width[:, None])
+        if not ((corner >= 0).all() and (corner + width[:, None] <= extent).all()):
+            raise RefusedError("an OctoMap whose leaves lie inside its bounds")
+        parts.append(_Leaves(corner.astype(np.int32), width.astype(np.int32), table[:, 4] > 0.5))
+    if not parts:
+        raise RefusedError("a whole OctoMap tree")
+    return _Leaves(*(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))
+
+
+def _own_labels(leaves: _Leaves, shape: tuple[int, int, int]) -> np.ndarray:
+    """(X, Y, Z) int8 labels at the tree's own resolution."""
     labels = np.full(shape, UNKNOWN, np.int8)
-    single = width == 1
-    labels[tuple(corner[single].T)] = label[single]
-    for (x, y, z), w, value in zip(corner[~single], width[~single], label[~single], strict=True):
+    label = np.where(leaves.solid, SOLID, FREE).astype(np.int8)
+    single = leaves.width == 1
+    labels[tuple(leaves.corner[single].T)] = label[single]
+    large = ~single
+    for (x, y, z), w, value in zip(leaves.corner[large], leaves.width[large], label[large], strict=True):
         labels[x : x + w, y : y + w, z : z + w] = value
     return labels
+
+
+def _summed_labels(leaves: _Leaves, scale: float, shape: tuple[int, int, int]) -> np.ndarray:
+    """(X, Y, Z) int8 labels of voxels `scale` own ones wide: FREE or SOLID by the volumes of leaves.
+
+    By the rule of `resampling`.
+    """
+    labels = np.empty(shape, np.int8)
+    deep = max(1, _SLAB_VOXELS // (shape[1] * shape[2]))
+    for first in range(0, shape[0], deep):
+        last = min(first + deep, shape[0])
+        volumes = np.zeros((2, last - first, *shape[1:]))
+        begin, end = leaves.corner[:, 0] / scale, (leaves.corner[:, 0] + leaves.width) / scale
+        inside = (end > first) & (begin < last)
+        for solid in (False, True):
+            chosen = np.flatnonzero(inside & (leaves.solid == solid))
+            for place in range(0, len(chosen), _LEAVES_AT_ONCE):
+                some = chosen[place : place + _LEAVES_AT_ONCE]
+                _add_volumes(volumes[int(solid)], leaves.corner[some], leaves.width[some], scale, first)
+        free = volumes[0] >= FREE_AT_LEAST - ROUNDING
+        free &= volumes[1] < OCCUPIED_BELOW - ROUNDING
+        labels[first:last] = np.where(free, FREE, SOLID)
+    return labels
+
+
+def _add_volumes(
+    volumes: np.ndarray, corner: np.ndarray, width: np.ndarray, scale: float, first: int
+) -> None:
+    """Add to each voxel of a slab the share of its volume that cubes overlap.
+
+    Args:
+        volumes: (S, Y, Z) float64; changed in place. The slab begins at voxel `first` along x.
+        corner: (N, 3) of cubes that no two overlap, in own voxels.
+        width: (N,) their edges.
+        scale: Edge of a voxel in own ones.
+        first: Along x.
+    """
+    low = corner / scale
+    low[:, 0] -= first
+    high = low + (width / scale)[:, None]
+    np.clip(low, 0.0, volumes.shape, out=low)
+    np.clip(high, 0.0, volumes.shape, out=high)
+    begin = np.minimum(low.astype(np.int64), np.array(volumes.shape) - 1)
+    steps = np.ceil(high).astype(np.int64) - begin  # voxels that a cube overlaps along each axis
+    for count in np.unique(steps, axis=0):
+        alike = (steps == count).all(axis=1)
+        if np.prod(count) > 27:
+            _add_large(volumes, low[alike], high[alike], begin[alike], count)
+            continue
+        for step in np.ndindex(*count):
+            at = begin[alike] + step
+            sides = np.minimum(high[alike], at + 1) - np.maximum(low[alike], at)
+            flat = (at[:, 0] * volumes.shape[1] + at[:, 1]) * volumes.shape[2] + at[:, 2]
+            np.add.at(volumes.reshape(-1), flat, np.maximum(sides, 0.0).prod(axis=1))
+
+
+def _add_large(
+    volumes: np.ndarray, low: np.ndarray, high: np.ndarray, begin: np.ndarray, count: np.ndarray
+) -> None:
+    """As `_add_volumes`, cube by cube, for cubes over many voxels."""
+    for a, b, at in zip(low, high, begin, strict=True):
+        sides = [
+            np.minimum(b[axis], (cells := at[axis] + np.arange(count[axis])) + 1) - np.maximum(a[axis], cells)
+            for axis in range(3)
+        ]
+        block = tuple(slice(at[axis], at[axis] + count[axis]) for axis in range(3))
+        volumes[block] += np.einsum("i,j,k->ijk", *(np.maximum(side, 0.0) for side in sides))

@@ -23,6 +23,7 @@ from entropy_explore_env.worlds.files.voxels import (
 )
 
 NEEDS = (("pypcd4", "pypcd4"),)
+_POINTS_AT_ONCE = 1 << 20
 _MAX_SHRINKING = 64
 """LZF expands by about this factor at most; a header that states more is wrong."""
 
@@ -52,14 +53,18 @@ def _check_header(data: bytes) -> None:
 def voxels_of(points_m: np.ndarray, options: Options) -> Voxels:
     """Voxels, on multiples of the voxel size, that points (N, 3) lie in; only finite ones count."""
     voxel_m = options.need("voxel_size_m", "a point cloud")
-    points_m = points_m[np.isfinite(points_m).all(axis=1)]
+    finite = np.isfinite(points_m).all(axis=1)
+    if not finite.all():
+        points_m = points_m[finite]
     if len(points_m) == 0:
         raise RefusedError("a point cloud with points in it")
     low = np.floor(points_m.min(axis=0) / voxel_m + 1e-9)
     extent = np.floor(points_m.max(axis=0) / voxel_m + 1e-9) - low + 1.0
     labels = np.full(checked_shape(extent), FREE, np.int8)
-    index = (np.floor(points_m / voxel_m + 1e-9) - low).astype(np.int64)
-    labels[tuple(index.T)] = SOLID
+    for first in range(0, len(points_m), _POINTS_AT_ONCE):
+        some = points_m[first : first + _POINTS_AT_ONCE]
+        index = (np.floor(some / voxel_m + 1e-9) - low).astype(np.int64)
+        labels[tuple(index.T)] = SOLID
     x, y, z = (float(v) for v in low * voxel_m)
     if not all(math.isfinite(v) for v in (x, y, z)):
         raise RefusedError("a point cloud whose corner is finite")

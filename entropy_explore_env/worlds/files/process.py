@@ -22,15 +22,22 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from entropy_explore_env.command import READ_MEMORY_VARIABLE
 from entropy_explore_env.errors import MissingExtraError, SettingError, WorldError
-from entropy_explore_env.worlds.files.voxels import MAX_FILE_BYTES, MAX_FILE_VOXELS, Voxels
+from entropy_explore_env.worlds.files.voxels import (
+    MAX_FILE_BYTES,
+    MAX_FILE_VOXELS,
+    Voxels,
+    memory_allowed,
+)
 
 MEMORY_BYTES = 448 << 20
-"""Memory limit of the process, including its own 80 to 140 MiB; higher for larger files."""
+"""Memory limit of the process, including its own 80 to 140 MiB, and more for each byte of the file."""
 CPU_S = 1.5
 CPU_S_PER_MIB = 20.0
 """Processor time that a file may take, and in addition for each MiB of it."""
-_MEMORY_PER_BYTE = 16
+_MOST_MEMORY_BYTES = 4 << 30
+"""Memory limit of the largest files, unless another one is given."""
 _PATIENCE = 10.0
 """Elapsed time per allowed processor time after which a process that waits is ended."""
 _START_S = 60.0
@@ -52,6 +59,36 @@ class Format(NamedTuple):
 
     reader: str
     kind: str
+    memory_per_byte: int = 16
+    """How much more memory a file may take for each of its bytes."""
+
+
+class Limits(NamedTuple):
+    """What reading a file may take; None = by the file's size."""
+
+    cpu_s: float | None = None
+    """Processor time."""
+    memory_mib: float | None = None
+    """Memory of the process, its own 80 to 140 MiB included."""
+
+
+USUAL = Limits()
+
+
+def _memory_bytes(limits: Limits, form: Format, size: int) -> int:
+    """The memory limit for a file of so many bytes."""
+    mib: Any = limits.memory_mib
+    if mib is None:
+        mib = os.environ.get(READ_MEMORY_VARIABLE)
+    if mib is None:
+        return min(MEMORY_BYTES + form.memory_per_byte * size, _MOST_MEMORY_BYTES)
+    try:
+        allowed = float(mib) * (1 << 20)
+    except ValueError:
+        allowed = math.nan
+    if not 0 < allowed < 2**62:
+        raise SettingError(READ_MEMORY_VARIABLE, mib, "a number of MiB > 0")
+    return int(allowed)
 
 
 class ReaderProcess:
@@ -68,7 +105,7 @@ class ReaderProcess:
         self.cost: dict[str, float] | None = None
 
     def read(
-        self, form: Format, path: Path | str, options: Mapping[str, Any], cpu_s: float | None = None
+        self, form: Format, path: Path | str, options: Mapping[str, Any], limits: Limits = USUAL
     ) -> Voxels:
         """The voxels in a file.
 
@@ -76,22 +113,22 @@ class ReaderProcess:
             form: The file's format.
             path: The file.
             options: Settings for the reader; None = not given.
-            cpu_s: Limit of the processor time; None = by the file's size.
+            limits: Of time and memory.
 
         Raises:
-            WorldError: The file is missing, too large, broken, or takes too long.
+            WorldError: The file is missing, too large, broken, or takes too long or too much memory.
             SettingError: A setting is missing or does not apply to this format.
             MissingExtraError: The package that reads it is not installed.
         """
         size = _size(path)
-        allowed_s = CPU_S + CPU_S_PER_MIB * size / (1 << 20) if cpu_s is None else cpu_s
+        allowed_s = CPU_S + CPU_S_PER_MIB * size / (1 << 20) if limits.cpu_s is None else limits.cpu_s
         request = {
             "reader": form.reader,
             "kind": form.kind,
             "path": str(path),
             "options": dict(options),
             "cpu_s": allowed_s,
-            "memory_bytes": MEMORY_BYTES + _MEMORY_PER_BYTE * size,
+            "memory_bytes": _memory_bytes(limits, form, size),
         }
         process = self._running()
         timer = threading.Timer(_START_S + _PATIENCE * allowed_s, process.kill)
@@ -104,7 +141,7 @@ class ReaderProcess:
         finally:
             timer.cancel()
         if answer is None:
-            raise WorldError("world file", str(path), self._cause_of_death(form, allowed_s))
+            raise WorldError("world file", str(path), self._cause_of_death(form, allowed_s, request))
         header, arrays = answer
         self.cost = {"cpu_s": header["cpu_s"], "peak_kib": header["peak_kib"]}
         _raise_error(header, form, path)
@@ -138,7 +175,7 @@ class ReaderProcess:
             )
         return self._process
 
-    def _cause_of_death(self, form: Format, allowed_s: float) -> str:
+    def _cause_of_death(self, form: Format, allowed_s: float, request: Mapping[str, Any]) -> str:
         """What is allowed, in the terms of an error: a file that does not end the process."""
         assert self._process is not None
         code = self._process.wait()
@@ -147,6 +184,8 @@ class ReaderProcess:
         slow = code in (-getattr(signal, "SIGPROF", 27), -getattr(signal, "SIGKILL", 9))
         if slow:
             return f"a file that is read within {allowed_s:.3g} s of computing (read_limit_s allows more)"
+        if code == -signal.SIGABRT:  # libraries in C++ end so where there is no more memory
+            return f"a whole {form.kind} that is {memory_allowed(request['memory_bytes'])}"
         return f"a whole {form.kind}"
 
 
@@ -217,12 +256,10 @@ def kept_reader() -> Iterator[ReaderProcess]:
         reader.close()
 
 
-def read_apart(
-    form: Format, path: Path | str, options: Mapping[str, Any], cpu_s: float | None = None
-) -> Voxels:
+def read_apart(form: Format, path: Path | str, options: Mapping[str, Any], limits: Limits = USUAL) -> Voxels:
     """Read a file in the process of `kept_reader`, or in one for this file; see ReaderProcess.read."""
     kept = _KEPT.get()
     if kept is not None:
-        return kept.read(form, path, options, cpu_s)
+        return kept.read(form, path, options, limits)
     with kept_reader() as reader:
-        return reader.read(form, path, options, cpu_s)
+        return reader.read(form, path, options, limits)

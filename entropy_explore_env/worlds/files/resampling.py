@@ -7,11 +7,15 @@ import math
 import numpy as np
 
 from entropy_explore_env.compilation.kernels import lean_kernel
-from entropy_explore_env.worlds.files.voxels import FREE, SOLID, Voxels, checked_shape
-
-FREE_AT_LEAST = 0.5
-OCCUPIED_BELOW = 0.25
-_ROUNDING = 1e-9
+from entropy_explore_env.worlds.files.voxels import (
+    FREE,
+    FREE_AT_LEAST,
+    OCCUPIED_BELOW,
+    ROUNDING,
+    SOLID,
+    Voxels,
+    checked_shape,
+)
 
 
 def resampled(voxels: Voxels, voxel_size_m: float | None) -> tuple[np.ndarray, np.ndarray | None]:
@@ -75,8 +79,8 @@ def _pool(labels, scale, solid):
                                 free += part
                             elif labels[x, y, z] == SOLID:
                                 occupied += part
-                is_free = free >= (FREE_AT_LEAST - _ROUNDING) * volume
-                solid[i, j, k] = not is_free or occupied >= (OCCUPIED_BELOW - _ROUNDING) * volume
+                is_free = free >= (FREE_AT_LEAST - ROUNDING) * volume
+                solid[i, j, k] = not is_free or occupied >= (OCCUPIED_BELOW - ROUNDING) * volume
 
 
 @lean_kernel
@@ -96,7 +100,7 @@ def _lower(ceiling, scale, none, new_none, lowered):
             for x in range(int(i * scale), min(ceiling.shape[0], math.ceil((i + 1) * scale))):
                 for y in range(int(j * scale), min(ceiling.shape[1], math.ceil((j + 1) * scale))):
                     lowest = min(lowest, ceiling[x, y])
-            lowered[i, j] = new_none if lowest == none else int(lowest / scale + _ROUNDING)
+            lowered[i, j] = new_none if lowest == none else int(lowest / scale + ROUNDING)
 
 
 def extruded(plan: np.ndarray, layers: int) -> np.ndarray:

@@ -18,6 +18,11 @@ from entropy_explore_env.settings import MAX_VOXELS_ALONG_AXIS
 
 UNKNOWN, FREE, SOLID = -1, 0, 1
 """Labels of voxels."""
+FREE_AT_LEAST = 0.5
+OCCUPIED_BELOW = 0.25
+ROUNDING = 1e-9
+"""Where voxels are resampled, one is free if at least so much of its volume is known to be free and less than
+so much is solid; sums of volumes are compared with this slack, as a share of a voxel."""
 MAX_FILE_BYTES = 256 << 20
 MAX_FILE_VOXELS = 130_000_000
 """Voxels of one file, at its own resolution or at the one asked for."""
@@ -79,6 +84,12 @@ class Options:
                 raise SettingError(name, value, f"None: it does not apply to {kind}")
 
 
+def memory_allowed(limit_bytes: int) -> str:
+    """What is allowed where reading took too much memory."""
+    limit = f"read within {limit_bytes >> 20} MiB of memory"
+    return f"{limit} (read_memory_mib allows more, a larger voxel_size_m may need less)"
+
+
 def content(path: Path) -> bytes:
     """All bytes of a file.
 
@@ -103,5 +114,8 @@ def checked_shape(extent: Sequence[float] | np.ndarray) -> tuple[int, int, int]:
         raise RefusedError(f"a map of at most {MAX_VOXELS_ALONG_AXIS} voxels along each axis")
     x, y, z = (max(1, math.ceil(edge - 1e-6)) for edge in edges)
     if x * y * z > MAX_FILE_VOXELS:
-        raise RefusedError(f"a map whose box holds at most {MAX_FILE_VOXELS} voxels at this voxel size")
+        fewer = "a larger voxel_size_m has fewer"
+        raise RefusedError(
+            f"a map whose box holds at most {MAX_FILE_VOXELS} of its {x * y * z} voxels; {fewer}"
+        )
     return x, y, z

@@ -22,7 +22,7 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from entropy_explore_env.errors import MissingExtraError, SettingError
-from entropy_explore_env.worlds.files.voxels import Options, RefusedError, Voxels
+from entropy_explore_env.worlds.files.voxels import Options, RefusedError, Voxels, memory_allowed
 
 _READERS = "entropy_explore_env.worlds.files."
 
@@ -52,7 +52,7 @@ def _answer(request: dict[str, Any]) -> tuple[dict[str, Any], list[np.ndarray]]:
     except SettingError as error:
         return {"setting": [error.field, error.value, error.allowed]}, []
     except MemoryError:
-        return {"refused": f"a file that is read within {request['memory_bytes'] >> 20} MiB"}, []
+        return {"refused": f"a file that is {memory_allowed(request['memory_bytes'])}"}, []
     except Exception:  # readers raise whatever a broken file leads them to
         return {"refused": None}, []
     arrays = [voxels.labels] if voxels.ceiling is None else [voxels.labels, voxels.ceiling]

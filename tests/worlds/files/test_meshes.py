@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 
 from entropy_explore_env.errors import SettingError, WorldError
+from entropy_explore_env.worlds.files import meshes
+from entropy_explore_env.worlds.files.voxels import Options
 from entropy_explore_env.worlds.load import load_world
 
 trimesh = pytest.importorskip("trimesh", reason="trimesh is not installed")
@@ -99,3 +101,14 @@ def test_a_file_without_faces_is_refused(tmp_path):
 def test_trimesh_reads_from_memory_only(tmp_path):
     scene = trimesh.load_scene(io.BytesIO(write(tmp_path, "stl").read_bytes()), file_type="stl")
     assert len(scene.to_mesh().faces) == 24
+
+
+def test_a_surface_in_parts_has_the_same_voxels(monkeypatch):
+    """Also faces that are first cut into four, since they alone would be too many small triangles."""
+    turned = trimesh.transformations.euler_matrix(0.3, 0.2, 0.5)
+    parts = [trimesh.creation.box((3.0, 2.0, 1.0), turned), trimesh.creation.icosphere(2, 0.8)]
+    whole = meshes._voxels(trimesh.util.concatenate(parts), False, Options({"voxel_size_m": 0.05}))
+    monkeypatch.setattr(meshes, "_TRIANGLES_AT_ONCE", 2000)
+    again = meshes._voxels(trimesh.util.concatenate(parts), False, Options({"voxel_size_m": 0.05}))
+    np.testing.assert_array_equal(again.labels, whole.labels)
+    assert again.origin_m == whole.origin_m and 0 < (whole.labels == 1).mean() < 1

@@ -8,12 +8,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from entropy_explore_env.command import READ_MEMORY_VARIABLE, allow_read_memory
 from entropy_explore_env.errors import SettingError, WorldError
 from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.scenarios import BOX
 from entropy_explore_env.worlds.files import process
-from entropy_explore_env.worlds.load import load_octomap, make_world, with_world
+from entropy_explore_env.worlds.files.process import kept_reader
+from entropy_explore_env.worlds.files.resampling import resampled
+from entropy_explore_env.worlds.files.voxels import Voxels
+from entropy_explore_env.worlds.load import load_octomap, load_world, make_world, with_world
 from tests.reference.scenes import free_box, wander
+from tests.worlds.trees import building, write_tree
 
 octomap = pytest.importorskip("octomap", reason="octomap-python is not installed")
 
@@ -79,6 +84,75 @@ def test_a_wall_one_voxel_thick_stays_a_wall_in_voxels_four_times_as_large(tmp_p
     assert world.grid.shape == (4, 3, 2)
     assert world.occupied[1].all()
     assert not world.occupied[[0, 2, 3]].any()
+
+
+@pytest.mark.parametrize("share", [0.5, 0.7, 1.5, 2.0, 2.9, 4.0, 11.3])
+def test_leaves_are_summed_up_as_the_whole_grid_would_be_resampled(tmp_path, share):
+    labels = building((61, 45, 19), seed=int(10 * share), rooms=4, speckle=0.05)
+    path = write_tree(tmp_path / "house.bt", labels, EDGE_M, (-20, 3, -7))
+    assert np.array_equal(load_octomap(path).occupied, labels != FREE)
+    world = load_octomap(path, share * EDGE_M)
+    whole, _ = resampled(Voxels(labels, EDGE_M), share * EDGE_M)
+    np.testing.assert_array_equal(world.occupied, whole)
+    assert world.grid.origin_m == pytest.approx((-20 * EDGE_M, 3 * EDGE_M, -7 * EDGE_M))
+
+
+def check_large(path, shape, edge_m, rooms, wanted_m, most_mib):
+    """A building of this many nodes is read with the usual limits, and within so much memory."""
+    speckle = 0.02
+    write_tree(path, building(shape, 1, rooms, speckle), edge_m, (-300, -200, -10))
+    with kept_reader() as reader:
+        for voxel_m in wanted_m:
+            world = load_octomap(path, voxel_m)
+            extent = np.array(shape) * edge_m
+            assert np.abs(world.grid.size_m - extent).max() < voxel_m
+            assert 0.1 < 1.0 - world.occupied.mean() < 0.9
+        assert reader.cost is not None and reader.cost["peak_kib"] < most_mib * 1024
+    return path.stat().st_size
+
+
+def test_a_tree_with_a_large_box_is_read_at_a_size_that_fits(tmp_path):
+    """Its own grid has 132 million nodes, more than any world may have; it is never made."""
+    labels = np.full((1200, 1100, 100), UNKNOWN, np.int8)
+    labels[100:900:4, 100, 50] = labels[0, 0, 0] = labels[-1, -1, -1] = SOLID
+    labels[200:280, 300:364, 20:64] = FREE
+    path = write_tree(tmp_path / "campus.bt", labels, 0.05, (-600, -100, -3))
+    del labels
+    assert "of its 132000000 voxels; a larger voxel_size_m has fewer" in refused(path).allowed
+    with kept_reader() as reader:
+        world = load_octomap(path, 0.4)
+        assert reader.cost is not None and reader.cost["peak_kib"] < 200 * 1024
+    assert world.grid.shape == (150, 138, 13)
+    np.testing.assert_array_equal(np.argwhere(~world.occupied).min(axis=0), [25, 37, 2])
+    np.testing.assert_array_equal(np.argwhere(~world.occupied).max(axis=0), [34, 45, 7])
+
+
+@pytest.mark.long
+def test_trees_of_large_buildings_are_read_with_the_usual_limits(tmp_path):
+    size = check_large(tmp_path / "floor.bt", (874, 364, 65), 0.05, 30, (None, 0.1, 0.2, 0.25), 700)
+    assert 0.7e6 < size < 2.1e6
+    size = check_large(tmp_path / "campus.bt", (1460, 836, 140), 0.2, 12, (0.4, 0.8, 1.0), 1800)
+    assert size > 2.1e6
+
+
+def test_what_takes_too_much_memory_says_which_option_allows_more(tmp_path, monkeypatch):
+    path = write_tree(tmp_path / "house.bt", building((90, 80, 40), 1, 6, 0.2), EDGE_M, (0, 0, 0))
+    for load in (load_octomap, load_world):
+        with pytest.raises(WorldError, match=r"within 1 MiB of memory \(read_memory_mib allows more"):
+            load(path, read_memory_mib=1.0)
+    monkeypatch.setenv(READ_MEMORY_VARIABLE, "400")
+    allow_read_memory(None)
+    assert load_octomap(path).grid.shape == (90, 80, 40)
+    allow_read_memory(1)
+    with pytest.raises(WorldError, match="within 1 MiB"):
+        load_octomap(path)
+    assert load_octomap(path, read_memory_mib=400).grid.shape == (90, 80, 40)
+    monkeypatch.setenv(READ_MEMORY_VARIABLE, "much")
+    with pytest.raises(SettingError, match=f"{READ_MEMORY_VARIABLE} = 'much'"):
+        load_octomap(path)
+    for wrong in (0, -1.0, math.nan, math.inf):
+        with pytest.raises(SettingError, match="read_memory_mib"):
+            allow_read_memory(wrong)
 
 
 BROKEN = {
@@ -147,7 +221,7 @@ def test_a_file_whose_box_is_absurdly_large_is_refused(tmp_path):
 
 def test_voxels_so_small_that_there_are_too_many_are_refused(tmp_path):
     error = refused(write(tmp_path / "room.bt", some_labels()), 1e-4)
-    assert (error.field, error.value) == ("voxel_size_m", 1e-4)
+    assert error.allowed.endswith("of its 3080000000000 voxels; a larger voxel_size_m has fewer")
 
 
 def test_a_map_without_free_space_is_refused(tmp_path):

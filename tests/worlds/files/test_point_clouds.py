@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 from entropy_explore_env.errors import SettingError, WorldError
+from entropy_explore_env.worlds.files import point_clouds
+from entropy_explore_env.worlds.files.voxels import Options
 from entropy_explore_env.worlds.load import load_world
 from tests.worlds.samples import pcd, ply, points
 
@@ -53,7 +55,7 @@ def test_a_cloud_needs_a_voxel_size_that_gives_a_box_of_reason(tmp_path):
     path.write_bytes(by_hand("0 0 0", "900 900 900"))
     with pytest.raises(SettingError, match="voxel_size_m = None"):
         load_world(path)
-    with pytest.raises(WorldError, match="at most 130000000 voxels"):
+    with pytest.raises(WorldError, match="of its 5841725401 voxels; a larger voxel_size_m has fewer"):
         load_world(path, 0.5)
     path.write_bytes(by_hand("0 0 0", "1e30 0 0"))
     with pytest.raises(WorldError, match="along each axis"):
@@ -66,3 +68,12 @@ def test_a_header_that_promises_too_many_points_is_refused(tmp_path, count):
     path.write_bytes(by_hand("0 0 0", "1 1 1", count=count))
     with pytest.raises(WorldError, match="as many points as its header says"):
         load_world(path, 0.5)
+
+
+def test_a_cloud_in_parts_has_the_same_voxels(monkeypatch):
+    points_m = np.random.default_rng(0).normal(0.0, (1.0, 2.0, 0.5), (1000, 3))
+    points_m[7] = np.nan
+    whole = point_clouds.voxels_of(points_m, Options({"voxel_size_m": 0.2}))
+    monkeypatch.setattr(point_clouds, "_POINTS_AT_ONCE", 64)
+    again = point_clouds.voxels_of(points_m, Options({"voxel_size_m": 0.2}))
+    np.testing.assert_array_equal(again.labels, whole.labels)

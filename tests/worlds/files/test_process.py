@@ -56,7 +56,7 @@ def test_what_takes_too_much_memory_is_refused_and_the_process_lives(tmp_path, m
     monkeypatch.setattr(process, "MEMORY_BYTES", 8 << 20)
     path = tmp_path / "plan.pgm"
     path.write_bytes(pgm(plan(3000, 1000)))
-    monkeypatch.setattr(process, "_MEMORY_PER_BYTE", 0)
+    monkeypatch.setattr(process, "_MOST_MEMORY_BYTES", 8 << 20)
     with kept_reader() as reader:
         with pytest.raises(WorldError, match="read within 8 MiB"):
             load_world(path)
