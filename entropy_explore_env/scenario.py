@@ -68,7 +68,8 @@ class Scenario:
         sigma_prior: Standard deviation of coverage before any measurement; the mean is ½.
         decision_period_s: A step lasts this long, 1e-3 to 1e5; None = until the next robot has to decide.
         track_truth: Whether the team's joint map, of everything measured, is kept and compared with the
-            truth: for figures only, nobody acts on it. It costs one more map a mission.
+            truth: for figures only, nobody acts on it. It costs one more map a mission. True by itself where
+            the ending asks for what was seen.
     """
 
     name: str
@@ -108,6 +109,8 @@ class Scenario:
         if self.decision_period_s is not None:
             check_within(self, "decision_period_s", least=1e-3, most=1e5)
         check_kind(self, "track_truth", bool)
+        if self.ending.by_seen:
+            object.__setattr__(self, "track_truth", True)
         if self.ending.sigma_end >= self.sigma_prior:
             raise SettingError(
                 "Ending.sigma_end", self.ending.sigma_end, f"below sigma_prior = {self.sigma_prior}"

@@ -309,14 +309,24 @@ class Channel:
 
 @dataclass(frozen=True)
 class Ending:
-    """When a mission is over (Rocha04, eq. 41).
+    """When a mission is over: by the entropy of maps (Rocha04, eq. 41), or by what the team has seen.
 
     The threshold is the entropy of a map in which every voxel that can be seen at all has the
     standard deviation `sigma_end`; where everything can be seen it is V·h(σ_end), as in Rocha04.
 
+    With `seen_share` or `unseen_free_voxels`, one of the two, the threshold ends nothing; rewards are still
+    counted in shares of it. A voxel is seen when some robot has measured it at least once. What can be seen
+    are the voxels of `World.visible`: all free ones that are connected with where robots can be, and the
+    solid ones beside them. In a plan that is exact for bodies that fit into a voxel, with a sensor that
+    updates one voxel behind a hit. Elsewhere some of them may lie where no ray gets to from where robots can
+    be: then a share of 1 is never reached. Nobody acts on it: the mission keeps the joint map for it
+    (`Scenario.track_truth`).
+
     Attributes:
         sigma_end: Standard deviation of coverage at which a voxel counts as known.
         termination: `any` or `all`: whether one robot's map has to pass the threshold, or all robots' maps.
+        seen_share: The mission ends when the team has seen this share of what can be seen; None = by entropy.
+        unseen_free_voxels: It ends when no more free voxels than this are unseen of those that can be seen.
         time_limit_s: Simulated time after which the mission is cut off (a truncation), 1e-3 to 1e9; inf =
             never.
         max_cycles: Steps after which it is cut off; None = never.
@@ -324,6 +334,8 @@ class Ending:
 
     sigma_end: float = 0.03
     termination: Literal["any", "all"] = "any"
+    seen_share: float | None = None
+    unseen_free_voxels: int | None = None
     time_limit_s: float = 10_000.0
     max_cycles: int | None = None
 
@@ -331,9 +343,21 @@ class Ending:
         """Check every field."""
         check(self, "sigma_end", "a number from 1e-4 to 1e4", lambda v: 1e-4 <= v <= 1e4)
         check_choice(self, "termination", Literal["any", "all"])
+        if self.seen_share is not None:
+            check(self, "seen_share", "None, or a number above 0 up to 1", lambda v: 0 < v <= 1)
+        if self.unseen_free_voxels is not None:
+            check_count(self, "unseen_free_voxels", 0, MAX_VOXELS)
+            if self.seen_share is not None:
+                allowed = "None where seen_share is given"
+                raise SettingError("Ending.unseen_free_voxels", self.unseen_free_voxels, allowed)
         check_within(self, "time_limit_s", least=1e-3, most=1e9, inf=True)
         if self.max_cycles is not None:
             check_count(self, "max_cycles", 1, 2**62)
+
+    @property
+    def by_seen(self) -> bool:
+        """Whether a mission ends by what the team has seen, and not by entropy."""
+        return self.seen_share is not None or self.unseen_free_voxels is not None
 
 
 @dataclass(frozen=True)

@@ -99,6 +99,8 @@ FIELDS: Mapping[type, Mapping[str, Numbers | Sequence[Any]]] = MappingProxyType(
         Ending: {
             "sigma_end": Numbers(1e-4, 1e4, 0.01, 1.0),
             "termination": ("any", "all"),
+            "seen_share": Numbers(1e-9, 1.0, 0.2, 1.0, also=(None,)),
+            "unseen_free_voxels": _count(0, 2**31 - 1, 0, 500, None),
             "time_limit_s": Numbers(1e-3, 1e9, 1.0, 1e4, also=(math.inf,)),
             "max_cycles": _count(1, 2**62, 1, 100, None),
         },

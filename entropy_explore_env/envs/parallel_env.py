@@ -39,7 +39,8 @@ class EntropyExploreEnv(ParallelEnv[str, Any, Any]):
     Every robot has the same spaces (see `missions.observation.layout` and `missions.action`). A robot that
     is driving or scanning is busy: its action is ignored, and `infos[agent]["deciding"]` says for
     the next step whether it will count. All robots end together: terminated when the map's entropy
-    reached the threshold, truncated at the limit of time or steps. `envs.infos` lists the infos.
+    reached the threshold, or the team has seen what the scenario asks for; truncated at the limit of time or
+    steps. `envs.infos` lists the infos.
     """
 
     metadata = {  # noqa: RUF012 - the form that PettingZoo asks for
@@ -190,8 +191,8 @@ class EntropyExploreEnv(ParallelEnv[str, Any, Any]):
         observations, infos = self._observations(), self._infos()
         rewards = dict(zip(self.agents, earned.tolist(), strict=True))
         end = self.missions.over(0)
-        terminations = dict.fromkeys(self.agents, end is MissionEnd.MAPPED)
-        truncations = dict.fromkeys(self.agents, end in (MissionEnd.TIME_UP, MissionEnd.CYCLES_UP))
+        terminations = dict.fromkeys(self.agents, end.reached_goal)
+        truncations = dict.fromkeys(self.agents, end is not MissionEnd.RUNNING and not end.reached_goal)
         if end is not MissionEnd.RUNNING:
             self.agents = []
         self._painter.watch(self.missions)

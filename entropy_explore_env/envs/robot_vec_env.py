@@ -25,7 +25,7 @@ from entropy_explore_env.missions.reset_options import (
     named_options,
 )
 from entropy_explore_env.missions.snapshot import check_array, restore, snapshot
-from entropy_explore_env.missions.state import MissionEnd
+from entropy_explore_env.missions.state import goals_reached
 from entropy_explore_env.randomness import check_seed
 from entropy_explore_env.scenario import Scenario
 from entropy_explore_env.validation import check_instance, is_whole
@@ -35,7 +35,6 @@ try:
 except ImportError:
     raise MissingExtraError("stable_baselines3", "training") from None
 
-_MAPPED = MissionEnd.MAPPED.code
 _CARRIED = ("deciding", "_returns", "_steps", "_time_s")
 
 
@@ -216,7 +215,7 @@ class RobotVecEnv(VecEnv):
         told: list[dict[str, Any]],
     ) -> None:
         """What infos say of the rows of a mission that ended."""
-        truncated = int(last["end"][mission]) != _MAPPED
+        truncated = not goals_reached(last["end"])[mission]
         for robot in range(self._robots):
             row = mission * self._robots + robot
             told[row] |= {

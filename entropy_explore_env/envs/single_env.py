@@ -88,11 +88,11 @@ class SingleRobotEnv(gymnasium.Env[Any, Any]):
         reward = float(self._rewards.after(self.missions, before)[0, 0])
         self._painter.watch(self.missions)
         end = self.missions.over(0)
-        truncated = end in (MissionEnd.TIME_UP, MissionEnd.CYCLES_UP)
+        truncated = end is not MissionEnd.RUNNING and not end.reached_goal
         return (
             self._observation(),
             reward,
-            end is MissionEnd.MAPPED,
+            end.reached_goal,
             truncated,
             robot_infos(self.missions, 0)[0],
         )

@@ -16,7 +16,7 @@ from entropy_explore_env.errors import CallOrderError, SettingError
 from entropy_explore_env.missions.action import action_space
 from entropy_explore_env.missions.reset_options import NAMES, ResetOptions, batch_options, named_options
 from entropy_explore_env.missions.simulation import Missions
-from entropy_explore_env.missions.state import MissionEnd
+from entropy_explore_env.missions.state import MissionEnd, goals_reached
 from entropy_explore_env.randomness import check_seed
 from entropy_explore_env.reports.metrics import mission_figures
 from entropy_explore_env.reports.painting import FRAMES_PER_S, RENDER_MODES, Painter, check_render_mode
@@ -25,7 +25,7 @@ from entropy_explore_env.scenarios import find_scenario
 from entropy_explore_env.validation import check_instance, check_whole
 from entropy_explore_env.worlds.given import with_given_worlds
 
-_RUNNING, _MAPPED = MissionEnd.RUNNING.code, MissionEnd.MAPPED.code
+_RUNNING = MissionEnd.RUNNING.code
 
 
 class EntropyExploreVectorEnv(VectorEnv[Any, Any, Any]):
@@ -186,7 +186,8 @@ class EntropyExploreVectorEnv(VectorEnv[Any, Any, Any]):
         earned = self._rewards.after(self.missions, before)
         earned[over] = 0.0
         self.missions.begin(drawn)
-        terminations, truncations = clocks["end"] == _MAPPED, clocks["end"] > _MAPPED
+        terminations = goals_reached(clocks["end"])
+        truncations = (clocks["end"] != _RUNNING) & ~terminations
         infos = self._infos(earned)
         ended = np.flatnonzero(terminations | truncations)
         if len(ended) and self.autoreset_mode is AutoresetMode.SAME_STEP:

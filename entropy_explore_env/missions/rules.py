@@ -55,6 +55,7 @@ PARAMS = np.dtype(
         ("repeats", "i8"),
         ("period_s", "f8"),  # length of a step; inf = until the next robot has to decide
         ("all_maps", "?"),
+        ("by_seen", "?"),  # whether the mission ends by what was seen
         ("time_limit_s", "f8"),
         ("max_cycles", "i8"),
         ("team_reward", "?"),
@@ -117,6 +118,7 @@ def rules_of(scenario: Scenario) -> Rules:
         "repeats": channel.repeats,
         "period_s": math.inf if scenario.decision_period_s is None else scenario.decision_period_s,
         "all_maps": ending.termination == "all",
+        "by_seen": ending.by_seen,
         "time_limit_s": ending.time_limit_s,
         "max_cycles": _NEVER if ending.max_cycles is None else ending.max_cycles,
         "team_reward": scenario.reward.kind == "team",

@@ -11,9 +11,11 @@ import numpy as np
 from entropy_explore_env.belief.map_update import fuse_ray
 from entropy_explore_env.belief.measurement_model import Return
 from entropy_explore_env.compilation.kernels import lean_kernel
-from entropy_explore_env.missions.state import PROGRESS
+from entropy_explore_env.missions.poses import share_left
+from entropy_explore_env.missions.state import PROGRESS, SEEN_MARKS
 
 _NOTHING = int(Return.NOTHING)
+_ROUNDING = 1e-9
 _ADD, _REMOVE = np.int64(1), np.int64(-1)
 """NumPy integers, so that `score_voxels` compiles for one type."""
 
@@ -28,6 +30,26 @@ def note_progress(clock, robots):
     for mark in range(len(PROGRESS)):
         if clock.reached_s[mark] < 0.0 and gained >= PROGRESS[mark] * asked:
             clock.reached_s[mark] = clock.time_s
+
+
+@lean_kernel
+def note_seen(params, clock, robots):
+    """Take time and driven path when the team has seen each of SEEN_MARKS of what can be seen.
+
+    Args:
+        params: (A,) PARAMS.
+        clock: MISSION, changed in place.
+        robots: (A,) ROBOT.
+    """
+    for mark in range(len(SEEN_MARKS)):
+        enough = clock.explored_visible >= SEEN_MARKS[mark] * clock.visible - _ROUNDING
+        if enough and clock.seen_s[mark] < 0.0:
+            clock.seen_s[mark] = clock.time_s
+            clock.seen_m[mark] = 0.0
+            for index in range(len(robots)):
+                robot = robots[index]
+                left_m = share_left(params[index], robot, clock.time_s) * robot.path_m
+                clock.seen_m[mark] += robot.distance_m - left_m
 
 
 @lean_kernel
@@ -65,5 +87,7 @@ def score_voxels(clock, joint, truth, prior, crossed, n, sign):
             clock.error += sign * abs(np.float64(mean[voxel]) - np.float64(truth[voxel]))
             if visible[voxel]:
                 clock.explored_visible += sign
+                if truth[voxel] <= 0.5:
+                    clock.explored_free += sign
             if (mean[voxel] > 0.5) != (truth[voxel] > 0.5):
                 clock.wrong += sign

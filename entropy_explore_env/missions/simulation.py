@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 import os
 from collections.abc import Callable, Iterable, Sequence
 from typing import NamedTuple
@@ -255,8 +256,9 @@ class Missions:
         if self.scenario.track_truth:
             state.joint_mean[mission] = PRIOR_MEAN
             state.joint_precision[mission] = self.rules.params["prior_precision"][0]
-            state.visible[mission] = world.visible(self.scenario).ravel()
-        state.missions[mission]["reached_s"] = -1.0
+            self._set_seen_goal(mission, world)
+        for field in ("reached_s", "seen_s", "seen_m"):
+            state.missions[mission][field] = -1.0
         self._set_entropies(mission, world.visible_voxels(self.scenario))
         robots = state.robots[mission]
         for field in ("origin", "goal", "target", "scan_pose"):
@@ -278,6 +280,17 @@ class Missions:
             self.state.collision[row] = world.layout(self.scenario, kind).collision_mask.ravel()
             if self._no_fly.size:
                 self._no_fly[row] = world.no_fly_mask(kind.robot.body_radius_m).ravel()
+
+    def _set_seen_goal(self, mission: int, world: World) -> None:
+        """What can be seen, and how much of it has to be where that ends the mission."""
+        clock, ending = self.state.missions[mission], self.scenario.ending
+        visible = world.visible(self.scenario)
+        self.state.visible[mission] = visible.ravel()
+        clock["visible"], clock["visible_free"] = visible.sum(), (visible & ~world.occupied).sum()
+        if ending.seen_share is not None:
+            clock["explored_end"] = math.ceil(ending.seen_share * clock["visible"] - 1e-9)
+        if ending.unseen_free_voxels is not None:
+            clock["explored_free_end"] = clock["visible_free"] - ending.unseen_free_voxels
 
     def _set_entropies(self, mission: int, visible_voxels: int) -> None:
         """H(0) by eq. 25, and H_th: voxels that can be seen at σ_end, the others at the prior."""

@@ -25,11 +25,22 @@ class MissionEnd(enum.Enum):
     MAPPED = "The entropy of the map, or of all maps, fell to the threshold."
     TIME_UP = "The simulated time reached its limit."
     CYCLES_UP = "The number of steps reached its limit."
+    SEEN = "The team has seen as much of the world as the mission asks for."
 
     @property
     def code(self) -> int:
         """Number of this end in arrays."""
         return list(MissionEnd).index(self)
+
+    @property
+    def reached_goal(self) -> bool:
+        """Whether the mission came to what it asks for: then it is terminated. Others are truncated."""
+        return self in (MissionEnd.MAPPED, MissionEnd.SEEN)
+
+
+def goals_reached(ends: np.ndarray) -> np.ndarray:
+    """Which of some missions came to what they ask for, bool, from the codes of their ends."""
+    return (ends == MissionEnd.MAPPED.code) | (ends == MissionEnd.SEEN.code)
 
 
 MISSION = np.dtype(
@@ -47,12 +58,22 @@ MISSION = np.dtype(
         ("explored_visible", "i8"),  # of those that can be seen from where robots can be
         ("error", "f8"),  # sum of |expected - true coverage| over explored voxels
         ("wrong", "i8"),  # explored voxels on the wrong side of ½
+        ("visible", "i8"),  # voxels that can be seen from where robots can be
+        ("visible_free", "i8"),  # of those that are free
+        ("explored_free", "i8"),  # of those that were measured
+        ("seen_s", "f8", (5,)),  # when the share of SEEN_MARKS of what is visible was explored; -1 = not yet
+        ("seen_m", "f8", (5,)),  # what the team had driven then; -1 likewise
+        ("explored_end", "i8"),  # so many explored visible voxels end the mission, if so it ends,
+        ("explored_free_end", "i8"),  # and so many free ones
     ],
     align=True,
 )
 
 PROGRESS = (0.5, 0.9, 0.99, 1.0)
 """Shares of the bits that the mission asks for, at which the time is taken."""
+
+SEEN_MARKS = (0.5, 0.9, 0.95, 0.99, 1.0)
+"""Shares of what can be seen, at which time and driven path are taken where the truth is tracked."""
 
 WAYPOINTS = 32
 """Most points that a planned path leads to, one after the other."""

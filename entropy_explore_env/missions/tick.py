@@ -35,7 +35,7 @@ from entropy_explore_env.missions.phases import broadcast_all, collect_batch, ne
 from entropy_explore_env.missions.poses import copy_numbers, grid_size, pose_at, to_grid_units
 from entropy_explore_env.missions.redecision import decide, note_braking
 from entropy_explore_env.missions.reward import reward_robots
-from entropy_explore_env.missions.scoring import note_progress, score_scan
+from entropy_explore_env.missions.scoring import note_progress, note_seen, score_scan
 from entropy_explore_env.missions.state import (
     Beliefs,
     InFlight,
@@ -56,7 +56,7 @@ from entropy_explore_env.robots.range_sensor import (
     visibility_parameters,
 )
 
-_RUNNING, _MAPPED, _TIME_UP, _CYCLES_UP = (end.code for end in MissionEnd)
+_RUNNING, _MAPPED, _TIME_UP, _CYCLES_UP, _SEEN = (end.code for end in MissionEnd)
 _NOTHING = int(Return.NOTHING)
 _NO_EVENT, _MESSAGE, _BROADCAST, _ROBOT = range(4)
 
@@ -217,8 +217,7 @@ def advance(mission, sensors, work):
         if ASSERTING and events_handled(robots, messages, mission.phases) <= handled:
             raise AssertionError("an event was not used up")
         note_progress(clock, robots)
-        if mapped(robots, clock.entropy_end_bits, shared.all_maps):
-            clock.end = _MAPPED
+        clock.end = goal_reached(shared, clock, robots)
     if clock.end == _RUNNING:
         clock.time_s = max(clock.time_s, stop_s)
         if stop_s >= shared.time_limit_s:
@@ -302,13 +301,17 @@ def next_robot(robots):
 
 
 @lean_kernel
-def mapped(robots, entropy_end_bits, all_maps):
-    """Whether one robot's map, or all maps, passed the threshold (Rocha04, eq. 41)."""
+def goal_reached(shared, clock, robots):
+    """Code of a MissionEnd: by what the team has seen, or by the threshold of entropy (Rocha04, eq. 41)."""
+    if shared.by_seen:
+        seen = clock.explored_visible >= clock.explored_end and clock.explored_free >= clock.explored_free_end
+        return _SEEN if seen else _RUNNING
     passed = 0
     for robot in robots:
-        if robot.entropy_bits <= entropy_end_bits:
+        if robot.entropy_bits <= clock.entropy_end_bits:
             passed += 1
-    return passed == len(robots) if all_maps else passed > 0
+    mapped = passed == len(robots) if shared.all_maps else passed > 0
+    return _MAPPED if mapped else _RUNNING
 
 
 @lean_kernel
@@ -343,6 +346,7 @@ def scan_and_share(mission, sensor, index, work):
     note_scan(robot, mission.latest, scan, index)
     if params.track_truth:
         score_scan(clock, mission.joint, mission.truth, scan, params.prior_precision)
+        note_seen(team.params, clock, team.robots)
     if len(team.robots) > 1 and params.burst > 0:
         share(mission, scan, index, work.recipients)
 

@@ -8,8 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from entropy_explore_env.missions.poses import driven_metres
 from entropy_explore_env.missions.simulation import Missions
-from entropy_explore_env.missions.state import COUNTED, MissionEnd
+from entropy_explore_env.missions.state import COUNTED, SEEN_MARKS
 from entropy_explore_env.robots.range_sensor import (
     Return,
     Scene,
@@ -60,7 +61,7 @@ def mission_figures(missions: Missions, mission: int, floor: bool | None = None)
         "world": missions.scenario.world if world is None else world.name,
         "robots": missions.scenario.robots,
         "seed": missions.seeds[mission],
-        "finished": end is MissionEnd.MAPPED,
+        "finished": end.reached_goal,
         "end_reason": end.name,
         "t_mission_s": float(clock["time_s"]),
         **{f"t{mark}_s": _reached(clock, place) for place, mark in enumerate((50, 90, 99))},
@@ -97,15 +98,27 @@ def joint_figures(missions: Missions, mission: int) -> dict[str, float | int | N
     Returns:
         `entropy_bits`; `explored`: share of the voxels that robots can observe at all that were
         measured; `error`: mean |expected - true coverage| over the measured voxels; `wrong`: share of
-        them on the wrong side of ½; None where nothing was measured.
+        them on the wrong side of ½; None where nothing was measured. `unseen_free_voxels`: those that can be
+        observed and were not measured; `driven_m`: what the team has driven up to now. `t50_seen_s` and
+        `path50_seen_m`, also for 90, 95, 99 and 100: time, and what the team had driven, when that
+        percentage of the voxels that can be observed was measured; None = it was not.
     """
-    clock = missions.state.missions[mission]
-    explored, visible = int(clock["explored"]), int(missions.state.visible[mission].sum())
+    clock, explored = missions.state.missions[mission], int(missions.state.missions[mission]["explored"])
+    marks: dict[str, float | int | None] = {}
+    for place, share in enumerate(SEEN_MARKS):
+        seen = clock["seen_s"][place] >= 0.0
+        marks[f"t{round(100 * share)}_seen_s"] = float(clock["seen_s"][place]) if seen else None
+        marks[f"path{round(100 * share)}_seen_m"] = float(clock["seen_m"][place]) if seen else None
+    one, driven_m = slice(mission, mission + 1), np.empty((1, missions.scenario.robots))
+    driven_metres(missions.rules.params, missions.state.missions[one], missions.state.robots[one], driven_m)
     return {
         "entropy_bits": float(clock["joint_bits"]),
-        "explored": int(clock["explored_visible"]) / visible,
+        "explored": int(clock["explored_visible"]) / int(clock["visible"]),
         "error": float(clock["error"]) / explored if explored else None,
         "wrong": int(clock["wrong"]) / explored if explored else None,
+        "unseen_free_voxels": int(clock["visible_free"]) - int(clock["explored_free"]),
+        "driven_m": float(driven_m.sum()),
+        **marks,
     }
 
 

@@ -68,6 +68,9 @@ _FIELDS: Mapping[str, tuple[str, ...]] = MappingProxyType(
 FIELDS_UNDER_WAY = "under_way path_blocked lead_s scan_lead_m decided_s redecide_s".split()
 """Further fields of `robots`, where some robot decides under way."""
 
+FIELDS_SEEN = ("explored_free", "seen_s", "seen_m")
+"""Further fields of `missions`, where a mission ends by what was seen."""
+
 _FIELDS_TODAY: Mapping[str, str] = MappingProxyType(
     {
         "missions.letters": "enqueued",
@@ -97,8 +100,8 @@ def state_values(missions: Missions, mission: int) -> dict[str, np.ndarray]:
         mission: Which one.
 
     Returns:
-        Name → array, a view of the state, in the order of the digest; the phases of the broadcast only
-        where there are some, and what decisions under way need only where robots take some.
+        Name → array, a view of the state, in the order of the digest. The phases of the broadcast, what an
+        ending by what was seen needs, and what decisions under way need, are there only where they are used.
     """
     values: dict[str, np.ndarray] = {}
     for name, read in _ARRAYS.items():
@@ -110,6 +113,8 @@ def state_values(missions: Missions, mission: int) -> dict[str, np.ndarray]:
             values[f"{name}.{field}"] = array[today][mission, ...]
         if name not in _FIELDS:
             values[name] = array[mission]
+        if name == "missions" and missions.scenario.ending.by_seen:
+            values.update({f"missions.{field}": array[field][mission, ...] for field in FIELDS_SEEN})
         if name == "robots" and any(kind.robot.redecide != "at_stop" for kind in missions.scenario.kinds):
             values.update({f"robots.{field}": array[field][mission, ...] for field in FIELDS_UNDER_WAY})
     return values

@@ -66,6 +66,7 @@ def test_scenarios_conform_in_fresh_processes_too(scenario: str, robots: int, ki
     [
         {"decision_period_s": None, "time_limit_s": 25.0, "observation": {"flat": True}},
         {"decision_period_s": None, "time_limit_s": 25.0, "robot": {"redecide": 0.7}},
+        {"ending": {"seen_share": 0.6, "time_limit_s": 60.0}, "time_limit_s": 60.0},
         {"robot": {"redecide": "on_scan", "navigator": "planned"}, "sensor": {"scan_every_m": 0.3}},
         {"robots": 9, "robot": {"body_radius_m": 0.24}, "reward": {"kind": "team", "cost_per_s": 0.001}},
         {"robot": {"motion": "planar", "reach_m": float("inf")}, "channel": {"range_m": 1.5}},

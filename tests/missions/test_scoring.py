@@ -2,14 +2,21 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
+from hypothesis import given
 
 from entropy_explore_env.belief.entropy import map_entropy_bits
+from entropy_explore_env.missions.poses import driven_metres
 from entropy_explore_env.missions.simulation import Missions
-from entropy_explore_env.missions.state import PROGRESS
-from entropy_explore_env.reports.metrics import joint_figures
-from tests.reference.scenes import free_box, random_actions, started, wander
+from entropy_explore_env.missions.state import PROGRESS, MissionEnd
+from entropy_explore_env.missions.view import view_of
+from entropy_explore_env.reports.metrics import joint_figures, mission_figures
+from entropy_explore_env.settings import Grid
+from entropy_explore_env.worlds.world import World
+from tests.reference.scenes import drawn, free_box, put, random_actions, seeds, started, wander
 
 NOISY = {"sensor": {"range_noise_m": 0.2, "max_range_m": 2.0}, "channel": {"loss_probability": 0.4}}
 
@@ -85,3 +92,79 @@ def test_bits_gained_and_heard_add_up_to_what_the_map_lost():
     np.testing.assert_allclose(robots["gained_bits"] + robots["heard_bits"], lost, rtol=0, atol=1e-6)
     assert (robots["heard_bits"] > 0.0).all()
     assert (robots["redundant"] > 0).all() and (robots["redundant"] <= robots["measurements"]).all()
+
+
+def plan(seed: int) -> np.ndarray:
+    """Solid voxels (9, 13, 1) of a plan, drawn so that pockets, diagonal gaps and lone pillars occur."""
+    return np.random.default_rng(seed).random((9, 13, 1)) < 0.35
+
+
+@drawn(10)
+@given(seeds)
+def test_in_a_plan_what_can_be_seen_is_what_a_scanner_in_all_places_sees(seed):
+    """Free voxels and walls, none more and none fewer: 100 % can be reached, and not before all is seen."""
+    scenario = free_box(
+        grid=Grid((9, 13, 1), 0.5),
+        robots=1,
+        sensor={"field_of_view_rad": (2 * math.pi, 0.0), "angular_step_rad": math.pi / 360},
+        ending={"seen_share": 1.0},
+    )
+    world = World(scenario.grid, plan(seed), "plan")
+    missions = Missions(scenario, given=[world])
+    missions.reset(0, seed)
+    state, clock = missions.state, missions.state.missions[0]
+    places = world.layout(scenario).starts
+    rng = np.random.default_rng(seed)
+    for voxel in rng.permutation(places):
+        assert missions.over(0) is MissionEnd.RUNNING
+        x, y, _ = np.unravel_index(voxel, scenario.grid.shape)
+        put(missions, 0, (0.5 * x + 0.25, 0.5 * y + 0.25, 0.25, 0.0, 0.0))
+        stay = view_of(missions, 0, 0).action_for(state.robots[0, 0]["goal"])
+        missions.step(np.array([[stay]]), np.zeros((1, 1), np.int64))
+        measured = state.joint_precision[0] > missions.rules.params[0]["prior_precision"]
+        assert not (measured & ~state.visible[0]).any()
+        assert clock["explored_free"] == (measured & state.visible[0] & (state.truth[0] == 0.0)).sum()
+        if missions.over(0) is not MissionEnd.RUNNING:
+            break
+    assert missions.over(0) is MissionEnd.SEEN
+    assert (measured == state.visible[0]).all() and clock["explored_visible"] == clock["visible"]
+    assert clock["explored_free"] == clock["visible_free"] == len(places)
+    figures = mission_figures(missions, 0)
+    assert figures["finished"] and figures["joint"]["unseen_free_voxels"] == 0
+
+
+@pytest.mark.parametrize(
+    "ending", [{"seen_share": 0.8}, {"unseen_free_voxels": 40}, {"seen_share": 0.8, "sigma_end": 20.0}]
+)
+def test_a_mission_ends_with_the_scan_that_shows_enough(ending):
+    """Whatever its entropy is, and not a scan earlier; time and path at marks are those of their scans."""
+    scenario = free_box(ending=ending, world="furnished", robots=2, sensor={"scan_every_m": 0.3})
+    assert scenario.track_truth
+    missions = started(scenario, seed=6)
+    clock, robots = missions.state.missions[0], missions.state.robots[0]
+    rng, driven_m = np.random.default_rng(1), np.zeros((1, 2))
+    marks = {0.5: None, 0.9: None, 0.95: None, 0.99: None, 1.0: None}
+    assert clock["seen_s"].tolist() == clock["seen_m"].tolist() == [-1.0] * 5
+    while missions.over(0) is MissionEnd.RUNNING:
+        share = clock["explored_visible"] / clock["visible"]
+        unseen = clock["visible_free"] - clock["explored_free"]
+        assert share < ending["seen_share"] if "seen_share" in ending else unseen > 40
+        missions.step(*random_actions(missions, rng))
+        driven_metres(missions.rules.params, missions.state.missions, missions.state.robots, driven_m)
+        for mark in marks:
+            if marks[mark] is None and clock["explored_visible"] >= mark * clock["visible"]:
+                marks[mark] = (float(clock["time_s"]), driven_m.sum())
+    assert missions.over(0) is MissionEnd.SEEN
+    reached = [mark for mark in marks.values() if mark is not None]
+    assert 0 < len(reached) < 5
+    for number, mark in enumerate(reached):
+        # steps may hold several scans, so a mark may have been reached earlier in its step
+        assert clock["seen_s"][number] <= mark[0] and clock["seen_m"][number] <= mark[1] + 1e-9
+        assert number == 0 or clock["seen_s"][number] > reached[number - 1][0] - 1e-9
+    assert clock["seen_s"][len(reached) :].tolist() == [-1.0] * (5 - len(reached))
+    joint = mission_figures(missions, 0)["joint"]
+    assert joint["t50_seen_s"] == clock["seen_s"][0] and joint["path50_seen_m"] == clock["seen_m"][0]
+    assert joint["t100_seen_s"] is None and joint["path100_seen_m"] is None
+    assert (
+        joint["driven_m"] == pytest.approx(driven_m.sum()) and joint["driven_m"] <= robots["distance_m"].sum()
+    )

@@ -62,11 +62,12 @@ def test_each_robot_s_own_counts_stand_beside_the_sums():
 
 
 @pytest.mark.parametrize("end", MissionEnd)
-def test_a_mission_is_finished_only_if_it_was_mapped(end):
+def test_a_mission_is_finished_only_if_it_was_mapped_or_seen(end):
     missions = filled()
     missions.state.missions[1]["end"] = end.code
     figures = mission_figures(missions, 1)
-    assert (figures["finished"], figures["end_reason"]) == (end is MissionEnd.MAPPED, end.name)
+    finished = end in (MissionEnd.MAPPED, MissionEnd.SEEN)
+    assert (figures["finished"], figures["end_reason"]) == (finished, end.name)
 
 
 def test_figures_say_which_mission_it_was():
@@ -124,7 +125,15 @@ def test_joint_figures_by_hand():
     visible = missions.state.visible[0].sum()
     assert visible == 385
     expected = {"entropy_bits": -7.5, "explored": 30 / 385, "error": 0.05, "wrong": 0.25}
-    assert mission_figures(missions, 0)["joint"] == expected
+    clock["explored_free"], clock["seen_s"][:2], clock["seen_m"][:2] = 25, (3.0, 4.5), (0.0, 1.25)
+    marks = {"t50_seen_s": 3.0, "path50_seen_m": 0.0, "t90_seen_s": 4.5, "path90_seen_m": 1.25}
+    unseen = {
+        f"{name}{mark}_seen_{unit}": None
+        for name, unit in (("t", "s"), ("path", "m"))
+        for mark in (95, 99, 100)
+    }
+    free = {"unseen_free_voxels": 385 - 25, "driven_m": 0.0}
+    assert mission_figures(missions, 0)["joint"] == {**expected, **free, **marks, **unseen}
 
 
 def test_the_floor_of_the_paper_s_room():

@@ -27,6 +27,7 @@ from entropy_explore_env.reports.mission_record import (
 )
 from entropy_explore_env.reports.record_versions import digest_of_version, named_digest
 from entropy_explore_env.reports.state_values import (
+    FIELDS_SEEN,
     FIELDS_UNDER_WAY,
     FOLLOWS_FROM_WORLD,
     state_digest,
@@ -150,6 +151,7 @@ def test_before_a_reset_there_is_nothing_to_record():
 
 DELAYED = {"robots": 2, "track_truth": True, "channel": {"delay_s": 1.0}}
 PHASED = {"robots": 2, "channel": {"phase_s": 3.0, "repeats": 2}}
+BY_SEEN = {"robots": 2, "ending": {"seen_share": 0.9}}
 UNDER_WAY = {"robots": 2, "robot": {"redecide": 1.0}}
 
 
@@ -161,7 +163,7 @@ def leaf_arrays(state: object) -> Iterator[np.ndarray]:
         yield from [state[name] for name in state.dtype.names] if state.dtype.names else [state]
 
 
-@pytest.mark.parametrize("changes", [DELAYED, PHASED, UNDER_WAY])
+@pytest.mark.parametrize("changes", [DELAYED, PHASED, UNDER_WAY, BY_SEEN])
 def test_a_digest_sees_every_array_and_field(changes):
     missions = started(free_box(**changes), seed=3, missions=2)
     before, other = state_digest(missions, 0), state_digest(missions, 1)
@@ -169,6 +171,10 @@ def test_a_digest_sees_every_array_and_field(changes):
     left_out = [state_values(missions, 0)[name] for name in FOLLOWS_FROM_WORLD]
     if not missions.scenario.channel.phase_s:  # nobody uses them then: tests/missions/test_phases.py
         left_out.append(missions.state.phases)
+    clocks = missions.state.missions
+    left_out += [clocks[name] for name in ("visible", "visible_free", "explored_end", "explored_free_end")]
+    if not missions.scenario.ending.by_seen:
+        left_out += [clocks[name] for name in FIELDS_SEEN]
     if missions.scenario.robot.redecide == "at_stop":
         left_out += [missions.state.robots[name] for name in FIELDS_UNDER_WAY]
     seen = 0
