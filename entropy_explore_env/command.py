@@ -6,6 +6,7 @@ Exit codes: 0 done, 1 a check of the command failed, 2 bad input, 130 interrupte
 from __future__ import annotations
 
 import argparse
+import io
 import math
 import os
 import sys
@@ -51,10 +52,15 @@ class LineParser(argparse.ArgumentParser):
 def run_command(main: Callable[[Sequence[str]], int], words: Sequence[str] | None = None) -> int:
     """Run a command's main function; its errors become one line on standard error and an exit code.
 
+    Characters that a terminal does not have, as one of ASCII has no σ, are written as question marks.
+
     Args:
         main: Takes the arguments of the command line, returns an exit code.
         words: The arguments; None = those of the process.
     """
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper) and stream.errors == "strict":
+            stream.reconfigure(errors="replace")
     try:
         return main(sys.argv[1:] if words is None else words)
     except EntropyExploreError as error:

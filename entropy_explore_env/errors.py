@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pickle
+
 _LONGEST_VALUE = 200
 """Characters of a value that a message shows at most."""
 
@@ -13,6 +15,27 @@ def shown(value: object) -> str:
     except Exception:  # a repr of somebody else's, or a whole number of too many digits
         text = f"<{type(value).__name__}>"
     return text if len(text) <= _LONGEST_VALUE else text[:_LONGEST_VALUE] + " …"
+
+
+class ShownValue:
+    """Stands for a value that cannot be pickled, such as a function without a name; it looks the same."""
+
+    def __init__(self, shown: str) -> None:
+        """Keep what `repr` shows."""
+        self.shown = shown
+
+    def __repr__(self) -> str:
+        """What `repr` showed of the value."""
+        return self.shown
+
+
+def _passed_on(value: object) -> object:
+    """The value, if it can be pickled and restored."""
+    try:
+        pickle.loads(pickle.dumps(value))
+    except Exception:  # objects may raise whatever they want
+        return ShownValue(shown(value))
+    return value
 
 
 class EntropyExploreError(ValueError):
@@ -28,8 +51,8 @@ class SettingError(EntropyExploreError):
         self.field, self.value, self.allowed = field, value, allowed
 
     def __reduce__(self) -> tuple[type, tuple[str, object, str]]:
-        """Restore the error in another process."""
-        return type(self), (self.field, self.value, self.allowed)
+        """Restore the error in another process, with what is shown of a value that cannot go there."""
+        return type(self), (self.field, _passed_on(self.value), self.allowed)
 
 
 class ActionError(SettingError):

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import io
+import os
+import subprocess
 import sys
 
 import pytest
@@ -66,3 +69,41 @@ def test_words_that_do_not_fit_are_one_line(words, capsys):
         parser.parse_args(words)
     assert "\n" not in str(error.value) and "--help" in str(error.value)
     assert capsys.readouterr() == ("", "")
+
+
+def test_a_terminal_that_lacks_characters_gets_question_marks(run, monkeypatch):
+    out, err = (io.TextIOWrapper(io.BytesIO(), "ascii") for _ in range(2))
+    monkeypatch.setattr(sys, "stdout", out)
+    monkeypatch.setattr(sys, "stderr", err)
+
+    def main(words):
+        print("σ = 0.03 …")
+        raise WorldError("maße", "Ω", "×")
+
+    assert run(main, []) == BAD_INPUT
+    for stream, expected in ((out, b"? = 0.03 ?\n"), (err, b"error: ma?e = '?': allowed is ?\n")):
+        stream.flush()
+        assert stream.buffer.getvalue() == expected
+
+
+COMMANDS = (
+    "baselines.run",
+    pytest.param("entropy_explore_env.worlds", marks=pytest.mark.long),
+    pytest.param("entropy_explore_env.warm", marks=pytest.mark.long),
+    pytest.param("entropy_explore_env.envs.conformance", marks=pytest.mark.long),
+    pytest.param("baselines.benchmark", marks=pytest.mark.long),
+    pytest.param("baselines.replay", marks=pytest.mark.long),
+    pytest.param("baselines.papers.sawhney", marks=pytest.mark.long),
+    pytest.param("training.ppo", marks=pytest.mark.long),
+    pytest.param("training.evaluate", marks=pytest.mark.long),
+    pytest.param("benchmarks.speed", marks=pytest.mark.long),
+)
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_the_help_of_a_command_comes_out_on_a_terminal_of_ascii(name):
+    variables = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path), "PYTHONIOENCODING": "ascii"}
+    words = [sys.executable, "-m", name, "--help"]
+    done = subprocess.run(words, env=variables, capture_output=True, timeout=120)
+    assert done.returncode == 0, done.stderr.decode()
+    assert b"--help" in done.stdout and b"Traceback" not in done.stderr

@@ -406,3 +406,22 @@ def test_errors_survive_the_way_to_another_process():
     error = refusal(lambda: Robot(reach_m=-1.0))
     again = pickle.loads(pickle.dumps(error))
     assert (type(again), str(again)) == (type(error), str(error))
+
+
+class Unreadable:
+    def __reduce__(self):
+        return int, ("no number",)
+
+    def __repr__(self):
+        return "Unreadable()"
+
+
+@pytest.mark.parametrize("value", [lambda: None, Unreadable(), [1, (i for i in ())]], ids=repr)
+def test_an_error_about_what_cannot_be_pickled_goes_to_other_processes(value):
+    error = SettingError("Robot.reach_m", value, "a number")
+    again = pickle.loads(pickle.dumps(error))
+    assert type(again) is SettingError and str(again) == str(error)
+    assert (again.field, again.allowed) == (error.field, error.allowed)
+    assert repr(again.value) == repr(value)
+    assert str(pickle.loads(pickle.dumps(again))) == str(error)
+    assert copy.deepcopy(error).value is not None
