@@ -34,7 +34,7 @@ from entropy_explore_env.validation import (
 
 MAX_IN_FLIGHT = 2**24
 """Measurements of delayed messages that may be under way at once."""
-MAX_MESSAGES = 2**18
+MAX_MESSAGES = 2**16
 """Delayed messages that may be under way at once: every event looks through all of them."""
 MAX_DRIVE_S = 1e5
 """A robot drives straight across the workspace in this time, or less."""

@@ -256,8 +256,8 @@ def test_settings_that_do_not_fit_each_other_are_refused():
         ({"robot": {"redecide": "on_scan"}}, "Robot.redecide"),
         ({"ending": {"seen_share": 1.0, "unseen_free_voxels": 250}}, "Ending.unseen_free_voxels"),
         ({"robot": {"redecide": 0.01}, "channel": {"delay_s": 3600.0}, "robots": 64}, "Channel.delay_s"),
-        # A scan each 0.1 ms: two messages a scan, 65,537 scans, two robots.
-        ({"channel": {"delay_s": 6.55352, "burst": 1}, "sensor": {"scan_time_s": 1e-4}}, "Channel.delay_s"),
+        # A scan each 0.1 ms: two messages a scan, 16,385 scans, two robots.
+        ({"channel": {"delay_s": 1.63832, "burst": 1}, "sensor": {"scan_time_s": 1e-4}}, "Channel.delay_s"),
         ({"channel": {"phase_s": 0.9, "repeats": 1000}}, "Channel.repeats"),
         # 200,000 broadcasts in a step: of 1,000 s; at most 369.5 s; and of 300 s in all.
         ({"channel": {"phase_s": 0.0049}, "decision_period_s": 1000.0}, "Channel.phase_s"),
@@ -282,8 +282,8 @@ def test_settings_that_do_not_fit_each_other_are_refused():
         {"channel": {"phase_s": 0.0016}, "decision_period_s": 1e5, "time_limit_s": 300.0},
     ):
         assert with_settings(BOX, few).channel.phase_s > 0.0
-    most = {"channel": {"delay_s": 6.55332, "burst": 1}, "sensor": {"scan_time_s": 1e-4}}
-    assert with_settings(BOX, most).message_slots == 4 * 65_535
+    most = {"channel": {"delay_s": 1.63812, "burst": 1}, "sensor": {"scan_time_s": 1e-4}}
+    assert with_settings(BOX, most).message_slots == 4 * 16_383
     edge = {"robot": {"body_radius_m": 2.75}, "sensor": {"scan_every_m": 0.0035}}
     assert with_settings(BOX, {**edge, "grid": Grid((7, 11, 5), 5.0)}).robot.body_radius_m == 2.75
     assert with_settings(BOX, {**discrete, "robot": {"reach_m": 0.5}}).action.kind == "discrete"
