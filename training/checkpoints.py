@@ -243,7 +243,11 @@ def _tensors(file: Path, digests: Mapping[str, Any]) -> dict[str, torch.Tensor]:
 
 def _arrays(file: Path, digests: Mapping[str, Any]) -> dict[str, np.ndarray]:
     try:
-        with np.load(io.BytesIO(_content(file, digests)), allow_pickle=False) as arrays:
+        content = _content(file, digests)
+        with zipfile.ZipFile(io.BytesIO(content)) as members:
+            if any(each.file_size != each.compress_size for each in members.infolist()):
+                raise ValueError("its arrays are compressed: a small file could fill the memory")
+        with np.load(io.BytesIO(content), allow_pickle=False) as arrays:
             return {name: arrays[name] for name in arrays.files}
     except (ValueError, zipfile.BadZipFile, EOFError, OSError) as error:
         raise CheckpointError("checkpoint", str(file), f"NumPy's npz without objects ({error})") from None

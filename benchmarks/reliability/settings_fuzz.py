@@ -10,7 +10,8 @@ import numpy as np
 
 from benchmarks.reliability.drawn_scenarios import Drawn, draw_scenario
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
-from entropy_explore_env.errors import EntropyExploreError
+from entropy_explore_env.errors import EntropyExploreError, RecordError
+from entropy_explore_env.missions.state_ranges import check_ranges
 from entropy_explore_env.settings_json import settings_json
 
 STEPS = 50
@@ -120,13 +121,14 @@ def _check(env: EntropyExploreEnv, observations: dict, rewards: dict, earlier_s:
         if not env.observation_space(agent).contains(observed):
             raise BrokenPromiseError(f"{agent} observed what is outside its space: {env.scenario}")
     figures = {f"the reward of {agent}": reward for agent, reward in rewards.items()}
-    clock, robots = env.missions.state.missions[0], env.missions.state.robots[0]
-    figures["the time"] = time_s = float(clock["time_s"])
-    for field in ("entropy_bits", "distance_m", "origin", "goal", "scan_pose", "ready_s", "i_min_bits"):
-        figures[f"the sum of robots' {field}"] = float(robots[field].sum())
+    figures["the time"] = time_s = float(env.missions.state.missions[0]["time_s"])
     for name, value in figures.items():
         if not math.isfinite(value):
             raise BrokenPromiseError(f"{name} is {value}: {env.scenario}")
+    try:
+        check_ranges(env.scenario, env.missions.state._asdict())
+    except RecordError as error:
+        raise BrokenPromiseError(f"{error}: {env.scenario}") from None
     if time_s < earlier_s:
         raise BrokenPromiseError(f"time ran from {earlier_s} back to {time_s} s: {env.scenario}")
     return time_s

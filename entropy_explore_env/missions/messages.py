@@ -10,7 +10,7 @@ import numpy as np
 from entropy_explore_env.belief.map_update import fuse_scan
 from entropy_explore_env.belief.pooling import Cells, Pool, fuse_pooled_scan
 from entropy_explore_env.belief.raycast import point
-from entropy_explore_env.compilation.kernels import lean_kernel
+from entropy_explore_env.compilation.kernels import ASSERTING, lean_kernel
 from entropy_explore_env.missions.poses import (
     copy_numbers,
     distance_between,
@@ -139,9 +139,10 @@ def transmit(team, index, place, time_s, recipients):
 
 @lean_kernel
 def enqueue(clock, robot, in_flight, index, count, recipients, delay_s):
-    """Put a message into a free slot; returns the slot.
+    """Put a message into a free slot; returns the slot, or -1 where there is none: the message is gone.
 
-    There is one: `Scenario.message_slots` counts how many messages can be under way at once.
+    There is one in every mission: `Scenario.message_slots` counts how many messages can be under way at once.
+    A state from outside may have none.
 
     Args:
         clock: MISSION.
@@ -153,8 +154,12 @@ def enqueue(clock, robot, in_flight, index, count, recipients, delay_s):
         delay_s: How long it is under way.
     """
     slot = 0
-    while not math.isinf(in_flight.messages[slot].due_s):
+    while slot < len(in_flight.messages) and not math.isinf(in_flight.messages[slot].due_s):
         slot += 1
+    if ASSERTING and slot == len(in_flight.messages):
+        raise AssertionError("no slot is free for a message")
+    if slot == len(in_flight.messages):
+        return -1
     message = in_flight.messages[slot]
     message.sent_s = clock.time_s
     message.due_s = clock.time_s + delay_s
@@ -220,7 +225,8 @@ def send_batch(team, maps, clock, in_flight, scan, index, count, recipients):
     reached = transmit(team, index, point(robot.scan_pose), clock.time_s, recipients)
     if reached and delay_s > 0.0:
         slot = enqueue(clock, robot, in_flight, index, count, recipients, delay_s)
-        pack_measurements(scan, count, in_flight.rays[slot])
+        if slot >= 0:
+            pack_measurements(scan, count, in_flight.rays[slot])
         return
     for mate in range(len(team.robots)):
         if recipients[mate]:

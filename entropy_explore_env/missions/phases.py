@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 
 from entropy_explore_env.belief.raycast import point
-from entropy_explore_env.compilation.kernels import lean_kernel
+from entropy_explore_env.compilation.kernels import ASSERTING, lean_kernel
 from entropy_explore_env.missions.messages import (
     count_sent,
     hear_batch,
@@ -38,9 +38,16 @@ def next_broadcast(params, phases):
 
 @lean_kernel
 def collect_batch(robot, buffers, phases, scan, index, count):
-    """Put `count` measurements of `scan.order` into a robot's collecting buffer."""
+    """Put `count` measurements of `scan.order` into a robot's collecting buffer.
+
+    It has room in every mission, see `Scenario.phase_batches`; a state from outside may have none left.
+    """
     side = phases.collecting
     place = buffers.counts[index, side]
+    if ASSERTING and place == buffers.batches.shape[2]:
+        raise AssertionError("no room is left for a batch")
+    if place == buffers.batches.shape[2]:
+        return
     batch = buffers.batches[index, side, place]
     copy_numbers(robot.scan_pose, batch.pose, 5)
     batch.count = count

@@ -27,6 +27,7 @@ from entropy_explore_env.missions.reset_options import DRAWN, ResetOptions
 from entropy_explore_env.missions.rules import rules_of
 from entropy_explore_env.missions.starts import checked_starts, start_poses
 from entropy_explore_env.missions.state import MissionEnd, MissionState, new_state
+from entropy_explore_env.missions.state_ranges import FROM_WORLD, check_ranges
 from entropy_explore_env.missions.threads import Threads
 from entropy_explore_env.missions.tick import step_missions
 from entropy_explore_env.missions.workspace import Workspace, new_workspace
@@ -197,7 +198,7 @@ class Missions:
         """What missions would start with after a reset; nothing changes. See `reset`."""
         given = [DRAWN] * len(seeds) if options is None else options
         return [
-            self._draw(mission, *self._episode(mission, seed), fixed)
+            self.draw_episode(mission, *self._episode(mission, seed), fixed)
             for mission, seed, fixed in zip(missions, seeds, given, strict=True)
         ]
 
@@ -208,7 +209,7 @@ class Missions:
 
     def start_episode(self, mission: int, seed: int, episode: int, options: ResetOptions = DRAWN) -> None:
         """Start a mission as an episode of a seed, without those before it; see `reset`."""
-        self.begin([self._draw(mission, seed, episode, options)])
+        self.begin([self.draw_episode(mission, seed, episode, options)])
 
     def _episode(self, mission: int, seed: int | None) -> tuple[int, int]:
         """Seed and episode of a mission after a reset."""
@@ -216,7 +217,8 @@ class Missions:
             return check_seed(seed), 0
         return self.seeds[mission], self.episodes[mission] + 1
 
-    def _draw(self, mission: int, seed: int, episode: int, options: ResetOptions) -> Start:
+    def draw_episode(self, mission: int, seed: int, episode: int, options: ResetOptions) -> Start:
+        """What a mission would start with as an episode of a seed; nothing changes. See `reset`."""
         if options.world is not None:
             world = options.world
         elif options.world_number is not None:
@@ -417,8 +419,15 @@ class Missions:
         return kept
 
     def __setstate__(self, kept: dict[str, object]) -> None:
-        """Take the arrays back and make new scratch space."""
+        """Take the arrays back and make new scratch space.
+
+        Raises:
+            RecordError: A number of the state is in no mission of the scenario.
+        """
         self.__dict__.update(kept)
+        begun = np.array(self.episodes) >= 0
+        arrays = {name: array for name, array in self.state._asdict().items() if name not in FROM_WORLD}
+        check_ranges(self.scenario, {name: array[begun] for name, array in arrays.items()})
         self._make_working_space()
 
 

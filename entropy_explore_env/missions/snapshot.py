@@ -7,12 +7,14 @@ from collections.abc import Mapping
 import numpy as np
 
 from entropy_explore_env.errors import RecordError
-from entropy_explore_env.missions.reset_options import ResetOptions
+from entropy_explore_env.missions.reset_options import ResetOptions, mission_options
 from entropy_explore_env.missions.simulation import Missions
+from entropy_explore_env.missions.state_ranges import FROM_WORLD, check_ranges
 from entropy_explore_env.worlds.load import world_bytes, world_from_bytes
+from entropy_explore_env.worlds.world import World
 
-_DRAWN = ("truth", "collision", "visible")
-"""State that follows from a mission's seed and episode."""
+_MOST_EPISODES = 2**53
+_MOST_DIGITS = 4000
 
 
 def snapshot(missions: Missions) -> dict[str, np.ndarray]:
@@ -25,7 +27,7 @@ def snapshot(missions: Missions) -> dict[str, np.ndarray]:
         bytes that `save_world` writes) of a mission e.
     """
     state = missions.state._asdict()
-    kept = {name: array.copy() for name, array in state.items() if name not in _DRAWN}
+    kept = {name: array.copy() for name, array in state.items() if name not in FROM_WORLD}
     kept["seeds"] = np.array([str(seed) for seed in missions.seeds])
     kept["episodes"] = np.array(missions.episodes, np.int64)
     kept["observations"] = missions.observations.copy()
@@ -47,39 +49,67 @@ def restore(missions: Missions, arrays: Mapping[str, np.ndarray]) -> None:
         arrays: As `snapshot` gave them.
 
     Raises:
-        RecordError: An array is missing or does not fit these missions. Nothing has changed then.
+        RecordError: An array is missing or does not fit these missions, or a number in it is in no mission
+            of the scenario. Nothing has changed then.
+        SettingError: Starts or a world number are not allowed, likewise.
+        WorldError: A world cannot be used, likewise.
     """
     expected = {**missions.state._asdict(), "observations": missions.observations}
     expected["episodes"] = np.zeros(missions.count, np.int64)
     for name, array in expected.items():
-        if name not in _DRAWN:
+        if name not in FROM_WORLD:
             check_array(name, arrays.get(name), array)
     seeds = arrays.get("seeds")
-    if seeds is None or seeds.shape != (missions.count,) or not all(str(seed).isdecimal() for seed in seeds):
+    if seeds is None or seeds.shape != (missions.count,) or not all(map(_is_seed, seeds)):
         raise RecordError("seeds", seeds, f"{missions.count} whole numbers ≥ 0")
-    given = [_options_of(missions, mission, arrays) for mission in range(missions.count)]
-    for mission, options in enumerate(given):
-        seed, episode = int(str(seeds[mission])), max(int(arrays["episodes"][mission]), 0)
-        missions.start_episode(mission, seed, episode, options)
+    episodes, observations = arrays["episodes"], arrays["observations"]
+    if not ((episodes >= 0) & (episodes < _MOST_EPISODES)).all():
+        raise RecordError("episodes", episodes, f"from 0, the first, to {_MOST_EPISODES - 1}")
+    low, high = missions.layout.low.astype(np.float32), missions.layout.high.astype(np.float32)
+    if not ((observations >= low) & (observations <= high)).all():
+        raise RecordError("observations", observations, "within the observation space")
+    check_ranges(missions.scenario, arrays)
+    starts = [
+        missions.draw_episode(
+            mission,
+            int(str(seeds[mission])),
+            int(episodes[mission]),
+            _options_of(missions, mission, arrays),
+        )
+        for mission in range(missions.count)
+    ]
+    missions.begin(starts)
     for name, array in missions.state._asdict().items():
-        if name not in _DRAWN:
+        if name not in FROM_WORLD:
             array[...] = arrays[name]
-    missions.observations[...] = arrays["observations"]
+    missions.observations[...] = observations
+
+
+def _is_seed(seed: np.str_) -> bool:
+    """Whether a text is a seed's digits, and no more than Python turns into a number."""
+    return str(seed).isdecimal() and len(str(seed)) <= _MOST_DIGITS
 
 
 def _options_of(missions: Missions, mission: int, arrays: Mapping[str, np.ndarray]) -> ResetOptions:
     """What the mission's latest reset was given."""
     starts, number = arrays.get(f"starts_{mission}"), arrays.get(f"world_number_{mission}")
-    world = arrays.get(f"world_{mission}")
+    content = arrays.get(f"world_{mission}")
     if starts is not None:
         check_array(f"starts_{mission}", starts, np.zeros((missions.scenario.robots, 5)))
     if number is not None:
         check_array(f"world_number_{mission}", number, np.array(0))
-    return ResetOptions(
-        None if starts is None else starts.copy(),
-        None if number is None else int(number),
-        None if world is None else world_from_bytes(world.tobytes()),
-    )
+        number = int(number)
+    world = None if content is None else _saved_world(f"world_{mission}", content)
+    given = {"starts": starts, "world": number if world is None else world}
+    return mission_options(given, missions.scenario)
+
+
+def _saved_world(name: str, content: np.ndarray) -> World:
+    """The world in the bytes of its file."""
+    try:
+        return world_from_bytes(content.tobytes())
+    except Exception:  # of a broken archive: zipfile and NumPy raise a dozen kinds
+        raise RecordError(name, f"{content.size} bytes", "the bytes of a saved world") from None
 
 
 def check_array(name: str, given: np.ndarray | None, expected: np.ndarray) -> None:

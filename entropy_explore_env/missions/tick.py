@@ -254,12 +254,14 @@ def next_event(shared, robots, messages, phases):
 def events_handled(robots, messages, phases):
     """A number that every event makes greater, so that none is met twice: asserted in debug builds.
 
-    A message frees its slot. A broadcast is counted. A robot counts its scan, which may send one message, or
-    decides: it has waited, or driven since it last decided. Arguments as those of `next_event`.
+    A message frees its slot. A broadcast is counted. A robot counts its scan; or it decides, having waited or
+    driven since it last decided; or it puts that off. A scan may send a message, begin the wait of a robot
+    that could decide, and set when it decides next: it counts for more than these three. Arguments as those
+    of `next_event`.
     """
     handled = phases.broadcasts
     for robot in robots:
-        handled += 2 * robot.scans + int(robot.deciding)
+        handled += 4 * robot.scans + int(robot.deciding) + int(math.isinf(robot.redecide_s))
     for message in messages:
         handled -= int(not math.isinf(message.due_s))
     return handled

@@ -95,7 +95,7 @@ def test_every_kind_of_event_counts_as_handled():
         return events_handled(state.robots[0], state.in_flight[0], state.phases[0])
 
     begun = handled()
-    assert begun == 3  # all decide
+    assert begun == 6  # all decide, and will not under way
     state.in_flight["due_s"][0, :2] = 3.0, 2.0
     assert handled() == begun - 2
     state.in_flight["due_s"][0, 1] = NEVER  # heard
@@ -103,7 +103,10 @@ def test_every_kind_of_event_counts_as_handled():
     state.phases["broadcasts"][0] += 1
     assert handled() == begun
     state.robots["scans"][0, 2] += 1
-    state.in_flight["due_s"][0, 1] = 5.0  # a scan of which something is sent
+    state.in_flight["due_s"][0, 1] = 5.0  # a scan of which something is sent …
+    state.robots["deciding"][0, 2], state.robots["redecide_s"][0, 2] = False, 7.0  # … and the robot drives on
     assert handled() == begun + 1
-    state.robots["deciding"][0, 0] = False
-    assert handled() == begun
+    state.robots["deciding"][0, 2] = True
+    assert handled() == begun + 2
+    state.robots["redecide_s"][0, 2] = NEVER
+    assert handled() == begun + 3

@@ -170,6 +170,20 @@ def test_loading_runs_no_code(saved):
         load_checkpoint(saved)
 
 
+def test_arrays_that_would_grow_while_they_are_read_are_refused(saved):
+    """A hundred MiB of zeros in a hundred KiB, with the right digest."""
+    import hashlib
+
+    np.savez_compressed(saved / "normalisation.npz", observations_mean=np.zeros(13_000_000))
+    content = (saved / "normalisation.npz").read_bytes()
+    assert len(content) < 200_000
+    head = json.loads((saved / "policy.json").read_text())
+    head["sha256"]["normalisation.npz"] = hashlib.sha256(content).hexdigest()
+    (saved / "policy.json").write_text(json.dumps(head))
+    with pytest.raises(CheckpointError, match="its arrays are compressed"):
+        load_checkpoint(saved)
+
+
 def test_a_policy_is_a_strategy_like_any_other(saved, tmp_path):
     """The same seed gives the same mission, from a run's folder or a checkpoint's, with any action form."""
     ends = []

@@ -1,0 +1,131 @@
+"""Saved states with a number changed: each is refused by name and changes nothing, or its missions go on."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from benchmarks.reliability.settings_fuzz import BrokenPromiseError
+from entropy_explore_env.errors import EntropyExploreError
+from entropy_explore_env.missions.simulation import Missions
+from entropy_explore_env.missions.snapshot import restore, snapshot
+from entropy_explore_env.reports.state_values import state_digest
+from entropy_explore_env.scenario import Scenario, with_settings
+from entropy_explore_env.scenarios import BOX
+
+STEPS = 20
+_BOX = {"robots": 3, "world": "furnished", "track_truth": True}
+SETTINGS: tuple[dict[str, Any], ...] = (
+    {"channel": {"delay_s": 3.0, "i_min_bits": 0.0}, "decision_period_s": None},
+    {"channel": {"phase_s": 2.0, "repeats": 2, "i_min_fill": 0.5}},
+    {"robot": {"navigator": "planned", "redecide": "on_scan"}, "sensor": {"scan_every_m": 0.3}},
+    {"robot": {"when_blocked": "wait", "redecide": 0.7, "motion": "planar"}, "action": {"kind": "discrete"}},
+)
+"""Of the missions whose states are changed, so that every part of a state is in use."""
+_NUMBERS = (np.nan, np.inf, -np.inf, -1.0, 0.0, 1.0, 1e9, -1e9, 1e300, 5e-324)
+_COUNTS = (-1, 0, 1, 2, 31, 32, 33, 1000, 10**8, 2**31, 2**62, -(2**62))
+
+
+@dataclass(frozen=True)
+class Change:
+    """One number of one state, changed.
+
+    Attributes:
+        number: What it is drawn from.
+    """
+
+    number: int
+
+
+@dataclass(frozen=True)
+class Changed:
+    """What came of it.
+
+    Attributes:
+        what: `array.field[place] = value`.
+        refused: The error's message; empty = the missions went on.
+    """
+
+    what: str
+    refused: str
+
+
+def scenario_of(number: int) -> Scenario:
+    """The scenario of a change."""
+    return with_settings(with_settings(BOX, _BOX), SETTINGS[number % len(SETTINGS)])
+
+
+def play(change: Change) -> Changed:
+    """Change a number of a saved state, and go on from it.
+
+    Raises:
+        BrokenPromiseError: The state was refused but missions changed, or missions that went on observed what
+            is outside their space.
+        Exception: Whatever else a restored mission raises; and the process may end.
+    """
+    scenario, rng = scenario_of(change.number), np.random.default_rng([change.number, 7])
+    missions = Missions(scenario, 2)
+    missions.reset_some([0, 1], [change.number, change.number + 1])
+    _walk(missions, rng)
+    saved = snapshot(missions)
+    what = _spoil(saved, rng)
+    others = Missions(scenario, 2)
+    others.reset_some([0, 1], [3, 4])
+    before = _all_of(others)
+    try:
+        restore(others, saved)
+    except EntropyExploreError as error:
+        if _all_of(others) != before:
+            raise BrokenPromiseError(f"{what}: refused, and yet missions changed") from None
+        return Changed(what, str(error))
+    _walk(others, rng)
+    bounds = others.layout.flat_space()
+    if not all(bounds.contains(seen) for team in others.observations for seen in team):
+        raise BrokenPromiseError(f"{what}: an observation is outside its space")
+    if not np.isfinite(others.state.robots["reward"]).all():
+        raise BrokenPromiseError(f"{what}: a reward is not finite")
+    return Changed(what, "")
+
+
+def _all_of(missions: Missions) -> list[Any]:
+    """All that a state which is refused must leave as it was."""
+    digests = [state_digest(missions, mission) for mission in range(missions.count)]
+    worlds, truth = missions.worlds[:], missions.state.truth.tobytes()
+    return [digests, worlds, truth, missions.seeds[:], missions.episodes[:], missions.observations.tobytes()]
+
+
+def _walk(missions: Missions, rng: np.random.Generator) -> None:
+    """Step by drawn actions."""
+    team, rules = (missions.count, missions.scenario.robots), missions.rules
+    choices = len(rules.actions.moves) * len(rules.actions.gazes)
+    for _ in range(STEPS):
+        boxes = rng.uniform(-1.0, 1.0, (*team, 5)).astype(np.float32).astype(np.float64)
+        missions.step(boxes, rng.integers(0, choices, team))
+
+
+def _spoil(arrays: dict[str, np.ndarray], rng: np.random.Generator) -> str:
+    """Change one number of one array, or of one field of it; says which."""
+    fields = [
+        (name, field)
+        for name, array in arrays.items()
+        if array.size and array.dtype.kind != "U"
+        for field in array.dtype.names or ("",)
+    ]
+    name, field = fields[int(rng.integers(len(fields)))]
+    array = arrays[name][field] if field else arrays[name]
+    place = tuple(int(rng.integers(n)) for n in array.shape)
+    if array.dtype == np.bool_:
+        value: Any = int(rng.integers(2, 256))
+        array.view(np.uint8)[place] = value
+    elif array.dtype.kind == "f":
+        numbers = (*_NUMBERS, float(array[place]) * (1.0 + 1e-3 * rng.standard_normal()))
+        value = numbers[int(rng.integers(len(numbers)))]
+        with np.errstate(over="ignore"):
+            array[place] = value
+    else:
+        limits = np.iinfo(array.dtype)
+        value = min(max(_COUNTS[int(rng.integers(len(_COUNTS)))], limits.min), limits.max)
+        array[place] = value
+    return f"{name}.{field}{list(place)} = {value!r}"

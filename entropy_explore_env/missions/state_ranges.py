@@ -1,0 +1,235 @@
+"""What the values of a mission's state can be: a saved state with other numbers is refused by name.
+
+Kernels take the state as it is. A count of corners that no path has would lead them beyond their arrays, and
+a place outside the workspace, or a number that is none, to observations that are none. The ranges keep
+kernels within their arrays and observations finite; they do not prove that a mission came there.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from typing import NamedTuple
+
+import numpy as np
+
+from entropy_explore_env.errors import RecordError
+from entropy_explore_env.missions.state import WAYPOINTS, MissionEnd
+from entropy_explore_env.robots.motion import MoveEnd
+from entropy_explore_env.robots.range_sensor import Return
+from entropy_explore_env.scenario import Scenario
+
+FROM_WORLD = ("truth", "collision", "visible")
+"""Arrays of the state that follow from a mission's world, which its seed and what was given determine."""
+_MOST = 1e15
+"""Of seconds, metres, bits and counts: more than any mission comes to, and exact in a float64."""
+_HUGE = 1e300
+_LARGEST_PRECISION = 1e37
+_ROUNDING = 1e-6
+_TURN = 4.0 * math.pi
+
+
+class Values(NamedTuple):
+    """Numbers of the state, and the range that each of them is in."""
+
+    name: str
+    numbers: np.ndarray
+    least: float | np.ndarray
+    most: float | np.ndarray
+    also: float | None = None
+    """Another number that is allowed."""
+
+
+def check_ranges(scenario: Scenario, arrays: Mapping[str, np.ndarray]) -> None:
+    """Check every number of a saved state.
+
+    Args:
+        scenario: Of the missions.
+        arrays: The arrays of a MissionState by name, of the shapes and types that missions of the scenario
+            have; those that follow from the world may be missing. Missions of other numbers do not matter.
+
+    Raises:
+        RecordError: A number is in no mission of the scenario; the message names `array.field`.
+    """
+    for part in (_missions, _robots, _heard, _messages, _phases, _maps, _scans):
+        for values in part(scenario, arrays):
+            _check(values)
+
+
+def _check(values: Values) -> None:
+    numbers = values.numbers
+    if numbers.dtype == np.bool_:
+        numbers = np.ascontiguousarray(numbers).view(np.uint8)
+    allowed = (numbers >= values.least) & (numbers <= values.most)  # neither is true of NaN
+    if values.also is not None:
+        allowed |= numbers == values.also
+    if not allowed.all():
+        place = tuple(int(i) for i in np.argwhere(~allowed)[0])
+        least, most = (np.broadcast_to(end, numbers.shape)[place] for end in (values.least, values.most))
+        other = "" if values.also is None else f", or {values.also:g}"
+        raise RecordError(
+            f"{values.name}{list(place)}",
+            numbers[place].item(),
+            f"a number from {least:g} to {most:g}{other}",
+        )
+
+
+def _missions(scenario: Scenario, arrays: Mapping[str, np.ndarray]) -> Iterator[Values]:
+    """MISSION."""
+    clock, voxels = arrays["missions"], scenario.grid.voxels
+    time_limit_s, cycles = scenario.ending.time_limit_s, scenario.ending.max_cycles
+    yield Values("missions.time_s", clock["time_s"], 0.0, min(time_limit_s, _MOST))
+    yield Values("missions.cycles", clock["cycles"], 0, _MOST if cycles is None else cycles)
+    yield Values("missions.end", clock["end"], 0, len(MissionEnd) - 1)
+    yield Values("missions.enqueued", clock["enqueued"], 0, _MOST)
+    yield Values("missions.reached_s", clock["reached_s"], 0.0, clock["time_s"][:, None], -1.0)
+    for name in ("entropy_start_bits", "entropy_end_bits", "joint_bits"):
+        yield Values(f"missions.{name}", clock[name], -_MOST, _MOST)
+    for name in ("explored", "explored_visible", "error", "wrong"):
+        yield Values(f"missions.{name}", clock[name], -_ROUNDING, voxels)
+
+
+def _robots(scenario: Scenario, arrays: Mapping[str, np.ndarray]) -> Iterator[Values]:
+    """ROBOT."""
+    robots, time_s = arrays["robots"], arrays["missions"]["time_s"][:, None]
+    low, high = _workspace(scenario)
+    for name in ("origin", "goal", "scan_pose"):
+        yield from _poses(f"robots.{name}", robots[name], low, high)
+    far_m = _farthest_m(scenario)
+    yield from _poses("robots.target", robots["target"], low - far_m, high + far_m)
+    for name in ("deciding", "under_way", "path_blocked", "waiting"):
+        yield Values(f"robots.{name}", robots[name], 0, 1)
+    yield Values("robots.waypoints", robots["waypoints"], 0, WAYPOINTS)
+    yield Values("robots.corners", robots["corners"], 0, np.maximum(robots["waypoints"] - 1, 0))
+    for name in ("path_end", "move_end"):
+        yield Values(f"robots.{name}", robots[name], 0, len(MoveEnd) - 1)
+    used = np.arange(WAYPOINTS)[:, None] < robots["waypoints"][..., None, None]
+    beyond = np.where(used, far_m, _MOST)
+    yield Values("robots.path", robots["path"], low - beyond, high + beyond)
+    for name in ("depart_s", "decided_s"):
+        yield Values(f"robots.{name}", robots[name], 0.0, time_s)
+    for name in ("next_scan_s", "ready_s"):
+        yield Values(f"robots.{name}", robots[name], 0.0, time_s + 1e9)
+    yield Values("robots.redecide_s", robots["redecide_s"], 0.0, time_s + 1e9, math.inf)
+    for name in ("lead_s", "own_bits", "received_bits", "entropy_bits", "gained_bits", "heard_bits"):
+        yield Values(f"robots.{name}", robots[name], -_MOST, _MOST)
+    yield Values("robots.reward", robots["reward"], -_HUGE, _HUGE)
+    yield Values("robots.half_angle_rad", robots["half_angle_rad"], 0.0, math.pi + _ROUNDING)
+    yield Values("robots.depth_m", robots["depth_m"], 0.0, _longest_m(scenario))
+    yield Values("robots.distance_m", robots["distance_m"], -1.0, _MOST)
+    for name in ("path_m", "scan_lead_m"):
+        yield Values(f"robots.{name}", robots[name], 0.0, _MOST)
+    for name in ("i_min_bits", "next_i_min_bits"):
+        yield Values(f"robots.{name}", robots[name], 0.0, _HUGE)
+    counted = ("scans", "measurements", "redundant", "blocked_moves", "messages_sent", "measurements_sent")
+    heard = ("bits_sent", "messages_received", "measurements_received", "bits_received", "messages_lost")
+    for name in ("scans_under_way", *counted, *heard, "messages_out_of_range"):
+        yield Values(f"robots.{name}", robots[name], 0, _MOST)
+
+
+def _heard(scenario: Scenario, arrays: Mapping[str, np.ndarray]) -> Iterator[Values]:
+    """HEARD."""
+    heard, time_s = arrays["heard"], arrays["missions"]["time_s"][:, None, None]
+    low, high = _workspace(scenario)
+    far_m = _farthest_m(scenario)
+    low, high = np.minimum(low - far_m, 0.0), np.maximum(high + far_m, 0.0)  # 0: nothing was heard yet
+    for name in ("heard_s", "announced_s"):
+        yield Values(f"heard.{name}", heard[name], 0.0, time_s, -1.0)
+    yield from _poses("heard.pose", heard["pose"], low, high)
+    yield from _poses("heard.announced", heard["announced"][..., :5], low, high)
+    cone = np.array([_longest_m(scenario), math.pi + _ROUNDING])
+    yield Values("heard.announced", heard["announced"][..., 5:], 0.0, cone)
+
+
+def _messages(scenario: Scenario, arrays: Mapping[str, np.ndarray]) -> Iterator[Values]:
+    """MESSAGE, to whom, and what is in it."""
+    messages, rays = arrays["in_flight"], arrays["in_flight_rays"]
+    clock = arrays["missions"]
+    time_s, under_way = clock["time_s"][:, None], np.isfinite(messages["due_s"])
+    yield Values("in_flight.due_s", messages["due_s"], 0.0, time_s + scenario.channel.delay_s, math.inf)
+    yield Values("in_flight.sent_s", messages["sent_s"], 0.0, time_s)
+    yield Values("in_flight.serial", messages["serial"], 0, clock["enqueued"][:, None])
+    yield Values("in_flight.sender", messages["sender"], 0, scenario.robots - 1)
+    yield Values("in_flight.count", messages["count"], -1, rays.shape[2])
+    low, high = _workspace(scenario)
+    far_m = _farthest_m(scenario)
+    wide = np.where(under_way[..., None], 0.0, _MOST)
+    yield from _poses("in_flight.pose", messages["pose"], low - wide, high + wide)
+    yield from _poses(
+        "in_flight.announced", messages["announced"][..., :5], low - wide - far_m, high + wide + far_m
+    )
+    cone = np.array([_longest_m(scenario), math.pi + _ROUNDING])
+    yield Values("in_flight.announced", messages["announced"][..., 5:], 0.0, cone)
+    yield Values("in_flight_to", arrays["in_flight_to"], 0, 1)
+    used = np.arange(rays.shape[2]) < np.where(under_way, messages["count"], 0)[..., None]
+    yield from _packed(scenario, "in_flight_rays", rays, used)
+
+
+def _phases(scenario: Scenario, arrays: Mapping[str, np.ndarray]) -> Iterator[Values]:
+    """PHASES, and the buffers of the broadcast."""
+    phases, counts = arrays["phases"], arrays["phase_counts"]
+    batches, rays = arrays["phase_batches"], arrays["phase_rays"]
+    yield Values("phases.broadcasts", phases["broadcasts"], 0, _MOST)
+    yield Values("phases.collecting", phases["collecting"], 0, 1)
+    yield Values("phase_counts", counts, 0, batches.shape[3])
+    yield Values("phase_heard", arrays["phase_heard"], 0, 3)
+    yield Values("phase_batches.count", batches["count"], 0, rays.shape[4])
+    filled = np.arange(batches.shape[3]) < counts[..., None]
+    low, high = _workspace(scenario)
+    wide = np.where(filled[..., None], 0.0, _MOST)
+    yield from _poses("phase_batches.pose", batches["pose"], low - wide, high + wide)
+    used = np.arange(rays.shape[4]) < np.where(filled, batches["count"], 0)[..., None]
+    yield from _packed(scenario, "phase_rays", rays, used)
+
+
+def _maps(scenario: Scenario, arrays: Mapping[str, np.ndarray]) -> Iterator[Values]:
+    """The beliefs, and the joint map."""
+    prior = scenario.sigma_prior**-2.0 * (1.0 - _ROUNDING)
+    for name in ("", "joint_"):
+        yield Values(f"{name}mean", arrays[f"{name}mean"], -_ROUNDING, 1.0 + _ROUNDING)
+        yield Values(f"{name}precision", arrays[f"{name}precision"], prior, _LARGEST_PRECISION)
+    yield Values("pooled", arrays["pooled"], -_MOST, _MOST)
+
+
+def _scans(scenario: Scenario, arrays: Mapping[str, np.ndarray]) -> Iterator[Values]:
+    """The latest scans."""
+    longest_m = _longest_m(scenario)
+    yield Values("scan_range_m", arrays["scan_range_m"], -longest_m, longest_m)
+    yield Values("scan_returned", arrays["scan_returned"], min(Return), max(Return))
+    yield Values("scan_utility_bits", arrays["scan_utility_bits"], -1.0, _MOST)
+
+
+def _poses(name: str, poses: np.ndarray, low: np.ndarray, high: np.ndarray) -> Iterator[Values]:
+    """Places between two corners; yaw and pitch, which may go beyond a turn while a robot turns."""
+    yield Values(name, poses[..., :3], low, high)
+    yield Values(name, poses[..., 3:], -_TURN, _TURN)
+
+
+def _packed(scenario: Scenario, name: str, rays: np.ndarray, used: np.ndarray) -> Iterator[Values]:
+    """Measurements of messages: unit vectors, distances in grid units, a Return each; others may be 0."""
+    squares = (rays[..., :3] ** 2).sum(axis=-1)
+    yield Values(
+        f"{name}, length of a direction", squares, np.where(used, 1.0 - _ROUNDING, 0.0), 1.0 + _ROUNDING
+    )
+    longest = _longest_m(scenario) / scenario.grid.voxel_size_m
+    yield Values(f"{name}, distance", rays[..., 3], 0.0, longest)
+    yield Values(f"{name}, Return", rays[..., 4], min(Return), max(Return))
+    yield Values(f"{name}, Return", rays[..., 4] % 1.0, 0.0, 0.0)
+
+
+def _workspace(scenario: Scenario) -> tuple[np.ndarray, np.ndarray]:
+    """(3,) each: the lower and the upper corner of the workspace, in metres."""
+    low = np.asarray(scenario.grid.origin_m, np.float64)
+    return low, low + scenario.grid.size_m
+
+
+def _longest_m(scenario: Scenario) -> float:
+    """Metres that no measured distance is beyond, noise included."""
+    return _farthest_m(scenario) + 100.0 * max(kind.sensor.range_noise_m for kind in scenario.kinds)
+
+
+def _farthest_m(scenario: Scenario) -> float:
+    """Metres that no viewpoint is beyond the workspace, nor anything in it from anything else."""
+    across_m = float(np.linalg.norm(scenario.grid.size_m)) + scenario.grid.voxel_size_m
+    reaches_m = [kind.robot.reach_m for kind in scenario.kinds if math.isfinite(kind.robot.reach_m)]
+    return 2.0 * max([across_m, *reaches_m])
