@@ -416,7 +416,10 @@ class Unreadable:
         return "Unreadable()"
 
 
-@pytest.mark.parametrize("value", [lambda: None, Unreadable(), [1, (i for i in ())]], ids=repr)
+UNPICKLED = {"lambda": lambda: None, "unreadable": Unreadable(), "generator": [1, (i for i in ())]}
+
+
+@pytest.mark.parametrize("value", UNPICKLED.values(), ids=UNPICKLED)
 def test_an_error_about_what_cannot_be_pickled_goes_to_other_processes(value):
     error = SettingError("Robot.reach_m", value, "a number")
     again = pickle.loads(pickle.dumps(error))
