@@ -33,7 +33,7 @@ class Args:
     scenario: Positional[str] = "room"
     """A named scenario: room, office, cave, … (the README lists them)."""
     strategy: str = "gradient"
-    """Chooses viewpoints: best (the one that we recommend), random, gradient, gradient-plane,
+    """Chooses viewpoints: best (planned-rate, which we recommend), random, gradient, gradient-plane,
     mutual-information, ground-gradient, information-rate-v0, information-per-scan, voronoi, voronoi-gradient,
     voronoi-nearest, per-time-visibility, nearest-candidate, coordinated-candidate, nearest-frontier,
     distance-advantage; a learned policy: pretrained:room, or the folder of a run of training.ppo; or a class

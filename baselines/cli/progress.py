@@ -106,6 +106,19 @@ def _setting(scenario: Scenario) -> Iterator[tuple[str, str]]:
     yield "sensor's range", ", ".join(said)
 
 
+def standing_still(figures: dict[str, Any], moved_m: float) -> list[str]:
+    """Warnings of robots that drove less than so many metres though they tried, or mapped nothing so.
+
+    In a room without obstacles a robot may well map all from where it starts.
+    """
+    return [
+        f"warning: robot {number} has not moved: {robot['scans']:,} scans from one spot, "
+        f"{robot['blocked_moves']:,} moves blocked"
+        for number, robot in enumerate(figures["per_robot"])
+        if robot["distance_m"] < moved_m and (robot["blocked_moves"] > 0 or not figures["finished"])
+    ]
+
+
 def print_table(figures: dict[str, Any], written: list[Path], scenario: Scenario) -> None:
     """Print what a mission came to, and the files that were written."""
     from rich.console import Console
@@ -131,5 +144,7 @@ def print_table(figures: dict[str, Any], written: list[Path], scenario: Scenario
             table.add_row(label, shown(values[name]))
     console = Console()
     console.print(table)
+    for warning in standing_still(figures, scenario.grid.voxel_size_m):
+        console.print(warning, style="yellow", highlight=False, soft_wrap=True)
     if written:
         console.print(f"written: {', '.join(map(str, written))}", highlight=False, soft_wrap=True)

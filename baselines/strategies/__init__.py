@@ -17,6 +17,7 @@ from baselines.strategies.gradient import GradientStrategy
 from baselines.strategies.information_rate_v0 import InformationRate, InformationRateConfig
 from baselines.strategies.loading import entry_points, is_reference, make_referenced, module_of
 from baselines.strategies.mutual_information import MutualInformation, MutualInformationConfig
+from baselines.strategies.planned_rate import PlannedRate
 from baselines.strategies.protocol import Strategy
 from baselines.strategies.random_walk import RandomWalk
 from baselines.strategies.voronoi import VoronoiConfig, VoronoiCoverage
@@ -29,6 +30,7 @@ STRATEGIES: MappingProxyType[str, Callable[[], Strategy]] = MappingProxyType(
         "gradient-plane": partial(GradientStrategy, motion_plane=True),
         "mutual-information": MutualInformation,
         "ground-gradient": partial(MutualInformation, MutualInformationConfig(coordinated=False)),
+        "planned-rate": PlannedRate,
         "information-rate-v0": InformationRate,
         "information-per-scan": partial(
             InformationRate, InformationRateConfig(per_scan=True, candidates=120)
@@ -49,7 +51,7 @@ STRATEGIES: MappingProxyType[str, Callable[[], Strategy]] = MappingProxyType(
 """Name → a function that makes the strategy."""
 
 ALIASES: MappingProxyType[str, str] = MappingProxyType(
-    {"best": "information-rate-v0", "information-rate": "information-rate-v0"}
+    {"best": "planned-rate", "information-rate": "information-rate-v0"}
 )
 """Other name → the name that records and tables hold: of what we recommend, and of former versions."""
 

@@ -205,6 +205,32 @@ def evaluate_viewpoints(belief, scan, drive, here, viewpoints, cones, scratch, o
         outlook.bits[k] = expected_scan_bits(belief, scan, viewpoint, cones, scratch)
 
 
+@lean_kernel
+def straight_seconds(belief, voxel_size_m, drive, here, viewpoints, scratch, seconds):
+    """Fill in the seconds until the scans at viewpoints are taken, on straight lines.
+
+    Args:
+        belief: A Belief.
+        voxel_size_m: Edge of a voxel.
+        drive: A DriveModel.
+        here: (5,) the robot, in grid units.
+        viewpoints: (K, 5) in grid units.
+        scratch: A ScanScratch.
+        seconds: (K,) float64, filled in; inf = the line is not free.
+    """
+    for k in range(len(viewpoints)):
+        at = viewpoints[k]
+        x, y, z = at[0] - here[0], at[1] - here[1], at[2] - here[2]
+        length = math.sqrt(x * x + y * y + z * z)
+        drive_s = driving_time(length * voxel_size_m, drive.max_speed_m_s, drive.acceleration_m_s2)
+        turn_s = turning_time(here[3], here[4], at[3], at[4], drive.turn_rate_rad_s)
+        seconds[k] = max(drive_s, turn_s) + drive.scan_time_s
+        if length > 1e-9:
+            direction = (x / length, y / length, z / length)
+            if not line_is_free(belief, here, direction, length, drive.body_radius, scratch):
+                seconds[k] = math.inf
+
+
 def expected_outlook(
     belief: Belief,
     model: RobotModel,

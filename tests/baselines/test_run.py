@@ -19,6 +19,7 @@ from PIL import Image
 from baselines import replay, run
 from baselines.cli import mission_outputs as mission_log
 from baselines.cli.arguments import run_command
+from baselines.cli.progress import standing_still
 from baselines.cli.world_options import Reading
 from baselines.experiments.mission import run_mission, scripted
 from baselines.strategies import ALIASES, STRATEGIES, make_strategy
@@ -111,6 +112,16 @@ def test_an_alias_runs_what_it_stands_for_and_says_so(figures, name):
     printed = figures("--strategy", name, *SHORT)
     assert printed["strategy"] == ALIASES[name] in STRATEGIES
     assert without_clock(printed) == without_clock(figures("--strategy", ALIASES[name], *SHORT))
+
+
+def test_the_table_warns_of_robots_that_have_not_moved():
+    def of(finished, *robots):
+        rows = [{"distance_m": m, "blocked_moves": blocked, "scans": 2262} for m, blocked in robots]
+        return standing_still({"finished": finished, "per_robot": rows}, 0.25)
+
+    (warning,) = of(True, (3.0, 9), (0.2, 810), (0.0, 0))
+    assert warning == "warning: robot 1 has not moved: 2,262 scans from one spot, 810 moves blocked"
+    assert len(of(False, (0.0, 0), (0.3, 0))) == 1
 
 
 def test_what_is_not_said_is_the_scenario_s_own(figures):

@@ -1,0 +1,100 @@
+"""Far places that may be worth a drive: uncertain blocks of a belief, and places to look at them from.
+
+The belief is divided into blocks of voxels. Of each block that a path search reached, the place is the
+reached voxel nearest to its centre; the block's remaining bits are those of its voxels that nothing covers.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from entropy_explore_env.belief.fields import remaining_bits
+from entropy_explore_env.belief.paths.search import cost_to
+from entropy_explore_env.belief.raycast import STOP_AT_COVERED
+from entropy_explore_env.belief.voxel_index import flat_index, grid_index
+from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel
+
+NOT_REACHED = -1
+"""As a place: no voxel of the block was reached."""
+
+
+class Blocks(NamedTuple):
+    """Blocks of a belief, I, J, K along the axes."""
+
+    edge: int
+    """Voxels along a block's edge."""
+    bits: np.ndarray
+    """(I, J, K) float64, remaining bits; 0 outside the window that was looked at."""
+    place: np.ndarray
+    """(I, J, K) int64, the reached voxel nearest to the block's centre, or NOT_REACHED."""
+
+
+def new_blocks(shape: tuple[int, int, int], edge: int) -> Blocks:
+    """Memory for the blocks of a grid, `edge` voxels along each axis that has so many."""
+    count = tuple(math.ceil(n / edge) for n in shape)
+    return Blocks(edge, np.zeros(count), np.full(count, NOT_REACHED, np.int64))
+
+
+@inlined_kernel
+def _fill_block(search, belief, target_precision, layer, low, high):
+    """(bits, place) of the block of the voxels from `low` up to, not including, `high`."""
+    bits, place, nearest = 0.0, NOT_REACHED, math.inf
+    for x in range(low[0], high[0]):
+        for y in range(low[1], high[1]):
+            for z in range(low[2], high[2]):
+                voxel = flat_index(belief.size, x, y, z)
+                if belief.mean[voxel] > STOP_AT_COVERED:
+                    continue
+                if belief.precision[voxel] < target_precision:
+                    bits += remaining_bits(belief.precision[voxel], target_precision)
+                if (layer >= 0 and z != layer) or math.isinf(cost_to(search, voxel)):
+                    continue
+                away = (
+                    (2 * x + 1 - low[0] - high[0]) ** 2
+                    + (2 * y + 1 - low[1] - high[1]) ** 2
+                    + (2 * z + 1 - low[2] - high[2]) ** 2
+                )
+                if away < nearest:
+                    nearest, place = away, voxel
+    return bits, place
+
+
+@lean_kernel
+def fill_blocks(search, belief, target_precision, layer, start, radius, blocks):
+    """Fill in the blocks of a belief around a robot after a search for paths.
+
+    Args:
+        search: The latest search.
+        belief: A Belief.
+        target_precision: 1/σ² of a voxel at which nothing remains to be gained.
+        layer: The layer of a planar robot, from which alone places are taken; -1 = it flies.
+        start: Voxel of the robot.
+        radius: Half an edge of the window of voxels that is looked at; no path was searched beyond.
+        blocks: Blocks, filled in.
+    """
+    size, edge, centre = belief.size, blocks.edge, grid_index(belief.size, start)
+    for i in range(blocks.bits.shape[0]):
+        for j in range(blocks.bits.shape[1]):
+            for k in range(blocks.bits.shape[2]):
+                low = (i * edge, j * edge, k * edge)
+                high = (min(low[0] + edge, size[0]), min(low[1] + edge, size[1]), min(low[2] + edge, size[2]))
+                inside = True
+                for axis in range(3):
+                    inside &= low[axis] <= centre[axis] + radius and high[axis] > centre[axis] - radius
+                bits, place = 0.0, NOT_REACHED
+                if inside:
+                    bits, place = _fill_block(search, belief, target_precision, layer, low, high)
+                blocks.bits[i, j, k], blocks.place[i, j, k] = bits, place
+
+
+def bits_around(blocks: Blocks) -> np.ndarray:
+    """(I, J, K) float64, the bits of each block and of its neighbours."""
+    total = blocks.bits
+    for axis in range(3):
+        wider = np.pad(total, [(1, 1) if axis == other else (0, 0) for other in range(3)])
+        n = total.shape[axis]
+        total = np.sum([np.take(wider, np.arange(first, first + n), axis) for first in range(3)], axis=0)
+    return total

@@ -1,0 +1,117 @@
+"""What scans from viewpoints should bring, where walls have gaps: the bits of many viewpoints in one call.
+
+As `expected_scan`, but for two things, without which rays are imagined to see through walls. An unknown voxel
+beside something believed covered stops a ray with another, higher probability: rays that lie apart leave gaps
+in what they see of a wall. And a known voxel with expected coverage μ ≤ ½, where a wall was hit at a flat
+angle, stops a ray with probability 2 μ; the voxel in which it starts does not.
+"""
+
+from __future__ import annotations
+
+import math
+
+from entropy_explore_env.belief.measurement_model import measurement_precision
+from entropy_explore_env.belief.raycast import OPEN, OPEN_END, STOP_AT_COVERED, Crossing, Line, cast_ray
+from entropy_explore_env.belief.visibility import in_cones
+from entropy_explore_env.belief.voxel_index import grid_index
+from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel
+
+_FOLD_ABOVE = 1e250
+"""A product of ratios is folded into bits, by its logarithm, before it could leave a float64."""
+_LEAST_SHARE = 1e-3
+"""Rays that get on with less probability are not followed."""
+
+
+@inlined_kernel
+def beside_covered(belief, voxel):
+    """Whether a voxel shares a face with one that is believed covered."""
+    size, mean = belief.size, belief.mean
+    x, y, z = grid_index(size, voxel)
+    row, column = size[2], size[1] * size[2]
+    return (
+        (x > 0 and mean[voxel - column] > STOP_AT_COVERED)
+        or (x < size[0] - 1 and mean[voxel + column] > STOP_AT_COVERED)
+        or (y > 0 and mean[voxel - row] > STOP_AT_COVERED)
+        or (y < size[1] - 1 and mean[voxel + row] > STOP_AT_COVERED)
+        or (z > 0 and mean[voxel - 1] > STOP_AT_COVERED)
+        or (z < size[2] - 1 and mean[voxel + 1] > STOP_AT_COVERED)
+    )
+
+
+@inlined_kernel
+def _imagine_ray(belief, scan, gap_probability, start, direction, count, scratch):
+    """Add the precision that one imagined ray should bring to `scratch.added`; returns the touched voxels."""
+    length, n, end = cast_ray(
+        belief.mean,
+        belief.size,
+        Line(start, direction, scan.max_range_m / scan.voxel_size_m),
+        STOP_AT_COVERED,
+        OPEN_END,
+        scan.voxels_behind,
+        Crossing(scratch.crossed, scratch.entered),
+    )
+    range_m = length * scan.voxel_size_m
+    if end != OPEN and range_m < scan.min_range_m:
+        return count
+    share = 1.0
+    gain = scan.sensor_rays * measurement_precision(range_m, scan.sigma_min, scan.sigma_slope_per_m)
+    for i in range(n):
+        voxel = scratch.crossed[i]
+        if scratch.added[voxel] == 0.0:
+            scratch.touched[count] = voxel
+            count += 1
+        scratch.added[voxel] += gain * share
+        if belief.precision[voxel] < scan.known_precision:
+            gap = beside_covered(belief, voxel)
+            share *= 1.0 - (gap_probability if gap else scan.stop_probability)
+        elif i > 0:
+            share *= 1.0 - min(2.0 * belief.mean[voxel], 1.0)
+        if share < _LEAST_SHARE:
+            break
+    return count
+
+
+@lean_kernel
+def imagined_bits(belief, scan, gap_probability, viewpoints, cones, scratch, bits):
+    """Fill in the bits that a scan from each viewpoint should take from the robot's map.
+
+    Args:
+        belief: A Belief.
+        scan: A ScanModel.
+        gap_probability: Probability that an unknown voxel beside a covered one stops a ray.
+        viewpoints: (K, 5) x, y, z in grid units, yaw, pitch.
+        cones: (M,) CONE; voxels whose centres lie in one are left to teammates and count nothing.
+        scratch: A ScanScratch.
+        bits: (K,) float64, filled in.
+    """
+    for k in range(len(viewpoints)):
+        at, count = viewpoints[k], 0
+        for column in range(len(scan.yaws)):
+            yaw = at[3] + scan.yaws[column]
+            along, across = math.cos(yaw), math.sin(yaw)
+            for row in range(len(scan.pitches)):
+                pitch = at[4] + scan.pitches[row]
+                level = math.cos(pitch)
+                direction = (along * level, across * level, -math.sin(pitch))
+                start = (at[0], at[1], at[2])
+                count = _imagine_ray(belief, scan, gap_probability, start, direction, count, scratch)
+        bits[k] = _gathered(belief, cones, scratch, count)
+
+
+@inlined_kernel
+def _gathered(belief, cones, scratch, count):
+    """Σ ½ log2(1 + added/p) over the touched voxels outside the cones; what was added is cleared."""
+    bits, growth = 0.0, 1.0
+    for i in range(count):
+        voxel = scratch.touched[i]
+        share = scratch.added[voxel] / belief.precision[voxel]
+        scratch.added[voxel] = 0.0
+        if len(cones) > 0:
+            x, y, z = grid_index(belief.size, voxel)
+            if in_cones(cones, x + 0.5, y + 0.5, z + 0.5):
+                continue
+        growth *= 1.0 + share
+        if growth > _FOLD_ABOVE:
+            bits += math.log2(growth)
+            growth = 1.0
+    return 0.5 * (bits + math.log2(growth))

@@ -1,0 +1,98 @@
+"""The strategy `planned-rate`: how soon it is done, what it remembers, and that it never stands still."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from baselines.experiments.mission import run_mission, scripted
+from baselines.strategies import planned_rate
+from baselines.strategies.information_rate_v0 import InformationRate
+from baselines.strategies.planned_rate import PlannedRate, _comes_near, _experience, _Memory, _Weigher
+from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
+from entropy_explore_env.reports.metrics import mission_figures
+from entropy_explore_env.robots.motion import MoveEnd
+from entropy_explore_env.scenario import with_settings
+from entropy_explore_env.scenarios import BOX, OFFICE, ROOM, find_scenario
+
+
+def figures_of(strategy, scenario=ROOM, seed=0, **settings):
+    env = EntropyExploreEnv(with_settings(scripted(scenario), settings))
+    run_mission(env, strategy, seed)
+    return mission_figures(env.missions, 0)
+
+
+@pytest.mark.parametrize(("name", "robots", "share"), [("room-furnished", 3, 0.98), ("office", 1, 0.85)])
+def test_it_is_sooner_done_than_its_predecessor(name, robots, share):
+    ours, before = (
+        [figures_of(make(), find_scenario(name), seed, robots=robots)["t_mission_s"] for seed in (0, 1)]
+        for make in (PlannedRate, InformationRate)
+    )
+    assert sum(ours) < share * sum(before)
+
+
+def test_the_same_seed_gives_the_same_mission():
+    first, second = (figures_of(PlannedRate(), BOX, seed=4) for _ in range(2))
+    assert first == second and first["finished"]
+
+
+def test_mixed_teams_take_the_recipe_of_each_kind():
+    mixed = find_scenario("office-mixed")
+    figures = figures_of(PlannedRate(), mixed, seed=1, robots=2, ending={"time_limit_s": 40.0})
+    assert all(robot["scans"] > 10 for robot in figures["per_robot"])
+
+
+@pytest.fixture
+def view():
+    env = EntropyExploreEnv(scripted(with_settings(OFFICE, {"robots": 2})))
+    env.reset(seed=0)
+    return env.view("robot_0")
+
+
+def test_what_brought_nothing_and_what_was_not_reached_is_not_tried_again(view):
+    here = view.scenario.grid.in_grid_units(view.pose)
+    memory = _Memory(chosen=here.copy(), expected=100.0)
+    _experience(memory, view, here)  # no scan was taken: nothing came
+    elsewhere = here + np.array([3.0, 0.0, 0.0, 0.0, 0.0])
+    memory.chosen = elsewhere
+    _experience(memory, view, here)
+    assert [each.share for each in memory.avoided] == [0.0, 0.0]
+    viewpoints = np.stack([here, elsewhere, here + np.array([0.0, 2.0, 0.0, 0.0, 0.0])])
+    np.testing.assert_array_equal(_Weigher(memory, view)(viewpoints, np.full(3, 5.0)), [0.0, 0.0, 5.0])
+    far_off = here + np.array([50.0, 0.0, 0.0, 0.0, 0.0])
+    memory.chosen = None
+    _experience(memory, view, far_off)
+    assert memory.avoided == []
+
+
+def test_a_robot_that_a_teammate_blocked_keeps_clear_of_it(view):
+    grid = view.scenario.grid
+    here = grid.in_grid_units(view.pose)
+    mate_at = view.pose + np.array([1.0, 0.0, 0.0, 0.0, 0.0])
+    heard = dataclasses.replace(view.teammates[1], heard_s=0.0, pose=mate_at)
+    blocked = dataclasses.replace(view, move_end=MoveEnd.TEAMMATE, teammates={1: heard})
+    memory = _Memory(chosen=here + np.array([4.0, 0.0, 0.0, 0.0, 0.0]))
+    _experience(memory, blocked, here)
+    assert memory.blocked > 0
+    ahead, behind = (here + np.array([dx, 0.0, 0.0, 0.0, 0.0]) for dx in (8.0, -8.0))
+    worth = _Weigher(memory, blocked)(np.stack([ahead, behind, here]), np.ones(3))
+    np.testing.assert_array_equal(worth, [0.0, 1.0, 1.0])
+    free = _Weigher(_Memory(), blocked)(np.stack([ahead]), np.ones(1))
+    assert free[0] == 1.0
+
+
+def test_bodies_that_touch_may_part():
+    here, body = np.zeros(3), np.array([1.0, 0.0, 0.0])
+    places = np.array([[-2.0, 0.0, 0.0], [3.0, 0.0, 0.0], [0.0, 2.0, 0.0], [0.0, 0.0, 0.0], [0.5, 2.0, 0.0]])
+    np.testing.assert_array_equal(_comes_near(here, places, body, 1.5), [False, True, False, False, True])
+
+
+def test_where_nothing_is_left_nearby_it_goes_elsewhere(view, monkeypatch):
+    monkeypatch.setattr(planned_rate._Weigher, "__call__", lambda self, viewpoints, bits: 0.0 * bits)
+    strategy = PlannedRate()
+    strategy.reset(view.scenario, np.random.default_rng(0))
+    chosen = np.stack([strategy.choose([view])[0] for _ in range(3)])
+    apart = np.linalg.norm(chosen[:, :3] - view.pose[:3], axis=1)
+    assert (apart > 0.1).all() and (apart <= view.kind.robot.reach_m).all()
