@@ -36,8 +36,9 @@ class Args:
     """Chooses viewpoints: best (planned-rate, which we recommend), random, gradient, gradient-plane,
     mutual-information, ground-gradient, information-rate-v0, information-per-scan, voronoi, voronoi-gradient,
     voronoi-nearest, per-time-visibility, nearest-candidate, coordinated-candidate, nearest-frontier,
-    distance-advantage; a learned policy: pretrained:room, or the folder of a run of training.ppo; or a class
-    of your own: my_package.my_module:MyStrategy, or path/to/file.py:MyStrategy."""
+    coordinated-frontier, assigned-frontier, information-gain, distance-advantage, receding-horizon, tour; a
+    learned policy: pretrained:room, or the folder of a run of training.ppo; or a class of your own:
+    my_package.my_module:MyStrategy, or path/to/file.py:MyStrategy."""
     robots: int = 3
     """Team size."""
     seed: int = 0

@@ -9,8 +9,12 @@ from functools import partial
 from pathlib import Path
 from types import MappingProxyType, ModuleType
 
+from baselines.strategies.explorers.coordinated_frontier import AssignedFrontier, CoordinatedFrontier
 from baselines.strategies.explorers.distance_advantage import DistanceAdvantage
+from baselines.strategies.explorers.information_gain import InformationGain
 from baselines.strategies.explorers.nearest_frontier import NearestFrontier
+from baselines.strategies.explorers.receding_horizon import RecedingHorizon
+from baselines.strategies.explorers.tour import Tour
 from baselines.strategies.frontier import FrontierStrategy
 from baselines.strategies.frontier.metrics import coordinated_candidate, nearest_candidate
 from baselines.strategies.gradient import GradientStrategy
@@ -37,7 +41,12 @@ STRATEGIES: MappingProxyType[str, Callable[[], Strategy]] = MappingProxyType(
         ),
         "per-time-visibility": FrontierStrategy,
         "nearest-frontier": NearestFrontier,
+        "coordinated-frontier": CoordinatedFrontier,
+        "assigned-frontier": AssignedFrontier,
+        "information-gain": InformationGain,
         "distance-advantage": DistanceAdvantage,
+        "receding-horizon": RecedingHorizon,
+        "tour": Tour,
         "nearest-candidate": nearest_candidate,
         "coordinated-candidate": coordinated_candidate,
         "voronoi": VoronoiCoverage,

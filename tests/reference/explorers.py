@@ -73,3 +73,36 @@ def distance_advantage(plan: np.ndarray, robot: Cell, radius: int, horizon: floa
 def chosen(values: dict[Cell, float]) -> Cell | None:
     """A cell of greatest value."""
     return max(values, key=values.__getitem__) if values else None
+
+
+def coordinated(
+    plan: np.ndarray, robots: list[Cell], targets: list[Cell], beta: float, reach: float
+) -> list[Cell | None]:
+    """Burgard 2005's algorithm: who of several robots that choose together goes to which frontier cell.
+
+    Args:
+        plan: The map that all of them have.
+        robots: Where they are.
+        targets: Where others are under way to.
+        beta: Cost of a path as long as the reach.
+        reach: The sensor's range, in cells.
+    """
+    cells = frontier_cells(plan)
+    utility = {cell: 1.0 - sum(max(1.0 - math.dist(cell, t) / reach, 0.0) for t in targets) for cell in cells}
+    lengths = [lengths_from(plan, robot) for robot in robots]
+    found: list[Cell | None] = [None] * len(robots)
+    for _ in robots:
+        worth = {
+            (robot, cell): utility[cell] - beta * lengths[robot][cell] / reach
+            for robot in range(len(robots))
+            if found[robot] is None
+            for cell in cells
+            if math.isfinite(lengths[robot][cell])
+        }
+        if not worth:
+            break
+        robot, cell = max(worth, key=worth.__getitem__)
+        found[robot] = cell
+        for other in cells:
+            utility[other] -= max(1.0 - math.dist(other, cell) / reach, 0.0)
+    return found

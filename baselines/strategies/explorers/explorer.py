@@ -89,6 +89,8 @@ class Explorer(ABC):
 
     rule = "this rule"
     """Its name, for errors."""
+    until_reached = False
+    """Whether a target holds, once picked, until it is reached; else until the map changes."""
 
     @abstractmethod
     def pick(self, scene: Scene) -> int:
@@ -123,14 +125,18 @@ class Explorer(ABC):
         stopped = self._note_end(view, memory, here)
         if stopped is not None:
             return stopped
-        kept = memory.target != NONE and memory.cells.is_frontier(memory.target)
-        if kept and not memory.cells.changed:
+        kept = memory.target not in (NONE, here) and self._holds(memory.cells, memory.target)
+        if kept and (self.until_reached or not memory.cells.changed):
             return self._towards(view, memory, here, memory.target)
         target = self._pick(view, memory, here, memory.target if kept else NONE)
         if target == NONE:
             memory.target, memory.viewpoint = NONE, None
             return random_viewpoint(view, self._rng)
         return self._towards(view, memory, here, target)
+
+    def _holds(self, cells: FrontierCells, target: int) -> bool:
+        """Whether a target is one still."""
+        return cells.is_known_free(target) if self.until_reached else cells.is_frontier(target)
 
     def _memory(self, view: RobotView) -> _Memory:
         """The robot's memory, made at its first choice: an exposure surface is not known before."""

@@ -25,6 +25,7 @@ from baselines.strategies.frontier.voxel.map import (
     block_span,
     queue_block,
 )
+from baselines.strategies.frontier.voxel.visibility import count_from
 from entropy_explore_env.belief.paths.search import Search, cost_to
 from entropy_explore_env.belief.voxel_index import flat_index, grid_index
 from entropy_explore_env.compilation.kernels import lean_kernel
@@ -48,9 +49,9 @@ class FrontierCells(VoxelCandidates):
         body_reach: Voxels that the body extends beyond its own, along an axis.
     """
 
-    def __init__(self, scenario: Scenario, kind: RobotKind) -> None:
-        """Nothing is known yet."""
-        block_m = BLOCK * scenario.grid.voxel_size_m
+    def __init__(self, scenario: Scenario, kind: RobotKind, block: int = BLOCK) -> None:
+        """Nothing is known yet; blocks have an edge of this many voxels."""
+        block_m = block * scenario.grid.voxel_size_m
         super().__init__(scenario, kind, FrontierConfig(sigma=KNOWN_SIGMA, spacing_m=block_m))
         self.body_reach = int(np.abs(self._map.footprint).max(initial=0))
         self._radius = self.body_reach + 2
@@ -71,6 +72,12 @@ class FrontierCells(VoxelCandidates):
     def is_known_free(self, voxel: int) -> bool:
         """Whether the body may stand in a voxel, by what is known."""
         return math.isfinite(self._map.traversal_cost[voxel])
+
+    def gains(self, voxels: np.ndarray) -> np.ndarray:
+        """(K,) how many unknown voxels the sensor would see, all around, from (K,) int32 voxels."""
+        gains, weighed = np.empty(len(voxels)), np.empty(len(voxels))
+        count_from(self._counter, self._map.state, self._size, voxels, self._tree, self._met, gains, weighed)
+        return gains
 
     def nearest_of_blocks(self, search: Search, reach: float) -> tuple[np.ndarray, np.ndarray]:
         """Of each block the frontier cell that the latest search reached by the shortest path.

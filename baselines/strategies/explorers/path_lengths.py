@@ -14,7 +14,7 @@ from baselines.strategies.explorers.frontier_cells import FrontierCells
 from entropy_explore_env.belief.paths.lattice import Costs, Lattice, costs_of, new_lattice
 from entropy_explore_env.belief.paths.planning import resume_search, search_paths, start_search
 from entropy_explore_env.belief.paths.search import Search, cost_to, extract_path
-from entropy_explore_env.belief.paths.string_pulling import string_pulled
+from entropy_explore_env.belief.paths.string_pulling import line_of_sight_cost, string_pulled
 from entropy_explore_env.belief.voxel_index import flat_index
 from entropy_explore_env.compilation.kernels import lean_kernel
 from entropy_explore_env.scenario import Scenario
@@ -102,14 +102,30 @@ class KnownPaths:
         arrays = self.search, self.lattice, self.costs
         return float(mean_length_from(*arrays, np.array([voxel], np.int32), others, least, most))
 
+    def in_sight(self, first: np.ndarray, second: np.ndarray) -> bool:
+        """Whether the straight line between two places (3,), in voxel edges, is known to be free."""
+        ends = [(float(p[0]), float(p[1]), float(p[2])) for p in (first, second)]
+        cost = line_of_sight_cost(self.search, self.lattice, self.costs, ends[0], ends[1])
+        return math.isfinite(cost)
+
+    def sights(self, places: np.ndarray, farthest: float) -> np.ndarray:
+        """(K, K) bool: between which of (K, 3) places the line is known free, and at most `farthest` long."""
+        seen = np.zeros((len(places), len(places)), np.bool_)
+        fill_sights(self.search, self.lattice, self.costs, np.ascontiguousarray(places), farthest, seen)
+        return seen
+
+    def route_to(self, goal: int) -> np.ndarray:
+        """(N,) int32 voxels of the path to a voxel by the latest search, from where it began."""
+        path = np.empty(extract_path(self.search, self.lattice, goal, np.empty(0, np.int32)), np.int32)
+        extract_path(self.search, self.lattice, goal, path)
+        return path
+
     def path_to(self, start: int, goal: int) -> np.ndarray:
         """(N,) int32 voxels of the shortest path between two voxels; none if there is none. A new search."""
         opened = self._cells.open_start(start)
         search_paths(self.search, self.lattice, self.costs, np.array([start], np.int32), goal, math.inf)
         self._cells.close(opened)
-        path = np.empty(extract_path(self.search, self.lattice, goal, np.empty(0, np.int32)), np.int32)
-        extract_path(self.search, self.lattice, goal, path)
-        return path
+        return self.route_to(goal)
 
     def corners_of(self, path: np.ndarray, start: np.ndarray, goal: np.ndarray) -> np.ndarray:
         """(M, 3) points in grid units at which the latest path, pulled straight, turns; the goal last."""
@@ -121,6 +137,22 @@ def fill_lengths(search: Search, voxels: np.ndarray, lengths: np.ndarray) -> Non
     """Fill (K,) float64 with the lengths of paths to (K,) int32 voxels by the latest search."""
     for place in range(len(voxels)):
         lengths[place] = cost_to(search, voxels[place])
+
+
+@lean_kernel
+def fill_sights(
+    search: Search, lattice: Lattice, costs: Costs, places: np.ndarray, farthest: float, seen: np.ndarray
+) -> None:
+    """Fill (K, K) bool; see `KnownPaths.sights`."""
+    for first in range(len(places)):
+        seen[first, first] = True
+        for second in range(first):
+            a = (places[first, 0], places[first, 1], places[first, 2])
+            b = (places[second, 0], places[second, 1], places[second, 2])
+            apart = math.sqrt((a[0] - b[0]) ** 2 + (a[1] - b[1]) ** 2 + (a[2] - b[2]) ** 2)
+            if apart <= farthest:
+                cost = line_of_sight_cost(search, lattice, costs, a, b)
+                seen[first, second] = seen[second, first] = not math.isinf(cost)
 
 
 @lean_kernel

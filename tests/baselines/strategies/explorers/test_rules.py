@@ -15,64 +15,15 @@ from baselines.strategies.explorers.distance_advantage import (
     DistanceAdvantageConfig,
     advantages,
 )
-from baselines.strategies.explorers.explorer import Scene
-from baselines.strategies.explorers.frontier_cells import BLOCK, FrontierCells
+from baselines.strategies.explorers.frontier_cells import BLOCK
+from baselines.strategies.explorers.information_gain import InformationGain, InformationGainConfig
 from baselines.strategies.explorers.nearest_frontier import NearestFrontier, best_of
-from baselines.strategies.explorers.path_lengths import KnownPaths
 from baselines.strategies.frontier.voxel.map import NONE
-from entropy_explore_env.belief.paths.search import new_search
-from entropy_explore_env.scenario import with_settings
-from entropy_explore_env.scenarios import find_scenario
-from entropy_explore_env.settings import Grid
+from tests.baselines.strategies.explorers.scenes import belief_of_plan, cell, random_plan, scene_of
 from tests.reference import explorers as reference
 from tests.reference.scenes import drawn, seeds
 
 SHAPES = ((17, 11), (9, 23), (31, 14))
-
-
-def random_plan(shape, rng):
-    """Known free cells in patches, walls and unknown cells among them; one free cell for the robot."""
-    plan = np.full(shape, reference.UNKNOWN, np.int8)
-    for _ in range(int(rng.integers(2, 9))):
-        low = [int(rng.integers(0, n)) for n in shape]
-        wide = [int(rng.integers(2, 9)) for _ in shape]
-        plan[low[0] : low[0] + wide[0], low[1] : low[1] + wide[1]] = reference.FREE
-    plan[(plan == reference.FREE) & (rng.random(shape) < 0.15)] = reference.WALL
-    free = np.argwhere(plan == reference.FREE)
-    robot = tuple(int(i) for i in free[rng.integers(len(free))]) if len(free) else (0, 0)
-    plan[robot] = reference.FREE
-    return plan, robot
-
-
-def belief_of_plan(plan):
-    """(X, Y, 1) mean and precision that say the same."""
-    mean = np.where(plan == reference.WALL, 0.95, 0.05).astype(np.float32)
-    precision = np.where(plan == reference.UNKNOWN, 30.0**-2, 100.0).astype(np.float32)
-    return mean[:, :, None], precision[:, :, None]
-
-
-def scenario_of(shape, **robot):
-    base = find_scenario("office")
-    settings = {"grid": Grid((*shape, 1), 0.1), "world": "empty", "robot": {"body_radius_m": 0.0, **robot}}
-    return with_settings(base, settings)
-
-
-def scene_of(plan, robot, target=NONE):
-    """What a robot there knows of a plan."""
-    scenario = scenario_of(plan.shape)
-    mean, precision = belief_of_plan(plan)
-    view = SimpleNamespace(mean=mean, precision=precision, scenario=scenario)
-    cells = FrontierCells(scenario, scenario.kind_of(0))
-    cells.update(view, 0.5)  # type: ignore[arg-type]
-    paths = KnownPaths(scenario, scenario.kind_of(0), cells, new_search(scenario.grid.voxels))
-    here = int(np.ravel_multi_index(robot, plan.shape))
-    paths.start(here)
-    return Scene(view, cells, paths, here, target)  # type: ignore[arg-type]
-
-
-def cell(plan, voxel):
-    x, y = np.unravel_index(voxel, plan.shape)
-    return int(x), int(y)
 
 
 @given(st.sampled_from(SHAPES), seeds)
@@ -170,3 +121,49 @@ def test_a_dropped_cell_counts_again_when_the_map_changes_around_it_only():
         view.mean[place] = 0.05
         scene.cells.update(view, 0.5)  # type: ignore[arg-type]
         assert scene.cells.is_frontier(left) == back
+
+
+@given(st.sampled_from([0.02, 0.2, 2.0]), st.sampled_from([0.1, 3.0]), seeds)
+@drawn(30)
+def test_counting_only_gains_that_may_be_best_changes_no_choice(weight, horizon, seed):
+    """In one view after another: gains that were counted before bound those of a map that has grown."""
+    rng = np.random.default_rng(seed)
+    plan, robot = random_plan((31, 14), rng)
+    scene = scene_of(plan, robot)
+    for _ in range(3):
+        picked = InformationGain(InformationGainConfig(weight=weight, horizon=horizon)).pick(scene)
+        scene.paths.start(scene.here)
+        scene.paths.extend(math.inf)
+        _, voxels = scene.cells.listed(all_of_them=True)
+        lengths = scene.paths.lengths_to(voxels)
+        near = lengths <= horizon * scene.cells.reach
+        if near.sum() > 1:
+            worth = weight * scene.cells.reach * np.log1p(scene.cells.gains(voxels)) - lengths
+            mine = np.flatnonzero(voxels == picked)
+            assert len(mine) == 1 and worth[mine[0]] == pytest.approx(worth[near].max())
+        elif np.isfinite(lengths).any():
+            assert picked != NONE
+        grown = plan == reference.UNKNOWN
+        plan[grown & (rng.random(plan.shape) < 0.2)] = reference.FREE
+        grown_view = scene_of(plan, robot).view
+        scene.cells.update(grown_view, 0.5)
+        scene.paths.start(scene.here)
+
+
+def test_of_two_equally_near_frontiers_the_one_that_shows_more_is_taken_by_hand():
+    """The robot stands at a corner; up its corridor one unknown cell before a wall, to the right five."""
+    plan = np.full((16, 7), reference.WALL, np.int8)
+    plan[5, 1:4] = plan[5:8, 1] = reference.FREE
+    plan[5, 4] = plan[8:13, 1] = reference.UNKNOWN
+    scene = scene_of(plan, (5, 1), block=1)
+    up, right = (int(np.ravel_multi_index(place, plan.shape)) for place in ((5, 3), (7, 1)))
+    assert scene.cells.gains(np.array([up, right], np.int32)).tolist() == [1.0, 5.0]
+    assert InformationGain().pick(scene) == right
+
+
+def test_beyond_the_horizon_the_nearest_frontier_is_taken():
+    plan = np.full((30, 3), reference.WALL, np.int8)
+    plan[1:28, 1] = reference.FREE
+    plan[28, 1] = reference.UNKNOWN
+    scene = scene_of(plan, (7, 1))
+    assert cell(plan, InformationGain(InformationGainConfig(horizon=0.1)).pick(scene)) == (27, 1)

@@ -1,0 +1,155 @@
+"""The strategy `tour`, in the manner of TARE (Cao et al. 2021): near viewpoints and far regions in a tour.
+
+Within a horizon of the robot, few frontier cells are chosen from which all frontier cells there can be seen
+close enough: in turn, the one that covers most that is not covered yet (greedy set cover, as there). Beyond
+the horizon, frontier cells are put together by coarse cells of the map; the nearest one stands for its
+coarse cell. The robot goes to the first place of a short open tour from where it is through all of these.
+
+The tour minimises the length of paths. Between near places they are searched; to and between far ones they
+lead along the tree of shortest paths from the robot, as TARE's lead along its graph of visited places. TARE
+solves the two levels one after the other and takes the first solution of OR-Tools; here both are one tour,
+built by insertion and improved by 2-opt and Or-opt moves (`open_tours`).
+
+Ours: the place chosen last stays the first unless that makes the tour longer by more than a share.
+
+Tuned: `near` and `cover`, see `TourConfig`.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from baselines.strategies.explorers.explorer import Explorer, Scene
+from baselines.strategies.explorers.nearest_frontier import best_of
+from baselines.strategies.explorers.open_tours import open_tour, tour_length
+from baselines.strategies.explorers.path_lengths import KnownPaths
+from baselines.strategies.explorers.teammates import centres_of
+from baselines.strategies.frontier.voxel.map import NONE
+from entropy_explore_env.validation import check, check_count, check_positive
+
+
+@dataclass(frozen=True)
+class TourConfig:
+    """What is near, and how much a place covers.
+
+    Attributes:
+        near: Longest path to a near frontier cell, in sensor ranges.
+        cover: From how far off a frontier cell is seen close enough, in sensor ranges.
+        coarse: Edge of the coarse cells, in sensor ranges.
+        most_near: Near places at most; the nearest count.
+        most_far: Far ones at most.
+        stay: The share by which a tour may be longer to begin where the last one did.
+
+    Raises:
+        SettingError: One of them is not allowed.
+    """
+
+    near: float = 1.5
+    cover: float = 0.5
+    coarse: float = 1.0
+    most_near: int = 120
+    most_far: int = 20
+    stay: float = 0.1
+
+    def __post_init__(self) -> None:
+        """Check every field."""
+        check_positive(self, "near", "cover", "coarse")
+        check_count(self, "most_near", 1, 10_000)
+        check_count(self, "most_far", 0, 10_000)
+        check(self, "stay", "a number from 0 to 1", lambda v: 0.0 <= v <= 1.0)
+
+
+class Tour(Explorer):
+    """Goes to the first place of a tour through what is left to explore."""
+
+    rule = "tour"
+
+    def __init__(self, config: TourConfig | None = None) -> None:
+        """Take the settings; None = the defaults."""
+        self.config = config or TourConfig()
+
+    def pick(self, scene: Scene) -> int:
+        """See `Explorer`."""
+        voxels, lengths = scene.paths.frontiers_within(math.inf)
+        if len(voxels) <= 1:
+            return best_of(voxels, -lengths, scene.target)
+        order = np.argsort(lengths, kind="stable")
+        voxels, lengths = voxels[order], lengths[order]
+        near = lengths <= self.config.near * scene.cells.reach
+        near[self.config.most_near :] = False
+        kept, far = self._cover(scene, voxels[near]), self._coarse(scene, voxels[~near])
+        places = np.concatenate([voxels[near][kept], voxels[~near][far]]).astype(np.int32)
+        between = lengths_between(scene.paths, scene.here, places, len(kept))
+        if scene.target != NONE and scene.target in places:
+            return self._begun(between, places, scene.target)
+        return int(places[open_tour(between)[1] - 1])
+
+    def _begun(self, between: np.ndarray, places: np.ndarray, target: int) -> int:
+        """The first place of a short tour, the target where that is hardly longer."""
+        tour = open_tour(between)
+        first = 1 + int(np.flatnonzero(places == target)[0])
+        rest = np.array([first, *(n for n in range(1, len(between)) if n != first)])
+        onward = rest[open_tour(between[np.ix_(rest, rest)])]
+        length = float(between[0, first]) + tour_length(between, onward)
+        if length <= (1.0 + self.config.stay) * tour_length(between, tour):
+            return target
+        return int(places[tour[1] - 1])
+
+    def _cover(self, scene: Scene, voxels: np.ndarray) -> list[int]:
+        """Which near frontier cells cover all of them: the target, then of equally good ones the nearest."""
+        if len(voxels) == 0:
+            return []
+        seen = scene.paths.sights(centres_of(scene, voxels), self.config.cover * scene.cells.reach)
+        left, chosen = np.ones(len(voxels), bool), []
+        for target in np.flatnonzero(voxels == scene.target):
+            chosen.append(int(target))
+            left &= ~seen[target]
+        while left.any():
+            best = int(np.argmax((seen & left).sum(axis=1)))
+            chosen.append(best)
+            left &= ~seen[best]
+        return chosen
+
+    def _coarse(self, scene: Scene, voxels: np.ndarray) -> list[int]:
+        """Of the far frontier cells, in order of distance, the first of each coarse cell; the target, too."""
+        edge = max(self.config.coarse * scene.cells.reach, 1.0)
+        cells = np.floor(centres_of(scene, voxels) / edge).astype(np.int64)
+        first: dict[tuple[int, ...], int] = {}
+        for number, cell in enumerate(map(tuple, cells.tolist())):
+            if cell not in first or voxels[number] == scene.target:
+                first[cell] = number
+        return sorted(first.values())[: self.config.most_far]
+
+
+def lengths_between(paths: KnownPaths, here: int, places: np.ndarray, near: int) -> np.ndarray:
+    """(1 + K, 1 + K) lengths of paths between the robot's voxel and K places, the first `near` of them near.
+
+    Args:
+        paths: Of the robot, with a complete search from where it is, which is another one afterwards.
+        here: Its voxel.
+        places: (K,) int32 voxels that the search reached.
+        near: Between so many of them paths are searched.
+    """
+    routes = [paths.route_to(place) for place in (here, *places)]
+    lengths = np.concatenate([[0.0], paths.lengths_to(places)])
+    along = [paths.lengths_to(route) for route in routes]
+    between = np.zeros((len(routes), len(routes)))
+    for first in range(len(routes)):
+        for second in range(first):
+            a, b = routes[first], routes[second]
+            count = min(len(a), len(b))
+            apart = np.flatnonzero(a[:count] != b[:count])
+            fork = int(apart[0]) if len(apart) else count
+            shared = along[first][fork - 1] if fork else 0.0
+            between[first, second] = lengths[first] + lengths[second] - 2.0 * shared
+            between[second, first] = between[first, second]
+    for number in range(near):
+        row = between[1 + number, 1 : 1 + near]
+        paths.start(int(places[number]))
+        paths.extend(float(row.max(initial=0.0)))
+        row[:] = np.minimum(row, paths.lengths_to(places[:near]))
+        between[1 : 1 + near, 1 + number] = row
+    return between
