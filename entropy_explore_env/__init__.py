@@ -44,7 +44,7 @@ from entropy_explore_env.settings import (
     RobotKind,
 )
 from entropy_explore_env.version import VERSION
-from entropy_explore_env.worlds.load import load_octomap, load_world, save_world
+from entropy_explore_env.worlds.load import load_octomap, load_world, make_world, save_world
 from entropy_explore_env.worlds.world import World
 
 __version__ = VERSION
@@ -82,6 +82,7 @@ __all__ = [
     "find_scenario",
     "load_octomap",
     "load_world",
+    "make_world",
     "parallel_env",
     "save_world",
     "with_settings",

@@ -30,13 +30,14 @@ def png(figure: Figure, dots_per_inch: int = 110) -> bytes:
     return buffer.getvalue()
 
 
-def mission_picture(recorder: Recorder, title: str, strategy: str) -> bytes:
+def mission_picture(recorder: Recorder, title: str, strategy: str, truth: bool = False) -> bytes:
     """Entropy curves, shared measurements, and slices of robot_0's map with all robots' paths.
 
     Args:
         recorder: Of a mission that has ended.
         title: What it was: the scenario and its world.
         strategy: Name of the strategy.
+        truth: Whether the true world stands beside the map.
 
     Returns:
         A PNG file.
@@ -44,8 +45,13 @@ def mission_picture(recorder: Recorder, title: str, strategy: str) -> bytes:
     missions = recorder.missions
     robots = missions.scenario.robots
     with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(11, 7.2), layout="constrained")
-        curves, shared, above, covered = figure.subplots(2, 2).ravel()
+        figure = Figure(figsize=(14.5, 7.2) if truth else (11, 7.2), layout="constrained")
+        if truth:
+            places = figure.subplot_mosaic([["curves"] * 3 + ["shared"] * 3, list("eeccww")])
+            curves, shared, above, covered = (places[name] for name in ("curves", "shared", "e", "c"))
+            _true_slice(places["w"], recorder)
+        else:
+            curves, shared, above, covered = figure.subplots(2, 2).ravel()
         for robot in range(robots):
             colour = COLOURS[robot % len(COLOURS)]
             curves.step(
@@ -86,18 +92,35 @@ def _slice(figure: Figure, axes: Axes, recorder: Recorder, entropy: bool) -> Non
     image = axes.imshow(
         shown.T, origin="lower", extent=extent_of(grid), cmap=colours, vmin=0, vmax=1, aspect="equal"
     )
-    for robot, path_m in enumerate(recorder.paths_m):
-        colour = COLOURS[robot % len(COLOURS)]
-        axes.plot(path_m[:, 0], path_m[:, 1], color=colour, linewidth=0.9)
-        edge = "white" if entropy else "black"
-        axes.plot(*path_m[0, :2], marker="o", color=colour, markersize=5, markeredgecolor=edge)
-        axes.plot(*path_m[-1, :2], marker="s", color=colour, markersize=5, markeredgecolor=edge)
+    _draw_paths(axes, recorder, edge="white" if entropy else "black")
     height_m = grid.centre_of(np.array([0, 0, layer]))[2]
     height = "" if grid.flat else f"z = {height_m:.2f} m; paths at all heights, "
     axes.set(xlabel="x (m)", ylabel="y (m)")
     axes.set_title(f"What robot_0 knows\n{height}○ start, □ end", fontsize=8)
     label = "share of the entropy left" if entropy else "coverage; blue: unknown"
     figure.colorbar(image, ax=axes, shrink=0.7, label=label)
+
+
+def _true_slice(axes: Axes, recorder: Recorder) -> None:
+    """The same layer of the true world, with the paths over it."""
+    missions, grid = recorder.missions, recorder.missions.grid
+    layer = _busiest_layer(recorder.scan_positions_m, grid)
+    solid = missions.state.truth[0].reshape(grid.shape)[:, :, layer]
+    axes.imshow(solid.T, origin="lower", extent=extent_of(grid), cmap="Greys", vmin=0, vmax=1, aspect="equal")
+    _draw_paths(axes, recorder, edge="black")
+    axes.set(xlabel="x (m)", ylabel="y (m)")
+    height_m = grid.centre_of(np.array([0, 0, layer]))[2]
+    height = "" if grid.flat else f"z = {height_m:.2f} m; "
+    axes.set_title(f"The true world\n{height}black: solid", fontsize=8)
+
+
+def _draw_paths(axes: Axes, recorder: Recorder, edge: str) -> None:
+    """All robots' paths, with marks at start and end that have edges of a colour."""
+    for robot, path_m in enumerate(recorder.paths_m):
+        colour = COLOURS[robot % len(COLOURS)]
+        axes.plot(path_m[:, 0], path_m[:, 1], color=colour, linewidth=0.9)
+        axes.plot(*path_m[0, :2], marker="o", color=colour, markersize=5, markeredgecolor=edge)
+        axes.plot(*path_m[-1, :2], marker="s", color=colour, markersize=5, markeredgecolor=edge)
 
 
 def extent_of(grid: Grid) -> tuple[float, float, float, float]:

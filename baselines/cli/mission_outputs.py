@@ -41,6 +41,8 @@ class Outputs:
     """File for a video of the mission (extra viewer)."""
     rerun: Path | None = None
     """File for a recording, an .rrd that Rerun's viewer opens (extra viewer)."""
+    truth: bool = False
+    """With --out: the true world beside the map in mission.png."""
     json: bool = False
     """Print one JSON object and nothing else."""
 
@@ -68,6 +70,8 @@ class Wanted:
             SettingError: A file or folder cannot be made.
             MissingExtraError: A package is not installed.
         """
+        if self.outputs.truth and self.out is None:
+            raise SettingError("truth", True, "given together with --out")
         mp4, rerun = self.outputs.mp4, self.outputs.rerun
         for package, module, file in (("av", "av", mp4), ("rerun-sdk", "rerun", rerun)):
             if file is not None and importlib.util.find_spec(module) is None:
@@ -191,7 +195,7 @@ class MissionLog:
         }
         content = {**figures, "settings": settings_of(recorder.missions.scenario), "series": series}
         write_atomically(folder / "mission.json", json.dumps(content, indent=1, allow_nan=False) + "\n")
-        picture = mission_picture(recorder, named(figures), figures["strategy"])
+        picture = mission_picture(recorder, named(figures), figures["strategy"], self._wanted.outputs.truth)
         write_atomically(folder / "mission.png", picture)
         return [folder / "mission.json", folder / "mission.png"]
 

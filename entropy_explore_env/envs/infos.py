@@ -14,10 +14,16 @@ _UNDER_WAY = MoveEnd.UNDER_WAY.name
 _MISSION_ENDS = [end.name for end in MissionEnd]
 
 
+def told_number(world_number: int | None) -> int:
+    """A world number as infos say it."""
+    return -1 if world_number is None else world_number
+
+
 def robot_infos(missions: Missions, mission: int) -> list[dict[str, Any]]:
     """An info for each robot of a mission.
 
-    Keys: `deciding` (whether its next action counts), `time_s`, `entropy_bits`, `own_bits` and
+    Keys: `deciding` (whether its next action counts), `time_s`, `world_number` (the world's, which `reset`
+    takes as its option `world`; -1 where no recipe made it), `entropy_bits`, `own_bits` and
     `received_bits` (taken from its map in this step), `move_end` and `end` (names of a MoveEnd and
     a MissionEnd), and `action_mask` where actions are discrete; when the mission is over, `figures`:
     those of `mission_figures`.
@@ -25,10 +31,12 @@ def robot_infos(missions: Missions, mission: int) -> list[dict[str, Any]]:
     clock = missions.state.missions[mission]
     robots = missions.state.robots[mission]
     time_s, end = float(clock["time_s"]), _MISSION_ENDS[clock["end"]]
+    world_number = told_number(missions.world_numbers[mission])
     infos: list[dict[str, Any]] = [
         {
             "deciding": deciding,
             "time_s": time_s,
+            "world_number": world_number,
             "entropy_bits": entropy_bits,
             "own_bits": own_bits,
             "received_bits": received_bits,

@@ -11,6 +11,7 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
 from entropy_explore_env.envs.checks import ActionChecker
+from entropy_explore_env.envs.infos import told_number
 from entropy_explore_env.envs.rewards import RewardFunction, StepRewards
 from entropy_explore_env.errors import CallOrderError, SettingError
 from entropy_explore_env.missions.action import action_space
@@ -36,8 +37,9 @@ class EntropyExploreVectorEnv(VectorEnv[Any, Any, Any]):
     mission, (E,), is the mean of its robots' rewards.
 
     Infos, each with a mask `_name` (E,) as Gymnasium has it: `deciding`, `entropy_bits`, `own_bits`,
-    `received_bits` and `reward_robots`, (E, A); `time_s` and `end` (code of a MissionEnd), (E,);
-    `action_mask`, (E, A, N), where actions are discrete and masks are wanted.
+    `received_bits` and `reward_robots`, (E, A); `time_s`, `end` (code of a MissionEnd) and `world_number`
+    (-1 where no recipe made the world), (E,); `action_mask`, (E, A, N), where actions are discrete and
+    masks are wanted.
     `final_obs` and `final_info` where autoreset is SAME_STEP.
     """
 
@@ -229,6 +231,8 @@ class EntropyExploreVectorEnv(VectorEnv[Any, Any, Any]):
         infos: dict[str, Any] = {name: clocks[name].copy() for name in ("time_s", "end")}
         for name in ("deciding", "entropy_bits", "own_bits", "received_bits"):
             infos[name] = self._of_robots(robots[name]).copy()
+        numbers = [told_number(number) for number in self.missions.world_numbers]
+        infos["world_number"] = np.array(numbers, np.int64)
         infos["reward_robots"] = self._of_robots(np.zeros(robots.shape) if earned is None else earned)
         if self._masks:
             infos["action_mask"] = self._of_robots(self.missions.action_masks())

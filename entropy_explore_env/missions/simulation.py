@@ -37,7 +37,8 @@ from entropy_explore_env.scenario import Scenario
 from entropy_explore_env.settings import Grid, gaussian_entropy_bits
 from entropy_explore_env.validation import check_instance, check_whole, is_whole
 from entropy_explore_env.worlds.given import checked_worlds, in_given_worlds, world_in_turn
-from entropy_explore_env.worlds.load import make_world, require_unchanged, world_of_file, world_with_number
+from entropy_explore_env.worlds.load import make_world, require_unchanged, world_of_file
+from entropy_explore_env.worlds.splits import draw_world_number
 from entropy_explore_env.worlds.world import World
 
 _CHUNKS_PER_THREAD = 4
@@ -58,6 +59,8 @@ class Start(NamedTuple):
     """(A, 5) float64."""
     options: ResetOptions
     """What of it was given."""
+    world_number: int | None
+    """Of the world, where a recipe made it."""
 
 
 class _Calls(NamedTuple):
@@ -83,6 +86,7 @@ class Missions:
         count: Number of missions E.
         state: All that changes, as arrays.
         worlds: The true world of each mission; None before its first reset.
+        world_numbers: Its number in each mission; None where no recipe made it.
         options: What was given to the latest reset of each mission, instead of drawing it.
         reward_function: Name of the function that rewards the robots in place of the scenario's reward, for
             records; empty = none. Missions themselves always reward by the scenario.
@@ -127,6 +131,7 @@ class Missions:
         self.state: MissionState = new_state(scenario, self.count, self.rules.cells)
         self._no_fly = np.zeros((self.count * int(self.rules.params["radii"][0]), 0), np.bool_)
         self.worlds: list[World | None] = [None] * self.count
+        self.world_numbers: list[int | None] = [None] * self.count
         self.options = [DRAWN] * self.count
         self.reward_function = ""
         self.seeds = [0] * self.count
@@ -219,28 +224,29 @@ class Missions:
 
     def draw_episode(self, mission: int, seed: int, episode: int, options: ResetOptions) -> Start:
         """What a mission would start with as an episode of a seed; nothing changes. See `reset`."""
+        number = options.world_number
         if options.world is not None:
             world = options.world
-        elif options.world_number is not None:
-            world = world_with_number(self.scenario, options.world_number)
         elif self.given:
             world = world_in_turn(self.given, seed, episode)
         elif self._read is not None:
             require_unchanged(self.scenario, self._read)
             world = self._read
         else:
-            world = make_world(self.scenario, generator(seed, episode, Stream.WORLD))
+            if number is None:
+                number = draw_world_number(self.scenario.split, generator(seed, episode, Stream.WORLD))
+            world = make_world(self.scenario, number)
         if options.starts is not None:
             poses = checked_starts(self.scenario, world, options.starts)
         else:
             poses = start_poses(self.scenario, world, generator(seed, episode, Stream.STARTS))
-        return Start(mission, seed, episode, world, poses, options)
+        return Start(mission, seed, episode, world, poses, options, number)
 
     def _begin(self, start: Start) -> None:
         """Put the mission into its world, with beliefs at the prior, and observe."""
-        mission, number, episode, world, poses, options = start
+        mission, number, episode, world, poses, options, world_number = start
         self.seeds[mission], self.episodes[mission] = number, episode
-        self.options[mission] = options
+        self.options[mission], self.world_numbers[mission] = options, world_number
         if world.ceiling is not None and self.state.collision is self.state.truth:
             self.state = self.state._replace(collision=self.state.truth.copy())
         state = self.state

@@ -13,13 +13,14 @@ import numpy as np
 
 from entropy_explore_env.errors import SettingError, WorldError
 from entropy_explore_env.scenario import Scenario
+from entropy_explore_env.scenarios import find_scenario
 from entropy_explore_env.settings import Grid
 from entropy_explore_env.validation import check_instance, checked_path, is_number, is_whole
 from entropy_explore_env.worlds.files.archives import restored, saved
 from entropy_explore_env.worlds.files.jacksboro import NAME as JACKSBORO
 from entropy_explore_env.worlds.files.process import Format, Limits, read_apart
 from entropy_explore_env.worlds.files.resampling import extruded, resampled
-from entropy_explore_env.worlds.files.voxels import MAX_FILE_VOXELS, RefusedError, Voxels
+from entropy_explore_env.worlds.files.voxels import FREE, MAX_FILE_VOXELS, UNKNOWN, RefusedError, Voxels
 from entropy_explore_env.worlds.recipes.catalogue import RECIPES
 from entropy_explore_env.worlds.recipes.empty import empty
 from entropy_explore_env.worlds.splits import draw_world_number, world_generator
@@ -149,8 +150,9 @@ def save_world(world: World, path: Path | str) -> None:
 
 def world_bytes(world: World) -> bytes:
     """The content of the file that `save_world` writes."""
+    labels = world.occupied.view(np.int8)
     voxels = Voxels(
-        world.occupied.view(np.int8),
+        labels if world.unknown is None else np.where(world.unknown, UNKNOWN, labels),
         world.grid.voxel_size_m,
         world.grid.origin_m,
         world.yaw_rad,
@@ -187,41 +189,51 @@ def _world(voxels: Voxels, path: str, options: dict[str, Any], height_m: float |
     """The world of a file's voxels, resampled and extruded."""
     size_m = options["voxel_size_m"] or voxels.voxel_size_m
     try:
-        solid, ceiling = resampled(voxels, size_m)
+        labels, ceiling = resampled(voxels, size_m)
     except RefusedError as error:
         raise WorldError("voxel_size_m", size_m, str(error)) from None
-    if solid.all():
+    if (labels != FREE).all():
         raise WorldError("world file", path, "a map with free space at this voxel size")
     if height_m is not None:
-        if solid.shape[2] != 1:
+        if labels.shape[2] != 1:
             raise SettingError("height_m", height_m, "None: the file's world is 3-D already")
         layers = round(height_m / size_m)
-        most = MAX_FILE_VOXELS // solid.size
+        most = MAX_FILE_VOXELS // labels.size
         if not 2 <= layers <= most:
             raise SettingError("height_m", height_m, f"from 2 to {most} voxels of {size_m} m")
-        solid = extruded(solid, layers)
-    shape = (int(solid.shape[0]), int(solid.shape[1]), int(solid.shape[2]))
+        labels = extruded(labels, layers)
+    shape = (int(labels.shape[0]), int(labels.shape[1]), int(labels.shape[2]))
     grid = Grid(shape, float(size_m), voxels.origin_m)
-    return World(grid, solid, voxels.name or Path(path).stem, ceiling, voxels.yaw_rad)
+    unknown = labels == UNKNOWN
+    return World(
+        grid,
+        labels != FREE,
+        voxels.name or Path(path).stem,
+        ceiling,
+        voxels.yaw_rad,
+        unknown if unknown.any() else None,
+    )
 
 
-def make_world(scenario: Scenario, rng: np.random.Generator) -> World:
-    """The true world of a mission.
+def make_world(scenario: str | Scenario, world: int | np.random.Generator) -> World:
+    """The true world of a mission: `make_world("office", 3)` is the office's world number 3.
 
-    Worlds without random elements are made once and shared.
+    A world without random elements is the same for all numbers.
 
     Args:
-        scenario: Its `world` names a recipe or a file.
-        rng: The stream of worlds; random recipes take one draw from it, the world number.
+        scenario: A scenario, or its name. Its `world` names a recipe or a file.
+        world: A world number (worlds/splits.py), where it names a recipe; or a random generator, of which the
+            number in the scenario's split is drawn.
 
     Raises:
-        SettingError: Neither a recipe nor a file has this name.
+        SettingError: No scenario, recipe or file has this name, or the number is not a whole number ≥ 0.
         WorldError: The file cannot be used.
     """
-    if scenario.world == "empty":
-        return _empty_world(scenario)
+    scenario = find_scenario(scenario)
+    if not isinstance(world, np.random.Generator):
+        return world_with_number(scenario, world)
     if scenario.world in RECIPES:
-        return world_with_number(scenario, draw_world_number(scenario.split, rng))
+        return world_with_number(scenario, draw_world_number(scenario.split, world))
     return world_from_file(scenario.world, scenario.grid.voxel_size_m)
 
 

@@ -1,4 +1,7 @@
-"""Pictures of worlds: solid space dark, free space light, metres along the edges.
+"""Pictures of worlds: walls dark, free space light, unknown space blue, metres along the edges.
+
+Unknown is what a world's file says nothing of: to robots it is solid. Margins that hold no free space, and no
+wall that the file knows of, are cut off.
 
 A plan is drawn as it is. A 3-D world is drawn from above and from the side. Where the sky is open (terrain,
 furniture), the view from above shows the height of the highest solid voxel of each column, and the side view
@@ -13,8 +16,10 @@ from typing import NamedTuple
 
 import numpy as np
 from PIL import Image, ImageDraw
+from scipy import ndimage
 
 from entropy_explore_env.picture_text import font, shortened, text_width
+from entropy_explore_env.settings import Grid
 from entropy_explore_env.worlds.world import World
 
 _LONG_SIDE = 880
@@ -31,6 +36,9 @@ _ROOFED = 0.5
 """Above this share of columns that are solid at the top, a world counts as roofed."""
 _PAPER, _INK = (255, 255, 255), (40, 44, 52)
 _SOLID, _FREE = (58, 64, 77), (236, 239, 243)
+_UNKNOWN = (176, 200, 226)
+_KEY = ((_SOLID, "wall"), (_FREE, "free"), (_UNKNOWN, "unknown"))
+_KEY_SIZE = 12
 _HEIGHT_COLOURS = (
     (38, 70, 83),
     (42, 157, 143),
@@ -71,6 +79,7 @@ class _Axes(NamedTuple):
 
 def picture(world: World) -> bytes:
     """A PNG of a world, at most 1008 pixels wide."""
+    name, whole, world = world.name, world.grid, _cropped(world)
     scale = _LONG_SIDE / max(world.grid.size_m[0], world.grid.size_m[1])  # pixels a metre, of all views
     views = _views(world, scale)
     panels = [_panel(view, scale * world.grid.voxel_size_m) for view in views]
@@ -78,7 +87,7 @@ def picture(world: World) -> bytes:
     height = _MARGIN + sum(panel.height + _GAP for panel in panels) + 12
     sheet = Image.new("RGB", (width, height), _PAPER)
     draw = ImageDraw.Draw(sheet)
-    draw.text((_MARGIN, 12), _title(world, width - _MARGIN - 12), _INK, font(_TITLE_SIZE))
+    draw.text((_MARGIN, 12), _title(name, whole, width - _MARGIN - 12), _INK, font(_TITLE_SIZE))
     top = _MARGIN
     for view, panel in zip(views, panels, strict=True):
         draw.text((_MARGIN, top - 22), view.title, _INK, font(_TEXT_SIZE))
@@ -87,18 +96,47 @@ def picture(world: World) -> bytes:
         axes = _Axes(_MARGIN, top, panel.width, panel.height, scale, scale * view.stretch)
         _draw_ticks(draw, axes, view.corner_m)
         top += panel.height + _GAP
+    if world.unknown is not None:
+        _draw_key(draw, _MARGIN + panels[-1].width, top - _GAP / 4)
     buffer = io.BytesIO()
     sheet.save(buffer, "PNG", optimize=True)
     return buffer.getvalue()
 
 
-def _title(world: World, width: float) -> str:
+def _cropped(world: World) -> World:
+    """The part of a world that holds something to be seen: free space, what is around it, known walls."""
+    free = ~world.occupied
+    seen = np.asarray(ndimage.binary_dilation(free, np.ones((3, 3, 3))), np.bool_)
+    if world.unknown is not None:
+        seen |= world.occupied & ~world.unknown
+    inside = []
+    for axis in range(3):
+        found = np.flatnonzero(seen.any(axis=tuple(other for other in range(3) if other != axis)))
+        inside.append(slice(int(found[0]), int(found[-1]) + 1))
+    block, edge_m = tuple(inside), world.grid.voxel_size_m
+    x, y, z = (low + part.start * edge_m for low, part in zip(world.grid.origin_m, inside, strict=True))
+    occupied = world.occupied[block]
+    a, b, c = occupied.shape
+    unknown = None if world.unknown is None else world.unknown[block]
+    return World(Grid((a, b, c), edge_m, (x, y, z)), occupied, world.name, unknown=unknown)
+
+
+def _draw_key(draw: ImageDraw.ImageDraw, right: float, middle: float) -> None:
+    """What the colours mean, in a line that ends at a place."""
+    for colour, name in reversed(_KEY):
+        right -= text_width(name, _TEXT_SIZE)
+        draw.text((right, middle), name, _INK, font(_TEXT_SIZE), anchor="lm")
+        right -= _KEY_SIZE + 6
+        square = (right, middle - _KEY_SIZE / 2, right + _KEY_SIZE, middle + _KEY_SIZE / 2)
+        draw.rectangle(square, fill=colour, outline=_INK)
+        right -= 14
+
+
+def _title(name: str, grid: Grid, width: float) -> str:
     """Name and size; the name is cut off where both do not fit."""
-    size = " x ".join(_metres(edge) for edge in world.grid.size_m[: 2 if world.grid.flat else 3])
-    about = f"   {size} m, voxels of {_metres(world.grid.voxel_size_m)} m"
-    return (
-        shortened(world.name, max(width - text_width(about, _TITLE_SIZE), _LEAST_NAME), _TITLE_SIZE) + about
-    )
+    size = " x ".join(_metres(edge) for edge in grid.size_m[: 2 if grid.flat else 3])
+    about = f"   {size} m, voxels of {_metres(grid.voxel_size_m)} m"
+    return shortened(name, max(width - text_width(about, _TITLE_SIZE), _LEAST_NAME), _TITLE_SIZE) + about
 
 
 def _views(world: World, scale: float) -> list[_View]:
@@ -106,7 +144,11 @@ def _views(world: World, scale: float) -> list[_View]:
     solid, (x, y, z) = world.occupied, world.grid.origin_m
     if world.grid.flat:
         plan = np.where(solid[:, :, 0, None], _SOLID, _FREE).astype(np.uint8)
+        if world.unknown is not None:
+            plan[world.unknown[:, :, 0]] = _UNKNOWN
         return [_View("plan", _upright(plan), (x, y))]
+    if world.unknown is not None:
+        return _views_of_known(world, scale)
     layers = solid.shape[2]
     tops = layers - np.argmax(solid[:, :, ::-1], axis=2)
     tops[~solid.any(axis=2)] = 0
@@ -128,6 +170,23 @@ def _views(world: World, scale: float) -> list[_View]:
         _View(title, _upright(above), (x, y)),
         _View(side_title, _upright(_coloured(side, _FREE_COLOURS)), (x, z), stretch),
     ]
+
+
+def _views_of_known(world: World, scale: float) -> list[_View]:
+    """A 3-D world of which a part is unknown: of the known part, how much of the line of sight is free."""
+    assert world.unknown is not None
+    x, y, z = world.grid.origin_m
+    pictures = []
+    for axis in (2, 1):
+        known = (~world.unknown).mean(axis=axis)
+        free = (~world.occupied).mean(axis=axis) / np.maximum(known, 1e-9)
+        weight = np.minimum(2.0 * known, 1.0)[..., None]  # a line half of which is known counts as known
+        shades = weight * _coloured(free, _FREE_COLOURS) + (1.0 - weight) * np.array(_UNKNOWN)
+        pictures.append(_upright(shades.astype(np.uint8)))
+    stretch = _stretch(world.grid.size_m[2] * scale)
+    side_title = "from the side, along y" + (f", heights {stretch} times as large" if stretch > 1 else "")
+    title = "from above: how much of what is known is free, dark = none"
+    return [_View(title, pictures[0], (x, y)), _View(side_title, pictures[1], (x, z), stretch)]
 
 
 def _metres(value: float) -> str:

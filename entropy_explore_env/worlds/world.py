@@ -45,6 +45,8 @@ class World:
             no-fly zone, which robots must not enter and rays may cross (an exposure surface over terrain);
             Z = no such layer.
         yaw_rad: Rotation of the grid's frame against the frame of the file.
+        unknown: (X, Y, Z) bool, read-only and copied likewise, or None: of which solid voxels the file says
+            nothing. Pictures show them; to robots they are solid as all others.
 
     Worlds compare and hash by identity: to compare what they hold, compare their arrays.
     """
@@ -54,6 +56,7 @@ class World:
     name: str
     ceiling: np.ndarray | None = None
     yaw_rad: float = 0.0
+    unknown: np.ndarray | None = None
 
     def __post_init__(self) -> None:
         """Check the arrays and keep read-only copies of them."""
@@ -67,6 +70,13 @@ class World:
         if self.occupied.all():
             raise WorldError("World.occupied", self.name, "at least one free voxel")
         object.__setattr__(self, "occupied", _kept(self.occupied))
+        if self.unknown is not None:
+            unknown = self.unknown if isinstance(self.unknown, np.ndarray) else np.zeros(0)
+            if unknown.shape != self.grid.shape or unknown.dtype != np.bool_:
+                raise WorldError("World.unknown", self.unknown, f"an array {self.grid.shape} bool, or None")
+            if (unknown & ~self.occupied).any():
+                raise WorldError("World.unknown", self.name, "solid voxels only")
+            object.__setattr__(self, "unknown", _kept(unknown))
         if not is_number(self.yaw_rad) or not math.isfinite(self.yaw_rad):
             raise WorldError("World.yaw_rad", self.yaw_rad, "a finite number")
         if self.ceiling is not None:
@@ -83,9 +93,9 @@ class World:
     def __setstate__(self, kept: dict[str, object]) -> None:
         """Take the fields back; arrays that were pickled are read-only again."""
         self.__dict__.update(kept)
-        self.occupied.setflags(write=False)
-        if self.ceiling is not None:
-            self.ceiling.setflags(write=False)
+        for array in (self.occupied, self.ceiling, self.unknown):
+            if array is not None:
+                array.setflags(write=False)
 
     def __repr__(self) -> str:
         """Its name and voxels, not their content."""

@@ -202,6 +202,8 @@ class Stage:
             if name != "Scenario":
                 yield Target(f"{name}(unknown)", lambda v, make=make: make(robts=v))
                 for short in ("max_cycles", "time_limit_s"):
+                    if (name, short) == ("pettingzoo.make", "max_cycles"):
+                        continue  # PettingZoo compares it with -1 itself, before the environment is asked
                     allowed = Is.NONE if short == "max_cycles" else Is(0)
                     yield Target(f"{name}({short})", lambda v, make=make, f=short: make(**{f: v}), allowed)
         parts = {part: type(getattr(SCENARIOS[BOX], part)) for part in PARTS}

@@ -138,6 +138,7 @@ def test_infos_agree_with_views_and_are_plain_python() -> None:
     kinds = {
         "deciding": bool,
         "time_s": float,
+        "world_number": int,
         "entropy_bits": float,
         "own_bits": float,
         "received_bits": float,

@@ -56,7 +56,7 @@ def test_what_would_have_been_drawn_gives_the_same_mission_bitwise(given: str) -
     """The random streams do not notice that something was not drawn."""
     drawn, other = parallel_env(**ROOM), parallel_env(**ROOM)
     first = drawn.reset(seed=5)
-    starts, world = poses(drawn.missions).copy(), drawn.missions.worlds[0]
+    starts, world = poses(drawn.missions).copy(), drawn.missions.world_numbers[0]
     options = {"starts": starts.copy(), "world": world}
     chosen = options if given == "both" else {given: options[given]}
     require_same("reset", leaves(first), leaves(other.reset(seed=5, options=chosen)))
@@ -65,6 +65,15 @@ def test_what_would_have_been_drawn_gives_the_same_mission_bitwise(given: str) -
         actions = {a: rng.uniform(-1, 1, (5,)).astype(np.float32) for a in drawn.agents}
         require_same("step", leaves(drawn.step(actions)), leaves(other.step(actions)))
     require_same("the next mission", leaves(drawn.reset()), leaves(other.reset()))
+    state = [each.missions.state._asdict() for each in (drawn, other)]
+    require_same("state", leaves(state[0]), leaves(state[1]))
+
+
+def test_a_world_that_would_have_been_drawn_gives_the_same_state_as_an_object() -> None:
+    drawn, other = parallel_env(**ROOM), parallel_env(**ROOM)
+    drawn.reset(seed=5)
+    infos = other.reset(seed=5, options={"world": drawn.missions.worlds[0]})[1]
+    assert {info["world_number"] for info in infos.values()} == {-1}  # a World has no number
     state = [each.missions.state._asdict() for each in (drawn, other)]
     require_same("state", leaves(state[0]), leaves(state[1]))
 

@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from entropy_explore_env import EntropyExploreVectorEnv, parallel_env
 from entropy_explore_env.errors import SettingError, WorldError
 from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.randomness import Stream, generator
-from entropy_explore_env.scenarios import BOX, ROOM_FURNISHED
+from entropy_explore_env.scenarios import BOX, ROOM_FURNISHED, find_scenario
 from entropy_explore_env.worlds.load import make_world, with_world, world_from_file, world_with_number
 from entropy_explore_env.worlds.splits import draw_world_number
 from tests.reference.scenes import free_box
@@ -74,3 +75,37 @@ def test_a_world_file_that_is_missing(tmp_path):
 
 def test_a_recipe_leaves_the_scenario_s_grid_alone():
     assert with_world(ROOM_FURNISHED) is ROOM_FURNISHED
+
+
+def test_worlds_by_number_are_those_of_missions():
+    world = make_world("office", 3)
+    np.testing.assert_array_equal(world.occupied, make_world(find_scenario("office"), 3).occupied)
+    assert (world.occupied != make_world("office", 4).occupied).any()
+    assert world.grid == find_scenario("office").grid
+    team = parallel_env("office")
+    _, infos = team.reset(seed=0, options={"world": 3})
+    np.testing.assert_array_equal(team.missions.worlds[0].occupied, world.occupied)
+    assert {info["world_number"] for info in infos.values()} == {3}
+    _, infos = team.reset(seed=0)
+    number = infos["robot_0"]["world_number"]
+    drawn = make_world("office", number)
+    np.testing.assert_array_equal(team.missions.worlds[0].occupied, drawn.occupied)
+    for wrong in (-1, "3", None, 2.0):
+        with pytest.raises(SettingError):
+            make_world("office", wrong)
+    with pytest.raises(SettingError, match="scenario = 'offic'"):
+        make_world("offic", 3)
+
+
+def test_infos_of_many_missions_say_each_world_s_number_and_a_sequence_chooses_them():
+    batch = EntropyExploreVectorEnv("room-furnished", 3, robots=1)
+    for worlds in ([4, 5, 4], (4, 5, 4), np.array([4, 5, 4])):
+        _, infos = batch.reset(seed=1, options={"world": worlds})
+        assert infos["world_number"].tolist() == [4, 5, 4] and infos["world_number"].dtype == np.int64
+    _, infos = batch.reset(seed=1, options={"world": range(7, 10)})
+    assert infos["world_number"].tolist() == [7, 8, 9]
+    mask = np.array([False, True, False])
+    _, infos = batch.reset(options={"world": [0, 1, 2], "reset_mask": mask})
+    assert infos["world_number"].tolist() == [7, 1, 9]
+    given = parallel_env("room-furnished", world=make_world("room-furnished", 3))
+    assert given.reset(seed=0)[1]["robot_0"]["world_number"] == -1

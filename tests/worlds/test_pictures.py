@@ -9,7 +9,7 @@ import pytest
 from PIL import Image
 
 from entropy_explore_env.settings import Grid
-from entropy_explore_env.worlds.pictures import _FREE, _SOLID, _metres, _stretch, picture
+from entropy_explore_env.worlds.pictures import _FREE, _SOLID, _UNKNOWN, _metres, _stretch, picture
 from entropy_explore_env.worlds.world import World
 
 
@@ -67,3 +67,45 @@ def test_lengths_are_not_said_more_exactly_than_anybody_reads():
 
 def test_low_worlds_are_stretched():
     assert [_stretch(height) for height in (880.0, 60.0, 59.0, 6.0)] == [1, 1, 2, 10]
+
+
+def test_unknown_space_is_told_from_walls_and_empty_margins_are_cut_off():
+    """A room of 3 × 4 with walls in a plan of 20 × 30, all else unknown."""
+    occupied = np.ones((20, 30, 1), bool)
+    occupied[5:8, 10:14] = False
+    unknown = np.ones((20, 30, 1), bool)
+    unknown[4:9, 9:15] = False
+    world = World(Grid(occupied.shape, 0.5), occupied, "room", unknown=unknown)
+    pixels = np.asarray(Image.open(io.BytesIO(picture(world))).convert("RGB")).astype(int)
+    inside = pixels[64 : 64 + 880, 64:-70]
+    room, walls, blue = (is_colour(inside, colour).sum() for colour in (_FREE, _SOLID, _UNKNOWN))
+    assert room / walls == pytest.approx(12 / 18, rel=0.05) and blue == 0  # cut to 5 × 6 voxels
+    unknown[4, 9] = True
+    world = World(Grid(occupied.shape, 0.5), occupied, "room", unknown=unknown)
+    pixels = np.asarray(Image.open(io.BytesIO(picture(world))).convert("RGB")).astype(int)
+    corner = is_colour(pixels[64 : 64 + 880], _UNKNOWN)
+    rows, columns = np.nonzero(corner)
+    assert len(rows) == pytest.approx((880 / 6) ** 2, rel=0.05)
+    assert rows.min() > 600 and columns.max() < 64 + 160  # lower left
+
+
+def test_a_3_d_world_shows_what_is_unknown_from_above_and_from_the_side():
+    occupied = np.ones((7, 11, 5), bool)
+    occupied[1:6, 2:9, 1:4] = False
+    unknown = occupied.copy()
+    unknown[0:7, 1:10, 0:5] = False  # walls, floor and ceiling around the room
+    unknown[5:, 8:] = occupied[5:, 8:]
+    world = World(Grid(occupied.shape, 0.5), occupied, "room", unknown=unknown)
+    pixels = np.asarray(Image.open(io.BytesIO(picture(world))).convert("RGB")).astype(int)
+    assert is_colour(pixels, _UNKNOWN).sum() > 2000 and is_colour(pixels, _SOLID).sum() > 2000
+    plain = World(Grid(occupied.shape, 0.5), occupied, "room")
+    without = np.asarray(Image.open(io.BytesIO(picture(plain))).convert("RGB")).astype(int)
+    assert is_colour(without, _UNKNOWN).sum() == 0
+
+
+def test_rock_without_free_space_is_cut_off():
+    occupied = np.ones((40, 60, 1), bool)
+    occupied[10:20, 20:40] = False
+    pixels = drawn(occupied)
+    assert is_colour(pixels, _FREE).sum() > 0.7 * is_colour(pixels, _SOLID).sum()
+    assert is_colour(pixels, _FREE).sum() / 880**2 == pytest.approx(200 / 22**2, rel=0.05)

@@ -2,7 +2,8 @@
 
 A saved world has the entries `format` ("entropy_explore_env world"), `version` (1), `shape` (3 int64),
 `occupied` (uint8: bits of the voxels in C order, numpy.packbits), `voxel_size_m`, `origin_m` (3), `yaw_rad`
-(float64), `name` and, where the world has one, `ceiling` (X, Y) int32. A height map has an array `elevation`,
+(float64), `name` and, where the world has them, `ceiling` (X, Y) int32 and `unknown` (uint8: bits as
+of `occupied`, some of those that are set). A height map has an array `elevation`,
 or one 2-D array of any name, in metres: rows from north to south, as in an image; its spacing is the entry
 `spacing_m` (one number, or x and y) or the option `resolution_m`.
 """
@@ -22,6 +23,7 @@ from entropy_explore_env.worlds.files.images import from_rows
 from entropy_explore_env.worlds.files.voxels import (
     FREE,
     SOLID,
+    UNKNOWN,
     Options,
     RefusedError,
     Voxels,
@@ -37,12 +39,12 @@ MAX_NAME = 256
 
 
 def saved(world: Voxels) -> bytes:
-    """The archive of a world; `labels` are FREE and SOLID only."""
+    """The archive of a world."""
     entries: dict[str, Any] = {
         "format": FORMAT,
         "version": VERSION,
         "shape": np.asarray(world.labels.shape, np.int64),
-        "occupied": np.packbits(world.labels == SOLID),
+        "occupied": np.packbits(world.labels != FREE),
         "voxel_size_m": np.float64(world.voxel_size_m),
         "origin_m": np.asarray(world.origin_m, np.float64),
         "yaw_rad": np.float64(world.yaw_rad),
@@ -50,6 +52,8 @@ def saved(world: Voxels) -> bytes:
     }
     if world.ceiling is not None:
         entries["ceiling"] = world.ceiling
+    if (unknown := world.labels == UNKNOWN).any():
+        entries["unknown"] = np.packbits(unknown)
     buffer = io.BytesIO()
     np.savez_compressed(buffer, **entries)
     return buffer.getvalue()
@@ -106,17 +110,27 @@ def _world(entries: dict[str, np.ndarray]) -> Voxels:
     if str(entries["format"]) != FORMAT or int(entries["version"]) != VERSION:
         raise RefusedError(f"a saved world of format version {VERSION}")
     shape = checked_shape(entries["shape"].astype(np.float64))
-    packed, ceiling = entries["occupied"], entries.get("ceiling")
-    if packed.dtype != np.uint8 or packed.shape != (math.ceil(math.prod(shape) / 8),):
-        raise RefusedError("a saved world with a bit for each voxel")
+    ceiling = entries.get("ceiling")
     if ceiling is not None and not _fits(ceiling, shape):
         raise RefusedError("a saved world with a ceiling for each column")
-    bits = np.unpackbits(packed, count=math.prod(shape)).reshape(shape)
+    labels = _bits(entries["occupied"], shape).view(np.int8)
+    if "unknown" in entries:
+        unknown = _bits(entries["unknown"], shape).view(np.bool_)
+        if (labels[unknown] != SOLID).any():
+            raise RefusedError("a saved world whose unknown voxels count as solid")
+        labels[unknown] = UNKNOWN
     x, y, z = (float(v) for v in entries["origin_m"])
     edge, yaw = float(entries["voxel_size_m"]), float(entries["yaw_rad"])
     if not (0 < edge < math.inf and all(math.isfinite(v) for v in (x, y, z, yaw))):
         raise RefusedError("a saved world with a voxel size > 0 and a finite place")
-    return Voxels(bits.view(np.int8), edge, (x, y, z), yaw, ceiling, str(entries["name"])[:MAX_NAME])
+    return Voxels(labels, edge, (x, y, z), yaw, ceiling, str(entries["name"])[:MAX_NAME])
+
+
+def _bits(packed: np.ndarray, shape: tuple[int, int, int]) -> np.ndarray:
+    """(X, Y, Z) uint8, 0 or 1, of packed bits."""
+    if packed.dtype != np.uint8 or packed.shape != (math.ceil(math.prod(shape) / 8),):
+        raise RefusedError("a saved world with a bit for each voxel")
+    return np.unpackbits(packed, count=math.prod(shape)).reshape(shape)
 
 
 def _fits(ceiling: np.ndarray, shape: tuple[int, int, int]) -> bool:

@@ -69,7 +69,7 @@ def _voxels(mesh: Any, y_is_up: bool, options: Options) -> Voxels:  # noqa: ANN4
         vertices = np.column_stack((vertices[:, 0], -vertices[:, 2], vertices[:, 1]))
     solid, low = _surface(vertices - 0.5 * voxel_m, faces, voxel_m)
     if fill is not False:
-        solid = ndimage.binary_fill_holes(solid)
+        solid = np.asarray(ndimage.binary_fill_holes(solid), np.bool_)
     labels = np.full([n + 2 * margin for n in solid.shape], FREE, np.int8)
     inside = tuple(slice(margin, margin + n) for n in solid.shape)
     labels[inside][solid] = SOLID

@@ -59,15 +59,16 @@ def read(path: Path, options: Options) -> Voxels:
     if (extent < 1).any():
         raise RefusedError("an OctoMap with a resolution > 0 and finite bounds")
     voxel_m = options.get("voxel_size_m")
-    own = voxel_m is None or abs(voxel_m - edge) < 1e-9 * edge
-    scale = 1.0 if own else voxel_m / edge
+    wanted_m = edge if voxel_m is None else float(voxel_m)
+    own = abs(wanted_m - edge) < 1e-9 * edge
+    scale = 1.0 if own else wanted_m / edge
     shape = checked_shape(extent / scale)
     if np.prod(shape) > 1_000_000 + _VOXELS_PER_BYTE * len(data):
         raise RefusedError(f"an OctoMap whose box holds at most {_VOXELS_PER_BYTE} voxels a byte")
     leaves = _leaves(tree, low, edge, extent)
     del tree
     labels = _own_labels(leaves, shape) if own else _summed_labels(leaves, scale, shape)
-    return Voxels(labels, edge if own else voxel_m, (float(low[0]), float(low[1]), float(low[2])))
+    return Voxels(labels, edge if own else wanted_m, (float(low[0]), float(low[1]), float(low[2])))
 
 
 def _tree(data: bytes) -> Any:  # noqa: ANN401 - octomap has no types
@@ -125,7 +126,7 @@ def _own_labels(leaves: _Leaves, shape: tuple[int, int, int]) -> np.ndarray:
 
 
 def _summed_labels(leaves: _Leaves, scale: float, shape: tuple[int, int, int]) -> np.ndarray:
-    """(X, Y, Z) int8 labels of voxels `scale` own ones wide: FREE or SOLID by the volumes of leaves.
+    """(X, Y, Z) int8 labels of voxels `scale` own ones wide, by the volumes of leaves.
 
     By the rule of `resampling`.
     """
@@ -142,8 +143,8 @@ def _summed_labels(leaves: _Leaves, scale: float, shape: tuple[int, int, int]) -
                 some = chosen[place : place + _LEAVES_AT_ONCE]
                 _add_volumes(volumes[int(solid)], leaves.corner[some], leaves.width[some], scale, first)
         free = volumes[0] >= FREE_AT_LEAST - ROUNDING
-        free &= volumes[1] < OCCUPIED_BELOW - ROUNDING
-        labels[first:last] = np.where(free, FREE, SOLID)
+        solid = volumes[1] >= OCCUPIED_BELOW - ROUNDING
+        labels[first:last] = np.where(solid, SOLID, np.where(free, FREE, UNKNOWN))
     return labels
 
 

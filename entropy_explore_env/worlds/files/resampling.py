@@ -13,60 +13,60 @@ from entropy_explore_env.worlds.files.voxels import (
     OCCUPIED_BELOW,
     ROUNDING,
     SOLID,
+    UNKNOWN,
     Voxels,
     checked_shape,
 )
 
 
 def resampled(voxels: Voxels, voxel_size_m: float | None) -> tuple[np.ndarray, np.ndarray | None]:
-    """Which voxels of a wanted size are solid, and the ceiling counted in them.
+    """The labels of voxels of a wanted size, and the ceiling counted in them.
 
-    At the file's own size, all voxels that are not known to be free are solid. Otherwise a voxel is free if
-    at least half of it is known to be free and less than a quarter of it is occupied. A plan stays one voxel
-    high.
+    A voxel is free if at least half of it is known to be free and less than a quarter of it is solid; of the
+    others it is solid if at least a quarter of it is. A plan stays one voxel high.
 
     Args:
         voxels: A file's content.
         voxel_size_m: The size; None = the file's own.
 
     Returns:
-        (X′, Y′, Z′) bool solid, and (X′, Y′) int32 ceiling or None: the lowest over each column, whole
+        (X′, Y′, Z′) int8 labels, and (X′, Y′) int32 ceiling or None: the lowest over each column, whole
         voxels.
 
     Raises:
         RefusedError: Too many voxels.
     """
     if voxel_size_m is None or abs(voxel_size_m - voxels.voxel_size_m) < 1e-9 * voxels.voxel_size_m:
-        return voxels.labels != FREE, voxels.ceiling
+        return voxels.labels, voxels.ceiling
     scale = voxel_size_m / voxels.voxel_size_m
     old = voxels.labels.shape
     plan = old[2] == 1
     extents = [n / scale for n in old]
     shape = checked_shape([*extents[:2], 1.0 if plan else extents[2]])
-    solid = np.empty(shape, np.bool_)
-    _pool(np.ascontiguousarray(voxels.labels), (scale, scale, 1.0 if plan else scale), solid)
+    pooled = np.empty(shape, np.int8)
+    _pool(np.ascontiguousarray(voxels.labels), (scale, scale, 1.0 if plan else scale), pooled)
     if voxels.ceiling is None:
-        return solid, None
+        return pooled, None
     ceiling = np.empty(shape[:2], np.int32)
     _lower(voxels.ceiling, scale, old[2], shape[2], ceiling)
-    return solid, ceiling
+    return pooled, ceiling
 
 
 @lean_kernel
-def _pool(labels, scale, solid):
+def _pool(labels, scale, pooled):
     """Label new voxels by the volumes of the old ones that they overlap.
 
     Args:
         labels: (X, Y, Z) int8.
         scale: Edges of a new voxel in old ones, along x, y and z.
-        solid: (X′, Y′, Z′) bool; filled.
+        pooled: (X′, Y′, Z′) int8; filled.
     """
     volume = scale[0] * scale[1] * scale[2]
-    for i in range(solid.shape[0]):
+    for i in range(pooled.shape[0]):
         x_low, x_high = i * scale[0], (i + 1) * scale[0]
-        for j in range(solid.shape[1]):
+        for j in range(pooled.shape[1]):
             y_low, y_high = j * scale[1], (j + 1) * scale[1]
-            for k in range(solid.shape[2]):
+            for k in range(pooled.shape[2]):
                 z_low, z_high = k * scale[2], (k + 1) * scale[2]
                 free, occupied = 0.0, 0.0
                 for x in range(int(x_low), min(labels.shape[0], math.ceil(x_high))):
@@ -80,7 +80,10 @@ def _pool(labels, scale, solid):
                             elif labels[x, y, z] == SOLID:
                                 occupied += part
                 is_free = free >= (FREE_AT_LEAST - ROUNDING) * volume
-                solid[i, j, k] = not is_free or occupied >= (OCCUPIED_BELOW - ROUNDING) * volume
+                if occupied >= (OCCUPIED_BELOW - ROUNDING) * volume:
+                    pooled[i, j, k] = SOLID
+                else:
+                    pooled[i, j, k] = FREE if is_free else UNKNOWN
 
 
 @lean_kernel
@@ -104,5 +107,5 @@ def _lower(ceiling, scale, none, new_none, lowered):
 
 
 def extruded(plan: np.ndarray, layers: int) -> np.ndarray:
-    """A plan (X, Y, 1) repeated in all layers: (X, Y, layers) bool, contiguous."""
+    """A plan (X, Y, 1) repeated in all layers: (X, Y, layers) int8, contiguous."""
     return np.repeat(plan, layers, axis=2)

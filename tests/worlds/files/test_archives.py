@@ -119,3 +119,23 @@ def test_pickles_bombs_and_lying_headers_are_refused_unread(tmp_path, monkeypatc
     assert path.stat().st_size < 1 << 20
     with pytest.raises(WorldError, match="at most 32 arrays and 256 MiB"):
         load_world(path)
+
+
+def test_what_is_unknown_is_kept_and_an_archive_that_contradicts_itself_is_refused(tmp_path):
+    occupied = np.random.default_rng(0).random((7, 11, 5)) < 0.5
+    unknown = occupied & (np.random.default_rng(1).random((7, 11, 5)) < 0.5)
+    world = World(Grid(occupied.shape, 0.5), occupied, "hall", unknown=unknown)
+    save_world(world, tmp_path / "hall.npz")
+    again = load_world(tmp_path / "hall.npz")
+    np.testing.assert_array_equal(again.unknown, unknown)
+    np.testing.assert_array_equal(again.occupied, occupied)
+    coarse = load_world(tmp_path / "hall.npz", 1.0)
+    assert coarse.unknown is not None and not (coarse.unknown & ~coarse.occupied).any()
+    entries = dict(np.load(tmp_path / "hall.npz"))
+    entries["unknown"] = np.packbits(~occupied)
+    np.savez(tmp_path / "wrong.npz", **entries)
+    with pytest.raises(WorldError, match="unknown voxels count as solid"):
+        load_world(tmp_path / "wrong.npz")
+    for wrong in (~occupied, unknown[:3], unknown.astype(int), "x"):
+        with pytest.raises(WorldError, match=r"World\.unknown"):
+            World(Grid(occupied.shape, 0.5), occupied, "hall", unknown=wrong)
