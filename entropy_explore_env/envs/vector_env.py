@@ -78,7 +78,7 @@ class EntropyExploreVectorEnv(VectorEnv[Any, Any, Any]):
         check_instance("action_masks", action_masks, bool)
         try:
             self.autoreset_mode = AutoresetMode(autoreset_mode)
-        except ValueError:
+        except Exception:  # whatever was given, compared with the modes
             allowed = "one of " + ", ".join(mode.value for mode in AutoresetMode)
             raise SettingError("autoreset_mode", autoreset_mode, allowed) from None
         asked, given = with_given_worlds(find_scenario(scenario), settings)
@@ -155,7 +155,8 @@ class EntropyExploreVectorEnv(VectorEnv[Any, Any, Any]):
         if seed is None or isinstance(seed, int | np.integer):
             first = None if seed is None else check_seed(seed)
             return [None if first is None else first + mission for mission in range(self.num_envs)]
-        if not isinstance(seed, list | tuple | np.ndarray) or len(seed) != self.num_envs:
+        several = isinstance(seed, list | tuple) or (isinstance(seed, np.ndarray) and seed.ndim == 1)
+        if not several or len(seed) != self.num_envs:  # type: ignore[arg-type]
             raise SettingError("seed", seed, f"a whole number ≥ 0, or {self.num_envs} of them")
         return [None if one is None else check_seed(one) for one in seed]
 

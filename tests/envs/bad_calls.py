@@ -104,7 +104,7 @@ VALUES: tuple[tuple[Is, Callable[[], Any]], ...] = (
     (Is.STRANGE, lambda: np.array([1, 2])),
     (Is.STRANGE, lambda: np.array("x")),
     (Is.STRANGE, lambda: np.array(None)),
-    (Is.STRANGE, lambda: np.zeros((2, 2))),
+    (Is.STRANGE, lambda: np.zeros((2, 4))),
     (Is.STRANGE, lambda: np.full(5, np.nan)),
     (Is.STRANGE, lambda: np.zeros((0, 5))),
     (Is.STRANGE, lambda: np.datetime64("2026-11-22")),
@@ -134,7 +134,7 @@ class Stage:
         self.alone = SingleRobotEnv(BOX)
         self.batch = EntropyExploreVectorEnv(BOX, 3)
         self.numbered = EntropyExploreVectorEnv(BOX, 3, **DISCRETE)
-        self.rows = RobotVecEnv(BOX, 2)
+        self.rows = RobotVecEnv(BOX, 3)
         self.missions = Missions(SCENARIOS[BOX], 2)
         for each in (self.team, self.discrete, self.turns, self.alone, self.batch, self.numbered):
             each.reset(seed=1)
@@ -228,7 +228,9 @@ class Stage:
         yield Target("autoreset_mode", lambda v: EntropyExploreVectorEnv(BOX, 2, autoreset_mode=v))
         yield Target("action_masks", lambda v: EntropyExploreVectorEnv(BOX, 2, action_masks=v), Is.BOOL)
         for make in (EntropyExploreVectorEnv, RobotVecEnv):
-            yield Target(f"{make.__name__}(threads)", lambda v, make=make: make(BOX, 2, threads=v), Is.NONE)
+            yield Target(
+                f"{make.__name__}(threads)", lambda v, make=make: make(BOX, 2, threads=v), Is.NONE | Is.LARGE
+            )
         yield Target("make_vec(num_envs)", lambda v: gymnasium.make_vec(box, v))
         yield Target("RobotVecEnv(missions)", lambda v: RobotVecEnv(BOX, v))
         yield Target("RobotVecEnv(seeds)", lambda v: RobotVecEnv(BOX, 3, seeds=v), Is.NONE)
@@ -274,7 +276,9 @@ class Stage:
                 f"rows.set_options({option})", lambda v, o=option: self.rows.set_options({o: v}), Is.NONE
             )
         yield Target(
-            "rows.set_options of a row", lambda v: self.rows.set_options([{}, {}, {"starts": v}, {}]), Is.NONE
+            "rows.set_options of a row",
+            lambda v: self.rows.set_options([{}, {}, {"starts": v}, {}, {}, {}]),
+            Is.NONE,
         )
         yield Target("Missions.reset(mission)", lambda v: self.missions.reset(v, 1))
         yield Target("Missions.reset(seed)", lambda v: self.missions.reset(0, v), Is.NONE | Is.LARGE)
