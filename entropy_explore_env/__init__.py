@@ -9,6 +9,8 @@ Importing registers, for every scenario (room → Room-v0), `gymnasium.make`, `g
 
 from __future__ import annotations
 
+import math
+
 import gymnasium
 import pettingzoo
 
@@ -99,18 +101,26 @@ def environment_id(scenario: str) -> str:
     return "entropy_explore_env/" + "".join(word[:1].upper() + word[1:] for word in words) + "-v0"
 
 
+_MAPPED_IN_TIME = 0.8
+"""A mission that maps all that it should returns 1, less what its seconds cost: this is a good mission's."""
+
+
 def _register() -> None:
     """Register every named scenario with Gymnasium and PettingZoo.
 
-    A robot on its own waits for nobody: under Gymnasium a step lasts until it may decide again.
+    A robot on its own waits for nobody: under Gymnasium a step lasts until it may decide again. Every
+    decision is followed by a scan, so that a mission has at most `max_episode_steps` of them; where settings
+    change that, `gymnasium.make(..., max_episode_steps=-1)` leaves the end to the mission.
     """
-    for scenario in SCENARIOS:
+    for scenario, task in SCENARIOS.items():
         name = environment_id(scenario)
         gymnasium.register(
             id=name,
             entry_point="entropy_explore_env.envs.single_env:SingleRobotEnv",
             vector_entry_point="entropy_explore_env.envs.vector_env:EntropyExploreVectorEnv",
             kwargs={"scenario": scenario, "robots": 1, "decision_period_s": None},
+            max_episode_steps=math.ceil(task.ending.time_limit_s / task.sensor.scan_time_s) + 1,
+            reward_threshold=_MAPPED_IN_TIME,
         )
         pettingzoo.register("parallel", name, parallel_env, kwargs={"scenario": scenario})
         pettingzoo.register("aec", name, env, kwargs={"scenario": scenario})

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from gymnasium import spaces
@@ -22,10 +22,15 @@ from entropy_explore_env.missions.reset_options import mission_options, named_op
 from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.missions.state import MissionEnd
 from entropy_explore_env.missions.view import RobotView, view_of
-from entropy_explore_env.reports.painting import FRAMES_PER_S, RENDER_MODES, Painter, check_render_mode
+from entropy_explore_env.reports.painting import FRAMES_PER_S, Painter, check_render_mode, offered_modes
 from entropy_explore_env.scenario import Scenario
 from entropy_explore_env.scenarios import find_scenario
 from entropy_explore_env.worlds.given import with_given_worlds
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
+
+    from entropy_explore_env.envs.keywords import ScenarioSettings
 
 _SENT_BY_CHECKERS = {"options": 1}
 """What `parallel_api_test` and `api_test` of PettingZoo reset with."""
@@ -45,7 +50,7 @@ class EntropyExploreEnv(ParallelEnv[str, Any, Any]):
 
     metadata = {  # noqa: RUF012 - the form that PettingZoo asks for
         "name": "entropy_explore_env_v0",
-        "render_modes": list(RENDER_MODES),
+        "render_modes": offered_modes(),
         "render_fps": FRAMES_PER_S,
         "is_parallelizable": True,
     }
@@ -56,7 +61,7 @@ class EntropyExploreEnv(ParallelEnv[str, Any, Any]):
         render_mode: str | None = None,
         *,
         reward_function: RewardFunction | None = None,
-        **settings: object,
+        **settings: Unpack[ScenarioSettings],
     ) -> None:
         """Make the environment; `reset` starts a mission.
 
@@ -235,7 +240,7 @@ def parallel_env(
     render_mode: str | None = None,
     *,
     reward_function: RewardFunction | None = None,
-    **settings: object,
+    **settings: Unpack[ScenarioSettings],
 ) -> EntropyExploreEnv:
     """A team's mission as a ParallelEnv: see `EntropyExploreEnv`.
 
@@ -299,7 +304,7 @@ def env(
     render_mode: str | None = None,
     *,
     reward_function: RewardFunction | None = None,
-    **settings: object,
+    **settings: Unpack[ScenarioSettings],
 ) -> TurnTakingEnv:
     """The same as an AECEnv: robots act in turn, and the step is taken when all have."""
     return TurnTakingEnv(parallel_env(scenario, render_mode, reward_function=reward_function, **settings))

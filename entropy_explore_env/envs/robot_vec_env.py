@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from gymnasium.vector import AutoresetMode
@@ -29,6 +29,11 @@ from entropy_explore_env.missions.state import goals_reached
 from entropy_explore_env.randomness import check_seed
 from entropy_explore_env.scenario import Scenario
 from entropy_explore_env.validation import check_instance, is_whole
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
+
+    from entropy_explore_env.envs.keywords import ScenarioSettings
 
 try:
     from stable_baselines3.common.vec_env import VecEnv
@@ -66,7 +71,7 @@ class RobotVecEnv(VecEnv):
         threads: int | None = 1,
         seeds: Sequence[int] | None = None,
         reward_function: RewardFunction | None = None,
-        **settings: Any,  # noqa: ANN401 - whatever a setting may be
+        **settings: Unpack[ScenarioSettings],
     ) -> None:
         """Make the missions.
 

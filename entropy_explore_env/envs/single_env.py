@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import gymnasium
 import numpy as np
@@ -17,17 +17,22 @@ from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.missions.state import MissionEnd
 from entropy_explore_env.missions.view import RobotView, view_of
 from entropy_explore_env.randomness import check_seed
-from entropy_explore_env.reports.painting import FRAMES_PER_S, RENDER_MODES, Painter, check_render_mode
+from entropy_explore_env.reports.painting import FRAMES_PER_S, Painter, check_render_mode, offered_modes
 from entropy_explore_env.scenario import Scenario
 from entropy_explore_env.scenarios import find_scenario
 from entropy_explore_env.validation import is_whole
 from entropy_explore_env.worlds.given import with_given_worlds
 
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
+
+    from entropy_explore_env.envs.keywords import ScenarioSettings
+
 
 class SingleRobotEnv(gymnasium.Env[Any, Any]):
     """A mission of one robot. Spaces and infos are those of the team's environment."""
 
-    metadata = {"render_modes": list(RENDER_MODES), "render_fps": FRAMES_PER_S}  # noqa: RUF012 - Gymnasium's form
+    metadata = {"render_modes": offered_modes(), "render_fps": FRAMES_PER_S}  # noqa: RUF012 - Gymnasium's form
 
     def __init__(
         self,
@@ -35,7 +40,7 @@ class SingleRobotEnv(gymnasium.Env[Any, Any]):
         render_mode: str | None = None,
         *,
         reward_function: RewardFunction | None = None,
-        **settings: object,
+        **settings: Unpack[ScenarioSettings],
     ) -> None:
         """Make the environment; `reset` starts a mission.
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from gymnasium import spaces
@@ -15,16 +15,22 @@ from entropy_explore_env.envs.infos import told_number
 from entropy_explore_env.envs.rewards import RewardFunction, StepRewards
 from entropy_explore_env.errors import CallOrderError, SettingError
 from entropy_explore_env.missions.action import action_space
+from entropy_explore_env.missions.observation.layout import short_repr
 from entropy_explore_env.missions.reset_options import NAMES, ResetOptions, batch_options, named_options
 from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.missions.state import MissionEnd, goals_reached
 from entropy_explore_env.randomness import check_seed
 from entropy_explore_env.reports.metrics import mission_figures
-from entropy_explore_env.reports.painting import FRAMES_PER_S, RENDER_MODES, Painter, check_render_mode
+from entropy_explore_env.reports.painting import FRAMES_PER_S, Painter, check_render_mode, offered_modes
 from entropy_explore_env.scenario import Scenario
 from entropy_explore_env.scenarios import find_scenario
 from entropy_explore_env.validation import check_instance, check_whole
 from entropy_explore_env.worlds.given import with_given_worlds
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
+
+    from entropy_explore_env.envs.keywords import ScenarioSettings
 
 _RUNNING = MissionEnd.RUNNING.code
 
@@ -53,7 +59,7 @@ class EntropyExploreVectorEnv(VectorEnv[Any, Any, Any]):
         render_mode: str | None = None,
         action_masks: bool = True,
         reward_function: RewardFunction | None = None,
-        **settings: object,
+        **settings: Unpack[ScenarioSettings],
     ) -> None:
         """Make the missions; `reset` starts them.
 
@@ -89,7 +95,7 @@ class EntropyExploreVectorEnv(VectorEnv[Any, Any, Any]):
         self.num_envs = self.missions.count
         self.metadata = {
             "autoreset_mode": self.autoreset_mode,
-            "render_modes": list(RENDER_MODES),
+            "render_modes": offered_modes(),
             "render_fps": FRAMES_PER_S,
         }
         self.render_mode = render_mode
@@ -98,9 +104,13 @@ class EntropyExploreVectorEnv(VectorEnv[Any, Any, Any]):
         self._checker = ActionChecker(space)
         self._masks = action_masks and self.scenario.action.kind == "discrete"
         self.single_action_space = space if robots == 1 else batch_space(space, robots)
-        self.single_observation_space = observation if robots == 1 else batch_space(observation, robots)
+        self.single_observation_space = (
+            observation if robots == 1 else short_repr(batch_space(observation, robots))
+        )
         self.action_space = batch_space(self.single_action_space, self.num_envs)
-        self.observation_space: spaces.Space = batch_space(self.single_observation_space, self.num_envs)
+        self.observation_space: spaces.Space = short_repr(
+            batch_space(self.single_observation_space, self.num_envs)
+        )
         painted = self.num_envs if render_mode == "rgb_array" else 1
         self._painters = [Painter(render_mode, mission) for mission in range(painted)]
 

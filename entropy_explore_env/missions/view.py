@@ -37,6 +37,12 @@ class ScanView:
     returned: np.ndarray
     utility_bits: np.ndarray
 
+    def __repr__(self) -> str:
+        """From where it was taken, and how much it brought."""
+        return (
+            f"ScanView({len(self.range_m)} rays from {_place(self.pose)}, {self.utility_bits.sum():.6g} bits)"
+        )
+
 
 @dataclass(frozen=True, eq=False)
 class TeammateView:
@@ -59,6 +65,13 @@ class TeammateView:
     viewpoint: np.ndarray
     depth_m: float
     half_angle_rad: float
+
+    def __repr__(self) -> str:
+        """Where it was last heard, and where it went."""
+        if self.heard_s < 0.0:
+            return "TeammateView(never heard)"
+        announced = "" if self.announced_s < 0.0 else f", to {_place(self.viewpoint)}"
+        return f"TeammateView(at {_place(self.pose)} at {self.heard_s:g} s{announced})"
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,6 +122,16 @@ class RobotView:
     ceiling: np.ndarray | None
     rules: Rules
 
+    def __repr__(self) -> str:
+        """Who it is, when and where, not what it holds to be true."""
+        x, y, z = self.mean.shape
+        state = "deciding" if self.deciding else "busy"
+        who = f"robot_{self.robot} of {self.scenario.robots} in {self.scenario.name!r}"
+        return (
+            f"RobotView({who}, {self.time_s:g} s, "
+            f"{state}, at {_place(self.pose)}, {x} × {y} × {z} voxels, {self.entropy_bits:.6g} bits)"
+        )
+
     def action_for(self, viewpoint: np.ndarray) -> np.ndarray | np.int64:
         """The action that sends the robot to a viewpoint (5,): see `encode_viewpoint`."""
         return encode_viewpoint(self.rules, self.pose, viewpoint, self.robot)
@@ -129,6 +152,11 @@ class RobotView:
             return None
         grid = self.scenario.grid
         return no_fly_mask(self.ceiling, grid.shape[2], self.kind.robot.body_radius_m / grid.voxel_size_m)
+
+
+def _place(pose: np.ndarray) -> str:
+    """The first three numbers of a pose or viewpoint, metres."""
+    return "(" + ", ".join(f"{number:.3g}" for number in pose[:3]) + ") m"
 
 
 def view_of(missions: Missions, mission: int, robot: int) -> RobotView:

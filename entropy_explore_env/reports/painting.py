@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +18,15 @@ from entropy_explore_env.worlds.recipes.catalogue import RECIPES
 
 RENDER_MODES = ("human", "rgb_array")
 FRAMES_PER_S = 10
+
+
+def offered_modes() -> list[str]:
+    """The render modes that can be had with what is installed: a window needs the extra `render`."""
+    try:
+        window = importlib.util.find_spec("pygame") is not None
+    except ImportError:
+        window = False
+    return [mode for mode in RENDER_MODES if window or mode != "human"]
 
 
 def check_render_mode(render_mode: str | None) -> None:

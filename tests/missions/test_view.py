@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import pickle
+
 import numpy as np
 import pytest
 
+from entropy_explore_env import EntropyExploreVectorEnv, parallel_env
 from entropy_explore_env.missions.view import view_of
 from entropy_explore_env.robots.motion import MoveEnd
 from tests.reference.scenes import free_box, put, started, wander
@@ -68,3 +71,18 @@ def test_the_action_for_a_viewpoint_goes_there(kind):
         numbers[0, 0] = action
     missions.step(boxes, numbers)
     assert missions.state.robots[0, 0]["goal"] == pytest.approx(wanted, abs=1e-6)
+
+
+def test_texts_of_views_and_spaces_are_short() -> None:
+    team = parallel_env("room", robots=3, observation={"patch": True})
+    team.reset(seed=0)
+    team.step({agent: np.zeros(5, np.float32) for agent in team.agents})
+    view = team.view("robot_1")
+    for each in (view, view.scan, view.teammates[0], team.observation_space("robot_0"), team.state_space):
+        assert 10 < len(repr(each)) < 300 and "\n" not in repr(each)
+    assert repr(view).startswith("RobotView(robot_1 of 3 in 'room', 1 s, ")
+    assert f"{view.entropy_bits:.6g} bits" in repr(view)
+    batch = EntropyExploreVectorEnv("room", 4)
+    assert len(repr(batch.observation_space)) < 300
+    space = team.observation_space("robot_0")
+    assert pickle.loads(pickle.dumps(space)) == space and "Box(0, 1, (4, 11, 11, 5), float32)" in repr(space)

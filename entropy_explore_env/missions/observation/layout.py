@@ -29,7 +29,7 @@ belief and what it heard over the channel enter.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 from gymnasium import spaces
@@ -41,6 +41,8 @@ from entropy_explore_env.missions.observation.patch import PATCH_CHANNELS
 from entropy_explore_env.missions.observation.team import TEAMMATE_VALUES
 from entropy_explore_env.missions.rules import Rules, overview_shape, rules_of
 from entropy_explore_env.scenario import Scenario
+
+_Space = TypeVar("_Space", bound=spaces.Space)
 
 
 class Part(NamedTuple):
@@ -71,14 +73,14 @@ class ObservationLayout:
         """A new space object of one robot's observation: a Dict of parts, or one Box."""
         if self.flat:
             return self.flat_space()
-        return spaces.Dict({name: _part_space(name, part) for name, part in self.parts.items()})
+        return short_repr(spaces.Dict({name: _part_space(name, part) for name, part in self.parts.items()}))
 
     def flat_space(self, robots: int | None = None) -> spaces.Box:
         """One robot's observation as a Box, or that of a whole team one after the other."""
         low, high = self.low.astype(np.float32), self.high.astype(np.float32)
         if robots is not None:
             low, high = np.tile(low, robots), np.tile(high, robots)
-        return spaces.Box(low, high, dtype=np.float32)
+        return short_repr(spaces.Box(low, high, dtype=np.float32))
 
     def split(self, vectors: np.ndarray) -> np.ndarray | dict[str, np.ndarray]:
         """An observation from flat vectors (..., size) float32; parts are views of them."""
@@ -96,6 +98,24 @@ class ObservationLayout:
         if isinstance(together, np.ndarray):
             return list(together)
         return [{name: values[row] for name, values in together.items()} for row in range(len(rows))]
+
+
+def short_repr(space: _Space) -> _Space:
+    """The space, whose text says the range of its bounds and not each of them."""
+    if isinstance(space, spaces.Dict):
+        for part in space.spaces.values():
+            short_repr(part)
+    if isinstance(space, spaces.Box):
+        space.low_repr, space.high_repr = _range_text(space.low), _range_text(space.high)
+    return space
+
+
+def _range_text(bounds: np.ndarray) -> str:
+    """One number where all are alike, else the least and the largest."""
+    if bounds.size == 0:
+        return "-"
+    least, most = float(bounds.min()), float(bounds.max())
+    return f"{least:g}" if least == most else f"{least:g}…{most:g}"
 
 
 def _part_space(name: str, part: Part) -> spaces.Box:

@@ -1,0 +1,47 @@
+"""The settings that environments take as keywords, for type checkers: `parallel_env("room", robts=3)` is one.
+
+At run time the settings check themselves (`scenario.with_settings`, `worlds.given`).
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from typing import Any, Literal, TypedDict
+
+from entropy_explore_env.settings import (
+    Action,
+    Channel,
+    Ending,
+    Grid,
+    Observation,
+    RangeSensor,
+    Reward,
+    Robot,
+    RobotKind,
+)
+from entropy_explore_env.worlds.world import World
+
+
+class ScenarioSettings(TypedDict, total=False):
+    """Fields of a Scenario, and what is short for fields of its ending; parts also as mappings of fields."""
+
+    name: str
+    grid: Grid | Mapping[str, Any]
+    world: str | os.PathLike[str] | World | Sequence[World] | Mapping[str, Any]
+    split: Literal["train", "validation", "test"]
+    robots: int
+    start_radius_m: float
+    sigma_prior: float
+    decision_period_s: float | None
+    track_truth: bool
+    robot: Robot | Mapping[str, Any]
+    sensor: RangeSensor | Mapping[str, Any]
+    extra_kinds: tuple[RobotKind, ...]
+    channel: Channel | Mapping[str, Any]
+    ending: Ending | Mapping[str, Any]
+    reward: Reward | Mapping[str, Any]
+    action: Action | Mapping[str, Any]
+    observation: Observation | Mapping[str, Any]
+    max_cycles: int | None
+    time_limit_s: float
