@@ -1,8 +1,9 @@
-"""Strategies head to head: `python -m baselines.benchmark --scenarios room,office --seeds 30 --out DIR`.
+"""Strategies compared: `python -m baselines.benchmark --suite plans`, or `--scenarios room,office`.
 
-Runs every strategy in every scenario and team size on the same seeds, and writes a page with tables and
-figures. Missions are kept, a file each: an interrupted run resumes and ends with the same
-page, byte for byte. A mission that raises an error or runs past its limit is a row with the reason.
+A suite is a set of worlds, starts and seeds that is pinned (scoreboard/suites.py). Every strategy runs the
+same missions; written are a page with tables and figures. Missions are kept, a file each: an interrupted run
+resumes and ends with the same page, byte for byte. A mission that raises an error or runs past its limit is
+a row with the reason.
 """
 
 from __future__ import annotations
@@ -18,7 +19,8 @@ from pathlib import Path
 
 from baselines.cli.arguments import make_folder, parse, print_json, run_command
 from baselines.experiments.cells import run_cells
-from baselines.head_to_head.cells import Entries, chosen_scenarios, chosen_strategies
+from baselines.scoreboard.chosen import chosen_scenarios, chosen_strategies, own_tasks
+from baselines.scoreboard.suites import Suite, find_suite
 from entropy_explore_env.command import allow_read_memory
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.scenarios import SCENARIOS
@@ -30,30 +32,34 @@ _MOST_ROBOTS = 1000
 
 @dataclass
 class Args:
-    """Run strategies head to head."""
+    """Compare strategies."""
 
+    suite: str | None = None
+    """plans, volumes or teams: worlds and starts that are pinned."""
     scenarios: str | None = None
-    """Names and world files, commas between; default: room,room-furnished,lab,office,cave."""
+    """In place of a suite: names and world files, commas between; default:
+    room,room-furnished,lab,office,cave."""
     strategies: str = "all"
-    """Names as in baselines.run, commas between; random is always added, as the baseline."""
+    """Names as in baselines.run, commas between; what ratios are relative to is always added."""
     robots: str | None = None
-    """Team sizes, commas between; default: 1,2,4."""
+    """Team sizes of scenarios, commas between; default: 1,2,4."""
     seeds: int | None = None
     """Missions of every strategy in every scenario and team size; default: 30."""
     quick: bool = False
-    """What is not given shrinks: scenarios room,office, team sizes 1,2, 5 seeds."""
+    """A suite of few worlds and starts; without a suite room,office, team sizes 1,2, 5 seeds, where they are
+    not given."""
     world_scenario: str | None = None
     """Scenario that gives robots and sensors for world files; default: office for plans, else room."""
     read_memory_mib: float | None = None
     """MiB of memory that reading a world file may take; default: by the file's size."""
     time_limit_s: float | None = None
-    """Simulated time after which missions are cut off; default: each scenario's own."""
+    """Simulated time after which missions in scenarios are cut off; default: each scenario's own."""
     wall_limit_s: float = 600.0
     """Time on the clock after which a mission is ended, and counts as failed."""
     jobs: int | None = None
     """Processes; default: one a processor."""
-    out: Path = Path("results/head-to-head")
-    """Folder for head-to-head.md and, in head-to-head, its tables and figures."""
+    out: Path = Path("results/scoreboard")
+    """Folder for scoreboard.md and, in scoreboard, its tables and figures."""
     runs: Path | None = None
     """Folder that keeps the missions; default: runs in --out."""
     json: bool = False
@@ -64,26 +70,26 @@ def main(words: Sequence[str]) -> int:
     """Run the command."""
     args = parse(Args, words, description=__doc__)
     allow_read_memory(args.read_memory_mib)
-    entries = _entries(args)
-    from baselines.head_to_head.page import write_page  # matplotlib: after the help
-    from baselines.head_to_head.rows import Results
-    from baselines.head_to_head.terminal import printed_results, show_results
+    suite = _suite(args)
+    from baselines.scoreboard.page import write_page  # matplotlib: after the help
+    from baselines.scoreboard.results import Results
+    from baselines.scoreboard.terminal import printed_results, show_results
 
     runs = args.runs or args.out / "runs"
     make_folder("out", args.out)
     make_folder("runs", runs)
     started = time.perf_counter()
     records = run_cells(
-        entries.cells(),
+        suite.cells,
         runs,
         args.jobs or os.cpu_count() or 1,
-        "head to head",
+        f"suite {suite.name}" if args.suite else "strategies",
         quiet=args.json,
         limit_s=args.wall_limit_s,
         keep_failures=True,
     )
-    results = Results(entries, records)
-    page = write_page(args.out, results, _command(args, entries))
+    results = Results(suite, records)
+    page = write_page(args.out, results, _command(args, suite))
     if args.json:
         print_json({**printed_results(results), "wall_s": round(time.perf_counter() - started, 1)})
     else:
@@ -92,11 +98,11 @@ def main(words: Sequence[str]) -> int:
     return 0
 
 
-def _entries(args: Args) -> Entries:
-    """The entries that the options ask for.
+def _suite(args: Args) -> Suite:
+    """What the options ask for.
 
     Raises:
-        SettingError: An option has a value that is not allowed.
+        SettingError: An option has a value that is not allowed, or does not go with a suite.
     """
     seeds = args.seeds if args.seeds is not None else (5 if args.quick else 30)
     for name, value in (("seeds", seeds), ("jobs", args.jobs)):
@@ -105,13 +111,18 @@ def _entries(args: Args) -> Entries:
     for name, limit_s in (("time_limit_s", args.time_limit_s), ("wall_limit_s", args.wall_limit_s)):
         if limit_s is not None and not 0.0 < limit_s < math.inf:
             raise SettingError(name, limit_s, "a number > 0")
+    if args.suite is not None:
+        pinned = ("scenarios", "robots", "seeds", "world_scenario", "time_limit_s")
+        for name in pinned:
+            if getattr(args, name) is not None:
+                raise SettingError(name, getattr(args, name), "left out together with --suite, which pins it")
+        return find_suite(args.suite, args.quick, chosen_strategies(args.strategies, suite=True))
     if args.world_scenario is not None and args.world_scenario not in SCENARIOS:
         raise SettingError("world_scenario", args.world_scenario, "one of " + ", ".join(SCENARIOS))
     robots = _team_sizes(args.robots if args.robots is not None else ("1,2" if args.quick else "1,2,4"))
-    strategies = chosen_strategies(args.strategies)
     wanted = args.scenarios if args.scenarios is not None else ("room,office" if args.quick else _SCENARIOS)
     scenarios = chosen_scenarios(wanted, args.world_scenario, args.time_limit_s)
-    return Entries(scenarios, strategies, robots, seeds)
+    return Suite("own", own_tasks(scenarios, robots, seeds), chosen_strategies(args.strategies, suite=False))
 
 
 def _team_sizes(words: str) -> tuple[int, ...]:
@@ -124,19 +135,23 @@ def _team_sizes(words: str) -> tuple[int, ...]:
     return sizes
 
 
-def _command(args: Args, entries: Entries) -> str:
+def _command(args: Args, suite: Suite) -> str:
     """What makes the same page again, wherever the world files lie."""
-    scenarios = args.scenarios or ",".join(entries.scenarios)
-    given = {
-        "scenarios": ",".join(Path(word).name for word in scenarios.split(",")),
-        "strategies": args.strategies,
-        "robots": ",".join(map(str, entries.robots)),
-        "seeds": str(entries.seeds),
-        "world-scenario": args.world_scenario,
-        "time-limit-s": None if args.time_limit_s is None else f"{args.time_limit_s:g}",
-    }
-    options = (f"--{name} {shlex.quote(value)}" for name, value in given.items() if value is not None)
-    return "python -m baselines.benchmark " + " ".join(options)
+    given: dict[str, str | None] = {"strategies": args.strategies}
+    if args.suite is not None:
+        given = {"suite": args.suite, **given}
+    else:
+        scenarios = args.scenarios or ",".join(dict.fromkeys(task.scenario.name for task in suite.tasks))
+        given |= {
+            "scenarios": ",".join(Path(word).name for word in scenarios.split(",")),
+            "robots": ",".join(map(str, dict.fromkeys(task.scenario.robots for task in suite.tasks))),
+            "seeds": str(suite.tasks[0].missions),
+            "world-scenario": args.world_scenario,
+            "time-limit-s": None if args.time_limit_s is None else f"{args.time_limit_s:g}",
+        }
+    options = [f"--{name} {shlex.quote(value)}" for name, value in given.items() if value is not None]
+    quick = ["--quick"] if args.quick and args.suite is not None else []
+    return " ".join(["python -m baselines.benchmark", *options, *quick])
 
 
 if __name__ == "__main__":

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import hashlib
 import math
 from collections.abc import Callable, Sequence
@@ -43,10 +44,16 @@ class Cell:
 
     @cached_property
     def settings_digest(self) -> str:
-        """Of the scenario, the strategy's name, what is recorded, and the files that these name."""
+        """Of the scenario, the strategy's name, what is recorded, and the files that these name.
+
+        Of files the content counts, and not where a world's file lies.
+        """
+        scenario = scripted(self.scenario)
+        if Path(scenario.world).is_file():
+            scenario = dataclasses.replace(scenario, world=Path(scenario.world).name)
         described = repr(
             (
-                scripted(self.scenario),
+                scenario,
                 self.strategy,
                 self.record if is_dataclass(self.record) else self.record.__qualname__,
             )

@@ -83,6 +83,20 @@ def median_ratio_interval(numerator: Sample, denominator: Sample) -> Interval:
     return Interval(ratio, *_central(medians[:, 0] / medians[:, 1]))
 
 
+def geometric_ratio_interval(ours: Sequence[Sample], theirs: Sequence[Sample]) -> Interval:
+    """Geometric mean over tasks of the geometric mean of paired ratios in each, and its interval.
+
+    exp( 1/S Σ_s 1/N_s Σ_i ln(ours_si / theirs_si) ); the bootstrap draws pairs within each task.
+
+    Args:
+        ours: Of each of S tasks (N_s,) figures > 0.
+        theirs: The same missions.
+    """
+    logs = [np.log(np.asarray(a, float) / np.asarray(b, float)) for a, b in zip(ours, theirs, strict=True)]
+    drawn = np.mean([_resampled(log, len(log), place).mean(axis=1) for place, log in enumerate(logs)], axis=0)
+    return Interval(float(np.exp(np.mean([log.mean() for log in logs]))), *_central(np.exp(drawn)))
+
+
 def double_ratio_interval(
     numerator: Sample, denominator: Sample, numerator_before: Sample, denominator_before: Sample
 ) -> Interval:
@@ -207,9 +221,9 @@ def _central(values: np.ndarray) -> Range:
     return Range(float(low), float(high))
 
 
-def _resampled(sample: np.ndarray, size: int) -> np.ndarray:
-    """(B, size, …) draws with replacement, always the same ones."""
-    rows = np.random.default_rng(0).integers(len(sample), size=(_RESAMPLES, size))
+def _resampled(sample: np.ndarray, size: int, stream: int = 0) -> np.ndarray:
+    """(B, size, …) draws with replacement, always the same ones of a stream."""
+    rows = np.random.default_rng(stream).integers(len(sample), size=(_RESAMPLES, size))
     return sample[rows]
 
 

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import csv
-import dataclasses
 import json
+import math
+import re
 import subprocess
 import sys
 import time
@@ -19,11 +20,20 @@ from baselines import benchmark, strategies
 from baselines.cli.arguments import run_command
 from baselines.experiments import runner
 from baselines.experiments.mission import run_mission, scripted
-from baselines.head_to_head import cells as head_to_head_cells
-from baselines.head_to_head.cells import Entries, chosen_scenarios, chosen_strategies
-from baselines.head_to_head.page import write_page
-from baselines.head_to_head.rows import Results, failed_rows, mission_rows, overall_rows, scenario_rows
-from baselines.head_to_head.timed_mission import timed_record
+from baselines.scoreboard import chosen
+from baselines.scoreboard.chosen import chosen_scenarios, chosen_strategies
+from baselines.scoreboard.mission import SuiteMission
+from baselines.scoreboard.page import write_page
+from baselines.scoreboard.results import (
+    PATH,
+    TIME,
+    Results,
+    failed_rows,
+    mission_rows,
+    overall_rows,
+    task_rows,
+)
+from baselines.scoreboard.suites import Place, Suite, Task
 from baselines.strategies import make_strategy
 from baselines.strategies.random_walk import RandomWalk
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
@@ -32,14 +42,18 @@ from entropy_explore_env.scenario import with_settings
 from entropy_explore_env.scenarios import BOX, LAB
 
 ROOT = Path(__file__).parents[2]
-TINY = ("--scenarios", "box-7x11x5", "--robots", "1,2", "--time-limit-s", "60")
+TINY = ("--scenarios", "box-7x11x5", "--robots", "1,2", "--time-limit-s", "150")
 PAIR = (*TINY, "--strategies", "gradient", "--seeds", "6", "--jobs", "1")
+
+
+_MILLISECONDS = re.compile(rb"\| [0-9.,-]+ \| [0-9.,-]+ \|$", re.MULTILINE)
+"""The last two columns of the page's tables."""
 
 
 def contents(folder: Path) -> dict[str, bytes]:
     """All that the command wrote but missions and the clock; what a kill left of half files is nobody's."""
     return {
-        str(path.relative_to(folder)): path.read_bytes()
+        str(path.relative_to(folder)): _MILLISECONDS.sub(b"|", path.read_bytes())
         for path in sorted(folder.rglob("*"))
         if path.is_file() and "runs" not in path.parts and path.name[0] != "." and path.name != "timing.csv"
     }
@@ -64,88 +78,82 @@ def pair(tmp_path_factory):
 
 def test_the_command_leaves_page_tables_figures_and_a_file_a_mission(pair):
     folder, ran = pair
-    assert "beats" in ran.stdout and "gradient" in ran.stdout
-    assert "24/24" in ran.stderr and "head-to-head.md" in ran.stderr
-    assert set(contents(folder)) == {"head-to-head.md"} | {
-        f"head-to-head/{name}"
-        for name in (
-            "overall.csv",
-            "scenarios.csv",
-            "missions.csv",
-            "profiles.csv",
-            "profiles.png",
-            "times.png",
-        )
+    assert "over random's" in ran.stdout and "gradient" in ran.stdout
+    assert "24/24" in ran.stderr and "scoreboard.md" in ran.stderr
+    assert set(contents(folder)) == {"scoreboard.md"} | {
+        f"scoreboard/own/{name}"
+        for name in ("part.md", "overall.csv", "tasks.csv", "missions.csv", "ratios.png", "tasks.png")
     }
     missions = sorted(str(path.relative_to(folder / "runs")) for path in folder.rglob("seed-*.json"))
     assert missions == sorted(
-        f"box-7x11x5/robots-{robots}/{strategy}/seed-{seed}.json"
-        for robots in (1, 2)
+        f"box-7x11x5-{robots}/{strategy}/seed-{seed}.json"
+        for robots in ("1-robot", "2-robots")
         for strategy in ("random", "gradient")
         for seed in range(6)
     )
-    for name in ("profiles", "times"):
-        with Image.open(folder / "head-to-head" / f"{name}.png") as picture:
+    for name in ("ratios", "tasks"):
+        with Image.open(folder / "scoreboard" / "own" / f"{name}.png") as picture:
             assert picture.width > 400 and len(np.unique(np.asarray(picture.convert("L")))) > 30
 
 
 def test_the_page_says_what_made_it_and_every_row(pair):
-    page = (pair[0] / "head-to-head.md").read_text()
+    page = (pair[0] / "scoreboard.md").read_text()
     command = (
-        "python -m baselines.benchmark --scenarios box-7x11x5 --strategies gradient --robots 1,2 --seeds 6"
+        "python -m baselines.benchmark --strategies gradient --scenarios box-7x11x5 --robots 1,2 --seeds 6"
     )
-    assert f"`{command} --time-limit-s 60`" in page
-    assert "Agarwal" in page and "## box-7x11x5" in page and "time limit 60 s" in page
-    table = [line for line in page.splitlines() if line.startswith(("| 1 |", "| 2 |"))]
-    assert len(table) == 8 and all(
-        f"`{name}`" in line for line, name in zip(table, ["random", "gradient"] * 4, strict=True)
-    )
+    assert f"`{command} --time-limit-s 150`" in page
+    assert "### box-7x11x5, 1 robot\n" in page and "### box-7x11x5, 2 robots\n" in page
+    assert page.count("time limit 150 s") == 2
+    table = [line for line in page.splitlines() if line.startswith("| `")]
+    assert len(table) == 6 and sum(line.startswith("| `gradient` |") for line in table) == 3
     assert "nan" not in page and "None" not in page and "failed" not in page.split("##", 1)[1]
 
 
 def test_figures_are_those_of_the_missions(pair):
     folder, _ = pair
     env = EntropyExploreEnv(
-        scripted(with_settings(BOX, {"track_truth": True, "time_limit_s": 60.0, "robots": 2}))
+        scripted(with_settings(BOX, {"track_truth": True, "time_limit_s": 150.0, "robots": 2}))
     )
     for seed in (0, 5):
         run_mission(env, make_strategy("gradient"), seed)
         figures = mission_figures(env.missions, 0, floor=True)
-        path = folder / "runs" / "box-7x11x5" / "robots-2" / "gradient" / f"seed-{seed}.json"
+        path = folder / "runs" / "box-7x11x5-2-robots" / "gradient" / f"seed-{seed}.json"
         record = json.loads(path.read_text())["record"]
-        assert record.pop("clock").keys() == {"decision_ms", "mission_s"}
+        assert record.pop("clock").keys() == {"decision_ms", "worst_decision_ms", "mission_s"}
         assert {name: figures[name] for name in record} == record and "joint" in record
         row = next(
             row
-            for row in rows_of(folder / "head-to-head" / "missions.csv")
-            if (row["robots"], row["strategy"], row["seed"]) == ("2", "gradient", str(seed))
+            for row in rows_of(folder / "scoreboard" / "own" / "missions.csv")
+            if (row["task"], row["strategy"], row["seed"]) == ("box-7x11x5, 2 robots", "gradient", str(seed))
         )
         assert float(row["t_mission_s"]) == pytest.approx(figures["t_mission_s"], rel=1e-5)
-        assert float(row["explored"]) == pytest.approx(figures["joint"]["explored"], rel=1e-5)
+        assert row["time_s_90_bits"] == ("" if figures["t90_s"] is None else f"{figures['t90_s']:.6g}")
+        assert float(row["distance_m"]) == pytest.approx(figures["distance_m"], rel=1e-5)
         assert row["end_reason"] == figures["end_reason"]
 
 
 def test_the_tables_are_made_of_the_missions(pair):
     folder, _ = pair
-    missions = rows_of(folder / "head-to-head" / "missions.csv")
+    missions = rows_of(folder / "scoreboard" / "own" / "missions.csv")
+    names = [f"box-7x11x5, {team}" for team in ("1 robot", "2 robots")]
 
-    def times(strategy, robots):
-        found = [row for row in missions if (row["strategy"], row["robots"]) == (strategy, str(robots))]
-        return np.asarray([min(float(row["t_mission_s"]), 60.0) for row in found])
+    def times(strategy, name):
+        found = [row for row in missions if (row["strategy"], row["task"]) == (strategy, name)]
+        return np.asarray([min(float(row["t_mission_s"]), 150.0) for row in found])
 
-    rows = {
-        (row["strategy"], int(row["robots"])): row for row in rows_of(folder / "head-to-head" / "overall.csv")
-    }
-    for robots in (1, 2):
-        ours, walk = times("gradient", robots), times("random", robots)
-        row = rows["gradient", robots]
-        relative = stats.trim_mean(ours / walk, 0.25)
-        assert float(row["relative_time"]) == pytest.approx(relative, rel=1e-4)
-        assert float(row["relative_time_low"]) <= relative <= float(row["relative_time_high"])
-        wins = stats.mannwhitneyu(walk, ours, method="asymptotic").statistic / 36
-        assert float(row["faster_than_random"]) == pytest.approx(wins, rel=1e-4)
-        assert row["faster_than_gradient"] == "" and rows["random", robots]["faster_than_random"] == ""
-        assert float(rows["random", robots]["relative_time"]) == 1.0
+    rows = rows_of(folder / "scoreboard" / "own" / "tasks.csv")
+    overall = rows_of(folder / "scoreboard" / "own" / "overall.csv")
+    means = []
+    for name in names:
+        means.append(stats.gmean(times("gradient", name) / times("random", name)))
+        row = next(row for row in rows if (row["task"], row["strategy"]) == (name, "gradient"))
+        assert float(row["time_s_end_over_random"]) == pytest.approx(means[-1], rel=1e-4)
+        assert float(row["time_s_end"]) == pytest.approx(np.median(times("gradient", name)), rel=1e-4)
+        low, high = (float(row[f"time_s_end_over_random_{end}"]) for end in ("low", "high"))
+        assert low <= means[-1] <= high
+    assert low < high and means[1] < 1.0
+    whole = {row["strategy"]: float(row["time_s_end_over_random"]) for row in overall}
+    assert whole == {"random": 1.0, "gradient": pytest.approx(stats.gmean(means), rel=1e-4)}
 
 
 def test_a_finished_experiment_says_the_same_again_without_a_mission(pair, capsys, monkeypatch):
@@ -161,7 +169,7 @@ def test_a_finished_experiment_says_the_same_again_without_a_mission(pair, capsy
     said = capsys.readouterr()
     results = json.loads(said.out, parse_constant=pytest.fail)
     assert said.err == "" and contents(folder) == before
-    assert [len(results[name]) for name in ("overall", "scenarios", "failed", "timing")] == [4, 4, 0, 4]
+    assert [len(results[name]) for name in ("overall", "tasks", "failed")] == [2, 4, 0]
 
 
 def test_two_processes_write_the_same_bytes(pair, tmp_path, capsys):
@@ -175,7 +183,7 @@ import os, random, signal, sys, time
 from pathlib import Path
 from baselines import benchmark
 from baselines.cli.arguments import run_command
-import baselines.head_to_head.page, baselines.head_to_head.terminal, baselines.experiments.worker_pool
+import baselines.scoreboard.page, baselines.scoreboard.terminal, baselines.experiments.worker_pool
 from tests.baselines.test_benchmark import PAIR
 
 folder, kills = Path(sys.argv[1]), int(sys.argv[2])
@@ -236,7 +244,7 @@ def entered(monkeypatch):
     """Two strategies that fail, beside the random walk."""
     named = {"random": RandomWalk, "raises": Raises, "sleeps": Sleeps}
     monkeypatch.setattr(strategies, "STRATEGIES", named)
-    monkeypatch.setattr(head_to_head_cells, "STRATEGIES", named)
+    monkeypatch.setattr(chosen, "STRATEGIES", named)
 
 
 FAILING = (*TINY, "--seeds", "2", "--jobs", "1", "--wall-limit-s", "0.5")
@@ -245,17 +253,20 @@ FAILING = (*TINY, "--seeds", "2", "--jobs", "1", "--wall-limit-s", "0.5")
 def test_a_mission_that_fails_is_a_row_with_its_reason(entered, tmp_path, capsys):
     assert run_command(benchmark.main, [*FAILING, "--out", str(tmp_path)]) == 0
     said = capsys.readouterr()
-    assert "failed: sleeps, box-7x11x5, robots 1, seeds 0, 1: ran past 0.5 s on the clock" in said.out
-    page = (tmp_path / "head-to-head.md").read_text()
-    failed = page.split("## Missions that failed")[1]
-    assert r"| box-7x11x5 | 2 | `raises` | 0, 1 | ValueError: no \| way at \<all\> |" in failed
+    assert "failed: sleeps, box-7x11x5, 1 robot, missions 0, 1: ran past 0.5 s on the clock" in said.out
+    page = (tmp_path / "scoreboard.md").read_text()
+    failed = page.split("### Missions that failed")[1]
+    assert r"| box-7x11x5, 2 robots | `raises` | 0, 1 | ValueError: no \| way at \<all\> |" in failed
     assert failed.count("`sleeps` | 0, 1 | ran past 0.5 s on the clock |") == 2
-    assert "| 1 | `raises` | 0 of 2 |" in page and "| 2 | `raises` | 0 of 2, 2 failed |" in page
-    rows = rows_of(tmp_path / "head-to-head" / "scenarios.csv")
+    assert "| `raises` | 0 of 2 |" in page and "| `raises` | 0 of 2, 2 failed |" in page
+    rows = rows_of(tmp_path / "scoreboard" / "own" / "tasks.csv")
     assert [row["failed"] for row in rows] == ["0", "0", "2", "0", "2", "2"]
     slept = next(row for row in rows if row["strategy"] == "sleeps")
-    assert (slept["failed"], slept["mapped"], float(slept["time_s"]), slept["scans"]) == ("2", "0", 60.0, "")
-    ends = [row["end_reason"] for row in rows_of(tmp_path / "head-to-head" / "missions.csv")]
+    assert (slept["failed"], slept["finished"], float(slept["time_s_end"])) == ("2", "0", 150.0)
+    overall = {row["strategy"]: row for row in rows_of(tmp_path / "scoreboard" / "own" / "overall.csv")}
+    assert (overall["sleeps"]["tasks"], overall["sleeps"]["time_s_end_over_random"]) == ("0", "")
+    assert overall["raises"]["tasks"] == "1"
+    ends = [row["end_reason"] for row in rows_of(tmp_path / "scoreboard" / "own" / "missions.csv")]
     assert ends.count("FAILED") == 6
 
 
@@ -277,36 +288,37 @@ def test_a_world_without_room_for_the_team_is_a_row_for_all(tmp_path, capsys):
     words += ["--strategies", "random", "--time-limit-s", "20", "--out", str(tmp_path), "--json"]
     assert run_command(benchmark.main, words) == 0
     failed = json.loads(capsys.readouterr().out)["failed"]
-    assert len(failed) == 1 and failed[0]["robots"] == 900 and "WorldError" in failed[0]["reason"]
+    assert len(failed) == 1 and failed[0]["task"] == "box-7x11x5, 900 robots"
+    assert "WorldError" in failed[0]["reason"]
 
 
 # --- rows from missions worked out by hand
 
 
 def results_of(times: dict[str, list[list[float | str | None]]]) -> Results:
-    """Strategy → scenario → seed: seconds; None = cut off at 100 s; a word = failed for this reason."""
+    """Strategy → task → mission: seconds; None = cut off at 100 s; a word = failed for this reason."""
     names = [f"world-{number}" for number in range(len(times["random"]))]
     limited = with_settings(BOX, {"time_limit_s": 100.0})
-    scenarios = {name: dataclasses.replace(limited, name=name) for name in names}
-    entries = Entries(scenarios, tuple(times), (1,), len(times["random"][0]))
+    tasks = tuple(Task(name, (Place(name, limited, len(times["random"][0])),)) for name in names)
+    suite = Suite("own", tasks, tuple(times))
     records = {}
     for strategy, worlds in times.items():
-        for name, seconds in zip(names, worlds, strict=True):
-            records[entries.cell_id(name, 1, strategy)] = [
+        for task, seconds in zip(tasks, worlds, strict=True):
+            records[suite.cell_id(task, task.places[0], strategy)] = [
                 {"failed": time_s, "limit_s": None}
                 if isinstance(time_s, str)
                 else {
-                    "world": name,
+                    "world": task.name,
                     "finished": time_s is not None,
                     "end_reason": "TIME_UP" if time_s is None else "MAPPED",
                     "t_mission_s": 100.0 if time_s is None else time_s,
                     "t90_s": None if time_s is None else time_s / 2,
-                    "scans": 7,
-                    "clock": {"decision_ms": 1.0, "mission_s": 2.0},
+                    "distance_m": 7.0,
+                    "clock": {"decision_ms": 1.0, "worst_decision_ms": 3.0, "mission_s": 2.0},
                 }
                 for time_s in seconds
             ]
-    return Results(entries, records)
+    return Results(suite, records)
 
 
 BY_HAND = {
@@ -316,41 +328,39 @@ BY_HAND = {
 }
 
 
-def test_rows_of_scenarios_worked_out_by_hand():
-    rows = {(row["scenario"], row["strategy"]): row for row in scenario_rows(results_of(BY_HAND))}
+def test_rows_of_tasks_worked_out_by_hand():
+    rows = {(row["task"], row["strategy"]): row for row in task_rows(results_of(BY_HAND))}
     walk, gradient, odd = (rows["world-0", name] for name in BY_HAND)
-    assert (walk["mapped"], walk["cut_off"], walk["failed"], walk["time_s"]) == (2, 0, 0, 45.0)
-    assert (odd["mapped"], odd["cut_off"], odd["failed"], odd["time_s"]) == (1, 0, 1, 55.0)
-    assert gradient["relative_time"] == (25 / 50 + 50 / 40) / 2
-    assert odd["relative_time"] == (10 / 50 + 100 / 40) / 2
-    assert odd["t90_s"] == (5.0 + 100.0) / 2 and odd["scans"] == 7.0 and odd["overlap"] is None
-    assert rows["world-1", "random"]["cut_off"] == 1
-    assert rows["world-1", "random"]["time_s"] == 90.0
+    assert (walk["finished"], walk["failed"], walk["time_s_end"]) == (2, 0, 45.0)
+    assert (odd["finished"], odd["failed"], odd["time_s_end"]) == (1, 1, 55.0)
+    assert gradient["time_s_end_over_random"] == pytest.approx(math.sqrt(25 / 50 * 50 / 40))
+    assert odd["time_s_end_over_random"] == pytest.approx(math.sqrt(10 / 50 * 100 / 40))
+    assert odd["time_s_90_bits"] == (5.0 + 100.0) / 2 and odd["median_time_s_90_bits"] is None  # half only
+    assert walk["median_time_s_90_bits"] == (25.0 + 20.0) / 2 and odd["decision_ms"] == 1.0
+    assert rows["world-1", "random"]["time_s_end"] == 90.0
 
 
 def test_the_overall_rows_worked_out_by_hand():
     rows = {row["strategy"]: row for row in overall_rows(results_of(BY_HAND))}
-    # gradient over random: 0.5, 1.25, 0.2, 1.25; without the lowest and the highest quarter
-    assert rows["gradient"]["relative_time"] == (0.5 + 1.25) / 2
-    assert rows["random"]["relative_time"] == 1.0 and rows["odd"]["mapped"] == 0.5
-    # pairs of world-0, 25 and 50 against 50 and 40: two faster, one equal; of world-1, 20 and 100 against
-    # 100 and 80: the same
-    assert rows["gradient"]["faster_than_random"] == ((2 + 0.5) / 4 + (2 + 0.5) / 4) / 2
-    assert rows["odd"]["faster_than_gradient"] == ((2 + 0) / 4 + (1 + 0.5) / 4) / 2
-    assert rows["random"]["faster_than_random"] is None
-    assert 0.0 <= rows["odd"]["faster_than_random_low"] <= rows["odd"]["faster_than_random"]
+    expected = math.sqrt(math.sqrt(0.5 * 1.25) * math.sqrt(0.2 * 1.25))
+    assert rows["gradient"]["time_s_end_over_random"] == pytest.approx(expected)
+    assert rows["random"]["time_s_end_over_random"] == 1.0
+    assert (rows["odd"]["finished"], rows["odd"]["worst_decision_ms"]) == (0.5, 3.0)
+    low, high = (rows["odd"][f"time_s_end_over_random_{end}"] for end in ("low", "high"))
+    assert low < rows["odd"]["time_s_end_over_random"] < high
 
 
-def test_a_profile_never_counts_what_was_not_mapped():
+def test_a_path_counts_with_what_the_team_could_have_driven():
     results = results_of(BY_HAND)
-    share = results.profile(1, "odd", np.array([0.1, 0.2, 0.3, 1e9])).share
-    assert share.tolist() == [0.0, 0.25, 0.5, 0.5]  # 10/50 and 30/100
-    assert results.profile(1, "random", np.array([0.99, 1.0])).share.tolist() == [0.0, 0.75]
+    task = results.suite.tasks[1]
+    assert BOX.robots == 2 and BOX.robot.max_speed_m_s == 0.5
+    assert results.values(task, "random", PATH).tolist() == [2 * 0.5 * 100.0, 7.0]
+    assert results.values(task, "random", TIME).tolist() == [100.0, 80.0]
 
 
 def test_failures_of_one_reason_share_a_row():
     times = {"random": [["Oops", "Oops", 3.0, "Ouch"]], "odd": [[1.0, 2.0, "Oops", 4.0]]}
-    rows = [(row["strategy"], row["reason"], row["seeds"]) for row in failed_rows(results_of(times))]
+    rows = [(row["strategy"], row["reason"], row["missions"]) for row in failed_rows(results_of(times))]
     assert rows == [("random", "Oops", [0, 1]), ("random", "Ouch", [3]), ("odd", "Oops", [2])]
     ends = [row["end_reason"] for row in mission_rows(results_of(times))]
     assert ends == ["FAILED", "FAILED", "MAPPED", "FAILED", "MAPPED", "MAPPED", "FAILED", "MAPPED"]
@@ -358,20 +368,20 @@ def test_failures_of_one_reason_share_a_row():
 
 def test_a_page_where_all_failed_is_a_page(tmp_path):
     page = write_page(tmp_path, results_of({"random": [["Oops", "Oops"]]}), "the command")
-    text = page.read_text()
-    assert "| 1 | `random` | 0% | 1.00 (1.00 … 1.00)" in text and "0 of 2, 2 failed" in text
+    assert "| `random` | 0 of 2, 2 failed | > 100 |" in page.read_text()
 
 
 # --- what takes part
 
 
 def test_random_is_always_there_and_first():
-    assert chosen_strategies("gradient,random") == ("random", "gradient")
-    assert set(chosen_strategies("all")) == set(strategies.STRATEGIES)
-    assert chosen_strategies("voronoi,gradient")[1:] == ("voronoi", "gradient")
+    assert chosen_strategies("gradient,random", suite=False) == ("random", "gradient")
+    assert set(chosen_strategies("all", suite=False)) == set(strategies.STRATEGIES)
+    assert chosen_strategies("gradient", suite=True)[-1] == "gradient"
+    assert "nearest-frontier" in chosen_strategies("gradient", suite=True)
     former = ("random", "information-rate-v0")
-    assert chosen_strategies("information-rate,information-rate-v0") == former
-    assert chosen_strategies("best") == ("random", strategies.ALIASES["best"])
+    assert chosen_strategies("information-rate,information-rate-v0", suite=False) == former
+    assert chosen_strategies("best", suite=False) == ("random", strategies.ALIASES["best"])
 
 
 def test_scenarios_are_names_and_files(tmp_path):
@@ -400,18 +410,18 @@ def test_the_page_of_a_file_does_not_say_where_it_lies(tmp_path, capsys):
     words = ["--scenarios", str(path), "--strategies", "random", "--robots", "1", "--seeds", "1"]
     words += ["--jobs", "1", "--time-limit-s", "20", "--out", str(tmp_path / "out"), "--json"]
     assert run_command(benchmark.main, words) == 0
-    page = (tmp_path / "out" / "head-to-head.md").read_text()
-    assert "--scenarios 'a plan.png'" in page and "World file `a plan.png`, " in page
-    assert str(tmp_path) not in page and "ground robots" in page
+    page = (tmp_path / "out" / "scoreboard.md").read_text()
+    assert "--scenarios 'a plan.png'" in page and "world file `a plan.png`, " in page
+    assert str(tmp_path) not in page and "1 ground robot" in page
 
 
 def test_what_a_record_says_of_the_clock_is_its_own(monkeypatch):
     ticks = iter(range(10**6))
-    monkeypatch.setattr("baselines.head_to_head.timed_mission.time.perf_counter", lambda: float(next(ticks)))
+    monkeypatch.setattr("baselines.scoreboard.mission.time.perf_counter", lambda: float(next(ticks)))
     env = EntropyExploreEnv(
         scripted(with_settings(BOX, {"track_truth": True, "robots": 1, "time_limit_s": 9.0}))
     )
-    record = timed_record(env, "random", 0)
+    record = SuiteMission()(env, "random", 0)
     assert record["clock"]["decision_ms"] == 1000.0  # a tick a decision
     assert record["clock"]["mission_s"] >= 2 * 3 and "per_robot" not in record
 
@@ -419,6 +429,9 @@ def test_what_a_record_says_of_the_clock_is_its_own(monkeypatch):
 @pytest.mark.parametrize(
     "words",
     [
+        ["--suite", "plan"],
+        ["--suite", "plans", "--scenarios", "room"],
+        ["--suite", "plans", "--seeds", "3"],
         ["--scenarios", "rooom"],
         ["--scenarios", "room,room"],
         ["--scenarios", "nowhere.bt"],
@@ -465,6 +478,6 @@ def test_quick_shrinks_what_is_not_given(monkeypatch, tmp_path):
     words = ["--quick", "--robots", "3", "--out", str(tmp_path), "--strategies", "random"]
     assert run_command(benchmark.main, words) == 130
     assert [(cell.id, cell.seeds, cell.scenario.robots) for cell in asked] == [
-        ("room/robots-3/random", 5, 3),
-        ("office/robots-3/random", 5, 3),
+        ("room-3-robots/random", 5, 3),
+        ("office-3-robots/random", 5, 3),
     ]

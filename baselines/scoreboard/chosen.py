@@ -1,14 +1,14 @@
-"""The entries of a head-to-head: every strategy in every scenario and team size, on the same seeds."""
+"""What a user chooses: strategies by name, and scenarios of one's own in place of a suite."""
 
 from __future__ import annotations
 
 import dataclasses
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from baselines.experiments.cells import Cell
 from baselines.experiments.mission import scripted
-from baselines.head_to_head.timed_mission import timed_record
+from baselines.scoreboard.results import BASELINE, REFERENCES
+from baselines.scoreboard.suites import Place, Task, team_name
 from baselines.strategies import STRATEGIES, make_strategy, resolved
 from baselines.world_sweep import is_plan
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
@@ -16,48 +16,13 @@ from entropy_explore_env.errors import SettingError
 from entropy_explore_env.scenario import Scenario, with_settings
 from entropy_explore_env.scenarios import SCENARIOS, find_scenario
 
-BASELINE = "random"
-"""The strategy that relative times are relative to; it is always part of the table."""
 
-
-@dataclass(frozen=True)
-class Entries:
-    """The experiment.
-
-    Attributes:
-        scenarios: Name → the task, with one robot.
-        strategies: Names, `random` first.
-        robots: Team sizes.
-        seeds: Missions of every strategy in every scenario and team size.
-    """
-
-    scenarios: dict[str, Scenario]
-    strategies: tuple[str, ...]
-    robots: tuple[int, ...]
-    seeds: int
-
-    def cell_id(self, scenario: str, robots: int, strategy: str) -> str:
-        """Name of a cell."""
-        return f"{scenario}/robots-{robots}/{strategy}"
-
-    def cells(self) -> list[Cell]:
-        """All cells: strategies of one scenario and team size beside each other."""
-        return [
-            Cell(
-                self.cell_id(name, robots, strategy),
-                with_settings(scenario, {"robots": robots}),
-                strategy,
-                self.seeds,
-                timed_record,
-            )
-            for name, scenario in self.scenarios.items()
-            for robots in self.robots
-            for strategy in self.strategies
-        ]
-
-
-def chosen_strategies(words: str) -> tuple[str, ...]:
+def chosen_strategies(words: str, suite: bool) -> tuple[str, ...]:
     """Strategies from names with commas between them; `all` = every one.
+
+    Args:
+        words: Names.
+        suite: Of a suite, whose references are added; else the random walk is.
 
     Raises:
         SettingError: None has such a name.
@@ -65,7 +30,17 @@ def chosen_strategies(words: str) -> tuple[str, ...]:
     names = list(STRATEGIES) if words == "all" else words.split(",")
     for name in names:
         make_strategy(name)
-    return tuple(dict.fromkeys([BASELINE, *map(resolved, names)]))
+    added = [name for name in REFERENCES if name in STRATEGIES] if suite else [BASELINE]
+    return tuple(dict.fromkeys([*added, *map(resolved, names)]))
+
+
+def own_tasks(scenarios: Mapping[str, Scenario], robots: Sequence[int], missions: int) -> tuple[Task, ...]:
+    """A task for each scenario and team size, in worlds of the scenario's own split."""
+    return tuple(
+        Task(team_name(name, team), (Place(name, with_settings(scenario, {"robots": team}), missions),))
+        for name, scenario in scenarios.items()
+        for team in robots
+    )
 
 
 def chosen_scenarios(

@@ -1,0 +1,226 @@
+"""The page of results: a part for each suite, with its tables and figures beside it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import matplotlib as mpl
+
+from baselines.cli.figures import STYLE, png
+from baselines.experiments.tables import csv_table, markdown_table
+from baselines.scoreboard.figures import ratio_figure, task_figure
+from baselines.scoreboard.results import (
+    BITS,
+    SEEN,
+    Measure,
+    Results,
+    Row,
+    failed_rows,
+    mission_rows,
+    overall_rows,
+    task_rows,
+)
+from baselines.scoreboard.suites import Task
+from entropy_explore_env.writing import write_atomically
+
+PAGE, FILES = "scoreboard.md", "scoreboard"
+_DIGITS = 6
+"""Significant digits of the CSV tables."""
+_CLOCK = ("decision_ms", "worst_decision_ms")
+"""Columns that differ from run to run; they stand in a table of their own."""
+
+
+def write_page(folder: Path, results: Results, command: str) -> Path:
+    """Write what a suite came to, and the page that joins it with the other suites in the folder.
+
+    All but milliseconds, which `timing.csv` and the page's last columns tell, depends on the missions alone;
+    the missions' files keep the milliseconds, too: whatever was stopped and started again, the bytes are the
+    same.
+
+    Args:
+        folder: Where; `scoreboard/SUITE/` holds a suite's part of the page, its tables and figures.
+        results: Of the suite.
+        command: What made them.
+
+    Returns:
+        Path of the page.
+    """
+    suite = results.suite.name
+    beside = folder / FILES / suite
+    tasks, overall = task_rows(results), overall_rows(results)
+    with mpl.rc_context(STYLE):
+        write_atomically(beside / "ratios.png", png(ratio_figure(results, overall)))
+        write_atomically(beside / "tasks.png", png(task_figure(results)))
+    tables = {
+        "overall": _without_clock(overall),
+        "tasks": _without_clock(tasks),
+        "missions": mission_rows(results),
+    }
+    for name, rows in tables.items():
+        write_atomically(beside / f"{name}.csv", csv_rows(rows))
+    names = ("task", "strategy", *_CLOCK)
+    write_atomically(beside / "timing.csv", csv_rows([{name: row[name] for name in names} for row in tasks]))
+    part = "\n\n".join(text.strip() for text in _parts(results, tasks, overall, command)) + "\n"
+    write_atomically(beside / "part.md", part)
+    found = [folder / FILES / name / "part.md" for name in ("plans", "volumes", "teams", "own")]
+    text = _READING + "\n" + "\n".join(path.read_text() for path in found if path.is_file())
+    write_atomically(folder / PAGE, text)
+    return folder / PAGE
+
+
+def csv_rows(rows: Sequence[Row]) -> str:
+    """Rows of equal keys as CSV; nothing where there is no figure."""
+    return csv_table({name: [_cell(row[name]) for row in rows] for name in rows[0]})
+
+
+def _cell(value: object) -> object:
+    if value is None:
+        return ""
+    return f"{value:.{_DIGITS}g}" if isinstance(value, float) else value
+
+
+def _without_clock(rows: Sequence[Row]) -> list[Row]:
+    return [{name: value for name, value in row.items() if name not in _CLOCK} for row in rows]
+
+
+_READING = """# Scoreboard
+
+Strategies on the same worlds, starts and seeds, in suites that are pinned (`baselines/scoreboard/suites.py`).
+
+- A ratio is the geometric mean of paired missions' ratios, over all tasks the geometric mean of the
+  tasks'; below 1 is better. Intervals (…) hold 95 %: a bootstrap over pairs, within each task.
+- A mission that was cut off, or failed, counts with the time limit, and with the path that the team
+  could have driven in it. Where both of a pair were cut off their ratio is 1.
+- Seen: measured by any robot of the team, of the voxels that can be seen at all. Bits: what the best map
+  lost, of the bits that the mission asks for.
+- ms a decision: of one robot, the median over missions of their medians, and the worst of all.
+- A strategy of one's own takes part by `python -m baselines.benchmark --suite NAME --strategies MODULE:CLASS`
+  (docs/own_strategy.md).
+"""
+
+
+def _parts(results: Results, tasks: list[Row], overall: list[Row], command: str) -> list[str]:
+    """The suite's part of the page from top to bottom."""
+    suite = results.suite
+    beside = f"{FILES}/{suite.name}"
+    parts = [
+        f"## {_TITLES[suite.name]}",
+        f"Written by `{command}`.",
+        _overall_table(results, overall),
+        f"![Ratios with intervals]({beside}/ratios.png)",
+        f"![Ratios by task]({beside}/tasks.png)",
+    ]
+    for task in suite.tasks:
+        rows = [row for row in tasks if row["task"] == task.name]
+        parts += [f"### {task.name}", _about(task), _task_table(results, rows)]
+    failed = failed_rows(results)
+    if failed:
+        parts += ["### Missions that failed", _failed_table(failed)]
+    files = ("overall", "tasks", "missions", "timing")
+    parts.append("Files: " + ", ".join(f"[`{name}.csv`]({beside}/{name}.csv)" for name in files) + ".")
+    return parts
+
+
+_TITLES: Mapping[str, str] = {
+    "plans": "Plans: until everything is seen",
+    "volumes": "Volumes and offices: until the map is known",
+    "teams": "Teams and channels",
+    "own": "Scenarios of one's own",
+}
+
+
+def _overall_table(results: Results, rows: list[Row]) -> str:
+    pairs = [(measure, reference) for measure in results.judged_by for reference in results.references]
+    head = ["strategy", "tasks", "finished", *(f"{m.words}, over `{r}`" for m, r in pairs)]
+    first = f"{results.judged_by[0].name}_over_{results.references[0]}"
+    ordered = sorted(rows, key=lambda row: (row[first] is None, row[first]))
+    shown = [
+        [
+            f"`{row['strategy']}`",
+            row["tasks"],
+            "-" if row["finished"] is None else f"{row['finished']:.0%}",
+            *(ranged(row, f"{m.name}_over_{r}", ".2f") for m, r in pairs),
+            *_milliseconds(row),
+        ]
+        for row in ordered
+    ]
+    return markdown_table([*head, "ms a decision", "worst"], shown)
+
+
+def _task_table(results: Results, rows: list[Row]) -> str:
+    plans = results.suite.name == "plans"
+    marks = [Measure("path_m", share) for share in SEEN]
+    if not plans:
+        marks = [Measure("time_s", share, "bits") for share in BITS]
+    unit = "path (m)" if plans else "time (s)"
+    head = ["strategy", "finished", *(measure.words for measure in results.judged_by)]
+    head += [f"{unit} to " + " / ".join(str(mark.share) for mark in marks) + f" % {marks[0].of}"]
+    head += [f"over `{reference}`" for reference in results.references]
+    first = results.judged_by[0]
+    shown = [
+        [
+            f"`{row['strategy']}`",
+            f"{row['finished']} of {row['missions']}"
+            + (f", {row['failed']} failed" if row["failed"] else ""),
+            *(_limited(row, measure) for measure in results.judged_by),
+            " / ".join(_number(row[f"median_{mark.name}"]) for mark in marks),
+            *(ranged(row, f"{first.name}_over_{reference}", ".2f") for reference in results.references),
+            *_milliseconds(row),
+        ]
+        for row in sorted(rows, key=lambda row: row[first.name])
+    ]
+    return markdown_table([*head, "ms a decision", "worst"], shown)
+
+
+def _limited(row: Row, measure: Measure) -> str:
+    """A median with its interval; > the limit, where half of the missions were cut off."""
+    limit = row[f"{measure.name}_limit"]
+    if limit is not None and row[measure.name] >= limit:
+        return f"> {limit:,.0f}"
+    return ranged(row, measure.name, ",.0f")
+
+
+def _milliseconds(row: Row) -> list[str]:
+    return [_number(row[name], ",.2f") for name in _CLOCK]
+
+
+def _number(value: float | None, form: str = ",.0f") -> str:
+    return "-" if value is None else f"{value:{form}}"
+
+
+def ranged(row: Row, name: str, form: str) -> str:
+    """A figure and its interval."""
+    if row[name] is None:
+        return "-"
+    low, high = row[f"{name}_low"], row[f"{name}_high"]
+    return f"{row[name]:{form}} ({low:{form}} … {high:{form}})"
+
+
+def _failed_table(rows: list[Row]) -> str:
+    shown = [
+        [row["task"], f"`{row['strategy']}`", ", ".join(map(str, row["missions"])), _plain(row["reason"])]
+        for row in rows
+    ]
+    return markdown_table(["task", "strategy", "missions", "reason"], shown)
+
+
+def _plain(text: str) -> str:
+    """As it is, whatever Markdown would make of it."""
+    return "".join(f"\\{sign}" if sign in r"\`*_{}[]<>()#!|~" else sign for sign in text)
+
+
+def _about(task: Task) -> str:
+    """What kind of missions a task has."""
+    scenario = task.scenario
+    grid, file = scenario.grid, Path(scenario.world)
+    shape = " × ".join(map(str, grid.shape if not grid.flat else grid.shape[:2]))
+    kind = "ground" if scenario.planar else "flying"
+    worlds = f"{len(task.places)} worlds" if len(task.places) > 1 else f"world `{scenario.world}`"
+    if file.is_file() and len(task.places) == 1:
+        worlds = f"world file `{file.name}`"
+    team = f"{scenario.robots} {kind} robot" + ("s" if scenario.robots > 1 else "")
+    return (
+        f"{task.missions} missions, {worlds}, {shape} voxels of {grid.voxel_size_m:g} m, {team}, "
+        f"time limit {scenario.ending.time_limit_s:,.0f} s."
+    )

@@ -1,0 +1,249 @@
+"""From missions of a suite to rows: one of each strategy in each task, and one over all tasks.
+
+A measure (path, time) of a mission that never came so far counts with its limit: the time limit, and the path
+that the team could have driven in it. A ratio is that of paired missions, with the same world, start and
+seed: of a task its geometric mean, over all tasks the geometric mean of the tasks', each task alike.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from baselines.experiments.outcome import Record
+from baselines.experiments.statistics import Interval, geometric_ratio_interval, median_interval
+from baselines.scoreboard.suites import Suite, Task
+
+BASELINE = "random"
+REFERENCES = ("nearest-frontier", "information-rate-v0")
+"""Strategies that ratios are relative to; where neither takes part, the random walk is."""
+SEEN = (50, 90, 95, 99, 100)
+"""Per cent of what can be seen."""
+BITS = (50, 90, 99)
+"""Per cent of the bits that a mission asks for."""
+
+_LEAST = 1e-3
+"""Of any measure, in metres or seconds: ratios need numbers above 0."""
+
+Row = dict[str, Any]
+
+
+class Measure(NamedTuple):
+    """What a mission is judged by; smaller is better.
+
+    Attributes:
+        figure: `time_s` or `path_m`.
+        share: When that many per cent of what can be seen were seen, or the best map had lost that many per
+            cent of the bits that the mission asks for; None = at the mission's end.
+        of: `seen` or `bits`.
+    """
+
+    figure: str
+    share: int | None = None
+    of: str = "seen"
+
+    @property
+    def name(self) -> str:
+        """Of its column in a table of numbers."""
+        return f"{self.figure}_end" if self.share is None else f"{self.figure}_{self.share}_{self.of}"
+
+    @property
+    def words(self) -> str:
+        """In the heads of tables."""
+        what = "path (m)" if self.figure == "path_m" else "time (s)"
+        return f"{what} to the end" if self.share is None else f"{what} to {self.share} % {self.of}"
+
+
+PATH, TIME, TIME_99, TIME_90 = (
+    Measure("path_m"),
+    Measure("time_s"),
+    Measure("time_s", 99),
+    Measure("time_s", 90, "bits"),
+)
+JUDGED_BY = {
+    "plans": (PATH, TIME_99),
+    "volumes": (TIME, TIME_90),
+    "teams": (TIME, TIME_90),
+    "own": (TIME, TIME_90),
+}
+"""Suite → its two measures, the more important one first."""
+MARKS = (
+    *(Measure(figure, share) for figure in ("time_s", "path_m") for share in SEEN),
+    *(Measure("time_s", share, "bits") for share in BITS),
+)
+"""What is told of every mission."""
+
+
+@dataclass(frozen=True)
+class Results:
+    """A suite that was run.
+
+    Attributes:
+        suite: Its tasks and strategies.
+        records: Cell id → records by seed: of `SuiteMission`, or `failed_record`.
+    """
+
+    suite: Suite
+    records: dict[str, list[Record]]
+
+    @property
+    def references(self) -> tuple[str, ...]:
+        """Strategies that ratios are relative to."""
+        present = tuple(name for name in REFERENCES if name in self.suite.strategies)
+        return present or tuple(name for name in (BASELINE,) if name in self.suite.strategies)
+
+    @property
+    def judged_by(self) -> tuple[Measure, ...]:
+        """The suite's measures."""
+        return JUDGED_BY[self.suite.name]
+
+    def of(self, task: Task, strategy: str) -> list[Record]:
+        """(N) records of a task, the same missions in the same order for every strategy."""
+        return [
+            record
+            for place in task.places
+            for record in self.records[self.suite.cell_id(task, place, strategy)]
+        ]
+
+    def values(self, task: Task, strategy: str, measure: Measure) -> np.ndarray:
+        """(N,) float64 a measure of each mission; its limit where the mission never came so far."""
+        limit = limit_of(task, measure)
+        found = [value(record, measure) for record in self.of(task, strategy)]
+        reached = np.asarray([limit if each is None else each for each in found], float)
+        return np.maximum(reached, _LEAST)
+
+    def ratio(self, strategy: str, reference: str, measure: Measure, tasks: Sequence[Task]) -> Interval:
+        """The ratio to a reference over some tasks."""
+        return geometric_ratio_interval(
+            [self.values(task, strategy, measure) for task in tasks],
+            [self.values(task, reference, measure) for task in tasks],
+        )
+
+
+def limit_of(task: Task, measure: Measure) -> float:
+    """What a mission counts with that never came so far."""
+    limit_s = task.scenario.ending.time_limit_s
+    if measure.figure == "time_s":
+        return limit_s
+    return (
+        sum(task.scenario.kind_of(robot).robot.max_speed_m_s for robot in range(task.scenario.robots))
+        * limit_s
+    )
+
+
+def value(record: Record, measure: Measure) -> float | None:
+    """A measure of a mission; None = it never came so far, or failed."""
+    if measure.share is None:
+        if not record.get("finished", False):
+            return None
+        return record["joint"]["driven_m"] if measure.figure == "path_m" else record["t_mission_s"]
+    if measure.of == "bits":
+        return record.get(f"t{measure.share}_s")
+    mark = f"path{measure.share}_seen_m" if measure.figure == "path_m" else f"t{measure.share}_seen_s"
+    return record.get("joint", {}).get(mark)
+
+
+def task_rows(results: Results) -> list[Row]:
+    """A row of each task and strategy; ends of intervals as `…_low` and `…_high`."""
+    return [
+        _task_row(results, task, strategy)
+        for task in results.suite.tasks
+        for strategy in results.suite.strategies
+    ]
+
+
+def _task_row(results: Results, task: Task, strategy: str) -> Row:
+    records = results.of(task, strategy)
+    row: Row = {
+        "task": task.name,
+        "strategy": strategy,
+        "missions": len(records),
+        "finished": sum(record.get("finished", False) for record in records),
+        "failed": sum("failed" in record for record in records),
+    }
+    for measure in results.judged_by:
+        limit = limit_of(task, measure)
+        row |= interval_columns(measure.name, median_interval(results.values(task, strategy, measure)))
+        row[f"{measure.name}_limit"] = limit if math.isfinite(limit) else None
+        for reference in results.references:
+            name = f"{measure.name}_over_{reference}"
+            row |= interval_columns(name, results.ratio(strategy, reference, measure, [task]))
+    for measure in MARKS:
+        reached = [each for each in (value(record, measure) for record in records) if each is not None]
+        name = f"median_{measure.name}"
+        row[name] = float(np.median(reached)) if 2 * len(reached) > len(records) else None
+    return row | _clock(records)
+
+
+def _clock(records: Sequence[Record]) -> Row:
+    """Milliseconds a decision: the median of the missions' medians, and the worst of all."""
+    clocks = [record["clock"] for record in records if "clock" in record]
+    return {
+        "decision_ms": float(np.median([clock["decision_ms"] for clock in clocks])) if clocks else None,
+        "worst_decision_ms": max((clock["worst_decision_ms"] for clock in clocks), default=None),
+    }
+
+
+def overall_rows(results: Results) -> list[Row]:
+    """A row of each strategy over all tasks in which no mission of it failed."""
+    rows = []
+    for strategy in results.suite.strategies:
+        tasks = [task for task in results.suite.tasks if not _cannot_act(results.of(task, strategy))]
+        records = [record for task in tasks for record in results.of(task, strategy)]
+        finished = sum(record.get("finished", False) for record in records)
+        row: Row = {
+            "strategy": strategy,
+            "tasks": len(tasks),
+            "missions": len(records),
+            "finished": finished / len(records) if records else None,
+        }
+        for measure in results.judged_by:
+            for reference in results.references:
+                ratio = results.ratio(strategy, reference, measure, tasks) if tasks else None
+                row |= interval_columns(f"{measure.name}_over_{reference}", ratio)
+        rows.append(row | _clock(records))
+    return rows
+
+
+def _cannot_act(records: Sequence[Record]) -> bool:
+    """Whether every mission of a task failed."""
+    return all("failed" in record for record in records)
+
+
+_KEPT = ("world", "seed", "end_reason", "t_mission_s", "distance_m", "scans", "blocked_moves")
+
+
+def mission_rows(results: Results) -> list[Row]:
+    """A row of each mission."""
+    rows = []
+    for task in results.suite.tasks:
+        for strategy in results.suite.strategies:
+            for number, record in enumerate(results.of(task, strategy)):
+                row: Row = {"task": task.name, "strategy": strategy, "mission": number}
+                row |= {name: record.get(name) for name in _KEPT}
+                row["end_reason"] = "FAILED" if "failed" in record else row["end_reason"]
+                row |= {measure.name: value(record, measure) for measure in MARKS}
+                rows.append(row)
+    return rows
+
+
+def failed_rows(results: Results) -> list[Row]:
+    """Missions that failed: a row of each task, strategy and reason, with the numbers of the missions."""
+    found: dict[tuple[str, str, str], list[int]] = {}
+    for task in results.suite.tasks:
+        for strategy in results.suite.strategies:
+            for number, record in enumerate(results.of(task, strategy)):
+                if "failed" in record:
+                    found.setdefault((task.name, strategy, record["failed"]), []).append(number)
+    names = ("task", "strategy", "reason")
+    return [{**dict(zip(names, key, strict=True)), "missions": numbers} for key, numbers in found.items()]
+
+
+def interval_columns(name: str, interval: Interval | None) -> Row:
+    """A figure and the ends of its interval under names of their own."""
+    middle, low, high = (None, None, None) if interval is None else interval
+    return {name: middle, f"{name}_low": low, f"{name}_high": high}

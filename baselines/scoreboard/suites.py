@@ -1,0 +1,270 @@
+"""The suites: worlds and starts that are pinned, so that figures of different strategies can be compared.
+
+    plans     floor plans, one ground robot that replans at every scan under way, until everything that can be
+              seen is seen: how far it drives, and how long
+    volumes   3-D worlds and the office, one robot and three, as the scenarios stand, until a map passes the
+              mission's entropy threshold
+    teams     2, 4 and 8 robots with a channel that carries everything; 4 also with a narrow one, and with one
+              that loses half of the messages
+
+Worlds of recipes are those of the test split, which nothing was tuned on; mission k of a task has seed k for
+every strategy. The dungeons are those of ARiADNE (Cao et al., ICRA 2023): a sensor of 80 cells, a robot
+without a body, the start mark as start, and the end when at most 250 cells are unseen.
+"""
+
+from __future__ import annotations
+
+import csv
+import dataclasses
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from pathlib import Path
+from typing import Any
+
+from baselines.experiments.cells import Cell
+from baselines.experiments.mission import scripted
+from baselines.scoreboard.mission import SuiteMission
+from baselines.strategies import STRATEGIES
+from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
+from entropy_explore_env.errors import SettingError
+from entropy_explore_env.scenario import Scenario, with_settings
+from entropy_explore_env.scenarios import SCENARIOS
+from entropy_explore_env.settings import Grid
+
+WORLDS = Path(__file__).parent / "worlds"
+STARTS = WORLDS / "starts.csv"
+STARTS_A_TASK, QUICK_STARTS = 30, 2
+QUICK_DUNGEONS = 4
+SCAN_EVERY_M = 0.5
+"""Plans: everybody scans, and may replan, whenever so much of the way is driven."""
+DUNGEON_UNSEEN = 250
+_UNLIMITED, _LOSSY = 1_000_000, 0.5
+
+
+@dataclass(frozen=True)
+class Place:
+    """A scenario, and the missions that are run in it.
+
+    Attributes:
+        name: Of its folder of results.
+        scenario: Tracks the truth.
+        missions: Their number; their seeds are 0, 1, ….
+        start: x, y, z, yaw, pitch of one robot; None = drawn from the seed.
+    """
+
+    name: str
+    scenario: Scenario
+    missions: int
+    start: tuple[float, float, float, float, float] | None = None
+
+
+@dataclass(frozen=True)
+class Task:
+    """A row of the table for each strategy.
+
+    Attributes:
+        name: As the table says it.
+        places: Their missions, one after the other, are those of the task.
+    """
+
+    name: str
+    places: tuple[Place, ...]
+
+    @property
+    def scenario(self) -> Scenario:
+        """Of the first place; all have the same settings but for the world."""
+        return self.places[0].scenario
+
+    @property
+    def folder(self) -> str:
+        """Of its results."""
+        return "-".join(self.name.replace(",", "").split())
+
+    @property
+    def missions(self) -> int:
+        """N, of all places."""
+        return sum(place.missions for place in self.places)
+
+
+@dataclass(frozen=True)
+class Suite:
+    """What is run.
+
+    Attributes:
+        name: `plans`, `volumes`, `teams`, or `own` for scenarios of one's own.
+        tasks: The rows of each strategy.
+        strategies: Names.
+    """
+
+    name: str
+    tasks: tuple[Task, ...]
+    strategies: tuple[str, ...]
+
+    def cell_id(self, task: Task, place: Place, strategy: str) -> str:
+        """Name of a cell of missions."""
+        where = f"{task.folder}/{place.name}" if len(task.places) > 1 else task.folder
+        return f"{where}/{strategy}"
+
+    @cached_property
+    def cells(self) -> list[Cell]:
+        """All cells, strategies of one place beside each other."""
+        return [
+            Cell(
+                self.cell_id(task, place, strategy),
+                place.scenario,
+                strategy,
+                place.missions,
+                SuiteMission(place.start),
+            )
+            for task in self.tasks
+            for place in task.places
+            for strategy in self.strategies
+        ]
+
+
+def plans(quick: bool = False) -> tuple[Task, ...]:
+    """One ground robot in floor plans, replanning at every scan, until everything is seen."""
+    starts = QUICK_STARTS if quick else STARTS_A_TASK
+    recipes = {name: SCENARIOS[name] for name in ("office", "corridor", "cluttered", "hybrid")}
+    files = {name: _in_file(SCENARIOS["office"], name) for name in ("depot", "warehouse", "willow")}
+    small = {"depot"} if quick else set(files)
+    chosen = {**recipes, **{name: scenario for name, scenario in files.items() if name in small}}
+    return (
+        _dungeons(QUICK_DUNGEONS if quick else None),
+        *(_one(name, _explored(scenario), starts) for name, scenario in chosen.items()),
+    )
+
+
+def volumes(quick: bool = False) -> tuple[Task, ...]:
+    """One robot and three in 3-D worlds and the office, as the scenarios stand."""
+    starts = QUICK_STARTS if quick else STARTS_A_TASK
+    names = ("room", "room-furnished", "office", "office-3d", "cave", "terrain")
+    worlds = {name: SCENARIOS[name] for name in (names[:3] if quick else names)}
+    if not quick:
+        worlds["geb079"] = _in_file(SCENARIOS["office-3d"], "geb079", {"time_limit_s": 14_400.0})
+    return tuple(
+        _one(team_name(name, robots), with_settings(scenario, {"robots": robots}), starts)
+        for name, scenario in worlds.items()
+        for robots in (1, 3)
+    )
+
+
+def teams(quick: bool = False) -> tuple[Task, ...]:
+    """Teams of 2, 4 and 8 robots, with channels of different width."""
+    starts = QUICK_STARTS if quick else STARTS_A_TASK
+    names = ("room-furnished", "office", "office-3d", "cave", "terrain")
+    worlds = {name: SCENARIOS[name] for name in (names[:2] if quick else names)}
+    if not quick:
+        worlds["warehouse"] = _in_file(SCENARIOS["office"], "warehouse")
+    whole: dict[str, Any] = {"burst": _UNLIMITED, "i_min_bits": 0.0}
+    channels: Mapping[str, dict[str, Any]] = {
+        "": whole,
+        ", burst 64": {"burst": 64},
+        ", half of the messages lost": {**whole, "loss_probability": _LOSSY},
+    }
+    return tuple(
+        _one(
+            team_name(name, robots) + words,
+            with_settings(scenario, {"robots": robots, "channel": channel}),
+            starts,
+        )
+        for name, scenario in worlds.items()
+        for words, channel in channels.items()
+        for robots in ((2, 4, 8) if not words else (4,))
+    )
+
+
+SUITES = {"plans": plans, "volumes": volumes, "teams": teams}
+"""Name → a function of `quick` that makes the tasks."""
+
+
+def find_suite(name: str, quick: bool, strategies: tuple[str, ...]) -> Suite:
+    """The suite with a name.
+
+    Args:
+        name: One of SUITES.
+        quick: Few worlds and starts.
+        strategies: Names.
+
+    Raises:
+        SettingError: No suite has this name, or its worlds are not where they should be.
+    """
+    if name not in SUITES:
+        raise SettingError("suite", name, "one of " + ", ".join(SUITES))
+    return Suite(name, SUITES[name](quick), strategies)
+
+
+def all_strategies() -> tuple[str, ...]:
+    """The names of all scripted strategies."""
+    return tuple(STRATEGIES)
+
+
+def _one(name: str, scenario: Scenario, missions: int) -> Task:
+    """A task in one scenario of the test split."""
+    tested = with_settings(scenario, {"split": "test", "track_truth": True})
+    return Task(name, (Place(name, tested, missions),))
+
+
+def team_name(name: str, robots: int) -> str:
+    """A task's name: the scenario and the team size."""
+    return f"{name}, {robots} robot" + ("s" if robots > 1 else "")
+
+
+def _explored(scenario: Scenario) -> Scenario:
+    """A scenario whose robot replans at every scan, and whose mission ends when everything is seen."""
+    changes = {
+        "robots": 1,
+        "robot": {"redecide": "on_scan", "body_radius_m": 0.0},
+        "sensor": {"scan_every_m": SCAN_EVERY_M},
+        "ending": {"seen_share": 1.0, "time_limit_s": 7200.0},
+    }
+    return with_settings(scenario, changes)
+
+
+def _in_file(scenario: Scenario, name: str, settings: Mapping[str, Any] | None = None) -> Scenario:
+    """A scenario in one of the worlds that come with the suites.
+
+    Raises:
+        SettingError: The world is not there.
+    """
+    path = WORLDS / f"{name}.npz"
+    if not path.is_file():
+        allowed = "there: it comes with the project; make it again with baselines.scoreboard.pack_worlds"
+        raise SettingError("suite world", str(path), allowed)
+    size_m = {"geb079": 0.16}.get(Path(name).name, 0.1)
+    replaced = dataclasses.replace(scenario, name=Path(name).name, world=str(path))
+    return with_settings(dataclasses.replace(replaced, grid=_grid_of(str(path), size_m)), settings or {})
+
+
+@lru_cache(maxsize=256)
+def _grid_of(path: str, voxel_size_m: float) -> Grid:
+    """The grid of a saved world, read as environments read it."""
+    base = with_settings(SCENARIOS["office"], {"world": path, "grid": {"voxel_size_m": voxel_size_m}})
+    return EntropyExploreEnv(scripted(base)).scenario.grid
+
+
+def _dungeons(count: int | None) -> Task:
+    """ARiADNE's dungeons; None = all."""
+    if not STARTS.is_file():
+        raise SettingError("suite world", str(STARTS), "there: it comes with the project")
+    base = with_settings(
+        SCENARIOS["office"],
+        {
+            "robots": 1,
+            "robot": {"redecide": "on_scan", "body_radius_m": 0.0, "reach_m": 8.0},
+            "sensor": {"max_range_m": 8.0, "scan_every_m": SCAN_EVERY_M, "angular_step_rad": math.pi / 360},
+            "ending": {"unseen_free_voxels": DUNGEON_UNSEEN, "time_limit_s": 7200.0},
+            "track_truth": True,
+        },
+    )
+    with STARTS.open(newline="") as file:
+        rows = list(csv.DictReader(file))[:count]
+    places = []
+    for row in rows:
+        scenario = _in_file(base, f"dungeons/{row['dungeon']}")
+        z_m = float(scenario.grid.voxel_size_m / 2)
+        start = (float(row["x_m"]), float(row["y_m"]), z_m, 0.0, 0.0)
+        places.append(Place(row["dungeon"], dataclasses.replace(scenario, name="dungeon"), 1, start))
+    return Task("dungeons", tuple(places))

@@ -1,0 +1,52 @@
+"""Results of a suite in the terminal, and as JSON."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from baselines.scoreboard.page import ranged
+from baselines.scoreboard.results import Results, failed_rows, overall_rows, task_rows
+
+
+def printed_results(results: Results) -> dict[str, Any]:
+    """All rows, for JSON."""
+    return {
+        "suite": results.suite.name,
+        "overall": overall_rows(results),
+        "tasks": task_rows(results),
+        "failed": failed_rows(results),
+    }
+
+
+def show_results(results: Results) -> None:
+    """A table over all tasks on standard output, and missions that failed."""
+    from rich import box
+    from rich.console import Console
+    from rich.table import Table
+
+    measure, reference = results.judged_by[0], results.references[0]
+    names = ", ".join(task.name for task in results.suite.tasks)
+    table = Table(
+        title=f"{names}; ratios: over {reference}'s",
+        title_justify="left",
+        box=box.SIMPLE_HEAD,
+        padding=(0, 1, 0, 0),
+        pad_edge=False,
+    )
+    table.add_column("strategy", overflow="fold")
+    for head in ("finished", measure.words, "ms a\ndecision"):
+        table.add_column(head, justify="right", no_wrap=True)
+    name = f"{measure.name}_over_{reference}"
+    for row in sorted(overall_rows(results), key=lambda row: (row[name] is None, row[name])):
+        table.add_row(
+            row["strategy"],
+            "-" if row["finished"] is None else f"{row['finished']:.0%}",
+            ranged(row, name, ".2f"),
+            "-" if row["decision_ms"] is None else f"{row['decision_ms']:.2f}",
+        )
+    console = Console()
+    console.print(table)
+    for row in failed_rows(results):
+        missions = ", ".join(map(str, row["missions"]))
+        line = f"failed: {row['strategy']}, {row['task']}, missions {missions}: {row['reason']}"
+        console.print(line, markup=False, highlight=False)

@@ -1,0 +1,113 @@
+"""The suites: worlds, starts and seeds that stay as they are."""
+
+from __future__ import annotations
+
+import hashlib
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from baselines.scoreboard import suites
+from baselines.scoreboard.pack_worlds import dungeon
+from baselines.scoreboard.suites import DUNGEON_UNSEEN, SUITES, WORLDS, find_suite
+from entropy_explore_env import load_world
+from entropy_explore_env.errors import SettingError, WorldError
+
+TEAMS = ("random", "gradient")
+NAMES = {
+    "plans": ["dungeons", "office", "corridor", "cluttered", "hybrid", "depot", "warehouse", "willow"],
+    "volumes": [
+        f"{name}, {team}"
+        for name in ("room", "room-furnished", "office", "office-3d", "cave", "terrain", "geb079")
+        for team in ("1 robot", "3 robots")
+    ],
+    "teams": [
+        f"{name}, {team}"
+        for name in ("room-furnished", "office", "office-3d", "cave", "terrain", "warehouse")
+        for team in (
+            "2 robots",
+            "4 robots",
+            "8 robots",
+            "4 robots, burst 64",
+            "4 robots, half of the messages lost",
+        )
+    ],
+}
+
+
+@pytest.mark.parametrize("name", SUITES)
+def test_a_suite_is_pinned(name):
+    suite = find_suite(name, False, TEAMS)
+    assert [task.name for task in suite.tasks] == NAMES[name]
+    for task in suite.tasks:
+        assert task.missions == (100 if task.name == "dungeons" else 30)
+        assert task.scenario.track_truth
+        assert task.scenario.split == "test" or task.name == "dungeons"  # which has no split
+    ids = [cell.id for cell in suite.cells]
+    assert len(set(ids)) == len(ids) and all("," not in each and " " not in each for each in ids)
+
+
+def test_the_worlds_are_those_that_they_were():
+    digest = hashlib.sha256()
+    for path in sorted(WORLDS.rglob("*.npz")):
+        world = load_world(path)
+        digest.update(repr((path.relative_to(WORLDS).as_posix(), world.grid)).encode())
+        digest.update(np.packbits(world.occupied).tobytes())
+    digest.update((WORLDS / "starts.csv").read_bytes())
+    assert digest.hexdigest() == "51d9a6aa1c3dd334d6c5f6bbd321b90bb285c291445e1baeb6712078393672ac"
+
+
+def test_plans_replan_at_every_scan_until_everything_is_seen():
+    for task in find_suite("plans", False, TEAMS).tasks:
+        scenario = task.scenario
+        assert (scenario.robot.redecide, scenario.sensor.scan_every_m) == ("on_scan", suites.SCAN_EVERY_M)
+        if task.name == "dungeons":
+            assert scenario.ending.unseen_free_voxels == DUNGEON_UNSEEN == 250
+            assert scenario.sensor.max_range_m == 80 * scenario.grid.voxel_size_m
+            assert scenario.robot.body_radius_m == 0.0
+        else:
+            assert scenario.ending.seen_share == 1.0
+
+
+def test_dungeons_start_on_their_mark():
+    (dungeons,) = [task for task in find_suite("plans", False, TEAMS).tasks if task.name == "dungeons"]
+    for place in dungeons.places[:: len(dungeons.places) // 4]:
+        world, start = load_world(place.scenario.world), place.start
+        assert start is not None
+        x, y, z = world.grid.voxel_of(np.asarray(start[:3]))
+        assert not world.occupied[x, y, z]
+    assert len({place.scenario.world for place in dungeons.places}) == len(dungeons.places) == 100
+
+
+def test_a_dungeon_is_rock_and_floor_as_in_its_image(tmp_path):
+    colours = np.full((5, 7, 3), 195, np.uint8)
+    colours[0, :, :], colours[4, 2, :] = 127, 127
+    colours[3, 4:6, :] = (255, 216, 0)
+    Image.fromarray(colours).save(tmp_path / "img_1.png")
+    world, start = dungeon(tmp_path / "img_1.png")
+    assert world.grid.shape == (7, 5, 1)
+    assert world.occupied[:, 4, 0].all() and world.occupied[2, 0, 0] and world.occupied.sum() == 8
+    assert start == (pytest.approx(0.5), pytest.approx(0.15))  # columns 4 and 5, the second row from below
+    colours[3, 4:6, :] = 195
+    Image.fromarray(colours).save(tmp_path / "img_1.png")
+    with pytest.raises(WorldError, match="start"):
+        dungeon(tmp_path / "img_1.png")
+
+
+def test_teams_differ_in_their_channel_alone():
+    tasks = {task.name: task.scenario for task in find_suite("teams", True, TEAMS).tasks}
+    whole, narrow = tasks["office, 4 robots"], tasks["office, 4 robots, burst 64"]
+    lossy = tasks["office, 4 robots, half of the messages lost"]
+    assert whole.channel.burst >= whole.sensor.rays and whole.channel.i_min_bits == 0.0
+    assert (narrow.channel.burst, lossy.channel.loss_probability) == (64, 0.5)
+    assert lossy.channel.burst == whole.channel.burst and whole.channel.loss_probability == 0.0
+
+
+def test_unknown_suites_and_missing_worlds_are_named(monkeypatch):
+    with pytest.raises(SettingError, match=r"suite = 'plan': allowed is one of plans, volumes, teams"):
+        find_suite("plan", False, TEAMS)
+    monkeypatch.setattr(suites, "WORLDS", Path("/nowhere"))
+    with pytest.raises(SettingError, match=r"suite world = '/nowhere/geb079.npz'.*pack_worlds"):
+        find_suite("volumes", False, TEAMS)
