@@ -11,18 +11,15 @@ import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
 
-from baselines.cli.arguments import OmitArgPrefixes, Positional, parse, run_command
+from baselines.cli.arguments import INLINE, OmitArgPrefixes, Positional, parse, run_command
 from baselines.cli.mission_outputs import MissionLog, Outputs, Wanted, show_results
 from baselines.cli.progress import progress_bar
-from baselines.cli.start_options import reset_options
-from baselines.cli.world_options import Reading, world_settings
-from baselines.experiments.mission import run_mission, scripted
+from baselines.cli.task_options import TaskOptions, base_task, parsed_for, tasked
+from baselines.experiments.mission import run_mission, scripted_env
 from baselines.strategies import make_strategy, resolved
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
-from entropy_explore_env.scenario import Scenario
-from entropy_explore_env.scenarios import ROOM, find_scenario
-from entropy_explore_env.settings import Channel, Ending, RangeSensor, Robot
 from entropy_explore_env.validation import check_whole
 
 
@@ -43,36 +40,23 @@ class Args:
     """Team size."""
     seed: int = 0
     """Of the world, the starts and every other draw."""
-    world: str | None = None
-    """A world file in place of the scenario's world; entropy_explore_env.worlds lists the kinds."""
-    world_number: int | None = None
-    """The world with this number of the scenario's recipe; default: drawn by the seed."""
-    starts: str | None = None
-    """Poses of all robots as JSON, or a file of it: [[x, y, z, yaw, pitch], ...] in metres and radians,
-    of planar robots also [x, y, yaw]; default: drawn by the seed."""
-    voxel_size_m: float | None = None
-    """Resample the world file's voxels to this size; default: the scenario's."""
-    world_file: OmitArgPrefixes[Reading] = dataclasses.field(default_factory=Reading)
+    task: Annotated[TaskOptions, INLINE] = dataclasses.field(default_factory=TaskOptions)
     out: Path | None = None
     """Folder for mission.json, mission.png, mission.gif and mission.npz."""
     record: Path | None = None
     """File for the mission's record, an .npz that baselines.replay runs again."""
     output: OmitArgPrefixes[Outputs] = dataclasses.field(default_factory=Outputs)
-    robot: Robot = dataclasses.field(default_factory=Robot)
-    sensor: RangeSensor = dataclasses.field(default_factory=RangeSensor)
-    channel: Channel = dataclasses.field(default_factory=Channel)
-    ending: Ending = dataclasses.field(default_factory=Ending)
 
 
 def main(words: Sequence[str]) -> int:
     """Run the command."""
-    named = parse(Args, words, default=_defaults(ROOM), description=__doc__).scenario
-    args = parse(Args, words, default=_defaults(find_scenario(named)), description=__doc__)
+    first = parse(Args, words, description=__doc__)
+    task = base_task(first.scenario, first.task.settings)
+    args = parsed_for(task, first, words, __doc__, robots=task.scenario.robots)
     name = resolved(args.strategy)
     strategy = make_strategy(name)
     check_whole("seed", args.seed, 0)
-    env = _env(args)
-    options = reset_options(args.starts, args.world_number, env.scenario)
+    env = scripted_env(*tasked(task.scenario, args.task, args.robots), track_truth=True)
     wanted = Wanted(args.output, args.out, args.record)
     wanted.prepare()
     title = f"{args.scenario}, {name}"
@@ -82,28 +66,10 @@ def main(words: Sequence[str]) -> int:
             log.note(env)
             show(env)
 
-        run_mission(env, strategy, args.seed, after_step, log.command, options)
+        run_mission(env, strategy, args.seed, after_step, log.command)
         figures, written = log.finish(name)
     show_results(env, figures, written, args.output.json)
     return 0
-
-
-def _defaults(scenario: Scenario) -> Args:
-    return Args(
-        scenario=scenario.name,
-        robots=scenario.robots,
-        robot=scenario.robot,
-        sensor=scenario.sensor,
-        channel=scenario.channel,
-        ending=scenario.ending,
-    )
-
-
-def _env(args: Args) -> EntropyExploreEnv:
-    """The scenario with the command line's settings, in its world or in the file's."""
-    settings = {name: getattr(args, name) for name in ("robots", "robot", "sensor", "channel", "ending")}
-    world = world_settings(args.world, args.voxel_size_m, args.world_file)
-    return EntropyExploreEnv(scripted(find_scenario(args.scenario)), track_truth=True, **settings, **world)
 
 
 if __name__ == "__main__":

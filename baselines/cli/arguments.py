@@ -39,9 +39,10 @@ if TYPE_CHECKING:
     from tyro.conf import OmitArgPrefixes, Positional
 
     WholeNumber = int
+    INLINE: Any
 else:
     try:
-        from tyro.conf import OmitArgPrefixes, Positional
+        from tyro.conf import OmitArgPrefixes, Positional, arg
         from tyro.constructors import PrimitiveConstructorSpec
 
         WholeNumber = Annotated[
@@ -55,6 +56,8 @@ else:
             ),
         ]
         """Of a field: an int that may also be typed as 1e6."""
+        INLINE = arg(name="")
+        """`Annotated[Options, INLINE]`: the options of a dataclass without the field's name before theirs."""
     except ImportError:  # `parse` says what is missing
 
         class Positional:
@@ -64,7 +67,7 @@ else:
                 """The kind itself."""
                 return kind
 
-        OmitArgPrefixes, WholeNumber = Positional, int
+        OmitArgPrefixes, WholeNumber, INLINE = Positional, int, None
 
 Arguments = TypeVar("Arguments")
 

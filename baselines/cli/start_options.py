@@ -26,25 +26,29 @@ def reset_options(starts: str | None, world_number: int | None, scenario: Scenar
     """
     options: dict[str, Any] = {} if world_number is None else {"world": world_number}
     if starts is not None:
-        poses = _json(starts)
+        poses = given_json("starts", starts, _ALLOWED)
         if not isinstance(poses, list) or not all(isinstance(pose, list) for pose in poses):
             raise SettingError("starts", starts, _ALLOWED)
         options["starts"] = [_full_pose(scenario, robot, pose) for robot, pose in enumerate(poses)]
     return options
 
 
-def _json(starts: str) -> Any:  # noqa: ANN401 - whatever the text holds
-    """What the text, or the file of this name, holds."""
-    text = starts
-    if not starts.lstrip().startswith("["):
+def given_json(option: str, given: str, allowed: str) -> Any:  # noqa: ANN401 - whatever the text holds
+    """What a text of JSON (it begins with a bracket), or the file of this name, holds.
+
+    Raises:
+        SettingError: It is neither.
+    """
+    text = given
+    if not given.lstrip().startswith("["):
         try:
-            text = Path(starts).read_text()
+            text = Path(given).expanduser().read_text("utf-8")
         except (OSError, UnicodeDecodeError):
-            raise SettingError("starts", starts, _ALLOWED) from None
+            raise SettingError(option, given, allowed) from None
     try:
         return json.loads(text)
     except (ValueError, RecursionError):
-        raise SettingError("starts", starts, _ALLOWED) from None
+        raise SettingError(option, given, allowed) from None
 
 
 def _full_pose(scenario: Scenario, robot: int, pose: list[Any]) -> list[Any]:

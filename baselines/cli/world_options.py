@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -45,23 +46,24 @@ class Reading:
         return options
 
 
-def world_settings(world: str | None, voxel_size_m: float | None, reading: Reading) -> dict[str, Any]:
-    """Settings of an environment in a world file.
+def world_settings(worlds: Sequence[str], voxel_size_m: float | None, reading: Reading) -> dict[str, Any]:
+    """Settings of an environment in world files; what JSON holds.
 
     Args:
-        world: The file; None = the scenario's own world.
+        worlds: The files; none = the scenario's own world.
         voxel_size_m: Edge of the voxels wanted; None = the scenario's.
-        reading: How it is read. Where nothing is asked for, the file stays a setting of the scenario, which
-            a mission record refers to; else the record holds the world.
+        reading: How they are read. A single file of which nothing is asked stays a setting of the scenario,
+            which a mission record refers to; else the record holds the world.
 
     Raises:
         SettingError: Something is asked for and there is no file.
     """
     size = {} if voxel_size_m is None else {"voxel_size_m": voxel_size_m}
-    if world is None:
+    if not worlds:
         for name, value in (size | reading.asked()).items():
             raise SettingError(name, value, "given together with --world only")
         return {}
-    if reading.asked():
-        return {"world": {"path": world, **size, **reading.options()}}
-    return {"world": world, **({"grid": size} if size else {})}
+    if len(worlds) > 1 or reading.asked():
+        path = worlds[0] if len(worlds) == 1 else list(worlds)
+        return {"world": {"path": path, **size, **reading.options()}}
+    return {"world": worlds[0], **({"grid": size} if size else {})}

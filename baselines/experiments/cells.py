@@ -11,7 +11,7 @@ from functools import cached_property, lru_cache
 from pathlib import Path
 
 from baselines.experiments import mission
-from baselines.experiments.mission import mission_record, scripted
+from baselines.experiments.mission import Surroundings, mission_record, scripted, scripted_env
 from baselines.experiments.outcome import Outcome, Record
 from baselines.experiments.provenance import code_digest, modules_of
 from baselines.experiments.runner import Conditions, run_all
@@ -34,6 +34,7 @@ class Cell:
         record: Runs a mission with a strategy and a seed, and says what is kept of it: a function at the top
             of a module, or a frozen dataclass that can be called. Its module, and those of its fields that
             are dataclasses, are part of the code that makes the results.
+        surroundings: World files, starts and length of a step; None = those that the scenario says.
     """
 
     id: str
@@ -41,6 +42,7 @@ class Cell:
     strategy: str
     seeds: int
     record: Callable[[EntropyExploreEnv, str, int], Record] = mission_record
+    surroundings: Surroundings | None = None
 
     @cached_property
     def settings_digest(self) -> str:
@@ -56,6 +58,7 @@ class Cell:
                 scenario,
                 self.strategy,
                 self.record if is_dataclass(self.record) else self.record.__qualname__,
+                *(() if self.surroundings is None else (self.surroundings,)),
             )
         )
         for file in self._files():
@@ -72,7 +75,8 @@ class Cell:
     def _files(self) -> list[Path]:
         """Files that the scenario and the record name."""
         named = (self.scenario.world, *(part for part in _parts(self.record) if isinstance(part, str)))
-        return [Path(name) for name in named if Path(name).is_file()]
+        files = [*map(Path, named), *(self.surroundings.files() if self.surroundings else ())]
+        return [file for file in files if file.is_file()]
 
 
 def _parts(value: object) -> list[object]:
@@ -105,7 +109,7 @@ class CellMission:
     def run(self) -> Outcome:
         """Run the mission in this process."""
         try:
-            env = _environment(scripted(self.cell.scenario))
+            env = _environment(self.cell.scenario, self.cell.surroundings)
             return Outcome(self.cell.record(env, self.cell.strategy, self.seed))
         except BaseException:
             _environment.cache_clear()  # it stopped in the middle of something
@@ -113,9 +117,9 @@ class CellMission:
 
 
 @lru_cache(maxsize=1)
-def _environment(scenario: Scenario) -> EntropyExploreEnv:
+def _environment(scenario: Scenario, surroundings: Surroundings | None) -> EntropyExploreEnv:
     """Kept for the next mission."""
-    return EntropyExploreEnv(scenario)
+    return scripted_env(scenario, surroundings)
 
 
 def run_cells(

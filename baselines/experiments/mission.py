@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -23,9 +26,54 @@ NOTHING_OBSERVED = Observation(panorama=False, self_state=False, team=False)
 _SERIES_POINTS = 200
 
 
-def scripted(scenario: Scenario) -> Scenario:
-    """The scenario as scripted strategies run it: steps from decision to decision, no observation."""
-    return with_settings(scenario, {"decision_period_s": None, "observation": NOTHING_OBSERVED})
+@dataclass(frozen=True)
+class Surroundings:
+    """What of missions is no setting of their scenario, as texts, so that it goes into digests.
+
+    Attributes:
+        worlds: JSON of the settings `world` and `grid` of missions in world files; empty = in no files.
+        every_reset: JSON of the options `starts` and `world` of every reset; empty = all is drawn.
+        decision_period_s: Length of a step; None = until the next robot has to decide.
+    """
+
+    worlds: str = ""
+    every_reset: str = ""
+    decision_period_s: float | None = None
+
+    def settings(self) -> dict[str, Any]:
+        """As an environment takes them."""
+        fixed = {"every_reset": json.loads(self.every_reset)} if self.every_reset else {}
+        return {**(json.loads(self.worlds) if self.worlds else {}), **fixed}
+
+    def files(self) -> list[Path]:
+        """The world files."""
+        world = self.settings().get("world", [])
+        paths = world["path"] if isinstance(world, dict) else world
+        return [Path(path) for path in ([paths] if isinstance(paths, str) else paths)]
+
+
+def scripted(scenario: Scenario, decision_period_s: float | None = None) -> Scenario:
+    """The scenario as scripted strategies run it: no observation, steps until a decision or of a length."""
+    return with_settings(scenario, {"decision_period_s": decision_period_s, "observation": NOTHING_OBSERVED})
+
+
+def scripted_env(
+    scenario: Scenario, surroundings: Surroundings | None = None, **settings: object
+) -> EntropyExploreEnv:
+    """An environment for scripted strategies.
+
+    Args:
+        scenario: The task.
+        surroundings: Of its missions; None = no others than the scenario says.
+        **settings: Fields of the scenario to change.
+
+    Raises:
+        SettingError: A setting is not allowed.
+        WorldError: A world file cannot be used.
+    """
+    around = surroundings or Surroundings()
+    task = scripted(scenario, around.decision_period_s)
+    return EntropyExploreEnv(task, **{**around.settings(), **settings})
 
 
 def run_mission(

@@ -61,6 +61,7 @@ class EntropyExploreEnv(ParallelEnv[str, Any, Any]):
         render_mode: str | None = None,
         *,
         reward_function: RewardFunction | None = None,
+        every_reset: Mapping[str, Any] | None = None,
         **settings: Unpack[ScenarioSettings],
     ) -> None:
         """Make the environment; `reset` starts a mission.
@@ -69,6 +70,7 @@ class EntropyExploreEnv(ParallelEnv[str, Any, Any]):
             scenario: A scenario's name, or a Scenario.
             render_mode: None, "human" or "rgb_array".
             reward_function: Rewards the robots in place of the scenario's reward; see `envs.rewards`.
+            every_reset: `starts` and `world` of all missions, for resets that do not say them.
             **settings: Fields of the Scenario to change; `world` may also be a World, a sequence of
                 them, or a mapping of a file's `path` and options: see `worlds.given`.
 
@@ -82,6 +84,7 @@ class EntropyExploreEnv(ParallelEnv[str, Any, Any]):
         self.missions = Missions(asked, given=given)
         self.missions.reward_function = self._rewards.name
         self.scenario = self.missions.scenario
+        self.missions.every_reset = mission_options(named_options(every_reset), self.scenario)
         self.render_mode = render_mode
         self.possible_agents = list(self.scenario.agents)
         self.agents: list[str] = []
@@ -240,6 +243,7 @@ def parallel_env(
     render_mode: str | None = None,
     *,
     reward_function: RewardFunction | None = None,
+    every_reset: Mapping[str, Any] | None = None,
     **settings: Unpack[ScenarioSettings],
 ) -> EntropyExploreEnv:
     """A team's mission as a ParallelEnv: see `EntropyExploreEnv`.
@@ -248,13 +252,16 @@ def parallel_env(
         scenario: A scenario's name (`entropy_explore_env.SCENARIOS`), or a Scenario.
         render_mode: None, `rgb_array` or `human`.
         reward_function: Rewards the robots in place of the scenario's reward; see `envs.rewards`.
+        every_reset: `starts` and `world` of all missions, for resets that do not say them.
         **settings: Fields of the Scenario to change: `robots`, `world` (a recipe, a file, a World, or
             several Worlds dealt to missions in turn: see `worlds.given`),
             `decision_period_s`, `max_cycles`, `time_limit_s`, and its parts `grid`, `robot`, `sensor`,
             `channel` (`{"burst": 32, "i_min_bits": 0.3}`), `ending`, `reward`, `action`, `observation`,
             each a mapping of some of its fields or a whole object: see `help` of Scenario, Channel, …
     """
-    return EntropyExploreEnv(scenario, render_mode, reward_function=reward_function, **settings)
+    return EntropyExploreEnv(
+        scenario, render_mode, reward_function=reward_function, every_reset=every_reset, **settings
+    )
 
 
 parallel_env.__doc__ = f"{parallel_env.__doc__}\n\nWhat a robot observes. {_PARTS}"
@@ -304,7 +311,12 @@ def env(
     render_mode: str | None = None,
     *,
     reward_function: RewardFunction | None = None,
+    every_reset: Mapping[str, Any] | None = None,
     **settings: Unpack[ScenarioSettings],
 ) -> TurnTakingEnv:
     """The same as an AECEnv: robots act in turn, and the step is taken when all have."""
-    return TurnTakingEnv(parallel_env(scenario, render_mode, reward_function=reward_function, **settings))
+    return TurnTakingEnv(
+        parallel_env(
+            scenario, render_mode, reward_function=reward_function, every_reset=every_reset, **settings
+        )
+    )

@@ -71,6 +71,7 @@ class RobotVecEnv(VecEnv):
         threads: int | None = 1,
         seeds: Sequence[int] | None = None,
         reward_function: RewardFunction | None = None,
+        every_reset: Mapping[str, Any] | None = None,
         **settings: Unpack[ScenarioSettings],
     ) -> None:
         """Make the missions.
@@ -81,6 +82,7 @@ class RobotVecEnv(VecEnv):
             threads: That share the missions; None = one a processor. Results are the same.
             seeds: (E,) of the missions' first reset, whatever `seed` says; None = that, else fresh ones.
             reward_function: Rewards the robots in place of the scenario's reward; see `envs.rewards`.
+            every_reset: `starts` and `world` of all missions, for resets that do not say them.
             **settings: Fields of the Scenario to change.
 
         Raises:
@@ -94,6 +96,7 @@ class RobotVecEnv(VecEnv):
             autoreset_mode=AutoresetMode.SAME_STEP,
             action_masks=False,
             reward_function=reward_function,
+            every_reset=every_reset,
             **settings,
         )
         if seeds is not None:

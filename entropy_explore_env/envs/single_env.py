@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import gymnasium
@@ -40,6 +41,7 @@ class SingleRobotEnv(gymnasium.Env[Any, Any]):
         render_mode: str | None = None,
         *,
         reward_function: RewardFunction | None = None,
+        every_reset: Mapping[str, Any] | None = None,
         **settings: Unpack[ScenarioSettings],
     ) -> None:
         """Make the environment; `reset` starts a mission.
@@ -48,6 +50,7 @@ class SingleRobotEnv(gymnasium.Env[Any, Any]):
             scenario: A scenario's name, or a Scenario; its team size is set to 1.
             render_mode: None, "human" or "rgb_array".
             reward_function: Rewards the robots in place of the scenario's reward; see `envs.rewards`.
+            every_reset: `starts` and `world` of all missions, for resets that do not say them.
             **settings: Fields of the Scenario to change; `world` may also be a World, a sequence of
                 them, or a mapping of a file's `path` and options: see `worlds.given`.
 
@@ -63,6 +66,7 @@ class SingleRobotEnv(gymnasium.Env[Any, Any]):
         self.missions = Missions(asked, given=given)
         self.missions.reward_function = self._rewards.name
         self.scenario = self.missions.scenario
+        self.missions.every_reset = mission_options(named_options(every_reset), self.scenario)
         self.render_mode = render_mode
         space = action_space(self.scenario)
         self.action_space = space

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,7 +16,13 @@ from entropy_explore_env.envs.rewards import RewardFunction, StepRewards
 from entropy_explore_env.errors import CallOrderError, SettingError
 from entropy_explore_env.missions.action import action_space
 from entropy_explore_env.missions.observation.layout import short_repr
-from entropy_explore_env.missions.reset_options import NAMES, ResetOptions, batch_options, named_options
+from entropy_explore_env.missions.reset_options import (
+    NAMES,
+    ResetOptions,
+    batch_options,
+    mission_options,
+    named_options,
+)
 from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.missions.state import MissionEnd, goals_reached
 from entropy_explore_env.randomness import check_seed
@@ -59,6 +65,7 @@ class EntropyExploreVectorEnv(VectorEnv[Any, Any, Any]):
         render_mode: str | None = None,
         action_masks: bool = True,
         reward_function: RewardFunction | None = None,
+        every_reset: Mapping[str, Any] | None = None,
         **settings: Unpack[ScenarioSettings],
     ) -> None:
         """Make the missions; `reset` starts them.
@@ -72,6 +79,7 @@ class EntropyExploreVectorEnv(VectorEnv[Any, Any, Any]):
             render_mode: None, "human" or "rgb_array", of the first mission.
             action_masks: Whether infos hold the masks of discrete actions; without them steps are faster.
             reward_function: Rewards the robots in place of the scenario's reward; see `envs.rewards`.
+            every_reset: `starts` and `world` of all missions, for resets that do not say them.
             **settings: Fields of the Scenario to change; `world` may also be a World, a sequence of
                 them, or a mapping of a file's `path` and options: see `worlds.given`.
 
@@ -92,6 +100,7 @@ class EntropyExploreVectorEnv(VectorEnv[Any, Any, Any]):
         self.missions = Missions(asked, num_envs, threads, given)
         self.missions.reward_function = self._rewards.name
         self.scenario = self.missions.scenario
+        self.missions.every_reset = mission_options(named_options(every_reset), self.scenario)
         self.num_envs = self.missions.count
         self.metadata = {
             "autoreset_mode": self.autoreset_mode,

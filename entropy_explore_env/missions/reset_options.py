@@ -38,6 +38,13 @@ class ResetOptions(NamedTuple):
     world_number: int | None = None
     world: World | None = None
 
+    def filled_up(self, others: ResetOptions) -> ResetOptions:
+        """These options, and of others what these leave open."""
+        starts = others.starts if self.starts is None else self.starts
+        if self.world is None and self.world_number is None:
+            return ResetOptions(starts, others.world_number, others.world)
+        return ResetOptions(starts, self.world_number, self.world)
+
 
 DRAWN = ResetOptions()
 """Nothing is given."""

@@ -88,6 +88,7 @@ class Missions:
         worlds: The true world of each mission; None before its first reset.
         world_numbers: Its number in each mission; None where no recipe made it.
         options: What was given to the latest reset of each mission, instead of drawing it.
+        every_reset: What resets are given that say nothing of it, also where missions start by themselves.
         reward_function: Name of the function that rewards the robots in place of the scenario's reward, for
             records; empty = none. Missions themselves always reward by the scenario.
         layout: What an observation is made of.
@@ -133,6 +134,7 @@ class Missions:
         self.worlds: list[World | None] = [None] * self.count
         self.world_numbers: list[int | None] = [None] * self.count
         self.options = [DRAWN] * self.count
+        self.every_reset = DRAWN
         self.reward_function = ""
         self.seeds = [0] * self.count
         self.episodes = [-1] * self.count
@@ -224,6 +226,7 @@ class Missions:
 
     def draw_episode(self, mission: int, seed: int, episode: int, options: ResetOptions) -> Start:
         """What a mission would start with as an episode of a seed; nothing changes. See `reset`."""
+        options = options.filled_up(self.every_reset)
         number = options.world_number
         if options.world is not None:
             world = options.world

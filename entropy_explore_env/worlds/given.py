@@ -8,14 +8,18 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from entropy_explore_env.errors import SettingError, WorldError
 from entropy_explore_env.scenario import Scenario, with_settings
+from entropy_explore_env.settings import Grid
 from entropy_explore_env.worlds.load import world_from_file
 from entropy_explore_env.worlds.world import World
 
 GIVEN = "given"
 """`Scenario.world` of missions whose worlds were given as objects: nothing can be made from it alone."""
 _ALLOWED = "a recipe's name, a file's path, a World, a list of Worlds, or a mapping: `path` and options"
+_PATHS = "a mapping with the `path` of a file, or a list of paths"
 
 
 def with_given_worlds(scenario: Scenario, settings: Mapping[str, Any]) -> tuple[Scenario, tuple[World, ...]]:
@@ -24,8 +28,9 @@ def with_given_worlds(scenario: Scenario, settings: Mapping[str, Any]) -> tuple[
     Args:
         scenario: What to start from.
         settings: As for `config.with_settings`; `world` may also be a World, a sequence of Worlds of one
-            grid, or a mapping of a file's `path` and options of `load_world`, whose voxels have the
-            scenario's size unless it says another. The grid is then the world's.
+            grid, or a mapping of a file's `path` (or a list of paths) and options of `load_world`, whose
+            voxels have the scenario's size unless it says another. The grid is then the world's; that of
+            several files holds each of them (`on_one_grid`).
 
     Returns:
         The scenario, and its worlds (N,); none where they come from a recipe or a file.
@@ -79,11 +84,74 @@ def world_in_turn(given: Sequence[World], seed: int, episode: int) -> World:
 
 
 def _from_options(scenario: Scenario, asked: Mapping[str, Any]) -> tuple[World, ...]:
-    """The world that a mapping of a file's path and options stands for."""
+    """The worlds that a mapping of one or several files' `path` and options stands for."""
     options = dict(asked)
     path = options.pop("path", None)
-    if not isinstance(path, str | os.PathLike):
-        raise SettingError("world", dict(asked), "a mapping with the `path` of a file")
+    paths = list(path) if isinstance(path, list | tuple) else [path]
+    if not paths or not all(isinstance(each, str | os.PathLike) for each in paths):
+        raise SettingError("world", dict(asked), _PATHS)
     size_m = options.pop("voxel_size_m", None)
     size_m = scenario.grid.voxel_size_m if size_m is None else size_m
-    return (world_from_file(Path(path), size_m, **options),)
+    worlds = [world_from_file(Path(each), size_m, **options) for each in paths]
+    if len(worlds) == 1:
+        return tuple(worlds)
+    names = distinct_names([Path(each) for each in paths])
+    return tuple(on_one_grid([_named(world, name) for world, name in zip(worlds, names, strict=True)]))
+
+
+def _named(world: World, name: str) -> World:
+    return world if world.name == name else dataclasses.replace(world, name=name)
+
+
+def on_one_grid(worlds: Sequence[World]) -> list[World]:
+    """Worlds of different sizes on a grid that holds each: what a smaller one lacks is solid.
+
+    All begin at the first one's origin; the frames of their own files are given up. Where one of them has a
+    ceiling, all have one: columns that had none are free of it.
+
+    Args:
+        worlds: Of one voxel size, all one voxel high or none.
+
+    Raises:
+        WorldError: Some are plans and some are not.
+    """
+    first = worlds[0].grid
+    for number, world in enumerate(worlds):
+        if world.grid.flat != first.flat:
+            kind = "one voxel high" if first.flat else "more than one voxel high"
+            raise WorldError(f"world[{number}]", world.name, f"{kind}, as {worlds[0].name} is")
+    shape = tuple(max(world.grid.shape[axis] for world in worlds) for axis in range(3))
+    grid = Grid((shape[0], shape[1], shape[2]), first.voxel_size_m, first.origin_m)
+    return [_widened(world, grid, any(each.ceiling is not None for each in worlds)) for world in worlds]
+
+
+def _widened(world: World, grid: Grid, with_ceiling: bool) -> World:
+    """A world on a larger grid, solid where it was not."""
+    if world.grid == grid and (world.ceiling is not None or not with_ceiling):
+        return world
+    x, y, z = world.grid.shape
+    solid, ceiling = np.ones(grid.shape, bool), None
+    solid[:x, :y, :z] = world.occupied
+    if with_ceiling:
+        ceiling = np.full(grid.shape[:2], grid.shape[2], np.int32)
+        if world.ceiling is not None:
+            ceiling[:x, :y] = world.ceiling
+    return World(grid, solid, world.name, ceiling)
+
+
+def distinct_names(paths: Sequence[Path]) -> list[str]:
+    """The names of files without suffix, each with as many of its folders as make it differ from the others.
+
+    Files that differ in their suffix alone keep it; a file that is named twice has the same name twice.
+    """
+    whole = [path.absolute() for path in paths]
+    return [_distinct_name(path, {other for other in whole if other != path}) for path in whole]
+
+
+def _distinct_name(path: Path, others: set[Path]) -> str:
+    """A file's name beside others; absolute paths."""
+    for length in range(1, len(path.parts)):
+        tail = path.with_suffix("").parts[-length:]
+        if all(other.with_suffix("").parts[-length:] != tail for other in others):
+            return Path(*tail).as_posix()
+    return path.name
