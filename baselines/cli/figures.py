@@ -47,8 +47,8 @@ def mission_picture(recorder: Recorder, title: str, strategy: str, truth: bool =
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(14.5, 7.2) if truth else (11, 7.2), layout="constrained")
         if truth:
-            places = figure.subplot_mosaic([["curves"] * 3 + ["shared"] * 3, list("eeccww")])
-            curves, shared, above, covered = (places[name] for name in ("curves", "shared", "e", "c"))
+            places = figure.subplot_mosaic("aaabbb;eeccww")
+            curves, shared, above, covered = (places[name] for name in "abec")
             _true_slice(places["w"], recorder)
         else:
             curves, shared, above, covered = figure.subplots(2, 2).ravel()
