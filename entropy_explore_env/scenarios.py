@@ -5,16 +5,67 @@ from __future__ import annotations
 import dataclasses
 import math
 from types import MappingProxyType
+from typing import NamedTuple
 
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.scenario import Scenario
-from entropy_explore_env.settings import Channel, Ending, Grid, RangeSensor, Robot, RobotKind
+from entropy_explore_env.settings import Channel, Ending, Grid, RangeSensor, Reward, Robot, RobotKind
+
+
+class MissionTimes(NamedTuple):
+    """How long the missions of a scenario take."""
+
+    median_s: float
+    """Of the scenario's own team with `information-rate-v0`, in worlds of the training split."""
+    missions: int
+    """How many were measured; all of them were mapped."""
+
+
+MISSION_TIMES = MappingProxyType(
+    {
+        "room": MissionTimes(33.0, 20),
+        "room-furnished": MissionTimes(61.3, 20),
+        "box-7x11x5": MissionTimes(17.9, 20),
+        "office": MissionTimes(231.1, 20),
+        "office-3d": MissionTimes(430.0, 5),
+        "office-mixed": MissionTimes(541.8, 5),
+        "corridor": MissionTimes(152.5, 20),
+        "cluttered": MissionTimes(94.3, 20),
+        "hybrid": MissionTimes(340.5, 11),
+        "cave": MissionTimes(175.9, 5),
+        "terrain": MissionTimes(1216.3, 5),
+        "terrain-smooth": MissionTimes(1229.2, 5),
+        "terrain-rough": MissionTimes(1215.1, 4),
+        "occlusions": MissionTimes(1445.3, 4),
+        "lab": MissionTimes(161.6, 20),
+        "bhattacharya-office": MissionTimes(86.5, 20),
+    }
+)
+"""Name → mission times, as `python -m baselines.mission_times` prints them; those of fewer than 20 missions
+are rough. Missions in `bhattacharya-cluttered` compute too long: it has none, a second costs nothing."""
+COST_OF_A_MISSION = 0.2
+"""What a mission as long as the median costs, in shares of all bits."""
+
+
+def usual_reward(name: str) -> Reward:
+    """The reward of a named scenario: a second costs 0.2 over the median mission time, a plain number.
+
+    So the returns tell fast from slow. With the team's reward, or one robot, a mission as long as the median
+    returns about 0.8, one twice as long 0.6. With each robot's own reward it is less by what teammates sent:
+    as a mean over three robots that share, about 0.2.
+    """
+    times = MISSION_TIMES.get(name)
+    return (
+        Reward() if times is None else Reward(cost_per_s=float(f"{COST_OF_A_MISSION / times.median_s:.3g}"))
+    )
+
 
 _ROOM_GRID = Grid((41, 41, 17), 0.25, (-0.125, -0.125, -0.125))
 """Voxel centres on 0, 0.25, …, 10 m: 28,577 voxels, as Rocha04's H(0) and H_th ask for."""
 
 ROOM = Scenario(
     name="room",
+    reward=usual_reward("room"),
     grid=_ROOM_GRID,
     world="empty",
     robot=Robot(turn_rate_rad_s=math.inf),
@@ -22,11 +73,14 @@ ROOM = Scenario(
 """Rocha04's room, tables 1-2: 10 × 10 × 4 m, empty. Its turn rate is unlimited and its scan takes
 0.5 s, neither of which the paper gives; the walls stand on the outer faces of the outer voxels."""
 
-ROOM_FURNISHED = Scenario(name="room-furnished", grid=_ROOM_GRID, world="furnished")
+ROOM_FURNISHED = Scenario(
+    name="room-furnished", reward=usual_reward("room-furnished"), grid=_ROOM_GRID, world="furnished"
+)
 """The same room with boxes on its floor, drawn from the seed; robots turn at π/2 rad/s."""
 
 BOX = Scenario(
     name="box-7x11x5",
+    reward=usual_reward("box-7x11x5"),
     grid=Grid((7, 11, 5), 0.5),
     world="empty",
     robots=2,
@@ -52,6 +106,7 @@ the next one; `reach_m=math.inf` is for strategies that choose goals in the whol
 
 OFFICE = Scenario(
     name="office",
+    reward=usual_reward("office"),
     grid=Grid((240, 180, 1), 0.1),
     world="office",
     robot=_WHEELED,
@@ -62,6 +117,7 @@ OFFICE = Scenario(
 
 OFFICE_3D = Scenario(
     name="office-3d",
+    reward=usual_reward("office-3d"),
     grid=Grid((96, 72, 10), 0.25),
     world="office",
     robot=Robot(
@@ -75,6 +131,7 @@ OFFICE_3D = Scenario(
 OFFICE_MIXED = dataclasses.replace(
     OFFICE_3D,
     name="office-mixed",
+    reward=usual_reward("office-mixed"),
     robot=dataclasses.replace(_WHEELED, reach_m=OFFICE_3D.robot.reach_m),
     sensor=RangeSensor((2 * math.pi, math.pi / 6), math.pi / 60, max_range_m=8.0),
     extra_kinds=(RobotKind(OFFICE_3D.robot, OFFICE_3D.sensor),),
@@ -84,6 +141,7 @@ the flying ones."""
 
 CORRIDOR = Scenario(
     name="corridor",
+    reward=usual_reward("corridor"),
     grid=Grid((300, 200, 1), 0.1),
     world="corridor",
     robot=_WHEELED,
@@ -94,6 +152,7 @@ CORRIDOR = Scenario(
 
 CLUTTERED = Scenario(
     name="cluttered",
+    reward=usual_reward("cluttered"),
     grid=Grid((200, 160, 1), 0.1),
     world="cluttered",
     robot=_WHEELED,
@@ -104,6 +163,7 @@ CLUTTERED = Scenario(
 
 HYBRID = Scenario(
     name="hybrid",
+    reward=usual_reward("hybrid"),
     grid=Grid((320, 240, 1), 0.1),
     world="hybrid",
     robot=_WHEELED,
@@ -114,6 +174,7 @@ HYBRID = Scenario(
 
 CAVE = Scenario(
     name="cave",
+    reward=usual_reward("cave"),
     grid=Grid((80, 60, 25), 0.4),
     world="cave",
     robot=Robot(
@@ -126,6 +187,7 @@ CAVE = Scenario(
 
 TERRAIN = Scenario(
     name="terrain",
+    reward=usual_reward("terrain"),
     grid=Grid((96, 72, 24), 1.0),
     world="terrain",
     robot=Robot(reach_m=6.0, max_speed_m_s=3.0, acceleration_m_s2=2.0, body_radius_m=0.3),
@@ -134,14 +196,19 @@ TERRAIN = Scenario(
 )
 """96 × 72 m of hills up to 18 m high, for UAVs that stay below the exposure surface (Sawhney)."""
 
-TERRAIN_SMOOTH = dataclasses.replace(TERRAIN, name="terrain-smooth", world="terrain-smooth")
+TERRAIN_SMOOTH = dataclasses.replace(
+    TERRAIN, name="terrain-smooth", world="terrain-smooth", reward=usual_reward("terrain-smooth")
+)
 """The same, gentler: Hurst exponent 0.95 instead of 0.8."""
 
-TERRAIN_ROUGH = dataclasses.replace(TERRAIN, name="terrain-rough", world="terrain-rough")
+TERRAIN_ROUGH = dataclasses.replace(
+    TERRAIN, name="terrain-rough", world="terrain-rough", reward=usual_reward("terrain-rough")
+)
 """The same, rugged: Hurst exponent 0.5."""
 
 OCCLUSIONS = Scenario(
     name="occlusions",
+    reward=usual_reward("occlusions"),
     grid=Grid((200, 200, 1), 0.5),
     world="occlusions",
     robots=1,
@@ -161,6 +228,7 @@ and reach are ours; with two robots the paper takes 75° and 10 m."""
 
 LAB = Scenario(
     name="lab",
+    reward=usual_reward("lab"),
     grid=Grid((50, 46, 20), 0.1),
     world="lab",
     robots=2,
@@ -172,6 +240,7 @@ height nor field of view: 2 m, and 45° × 30° up to 4 m, are ours, as is the S
 
 BHATTACHARYA_OFFICE = Scenario(
     name="bhattacharya-office",
+    reward=usual_reward("bhattacharya-office"),
     grid=Grid((170, 200, 1), 0.1),
     world="bhattacharya-office",
     robots=5,
@@ -183,6 +252,7 @@ BHATTACHARYA_OFFICE = Scenario(
 
 BHATTACHARYA_CLUTTERED = Scenario(
     name="bhattacharya-cluttered",
+    reward=usual_reward("bhattacharya-cluttered"),
     grid=Grid((1000, 783, 1), 0.1),
     world="bhattacharya-cluttered",
     robots=4,

@@ -94,8 +94,8 @@ class Args:
 
     reward: Literal["individual", "team"] = "individual"
     """individual: bits that the robot's own scans take from its map; team: bits that the team's maps lose."""
-    cost_per_s: float = 0.01
-    """Cost of a second, as a share of all bits that the mission has to gain."""
+    cost_per_s: float | None = None
+    """Cost of a second, as a share of all bits that the mission has to gain; default: the scenario's."""
     decision_period_s: float | None = None
     """Seconds between decisions; by default a robot decides as soon as it can."""
     time_limit_s: float = 2000.0
@@ -153,6 +153,8 @@ def main(words: Sequence[str]) -> int:
     if args.resume is not None:
         args, changed = resumed_options(Args, args.resume, words, _CHANGEABLE, __doc__)
     out = args.out = args.out or Path("runs") / f"{args.scenario}-{args.robots}"
+    if args.cost_per_s is None:
+        args.cost_per_s = find_scenario(args.scenario).reward.cost_per_s
     check(args)
     scenario = training_scenario(args)
     checkpoint = None
@@ -236,7 +238,10 @@ def training_scenario(args: Args) -> Scenario:
             "channel": args.channel,
             "decision_period_s": args.decision_period_s,
             "time_limit_s": args.time_limit_s,
-            "reward": {"kind": args.reward, "cost_per_s": args.cost_per_s},
+            "reward": {
+                "kind": args.reward,
+                **({} if args.cost_per_s is None else {"cost_per_s": args.cost_per_s}),
+            },
             "action": {"kind": args.actions, "moves": "axes", "yaws": args.yaws, "pitches": args.pitches},
             "observation": {
                 "panorama_yaws": args.yaws,

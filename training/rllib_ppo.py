@@ -66,8 +66,8 @@ class Args:
     """Processes that collect experience; 0: the trainer itself does."""
     missions: int = 8
     """Missions in each runner."""
-    cost_per_s: float = 0.01
-    """Cost of a second, as a share of all bits that the mission has to gain."""
+    cost_per_s: float | None = None
+    """Cost of a second, as a share of all bits that the mission has to gain; default: the scenario's."""
     hidden: list[int] = field(default_factory=lambda: [128, 128])
     """Units of the hidden layers of actor and critic."""
     learning_rate: float = 3e-4
@@ -98,6 +98,8 @@ def main(words: Sequence[str]) -> int:
         said = "".join(f"; {name} was {value}" for name, value in changed.items())
         print(f"{resume}: {_where(resume)}{said}", file=sys.stderr)
     args.out = args.out or Path("runs") / f"rllib-{args.scenario}-{args.robots}"
+    if args.cost_per_s is None:
+        args.cost_per_s = find_scenario(args.scenario).reward.cost_per_s
     check(args)
     env_settings = environment_settings(args)
     if args.resume is None:
@@ -151,7 +153,7 @@ def environment_settings(args: Args) -> dict[str, Any]:
         "decision_period_s": None,
         "action": {"kind": "discrete", "moves": "axes"},
         "observation": {"flat": True, "panorama_utility": "log2"},  # what a small network learns best from
-        "reward": {"cost_per_s": args.cost_per_s},
+        "reward": {} if args.cost_per_s is None else {"cost_per_s": args.cost_per_s},
     }
     with_settings(find_scenario(args.scenario), settings)  # checks them
     return {"scenario": args.scenario, **settings}

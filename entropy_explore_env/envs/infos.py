@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping
 from typing import Any
 
 from entropy_explore_env.missions.simulation import Missions
@@ -19,6 +21,16 @@ def told_number(world_number: int | None) -> int:
     return -1 if world_number is None else world_number
 
 
+END_FIGURES = ("t_mission_s", "bits_gained_per_bit_sent")
+"""Figures that infos at a mission's end hold by themselves, as numbers that loggers of episodes can show:
+Stable-Baselines3's Monitor and VecMonitor by `info_keywords=END_FIGURES`."""
+
+
+def end_figures(figures: Mapping[str, Any]) -> dict[str, float]:
+    """The END_FIGURES out of a mission's figures; NaN where one is not defined."""
+    return {name: math.nan if figures[name] is None else float(figures[name]) for name in END_FIGURES}
+
+
 def robot_infos(missions: Missions, mission: int) -> list[dict[str, Any]]:
     """An info for each robot of a mission.
 
@@ -26,7 +38,7 @@ def robot_infos(missions: Missions, mission: int) -> list[dict[str, Any]]:
     takes as its option `world`; -1 where no recipe made it), `entropy_bits`, `own_bits` and
     `received_bits` (taken from its map in this step), `move_end` and `end` (names of a MoveEnd and
     a MissionEnd), and `action_mask` where actions are discrete; when the mission is over, `figures`:
-    those of `mission_figures`.
+    those of `mission_figures`, and beside them the two of END_FIGURES.
     """
     clock = missions.state.missions[mission]
     robots = missions.state.robots[mission]
@@ -59,4 +71,5 @@ def robot_infos(missions: Missions, mission: int) -> list[dict[str, Any]]:
     if clock["end"]:
         for info in infos:
             info["figures"] = mission_figures(missions, mission)
+            info |= end_figures(info["figures"])
     return infos

@@ -14,6 +14,7 @@ import numpy as np
 from gymnasium.vector import AutoresetMode
 
 from entropy_explore_env.envs.checks import as_array
+from entropy_explore_env.envs.infos import end_figures
 from entropy_explore_env.envs.rewards import RewardFunction
 from entropy_explore_env.envs.vector_env import EntropyExploreVectorEnv
 from entropy_explore_env.errors import ActionError, MissingExtraError, SettingError
@@ -52,7 +53,7 @@ class RobotVecEnv(VecEnv):
 
     Every info holds `decided`: whether the row's action counted in this step, and `elapsed_s`: simulated
     seconds that the step took. At a mission's end also `episode`: the row's sum of rewards `r`, its steps
-    `l` and the mission's seconds `t`; and `figures`: those of `mission_figures`.
+    `l` and the mission's seconds `t`; and `figures`: those of `mission_figures`, and `infos.END_FIGURES`.
 
     Attributes:
         vector_env: The missions.
@@ -235,6 +236,7 @@ class RobotVecEnv(VecEnv):
                     "t": float(last["time_s"][mission]),
                 },
                 "figures": last["figures"][mission],
+                **end_figures(last["figures"][mission]),
             }
 
     def _of_robot(self, team: Any, robot: int) -> Any:  # noqa: ANN401 - an array, or a dict of them

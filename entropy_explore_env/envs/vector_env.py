@@ -11,7 +11,7 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
 from entropy_explore_env.envs.checks import ActionChecker
-from entropy_explore_env.envs.infos import told_number
+from entropy_explore_env.envs.infos import END_FIGURES, end_figures, told_number
 from entropy_explore_env.envs.rewards import RewardFunction, StepRewards
 from entropy_explore_env.errors import CallOrderError, SettingError
 from entropy_explore_env.missions.action import action_space
@@ -262,6 +262,11 @@ class EntropyExploreVectorEnv(VectorEnv[Any, Any, Any]):
             infos["figures"], infos["_figures"] = np.empty(self.num_envs, object), over
             for mission in np.flatnonzero(over):
                 infos["figures"][mission] = mission_figures(self.missions, int(mission))
+            for name in END_FIGURES:
+                infos[name], infos[f"_{name}"] = np.zeros(self.num_envs), over
+            for mission in np.flatnonzero(over):
+                for name, value in end_figures(infos["figures"][mission]).items():
+                    infos[name][mission] = value
         return infos
 
     def render(self) -> Any:  # noqa: ANN401 - Gymnasium's signature

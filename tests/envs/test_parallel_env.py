@@ -154,7 +154,7 @@ def test_a_step_lasts_one_period_or_until_the_next_robot_decides() -> None:
 def test_rewards_are_bits_gained_as_shares_of_all_bits(kind: str) -> None:
     """H(0) - H_th is V log2(30 / 0.03): every voxel of the box can be seen."""
     span = BOX_VOXELS * math.log2(1000.0)
-    team = parallel_env(BOX, robots=3, reward={"kind": kind}, max_cycles=80)
+    team = parallel_env(BOX, robots=3, reward={"kind": kind, "cost_per_s": 0.0}, max_cycles=80)
     before = {agent: info["entropy_bits"] for agent, info in team.reset(seed=0)[1].items()}
     assert before["robot_0"] == pytest.approx(
         BOX_VOXELS * math.log2(math.sqrt(2 * math.pi * math.e) * 30), rel=1e-7
@@ -174,7 +174,11 @@ def test_rewards_are_bits_gained_as_shares_of_all_bits(kind: str) -> None:
 @pytest.mark.parametrize("period", [1.0, None])
 def test_team_rewards_add_up_to_the_mean_decrease_of_entropy(period: float | None) -> None:
     team = parallel_env(
-        BOX, robots=4, reward={"kind": "team"}, decision_period_s=period, ending={"sigma_end": 5.0}
+        BOX,
+        robots=4,
+        reward={"kind": "team", "cost_per_s": 0.0},
+        decision_period_s=period,
+        ending={"sigma_end": 5.0},
     )
     start = [info["entropy_bits"] for info in team.reset(seed=3)[1].values()]
     results = played(team, seed=3)
@@ -188,7 +192,9 @@ def test_team_rewards_add_up_to_the_mean_decrease_of_entropy(period: float | Non
 
 @pytest.mark.parametrize("kind", ["individual", "team"])
 def test_time_costs_what_the_scenario_says(kind: str) -> None:
-    free = parallel_env(BOX, robots=2, reward={"kind": kind}, decision_period_s=None, **QUICK)
+    free = parallel_env(
+        BOX, robots=2, reward={"kind": kind, "cost_per_s": 0.0}, decision_period_s=None, **QUICK
+    )
     costly = parallel_env(
         BOX, robots=2, reward={"kind": kind, "cost_per_s": 0.01}, decision_period_s=None, **QUICK
     )

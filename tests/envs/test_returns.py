@@ -1,0 +1,84 @@
+"""Returns of the named scenarios tell fast from slow; loggers of episodes show mission times."""
+
+from __future__ import annotations
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.wrappers import RecordEpisodeStatistics
+from stable_baselines3.common.monitor import Monitor
+from stable_baselines3.common.vec_env import VecMonitor
+
+from baselines.experiments.mission import run_mission, scripted
+from baselines.strategies import make_strategy
+from entropy_explore_env.envs.infos import END_FIGURES
+from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
+from entropy_explore_env.envs.robot_vec_env import RobotVecEnv
+from entropy_explore_env.envs.vector_env import EntropyExploreVectorEnv
+from entropy_explore_env.scenario import with_settings
+from entropy_explore_env.scenarios import BOX, MISSION_TIMES, SCENARIOS
+
+SHORT = {"robots": 2, "time_limit_s": 6.0, "action": {"kind": "discrete", "moves": "axes"}}
+
+
+def test_a_second_costs_a_fifth_over_the_median_mission_time():
+    assert set(SCENARIOS) - set(MISSION_TIMES) == {"bhattacharya-cluttered"}
+    for name, (median_s, _) in MISSION_TIMES.items():
+        assert SCENARIOS[name].reward.cost_per_s == pytest.approx(0.2 / median_s, rel=5e-3)
+    assert SCENARIOS["bhattacharya-cluttered"].reward.cost_per_s == 0.0
+
+
+def test_a_mission_as_long_as_the_median_returns_about_four_fifths():
+    env, returns, times_s = (
+        EntropyExploreEnv(scripted(with_settings(BOX, {"reward": {"kind": "team"}}))),
+        [],
+        [],
+    )
+    step = env.step
+    for strategy, seeds in (("information-rate-v0", range(5)), ("random", range(5))):
+        for seed in seeds:
+            earned = []
+
+            def counted(actions, earned=earned):
+                stepped = step(actions)
+                earned.append(np.mean(list(stepped[1].values())))
+                return stepped
+
+            env.step = counted
+            run_mission(env, make_strategy(strategy), seed)
+            returns.append(sum(earned))
+            times_s.append(float(env.missions.state.missions[0]["time_s"]))
+    assert 0.7 < np.median(returns[:5]) < 0.9
+    slower = np.array(times_s) / MISSION_TIMES["box-7x11x5"].median_s
+    np.testing.assert_allclose(returns, 1.0 - 0.2 * slower, atol=0.05)  # by what comes beyond the threshold
+
+
+def test_gymnasium_and_stable_baselines_show_mission_time_and_bits_per_bit():
+    made = gymnasium.make("entropy_explore_env/Box7x11x5-v0", time_limit_s=6.0)
+    env, over = Monitor(RecordEpisodeStatistics(made), info_keywords=END_FIGURES), False
+    env.reset(seed=0)
+    env.action_space.seed(0)
+    info = {}
+    while not over:
+        *_, terminated, truncated, info = env.step(env.action_space.sample())
+        over = terminated or truncated
+    assert info["episode"]["t_mission_s"] == info["t_mission_s"] == info["time_s"] == 6.0
+    assert np.isnan(info["episode"]["bits_gained_per_bit_sent"])  # alone, it sends nothing
+    rows = VecMonitor(RobotVecEnv(BOX, 2, **SHORT), info_keywords=END_FIGURES)
+    rows.seed(0)
+    rows.reset()
+    infos, dones = [], np.zeros(4, bool)
+    while not dones.any():
+        _, _, dones, infos = rows.step(np.zeros(4, np.int64))
+    for row in np.flatnonzero(dones):
+        figures = infos[row]["figures"]
+        assert infos[row]["episode"]["t_mission_s"] == figures["t_mission_s"]
+        assert infos[row]["episode"]["bits_gained_per_bit_sent"] == pytest.approx(
+            figures["bits_gained_per_bit_sent"] or np.nan, nan_ok=True
+        )
+    many = EntropyExploreVectorEnv(BOX, 2, time_limit_s=6.0)
+    many.reset(seed=0)
+    ended = np.zeros(2, bool)
+    while not ended.any():
+        *_, ended, told = many.step(np.zeros(many.action_space.shape, np.float32))
+    assert (told["_t_mission_s"] == ended).all() and (told["t_mission_s"][ended] == 6.0).all()
