@@ -61,16 +61,27 @@ reproduce: $(STAMP)baselines
 	$(RUN) baselines.papers.bhattacharya --out docs/results
 	$(RUN) baselines.papers.sawhney --out docs/results
 
+# PyTorch's CPU build, unless there is an NVIDIA GPU: pip's own index brings gigabytes of CUDA libraries on Linux.
+# Where PyTorch's index cannot be reached, pip's own one serves. $(1): python, $(2): the file with the pin.
+CPU_INDEX := https://download.pytorch.org/whl/cpu
+define cpu_torch
+@command -v nvidia-smi >/dev/null 2>&1 || $(1) -m pip install -qq --disable-pip-version-check --no-deps \
+	--retries 0 --timeout 15 --index-url $(CPU_INDEX) $$(grep -o '^torch==[0-9.]*' $(2)) 2>/dev/null \
+	|| echo "$(CPU_INDEX) is not reached: PyTorch comes from pip's own index" >&2
+endef
+
 # The stamp .venv/installed-EXTRA says that the package is installed with that extra.
 $(STAMP)%: pyproject.toml requirements/constraints.txt
 	@$(RUN) pip --version >/dev/null 2>&1 || $(PYTHON) -m venv $(VENV)
 	@echo "installing entropy_explore_env[$*] in $(VENV), a minute or two the first time ..." >&2
+	$(if $(filter training test dev,$*),$(call cpu_torch,$(VENV)/bin/python,requirements/constraints.txt))
 	@$(RUN) pip install -qq --disable-pip-version-check -c requirements/constraints.txt -e ".[$*]"
 	@touch $@
 
 $(VENV_RLLIB)/installed: pyproject.toml requirements/constraints-rllib.txt
 	@$(VENV_RLLIB)/bin/python -m pip --version >/dev/null 2>&1 || $(PYTHON) -m venv $(VENV_RLLIB)
 	@echo "installing entropy_explore_env[rllib] in $(VENV_RLLIB), a minute or two the first time ..." >&2
+	$(call cpu_torch,$(VENV_RLLIB)/bin/python,requirements/constraints-rllib.txt)
 	@$(VENV_RLLIB)/bin/python -m pip install -qq --disable-pip-version-check \
 		-c requirements/constraints-rllib.txt -e ".[rllib]" "pytest>=8.2" "hypothesis>=6.100"
 	@touch $@

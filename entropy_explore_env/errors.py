@@ -4,6 +4,10 @@ from __future__ import annotations
 
 import pickle
 
+CPU_BUILD = "https://download.pytorch.org/whl/cpu"
+"""Index of PyTorch's CPU build: what other indices have brings gigabytes of CUDA libraries."""
+_WITH_TORCH = ("training", "rllib")
+"""Extras that need PyTorch."""
 _LONGEST_VALUE = 200
 """Characters of a value that a message shows at most."""
 
@@ -76,7 +80,9 @@ class MissingExtraError(EntropyExploreError, ImportError):
 
     def __init__(self, package: str, extra: str) -> None:
         """Name the package that is missing and the extra that brings it."""
-        super().__init__(f"{package} is not installed: pip install 'entropy_explore_env[{extra}]'")
+        first = f"pip install torch --index-url {CPU_BUILD} (for CUDA: pip install torch), then "
+        how = f"{first if extra in _WITH_TORCH else ''}pip install 'entropy_explore_env[{extra}]'"
+        super().__init__(f"{package} is not installed: {how}")
         self.package, self.extra = package, extra
 
     def __reduce__(self) -> tuple[type, tuple[str, str]]:

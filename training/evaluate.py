@@ -25,6 +25,7 @@ from entropy_explore_env.errors import SettingError
 from entropy_explore_env.scenario import Scenario, with_settings
 from entropy_explore_env.scenarios import find_scenario
 from entropy_explore_env.validation import check_whole
+from training import extra  # noqa: F401 - before what is not there without it
 from training.checkpoints import PolicySettings, latest_checkpoint, load_checkpoint
 from training.policy import POLICIES, PREFIX, policy_folder
 

@@ -37,6 +37,7 @@ from entropy_explore_env.scenarios import find_scenario
 from entropy_explore_env.settings import Channel
 from entropy_explore_env.validation import check_whole
 from entropy_explore_env.writing import write_atomically
+from training import extra  # noqa: F401 - before what is not there without it
 from training.advantages import DecisionBuffer, DiscountUnit
 from training.best_mission import draw_best_mission
 from training.checkpoints import PolicySettings, checkpoint_name, forget_later, save_checkpoint
