@@ -51,10 +51,8 @@ def test_install_run_uninstall_and_install_from_the_checkout(tmp_path):
         )
 
     def install(*words: str) -> None:
-        ran = call(
-            "-c",
-            f"import sys; sys.argv = {['pip', *words]!r}; from pip._internal.cli.main import main; sys.exit(main())",
-        )
+        pip = f"import sys; from pip._internal.cli.main import main; sys.exit(main({list(words)!r}))"
+        ran = call("-c", pip)
         assert ran.returncode == 0, ran.stderr
 
     options = ("--no-deps", "--no-build-isolation", "--ignore-installed", "-q")
