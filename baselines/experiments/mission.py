@@ -58,7 +58,9 @@ def scripted(scenario: Scenario, decision_period_s: float | None = None) -> Scen
 
 
 def scripted_env(
-    scenario: Scenario, surroundings: Surroundings | None = None, **settings: object
+    scenario: Scenario,
+    surroundings: Surroundings | None = None,
+    **settings: Any,  # noqa: ANN401 - whatever a setting may be
 ) -> EntropyExploreEnv:
     """An environment for scripted strategies.
 
