@@ -8,6 +8,7 @@ series), `mission.png` (curves and maps), `mission.gif` (the mission as it went)
 from __future__ import annotations
 
 import dataclasses
+import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -68,6 +69,9 @@ def main(words: Sequence[str]) -> int:
 
         run_mission(env, strategy, args.seed, after_step, log.command)
         figures, written = log.finish(name)
+    if args.world is not None and env.scenario.grid.flat and not find_scenario(args.scenario).grid.flat:
+        plan = f"{args.world} is one voxel high: robots stayed in its plane and looked level"
+        print(f"{plan} (--height-m makes it 3-D; office has ground robots)", file=sys.stderr)
     show_results(env, figures, written, args.output.json)
     return 0
 

@@ -6,13 +6,14 @@ Exit codes: 0 done, 1 a check of the command failed, 2 bad input, 130 interrupte
 from __future__ import annotations
 
 import argparse
+import contextlib
 import io
 import math
 import os
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import NoReturn
+from typing import Any, NoReturn
 
 from entropy_explore_env.errors import EntropyExploreError, SettingError
 
@@ -37,12 +38,44 @@ def allow_read_memory(read_memory_mib: float | None) -> None:
     os.environ[READ_MEMORY_VARIABLE] = str(read_memory_mib)
 
 
+def whole_number(word: str) -> int:
+    """A whole number as one types it: `2500000`, `2_500_000`, `2.5e6` or `1e6`.
+
+    Raises:
+        ValueError: It is something else.
+    """
+    for kind in (int, float):  # a float holds 2^53 and above only roughly, an int exactly
+        with contextlib.suppress(ValueError):
+            value = kind(word)
+            if value == value // 1:
+                return int(value)
+    raise ValueError(f"{word} is not a whole number")
+
+
+def home_path(word: str) -> Path:
+    """A path as one types it, `~` at its beginning standing for the home folder.
+
+    Raises:
+        ValueError: There is no such home folder.
+    """
+    try:
+        return Path(word).expanduser()
+    except RuntimeError as error:
+        raise ValueError(f"{word}: {error}") from None
+
+
 class UsageError(EntropyExploreError):
     """The arguments of a command line do not fit its options."""
 
 
 class LineParser(argparse.ArgumentParser):
-    """An argument parser whose errors are one line."""
+    """An argument parser whose errors are one line; whole numbers may be typed as 1e6, paths with `~`."""
+
+    def __init__(self, *args: Any, **more: Any) -> None:  # noqa: ANN401 - argparse's
+        """Take words as all commands do."""
+        super().__init__(*args, **more)
+        self.register("type", int, whole_number)
+        self.register("type", Path, home_path)
 
     def error(self, message: str) -> NoReturn:
         """Raise a UsageError, for `run_command` to print."""

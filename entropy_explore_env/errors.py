@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import difflib
 import pickle
+from collections.abc import Iterable
 
 CPU_BUILD = "https://download.pytorch.org/whl/cpu"
 """Index of PyTorch's CPU build: what other indices have brings gigabytes of CUDA libraries."""
@@ -40,6 +42,12 @@ def _passed_on(value: object) -> object:
     except Exception:  # objects may raise whatever they want
         return ShownValue(shown(value))
     return value
+
+
+def did_you_mean(word: object, known: Iterable[str]) -> str:
+    """The known name that is most like a word, as the end of a message; empty where none is like it."""
+    alike = difflib.get_close_matches(word, list(known), n=1) if isinstance(word, str) else []
+    return f"; did you mean {alike[0]}?" if alike else ""
 
 
 class EntropyExploreError(ValueError):

@@ -11,7 +11,7 @@ from typing import Any, Literal, TypeVar
 
 import numpy as np
 
-from entropy_explore_env.errors import SettingError
+from entropy_explore_env.errors import SettingError, did_you_mean
 from entropy_explore_env.settings import (
     Action,
     Channel,
@@ -271,6 +271,10 @@ _PARTS: tuple[tuple[str, type], ...] = (
 )
 
 
+_SHORT = ("max_cycles", "time_limit_s")
+"""Fields of the ending that `with_settings` takes as the scenario's own."""
+
+
 def with_settings(scenario: Scenario, settings: Mapping[str, Any]) -> Scenario:
     """A copy of the scenario with some settings changed.
 
@@ -287,7 +291,7 @@ def with_settings(scenario: Scenario, settings: Mapping[str, Any]) -> Scenario:
     if not isinstance(settings, Mapping):
         raise SettingError("settings", settings, "a mapping from names of settings to values")
     changes = dict(settings)
-    for name in ("max_cycles", "time_limit_s"):
+    for name in _SHORT:
         if name in changes:
             ending = changes.get("ending", {})
             shortcut = {name: changes.pop(name)}
@@ -301,11 +305,14 @@ def with_settings(scenario: Scenario, settings: Mapping[str, Any]) -> Scenario:
 def _replaced(settings: Settings, changes: Mapping[str, Any]) -> Settings:
     """Like dataclasses.replace, into nested parts, with a named error for an unknown field."""
     fields = [f.name for f in dataclasses.fields(settings)]  # type: ignore[arg-type]
+    known = [*fields, *(_SHORT if isinstance(settings, Scenario) else ())]
     values: dict[str, Any] = {}
     for name, value in changes.items():
         if name not in fields:
             raise SettingError(
-                f"{type(settings).__name__}.{name}", value, "one of the fields " + ", ".join(fields)
+                f"{type(settings).__name__}.{name}",
+                value,
+                "one of the fields " + ", ".join(fields) + did_you_mean(name, known),
             )
         current = getattr(settings, name)
         nested = isinstance(value, Mapping) and dataclasses.is_dataclass(current)

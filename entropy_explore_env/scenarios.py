@@ -7,7 +7,7 @@ import math
 from types import MappingProxyType
 from typing import NamedTuple
 
-from entropy_explore_env.errors import SettingError
+from entropy_explore_env.errors import SettingError, did_you_mean
 from entropy_explore_env.scenario import Scenario
 from entropy_explore_env.settings import Channel, Ending, Grid, RangeSensor, Reward, Robot, RobotKind
 
@@ -298,5 +298,6 @@ def find_scenario(scenario: str | Scenario) -> Scenario:
     if isinstance(scenario, Scenario):
         return scenario
     if not isinstance(scenario, str) or scenario not in SCENARIOS:
-        raise SettingError("scenario", scenario, "one of " + ", ".join(SCENARIOS))
+        known = "one of " + ", ".join(SCENARIOS)
+        raise SettingError("scenario", scenario, known + did_you_mean(scenario, SCENARIOS))
     return SCENARIOS[scenario]

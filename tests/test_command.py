@@ -6,6 +6,7 @@ import io
 import os
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -107,3 +108,19 @@ def test_the_help_of_a_command_comes_out_on_a_terminal_of_ascii(name):
     done = subprocess.run(words, env=variables, capture_output=True, timeout=120)
     assert done.returncode == 0, done.stderr.decode()
     assert b"--help" in done.stdout and b"Traceback" not in done.stderr
+
+
+def test_whole_numbers_have_exponents_and_paths_begin_at_home(monkeypatch, tmp_path):
+    monkeypatch.setenv("HOME", str(tmp_path))
+    parser = LineParser("count")
+    parser.add_argument("--number", type=int)
+    parser.add_argument("folder", type=Path)
+    commands = LineParser("both").add_subparsers()
+    part = commands.add_parser("part")
+    part.add_argument("--number", type=int)
+    assert isinstance(part, LineParser) and part.parse_args(["--number", "2e3"]).number == 2000
+    given = parser.parse_args(["--number", "1e6", "~/maps"])
+    assert given.number == 1_000_000 and type(given.number) is int and given.folder == tmp_path / "maps"
+    for words in (["--number", "1.5", "a"], ["~nobody-of-this-name/a"]):
+        with pytest.raises(UsageError):
+            parser.parse_args(words)

@@ -17,23 +17,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 from entropy_explore_env import command
-from entropy_explore_env.command import UsageError
+from entropy_explore_env.command import UsageError, home_path, whole_number
 from entropy_explore_env.errors import MissingExtraError, SettingError
-
-
-def whole_number(word: str) -> int:
-    """A whole number as one types it: `2500000`, `2_500_000`, `2.5e6` or `1e6`.
-
-    Raises:
-        ValueError: It is something else.
-    """
-    for kind in (int, float):  # a float holds 2^53 and above only roughly, an int exactly
-        with contextlib.suppress(ValueError):
-            value = kind(word)
-            if value == value // 1:
-                return int(value)
-    raise ValueError(f"{word} is not a whole number")
-
 
 if TYPE_CHECKING:
     from tyro.conf import OmitArgPrefixes, Positional
@@ -45,17 +30,22 @@ else:
         from tyro.conf import OmitArgPrefixes, Positional, arg
         from tyro.constructors import PrimitiveConstructorSpec
 
-        WholeNumber = Annotated[
-            int,
-            PrimitiveConstructorSpec(
-                nargs=1,
-                metavar="INT",
-                instance_from_str=lambda words: whole_number(words[0]),
-                is_instance=lambda value: isinstance(value, int),
-                str_from_instance=lambda value: [str(value)],
-            ),
-        ]
-        """Of a field: an int that may also be typed as 1e6."""
+        _WHOLE = PrimitiveConstructorSpec(
+            nargs=1,
+            metavar="INT",
+            instance_from_str=lambda words: whole_number(words[0]),
+            is_instance=lambda value: isinstance(value, int) and not isinstance(value, bool),
+            str_from_instance=lambda value: [str(value)],
+        )
+        _PATH = PrimitiveConstructorSpec(
+            nargs=1,
+            metavar="PATH",
+            instance_from_str=lambda words: home_path(words[0]),
+            is_instance=lambda value: isinstance(value, Path),
+            str_from_instance=lambda value: [str(value)],
+        )
+        WholeNumber = Annotated[int, _WHOLE]
+        """Of a field: an int that may also be typed as 1e6, as all ints of commands may."""
         INLINE = arg(name="")
         """`Annotated[Options, INLINE]`: the options of a dataclass without the field's name before theirs."""
     except ImportError:  # `parse` says what is missing
@@ -108,12 +98,22 @@ def parse(
                 args=list(words),
                 description=description,
                 default=start,
+                registry=_registry(),
                 config=(tyro.conf.DisallowNone,),  # options that are not given are None: nobody types it
             )
     except SystemExit as stop:
         if stop.code in (0, None):
             raise
         raise UsageError(_one_line(complaint.getvalue())) from None
+
+
+def _registry() -> Any:  # noqa: ANN401 - tyro comes late
+    """How fields of a kind are typed in all commands: whole numbers also as 1e6, paths also with `~`."""
+    from tyro.constructors import ConstructorRegistry
+
+    registry = ConstructorRegistry()
+    registry.primitive_rule(lambda field: {int: _WHOLE, Path: _PATH}.get(field.type))
+    return registry
 
 
 def _program() -> str:

@@ -25,6 +25,7 @@ from baselines.strategies.planned_rate import PlannedRate
 from baselines.strategies.protocol import Strategy
 from baselines.strategies.random_walk import RandomWalk
 from baselines.strategies.voronoi import VoronoiConfig, VoronoiCoverage
+from entropy_explore_env.command import home_path
 from entropy_explore_env.errors import MissingExtraError, SettingError
 
 STRATEGIES: MappingProxyType[str, Callable[[], Strategy]] = MappingProxyType(
@@ -93,7 +94,7 @@ def make_strategy(name: str) -> Strategy:
 
 def resolved(name: str) -> str:
     """The name that records and tables hold of a strategy that is asked for by this name."""
-    return ALIASES.get(name, name)
+    return ALIASES.get(name, str(home_path(name)) if name.startswith("~") else name)
 
 
 def strategy_module(name: str) -> str | Path:

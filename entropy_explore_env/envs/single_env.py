@@ -59,8 +59,9 @@ class SingleRobotEnv(gymnasium.Env[Any, Any]):
             WorldError: The world cannot be used.
         """
         check_render_mode(render_mode)
-        if not is_whole(settings.get("robots", 1), 1, 1):
-            raise SettingError("robots", settings["robots"], "1; parallel_env() takes a team")
+        robots = settings.get("robots", 1)
+        if not is_whole(robots, 1, 1):
+            raise SettingError("robots", robots, "1; parallel_env() takes a team")
         asked, given = with_given_worlds(find_scenario(scenario), {**settings, "robots": 1})
         self._rewards = StepRewards(reward_function)
         self.missions = Missions(asked, given=given)

@@ -12,14 +12,13 @@ The random streams stay as they are: what is given is not drawn, everything else
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Collection, Mapping, Sequence
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from entropy_explore_env.errors import SettingError, WorldError
+from entropy_explore_env.errors import SettingError, WorldError, did_you_mean
 from entropy_explore_env.scenario import Scenario
 from entropy_explore_env.validation import is_whole
 from entropy_explore_env.worlds.recipes.catalogue import RECIPES
@@ -69,9 +68,8 @@ def named_options(
         raise SettingError("options", options, "a dict, or None")
     for name, value in options.items():
         if name not in allowed and not (name in ignored and value is ignored[name]):
-            near = difflib.get_close_matches(str(name), allowed, 1)
-            meant = f"; did you mean {near[0]}?" if near else ""
-            raise SettingError("options", name, "nothing but " + ", ".join(allowed) + meant)
+            known = "nothing but " + ", ".join(allowed)
+            raise SettingError("options", name, known + did_you_mean(name, allowed))
     return dict(options)
 
 

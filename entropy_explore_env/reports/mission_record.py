@@ -32,6 +32,7 @@ from entropy_explore_env.reports.record_versions import (
 from entropy_explore_env.reports.state_values import state_digest
 from entropy_explore_env.scenario import Scenario
 from entropy_explore_env.settings_json import scenario_from_json, settings_json
+from entropy_explore_env.validation import checked_path
 from entropy_explore_env.version import VERSION
 from entropy_explore_env.worlds.files.archives import arrays
 from entropy_explore_env.worlds.files.voxels import MAX_FILE_VOXELS, RefusedError
@@ -195,13 +196,15 @@ def check_world(record: MissionRecord, missions: Missions) -> None:
         raise WorldError("Scenario.world", world, "the file of the recorded mission, unchanged")
 
 
-def save_record(record: MissionRecord, path: Path) -> None:
+def save_record(record: MissionRecord, path: Path | str) -> None:
     """Write a record to an `.npz`; the file appears only when complete.
 
     Raises:
+        SettingError: It is no path.
         RecordError: The world is too large for a file.
         OSError: The file cannot be written.
     """
+    path = checked_path("record", path)
     entries = {
         "format": np.asarray(FORMAT),
         "version": np.int64(record.version),
@@ -236,12 +239,14 @@ def _checksum(entries: Mapping[str, Any]) -> str:
     return named_digest({name: np.asarray(entries[name]) for name in sorted(entries) if name != "checksum"})
 
 
-def load_record(path: Path) -> MissionRecord:
+def load_record(path: Path | str) -> MissionRecord:
     """Read a record.
 
     Raises:
+        SettingError: It is no path.
         RecordError: The file is missing, broken, changed, of another format, or no record at all.
     """
+    path = checked_path("record", path)
     try:
         if path.stat().st_size > MAX_FILE_BYTES:
             raise RefusedError(f"a file of at most {MAX_FILE_BYTES >> 30} GiB")

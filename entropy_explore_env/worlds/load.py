@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from entropy_explore_env.errors import SettingError, WorldError
+from entropy_explore_env.errors import SettingError, WorldError, did_you_mean
 from entropy_explore_env.scenario import Scenario
 from entropy_explore_env.scenarios import find_scenario
 from entropy_explore_env.settings import Grid
@@ -278,10 +278,11 @@ def world_from_file(path: Path | str, voxel_size_m: float, **options: Any) -> Wo
     if str(path) != JACKSBORO and path.suffix.lower() not in FORMATS:
         files = ", ".join(f"*{suffix}" for suffix in FORMATS)
         allowed = f"a recipe ({', '.join(RECIPES)}), a file ({files}) or, to an environment, a World"
-        raise SettingError("Scenario.world", str(path), allowed)
+        raise SettingError("Scenario.world", str(path), allowed + did_you_mean(str(path), RECIPES))
     for name, value in options.items():
         if name not in LOAD_OPTIONS:
-            raise SettingError(name, value, "one of the options " + ", ".join(LOAD_OPTIONS))
+            known = "one of the options " + ", ".join(LOAD_OPTIONS)
+            raise SettingError(name, value, known + did_you_mean(name, LOAD_OPTIONS))
     size = {"voxel_size_m": voxel_size_m}
     _check(options)
     _check(size)

@@ -575,3 +575,18 @@ def test_the_mission_s_end_is_said_by_its_name():
     env = EntropyExploreEnv(with_settings(scripted(BOX), {"max_cycles": 3}))
     run_mission(env, make_strategy("random"), 0)
     assert mission_figures(env.missions, 0)["end_reason"] == "CYCLES_UP"
+
+
+def test_flying_robots_in_a_flat_plan_are_told_that_they_stay_in_its_plane(tmp_path, monkeypatch, capsys):
+    monkeypatch.setenv("HOME", str(tmp_path))
+    (tmp_path / "plan.pgm").write_bytes(pgm(np.full((30, 40), 254, np.uint8)))
+    words = ["--strategy", "random", "--world", "~/plan.pgm", "--robots", "1", "--json", "--seed", "1e0"]
+    words += ["--ending.max-cycles", "3e0", "--voxel-size-m", "0.1"]
+    assert run.main(["room", *words]) == 0
+    said = capsys.readouterr()
+    assert json.loads(said.out)["seed"] == 1
+    assert "plan.pgm is one voxel high: robots stayed in its plane and looked level" in said.err
+    assert run.main(["room", *words, "--height-m", "1.0"]) == 0
+    assert "one voxel high" not in capsys.readouterr().err
+    assert run.main(["office", *words]) == 0
+    assert "one voxel high" not in capsys.readouterr().err

@@ -116,3 +116,30 @@ def test_only_what_checkers_send_may_be_given_for_nothing(value: Any) -> None:
 def test_values_that_cannot_be_shown_are_refused_all_the_same() -> None:
     with pytest.raises(SettingError, match=r"Scenario.robots = <int>: allowed is a whole number"):
         parallel_env(BOX, robots=10**5000)
+
+
+@pytest.mark.parametrize(
+    ("asked", "meant"),
+    [
+        ({"scenario": "ofice"}, "office"),
+        ({"scenario": "room-furnishd"}, "room-furnished"),
+        ({"robts": 3}, "robots"),
+        ({"max_cyles": 3}, "max_cycles"),
+        ({"channel": {"brust": 3}}, "burst"),
+        ({"world": "furnishd"}, "furnished"),
+        ({"world": {"path": "x.npz", "hight_m": 3.0}}, "height_m"),
+        ({"scenario": "xyz"}, None),
+        ({"xyz": 3}, None),
+        ({"scenario": ["ofice"]}, None),
+    ],
+)
+def test_names_that_are_nearly_right_are_answered_with_the_right_one(asked: Any, meant: str | None) -> None:
+    with pytest.raises(SettingError) as caught:
+        parallel_env(**{"scenario": BOX, **asked})
+    assert str(caught.value).endswith(f"; did you mean {meant}?") == (meant is not None)
+    assert meant is not None or "did you mean" not in str(caught.value)
+
+
+def test_an_option_of_a_reset_that_is_nearly_right_is_answered_with_the_right_one() -> None:
+    with pytest.raises(SettingError, match="did you mean starts"):
+        parallel_env(BOX).reset(seed=0, options={"start": None})

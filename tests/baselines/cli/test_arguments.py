@@ -97,3 +97,28 @@ def test_json_is_one_object_that_any_reader_takes(capsys):
     with pytest.raises(ValueError, match="JSON"):
         print_json({"a": float("nan")})
     assert capsys.readouterr().out == ""
+
+
+@dataclass
+class Many:
+    """Do something."""
+
+    count: int = 3
+    """How many."""
+    most: int | None = None
+    """At most."""
+    out: Path | None = None
+    """Where."""
+    folder: Path = Path("a")
+    """Where from."""
+
+
+def test_all_whole_numbers_may_be_typed_with_an_exponent_and_all_paths_begin_at_home(monkeypatch, tmp_path):
+    monkeypatch.setenv("HOME", str(tmp_path))
+    assert parse(Many, ["--count", "1e6", "--most", "2.5e3"]) == Many(1_000_000, 2500)
+    assert parse(Many, ["--count", "1_000", "--out", "~/b/c"]) == Many(1000, None, tmp_path / "b" / "c")
+    assert parse(Many, ["--folder", "~"], default=Many(7)).folder == tmp_path
+    assert parse(Many, [], default=Many(7, 8, Path("b"))) == Many(7, 8, Path("b"))
+    for words in (["--count", "1.5"], ["--count", "1e-3"], ["--most", "x"], ["--count", "inf"]):
+        with pytest.raises(UsageError, match=words[0]):
+            parse(Many, words)
