@@ -69,8 +69,8 @@ def main(words: Sequence[str]) -> int:
 
         run_mission(env, strategy, args.seed, after_step, log.command)
         figures, written = log.finish(name)
-    if args.world is not None and env.scenario.grid.flat and not find_scenario(args.scenario).grid.flat:
-        plan = f"{args.world} is one voxel high: robots stayed in its plane and looked level"
+    if args.task.world and env.scenario.grid.flat and not task.scenario.grid.flat:
+        plan = f"{args.task.world[0]} is one voxel high: robots stayed in its plane and looked level"
         print(f"{plan} (--height-m makes it 3-D; office has ground robots)", file=sys.stderr)
     show_results(env, figures, written, args.output.json)
     return 0

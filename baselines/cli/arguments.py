@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 
     WholeNumber = int
     INLINE: Any
+    _WHOLE: Any
+    _PATH: Any
 else:
     try:
         from tyro.conf import OmitArgPrefixes, Positional, arg
