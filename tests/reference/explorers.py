@@ -7,10 +7,14 @@ through known free cells; a diagonal step needs both cells beside it.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
+
+from entropy_explore_env.missions.view import RobotView
+from entropy_explore_env.scenario import Scenario
 
 UNKNOWN, FREE, WALL = -1, 0, 1
 Cell = tuple[int, int]
@@ -18,36 +22,37 @@ Cell = tuple[int, int]
 
 def frontier_cells(plan: np.ndarray) -> list[Cell]:
     """Known free cells that share a side with an unknown one (Yamauchi 1998)."""
-    found = []
-    for x, y in zip(*np.nonzero(plan == FREE), strict=True):
-        beside = [(x + 1, y), (x - 1, y), (x, y + 1), (x, y - 1)]
-        inside = [(i, j) for i, j in beside if 0 <= i < plan.shape[0] and 0 <= j < plan.shape[1]]
-        if any(plan[place] == UNKNOWN for place in inside):
-            found.append((int(x), int(y)))
-    return found
+    unknown = np.pad(plan == UNKNOWN, 1)
+    beside = unknown[2:, 1:-1] | unknown[:-2, 1:-1] | unknown[1:-1, 2:] | unknown[1:-1, :-2]
+    return [(int(x), int(y)) for x, y in np.argwhere((plan == FREE) & beside)]
 
 
 def steps(plan: np.ndarray) -> csr_array:
     """(X·Y, X·Y) lengths of the steps between neighbouring known free cells."""
+    free, number = np.pad(plan == FREE, 1), np.pad(np.arange(plan.size).reshape(plan.shape), 1)
     rows, columns, lengths = [], [], []
-    for x, y in zip(*np.nonzero(plan == FREE), strict=True):
-        for dx, dy in ((1, 0), (0, 1), (1, 1), (1, -1)):
-            i, j = x + dx, y + dy
-            if not (0 <= i < plan.shape[0] and 0 <= j < plan.shape[1]) or plan[i, j] != FREE:
-                continue
-            if dx and dy and (plan[i, y] != FREE or plan[x, j] != FREE):
-                continue
-            rows.append(x * plan.shape[1] + y)
-            columns.append(i * plan.shape[1] + j)
-            lengths.append(math.hypot(dx, dy))
-    cells = plan.size
-    return csr_array((lengths, (rows, columns)), shape=(cells, cells))
+    inner = np.s_[1:-1, 1:-1]
+    for dx, dy in ((1, 0), (0, 1), (1, 1), (1, -1)):
+        there = np.roll(free, (-dx, -dy), (0, 1))
+        may = free & there
+        if dx and dy:
+            may &= np.roll(free, -dx, 0) & np.roll(free, -dy, 1)
+        rows.append(number[inner][may[inner]])
+        columns.append(np.roll(number, (-dx, -dy), (0, 1))[inner][may[inner]])
+        lengths.append(np.full(len(rows[-1]), math.hypot(dx, dy)))
+    places = (np.concatenate(rows), np.concatenate(columns))
+    return csr_array((np.concatenate(lengths), places), shape=(plan.size, plan.size))
 
 
 def lengths_from(plan: np.ndarray, cell: Cell) -> np.ndarray:
     """(X, Y) lengths of the shortest paths from a cell; inf = there is none."""
-    number = cell[0] * plan.shape[1] + cell[1]
-    return np.asarray(dijkstra(steps(plan), directed=False, indices=number)).reshape(plan.shape)
+    return lengths_from_all(plan, [cell])[0]
+
+
+def lengths_from_all(plan: np.ndarray, cells: Sequence[Cell]) -> np.ndarray:
+    """(K, X, Y) lengths of the shortest paths from K cells; inf = there is none."""
+    numbers = [x * plan.shape[1] + y for x, y in cells]
+    return np.asarray(dijkstra(steps(plan), directed=False, indices=numbers)).reshape(-1, *plan.shape)
 
 
 def nearest_frontier(plan: np.ndarray, robot: Cell) -> dict[Cell, float]:
@@ -67,7 +72,8 @@ def distance_advantage(plan: np.ndarray, robot: Cell, radius: int, horizon: floa
         return nearest_frontier(plan, robot)
     x, y = np.indices(plan.shape)
     around = (abs(x - robot[0]) <= radius) & (abs(y - robot[1]) <= radius) & np.isfinite(lengths)
-    return {cell: float(lengths_from(plan, cell)[around].mean() - lengths[cell]) for cell in near}
+    means = [float(field[around].mean()) for field in lengths_from_all(plan, near)]
+    return {cell: mean - float(lengths[cell]) for cell, mean in zip(near, means, strict=True)}
 
 
 def chosen(values: dict[Cell, float]) -> Cell | None:
@@ -106,3 +112,43 @@ def coordinated(
         for other in cells:
             utility[other] -= max(1.0 - math.dist(other, cell) / reach, 0.0)
     return found
+
+
+class Textbook:
+    """A strategy of one point robot that decides by a rule at every call, and forgets all but its target.
+
+    It goes to the cell of greatest value. The target is kept until the map changes; a cell in which the robot
+    stands and that is a frontier still, since its scan did not show what is beside it, counts no more.
+    """
+
+    def __init__(self, rule: Callable[[np.ndarray, Cell], dict[Cell, float]]) -> None:
+        """Take a rule: from a map and the robot's cell to the values of frontier cells."""
+        self.rule = rule
+
+    def reset(self, scenario: Scenario, rng: np.random.Generator) -> None:
+        """A new mission begins; nothing is drawn."""
+        del scenario, rng
+        self.before, self.target, self.dropped = np.zeros((0, 0)), None, set[Cell]()
+
+    def choose(self, views: Sequence[RobotView]) -> list[np.ndarray]:
+        """(5,) the viewpoint of the robot."""
+        view = views[0]
+        if not self.before.size:
+            self.before = np.ones((1, 1))
+            return [view.pose.copy()]
+        plan = np.where(view.mean > 0.5, WALL, FREE)[:, :, 0]
+        plan[view.precision[:, :, 0] < 0.5**-2] = UNKNOWN
+        grid = view.scenario.grid
+        x, y, _ = (int(i) for i in grid.voxel_of(view.pose[:3]))
+        plan[x, y] = FREE
+        if (x, y) in frontier_cells(plan):
+            self.dropped.add((x, y))
+        same = plan.shape == self.before.shape and (plan == self.before).all()
+        if not (same and self.target in frontier_cells(plan) and self.target not in self.dropped):
+            values = self.rule(plan, (x, y))
+            self.target = chosen({cell: value for cell, value in values.items() if cell not in self.dropped})
+        self.before = plan
+        viewpoint = view.pose.copy()
+        if self.target is not None:
+            viewpoint[:2] = grid.centre_of(np.array([*self.target, 0]))[:2]
+        return [viewpoint]

@@ -1,0 +1,127 @@
+"""Whole missions: as far as the textbook's, no robot stands still, bodies part, and what is refused."""
+
+from __future__ import annotations
+
+import math
+from functools import partial
+
+import numpy as np
+import pytest
+
+from baselines.experiments.mission import run_mission, scripted
+from baselines.strategies import make_strategy
+from baselines.strategies.explorers.distance_advantage import DistanceAdvantage, DistanceAdvantageConfig
+from baselines.strategies.explorers.nearest_frontier import NearestFrontier
+from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
+from entropy_explore_env.errors import SettingError
+from entropy_explore_env.reports.metrics import joint_figures, mission_figures
+from entropy_explore_env.scenario import with_settings
+from entropy_explore_env.scenarios import find_scenario
+from entropy_explore_env.settings import Grid
+from tests.reference import explorers as reference
+
+NAMES = (
+    "nearest-frontier",
+    "coordinated-frontier",
+    "assigned-frontier",
+    "information-gain",
+    "distance-advantage",
+    "receding-horizon",
+    "tour",
+)
+SHARE = 0.995
+
+
+def small_plan(**settings):
+    """A part of a cluttered hall, for a point robot that decides at every scan under way."""
+    base = with_settings(scripted(find_scenario("cluttered")), {"grid": Grid((70, 60, 1), 0.1)})
+    changes = {
+        "robots": 1,
+        "robot": {"reach_m": math.inf, "body_radius_m": 0.0, "redecide": "on_scan"},
+        "sensor": {"max_range_m": 1.5, "angular_step_rad": math.pi / 90, "scan_every_m": 0.2},
+        "ending": {"sigma_end": 1e-3, "time_limit_s": 2000.0},
+        "track_truth": True,
+    }
+    return with_settings(base, {**changes, **settings})
+
+
+def path_m(strategy, seed, scenario):
+    """Metres until SHARE of what can be seen was seen."""
+    env, seen = EntropyExploreEnv(scenario), []
+
+    class EnoughError(Exception):
+        """All is seen."""
+
+    def look(env):
+        explored = joint_figures(env.missions, 0)["explored"] or 0.0
+        if explored >= SHARE:
+            seen.append(float(mission_figures(env.missions, 0)["distance_m"]))
+            raise EnoughError
+
+    with pytest.raises(EnoughError):
+        run_mission(env, strategy, seed, look)
+    return seen[0]
+
+
+RULES = {
+    "nearest-frontier": (NearestFrontier, reference.nearest_frontier),
+    "distance-advantage": (
+        partial(DistanceAdvantage, DistanceAdvantageConfig(radius=25, horizon=26.0, opening=0.0)),
+        partial(reference.distance_advantage, radius=25, horizon=26.0),
+    ),
+}
+
+
+def ratios(rule, starts):
+    """Path lengths of a strategy over those of the textbook, start by start."""
+    ours, textbook = RULES[rule]
+    plan = small_plan()
+    return np.array(
+        [path_m(ours(), seed, plan) / path_m(reference.Textbook(textbook), seed, plan) for seed in starts]
+    )
+
+
+def test_the_path_to_nearest_frontiers_is_the_textbooks():
+    assert ratios("nearest-frontier", [0]) == pytest.approx([1.0], rel=1e-3)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("rule", sorted(RULES))
+def test_over_thirty_starts_paths_are_as_long_as_the_textbooks(rule):
+    """Ties are broken differently, so single missions differ; their geometric mean by no more than 3 %."""
+    found = ratios(rule, range(30))
+    assert abs(np.log(found).mean()) < math.log(1.03)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_every_explorer_sees_a_plan(name):
+    assert path_m(make_strategy(name), 3, small_plan()) < 60.0
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_in_space_each_call_gains_or_moves(name):
+    """Two flying robots with cameras: they map on, and none stands still for long."""
+    settings = {"robots": 2, "ending": {"time_limit_s": 40.0}, "track_truth": True}
+    scenario = with_settings(scripted(find_scenario("room-furnished")), settings)
+    env, idle = EntropyExploreEnv(scenario), [0, 0]
+    last = [None, None]
+
+    def look(env):
+        for robot in range(2):
+            view = env.view(f"robot_{robot}") if env.agents else None
+            if view is None or not view.deciding:
+                continue
+            now = (*view.pose.round(6), round(view.entropy_bits, 3))
+            idle[robot] = idle[robot] + 1 if now == last[robot] else 0
+            last[robot] = now
+            assert idle[robot] < 5
+
+    run_mission(env, make_strategy(name), 1, look)
+    assert joint_figures(env.missions, 0)["explored"] > 0.5
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_world_under_an_exposure_surface_is_refused_with_the_reason(name):
+    env = EntropyExploreEnv(with_settings(scripted(find_scenario("terrain")), {"robots": 1}))
+    with pytest.raises(SettingError, match=f"{name}.*exposure surface"):
+        run_mission(env, make_strategy(name), 0)
