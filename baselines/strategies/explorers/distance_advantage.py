@@ -54,9 +54,9 @@ class DistanceAdvantageConfig:
 
     radius: int = 60
     horizon: float = 61.0
-    opening: float = 0.05
-    passing: float = 0.125
-    meanwhile: float = 0.25
+    opening: float = 0.1
+    passing: float = 0.06
+    meanwhile: float = 0.5
     detour: float = 8.0
 
     def __post_init__(self) -> None:

@@ -117,7 +117,7 @@ def test_in_space_each_call_gains_or_moves(name):
             assert idle[robot] < 5
 
     run_mission(env, make_strategy(name), 1, look)
-    assert joint_figures(env.missions, 0)["explored"] > 0.5
+    assert (joint_figures(env.missions, 0)["explored"] or 0.0) > 0.5
 
 
 @pytest.mark.parametrize("name", NAMES)
