@@ -16,7 +16,7 @@ from entropy_explore_env.settings_json import settings_json
 
 STEPS = 50
 WATCHDOG_S = 20.0
-"""The steps of a scenario take less, compiling kernels aside."""
+"""The steps of a scenario take less processor time, compiling kernels aside."""
 _MOST_DRAWS = 10_000
 
 
@@ -46,7 +46,7 @@ class Played:
     Attributes:
         number: Of the task.
         refused: Why scenarios that were drawn before were not allowed: names of fields.
-        seconds: Of all steps but the first, which may compile kernels.
+        seconds: Of the processor, for all steps but the first, which may compile kernels.
         episodes: How many were begun.
         settings: Of the scenario, as JSON.
     """
@@ -91,8 +91,8 @@ def _environment(drawn: Drawn) -> EntropyExploreEnv:
 
 
 def _play(env: EntropyExploreEnv, rng: np.random.Generator, task: Task) -> tuple[float, int]:
-    """Seconds of all steps but the first, and how many episodes they were in."""
-    agents, begun_s, episodes, earlier_s = env.possible_agents, math.nan, 1, 0.0
+    """Processor seconds of all steps but the first, and how many episodes they were in."""
+    agents, seconds, episodes, earlier_s = env.possible_agents, 0.0, 1, 0.0
     for agent in agents:
         env.action_space(agent).seed(int(rng.integers(2**31)))
     for step in range(task.steps):
@@ -100,11 +100,12 @@ def _play(env: EntropyExploreEnv, rng: np.random.Generator, task: Task) -> tuple
             _go_on(env, task.number)
             episodes, earlier_s = episodes + 1, 0.0
         actions = {agent: env.action_space(agent).sample() for agent in env.agents}
+        begun_s = time.process_time()
         observations, rewards = env.step(actions)[:2]
+        if step > 0:
+            seconds += time.process_time() - begun_s
         earlier_s = _check(env, observations, rewards, earlier_s)
-        if step == 0:
-            begun_s = time.perf_counter()
-    return time.perf_counter() - begun_s, episodes
+    return seconds, episodes
 
 
 def _go_on(env: EntropyExploreEnv, seed: int) -> None:
@@ -115,11 +116,23 @@ def _go_on(env: EntropyExploreEnv, seed: int) -> None:
         env.reset(seed)
 
 
+def _outside(env: EntropyExploreEnv, agent: str) -> str:
+    """The numbers of an observation that its space does not have, with their places in the flat one."""
+    layout, robot = env.missions.layout, env.possible_agents.index(agent)
+    seen = env.missions.observations[0, robot]
+    within = (seen >= layout.low.astype(np.float32)) & (seen <= layout.high.astype(np.float32))
+    return ", ".join(
+        f"{seen[place]!r} at {place} of {list(layout.parts)}" for place in np.flatnonzero(~within)
+    )
+
+
 def _check(env: EntropyExploreEnv, observations: dict, rewards: dict, earlier_s: float) -> float:
     """Check what a step gave; returns the mission's time."""
     for agent, observed in observations.items():
         if not env.observation_space(agent).contains(observed):
-            raise BrokenPromiseError(f"{agent} observed what is outside its space: {env.scenario}")
+            raise BrokenPromiseError(
+                f"{agent} observed {_outside(env, agent)} outside its space: {env.scenario}"
+            )
     figures = {f"the reward of {agent}": reward for agent, reward in rewards.items()}
     figures["the time"] = time_s = float(env.missions.state.missions[0]["time_s"])
     for name, value in figures.items():

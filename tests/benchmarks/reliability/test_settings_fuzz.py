@@ -85,7 +85,8 @@ def test_what_breaks_a_promise_is_found():
     with pytest.raises(BrokenPromiseError, match=r"robots\.goal\[0, 1, 2\] = inf"):
         check(env, observations, rewards, 0.0)
     observations["robot_0"]["self"] = np.full_like(observations["robot_0"]["self"], math.nan)
-    with pytest.raises(BrokenPromiseError, match="outside its space"):
+    env.missions.observations[0, 0, 3] = math.nan
+    with pytest.raises(BrokenPromiseError, match=r"nan.* at 3 of .* outside its space"):
         check(env, observations, rewards, 0.0)
 
 
