@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 import time
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -145,3 +147,8 @@ def _check(env: EntropyExploreEnv, observations: dict, rewards: dict, earlier_s:
     if time_s < earlier_s:
         raise BrokenPromiseError(f"time ran from {earlier_s} back to {time_s} s: {env.scenario}")
     return time_s
+
+
+def play_number(number: int) -> dict[str, Any]:
+    """The case of a number, as what is kept of it."""
+    return dataclasses.asdict(play(Task(number)))

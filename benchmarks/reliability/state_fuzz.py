@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import dataclass
 from typing import Any
 
@@ -129,3 +130,8 @@ def _spoil(arrays: dict[str, np.ndarray], rng: np.random.Generator) -> str:
         value = min(max(_COUNTS[int(rng.integers(len(_COUNTS)))], limits.min), limits.max)
         array[place] = value
     return f"{name}.{field}{list(place)} = {value!r}"
+
+
+def play_number(number: int) -> dict[str, Any]:
+    """The case of a number, as what is kept of it."""
+    return dataclasses.asdict(play(Change(number)))
