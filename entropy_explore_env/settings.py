@@ -415,6 +415,7 @@ class Observation:
         panorama_pitches: Directions up and down, from -π/4 to π/4; planar robots have one.
         panorama_utility: `bits`, or `log2` for log2(1 + bits), which suits networks.
         self_state: The robot's pose, time, remaining entropy and whether it decides (part `self`).
+        drive: The robot's speed and the viewpoint that it chose last, for those that decide under way.
         team: Where teammates were last heard, and what they announced.
         patch: The belief around the robot.
         patch_shape: Its voxels along x, y and z; odd, the robot in the middle.
@@ -431,6 +432,7 @@ class Observation:
     panorama_pitches: int = 3
     panorama_utility: Literal["bits", "log2"] = "bits"
     self_state: bool = True
+    drive: bool = False
     team: bool = True
     patch: bool = False
     patch_shape: tuple[int, int, int] = (11, 11, 5)
@@ -445,6 +447,7 @@ class Observation:
         for name in (
             "panorama",
             "self_state",
+            "drive",
             "team",
             "patch",
             "overview",

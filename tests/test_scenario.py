@@ -122,6 +122,7 @@ REFUSED = {
     (Observation, "panorama_pitches"): (*COUNT, 0, 91),
     (Observation, "panorama_utility"): KIND,
     (Observation, "self_state"): SWITCH,
+    (Observation, "drive"): SWITCH,
     (Observation, "team"): SWITCH,
     (Observation, "patch"): SWITCH,
     (Observation, "patch_shape"): (

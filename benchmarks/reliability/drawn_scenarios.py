@@ -120,6 +120,7 @@ FIELDS: Mapping[type, Mapping[str, Numbers | Sequence[Any]]] = MappingProxyType(
             "panorama_pitches": _count(1, 90, 1, 5),
             "panorama_utility": ("bits", "log2"),
             "self_state": _SWITCH,
+            "drive": _SWITCH,
             "team": _SWITCH,
             "patch": _SWITCH,
             "overview": _SWITCH,
@@ -241,7 +242,7 @@ def _observation(rng: np.random.Generator, part: Callable[..., Any], few_kernels
     if not few_kernels:
         return drawn
     every = bool(rng.random() < 0.5)
-    names = ("panorama", "self_state", "team", "patch", "overview")
+    names = ("panorama", "self_state", "drive", "team", "patch", "overview")
     default = Observation()
     return dataclasses.replace(
         drawn, action_mask=False, **{name: every or getattr(default, name) for name in names}

@@ -20,7 +20,7 @@ class NearestUnknown:
     def _choose(self, view):
         grid, here = view.scenario.grid, view.pose[:3]
         unknown = np.argwhere(view.precision < self._unknown)  # view.mean and view.precision: (X, Y, Z)
-        if view.move_end.name not in ("ARRIVED", "SEEN") or len(unknown) == 0:
+        if view.move_end.name not in ("ARRIVED", "SEEN", "UNDER_WAY") or len(unknown) == 0:
             return random_viewpoint(view, self._rng)  # something was in the way, or all is known
         apart = grid.centre_of(unknown) - here
         nearest = apart[np.argmin((apart**2).sum(axis=1))]

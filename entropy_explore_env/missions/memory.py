@@ -31,6 +31,7 @@ _LAST_GROUP = Path("/sys/fs/cgroup/memory.max")
 _SETTING_OF_PART = {
     "panorama": "Observation.panorama_yaws",
     "self": "Observation.self_state",
+    "drive": "Observation.drive",
     "team": "Observation.team",
     "patch": "Observation.patch_shape",
     "overview": "Observation.overview_shape",

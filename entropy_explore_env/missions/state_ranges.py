@@ -18,6 +18,7 @@ from entropy_explore_env.missions.state import WAYPOINTS, MissionEnd
 from entropy_explore_env.robots.motion import MoveEnd
 from entropy_explore_env.robots.range_sensor import Return
 from entropy_explore_env.scenario import Scenario
+from entropy_explore_env.settings import MAX_VOXELS
 
 FROM_WORLD = ("truth", "collision", "visible")
 """Arrays of the state that follow from a mission's world, which its seed and what was given determine."""
@@ -85,6 +86,11 @@ def _missions(scenario: Scenario, arrays: Mapping[str, np.ndarray]) -> Iterator[
     yield Values("missions.reached_s", clock["reached_s"], 0.0, clock["time_s"][:, None], -1.0)
     for name in ("entropy_start_bits", "entropy_end_bits", "joint_bits"):
         yield Values(f"missions.{name}", clock[name], -_MOST, _MOST)
+    yield Values("missions.seen_s", clock["seen_s"], 0.0, clock["time_s"][:, None], -1.0)
+    yield Values("missions.seen_m", clock["seen_m"], -_ROUNDING, _MOST, -1.0)
+    yield Values("missions.explored_free_end", clock["explored_free_end"], -MAX_VOXELS, voxels)
+    for name in ("visible", "visible_free", "explored_free", "explored_end"):
+        yield Values(f"missions.{name}", clock[name], 0, voxels)
     for name in ("explored", "explored_visible", "error", "wrong"):
         yield Values(f"missions.{name}", clock[name], -_ROUNDING, voxels)
 

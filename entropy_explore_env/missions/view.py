@@ -9,8 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from entropy_explore_env.missions.action import encode_viewpoint
-from entropy_explore_env.missions.poses import place_at, pose_at, speed_at
+from entropy_explore_env.missions.action import ROUNDING, encode_viewpoint
+from entropy_explore_env.missions.poses import place_at, pose_at, share_left, speed_at
 from entropy_explore_env.missions.rules import Rules
 from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.robots.motion import MoveEnd
@@ -87,6 +87,7 @@ class RobotView:
         deciding: Whether it chooses a viewpoint now.
         under_way: Whether it does so while it drives on. Where it chooses `target` again, nothing changes.
         speed_m_s: Its speed on its path; 0 while it stands.
+        since_scan_m: Metres that it has driven since its latest scan.
         pose: (5,) x, y, z, yaw, pitch: map frame, metres, radians, pitch downwards.
         mean: (X, Y, Z) float32, expected coverage.
         precision: (X, Y, Z) float32, 1/σ² of it.
@@ -108,6 +109,7 @@ class RobotView:
     deciding: bool
     under_way: bool
     speed_m_s: float
+    since_scan_m: float
     pose: np.ndarray
     mean: np.ndarray
     precision: np.ndarray
@@ -146,6 +148,26 @@ class RobotView:
         """Whether it stays in its plane and looks level."""
         return self.scenario.layer_of(self.kind.robot) is not None
 
+    def scan_places(self, path_m: np.ndarray) -> np.ndarray:
+        """Where the robot would scan under way on a path from its place, the scan at its end not among them.
+
+        It does so after every `scan_every_m` that it has driven. The way to brake, where it has to come to
+        rest first, is not taken into account.
+
+        Args:
+            path_m: (N, 3) points to which it would drive straight, one after the other; such as `path`.
+
+        Returns:
+            (S, 3) float64, in metres, map frame.
+        """
+        points = np.vstack([self.pose[None, :3], np.asarray(path_m, np.float64).reshape(-1, 3)])
+        ends_m = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
+        every_m = self.kind.sensor.scan_every_m
+        if not ends_m[-1] + self.since_scan_m > every_m:
+            return np.zeros((0, 3))
+        scans_m = np.arange(every_m - self.since_scan_m, ends_m[-1] * (1.0 - ROUNDING), every_m)
+        return np.stack([np.interp(scans_m, ends_m, points[:, axis]) for axis in range(3)], axis=1)
+
     def no_fly_mask(self) -> np.ndarray | None:
         """(X, Y, Z) bool, where its body would reach above the ceiling; None = there is no ceiling."""
         if self.ceiling is None:
@@ -173,6 +195,7 @@ def view_of(missions: Missions, mission: int, robot: int) -> RobotView:
         deciding=bool(own["deciding"]),
         under_way=bool(own["under_way"]),
         speed_m_s=float(speed_at(rules.params[robot], own, time_s)),
+        since_scan_m=_since_scan_m(rules.params[robot], own, time_s),
         pose=np.array(pose_at(rules.params[robot], own, time_s)),
         mean=read_only(state.mean[here].reshape(shape)),
         precision=read_only(state.precision[here].reshape(shape)),
@@ -192,6 +215,15 @@ def view_of(missions: Missions, mission: int, robot: int) -> RobotView:
         ceiling=None if world is None else world.ceiling,
         rules=rules,
     )
+
+
+def _since_scan_m(params: np.void, own: np.void, time_s: float) -> float:
+    """Metres that a robot has driven since its latest scan, or since its start."""
+    if own["deciding"] and not own["under_way"]:
+        return 0.0
+    scanned_m = own["scans_under_way"] * params["scan_every_m"] if own["scans_under_way"] else 0.0
+    driven_m = (1.0 - share_left(params, own, time_s)) * own["path_m"]
+    return max(float(own["scan_lead_m"] + driven_m - scanned_m), 0.0)
 
 
 def _path_ahead(params: np.void, own: np.void, time_s: float) -> np.ndarray:

@@ -66,6 +66,8 @@ class ViewObserver:
             view.time_s,
             view.entropy_bits,
             view.deciding,
+            view.speed_m_s,
+            view.target,
             _heard(view, self.scenario.robots),
             mean,
             precision,

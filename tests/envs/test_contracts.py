@@ -28,8 +28,8 @@ PARTS: dict[str, dict[str, Any]] = {
     "nothing": {"panorama": False, "self_state": False, "team": False},
     "self": {"panorama": False, "team": False},
     "default": {},
-    "everything": {"patch": True, "overview": True, "action_mask": True},
-    "flat": {"patch": True, "overview": True, "action_mask": True, "flat": True},
+    "everything": {"drive": True, "patch": True, "overview": True, "action_mask": True},
+    "flat": {"drive": True, "patch": True, "overview": True, "action_mask": True, "flat": True},
 }
 KINDS = ("continuous", "discrete")
 TEAMS = (SMALL, range(1, 6), KINDS)

@@ -35,6 +35,7 @@ def drawn(rng: np.random.Generator) -> tuple[str, dict[str, Any], int, int]:
     settings["channel"] = {**channel[rng.integers(3)], "burst": int(rng.integers(1, 200))}
     patch = tuple(int(n) for n in 2 * rng.integers(0, 16, 3) + 1)
     settings["observation"] = {
+        "drive": bool(rng.integers(2)),
         "patch": bool(rng.integers(2)),
         "patch_shape": patch,
         "overview": bool(rng.integers(2)),

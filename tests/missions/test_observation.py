@@ -10,6 +10,7 @@ import pytest
 from entropy_explore_env.belief.entropy import map_entropy_bits
 from entropy_explore_env.belief.map_update import fuse_scan
 from entropy_explore_env.belief.measurement_model import Return
+from entropy_explore_env.missions.poses import pose_at
 from entropy_explore_env.robots.range_sensor import Scene, SensorPose, new_scan, sensor_model, take_scan
 from entropy_explore_env.settings import Grid, RangeSensor, gaussian_entropy_bits
 from tests.reference import rocha04
@@ -17,6 +18,7 @@ from tests.reference.scenes import as_reference, free_box, put, started, wander
 
 EVERYTHING = {
     "panorama": True,
+    "drive": True,
     "patch": True,
     "patch_shape": (5, 7, 3),
     "overview": True,
@@ -52,6 +54,7 @@ SETTINGS = {
         "ending": {"time_limit_s": 1e3},
         "observation": EVERYTHING,
     },
+    "under way": {"robots": 2, "robot": {"redecide": 0.3}, "observation": EVERYTHING},
 }
 
 
@@ -91,7 +94,7 @@ def normalised(missions, precision):
 
 def test_the_parts_are_those_asked_for(mission):
     missions, parts = mission
-    expected = ["panorama", "self", "team", "patch", "overview"]
+    expected = ["panorama", "self", "drive", "team", "patch", "overview"]
     if missions.scenario.action.kind == "discrete":
         expected.append("action_mask")
     assert list(parts[0]) == expected
@@ -117,6 +120,22 @@ def test_self(mission):
             float(own["deciding"]),
         ]
         assert part["self"] == pytest.approx(expected, abs=2e-5)
+
+
+def test_drive(mission):
+    missions, parts = mission
+    size_m, time_s, moving = missions.grid.size_m, float(missions.state.missions[0]["time_s"]), 0
+    for robot, part in enumerate(parts):
+        own, params = missions.state.robots[0, robot], missions.rules.params[robot]
+        expected = relative(own["target"], pose_of(missions, robot), size_m)
+        assert part["drive"][1:] == pytest.approx(expected, abs=2e-5)
+        before, after = (np.array(pose_at(params, own, time_s + gap)[:3]) for gap in (-1e-4, 1e-4))
+        standing = own["deciding"] and not own["under_way"]
+        speed_m_s = 0.0 if standing else np.linalg.norm(after - before) / 2e-4
+        assert part["drive"][0] * params["max_speed_m_s"] == pytest.approx(speed_m_s, abs=1e-3)
+        moving += part["drive"][0] > 0.0
+    if missions.scenario.robot.redecide != "at_stop":
+        assert moving
 
 
 def relative(other, pose, size_m):

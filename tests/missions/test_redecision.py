@@ -340,3 +340,37 @@ def test_missions_with_decisions_under_way_are_kept_copied_and_run_again(redecid
     assert digests[0] == digests[1] == digests[2]
     missions.state.robots["lead_s"][0, 0] += 0.125
     assert state_digest(missions, 0) != digests[0][0]
+
+
+@pytest.mark.parametrize("redecide", ["on_scan", 0.9])
+def test_a_view_says_where_the_robot_would_scan(redecide):
+    """A plan around the wall, and around again from the middle of a stretch between two scans."""
+    sensor = {**ALL_ROUND, "scan_every_m": 0.6}
+    missions = started(planner(sensor=sensor, robot={"redecide": redecide}))
+    build(missions, wall_with_a_gap())
+    missions.state.mean[0, 0], missions.state.precision[0, 0] = wall_with_a_gap().ravel(), 1e4
+    put(missions, 0, START)
+    robot, expected, found = missions.state.robots[0, 0], [], []
+    assert view_of(missions, 0, 0).since_scan_m == 0.0
+    toward(missions, BEHIND)
+    for _ in range(60):
+        view = view_of(missions, 0, 0)
+        places = view.scan_places(view.path)
+        if view.under_way and len(places):
+            first = np.linalg.norm(places[0] - view.pose[:3])  # shorter than the path where that has a corner
+            assert first <= 0.6 - view.since_scan_m + 1e-6
+            expected.append((int(robot["scans"]) + 1, places[0]))
+        scans = robot["scans"]
+        toward(missions, view.target)
+        if robot["scans"] > scans:
+            found.append((int(robot["scans"]), robot["scan_pose"][:3].copy()))
+        if not robot["under_way"]:
+            break
+    assert len(expected) >= 10
+    for number, place in expected:
+        scanned = dict(found)
+        assert place == pytest.approx(scanned[number], abs=1e-6)
+    view = view_of(missions, 0, 0)
+    assert view.since_scan_m == 0.0 and view.path.shape == view.scan_places(view.path).shape == (0, 3)
+    straight = view.scan_places(view.pose[None, :3] + [[0.0, 1.8, 0.0]])
+    assert straight[:, 1] - view.pose[1] == pytest.approx([0.6, 1.2])  # the one at 1.8 m is that on arrival

@@ -13,7 +13,13 @@ from entropy_explore_env.missions.view_observation import ViewObserver
 from entropy_explore_env.settings import Action, Observation
 
 EVERYTHING = Observation(
-    flat=True, patch=True, overview=True, overview_shape=(3, 4, 2), action_mask=True, panorama_utility="log2"
+    flat=True,
+    drive=True,
+    patch=True,
+    overview=True,
+    overview_shape=(3, 4, 2),
+    action_mask=True,
+    panorama_utility="log2",
 )
 PLAIN = Observation(panorama=False, self_state=False, team=False)
 

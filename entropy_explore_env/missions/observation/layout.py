@@ -10,6 +10,9 @@ Parts, in this order, each only if the scenario's settings ask for it (D directi
                            sin of pitch; share of the time limit gone (0 without one); share of
                            the map's entropy left, counting every voxel; 1 while it decides; in
                            teams of K > 1 kinds of robots 1 for its kind, 0 for the others
+    drive     (8,)         speed as a share of the top speed; the viewpoint that the robot chose
+                           last: where it is, relative, in workspace sizes (3); cos and sin of its
+                           yaw and of its pitch (4)
     team      (A-1, 19)    per teammate, in the order of their numbers: 1 if ever heard; where it
                            was, relative, in workspace sizes (3); cos and sin of its yaw and of its
                            pitch (4); seconds since then as s/(s + 60); 1 if an announcement was
@@ -36,6 +39,7 @@ from gymnasium import spaces
 
 from entropy_explore_env.belief.raycast import longest_crossing
 from entropy_explore_env.missions.observation.overview import OVERVIEW_CHANNELS
+from entropy_explore_env.missions.observation.own_drive import DRIVE_VALUES
 from entropy_explore_env.missions.observation.own_state import SELF_VALUES
 from entropy_explore_env.missions.observation.patch import PATCH_CHANNELS
 from entropy_explore_env.missions.observation.team import TEAMMATE_VALUES
@@ -143,6 +147,8 @@ def observation_parts(scenario: Scenario) -> dict[str, Part]:
     if settings.self_state:
         kinds = len(scenario.kinds)
         limits["self"] = ((SELF_VALUES + (kinds if kinds > 1 else 0),), -1.0, one)
+    if settings.drive:
+        limits["drive"] = ((DRIVE_VALUES,), -1.0, one)
     if settings.team and scenario.robots > 1:
         limits["team"] = ((scenario.robots - 1, TEAMMATE_VALUES), -1.0, one)
     if settings.patch:
@@ -174,6 +180,7 @@ class PartOffsets(NamedTuple):
 
     panorama: int | None
     self_state: int | None
+    drive: int | None
     team: int | None
     patch: int | None
     overview: int | None
@@ -190,7 +197,7 @@ def part_offsets(scenario: Scenario, layout: ObservationLayout) -> PartOffsets:
     begin = {name: part.start for name, part in layout.parts.items()}
     patch = scenario.observation.patch_shape
     return PartOffsets(
-        *(begin.get(name) for name in ("panorama", "self", "team", "patch", "overview", "action_mask")),
+        *map(begin.get, ("panorama", "self", "drive", "team", "patch", "overview", "action_mask")),
         patch_shape=(int(patch[0]), int(patch[1]), int(patch[2])),
         kinds=len(scenario.kinds) if len(scenario.kinds) > 1 else 0,
         while_busy=scenario.observation.while_busy,

@@ -9,11 +9,12 @@ import numpy as np
 from entropy_explore_env.compilation.kernels import lean_kernel
 from entropy_explore_env.missions.observation.mask import observe_mask
 from entropy_explore_env.missions.observation.overview import observe_overview
+from entropy_explore_env.missions.observation.own_drive import observe_drive
 from entropy_explore_env.missions.observation.own_state import observe_self
 from entropy_explore_env.missions.observation.panorama import observe_panorama
 from entropy_explore_env.missions.observation.patch import observe_patch
 from entropy_explore_env.missions.observation.team import observe_team
-from entropy_explore_env.missions.poses import pose_at, to_grid_units
+from entropy_explore_env.missions.poses import pose_at, speed_at, to_grid_units
 
 
 class Known(NamedTuple):
@@ -25,6 +26,9 @@ class Known(NamedTuple):
     entropy_bits: float
     """Entropy of its map."""
     deciding: bool
+    speed_m_s: float
+    target: np.ndarray
+    """(5,) the viewpoint that it chose last."""
     heard: np.ndarray
     """(A,) HEARD, what it heard of each teammate."""
     mean: np.ndarray
@@ -68,6 +72,7 @@ def observe_robot(rules, offsets, robot, known, crossing, out):
     start = to_grid_units(params, known.pose)
     observe_panorama(offsets.panorama, params, sensor, rules.panorama, start, known, crossing, out)
     observe_self(offsets.self_state, params, offsets.kinds, known, out)
+    observe_drive(offsets.drive, params, known, out)
     observe_team(offsets.team, params, robot, known, out)
     observe_patch(offsets.patch, params, offsets.patch_shape, robot, start, known, out)
     observe_overview(offsets.overview, rules.cells, known.pooled, out)
@@ -100,6 +105,8 @@ def observe_missions(rules, offsets, observed, crossing, first, last, out):
                 clock.time_s,
                 own.entropy_bits,
                 own.deciding,
+                speed_at(rules.params[robot], own, clock.time_s),
+                own.target,
                 observed.heard[mission, robot],
                 observed.mean[mission, robot],
                 observed.precision[mission, robot],
