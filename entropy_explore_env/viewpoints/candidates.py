@@ -7,6 +7,7 @@ bits, the seconds until its scan, and whether it is a gaze from the spot, a plac
 from __future__ import annotations
 
 import enum
+import itertools
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -183,9 +184,7 @@ class CandidatePlanner:
         maker = self._maker(situation.robot)
         recipe = maker.recipe
         if travel is not None:
-            resume_search(
-                travel.search, travel.lattice, travel.costs, _AROUND_CORNERS * maker.within.reach + 1.0
-            )
+            self._search_nearby(maker, travel)
         found = self._evaluated(situation, maker, maker.drawn, _drawn(maker, situation.here, rng), travel)
         spread = angular_spread(maker.kind)
         for number in range(recipe.refinements):
@@ -197,6 +196,36 @@ class CandidatePlanner:
                 best = self._evaluated(situation, maker, maker.exact, best.viewpoints, travel)
             found = best.joined(self._evaluated(situation, maker, maker.exact, near, travel))
         return found
+
+    def seconds_to(self, situation: Situation, travel: Travel, viewpoints: np.ndarray) -> np.ndarray:
+        """(K,) seconds to viewpoints (K, 5) nearby on planned paths; inf = there is no path."""
+        maker = self._maker(situation.robot)
+        self._search_nearby(maker, travel)
+        seconds = np.empty(len(viewpoints))
+        self._fill_seconds(maker, situation.here, viewpoints, math.inf, seconds)
+        return seconds
+
+    def _search_nearby(self, maker: _Maker, travel: Travel) -> None:
+        farthest = _AROUND_CORNERS * maker.within.reach + 1.0
+        resume_search(travel.search, travel.lattice, travel.costs, farthest)
+
+    def exits(self, situation: Situation) -> np.ndarray:
+        """(K, 5) viewpoints on the neighbouring voxels that the latest search reached.
+
+        A body that does not fit where it is, by its belief, leaves by one of them, and searches anew there.
+        """
+        maker, here = self._maker(situation.robot), situation.here
+        layers = (0,) if maker.planar else (-1, 0, 1)
+        steps = np.array([s for s in itertools.product((-1, 0, 1), (-1, 0, 1), layers) if any(s)], float)
+        viewpoints = np.tile(here, (len(steps), 1))
+        viewpoints[:, :3] = np.floor(here[:3]) + 0.5 + steps
+        if maker.planar:
+            viewpoints[:, 2] = here[2]
+        inside = ((viewpoints[:, :3] > 0.0) & (viewpoints[:, :3] < self._grid.shape)).all(axis=1)
+        viewpoints = viewpoints[inside]
+        seconds = np.empty(len(viewpoints))
+        self._fill_seconds(maker, here, viewpoints, math.inf, seconds)
+        return viewpoints[np.isfinite(seconds)]
 
     def _evaluated(
         self,

