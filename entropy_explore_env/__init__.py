@@ -9,8 +9,6 @@ Importing registers, for every scenario (room → Room-v0), `gymnasium.make`, `g
 
 from __future__ import annotations
 
-import math
-
 import gymnasium
 import pettingzoo
 
@@ -117,9 +115,9 @@ def _register() -> None:
         gymnasium.register(
             id=name,
             entry_point="entropy_explore_env.envs.single_env:SingleRobotEnv",
-            vector_entry_point="entropy_explore_env.envs.vector_env:EntropyExploreVectorEnv",
+            vector_entry_point="entropy_explore_env.envs.vector_env:registered_vector_env",
             kwargs={"scenario": scenario, "robots": 1, "decision_period_s": None},
-            max_episode_steps=math.ceil(task.ending.time_limit_s / task.sensor.scan_time_s) + 1,
+            max_episode_steps=task.most_decisions,
             reward_threshold=_MAPPED_IN_TIME,
         )
         pettingzoo.register("parallel", name, parallel_env, kwargs={"scenario": scenario})

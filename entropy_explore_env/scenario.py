@@ -224,6 +224,15 @@ class Scenario:
         return math.floor(min(time_s / apart_s, 1e9)) + 2
 
     @property
+    def most_decisions(self) -> int:
+        """Decisions of a robot on its own that the time limit leaves time for: a scan follows each of them.
+
+        Decisions under way (`Robot.redecide`) are not counted. At most 2⁶².
+        """
+        decisions = self.ending.time_limit_s / self.sensor.scan_time_s
+        return math.ceil(min(decisions, 2.0**62)) + 1
+
+    @property
     def planar(self) -> bool:
         """Whether the whole team stays in planes and looks level."""
         return all(self.layer_of(kind.robot) is not None for kind in self.kinds)

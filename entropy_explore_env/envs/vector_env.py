@@ -284,3 +284,28 @@ class EntropyExploreVectorEnv(VectorEnv[Any, Any, Any]):
         for painter in self._painters:
             painter.close()
         self.missions.close()
+
+
+def registered_vector_env(
+    scenario: str | Scenario = "room",
+    num_envs: int = 1,
+    *,
+    max_episode_steps: int | None = None,
+    **more: Any,  # noqa: ANN401 - as EntropyExploreVectorEnv takes them
+) -> EntropyExploreVectorEnv:
+    """What `gymnasium.make_vec` makes: an EntropyExploreVectorEnv.
+
+    Args:
+        scenario: As of EntropyExploreVectorEnv.
+        num_envs: Number of missions E.
+        max_episode_steps: Steps after which a mission is cut off, as `max_cycles`. None, -1, or what the
+            scenario is registered with, which Gymnasium always hands over: it ends as the scenario says.
+        **more: As of EntropyExploreVectorEnv.
+
+    Raises:
+        SettingError: As of EntropyExploreVectorEnv.
+        WorldError: The world cannot be used.
+    """
+    if max_episode_steps not in (None, -1, find_scenario(scenario).most_decisions):
+        more["max_cycles"] = max_episode_steps
+    return EntropyExploreVectorEnv(scenario, num_envs, **more)

@@ -189,6 +189,7 @@ class Stage:
         makers["pettingzoo.make"] = lambda **more: pettingzoo.make("parallel", box, **more)
         makers["with_settings"] = lambda **more: with_settings(SCENARIOS[BOX], more)
         makers["Scenario"] = lambda **more: dataclasses.replace(SCENARIOS[BOX], **more)
+        self.makers = makers
         for name, make in makers.items():
             for field, allowed in fields(Scenario).items():
                 if name == "with_settings" and field == "world":

@@ -47,3 +47,11 @@ def test_every_target_can_be_called_with_something_wrong(stage: Stage) -> None:
     names = {stage.call(number)[0].split(": ", 1)[1].rsplit(",", 1)[0] for number in range(CALLS)}
     missed = {target.name for target in stage.targets} - names
     assert len(stage.targets) > 300 and not missed
+
+
+def test_the_same_calls_with_nothing_wrong_are_taken(stage: Stage) -> None:
+    """Else whatever they are given would be refused."""
+    assert len(stage.makers) > 8
+    for make in stage.makers.values():
+        make()
+        make(robots=1, split="test")

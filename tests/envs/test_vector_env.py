@@ -21,6 +21,7 @@ from entropy_explore_env import (
     SingleRobotEnv,
     WorldError,
     environment_id,
+    find_scenario,
     parallel_env,
 )
 from entropy_explore_env.envs.conformance import leaves, require_apart, require_same, snapshot
@@ -461,3 +462,17 @@ def test_each_mission_has_a_picture_and_the_window_shows_the_first() -> None:
     assert window.render() is None and pygame.display.get_surface() is not None
     window.close()
     assert pygame.display.get_surface() is None
+
+
+def test_gymnasium_s_limit_of_steps_cuts_missions_off_only_where_it_is_asked_for() -> None:
+    name = environment_id(BOX)
+    usual = gymnasium.make_vec(name, 2)
+    assert usual.unwrapped.scenario.ending == find_scenario(BOX).ending  # type: ignore[attr-defined]
+    for limit, cycles in ((-1, None), (None, None), (3, 3)):
+        made = gymnasium.make_vec(name, 2, max_episode_steps=limit)
+        assert made.unwrapped.scenario.ending.max_cycles == cycles  # type: ignore[attr-defined]
+    made.reset(seed=0)
+    truncated = [made.step(made.action_space.sample())[3].tolist() for _ in range(3)]
+    assert truncated == [[False] * 2, [False] * 2, [True] * 2]
+    with pytest.raises(SettingError, match="max_cycles = 0"):
+        gymnasium.make_vec(name, 2, max_episode_steps=0)
