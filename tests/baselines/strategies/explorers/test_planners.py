@@ -1,0 +1,46 @@
+"""The planners that look ahead, tours and trees, by hand."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from baselines.strategies.explorers.receding_horizon import RecedingHorizon, RecedingHorizonConfig
+from baselines.strategies.explorers.tour import Tour, TourConfig, lengths_between
+from tests.baselines.strategies.explorers.scenes import cell, corridor, scene_of
+from tests.reference import explorers as reference
+
+
+def test_a_tour_of_both_ends_begins_with_the_nearer_and_keeps_its_target_when_that_is_as_good():
+    plan = corridor()
+    assert cell(plan, Tour().pick(scene_of(plan, (8, 1)))) == (1, 1)
+    assert cell(plan, Tour().pick(scene_of(plan, (20, 1)))) == (27, 1)
+    right = int(np.ravel_multi_index((27, 1), plan.shape))
+    near_middle = scene_of(plan, (13, 1), target=right)
+    assert cell(plan, Tour(TourConfig(stay=0.2)).pick(near_middle)) == (27, 1)
+    assert cell(plan, Tour(TourConfig(stay=0.0)).pick(scene_of(plan, (13, 1), target=right))) == (1, 1)
+
+
+@pytest.mark.parametrize("near", [0, 2])
+def test_lengths_between_places_are_those_of_paths_by_hand(near):
+    """A corridor: from cell 8 to both ends 7 and 19, and 26 between them, by search or along the tree."""
+    plan = corridor()
+    scene = scene_of(plan, (8, 1))
+    scene.paths.extend(np.inf)
+    ends = np.array([np.ravel_multi_index(place, plan.shape) for place in ((1, 1), (27, 1))], np.int32)
+    found = lengths_between(scene.paths, scene.here, ends, near)
+    assert found == pytest.approx(np.array([[0, 7, 19], [7, 0, 26], [19, 26, 0]], float))
+
+
+def test_a_tree_leads_to_where_something_is_unknown_and_else_to_the_nearest_frontier():
+    plan = np.full((40, 5), reference.WALL, np.int8)
+    plan[1:30, 1:4] = reference.FREE
+    plan[30:38, 1:4] = reference.UNKNOWN
+    scene = scene_of(plan, (15, 2))
+    planner = RecedingHorizon(RecedingHorizonConfig(edge=0.1))
+    planner.reset(scene.view.scenario, np.random.default_rng(5))
+    x, _ = cell(plan, planner.pick(scene))
+    assert x != 15 and plan[cell(plan, planner.pick(scene_of(plan, (15, 2))))] == reference.FREE
+    none = RecedingHorizon(RecedingHorizonConfig(least_gain=1e9))
+    none.reset(scene.view.scenario, np.random.default_rng(5))
+    assert cell(plan, none.pick(scene_of(plan, (15, 2)))) == (29, 2)
