@@ -117,7 +117,8 @@ def truth_reached_by(source: str) -> list[str]:
 
 @pytest.mark.parametrize("folder", ["baselines", "training"])
 def test_strategies_do_not_reach_the_truth_through_public_names(folder):
-    files = sorted((ROOT / folder).rglob("*.py"))
+    makes_files = "pack_worlds.py"  # a command that saves the suites' worlds: nothing that acts imports it
+    files = sorted(path for path in (ROOT / folder).rglob("*.py") if path.name != makes_files)
     assert len(files) > 10
     assert {str(file): names for file in files if (names := truth_reached_by(file.read_text()))} == {}
 
