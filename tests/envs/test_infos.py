@@ -170,10 +170,9 @@ def test_at_the_end_of_a_scored_mission_infos_say_all_figures() -> None:
         infos = env.step({agent: rng.uniform(-1, 1, 5).astype(np.float32) for agent in env.agents})[4]
     first, second = (infos[agent]["figures"] for agent in env.possible_agents)
     assert first == second == mission_figures(env.missions, 0, floor=True)
-    assert first["scans_over_floor"] > 0 and set(first["joint"]) == {
-        "entropy_bits",
-        "explored",
-        "error",
-        "wrong",
+    marks = {
+        figure for share in (50, 90, 95, 99, 100) for figure in (f"t{share}_seen_s", f"path{share}_seen_m")
     }
+    whole = {"entropy_bits", "explored", "error", "wrong", "unseen_free_voxels", "driven_m"}
+    assert first["scans_over_floor"] > 0 and set(first["joint"]) == whole | marks
     assert mission_figures(env.missions, 0, floor=False)["scans_over_floor"] is None
