@@ -103,7 +103,7 @@ def test_a_scenario_in_given_worlds_keeps_the_contract():
 
 @pytest.mark.parametrize("scenario", ["room", "office", "terrain"])
 def test_a_team_that_finds_no_room_is_refused_as_in_any_world(scenario):
-    env = eee.parallel_env(scenario, world=HUT, robot={"body_radius_m": 4.5})
+    env = eee.parallel_env(scenario, world=HUT, robot={"body_radius_m": 2.3})
     with pytest.raises(eee.WorldError, match="hut 4"):
         env.reset(seed=0)
 
