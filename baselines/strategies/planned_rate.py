@@ -21,7 +21,7 @@ from baselines.strategies.protocol import random_viewpoint
 from entropy_explore_env.missions.view import RobotView
 from entropy_explore_env.robots.motion import MoveEnd
 from entropy_explore_env.scenario import Scenario
-from entropy_explore_env.viewpoints.candidates import CandidatePlanner, Kind, Situation
+from entropy_explore_env.viewpoints.candidates import CandidatePlanner, Situation
 from entropy_explore_env.viewpoints.evaluation import sees_all_around
 from entropy_explore_env.viewpoints.recipe import Recipe
 from entropy_explore_env.viewpoints.travel import Travel
@@ -78,10 +78,6 @@ class _Memory:
     """(3,) where that was."""
     patience: int = 0
     """Decisions until far places are looked at again on the same spot."""
-    shut_in: bool = False
-    """Whether no place within reach could be reached at its latest decision."""
-    open_at: np.ndarray | None = None
-    """(3,) where it last was not shut in."""
     blocked: int = 0
     """Decisions during which it keeps clear of teammates."""
 
@@ -116,8 +112,10 @@ class PlannedRate:
             _Weigher(memory, view),
         )
         chosen, expected = self._best(situation, memory, view)
-        if memory.shut_in and expected < _POOR * memory.most_bits:
-            chosen, expected = self._way_out(view, situation, memory), 0.0
+        stays = bool((chosen[:3] == here[:3]).all())
+        exits = self._exits(view, situation) if stays and expected < _POOR * memory.most_bits else []
+        if len(exits) > 0:
+            chosen, expected = exits[int(self._rng.integers(len(exits)))], 0.0
         elif expected <= _NOTHING_BITS or (memory.blocked and self._rng.uniform() < 0.5):
             chosen, expected = self._elsewhere(view, situation), 0.0
         memory.chosen, memory.expected = chosen.copy(), expected
@@ -134,9 +132,6 @@ class PlannedRate:
         values = near.values(recipe.exponent)
         best = int(np.argmax(values))
         value, bits = float(values[best]), float(near.bits[best])
-        memory.shut_in = not (np.isfinite(near.seconds) & (near.kind == Kind.REACH)).any()
-        if not memory.shut_in:
-            memory.open_at = situation.here[:3].copy()
         memory.most_bits = max(memory.most_bits, bits)
         if self._look_far(memory, situation.here, value, bits, recipe):
             travel = travel or self._planner.start_search(situation)
@@ -176,15 +171,17 @@ class PlannedRate:
                 return stop
         return None
 
-    def _way_out(self, view: RobotView, situation: Situation, memory: _Memory) -> np.ndarray:
-        """(5,) of the voxels by which a body leaves where it does not fit, that nearest to where it did."""
-        if view.kind.robot.navigator == "planned" and memory.open_at is not None:
-            self._planner.seconds_to(situation, self._planner.start_search(situation), situation.here[None])
-            exits = self._planner.exits(situation)
-            exits = exits[situation.weigh(exits, np.ones(len(exits))) > 0.0]
-            if len(exits) > 0:
-                return exits[int(np.argmin(np.linalg.norm(exits[:, :3] - memory.open_at, axis=1)))]
-        return self._elsewhere(view, situation)
+    def _exits(self, view: RobotView, situation: Situation) -> Sequence[np.ndarray]:
+        """Viewpoints (5,) next to a robot that its belief shuts in; none where it can get anywhere else."""
+        if view.kind.robot.navigator != "planned":
+            return []
+        grid = view.scenario.grid
+        drawn = np.stack([grid.in_grid_units(random_viewpoint(view, self._rng)) for _ in range(_ELSEWHERE)])
+        travel = self._planner.start_search(situation)
+        if np.isfinite(self._planner.seconds_to(situation, travel, drawn)).any():
+            return []
+        exits = self._planner.exits(situation)
+        return list(exits[situation.weigh(exits, np.ones(len(exits))) > 0.0])
 
     def _elsewhere(self, view: RobotView, situation: Situation) -> np.ndarray:
         """(5,) a random viewpoint in grid units: of some, one that a path leads to, past all teammates."""

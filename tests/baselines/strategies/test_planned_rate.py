@@ -96,3 +96,22 @@ def test_where_nothing_is_left_nearby_it_goes_elsewhere(view, monkeypatch):
     chosen = np.stack([strategy.choose([view])[0] for _ in range(3)])
     apart = np.linalg.norm(chosen[:, :3] - view.pose[:3], axis=1)
     assert (apart > 0.05).all() and (apart <= view.kind.robot.reach_m).all()
+
+
+def test_only_a_robot_that_its_belief_shuts_in_leaves_by_the_voxels_next_to_it(view):
+    strategy, grid = PlannedRate(), view.scenario.grid
+    strategy.reset(view.scenario, np.random.default_rng(0))
+    here = grid.in_grid_units(view.pose)
+
+    def exits(mean):
+        belief = planned_rate.belief_of(view)._replace(mean=mean.reshape(-1))
+        situation = planned_rate.Situation(0, here, belief, planned_rate.announced_cones(view))
+        return np.array(strategy._exits(view, situation))
+
+    free = np.zeros(grid.shape, np.float32)
+    assert len(exits(free)) == 0
+    x, y = here[:2].astype(int)
+    shut = np.ones(grid.shape, np.float32)
+    shut[x - 1 : x + 2, y - 1 : y + 2] = 0.0
+    found = exits(shut)
+    assert len(found) > 0 and (np.abs(found[:, :2] - here[:2]) < 2.0).all()
