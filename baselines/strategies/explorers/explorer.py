@@ -9,8 +9,8 @@ Ours, where the rules say nothing:
   map changes around it; so is a cell to which a drive ended early.
 - Without a frontier, a finer σ counts as known, half the one before, down to the mission's σ_end, since a
   mission may require more than having seen everything once. Then robots go to random viewpoints.
-- A robot that a teammate stops drives around it if it knows a path; else it waits for one scan if its number
-  is the lower, and steps aside, to a random viewpoint, if it is the higher or has waited before.
+- A robot that a teammate stops waits for one scan if its number is the lower, and steps aside, to a random
+  viewpoint, if it is the higher or has waited before.
 - A sensor that looks one way is turned to where most is unknown.
 """
 
