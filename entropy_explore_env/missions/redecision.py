@@ -76,7 +76,10 @@ def decide(params, actions, robot, time_s, continuous, discrete, choice):
         discrete: Number of the action.
         choice: CHOICE, filled in as for a straight drive.
     """
-    copy_numbers(pose_at(params, robot, time_s), choice.pose, 5)
+    if robot.under_way:
+        copy_numbers(pose_at(params, robot, time_s), choice.pose, 5)
+    else:
+        copy_numbers(robot.goal, choice.pose, 5)
     decode_action(params, actions, choice.pose, continuous, discrete, choice.viewpoint)
     copy_numbers(choice.pose, choice.start, 3)
     copy_numbers(choice.viewpoint, choice.path[0], 3)
@@ -131,8 +134,10 @@ def note_braking(params, robot, time_s, choice):
         time_s: Now.
         choice: CHOICE; `brakes` and `start` are filled in.
     """
+    if not robot.under_way:
+        return
     braking_m = braking_metres(params, robot, time_s)
-    if robot.under_way and braking_m > 0.0:
+    if braking_m > 0.0:
         x, y, z, _ = resting_place(params, robot, time_s, braking_m)
         if not keeps_speed(choice, (x, y, z), braking_m):
             choice.brakes = True

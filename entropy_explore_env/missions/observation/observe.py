@@ -105,7 +105,7 @@ def observe_missions(rules, offsets, observed, crossing, first, last, out):
                 clock.time_s,
                 own.entropy_bits,
                 own.deciding,
-                speed_at(rules.params[robot], own, clock.time_s),
+                0.0 if offsets.drive is None else speed_at(rules.params[robot], own, clock.time_s),
                 own.target,
                 observed.heard[mission, robot],
                 observed.mean[mission, robot],
