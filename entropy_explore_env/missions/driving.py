@@ -51,14 +51,9 @@ def start_drive(team, collision, choice, index, time_s, work):
         work: Workspace.
     """
     params, robots = team.params, team.robots
-    own, robot = params[index], robots[index]
-    goal, braking_m = robot.goal, braking_metres(own, robot, time_s) if robot.under_way else 0.0
-    rests = 0
-    if robot.under_way:
-        rests = leave_path(own, robot, time_s, braking_m, work.braking)
-    else:
-        robot.scan_lead_m = 0.0
-    free = take_path(own, robot, choice, rests if choice.brakes else 0, work.braking)
+    own, robot, goal = params[index], robots[index], robots[index].goal
+    rests = leave_path(own, robot, time_s, work.braking)
+    free = take_path(robot, choice, rests, work.braking)
     robot.depart_s = robot.decided_s = time_s
     robot.deciding = robot.waiting = robot.under_way = robot.path_blocked = False
     driven, code = 0.0, _ARRIVED
@@ -77,39 +72,41 @@ def start_drive(team, collision, choice, index, time_s, work):
             break
     if code == _ARRIVED and robot.waypoints > 0:
         code = robot.path_end
-    robot.lead_s = math.sqrt(2.0 * braking_m / own.acceleration_m_s2)
-    if choice.brakes:
-        robot.lead_s = -robot.lead_s
-    elif robot.path_m < braking_m:
-        driven = rest_on_path(robot, rests, work.braking) / own.voxel_size_m
+    driven_m = driven * own.voxel_size_m
+    if rest_on_path(own, robot, rests, work.braking):
+        driven_m = robot.path_m
     if code != _ARRIVED and code != _CORNERS:
         robot.blocked_moves += 1
     robot.move_end = code
-    driven_m = driven * own.voxel_size_m
     robot.distance_m += driven_m
     drive_s = duration_of(SpeedProfile(driven_m, robot.lead_s, own.max_speed_m_s, own.acceleration_m_s2))
     turn_s = turning_time(robot.origin[3], robot.origin[4], goal[3], goal[4], own.turn_rate_rad_s)
     robot.ready_s = time_s + max(drive_s, turn_s) + own.scan_time_s
     robot.scans_under_way = 0
     plan_scan(own, robot)
-    plan_redecision(own, robot, time_s)
+    plan_redecision(own, robot, time_s, work.braking)
 
 
 @lean_kernel
-def leave_path(params, robot, time_s, braking_m, braking):
-    """Give up the rest of a robot's drive, and note how it can come to rest on it.
+def leave_path(params, robot, time_s, braking):
+    """Give up the rest of a robot's drive, if it is under way, and note how it can come to rest on it.
 
     Args:
         params: PARAMS of the robot.
-        robot: ROBOT; what was counted for the rest of its drive is taken back.
+        robot: ROBOT; what was counted for the rest of its drive is taken back, and its speed is noted.
         time_s: Now.
-        braking_m: Its braking distance.
-        braking: (W, 3) float64, filled in.
+        braking: (W, 3) float64, filled in; see Workspace.
 
     Returns:
         How many points there are in `braking`: to them it drives straight, one after the other, at the last
         of them it is at rest. 0 = it stands already.
     """
+    if braking is None:  # known while compiling: nothing of the rest is compiled
+        return 0
+    if not robot.under_way:
+        robot.lead_s = robot.scan_lead_m = 0.0
+        return 0
+    braking_m = braking_metres(params, robot, time_s)
     left = share_left(params, robot, time_s)
     driven_m = (1.0 - left) * robot.path_m
     robot.distance_m -= left * robot.path_m
@@ -118,9 +115,10 @@ def leave_path(params, robot, time_s, braking_m, braking):
     if not math.isinf(params.scan_every_m):
         since_m = robot.scan_lead_m + driven_m - robot.scans_under_way * params.scan_every_m
         robot.scan_lead_m = min(max(since_m, 0.0), params.scan_every_m)
+    x, y, z, passed = resting_place(params, robot, time_s, braking_m)
+    robot.lead_s = math.sqrt(2.0 * braking_m / params.acceleration_m_s2)
     if braking_m == 0.0:
         return 0
-    x, y, z, passed = resting_place(params, robot, time_s, braking_m)
     behind = place_with_left(robot, left)[3]
     for number in range(behind, passed):
         copy_numbers(robot.path[number], braking[number - behind], 3)
@@ -129,57 +127,81 @@ def leave_path(params, robot, time_s, braking_m, braking):
 
 
 @lean_kernel
-def take_path(params, robot, choice, rests, braking):
-    """Put a robot on the path that it chose, behind the first `rests` points of `braking`.
+def take_path(robot, choice, rests, braking):
+    """Put a robot on the path that it chose, behind the `rests` points of `braking` if it brakes first.
 
     Returns:
         How many legs of the path are known to be free.
     """
+    robot.path_m = 0.0
     copy_numbers(choice.pose, robot.origin, 5)
     copy_numbers(choice.viewpoint, robot.goal, 5)
     copy_numbers(choice.viewpoint, robot.target, 5)
+    if choice.brakes:
+        return brake_first(robot, choice, rests, braking)
+    robot.waypoints, robot.path_end = choice.waypoints, choice.path_end
+    for number in range(choice.waypoints):
+        copy_numbers(choice.path[number], robot.path[number], 3)
+    return 0
+
+
+@lean_kernel
+def brake_first(robot, choice, rests, braking):
+    """Put a robot on the `rests` points of `braking`, and then on the path that it chose; see `take_path`."""
+    if braking is None:  # known while compiling: nothing of the rest is compiled
+        return 0
+    robot.lead_s = -robot.lead_s
     for number in range(rests):
         copy_numbers(braking[number], robot.path[number], 3)
-    points = choice.waypoints
-    if rests > 0 and points == 0:
-        points = 1
+    points = max(choice.waypoints, 1)
     kept = min(points, len(robot.path) - rests)
     for number in range(kept):
         copy_numbers(choice.path[number], robot.path[rests + number], 3)
     robot.waypoints = rests + kept
     robot.path_end = choice.path_end if kept == points else _CORNERS
-    robot.path_m = 0.0
     return rests
 
 
 @lean_kernel
-def rest_on_path(robot, rests, braking):
+def rest_on_path(params, robot, rests, braking):
     """Let a drive that is too short to come to rest on end where the robot comes to rest on its old path.
 
+    Args:
+        params: PARAMS of the robot.
+        robot: ROBOT.
+        rests: How many points there are in `braking`.
+        braking: As `leave_path` filled it in.
+
     Returns:
-        Its length in metres.
+        Whether the drive was too short.
     """
+    if braking is None:  # known while compiling: nothing of the rest is compiled
+        return False
+    if robot.lead_s <= 0.0 or robot.path_m >= 0.5 * params.acceleration_m_s2 * robot.lead_s * robot.lead_s:
+        return False
     for number in range(rests):
         copy_numbers(braking[number], robot.path[number], 3)
     copy_numbers(braking[rests - 1], robot.goal, 3)
     robot.waypoints, robot.corners, robot.path_m, robot.lead_s = rests, rests - 1, 0.0, -robot.lead_s
     for leg in range(rests):
         robot.path_m += distance_between(path_point(robot, leg), path_point(robot, leg + 1))
-    return robot.path_m
+    return True
 
 
 @lean_kernel
-def keep_drive(params, robot, time_s):
+def keep_drive(params, robot, time_s, braking):
     """Let a robot that keeps its viewpoint drive on as it does."""
     robot.deciding = robot.under_way = False
     robot.decided_s = time_s
-    plan_redecision(params, robot, time_s)
+    plan_redecision(params, robot, time_s, braking)
 
 
 @lean_kernel
-def plan_redecision(params, robot, time_s):
+def plan_redecision(params, robot, time_s, braking):
     """Set when a robot that has just decided does so again under way; inf where it stops before that."""
     robot.redecide_s = math.inf
+    if braking is None:  # known while compiling: nothing of the rest is compiled
+        return
     if params.redecide_on_scan and robot.next_scan_s < robot.ready_s:
         robot.redecide_s = robot.next_scan_s
     elif not math.isinf(params.redecide_every_s):

@@ -11,7 +11,7 @@ import numpy as np
 
 from entropy_explore_env.compilation.kernels import lean_kernel
 from entropy_explore_env.missions.poses import to_grid_units
-from entropy_explore_env.missions.redecision import decide, note_braking
+from entropy_explore_env.missions.redecision import decide, note_braking, note_change
 from entropy_explore_env.missions.rules import ActionSet
 from entropy_explore_env.missions.state import MissionEnd
 from entropy_explore_env.robots.motion import MoveEnd
@@ -43,13 +43,14 @@ class Planning(NamedTuple):
 
 
 @lean_kernel
-def plan_missions(planning, navigator, kind, continuous, discrete, first, last):
+def plan_missions(planning, navigator, kind, braking, continuous, discrete, first, last):
     """Plan the paths of the robots of one kind that decide, each through its own belief.
 
     Args:
         planning: Planning.
         navigator: Working space for this kind, not shared with another thread.
         kind: Its number.
+        braking: Of the Workspace.
         continuous: (E, A, N) float64 actions.
         discrete: (E, A) int64 actions.
         first: The first mission.
@@ -64,11 +65,12 @@ def plan_missions(planning, navigator, kind, continuous, discrete, first, last):
                     choice = planning.choices[mission, index]
                     chosen, number = continuous[mission, index], discrete[mission, index]
                     decide(own, planning.actions, robot, clock.time_s, chosen, number, choice)
+                    note_change(own, robot, choice, braking)
                     mean, precision = planning.mean[mission, index], planning.precision[mission, index]
                     no_fly = planning.no_fly[mission * own.radii + own.radius_number]
                     if choice.changed:
                         plan_drive(own, navigator, mean, precision, no_fly, choice)
-                        note_braking(own, robot, clock.time_s, choice)
+                        note_braking(own, robot, clock.time_s, choice, braking)
                         if choice.brakes:
                             plan_drive(own, navigator, mean, precision, no_fly, choice)
 

@@ -65,7 +65,7 @@ _STANDS_M = 1e-9
 
 @lean_kernel
 def decide(params, actions, robot, time_s, continuous, discrete, choice):
-    """Write what a robot that decides has chosen, and whether that changes its drive.
+    """Write what a robot that decides has chosen, as if it began a drive.
 
     Args:
         params: PARAMS of the robot.
@@ -76,17 +76,29 @@ def decide(params, actions, robot, time_s, continuous, discrete, choice):
         discrete: Number of the action.
         choice: CHOICE, filled in as for a straight drive.
     """
+    copy_numbers(robot.goal, choice.pose, 5)
     if robot.under_way:
         copy_numbers(pose_at(params, robot, time_s), choice.pose, 5)
-    else:
-        copy_numbers(robot.goal, choice.pose, 5)
     decode_action(params, actions, choice.pose, continuous, discrete, choice.viewpoint)
     copy_numbers(choice.pose, choice.start, 3)
     copy_numbers(choice.viewpoint, choice.path[0], 3)
-    choice.waypoints, choice.path_end, choice.brakes = 0, 0, False
-    choice.changed = (
-        not robot.under_way or robot.path_blocked or not keeps_target(params, choice, robot.target)
-    )
+    choice.waypoints, choice.path_end, choice.brakes, choice.changed = 0, 0, False, True
+
+
+@lean_kernel
+def note_change(params, robot, choice, braking):
+    """Find out whether what a robot chose changes its drive.
+
+    Args:
+        params: PARAMS of the robot.
+        robot: ROBOT.
+        choice: CHOICE; `changed` is filled in.
+        braking: Of the Workspace.
+    """
+    if braking is None:  # known while compiling: nothing of the rest is compiled
+        return
+    if robot.under_way and not robot.path_blocked:
+        choice.changed = not keeps_target(params, choice, robot.target)
 
 
 @lean_kernel
@@ -125,7 +137,7 @@ def resting_place(params, robot, time_s, braking_m):
 
 
 @lean_kernel
-def note_braking(params, robot, time_s, choice):
+def note_braking(params, robot, time_s, choice, braking):
     """Find out whether a robot under way has to come to rest before the path that it chose.
 
     Args:
@@ -133,7 +145,10 @@ def note_braking(params, robot, time_s, choice):
         robot: ROBOT.
         time_s: Now.
         choice: CHOICE; `brakes` and `start` are filled in.
+        braking: Of the Workspace.
     """
+    if braking is None:  # known while compiling: nothing of the rest is compiled
+        return
     if not robot.under_way:
         return
     braking_m = braking_metres(params, robot, time_s)

@@ -359,7 +359,7 @@ class Missions:
     ) -> None:
         calls, work = self._bound_calls(), self._work[thread]
         for kind, navigator in self._navigators[thread].items():
-            plan_missions(calls.planning, navigator, kind, continuous, discrete, first, last)
+            plan_missions(calls.planning, navigator, kind, work.braking, continuous, discrete, first, last)
         arguments = (self.rules, self.state, self._choices, work, continuous, discrete, first, last)
         step = calls.step
         if step is None:

@@ -33,7 +33,7 @@ from entropy_explore_env.missions.messages import (
 )
 from entropy_explore_env.missions.phases import broadcast_all, collect_batch, next_broadcast
 from entropy_explore_env.missions.poses import copy_numbers, grid_size, pose_at, to_grid_units
-from entropy_explore_env.missions.redecision import decide, note_braking
+from entropy_explore_env.missions.redecision import decide, note_braking, note_change
 from entropy_explore_env.missions.reward import reward_robots
 from entropy_explore_env.missions.scoring import note_progress, note_seen, score_scan
 from entropy_explore_env.missions.state import (
@@ -122,22 +122,33 @@ def step_missions(rules, state, choices, work, continuous, discrete, first, last
         if clock.end == _RUNNING:
             before_s = clock.time_s
             collision = state.collision[m * masks : (m + 1) * masks]
-            choose(team, clock, rules.actions, continuous[m], discrete[m], choices[m])
+            choose(team, clock, rules.actions, continuous[m], discrete[m], choices[m], work.braking)
             depart(team, clock, mission.in_flight, collision, choices[m], work)
             advance(mission, rules.sensors, work)
             finish_step(team, clock, before_s)
 
 
 @lean_kernel
-def choose(team, clock, actions, continuous, discrete, choices):
-    """Begin to count the step, and fill in the choices, (A,) CHOICE, that were not planned before it."""
+def choose(team, clock, actions, continuous, discrete, choices, braking):
+    """Begin to count the step, and fill in the choices that were not planned before it.
+
+    Args:
+        team: Team.
+        clock: MISSION.
+        actions: ActionSet.
+        continuous: (A, N) float64 actions.
+        discrete: (A,) int64 actions.
+        choices: (A,) CHOICE.
+        braking: Of the Workspace.
+    """
     for index in range(len(team.robots)):
         robot, own = team.robots[index], team.params[index]
         robot.own_bits = 0.0
         robot.received_bits = 0.0
         if robot.deciding and not own.planned:
             decide(own, actions, robot, clock.time_s, continuous[index], discrete[index], choices[index])
-            note_braking(own, robot, clock.time_s, choices[index])
+            note_change(own, robot, choices[index], braking)
+            note_braking(own, robot, clock.time_s, choices[index], braking)
 
 
 @lean_kernel
@@ -160,7 +171,7 @@ def depart(team, clock, in_flight, collision, choices, work):
             start_drive(team, collision[own.radius_number], choices[index], index, clock.time_s, work)
             announce(team, clock, in_flight, index, work.recipients)
         elif robot.deciding:
-            keep_drive(own, robot, clock.time_s)
+            keep_drive(own, robot, clock.time_s, work.braking)
 
 
 @lean_kernel

@@ -22,8 +22,9 @@ class Workspace(NamedTuple):
     scan: Scan
     drive: Crossing
     """Voxels on the longest drive."""
-    braking: np.ndarray
-    """(W, 3) float64, points on which a robot comes to rest."""
+    braking: np.ndarray | None
+    """(W, 3) float64, points on which a robot comes to rest; None = no robot of the team decides under way,
+    and nothing of that is compiled."""
     bodies: np.ndarray
     """(A, 4) float64, teammates' bodies: centre and radius in grid units."""
     recipients: np.ndarray
@@ -41,7 +42,7 @@ def new_workspace(scenario: Scenario, navigators: Mapping[int, Navigator]) -> Wo
     return Workspace(
         scan=new_scan(grid, sensors, max(sensor.rays for sensor in sensors)),
         drive=Crossing(np.zeros(longest, np.int32), np.zeros(longest, np.int64)),
-        braking=np.zeros((WAYPOINTS, 3)),
+        braking=np.zeros((WAYPOINTS, 3)) if any(robot.redecide != "at_stop" for robot in robots) else None,
         bodies=np.zeros((scenario.robots, 4)),
         recipients=np.zeros(scenario.robots, np.bool_),
         footprints=footprints(navigators, len(kinds))
