@@ -113,7 +113,7 @@ def env_for(path: Path, args: Args) -> EntropyExploreEnv:
     scenario = scripted(find_scenario("office" if plan else "room"))
     edge_m = args.plan_voxel_size_m if plan else args.voxel_size_m
     reading = Reading(resolution_m=args.resolution_m, negate=args.negate)
-    world = world_settings(str(path), edge_m, reading if path.suffix.lower() in _IMAGES else Reading())
+    world = world_settings((str(path),), edge_m, reading if path.suffix.lower() in _IMAGES else Reading())
     return EntropyExploreEnv(
         scenario, robots=args.robots, track_truth=True, time_limit_s=args.time_limit_s, **world
     )

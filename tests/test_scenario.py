@@ -334,10 +334,13 @@ def test_unknown_names_and_nested_values_that_are_not_allowed(settings, field):
 
 
 def test_an_unknown_name_is_answered_with_the_names_that_there_are():
-    for settings, part in (({"robotz": 3}, Scenario), ({"channel": {"bursts": 3}}, Channel)):
+    for settings, part, near in (
+        ({"robotz": 3}, Scenario, "robot"),
+        ({"channel": {"bursts": 3}}, Channel, "burst"),
+    ):
         allowed = refusal(lambda changes=settings: with_settings(BOX, changes)).allowed
         names = [field.name for field in dataclasses.fields(part)]
-        assert allowed == "one of the fields " + ", ".join(names)
+        assert allowed == f"one of the fields {', '.join(names)}; did you mean {near}?"
 
 
 @pytest.mark.parametrize("scenario", SCENARIOS.values(), ids=SCENARIOS)

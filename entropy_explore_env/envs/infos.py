@@ -16,11 +16,6 @@ _UNDER_WAY = MoveEnd.UNDER_WAY.name
 _MISSION_ENDS = [end.name for end in MissionEnd]
 
 
-def told_number(world_number: int | None) -> int:
-    """A world number as infos say it."""
-    return -1 if world_number is None else world_number
-
-
 END_FIGURES = ("t_mission_s", "bits_gained_per_bit_sent")
 """Figures that infos at a mission's end hold by themselves, as numbers that loggers of episodes can show:
 Stable-Baselines3's Monitor and VecMonitor by `info_keywords=END_FIGURES`."""
@@ -43,7 +38,7 @@ def robot_infos(missions: Missions, mission: int) -> list[dict[str, Any]]:
     clock = missions.state.missions[mission]
     robots = missions.state.robots[mission]
     time_s, end = float(clock["time_s"]), _MISSION_ENDS[clock["end"]]
-    world_number = told_number(missions.world_numbers[mission])
+    world_number = int(missions.world_numbers[mission])
     infos: list[dict[str, Any]] = [
         {
             "deciding": deciding,

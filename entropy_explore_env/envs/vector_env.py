@@ -11,7 +11,7 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
 from entropy_explore_env.envs.checks import ActionChecker
-from entropy_explore_env.envs.infos import END_FIGURES, end_figures, told_number
+from entropy_explore_env.envs.infos import END_FIGURES, end_figures
 from entropy_explore_env.envs.rewards import RewardFunction, StepRewards
 from entropy_explore_env.errors import CallOrderError, SettingError
 from entropy_explore_env.missions.action import action_space
@@ -251,8 +251,7 @@ class EntropyExploreVectorEnv(VectorEnv[Any, Any, Any]):
         infos: dict[str, Any] = {name: clocks[name].copy() for name in ("time_s", "end")}
         for name in ("deciding", "entropy_bits", "own_bits", "received_bits"):
             infos[name] = self._of_robots(robots[name]).copy()
-        numbers = [told_number(number) for number in self.missions.world_numbers]
-        infos["world_number"] = np.array(numbers, np.int64)
+        infos["world_number"] = self.missions.world_numbers.copy()
         infos["reward_robots"] = self._of_robots(np.zeros(robots.shape) if earned is None else earned)
         if self._masks:
             infos["action_mask"] = self._of_robots(self.missions.action_masks())

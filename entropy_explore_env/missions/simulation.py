@@ -86,7 +86,7 @@ class Missions:
         count: Number of missions E.
         state: All that changes, as arrays.
         worlds: The true world of each mission; None before its first reset.
-        world_numbers: Its number in each mission; None where no recipe made it.
+        world_numbers: (E,) int64, its number in each mission; -1 where no recipe made it.
         options: What was given to the latest reset of each mission, instead of drawing it.
         every_reset: What resets are given that say nothing of it, also where missions start by themselves.
         reward_function: Name of the function that rewards the robots in place of the scenario's reward, for
@@ -132,7 +132,7 @@ class Missions:
         self.state: MissionState = new_state(scenario, self.count, self.rules.cells)
         self._no_fly = np.zeros((self.count * int(self.rules.params["radii"][0]), 0), np.bool_)
         self.worlds: list[World | None] = [None] * self.count
-        self.world_numbers: list[int | None] = [None] * self.count
+        self.world_numbers = np.full(self.count, -1, np.int64)
         self.options = [DRAWN] * self.count
         self.every_reset = DRAWN
         self.reward_function = ""
@@ -249,7 +249,8 @@ class Missions:
         """Put the mission into its world, with beliefs at the prior, and observe."""
         mission, number, episode, world, poses, options, world_number = start
         self.seeds[mission], self.episodes[mission] = number, episode
-        self.options[mission], self.world_numbers[mission] = options, world_number
+        self.options[mission] = options
+        self.world_numbers[mission] = -1 if world_number is None else world_number
         if world.ceiling is not None and self.state.collision is self.state.truth:
             self.state = self.state._replace(collision=self.state.truth.copy())
         state = self.state

@@ -180,7 +180,7 @@ def test_missing_packages_are_named_before_the_mission(option, module, command, 
 def test_an_interrupted_recording_leaves_nothing(command, tmp_path, monkeypatch):
     pytest.importorskip("rerun")
 
-    def interrupted(env, strategy, seed, after_step, before_step, options) -> None:
+    def interrupted(env, strategy, seed, after_step, before_step) -> None:
         env.reset(seed=0)
         after_step(env)
         raise KeyboardInterrupt

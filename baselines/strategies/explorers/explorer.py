@@ -78,6 +78,8 @@ class _Memory:
     """How often it has looked from where it stands."""
     blocked: int = 0
     """How many drives in a row a teammate stopped."""
+    waited: bool = False
+    """Whether it let a teammate pass at its latest decision."""
 
 
 class Explorer(ABC):
@@ -160,7 +162,9 @@ class Explorer(ABC):
         if view.move_end is MoveEnd.TEAMMATE:
             memory.blocked += 1
             return self._give_way(view, memory)
-        memory.blocked = 0
+        if not memory.waited:  # having waited is no arrival
+            memory.blocked = 0
+        memory.waited = False
         if view.move_end in _STOPPED:
             memory.cells.drop(memory.target, with_edges=False)
         elif here == memory.target and memory.cells.is_frontier(here):
@@ -176,6 +180,7 @@ class Explorer(ABC):
         """What a robot does that a teammate stopped; None = it goes on by its rule."""
         near = self._nearest_mate(view)
         if memory.blocked == 1 and near > view.robot:
+            memory.waited = True
             return view.pose.copy()
         memory.target, memory.viewpoint, memory.blocked = NONE, None, 0
         return random_viewpoint(view, self._rng)

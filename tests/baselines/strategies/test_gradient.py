@@ -278,7 +278,7 @@ def test_it_wanders_after_a_move_that_was_blocked(end):
     missions.state.robots[0, 0]["move_end"] = end.code
     view = view_of(missions, 0, 0)
     wanders = chosen(view).tolist() == random_viewpoint(view, np.random.default_rng(3)).tolist()
-    assert wanders == (end is not MoveEnd.ARRIVED)
+    assert wanders == (end not in (MoveEnd.ARRIVED, MoveEnd.UNDER_WAY))
 
 
 def test_free_robots_take_the_field_and_planar_ones_its_projection_unless_told():
