@@ -107,7 +107,7 @@ def _setting(scenario: Scenario) -> Iterator[tuple[str, str]]:
 
 
 def standing_still(figures: dict[str, Any], moved_m: float) -> list[str]:
-    """Warnings of robots that drove less than so many metres though they tried, or mapped nothing so.
+    """A warning of each robot that drove less than so many metres and was blocked, or did not finish the map.
 
     In a room without obstacles a robot may well map all from where it starts.
     """

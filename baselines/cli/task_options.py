@@ -1,4 +1,4 @@
-"""The task on a command line: the same options in every command that runs missions.
+"""The task on a command line: one definition of the options for commands that run missions.
 
 A scenario, a named one or a file of settings, and what is changed of it: worlds, starts, robots, sensor,
 channel, ending. Options that are not given have the scenario's own values, which the help shows.

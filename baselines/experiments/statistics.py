@@ -1,22 +1,15 @@
-"""Statistics over missions: bootstrap intervals, paired tests, and measures across scenarios.
+"""Statistics over missions: bootstrap intervals and paired tests.
 
 Intervals hold 95 %: percentiles of a bootstrap over missions, which draws the same resamples in every
 call. What is compared with the same seeds is resampled in pairs. `scipy.stats.bootstrap` agrees within its
 own noise (the tests compare them); ours repeats bit for bit, also for ratios of two and of four samples.
 
-The measures across scenarios are those of Agarwal, Schwarzer, Castro, Courville and Bellemare, *Deep
-Reinforcement Learning at the Edge of the Statistical Precipice* (NeurIPS 2021). Their package rliable 1.2
-cannot be imported beside pandas 3, and resamples the missions of two strategies independently, although
-ours share their seeds. Scores are times here: smaller is better. The bootstrap draws seeds with replacement
-within every scenario (stratified), the same draws for all strategies (paired).
-
-Letters: S scenarios, N seeds, T thresholds, B resamples.
+Letters: S tasks, N missions of each, B resamples.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -24,7 +17,6 @@ from scipy import stats
 
 _CONFIDENCE = 0.95
 _RESAMPLES = 9999
-_STRATIFIED_RESAMPLES = 4999
 
 Sample = Sequence[float] | np.ndarray
 """(N,) one figure of each mission, by seed where it is compared."""
@@ -152,66 +144,6 @@ def holm(p_values: Sequence[float]) -> np.ndarray:
     return corrected
 
 
-def interquartile_mean(scores: np.ndarray) -> np.ndarray:
-    """Mean without the lowest and the highest quarter; what is less than a whole score of them stays.
-
-    Args:
-        scores: (…, n) float64.
-
-    Returns:
-        (…,) float64.
-    """
-    cut = scores.shape[-1] // 4
-    return np.sort(scores, axis=-1)[..., cut : scores.shape[-1] - cut].mean(axis=-1)
-
-
-def iqm_interval(scores: np.ndarray) -> Interval:
-    """Interquartile mean over all scenarios and seeds.
-
-    Args:
-        scores: (S, N) float64.
-    """
-    drawn = np.take_along_axis(scores[None], _draws(*scores.shape), axis=2)  # (B, S, N)
-    means = interquartile_mean(drawn.reshape(len(drawn), -1))
-    return Interval(float(interquartile_mean(scores.ravel())), *_central(means))
-
-
-def improvement_interval(ours: np.ndarray, theirs: np.ndarray) -> Interval:
-    """Probability that a mission of ours is faster than one of theirs in the same scenario.
-
-    P = 1/S Σ_s 1/N² Σ_ij [ours_si < theirs_sj], ties count ½ (Mann-Whitney's U over N²).
-
-    Args:
-        ours: (S, N) float64.
-        theirs: (S, N) float64, the same scenarios and seeds.
-    """
-    better = ours[:, :, None] < theirs[:, None, :]
-    wins = better + 0.5 * (ours[:, :, None] == theirs[:, None, :])  # (S, N, N)
-    counts = _counts(*ours.shape).transpose(1, 0, 2)
-    drawn = ((counts @ wins) * counts).sum(axis=2)  # (S, B)
-    return Interval(float(wins.mean()), *_central(drawn.mean(axis=0) / ours.shape[1] ** 2))
-
-
-class Profile(NamedTuple):
-    """Share of missions within each threshold, (T,) float64, with the ends of its pointwise 95 % interval."""
-
-    share: np.ndarray
-    low: np.ndarray
-    high: np.ndarray
-
-
-def performance_profile(scores: np.ndarray, thresholds: np.ndarray) -> Profile:
-    """The share of missions whose score is at most a threshold.
-
-    Args:
-        scores: (S, N) float64; inf = never.
-        thresholds: (T,) float64.
-    """
-    within = (scores[:, :, None] <= thresholds).reshape(scores.size, -1).astype(float)
-    drawn = _counts(*scores.shape).reshape(-1, scores.size) @ within / scores.size  # (B, T)
-    return Profile(within.mean(axis=0), *np.quantile(drawn, _ENDS, axis=0))
-
-
 _ENDS = ((1 - _CONFIDENCE) / 2, (1 + _CONFIDENCE) / 2)
 """Quantiles that enclose the central 95 %."""
 
@@ -225,19 +157,3 @@ def _resampled(sample: np.ndarray, size: int, stream: int = 0) -> np.ndarray:
     """(B, size, …) draws with replacement, always the same ones of a stream."""
     rows = np.random.default_rng(stream).integers(len(sample), size=(_RESAMPLES, size))
     return sample[rows]
-
-
-@lru_cache(maxsize=2)
-def _draws(scenarios: int, seeds: int) -> np.ndarray:
-    """(B, S, N) which seeds are drawn, always the same ones."""
-    return np.random.default_rng(0).integers(seeds, size=(_STRATIFIED_RESAMPLES, scenarios, seeds))
-
-
-@lru_cache(maxsize=2)
-def _counts(scenarios: int, seeds: int) -> np.ndarray:
-    """(B, S, N) float64 how often each seed is drawn; sums over whole and half numbers are exact."""
-    draws = _draws(scenarios, seeds)
-    counts = np.zeros(draws.shape)
-    drawn, scenario = np.ogrid[: len(draws), :scenarios]
-    np.add.at(counts, (drawn[..., None], scenario[..., None], draws), 1.0)
-    return counts

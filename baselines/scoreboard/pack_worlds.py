@@ -18,20 +18,16 @@ import numpy as np
 from PIL import Image
 
 from baselines.cli.arguments import Positional, parse, run_command
+from baselines.scoreboard.suites import DUNGEON_CELL_M, STARTS, VOXEL_SIZES_M, WORLDS
 from entropy_explore_env.errors import WorldError
 from entropy_explore_env.settings import Grid
 from entropy_explore_env.worlds.load import load_world, save_world
 from entropy_explore_env.worlds.world import World
 from entropy_explore_env.writing import write_atomically
 
-WORLDS = Path(__file__).parent / "worlds"
-STARTS = WORLDS / "starts.csv"
 DUNGEONS = 100
-_CELL_M = 0.1
 _WALL, _START = (127, 127, 127), (255, 216, 0)
 """In the dungeons' images: rock, and the patch in whose middle the robot starts; all else is floor."""
-_SIZES_M = {"warehouse": 0.1, "depot": 0.1, "willow": 0.1, "geb079": 0.16}
-"""Edge of a voxel of the other worlds."""
 _SOURCES = {
     "warehouse": "nav2/warehouse.yaml",
     "depot": "nav2/depot.yaml",
@@ -60,8 +56,8 @@ def dungeon(path: Path) -> tuple[World, tuple[float, float]]:
     marked = np.argwhere((columns == _START).all(axis=-1))
     if len(marked) == 0:
         raise WorldError("dungeon", str(path), f"an image with a patch of the colour {_START}, the start")
-    x_m, y_m = ((marked.mean(axis=0) + 0.5) * _CELL_M).tolist()
-    grid = Grid((solid.shape[0], solid.shape[1], 1), _CELL_M)
+    x_m, y_m = ((marked.mean(axis=0) + 0.5) * DUNGEON_CELL_M).tolist()
+    grid = Grid((solid.shape[0], solid.shape[1], 1), DUNGEON_CELL_M)
     return World(grid, solid[:, :, None], path.stem), (x_m, y_m)
 
 
@@ -77,7 +73,7 @@ def main(words: Sequence[str]) -> int:
         table.writerow((number, f"{x_m:.2f}", f"{y_m:.2f}"))
     write_atomically(STARTS, rows.getvalue())
     for name, source in _SOURCES.items():
-        save_world(load_world(folder / source, _SIZES_M[name]), WORLDS / f"{name}.npz")
+        save_world(load_world(folder / source, VOXEL_SIZES_M[name]), WORLDS / f"{name}.npz")
     return 0
 
 

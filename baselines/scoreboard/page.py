@@ -63,7 +63,7 @@ def write_page(folder: Path, results: Results, command: str) -> Path:
     write_atomically(beside / "timing.csv", csv_rows([{name: row[name] for name in names} for row in tasks]))
     part = "\n\n".join(text.strip() for text in _parts(results, tasks, overall, command)) + "\n"
     write_atomically(beside / "part.md", part)
-    found = [folder / FILES / name / "part.md" for name in ("plans", "volumes", "teams", "own")]
+    found = [folder / FILES / name / "part.md" for name in _TITLES]
     text = _READING + "\n" + "\n".join(path.read_text() for path in found if path.is_file())
     write_atomically(folder / PAGE, text)
     return folder / PAGE

@@ -189,7 +189,7 @@ def _clock(records: Sequence[Record]) -> Row:
 
 
 def overall_rows(results: Results) -> list[Row]:
-    """A row of each strategy over all tasks in which no mission of it failed."""
+    """A row of each strategy over all tasks but those in which all of its missions failed."""
     rows = []
     for strategy in results.suite.strategies:
         tasks = [task for task in results.suite.tasks if not _cannot_act(results.of(task, strategy))]

@@ -9,7 +9,8 @@
 
 Worlds of recipes are those of the test split, which nothing was tuned on; mission k of a task has seed k for
 every strategy. The dungeons are those of ARiADNE (Cao et al., ICRA 2023): a sensor of 80 cells, a robot
-without a body, the start mark as start, and the end when at most 250 cells are unseen.
+without a body, the start mark as start, and the end when at most 250 free cells are unseen. In the other
+plans robots have no body either, so that all cells can be seen.
 """
 
 from __future__ import annotations
@@ -26,7 +27,6 @@ from typing import Any
 from baselines.experiments.cells import Cell
 from baselines.experiments.mission import scripted
 from baselines.scoreboard.mission import SuiteMission
-from baselines.strategies import STRATEGIES
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.scenario import Scenario, with_settings
@@ -35,6 +35,9 @@ from entropy_explore_env.settings import Grid
 
 WORLDS = Path(__file__).parent / "worlds"
 STARTS = WORLDS / "starts.csv"
+VOXEL_SIZES_M = {"warehouse": 0.1, "depot": 0.1, "willow": 0.1, "geb079": 0.16}
+"""Of the worlds in WORLDS; the dungeons' are those of `DUNGEON_CELL_M`."""
+DUNGEON_CELL_M = 0.1
 STARTS_A_TASK, QUICK_STARTS = 30, 2
 QUICK_DUNGEONS = 4
 SCAN_EVERY_M = 0.5
@@ -133,7 +136,7 @@ def plans(quick: bool = False) -> tuple[Task, ...]:
     chosen = {**recipes, **{name: scenario for name, scenario in files.items() if name in small}}
     return (
         _dungeons(QUICK_DUNGEONS if quick else None),
-        *(_one(name, _explored(scenario), starts) for name, scenario in chosen.items()),
+        *(_one(name, _explored(scenario, {"seen_share": 1.0}), starts) for name, scenario in chosen.items()),
     )
 
 
@@ -196,11 +199,6 @@ def find_suite(name: str, quick: bool, strategies: tuple[str, ...]) -> Suite:
     return Suite(name, SUITES[name](quick), strategies)
 
 
-def all_strategies() -> tuple[str, ...]:
-    """The names of all scripted strategies."""
-    return tuple(STRATEGIES)
-
-
 def _one(name: str, scenario: Scenario, missions: int) -> Task:
     """A task in one scenario of the test split."""
     tested = with_settings(scenario, {"split": "test", "track_truth": True})
@@ -212,13 +210,13 @@ def team_name(name: str, robots: int) -> str:
     return f"{name}, {robots} robot" + ("s" if robots > 1 else "")
 
 
-def _explored(scenario: Scenario) -> Scenario:
-    """A scenario whose robot replans at every scan, and whose mission ends when everything is seen."""
+def _explored(scenario: Scenario, ending: Mapping[str, Any]) -> Scenario:
+    """A scenario whose one robot replans at every scan and has no body, with another end of the mission."""
     changes = {
         "robots": 1,
         "robot": {"redecide": "on_scan", "body_radius_m": 0.0},
         "sensor": {"scan_every_m": SCAN_EVERY_M},
-        "ending": {"seen_share": 1.0, "time_limit_s": 7200.0},
+        "ending": {**ending, "time_limit_s": 7200.0},
     }
     return with_settings(scenario, changes)
 
@@ -229,16 +227,21 @@ def _in_file(scenario: Scenario, name: str, settings: Mapping[str, Any] | None =
     Raises:
         SettingError: The world is not there.
     """
+    path = _world_file(name)
+    grid = _grid_of(path, VOXEL_SIZES_M.get(name, DUNGEON_CELL_M))
+    return with_settings(dataclasses.replace(scenario, name=name, world=path, grid=grid), settings or {})
+
+
+def _world_file(name: str) -> str:
+    """The path of a world; an error if it is not there."""
     path = WORLDS / f"{name}.npz"
     if not path.is_file():
         allowed = "there: it comes with the project; make it again with baselines.scoreboard.pack_worlds"
         raise SettingError("suite world", str(path), allowed)
-    size_m = {"geb079": 0.16}.get(Path(name).name, 0.1)
-    replaced = dataclasses.replace(scenario, name=Path(name).name, world=str(path))
-    return with_settings(dataclasses.replace(replaced, grid=_grid_of(str(path), size_m)), settings or {})
+    return str(path)
 
 
-@lru_cache(maxsize=256)
+@lru_cache(maxsize=16)
 def _grid_of(path: str, voxel_size_m: float) -> Grid:
     """The grid of a saved world, read as environments read it."""
     base = with_settings(SCENARIOS["office"], {"world": path, "grid": {"voxel_size_m": voxel_size_m}})
@@ -249,22 +252,20 @@ def _dungeons(count: int | None) -> Task:
     """ARiADNE's dungeons; None = all."""
     if not STARTS.is_file():
         raise SettingError("suite world", str(STARTS), "there: it comes with the project")
-    base = with_settings(
-        SCENARIOS["office"],
-        {
-            "robots": 1,
-            "robot": {"redecide": "on_scan", "body_radius_m": 0.0, "reach_m": 8.0},
-            "sensor": {"max_range_m": 8.0, "scan_every_m": SCAN_EVERY_M, "angular_step_rad": math.pi / 360},
-            "ending": {"unseen_free_voxels": DUNGEON_UNSEEN, "time_limit_s": 7200.0},
-            "track_truth": True,
-        },
-    )
     with STARTS.open(newline="") as file:
         rows = list(csv.DictReader(file))[:count]
+    seen_from_afar = {
+        "robot": {"reach_m": 8.0},
+        "sensor": {"max_range_m": 8.0, "angular_step_rad": math.pi / 360},
+        "track_truth": True,
+    }
+    base = _explored(SCENARIOS["office"], {"unseen_free_voxels": DUNGEON_UNSEEN})
+    first = _in_file(with_settings(base, seen_from_afar), f"dungeons/{rows[0]['dungeon']}")
     places = []
-    for row in rows:
-        scenario = _in_file(base, f"dungeons/{row['dungeon']}")
-        z_m = float(scenario.grid.voxel_size_m / 2)
-        start = (float(row["x_m"]), float(row["y_m"]), z_m, 0.0, 0.0)
-        places.append(Place(row["dungeon"], dataclasses.replace(scenario, name="dungeon"), 1, start))
+    for row in rows:  # all of one grid
+        world = _world_file(f"dungeons/{row['dungeon']}")
+        start = (float(row["x_m"]), float(row["y_m"]), DUNGEON_CELL_M / 2, 0.0, 0.0)
+        places.append(
+            Place(row["dungeon"], dataclasses.replace(first, name="dungeon", world=world), 1, start)
+        )
     return Task("dungeons", tuple(places))

@@ -206,10 +206,8 @@ def advance(mission, sensors, work):
         event = next_event(shared, robots, messages, mission.phases)
         if event.kind == _NO_EVENT or event.time_s > stop_s:
             break
-        handled, earlier_s = (
-            events_handled(robots, messages, mission.phases) if ASSERTING else 0,
-            clock.time_s,
-        )
+        handled = events_handled(robots, messages, mission.phases) if ASSERTING else 0
+        earlier_s = clock.time_s
         clock.time_s = max(clock.time_s, event.time_s)
         if event.kind == _MESSAGE:
             receive(team, maps, mission.in_flight, event.number, tracer, scan)

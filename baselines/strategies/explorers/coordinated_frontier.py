@@ -15,12 +15,13 @@ all robots that are known, under way or not, are assigned to different groups so
 lengths is least (the Hungarian method, Kuhn 1955). A robot without a group, there being fewer than robots,
 goes to the nearest one.
 
-Tuned: β, see `CoordinatedConfig`.
+Neither β nor the size of groups is tuned.
 """
 
 from __future__ import annotations
 
 import math
+from abc import abstractmethod
 from dataclasses import dataclass
 
 import numpy as np
@@ -57,10 +58,8 @@ class CoordinatedConfig:
         check_positive(self, "beta", "group")
 
 
-class CoordinatedFrontier(Explorer):
-    """Goes to near frontier cells that are far from teammates' targets."""
-
-    rule = "coordinated-frontier"
+class _Coordinated(Explorer):
+    """A rule that weighs all frontier cells that a path leads to by what teammates do."""
 
     def __init__(self, config: CoordinatedConfig | None = None) -> None:
         """Take the settings; None = the defaults."""
@@ -69,8 +68,26 @@ class CoordinatedFrontier(Explorer):
     def pick(self, scene: Scene) -> int:
         """See `Explorer`."""
         voxels, lengths = scene.paths.frontiers_within(math.inf)
-        if len(voxels) == 0:
-            return NONE
+        return NONE if len(voxels) == 0 else self.pick_among(scene, voxels, lengths)
+
+    @abstractmethod
+    def pick_among(self, scene: Scene, voxels: np.ndarray, lengths: np.ndarray) -> int:
+        """The voxel to go to.
+
+        Args:
+            scene: What the robot knows.
+            voxels: (K,) int32 frontier cells, K ≥ 1.
+            lengths: (K,) of the paths to them, in voxel edges.
+        """
+
+
+class CoordinatedFrontier(_Coordinated):
+    """Goes to near frontier cells that are far from teammates' targets."""
+
+    rule = "coordinated-frontier"
+
+    def pick_among(self, scene: Scene, voxels: np.ndarray, lengths: np.ndarray) -> int:
+        """See `_Coordinated`."""
         team, reach = team_of(scene), scene.cells.reach
         places = centres_of(scene, voxels)
         utility = np.ones(len(voxels))
@@ -86,7 +103,7 @@ def taken(places: np.ndarray, target: np.ndarray, reach: float) -> np.ndarray:
 
 
 def greedy_worth(places: np.ndarray, utility: np.ndarray, costs: np.ndarray, reach: float) -> np.ndarray:
-    """(K,) what frontier cells are worth to the first robot, after those who are assigned theirs before it.
+    """(K,) what frontier cells are worth to the first robot, once cells are assigned to robots before it.
 
     Args:
         places: (K, 3) of the cells, in voxel edges.
@@ -105,20 +122,13 @@ def greedy_worth(places: np.ndarray, utility: np.ndarray, costs: np.ndarray, rea
         left.pop(int(robot))
 
 
-class AssignedFrontier(Explorer):
+class AssignedFrontier(_Coordinated):
     """Goes to the group of frontier cells that the optimal assignment of all robots gives it."""
 
     rule = "assigned-frontier"
 
-    def __init__(self, config: CoordinatedConfig | None = None) -> None:
-        """Take the settings; None = the defaults."""
-        self.config = config or CoordinatedConfig()
-
-    def pick(self, scene: Scene) -> int:
-        """See `Explorer`."""
-        voxels, lengths = scene.paths.frontiers_within(math.inf)
-        if len(voxels) == 0:
-            return NONE
+    def pick_among(self, scene: Scene, voxels: np.ndarray, lengths: np.ndarray) -> int:
+        """See `_Coordinated`."""
         mates = [mate for mate in scene.view.teammates.values() if mate.heard_s >= 0.0]
         known = np.array([voxel_of(scene.view, mate.pose) for mate in mates], np.int32)
         group = groups(centres_of(scene, voxels), self.config.group * scene.cells.reach)

@@ -3,9 +3,8 @@
     v* = argmax over frontier cells v of Adv(v),   Adv(v) = mean over u of d(u, v) - d(robot, v)
 
 u are the free cells around the robot: those that it can reach, up to a radius off along either axis. d is
-the length of the path through known free space. What would be far to come back to is taken now. Frontier
-cells count whose path is no longer than a horizon; beyond it only the nearest one, where there is none
-within.
+the length of the path through known free space. What would be far to come back to is taken now. Only
+frontier cells whose path is no longer than a horizon count; where there is none, the nearest one does.
 
 What there is to gain is no part of the worth; it says which frontier cells are worth going to at all, as in
 the paper. A cell counts if it belongs to a wide opening, that is, to many connected frontier cells, or if

@@ -39,7 +39,7 @@ _WITHIN_REACH = 0.999
 _STOPPED = (MoveEnd.OBSTACLE, MoveEnd.GROUND, MoveEnd.CEILING, MoveEnd.WALL, MoveEnd.NO_PATH)
 """Ends of a drive to a place that cannot be reached, whatever the belief says."""
 _GAZES = 4
-"""A place is dropped after so many gazes from it."""
+"""A place is dropped when the robot has looked from it in so many directions."""
 
 
 @dataclass

@@ -28,7 +28,7 @@ class NearestFrontier(Explorer):
 
 
 def best_of(voxels: np.ndarray, worth: np.ndarray, target: int) -> int:
-    """The voxel of most worth, the target if it is worth as much; NONE = there is none, or all are -inf.
+    """The voxel that is worth most, of equals the target; NONE = there are no voxels, or all are worth -inf.
 
     Args:
         voxels: (K,) candidates.
