@@ -114,11 +114,11 @@ def expected_scan_bits(belief, scan, viewpoint, cones, scratch):
                 scratch.added[voxel] += np.float32(gain)
                 if belief.precision[voxel] < scan.known_precision:
                     gain *= 1.0 - scan.stop_probability
-    return _gathered_bits(belief, cones, scratch, count)
+    return gathered_bits(belief, cones, scratch, count)
 
 
 @inlined_kernel
-def _gathered_bits(belief, cones, scratch, count):
+def gathered_bits(belief, cones, scratch, count):
     """Σ ½ log2(1 + added/p) over the touched voxels outside the cones; what was added is cleared."""
     bits, growth = 0.0, 1.0
     for i in range(count):

@@ -12,12 +12,10 @@ import math
 
 from entropy_explore_env.belief.measurement_model import measurement_precision
 from entropy_explore_env.belief.raycast import OPEN, OPEN_END, STOP_AT_COVERED, Crossing, Line, cast_ray
-from entropy_explore_env.belief.visibility import in_cones
 from entropy_explore_env.belief.voxel_index import grid_index
 from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel
+from entropy_explore_env.viewpoints.expected_scan import gathered_bits
 
-_FOLD_ABOVE = 1e250
-"""A product of ratios is folded into bits, by its logarithm, before it could leave a float64."""
 _LEAST_SHARE = 1e-3
 """Rays that get on with less probability are not followed."""
 
@@ -95,23 +93,4 @@ def imagined_bits(belief, scan, gap_probability, viewpoints, cones, scratch, bit
                 direction = (along * level, across * level, -math.sin(pitch))
                 start = (at[0], at[1], at[2])
                 count = _imagine_ray(belief, scan, gap_probability, start, direction, count, scratch)
-        bits[k] = _gathered(belief, cones, scratch, count)
-
-
-@inlined_kernel
-def _gathered(belief, cones, scratch, count):
-    """Σ ½ log2(1 + added/p) over the touched voxels outside the cones; what was added is cleared."""
-    bits, growth = 0.0, 1.0
-    for i in range(count):
-        voxel = scratch.touched[i]
-        share = scratch.added[voxel] / belief.precision[voxel]
-        scratch.added[voxel] = 0.0
-        if len(cones) > 0:
-            x, y, z = grid_index(belief.size, voxel)
-            if in_cones(cones, x + 0.5, y + 0.5, z + 0.5):
-                continue
-        growth *= 1.0 + share
-        if growth > _FOLD_ABOVE:
-            bits += math.log2(growth)
-            growth = 1.0
-    return 0.5 * (bits + math.log2(growth))
+        bits[k] = gathered_bits(belief, cones, scratch, count)
