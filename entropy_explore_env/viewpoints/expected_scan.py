@@ -9,12 +9,8 @@ import numpy as np
 
 from entropy_explore_env.belief.measurement_model import measurement_precision
 from entropy_explore_env.belief.raycast import OPEN, OPEN_END, STOP_AT_COVERED, Crossing, Line, cast_ray
-from entropy_explore_env.belief.visibility import in_cones
-from entropy_explore_env.belief.voxel_index import grid_index
-from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel
-
-_FOLD_ABOVE = 1e250
-"""A product of ratios is folded into bits, by its logarithm, before it could leave a float64."""
+from entropy_explore_env.compilation.kernels import lean_kernel
+from entropy_explore_env.viewpoints.gathered_bits import gathered_bits
 
 
 class ScanModel(NamedTuple):
@@ -115,22 +111,3 @@ def expected_scan_bits(belief, scan, viewpoint, cones, scratch):
                 if belief.precision[voxel] < scan.known_precision:
                     gain *= 1.0 - scan.stop_probability
     return gathered_bits(belief, cones, scratch, count)
-
-
-@inlined_kernel
-def gathered_bits(belief, cones, scratch, count):
-    """Σ ½ log2(1 + added/p) over the touched voxels outside the cones; what was added is cleared."""
-    bits, growth = 0.0, 1.0
-    for i in range(count):
-        voxel = np.uint32(scratch.touched[i])
-        share = np.float64(scratch.added[voxel]) / np.float64(belief.precision[voxel])
-        scratch.added[voxel] = 0.0
-        if len(cones) > 0:
-            x, y, z = grid_index(belief.size, scratch.touched[i])
-            if in_cones(cones, x + 0.5, y + 0.5, z + 0.5):
-                continue
-        growth *= 1.0 + share
-        if growth > _FOLD_ABOVE:
-            bits += math.log2(growth)
-            growth = 1.0
-    return 0.5 * (bits + math.log2(growth))

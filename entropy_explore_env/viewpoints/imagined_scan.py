@@ -14,7 +14,7 @@ from entropy_explore_env.belief.measurement_model import measurement_precision
 from entropy_explore_env.belief.raycast import OPEN, OPEN_END, STOP_AT_COVERED, Crossing, Line, cast_ray
 from entropy_explore_env.belief.voxel_index import grid_index
 from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel
-from entropy_explore_env.viewpoints.expected_scan import gathered_bits
+from entropy_explore_env.viewpoints.gathered_bits import gathered_bits
 
 _LEAST_SHARE = 1e-3
 """Rays that get on with less probability are not followed."""
