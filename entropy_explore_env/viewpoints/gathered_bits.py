@@ -1,4 +1,4 @@
-"""Bits that come of the precision which imagined rays should bring: Σ ½ log2(1 + added/p) (Rocha04, eq. 27)."""
+"""Bits that the precision of imagined rays should bring: Σ ½ log2(1 + added/p) (Rocha04, eq. 27)."""
 
 from __future__ import annotations
 
