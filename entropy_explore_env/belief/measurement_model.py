@@ -17,7 +17,7 @@ class Return(enum.IntEnum):
     """What came back along a ray."""
 
     NOTHING = 0
-    """A teammate's body was in the way, or the return was too near for the sensor: no measurement."""
+    """No measurement: a teammate's body was in the way, the return was too near, or the surface gave none."""
     FREE = 1
     """No return within the sensor's range: all that the ray crossed is free."""
     HIT = 2

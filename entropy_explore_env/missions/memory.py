@@ -98,7 +98,8 @@ def _world_bytes(scenario: Scenario, batch: Batch) -> int:
     for kind in set(scenario.kinds):
         layouts += 2 * voxels + 8 * (voxels if scenario.layer_of(kind.robot) is None else planar)
     if batch.given:
-        ceiling, held = any(world.ceiling is not None for world in batch.given), len(batch.given) * layouts
+        own_masks = any(world.ceiling is not None or world.unreadable is not None for world in batch.given)
+        ceiling, held = own_masks, len(batch.given) * layouts
     else:
         from_file = scenario.world not in RECIPES  # such a world may have a ceiling
         ceiling = from_file or "terrain" in scenario.world

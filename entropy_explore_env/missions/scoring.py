@@ -84,7 +84,7 @@ def score_voxels(clock, joint, truth, prior, crossed, n, sign):
         voxel = np.uint32(crossed[i])
         if precision[voxel] > prior:
             clock.explored += sign
-            clock.error += sign * abs(np.float64(mean[voxel]) - np.float64(truth[voxel]))
+            clock.error += sign * abs(np.float64(mean[voxel]) - min(np.float64(truth[voxel]), 1.0))
             if visible[voxel]:
                 clock.explored_visible += sign
                 if truth[voxel] <= 0.5:

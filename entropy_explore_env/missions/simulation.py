@@ -33,6 +33,7 @@ from entropy_explore_env.missions.tick import step_missions
 from entropy_explore_env.missions.workspace import Workspace, new_workspace
 from entropy_explore_env.randomness import Stream, check_seed, generator, splitmix_states
 from entropy_explore_env.robots.navigator import new_navigators
+from entropy_explore_env.robots.range_sensor import true_coverage
 from entropy_explore_env.scenario import Scenario
 from entropy_explore_env.settings import Grid, gaussian_entropy_bits
 from entropy_explore_env.validation import check_instance, check_whole, is_whole
@@ -251,14 +252,15 @@ class Missions:
         self.seeds[mission], self.episodes[mission] = number, episode
         self.options[mission] = options
         self.world_numbers[mission] = -1 if world_number is None else world_number
-        if world.ceiling is not None and self.state.collision is self.state.truth:
+        differs = world.ceiling is not None or world.unreadable is not None
+        if differs and self.state.collision is self.state.truth:
             self.state = self.state._replace(collision=self.state.truth.copy())
         state = self.state
         if world.ceiling is not None and not self._no_fly.size and self._navigators[0]:
             self._no_fly = np.zeros((len(self._no_fly), self.grid.voxels), np.bool_)
         if world is not self.worlds[mission]:
             self.worlds[mission] = world
-            state.truth[mission] = world.occupied.ravel()
+            state.truth[mission] = true_coverage(world.occupied, world.unreadable)
             self._set_collision_masks(mission, world)
         for array in state[4:]:
             array[mission] = np.zeros((), array.dtype)

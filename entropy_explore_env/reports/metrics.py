@@ -18,6 +18,7 @@ from entropy_explore_env.robots.range_sensor import (
     new_scan,
     sensor_model,
     take_scan,
+    true_coverage,
 )
 from entropy_explore_env.scenario import Scenario
 from entropy_explore_env.settings import RobotKind
@@ -145,7 +146,7 @@ def _most_added(scenario: Scenario, kind: RobotKind, world: World) -> float:
     rng, grid, sensor = np.random.default_rng(0), world.grid, kind.sensor
     layout, model = world.layout(scenario, kind), sensor_model(sensor)
     scan, rng_state = new_scan(grid, [sensor], sensor.rays), np.zeros(1, np.uint64)
-    truth, added = world.occupied.ravel().astype(np.float32), 0.0
+    truth, added = true_coverage(world.occupied, world.unreadable), 0.0
     scene = Scene(truth, grid.shape, grid.voxel_size_m, np.zeros((0, 4)))
     voxels = np.stack(np.unravel_index(rng.choice(layout.starts, _FLOOR_SCANS), grid.shape), axis=-1)
     steepest = _STEEPEST_RAD if scenario.layer_of(kind.robot) is None else 0.0

@@ -176,7 +176,7 @@ def same_end(record: MissionRecord, missions: Missions) -> bool:
 
 
 def world_digest(missions: Missions, mission: int) -> str:
-    """SHA-256 of a mission's true world as its file or recipe gave it: solid voxels, their size, ceiling."""
+    """SHA-256 of a mission's true world as its file or recipe gave it: its voxels and ceiling."""
     world = missions.worlds[mission]
     if world is None:
         raise CallOrderError("world_digest before reset: call reset() first")
@@ -186,7 +186,11 @@ def world_digest(missions: Missions, mission: int) -> str:
         "occupied": np.packbits(world.occupied),
         "shape": np.asarray(grid.shape, np.int64),
     }
-    return named_digest(parts if world.ceiling is None else {**parts, "ceiling": world.ceiling})
+    if world.ceiling is not None:
+        parts["ceiling"] = world.ceiling
+    if world.unreadable is not None:
+        parts["unreadable"] = np.packbits(world.unreadable)
+    return named_digest(parts)
 
 
 def check_world(record: MissionRecord, missions: Missions) -> None:

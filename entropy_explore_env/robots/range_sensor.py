@@ -16,6 +16,7 @@ from entropy_explore_env.belief.map_update import RAY, Scan
 from entropy_explore_env.belief.measurement_model import Return, measured_coverage, measurement_precision
 from entropy_explore_env.belief.raycast import (
     NEVER_STOP,
+    OBSTACLE,
     OPEN,
     OPEN_END,
     STOP_AT_COVERED,
@@ -32,6 +33,8 @@ from entropy_explore_env.settings import Grid, RangeSensor, centred_angles
 _NOTHING, _FREE, _HIT = int(Return.NOTHING), int(Return.FREE), int(Return.HIT)
 _NEAREST = 1e-3
 """Noise makes no measurement shorter than this, in voxel edges."""
+_UNREADABLE = 2.0
+"""True coverage of a solid voxel that gives no return; 1 is that of others."""
 
 SENSOR_PARAMS = np.dtype(
     [
@@ -84,12 +87,28 @@ class Scene(NamedTuple):
     """What a sensor scans: the true world, and the teammates' bodies in it."""
 
     occupied: np.ndarray
-    """(V,) float32 true coverage."""
+    """(V,) float32 `true_coverage`."""
     size: tuple[int, int, int]
     """(X, Y, Z) voxels."""
     voxel_size_m: float
     bodies: np.ndarray
     """(B, 4) float64: centre and radius in grid units of each body that may be seen."""
+
+
+def true_coverage(occupied: np.ndarray, unreadable: np.ndarray | None) -> np.ndarray:
+    """What rays are cast through.
+
+    Args:
+        occupied: (X, Y, Z) bool, which voxels are solid.
+        unreadable: (X, Y, Z) bool, which of them give no return; None = all give one.
+
+    Returns:
+        (V,) float32: 0 free, 1 solid, 2 solid without return.
+    """
+    coverage = occupied.ravel().astype(np.float32)
+    if unreadable is not None:
+        coverage[unreadable.ravel()] = _UNREADABLE
+    return coverage
 
 
 def sensor_model(sensor: RangeSensor) -> SensorModel:
@@ -272,25 +291,28 @@ def take_scan(scan, model, scene, pose, rng):
         rng: (1,) uint64 random state; drawn from only where range noise is on.
     """
     params, start = model.params[0], pose.start
+    behind = max(params.voxels_behind, 1)  # the voxel that a ray ends at is among those behind its end
     point_rays(model, pose.yaw, pose.pitch, scan.rays)
     reach = params.max_range_m / scene.voxel_size_m
     for index in range(len(scan.rays)):
         ray = scan.rays[index]
         direction = point(ray.direction)
-        length, ray.voxels, end = cast_ray(
+        length, voxels, end = cast_ray(
             scene.occupied,
             scene.size,
             Line(start, direction, reach),
             STOP_AT_COVERED,
             OPEN_END,
-            params.voxels_behind,
+            behind,
             Crossing(scan.crossed[index], scan.entered),
         )
+        no_return = end == OBSTACLE and ends_unreadable(scene.occupied, scan.crossed[index], voxels, behind)
+        ray.voxels = voxels - 1 if end == OBSTACLE and params.voxels_behind == 0 else voxels
         ray.length = length
         ray.range_m = length * scene.voxel_size_m
         error = params.noise_m * draw_gaussian(rng) if params.noise_m > 0.0 else 0.0
         ray.returned = _FREE if end == OPEN else _HIT
-        if len(scene.bodies) > 0 and body_distance(start, direction, scene.bodies) < length:
+        if no_return or (len(scene.bodies) > 0 and body_distance(start, direction, scene.bodies) < length):
             ray.returned = _NOTHING
             ray.range_m = 0.0
         elif end == OPEN or error == 0.0:
@@ -301,6 +323,19 @@ def take_scan(scan, model, scene, pose, rng):
         if ray.returned == _HIT and ray.range_m < params.min_range_m:
             ray.returned = _NOTHING
             ray.range_m = 0.0
+
+
+@inlined_kernel
+def ends_unreadable(occupied, crossed, n, behind):
+    """Whether the covered voxel that a ray ended at gives no return.
+
+    It is the first covered one of the last `behind` of the `n` voxels noted, which are all behind the end.
+    """
+    for i in range(max(n - behind, 1), n):
+        covered = occupied[np.uint32(crossed[i])]
+        if covered > STOP_AT_COVERED:
+            return covered >= _UNREADABLE
+    return False
 
 
 @lean_kernel

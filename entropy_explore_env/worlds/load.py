@@ -20,7 +20,14 @@ from entropy_explore_env.worlds.files.archives import restored, saved
 from entropy_explore_env.worlds.files.jacksboro import NAME as JACKSBORO
 from entropy_explore_env.worlds.files.process import Format, Limits, read_apart
 from entropy_explore_env.worlds.files.resampling import extruded, resampled
-from entropy_explore_env.worlds.files.voxels import FREE, MAX_FILE_VOXELS, UNKNOWN, RefusedError, Voxels
+from entropy_explore_env.worlds.files.voxels import (
+    FREE,
+    MAX_FILE_VOXELS,
+    UNKNOWN,
+    UNREADABLE,
+    RefusedError,
+    Voxels,
+)
 from entropy_explore_env.worlds.recipes.catalogue import RECIPES
 from entropy_explore_env.worlds.recipes.empty import empty
 from entropy_explore_env.worlds.splits import draw_world_number, world_generator
@@ -150,9 +157,12 @@ def save_world(world: World, path: Path | str) -> None:
 
 def world_bytes(world: World) -> bytes:
     """The content of the file that `save_world` writes."""
-    labels = world.occupied.view(np.int8)
+    labels = world.occupied.astype(np.int8)
+    for mask, label in ((world.unknown, UNKNOWN), (world.unreadable, UNREADABLE)):
+        if mask is not None:
+            labels[mask] = label
     voxels = Voxels(
-        labels if world.unknown is None else np.where(world.unknown, UNKNOWN, labels),
+        labels,
         world.grid.voxel_size_m,
         world.grid.origin_m,
         world.yaw_rad,
@@ -204,7 +214,7 @@ def _world(voxels: Voxels, path: str, options: dict[str, Any], height_m: float |
         labels = extruded(labels, layers)
     shape = (int(labels.shape[0]), int(labels.shape[1]), int(labels.shape[2]))
     grid = Grid(shape, float(size_m), voxels.origin_m)
-    unknown = labels == UNKNOWN
+    unknown, unreadable = labels == UNKNOWN, labels == UNREADABLE
     return World(
         grid,
         labels != FREE,
@@ -212,6 +222,7 @@ def _world(voxels: Voxels, path: str, options: dict[str, Any], height_m: float |
         ceiling,
         voxels.yaw_rad,
         unknown if unknown.any() else None,
+        unreadable if unreadable.any() else None,
     )
 
 
@@ -341,7 +352,8 @@ def require_unchanged(scenario: Scenario, world: World) -> None:
     if found is world or found is None:
         return
     same = found.grid == world.grid and found.yaw_rad == world.yaw_rad
-    same = same and np.array_equal(found.occupied, world.occupied)
-    if not same or not np.array_equal(found.ceiling, world.ceiling):  # type: ignore[arg-type] - None is allowed
+    for array in ("occupied", "ceiling", "unreadable"):  # the last two may be None
+        same = same and np.array_equal(getattr(found, array), getattr(world, array))
+    if not same:
         allowed = "a file that stays as it was read: make another environment to be in its new world"
         raise WorldError("Scenario.world", scenario.world, allowed)

@@ -1,5 +1,7 @@
 """Pictures of worlds: walls dark, free space light, unknown space blue, metres along the edges.
 
+Solid voxels that give no return are red.
+
 Unknown is what a world's file says nothing of: to robots it is solid. Margins that hold no free space, and no
 wall that the file knows of, are cut off.
 
@@ -36,8 +38,8 @@ _ROOFED = 0.5
 """Above this share of columns that are solid at the top, a world counts as roofed."""
 _PAPER, _INK = (255, 255, 255), (40, 44, 52)
 _SOLID, _FREE = (58, 64, 77), (236, 239, 243)
-_UNKNOWN = (176, 200, 226)
-_KEY = ((_SOLID, "wall"), (_FREE, "free"), (_UNKNOWN, "unknown"))
+_UNKNOWN, _UNREADABLE = (176, 200, 226), (190, 74, 72)
+_KEY = ((_SOLID, "wall"), (_FREE, "free"), (_UNKNOWN, "unknown"), (_UNREADABLE, "no return"))
 _KEY_SIZE = 12
 _HEIGHT_COLOURS = (
     (38, 70, 83),
@@ -96,8 +98,9 @@ def picture(world: World) -> bytes:
         axes = _Axes(_MARGIN, top, panel.width, panel.height, scale, scale * view.stretch)
         _draw_ticks(draw, axes, view.corner_m)
         top += panel.height + _GAP
-    if world.unknown is not None:
-        _draw_key(draw, _MARGIN + panels[-1].width, top - _GAP / 4)
+    shown = [_in(views, _UNKNOWN, world.unknown), _in(views, _UNREADABLE, world.unreadable)]
+    if any(shown):
+        _draw_key(draw, _MARGIN + panels[-1].width, top - _GAP / 4, [True, True, *shown])
     buffer = io.BytesIO()
     sheet.save(buffer, "PNG", optimize=True)
     return buffer.getvalue()
@@ -117,13 +120,23 @@ def _cropped(world: World) -> World:
     x, y, z = (low + part.start * edge_m for low, part in zip(world.grid.origin_m, inside, strict=True))
     occupied = world.occupied[block]
     a, b, c = occupied.shape
-    unknown = None if world.unknown is None else world.unknown[block]
-    return World(Grid((a, b, c), edge_m, (x, y, z)), occupied, world.name, unknown=unknown)
+    unknown, unreadable = (
+        None if mask is None else mask[block] for mask in (world.unknown, world.unreadable)
+    )
+    grid = Grid((a, b, c), edge_m, (x, y, z))
+    return World(grid, occupied, world.name, unknown=unknown, unreadable=unreadable)
 
 
-def _draw_key(draw: ImageDraw.ImageDraw, right: float, middle: float) -> None:
+def _in(views: list[_View], colour: tuple[int, int, int], mask: np.ndarray | None) -> bool:
+    """Whether views of a world with such a mask show its colour."""
+    return mask is not None and (colour == _UNKNOWN or any((v.pixels == colour).all(-1).any() for v in views))
+
+
+def _draw_key(draw: ImageDraw.ImageDraw, right: float, middle: float, shown: list[bool]) -> None:
     """What the colours mean, in a line that ends at a place."""
-    for colour, name in reversed(_KEY):
+    for (colour, name), is_shown in reversed(list(zip(_KEY, shown, strict=True))):
+        if not is_shown:
+            continue
         right -= text_width(name, _TEXT_SIZE)
         draw.text((right, middle), name, _INK, font(_TEXT_SIZE), anchor="lm")
         right -= _KEY_SIZE + 6
@@ -146,6 +159,8 @@ def _views(world: World, scale: float) -> list[_View]:
         plan = np.where(solid[:, :, 0, None], _SOLID, _FREE).astype(np.uint8)
         if world.unknown is not None:
             plan[world.unknown[:, :, 0]] = _UNKNOWN
+        if world.unreadable is not None:
+            plan[world.unreadable[:, :, 0]] = _UNREADABLE
         return [_View("plan", _upright(plan), (x, y))]
     if world.unknown is not None:
         return _views_of_known(world, scale)
@@ -161,6 +176,9 @@ def _views(world: World, scale: float) -> list[_View]:
         low_m, high_m = (float(top) * world.grid.voxel_size_m + z for top in (tops.min(), tops.max()))
         above = _coloured((tops - tops.min()) / max(1, int(np.ptp(tops))), _HEIGHT_COLOURS)
         title = f"from above: top of what is solid, {_metres(low_m)} m (dark) to {_metres(high_m)} m (light)"
+        if world.unreadable is not None:
+            highest = np.maximum(tops - 1, 0)[:, :, None]
+            above[np.take_along_axis(world.unreadable, highest, axis=2)[:, :, 0]] = _UNREADABLE
         side = np.where(free_along_y < 1.0, 0.7 - 0.7 * np.sqrt(1.0 - free_along_y), 1.0)
         side_title = "from the side, along y: how much is solid, white = nothing"
     stretch = _stretch(world.grid.size_m[2] * scale)

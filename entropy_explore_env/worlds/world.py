@@ -47,6 +47,10 @@ class World:
         yaw_rad: Rotation of the grid's frame against the frame of the file.
         unknown: (X, Y, Z) bool, read-only and copied likewise, or None: of which solid voxels the file says
             nothing. Pictures show them; to robots they are solid as all others.
+        unreadable: (X, Y, Z) bool, read-only and copied likewise, or None: which solid voxels give no return
+            to a range sensor (poor texture, glass, black paint). A ray that ends at one measures nothing,
+            other than one that ends in the open, which frees what it crossed. No robot can observe them, so
+            that endings leave them out.
 
     Worlds compare and hash by identity: to compare what they hold, compare their arrays.
     """
@@ -57,6 +61,7 @@ class World:
     ceiling: np.ndarray | None = None
     yaw_rad: float = 0.0
     unknown: np.ndarray | None = None
+    unreadable: np.ndarray | None = None
 
     def __post_init__(self) -> None:
         """Check the arrays and keep read-only copies of them."""
@@ -70,13 +75,11 @@ class World:
         if self.occupied.all():
             raise WorldError("World.occupied", self.name, "at least one free voxel")
         object.__setattr__(self, "occupied", _kept(self.occupied))
-        if self.unknown is not None:
-            unknown = self.unknown if isinstance(self.unknown, np.ndarray) else np.zeros(0)
-            if unknown.shape != self.grid.shape or unknown.dtype != np.bool_:
-                raise WorldError("World.unknown", self.unknown, f"an array {self.grid.shape} bool, or None")
-            if (unknown & ~self.occupied).any():
-                raise WorldError("World.unknown", self.name, "solid voxels only")
-            object.__setattr__(self, "unknown", _kept(unknown))
+        for name in ("unknown", "unreadable"):
+            self._keep_some_solid(name, getattr(self, name))
+        masks = [mask for mask in (self.unknown, self.unreadable) if mask is not None]
+        if len(masks) == 2 and (masks[0] & masks[1]).any():
+            raise WorldError("World.unreadable", self.name, "no voxels that are unknown")
         if not is_number(self.yaw_rad) or not math.isfinite(self.yaw_rad):
             raise WorldError("World.yaw_rad", self.yaw_rad, "a finite number")
         if self.ceiling is not None:
@@ -90,10 +93,21 @@ class World:
                 raise WorldError("World.ceiling", found, f"layers from 0 to {self.grid.shape[2]}")
             object.__setattr__(self, "ceiling", _kept(self.ceiling))
 
+    def _keep_some_solid(self, name: str, given: object) -> None:
+        """Check a mask of some solid voxels, if there is one, and keep a read-only copy of it."""
+        if given is None:
+            return
+        mask = given if isinstance(given, np.ndarray) else np.zeros(0)
+        if mask.shape != self.grid.shape or mask.dtype != np.bool_:
+            raise WorldError(f"World.{name}", given, f"an array {self.grid.shape} bool, or None")
+        if (mask & ~self.occupied).any():
+            raise WorldError(f"World.{name}", self.name, "solid voxels only")
+        object.__setattr__(self, name, _kept(mask))
+
     def __setstate__(self, kept: dict[str, object]) -> None:
         """Take the fields back; arrays that were pickled are read-only again."""
         self.__dict__.update(kept)
-        for array in (self.occupied, self.ceiling, self.unknown):
+        for array in (self.occupied, self.ceiling, self.unknown, self.unreadable):
             if array is not None:
                 array.setflags(write=False)
 
@@ -199,7 +213,9 @@ class World:
         labels, _ = connected_components(~self.occupied)
         visible = np.isin(labels, np.unique(labels[starts]))
         if voxels_behind:
-            visible |= ndimage.binary_dilation(visible, iterations=voxels_behind) & self.occupied
+            within = None if self.unreadable is None else ~self.unreadable
+            behind = ndimage.binary_dilation(visible, iterations=voxels_behind, mask=within)
+            visible |= behind & self.occupied
         if level_view is not None:
             visible &= self._within_view(np.any(starts, axis=2), level_view)
         return Layout(collision_mask, np.flatnonzero(starts), visible)

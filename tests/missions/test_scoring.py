@@ -168,3 +168,30 @@ def test_a_mission_ends_with_the_scan_that_shows_enough(ending):
     assert (
         joint["driven_m"] == pytest.approx(driven_m.sum()) and joint["driven_m"] <= robots["distance_m"].sum()
     )
+
+
+def test_surfaces_without_return_stay_unknown_and_the_mission_ends_without_them():
+    """A room with a glass wall: nobody maps the glass, and the ending does not ask for it."""
+    grid = Grid((7, 11, 5), 0.5)
+    solid = np.zeros(grid.shape, bool)
+    solid[0] = True
+    glass = np.zeros(grid.shape, bool)
+    glass[0, 3:8] = True
+    plain, glazed = World(grid, solid, "plain"), World(grid, solid, "glazed", unreadable=glass)
+    missions = Missions(
+        free_box(track_truth=True, ending={"seen_share": 1.0, "time_limit_s": 4000.0}), given=[glazed]
+    )
+    missions.reset(0, seed=1)
+    clock, state = missions.state.missions[0], missions.state
+    assert clock["visible"] == plain.visible_voxels(missions.scenario) - glass.sum()
+    assert set(np.unique(state.truth[0])) == {0.0, 1.0, 2.0}
+    wander(missions, 3000, 1)
+    prior = missions.rules.params[0]["prior_precision"]
+    precision = missions.precision[0]
+    assert (precision[:, glass] == prior).all()
+    assert (missions.state.joint_precision[0].reshape(grid.shape)[glass] == prior).all()
+    assert (missions.state.joint_precision[0].reshape(grid.shape)[solid & ~glass] > prior).all()
+    assert clock["end"] == MissionEnd.SEEN.code
+    measured = state.joint_precision[0] > prior
+    error = np.abs(state.joint_mean[0] - np.minimum(state.truth[0], 1.0))[measured].sum(dtype=np.float64)
+    assert clock["error"] == pytest.approx(error, rel=1e-6)

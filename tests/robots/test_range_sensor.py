@@ -20,6 +20,7 @@ from entropy_explore_env.robots.range_sensor import (
     sensor_model,
     take_scan,
     trace_measurement,
+    true_coverage,
     visibility_parameters,
 )
 from entropy_explore_env.settings import Grid, RangeSensor
@@ -368,3 +369,34 @@ def test_visibility_parameters():
     assert half_angle == pytest.approx(0.1)
     one = scan_of(np.zeros(SIZE, np.float32), (3.5, 5.5, 2.5), 2.0, 0.3, RangeSensor((0.0, 0.0), 0.1))
     assert visibility_parameters(one.rays, 2.0, 0.3)[1] == pytest.approx(0.0, abs=1e-7)
+
+
+@drawn(60)
+@given(st.sampled_from(SHAPES), seeds, st.sampled_from([math.inf, 0.6]), st.integers(0, 2))
+def test_rays_that_end_at_what_gives_no_return_measure_nothing_and_others_all_that_they_did(
+    size, seed, max_range_m, behind
+):
+    rng = np.random.default_rng(seed)
+    truth, start = random_cover(size, 0.15, seed), rng.uniform(0.1, 0.9, 3) + rng.integers(0, size)
+    yaw, pitch = rng.uniform(-math.pi, math.pi), rng.uniform(-1.2, 1.2) * (size[2] > 1)
+    unreadable = (truth > 0.5) & (rng.random(size) < 0.5)
+    view = (COARSE.field_of_view_rad[0], COARSE.field_of_view_rad[1] * (size[2] > 1))
+    sensor = RangeSensor(view, math.pi / 12, max_range_m, 0.05, 0.02, voxels_behind=behind)
+    readable = scan_of(truth, start, yaw, pitch, sensor)
+    scan = scan_of(true_coverage(truth > 0.5, unreadable).reshape(size), start, yaw, pitch, sensor)
+    longest = max_range_m / 0.5
+    for index, ray in enumerate(scan.rays):
+        assume(rocha04.is_generic(start, ray["direction"], size, longest))
+        theirs = rocha04.trace(lambda v: truth[v] > 0.5, start, ray["direction"], size, longest, 1)
+        hit = theirs.end == rocha04.HIT and unreadable[theirs.voxels[-1]]
+        if hit:
+            assert (ray["returned"], ray["range_m"]) == (Return.NOTHING, 0.0)
+        else:
+            assert ray == readable.rays[index]
+            assert voxels_on(scan, index) == voxels_on(readable, index)
+
+
+def test_true_coverage_tells_free_solid_and_unreadable_voxels_apart():
+    occupied = np.array([[[False, True, True]]])
+    assert true_coverage(occupied, None).tolist() == [0.0, 1.0, 1.0]
+    assert true_coverage(occupied, np.array([[[False, False, True]]])).tolist() == [0.0, 1.0, 2.0]

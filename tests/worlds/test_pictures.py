@@ -9,7 +9,15 @@ import pytest
 from PIL import Image
 
 from entropy_explore_env.settings import Grid
-from entropy_explore_env.worlds.pictures import _FREE, _SOLID, _UNKNOWN, _metres, _stretch, picture
+from entropy_explore_env.worlds.pictures import (
+    _FREE,
+    _SOLID,
+    _UNKNOWN,
+    _UNREADABLE,
+    _metres,
+    _stretch,
+    picture,
+)
 from entropy_explore_env.worlds.world import World
 
 
@@ -109,3 +117,20 @@ def test_rock_without_free_space_is_cut_off():
     pixels = drawn(occupied)
     assert is_colour(pixels, _FREE).sum() > 0.7 * is_colour(pixels, _SOLID).sum()
     assert is_colour(pixels, _FREE).sum() / 880**2 == pytest.approx(200 / 22**2, rel=0.05)
+
+
+def test_surfaces_without_return_are_red_in_plans_and_where_they_are_the_top_of_the_ground():
+    occupied = np.ones((7, 11, 1), bool)
+    occupied[1:6, 1:10] = False
+    glass = np.zeros((7, 11, 1), bool)
+    glass[0, 2:5] = True
+    plan = World(Grid(occupied.shape, 0.5), occupied, "room", unreadable=glass)
+    pixels = np.asarray(Image.open(io.BytesIO(picture(plan))).convert("RGB")).astype(int)
+    assert is_colour(pixels, _UNREADABLE).sum() == pytest.approx(3 * (880 / 11) ** 2, rel=0.05)
+    ground = np.zeros((7, 11, 5), bool)
+    ground[:, :, :2] = True
+    sand = np.zeros((7, 11, 5), bool)
+    sand[2, 3:5, 1] = sand[5, 5, 0] = True  # the last is below the ground
+    terrain = World(Grid(ground.shape, 0.5), ground, "ground", unreadable=sand)
+    pixels = np.asarray(Image.open(io.BytesIO(picture(terrain))).convert("RGB")).astype(int)
+    assert is_colour(pixels, _UNREADABLE).sum() == pytest.approx(2 * (880 / 11) ** 2, rel=0.05)

@@ -2,10 +2,10 @@
 
 A saved world has the entries `format` ("entropy_explore_env world"), `version` (1), `shape` (3 int64),
 `occupied` (uint8: bits of the voxels in C order, numpy.packbits), `voxel_size_m`, `origin_m` (3), `yaw_rad`
-(float64), `name` and, where the world has them, `ceiling` (X, Y) int32 and `unknown` (uint8: bits as
-of `occupied`, some of those that are set). A height map has an array `elevation`,
-or one 2-D array of any name, in metres: rows from north to south, as in an image; its spacing is the entry
-`spacing_m` (one number, or x and y) or the option `resolution_m`.
+(float64), `name` and, where the world has them, `ceiling` (X, Y) int32, `unknown` and `unreadable`
+(uint8: bits as of `occupied`, some of those that are set, none in both). A height map has an array
+`elevation`, or one 2-D array of any name, in metres: rows from north to south, as in an image; its spacing is
+the entry `spacing_m` (one number, or x and y) or the option `resolution_m`.
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ from entropy_explore_env.worlds.files.voxels import (
     FREE,
     SOLID,
     UNKNOWN,
+    UNREADABLE,
     Options,
     RefusedError,
     Voxels,
@@ -36,6 +37,7 @@ FORMAT, VERSION = "entropy_explore_env world", 1
 MAX_MEMBERS = 32
 MAX_MEMBER_BYTES = 256 << 20
 MAX_NAME = 256
+_SOME_SOLID = {"unknown": UNKNOWN, "unreadable": UNREADABLE}
 
 
 def saved(world: Voxels) -> bytes:
@@ -52,8 +54,9 @@ def saved(world: Voxels) -> bytes:
     }
     if world.ceiling is not None:
         entries["ceiling"] = world.ceiling
-    if (unknown := world.labels == UNKNOWN).any():
-        entries["unknown"] = np.packbits(unknown)
+    for name, label in _SOME_SOLID.items():
+        if (mask := world.labels == label).any():
+            entries[name] = np.packbits(mask)
     buffer = io.BytesIO()
     np.savez_compressed(buffer, **entries)
     return buffer.getvalue()
@@ -114,11 +117,12 @@ def _world(entries: dict[str, np.ndarray]) -> Voxels:
     if ceiling is not None and not _fits(ceiling, shape):
         raise RefusedError("a saved world with a ceiling for each column")
     labels = _bits(entries["occupied"], shape).view(np.int8)
-    if "unknown" in entries:
-        unknown = _bits(entries["unknown"], shape).view(np.bool_)
-        if (labels[unknown] != SOLID).any():
-            raise RefusedError("a saved world whose unknown voxels count as solid")
-        labels[unknown] = UNKNOWN
+    for name, label in _SOME_SOLID.items():
+        if name in entries:
+            mask = _bits(entries[name], shape).view(np.bool_)
+            if (labels[mask] != SOLID).any():
+                raise RefusedError(f"a saved world whose {name} voxels count as solid")
+            labels[mask] = label
     x, y, z = (float(v) for v in entries["origin_m"])
     edge, yaw = float(entries["voxel_size_m"]), float(entries["yaw_rad"])
     if not (0 < edge < math.inf and all(math.isfinite(v) for v in (x, y, z, yaw))):

@@ -14,6 +14,7 @@ from entropy_explore_env.worlds.files.voxels import (
     ROUNDING,
     SOLID,
     UNKNOWN,
+    UNREADABLE,
     Voxels,
     checked_shape,
 )
@@ -23,7 +24,8 @@ def resampled(voxels: Voxels, voxel_size_m: float | None) -> tuple[np.ndarray, n
     """The labels of voxels of a wanted size, and the ceiling counted in them.
 
     A voxel is free if at least half of it is known to be free and less than a quarter of it is solid; of the
-    others it is solid if at least a quarter of it is. A plan stays one voxel high.
+    others it is solid if at least a quarter of it is, and unreadable where most of what is solid is. A plan
+    stays one voxel high.
 
     Args:
         voxels: A file's content.
@@ -68,7 +70,7 @@ def _pool(labels, scale, pooled):
             y_low, y_high = j * scale[1], (j + 1) * scale[1]
             for k in range(pooled.shape[2]):
                 z_low, z_high = k * scale[2], (k + 1) * scale[2]
-                free, occupied = 0.0, 0.0
+                free, occupied, unreadable = 0.0, 0.0, 0.0
                 for x in range(int(x_low), min(labels.shape[0], math.ceil(x_high))):
                     across = min(x_high, x + 1.0) - max(x_low, float(x))
                     for y in range(int(y_low), min(labels.shape[1], math.ceil(y_high))):
@@ -77,11 +79,12 @@ def _pool(labels, scale, pooled):
                             part = area * (min(z_high, z + 1.0) - max(z_low, float(z)))
                             if labels[x, y, z] == FREE:
                                 free += part
-                            elif labels[x, y, z] == SOLID:
+                            elif labels[x, y, z] != UNKNOWN:
                                 occupied += part
+                                unreadable += part if labels[x, y, z] == UNREADABLE else 0.0
                 is_free = free >= (FREE_AT_LEAST - ROUNDING) * volume
                 if occupied >= (OCCUPIED_BELOW - ROUNDING) * volume:
-                    pooled[i, j, k] = SOLID
+                    pooled[i, j, k] = UNREADABLE if unreadable > 0.5 * occupied else SOLID
                 else:
                     pooled[i, j, k] = FREE if is_free else UNKNOWN
 

@@ -16,8 +16,8 @@ import numpy as np
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.settings import MAX_VOXELS_ALONG_AXIS
 
-UNKNOWN, FREE, SOLID = -1, 0, 1
-"""Labels of voxels."""
+UNKNOWN, FREE, SOLID, UNREADABLE = -1, 0, 1, 2
+"""Labels of voxels; those unreadable are solid, too, and give no return to a range sensor."""
 FREE_AT_LEAST = 0.5
 OCCUPIED_BELOW = 0.25
 ROUNDING = 1e-9
@@ -37,7 +37,7 @@ class Voxels:
     """A file's content.
 
     Attributes:
-        labels: (X, Y, Z) int8: UNKNOWN, FREE or SOLID; Z = 1 is a 2-D plan.
+        labels: (X, Y, Z) int8: UNKNOWN, FREE, SOLID or UNREADABLE; Z = 1 is a 2-D plan.
         voxel_size_m: Edge of a voxel.
         origin_m: Lower corner of voxel (0, 0, 0) in the file's frame.
         yaw_rad: Rotation of the voxels' axes against the file's frame, about `origin_m`.

@@ -139,3 +139,39 @@ def test_what_is_unknown_is_kept_and_an_archive_that_contradicts_itself_is_refus
     for wrong in (~occupied, unknown[:3], unknown.astype(int), "x"):
         with pytest.raises(WorldError, match=r"World\.unknown"):
             World(Grid(occupied.shape, 0.5), occupied, "hall", unknown=wrong)
+
+
+def test_surfaces_without_return_are_kept_and_those_that_contradict_the_rest_are_refused(tmp_path):
+    occupied = np.random.default_rng(0).random((7, 11, 5)) < 0.5
+    unreadable = occupied & (np.random.default_rng(1).random((7, 11, 5)) < 0.5)
+    world = World(Grid(occupied.shape, 0.5), occupied, "hall", unreadable=unreadable)
+    save_world(world, tmp_path / "hall.npz")
+    again = load_world(tmp_path / "hall.npz")
+    np.testing.assert_array_equal(again.unreadable, unreadable)
+    np.testing.assert_array_equal(again.occupied, occupied)
+    assert again.unknown is None
+    entries = dict(np.load(tmp_path / "hall.npz"))
+    entries["unreadable"] = np.packbits(~occupied)
+    np.savez(tmp_path / "wrong.npz", **entries)
+    with pytest.raises(WorldError, match="unreadable voxels count as solid"):
+        load_world(tmp_path / "wrong.npz")
+    for wrong in (~occupied, unreadable[:3], unreadable.astype(int), "x"):
+        with pytest.raises(WorldError, match=r"World\.unreadable"):
+            World(Grid(occupied.shape, 0.5), occupied, "hall", unreadable=wrong)
+    with pytest.raises(WorldError, match="no voxels that are unknown"):
+        World(Grid(occupied.shape, 0.5), occupied, "hall", unknown=unreadable, unreadable=unreadable)
+
+
+def test_resampled_voxels_are_unreadable_where_most_of_what_is_solid_in_them_is(tmp_path):
+    occupied = np.zeros((4, 2, 2), bool)
+    occupied[:2] = occupied[2, 0] = True
+    unreadable = np.zeros((4, 2, 2), bool)
+    unreadable[0] = unreadable[1, 0, 0] = unreadable[2, 0, 0] = True  # 5 of 8; 1 of 2
+    save_world(World(Grid((4, 2, 2), 0.5), occupied, "x", unreadable=unreadable), tmp_path / "x.npz")
+    with pytest.raises(WorldError, match="free space"):
+        load_world(tmp_path / "x.npz", 1.0)
+    occupied[2] = unreadable[2] = False
+    save_world(World(Grid((4, 2, 2), 0.5), occupied, "x", unreadable=unreadable), tmp_path / "x.npz")
+    coarse = load_world(tmp_path / "x.npz", 1.0)
+    assert coarse.occupied.ravel().tolist() == [True, False]
+    assert coarse.unreadable is not None and coarse.unreadable.ravel().tolist() == [True, False]
