@@ -10,12 +10,14 @@ VENV_RLLIB := .venv-rllib
 STYLE := $(RUN) ruff check . && $(RUN) ruff format --check . && $(VENV)/bin/lint-imports --no-cache
 WARM := $(RUN) entropy_explore_env.warm --processes 1
 
-.PHONY: help demo test test-long boundscheck test-rllib lint bench reproduce clean
+.PHONY: help demo docs docs-links test test-long boundscheck test-rllib lint bench reproduce clean
 .NOTPARALLEL:
 
 help:
 	@echo "make demo         three robots map a furnished room by the strategy recommended, shown in results/demo;"
 	@echo "                  make demo STRATEGY=gradient: by another one"
+	@echo "make docs         the documentation site, into docs/build/html"
+	@echo "make docs-links   whether its links to other sites lead somewhere"
 	@echo "make test         lint, then the tests"
 	@echo "make test-long    also the long ones, and more and other drawn examples: an hour"
 	@echo "make boundscheck  the kernels' own tests, with every index checked"
@@ -30,6 +32,13 @@ STRATEGY ?= best
 
 demo: $(STAMP)baselines
 	$(RUN) baselines.run room-furnished --strategy $(STRATEGY) --robots 3 --seed 0 --out results/demo
+
+docs: $(STAMP)docs
+	$(RUN) sphinx -b html -W --keep-going -q docs docs/build/html
+	@echo "docs/build/html/index.html is the site's first page"
+
+docs-links: $(STAMP)docs
+	$(RUN) sphinx -b linkcheck -q docs docs/build/links
 
 # The environments' kernels are compiled once, by one process, while pyright has the other core.
 test: $(STAMP)dev
@@ -87,5 +96,5 @@ $(VENV_RLLIB)/installed: pyproject.toml requirements/constraints-rllib.txt
 	@touch $@
 
 clean:
-	rm -rf $(VENV) $(VENV_RLLIB) build dist *.egg-info .pytest_cache .ruff_cache .hypothesis
+	rm -rf $(VENV) $(VENV_RLLIB) build dist docs/build docs/scenarios *.egg-info .pytest_cache .ruff_cache .hypothesis
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

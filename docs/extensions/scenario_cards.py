@@ -1,0 +1,324 @@
+"""A page for each named scenario, written from the code as the site is built, with a picture of its world."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from docs.extensions.attribute_docs import attribute_docs, constant_docs
+from docs.extensions.scenario_times import times_table
+from docs.extensions.space_numbers import Numbers, action_numbers, discrete_actions, observation_numbers
+from entropy_explore_env import environment_id, scenarios
+from entropy_explore_env.errors import SettingError
+from entropy_explore_env.missions.rules import rules_of
+from entropy_explore_env.scenario import Scenario, with_settings
+from entropy_explore_env.scenarios import MISSION_TIMES, SCENARIOS
+from entropy_explore_env.settings import RobotKind, gaussian_entropy_bits
+from entropy_explore_env.worlds.load import make_world
+from entropy_explore_env.worlds.pictures import picture
+from entropy_explore_env.worlds.recipes.catalogue import RECIPES
+
+if TYPE_CHECKING:
+    from sphinx.application import Sphinx
+
+FOLDER = "scenarios"
+"""Below `docs/`; git ignores it."""
+FILMS = "films"
+"""Below `docs/`: NAME.gif is shown where there is one."""
+
+
+def write_cards(docs: Path) -> list[Path]:
+    """Write the pages of all scenarios, and the page that lists them; those of scenarios that are gone go.
+
+    Args:
+        docs: The folder of the site's sources.
+    """
+    folder = docs / FOLDER
+    folder.mkdir(exist_ok=True)
+    texts = {name: card(scenario, docs) for name, scenario in SCENARIOS.items()}
+    written = [_write(folder / f"{name}.md", text.encode()) for name, text in texts.items()]
+    written += [
+        _write(folder / f"{name}.png", picture(make_world(scenario, 0)))
+        for name, scenario in SCENARIOS.items()
+    ]
+    written.append(_write(folder / "index.md", gallery().encode()))
+    for stale in set(folder.iterdir()) - set(written):
+        stale.unlink()
+    return written
+
+
+def _write(path: Path, content: bytes) -> Path:
+    """Write a file unless it holds this already: Sphinx reads again what is newer."""
+    if not path.exists() or path.read_bytes() != content:
+        path.write_bytes(content)
+    return path
+
+
+def gallery() -> str:
+    """The page that shows all scenarios."""
+    rows = [
+        [
+            f"[![{name}]({name}.png)]({name}.md)",
+            f"[{name}]({name}.md)<br>`{environment_id(name)}`",
+            _about(name),
+        ]
+        for name in SCENARIOS
+    ]
+    pages = "\n".join(SCENARIOS)
+    return f"""# Scenarios
+
+A scenario is a task: a kind of world, a team, what it may do, and when it is over. Each has an id for
+`gymnasium.make`, `gymnasium.make_vec` and `pettingzoo.make`; `entropy_explore_env.parallel_env` takes its
+name.
+These pages are written from the code when the site is built.
+
+{table(["", "scenario", "world and team"], rows)}
+
+```{{toctree}}
+:hidden:
+
+{pages}
+```
+"""
+
+
+def card(scenario: Scenario, docs: Path) -> str:
+    """The page of a scenario, Markdown.
+
+    Args:
+        scenario: One of SCENARIOS.
+        docs: The folder of the site's sources: results and films are looked for in it.
+    """
+    name = scenario.name
+    film = (
+        f"![A mission in {name}](../{FILMS}/{name}.gif)\n" if (docs / FILMS / f"{name}.gif").exists() else ""
+    )
+    parts = [
+        f"# {name}",
+        _about(name),
+        f"![A world of {name}]({name}.png)",
+        film,
+        "```python\nimport entropy_explore_env as eee\n\n"
+        f'env = eee.parallel_env("{name}")\nobservations, infos = env.reset(seed=0)\n```',
+        f"Ids: `{environment_id(name)}` for `gymnasium.make` (one robot, a step is a decision),\n"
+        "`gymnasium.make_vec` (many missions at once), and `pettingzoo.make` with `parallel` or `aec`.",
+        _world(scenario),
+        _actions(scenario),
+        _observation(scenario),
+        _reward(scenario),
+        _ending(scenario),
+        times_table(scenario, docs / "results"),
+        _settings(scenario),
+        _versions(name),
+    ]
+    return "\n\n".join(part for part in parts if part) + "\n"
+
+
+def _about(name: str) -> str:
+    """What scenarios.py says below the scenario."""
+    texts = constant_docs(scenarios)
+    named = {getattr(scenarios, key).name: text for key, text in texts.items() if _is_scenario(key)}
+    return named[name]
+
+
+def _is_scenario(name: str) -> bool:
+    return isinstance(getattr(scenarios, name), Scenario)
+
+
+def table(head: list[str], rows: Iterable[Iterable[object]]) -> str:
+    """A Markdown table whose cells may hold any text."""
+    lines = [head, ["---"] * len(head), *([str(cell).replace("|", "\\|") for cell in row] for row in rows)]
+    return "\n".join("| " + " | ".join(line) + " |" for line in lines)
+
+
+def _world(scenario: Scenario) -> str:
+    """Size and recipe."""
+    grid, recipe = scenario.grid, RECIPES[scenario.world]
+    x, y, z = grid.shape
+    size = " × ".join(f"{edge:g} m" for edge in (grid.size_m if z > 1 else grid.size_m[:2]))
+    voxels = f"{x} × {y} × {z} = {grid.voxels:,} of {grid.voxel_size_m:g} m" + (
+        ", one layer: 2-D" if z == 1 else ""
+    )
+    first = (recipe.__doc__ or "").partition("\n\n")[0]
+    file = f"entropy_explore_env/{recipe.__module__.partition('.')[2].replace('.', '/')}.py"
+    robots = f"{scenario.robots}" + (
+        f", of {len(scenario.kinds)} kinds in turn" if scenario.extra_kinds else ""
+    )
+    rows = [
+        ["workspace", size],
+        ["voxels", voxels],
+        ["made by", f"recipe `{scenario.world}`: {' '.join(first.split())} [source](../../{file})"],
+        [
+            "worlds",
+            "one for each world number; those of `split` `train`, `validation` and `test` are disjoint",
+        ],
+        ["robots", robots],
+    ]
+    return "## World and team\n\n" + table(["", ""], rows)
+
+
+def _numbers(numbers: Iterable[Numbers]) -> str:
+    return table(
+        ["number", "meaning", "unit", "range"], [[n.indices, n.meaning, n.unit, n.range] for n in numbers]
+    )
+
+
+def _actions(scenario: Scenario) -> str:
+    """Both kinds of actions."""
+    numbers = action_numbers(scenario)
+    text = (
+        "## Actions\n\nAn action is a viewpoint within reach: where to go and where to look. "
+        f"`continuous`, the default, is a Box of {len(numbers)} numbers.\n\n{_numbers(numbers)}\n\n"
+    )
+    if any(math.isinf(kind.robot.reach_m) for kind in scenario.kinds):
+        return text + "Discrete actions need a finite reach."
+    axes = with_settings(scenario, {"action": {"kind": "discrete", "moves": "axes"}})
+    moves, gazes = discrete_actions(axes)
+    text += (
+        '`action={"kind": "discrete", "moves": "axes"}` is a Discrete of '
+        f"{moves} moves × {gazes} gazes = {moves * gazes:,}"
+    )
+    try:
+        most, gazes = discrete_actions(with_settings(scenario, {"action": {"kind": "discrete"}}))
+    except SettingError:
+        return text + "; with all voxels within reach there would be too many."
+    return (
+        text + f", with all voxels within reach {most:,} × {gazes} = {most * gazes:,}. Infos hold the mask."
+    )
+
+
+def _observation(scenario: Scenario) -> str:
+    """Every number of the default observation, and of the parts on request."""
+    asked = with_settings(scenario, {"observation": {"drive": True, "patch": True, "overview": True}})
+    default = observation_numbers(scenario)
+    lines = [
+        "## Observation",
+        'A Dict of these parts, or with `observation={"flat": True}` one Box of '
+        f"{sum(math.prod(part.shape) for part in default.values()):,} numbers, the parts one after the "
+        "other. Only what the robot itself has measured or heard enters.",
+    ]
+    for name, part in observation_numbers(asked).items():
+        request = "" if name in default else f', on request: `observation={{"{name}": True}}`'
+        rows = f"; each of {part.rows} rows is a teammate" if part.rows > 1 or name == "team" else ""
+        lines.append(f"**`{name}`**, shape {part.shape}{rows}{request}\n\n{_numbers(part.numbers)}")
+    rules = rules_of(scenario)
+    if "panorama" in default:
+        lines.append(
+            f"The {len(rules.panorama)} directions of `panorama` are yaws from 0 counter-clockwise, in the "
+            "frame of the map"
+            + (", all level." if scenario.planar else ", each with pitches from -π/4 (up) to π/4 (down).")
+        )
+    return "\n\n".join(lines)
+
+
+def _reward(scenario: Scenario) -> str:
+    """What a step is worth."""
+    reward = scenario.reward
+    gained = "own bits" if reward.kind == "individual" else "mean over the team of own and received bits"
+    cost = f" - {reward.cost_per_s:g} × seconds" if reward.cost_per_s else ""
+    text = f"## Reward\n\n`{reward.kind}`: {gained} gained in the step / (H(0) - H_th){cost}."
+    times = MISSION_TIMES.get(scenario.name)
+    if times is not None and reward.cost_per_s:
+        text += (
+            f"\nA mission of {times.median_s:g} s, the median of `information-rate-v0` over {times.missions} "
+            'starts, costs 0.2. With `reward={"kind": "team"}`, or one robot, it returns about 0.8, '
+            "one twice as long 0.6."
+        )
+    return text
+
+
+def _ending(scenario: Scenario) -> str:
+    """When a mission is over."""
+    ending, voxels = scenario.ending, scenario.grid.voxels
+    begin, end = (voxels * gaussian_entropy_bits(sigma) for sigma in (scenario.sigma_prior, ending.sigma_end))
+    rows = [
+        [
+            "terminates",
+            f"when the entropy of {ending.termination} robot's map falls to H_th (`ending.termination`)",
+        ],
+        ["H(0)", f"{begin:,.0f} bits: every voxel at σ = {scenario.sigma_prior:g}"],
+        [
+            "H_th",
+            f"{end:,.0f} bits if all voxels can be seen: σ = {ending.sigma_end:g}; "
+            "hidden ones stay at the prior",
+        ],
+        ["truncates", f"after {ending.time_limit_s:,.0f} simulated seconds"],
+    ]
+    if ending.max_cycles is not None:
+        rows.append(["", f"after {ending.max_cycles:,} steps"])
+    return "## End\n\n" + table(["", ""], rows)
+
+
+def _settings(scenario: Scenario) -> str:
+    """Every field, its value here, the default of its class where that differs, and what it means."""
+    lines = [
+        "## Settings",
+        "What the scenario sets, beside the default of each class. `parallel_env` and its kin take any of "
+        f'them: `eee.parallel_env("{scenario.name}", robots=2, robot={{"reach_m": 1.0}})`.',
+    ]
+    own = [f for f in dataclasses.fields(scenario) if not dataclasses.is_dataclass(getattr(scenario, f.name))]
+    lines.append(_fields(scenario, [f for f in own if f.name != "extra_kinds"]))
+    for field in dataclasses.fields(scenario):
+        part = getattr(scenario, field.name)
+        if dataclasses.is_dataclass(part):
+            lines.append(
+                f"**`{field.name}`** ({type(part).__name__})\n\n{_fields(part, dataclasses.fields(part))}"
+            )
+    for number, kind in enumerate(scenario.extra_kinds, start=1):
+        lines.append(f"**Kind {number} of robots**: {_changed(kind, scenario)}")
+    return "\n\n".join(lines)
+
+
+def _changed(kind: RobotKind, scenario: Scenario) -> str:
+    """In what a further kind of robots differs from the first."""
+    words = []
+    for name, first in (("robot", scenario.robot), ("sensor", scenario.sensor)):
+        part = getattr(kind, name)
+        for field in dataclasses.fields(part):
+            if getattr(part, field.name) != getattr(first, field.name):
+                words.append(f"`{name}.{field.name}` = {_value(getattr(part, field.name))}")
+    return ", ".join(words)
+
+
+def _fields(part: Any, fields: Iterable[dataclasses.Field]) -> str:  # noqa: ANN401 - any settings
+    texts = attribute_docs(type(part))
+    rows = []
+    for field in fields:
+        value, default = getattr(part, field.name), _default(field)
+        usual = "" if default is dataclasses.MISSING or default == value else _value(default)
+        rows.append([f"`{field.name}`", _value(value), usual, texts.get(field.name, "")])
+    return table(["setting", "here", "default", "meaning"], rows)
+
+
+def _default(field: dataclasses.Field) -> object:
+    factory: Callable[[], object] | Any = field.default_factory
+    return field.default if factory is dataclasses.MISSING else factory()
+
+
+def _value(value: object) -> str:
+    """A setting as one types it; angles and other long numbers to six digits."""
+    if isinstance(value, float):
+        return f"{value:.6g}"
+    if isinstance(value, tuple):
+        return "(" + ", ".join(_value(v) for v in value) + ")"
+    return f"`{value}`" if isinstance(value, str) else str(value)
+
+
+def _versions(name: str) -> str:
+    """The history of the id."""
+    rows = [
+        [
+            f"`{environment_id(name)}`",
+            "first version; changes that alter results stand in the [changelog](../changelog.md)",
+        ]
+    ]
+    return "## Versions\n\n" + table(["id", ""], rows)
+
+
+def setup(app: Sphinx) -> dict[str, bool]:
+    """Sphinx calls this: the pages are written before it looks for pages."""
+    app.connect("config-inited", lambda sphinx, config: write_cards(Path(sphinx.srcdir)))
+    return {"parallel_read_safe": True, "parallel_write_safe": True}

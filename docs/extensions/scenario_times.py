@@ -1,0 +1,99 @@
+"""How long strategies take in a scenario, by the tables of results that lie in `docs/results`."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+from typing import NamedTuple
+
+from entropy_explore_env.scenario import Scenario
+from entropy_explore_env.scenarios import MISSION_TIMES
+
+
+class Time(NamedTuple):
+    """How long a strategy takes in a task."""
+
+    task: str
+    strategy: str
+    missions: str
+    finished: str
+    seconds: str
+    page: str
+
+
+def times_table(scenario: Scenario, results: Path) -> str:
+    """The section of a scenario's page; empty where nothing was measured.
+
+    Args:
+        scenario: One of the named scenarios.
+        results: The folder with the pages of results and their tables.
+    """
+    lines = []
+    measured = MISSION_TIMES.get(scenario.name)
+    if measured is not None:
+        lines.append(
+            f"`information-rate-v0`: median {measured.median_s:g} s over {measured.missions} starts of the "
+            "training split, this scenario's own team (`python -m baselines.mission_times`)."
+        )
+    times = head_to_head_times(scenario.name, results) + scoreboard_times(scenario.name, results)
+    if times:
+        rows = [
+            f"| {t.task} | `{t.strategy}` | {t.seconds} | {t.finished} of {t.missions} "
+            f"| [{t.page}](../results/{t.page}.md) |"
+            for t in times
+        ]
+        lines.append(
+            "| team | strategy | mission time (s) | finished | from |\n| --- | --- | --- | --- | --- |\n"
+            + "\n".join(rows)
+        )
+    return "## How long strategies take\n\n" + "\n\n".join(lines) if lines else ""
+
+
+def head_to_head_times(scenario: str, results: Path) -> list[Time]:
+    """Rows of `head-to-head/scenarios.csv`, in which `information-rate-v0` has the name of then."""
+    former = {"information-rate": "information-rate-v0", "nearest-frontier": "nearest-candidate"}
+    times = []
+    for row in _rows(results / "head-to-head" / "scenarios.csv"):
+        if row["scenario"] == scenario:
+            strategy = former.get(row["strategy"], row["strategy"])
+            seconds = _interval(row["time_s"], row["time_s_low"], row["time_s_high"])
+            team = f"{row['robots']} robot" + ("s" if row["robots"] != "1" else "")
+            times.append(Time(team, strategy, row["missions"], row["mapped"], seconds, "head-to-head"))
+    return times
+
+
+def scoreboard_times(scenario: str, results: Path) -> list[Time]:
+    """Rows of `scoreboard/*/tasks.csv` whose task is of this scenario: `office`, or `office-3`."""
+    times = []
+    for path in sorted((results / "scoreboard").glob("*/tasks.csv")):
+        for row in _rows(path):
+            if row.get("scenario", row.get("task", "")) != scenario:
+                continue
+            seconds = _interval(row.get("time_s_end"), row.get("time_s_end_low"), row.get("time_s_end_high"))
+            times.append(
+                Time(
+                    path.parent.name,
+                    row["strategy"],
+                    row.get("missions", "-"),
+                    row.get("finished", "-"),
+                    seconds,
+                    "scoreboard",
+                )
+            )
+    return times
+
+
+def _rows(path: Path) -> list[dict[str, str]]:
+    """The rows of a table; none where there is no such file."""
+    if not path.exists():
+        return []
+    with path.open(encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def _interval(middle: str | None, low: str | None, high: str | None) -> str:
+    """`33 (31 … 35)`."""
+    if not middle:
+        return "-"
+    text = f"{float(middle):,.0f}"
+    return f"{text} ({float(low):,.0f} … {float(high):,.0f})" if low and high else text

@@ -1,0 +1,117 @@
+"""The pages of scenarios that are written from the code: what they say of every number and setting is so."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+from gymnasium.spaces import Discrete
+
+from docs.extensions import scenario_times
+from docs.extensions.attribute_docs import attribute_docs, constant_docs
+from docs.extensions.scenario_cards import card, gallery
+from docs.extensions.space_numbers import action_numbers, discrete_actions, observation_numbers
+from entropy_explore_env import environment_id, scenarios, settings
+from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
+from entropy_explore_env.missions.action import action_space
+from entropy_explore_env.missions.observation.layout import ObservationLayout
+from entropy_explore_env.scenario import Scenario, with_settings
+from entropy_explore_env.scenarios import SCENARIOS
+
+ALL_PARTS = {
+    "observation": {"drive": True, "patch": True, "overview": True, "action_mask": True},
+    "action": {"kind": "discrete", "moves": "axes"},
+}
+
+
+@pytest.mark.parametrize("name", SCENARIOS)
+def test_every_number_is_told_of_once(name):
+    scenario = with_settings(SCENARIOS[name], ALL_PARTS)
+    parts = ObservationLayout(scenario).parts
+    told = observation_numbers(scenario)
+    assert list(told) == list(parts)
+    for part, (shape, rows, numbers) in told.items():
+        assert shape == parts[part].shape
+        assert [n.first for n in numbers] == np.cumsum([0] + [n.count for n in numbers])[:-1].tolist()
+        assert rows * sum(n.count for n in numbers) == math.prod(shape)
+    assert len(action_numbers(SCENARIOS[name])) == math.prod(action_space(SCENARIOS[name]).shape)
+    discrete = action_space(scenario)
+    assert isinstance(discrete, Discrete) and math.prod(discrete_actions(scenario)) == discrete.n
+
+
+def test_a_mission_s_numbers_are_in_the_ranges_told():
+    env = EntropyExploreEnv("box-7x11x5", **ALL_PARTS)
+    told = observation_numbers(env.scenario)
+    observations, _ = env.reset(seed=0)
+    rng = np.random.default_rng(0)
+    actions_in_all = math.prod(discrete_actions(env.scenario))
+    for _ in range(60):
+        for observation in observations.values():
+            for part, (_, rows, numbers) in told.items():
+                values = np.asarray(observation[part], float).reshape(rows, -1)
+                for n in numbers:
+                    block = values[:, n.first : n.first + n.count]
+                    assert n.low - 1e-6 <= block.min() and block.max() <= n.high * (1 + 1e-6), (
+                        part,
+                        n.meaning,
+                    )
+        actions = {a: rng.integers(actions_in_all) for a in env.agents}
+        observations, *_ = env.step(actions)
+        if not env.agents:
+            break
+
+
+@pytest.mark.parametrize(
+    "kind", [Scenario, *(getattr(settings, name) for name in ("Robot", "RangeSensor", "Channel", "Ending"))]
+)
+def test_every_setting_has_its_text(kind):
+    parts = {"channel", "ending", "reward", "action", "observation"}  # classes with texts of their own
+    assert set(attribute_docs(kind)) >= {field.name for field in dataclasses.fields(kind)} - parts
+
+
+def test_texts_are_read_from_docstrings():
+    class Thing:
+        """A thing.
+
+        Attributes:
+            a, b: Both of
+                them.
+            c: One: with a colon.
+
+        Raises:
+            Error: No.
+        """
+
+    assert attribute_docs(Thing) == {"a": "Both of them.", "b": "Both of them.", "c": "One: with a colon."}
+    assert constant_docs(scenarios)["ROOM"].startswith("Rocha04's room, tables 1-2: 10 × 10 × 4 m")
+
+
+@pytest.mark.parametrize("name", SCENARIOS)
+def test_a_card_says_what_the_scenario_sets(name, tmp_path):
+    scenario = SCENARIOS[name]
+    text = card(scenario, tmp_path)
+    assert text.startswith(f"# {name}\n") and f'eee.parallel_env("{name}")' in text
+    assert f"`{environment_id(name)}`" in text and f"{scenario.grid.voxels:,}" in text
+    for part in ("robot", "sensor", "channel", "ending", "reward", "action", "observation"):
+        for field in dataclasses.fields(getattr(scenario, part)):
+            assert f"| `{field.name}` | " in text, (part, field.name)
+    assert f"| `robots` | {scenario.robots} | " in text
+    assert f"[{name}]({name}.md)" in gallery()
+
+
+def test_times_come_from_the_tables_of_results(tmp_path):
+    folder = tmp_path / "head-to-head"
+    folder.mkdir()
+    head = "scenario,robots,strategy,missions,mapped,time_s,time_s_low,time_s_high"
+    rows = ["room,1,information-rate,2,2,82.4,80,85.6", "office,1,random,2,1,3000,,"]
+    (folder / "scenarios.csv").write_text("\n".join([head, *rows]) + "\n")
+    text = scenario_times.times_table(SCENARIOS["room"], tmp_path)
+    assert "| 1 robot | `information-rate-v0` | 82 (80 … 86) | 2 of 2 |" in text and "3,000" not in text
+    assert "| 1 robot | `random` | 3,000 | 1 of 2 |" in scenario_times.times_table(
+        SCENARIOS["office"], tmp_path
+    )
+    bare = SCENARIOS["bhattacharya-cluttered"]
+    if bare.name not in scenarios.MISSION_TIMES:
+        assert scenario_times.times_table(bare, tmp_path) == ""
