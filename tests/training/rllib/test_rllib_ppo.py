@@ -59,7 +59,7 @@ def missions_of(args: Args, iterations: int) -> list[tuple[int, bytes]]:
         runner = MultiAgentEnvRunner(config=config, worker_index=worker, num_workers=args.runners)
         runner.sample(num_timesteps=0, random_actions=True)
         assert len(runner.env.envs) == args.missions
-        for env in runner.env.envs:
+        for env in runner.env.envs or ():
             team = env.unwrapped.team
             missions.append((team.missions.seeds[0], team.view("robot_0").pose.tobytes()))
     return missions
