@@ -232,7 +232,7 @@ def configure(args: Args, env_settings: dict[str, Any], iterations: int = 0) -> 
     )
 
 
-def _policy_of(agent: str, episode: Any, **others: Any) -> str:  # noqa: ANN401 - RLlib's signature
+def _policy_of(agent: Any, episode: Any, **others: Any) -> str:  # noqa: ANN401 - RLlib's signature
     """All robots share one policy."""
     del agent, episode, others
     return POLICY
