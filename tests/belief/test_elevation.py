@@ -1,0 +1,123 @@
+"""Elevation maps read off beliefs, and completed as a dense solver of Laplace's equation completes them."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from entropy_explore_env.belief.elevation import completed, elevation_map
+from entropy_explore_env.errors import SettingError
+from entropy_explore_env.settings import Grid
+from tests.reference.scenes import drawn, seeds
+
+SIZE = (7, 11, 5)
+GRID = Grid(SIZE, 0.5, (1.0, 2.0, -3.0))
+PRIOR = np.float32(30.0**-2)
+
+
+def belief(changes):
+    """Mean and precision of a belief of which some voxels were measured: (μ, how often at σ 0.1)."""
+    mean, precision = np.full(SIZE, 0.5, np.float32), np.full(SIZE, PRIOR)
+    for voxel, (coverage, times) in changes.items():
+        mean[voxel] = coverage
+        precision[voxel] += np.float32(times * 100.0)
+    return mean, precision
+
+
+def test_the_ground_is_the_highest_covered_voxel_by_hand():
+    mean, precision = belief(
+        {
+            (2, 3, 4): (0.0, 9),  # free above
+            (2, 3, 3): (0.75, 4),  # the ground: 3.75 voxels above the floor
+            (2, 3, 2): (1.0, 2),
+            (5, 9, 2): (1.0, 1),  # nothing measured above it: the ground, too
+            (6, 0, 4): (0.0, 5),  # free at the top alone: not known
+            (0, 10, 0): (0.1, 3),  # free down to the floor
+            (3, 3, 1): (0.5, 7),  # neither covered nor lowest
+        }
+    )
+    ground = elevation_map(mean, precision, GRID, 30.0, 0.1)
+    assert set(zip(*np.nonzero(ground.known), strict=True)) == {(2, 3), (5, 9), (0, 10)}
+    assert ground.height_m[2, 3] == pytest.approx(-3.0 + 0.5 * 3.75)
+    assert ground.height_m[5, 9] == pytest.approx(-3.0 + 0.5 * 3.0)
+    assert ground.height_m[0, 10] == -3.0 == ground.height_m[6, 0]
+    assert ground.sigma_m[2, 3] == pytest.approx(0.5 * 0.1 / 2.0, rel=1e-4)
+    assert ground.sigma_m[6, 0] == math.inf
+    assert ground.measurements[[2, 5, 0, 6], [3, 9, 10, 0]] == pytest.approx([4, 1, 3, 0], rel=1e-5)
+
+
+def dense(heights, known):
+    """The limit of the neighbours' means, by a dense linear system."""
+    x, y = heights.shape
+    matrix, right = np.zeros((x * y, x * y)), np.zeros(x * y)
+    for i in range(x):
+        for j in range(y):
+            row = i * y + j
+            matrix[row, row] = 1.0
+            if known[i, j]:
+                right[row] = heights[i, j]
+                continue
+            steps = [(i - 1, j), (i + 1, j), (i, j - 1), (i, j + 1)]
+            near = [(a, b) for a, b in steps if 0 <= a < x and 0 <= b < y]
+            for a, b in near:
+                matrix[row, a * y + b] -= 1.0 / len(near)
+    return np.linalg.solve(matrix, right).reshape(x, y)
+
+
+@drawn(60)
+@given(st.tuples(st.integers(1, 23), st.integers(1, 17)), seeds, st.floats(0.02, 1.0))
+def test_unknown_columns_are_completed_as_the_dense_system_says(shape, seed, share):
+    rng = np.random.default_rng(seed)
+    heights, known = rng.normal(0.0, 3.0, shape), rng.random(shape) < share
+    known[rng.integers(shape[0]), rng.integers(shape[1])] = True
+    found = completed(np.where(known, heights, np.nan), known, 1e-6)
+    np.testing.assert_allclose(found, dense(heights, known), atol=2e-5)
+    np.testing.assert_array_equal(found[known], heights[known])
+    assert found.min() >= heights[known].min() - 1e-5 and found.max() <= heights[known].max() + 1e-5
+
+
+def test_the_paper_s_samples_a_sine_with_random_gaps_and_a_step_of_which_half_is_unknown():
+    """Fig. 7; no figures are given with it: gaps between samples close, and the unknown half is level."""
+    x, y = np.meshgrid(np.arange(60) / 59, np.arange(50) / 49, indexing="ij")
+    sine = np.sin(2 * math.pi * x) * np.cos(2 * math.pi * y)
+    known = np.random.default_rng(1).random(sine.shape) < 0.5
+    error = np.abs(completed(sine, known) - sine)
+    assert error.max() < 0.2 and error[~known].mean() < 0.01
+    step = np.where(x < 0.25, 1.0, 0.0)
+    half = x < 0.5
+    np.testing.assert_allclose(completed(step, half), step, atol=1e-3)
+
+
+def test_a_wide_gap_is_bridged_in_a_straight_line():
+    known = np.zeros((400, 3), bool)
+    known[0] = known[-1] = True
+    heights = np.zeros((400, 3))
+    heights[-1] = 39.9
+    expected = np.linspace(0.0, 39.9, 400)
+    np.testing.assert_allclose(completed(heights, known), np.repeat(expected[:, None], 3, 1), atol=2e-4)
+
+
+def test_nothing_known_is_level_and_all_known_stays():
+    assert (completed(np.full((3, 4), np.nan), np.zeros((3, 4), bool)) == 0.0).all()
+    heights = np.arange(12.0).reshape(3, 4)
+    np.testing.assert_array_equal(completed(heights, np.ones((3, 4), bool)), heights)
+
+
+def test_bad_input_is_named():
+    mean, precision = belief({})
+    with pytest.raises(SettingError, match=r"mean.*\(7, 11, 5\)"):
+        elevation_map(mean[:3], precision, GRID, 30.0, 0.1)
+    with pytest.raises(SettingError, match="more than one voxel high"):
+        elevation_map(mean[:, :, :1], precision[:, :, :1], Grid((7, 11, 1), 0.5), 30.0, 0.1)
+    with pytest.raises(SettingError, match=r"sigma_min.*> 0"):
+        elevation_map(mean, precision, GRID, 30.0, 0.0)
+    with pytest.raises(SettingError, match=r"known.*\(3, 4\) bool"):
+        completed(np.zeros((3, 4)), np.zeros((3, 4)))
+    with pytest.raises(SettingError, match="finite where it is known"):
+        completed(np.full((3, 4), np.nan), np.ones((3, 4), bool))
+    with pytest.raises(SettingError, match="tolerance_m"):
+        completed(np.zeros((3, 4)), np.ones((3, 4), bool), -1.0)
