@@ -138,7 +138,7 @@ def _relaxed(heights: np.ndarray, fixed: np.ndarray, tolerance: float) -> np.nda
     The slowest error over a gap of D columns that ends at the border falls by ρ = (1 + cos(π/(2D + 1)))/2 in
     a sweep of Jacobi's; the best factor for it is ω = 2/(1 + √(1 - ρ²)) (Young 1954).
     """
-    gap = int(distance_transform_cdt(~fixed, "taxicab").max())
+    gap = int(np.max(np.asarray(distance_transform_cdt(~fixed, "taxicab"))))
     slowest = 0.5 * (1.0 + math.cos(math.pi / (2 * gap + 1)))
     factor = 2.0 / (1.0 + math.sqrt(1.0 - slowest * slowest))
     inside = np.pad(np.ones(heights.shape), 1)
