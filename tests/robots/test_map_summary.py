@@ -1,0 +1,142 @@
+"""Summaries of maps: what comes back, how much more than nothing, and what is refused."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from entropy_explore_env.errors import RecordError, SettingError
+from entropy_explore_env.robots.map_summary import decode_map, encode_map
+from tests.reference.scenes import drawn, seeds
+
+SIZES = [(7, 11, 5), (13, 6, 1), (1, 1, 1), (1, 9, 2)]
+
+
+def drawn_map(shape, seed):
+    """A map in patches: coverages 0, 1 and between, some voxels never measured."""
+    rng = np.random.default_rng(seed)
+    patches = rng.integers(0, 4, tuple(-(-n // 3) for n in shape))
+    for axis in range(3):
+        patches = np.repeat(patches, 3, axis)
+    patches = patches[: shape[0], : shape[1], : shape[2]]
+    mean = np.select([patches == 0, patches == 1], [0.0, 1.0], rng.random(shape)).astype(np.float32)
+    precision = np.where(patches == 3, 0.0, 10.0 ** rng.uniform(-3, 5, shape)).astype(np.float32)
+    return mean, precision
+
+
+def textbook(mean, precision, threshold, region, leaves):
+    """The same tree by recursion: fills `leaves` with the voxels and the variance of each, in order."""
+    voxels = [tuple(v) for v in np.argwhere(np.ones([high - low for low, high in region]))]
+    voxels = [tuple(low + o for (low, _), o in zip(region, v, strict=True)) for v in voxels]
+    known = [precision[v] > 0.0 and 1.0 / precision[v] <= (2.0**-10 * 2.0 ** (255 / 16)) ** 2 for v in voxels]
+    if not any(known):
+        return
+    levels = np.bincount([min(int(mean[v] * 32), 31) for v in voxels], minlength=32) / len(voxels)
+    bits = -sum(q * math.log2(q) for q in levels if q > 0)
+    if all(known) and (len(voxels) == 1 or bits <= threshold):
+        leaves.append(voxels)
+        return
+    halves = []
+    for low, high in region:
+        middle = low + (high - low + 1) // 2
+        halves.append([(low, middle), (middle, high)] if middle < high else [(low, high)])
+    for x in halves[0]:
+        for y in halves[1]:
+            for z in halves[2]:
+                textbook(mean, precision, threshold, (x, y, z), leaves)
+
+
+@drawn(60)
+@given(st.sampled_from(SIZES), seeds, st.sampled_from([0.0, 0.5, 1.5, 5.0]))
+def test_what_comes_back_is_what_the_leaves_of_the_textbook_say(shape, seed, threshold):
+    mean, precision = drawn_map(shape, seed)
+    leaves = []
+    textbook(mean, precision, threshold, tuple((0, n) for n in shape), leaves)
+    summary = decode_map(encode_map(mean, precision, threshold), shape)
+    said = np.zeros(shape, bool)
+    for voxels in leaves:
+        at = tuple(np.array(voxels).T)
+        said[at] = True
+        assert len(set(summary.mean[at])) == len(set(summary.precision[at])) == 1
+        centre = mean[at].astype(np.float64).mean()
+        assert abs(summary.mean[at][0] - centre) <= 0.5 / 255 + 1e-6
+        spread = ((mean[at].astype(np.float64) - summary.mean[at][0]) ** 2).mean()
+        variance = 1.0 / np.float64(precision[at].min()) + spread
+        sigma = max(math.sqrt(variance), 2.0**-10)
+        assert (
+            sigma * (1 - 1e-5)
+            <= 1.0 / math.sqrt(summary.precision[at][0])
+            <= sigma * 2.0 ** (1 / 16) * (1 + 1e-5)
+        )
+    assert (summary.precision[~said] == 0.0).all() and (summary.mean[~said] == 0.5).all()
+    assert (summary.precision <= precision).all()  # never more than the sender had
+
+
+def test_a_plan_of_four_quadrants_by_hand():
+    mean = np.zeros((5, 3, 1), np.float32)
+    mean[3:, :2] = 1.0
+    precision = np.full((5, 3, 1), 100.0, np.float32)
+    precision[:3, 2] = 0.0
+    data = encode_map(mean, precision, 0.9)
+    summary = decode_map(data, (5, 3, 1))
+    np.testing.assert_array_equal(summary.mean[:3, :2], 0.0)
+    np.testing.assert_array_equal(summary.mean[3:, :2], 1.0)
+    assert (summary.precision[:3, 2] == 0.0).all() and (summary.precision[3:, 2] > 0.0).all()
+    assert len(data) < 45
+
+
+def test_what_is_alike_takes_few_bits_and_what_is_noise_takes_many():
+    rng = np.random.default_rng(3)
+    known = np.full((200, 160, 1), 400.0, np.float32)
+    noise = rng.random(known.shape).astype(np.float32)
+    plan = np.zeros(known.shape, np.float32)
+    plan[40:42], plan[:, 90:91] = 1.0, 1.0
+    sizes = [8 * len(encode_map(m, known, 0.5)) for m in (np.zeros_like(noise), plan, noise)]
+    assert sizes[0] < 400 and sizes[1] < 20_000 and sizes[2] > 200_000
+    thresholds = [8 * len(encode_map(plan, known, bits)) for bits in (0.0, 0.2, 0.5, 5.0)]
+    assert thresholds == sorted(thresholds, reverse=True) and thresholds[0] > thresholds[-1]
+
+
+@drawn(200)
+@given(seeds, st.data())
+def test_broken_summaries_are_refused_by_name(seed, data):
+    mean, precision = drawn_map((7, 11, 5), seed)
+    whole = encode_map(mean, precision, 0.5)
+    kind = data.draw(st.sampled_from(["cut", "longer", "bit", "foreign"]))
+    if kind == "cut":
+        broken = whole[: data.draw(st.integers(0, len(whole) - 1))]
+    elif kind == "longer":
+        broken = whole + b"x"
+    elif kind == "bit":
+        at = data.draw(st.integers(0, len(whole) - 1))
+        broken = whole[:at] + bytes([whole[at] ^ (1 << data.draw(st.integers(0, 7)))]) + whole[at + 1 :]
+    else:
+        broken = data.draw(st.binary(max_size=80))
+    try:
+        found = decode_map(broken, (7, 11, 5))
+    except RecordError as error:
+        assert "7 × 11 × 5" in str(error)
+    else:  # bits of zlib's own header that do not matter
+        np.testing.assert_array_equal(found.precision, decode_map(whole, (7, 11, 5)).precision)
+
+
+def test_a_summary_of_another_map_and_bad_input_are_named():
+    mean, precision = drawn_map((7, 11, 5), 1)
+    whole = encode_map(mean, precision, 0.5)
+    for shape in [(7, 11, 4), (11, 7, 5), (1, 1, 1)]:
+        with pytest.raises(RecordError, match="map summary"):
+            decode_map(whole, shape)
+    with pytest.raises(RecordError):
+        decode_map("text", (7, 11, 5))  # type: ignore[arg-type]
+    with pytest.raises(SettingError, match="threshold_bits"):
+        encode_map(mean, precision, math.nan)
+    with pytest.raises(SettingError, match="precision"):
+        encode_map(mean, -precision - 1.0, 0.5)
+    with pytest.raises(SettingError, match="coverages from 0 to 1"):
+        encode_map(mean + 2.0, precision, 0.5)
+    with pytest.raises(SettingError, match=r"precision.*\(7, 11, 5\)"):
+        encode_map(mean, precision[:3], 0.5)
