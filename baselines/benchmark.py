@@ -2,8 +2,9 @@
 
 A suite is a set of worlds, starts and seeds that is pinned (scoreboard/suites.py). Every strategy runs the
 same missions; written are a page with tables and figures. Missions are kept, a file each: an interrupted run
-resumes and ends with the same page, byte for byte. A mission that raises an error or runs past its limit is
-a row with the reason.
+resumes and ends with the same page, byte for byte. Mission k of all tasks and strategies is run before any
+mission k + 1, so that a page of a part is fair. A mission that raises an error or runs past its limit is a
+row with the reason.
 """
 
 from __future__ import annotations
@@ -56,6 +57,12 @@ class Args:
     """Simulated time after which missions in scenarios are cut off; default: each scenario's own."""
     wall_limit_s: float = 600.0
     """Time on the clock after which a mission is ended, and counts as failed."""
+    stop_after_s: float | None = None
+    """Time on the clock after which no mission is begun any more; the page then holds what was run, and the
+    same command goes on."""
+    confirm: bool = False
+    """Keep missions that other code ran, of each strategy and task whose first mission comes out the same
+    when it is run again; else a change of the code runs all again."""
     jobs: int | None = None
     """Processes; default: one a processor."""
     out: Path = Path("results/scoreboard")
@@ -87,8 +94,13 @@ def main(words: Sequence[str]) -> int:
         quiet=args.json,
         limit_s=args.wall_limit_s,
         keep_failures=True,
+        stop_after_s=math.inf if args.stop_after_s is None else args.stop_after_s,
+        confirm=args.confirm,
     )
     results = Results(suite, records)
+    if not any(results.of(task, strategy) for task in suite.tasks for strategy in suite.strategies):
+        print("nothing to write: no mission was run", file=sys.stderr)
+        return 0
     page = write_page(args.out, results, _command(args, suite))
     if args.json:
         print_json({**printed_results(results), "wall_s": round(time.perf_counter() - started, 1)})
@@ -108,7 +120,8 @@ def _suite(args: Args) -> Suite:
     for name, value in (("seeds", seeds), ("jobs", args.jobs)):
         if value is not None:
             check_whole(name, value, 1)
-    for name, limit_s in (("time_limit_s", args.time_limit_s), ("wall_limit_s", args.wall_limit_s)):
+    for name in ("time_limit_s", "wall_limit_s", "stop_after_s"):
+        limit_s = getattr(args, name)
         if limit_s is not None and not 0.0 < limit_s < math.inf:
             raise SettingError(name, limit_s, "a number > 0")
     if args.suite is not None:
@@ -150,8 +163,9 @@ def _command(args: Args, suite: Suite) -> str:
             "time-limit-s": None if args.time_limit_s is None else f"{args.time_limit_s:g}",
         }
     options = [f"--{name} {shlex.quote(value)}" for name, value in given.items() if value is not None]
-    quick = ["--quick"] if args.quick and args.suite is not None else []
-    return " ".join(["python -m baselines.benchmark", *options, *quick])
+    flags = ["--quick"] if args.quick and args.suite is not None else []
+    flags += ["--confirm"] if args.confirm else []
+    return " ".join(["python -m baselines.benchmark", *options, *flags])
 
 
 if __name__ == "__main__":

@@ -5,12 +5,14 @@ from __future__ import annotations
 import dataclasses
 import hashlib
 import math
+import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, is_dataclass
 from functools import cached_property, lru_cache
 from pathlib import Path
 
 from baselines.experiments import mission
+from baselines.experiments.confirmation import keep_confirmed
 from baselines.experiments.mission import Surroundings, mission_record, scripted, scripted_env
 from baselines.experiments.outcome import Outcome, Record
 from baselines.experiments.provenance import code_digest, modules_of
@@ -35,6 +37,8 @@ class Cell:
             of a module, or a frozen dataclass that can be called. Its module, and those of its fields that
             are dataclasses, are part of the code that makes the results.
         surroundings: World files, starts and length of a step; None = those that the scenario says.
+        round: When its first mission is run: all cells grow together, round by round.
+        group: Name of the cells beside which a sample of one stands for all; see `confirmation`.
     """
 
     id: str
@@ -43,6 +47,8 @@ class Cell:
     seeds: int
     record: Callable[[EntropyExploreEnv, str, int], Record] = mission_record
     surroundings: Surroundings | None = None
+    round: int = 0
+    group: str = ""
 
     @cached_property
     def settings_digest(self) -> str:
@@ -130,10 +136,13 @@ def run_cells(
     quiet: bool,
     limit_s: float = math.inf,
     keep_failures: bool = False,
+    stop_after_s: float = math.inf,
+    confirm: bool = False,
 ) -> dict[str, list[Record]]:
     """Run what is missing of an experiment, under a progress bar.
 
-    All cells grow together, seed by seed: so the bar's time left means something from the first round on.
+    All cells grow together, round by round: so the bar's time left means something from the first round on,
+    and what was stopped has as many missions of each.
 
     Args:
         cells: The points.
@@ -143,13 +152,22 @@ def run_cells(
         quiet: Show no bar.
         limit_s: Of every mission, on the clock.
         keep_failures: See `runner.Conditions`.
+        stop_after_s: Likewise.
+        confirm: Keep what other code ran where samples come out the same; see `confirmation`.
 
     Returns:
-        Cell id → records by seed; see `mission.record_mission` for what one holds.
+        Cell id → records by seed; see `mission.record_mission` for what one holds. Where the time was up,
+        `runner.NOT_RUN`.
     """
-    most = max((cell.seeds for cell in cells), default=0)
-    missions = [CellMission(cell, seed) for seed in range(most) for cell in cells if seed < cell.seeds]
-    found = run_all(missions, Conditions(folder, jobs, title, quiet, limit_s, keep_failures))
+    missions = [CellMission(cell, seed) for cell in cells for seed in range(cell.seeds)]
+    missions.sort(key=lambda mission: mission.cell.round + mission.seed)
+    conditions = Conditions(folder, jobs, title, quiet, limit_s, keep_failures, stop_after_s)
+    if confirm:
+        started_s = time.monotonic()
+        keep_confirmed(missions, [mission.cell.group or mission.cell.id for mission in missions], conditions)
+        left_s = stop_after_s - (time.monotonic() - started_s)
+        conditions = dataclasses.replace(conditions, stop_after_s=left_s)
+    found = run_all(missions, conditions)
     records: dict[str, list[Record]] = {cell.id: [] for cell in cells}
     for one, record in zip(missions, found, strict=True):
         records[one.cell.id].append(record)

@@ -12,10 +12,11 @@ import json
 import math
 import re
 import sys
+import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol, TypeVar
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 
@@ -27,6 +28,8 @@ from entropy_explore_env.writing import write_atomically
 _PACE_PERIOD_S = 600.0
 """The bar estimates the time left from so much of the past: single missions differ a lot."""
 _LONGEST_REASON = 200
+NOT_RUN: Record = {"not_run": True}
+"""In place of the record of work that was not begun."""
 _ADDRESS = re.compile(r" at 0x[0-9a-fA-F]+")
 """Where an object lies: another place in every process."""
 
@@ -66,6 +69,8 @@ class Conditions:
         quiet: Show no bar.
         limit_s: Of every piece of work, on the clock; see `worker_pool.run_each`.
         keep_failures: Work that fails leaves the record of `failed_record`; else its error is raised.
+        stop_after_s: When so much time has passed on the clock no more work is begun; what is left has the
+            record NOT_RUN.
     """
 
     folder: Path
@@ -74,6 +79,7 @@ class Conditions:
     quiet: bool
     limit_s: float = math.inf
     keep_failures: bool = False
+    stop_after_s: float = math.inf
 
 
 @dataclass(frozen=True)
@@ -88,12 +94,13 @@ def run_all(works: Sequence[Work], conditions: Conditions) -> list[Record]:
     """Run what is missing of some work, under a progress bar on standard error.
 
     Returns:
-        The record of each, in the same order.
+        The record of each, in the same order; NOT_RUN where the time was up.
 
     Raises:
         CodeChangedError: The code was edited meanwhile, so that a new process would run other code than those
             that began; what is done stays.
     """
+    ends_s = time.monotonic() + conditions.stop_after_s
     codes = [work.code_digest() for work in works]
     records = [
         read_record(conditions.folder, work, code, conditions.limit_s)
@@ -102,7 +109,9 @@ def run_all(works: Sequence[Work], conditions: Conditions) -> list[Record]:
     missing = [place for place, record in enumerate(records) if record is None]
     orders = [_Order(works[place], codes[place]) for place in missing]
     places = {id(order): place for order, place in zip(orders, missing, strict=True)}
-    results = run_each(_fulfil, orders, conditions.jobs, conditions.limit_s)
+    results = run_each(
+        _fulfil, orders if ends_s > time.monotonic() else [], conditions.jobs, conditions.limit_s
+    )
     for order, result in _progressing(results, len(works) - len(missing), len(works), conditions):
         if isinstance(result, Failure):
             if not conditions.keep_failures or isinstance(result.error, CodeChangedError):
@@ -110,7 +119,10 @@ def run_all(works: Sequence[Work], conditions: Conditions) -> list[Record]:
             result = Outcome(failed_record(result, conditions.limit_s))
         _write(conditions.folder, order, result)
         records[places[id(order)]] = result.record
-    return [record for record in records if record is not None]
+        if time.monotonic() > ends_s:
+            results.close()
+            break
+    return [NOT_RUN if record is None else record for record in records]
 
 
 def _fulfil(order: _Order) -> Outcome:
@@ -161,12 +173,19 @@ def _write(folder: Path, order: _Order, outcome: Outcome) -> None:
         buffer = io.BytesIO()
         np.savez_compressed(buffer, allow_pickle=False, **outcome.arrays)
         write_atomically(folder / f"{order.work.file}.npz", buffer.getvalue())
+    write_record(folder, order.work, order.code, outcome.record)
+
+
+def write_record(folder: Path, work: Work, code: str, record: Record) -> None:
+    """Keep the record of work that was done with some code."""
     content = {
-        "digest": result_digest(order.work, order.code),
-        "checksum": _checksum(outcome.record),
-        "record": outcome.record,
+        "digest": result_digest(work, code),
+        "settings": work.settings_digest,
+        "code": code,
+        "checksum": _checksum(record),
+        "record": record,
     }
-    write_atomically(folder / f"{order.work.file}.json", json.dumps(content, allow_nan=False))
+    write_atomically(folder / f"{work.file}.json", json.dumps(content, allow_nan=False))
 
 
 def _checksum(record: object) -> str:
@@ -176,14 +195,28 @@ def _checksum(record: object) -> str:
 
 def read_record(folder: Path, work: Work, code: str, limit_s: float = math.inf) -> Record | None:
     """The record of work with these settings and this code that was not ended by a shorter limit."""
+    content = _content(folder, work)
+    if content.get("digest") != result_digest(work, code):
+        return None
+    ended_after_s = content["record"].get("limit_s")
+    return None if ended_after_s is not None and ended_after_s < limit_s else content["record"]
+
+
+def read_older_record(folder: Path, work: Work) -> tuple[str, Record] | None:
+    """The digest of the code and the record of work with these settings, whatever code did it."""
+    content = _content(folder, work)
+    if content.get("settings") != work.settings_digest or not isinstance(content.get("code"), str):
+        return None
+    if content.get("digest") != result_digest(work, content["code"]):
+        return None
+    return content["code"], content["record"]
+
+
+def _content(folder: Path, work: Work) -> dict[str, Any]:
+    """What the file of some work holds; nothing if there is none, or if it was changed by hand."""
     try:
         content = json.loads((folder / f"{work.file}.json").read_text())
     except (OSError, ValueError):
-        return None
-    if not isinstance(content, dict) or content.get("digest") != result_digest(work, code):
-        return None
-    record = content.get("record")
-    if not isinstance(record, dict) or content.get("checksum") != _checksum(record):
-        return None
-    ended_after_s = record.get("limit_s")
-    return None if ended_after_s is not None and ended_after_s < limit_s else record
+        return {}
+    record = content.get("record") if isinstance(content, dict) else None
+    return content if isinstance(record, dict) and content.get("checksum") == _checksum(record) else {}

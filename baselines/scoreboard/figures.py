@@ -50,8 +50,9 @@ def task_figure(results: Results) -> Figure:
             ended = [
                 record.get("finished") for who in (strategy, reference) for record in results.of(task, who)
             ]
-            if any(ended) and not all("failed" in record for record in results.of(task, strategy)):
-                ratios[row, column] = results.ratio(strategy, reference, measure, [task]).value
+            if any(ended) and any("failed" not in record for record in results.of(task, strategy)):
+                ratio = results.ratio(strategy, reference, measure, [task])
+                ratios[row, column] = np.nan if ratio is None else ratio.value
     figure = Figure(figsize=(0.62 * len(tasks) + 2.8, 0.3 * len(strategies) + 2.0), layout="constrained")
     axes = figure.subplots()
     shown = axes.imshow(np.log2(ratios), cmap="RdBu_r", vmin=-2, vmax=2, aspect="auto")

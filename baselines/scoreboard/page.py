@@ -94,6 +94,8 @@ Strategies on the same worlds, starts and seeds, in suites that are pinned (`bas
   could have driven in it. Where both of a pair were cut off their ratio is 1.
 - Seen: measured by any robot of the team, of the voxels that can be seen at all. Bits: what the best map
   lost, of the bits that the mission asks for.
+- Where not every mission has been run yet, mission k of all strategies and tasks came before any mission
+  k + 1. Rows say how many there are of each, and ratios are of those that both have run.
 - ms a decision: of one robot, the median over missions of their medians, and the worst of all.
 - A strategy of one's own takes part by `python -m baselines.benchmark --suite NAME --strategies MODULE:CLASS`
   (docs/own_strategy.md).
@@ -106,14 +108,15 @@ def _parts(results: Results, tasks: list[Row], overall: list[Row], command: str)
     beside = f"{FILES}/{suite.name}"
     parts = [
         f"## {_TITLES[suite.name]}",
-        f"Written by `{command}`.",
+        f"Written by `{command}`." + (_CONFIRMED if "--confirm" in command.split() else ""),
         _overall_table(results, overall),
         f"![Ratios with intervals]({beside}/ratios.png)",
         f"![Ratios by task]({beside}/tasks.png)",
     ]
     for task in suite.tasks:
         rows = [row for row in tasks if row["task"] == task.name]
-        parts += [f"### {task.name}", _about(task), _task_table(results, rows)]
+        if rows:
+            parts += [f"### {task.name}", _about(task), _task_table(results, rows)]
     failed = failed_rows(results)
     if failed:
         parts += ["### Missions that failed", _failed_table(failed)]
@@ -122,6 +125,10 @@ def _parts(results: Results, tasks: list[Row], overall: list[Row], command: str)
     return parts
 
 
+_CONFIRMED = (
+    " Some missions may have been run by an earlier version of the code: the first one of their strategy and"
+    " task was run again by the last version, and came out the same."
+)
 _TITLES: Mapping[str, str] = {
     "plans": "Plans: until everything is seen",
     "volumes": "Volumes and offices: until the map is known",
@@ -132,13 +139,14 @@ _TITLES: Mapping[str, str] = {
 
 def _overall_table(results: Results, rows: list[Row]) -> str:
     pairs = [(measure, reference) for measure in results.judged_by for reference in results.references]
-    head = ["strategy", "tasks", "finished", *(f"{m.words}, over `{r}`" for m, r in pairs)]
+    head = ["strategy", "tasks", "missions", "finished", *(f"{m.words}, over `{r}`" for m, r in pairs)]
     first = f"{results.judged_by[0].name}_over_{results.references[0]}"
     ordered = sorted(rows, key=lambda row: (row[first] is None, row[first]))
     shown = [
         [
             f"`{row['strategy']}`",
             row["tasks"],
+            row["missions"],
             "-" if row["finished"] is None else f"{row['finished']:.0%}",
             *(ranged(row, f"{m.name}_over_{r}", ".2f") for m, r in pairs),
             *_milliseconds(row),
@@ -221,6 +229,6 @@ def _about(task: Task) -> str:
         worlds = f"world file `{file.name}`"
     team = f"{scenario.robots} {kind} robot" + ("s" if scenario.robots > 1 else "")
     return (
-        f"{task.missions} missions, {worlds}, {shape} voxels of {grid.voxel_size_m:g} m, {team}, "
+        f"{task.missions} starts, {worlds}, {shape} voxels of {grid.voxel_size_m:g} m, {team}, "
         f"time limit {scenario.ending.time_limit_s:,.0f} s."
     )

@@ -8,13 +8,14 @@ seed: of a task its geometric mean, over all tasks the geometric mean of the tas
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from baselines.experiments.outcome import Record
+from baselines.experiments.runner import NOT_RUN
 from baselines.experiments.statistics import Interval, geometric_ratio_interval, median_interval
 from baselines.scoreboard.suites import Suite, Task
 
@@ -82,9 +83,12 @@ MARKS = (
 class Results:
     """A suite that was run.
 
+    Not all of it needs to have been run: what is told of a strategy is of its missions so far, and a ratio of
+    those that the reference has run, too.
+
     Attributes:
         suite: Its tasks and strategies.
-        records: Cell id → records by seed: of `SuiteMission`, or `failed_record`.
+        records: Cell id → records by seed: of `SuiteMission`, `failed_record` or NOT_RUN.
     """
 
     suite: Suite
@@ -101,27 +105,52 @@ class Results:
         """The suite's measures."""
         return JUDGED_BY[self.suite.name]
 
-    def of(self, task: Task, strategy: str) -> list[Record]:
-        """(N) records of a task, the same missions in the same order for every strategy."""
-        return [
+    def numbered(self, task: Task, strategy: str) -> dict[int, Record]:
+        """Number of the mission → record, of those that were run; the same missions for every strategy."""
+        records = [
             record
             for place in task.places
             for record in self.records[self.suite.cell_id(task, place, strategy)]
         ]
+        return {number: record for number, record in enumerate(records) if record != NOT_RUN}
 
-    def values(self, task: Task, strategy: str, measure: Measure) -> np.ndarray:
-        """(N,) float64 a measure of each mission; its limit where the mission never came so far."""
-        limit = limit_of(task, measure)
-        found = [value(record, measure) for record in self.of(task, strategy)]
+    def of(self, task: Task, strategy: str) -> list[Record]:
+        """(N) records of the missions of a task that were run."""
+        return list(self.numbered(task, strategy).values())
+
+    def values(
+        self, task: Task, strategy: str, measure: Measure, missions: Iterable[int] | None = None
+    ) -> np.ndarray:
+        """(N,) float64 a measure of each mission; its limit where the mission never came so far.
+
+        Args:
+            task: Where.
+            strategy: Whose.
+            measure: Which.
+            missions: Numbers of missions that were run; None = all of these.
+        """
+        limit, records = limit_of(task, measure), self.numbered(task, strategy)
+        found = [value(records[number], measure) for number in (records if missions is None else missions)]
         reached = np.asarray([limit if each is None else each for each in found], float)
         return np.maximum(reached, _LEAST)
 
-    def ratio(self, strategy: str, reference: str, measure: Measure, tasks: Sequence[Task]) -> Interval:
-        """The ratio to a reference over some tasks."""
+    def ratio(
+        self, strategy: str, reference: str, measure: Measure, tasks: Sequence[Task]
+    ) -> Interval | None:
+        """The ratio to a reference over those of some tasks in which both ran a mission; None = in none."""
+        pairs = [(task, self.shared(task, (strategy, reference))) for task in tasks]
+        pairs = [(task, missions) for task, missions in pairs if missions]
+        if not pairs:
+            return None
         return geometric_ratio_interval(
-            [self.values(task, strategy, measure) for task in tasks],
-            [self.values(task, reference, measure) for task in tasks],
+            [self.values(task, strategy, measure, missions) for task, missions in pairs],
+            [self.values(task, reference, measure, missions) for task, missions in pairs],
         )
+
+    def shared(self, task: Task, strategies: Sequence[str]) -> list[int]:
+        """Numbers of the missions of a task that all of some strategies ran."""
+        first, *others = (self.numbered(task, strategy) for strategy in strategies)
+        return [number for number in first if all(number in other for other in others)]
 
 
 def limit_of(task: Task, measure: Measure) -> float:
@@ -148,11 +177,12 @@ def value(record: Record, measure: Measure) -> float | None:
 
 
 def task_rows(results: Results) -> list[Row]:
-    """A row of each task and strategy; ends of intervals as `…_low` and `…_high`."""
+    """A row of each task and strategy that ran a mission; ends of intervals as `…_low` and `…_high`."""
     return [
         _task_row(results, task, strategy)
         for task in results.suite.tasks
         for strategy in results.suite.strategies
+        if results.of(task, strategy)
     ]
 
 
@@ -189,7 +219,7 @@ def _clock(records: Sequence[Record]) -> Row:
 
 
 def overall_rows(results: Results) -> list[Row]:
-    """A row of each strategy over all tasks but those in which all of its missions failed."""
+    """A row of each strategy over its tasks but those in which all of its missions failed."""
     rows = []
     for strategy in results.suite.strategies:
         tasks = [task for task in results.suite.tasks if not _cannot_act(results.of(task, strategy))]
@@ -222,7 +252,7 @@ def mission_rows(results: Results) -> list[Row]:
     rows = []
     for task in results.suite.tasks:
         for strategy in results.suite.strategies:
-            for number, record in enumerate(results.of(task, strategy)):
+            for number, record in results.numbered(task, strategy).items():
                 row: Row = {"task": task.name, "strategy": strategy, "mission": number}
                 row |= {name: record.get(name) for name in _KEPT}
                 row["end_reason"] = "FAILED" if "failed" in record else row["end_reason"]
@@ -236,7 +266,7 @@ def failed_rows(results: Results) -> list[Row]:
     found: dict[tuple[str, str, str], list[int]] = {}
     for task in results.suite.tasks:
         for strategy in results.suite.strategies:
-            for number, record in enumerate(results.of(task, strategy)):
+            for number, record in results.numbered(task, strategy).items():
                 if "failed" in record:
                     found.setdefault((task.name, strategy, record["failed"]), []).append(number)
     names = ("task", "strategy", "reason")

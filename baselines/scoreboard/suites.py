@@ -112,7 +112,7 @@ class Suite:
 
     @cached_property
     def cells(self) -> list[Cell]:
-        """All cells, strategies of one place beside each other."""
+        """All cells, strategies of one place beside each other; mission k of every task is run in round k."""
         return [
             Cell(
                 self.cell_id(task, place, strategy),
@@ -120,9 +120,11 @@ class Suite:
                 strategy,
                 place.missions,
                 SuiteMission(place.start),
+                round=sum(before.missions for before in task.places[:number]),
+                group=f"{task.folder}/{strategy}",
             )
             for task in self.tasks
-            for place in task.places
+            for number, place in enumerate(task.places)
             for strategy in self.strategies
         ]
 

@@ -1,0 +1,55 @@
+"""Keeps results that older code made, where samples come out the same with the code of today.
+
+Results are kept under a digest of the code (`runner`), and most edits of code change no result. Of every
+group of results that the same code made, the first is run again. If it comes out the same but for its times
+on the clock, the others of the group count as results of the code of today; else they are run again, too.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+
+from baselines.experiments.outcome import Record
+from baselines.experiments.runner import (
+    Conditions,
+    Work,
+    read_older_record,
+    run_all,
+    write_record,
+)
+
+CLOCK = "clock"
+"""Key of a record under which lies what differs from run to run."""
+
+
+def keep_confirmed(works: Sequence[Work], groups: Sequence[str], conditions: Conditions) -> int:
+    """Run samples of what older code made, and keep the groups of those that come out the same.
+
+    Args:
+        works: In the order in which they are run.
+        groups: Name of the group of each.
+        conditions: For the samples.
+
+    Returns:
+        How many results are kept that were not run again.
+    """
+    older: dict[tuple[str, str], list[tuple[Work, Record]]] = {}
+    for work, group in zip(works, groups, strict=True):
+        found = read_older_record(conditions.folder, work)
+        if found is not None and found[0] != work.code_digest():
+            older.setdefault((group, found[0]), []).append((work, found[1]))
+    samples = [group[0] for group in older.values()]
+    again = run_all([work for work, _ in samples], conditions)
+    kept = 0
+    for (_, before), now, (_, *others) in zip(samples, again, older.values(), strict=True):
+        if _but_for_clock(before) == _but_for_clock(now):
+            for work, record in others:
+                write_record(conditions.folder, work, work.code_digest(), record)
+                kept += 1
+    return kept
+
+
+def _but_for_clock(record: Record) -> str:
+    """What a record says that is the same in every run."""
+    return json.dumps({name: value for name, value in record.items() if name != CLOCK}, sort_keys=True)
