@@ -20,6 +20,7 @@ from baselines import benchmark, strategies
 from baselines.cli.arguments import run_command
 from baselines.experiments import runner
 from baselines.experiments.mission import run_mission, scripted
+from baselines.experiments.runner import NOT_RUN
 from baselines.scoreboard import chosen
 from baselines.scoreboard.chosen import chosen_scenarios, chosen_strategies
 from baselines.scoreboard.mission import SuiteMission
@@ -321,6 +322,38 @@ def results_of(times: dict[str, list[list[float | str | None]]]) -> Results:
                 for time_s in seconds
             ]
     return Results(suite, records)
+
+
+def test_a_part_of_the_missions_is_compared_where_both_ran_them():
+    """`quick` has run the first and the third mission of one world, and none of the other."""
+    whole = results_of({"random": [[50.0, 40.0, 20.0], [60.0, 80.0, 90.0]], "quick": [[25.0] * 3, [1.0] * 3]})
+    suite, records = whole.suite, dict(whole.records)
+    first, second = (suite.cell_id(task, task.places[0], "quick") for task in suite.tasks)
+    records[first] = [records[first][0], NOT_RUN, records[first][2]]
+    records[second] = [NOT_RUN] * 3
+    results = Results(suite, records)
+    rows = {(row["task"], row["strategy"]): row for row in task_rows(results)}
+    assert set(rows) == {("world-0", "random"), ("world-0", "quick"), ("world-1", "random")}
+    assert [row["missions"] for row in rows.values()] == [3, 2, 3]
+    ratio = math.sqrt(25.0 / 50.0 * 25.0 / 20.0)
+    assert rows["world-0", "quick"]["time_s_end_over_random"] == pytest.approx(ratio)
+    overall = {row["strategy"]: row for row in overall_rows(results)}
+    assert (overall["quick"]["tasks"], overall["quick"]["missions"]) == (1, 2)
+    assert overall["quick"]["time_s_end_over_random"] == pytest.approx(ratio)
+    quick = [row["mission"] for row in mission_rows(results) if row["strategy"] == "quick"]
+    assert quick == [0, 2]
+
+
+def test_without_a_shared_mission_there_is_no_ratio(tmp_path):
+    whole = results_of({"random": [[50.0, 40.0]], "quick": [[25.0, 25.0]]})
+    suite, records = whole.suite, dict(whole.records)
+    for strategy, missing in (("random", 0), ("quick", 1)):
+        cell = suite.cell_id(suite.tasks[0], suite.tasks[0].places[0], strategy)
+        records[cell] = [NOT_RUN if n == missing else record for n, record in enumerate(records[cell])]
+    results = Results(suite, records)
+    assert results.ratio("quick", "random", TIME, suite.tasks) is None
+    page = write_page(tmp_path, results, "a command --confirm").read_text()
+    assert "| `quick` | 1 | 1 | 100% | - | - |" in page and "came out the same" in page
 
 
 BY_HAND = {

@@ -79,17 +79,15 @@ class FrontierCells(VoxelCandidates):
         count_from(self._counter, self._map.state, self._size, voxels, self._tree, self._met, gains, weighed)
         return gains
 
-    def opening(self, voxel: int, most: int) -> int:
-        """How many connected known free voxels beside unknown ones there are where a frontier cell is.
+    def crowd(self, voxel: int, radius: int, most: int) -> int:
+        """How many known free voxels beside unknown ones there are around a voxel.
 
         Args:
-            voxel: The frontier cell.
+            voxel: In the middle.
+            radius: Voxels that they may be off along any axis.
             most: No more are counted.
         """
-        edges = self._edges_beside(voxel)
-        if len(edges) == 0:
-            return 0
-        return int(count_connected(self._map, edges, np.empty(most + len(edges), np.int64), most))
+        return int(count_edges_around(self._map, voxel, radius, most))
 
     def nearest_of_blocks(self, search: Search, reach: float) -> tuple[np.ndarray, np.ndarray]:
         """Of each block the frontier cell that the latest search reached by the shortest path.
@@ -189,34 +187,18 @@ def fill_nearest_of_blocks(
 
 
 @lean_kernel
-def count_connected(frontiers: FrontierMap, edges: np.ndarray, found: np.ndarray, most: int) -> int:
-    """How many EDGE voxels are connected with some of them, by sides, edges or corners; no more than `most`.
-
-    Args:
-        frontiers: Of the robot.
-        edges: (N,) int64, the first of them.
-        found: (≥ most + N,) int64, scratch space.
-        most: Where counting ends.
-    """
-    size, count, place = frontiers.size, 0, 0
-    for edge in edges:
-        found[count] = edge
-        count += 1
-    while place < count and count < most:
-        x, y, z = grid_index(size, found[place])
-        place += 1
-        for i in range(max(x - 1, 0), min(x + 2, size[0])):
-            for j in range(max(y - 1, 0), min(y + 2, size[1])):
-                for k in range(max(z - 1, 0), min(z + 2, size[2])):
-                    near = flat_index(size, i, j, k)
-                    if count < most and frontiers.flags[near] & EDGE:
-                        known = False
-                        for other in range(count):
-                            known = known or found[other] == near
-                        if not known:
-                            found[count] = near
-                            count += 1
-    return min(count, most)
+def count_edges_around(frontiers: FrontierMap, voxel: int, radius: int, most: int) -> int:
+    """How many EDGE voxels lie within a radius, along every axis; no more than `most` are counted."""
+    size, count = frontiers.size, 0
+    x, y, z = grid_index(size, voxel)
+    for i in range(max(x - radius, 0), min(x + radius, size[0] - 1) + 1):
+        for j in range(max(y - radius, 0), min(y + radius, size[1] - 1) + 1):
+            for k in range(max(z - radius, 0), min(z + radius, size[2] - 1) + 1):
+                if frontiers.flags[flat_index(size, i, j, k)] & EDGE:
+                    count += 1
+                    if count >= most:
+                        return count
+    return count
 
 
 @lean_kernel

@@ -71,6 +71,13 @@ def test_plans_replan_at_every_scan_until_everything_is_seen():
             assert scenario.ending.seen_share == 1.0
 
 
+def test_mission_k_of_every_task_is_run_in_round_k():
+    """Each dungeon is a cell of its own; the others hold thirty starts."""
+    cells = find_suite("plans", False, TEAMS).cells
+    assert [cell.round for cell in cells if cell.group == "dungeons/random"] == list(range(100))
+    assert {cell.round for cell in cells if not cell.group.startswith("dungeons/")} == {0}
+
+
 def test_dungeons_start_on_their_mark():
     (dungeons,) = [task for task in find_suite("plans", False, TEAMS).tasks if task.name == "dungeons"]
     for place in dungeons.places[:: len(dungeons.places) // 4]:

@@ -66,7 +66,7 @@ def path_m(strategy, seed, scenario):
 RULES = {
     "nearest-frontier": (NearestFrontier, reference.nearest_frontier),
     "distance-advantage": (
-        partial(DistanceAdvantage, DistanceAdvantageConfig(radius=25, horizon=26.0, opening=0.0)),
+        partial(DistanceAdvantage, DistanceAdvantageConfig(radius=25, horizon=26.0, crowd=0)),
         partial(reference.distance_advantage, radius=25, horizon=26.0),
     ),
 }
