@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from baselines.experiments.mission import run_mission
 from baselines.experiments.outcome import Record
 from baselines.strategies import make_strategy
-from baselines.strategies.protocol import Stopwatch
+from baselines.strategies.protocol import Stopwatch, Strategy
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.reports.metrics import mission_figures
+
+SETTINGS = "::"
+"""Between the name of a strategy and settings that differ from its defaults."""
 
 
 @dataclass(frozen=True)
@@ -21,9 +25,11 @@ class SuiteMission:
 
     Attributes:
         start: x, y, z, yaw, pitch of the one robot, metres and radians, map frame; None = drawn.
+        settings: `name=value`, commas between, of strategies that are made with a `config`; "" = defaults.
     """
 
     start: tuple[float, float, float, float, float] | None = None
+    settings: str = ""
 
     def __call__(self, env: EntropyExploreEnv, strategy: str, seed: int) -> Record:
         """Run a mission and keep its figures, and what it cost on the clock.
@@ -33,7 +39,8 @@ class SuiteMission:
             `decision_ms` and `worst_decision_ms`, the time that the strategy took for one robot (median and
             largest, the first decision left out, since it may compile), and `mission_s`.
         """
-        timed, started = Stopwatch(make_strategy(strategy), time.perf_counter), time.perf_counter()
+        made = configured(make_strategy(strategy), self.settings)
+        timed, started = Stopwatch(made, time.perf_counter), time.perf_counter()
         options = None if self.start is None else {"starts": [self.start]}
         run_mission(env, timed, seed, options=options)
         mission_s = time.perf_counter() - started
@@ -46,3 +53,19 @@ class SuiteMission:
             "mission_s": round(mission_s, 4),
         }
         return {**figures, "clock": clock}
+
+
+def configured(strategy: Any, settings: str) -> Strategy:  # noqa: ANN401 - with or without a config
+    """A strategy with other settings than its defaults.
+
+    Args:
+        strategy: With a `config`, a dataclass that its class takes.
+        settings: See `SuiteMission`.
+    """
+    if not settings:
+        return strategy
+    config, changes = strategy.config, {}
+    for pair in settings.split(","):
+        name, _, value = pair.partition("=")
+        changes[name] = type(getattr(config, name))(float(value))
+    return type(strategy)(replace(config, **changes))

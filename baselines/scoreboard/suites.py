@@ -26,7 +26,7 @@ from typing import Any
 
 from baselines.experiments.cells import Cell
 from baselines.experiments.mission import scripted
-from baselines.scoreboard.mission import SuiteMission
+from baselines.scoreboard.mission import SETTINGS, SuiteMission
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.scenario import Scenario, with_settings
@@ -98,7 +98,7 @@ class Suite:
     Attributes:
         name: `plans`, `volumes`, `teams`, or `own` for scenarios of one's own.
         tasks: The rows of each strategy.
-        strategies: Names.
+        strategies: Names; of those that are tuned with the settings that differ (`name::setting=value`).
     """
 
     name: str
@@ -117,9 +117,9 @@ class Suite:
             Cell(
                 self.cell_id(task, place, strategy),
                 place.scenario,
-                strategy,
+                strategy.partition(SETTINGS)[0],
                 place.missions,
-                SuiteMission(place.start),
+                SuiteMission(place.start, strategy.partition(SETTINGS)[2]),
                 round=sum(before.missions for before in task.places[:number]),
                 group=f"{task.folder}/{strategy}",
             )
@@ -181,6 +181,17 @@ def teams(quick: bool = False) -> tuple[Task, ...]:
     )
 
 
+def training_plans(starts: int) -> tuple[Task, ...]:
+    """Plans like those of the suite on which settings may be tuned, so many starts of each.
+
+    Worlds are those of the recipes' training split, and the dungeons of odd number. Of the plans in files
+    there is one each, which nothing is tuned on.
+    """
+    names = ("office", "corridor", "cluttered", "hybrid")
+    recipes = [_one(name, _explored(SCENARIOS[name], {"seen_share": 1.0}), starts, "train") for name in names]
+    return (_dungeons(starts, every=2), *recipes)
+
+
 SUITES = {"plans": plans, "volumes": volumes, "teams": teams}
 """Name → a function of `quick` that makes the tasks."""
 
@@ -201,9 +212,9 @@ def find_suite(name: str, quick: bool, strategies: tuple[str, ...]) -> Suite:
     return Suite(name, SUITES[name](quick), strategies)
 
 
-def _one(name: str, scenario: Scenario, missions: int) -> Task:
-    """A task in one scenario of the test split."""
-    tested = with_settings(scenario, {"split": "test", "track_truth": True})
+def _one(name: str, scenario: Scenario, missions: int, split: str = "test") -> Task:
+    """A task in one scenario, in worlds of a split."""
+    tested = with_settings(scenario, {"split": split, "track_truth": True})
     return Task(name, (Place(name, tested, missions),))
 
 
@@ -250,12 +261,12 @@ def _grid_of(path: str, voxel_size_m: float) -> Grid:
     return EntropyExploreEnv(scripted(base)).scenario.grid
 
 
-def _dungeons(count: int | None) -> Task:
-    """ARiADNE's dungeons; None = all."""
+def _dungeons(count: int | None, every: int = 1) -> Task:
+    """ARiADNE's dungeons, of each `every` the first; None = all of these."""
     if not STARTS.is_file():
         raise SettingError("suite world", str(STARTS), "there: it comes with the project")
     with STARTS.open(newline="") as file:
-        rows = list(csv.DictReader(file))[:count]
+        rows = list(csv.DictReader(file))[::every][:count]
     seen_from_afar = {
         "robot": {"reach_m": 8.0},
         "sensor": {"max_range_m": 8.0, "angular_step_rad": math.pi / 360},

@@ -1,0 +1,70 @@
+"""Rivals' settings: which are tried, where, and the table in the page."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from baselines.cli.arguments import run_command
+from baselines.scoreboard import tuning
+from baselines.scoreboard.mission import SETTINGS, configured
+from baselines.scoreboard.suites import Place, Task, find_suite, training_plans
+from baselines.scoreboard.tuning import BEGIN, END, GRID, variants, with_table
+from baselines.strategies import make_strategy
+from entropy_explore_env.errors import SettingError
+from tests.baselines.strategies.explorers.test_missions import small_plan
+
+
+def test_each_setting_is_varied_alone_and_the_default_comes_first():
+    for strategy, grid in GRID.items():
+        found = variants(strategy)
+        assert found[0] == strategy and len(set(found)) == len(found)
+        assert len(found) == 1 + sum(len(values) - 1 for values in grid.values())
+        default = make_strategy(strategy).config  # type: ignore[attr-defined]
+        for variant in found[1:]:
+            name, _, value = variant.partition(SETTINGS)[2].partition("=")
+            made = configured(make_strategy(strategy), f"{name}={value}")
+            changed = {each for each in vars(default) if vars(made.config)[each] != vars(default)[each]}
+            assert changed == {name} and vars(made.config)[name] == float(value)
+            assert type(vars(made.config)[name]) is type(vars(default)[name])
+    with pytest.raises(SettingError, match=r"strategies = 'random'"):
+        variants("random")
+
+
+def test_nothing_of_the_suite_is_tuned_on_but_dungeons_of_odd_number():
+    tested = find_suite("plans", False, ("random",)).tasks
+    for task in training_plans(3):
+        same = next(other for other in tested if other.name == task.name)
+        if task.name == "dungeons":
+            assert [place.name for place in task.places] == ["1", "3", "5"]
+        else:
+            assert task.scenario.split == "train" and same.scenario.split == "test"
+            assert task.missions == 3
+
+
+def test_a_new_table_takes_the_place_of_the_old_one():
+    page = f"before\n{BEGIN}\nold\n{END}\nafter\n"
+    once = with_table(page, "| new |")
+    assert "old" not in once and once.startswith("before\n") and once.endswith(f"{END}\nafter\n")
+    assert with_table(once, "| new |") == once
+    with pytest.raises(SettingError, match="a page with the lines"):
+        with_table("no marks", "| new |")
+
+
+def test_the_command_writes_the_paths_over_the_defaults(tmp_path, monkeypatch, capsys):
+    plan = small_plan(ending={"seen_share": 0.8, "time_limit_s": 500.0})
+    monkeypatch.setattr(tuning, "training_plans", lambda n: (Task("hall", (Place("hall", plan, n),)),))
+    monkeypatch.setattr(tuning, "GRID", {"tour": {"near": (1.5, 0.05)}})
+    page = tmp_path / "page.md"
+    page.write_text(f"{BEGIN}\n{END}\n")
+    words = ["--strategies", "tour", "--starts", "2", "--runs", str(tmp_path / "runs"), "--page", str(page)]
+    assert run_command(tuning.main, words) == 0
+    rows = [line.split(" | ") for line in page.read_text().splitlines() if line.startswith("| `")]
+    assert [row[1:4] for row in rows] == [["default", "2", "1"], ["near=0.05", "2", rows[1][3]]]
+    ratios = [[float(row[column].split()[0]) for column in (3, 4)] for row in rows]
+    assert ratios[1][1] == pytest.approx(ratios[0][1] * ratios[1][0], abs=0.011)
+    assert ratios[1][0] != 1.0 and math.isfinite(ratios[1][0])
+    before = page.read_text()
+    assert run_command(tuning.main, words) == 0 and page.read_text() == before
+    capsys.readouterr()
