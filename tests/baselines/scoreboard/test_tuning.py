@@ -24,10 +24,9 @@ def test_each_setting_is_varied_alone_and_the_default_comes_first():
         default = make_strategy(strategy).config  # type: ignore[attr-defined]
         for variant in found[1:]:
             name, _, value = variant.partition(SETTINGS)[2].partition("=")
-            made = configured(make_strategy(strategy), f"{name}={value}")
-            changed = {each for each in vars(default) if vars(made.config)[each] != vars(default)[each]}
-            assert changed == {name} and vars(made.config)[name] == float(value)
-            assert type(vars(made.config)[name]) is type(vars(default)[name])
+            made = vars(configured(make_strategy(strategy), f"{name}={value}").config)  # type: ignore[attr-defined]
+            assert {each for each, was in vars(default).items() if made[each] != was} == {name}
+            assert made[name] == float(value) and type(made[name]) is type(vars(default)[name])
     with pytest.raises(SettingError, match=r"strategies = 'random'"):
         variants("random")
 
