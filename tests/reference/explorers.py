@@ -117,13 +117,16 @@ def coordinated(
 class Textbook:
     """A strategy of one point robot that decides by a rule at every call, and forgets all but its target.
 
-    It goes to the cell of greatest value. The target is kept until the map changes; a cell in which the robot
-    stands and that is a frontier still, since its scan did not show what is beside it, counts no more.
+    It goes to the cell of greatest value. The target is kept until the map changes, or until it is reached. A
+    cell in which the robot stands and that is a frontier still counts no more: its scan did not show what is
+    beside it.
     """
 
-    def __init__(self, rule: Callable[[np.ndarray, Cell], dict[Cell, float]]) -> None:
-        """Take a rule: from a map and the robot's cell to the values of frontier cells."""
-        self.rule = rule
+    def __init__(
+        self, rule: Callable[[np.ndarray, Cell], dict[Cell, float]], until_reached: bool = False
+    ) -> None:
+        """Take a rule, from a map and the robot's cell to values of cells; and how long a target holds."""
+        self.rule, self.until_reached = rule, until_reached
 
     def reset(self, scenario: Scenario, rng: np.random.Generator) -> None:
         """A new mission begins; nothing is drawn."""
@@ -144,7 +147,10 @@ class Textbook:
         if (x, y) in frontier_cells(plan):
             self.dropped.add((x, y))
         same = plan.shape == self.before.shape and (plan == self.before).all()
-        if not (same and self.target in frontier_cells(plan) and self.target not in self.dropped):
+        holds = same and self.target in frontier_cells(plan) and self.target not in self.dropped
+        if self.until_reached:
+            holds = self.target not in (None, (x, y)) and plan[self.target] == FREE
+        if not holds:
             values = self.rule(plan, (x, y))
             self.target = chosen({cell: value for cell, value in values.items() if cell not in self.dropped})
         self.before = plan

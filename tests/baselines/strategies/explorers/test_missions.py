@@ -11,7 +11,10 @@ import pytest
 from baselines.experiments.mission import run_mission, scripted
 from baselines.strategies import make_strategy
 from baselines.strategies.explorers.distance_advantage import DistanceAdvantage, DistanceAdvantageConfig
+from baselines.strategies.explorers.information_gain import InformationGain, InformationGainConfig
 from baselines.strategies.explorers.nearest_frontier import NearestFrontier
+from baselines.strategies.explorers.receding_horizon import RecedingHorizon
+from baselines.strategies.explorers.tour import Tour
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.reports.metrics import joint_figures, mission_figures
@@ -19,6 +22,7 @@ from entropy_explore_env.scenario import with_settings
 from entropy_explore_env.scenarios import find_scenario
 from entropy_explore_env.settings import Grid
 from tests.reference import explorers as reference
+from tests.reference import planners
 
 NAMES = (
     "nearest-frontier",
@@ -63,22 +67,34 @@ def path_m(strategy, seed, scenario):
     return seen[0]
 
 
+REACH = 15.0
+"""Of the sensor of `small_plan`, in cells."""
 RULES = {
-    "nearest-frontier": (NearestFrontier, reference.nearest_frontier),
+    "nearest-frontier": (NearestFrontier, lambda: reference.Textbook(reference.nearest_frontier)),
     "distance-advantage": (
         partial(DistanceAdvantage, DistanceAdvantageConfig(radius=25, horizon=26.0, crowd=0)),
-        partial(reference.distance_advantage, radius=25, horizon=26.0),
+        lambda: reference.Textbook(partial(reference.distance_advantage, radius=25, horizon=26.0)),
+    ),
+    "information-gain": (
+        partial(InformationGain, InformationGainConfig(weight=0.4, horizon=3.0)),
+        lambda: reference.Textbook(partial(planners.information_gain, weight=0.4, horizon=3.0, reach=REACH)),
+    ),
+    "tour": (Tour, lambda: reference.Textbook(planners.Tour(REACH, 1.5, 0.5, 1.0, 0.1))),
+    "receding-horizon": (
+        RecedingHorizon,
+        lambda: reference.Textbook(
+            planners.RecedingHorizon(REACH, 2.0, 0.4, 1.5, (30, 120)), until_reached=True
+        ),
     ),
 }
+"""Name → what makes ours, and what makes the textbook's."""
 
 
 def ratios(rule, starts):
     """Path lengths of a strategy over those of the textbook, start by start."""
     ours, textbook = RULES[rule]
     plan = small_plan()
-    return np.array(
-        [path_m(ours(), seed, plan) / path_m(reference.Textbook(textbook), seed, plan) for seed in starts]
-    )
+    return np.array([path_m(ours(), seed, plan) / path_m(textbook(), seed, plan) for seed in starts])
 
 
 def test_the_path_to_nearest_frontiers_is_the_textbooks():
@@ -88,9 +104,13 @@ def test_the_path_to_nearest_frontiers_is_the_textbooks():
 @pytest.mark.long
 @pytest.mark.parametrize("rule", sorted(RULES))
 def test_over_thirty_starts_paths_are_as_long_as_the_textbooks(rule):
-    """Ties are broken differently, so single missions differ; their geometric mean by no more than 3 %."""
-    found = ratios(rule, range(30))
-    assert abs(np.log(found).mean()) < math.log(1.03)
+    """Ties are broken differently, so single missions differ; their geometric mean by no more than 3 %.
+
+    Trees are drawn, and tours differ by their places, so that thirty missions leave an error of the mean.
+    """
+    logs = np.log(ratios(rule, range(30)))
+    error = logs.std(ddof=1) / math.sqrt(len(logs)) if rule in ("tour", "receding-horizon") else 0.0
+    assert abs(logs.mean()) < math.log(1.03) + 2.0 * error
 
 
 @pytest.mark.parametrize("name", NAMES)
