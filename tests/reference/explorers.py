@@ -83,8 +83,11 @@ def chosen(values: dict[Cell, float]) -> Cell | None:
 
 def coordinated(
     plan: np.ndarray, robots: list[Cell], targets: list[Cell], beta: float, reach: float
-) -> list[Cell | None]:
-    """Burgard 2005's algorithm: who of several robots that choose together goes to which frontier cell.
+) -> dict[Cell, float]:
+    """Burgard 2005's algorithm: frontier cell → U - β V for the first of several robots that choose together.
+
+    In turn the pair of robot and cell that is worth most is taken, of equal ones the first; what is worth
+    less then is told when it is the first robot's turn.
 
     Args:
         plan: The map that all of them have.
@@ -96,22 +99,20 @@ def coordinated(
     cells = frontier_cells(plan)
     utility = {cell: 1.0 - sum(max(1.0 - math.dist(cell, t) / reach, 0.0) for t in targets) for cell in cells}
     lengths = [lengths_from(plan, robot) for robot in robots]
-    found: list[Cell | None] = [None] * len(robots)
-    for _ in robots:
+    left = list(range(len(robots)))
+    while True:
         worth = {
-            (robot, cell): utility[cell] - beta * lengths[robot][cell] / reach
-            for robot in range(len(robots))
-            if found[robot] is None
+            (robot, cell): utility[cell] - beta * float(lengths[robot][cell]) / reach
+            for robot in left
             for cell in cells
             if math.isfinite(lengths[robot][cell])
         }
-        if not worth:
-            break
-        robot, cell = max(worth, key=worth.__getitem__)
-        found[robot] = cell
+        robot, taken = max(worth, key=worth.__getitem__, default=(0, None))
+        if taken is None or robot == 0:
+            return {cell: value for (who, cell), value in worth.items() if who == 0}
+        left.remove(robot)
         for other in cells:
-            utility[other] -= max(1.0 - math.dist(other, cell) / reach, 0.0)
-    return found
+            utility[other] -= max(1.0 - math.dist(other, taken) / reach, 0.0)
 
 
 class Textbook:

@@ -11,6 +11,7 @@ import pytest
 from baselines.experiments.mission import run_mission, scripted
 from baselines.strategies import STRATEGIES, make_strategy
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
+from entropy_explore_env.robots.motion import MoveEnd
 from entropy_explore_env.scenario import with_settings
 from entropy_explore_env.scenarios import OFFICE
 from entropy_explore_env.settings import Grid
@@ -64,8 +65,20 @@ def close_starts(world: World, robots: int, rng: np.random.Generator) -> np.ndar
     return starts
 
 
-def longest_stand_s(strategy: str, robots: int, seed: int) -> float:
+def longest_stand_s(strategy: str, robots: int, seed: int, **changes: object) -> float:
     """The longest time that a robot neither moves nor gains anything, in a maze with close starts."""
+    return stand_of(strategy, robots, seed, **changes)[0]
+
+
+def stand_of(strategy: str, robots: int, seed: int, **changes: object) -> tuple[float, int]:
+    """As `longest_stand_s`; and how many drives a teammate's body stopped.
+
+    Args:
+        strategy: Name.
+        robots: Team size.
+        seed: Of maze, starts and mission.
+        changes: Other settings of the scenario.
+    """
     rng = np.random.default_rng(seed)
     world = maze(rng)
     settings = {
@@ -74,12 +87,13 @@ def longest_stand_s(strategy: str, robots: int, seed: int) -> float:
         "ending": {"time_limit_s": LIMIT_S},
         "robot": {"reach_m": 3.0},
     }
-    env = EntropyExploreEnv(with_settings(scripted(OFFICE), settings))
+    env = EntropyExploreEnv(with_settings(with_settings(scripted(OFFICE), settings), changes))
     since = np.zeros(robots)
     places, gained, longest = np.full((robots, 3), np.inf), np.zeros(robots), 0.0
+    stopped = 0
 
     def note(env: EntropyExploreEnv) -> None:
-        nonlocal longest
+        nonlocal longest, stopped
         state = env.missions.state
         time_s, here = float(state.missions[0]["time_s"]), state.robots[0]["origin"][:, :3]
         bits = state.robots[0]["gained_bits"]
@@ -87,16 +101,25 @@ def longest_stand_s(strategy: str, robots: int, seed: int) -> float:
         active |= bits - gained >= GAINED_BITS
         places[active], gained[active], since[active] = here[active], bits[active], time_s
         longest = max(longest, float((time_s - since).max()))
+        stopped += int((state.robots[0]["move_end"] == MoveEnd.TEAMMATE.code).sum())
 
     options = {"world": world, "starts": close_starts(world, robots, rng)}
     run_mission(env, make_strategy(strategy), seed, note, options=options)
-    return longest
+    return longest, stopped
 
 
 @pytest.mark.parametrize("strategy", STRATEGIES)
 def test_robots_that_start_close_to_each_other_keep_moving(strategy):
     for robots in (2, 3):
         assert longest_stand_s(strategy, robots, seed=robots) < STILL_S
+
+
+@pytest.mark.parametrize("strategy", ["nearest-frontier", "distance-advantage", "tour"])
+def test_explorers_whose_bodies_block_each_other_part_when_they_replan_under_way(strategy):
+    """Two in corridors that are too narrow to pass: bodies stop them, and both map on."""
+    under_way = {"robot": {"redecide": "on_scan"}, "sensor": {"scan_every_m": 0.3}}
+    stood_s, stopped = stand_of(strategy, 2, 2, **under_way)
+    assert stopped > 0 and stood_s < STILL_S
 
 
 @pytest.mark.long
