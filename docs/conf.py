@@ -20,6 +20,7 @@ extensions = [
     "sphinx.ext.autodoc",
     "sphinx.ext.napoleon",
     "sphinx_copybutton",
+    "docs.extensions.literal_blocks",
     "docs.extensions.repository_links",
     "docs.extensions.scenario_cards",
 ]

@@ -120,5 +120,10 @@ def _kernels(count: int) -> str:
     return "1 kernel" if count == 1 else f"{count} kernels"
 
 
+def command() -> int:
+    """The command as a program of its own."""
+    return run_command(main)
+
+
 if __name__ == "__main__":
-    sys.exit(run_command(main))
+    sys.exit(command())

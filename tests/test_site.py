@@ -11,6 +11,7 @@ from urllib.parse import unquote, urlsplit
 
 import pytest
 
+from docs.extensions.literal_blocks import mark_literal
 from docs.extensions.repository_links import to_repository
 from tests.code_blocks import DOCS, ROOT, Block, blocks, shown_files
 
@@ -87,3 +88,24 @@ def test_links_out_of_docs_lead_to_the_repository():
         "[`e`](https://h/r/blob/main/README.md#f) [g](../api.md)"
     )
     assert to_repository("[a](../x/y.py)", "page.md", "https://h/r") == "[a](https://h/r/blob/main/x/y.py)"
+
+
+def test_indented_blocks_of_docstrings_are_literal():
+    lines = [
+        "Text",
+        "of two lines:",
+        "",
+        "    a = b*",
+        "",
+        "    c",
+        "",
+        ":param x: y",
+        "",
+        "   z",
+        "",
+        "- item",
+        "",
+        "  w",
+    ]
+    marked = mark_literal(lines)
+    assert marked == [*lines[:3], "::", "", *lines[3:]]

@@ -395,5 +395,10 @@ def main(words: Sequence[str]) -> int:
     return 0 if broken is None else 1
 
 
+def command() -> int:
+    """The command as a program of its own."""
+    return run_command(main)
+
+
 if __name__ == "__main__":
-    sys.exit(run_command(main))
+    sys.exit(command())

@@ -127,5 +127,10 @@ def _about(world: World) -> str:
     return f"{x} × {y} × {z} voxels of {world.grid.voxel_size_m:.6g} m, {free:.1%} free"
 
 
+def command() -> int:
+    """The command as a program of its own."""
+    return run_command(main)
+
+
 if __name__ == "__main__":
-    sys.exit(run_command(main))
+    sys.exit(command())

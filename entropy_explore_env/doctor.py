@@ -1,0 +1,123 @@
+"""What a report of a problem needs: versions, what of the extras is there, and where compiled kernels are."""
+
+from __future__ import annotations
+
+import importlib.metadata
+import os
+import platform
+import sys
+import tempfile
+from collections import Counter
+from pathlib import Path
+from typing import Any
+
+from entropy_explore_env.compilation.announcement import short_path
+from entropy_explore_env.compilation.folder import SUFFIX, kernel_folder
+from entropy_explore_env.version import VERSION
+
+NEEDED = ("numpy", "numba", "llvmlite", "scipy", "gymnasium", "pettingzoo", "pillow")
+EXTRAS = {
+    "baselines": ("matplotlib", "tyro", "rich", "pebble", "tabulate", "py-cpuinfo"),
+    "worlds": ("octomap-python", "pyyaml", "pypcd4", "trimesh", "tifffile"),
+    "render": ("pygame-ce",),
+    "viewer": ("av", "rerun-sdk"),
+    "training": ("stable-baselines3", "torch", "safetensors", "tensorboard"),
+    "rllib": ("ray",),
+}
+"""Extra → the packages that it brings."""
+
+
+def findings() -> dict[str, Any]:
+    """What there is, as plain values.
+
+    Keys: `version`, `library` (its folder), `python`, `system`, `processors`; `packages` and `extras` (name →
+    version, None where it is not installed); `kernels`: `folder`, whether it is `writable`, the number of
+    `files` and of `mebibytes`, and `rooms` (packages of modules → files); `problems`, sentences.
+    """
+    folder = kernel_folder()
+    kernels = _kernels(folder)
+    packages = {name: _installed(name) for name in NEEDED}
+    problems = [f"{name} is not installed" for name, version in packages.items() if version is None]
+    if folder is None:
+        problems.append("no folder for compiled kernels: set NUMBA_CACHE_DIR, or every process compiles anew")
+    elif not kernels["writable"]:
+        problems.append(f"{folder} cannot be written: set NUMBA_CACHE_DIR, or every process compiles anew")
+    return {
+        "version": VERSION,
+        "library": str(Path(__file__).parent),
+        "python": platform.python_version(),
+        "system": platform.platform(),
+        "processors": os.cpu_count(),
+        "packages": packages,
+        "extras": {extra: {name: _installed(name) for name in names} for extra, names in EXTRAS.items()},
+        "kernels": kernels,
+        "problems": problems,
+    }
+
+
+def report(found: dict[str, Any]) -> str:
+    """The findings as lines for people."""
+    lines = [
+        f"entropy_explore_env {found['version']} in {found['library']}",
+        f"Python {found['python']} ({sys.executable}), {found['system']}, {found['processors']} processors",
+        "packages: " + _named(found["packages"]),
+    ]
+    for extra, packages in found["extras"].items():
+        missing = [name for name, version in packages.items() if version is None]
+        there = _named({name: version for name, version in packages.items() if version is not None})
+        lines.append(f"extra {extra}: {there or 'not installed'}")
+        if missing and there:
+            lines[-1] += f"; lacks {', '.join(missing)}"
+    kernels = found["kernels"]
+    if kernels["folder"] is not None:
+        lines.append(
+            f"compiled kernels: {kernels['files']} files, {kernels['mebibytes']:.1f} MiB, in "
+            f"{short_path(Path(kernels['folder']))}"
+        )
+        lines += [f"  {room}: {files}" for room, files in kernels["rooms"].items()]
+        if not kernels["files"]:
+            lines.append("  none yet: the first step compiles for about 10 s, or `entropy-explore-warm` now")
+    lines += [f"problem: {problem}" for problem in found["problems"]] or ["no problem found"]
+    return "\n".join(lines)
+
+
+def _installed(name: str) -> str | None:
+    try:
+        return importlib.metadata.version(name)
+    except importlib.metadata.PackageNotFoundError:
+        return None
+
+
+def _named(packages: dict[str, str | None]) -> str:
+    return ", ".join(f"{name} {version or 'missing'}" for name, version in packages.items())
+
+
+def _kernels(folder: Path | None) -> dict[str, Any]:
+    """What is in the folder of compiled kernels; of this version of the library, and of others."""
+    found: dict[str, Any] = {"folder": None if folder is None else str(folder)}
+    paths = sorted(folder.glob(f"*{SUFFIX}")) if folder is not None and folder.is_dir() else []
+    rooms = Counter(".".join(path.name.rpartition("-")[0].split(".")[:2]) for path in paths)
+    found["writable"] = folder is not None and _writable(folder)
+    found["files"] = len(paths)
+    found["mebibytes"] = sum(_size(path) for path in paths) / 2**20
+    found["rooms"] = dict(sorted(rooms.items()))
+    return found
+
+
+def _size(path: Path) -> int:
+    try:
+        return path.stat().st_size
+    except OSError:  # another process has just removed it
+        return 0
+
+
+def _writable(folder: Path) -> bool:
+    """Whether files can be made in it, or in the nearest folder above it that exists."""
+    there = next((parent for parent in (folder, *folder.parents) if parent.exists()), None)
+    if there is None or not there.is_dir():
+        return False
+    try:
+        with tempfile.TemporaryFile(dir=there):
+            return True
+    except OSError:
+        return False
