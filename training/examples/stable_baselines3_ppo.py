@@ -1,5 +1,6 @@
 """PPO of Stable-Baselines3 on a team: every robot of every mission is a row, one network drives them all."""
 
+import numpy as np
 from stable_baselines3 import PPO
 from stable_baselines3.common.vec_env import VecMonitor
 
@@ -18,6 +19,6 @@ env = VecMonitor(rows, info_keywords=END_FIGURES)  # logs mission times, and bit
 policy = PPO("MlpPolicy", env, n_steps=64, batch_size=128, n_epochs=2, seed=0, device="cpu")
 policy.learn(total_timesteps=1024)  # a million or more to learn something
 observations = env.reset()
-actions, _ = policy.predict(observations)
+actions, _ = policy.predict(np.asarray(observations))
 observations, rewards, dones, infos = env.step(actions)
-print(observations.shape, rewards.shape, [info["decided"] for info in infos])
+print(np.shape(observations), rewards.shape, [info["decided"] for info in infos])
