@@ -18,7 +18,7 @@ rows = RobotVecEnv(
 env = VecMonitor(rows, info_keywords=END_FIGURES)  # logs mission times, and bits gained per bit sent
 policy = PPO("MlpPolicy", env, n_steps=64, batch_size=128, n_epochs=2, seed=0, device="cpu")
 policy.learn(total_timesteps=1024)  # a million or more to learn something
-observations = env.reset()
-actions, _ = policy.predict(np.asarray(observations))
-observations, rewards, dones, infos = env.step(actions)
-print(np.shape(observations), rewards.shape, [info["decided"] for info in infos])
+observations: np.ndarray = rows.reset()  # (8, F), a row for each robot of each mission
+actions, _ = policy.predict(observations)
+_, rewards, dones, infos = rows.step(actions)
+print(observations.shape, rewards, [info["decided"] for info in infos])
