@@ -21,6 +21,7 @@ from baselines.strategies.gradient import GradientStrategy
 from baselines.strategies.information_rate_v0 import InformationRate, InformationRateConfig
 from baselines.strategies.loading import entry_points, is_reference, make_referenced, module_of
 from baselines.strategies.mutual_information import MutualInformation, MutualInformationConfig
+from baselines.strategies.next_best_view import NextBestView, NextBestViewConfig, Raster, RasterConfig
 from baselines.strategies.planned_rate import PlannedRate
 from baselines.strategies.protocol import Strategy
 from baselines.strategies.random_walk import RandomWalk
@@ -48,6 +49,12 @@ STRATEGIES: MappingProxyType[str, Callable[[], Strategy]] = MappingProxyType(
         "distance-advantage": DistanceAdvantage,
         "receding-horizon": RecedingHorizon,
         "tour": Tour,
+        "next-best-view": NextBestView,
+        "most-unmapped": partial(NextBestView, NextBestViewConfig("most-unmapped")),
+        "least-mapped": partial(NextBestView, NextBestViewConfig("least-mapped")),
+        "random-known": partial(NextBestView, NextBestViewConfig("random")),
+        "raster": Raster,
+        "raster-fixed-yaw": partial(Raster, RasterConfig(turning=False)),
         "nearest-candidate": nearest_candidate,
         "coordinated-candidate": coordinated_candidate,
         "voronoi": VoronoiCoverage,

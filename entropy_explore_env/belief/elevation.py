@@ -97,7 +97,9 @@ def _fill_ground(mean, precision, prior, unit, ground):
             ground[2, i, j] = (known - prior) / unit if measured else 0.0
 
 
-def completed(height_m: np.ndarray, known: np.ndarray, tolerance_m: float = 1e-4) -> np.ndarray:
+def completed(
+    height_m: np.ndarray, known: np.ndarray, tolerance_m: float = 1e-4, begin_m: np.ndarray | None = None
+) -> np.ndarray:
     """Heights with those of unknown columns filled in: each the mean of its neighbours (Sujan, fig. 7).
 
     The paper's Markovian approximation: unknown columns begin at the lowest known height, the worst case
@@ -109,6 +111,8 @@ def completed(height_m: np.ndarray, known: np.ndarray, tolerance_m: float = 1e-4
         height_m: (X, Y), heights; what stands in unknown columns does not matter.
         known: (X, Y) bool, which are fixed.
         tolerance_m: Most by which a height may differ from the limit, about.
+        begin_m: (X, Y) finite heights at which unknown columns begin, such as those completed before: the
+            limit is the same, and nearer. None = the lowest known height.
 
     Returns:
         (X, Y) float64; all zeros where nothing is known.
@@ -126,7 +130,9 @@ def completed(height_m: np.ndarray, known: np.ndarray, tolerance_m: float = 1e-4
         raise SettingError("tolerance_m", tolerance_m, "a finite number > 0")
     if not fixed.any():
         return np.zeros(heights.shape)
-    heights[~fixed] = heights[fixed].min()
+    if begin_m is not None and (begin_m.shape != heights.shape or not np.isfinite(begin_m).all()):
+        raise SettingError("begin_m", begin_m.shape, f"finite numbers {heights.shape}")
+    heights[~fixed] = heights[fixed].min() if begin_m is None else begin_m[~fixed]
     if not fixed.all():
         heights = _relaxed(heights, fixed, float(tolerance_m))
     return heights

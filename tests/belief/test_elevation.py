@@ -77,6 +77,8 @@ def test_unknown_columns_are_completed_as_the_dense_system_says(shape, seed, sha
     found = completed(np.where(known, heights, np.nan), known, 1e-6)
     np.testing.assert_allclose(found, dense(heights, known), atol=2e-5)
     np.testing.assert_array_equal(found[known], heights[known])
+    again = completed(heights, known, 1e-6, rng.normal(0.0, 3.0, shape))
+    np.testing.assert_allclose(again, found, atol=4e-5)
     assert found.min() >= heights[known].min() - 1e-5 and found.max() <= heights[known].max() + 1e-5
 
 
@@ -121,3 +123,5 @@ def test_bad_input_is_named():
         completed(np.full((3, 4), np.nan), np.ones((3, 4), bool))
     with pytest.raises(SettingError, match="tolerance_m"):
         completed(np.zeros((3, 4)), np.ones((3, 4), bool), -1.0)
+    with pytest.raises(SettingError, match="begin_m"):
+        completed(np.zeros((3, 4)), np.eye(3, 4, dtype=bool), 1.0, np.full((3, 4), np.nan))

@@ -25,6 +25,7 @@ import numpy as np
 
 from baselines.strategies.explorers.frontier_cells import KNOWN_SIGMA, FrontierCells
 from baselines.strategies.explorers.path_lengths import KnownPaths
+from baselines.strategies.explorers.stops import apart_m, stop_towards
 from baselines.strategies.frontier.voxel.map import NONE
 from baselines.strategies.knowledge import voxel_of
 from baselines.strategies.protocol import random_viewpoint
@@ -34,8 +35,6 @@ from entropy_explore_env.missions.view import RobotView
 from entropy_explore_env.robots.motion import MoveEnd
 from entropy_explore_env.scenario import Scenario
 
-_WITHIN_REACH = 0.999
-"""Share of the reach that is used, so that rounding never moves a place towards the robot."""
 _STOPPED = (MoveEnd.OBSTACLE, MoveEnd.GROUND, MoveEnd.CEILING, MoveEnd.WALL, MoveEnd.NO_PATH)
 """Ends of a drive to a place that cannot be reached, whatever the belief says."""
 _GAZES = 4
@@ -211,7 +210,7 @@ class Explorer(ABC):
         if memory.viewpoint is not None and (at_once or not self._stands_at(view, memory.viewpoint)):
             return memory.viewpoint.copy()
         goal = self._centre(view, target)
-        place = goal if at_once else self._stop(view, memory, here, goal)
+        place = goal if at_once else stop_towards(view, memory.paths, here, goal)
         return self._look(view, memory, place)
 
     def _look(self, view: RobotView, memory: _Memory, place: np.ndarray) -> np.ndarray:
@@ -223,33 +222,8 @@ class Explorer(ABC):
         memory.viewpoint = viewpoint
         return viewpoint.copy()
 
-    def _stop(self, view: RobotView, memory: _Memory, here: int, goal: np.ndarray) -> np.ndarray:
-        """(3,) the farthest place on the path to a goal (3,) to which one drive leads."""
-        grid, robot = self._scenario.grid, view.kind.robot
-        reach_m = robot.reach_m * _WITHIN_REACH
-        if robot.navigator == "planned":
-            if _apart_m(view, goal) <= reach_m:
-                return goal
-            path = memory.paths.path_to(here, memory.target)
-            places = grid.centre_of(np.stack(np.unravel_index(path, grid.shape), axis=-1))
-            axes = 2 if view.planar else 3
-            apart_m = np.linalg.norm(places[:, :axes] - view.pose[:axes], axis=1)
-            beyond = np.flatnonzero(apart_m > reach_m)
-            last = (int(beyond[0]) if len(beyond) else len(path)) - 1
-            return places[max(last, 0)] if len(path) else goal
-        path = memory.paths.path_to(here, memory.target)
-        if len(path) == 0:
-            return goal
-        start, end = (grid.in_grid_units(np.append(p, (0.0, 0.0)))[:3] for p in (view.pose[:3], goal))
-        if memory.paths.lattice.layer >= 0:
-            end[2] = start[2]
-        corners = memory.paths.corners_of(path, start, end)
-        first = np.asarray(grid.origin_m) + (corners[0] if len(corners) else end) * grid.voxel_size_m
-        apart_m = _apart_m(view, first)
-        return view.pose[:3] + (first - view.pose[:3]) * min(1.0, reach_m / max(apart_m, 1e-9))
-
     def _stands_at(self, view: RobotView, viewpoint: np.ndarray) -> bool:
-        return _apart_m(view, viewpoint) < 0.5 * self._scenario.grid.voxel_size_m
+        return apart_m(view, viewpoint) < 0.5 * self._scenario.grid.voxel_size_m
 
     def _centre(self, view: RobotView, voxel: int) -> np.ndarray:
         """(3,) a voxel's centre in the map frame; of planar robots at their sensor's height."""
@@ -258,9 +232,3 @@ class Explorer(ABC):
         if view.planar:
             place[2] = view.pose[2]
         return place
-
-
-def _apart_m(view: RobotView, place: np.ndarray) -> float:
-    """Straight distance from a robot to a place, map frame."""
-    axes = 2 if view.planar else 3
-    return float(np.linalg.norm(place[:axes] - view.pose[:axes]))

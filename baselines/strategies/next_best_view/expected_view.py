@@ -1,0 +1,192 @@
+"""What a scan from a place is expected to show: known and unknown voxels in view, by their occupancy.
+
+Rays go through the belief like those of a scan, until something believed covered; unknown voxels let them
+through. Each voxel counts once. Places are in grid units.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from entropy_explore_env.belief.elevation import completed
+from entropy_explore_env.belief.fields import Belief, occupancy_probability
+from entropy_explore_env.belief.raycast import OPEN_END, STOP_AT_COVERED, Crossing, Line, cast_ray
+from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel
+from entropy_explore_env.viewpoints.expected_scan import ScanModel
+
+LEVELS = 20
+"""Intervals of occupancy, and of stretched occupancy, whose histograms are taken."""
+_TOLERANCE = 0.01
+"""Of the occupancy of unknown cells, as neighbours say it."""
+
+
+class OccupancyMap(NamedTuple):
+    """A robot's map as occupancies; V voxels."""
+
+    belief: Belief
+    occupancy: np.ndarray
+    """(V,) float32, P(c > ½)."""
+    unknown: np.ndarray
+    """(V,) uint8, 1 = never measured."""
+    interest: np.ndarray
+    """(V,) float32, the interest function (Sujan, eq. 9)."""
+
+
+class View(NamedTuple):
+    """What is expected to be seen from one viewpoint; filled in by `look`."""
+
+    shares: np.ndarray
+    """(2, LEVELS) float64: number of known (row 0) and unknown (row 1) voxels in view by occupancy, each
+    weighed by the interest in it."""
+    counts: np.ndarray
+    """(2,) int64: known and unknown voxels in view."""
+    seen: np.ndarray
+    """(V,) int32, the unknown voxels in view first."""
+
+
+class Scratch(NamedTuple):
+    """Working space of `look`."""
+
+    stamps: np.ndarray
+    """(V,) int32, zeros at first: the latest look that met each voxel."""
+    looks: np.ndarray
+    """(1,) int64, how many looks there were."""
+    crossed: np.ndarray
+    """(L,) int32, see `cast_ray`."""
+    entered: np.ndarray
+    """(L,) int64."""
+
+
+def new_view(voxels: int) -> View:
+    """Room for what is seen in a grid of so many voxels."""
+    return View(np.zeros((2, LEVELS)), np.zeros(2, np.int64), np.zeros(voxels, np.int32))
+
+
+def new_scratch(voxels: int, longest_ray: int) -> Scratch:
+    """Working space for a grid, and rays that cross at most so many of its voxels."""
+    crossed, entered = np.zeros(longest_ray, np.int32), np.zeros(longest_ray, np.int64)
+    return Scratch(np.zeros(voxels, np.int32), np.zeros(1, np.int64), crossed, entered)
+
+
+def occupancy_map(belief: Belief, prior_precision: float, interest: np.ndarray) -> OccupancyMap:
+    """The occupancies of a belief; ½ where nothing is known.
+
+    Args:
+        belief: Of the robot.
+        prior_precision: Precision of a voxel that nobody has measured.
+        interest: (V,) float32, kept as it is.
+    """
+    occupancy, unknown = np.empty(len(belief.mean), np.float32), np.empty(len(belief.mean), np.uint8)
+    _fill_occupancy(belief.mean, belief.precision, np.float32(prior_precision), occupancy, unknown)
+    return OccupancyMap(belief, occupancy, unknown, interest)
+
+
+def extrapolated(known: OccupancyMap, before: np.ndarray | None) -> OccupancyMap:
+    """A plan's map in which unknown cells have the mean occupancy of their neighbours (Sujan, sect. 2.3.2).
+
+    In 3-D they keep ½.
+
+    Args:
+        known: Of `occupancy_map`.
+        before: (V,) float32 occupancies extrapolated for an earlier map, near which these are; None = none.
+    """
+    plan = known.belief.size[:2]
+    if known.belief.size[2] > 1 or known.unknown.all():
+        return known
+    measured = (known.unknown == 0).reshape(plan)
+    begin = None if before is None else before.reshape(plan)
+    filled = completed(known.occupancy.reshape(plan), measured, _TOLERANCE, begin)
+    return known._replace(occupancy=filled.astype(np.float32).reshape(-1))
+
+
+@lean_kernel
+def _fill_occupancy(mean, precision, prior, occupancy, unknown):
+    """Fill in P(c > ½) of each voxel, and whether it was never measured."""
+    for voxel in range(len(mean)):
+        unknown[voxel] = precision[voxel] <= prior
+        if unknown[voxel]:
+            occupancy[voxel] = 0.5
+        else:
+            occupancy[voxel] = occupancy_probability(np.float64(mean[voxel]), np.float64(precision[voxel]))
+
+
+@lean_kernel
+def look(known, scan, viewpoint, stretched, scratch, view):
+    """What a scan from a viewpoint is expected to show.
+
+    Args:
+        known: OccupancyMap.
+        scan: ScanModel, all rays of the sensor.
+        viewpoint: (5,) x, y, z in grid units, yaw, pitch.
+        stretched: Whether occupancies are stretched by distance (Sujan, eq. 7).
+        scratch: Scratch.
+        view: View, filled in.
+    """
+    scratch.looks[0] += 1
+    view.counts[0] = view.counts[1] = 0
+    for level in range(LEVELS):
+        view.shares[0, level] = view.shares[1, level] = 0.0
+    start, belief = (viewpoint[0], viewpoint[1], viewpoint[2]), known.belief
+    for column in range(len(scan.yaws)):
+        yaw = viewpoint[3] + scan.yaws[column]
+        for row in range(len(scan.pitches)):
+            pitch = viewpoint[4] + scan.pitches[row]
+            level = math.cos(pitch)
+            direction = (math.cos(yaw) * level, math.sin(yaw) * level, -math.sin(pitch))
+            end = cast_ray(
+                belief.mean,
+                belief.size,
+                Line(start, direction, scan.max_range_m / scan.voxel_size_m),
+                STOP_AT_COVERED,
+                OPEN_END,
+                max(scan.voxels_behind, 1),
+                Crossing(scratch.crossed, scratch.entered),
+            )
+            for i in range(end.voxels):
+                _count(known, scan, start, stretched, scratch, view, scratch.crossed[i])
+
+
+@inlined_kernel
+def _count(known, scan, start, stretched, scratch, view, voxel):
+    """Count a voxel in view, unless this look has met it before."""
+    if scratch.stamps[voxel] == scratch.looks[0]:
+        return
+    scratch.stamps[voxel] = scratch.looks[0]
+    p, row = np.float64(known.occupancy[voxel]), np.int64(known.unknown[voxel])
+    if stretched:
+        size = known.belief.size
+        x = voxel // (size[1] * size[2]) + 0.5 - start[0]
+        y = voxel // size[2] % size[1] + 0.5 - start[1]
+        z = voxel % size[2] + 0.5 - start[2]
+        p = stretched_occupancy(p, math.sqrt(x * x + y * y + z * z) * scan.voxel_size_m)
+    if row == 1:
+        view.seen[view.counts[1]] = voxel
+    view.counts[row] += 1
+    view.shares[row, min(int(p * LEVELS), LEVELS - 1)] += known.interest[voxel]
+
+
+@inlined_kernel
+def stretched_occupancy(p, distance_m):
+    """p″ of eq. 7, kept within [0, 1]; nearer than a metre counts as a metre."""
+    sure = 1.0 - p if p < 0.5 else p
+    stretched = 0.5 * (1.0 / (sure * max(distance_m, 1.0)) - 1.0)
+    return min(max(stretched if p < 0.5 else 1.0 - stretched, 0.0), 1.0)
+
+
+def voxels_in_view(scan: ScanModel, field_of_view_rad: tuple[float, float], flat: bool, most: int) -> float:
+    """The largest number of voxels that the sensor can see, N of eqs. 6 and 8.
+
+    Args:
+        scan: Of the sensor.
+        field_of_view_rad: Full widths (yaw, pitch).
+        flat: Whether the grid is a plan: then the view is a sector, else a part of a ball.
+        most: Voxels of the grid.
+    """
+    reach, (wide, high) = scan.max_range_m / scan.voxel_size_m, field_of_view_rad
+    if math.isinf(reach):
+        return float(most)
+    inside = 0.5 * wide * reach**2 if flat else wide * 2.0 * math.sin(0.5 * high) * reach**3 / 3.0
+    return float(min(max(inside, 1.0), most))
