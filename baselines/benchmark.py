@@ -9,6 +9,7 @@ row with the reason.
 
 from __future__ import annotations
 
+import dataclasses
 import math
 import os
 import shlex
@@ -17,12 +18,27 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
 
-from baselines.cli.arguments import make_folder, parse, print_json, run_command
+from baselines.cli.arguments import INLINE, make_folder, parse, print_json, run_command
+from baselines.cli.task_options import (
+    TaskOptions,
+    base_task,
+    first_change,
+    is_whole_scenario,
+    parsed_for,
+    words_of,
+)
 from baselines.experiments.cells import run_cells
-from baselines.scoreboard.chosen import chosen_scenarios, chosen_strategies, own_tasks
+from baselines.scoreboard.chosen import (
+    Entry,
+    Mission,
+    chosen_entries,
+    chosen_strategies,
+    entry_mission,
+    own_tasks,
+)
 from baselines.scoreboard.suites import Suite, find_suite
-from entropy_explore_env.command import allow_read_memory
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.scenarios import SCENARIOS
 from entropy_explore_env.validation import check_whole
@@ -38,12 +54,12 @@ class Args:
     suite: str | None = None
     """plans, volumes or teams: worlds and starts that are pinned."""
     scenarios: str | None = None
-    """In place of a suite: names and world files, commas between; default:
-    room,room-furnished,lab,office,cave."""
+    """In place of a suite: names and world files, commas between, each changed by the options of the task;
+    default: room,room-furnished,lab,office,cave, or the scenario that --settings holds as a whole."""
     strategies: str = "all"
     """Names as in baselines.run, commas between; what ratios are relative to is always added."""
     robots: str | None = None
-    """Team sizes of scenarios, commas between; default: 1,2,4."""
+    """Team sizes of scenarios, commas between; default: 1,2,4, or that of the scenario in --settings."""
     seeds: int | None = None
     """Missions of every strategy in every scenario and team size; default: 30."""
     quick: bool = False
@@ -51,10 +67,7 @@ class Args:
     not given."""
     world_scenario: str | None = None
     """Scenario that gives robots and sensors for world files; default: office for plans, else room."""
-    read_memory_mib: float | None = None
-    """MiB of memory that reading a world file may take; default: by the file's size."""
-    time_limit_s: float | None = None
-    """Simulated time after which missions in scenarios are cut off; default: each scenario's own."""
+    task: Annotated[TaskOptions, INLINE] = dataclasses.field(default_factory=TaskOptions)
     wall_limit_s: float = 600.0
     """Time on the clock after which a mission is ended, and counts as failed."""
     stop_after_s: float | None = None
@@ -76,8 +89,7 @@ class Args:
 def main(words: Sequence[str]) -> int:
     """Run the command."""
     args = parse(Args, words, description=__doc__)
-    allow_read_memory(args.read_memory_mib)
-    suite = _suite(args)
+    suite, changes = _suite(args, words)
     from baselines.scoreboard.page import write_page  # matplotlib: after the help
     from baselines.scoreboard.results import Results
     from baselines.scoreboard.terminal import printed_results, show_results
@@ -101,7 +113,7 @@ def main(words: Sequence[str]) -> int:
     if not any(results.of(task, strategy) for task in suite.tasks for strategy in suite.strategies):
         print("nothing to write: no mission was run", file=sys.stderr)
         return 0
-    page = write_page(args.out, results, _command(args, suite))
+    page = write_page(args.out, results, _command(args, suite, changes))
     if args.json:
         print_json({**printed_results(results), "wall_s": round(time.perf_counter() - started, 1)})
     else:
@@ -110,35 +122,63 @@ def main(words: Sequence[str]) -> int:
     return 0
 
 
-def _suite(args: Args) -> Suite:
-    """What the options ask for.
+def _suite(args: Args, words: Sequence[str]) -> tuple[Suite, list[str]]:
+    """What the options ask for, and those of them that change scenarios, as words.
 
     Raises:
         SettingError: An option has a value that is not allowed, or does not go with a suite.
+        WorldError: A world file cannot be used.
     """
     seeds = args.seeds if args.seeds is not None else (5 if args.quick else 30)
     for name, value in (("seeds", seeds), ("jobs", args.jobs)):
         if value is not None:
             check_whole(name, value, 1)
-    for name in ("time_limit_s", "wall_limit_s", "stop_after_s"):
+    for name in ("wall_limit_s", "stop_after_s"):
         limit_s = getattr(args, name)
         if limit_s is not None and not 0.0 < limit_s < math.inf:
             raise SettingError(name, limit_s, "a number > 0")
     if args.suite is not None:
-        pinned = ("scenarios", "robots", "seeds", "world_scenario", "time_limit_s")
-        for name in pinned:
-            if getattr(args, name) is not None:
-                raise SettingError(name, getattr(args, name), "left out together with --suite, which pins it")
-        return find_suite(args.suite, args.quick, chosen_strategies(args.strategies, suite=True))
+        pinned = [(name, getattr(args, name)) for name in ("scenarios", "robots", "seeds", "world_scenario")]
+        changed = first_change(args.task)
+        for name, value in [*pinned, *([] if changed is None else [changed])]:
+            if value is not None:
+                raise SettingError(name, value, "left out together with --suite, which pins it")
+        strategies = chosen_strategies(args.strategies, suite=True)
+        return find_suite(args.suite, args.quick, strategies), []
     if args.world_scenario is not None and args.world_scenario not in SCENARIOS:
         raise SettingError("world_scenario", args.world_scenario, "one of " + ", ".join(SCENARIOS))
-    robots = _team_sizes(args.robots if args.robots is not None else ("1,2" if args.quick else "1,2,4"))
+    strategies = chosen_strategies(args.strategies, suite=False)
+    missions: dict[str, list[Mission]] = {}
+    changes: dict[str, list[str]] = {}
+    for name, entry in _entries(args).items():
+        task = base_task(entry.scenario, args.task.settings)
+        options = parsed_for(task, args, words, __doc__).task
+        changes |= words_of(options, task)
+        missions[name] = [entry_mission(entry, task, options, team) for team in _team_sizes(args)]
+        if (limit_s := missions[name][0].scenario.ending.time_limit_s) == math.inf:
+            raise SettingError("time_limit_s", limit_s, "finite, so that every mission ends")
+    tasks = own_tasks(missions, seeds)
+    return Suite("own", tasks, strategies), [word for option in changes.values() for word in option]
+
+
+def _entries(args: Args) -> dict[str, Entry]:
+    """The scenarios that are asked for."""
+    settings = args.task.settings
+    if is_whole_scenario(settings):
+        if args.scenarios is not None:
+            allowed = "left out: --settings holds a scenario of its own"
+            raise SettingError("scenarios", args.scenarios, allowed)
+        scenario = base_task("room", settings).scenario
+        return {scenario.name: Entry(scenario)}
     wanted = args.scenarios if args.scenarios is not None else ("room,office" if args.quick else _SCENARIOS)
-    scenarios = chosen_scenarios(wanted, args.world_scenario, args.time_limit_s)
-    return Suite("own", own_tasks(scenarios, robots, seeds), chosen_strategies(args.strategies, suite=False))
+    return chosen_entries(wanted, args.world_scenario)
 
 
-def _team_sizes(words: str) -> tuple[int, ...]:
+def _team_sizes(args: Args) -> tuple[int, ...]:
+    """The team sizes that are asked for."""
+    if args.robots is None and is_whole_scenario(args.task.settings):
+        return (base_task("room", args.task.settings).scenario.robots,)
+    words = args.robots if args.robots is not None else ("1,2" if args.quick else "1,2,4")
     sizes = tuple(int(word) for word in words.split(",") if word.isascii() and word.isdigit())
     distinct = len(set(sizes)) == len(sizes) == len(words.split(","))
     if not distinct or not all(1 <= size <= _MOST_ROBOTS for size in sizes):
@@ -148,24 +188,25 @@ def _team_sizes(words: str) -> tuple[int, ...]:
     return sizes
 
 
-def _command(args: Args, suite: Suite) -> str:
+def _command(args: Args, suite: Suite, changes: Sequence[str]) -> str:
     """What makes the same page again, wherever the world files lie."""
     given: dict[str, str | None] = {"strategies": args.strategies}
     if args.suite is not None:
         given = {"suite": args.suite, **given}
     else:
         scenarios = args.scenarios or ",".join(dict.fromkeys(task.scenario.name for task in suite.tasks))
+        alone = is_whole_scenario(args.task.settings)
         given |= {
-            "scenarios": ",".join(Path(word).name for word in scenarios.split(",")),
+            "scenarios": None if alone else ",".join(Path(word).name for word in scenarios.split(",")),
             "robots": ",".join(map(str, dict.fromkeys(task.scenario.robots for task in suite.tasks))),
             "seeds": str(suite.tasks[0].missions),
             "world-scenario": args.world_scenario,
-            "time-limit-s": None if args.time_limit_s is None else f"{args.time_limit_s:g}",
         }
     options = [f"--{name} {shlex.quote(value)}" for name, value in given.items() if value is not None]
+    changed = [shlex.join(changes)] if changes else []
     flags = ["--quick"] if args.quick and args.suite is not None else []
     flags += ["--confirm"] if args.confirm else []
-    return " ".join(["python -m baselines.benchmark", *options, *flags])
+    return " ".join(["python -m baselines.benchmark", *options, *changed, *flags])
 
 
 if __name__ == "__main__":

@@ -1,32 +1,56 @@
 """Explore every world file of a folder: `python -m baselines.world_sweep FOLDER [--strategy NAME]`.
 
-Plans are explored by ground robots (the settings of `office`), other worlds by flying ones (those of `room`).
-A mission ends when the map is known or its time is up; the table says which, and how far it came.
+Plans are explored by ground robots (the settings of `office`), other worlds by flying ones (those of `room`),
+all changed by the options of the task. A mission ends when the map is known or its time is up, by default
+after 600 s; the table says which, and how far it came.
 """
 
 from __future__ import annotations
 
+import dataclasses
+import shlex
 import sys
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, NamedTuple
 
-from baselines.cli.arguments import Positional, given_options, parse, print_json, run_command
-from baselines.cli.world_options import Reading, world_settings
-from baselines.experiments.mission import run_mission, scripted
+from baselines.cli.arguments import INLINE, Positional, given_options, print_json, run_command
+from baselines.cli.task_options import (
+    BaseTask,
+    TaskOptions,
+    base_task,
+    first_parsed,
+    limit_s,
+    parsed_for,
+    tasked,
+    words_of,
+)
+from baselines.cli.world_options import Reading
+from baselines.experiments.mission import run_mission, scripted_env
 from baselines.experiments.tables import markdown_table
 from baselines.strategies import make_strategy, resolved
-from entropy_explore_env.command import allow_read_memory
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.errors import SettingError, WorldError
 from entropy_explore_env.reports.metrics import mission_figures
-from entropy_explore_env.scenarios import find_scenario
 from entropy_explore_env.writing import write_atomically
 
 _IMAGES = (".png", ".pgm")
 _PLANS = (".yaml", ".yml", *_IMAGES)
+_MESHES = (".obj", ".stl", ".glb", ".ply")
+_HEIGHTS = (".tif", ".tiff", ".npz")
+_OF_SOME = {
+    "height_m": _PLANS,
+    "resolution_m": _IMAGES,
+    "negate": _IMAGES,
+    "elevation_step_m": _IMAGES,
+    "clearance_m": (*_HEIGHTS, *_MESHES),
+    "ceiling_m": _HEIGHTS,
+    "hollow": _MESHES,
+}
+"""Option of reading → the files that it is for; a YAML says itself how its image is read."""
+_OWN = {"ending": {"time_limit_s": 600.0}}
 _SUFFIXES = tuple(".bt .ot .yaml .yml .png .pgm .pcd .ply .obj .stl .glb .npz .tif .tiff".split())
 
 
@@ -35,53 +59,99 @@ class Args:
     """Explore every world file of a folder."""
 
     folder: Positional[Path] = Path("worlds")
-    """Where the files lie; folders in it are looked into, too."""
+    """Where the files lie; folders in it are looked into, too. With --world those files in its place."""
     strategy: str = "gradient"
     """How robots choose viewpoints; as in baselines.run."""
     robots: int = 2
     """Team size."""
     seed: int = 0
     """Of every mission."""
-    plan_voxel_size_m: float = 0.1
-    """Edge of the voxels of plans, one voxel high."""
-    voxel_size_m: float = 0.25
-    """Edge of the voxels of all other worlds."""
-    resolution_m: float | None = None
-    """Edge of a pixel of the images that have no YAML; default: 0.05."""
-    negate: bool = False
-    """In the images that have no YAML bright is solid."""
-    read_memory_mib: float | None = None
-    """MiB of memory that reading a world file may take; default: by the file's size."""
-    time_limit_s: float = 600.0
-    """Simulated time after which a mission is cut off."""
+    plan_voxel_size_m: float | None = None
+    """Edge of the voxels of plans; --voxel-size-m is that of all other worlds. Default: the scenario's."""
+    task: Annotated[TaskOptions, INLINE] = dataclasses.field(default_factory=TaskOptions)
     out: Path | None = None
     """A Markdown file for the table."""
     json: bool = False
     """Print one JSON object and nothing else."""
 
 
+class Sweep(NamedTuple):
+    """How a kind of worlds is explored."""
+
+    task: BaseTask
+    """What the options change."""
+    options: TaskOptions
+    args: Args
+
+
 def main(words: Sequence[str]) -> int:
     """Run the command."""
-    args = parse(Args, words, description=__doc__)
-    allow_read_memory(args.read_memory_mib)
-    files = world_files(args.folder)
+    args = first_parsed(Args, words, __doc__)
+    plans, others = (sweep_of(name, args, words) for name in ("office", "room"))
+    files = [Path(file) for file in args.task.world] or world_files(args.folder)
+    names = _distinct([path.as_posix() for path in files])
     make_strategy(args.strategy)
     rows = []
     for number, path in enumerate(files):
         if not args.json:
-            print(f"{number + 1} of {len(files)}: {path.name}", file=sys.stderr, flush=True)
-        rows.append(explore(path, args))
+            print(f"{number + 1} of {len(files)}: {names[number]}", file=sys.stderr, flush=True)
+        rows.append({**explore(path, plans if is_plan(path) else others), "world": names[number]})
     if args.out is not None:
-        options = given_options(args, leave_out=("folder", "out", "json"))
-        command = " ".join(["python -m baselines.world_sweep", args.folder.name, *options])
-        about = f"Made by `{command}`: strategy {resolved(args.strategy)}, {args.robots} robots, "
-        about += f"seed {args.seed}; missions are cut off after {args.time_limit_s:g} s."
+        about = (
+            f"Made by `{_command(plans, others)}`: strategy {resolved(args.strategy)}, {args.robots} robots, "
+        )
+        limits = dict.fromkeys(f"{limit_s(one.options):g} s" for one in (plans, others))
+        about += f"seed {args.seed}; missions are cut off after {' and '.join(limits)}."
         write_atomically(args.out, f"# Worlds explored\n\n{about}\n\n{table(rows)}\n")
     if args.json:
         print_json({"worlds": rows})
     else:
         print(table(rows), end="")
     return 0
+
+
+def sweep_of(scenario: str, args: Args, words: Sequence[str]) -> Sweep:
+    """How worlds are explored by the robots of a scenario.
+
+    Raises:
+        SettingError: An option is not allowed, whatever the world.
+    """
+    task = base_task(scenario, args.task.settings, _OWN)
+    args = parsed_for(task, args, words, __doc__)
+    nowhere = {
+        "world": (),
+        "voxel_size_m": None,
+        "world_file": Reading(),
+        "starts": None,
+        "world_number": None,
+    }
+    tasked(task.scenario, dataclasses.replace(args.task, **nowhere), args.robots)
+    if args.plan_voxel_size_m is not None and scenario == "office":
+        args = dataclasses.replace(
+            args, task=dataclasses.replace(args.task, voxel_size_m=args.plan_voxel_size_m)
+        )
+    return Sweep(task, args.task, args)
+
+
+def _command(*sweeps: Sweep) -> str:
+    """What makes the same table again, wherever the world files lie."""
+    args = sweeps[0].args
+    words = given_options(args, leave_out=("folder", "task", "out", "json"))
+    changes: dict[str, list[str]] = {}
+    for sweep in reversed(sweeps):  # the voxels of plans have an option of their own
+        more = words_of(sweep.options, sweep.task)
+        if sweep is sweeps[0] and args.plan_voxel_size_m is not None:
+            more.pop("voxel_size_m", None)
+        changes = more | changes
+    words += [shlex.quote(word) for option in changes.values() for word in option]
+    folder = [] if args.task.world else [args.folder.name]
+    return " ".join(["python -m baselines.world_sweep", *folder, *words])
+
+
+def _distinct(paths: Sequence[str]) -> list[str]:
+    """The files' names, with their folders where two have the same one."""
+    names = [Path(path).name for path in paths]
+    return [name if names.count(name) == 1 else path for name, path in zip(names, paths, strict=True)]
 
 
 def world_files(folder: Path) -> list[Path]:
@@ -103,37 +173,34 @@ def is_plan(path: Path) -> bool:
     return path.suffix.lower() in _PLANS
 
 
-def env_for(path: Path, args: Args) -> EntropyExploreEnv:
-    """Ground robots for plans, flying ones for everything else.
+def env_for(path: Path, sweep: Sweep) -> EntropyExploreEnv:
+    """The environment of a mission in a file.
 
     Raises:
+        SettingError: An option does not go with the file.
         WorldError: The file cannot be used.
     """
-    plan = is_plan(path)
-    scenario = scripted(find_scenario("office" if plan else "room"))
-    edge_m = args.plan_voxel_size_m if plan else args.voxel_size_m
-    reading = Reading(resolution_m=args.resolution_m, negate=args.negate)
-    world = world_settings((str(path),), edge_m, reading if path.suffix.lower() in _IMAGES else Reading())
-    return EntropyExploreEnv(
-        scenario, robots=args.robots, track_truth=True, time_limit_s=args.time_limit_s, **world
-    )
+    suffix, asked = path.suffix.lower(), sweep.options.world_file
+    foreign = {name: None for name, suffixes in _OF_SOME.items() if suffix not in suffixes}
+    reading = dataclasses.replace(asked, **{name: None for name in foreign})  # type: ignore[arg-type]
+    options = dataclasses.replace(sweep.options, world=(str(path),), world_file=reading)
+    return scripted_env(*tasked(sweep.task.scenario, options, sweep.args.robots), track_truth=True)
 
 
-def explore(path: Path, args: Args) -> dict[str, Any]:
+def explore(path: Path, sweep: Sweep) -> dict[str, Any]:
     """One mission in one world: what a row of the table says; `refused` where there is no mission."""
     try:
-        env = env_for(path, args)
+        env = env_for(path, sweep)
         started = time.perf_counter()
-        run_mission(env, make_strategy(args.strategy), args.seed)
-    except WorldError as error:
-        return {"world": path.name, "refused": str(error)}
+        run_mission(env, make_strategy(sweep.args.strategy), sweep.args.seed)
+    except (SettingError, WorldError) as error:
+        return {"refused": str(error)}
     figures = mission_figures(env.missions, 0)
     joint = {str(_JOINT.get(name, name)): value for name, value in figures.pop("joint").items()}
     shape = env.scenario.grid.shape
     return {
         **{name: value for name, value in figures.items() if name != "per_robot"},
         **joint,
-        "world": path.name,
         "voxels": " × ".join(map(str, shape if shape[2] > 1 else shape[:2])),
         "voxel_size_m": env.scenario.grid.voxel_size_m,
         "wall_s": round(time.perf_counter() - started, 2),

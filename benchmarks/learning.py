@@ -63,13 +63,12 @@ class Loop:
         try:
             import torch
 
-            from baselines.cli.arguments import parse
-            from training.ppo import Args, set_up, training_scenario
+            from training.ppo import parsed, set_up, training_task
         except ModuleNotFoundError as error:
             raise MissingExtraError(error.name or "torch", "training") from None
         self._torch, self._threads = torch, threads
-        args = parse(Args, ["--threads", str(threads), "--out", str(folder / f"run-{threads}"), *words])
-        self._state = set_up(args, training_scenario(args))
+        args = parsed(["--threads", str(threads), "--out", str(folder / f"run-{threads}"), *words])
+        self._state = set_up(args, training_task(args))
         self._steps = args.rollout_steps * self._state.envs.num_envs
         self._spent = {"environment": 0.0, "choosing": 0.0, "learning": 0.0}
         model: Any = self._state.model

@@ -7,23 +7,33 @@ prints how long their missions take. `--strategy runs/room-3` takes the best pol
 
 from __future__ import annotations
 
+import dataclasses
 import os
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
-from baselines.cli.arguments import make_folder, parse, print_json, run_command
+from baselines.cli.arguments import INLINE, make_folder, print_json, run_command
+from baselines.cli.task_options import (
+    TaskOptions,
+    base_task,
+    first_parsed,
+    is_whole_scenario,
+    parsed_for,
+    tasked,
+)
 from baselines.experiments.cells import Cell, run_cells
+from baselines.experiments.mission import Surroundings
 from baselines.experiments.outcome import Record
 from baselines.experiments.statistics import median_interval, median_ratio_interval
 from baselines.strategies import make_strategy, resolved
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.scenario import Scenario, with_settings
-from entropy_explore_env.scenarios import find_scenario
+from entropy_explore_env.scenarios import SCENARIOS, find_scenario
 from entropy_explore_env.validation import check_whole
 from training import extra  # noqa: F401 - before what is not there without it
 from training.checkpoints import PolicySettings, latest_checkpoint, load_checkpoint
@@ -44,9 +54,10 @@ class Args:
     against: str = "gradient,random,information-rate-v0"
     """Strategies to compare with, as in baselines.run, separated by commas."""
     scenario: str | None = None
-    """Named scenario; default: that of training."""
+    """Named scenario; default: that of training, with its robots, sensors and channel."""
     robots: int | None = None
     """Robots in a team; default: as in training."""
+    task: Annotated[TaskOptions, INLINE] = dataclasses.field(default_factory=TaskOptions)
     seeds: int = 100
     """Missions of each strategy, with the seeds 0, 1, …"""
     jobs: int | None = None
@@ -59,7 +70,7 @@ class Args:
 
 def main(words: Sequence[str]) -> int:
     """Run the command."""
-    args = parse(Args, words, description=__doc__)
+    args = first_parsed(Args, words, __doc__)
     if (args.pretrained is None) == (args.strategy is None):
         raise SettingError("strategy", args.strategy, "given, or else --pretrained, not both")
     for name, value in (("seeds", args.seeds), ("jobs", 1 if args.jobs is None else args.jobs)):
@@ -67,14 +78,23 @@ def main(words: Sequence[str]) -> int:
     policy = args.strategy if args.pretrained is None else PREFIX + args.pretrained
     assert policy is not None
     trained = load_checkpoint(latest_checkpoint(policy_folder(policy), *POLICIES)).settings
-    scenario = evaluation_scenario(trained, args.scenario, args.robots)
+    base = base_task(evaluation_scenario(trained, args.scenario, args.robots), args.task.settings)
+    if args.scenario is not None and is_whole_scenario(args.task.settings):
+        raise SettingError("scenario", args.scenario, "left out: --settings holds a scenario of its own")
+    base = base._replace(scenario=with_settings(base.scenario, {"split": "test"}))
+    args = parsed_for(base, args, words, __doc__)
+    elsewhere = args.scenario or args.task.settings or args.task.world
+    made = {scenario.world for scenario in SCENARIOS.values()}  # the recipes
+    if trained.scenario.world not in made and not elsewhere:
+        raise SettingError("world", "left out", "world files to test in, as the policy learned in files")
+    scenario, surroundings = tasked(base.scenario, args.task, args.robots)
     rivals = list(dict.fromkeys(map(resolved, args.against.split(","))))
     for name in (policy, *rivals):
         make_strategy(name).reset(scenario, np.random.default_rng(0))
     make_folder("runs", args.runs)
     began = time.perf_counter()
     jobs = args.jobs or os.cpu_count() or 1
-    compared = compare(policy, rivals, scenario, args.seeds, args.runs, jobs, args.json)
+    compared = compare(policy, rivals, scenario, args.seeds, args.runs, jobs, args.json, surroundings)
     if args.json:
         print_json({**compared, "wall_s": round(time.perf_counter() - began, 1)})
     else:
@@ -85,20 +105,31 @@ def main(words: Sequence[str]) -> int:
 def evaluation_scenario(
     trained: PolicySettings, name: str | None = None, robots: int | None = None
 ) -> Scenario:
-    """The scenario of a test: as its name says, with test worlds and the channel of training.
+    """The scenario of a test: as its name says, with test worlds, and of training the robots and the channel.
 
     Args:
         trained: The policy's settings.
         name: Of the scenario; None = that of training.
         robots: Team size; None = that of training.
     """
-    scenario = find_scenario(trained.scenario.name if name is None else name)
-    size = trained.scenario.robots if robots is None else robots
-    return with_settings(scenario, {"robots": size, "split": "test", "channel": trained.scenario.channel})
+    learned = trained.scenario
+    size = learned.robots if robots is None else robots
+    changes = {"robots": size, "split": "test", "channel": learned.channel}
+    if name is not None:
+        return with_settings(find_scenario(name), changes)
+    changes |= {each: getattr(learned, each) for each in ("robot", "sensor", "extra_kinds", "start_radius_m")}
+    return with_settings(SCENARIOS.get(learned.name, learned), changes)
 
 
 def compare(
-    policy: str, rivals: Sequence[str], scenario: Scenario, seeds: int, runs: Path, jobs: int, quiet: bool
+    policy: str,
+    rivals: Sequence[str],
+    scenario: Scenario,
+    seeds: int,
+    runs: Path,
+    jobs: int,
+    quiet: bool,
+    surroundings: Surroundings | None = None,
 ) -> dict[str, Any]:
     """Run a policy and its rivals on the seeds 0, 1, … and compare their mission times.
 
@@ -110,6 +141,7 @@ def compare(
         runs: Folder where missions are kept.
         jobs: Processes.
         quiet: Whether to show no progress.
+        surroundings: World files and starts of the missions; None = those that the scenario says.
 
     Returns:
         `scenario`, `robots`, `seeds`, and `rows`: of each strategy its name, `median_s` with its 95 %
@@ -120,7 +152,10 @@ def compare(
         on which the policy was faster than all of SIMPLE among the rivals.
     """
     folder = f"{scenario.name}/robots-{scenario.robots}"
-    cells = [Cell(f"{folder}/{name}", scenario, name, seeds) for name in (policy, *rivals)]
+    around = None if surroundings == Surroundings() else surroundings
+    cells = [
+        Cell(f"{folder}/{name}", scenario, name, seeds, surroundings=around) for name in (policy, *rivals)
+    ]
     records = run_cells(cells, runs, jobs, "evaluation", quiet=quiet)
     missions = {name: records[cell.id] for name, cell in zip((policy, *rivals), cells, strict=True)}
     times = {name: np.array([record["t_mission_s"] for record in own]) for name, own in missions.items()}

@@ -5,7 +5,10 @@
 The folder gets `curve.csv` (a row for each validation), TensorBoard's files (`tensorboard --logdir runs`),
 the checkpoints `step-N` (the latest, for `--resume`) and `best-N` (the best in validation), and a mission of
 the best policy as a picture and an animation. `python -m training.evaluate --strategy runs/room-3` compares
-the policy with the strategies.
+the policy with the strategies. Plans of one's own are learned in and tested in as lists of files:
+
+    python -m training.ppo --scenario office --world train/*.png --validation-world val/*.png --out runs/mine
+    python -m training.evaluate --strategy runs/mine --world test/*.png
 
 Steps are counted per robot: a step of all missions is missions × robots of them. A robot that drives cannot
 choose; `training/advantages.py` says what is learned of its steps.
@@ -20,7 +23,7 @@ from collections.abc import Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal, NamedTuple
+from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
 import torch
@@ -28,13 +31,21 @@ from stable_baselines3 import PPO
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import Logger, TensorBoardOutputFormat
 
-from baselines.cli.arguments import WholeNumber, make_folder, parse, print_json, run_command
+from baselines.cli.arguments import INLINE, WholeNumber, make_folder, print_json, run_command
+from baselines.cli.task_options import (
+    TaskOptions,
+    absolute_files,
+    base_task,
+    first_parsed,
+    is_whole_scenario,
+    parsed_for,
+    settled,
+    tasked,
+)
 from entropy_explore_env.command import INTERRUPTED
 from entropy_explore_env.envs.robot_vec_env import RobotVecEnv
 from entropy_explore_env.errors import SettingError
-from entropy_explore_env.scenario import Scenario, with_settings
-from entropy_explore_env.scenarios import find_scenario
-from entropy_explore_env.settings import Channel
+from entropy_explore_env.scenario import with_settings
 from entropy_explore_env.validation import check_whole
 from entropy_explore_env.writing import write_atomically
 from training import extra  # noqa: F401 - before what is not there without it
@@ -60,11 +71,14 @@ from training.resuming import (
 from training.run_folder import options_json, resume_command, resumed_options, save_options
 from training.seeds import learning_seeds
 from training.terminal import TrainingBar
+from training.training_task import TrainingTask, validation_task
 from training.validation import Validator
 
 _MODULE = "training.ppo"
 _CHANGEABLE = frozenset(("video", "threads", "json", "total_steps", "validate_every", "checkpoint_every"))
 """Options that may differ where a run is continued."""
+OWN = {"ending": {"time_limit_s": 2000.0}}
+"""What training changes of named scenarios: longer missions would teach little and take all the time."""
 _STOPPED = "a checkpoint is written when this rollout and its update are done"
 _RETURNS_MEMORY = 2e5
 """Decisions, about, whose returns normalise: the latest ones, since returns grow as the policy learns."""
@@ -97,11 +111,9 @@ class Args:
     """individual: bits that the robot's own scans take from its map; team: bits that the team's maps lose."""
     cost_per_s: float | None = None
     """Cost of a second, as a share of all bits that the mission has to gain; default: the scenario's."""
-    decision_period_s: float | None = None
-    """Seconds between decisions; by default a robot decides as soon as it can."""
-    time_limit_s: float = 2000.0
-    """Simulated seconds after which a mission is cut off, in training and in validation."""
-    channel: Channel = dataclasses.field(default_factory=Channel)
+    task: Annotated[TaskOptions, INLINE] = dataclasses.field(default_factory=TaskOptions)
+    validation_world: tuple[str, ...] = ()
+    """World files of validation, read as those of --world; default: the same as those learned in."""
 
     features: Literal["gazes", "vector", "maps"] = "gazes"
     """vector: an MLP; gazes: also a small network for gazes, over the panorama; maps: also convolutions."""
@@ -150,14 +162,15 @@ class Args:
 
 def main(words: Sequence[str]) -> int:
     """Run the command."""
-    args, changed = parse(Args, words, description=__doc__), {}
+    args, changed = parsed(words), {}
     if args.resume is not None:
-        args, changed = resumed_options(Args, args.resume, words, _CHANGEABLE, __doc__)
-    out = args.out = args.out or Path("runs") / f"{args.scenario}-{args.robots}"
+        args, changed = resumed_options(Args, args.resume, words, _CHANGEABLE, __doc__, settled_arguments)
+    named = base_task(args.scenario, args.task.settings, OWN).scenario
+    out = args.out = args.out or Path("runs") / f"{named.name}-{args.robots}"
     if args.cost_per_s is None:
-        args.cost_per_s = find_scenario(args.scenario).reward.cost_per_s
+        args.cost_per_s = named.reward.cost_per_s
     check(args)
-    scenario = training_scenario(args)
+    task = training_task(args)
     checkpoint = None
     if args.resume is None:
         check_unused(out)
@@ -165,7 +178,7 @@ def main(words: Sequence[str]) -> int:
     else:
         checkpoint = checkpoint_to_resume(out)
     torch.set_num_threads(args.threads)
-    state = set_up(args, scenario)
+    state = set_up(args, task)
     if args.resume is None:
         save_options(out, args, _MODULE, words)
     state.options, state.command = options_json(args), shlex.join(["python", "-m", _MODULE, *words])
@@ -181,7 +194,8 @@ def main(words: Sequence[str]) -> int:
         train(args, state, bar, interruption)
     if not finished(args, state):
         return say_stopped(out, state.model.num_timesteps, args.json)
-    files = draw_best_mission(out, scenario) if args.video else [out]
+    validated = validation_task(args.task, args.validation_world, state.settings.scenario, task)
+    files = draw_best_mission(out, *validated) if args.video else [out]
     summary, best = state.summary(), state.progress.best
     if args.json:
         print_json(summary | {"best": best, "files": [str(file) for file in files]})
@@ -229,16 +243,43 @@ def check(args: Args) -> None:
         raise SettingError("patch", args.patch, "used with --features maps, whose networks read it")
 
 
-def training_scenario(args: Args) -> Scenario:
-    """The scenario that the policy learns in."""
-    return with_settings(
-        find_scenario(args.scenario),
+def parsed(words: Sequence[str]) -> Args:
+    """The arguments of a command line; what is not given is the scenario's own.
+
+    Raises:
+        UsageError: The words do not fit.
+        SettingError: There is no such scenario.
+    """
+    first = first_parsed(Args, words, __doc__)
+    task = base_task(first.scenario, first.task.settings, OWN)
+    robots = {"robots": task.scenario.robots} if is_whole_scenario(first.task.settings) else {}
+    args = parsed_for(task, first, words, __doc__, **robots)
+    return settled_arguments(args)
+
+
+def settled_arguments(args: Args) -> Args:
+    """The same arguments wherever the run is continued.
+
+    Raises:
+        SettingError: A file of JSON does not hold what it should.
+    """
+    files = absolute_files(args.validation_world)
+    return dataclasses.replace(args, task=settled(args.task), validation_world=files)
+
+
+def training_task(args: Args) -> TrainingTask:
+    """What the policy learns in.
+
+    Raises:
+        SettingError: An option is not allowed.
+        WorldError: A world file cannot be used.
+    """
+    named = base_task(args.scenario, args.task.settings, OWN).scenario
+    scenario, surroundings = tasked(named, args.task, args.robots)
+    scenario = with_settings(
+        scenario,
         {
             "robots": args.robots,
-            "split": "train",
-            "channel": args.channel,
-            "decision_period_s": args.decision_period_s,
-            "time_limit_s": args.time_limit_s,
             "reward": {
                 "kind": args.reward,
                 **({} if args.cost_per_s is None else {"cost_per_s": args.cost_per_s}),
@@ -255,12 +296,14 @@ def training_scenario(args: Args) -> Scenario:
             },
         },
     )
+    return TrainingTask(scenario, surroundings)
 
 
-def set_up(args: Args, scenario: Scenario) -> TrainingState:
+def set_up(args: Args, task: TrainingTask) -> TrainingState:
     """Missions to learn from, and PPO with fresh weights."""
-    seeds = learning_seeds(args.seed, args.missions)
-    envs = RobotVecEnv(scenario, args.missions, threads=args.threads, seeds=seeds)
+    seeds, around = learning_seeds(args.seed, args.missions), task.surroundings.settings()
+    envs = RobotVecEnv(task.scenario, args.missions, threads=args.threads, seeds=seeds, **around)
+    scenario = envs.scenario
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", message="You have specified a mini-batch")  # ours are of even size
         model = DecisionPPO(
@@ -305,8 +348,8 @@ def train(args: Args, state: TrainingState, bar: TrainingBar, interruption: Inte
     model.set_logger(Logger(None, [TensorBoardOutputFormat(str(out))]))
     callback = model.start(args.total_steps, MissionFigures(args.robots))
     bar.show_steps(model.num_timesteps)
-    scenario = state.settings.scenario
-    with closing(envs), closing(Validator(scenario, args.validation_missions, args.threads)) as validator:
+    task = validation_task(args.task, args.validation_world, state.settings.scenario, training_task(args))
+    with closing(envs), closing(Validator(*task, args.validation_missions, args.threads)) as validator:
         while True:
             steps = model.num_timesteps
             last = steps >= args.total_steps

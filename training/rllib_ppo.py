@@ -18,15 +18,23 @@ import shutil
 import sys
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
-from baselines.cli.arguments import WholeNumber, make_folder, parse, run_command
+from baselines.cli.arguments import INLINE, WholeNumber, make_folder, run_command
+from baselines.cli.task_options import (
+    TaskOptions,
+    base_task,
+    first_parsed,
+    is_whole_scenario,
+    parsed_for,
+    settled,
+    tasked,
+)
 from entropy_explore_env.command import INTERRUPTED
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.scenario import with_settings
-from entropy_explore_env.scenarios import find_scenario
 from entropy_explore_env.validation import check_whole
 from training.errors import NotFiniteError
 from training.interruption import Interruption
@@ -66,6 +74,7 @@ class Args:
     """Processes that collect experience; 0: the trainer itself does."""
     missions: int = 8
     """Missions in each runner."""
+    task: Annotated[TaskOptions, INLINE] = field(default_factory=TaskOptions)
     cost_per_s: float | None = None
     """Cost of a second, as a share of all bits that the mission has to gain; default: the scenario's."""
     hidden: list[int] = field(default_factory=lambda: [128, 128])
@@ -92,14 +101,15 @@ class Args:
 
 def main(words: Sequence[str]) -> int:
     """Run the command."""
-    args = parse(Args, words, description=__doc__)
+    args = parsed(words)
     if (resume := args.resume) is not None:
-        args, changed = resumed_options(Args, resume, words, _CHANGEABLE, __doc__)
+        args, changed = resumed_options(Args, resume, words, _CHANGEABLE, __doc__, settled_arguments)
         said = "".join(f"; {name} was {value}" for name, value in changed.items())
         print(f"{resume}: {_where(resume)}{said}", file=sys.stderr)
-    args.out = args.out or Path("runs") / f"rllib-{args.scenario}-{args.robots}"
+    named = base_task(args.scenario, args.task.settings).scenario
+    args.out = args.out or Path("runs") / f"rllib-{named.name}-{args.robots}"
     if args.cost_per_s is None:
-        args.cost_per_s = find_scenario(args.scenario).reward.cost_per_s
+        args.cost_per_s = named.reward.cost_per_s
     check(args)
     env_settings = environment_settings(args)
     if args.resume is None:
@@ -141,22 +151,43 @@ def check(args: Args) -> None:
     check_address(args.address)
 
 
+def parsed(words: Sequence[str]) -> Args:
+    """The arguments of a command line; what is not given is the scenario's own.
+
+    Raises:
+        UsageError: The words do not fit.
+        SettingError: There is no such scenario.
+    """
+    first = first_parsed(Args, words, __doc__)
+    task = base_task(first.scenario, first.task.settings)
+    robots = {"robots": task.scenario.robots} if is_whole_scenario(first.task.settings) else {}
+    return settled_arguments(parsed_for(task, first, words, __doc__, **robots))
+
+
+def settled_arguments(args: Args) -> Args:
+    """The same arguments wherever the run is continued.
+
+    Raises:
+        SettingError: A file of JSON does not hold what it should.
+    """
+    return replace(args, task=settled(args.task))
+
+
 def environment_settings(args: Args) -> dict[str, Any]:
     """The settings of the environment to learn in, RLlib's `env_config`.
 
     Raises:
         SettingError: There is no such scenario, or it does not allow the settings.
+        WorldError: A world file cannot be used.
     """
+    named = base_task(args.scenario, args.task.settings).scenario
+    scenario, surroundings = tasked(named, args.task, args.robots)
     settings: dict[str, Any] = {
-        "robots": args.robots,
-        "split": "train",
-        "decision_period_s": None,
         "action": {"kind": "discrete", "moves": "axes"},
         "observation": {"flat": True, "panorama_utility": "log2"},  # what a small network learns best from
         "reward": {} if args.cost_per_s is None else {"cost_per_s": args.cost_per_s},
     }
-    with_settings(find_scenario(args.scenario), settings)  # checks them
-    return {"scenario": args.scenario, **settings}
+    return {"scenario": with_settings(scenario, settings), **surroundings.settings()}
 
 
 def train(args: Args, env_settings: dict[str, Any], interruption: Interruption) -> bool:

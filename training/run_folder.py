@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import dataclasses
+import hashlib
 import json
 import shlex
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Protocol, TypeVar
 
@@ -18,6 +19,8 @@ from training.errors import CheckpointError
 FILE = "run.json"
 OF_THE_CALL = frozenset(("out", "resume"))
 """Options that say where a run is, and that are no settings of it."""
+_INLINE = frozenset(("task", "world_file"))
+"""Options in options whose own name is not typed."""
 
 
 class RunOptions(Protocol):
@@ -41,16 +44,40 @@ def options_json(args: Any) -> dict[str, Any]:  # noqa: ANN401 - a dataclass of 
 
 
 def save_options(folder: Path, args: RunOptions, module: str, words: Sequence[str]) -> None:
-    """Note in a run's folder what it is started with.
+    """Note in a run's folder what it is started with, and what its world files hold.
 
     Raises:
         SettingError: The folder cannot be written.
     """
-    started = {"command": shlex.join(["python", "-m", module, *words]), "args": options_json(args)}
+    started = {
+        "command": shlex.join(["python", "-m", module, *words]),
+        "args": options_json(args),
+        "files": {str(file): _digest(file) for file in _files_of(args)},
+    }
     try:
         write_atomically(folder / FILE, json.dumps(started, indent=1, allow_nan=False) + "\n")
     except OSError as error:
         raise SettingError("out", str(folder), f"a folder that can be written ({error.strerror})") from None
+
+
+def _files_of(args: RunOptions) -> list[Path]:
+    """The world files that options name."""
+    task = getattr(args, "task", None)
+    named = (*(task.world if task is not None else ()), *getattr(args, "validation_world", ()))
+    return [Path(file) for file in named if Path(file).is_file()]
+
+
+def _digest(file: Path) -> str:
+    return hashlib.sha256(file.read_bytes()).hexdigest()
+
+
+def _check_files(folder: Path, files: Mapping[str, str]) -> None:
+    """Raise a CheckpointError where a world file of a run is not what it was."""
+    for file, digest in files.items():
+        there = Path(file).is_file()
+        if not there or _digest(Path(file)) != digest:
+            state = "changed since" if there else "missing"
+            raise CheckpointError("world", file, f"the file that the run in {folder} began with ({state})")
 
 
 def resumed_options(
@@ -59,6 +86,7 @@ def resumed_options(
     words: Sequence[str],
     changeable: frozenset[str],
     description: str | None = None,
+    settle: Callable[[Options], Options] = lambda options: options,
 ) -> tuple[Options, dict[str, Any]]:
     """The options of a run that is continued: those that it was started with, and what may differ.
 
@@ -68,25 +96,28 @@ def resumed_options(
         words: Of the command line that continues it.
         changeable: Options that may differ.
         description: The first line of the help.
+        settle: Makes options the same wherever they are read, as those that the run was started with.
 
     Returns:
         The options, and the values before of those that were changed.
 
     Raises:
-        CheckpointError: There is no run in the folder, or another option differs.
+        CheckpointError: There is no run in the folder, another option differs, or a world file has changed.
         SettingError: `--out` names another folder.
     """
     try:
-        before = json.loads((folder / FILE).read_text("utf-8"))["args"]
-        started = dataclass_of(kind, before, FILE)
+        run = json.loads((folder / FILE).read_text("utf-8"))
+        started, files = dataclass_of(kind, run["args"], FILE), dict(run["files"])
     except (OSError, ValueError, LookupError, TypeError) as error:
         reason = f": {error}" if isinstance(error, SettingError) else ""
         allowed = f"the folder of a run, with a {FILE} of this version{reason}"
         raise CheckpointError("resume", str(folder), allowed) from None
+    _check_files(folder, files)
     started.out = started.resume = folder
     args = parse(kind, words, default=started, description=description)
     if args.out is not None and args.out.absolute() != folder.absolute():
         raise SettingError("out", str(args.out), "not given with --resume, which names the folder")
+    args = settle(args)
     args.out, changed = folder, {}
     was, now = _flat(options_json(started)), _flat(options_json(args))
     for name in was.keys() | now.keys():
@@ -101,7 +132,8 @@ def _flat(options: dict[str, Any], prefix: str = "") -> dict[str, Any]:
     """Options in options by their names on the command line, `channel.burst`."""
     flat: dict[str, Any] = {}
     for name, value in options.items():
-        flat |= _flat(value, f"{prefix}{name}.") if isinstance(value, dict) else {prefix + name: value}
+        inside = prefix if name in _INLINE else f"{prefix}{name}."
+        flat |= _flat(value, inside) if isinstance(value, dict) else {prefix + name: value}
     return flat
 
 

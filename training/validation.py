@@ -9,6 +9,7 @@ import numpy as np
 import torch
 from stable_baselines3.common.policies import ActorCriticPolicy
 
+from baselines.experiments.mission import Surroundings
 from entropy_explore_env.envs.vector_env import EntropyExploreVectorEnv
 from entropy_explore_env.scenario import Scenario, with_settings
 from training.policy import choose_actions
@@ -34,16 +35,20 @@ class Validation:
 class Validator:
     """The same missions every time: worlds of the validation split, where robots decide whenever they can."""
 
-    def __init__(self, scenario: Scenario, missions: int, threads: int) -> None:
+    def __init__(self, scenario: Scenario, surroundings: Surroundings, missions: int, threads: int) -> None:
         """Make the missions.
 
         Args:
             scenario: The scenario of training.
+            surroundings: World files and starts of the missions.
             missions: How many missions to run.
             threads: Threads that share them.
         """
         validation = with_settings(scenario, {"split": "validation", "decision_period_s": None})
-        self._env = EntropyExploreVectorEnv(validation, missions, threads=threads, action_masks=False)
+        around = surroundings.settings()
+        self._env = EntropyExploreVectorEnv(
+            validation, missions, threads=threads, action_masks=False, **around
+        )
         self._seeds = validation_seeds(missions)
 
     def validate(

@@ -1,33 +1,41 @@
 """The task on a command line: one definition of the options for commands that run missions.
 
 A scenario, a named one or a file of settings, and what is changed of it: worlds, starts, robots, sensor,
-channel, ending. Options that are not given have the scenario's own values, which the help shows.
+channel, ending. Options that are not given have the scenario's own values, which the help shows; a command
+with several scenarios reads its words once for each of them.
 """
 
 from __future__ import annotations
 
 import dataclasses
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Literal, NamedTuple, TypeVar
+from types import MappingProxyType
+from typing import Any, Literal, NamedTuple, Protocol, TypeVar
 
 from baselines.cli.arguments import OmitArgPrefixes, parse
 from baselines.cli.start_options import given_json, reset_options
 from baselines.cli.world_options import Reading, world_settings
 from baselines.experiments.mission import Surroundings
+from entropy_explore_env.command import allow_read_memory
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.scenario import Scenario, with_settings
 from entropy_explore_env.scenarios import ROOM, find_scenario
 from entropy_explore_env.settings import Channel, Ending, RangeSensor, Robot, RobotKind
-from entropy_explore_env.settings_json import dataclass_of, scenario_of, settings_of
+from entropy_explore_env.settings_json import dataclass_of, json_of, scenario_of, settings_of
 
 _WHOLE = ("name", "grid")
 """Settings of a file that is a scenario of its own, and no change of a named one."""
 _WITHIN = ("settings", "scenario")
 """Where mission.json and policy.json hold a scenario."""
+_HELP = ("-h", "--help")
+_FILES = ("world", "settings", "starts", "extra_kinds")
+"""Options that name files; all but the first may be texts of JSON instead."""
+_OF_THE_PROCESS = ("read_memory_mib",)
+"""Options that change no mission."""
 
 
 @dataclass
@@ -35,7 +43,7 @@ class TaskOptions:
     """What missions are run; the defaults are a scenario's."""
 
     settings: str | None = None
-    """A file with a scenario as JSON, whole or some of its settings, which change the named scenario; a
+    """A scenario as JSON, or a file of it, whole or some of its settings, which change the named scenario; a
     mission.json, too. Options change it further."""
     world: tuple[str, ...] = ()
     """World files in place of the scenario's worlds, dealt to missions in turn by their seeds;
@@ -64,7 +72,13 @@ class TaskOptions:
     """Short for --ending.time-limit-s."""
 
 
-Arguments = TypeVar("Arguments")
+class TaskArguments(Protocol):
+    """The arguments of a command that runs missions; a dataclass."""
+
+    task: TaskOptions
+
+
+Arguments = TypeVar("Arguments", bound=TaskArguments)
 
 
 class BaseTask(NamedTuple):
@@ -89,30 +103,48 @@ class BaseTask(NamedTuple):
         )
 
 
-def base_task(name: str | Scenario, settings: str | None = None) -> BaseTask:
+def base_task(
+    name: str | Scenario,
+    settings: str | None = None,
+    own: Mapping[str, Mapping[str, Any]] = MappingProxyType({}),
+) -> BaseTask:
     """The named scenario with the settings of a file, or the scenario that the file holds as a whole.
 
     Args:
         name: Of a scenario, or a Scenario.
-        settings: JSON: settings of a Scenario, or an object with these under `settings` or `scenario`.
+        settings: JSON, or a file of it: settings of a Scenario, or an object with these under `settings` or
+            `scenario`.
+        own: Settings that a command changes in named scenarios, part by part; those of a file come after.
 
     Raises:
         SettingError: No scenario has the name, or the file holds no settings of one.
     """
     if settings is None:
-        return BaseTask(find_scenario(name), None)
+        return BaseTask(with_settings(find_scenario(name), own), None)
     given = _settings_in(settings)
-    if not all(field in given for field in _WHOLE):
-        given = _merged(settings_of(find_scenario(name)) | {"decision_period_s": None}, given)
+    if not is_whole_scenario(settings):
+        named = with_settings(find_scenario(name), own)
+        given = _merged(settings_of(named) | {"decision_period_s": None}, given)
     scenario = scenario_of({"decision_period_s": None, **given})
     return BaseTask(scenario, scenario.decision_period_s)
 
 
+def is_whole_scenario(settings: str | None) -> bool:
+    """Whether a file of settings is a scenario of its own, and changes no named one.
+
+    Raises:
+        SettingError: It holds no settings of a scenario.
+    """
+    given = {} if settings is None else _settings_in(settings)
+    return all(name in given for name in _WHOLE)
+
+
 def _settings_in(file: str) -> Mapping[str, Any]:
-    """The object of settings in a file."""
+    """The object of settings in a file, or in a text that is one."""
     allowed = "a file with a scenario's settings as JSON"
     try:
-        given = json.loads(Path(file).expanduser().read_text("utf-8"))
+        inline = file.lstrip().startswith("{")
+        given = json.loads(file if inline else Path(file).expanduser().read_text("utf-8"))
     except (OSError, ValueError, RecursionError) as error:
         reason = getattr(error, "strerror", None) or error
         raise SettingError("settings", file, f"{allowed} ({reason})") from None
@@ -136,6 +168,23 @@ def _merged(settings: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str
     return merged
 
 
+def first_parsed(
+    kind: type[Arguments], words: Sequence[str], description: str | None, default: Arguments | None = None
+) -> Arguments:
+    """A command's arguments before its scenario is known, of which `parsed_for` then says what is not given.
+
+    Args:
+        kind: The dataclass of arguments.
+        words: Of the command line; that help is asked for is left for `parsed_for`, which knows the defaults.
+        description: The first line of the help.
+        default: See `parse`.
+
+    Raises:
+        UsageError: The words do not fit.
+    """
+    return parse(kind, [word for word in words if word not in _HELP], default, description)
+
+
 def parsed_for(
     task: BaseTask, default: Arguments, words: Sequence[str], description: str | None, **more: object
 ) -> Arguments:
@@ -151,8 +200,7 @@ def parsed_for(
     Raises:
         UsageError: The words do not fit.
     """
-    settings = getattr(default, "task").settings  # noqa: B009 - of any dataclass with a task
-    start = dataclasses.replace(default, task=task.defaults(settings), **more)  # type: ignore[type-var]
+    start: Any = dataclasses.replace(default, task=task.defaults(default.task.settings), **more)  # type: ignore[type-var]
     return parse(type(default), words, default=start, description=description)
 
 
@@ -170,16 +218,14 @@ def tasked(
         SettingError: An option is not allowed.
         WorldError: A world file cannot be used.
     """
-    ending = options.ending
-    if options.time_limit_s is not None:
-        ending = dataclasses.replace(ending, time_limit_s=options.time_limit_s)
+    ending = dataclasses.replace(options.ending, time_limit_s=limit_s(options))
     names = ("split", "start_radius_m", "decision_period_s", "robot", "sensor", "channel")
     settings: dict[str, Any] = {"ending": ending, **{name: getattr(options, name) for name in names}}
     if robots is not None:
         settings["robots"] = robots
     if options.extra_kinds is not None:
         settings["extra_kinds"] = _kinds(options.extra_kinds)
-    worlds = world_settings(options.world, options.voxel_size_m, options.world_file)
+    worlds = worlds_of(options)
     changed = with_settings(scenario, settings)
     there = EntropyExploreEnv(changed, **worlds).scenario if worlds else changed  # refuses a wrong file
     fixed = reset_options(options.starts, options.world_number, there)
@@ -196,3 +242,99 @@ def _kinds(words: str) -> tuple[RobotKind, ...]:
     if not isinstance(kinds, list):
         raise SettingError("extra_kinds", words, allowed)
     return tuple(dataclass_of(RobotKind, kind, f"extra_kinds[{place}]") for place, kind in enumerate(kinds))
+
+
+def limit_s(options: TaskOptions) -> float:
+    """Simulated seconds after which a mission is cut off."""
+    return options.ending.time_limit_s if options.time_limit_s is None else options.time_limit_s
+
+
+def worlds_of(options: TaskOptions, files: Sequence[str] | None = None) -> dict[str, Any]:
+    """Settings of an environment in the world files of a task, and how much memory reading them may take.
+
+    Args:
+        options: Of the command.
+        files: In place of the options' own.
+
+    Raises:
+        SettingError: Something is asked of world files, and there is none.
+    """
+    reading = options.world_file
+    worlds = options.world if files is None else files
+    if worlds and reading.read_memory_mib is not None:
+        allow_read_memory(reading.read_memory_mib)  # of this process: no setting of a mission
+        reading = dataclasses.replace(reading, read_memory_mib=None)
+    return world_settings(worlds, options.voxel_size_m, reading)
+
+
+def settled(options: TaskOptions) -> TaskOptions:
+    """The same options wherever and whenever they are read: absolute paths, files of JSON as texts.
+
+    Raises:
+        SettingError: A file does not hold what it should.
+    """
+    texts = {
+        name: json.dumps(given_json(name, given, "JSON, or a file of it"))
+        for name in ("starts", "extra_kinds")
+        if (given := getattr(options, name)) is not None
+    }
+    if options.settings is not None:
+        texts["settings"] = json.dumps(_settings_in(options.settings))
+    return dataclasses.replace(options, world=absolute_files(options.world), **texts)
+
+
+def absolute_files(files: Iterable[str]) -> tuple[str, ...]:
+    """World files as absolute paths; a name that is no file stays."""
+    paths = ((file, Path(file).expanduser()) for file in files)
+    return tuple(str(path.absolute()) if path.is_file() else file for file, path in paths)
+
+
+def first_change(options: TaskOptions) -> tuple[str, object] | None:
+    """An option of a task that is not as it is where nothing is given, and its value; None = all are."""
+    changes = _changes(json_of(TaskOptions()), json_of(options))
+    return next(iter(changes.items()), None)
+
+
+def words_of(options: TaskOptions, task: BaseTask) -> dict[str, list[str]]:
+    """Options that differ from a task's own: name → words of a command line; of files, their names.
+
+    Args:
+        options: Of the command.
+        task: What they change.
+    """
+    words: dict[str, list[str]] = {}
+    for name, value in _changes(json_of(task.defaults()), json_of(options)).items():
+        if name in _OF_THE_PROCESS:
+            continue
+        option = name.replace("_", "-")
+        if isinstance(value, bool):
+            front, dot, last = option.rpartition(".")
+            words[name] = [f"--{front}{dot}{'' if value else 'no-'}{last}"]
+            continue
+        if name in _FILES:
+            value = [_file_name(each) for each in ([value] if isinstance(value, str) else value)]
+        words[name] = [f"--{option}", *map(_word, value if isinstance(value, list) else [value])]
+    return words
+
+
+def _word(value: object) -> str:
+    """A value as one types it."""
+    short = f"{value:g}" if isinstance(value, float) else str(value)
+    return short if not isinstance(value, float) or float(short) == value else repr(value)
+
+
+def _file_name(given: str) -> str:
+    """A file's name without its folders; a text of JSON as it is."""
+    return given if given.lstrip().startswith(("{", "[")) else Path(given).name
+
+
+def _changes(before: Mapping[str, Any], after: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
+    """The options that differ, by their names on the command line."""
+    changes: dict[str, Any] = {}
+    for name, value in after.items():
+        if isinstance(value, Mapping):
+            inside = prefix if name == "world_file" else f"{prefix}{name}."
+            changes |= _changes(before[name], value, inside)
+        elif value != before[name]:
+            changes[prefix + name] = value
+    return changes

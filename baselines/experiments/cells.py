@@ -64,7 +64,7 @@ class Cell:
                 scenario,
                 self.strategy,
                 self.record if is_dataclass(self.record) else self.record.__qualname__,
-                *(() if self.surroundings is None else (self.surroundings,)),
+                *(() if self.surroundings is None else (self.surroundings.without_folders(),)),
             )
         )
         for file in self._files():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -50,6 +51,17 @@ class Surroundings:
         world = self.settings().get("world", [])
         paths = world["path"] if isinstance(world, dict) else world
         return [Path(path) for path in ([paths] if isinstance(paths, str) else paths)]
+
+    def without_folders(self) -> Surroundings:
+        """The same, wherever the world files lie."""
+        if not self.worlds:
+            return self
+        worlds, names = json.loads(self.worlds), [path.name for path in self.files()]
+        if isinstance(worlds["world"], dict):
+            worlds["world"]["path"] = names
+        else:
+            worlds["world"] = names[0]
+        return dataclasses.replace(self, worlds=json.dumps(worlds))
 
 
 def scripted(scenario: Scenario, decision_period_s: float | None = None) -> Scenario:

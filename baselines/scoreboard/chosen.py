@@ -5,16 +5,18 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import NamedTuple
 
-from baselines.experiments.mission import scripted
+from baselines.cli.task_options import BaseTask, TaskOptions, tasked
+from baselines.experiments.mission import Surroundings, scripted_env
 from baselines.scoreboard.results import BASELINE, REFERENCES
 from baselines.scoreboard.suites import Place, Task, team_name
 from baselines.strategies import STRATEGIES, make_strategy, resolved
 from baselines.world_sweep import is_plan
-from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.scenario import Scenario, with_settings
 from entropy_explore_env.scenarios import SCENARIOS, find_scenario
+from entropy_explore_env.worlds.given import GIVEN, distinct_names
 
 
 def chosen_strategies(words: str, suite: bool) -> tuple[str, ...]:
@@ -34,52 +36,93 @@ def chosen_strategies(words: str, suite: bool) -> tuple[str, ...]:
     return tuple(dict.fromkeys([*added, *map(resolved, names)]))
 
 
-def own_tasks(scenarios: Mapping[str, Scenario], robots: Sequence[int], missions: int) -> tuple[Task, ...]:
-    """A task for each scenario and team size, in worlds of the scenario's own split."""
+class Entry(NamedTuple):
+    """A scenario that strategies are compared in, before options change it."""
+
+    scenario: str | Scenario
+    file: str | None = None
+    """A world file, in place of the scenario's worlds."""
+
+
+class Mission(NamedTuple):
+    """What is run in an entry with a team size."""
+
+    scenario: Scenario
+    surroundings: Surroundings
+
+
+def own_tasks(missions: Mapping[str, Sequence[Mission]], seeds: int) -> tuple[Task, ...]:
+    """A task for each name and team size, in worlds of the scenario's split.
+
+    Args:
+        missions: Name of an entry → a mission for each team size.
+        seeds: Missions of each strategy.
+    """
     return tuple(
-        Task(team_name(name, team), (Place(name, with_settings(scenario, {"robots": team}), missions),))
-        for name, scenario in scenarios.items()
-        for team in robots
+        Task(
+            team_name(name, scenario.robots),
+            (Place(name, scenario, seeds, surroundings=around if around != Surroundings() else None),),
+        )
+        for name, teams in missions.items()
+        for scenario, around in teams
     )
 
 
-def chosen_scenarios(
-    words: str, world_scenario: str | None, time_limit_s: float | None
-) -> dict[str, Scenario]:
+def chosen_entries(words: str, world_scenario: str | None) -> dict[str, Entry]:
     """Scenarios from names and paths of world files with commas between them.
 
     Args:
         words: Names and paths.
         world_scenario: Name of the scenario that gives robots, sensors and voxel size for the files; None =
             `office` for plans, `room` for other worlds.
-        time_limit_s: Of all missions; None = those of the scenarios.
 
     Returns:
-        Name → scenario, scored, one robot; the name of a file is that of its scenario, without suffix.
+        Name → entry; the name of a file is without suffix, with as many of its folders as tell it apart.
 
     Raises:
-        SettingError: A name is unknown or given twice, or a file cannot be used.
+        SettingError: A name is unknown or given twice.
     """
-    chosen: dict[str, Scenario] = {}
-    for word in words.split(","):
-        if word in SCENARIOS:
-            name, scenario = word, SCENARIOS[word]
-        else:
-            name, scenario = Path(word).stem, _file_scenario(word, world_scenario)
+    given = words.split(",")
+    files = [word for word in given if word not in SCENARIOS]
+    names = dict(zip(files, distinct_names([Path(file) for file in files]), strict=True))
+    chosen: dict[str, Entry] = {}
+    for word in given:
+        name = names.get(word, word)
         if name in chosen:
             raise SettingError("scenarios", words, f"each name once, not {name} twice")
-        settings = {"track_truth": True, "robots": 1}
-        if time_limit_s is not None:
-            settings["time_limit_s"] = time_limit_s
-        scenario = with_settings(scenario, settings)
-        env = EntropyExploreEnv(scripted(scenario))  # a file that cannot be used is refused here
-        chosen[name] = dataclasses.replace(scenario, grid=env.scenario.grid)
+        chosen[name] = _file_entry(word, name, world_scenario) if word in names else Entry(word)
     return chosen
 
 
-def _file_scenario(word: str, world_scenario: str | None) -> Scenario:
+def _file_entry(word: str, name: str, world_scenario: str | None) -> Entry:
     path = Path(word)
     if not path.is_file():
         raise SettingError("scenarios", word, "names out of " + ", ".join(SCENARIOS) + ", or world files")
     base = find_scenario(world_scenario or ("office" if is_plan(path) else "room"))
-    return dataclasses.replace(base, name=path.stem, world=word)
+    return Entry(dataclasses.replace(base, name=name), word)
+
+
+def entry_mission(entry: Entry, task: BaseTask, options: TaskOptions, robots: int) -> Mission:
+    """The mission of an entry with a team size, scored.
+
+    Args:
+        entry: The scenario.
+        task: What the options change.
+        options: Of the command.
+        robots: Team size.
+
+    Raises:
+        SettingError: An option is not allowed.
+        WorldError: A world file cannot be used.
+    """
+    if entry.file is not None:
+        if options.world:
+            raise SettingError("world", list(options.world), f"left out: {entry.file} is a world itself")
+        options = dataclasses.replace(options, world=(entry.file,))
+    scenario, around = tasked(with_settings(task.scenario, {"track_truth": True}), options, robots)
+    if around.worlds:
+        there = scripted_env(scenario, around).scenario
+        scenario = dataclasses.replace(scenario, world=there.world, grid=there.grid)
+        if there.world != GIVEN:  # one file alone is a setting of the scenario
+            around = dataclasses.replace(around, worlds="")
+    return Mission(scenario, around)

@@ -221,12 +221,14 @@ def _plain(text: str) -> str:
 def _about(task: Task) -> str:
     """What kind of missions a task has."""
     scenario = task.scenario
-    grid, file = scenario.grid, Path(scenario.world)
+    grid, around = scenario.grid, task.places[0].surroundings
+    files = [Path(scenario.world)] if around is None or not around.worlds else around.files()
     shape = " × ".join(map(str, grid.shape if not grid.flat else grid.shape[:2]))
     kind = "ground" if scenario.planar else "flying"
     worlds = f"{len(task.places)} worlds" if len(task.places) > 1 else f"world `{scenario.world}`"
-    if file.is_file() and len(task.places) == 1:
-        worlds = f"world file `{file.name}`"
+    if files[0].is_file() and len(task.places) == 1:
+        names = [f"`{name}`" for name in dict.fromkeys(file.name for file in files)]
+        worlds = f"world file{'s' if len(names) > 1 else ''} {', '.join(names)}"
     team = f"{scenario.robots} {kind} robot" + ("s" if scenario.robots > 1 else "")
     return (
         f"{task.missions} starts, {worlds}, {shape} voxels of {grid.voxel_size_m:g} m, {team}, "

@@ -25,7 +25,7 @@ from pathlib import Path
 from typing import Any
 
 from baselines.experiments.cells import Cell
-from baselines.experiments.mission import scripted
+from baselines.experiments.mission import Surroundings, scripted
 from baselines.scoreboard.mission import SETTINGS, SuiteMission
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.errors import SettingError
@@ -55,12 +55,14 @@ class Place:
         scenario: Tracks the truth.
         missions: Their number; their seeds are 0, 1, ….
         start: x, y, z, yaw, pitch of one robot; None = drawn from the seed.
+        surroundings: World files, starts and length of a step; None = those that the scenario says.
     """
 
     name: str
     scenario: Scenario
     missions: int
     start: tuple[float, float, float, float, float] | None = None
+    surroundings: Surroundings | None = None
 
 
 @dataclass(frozen=True)
@@ -120,6 +122,7 @@ class Suite:
                 strategy.partition(SETTINGS)[0],
                 place.missions,
                 SuiteMission(place.start, strategy.partition(SETTINGS)[2]),
+                place.surroundings,
                 round=sum(before.missions for before in task.places[:number]),
                 group=f"{task.folder}/{strategy}",
             )

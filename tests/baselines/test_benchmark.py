@@ -17,12 +17,12 @@ from PIL import Image
 from scipy import stats
 
 from baselines import benchmark, strategies
-from baselines.cli.arguments import run_command
+from baselines.cli.arguments import parse, run_command
 from baselines.experiments import runner
 from baselines.experiments.mission import run_mission, scripted
 from baselines.experiments.runner import NOT_RUN
 from baselines.scoreboard import chosen
-from baselines.scoreboard.chosen import chosen_scenarios, chosen_strategies
+from baselines.scoreboard.chosen import chosen_strategies
 from baselines.scoreboard.mission import SuiteMission
 from baselines.scoreboard.page import write_page
 from baselines.scoreboard.results import (
@@ -40,7 +40,11 @@ from baselines.strategies.random_walk import RandomWalk
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.reports.metrics import mission_figures
 from entropy_explore_env.scenario import with_settings
-from entropy_explore_env.scenarios import BOX, LAB
+from entropy_explore_env.scenarios import BOX, LAB, SCENARIOS
+from entropy_explore_env.settings import Grid
+from entropy_explore_env.settings_json import settings_json
+from entropy_explore_env.worlds.load import save_world
+from entropy_explore_env.worlds.world import World
 
 ROOT = Path(__file__).parents[2]
 TINY = ("--scenarios", "box-7x11x5", "--robots", "1,2", "--time-limit-s", "150")
@@ -420,22 +424,26 @@ def test_random_is_always_there_and_first():
 
 
 def test_scenarios_are_names_and_files(tmp_path):
-    from entropy_explore_env.settings import Grid
-    from entropy_explore_env.worlds.load import save_world
-    from entropy_explore_env.worlds.world import World
-
     solid = np.zeros((9, 12, 7), bool)
     solid[4, 5] = True
     save_world(World(Grid(solid.shape, 0.25), solid, "hut"), tmp_path / "hut.npz")
-    chosen = chosen_scenarios(f"lab,{tmp_path / 'hut.npz'}", None, None)
-    assert list(chosen) == ["lab", "hut"] and all(
-        one.track_truth and one.robots == 1 for one in chosen.values()
+
+    def chosen(*words):
+        words = ["--robots", "1", *words]
+        args = parse(benchmark.Args, words)
+        suite, _ = benchmark._suite(args, words)
+        return {task.places[0].name: task.scenario for task in suite.tasks}
+
+    found = chosen("--scenarios", f"lab,{tmp_path / 'hut.npz'}")
+    assert list(found) == ["lab", "hut"] and all(
+        one.track_truth and one.robots == 1 for one in found.values()
     )
-    assert chosen["lab"].ending == LAB.ending and chosen["lab"].grid == LAB.grid
-    assert chosen["hut"].grid.shape == (9, 12, 7) and chosen["hut"].robot.reach_m == 0.5  # those of the room
-    chosen = chosen_scenarios(str(tmp_path / "hut.npz"), "cave", 77.0)
-    assert chosen["hut"].robot.navigator == "planned" and chosen["hut"].ending.time_limit_s == 77.0
-    assert chosen["hut"].grid.voxel_size_m == 0.4 and chosen["hut"].name == "hut"
+    assert found["lab"].ending == LAB.ending and found["lab"].grid == LAB.grid
+    assert found["hut"].grid.shape == (9, 12, 7) and found["hut"].robot.reach_m == 0.5  # those of the room
+    words = "--world-scenario", "cave", "--time-limit-s", "77"
+    found = chosen("--scenarios", str(tmp_path / "hut.npz"), *words)
+    assert found["hut"].robot.navigator == "planned" and found["hut"].ending.time_limit_s == 77.0
+    assert found["hut"].grid.voxel_size_m == 0.4 and found["hut"].name == "hut"
 
 
 def test_the_page_of_a_file_does_not_say_where_it_lies(tmp_path, capsys):
@@ -516,3 +524,49 @@ def test_quick_shrinks_what_is_not_given(monkeypatch, tmp_path):
         ("room-3-robots/random", 5, 3),
         ("office-3-robots/random", 5, 3),
     ]
+
+
+def test_a_settings_file_and_flags_change_what_is_compared(tmp_path, capsys):
+    """A scenario of one's own in a file, worlds of two folders with one name, and a flag."""
+    pixels = np.full((30, 44), 254, np.uint8)
+    pixels[10:20, 15:18] = 0
+    files = []
+    for folder in ("a", "b"):
+        (tmp_path / folder).mkdir()
+        files.append(str(tmp_path / folder / "plan.png"))
+        Image.fromarray(pixels[: 30 if folder == "a" else 25]).save(files[-1])
+    mine = with_settings(SCENARIOS["office"], {"name": "mine", "robots": 1, "time_limit_s": 15.0})
+    (tmp_path / "mine.json").write_text(settings_json(mine))
+    usual = ["--strategies", "random", "--seeds", "2", "--jobs", "1", "--json"]
+    words = ["--settings", str(tmp_path / "mine.json"), "--world", *files, "--robot.reach-m", "2"]
+    assert run_command(benchmark.main, [*usual, *words, "--out", str(tmp_path / "out")]) == 0
+    page = (tmp_path / "out" / "scoreboard.md").read_text()
+    assert str(tmp_path) not in page and "world file `plan.png`, 22 × 15 voxels" in page
+    assert "--settings mine.json --world plan.png plan.png --robot.reach-m 2" in page
+    runs = sorted((tmp_path / "out" / "runs").rglob("seed-*.json"))
+    figures = [json.loads(run.read_text())["record"] for run in runs]
+    assert [one["world"] for one in figures] == ["a/plan", "b/plan"]
+    assert {one["robots"] for one in figures} == {1} and all(one["t_mission_s"] <= 15.0 for one in figures)
+    capsys.readouterr()
+    # Files of one name as scenarios of their own: a task each.
+    words = ["--scenarios", ",".join(files), "--robots", "1", "--time-limit-s", "5"]
+    assert run_command(benchmark.main, [*usual, *words, "--out", str(tmp_path / "each")]) == 0
+    results = json.loads(capsys.readouterr().out)
+    assert {row["task"] for row in results["tasks"]} == {"a/plan, 1 robot", "b/plan, 1 robot"}
+
+
+@pytest.mark.parametrize(
+    ("words", "named"),
+    [
+        (["--suite", "plans", "--robot.reach-m", "2"], "robot.reach_m"),
+        (["--settings", "mine.json", "--scenarios", "room"], "scenarios"),
+        (["--scenarios", "hut.npz", "--world", "hut.npz"], "world"),
+        (["--scenarios", "room", "--negate"], "negate"),
+    ],
+)
+def test_options_that_contradict_each_other_are_named(words, named, tmp_path, monkeypatch, capsys):
+    (tmp_path / "mine.json").write_text(settings_json(BOX))
+    save_world(World(Grid((9, 12, 7), 0.25), np.zeros((9, 12, 7), bool), "hut"), tmp_path / "hut.npz")
+    monkeypatch.chdir(tmp_path)
+    assert run_command(benchmark.main, [*words, "--out", "out"]) == 2
+    assert capsys.readouterr().err.startswith(f"error: {named} = ") and not (tmp_path / "out").exists()

@@ -104,3 +104,30 @@ def test_bad_input_is_one_line(words, tmp_path, capsys):
     assert run_command(world_sweep.main, [word.format(tmp_path) for word in words]) == 2
     said = capsys.readouterr()
     assert not said.out and said.err.startswith("error: ") and said.err.count("\n") == 1
+
+
+def test_the_options_of_the_task_hold_for_the_worlds_that_they_fit(folder, capsys):
+    """Files named one by one; two of one name are told apart; an option for plans leaves the hut alone."""
+    twin = folder / "below" / "hut.npz"
+    twin.write_bytes((folder / "hut.npz").read_bytes())
+    files = [str(folder / "hut.npz"), str(twin), str(folder / "floor.yaml")]
+    words = [
+        "--world",
+        *files,
+        *SHORT,
+        "--height-m",
+        "1.0",
+        "--plan-voxel-size-m",
+        "0.2",
+        "--robot.reach-m",
+        "2",
+    ]
+    out = folder / "table.md"
+    assert run_command(world_sweep.main, [*words, "--json", "--out", str(out)]) == 0
+    rows = json.loads(capsys.readouterr().out)["worlds"]
+    assert [row["world"] for row in rows] == [files[0], files[1], "floor.yaml"]
+    assert [row.get("voxels") for row in rows] == ["9 × 12 × 7", "9 × 12 × 7", "22 × 15 × 5"]
+    told = "--plan-voxel-size-m 0.2 --world hut.npz hut.npz floor.yaml --height-m 1 --robot.reach-m 2"
+    assert f"python -m baselines.world_sweep --strategy random {told} --time-limit-s 20`" in out.read_text()
+    assert run_command(world_sweep.main, [str(folder), "--robot.reach-m", "-1"]) == 2
+    assert capsys.readouterr().err.startswith("error: ")

@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from baselines.cli.arguments import parse
 from entropy_explore_env.command import BAD_INPUT
 from entropy_explore_env.errors import SettingError
 from training import experiment, ppo
@@ -89,13 +88,13 @@ def test_every_run_is_its_own_and_its_options_are_ppo_s() -> None:
     runs = planned_runs(TASKS, 1000, quick=False)
     assert len(runs) == sum(task.seeds for task in TASKS) + SEEDS * len(ABLATIONS)
     assert len({tuple(options) for options in runs.values()}) == len(runs)
-    default = vars(parse(ppo.Args, runs["ablations/default-1"]))
+    default = vars(ppo.parsed(runs["ablations/default-1"]))
     for name, ablation in ABLATIONS.items():
-        changed = vars(parse(ppo.Args, runs[f"ablations/{name}-1"]))
+        changed = vars(ppo.parsed(runs[f"ablations/{name}-1"]))
         different = [field for field, value in changed.items() if value != default[field]]
         assert (len(different) >= 1) is bool(ablation.options)
         assert ablation.reference in ABLATIONS
-        ppo.training_scenario(ppo.Args(**changed))
+        ppo.training_task(ppo.Args(**changed))
 
 
 def test_a_run_that_fails_is_named(tmp_path: Path) -> None:

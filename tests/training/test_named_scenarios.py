@@ -7,7 +7,6 @@ import json
 import pytest
 from gymnasium import spaces
 
-from baselines.cli.arguments import parse
 from entropy_explore_env.scenarios import SCENARIOS
 from training import ppo
 
@@ -19,10 +18,10 @@ FEW = (
 
 @pytest.mark.parametrize("name", SCENARIOS)
 def test_the_defaults_make_a_policy_for_every_named_scenario(name):
-    args = parse(ppo.Args, ["--scenario", name, "--missions", "1"])
+    args = ppo.parsed(["--scenario", name, "--missions", "1"])
     ppo.check(args)
-    scenario = ppo.training_scenario(args)
-    state = ppo.set_up(args, scenario)
+    task = ppo.training_task(args)
+    scenario, state = task.scenario, ppo.set_up(args, task)
     moves = 5 if scenario.planar else 7
     gazes = args.yaws * (1 if scenario.planar else args.pitches)
     actions = state.envs.action_space
@@ -35,7 +34,7 @@ def test_the_defaults_make_a_policy_for_every_named_scenario(name):
 )
 def test_training_begins_in_every_named_scenario(name, tmp_path, capsys):
     """Three rollouts and updates, a validation and a checkpoint."""
-    robots = ppo.training_scenario(parse(ppo.Args, ["--scenario", name])).robots
+    robots = ppo.training_task(ppo.parsed(["--scenario", name])).scenario.robots
     steps = 3 * 4 * 2 * robots
     words = [*FEW, "--scenario", name, "--total-steps", str(steps), "--out", str(tmp_path / "run")]
     assert ppo.run_command(ppo.main, words) == 0

@@ -19,7 +19,7 @@ import numpy as np
 import pytest
 import torch
 
-from baselines.cli.arguments import parse
+from baselines.experiments.mission import Surroundings
 from entropy_explore_env.command import BAD_INPUT, INTERRUPTED
 from entropy_explore_env.envs.robot_vec_env import RobotVecEnv
 from training import ppo
@@ -91,9 +91,9 @@ def test_missions_get_shorter_than_those_of_fresh_weights(tmp_path):
     words = "--missions 16 --rollout-steps 32 --batch 256 --epochs 6 --learning-rate 0.01 --hidden 16 16"
     words += " --validation-missions 8 --time-limit-s 300 --validate-every 9999 --no-video"
     words = [*TINY, *words.split()]
-    args = parse(ppo.Args, words)
-    fresh = ppo.set_up(args, ppo.training_scenario(args))
-    with contextlib.closing(Validator(fresh.settings.scenario, 8, threads=1)) as validator:
+    args = ppo.parsed(words)
+    fresh = ppo.set_up(args, ppo.training_task(args))
+    with contextlib.closing(Validator(fresh.settings.scenario, Surroundings(), 8, threads=1)) as validator:
         before = validator.validate(fresh.model.policy)
     assert learn(tmp_path / "run", *words, steps=6144) == 0
     with (tmp_path / "run" / "curve.csv").open() as file:
@@ -216,7 +216,7 @@ def test_a_run_is_neither_overwritten_nor_continued_with_other_options(uninterru
     assert f"--resume {out} continues the run" in capsys.readouterr().err
     for words, said in (
         (["--gamma", "0.5"], "error: gamma = 0.5: allowed is 0.9, as in the run"),
-        (["--channel.burst", "3"], "error: channel.burst = 3: allowed is 64, as in the run"),
+        (["--channel.burst", "3"], "error: channel.burst = 3: allowed is 8, as in the run"),
         (["--scenario", "room"], "error: scenario = 'room': allowed is box-7x11x5, as in the run"),
         (["--out", str(tmp_path)], "error: out = "),
     ):

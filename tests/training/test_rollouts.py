@@ -10,9 +10,8 @@ import pytest
 import torch
 from stable_baselines3 import PPO
 
-from baselines.cli.arguments import parse
 from training.advantages import DecisionBuffer
-from training.ppo import Args, DecisionPPO, set_up, training_scenario
+from training.ppo import DecisionPPO, parsed, set_up, training_task
 from training.resuming import TrainingState
 from training.seeds import learning_seeds
 
@@ -25,8 +24,8 @@ TINY = (
 
 def new_run(words: list[str]) -> TrainingState:
     """A run before its first rollout."""
-    args = parse(Args, [*TINY, *words])
-    return set_up(args, training_scenario(args))
+    args = parsed([*TINY, *words])
+    return set_up(args, training_task(args))
 
 
 def collect(run: TrainingState) -> None:

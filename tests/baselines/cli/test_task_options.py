@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+import contextlib
+import dataclasses
+import importlib
+import io
 import json
+import re
 
 import numpy as np
 import pytest
 from PIL import Image
 
-from baselines.cli.task_options import TaskOptions, base_task, tasked
+from baselines.cli.arguments import parse
+from baselines.cli.task_options import TaskOptions, base_task, first_change, settled, tasked, words_of
 from baselines.experiments.mission import Surroundings, run_mission, scripted_env
 from baselines.strategies import make_strategy
 from entropy_explore_env.errors import SettingError
@@ -99,3 +105,83 @@ def test_kinds_and_starts_are_given_as_json_or_in_files(tmp_path):
     for words in ("{}", "[1]", "nowhere.json", '[{"wings": 1}]'):
         with pytest.raises(SettingError):
             tasked(BOX, options("box-7x11x5", extra_kinds=words))
+
+
+def test_options_are_settled_so_that_they_are_the_same_everywhere(plans, tmp_path, monkeypatch):
+    kinds, settings = tmp_path / "kinds.json", tmp_path / "settings.json"
+    kinds.write_text('[{"robot": {"reach_m": 2.0}}]')
+    settings.write_text('{"robot": {"reach_m": 0.75}}')
+    monkeypatch.chdir(tmp_path)
+    given = options("office", world=("a/plan.png", "jacksboro"), extra_kinds="kinds.json")
+    there = settled(dataclasses.replace(given, settings="settings.json"))
+    assert there.world == (plans[0], "jacksboro")
+    monkeypatch.chdir("/")
+    kinds.unlink()
+    settings.unlink()
+    assert there.extra_kinds == '[{"robot": {"reach_m": 2.0}}]'
+    assert base_task("office", there.settings).scenario.robot.reach_m == 0.75
+    assert settled(there) == there
+
+
+def test_what_differs_from_the_scenario_is_told_as_words_that_say_it_again(plans):
+    task = base_task("office")
+    words = "--robot.redecide on_scan --channel.no-announcements --ending.time-limit-s 0.1 --split test"
+    words = [*words.split(), "--world", *plans, "--height-m", "2.5", "--read-memory-mib", "600"]
+    given = parse(TaskOptions, words, default=task.defaults())
+    told = [word for option in words_of(given, task).values() for word in option]
+    assert "--read-memory-mib" not in told  # changes no mission
+    again = parse(TaskOptions, told, default=task.defaults())
+    of_names = dataclasses.replace(given.world_file, read_memory_mib=None)
+    assert again == dataclasses.replace(given, world=("plan.png", "plan.png"), world_file=of_names)
+    assert words_of(task.defaults(), task) == {} and first_change(TaskOptions()) is None
+    assert first_change(TaskOptions(start_radius_m=1.5)) == ("start_radius_m", 1.5)
+
+
+FLAG = re.compile(r"^[│ ]+(--[a-z][a-z0-9.-]+)((?: [A-Z{\[][^\s│]*)*)", re.MULTILINE)
+
+
+COMMANDS = (
+    "baselines.run",
+    "baselines.benchmark",
+    "baselines.world_sweep",
+    "training.ppo",
+    "training.evaluate",
+    "training.rllib_ppo",
+)
+
+
+def flags_in(help_text):
+    """Flag → the kind of its values."""
+    return {found[1]: found[2].strip() for found in FLAG.finditer(help_text)}
+
+
+def flags_of(command, *words):
+    said = io.StringIO()
+    with contextlib.redirect_stdout(said), pytest.raises(SystemExit):
+        importlib.import_module(command).main([*words, "--help"])
+    return flags_in(said.getvalue())
+
+
+def flags_of_tasks():
+    said = io.StringIO()
+    with contextlib.redirect_stdout(said), pytest.raises(SystemExit):
+        parse(TaskOptions, ["--help"], default=base_task("room").defaults())
+    return flags_in(said.getvalue())
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_every_command_takes_every_flag_of_a_task_with_the_same_values(command, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "90")  # one column
+    task = flags_of_tasks()
+    assert {"--settings", "--world", "--split", "--starts", "--extra-kinds", "--robot.reach-m"} <= set(task)
+    words = ["--pretrained", "room"] if command == "training.evaluate" else []
+    flags = flags_of(command, *words)
+    assert {name: flags.get(name) for name in task} == task
+    assert {"--robots"} <= set(flags)
+
+
+def test_a_replay_takes_what_a_record_leaves_open(monkeypatch):
+    """A record holds its scenario: where the world's file lies now, and how much reading it may take."""
+    monkeypatch.setenv("COLUMNS", "90")  # one column
+    task, flags = flags_of_tasks(), flags_of("baselines.replay")
+    assert set(task) & set(flags) == {"--world", "--read-memory-mib"}
