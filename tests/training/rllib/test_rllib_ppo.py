@@ -16,7 +16,7 @@ from ray.rllib.env.multi_agent_env_runner import MultiAgentEnvRunner
 
 from baselines.cli.arguments import run_command
 from training import ray_cluster
-from training.rllib_ppo import Args, configure, environment_settings, main
+from training.rllib_ppo import Args, configure, environment_settings, main, parsed
 
 pytestmark = [  # RLlib's own
     pytest.mark.filterwarnings("ignore::DeprecationWarning"),
@@ -67,7 +67,8 @@ def missions_of(args: Args, iterations: int) -> list[tuple[int, bytes]]:
 
 def test_runners_explore_different_missions_and_repeat_them(tmp_path):
     """Runners as Ray starts them, one after the other in this process; those of a resumed run differ, too."""
-    args = Args("box-7x11x5", missions=2, runners=2, batch=40, minibatch=20, hidden=[8], out=tmp_path)
+    words = "--scenario box-7x11x5 --missions 2 --runners 2 --batch 40 --minibatch 20 --hidden 8"
+    args = parsed([*words.split(), "--out", str(tmp_path)])
     first, resumed = missions_of(args, iterations=0), missions_of(args, iterations=5)
     assert len({seed for seed, _ in [*first, *resumed]}) == 8
     assert len({start for _, start in [*first, *resumed]}) == 8
