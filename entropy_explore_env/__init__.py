@@ -25,9 +25,11 @@ from entropy_explore_env.errors import (
     SettingError,
     WorldError,
 )
+from entropy_explore_env.fault_settings import Faults, Outage, RadioFault, SensorFault
 from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.missions.state import MissionEnd
 from entropy_explore_env.missions.view import RobotView
+from entropy_explore_env.radio_settings import Signal
 from entropy_explore_env.robots.channel import Delivery
 from entropy_explore_env.robots.motion import MoveEnd
 from entropy_explore_env.scenario import Scenario, with_settings
@@ -60,12 +62,15 @@ __all__ = [
     "EntropyExploreEnv",
     "EntropyExploreError",
     "EntropyExploreVectorEnv",
+    "Faults",
     "Grid",
     "MissingExtraError",
     "MissionEnd",
     "Missions",
     "MoveEnd",
     "Observation",
+    "Outage",
+    "RadioFault",
     "RangeSensor",
     "RecordError",
     "Reward",
@@ -73,7 +78,9 @@ __all__ = [
     "RobotKind",
     "RobotView",
     "Scenario",
+    "SensorFault",
     "SettingError",
+    "Signal",
     "SingleRobotEnv",
     "StepFigures",
     "World",

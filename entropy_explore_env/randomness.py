@@ -24,6 +24,7 @@ class Stream(enum.IntEnum):
     SENSOR = 2
     CHANNEL = 3
     STRATEGY = 4
+    FAULTS = 5
 
 
 def seed_sequence(seed: int, episode: int, stream: Stream) -> np.random.SeedSequence:

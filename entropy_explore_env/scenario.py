@@ -12,6 +12,7 @@ from typing import Any, Literal, TypeVar
 import numpy as np
 
 from entropy_explore_env.errors import SettingError, did_you_mean
+from entropy_explore_env.fault_settings import Faults
 from entropy_explore_env.settings import (
     Action,
     Channel,
@@ -70,6 +71,7 @@ class Scenario:
         track_truth: Whether the team's joint map, of everything measured, is kept and compared with the
             truth: for figures only, nobody acts on it. It costs one more map a mission. True by itself where
             the ending asks for what was seen.
+        faults: What goes wrong with robots; nothing by default.
     """
 
     name: str
@@ -85,6 +87,7 @@ class Scenario:
     sensor: RangeSensor = field(default_factory=RangeSensor)
     extra_kinds: tuple[RobotKind, ...] = ()
     channel: Channel = field(default_factory=Channel)
+    faults: Faults = field(default_factory=Faults)
     ending: Ending = field(default_factory=Ending)
     reward: Reward = field(default_factory=Reward)
     action: Action = field(default_factory=Action)
@@ -119,13 +122,17 @@ class Scenario:
             self._check_kind(kind.robot)
             self._check_drives(kind)
         self._check_broadcasts()
+        self._check_faults()
         rays = max(kind.sensor.rays for kind in self.kinds)
         allowed = f"so short that at most {MAX_MESSAGES} messages are under way at once"
+        name, longest_s = ("Channel.delay_s", self.channel.delay_s)
+        if self.faults.radio.late > 0.0 and self.faults.radio.late_s > self.channel.delay_s:
+            name, longest_s = ("RadioFault.late_s", self.faults.radio.late_s)
         if self.message_slots > MAX_MESSAGES:
-            raise SettingError("Channel.delay_s", self.channel.delay_s, allowed)
+            raise SettingError(name, longest_s, allowed)
         allowed = f"so short that at most {MAX_IN_FLIGHT} measurements are under way at once"
         if self.message_slots * max(min(self.channel.burst, rays), 1) > MAX_IN_FLIGHT:
-            raise SettingError("Channel.delay_s", self.channel.delay_s, allowed)
+            raise SettingError(name, longest_s, allowed)
         if 2 * self.robots * self.phase_batches * max(min(self.channel.burst, rays), 1) > MAX_IN_FLIGHT:
             raise SettingError("Channel.phase_s", self.channel.phase_s, allowed)
 
@@ -151,6 +158,16 @@ class Scenario:
         if layer is not None and layer >= self.grid.shape[2]:
             allowed = f"below the workspace's height ({self.grid.size_m[2]} m)"
             raise SettingError("Robot.sensor_height_m", robot.sensor_height_m, allowed)
+
+    def _check_faults(self) -> None:
+        """Check that faults are those of robots that there are, and fit the channel."""
+        for part in self.faults.parts.values():
+            if part.robots and max(part.robots) >= self.robots:
+                allowed = f"numbers of robots of the team, which are below {self.robots}"
+                raise SettingError(f"{type(part).__name__}.robots", part.robots, allowed)
+        if self.faults.radio.late > 0.0 and self.channel.phase_s > 0.0:
+            allowed = "0 where batches are broadcast in phases"
+            raise SettingError("RadioFault.late", self.faults.radio.late, allowed)
 
     def _check_drives(self, kind: RobotKind) -> None:
         """Check that a drive takes a day at most and few scans, so that a step soon returns."""
@@ -204,11 +221,19 @@ class Scenario:
         Between two scans a robot stands still for the latter or drives to it, at most at top speed. A robot
         that decides under way by time may announce so much more often.
         """
-        if self.channel.delay_s == 0.0 or self.robots == 1:
+        longest_s = self.longest_delay_s
+        if longest_s == 0.0 or self.robots == 1:
             return 0
         periods = [kind.robot.redecide for kind in self.kinds if not isinstance(kind.robot.redecide, str)]
-        more = math.floor(self.channel.delay_s / min(periods)) + 2 if periods else 0
-        return (2 * self._scans_within(self.channel.delay_s) + more) * self.robots
+        more = math.floor(longest_s / min(periods)) + 2 if periods else 0
+        more += 2 if self.faults.stop.happens else 0  # a robot that works again decides without a scan before
+        return (2 * self._scans_within(longest_s) + more) * self.robots
+
+    @property
+    def longest_delay_s(self) -> float:
+        """Longest time from a message's sending to its arrival, that of late messages included."""
+        late_s = self.faults.radio.late_s if self.faults.radio.late > 0.0 else 0.0
+        return self.channel.delay_s + late_s
 
     @property
     def phase_batches(self) -> int:
@@ -273,6 +298,7 @@ _PARTS: tuple[tuple[str, type], ...] = (
     ("robot", Robot),
     ("sensor", RangeSensor),
     ("channel", Channel),
+    ("faults", Faults),
     ("ending", Ending),
     ("reward", Reward),
     ("action", Action),

@@ -9,6 +9,7 @@ from typing import Literal
 import numpy as np
 
 from entropy_explore_env.errors import SettingError
+from entropy_explore_env.radio_settings import Signal
 from entropy_explore_env.validation import (
     check,
     check_choice,
@@ -268,9 +269,16 @@ class Channel:
             on average over its scans so many bursts of measurements reach it (Rocha04, sect. 5.1.1).
         i_min_gain: How much a scan with no such measurement, or with twice as many, changes ln I_min.
         range_m: Farthest teammate that hears, 1e-9 to 1e6; inf = all.
+        reach: What else a message must come through: `distance` nothing; `line_of_sight` reaches a teammate
+            where no solid voxel of the true world is on the straight line between the two; `signal` where
+            the signal is strong enough. Bodies of robots are in no message's way.
+        signal: How strong it is.
         loss_probability: Of a message on its way to one teammate.
         delay_s: From sending to hearing, 0 to 3600.
         announcements: Whether robots announce the viewpoints that they choose.
+        silent_after_s: A teammate counts as silent when no message has come from it for longer than this,
+            1e-3 to 1e9, beyond what one decision of it may take (`missions.view.silent_since`). What it
+            announced is free for others then: `TeammateView.silent`. inf = never.
         phase_s: Length of a phase of the broadcast, 1e-3 to 3600; 0 = batches are sent at once.
         repeats: How often a phase's batches are sent in the next phase, evenly spread over it; 1e-3 s apart
             or more.
@@ -281,9 +289,12 @@ class Channel:
     i_min_fill: float | None = None
     i_min_gain: float = 0.1
     range_m: float = math.inf
+    reach: Literal["distance", "line_of_sight", "signal"] = "distance"
+    signal: Signal = field(default_factory=Signal)
     loss_probability: float = 0.0
     delay_s: float = 0.0
     announcements: bool = True
+    silent_after_s: float = 10.0
     phase_s: float = 0.0
     repeats: int = 1
 
@@ -296,9 +307,12 @@ class Channel:
             check(self, "i_min_bits", "above 0 where I_min is steered", lambda v: v > 0)
         check(self, "i_min_gain", "a number above 0 up to 1", lambda v: 0 < v <= 1)
         check_within(self, "range_m", least=1e-9, most=1e6, inf=True)
+        check_choice(self, "reach", Literal["distance", "line_of_sight", "signal"])
+        check_kind(self, "signal", Signal)
         check(self, "loss_probability", "a number from 0 to 1", lambda v: 0 <= v <= 1)
         check(self, "delay_s", "a number from 0 to 3600", lambda v: 0 <= v <= 3600)
         check_kind(self, "announcements", bool)
+        check_within(self, "silent_after_s", least=1e-3, most=1e9, inf=True)
         check_within(self, "phase_s", least=1e-3, most=3600, zero=True)
         check_count(self, "repeats", 1, 1000)
         if self.phase_s / self.repeats < 1e-3 and self.phase_s > 0.0:
@@ -324,7 +338,11 @@ class Ending:
 
     Attributes:
         sigma_end: Standard deviation of coverage at which a voxel counts as known.
-        termination: `any` or `all`: whether one robot's map has to pass the threshold, or all robots' maps.
+        termination: Whose map has to pass the threshold: `any` robot's, or that of `all` robots. `shared`:
+            the map of every robot that still works, which is every one that has not stopped for good
+            (`Faults.stop`), so that what is known has been shared. With `seen_share` or `unseen_free_voxels`
+            the first two are about what the team has seen together, and with `shared` every such robot's own
+            map must hold so much: what it measured itself or fused from messages.
         seen_share: The mission ends when the team has seen this share of what can be seen; None = by entropy.
         unseen_free_voxels: It ends when no more free voxels than this are unseen of those that can be seen.
         time_limit_s: Simulated time after which the mission is cut off (a truncation), 1e-3 to 1e9; inf =
@@ -333,7 +351,7 @@ class Ending:
     """
 
     sigma_end: float = 0.03
-    termination: Literal["any", "all"] = "any"
+    termination: Literal["any", "all", "shared"] = "any"
     seen_share: float | None = None
     unseen_free_voxels: int | None = None
     time_limit_s: float = 10_000.0
@@ -342,7 +360,7 @@ class Ending:
     def __post_init__(self) -> None:
         """Check every field."""
         check(self, "sigma_end", "a number from 1e-4 to 1e4", lambda v: 1e-4 <= v <= 1e4)
-        check_choice(self, "termination", Literal["any", "all"])
+        check_choice(self, "termination", Literal["any", "all", "shared"])
         if self.seen_share is not None:
             check(self, "seen_share", "None, or a number above 0 up to 1", lambda v: 0 < v <= 1)
         if self.unseen_free_voxels is not None:

@@ -78,6 +78,7 @@ _ROWS: tuple[tuple[str, str, Callable[[Any], str]], ...] = (
     ("entropy of the joint map", "joint_bits", lambda v: f"{v:,.0f} bits"),
     ("driven", "distance_m", lambda v: f"{v:,.1f} m"),
     ("blocked moves", "blocked_moves", lambda v: f"{v:,}"),
+    ("faults", "faults_told", str),
     ("computed, compiled and drawn in", "wall_s", lambda v: f"{v:,.2f} s"),
 )
 
@@ -104,6 +105,12 @@ def _setting(scenario: Scenario) -> Iterator[tuple[str, str]]:
     ranges = {kind.sensor.max_range_m: None for kind in scenario.kinds}  # in order, each once
     said = ("the whole world" if range_m == math.inf else f"{range_m:g} m" for range_m in ranges)
     yield "sensor's range", ", ".join(said)
+
+
+def _told(faults: dict[str, int]) -> str | None:
+    """What faults did, in words; None where there are none."""
+    said = [f"{count:,} {name.replace('_', ' ')}" for name, count in faults.items() if count]
+    return ("\n".join(said) or "none happened") if faults else None
 
 
 def standing_still(figures: dict[str, Any], moved_m: float) -> list[str]:
@@ -135,6 +142,7 @@ def print_table(figures: dict[str, Any], written: list[Path], scenario: Scenario
     joint = figures.get("joint", {})
     values = {**figures, **joint, "reached": "-" if none else reached + " s"}
     values["joint_bits"] = joint.get("entropy_bits")
+    values["faults_told"] = _told(figures.get("faults", {}))
     for label, shown in _setting(scenario):
         table.add_row(label, shown)
     for label, name, shown in _ROWS:

@@ -15,6 +15,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from entropy_explore_env.fault_settings import Faults, Outage, RadioFault, SensorFault
+from entropy_explore_env.radio_settings import Signal
 from entropy_explore_env.scenario import Scenario
 from entropy_explore_env.settings import (
     Action,
@@ -92,13 +94,38 @@ FIELDS: Mapping[type, Mapping[str, Numbers | Sequence[Any]]] = MappingProxyType(
             "range_m": _length(1e-9, 1e6, 1.0, 20.0, math.inf),
             "loss_probability": Numbers(1e-6, 1.0, 0.05, 0.9, also=(0.0,)),
             "delay_s": Numbers(1e-6, 3600.0, 0.1, 20.0, also=(0.0,)),
+            "reach": ("distance", "line_of_sight", "signal"),
             "announcements": _SWITCH,
+            "silent_after_s": Numbers(1e-3, 1e9, 1.0, 60.0, also=(math.inf,)),
             "phase_s": Numbers(1e-3, 3600.0, 0.5, 30.0, also=(0.0,)),
             "repeats": _count(1, 1000, 1, 5),
         },
+        Signal: {
+            "power_dbm": (-100.0, 0.0, 20.0, 100.0),
+            "loss_at_1_m_db": Numbers(1e-3, 200.0, 30.0, 60.0, also=(0.0,)),
+            "exponent": Numbers(1e-3, 10.0, 1.5, 5.0, also=(0.0,)),
+            "wall_loss_db_per_m": Numbers(1e-3, 1e4, 1.0, 100.0, also=(0.0,)),
+            "threshold_dbm": (-300.0, -90.0, -60.0, -30.0, 100.0),
+        },
+        Outage: {
+            "at_s": Numbers(1e-3, 1e9, 0.5, 30.0, also=(math.inf,)),
+            "mean_s": Numbers(1e-3, 1e9, 1.0, 100.0, also=(math.inf,)),
+            "lasts_s": Numbers(1e-3, 1e9, 0.1, 30.0, also=(math.inf,)),
+        },
+        SensorFault: {
+            "lost_rays": Numbers(1e-6, 1.0, 0.01, 0.5, also=(0.0,)),
+            "range_factor": Numbers(0.1, 10.0, 0.8, 1.25),
+            "range_bias_m": (0.0, -1e6, -0.3, 0.02, 0.5, 1e6),
+        },
+        RadioFault: {
+            "garbled": Numbers(1e-6, 1.0, 0.01, 0.5, also=(0.0,)),
+            "repeated": Numbers(1e-6, 1.0, 0.01, 0.5, also=(0.0,)),
+            "late": Numbers(1e-6, 1.0, 0.01, 0.5, also=(0.0,)),
+            "late_s": Numbers(1e-3, 3600.0, 0.1, 20.0),
+        },
         Ending: {
             "sigma_end": Numbers(1e-4, 1e4, 0.01, 1.0),
-            "termination": ("any", "all"),
+            "termination": ("any", "all", "shared"),
             "seen_share": Numbers(1e-9, 1.0, 0.2, 1.0, also=(None,)),
             "unseen_free_voxels": _count(0, 2**31 - 1, 0, 500, None),
             "time_limit_s": Numbers(1e-3, 1e9, 1.0, 1e4, also=(math.inf,)),
@@ -155,8 +182,9 @@ def draw_scenario(rng: np.random.Generator, few_kernels: bool = False) -> Drawn:
 
     Args:
         rng: Where from.
-        few_kernels: Observations have the default parts, or all: others have kernels of their own, which
-            take seconds to compile.
+        few_kernels: Observations have the default parts, or all, and channels reach by more than distance
+            where there are faults, and only there: others have kernels of their own, which take seconds to
+            compile.
 
     Raises:
         EntropyExploreError: Settings were drawn that do not fit each other. Draw again.
@@ -175,6 +203,7 @@ def draw_scenario(rng: np.random.Generator, few_kernels: bool = False) -> Drawn:
     kinds = [RobotKind(part(Robot), _sensor(rng, part)) for _ in range(int(rng.choice([1, 1, 1, 2, 3])))]
     own = {field: draw(Scenario, field) for field in FIELDS[Scenario]}
     given = rng.random() < 0.3
+    faults = _faults(rng, part, own["robots"])
     scenario = Scenario(
         name="drawn",
         grid=grid,
@@ -182,7 +211,8 @@ def draw_scenario(rng: np.random.Generator, few_kernels: bool = False) -> Drawn:
         robot=kinds[0].robot,
         sensor=kinds[0].sensor,
         extra_kinds=tuple(kinds[1:]),
-        channel=part(Channel),
+        channel=_channel(part, faults.happen, few_kernels),
+        faults=faults,
         ending=part(Ending),
         reward=part(Reward),
         action=part(Action),
@@ -232,6 +262,28 @@ def _sensor(rng: np.random.Generator, part: Callable[..., Any]) -> RangeSensor:
     view = [(yaw, pitch), (2.0 * math.pi, pitch), (yaw, 0.0), (0.0, 0.0)][int(rng.integers(4))]
     step = max(max(view) / rng.integers(1, _MOST_RAYS_ACROSS), 1e-6)
     return part(RangeSensor, field_of_view_rad=view, angular_step_rad=float(step))
+
+
+def _faults(rng: np.random.Generator, part: Callable[..., Any], robots: int) -> Faults:
+    """Nothing goes wrong in half of the scenarios; else each part may, of some robots or of all."""
+
+    def some() -> tuple[int, ...]:
+        number = int(rng.integers(0, min(robots, 3) + 1))
+        return tuple(int(robot) for robot in rng.choice(robots, number, replace=False))
+
+    if rng.random() < _DEFAULT:
+        return Faults()
+    outages = {name: part(Outage, robots=some()) for name in ("stop", "blind", "silent")}
+    sensor, radio = part(SensorFault, robots=some()), part(RadioFault, robots=some())
+    return Faults(**outages, sensor=sensor, radio=radio)
+
+
+def _channel(part: Callable[..., Any], faulty: bool, few_kernels: bool) -> Channel:
+    """A channel; with few kernels it reaches by more than distance where there are faults, and only there."""
+    channel = part(Channel, signal=part(Signal))
+    if few_kernels and faulty == (channel.reach == "distance"):
+        channel = dataclasses.replace(channel, reach="signal" if faulty else "distance")
+    return channel
 
 
 def _observation(rng: np.random.Generator, part: Callable[..., Any], few_kernels: bool) -> Observation:

@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
+from entropy_explore_env.missions.faults import failing
 from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.missions.state import MissionEnd
 from entropy_explore_env.reports.metrics import mission_figures
@@ -33,7 +34,8 @@ def robot_infos(missions: Missions, mission: int) -> list[dict[str, Any]]:
     takes as its option `world`; -1 where no recipe made it), `entropy_bits`, `own_bits` and
     `received_bits` (taken from its map in this step), `move_end` and `end` (names of a MoveEnd and
     a MissionEnd), and `action_mask` where actions are discrete; when the mission is over, `figures`:
-    those of `mission_figures`, and beside them the two of END_FIGURES.
+    those of `mission_figures`, and beside them the two of END_FIGURES. Where the scenario has faults
+    also `stopped`, `blind` and `silent`: whether the robot fails so now.
     """
     clock = missions.state.missions[mission]
     robots = missions.state.robots[mission]
@@ -60,6 +62,10 @@ def robot_infos(missions: Missions, mission: int) -> list[dict[str, Any]]:
             strict=True,
         )
     ]
+    if missions.scenario.faults.happen:
+        for name, now in failing(missions.state.faults[mission], time_s).items():
+            for info, failed in zip(infos, now.tolist(), strict=True):
+                info[name] = failed
     if missions.scenario.action.kind == "discrete":
         for info, mask in zip(infos, missions.action_masks()[mission], strict=True):
             info["action_mask"] = mask

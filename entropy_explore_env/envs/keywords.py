@@ -9,6 +9,7 @@ import os
 from collections.abc import Mapping, Sequence
 from typing import Any, Literal, TypedDict
 
+from entropy_explore_env.fault_settings import Faults
 from entropy_explore_env.settings import (
     Action,
     Channel,
@@ -39,6 +40,7 @@ class ScenarioSettings(TypedDict, total=False):
     sensor: RangeSensor | Mapping[str, Any]
     extra_kinds: tuple[RobotKind, ...]
     channel: Channel | Mapping[str, Any]
+    faults: Faults | Mapping[str, Any]
     ending: Ending | Mapping[str, Any]
     reward: Reward | Mapping[str, Any]
     action: Action | Mapping[str, Any]

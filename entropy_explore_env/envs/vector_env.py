@@ -15,6 +15,7 @@ from entropy_explore_env.envs.infos import END_FIGURES, end_figures
 from entropy_explore_env.envs.rewards import RewardFunction, StepRewards
 from entropy_explore_env.errors import CallOrderError, SettingError
 from entropy_explore_env.missions.action import action_space
+from entropy_explore_env.missions.faults import failing
 from entropy_explore_env.missions.observation.layout import short_repr
 from entropy_explore_env.missions.reset_options import (
     NAMES,
@@ -51,7 +52,7 @@ class EntropyExploreVectorEnv(VectorEnv[Any, Any, Any]):
     Infos, each with a mask `_name` (E,) as Gymnasium has it: `deciding`, `entropy_bits`, `own_bits`,
     `received_bits` and `reward_robots`, (E, A); `time_s`, `end` (code of a MissionEnd) and `world_number`
     (-1 where no recipe made the world), (E,); `action_mask`, (E, A, N), where actions are discrete and
-    masks are wanted.
+    masks are wanted; `stopped`, `blind` and `silent`, (E, A), where the scenario has faults.
     `final_obs` and `final_info` where autoreset is SAME_STEP.
     """
 
@@ -251,6 +252,9 @@ class EntropyExploreVectorEnv(VectorEnv[Any, Any, Any]):
         infos: dict[str, Any] = {name: clocks[name].copy() for name in ("time_s", "end")}
         for name in ("deciding", "entropy_bits", "own_bits", "received_bits"):
             infos[name] = self._of_robots(robots[name]).copy()
+        if self.missions.scenario.faults.happen:
+            now = failing(self.missions.state.faults, clocks["time_s"][:, None])
+            infos.update({name: self._of_robots(failed) for name, failed in now.items()})
         infos["world_number"] = self.missions.world_numbers.copy()
         infos["reward_robots"] = self._of_robots(np.zeros(robots.shape) if earned is None else earned)
         if self._masks:

@@ -16,6 +16,7 @@ from entropy_explore_env.missions.poses import (
     path_point,
     place_at,
     place_with_left,
+    pose_at,
     profile_of,
     share_left,
     to_grid_units,
@@ -33,7 +34,7 @@ from entropy_explore_env.robots.motion import (
 )
 
 _ARRIVED, _TEAMMATE = MoveEnd.ARRIVED.code, MoveEnd.TEAMMATE.code
-_CORNERS, _SEEN = MoveEnd.CORNERS.code, MoveEnd.SEEN.code
+_CORNERS, _SEEN, _FAILED = MoveEnd.CORNERS.code, MoveEnd.SEEN.code, MoveEnd.FAILED.code
 _ROUNDING = 1e-6
 """Of float32 actions, as a share: a scan this near to the end of the path is left to the arrival."""
 
@@ -228,6 +229,32 @@ def stop(params, robot, time_s):
     robot.ready_s = time_s + params.blocked_wait_s if robot.waiting else time_s
     robot.next_scan_s = robot.ready_s
     robot.under_way = robot.path_blocked = False
+    robot.redecide_s = math.inf
+
+
+@lean_kernel
+def halt(params, robot, time_s, until_s):
+    """A robot stops at once where it is; its drive and its scan are over, and it decides anew at a time.
+
+    Args:
+        params: PARAMS of the robot.
+        robot: ROBOT.
+        time_s: Now.
+        until_s: When it decides; inf = never.
+    """
+    here, left = pose_at(params, robot, time_s), share_left(params, robot, time_s)
+    if left > 0.0:
+        robot.distance_m -= left * robot.path_m
+        if robot.move_end == _ARRIVED or robot.move_end == _CORNERS:
+            robot.blocked_moves += 1
+    copy_numbers(here, robot.origin, 5)
+    copy_numbers(here, robot.goal, 5)
+    robot.waypoints = robot.corners = robot.scans_under_way = 0
+    robot.path_m = robot.lead_s = robot.scan_lead_m = 0.0
+    robot.depart_s, robot.move_end = time_s, _FAILED
+    robot.deciding = robot.under_way = robot.path_blocked = False
+    robot.waiting = True
+    robot.ready_s = robot.next_scan_s = until_s
     robot.redecide_s = math.inf
 
 

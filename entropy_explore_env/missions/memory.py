@@ -76,7 +76,7 @@ def memory_needs(scenario: Scenario, batch: Batch) -> list[Need]:
     delayed = sum(sizes[name] for name in ("in_flight", "in_flight_to", "in_flight_rays"))
     phases = sum(size for name, size in sizes.items() if name.startswith("phase"))
     scans = sum(sizes[name] for name in ("scan_range_m", "scan_returned", "scan_utility_bits"))
-    robots = sizes["missions"] + sizes["robots"] + sizes["heard"]
+    robots = sum(sizes[name] for name in ("missions", "robots", "heard", "faults"))
     maps = sum(sizes[name] for name in _MAPS) + _world_bytes(scenario, batch)
     burst = "Channel.burst" if scenario.channel.burst > 1 else "robots"
     return [
@@ -130,6 +130,8 @@ def _scratch_needs(scenario: Scenario, batch: Batch) -> list[Need]:
     rays = max(sensor.rays for sensor in sensors)
     longest_m = max(math.inf if robot.navigator == "planned" else robot.reach_m for robot in robots)
     drive = 12 * longest_crossing(*grid.shape, longest_m / grid.voxel_size_m, 1)
+    if scenario.channel.reach != "distance":
+        drive += 12 * longest_crossing(*grid.shape, math.inf, 1)
     scans = batch.threads * (scan_bytes(grid, sensors, rays) + drive + 33 * scenario.robots)
     plans = navigator_bytes(scenario) if any(robot.navigator == "planned" for robot in robots) else 0
     masks = 0

@@ -11,6 +11,13 @@ from entropy_explore_env.belief.map_update import fuse_scan
 from entropy_explore_env.belief.pooling import Cells, Pool, fuse_pooled_scan
 from entropy_explore_env.belief.raycast import point
 from entropy_explore_env.compilation.kernels import ASSERTING, lean_kernel
+from entropy_explore_env.missions.faults import (
+    TeamFaults,
+    count_silenced,
+    draw_lateness,
+    radio_silent,
+    takes_in,
+)
 from entropy_explore_env.missions.poses import (
     copy_numbers,
     distance_between,
@@ -23,8 +30,11 @@ from entropy_explore_env.robots.channel import (
     BITS_PER_ANNOUNCEMENT,
     BITS_PER_BATCH,
     BITS_PER_MEASUREMENT,
+    Air,
     Delivery,
     draw_delivery,
+    edges_in_walls,
+    path_loss_db,
 )
 from entropy_explore_env.robots.range_sensor import trace_measurement
 
@@ -42,6 +52,10 @@ class Team(NamedTuple):
     """(A,) ROBOT."""
     heard: np.ndarray
     """(A, A) HEARD."""
+    faults: TeamFaults | None = None
+    """None = nothing goes wrong, like the next one known while compiling."""
+    air: Air | None = None
+    """What messages pass through; None = the channel reaches by distance alone."""
 
 
 class Tracer(NamedTuple):
@@ -82,14 +96,21 @@ def hear_batch(team, maps, scan, index, count):
 
 @lean_kernel
 def note_message(robot, heard, position, sent_s, count):
-    """Count a message that a robot hears, and note where its sender was."""
+    """Count a message that a robot hears, and note where its sender was, unless newer ones came before.
+
+    Returns:
+        Whether it is an announcement, and the newest.
+    """
     robot.messages_received += 1
     robot.measurements_received += max(count, 0)
     robot.bits_received += message_bits(count)
-    heard.heard_s = sent_s
-    copy_numbers(position, heard.pose, 5)
-    if count < 0:
-        heard.announced_s = sent_s
+    if sent_s >= heard.heard_s:
+        heard.heard_s = sent_s
+        copy_numbers(position, heard.pose, 5)
+    if count >= 0 or sent_s < heard.announced_s:
+        return False
+    heard.announced_s = sent_s
+    return True
 
 
 @lean_kernel
@@ -120,6 +141,7 @@ def transmit(team, index, place, time_s, recipients):
         recipients: (A,) bool, filled in.
     """
     robot, shared, heard = team.robots[index], team.params[0], False
+    silent = radio_silent(team.faults, index, time_s)
     for mate in range(len(team.robots)):
         recipients[mate] = False
         if mate == index:
@@ -128,13 +150,39 @@ def transmit(team, index, place, time_s, recipients):
         if not math.isinf(shared.channel_range_m):
             apart_m = distance_between(place, point(pose_at(team.params[mate], team.robots[mate], time_s)))
         code = draw_delivery(apart_m, shared.channel_range_m, shared.loss_probability, robot.channel_rng)
-        if code == _LOST:
+        if code != _OUT_OF_RANGE and not passes(team.air, team, mate, place, time_s):
+            code = _OUT_OF_RANGE
+        if silent:
+            count_silenced(team.faults, index, 1)
+        elif code == _LOST:
             robot.messages_lost += 1
         elif code == _OUT_OF_RANGE:
             robot.messages_out_of_range += 1
         else:
             recipients[mate] = heard = True
     return heard
+
+
+@lean_kernel
+def passes(air, team, mate, place, time_s):
+    """Whether walls, and the distance, let a message through to a teammate.
+
+    Args:
+        air: Of the Team.
+        team: Team.
+        mate: Who is to hear it.
+        place: (x, y, z), where it is sent from.
+        time_s: When.
+    """
+    if air is None:  # known while compiling: nothing of the rest is compiled
+        return True
+    shared, there = team.params[0], point(pose_at(team.params[mate], team.robots[mate], time_s))
+    start, finish = to_grid_units(shared, place), to_grid_units(shared, there)
+    walls_m = edges_in_walls(air, grid_size(shared), start, finish) * shared.voxel_size_m
+    if shared.line_of_sight:
+        return walls_m == 0.0
+    exponent, wall_loss = shared.path_loss_exponent, shared.wall_loss_db_per_m
+    return path_loss_db(distance_between(place, there), exponent, wall_loss, walls_m) <= shared.spare_db
 
 
 @lean_kernel
@@ -220,7 +268,8 @@ def send_batch(team, maps, clock, in_flight, scan, index, count, recipients):
         count: How many measurements.
         recipients: (A,) bool, scratch space.
     """
-    robot, delay_s = team.robots[index], team.params[0].delay_s
+    robot = team.robots[index]
+    delay_s = team.params[0].delay_s + draw_lateness(team.faults, index)
     count_sent(robot, count)
     reached = transmit(team, index, point(robot.scan_pose), clock.time_s, recipients)
     if reached and delay_s > 0.0:
@@ -228,9 +277,10 @@ def send_batch(team, maps, clock, in_flight, scan, index, count, recipients):
         if slot >= 0:
             pack_measurements(scan, count, in_flight.rays[slot])
         return
+    time_s, bits = clock.time_s, message_bits(count)
     for mate in range(len(team.robots)):
-        if recipients[mate]:
-            note_message(team.robots[mate], team.heard[mate, index], robot.scan_pose, clock.time_s, count)
+        if recipients[mate] and takes_in(team.faults, team.robots[mate], mate, time_s, bits):
+            note_message(team.robots[mate], team.heard[mate, index], robot.scan_pose, time_s, count)
             hear_batch(team, maps, scan, mate, count)
 
 
@@ -241,15 +291,17 @@ def announce(team, clock, in_flight, index, recipients):
     if len(team.robots) == 1 or not shared.announcements:
         return
     count_sent(robot, _ANNOUNCEMENT)
+    delay_s = shared.delay_s + draw_lateness(team.faults, index)
     reached = transmit(team, index, point(robot.origin), clock.time_s, recipients)
-    if reached and shared.delay_s > 0.0:
-        enqueue(clock, robot, in_flight, index, _ANNOUNCEMENT, recipients, shared.delay_s)
+    if reached and delay_s > 0.0:
+        enqueue(clock, robot, in_flight, index, _ANNOUNCEMENT, recipients, delay_s)
         return
+    time_s, bits = clock.time_s, message_bits(_ANNOUNCEMENT)
     for mate in range(len(team.robots)):
-        if recipients[mate]:
+        if recipients[mate] and takes_in(team.faults, team.robots[mate], mate, time_s, bits):
             heard = team.heard[mate, index]
-            note_message(team.robots[mate], heard, robot.origin, clock.time_s, _ANNOUNCEMENT)
-            write_announcement(robot, heard.announced)
+            if note_message(team.robots[mate], heard, robot.origin, time_s, _ANNOUNCEMENT):
+                write_announcement(robot, heard.announced)
 
 
 @lean_kernel
@@ -273,16 +325,16 @@ def receive(team, maps, in_flight, slot, tracer, scan):
         scan: Scan, scratch space.
     """
     message = in_flight.messages[slot]
+    time_s, bits = message.due_s, message_bits(message.count)
     message.due_s = math.inf
     packed, sender = in_flight.rays[slot], message.sender
     unpack_measurements(team.params[0], tracer, sender, scan, message.pose, packed, message.count)
     for mate in range(len(team.robots)):
-        if in_flight.recipients[slot, mate]:
+        if in_flight.recipients[slot, mate] and takes_in(team.faults, team.robots[mate], mate, time_s, bits):
             heard = team.heard[mate, sender]
-            note_message(team.robots[mate], heard, message.pose, message.sent_s, message.count)
-            if message.count < 0:
+            if note_message(team.robots[mate], heard, message.pose, message.sent_s, message.count):
                 copy_numbers(message.announced, heard.announced, 7)
-            else:
+            elif message.count >= 0:
                 hear_batch(team, maps, scan, mate, message.count)
 
 

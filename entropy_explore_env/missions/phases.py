@@ -12,12 +12,19 @@ import math
 
 from entropy_explore_env.belief.raycast import point
 from entropy_explore_env.compilation.kernels import ASSERTING, lean_kernel
+from entropy_explore_env.missions.faults import (
+    count_silenced,
+    radio_silent,
+    switched_off,
+    takes_in,
+)
 from entropy_explore_env.missions.messages import (
     count_sent,
     hear_batch,
     message_bits,
     note_message,
     pack_measurements,
+    passes,
     unpack_measurements,
 )
 from entropy_explore_env.missions.poses import copy_numbers, distance_between, pose_at
@@ -78,7 +85,7 @@ def broadcast_all(team, maps, buffers, phases, time_s, tracer, scan):
     phases.broadcasts += 1
     side = 1 - phases.collecting
     for robot in range(robots):
-        if buffers.counts[robot, side] > 0:
+        if buffers.counts[robot, side] > 0 and not switched_off(team.faults, robot, time_s):
             broadcast(team, maps, buffers, side, robot, time_s, tracer, scan)
 
 
@@ -99,17 +106,23 @@ def broadcast(team, maps, buffers, side, index, time_s, tracer, scan):
     robots, robot, params = team.robots, team.robots[index], team.params
     batches, heard = buffers.counts[index, side], buffers.heard[index]
     here = pose_at(params[index], robot, time_s)
+    silent = radio_silent(team.faults, index, time_s)
+    bits = buffer_bits(buffers.batches[index, side], batches)
     for mate in range(len(robots)):
         if mate == index:
             continue
         apart_m = distance_between(point(here), point(pose_at(params[mate], robots[mate], time_s)))
         shared = params[0]
         code = draw_delivery(apart_m, shared.channel_range_m, shared.loss_probability, robot.channel_rng)
-        if code == _LOST:
+        if code != _OUT_OF_RANGE and not passes(team.air, team, mate, point(here), time_s):
+            code = _OUT_OF_RANGE
+        if silent:
+            count_silenced(team.faults, index, batches)
+        elif code == _LOST:
             robot.messages_lost += batches
         elif code == _OUT_OF_RANGE:
             robot.messages_out_of_range += batches
-        else:
+        elif takes_in(team.faults, robots[mate], mate, time_s, bits):
             heard[mate] = _AGAIN if heard[mate] == _HAS_IT else _NOW
     for place in range(batches):
         batch = buffers.batches[index, side, place]
@@ -130,3 +143,12 @@ def broadcast(team, maps, buffers, side, index, time_s, tracer, scan):
             team.heard[mate, index].heard_s = time_s
             copy_numbers(here, team.heard[mate, index].pose, 5)
             heard[mate] = _HAS_IT
+
+
+@lean_kernel
+def buffer_bits(batches, count):
+    """What a broadcast of the first `count` of (S,) BATCH costs."""
+    bits = 0
+    for place in range(count):
+        bits += message_bits(batches[place].count)
+    return bits

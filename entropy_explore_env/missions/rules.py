@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from entropy_explore_env.belief.pooling import Cells, new_cells, no_cells
+from entropy_explore_env.robots.faults import FAULT_PARAMS
 from entropy_explore_env.robots.range_sensor import TeamSensors, team_sensors
 from entropy_explore_env.scenario import Scenario
 from entropy_explore_env.settings import Observation, Robot
@@ -48,13 +49,19 @@ PARAMS = np.dtype(
         ("i_min_fill", "f8"),  # 0 = I_min stays as it is
         ("i_min_gain", "f8"),
         ("channel_range_m", "f8"),
+        ("line_of_sight", "?"),  # whether messages need it; else, where they pass through air, these:
+        ("spare_db", "f8"),  # Signal.spare_db
+        ("path_loss_exponent", "f8"),
+        ("wall_loss_db_per_m", "f8"),
         ("loss_probability", "f8"),
         ("delay_s", "f8"),
         ("announcements", "?"),
+        ("silent_after_s", "f8"),
         ("phase_s", "f8"),
         ("repeats", "i8"),
         ("period_s", "f8"),  # length of a step; inf = until the next robot has to decide
         ("all_maps", "?"),
+        ("shared_maps", "?"),  # those of all robots that still work
         ("by_seen", "?"),  # whether the mission ends by what was seen
         ("time_limit_s", "f8"),
         ("max_cycles", "i8"),
@@ -90,6 +97,8 @@ class Rules(NamedTuple):
     """Of the overview; none without it."""
     panorama: np.ndarray
     """(D, 3) float64 unit vectors of the panorama's rays; D = 0 without it."""
+    faults: np.ndarray | None
+    """(A,) FAULT_PARAMS; None = nothing goes wrong."""
 
 
 def rules_of(scenario: Scenario) -> Rules:
@@ -111,13 +120,19 @@ def rules_of(scenario: Scenario) -> Rules:
         "i_min_fill": channel.i_min_fill or 0.0,
         "i_min_gain": channel.i_min_gain,
         "channel_range_m": channel.range_m,
+        "line_of_sight": channel.reach == "line_of_sight",
+        "spare_db": channel.signal.spare_db,
+        "path_loss_exponent": channel.signal.exponent,
+        "wall_loss_db_per_m": channel.signal.wall_loss_db_per_m,
         "loss_probability": channel.loss_probability,
         "delay_s": channel.delay_s,
         "announcements": channel.announcements,
+        "silent_after_s": channel.silent_after_s,
         "phase_s": channel.phase_s,
         "repeats": channel.repeats,
         "period_s": math.inf if scenario.decision_period_s is None else scenario.decision_period_s,
         "all_maps": ending.termination == "all",
+        "shared_maps": ending.termination == "shared",
         "by_seen": ending.by_seen,
         "time_limit_s": ending.time_limit_s,
         "max_cycles": _NEVER if ending.max_cycles is None else ending.max_cycles,
@@ -151,7 +166,26 @@ def rules_of(scenario: Scenario) -> Rules:
         actions=ActionSet(discrete_moves(scenario), gaze_set(scenario.action.yaws, pitches)),
         cells=no_cells(size) if overview is None else new_cells(size, overview),
         panorama=panorama_directions(scenario),
+        faults=fault_params(scenario),
     )
+
+
+def fault_params(scenario: Scenario) -> np.ndarray | None:
+    """(A,) FAULT_PARAMS, what is wrong with each robot; None = nothing ever is."""
+    if not scenario.faults.happen:
+        return None
+    params = np.zeros(scenario.robots, FAULT_PARAMS)
+    params["range_factor"] = 1.0
+    names = {
+        "sensor": ("lost_rays", "range_factor", "range_bias_m"),
+        "radio": ("garbled", "repeated", "late", "late_s"),
+    }
+    for part, fields in names.items():
+        fault = getattr(scenario.faults, part)
+        rows = list(fault.robots) or slice(None)
+        for name in fields:
+            params[name][rows] = getattr(fault, name)
+    return params
 
 
 def collision_radii_m(scenario: Scenario) -> list[float]:

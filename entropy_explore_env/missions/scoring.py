@@ -53,6 +53,27 @@ def note_seen(params, clock, robots):
 
 
 @lean_kernel
+def holds_enough(clock, visible, truth, precision, prior_precision):
+    """Whether a robot's own map holds as much of what can be seen as ends the mission.
+
+    It counts all voxels: for missions whose joint map holds enough already.
+
+    Args:
+        clock: MISSION.
+        visible: (V,) bool, what can be seen.
+        truth: (V,) float32.
+        precision: (V,) float32 of the robot's belief.
+        prior_precision: 1/σ² of a voxel that it neither measured nor was told of.
+    """
+    prior, seen, free = np.float32(prior_precision), 0, 0
+    for voxel in range(len(precision)):
+        if visible[voxel] and precision[voxel] > prior:
+            seen += 1
+            free += int(truth[voxel] <= 0.5)
+    return seen >= clock.explored_end and free >= clock.explored_free_end
+
+
+@lean_kernel
 def score_scan(clock, joint, truth, scan, prior_precision):
     """Fuse a scan into the joint map, and carry its entropy, coverage and errors (see MISSION).
 

@@ -17,6 +17,7 @@ from entropy_explore_env.belief.raycast import Crossing
 from entropy_explore_env.compilation.announcement import end_of_step
 from entropy_explore_env.compilation.kernels import entry_point
 from entropy_explore_env.errors import ActionError, CallOrderError, SettingError
+from entropy_explore_env.missions.faults import draw_faults
 from entropy_explore_env.missions.memory import Batch, check_memory
 from entropy_explore_env.missions.navigation import Planning, plan_missions
 from entropy_explore_env.missions.observation.layout import ObservationLayout, part_offsets
@@ -284,6 +285,7 @@ class Missions:
         robots["channel_rng"][:, 0] = splitmix_states(number, episode, Stream.CHANNEL, len(robots))
         state.heard[mission]["heard_s"] = state.heard[mission]["announced_s"] = -1.0
         state.in_flight[mission]["due_s"] = np.inf
+        draw_faults(self.scenario, number, episode, state.faults[mission])
         self._observe(0, mission, mission + 1)
 
     def _set_collision_masks(self, mission: int, world: World) -> None:

@@ -26,6 +26,7 @@ class MissionEnd(enum.Enum):
     TIME_UP = "The simulated time reached its limit."
     CYCLES_UP = "The number of steps reached its limit."
     SEEN = "The team has seen as much of the world as the mission asks for."
+    STOPPED = "All robots have stopped for good."
 
     @property
     def code(self) -> int:
@@ -132,6 +133,29 @@ ROBOT = np.dtype(
     align=True,
 )
 
+FAULT = np.dtype(
+    [
+        # when each outage begins and ends; inf = never
+        ("stop_s", "f8"),
+        ("stop_until_s", "f8"),
+        ("blind_s", "f8"),
+        ("blind_until_s", "f8"),
+        ("silent_s", "f8"),
+        ("silent_until_s", "f8"),
+        ("stopped", "?"),  # whether it has stopped, whether or not it works again
+        ("sensor_rng", "u8", (1,)),  # random state of lost rays
+        ("radio_rng", "u8", (1,)),  # random state of messages that go wrong
+        # counted from the mission's start
+        ("blind_scans", "i8"),
+        ("rays_lost", "i8"),
+        ("messages_silenced", "i8"),  # per teammate that a silent radio did not reach, and those not heard
+        ("messages_garbled", "i8"),  # that arrived so
+        ("messages_repeated", "i8"),  # that arrived twice
+        ("messages_late", "i8"),  # that were sent late
+    ],
+    align=True,
+)
+
 COUNTED = ROBOT.names[ROBOT.names.index("distance_m") :] if ROBOT.names else ()
 """Fields of ROBOT that count from the mission's start."""
 
@@ -224,6 +248,8 @@ class MissionState(NamedTuple):
     """(E, A, 2, S, B, 5) float64, as in `in_flight_rays`."""
     phase_heard: np.ndarray
     """(E, A, A) int8: whether b has what a broadcasts; see `missions/phases.py`."""
+    faults: np.ndarray
+    """(E, A) FAULT; (E, 0) where nothing goes wrong."""
 
 
 class Beliefs(NamedTuple):
@@ -320,6 +346,7 @@ def state_arrays(
         "phase_batches": ((e, in_phases, 2, s), BATCH),
         "phase_rays": ((e, in_phases, 2, s, b, 5), np.float64),
         "phase_heard": ((e, in_phases, a), np.int8),
+        "faults": ((e, a if scenario.faults.happen else 0), FAULT),
     }
     return {name: (shape, np.dtype(kind)) for name, (shape, kind) in arrays.items()}
 

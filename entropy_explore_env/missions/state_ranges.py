@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from entropy_explore_env.errors import RecordError
+from entropy_explore_env.missions.faults import COUNTED, OUTAGES
 from entropy_explore_env.missions.state import WAYPOINTS, MissionEnd
 from entropy_explore_env.robots.motion import MoveEnd
 from entropy_explore_env.robots.range_sensor import Return
@@ -52,7 +53,7 @@ def check_ranges(scenario: Scenario, arrays: Mapping[str, np.ndarray]) -> None:
     Raises:
         RecordError: A number is in no mission of the scenario; the message names `array.field`.
     """
-    for part in (_missions, _robots, _heard, _messages, _phases, _maps, _scans):
+    for part in (_missions, _robots, _heard, _messages, _phases, _maps, _scans, _faults):
         for values in part(scenario, arrays):
             _check(values)
 
@@ -114,8 +115,9 @@ def _robots(scenario: Scenario, arrays: Mapping[str, np.ndarray]) -> Iterator[Va
     yield Values("robots.path", robots["path"], low - beyond, high + beyond)
     for name in ("depart_s", "decided_s"):
         yield Values(f"robots.{name}", robots[name], 0.0, time_s)
+    stopped_s = math.inf if scenario.faults.stop.happens else None
     for name in ("next_scan_s", "ready_s"):
-        yield Values(f"robots.{name}", robots[name], 0.0, time_s + 1e9)
+        yield Values(f"robots.{name}", robots[name], 0.0, time_s + 1e9, stopped_s)
     yield Values("robots.redecide_s", robots["redecide_s"], 0.0, time_s + 1e9, math.inf)
     for name in ("lead_s", "own_bits", "received_bits", "entropy_bits", "gained_bits", "heard_bits"):
         yield Values(f"robots.{name}", robots[name], -_MOST, _MOST)
@@ -152,7 +154,7 @@ def _messages(scenario: Scenario, arrays: Mapping[str, np.ndarray]) -> Iterator[
     messages, rays = arrays["in_flight"], arrays["in_flight_rays"]
     clock = arrays["missions"]
     time_s, under_way = clock["time_s"][:, None], np.isfinite(messages["due_s"])
-    yield Values("in_flight.due_s", messages["due_s"], 0.0, time_s + scenario.channel.delay_s, math.inf)
+    yield Values("in_flight.due_s", messages["due_s"], 0.0, time_s + scenario.longest_delay_s, math.inf)
     yield Values("in_flight.sent_s", messages["sent_s"], 0.0, time_s)
     yield Values("in_flight.serial", messages["serial"], 0, clock["enqueued"][:, None])
     yield Values("in_flight.sender", messages["sender"], 0, scenario.robots - 1)
@@ -203,6 +205,19 @@ def _scans(scenario: Scenario, arrays: Mapping[str, np.ndarray]) -> Iterator[Val
     yield Values("scan_range_m", arrays["scan_range_m"], -longest_m, longest_m)
     yield Values("scan_returned", arrays["scan_returned"], min(Return), max(Return))
     yield Values("scan_utility_bits", arrays["scan_utility_bits"], -1.0, _MOST)
+
+
+def _faults(scenario: Scenario, arrays: Mapping[str, np.ndarray]) -> Iterator[Values]:
+    """FAULT. When outages begin and end the seed says; here they are only times, in this order."""
+    del scenario
+    faults = arrays["faults"]
+    for name in OUTAGES:
+        begin_s = faults[f"{name}_s"]
+        yield Values(f"faults.{name}_s", begin_s, 0.0, _MOST, math.inf)
+        yield Values(f"faults.{name}_until_s", faults[f"{name}_until_s"], begin_s, _MOST, math.inf)
+    yield Values("faults.stopped", faults["stopped"], 0, 1)
+    for name in COUNTED:
+        yield Values(f"faults.{name}", faults[name], 0, _MOST)
 
 
 def _poses(name: str, poses: np.ndarray, low: np.ndarray, high: np.ndarray) -> Iterator[Values]:

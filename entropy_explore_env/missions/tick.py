@@ -1,8 +1,8 @@
 """One step of one mission, compiled: choose → drive → scan → fuse → select → send → fuse → account.
 
-The events of a mission (a message arrives; the robots broadcast; a robot scans, has waited, or decides under
-way) are processed in the order of simulated time. `next_event` alone says which is next, also of those at one
-instant.
+The events of a mission (a robot stops by a fault; a message arrives; the robots broadcast; a robot scans, has
+waited, or decides under way) are processed in the order of simulated time. `next_event` alone says which is
+next, also of those at one instant.
 """
 
 from __future__ import annotations
@@ -15,11 +15,21 @@ import numpy as np
 from entropy_explore_env.compilation.kernels import ASSERTING, lean_kernel
 from entropy_explore_env.missions.driving import (
     continue_drive,
+    halt,
     keep_drive,
     next_decision,
     redecide,
     start_drive,
     stop,
+)
+from entropy_explore_env.missions.faults import (
+    all_gone,
+    faults_of,
+    gone,
+    next_stop,
+    note_stop,
+    spoil,
+    stops_counted,
 )
 from entropy_explore_env.missions.messages import (
     Maps,
@@ -35,7 +45,7 @@ from entropy_explore_env.missions.phases import broadcast_all, collect_batch, ne
 from entropy_explore_env.missions.poses import copy_numbers, grid_size, pose_at, to_grid_units
 from entropy_explore_env.missions.redecision import decide, note_braking, note_change
 from entropy_explore_env.missions.reward import reward_robots
-from entropy_explore_env.missions.scoring import note_progress, note_seen, score_scan
+from entropy_explore_env.missions.scoring import holds_enough, note_progress, note_seen, score_scan
 from entropy_explore_env.missions.state import (
     Beliefs,
     InFlight,
@@ -44,7 +54,7 @@ from entropy_explore_env.missions.state import (
     MissionEnd,
     PhaseBuffers,
 )
-from entropy_explore_env.robots.channel import select_measurements, steered_i_min
+from entropy_explore_env.robots.channel import Air, select_measurements, steered_i_min
 from entropy_explore_env.robots.range_sensor import (
     Return,
     Scene,
@@ -56,16 +66,17 @@ from entropy_explore_env.robots.range_sensor import (
     visibility_parameters,
 )
 
-_RUNNING, _MAPPED, _TIME_UP, _CYCLES_UP, _SEEN = (end.code for end in MissionEnd)
+_RUNNING, _MAPPED, _TIME_UP, _CYCLES_UP, _SEEN, _STOPPED = (end.code for end in MissionEnd)
 _NOTHING = int(Return.NOTHING)
-_NO_EVENT, _MESSAGE, _BROADCAST, _ROBOT = range(4)
+_NO_EVENT, _MESSAGE, _BROADCAST, _ROBOT, _FAULT = range(5)
 
 
 class Event(NamedTuple):
     """What happens next in a mission."""
 
     kind: int
-    """A message arrives, the robots broadcast, a robot scans, has waited or decides under way; or nothing."""
+    """A robot stops by a fault, a message arrives, the robots broadcast, a robot scans, has waited or decides
+    under way; or nothing."""
     number: int
     """The slot of the message, or the number of the robot; 0 for others."""
     time_s: float
@@ -107,7 +118,13 @@ def step_missions(rules, state, choices, work, continuous, discrete, first, last
     for m in range(first, last):
         mission = Mission(
             state.missions[m],
-            Team(rules.params, state.robots[m], state.heard[m]),
+            Team(
+                rules.params,
+                state.robots[m],
+                state.heard[m],
+                faults_of(rules.faults, state.faults, m),
+                air_of(work.air, state.truth[m]),
+            ),
             Maps(Beliefs(state.mean[m], state.precision[m], state.pooled[m]), rules.cells),
             JointMap(state.joint_mean[m], state.joint_precision[m], state.visible[m]),
             LatestScans(state.scan_range_m[m], state.scan_returned[m], state.scan_utility_bits[m]),
@@ -126,6 +143,14 @@ def step_missions(rules, state, choices, work, continuous, discrete, first, last
             depart(team, clock, mission.in_flight, collision, choices[m], work)
             advance(mission, rules.sensors, work)
             finish_step(team, clock, before_s)
+
+
+@lean_kernel
+def air_of(crossing, truth):
+    """Air of a mission; None where the channel reaches by distance alone."""
+    if crossing is None:  # known while compiling: nothing of the rest is compiled
+        return None
+    return Air(truth, crossing)
 
 
 @lean_kernel
@@ -203,16 +228,21 @@ def advance(mission, sensors, work):
         target_s = next_decision(params, robots)
     stop_s = min(target_s, shared.time_limit_s)
     while clock.end == _RUNNING:
-        event = next_event(shared, robots, messages, mission.phases)
+        event = next_event(shared, robots, messages, mission.phases, team.faults)
         if event.kind == _NO_EVENT or event.time_s > stop_s:
             break
-        handled = events_handled(robots, messages, mission.phases) if ASSERTING else 0
+        handled = events_handled(robots, messages, mission.phases, team.faults) if ASSERTING else 0
         earlier_s = clock.time_s
         clock.time_s = max(clock.time_s, event.time_s)
         if event.kind == _MESSAGE:
             receive(team, maps, mission.in_flight, event.number, tracer, scan)
         elif event.kind == _BROADCAST:
             broadcast_all(team, maps, mission.buffers, mission.phases, clock.time_s, tracer, scan)
+        elif event.kind == _FAULT:
+            until_s = note_stop(team.faults, event.number)
+            halt(params[event.number], robots[event.number], clock.time_s, until_s)
+            if math.isinf(shared.period_s):
+                stop_s = min(next_decision(params, robots), shared.time_limit_s)
         elif robots[event.number].waiting:
             robots[event.number].deciding = True
         elif robots[event.number].next_scan_s > event.time_s:
@@ -223,10 +253,10 @@ def advance(mission, sensors, work):
                 stop_s = min(next_decision(params, robots), shared.time_limit_s)
         if ASSERTING and clock.time_s < earlier_s:
             raise AssertionError("time ran backwards")
-        if ASSERTING and events_handled(robots, messages, mission.phases) <= handled:
+        if ASSERTING and events_handled(robots, messages, mission.phases, team.faults) <= handled:
             raise AssertionError("an event was not used up")
         note_progress(clock, robots)
-        clock.end = goal_reached(shared, clock, robots)
+        clock.end = mission_end(mission)
     if clock.end == _RUNNING:
         clock.time_s = max(clock.time_s, stop_s)
         if stop_s >= shared.time_limit_s:
@@ -234,24 +264,28 @@ def advance(mission, sensors, work):
 
 
 @lean_kernel
-def next_event(shared, robots, messages, phases):
+def next_event(shared, robots, messages, phases, faults):
     """The earliest Event.
 
-    Of those at one instant messages come first, in the order of sending; then the broadcast of all robots;
-    then robots by number.
+    Of those at one instant robots that stop come first; then messages, in the order of sending; then the
+    broadcast of all robots; then robots by number.
 
     Args:
         shared: PARAMS of any robot.
         robots: (A,) ROBOT.
         messages: (Q,) MESSAGE.
         phases: PHASES of the mission.
+        faults: TeamFaults, or None.
     """
     slot, due_s = next_message(messages)
     broadcast_s = next_broadcast(shared, phases)
     robot, robot_s = next_robot(robots)
-    soonest_s = min(due_s, broadcast_s, robot_s)
+    stopping, stopping_s = next_stop(faults)
+    soonest_s = min(due_s, broadcast_s, robot_s, stopping_s)
     if math.isinf(soonest_s):
         return Event(_NO_EVENT, 0, soonest_s)
+    if stopping_s == soonest_s:
+        return Event(_FAULT, stopping, soonest_s)
     if due_s == soonest_s:
         return Event(_MESSAGE, slot, soonest_s)
     if broadcast_s == soonest_s:
@@ -260,15 +294,15 @@ def next_event(shared, robots, messages, phases):
 
 
 @lean_kernel
-def events_handled(robots, messages, phases):
+def events_handled(robots, messages, phases, faults):
     """A number that every event makes greater, so that none is met twice: asserted in debug builds.
 
     A message frees its slot. A broadcast is counted. A robot counts its scan; or it decides, having waited or
     driven since it last decided; or it puts that off. A scan may send a message, begin the wait of a robot
-    that could decide, and set when it decides next: it counts for more than these three. Arguments as those
-    of `next_event`.
+    that could decide, and set when it decides next: it counts for more than these three. So does a stop,
+    after which a robot does not decide. Arguments as those of `next_event`.
     """
-    handled = phases.broadcasts
+    handled = phases.broadcasts + 4 * stops_counted(faults)
     for robot in robots:
         handled += 4 * robot.scans + int(robot.deciding) + int(math.isinf(robot.redecide_s))
     for message in messages:
@@ -312,17 +346,45 @@ def next_robot(robots):
 
 
 @lean_kernel
-def goal_reached(shared, clock, robots):
-    """Code of a MissionEnd: by what the team has seen, or by the threshold of entropy (Rocha04, eq. 41)."""
-    if shared.by_seen:
-        seen = clock.explored_visible >= clock.explored_end and clock.explored_free >= clock.explored_free_end
-        return _SEEN if seen else _RUNNING
-    passed = 0
-    for robot in robots:
-        if robot.entropy_bits <= clock.entropy_end_bits:
+def mission_end(mission):
+    """Code of a MissionEnd after an event: what the mission asks for, or that nobody is left for it."""
+    clock, team = mission.clock, mission.team
+    if team.params[0].by_seen:
+        end = _SEEN if seen_enough(mission) else _RUNNING
+    else:
+        end = _MAPPED if mapped_enough(team, clock) else _RUNNING
+    return _STOPPED if end == _RUNNING and all_gone(team.faults) else end
+
+
+@lean_kernel
+def mapped_enough(team, clock):
+    """Whether those maps that have to have passed the threshold of entropy (Rocha04, eq. 41)."""
+    shared, passed, missing = team.params[0], 0, 0
+    for index in range(len(team.robots)):
+        if shared.shared_maps and gone(team.faults, index):
+            continue
+        if team.robots[index].entropy_bits <= clock.entropy_end_bits:
             passed += 1
-    mapped = passed == len(robots) if shared.all_maps else passed > 0
-    return _MAPPED if mapped else _RUNNING
+        else:
+            missing += 1
+    return passed > 0 and (missing == 0 or not (shared.all_maps or shared.shared_maps))
+
+
+@lean_kernel
+def seen_enough(mission):
+    """Whether the team has seen what ends the mission; where it has to be shared, whether all hold it."""
+    clock, team, joint = mission.clock, mission.team, mission.joint
+    if clock.explored_visible < clock.explored_end or clock.explored_free < clock.explored_free_end:
+        return False
+    if not team.params[0].shared_maps:
+        return True
+    working, precision, prior = 0, mission.maps.beliefs.precision, team.params[0].prior_precision
+    for index in range(len(team.robots)):
+        if not gone(team.faults, index):
+            working += 1
+            if not holds_enough(clock, joint.visible, mission.truth, precision[index], prior):
+                return False
+    return working > 0
 
 
 @lean_kernel
@@ -343,6 +405,7 @@ def scan_and_share(mission, sensor, index, work):
     bodies = work.bodies[: place_bodies(team, sensor, index, clock.time_s, pose, work.bodies)]
     scene = Scene(mission.truth, grid_size(params), params.voxel_size_m, bodies)
     take_scan(scan, sensor, scene, pose, robot.sensor_rng)
+    spoil(team.faults, index, scan, sensor, scene, pose, clock.time_s)
     for ray in range(len(scan.order)):
         scan.order[ray] = ray
     bits = fuse_measurements(team, mission.maps, scan, index, len(scan.order))

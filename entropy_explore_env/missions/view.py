@@ -5,6 +5,7 @@ Strategies see this and nothing else; the truth is not in it.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,10 +14,13 @@ from entropy_explore_env.missions.action import ROUNDING, encode_viewpoint
 from entropy_explore_env.missions.poses import place_at, pose_at, share_left, speed_at
 from entropy_explore_env.missions.rules import Rules
 from entropy_explore_env.missions.simulation import Missions
-from entropy_explore_env.robots.motion import MoveEnd
+from entropy_explore_env.robots.motion import MoveEnd, driving_time
 from entropy_explore_env.scenario import Scenario
 from entropy_explore_env.settings import RobotKind
 from entropy_explore_env.worlds.world import no_fly_mask
+
+_DETOURS = 2.0
+"""Times of the straight drive that a drive may take."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,6 +54,10 @@ class TeammateView:
 
     Equal only to itself, as other views.
 
+    A teammate that has not been heard for long (`Channel.silent_after_s`) counts as silent: it is out of
+    reach, or works no more. Where it was last heard it may still stand; what it announced is not kept, so
+    that its place is free for others.
+
     Attributes:
         heard_s: When the last message was sent that reached the robot.
         pose: (5,) where the teammate was then: x, y, z, yaw, pitch.
@@ -57,6 +65,8 @@ class TeammateView:
         viewpoint: (5,) the viewpoint that it announced: x, y, z, yaw, pitch.
         depth_m: r̂, mean measured distance of the teammate's latest scan then.
         half_angle_rad: α̂, largest angle of a measured ray from its gaze.
+        silent: Whether it was heard once, and counts as silent now: `announced_s` is -1 then, `viewpoint`,
+            `depth_m` and `half_angle_rad` are 0.
     """
 
     heard_s: float
@@ -65,11 +75,14 @@ class TeammateView:
     viewpoint: np.ndarray
     depth_m: float
     half_angle_rad: float
+    silent: bool = False
 
     def __repr__(self) -> str:
         """Where it was last heard, and where it went."""
         if self.heard_s < 0.0:
             return "TeammateView(never heard)"
+        if self.silent:
+            return f"TeammateView(at {_place(self.pose)} at {self.heard_s:g} s, silent since)"
         announced = "" if self.announced_s < 0.0 else f", to {_place(self.viewpoint)}"
         return f"TeammateView(at {_place(self.pose)} at {self.heard_s:g} s{announced})"
 
@@ -99,6 +112,7 @@ class RobotView:
         depth_m, half_angle_rad: r̂ and α̂ of its latest scan.
         scan: Its latest scan.
         teammates: Robot number → what it heard of it.
+        heard: (A,) HEARD, the same as it came, also of teammates that are silent since: for observations.
         ceiling: (X, Y) int32, in each column the lowest layer of the no-fly zone (an exposure surface
             is known beforehand); None = no such zone.
     """
@@ -121,6 +135,7 @@ class RobotView:
     half_angle_rad: float
     scan: ScanView
     teammates: dict[int, TeammateView]
+    heard: np.ndarray
     ceiling: np.ndarray | None
     rules: Rules
 
@@ -211,7 +226,12 @@ def view_of(missions: Missions, mission: int, robot: int) -> RobotView:
             read_only(state.scan_returned[here][:rays]),
             read_only(state.scan_utility_bits[here][:rays]),
         ),
-        teammates={mate: _teammate(heard[mate]) for mate in range(len(heard)) if mate != robot},
+        teammates={
+            mate: _teammate(rules.params[mate], heard[mate], time_s)
+            for mate in range(len(heard))
+            if mate != robot
+        },
+        heard=read_only(heard.copy()),
         ceiling=None if world is None else world.ceiling,
         rules=rules,
     )
@@ -236,16 +256,42 @@ def _path_ahead(params: np.void, own: np.void, time_s: float) -> np.ndarray:
     return own["path"][passed : own["waypoints"]].copy()
 
 
-def _teammate(heard: np.void) -> TeammateView:
-    announced = heard["announced"].copy()
+def _teammate(params: np.void, heard: np.void, time_s: float) -> TeammateView:
+    silent = silent_since(params, heard, time_s)
+    announced = np.zeros(7) if silent else heard["announced"].copy()
     return TeammateView(
         heard_s=float(heard["heard_s"]),
         pose=heard["pose"].copy(),
-        announced_s=float(heard["announced_s"]),
+        announced_s=-1.0 if silent else float(heard["announced_s"]),
         viewpoint=announced[:5],
         depth_m=float(announced[5]),
         half_angle_rad=float(announced[6]),
+        silent=silent,
     )
+
+
+def silent_since(params: np.void, heard: np.void, time_s: float) -> bool:
+    """Whether a teammate that was heard counts as silent: see `Channel.silent_after_s`.
+
+    Until it must be heard again it may drive, for twice the time of the straight drive to the viewpoint that
+    it announced, turn half round, scan, and wait behind a teammate; its message may wait for the end of a
+    phase, and be delayed.
+
+    Args:
+        params: PARAMS of the teammate.
+        heard: HEARD of it.
+        time_s: Now.
+    """
+    unheard_s = time_s - float(heard["heard_s"])
+    if heard["heard_s"] < 0.0 or unheard_s <= params["silent_after_s"]:
+        return False
+    drive_m = 0.0
+    if heard["announced_s"] >= 0.0:
+        drive_m = float(np.linalg.norm(heard["announced"][:3] - heard["pose"][:3]))
+    drive_s = _DETOURS * driving_time(drive_m, params["max_speed_m_s"], params["acceleration_m_s2"])
+    stands_s = math.pi / params["turn_rate_rad_s"] + params["scan_time_s"] + params["blocked_wait_s"]
+    message_s = params["phase_s"] + params["delay_s"]
+    return bool(unheard_s > params["silent_after_s"] + drive_s + stands_s + message_s)
 
 
 def read_only(array: np.ndarray) -> np.ndarray:

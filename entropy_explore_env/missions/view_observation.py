@@ -13,7 +13,6 @@ from entropy_explore_env.missions.action import decode_action
 from entropy_explore_env.missions.observation.layout import ObservationLayout, part_offsets
 from entropy_explore_env.missions.observation.observe import Known, observe_robot
 from entropy_explore_env.missions.rules import rules_of
-from entropy_explore_env.missions.state import HEARD
 from entropy_explore_env.missions.view import RobotView
 from entropy_explore_env.robots.range_sensor import new_scan
 from entropy_explore_env.scenario import Scenario, with_settings
@@ -68,7 +67,7 @@ class ViewObserver:
             view.deciding,
             view.speed_m_s,
             view.target,
-            _heard(view, self.scenario.robots),
+            view.heard.copy(),
             mean,
             precision,
             self._pooled,
@@ -95,20 +94,6 @@ class ViewObserver:
         )
         decode_action(params, self._rules.actions, view.pose, continuous, number, viewpoint)
         return viewpoint
-
-
-def _heard(view: RobotView, robots: int) -> np.ndarray:
-    """(A,) HEARD as the environment holds it."""
-    heard = np.zeros(robots, HEARD)
-    heard["heard_s"] = heard["announced_s"] = -1.0
-    for number, mate in view.teammates.items():
-        heard[number] = (
-            mate.heard_s,
-            mate.pose,
-            mate.announced_s,
-            (*mate.viewpoint, mate.depth_m, mate.half_angle_rad),
-        )
-    return heard
 
 
 def _writable(array: np.ndarray) -> np.ndarray:

@@ -29,6 +29,8 @@ class Workspace(NamedTuple):
     """(A, 4) float64, teammates' bodies: centre and radius in grid units."""
     recipients: np.ndarray
     """(A,) bool, whom a message reaches."""
+    air: Crossing | None
+    """Voxels between two robots; None = the channel reaches by distance alone: nothing else is compiled."""
     footprints: np.ndarray
     """(K, B, 3) int64, offsets of the voxels that bodies of each kind of robot touch; B = 0 if none plans."""
 
@@ -45,7 +47,16 @@ def new_workspace(scenario: Scenario, navigators: Mapping[int, Navigator]) -> Wo
         braking=np.zeros((WAYPOINTS, 3)) if any(robot.redecide != "at_stop" for robot in robots) else None,
         bodies=np.zeros((scenario.robots, 4)),
         recipients=np.zeros(scenario.robots, np.bool_),
+        air=_new_air(scenario),
         footprints=footprints(navigators, len(kinds))
         if navigators
         else np.zeros((len(kinds), 0, 3), np.int64),
     )
+
+
+def _new_air(scenario: Scenario) -> Crossing | None:
+    """Scratch memory for lines between robots, if the channel needs them."""
+    if scenario.channel.reach == "distance":
+        return None
+    longest = longest_crossing(*scenario.grid.shape, math.inf, 1)
+    return Crossing(np.zeros(longest, np.int32), np.zeros(longest, np.int64))

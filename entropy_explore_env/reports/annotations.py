@@ -85,6 +85,14 @@ def draw_ring(
     draw.ellipse(_around(centre, radius), outline=colour, width=2 * unit)
 
 
+def draw_cross(draw: ImageDraw.ImageDraw, centre: tuple[float, float], unit: int) -> None:
+    """The mark over a robot that has stopped: a dark cross, larger than the robot's disc."""
+    x, y = centre
+    arm = (MARK_RADIUS + 3) * unit
+    for side in (-1, 1):
+        draw.line((x - arm, y - side * arm, x + arm, y + side * arm), INK, 2 * unit)
+
+
 def _around(centre: tuple[float, float], radius: float) -> tuple[float, float, float, float]:
     """Corners of the square around a circle."""
     x, y = centre

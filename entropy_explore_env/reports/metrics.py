@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from entropy_explore_env.missions.faults import fault_counts
 from entropy_explore_env.missions.poses import driven_metres
 from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.missions.state import COUNTED, SEEN_MARKS
@@ -49,9 +50,11 @@ def mission_figures(missions: Missions, mission: int, floor: bool | None = None)
         `messages_lost`; `entropy_start_bits`, `entropy_threshold_bits`, `entropy_end_bits`,
         `entropy_mean_bits` over the team; `balance`: the coefficient of variation of the bits that the
         robots gained themselves; `distance_m`, `blocked_moves`; `per_robot`: a list of the counts of
-        each robot. If the scenario tracks the truth, also `joint`: see `joint_figures`.
+        each robot. If the scenario has faults, also `faults`: see `fault_counts`. If it tracks the truth,
+        also `joint`: see `joint_figures`.
     """
     clock, robots = missions.state.missions[mission], missions.state.robots[mission]
+    faults = missions.state.faults[mission]
     end, world = missions.over(mission), missions.worlds[mission]
     scans, sent = int(robots["scans"].sum()), int(robots["bits_sent"].sum())
     measurements, gained = int(robots["measurements"].sum()), robots["gained_bits"]
@@ -82,6 +85,7 @@ def mission_figures(missions: Missions, mission: int, floor: bool | None = None)
         "balance": float(gained.std() / gained.mean()) if gained.any() else None,
         "distance_m": float(robots["distance_m"].sum()),
         "blocked_moves": int(robots["blocked_moves"].sum()),
+        **({"faults": fault_counts(faults)} if len(faults) else {}),
         **({"joint": joint_figures(missions, mission)} if missions.scenario.track_truth else {}),
         "per_robot": [{name: robot[name].item() for name in COUNTED} for robot in robots],
     }

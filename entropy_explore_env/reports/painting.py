@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from entropy_explore_env.errors import CallOrderError, SettingError
+from entropy_explore_env.missions.faults import failing
 from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.reports.animation import Window
 from entropy_explore_env.reports.projection import shares_left
@@ -116,12 +117,16 @@ class Painter:
         time_s = float(missions.state.missions[self._number]["time_s"])
         poses = poses_now(missions, self._number)
         shares = np.stack(self._shares) if self._shares else np.zeros((0, len(robots)))
+        stopped = np.zeros(len(robots), bool)
+        if missions.scenario.faults.happen:
+            stopped = failing(missions.state.faults[self._number], time_s)["stopped"]
         status = (
             f"time {time_s:,.0f} s",
             f"entropy left {max(remaining_share(missions, self._number).min(), 0.0):.1%}",
             f"scans {robots['scans'].sum():,}",
             f"rays sent {robots['measurements_sent'].sum():,}",
             f"driven {robots['distance_m'].sum():,.1f} m",
+            *((f"stopped {stopped.sum()} of {len(robots)}",) if missions.scenario.faults.happen else ()),
         )
         frame = Frame(
             entropy_share=entropy_share(missions, self._number, 0),
@@ -136,6 +141,7 @@ class Painter:
             curve_share=shares,
             title=f"{world_name(missions, self._number)}: belief of robot_0",
             status=status,
+            stopped=tuple(np.flatnonzero(stopped).tolist()),
         )
         return draw_frame(frame)
 

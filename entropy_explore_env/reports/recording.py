@@ -9,6 +9,9 @@ import numpy as np
 
 from entropy_explore_env.missions.poses import place_at, pose_at
 from entropy_explore_env.missions.simulation import Missions
+from entropy_explore_env.robots.motion import MoveEnd
+
+_FAILED = MoveEnd.FAILED.code
 
 
 def poses_now(missions: Missions, mission: int) -> np.ndarray:
@@ -40,7 +43,8 @@ class DrivenPaths:
         for number, robot in enumerate(robots):
             points = self.passed_m[number]
             if robot["depart_s"] != self._departed_s[number]:
-                points += [*self._ahead[number], robot["origin"][:3].copy()]
+                halted = robot["move_end"] == _FAILED  # it has not passed all corners that were ahead
+                points += [*([] if halted else self._ahead[number]), robot["origin"][:3].copy()]
                 self._departed_s[number], self._corners_passed[number] = float(robot["depart_s"]), 0
             passed = int(place_at(numbers[number], robot, time_s)[3])
             points += list(robot["path"][self._corners_passed[number] : passed].copy())

@@ -18,6 +18,7 @@ from entropy_explore_env.reports.annotations import (
     MARK_RADIUS,
     TEXT_SIZE,
     Box,
+    draw_cross,
     draw_disc,
     draw_ring,
     write,
@@ -53,6 +54,7 @@ class Frame:
         curve_share: (T, A), share of the entropy that is left at those times; drawn from 0 to 1.
         title: One line.
         status: Lines such as "time 123 s"; at most eight are drawn.
+        stopped: Numbers of robots that a fault has stopped: a cross is drawn over them.
     """
 
     entropy_share: np.ndarray
@@ -67,6 +69,7 @@ class Frame:
     curve_share: np.ndarray
     title: str
     status: tuple[str, ...] = ()
+    stopped: tuple[int, ...] = ()
 
     def __post_init__(self) -> None:
         """Check that the arrays fit each other."""
@@ -182,6 +185,8 @@ def _draw_robots(picture: Image.Image, view: View, frame: Frame, unit: int) -> N
             draw.line((x, y, x + 1.1 * dx, y + 1.1 * dy), INK, 2 * unit + 3)
             draw.line((x, y, x + dx, y + dy), robot_colour(robot), 2 * unit + 1)
             draw_disc(draw, (x, y), MARK_RADIUS * unit, robot_colour(robot))
+            if robot in frame.stopped:
+                draw_cross(draw, (x, y), unit)
 
 
 def _draw_curves(draw: ImageDraw.ImageDraw, box: Box, frame: Frame, unit: int) -> None:

@@ -71,6 +71,12 @@ FIELDS_UNDER_WAY = "under_way path_blocked lead_s scan_lead_m decided_s redecide
 FIELDS_SEEN = ("explored_free", "seen_s", "seen_m")
 """Further fields of `missions`, where a mission ends by what was seen."""
 
+FIELDS_FAULTS = (
+    "stop_s stop_until_s blind_s blind_until_s silent_s silent_until_s stopped sensor_rng radio_rng "
+    "blind_scans rays_lost messages_silenced messages_garbled messages_repeated messages_late".split()
+)
+"""Fields of `faults`, where the scenario has any."""
+
 _FIELDS_TODAY: Mapping[str, str] = MappingProxyType(
     {
         "missions.letters": "enqueued",
@@ -101,7 +107,8 @@ def state_values(missions: Missions, mission: int) -> dict[str, np.ndarray]:
 
     Returns:
         Name → array, a view of the state, in the order of the digest. The phases of the broadcast, what an
-        ending by what was seen needs, and what decisions under way need, are there only where they are used.
+        ending by what was seen needs, what decisions under way need, and faults are there only where they are
+        used.
     """
     values: dict[str, np.ndarray] = {}
     for name, read in _ARRAYS.items():
@@ -117,6 +124,10 @@ def state_values(missions: Missions, mission: int) -> dict[str, np.ndarray]:
             values.update({f"missions.{field}": array[field][mission, ...] for field in FIELDS_SEEN})
         if name == "robots" and any(kind.robot.redecide != "at_stop" for kind in missions.scenario.kinds):
             values.update({f"robots.{field}": array[field][mission, ...] for field in FIELDS_UNDER_WAY})
+    if missions.scenario.faults.happen:
+        values.update(
+            {f"faults.{field}": missions.state.faults[field][mission, ...] for field in FIELDS_FAULTS}
+        )
     return values
 
 

@@ -3,14 +3,28 @@
 One measurement is a 3-D vector from the sensor to what it saw, three 32-bit numbers: 96 bits. Every
 message opens with its sender's pose, five numbers: 160 bits. An announcement adds a viewpoint
 (position, yaw, pitch) with r̂ and α̂ (RochaMI), seven numbers: 384 bits in all. A broadcast is charged
-once to its sender and once to each teammate that hears it.
+once to its sender and once to each teammate that hears it. What reaches whom is a matter of distance, of
+free sight through the true world, or of a signal that walls weaken.
 """
 
 from __future__ import annotations
 
 import enum
 import math
+from typing import NamedTuple
 
+import numpy as np
+
+from entropy_explore_env.belief.raycast import (
+    NEVER_STOP,
+    NONE_BEHIND,
+    OPEN_END,
+    STOP_AT_COVERED,
+    TICKS,
+    Crossing,
+    Line,
+    cast_ray,
+)
 from entropy_explore_env.compilation.kernels import lean_kernel
 from entropy_explore_env.randomness import draw_uniform
 
@@ -25,7 +39,7 @@ class Delivery(enum.Enum):
     """What became of a message on its way to one teammate; the value is a sentence for people."""
 
     HEARD = "The message arrives, at once or after the channel's delay."
-    OUT_OF_RANGE = "The teammate was farther away than the channel reaches when it was sent."
+    OUT_OF_RANGE = "The teammate was out of reach when it was sent: too far away, or behind walls."
     LOST = "The message was lost by chance."
 
     @property
@@ -35,6 +49,58 @@ class Delivery(enum.Enum):
 
 
 _HEARD, _OUT_OF_RANGE, _LOST = (delivery.code for delivery in Delivery)
+_NEAREST_M = 0.01
+"""Of the path loss, which is infinite at no distance."""
+
+
+class Air(NamedTuple):
+    """What messages pass through."""
+
+    occupied: np.ndarray
+    """(V,) float32 true coverage."""
+    crossing: Crossing
+    """Scratch space for a line through all of the workspace."""
+
+
+@lean_kernel
+def edges_in_walls(air, size, start, finish):
+    """How much of the straight line between two points is in solid voxels, in grid units.
+
+    The same from either end. Where the line only touches a voxel it is not in it.
+
+    Args:
+        air: Air.
+        size: (X, Y, Z) voxels.
+        start: (x, y, z) in grid units, inside the workspace.
+        finish: (x, y, z), likewise.
+    """
+    if finish < start:
+        start, finish = finish, start
+    x, y, z = finish[0] - start[0], finish[1] - start[1], finish[2] - start[2]
+    length = math.sqrt(x * x + y * y + z * z)
+    if length <= 0.0:
+        return 0.0
+    line = Line(start, (x / length, y / length, z / length), length)
+    _, n, _ = cast_ray(air.occupied, size, line, NEVER_STOP, OPEN_END, NONE_BEHIND, air.crossing)
+    within, ends = 0.0, length * TICKS
+    for step in range(n):
+        if air.occupied[air.crossing.voxels[step]] > STOP_AT_COVERED:
+            leaves = float(air.crossing.entered[step + 1]) if step + 1 < n else ends
+            within += max(leaves - air.crossing.entered[step], 0.0) / TICKS
+    return within
+
+
+@lean_kernel
+def path_loss_db(apart_m, exponent, wall_loss_db_per_m, walls_m):
+    """What the way beyond the first metre costs: see `radio_settings.Signal`.
+
+    Args:
+        apart_m: Distance between sender and teammate.
+        exponent: Of the loss in the open.
+        wall_loss_db_per_m: Of solid voxels.
+        walls_m: Metres of the way that are in them.
+    """
+    return 10.0 * exponent * math.log10(max(apart_m, _NEAREST_M)) + wall_loss_db_per_m * walls_m
 
 
 @lean_kernel

@@ -40,6 +40,7 @@ class MoveEnd(enum.Enum):
     CORNERS = "The path had more corners than a drive may have: the robot stands at the last of them."
     SEEN = "A scan under way showed that the rest of the path is blocked: the robot stands where it was."
     UNDER_WAY = "The drive goes on: the robot decides again without stopping."
+    FAILED = "A fault stopped the robot where it was."
 
     @property
     def code(self) -> int:

@@ -31,7 +31,7 @@ from entropy_explore_env.randomness import draw_gaussian
 from entropy_explore_env.settings import Grid, RangeSensor, centred_angles
 
 _NOTHING, _FREE, _HIT = int(Return.NOTHING), int(Return.FREE), int(Return.HIT)
-_NEAREST = 1e-3
+NEAREST = 1e-3
 """Noise makes no measurement shorter than this, in voxel edges."""
 _UNREADABLE = 2.0
 """True coverage of a solid voxel that gives no return; 1 is that of others."""
@@ -318,7 +318,7 @@ def take_scan(scan, model, scene, pose, rng):
         elif end == OPEN or error == 0.0:
             weigh_measurement(scan, index, params, scene.size, start)
         else:
-            ray.length = min(max(length + error / scene.voxel_size_m, _NEAREST), reach)
+            ray.length = min(max(length + error / scene.voxel_size_m, NEAREST), reach)
             trace_measurement(scan, index, params, scene.size, scene.voxel_size_m, start, scene.occupied)
         if ray.returned == _HIT and ray.range_m < params.min_range_m:
             ray.returned = _NOTHING

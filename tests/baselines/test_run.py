@@ -571,7 +571,14 @@ def test_an_interrupted_process_ends_with_130_and_leaves_nothing(tmp_path):
 
 
 def test_the_mission_s_end_is_said_by_its_name():
-    assert {end.name for end in MissionEnd} == {"RUNNING", "MAPPED", "TIME_UP", "CYCLES_UP", "SEEN"}
+    assert {end.name for end in MissionEnd} == {
+        "RUNNING",
+        "MAPPED",
+        "TIME_UP",
+        "CYCLES_UP",
+        "SEEN",
+        "STOPPED",
+    }
     env = EntropyExploreEnv(with_settings(scripted(BOX), {"max_cycles": 3}))
     run_mission(env, make_strategy("random"), 0)
     assert mission_figures(env.missions, 0)["end_reason"] == "CYCLES_UP"

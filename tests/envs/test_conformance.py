@@ -53,6 +53,22 @@ def test_scenarios_conform(in_this_process: int, scenario: str, robots: int, kin
     assert conform(scenario, robots, kind) == in_this_process == 8
 
 
+@pytest.mark.parametrize("period_s", [None, 1.0])
+def test_a_team_with_faults_conforms(in_this_process: int, period_s: float | None) -> None:
+    faults = {
+        "stop": {"mean_s": 12.0, "lasts_s": 3.0},
+        "blind": {"mean_s": 10.0, "lasts_s": 5.0},
+        "silent": {"mean_s": 10.0, "lasts_s": 5.0},
+        "sensor": {"lost_rays": 0.2, "range_factor": 1.05},
+        "radio": {"garbled": 0.2, "repeated": 0.2, "late": 0.2},
+    }
+    channel = {"reach": "signal", "i_min_bits": 0.0}
+    settings = {"faults": faults, "channel": channel, "decision_period_s": period_s}
+    said: list[str] = []
+    check_conformance(BOX, robots=3, steps=25, report=said.append, **settings)
+    assert len(said) == in_this_process
+
+
 @pytest.mark.long
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("robots", range(1, 6))

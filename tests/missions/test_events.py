@@ -10,16 +10,18 @@ import sys
 import numpy as np
 import pytest
 
+from entropy_explore_env.missions.faults import TeamFaults
 from entropy_explore_env.missions.rules import PARAMS
-from entropy_explore_env.missions.state import MESSAGE, PHASES, ROBOT
+from entropy_explore_env.missions.state import FAULT, MESSAGE, PHASES, ROBOT
 from entropy_explore_env.missions.tick import events_handled, next_event
+from entropy_explore_env.robots.faults import FAULT_PARAMS
 from tests.reference.scenes import free_box, started
 
-NOTHING, MESSAGES, BROADCAST, ROBOTS = range(4)
+NOTHING, MESSAGES, BROADCAST, ROBOTS, STOPS = range(5)
 NEVER = math.inf
 
 
-def event(due_s=(), serials=None, broadcasts=None, scans_s=(), deciding=()):
+def event(due_s=(), serials=None, broadcasts=None, scans_s=(), deciding=(), stops_s=None, stopped=()):
     """The next event of three messages and four robots at most; broadcasts every 2 s, if at all."""
     messages, robots = np.zeros(3, MESSAGE), np.zeros(4, ROBOT)
     messages["due_s"], robots["next_scan_s"], robots["redecide_s"] = NEVER, NEVER, NEVER
@@ -29,7 +31,13 @@ def event(due_s=(), serials=None, broadcasts=None, scans_s=(), deciding=()):
     shared, phases = np.zeros(1, PARAMS), np.zeros(1, PHASES)
     if broadcasts is not None:
         shared["phase_s"], shared["repeats"], phases["broadcasts"] = 6.0, 3, broadcasts
-    return tuple(next_event(shared[0], robots, messages, phases[0]))
+    faults = None
+    if stops_s is not None:
+        faults = TeamFaults(np.zeros(4, FAULT_PARAMS), np.zeros(4, FAULT))
+        faults.states["stop_s"] = NEVER
+        faults.states["stop_s"][: len(stops_s)] = stops_s
+        faults.states["stopped"][list(stopped)] = True
+    return tuple(next_event(shared[0], robots, messages, phases[0], faults))
 
 
 @pytest.mark.parametrize(
@@ -51,6 +59,10 @@ def event(due_s=(), serials=None, broadcasts=None, scans_s=(), deciding=()):
         ({"broadcasts": 4, "scans_s": (10.25,)}, (BROADCAST, 0, 10.0)),
         ({"broadcasts": 1, "due_s": (4.0,), "scans_s": (4.0,)}, (MESSAGES, 0, 4.0)),
         ({"broadcasts": 1, "due_s": (4.5,), "scans_s": (5.0,)}, (BROADCAST, 0, 4.0)),
+        ({"stops_s": (NEVER, NEVER)}, (NOTHING, 0, NEVER)),
+        ({"stops_s": (NEVER, 4.0), "broadcasts": 1, "due_s": (4.0,), "scans_s": (4.0,)}, (STOPS, 1, 4.0)),
+        ({"stops_s": (5.0, 4.0), "stopped": (1,), "scans_s": (4.5,)}, (ROBOTS, 0, 4.5)),
+        ({"stops_s": (5.0, 4.0), "stopped": (1,), "scans_s": (4.5,), "deciding": (0,)}, (STOPS, 0, 5.0)),
     ],
 )
 def test_the_earliest_event_is_next_and_ties_have_an_order(given, expected):
@@ -92,7 +104,9 @@ def test_every_kind_of_event_counts_as_handled():
     state = missions.state
 
     def handled():
-        return events_handled(state.robots[0], state.in_flight[0], state.phases[0])
+        return events_handled(state.robots[0], state.in_flight[0], state.phases[0], faults)
+
+    faults = None
 
     begun = handled()
     assert begun == 6  # all decide, and will not under way
@@ -110,3 +124,7 @@ def test_every_kind_of_event_counts_as_handled():
     assert handled() == begun + 2
     state.robots["redecide_s"][0, 2] = NEVER
     assert handled() == begun + 3
+    faults = TeamFaults(np.zeros(3, FAULT_PARAMS), np.zeros(3, FAULT))
+    faults.states["stopped"][2] = True
+    state.robots["deciding"][0, 2] = False
+    assert handled() == begun + 6

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import pickle
 
 import numpy as np
@@ -86,3 +87,45 @@ def test_texts_of_views_and_spaces_are_short() -> None:
     assert len(repr(batch.observation_space)) < 300
     space = team.observation_space("robot_0")
     assert pickle.loads(pickle.dumps(space)) == space and "Box(0, 1, (4, 11, 11, 5), float32)" in repr(space)
+
+
+def silent_views(unheard_s, **changes):
+    """What robot 0 knows of robot 1, which it heard last at 0.5 s, some seconds later."""
+    missions = started(free_box(robot={"turn_rate_rad_s": math.inf}, **changes))
+    wander(missions, 3, 0)
+    missions.state.missions["time_s"] = 0.5 + unheard_s
+    heard = missions.state.heard[0, 0, 1]
+    heard["heard_s"] = heard["announced_s"] = 0.5
+    heard["pose"], heard["announced"] = (1.0, 1.0, 1.0, 0.1, 0.2), (1.0, 2.0, 1.0, 0.3, 0.4, 2.0, 0.5)
+    return view_of(missions, 0, 0)
+
+
+@pytest.mark.parametrize(
+    ("changes", "limit_s"),
+    [
+        ({}, 10.0 + 2 * 3.0 + 0.5),  # 1 m at 0.5 m/s and 0.5 m/s²: 3 s; the scan takes 0.5 s
+        ({"channel": {"silent_after_s": 1.0}}, 1.0 + 2 * 3.0 + 0.5),
+        ({"channel": {"delay_s": 2.0}}, 12.0 + 2 * 3.0 + 0.5),
+        ({"channel": {"phase_s": 4.0}}, 14.0 + 2 * 3.0 + 0.5),
+    ],
+)
+def test_a_teammate_that_is_not_heard_for_long_is_silent_and_its_place_is_free(changes, limit_s):
+    heard, silent = (silent_views(limit_s + late_s, **changes).teammates[1] for late_s in (-1e-6, 1e-6))
+    assert (heard.silent, heard.announced_s, heard.depth_m) == (False, 0.5, 2.0)
+    assert heard.viewpoint.tolist() == [1.0, 2.0, 1.0, 0.3, 0.4]
+    assert (silent.silent, silent.announced_s, silent.depth_m) == (True, -1.0, 0.0)
+    assert not silent.viewpoint.any() and silent.pose.tolist() == heard.pose.tolist()
+    assert silent.heard_s == 0.5 and "silent since" in repr(silent) and "silent" not in repr(heard)
+
+
+def test_nobody_is_silent_where_the_channel_says_never_and_who_was_never_heard_is_not():
+    assert not silent_views(1e6, channel={"silent_after_s": math.inf}).teammates[1].silent
+    missions = started(free_box(channel={"range_m": 1e-6}))
+    missions.state.missions["time_s"] = 1e6
+    assert not view_of(missions, 0, 0).teammates[1].silent
+
+
+def test_a_policy_observes_what_was_heard_as_it_was():
+    view = silent_views(100.0)
+    assert view.heard[1]["announced_s"] == 0.5 and view.heard[1]["announced"][5] == 2.0
+    assert not view.heard.flags.writeable

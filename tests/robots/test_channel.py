@@ -9,17 +9,21 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from entropy_explore_env.radio_settings import Signal
 from entropy_explore_env.robots.channel import (
     BITS_PER_ANNOUNCEMENT,
     BITS_PER_BATCH,
     BITS_PER_MEASUREMENT,
+    Air,
     Delivery,
     draw_delivery,
+    edges_in_walls,
+    path_loss_db,
     select_measurements,
     steered_i_min,
 )
 from tests.reference import rocha04
-from tests.reference.scenes import drawn, seeds
+from tests.reference.scenes import drawn, ray_space, seeds
 
 
 def select(utility, burst, i_min):
@@ -132,3 +136,47 @@ def test_a_loss_probability_of_1_loses_everything(seed):
 
 def test_what_messages_cost():
     assert (BITS_PER_MEASUREMENT, BITS_PER_BATCH, BITS_PER_ANNOUNCEMENT) == (96, 160, 384)
+
+
+def slow_walls(occupied, start, finish, samples=20_000):
+    """Length of a straight line in solid voxels, in grid units: at the middles of many short pieces."""
+    start, finish = np.asarray(start), np.asarray(finish)
+    shares = (np.arange(samples) + 0.5) / samples
+    voxels = np.floor(start + shares[:, None] * (finish - start)).astype(int)
+    return np.linalg.norm(finish - start) * occupied[tuple(voxels.T)].mean()
+
+
+def walls(occupied, start, finish):
+    air = Air(occupied.ravel(), ray_space(occupied.shape, behind=1))
+    return edges_in_walls(air, occupied.shape, tuple(map(float, start)), tuple(map(float, finish)))
+
+
+@drawn(40)
+@given(seeds)
+def test_what_a_line_crosses_of_walls_is_what_the_slow_reference_finds(seed):
+    rng = np.random.default_rng(seed)
+    occupied = (rng.random((7, 11, 5)) < 0.3).astype(np.float32)
+    start, finish = (rng.random(3) * (7, 11, 5) for _ in range(2))
+    within = walls(occupied, start, finish)
+    assert within == pytest.approx(slow_walls(occupied, start, finish), abs=0.02)
+    assert walls(occupied, finish, start) == within
+
+
+def test_walls_by_hand():
+    """One wall, of one voxel, straight and aslant; a line along its face; and two places that are one."""
+    occupied = np.zeros((7, 11, 5), np.float32)
+    occupied[:, 4] = 1.0
+    assert walls(occupied, (2.5, 1.5, 2.5), (2.5, 8.0, 2.5)) == pytest.approx(1.0)
+    assert walls(occupied, (1.0, 2.5, 2.5), (5.0, 6.5, 2.5)) == pytest.approx(math.sqrt(2.0))
+    assert walls(occupied, (2.5, 1.5, 2.5), (2.5, 4.0, 2.5)) == 0.0
+    assert walls(occupied, (2.5, 1.5, 2.5), (2.5, 4.25, 2.5)) == pytest.approx(0.25)
+    assert walls(occupied, (2.5, 1.5, 2.5), (2.5, 1.5, 2.5)) == 0.0
+
+
+def test_path_loss_by_hand():
+    """20 dB a decade in the open; 12 dB a metre of wall; no more than at a hundredth of a metre."""
+    assert path_loss_db(10.0, 2.0, 30.0, 0.0) == pytest.approx(20.0)
+    assert path_loss_db(100.0, 3.0, 12.0, 0.5) == pytest.approx(66.0)
+    assert path_loss_db(1.0, 4.0, 12.0, 0.0) == 0.0
+    assert path_loss_db(0.0, 2.0, 12.0, 0.0) == pytest.approx(-40.0)
+    assert Signal(power_dbm=10.0, loss_at_1_m_db=45.0, threshold_dbm=-80.0).spare_db == 45.0

@@ -129,7 +129,8 @@ class AssignedFrontier(_Coordinated):
 
     def pick_among(self, scene: Scene, voxels: np.ndarray, lengths: np.ndarray) -> int:
         """See `_Coordinated`."""
-        mates = [mate for mate in scene.view.teammates.values() if mate.heard_s >= 0.0]
+        teammates = scene.view.teammates.values()
+        mates = [mate for mate in teammates if mate.heard_s >= 0.0 and not mate.silent]
         known = np.array([voxel_of(scene.view, mate.pose) for mate in mates], np.int32)
         group = groups(centres_of(scene, voxels), self.config.group * scene.cells.reach)
         apart = lengths_of_all(scene, voxels, lengths, known)

@@ -217,9 +217,11 @@ class VoronoiCoverage:
         return np.array(path, np.int64)
 
     def _sources(self, view: RobotView, here: int) -> tuple[np.ndarray, int]:
-        """Voxels of the robots that were heard and of this one, by number, and the index of this one."""
+        """Voxels of the robots that are heard and of this one, by number, and the index of this one."""
         heard = {
-            mate: voxel_of(view, seen.pose) for mate, seen in view.teammates.items() if seen.heard_s >= 0.0
+            mate: voxel_of(view, seen.pose)
+            for mate, seen in view.teammates.items()
+            if seen.heard_s >= 0.0 and not seen.silent
         }
         heard[view.robot] = here
         robots = sorted(heard)

@@ -14,16 +14,21 @@ from benchmarks.reliability.settings_fuzz import WATCHDOG_S, BrokenPromiseError,
 from benchmarks.reliability.settings_fuzz import _check as check
 from entropy_explore_env import EntropyExploreEnv
 from entropy_explore_env.errors import EntropyExploreError
+from entropy_explore_env.fault_settings import Outage, RadioFault, SensorFault
 from entropy_explore_env.scenario import Scenario
 from entropy_explore_env.scenarios import BOX
-from entropy_explore_env.settings import Observation, RangeSensor
+from entropy_explore_env.settings import Channel, Observation, RangeSensor
 from entropy_explore_env.settings_json import settings_of
 
 DRAWN_OTHERWISE = {
     RangeSensor: {"field_of_view_rad", "angular_step_rad"},
     Observation: {"patch_shape", "overview_shape"},
     Scenario: {"name", "grid", "world", "robot", "sensor", "extra_kinds"}
-    | {"channel", "ending", "reward", "action", "observation"},
+    | {"channel", "faults", "ending", "reward", "action", "observation"},
+    Channel: {"signal"},
+    Outage: {"robots"},
+    SensorFault: {"robots"},
+    RadioFault: {"robots"},
 }
 
 
@@ -39,11 +44,17 @@ def scenarios(count, few_kernels=False):
     return found
 
 
+def parts_of(settings):
+    """A dataclass of settings, and all those in it."""
+    within = [part for part in vars(settings).values() if dataclasses.is_dataclass(part)]
+    return [settings, *(each for part in within for each in parts_of(part))]
+
+
 def test_every_setting_is_drawn_and_takes_values_of_all_its_kinds():
     seen = {}
     for drawn in scenarios(400):
         for kind, fields in FIELDS.items():
-            for part in (drawn.scenario, *vars(drawn.scenario).values()):
+            for part in parts_of(drawn.scenario):
                 if isinstance(part, kind):
                     for field in fields:
                         seen.setdefault((kind, field), set()).add(getattr(part, field))

@@ -1,0 +1,163 @@
+"""What goes wrong with robots during a mission, as settings: stops, sensors and radios that fail."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+from entropy_explore_env.errors import SettingError
+from entropy_explore_env.validation import check, check_kind, check_within, is_whole
+
+_MOST_ROBOTS = 1000
+
+
+def _check_robots(settings: Outage | SensorFault | RadioFault) -> None:
+    """Check whose fault it is."""
+    robots = settings.robots
+    numbers = isinstance(robots, tuple) and all(is_whole(robot, 0, _MOST_ROBOTS - 1) for robot in robots)
+    if not numbers or len(set(robots)) < len(robots):
+        name = f"{type(settings).__name__}.robots"
+        raise SettingError(name, robots, "a tuple of different robot numbers; empty = all robots")
+
+
+@dataclass(frozen=True)
+class Outage:
+    """When something of a robot fails, once in a mission, and for how long.
+
+    Where a time is given and one is drawn, too, the earlier one counts.
+
+    Attributes:
+        at_s: Simulated time at which it fails, 1e-3 to 1e9; inf = at no given time.
+        mean_s: It also fails at a time drawn for each robot from the exponential distribution with this mean,
+            1e-3 to 1e9; inf = at no drawn time.
+        lasts_s: Until it works again, 1e-3 to 1e9; inf = never again.
+        robots: Numbers of the robots that it happens to; empty = all.
+    """
+
+    at_s: float = math.inf
+    mean_s: float = math.inf
+    lasts_s: float = math.inf
+    robots: tuple[int, ...] = ()
+
+    def __post_init__(self) -> None:
+        """Check every field."""
+        check_within(self, "at_s", "mean_s", "lasts_s", least=1e-3, most=1e9, inf=True)
+        _check_robots(self)
+
+    @property
+    def happens(self) -> bool:
+        """Whether it ever does."""
+        return math.isfinite(self.at_s) or math.isfinite(self.mean_s)
+
+
+@dataclass(frozen=True)
+class SensorFault:
+    """What is wrong with range sensors all through a mission.
+
+    Attributes:
+        lost_rays: Probability that a ray brings no measurement, 0 to 1; each ray on its own.
+        range_factor: Measured distances of hits are the true ones times this factor, 0.1 to 10, …
+        range_bias_m: … plus this, -1e6 to 1e6; not below a thousandth of a voxel edge, nor beyond the range.
+            `RangeSensor.min_range_m` applies before and after.
+        robots: Numbers of the robots that have such a sensor; empty = all.
+    """
+
+    lost_rays: float = 0.0
+    range_factor: float = 1.0
+    range_bias_m: float = 0.0
+    robots: tuple[int, ...] = ()
+
+    def __post_init__(self) -> None:
+        """Check every field."""
+        check(self, "lost_rays", "a number from 0 to 1", lambda v: 0 <= v <= 1)
+        check_within(self, "range_factor", least=0.1, most=10)
+        check_within(self, "range_bias_m", least=-1e6, most=1e6)
+        _check_robots(self)
+
+    @property
+    def happens(self) -> bool:
+        """Whether anything is wrong."""
+        return self.lost_rays > 0.0 or self.range_factor != 1.0 or self.range_bias_m != 0.0
+
+
+@dataclass(frozen=True)
+class RadioFault:
+    """What is wrong with radios all through a mission.
+
+    Attributes:
+        garbled: Probability that a message arrives garbled, 0 to 1: that is detected, and the message is
+            dropped and counted.
+        repeated: Probability that a message arrives twice, 0 to 1: the second one is known by its number; it
+            costs its bits, is counted and changes nothing.
+        late: Probability that a message is sent late, 0 to 1: those sent after it overtake it. News that is
+            older than what a robot has heard changes neither where its sender was, nor where it goes to;
+            late measurements are fused all the same.
+        late_s: How long such messages wait before they are sent, 1e-3 to 3600.
+        robots: Numbers of the robots that have such a radio; empty = all. `garbled` and `repeated` are about
+            what they hear, `late` is about what they send.
+    """
+
+    garbled: float = 0.0
+    repeated: float = 0.0
+    late: float = 0.0
+    late_s: float = 2.0
+    robots: tuple[int, ...] = ()
+
+    def __post_init__(self) -> None:
+        """Check every field."""
+        for name in ("garbled", "repeated", "late"):
+            check(self, name, "a number from 0 to 1", lambda v: 0 <= v <= 1)
+        check_within(self, "late_s", least=1e-3, most=3600)
+        _check_robots(self)
+
+    @property
+    def happens(self) -> bool:
+        """Whether anything is wrong."""
+        return max(self.garbled, self.repeated, self.late) > 0.0
+
+
+@dataclass(frozen=True)
+class Faults:
+    """What goes wrong with the robots of a team; by default nothing does.
+
+    Drawn times, rays and messages come from a random stream of their own: whether there are faults changes
+    neither worlds, starts, noise nor the channel's losses.
+
+    Attributes:
+        stop: The robot stops at once, wherever it is, and is switched off: it neither scans nor decides,
+            neither sends nor hears. Its body stays in the way, its map is not lost. When it works again it
+            decides anew. A mission in which all robots have stopped for good is cut off.
+        blind: The robot's scans measure nothing.
+        silent: The robot's radio is silent: what it sends reaches nobody, and it hears nothing.
+        sensor: Rays that are lost, and distances that are measured wrong.
+        radio: Messages that arrive garbled, twice, or out of order.
+    """
+
+    stop: Outage = field(default_factory=Outage)
+    blind: Outage = field(default_factory=Outage)
+    silent: Outage = field(default_factory=Outage)
+    sensor: SensorFault = field(default_factory=SensorFault)
+    radio: RadioFault = field(default_factory=RadioFault)
+
+    def __post_init__(self) -> None:
+        """Check every field."""
+        for name in ("stop", "blind", "silent"):
+            check_kind(self, name, Outage)
+        check_kind(self, "sensor", SensorFault)
+        check_kind(self, "radio", RadioFault)
+
+    @property
+    def parts(self) -> dict[str, Outage | SensorFault | RadioFault]:
+        """Name → what may go wrong."""
+        return {
+            "stop": self.stop,
+            "blind": self.blind,
+            "silent": self.silent,
+            "sensor": self.sensor,
+            "radio": self.radio,
+        }
+
+    @property
+    def happen(self) -> bool:
+        """Whether anything goes wrong."""
+        return any(part.happens for part in self.parts.values())

@@ -1,0 +1,105 @@
+"""Settings of faults and signals: what is allowed, that they go through JSON, and that teams fit them."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import pytest
+
+from entropy_explore_env.errors import SettingError
+from entropy_explore_env.fault_settings import Faults, Outage, RadioFault, SensorFault
+from entropy_explore_env.radio_settings import Signal
+from entropy_explore_env.scenario import with_settings
+from entropy_explore_env.scenarios import BOX
+from entropy_explore_env.settings_json import scenario_from_json, settings_json
+
+TEAM = with_settings(BOX, {"robots": 3})
+
+
+@pytest.mark.parametrize(
+    ("kind", "field", "value"),
+    [
+        (Outage, "at_s", 0.0),
+        (Outage, "mean_s", math.nan),
+        (Outage, "lasts_s", -1.0),
+        (Outage, "robots", (1, 1)),
+        (Outage, "robots", [1]),
+        (Outage, "robots", (-1,)),
+        (Outage, "robots", (True,)),
+        (SensorFault, "lost_rays", 1.1),
+        (SensorFault, "range_factor", 0.0),
+        (SensorFault, "range_bias_m", math.inf),
+        (RadioFault, "garbled", -0.1),
+        (RadioFault, "repeated", 2),
+        (RadioFault, "late", "often"),
+        (RadioFault, "late_s", 0.0),
+        (Faults, "stop", None),
+        (Faults, "sensor", Outage()),
+        (Signal, "exponent", -1.0),
+        (Signal, "threshold_dbm", math.nan),
+        (Signal, "wall_loss_db_per_m", math.inf),
+    ],
+)
+def test_other_values_are_refused_by_name(kind, field, value):
+    with pytest.raises(SettingError) as raised:
+        kind(**{field: value})
+    assert str(raised.value).startswith(f"{kind.__name__}.{field} = ")
+
+
+@pytest.mark.parametrize("part", ["stop", "blind", "silent", "sensor", "radio"])
+def test_faults_are_those_of_robots_that_there_are(part):
+    assert with_settings(TEAM, {"faults": {part: {"robots": (2, 0)}}}).faults.parts[part].robots == (2, 0)
+    with pytest.raises(
+        SettingError, match=r"robots = \(3,\): allowed is numbers of robots of the team, .* 3"
+    ):
+        with_settings(TEAM, {"faults": {part: {"robots": (3,)}}})
+
+
+def test_late_messages_and_phases_do_not_go_together():
+    late = {"faults": {"radio": {"late": 0.1}}}
+    assert with_settings(TEAM, late).message_slots > 0 == TEAM.message_slots
+    with pytest.raises(SettingError, match=r"RadioFault.late = 0.1: allowed is 0 where batches"):
+        with_settings(TEAM, {**late, "channel": {"phase_s": 2.0}})
+    with pytest.raises(SettingError, match=r"RadioFault.late_s = 3600.0: allowed is so short"):
+        with_settings(TEAM, {"faults": {"radio": {"late": 0.1, "late_s": 3600.0}}, "robots": 40})
+
+
+def test_nothing_goes_wrong_by_default():
+    assert not Faults().happen and not TEAM.faults.happen
+    changed = {
+        "stop": {"at_s": 5.0},
+        "blind": {"mean_s": 5.0},
+        "silent": {"at_s": 5.0},
+        "sensor": {"range_bias_m": -0.1},
+        "radio": {"repeated": 0.1},
+    }
+    for name, change in changed.items():
+        faults = with_settings(TEAM, {"faults": {name: change}}).faults
+        assert faults.happen and [part.happens for part in faults.parts.values()].count(True) == 1
+    assert not with_settings(
+        TEAM, {"faults": {"stop": {"lasts_s": 3.0}, "radio": {"late_s": 1.0}}}
+    ).faults.happen
+
+
+def test_they_go_through_json_without_loss():
+    faults = Faults(
+        Outage(at_s=3.0, robots=(1, 2)),
+        Outage(mean_s=7.5, lasts_s=2.0),
+        Outage(0.1, 0.2, 0.3, (0,)),
+        SensorFault(0.1, 1.02, -0.05, (2,)),
+        RadioFault(0.1, 0.2, 0.3, 4.0, (0, 1)),
+    )
+    channel = {
+        "reach": "signal",
+        "signal": {"exponent": 3.0, "threshold_dbm": -75.0},
+        "silent_after_s": math.inf,
+    }
+    scenario = with_settings(
+        TEAM, {"faults": faults, "channel": channel, "ending": {"termination": "shared"}}
+    )
+    again = scenario_from_json(settings_json(scenario))
+    assert again == scenario and again.faults == faults
+    assert again.channel.signal == Signal(exponent=3.0, threshold_dbm=-75.0)
+    bare = dataclasses.replace(scenario, faults=Faults())
+    assert bare != scenario and scenario_from_json(settings_json(bare)) == bare
