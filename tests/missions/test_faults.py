@@ -181,6 +181,7 @@ def test_late_messages_are_overtaken_and_old_news_changes_nothing():
     missions = team({"radio": {"late": 1.0, "late_s": 3.2, "robots": (0,)}}, channel={"i_min_bits": 0.0})
     toward(missions, HERE, STAY)
     assert missions.state.heard[0, 1, 0]["heard_s"] == -1.0  # nothing has arrived
+    assert missions.rules.faults is not None
     missions.rules.faults["late"] = 0.0
     toward(missions, FAR, STAY)
     state, told = missions.state, []

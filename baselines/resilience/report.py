@@ -1,0 +1,117 @@
+"""The page: what was run, the claims, figures and tables."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import matplotlib as mpl
+import numpy as np
+
+from baselines.cli.figures import STYLE, png
+from baselines.experiments.claims import Claim, claims_table
+from baselines.experiments.tables import csv_table, markdown_table
+from baselines.resilience.figures import fault_figure, loss_figure
+from baselines.resilience.sweep import (
+    CHANNELS,
+    RANGE_M,
+    TEXTS,
+    Experiment,
+    Records,
+    cell_id,
+    conditions,
+    times,
+)
+from entropy_explore_env.writing import write_atomically
+
+PAGE, FILES = "resilience.md", "resilience"
+
+
+def write_report(
+    folder: Path, experiment: Experiment, records: Records, claims: Sequence[Claim], command: str
+) -> Path:
+    """Write `resilience.md` and, in a folder `resilience` beside it, its figures and tables.
+
+    Returns:
+        Path of the page.
+    """
+    beside = folder / FILES
+    with mpl.rc_context(STYLE):
+        for name, draw in (("loss", loss_figure), ("faults", fault_figure)):
+            figure, table = draw(experiment, records)
+            write_atomically(beside / f"{name}.png", png(figure))
+            write_atomically(beside / f"{name}.csv", csv_table(table))
+    write_atomically(folder / PAGE, _text(experiment, records, claims, command))
+    return folder / PAGE
+
+
+def _text(experiment: Experiment, records: Records, claims: Sequence[Claim], command: str) -> str:
+    missions = sum(len(cell) for cell in records.values())
+    cut = sum(not record.get("finished", False) for cell in records.values() for record in cell)
+    held = sum(claim.holds for claim in claims)
+    parts = [
+        "# Teams whose robots and messages fail",
+        f"Written by `{command}`: {missions:,} missions, {experiment.seeds} a point, seeds 0, 1, …, the "
+        "same in every cell: worlds, starts and noise are the same with and without faults. Intervals "
+        f"hold 95 % (bootstrap). {cut} missions were cut off at "
+        f"{experiment.time_limit_s:g} s of simulated time, and count with it: ratios of strategies that are "
+        "cut off are too near to 1.",
+        _READING,
+        "## What fails",
+        markdown_table(["condition", "what it is"], [[TEXTS[name], _SAID[name]] for name in conditions()]),
+        "## Lost messages",
+        "![Lost messages](resilience/loss.png)",
+        "## All else that fails",
+        "![Faults](resilience/faults.png)",
+        "## Mission times",
+        *(_times_table(experiment, records, *team) for team in experiment.teams()),
+        f"## Claims: {held} of {len(claims)} hold",
+        _HOLDS,
+        claims_table(claims, interval_digits=3),
+        "Files: [`loss.csv`](resilience/loss.csv), [`faults.csv`](resilience/faults.csv).",
+    ]
+    return "\n\n".join(part.strip() for part in parts) + "\n"
+
+
+_READING = """A mission ends, as its scenario says, when one map is known; a mission time is therefore that of
+the best-informed robot. A strategy gains from its teammates what lies between "nothing fails" and "isolated":
+how much of that a fault takes away is what the figures show. Silent teammates count as silent after
+`Channel.silent_after_s` (10 s beyond what one decision may take): what they announced is free then."""
+
+_HOLDS = """"Never slower than in isolation" compares each condition with the same robots that tell each
+other nothing (where a robot is lost, with isolated robots of which the same one is lost); it fails only where
+a whole interval lies above 1. "At most its share": the team that lost one of A robots at half time needs at
+most ½ + ½ · A/(A - 1) of the time; it fails only where the whole interval lies above that."""
+
+_SAID = {
+    **{
+        name: f"`Channel.loss_probability={c['loss_probability']:g}`"
+        for name, c in CHANNELS.items()
+        if "loss" in name
+    },
+    "burst-0": "`Channel.burst=0`: viewpoints are announced, measurements are not sent",
+    "range": f"`Channel.range_m={RANGE_M:g}`",
+    "sight": "`Channel.reach='line_of_sight'`: no solid voxel of the true world in between",
+    "isolated": "`Channel.burst=0, announcements=False`",
+    "lost": "the last robot stops for good (`Faults.stop`) at half the median time without faults",
+    "lost-isolated": "the same, in isolation",
+}
+
+
+def _times_table(experiment: Experiment, records: Records, scenario: str, robots: int) -> str:
+    """Median times under every condition, and how many missions were cut off."""
+    rows = []
+    for strategy in experiment.strategies:
+        row = [f"`{strategy}`"]
+        for name in conditions():
+            cell = cell_id(scenario, robots, strategy, name)
+            found = times(records, cell)
+            cut = sum(not record.get("finished", False) for record in records[cell])
+            known = found[np.isfinite(found)]
+            median = f"{np.median(known):,.0f}" if len(known) else "-"
+            row.append(median + (f" ({cut})" if cut else ""))
+        rows.append(row)
+    head = ["strategy", *(TEXTS[name] for name in conditions())]
+    cut_off = f"in brackets how many of {experiment.seeds} were cut off"
+    title = f"{scenario}, {robots} robots: median seconds, {cut_off}"
+    return title + ".\n\n" + markdown_table(head, rows)

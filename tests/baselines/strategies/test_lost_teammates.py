@@ -1,0 +1,69 @@
+"""Teams go on when a teammate falls silent: nobody waits for it, and what it was to see is seen by others."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from baselines.experiments.mission import run_mission, scripted
+from baselines.resilience.sweep import STRATEGIES
+from baselines.strategies import make_strategy
+from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
+from entropy_explore_env.missions.state import MissionEnd
+from entropy_explore_env.scenario import with_settings
+from entropy_explore_env.scenarios import OFFICE
+from entropy_explore_env.settings import Grid
+from entropy_explore_env.worlds.world import World
+
+GRID = Grid((61, 87, 1), 0.1)
+LIMIT_S, STILL_S = 400.0, 60.0
+FAULTS = {
+    "stopped": {"stop": {"at_s": 3.0, "robots": (1,)}},
+    "silent": {"silent": {"at_s": 3.0, "robots": (1,)}},
+    "stopped for a while": {"stop": {"at_s": 3.0, "lasts_s": 40.0, "robots": (1,)}},
+    "blind": {"blind": {"at_s": 3.0, "robots": (1,)}},
+    "a bad radio": {"radio": {"garbled": 0.3, "repeated": 0.3, "late": 0.3, "late_s": 5.0}},
+}
+
+
+def two_rooms() -> World:
+    """A plan of two rooms with a door of 2 m between them."""
+    occupied = np.zeros(GRID.shape, bool)
+    occupied[[0, -1]] = occupied[:, [0, -1]] = True
+    occupied[:, 43] = True
+    occupied[20:40, 43] = False
+    return World(GRID, occupied, name="two-rooms")
+
+
+def ended(strategy: str, faults: dict) -> tuple[MissionEnd, float]:
+    """How a mission of three robots ended, and the longest time that a robot which decides stood still."""
+    settings = {
+        "grid": GRID,
+        "robots": 3,
+        "faults": faults,
+        "ending": {"seen_share": 0.97, "termination": "shared", "time_limit_s": LIMIT_S},
+        "robot": {"reach_m": 3.0},
+        "sensor": {"max_range_m": 3.0},
+    }
+    env = EntropyExploreEnv(with_settings(scripted(OFFICE), settings))
+    since, places, longest = np.zeros(3), np.full((3, 3), np.inf), 0.0
+
+    def note(env: EntropyExploreEnv) -> None:
+        nonlocal longest
+        state = env.missions.state
+        time_s, robots = float(state.missions[0]["time_s"]), state.robots[0]
+        active = np.linalg.norm(robots["origin"][:, :3] - places, axis=1) >= 0.2
+        active |= state.faults[0]["stopped"] if len(state.faults[0]) else False
+        places[active], since[active] = robots["origin"][active, :3], time_s
+        longest = max(longest, float((time_s - since).max()))
+
+    starts = [[1.0, 1.0, 0.05, 0.0, 0.0], [3.0, 2.0, 0.05, 1.5, 0.0], [5.0, 1.0, 0.05, 2.0, 0.0]]
+    run_mission(env, make_strategy(strategy), 1, note, options={"world": two_rooms(), "starts": starts})
+    return env.missions.over(0), longest
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+@pytest.mark.parametrize("strategy", STRATEGIES)
+def test_the_others_see_what_a_lost_teammate_was_to_see(strategy, fault):
+    end, longest_s = ended(strategy, FAULTS[fault])
+    assert end is MissionEnd.SEEN and longest_s < STILL_S
