@@ -5,6 +5,15 @@ Ours, not a paper's: the successor of `information-rate-v0`. Candidates and thei
 if it is worth more than every viewpoint nearby, along the shortest path by the robot's belief, and the robot
 decides anew at every stop. What did not come, and what could not be reached, is remembered: no place and gaze
 is tried again that brought nothing, and robots whose bodies block each other part.
+
+What a robot is, and what its mission asks for, decides how it explores:
+
+- Flying robots, and all in 3-D worlds: bits per time, with the recipe of narrow or of wide views.
+- Ground robots with a scanner that sees all around, in a plan, deciding at stops until the map has so little
+  entropy: bits per time.
+- The same robots where they decide under way (`Robot.redecide`), or where the mission ends by what is seen:
+  frontier cells, by `explorers.advantage_ahead`. Bits per time would change its mind at every scan, and
+  would leave what is small until the end.
 """
 
 from __future__ import annotations
@@ -16,11 +25,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from baselines.strategies.explorers.advantage_ahead import AdvantageAhead
 from baselines.strategies.knowledge import announced_cones, belief_of
 from baselines.strategies.protocol import random_viewpoint
 from entropy_explore_env.missions.view import RobotView
 from entropy_explore_env.robots.motion import MoveEnd
 from entropy_explore_env.scenario import Scenario
+from entropy_explore_env.settings import RobotKind
 from entropy_explore_env.viewpoints.candidates import CandidatePlanner, Situation
 from entropy_explore_env.viewpoints.evaluation import sees_all_around
 from entropy_explore_env.viewpoints.recipe import Recipe
@@ -82,8 +93,14 @@ class _Memory:
     """Decisions during which it keeps clear of teammates."""
 
 
+def explores_frontiers(scenario: Scenario, kind: RobotKind) -> bool:
+    """Whether robots of a kind go for frontier cells, and not for bits."""
+    plan = scenario.grid.flat and kind.robot.motion == "planar" and sees_all_around(kind.sensor)
+    return plan and (kind.robot.redecide != "at_stop" or scenario.ending.by_seen)
+
+
 class PlannedRate:
-    """Chooses among candidates nearby and far away by bits / s^c."""
+    """Chooses among candidates nearby and far away by bits / s^c; in some plans among frontier cells."""
 
     def __init__(self, recipes: Mapping[int, Recipe] | None = None) -> None:
         """Take the recipe of each kind of robot by its number; None = by what the robot is."""
@@ -94,10 +111,18 @@ class PlannedRate:
         self._rng = rng
         self._planner = CandidatePlanner(scenario, self._recipes)
         self._memories = [_Memory() for _ in range(scenario.robots)]
+        self._frontiers = [explores_frontiers(scenario, kind) for kind in scenario.kinds]
+        self._plans = AdvantageAhead()
+        if any(self._frontiers):
+            self._plans.reset(scenario, rng)
 
     def choose(self, views: Sequence[RobotView]) -> list[np.ndarray]:
         """The viewpoint of each view, by its own belief and what it has heard."""
-        return [self._choose(view) for view in views]
+        chosen = []
+        for view in views:
+            frontiers = self._frontiers[view.robot % len(self._frontiers)]
+            chosen += self._plans.choose([view]) if frontiers else [self._choose(view)]
+        return chosen
 
     def _choose(self, view: RobotView) -> np.ndarray:
         memory, grid = self._memories[view.robot], view.scenario.grid

@@ -89,6 +89,18 @@ class FrontierCells(VoxelCandidates):
         """
         return int(count_edges_around(self._map, voxel, radius, most))
 
+    def crowds(self, voxels: np.ndarray, radius: int, most: int) -> np.ndarray:
+        """(K,) how many known free voxels beside unknown ones there are around each of (K,) int32 voxels.
+
+        Args:
+            voxels: Each in the middle of its surroundings.
+            radius: Voxels that others may be off along any axis.
+            most: Where there are so many, no more are counted.
+        """
+        counts = np.empty(len(voxels), np.int64)
+        fill_crowds(self._map, voxels, radius, most, counts)
+        return counts
+
     def nearest_of_blocks(self, search: Search, reach: float) -> tuple[np.ndarray, np.ndarray]:
         """Of each block the frontier cell that the latest search reached by the shortest path.
 
@@ -199,6 +211,23 @@ def count_edges_around(frontiers: FrontierMap, voxel: int, radius: int, most: in
                     if count >= most:
                         return count
     return count
+
+
+@lean_kernel
+def fill_crowds(
+    frontiers: FrontierMap, voxels: np.ndarray, radius: int, most: int, counts: np.ndarray
+) -> None:
+    """Fill (K,) int64 with how many EDGE voxels lie within a radius of each voxel, along every axis."""
+    size = frontiers.size
+    for place in range(len(voxels)):
+        x, y, z = grid_index(size, voxels[place])
+        count = 0
+        for i in range(max(x - radius, 0), min(x + radius, size[0] - 1) + 1):
+            for j in range(max(y - radius, 0), min(y + radius, size[1] - 1) + 1):
+                for k in range(max(z - radius, 0), min(z + radius, size[2] - 1) + 1):
+                    if count < most and frontiers.flags[flat_index(size, i, j, k)] & EDGE:
+                        count += 1
+        counts[place] = count
 
 
 @lean_kernel
