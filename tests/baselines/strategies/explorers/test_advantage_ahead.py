@@ -34,7 +34,7 @@ def picked(plan, robot, config=None, came_from=None, ending=None, mates=()):
     rule.reset(with_settings(scenario_of(plan.shape), {"ending": ending or {}}), np.random.default_rng(0))
     scene = with_mates(scene_of(plan, robot), list(mates))
     for place in ([came_from] if came_from else []) + [robot]:
-        scene.view.pose = pose_in(place)
+        scene.view.pose = pose_in(place)  # type: ignore[misc]
         voxel = rule.pick(scene)
         scene.paths.start(scene.here)
     return cell(plan, voxel)
