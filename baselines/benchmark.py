@@ -57,7 +57,7 @@ class Args:
     """In place of a suite: names and world files, commas between, each changed by the options of the task;
     default: room,room-furnished,lab,office,cave, or the scenario that --settings holds as a whole."""
     strategies: str = "all"
-    """Names as in baselines.run, commas between; what ratios are relative to is always added."""
+    """Names as in baselines.run, commas between; nearest-frontier is added in suites, random else."""
     robots: str | None = None
     """Team sizes of scenarios, commas between; default: 1,2,4, or that of the scenario in --settings."""
     seeds: int | None = None

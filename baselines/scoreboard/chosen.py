@@ -24,7 +24,7 @@ def chosen_strategies(words: str, suite: bool) -> tuple[str, ...]:
 
     Args:
         words: Names.
-        suite: Of a suite, whose references are added; else the random walk is.
+        suite: Of a suite, whose first reference is added; else the random walk is.
 
     Raises:
         SettingError: None has such a name.
@@ -32,7 +32,7 @@ def chosen_strategies(words: str, suite: bool) -> tuple[str, ...]:
     names = list(STRATEGIES) if words == "all" else words.split(",")
     for name in names:
         make_strategy(name)
-    added = [name for name in REFERENCES if name in STRATEGIES] if suite else [BASELINE]
+    added = [name for name in REFERENCES[:1] if name in STRATEGIES] if suite else [BASELINE]
     return tuple(dict.fromkeys([*added, *map(resolved, names)]))
 
 

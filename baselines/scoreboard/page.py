@@ -89,7 +89,8 @@ _READING = """# Scoreboard
 Strategies on the same worlds, starts and seeds, in suites that are pinned (`baselines/scoreboard/suites.py`).
 
 - A ratio is the geometric mean of paired missions' ratios, over all tasks the geometric mean of the
-  tasks'; below 1 is better. Intervals (…) hold 95 %: a bootstrap over pairs, within each task.
+  tasks'; below 1 is better. Intervals (…) hold 95 %: a bootstrap over pairs, within each task. Of fewer than
+  about ten missions they are too narrow, and of a single one there is none.
 - A mission that was cut off, or failed, counts with the time limit, and with the path that the team
   could have driven in it. Where both of a pair were cut off their ratio is 1.
 - Seen: measured by any robot of the team, of the voxels that can be seen at all. Bits: what the best map
@@ -198,10 +199,12 @@ def _number(value: float | None, form: str = ",.0f") -> str:
 
 
 def ranged(row: Row, name: str, form: str) -> str:
-    """A figure and its interval."""
+    """A figure and its interval; without one that has no width, as of a reference over itself."""
     if row[name] is None:
         return "-"
     low, high = row[f"{name}_low"], row[f"{name}_high"]
+    if low == high:
+        return f"{row[name]:{form}}"
     return f"{row[name]:{form}} ({low:{form}} … {high:{form}})"
 
 

@@ -34,12 +34,13 @@ def show_results(results: Results) -> None:
         pad_edge=False,
     )
     table.add_column("strategy", overflow="fold")
-    for head in ("finished", measure.words, "ms a\ndecision"):
+    for head in ("missions", "finished", measure.words, "ms a\ndecision"):
         table.add_column(head, justify="right", no_wrap=True)
     name = f"{measure.name}_over_{reference}"
     for row in sorted(overall_rows(results), key=lambda row: (row[name] is None, row[name])):
         table.add_row(
             row["strategy"],
+            str(row["missions"]),
             "-" if row["finished"] is None else f"{row['finished']:.0%}",
             ranged(row, name, ".2f"),
             "-" if row["decision_ms"] is None else f"{row['decision_ms']:.2f}",

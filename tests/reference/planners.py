@@ -21,14 +21,14 @@ from tests.reference.explorers import (
     nearest_frontier,
 )
 
-_SAMPLES = 4
+_SAMPLES = 16
 """Points a cell at which a line of sight is looked at."""
 
 
 def in_sight(stops: np.ndarray, cell: Cell, others: np.ndarray) -> np.ndarray:
     """(K,) bool: which of (K, 2) cells are seen from a cell, middle to middle, past (X, Y) bool stops.
 
-    The cell that is looked at stops nothing.
+    The cell that is looked at stops nothing. Two stops that touch at a corner leave no gap.
     """
     if len(others) == 0:
         return np.zeros(0, bool)
@@ -37,7 +37,11 @@ def in_sight(stops: np.ndarray, cell: Cell, others: np.ndarray) -> np.ndarray:
     along = np.linspace(0.0, 1.0, count)[:, None, None]
     passed = np.floor(np.array(cell) + 0.5 + along * apart).astype(int)  # (S, K, 2)
     last = (passed == others).all(axis=-1)
-    return ~(stops[passed[..., 0], passed[..., 1]] & ~last).any(axis=0)
+    stopped = (stops[passed[..., 0], passed[..., 1]] & ~last).any(axis=0)
+    before, after = passed[:-1], passed[1:]
+    beside = stops[before[..., 0], after[..., 1]] & stops[after[..., 0], before[..., 1]]
+    across = (before != after).all(axis=-1)
+    return ~stopped & ~(beside & across).any(axis=0)
 
 
 def gain(plan: np.ndarray, cell: Cell, reach: float) -> int:

@@ -5,10 +5,10 @@ close enough: in turn, the one that covers most that is not covered yet (greedy 
 the horizon, frontier cells are put together by coarse cells of the map; the nearest one stands for its
 coarse cell. The robot goes to the first place of a short open tour from where it is through all of these.
 
-The tour minimises the length of paths. Between near places they are searched; to and between far ones they
-lead along the tree of shortest paths from the robot, as TARE's lead along its graph of visited places. TARE
-solves the two levels one after the other and takes the first solution of OR-Tools; here both are one tour,
-built by insertion and improved by 2-opt and Or-opt moves (`open_tours`).
+The tour minimises the length of shortest paths between all of its places. (Lengths along the tree of paths
+from the robot, which need no further searches, make it a quarter longer.) TARE solves the two levels one
+after the other and takes the first solution of OR-Tools; here both are one tour, built by insertion and
+improved by 2-opt and Or-opt moves (`open_tours`).
 
 Ours: the place chosen last stays the first unless that makes the tour longer by more than a share.
 
@@ -82,7 +82,7 @@ class Tour(Explorer):
         near[self.config.most_near :] = False
         kept, far = self._cover(scene, voxels[near]), self._coarse(scene, voxels[~near])
         places = np.concatenate([voxels[near][kept], voxels[~near][far]]).astype(np.int32)
-        between = lengths_between(scene.paths, scene.here, places, len(kept))
+        between = lengths_between(scene.paths, scene.here, places)
         if scene.target != NONE and scene.target in places:
             return self._begun(between, places, scene.target)
         return int(places[open_tour(between)[1] - 1])
@@ -124,32 +124,25 @@ class Tour(Explorer):
         return sorted(first.values())[: self.config.most_far]
 
 
-def lengths_between(paths: KnownPaths, here: int, places: np.ndarray, near: int) -> np.ndarray:
-    """(1 + K, 1 + K) lengths of paths between the robot's voxel and K places, the first `near` of them near.
+def lengths_between(paths: KnownPaths, here: int, places: np.ndarray) -> np.ndarray:
+    """(1 + K, 1 + K) lengths of the shortest paths between the robot's voxel and K places.
 
     Args:
         paths: Of the robot, with a complete search from where it is, which is another one afterwards.
         here: Its voxel.
         places: (K,) int32 voxels that the search reached.
-        near: Between so many of them paths are searched.
     """
-    routes = [paths.route_to(place) for place in (here, *places)]
-    lengths = np.concatenate([[0.0], paths.lengths_to(places)])
-    along = [paths.lengths_to(route) for route in routes]
-    between = np.zeros((len(routes), len(routes)))
-    for first in range(len(routes)):
-        for second in range(first):
-            a, b = routes[first], routes[second]
-            count = min(len(a), len(b))
-            apart = np.flatnonzero(a[:count] != b[:count])
-            fork = int(apart[0]) if len(apart) else count
-            shared = along[first][fork - 1] if fork else 0.0
-            between[first, second] = lengths[first] + lengths[second] - 2.0 * shared
-            between[second, first] = between[first, second]
-    for number in range(near):
-        row = between[1 + number, 1 : 1 + near]
-        paths.start(int(places[number]))
-        paths.extend(float(row.max(initial=0.0)))
-        row[:] = np.minimum(row, paths.lengths_to(places[:near]))
-        between[1 : 1 + near, 1 + number] = row
+    nodes = np.concatenate([[here], places]).astype(np.int32)
+    lengths = paths.lengths_to(nodes)
+    between = np.zeros((len(nodes), len(nodes)))
+    between[0], between[:, 0] = lengths, lengths
+    for number in range(1, len(nodes) - 1):
+        later = nodes[number + 1 :]
+        paths.start(int(nodes[number]))
+        row = paths.lengths_to(later)
+        most = float((lengths[number] + lengths[number + 1 :]).max())
+        while paths.reach < most and not (row <= paths.reach).all():
+            paths.extend(min(1.3 * paths.reach, most))
+            row = paths.lengths_to(later)
+        between[number, number + 1 :] = between[number + 1 :, number] = row
     return between
