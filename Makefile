@@ -24,7 +24,7 @@ help:
 	@echo "make test-rllib   the tests of the trainer with RLlib"
 	@echo "make lint         ruff, pyright and the contracts of imports"
 	@echo "make bench        speed against peers"
-	@echo "make reproduce    the experiments of Rocha04, RochaMI, Bhattacharya and Sawhney, into docs/results: many hours"
+	@echo "make reproduce    the experiments of the five papers, into docs/results: many hours"
 	@echo "make clean        remove the environments, builds and caches; results stay"
 
 # The alias `best` stands for the strategy that is recommended.
@@ -69,6 +69,7 @@ reproduce: $(STAMP)baselines
 	$(RUN) baselines.papers.rochami --out docs/results
 	$(RUN) baselines.papers.bhattacharya --out docs/results
 	$(RUN) baselines.papers.sawhney --out docs/results
+	$(RUN) baselines.papers.sujan --out docs/results
 
 # PyTorch's CPU build, unless there is an NVIDIA GPU: pip's own index brings gigabytes of CUDA libraries on Linux.
 # Where PyTorch's index cannot be reached, pip's own one serves. $(1): python, $(2): the file with the pin.

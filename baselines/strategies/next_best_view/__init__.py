@@ -52,11 +52,11 @@ from entropy_explore_env.missions.view import RobotView
 from entropy_explore_env.robots.motion import MoveEnd
 from entropy_explore_env.scenario import Scenario
 from entropy_explore_env.settings import RobotKind
-from entropy_explore_env.validation import check_choice, check_count, check_positive, check_within
+from entropy_explore_env.validation import check_choice, check_count, check_kind, check_positive, check_within
 from entropy_explore_env.viewpoints.evaluation import robot_model
 
 Choice = Literal["information", "most-unmapped", "least-mapped", "random"]
-Measure = Literal["uncertainty", "stretched"]
+Measure = Literal["uncertainty", "stretched", "linear"]
 _BY_COUNT = ("most-unmapped", "least-mapped")
 _LARGEST_OCCUPANCY = 0.05
 _GOES_ON = (MoveEnd.ARRIVED, MoveEnd.CORNERS, MoveEnd.UNDER_WAY)
@@ -76,7 +76,8 @@ class NextBestViewConfig:
         poses: m, drawn at each decision.
         distance_weight: w_d, bits a metre or radian, against w_NI = 1.
         measure: New information by eq. 8, `uncertainty`, which the paper thinks better, or by eqs. 6-7,
-            `stretched`.
+            `stretched`; `linear` is eq. 8 with q in place of -q log2 q, ours.
+        extrapolated: Whether unknown cells of a plan take the mean occupancy of their neighbours; else ½.
         interest_decay: β of eq. 9: a voxel that did not answer keeps e^-β of the interest in it.
 
     Raises:
@@ -87,12 +88,14 @@ class NextBestViewConfig:
     poses: int = 100
     distance_weight: float = 0.01
     measure: Measure = "uncertainty"
+    extrapolated: bool = True
     interest_decay: float = 1.0
 
     def __post_init__(self) -> None:
         """Check every field."""
         check_choice(self, "choice", Choice)
         check_choice(self, "measure", Measure)
+        check_kind(self, "extrapolated", bool)
         check_count(self, "poses", 1, 100_000)
         check_within(self, "distance_weight", "interest_decay", least=0.0, most=1e6)
 
@@ -236,7 +239,7 @@ class NextBestView(KnownSpace):
         nothing_new, memory.measured = measured == memory.measured, measured
         if self.config.choice == "random" or (nothing_new and self.config.choice in _BY_COUNT):
             return poses[0]
-        if self.config.choice == "information":
+        if self.config.choice == "information" and self.config.extrapolated:
             known = extrapolated(known, memory.occupancy)
             memory.occupancy = known.occupancy
         best, expected = poses[0], memory.expected
@@ -268,7 +271,8 @@ class NextBestView(KnownSpace):
         if config.choice == "least-mapped":
             return -float(self._view.counts[0])
         most = voxels_in_view(scan, view.kind.sensor.field_of_view_rad, grid.flat, grid.voxels)
-        bits = new_information(self._view.shares, most, None if stretched else UNCERTAINTY)
+        weights = None if stretched else UNCERTAINTY
+        bits = new_information(self._view.shares, most, weights, config.measure == "linear")
         occupancy = float(known.occupancy[voxel_of(view, pose)])
         return rating(bits, pose_distance(view.pose, pose), config.distance_weight, occupancy)
 

@@ -13,7 +13,9 @@ UNCERTAINTY = -(_MIDDLES * np.log2(_MIDDLES) + (1.0 - _MIDDLES) * np.log2(1.0 - 
 """(LEVELS,) -(p log2 p + (1 - p) log2(1 - p)) in the middle of each interval of occupancy."""
 
 
-def new_information(shares: np.ndarray, most: float, weights: np.ndarray | None = UNCERTAINTY) -> float:
+def new_information(
+    shares: np.ndarray, most: float, weights: np.ndarray | None = UNCERTAINTY, linear: bool = False
+) -> float:
     """NI in bits of the histograms of a view.
 
         NI = Σ_known u(p_k)·(-q_k log2 q_k) + Σ_unknown u(p_k)·(-q_k log2 q_k)
@@ -25,11 +27,10 @@ def new_information(shares: np.ndarray, most: float, weights: np.ndarray | None 
         shares: (2, LEVELS) number of known and unknown voxels in each interval.
         most: N, the largest number of voxels in view.
         weights: (LEVELS,) u; None = 1.
+        linear: Whether q_k stands in place of -q_k log2 q_k: ours, to compare with.
     """
     q = np.minimum(shares / most, 1.0)
-    bits = np.zeros(q.shape)
-    some = q > 0.0
-    bits[some] = -q[some] * np.log2(q[some])
+    bits = q if linear else -q * np.log2(np.where(q > 0.0, q, 1.0))
     return float((bits if weights is None else bits * weights).sum())
 
 

@@ -131,6 +131,7 @@ def test_ratings_by_hand():
     shares[1, 9] = 8.0  # an eighth of the largest view, at p = 0.475: 3 bits of 1/8, almost wholly uncertain
     assert new_information(shares, 64.0, None) == pytest.approx(3.0 / 8.0)
     assert new_information(shares, 64.0) == pytest.approx(0.99820 * 3.0 / 8.0, rel=1e-4)
+    assert new_information(shares, 64.0, linear=True) == pytest.approx(0.99820 / 8.0, rel=1e-4)
 
 
 def test_the_largest_view_is_a_sector_or_part_of_a_ball():

@@ -1,0 +1,1 @@
+"""The planar experiments of Sujan & Meggiolaro: five ways of choosing poses, one robot and two."""

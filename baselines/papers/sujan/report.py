@@ -1,0 +1,97 @@
+"""The report of Sujan: Markdown with the claims, and figures 20 and 22 beside it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import matplotlib as mpl
+
+from baselines.cli.figures import STYLE, png
+from baselines.experiments.claims import Claim, claims_table
+from baselines.experiments.statistics import mean_interval, ratio_interval
+from baselines.experiments.tables import csv_table, markdown_table
+from baselines.papers.sujan.claims import Records, by_scan, mapped, mapped_per_metre
+from baselines.papers.sujan.figures import figure_scans
+from baselines.papers.sujan.sweep import CHANGES, METHODS, OTHERS, SCANS, TEAMS, cell_id
+from entropy_explore_env.writing import write_atomically
+
+
+def write_report(folder: Path, records: Records, claims: Sequence[Claim], command: str) -> Path:
+    """Write `sujan.md` and, in a folder `sujan` beside it, its figures and tables.
+
+    Returns:
+        Path of the report.
+    """
+    beside = folder / "sujan"
+    with mpl.rc_context(STYLE):
+        for robots, name in zip(TEAMS, ("figure-20", "figure-22"), strict=True):
+            figure, table = figure_scans(records, robots)
+            write_atomically(beside / f"{name}.png", png(figure))
+            write_atomically(beside / f"{name}.csv", csv_table(table))
+    write_atomically(folder / "sujan.md", _text(records, claims, command))
+    return folder / "sujan.md"
+
+
+_ABOUT = """Written by `{command}`: {starts} worlds of `occlusions` (100 × 100 m, about 12 % covered), one
+mission in each with every method, seeds 0, 1, …, all from the middle; {scans} scans of the team.
+Intervals are 95 % paired bootstrap intervals over worlds. Robots know where they are, and a drive
+leads wherever its robot wants, so that a decision is a scan. The paper's cliff, errors of
+localization and shared summaries are not part of this page."""
+
+
+def _text(records: Records, claims: Sequence[Claim], command: str) -> str:
+    """The report."""
+    starts = len(records[cell_id(1, "v")])
+    parts = [
+        "# Sujan and Meggiolaro, the planar experiments reproduced",
+        _ABOUT.format(command=command, starts=starts, scans=SCANS),
+        f"## Claims: {sum(claim.holds for claim in claims)} of {len(claims)} hold",
+        f"A claim holds if the whole interval says so. What is mapped for the same scans is the mean of the "
+        f"share mapped over {SCANS} scans.",
+        claims_table(claims),
+        "## The methods",
+        _methods_table(records),
+        "![Figure 20](sujan/figure-20.png)",
+        "![Figure 22](sujan/figure-22.png)",
+    ]
+    if cell_id(1, f"v-{next(iter(CHANGES))}") in records:
+        parts += ["## Method (v) with one thing changed at a time", _changes_table(records)]
+    return "\n\n".join(parts) + "\n"
+
+
+def _row(records: Records, cell: str, first: list[str]) -> list[str]:
+    """A cell's figures, after what it is."""
+    share, way_m = (by_scan(records, cell, field)[:, -1] for field in ("mapped", "driven_m_by_scan"))
+    return [
+        *first,
+        "{:.3f} ({:.3f} … {:.3f})".format(*mean_interval(mapped(records, cell))),
+        f"{share.mean():.3f}",
+        f"{way_m.mean():,.0f}",
+        "{:.3f} ({:.3f} … {:.3f})".format(*mean_interval(mapped_per_metre(records, cell))),
+    ]
+
+
+_HEAD = ["mean share mapped", f"share after {SCANS} scans", "way (m)", "share a 100 m"]
+
+
+def _methods_table(records: Records) -> str:
+    """Every method and what stands beside them."""
+    rows = []
+    for robots in TEAMS:
+        for method, strategy in METHODS.items():
+            rows.append(_row(records, cell_id(robots, method), [str(robots), f"({method}) {strategy}"]))
+        if robots == 1:
+            rows += [_row(records, cell_id(1, name), ["1", f"{name}, not the paper's"]) for name in OTHERS]
+    return markdown_table(["robots", "method", *_HEAD], rows)
+
+
+def _changes_table(records: Records) -> str:
+    """Method (v), one robot, with one thing changed, and how much more it maps than it does."""
+    base = mapped(records, cell_id(1, "v"))
+    rows = [[*_row(records, cell_id(1, "v"), ["nothing"]), "1"]]
+    for name, (text, _) in CHANGES.items():
+        cell = cell_id(1, f"v-{name}")
+        ratio = "{:.2f} ({:.2f} … {:.2f})".format(*ratio_interval(mapped(records, cell), base))
+        rows.append([*_row(records, cell, [text]), ratio])
+    return markdown_table(["changed", *_HEAD, "mean share over (v)'s"], rows)
