@@ -1,16 +1,17 @@
 # Everything runs in .venv, which the first target that needs it creates and fills under
 # requirements/constraints.txt; it is filled again when that file or pyproject.toml changes. RLlib needs another
-# Gymnasium and has an environment of its own, .venv-rllib.
+# Gymnasium and has an environment of its own, .venv-rllib, BenchMARL another TorchRL: .venv-benchmarl.
 
 PYTHON ?= python3
 VENV := .venv
 RUN := $(VENV)/bin/python -m
 STAMP := $(VENV)/installed-
 VENV_RLLIB := .venv-rllib
+VENV_BENCHMARL := .venv-benchmarl
 STYLE := $(RUN) ruff check . && $(RUN) ruff format --check . && $(VENV)/bin/lint-imports --no-cache
 WARM := $(RUN) entropy_explore_env.warm --processes 1
 
-.PHONY: help demo docs docs-links test test-long boundscheck test-rllib lint bench reproduce clean
+.PHONY: help demo docs docs-links test test-long boundscheck test-rllib test-benchmarl lint bench reproduce clean
 .NOTPARALLEL:
 
 help:
@@ -22,6 +23,7 @@ help:
 	@echo "make test-long    also the long ones, and more and other drawn examples: an hour"
 	@echo "make boundscheck  the kernels' own tests, with every index checked"
 	@echo "make test-rllib   the tests of the trainer with RLlib"
+	@echo "make test-benchmarl   the tutorial with BenchMARL"
 	@echo "make lint         ruff, pyright and the contracts of imports"
 	@echo "make bench        speed against peers"
 	@echo "make reproduce    the experiments of the five papers, into docs/results: many hours"
@@ -56,6 +58,9 @@ boundscheck: $(STAMP)dev
 
 test-rllib: $(VENV_RLLIB)/installed
 	$(VENV_RLLIB)/bin/python -m pytest tests/training/rllib tests/training/test_rllib_refusals.py
+
+test-benchmarl: $(VENV_BENCHMARL)/installed
+	$(VENV_BENCHMARL)/bin/python -m pytest tests/training/test_examples.py -k mappo
 
 lint: $(STAMP)dev
 	$(STYLE)
@@ -96,6 +101,14 @@ $(VENV_RLLIB)/installed: pyproject.toml requirements/constraints-rllib.txt
 		-c requirements/constraints-rllib.txt -e ".[rllib]" "pytest>=8.2" "hypothesis>=6.100"
 	@touch $@
 
+$(VENV_BENCHMARL)/installed: pyproject.toml requirements/constraints-benchmarl.txt
+	@$(VENV_BENCHMARL)/bin/python -m pip --version >/dev/null 2>&1 || $(PYTHON) -m venv $(VENV_BENCHMARL)
+	@echo "installing entropy_explore_env[benchmarl] in $(VENV_BENCHMARL), a minute or two the first time ..." >&2
+	$(call cpu_torch,$(VENV_BENCHMARL)/bin/python,requirements/constraints-benchmarl.txt)
+	@$(VENV_BENCHMARL)/bin/python -m pip install -qq --disable-pip-version-check \
+		-c requirements/constraints-benchmarl.txt -e ".[benchmarl]" "pytest>=8.2" "hypothesis>=6.100"
+	@touch $@
+
 clean:
-	rm -rf $(VENV) $(VENV_RLLIB) build dist docs/build docs/scenarios *.egg-info .pytest_cache .ruff_cache .hypothesis
+	rm -rf $(VENV) $(VENV_RLLIB) $(VENV_BENCHMARL) build dist docs/build docs/scenarios *.egg-info .pytest_cache .ruff_cache .hypothesis
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -19,7 +19,12 @@ LARGE = ("benchmarl", "ray", "stable_baselines3", "torch", "torchrl")
 """What only some extras bring."""
 
 
-@pytest.mark.parametrize("block", blocks(), ids=lambda block: block.name)
+TESTED_THERE = tuple(path for path in shown_files() if "training" in path.parts)
+"""Files that tests/training/test_examples.py runs."""
+BLOCKS = [block for block in blocks() if ROOT / block.name not in TESTED_THERE]
+
+
+@pytest.mark.parametrize("block", BLOCKS, ids=lambda block: block.name)
 @pytest.mark.filterwarnings("ignore")  # of TorchRL, PettingZoo and Matplotlib
 def test_example_runs(block: Block, tmp_path, monkeypatch):
     for package in LARGE:

@@ -33,3 +33,22 @@ def test_a_loop_in_cleanrl_s_form_stores_choices(capsys):
     assert 0 < chosen < 64 * 4 * 3  # robots are busy most of the time
     masked = [one[1] for one in stored]
     assert masked[0].shape == (4, 3)
+
+
+@pytest.mark.filterwarnings("ignore")  # TorchRL's
+def test_mappo_s_critic_reads_the_state_of_the_team(tmp_path, monkeypatch):
+    pytest.importorskip("benchmarl", reason="benchmarl is not installed: make test-benchmarl")
+    monkeypatch.chdir(tmp_path)  # it leaves a folder
+    ran = runpy.run_path(str(EXAMPLES / "benchmarl_mappo.py"))
+    assert ran["experiment"].total_frames == 256
+    assert ran["critic"].in_keys == ["state"]
+    actor = ran["experiment"].losses["robot"].actor_network
+    assert ("robot", "observation") in actor.in_keys and "state" not in actor.in_keys
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_rows_of_stable_baselines3_say_whether_they_decided():
+    pytest.importorskip("stable_baselines3", reason="stable-baselines3 is not installed")
+    ran = runpy.run_path(str(EXAMPLES / "stable_baselines3_ppo.py"))
+    assert ran["policy"].num_timesteps >= 1024
+    assert ran["observations"].shape[0] == 8 and [i["decided"] for i in ran["infos"]] == [True] * 8
