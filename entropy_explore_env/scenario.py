@@ -61,7 +61,8 @@ class Scenario:
         split: Which worlds a recipe makes: `train`, `validation` and `test` have none in common
             (worlds/splits.py). Files, and recipes without chance, are one world in all of them.
         robots: Team size A.
-        robot, sensor: How robots move and what they sense.
+        robot: How robots move.
+        sensor: What they sense.
         extra_kinds: Further kinds of robots, for a mixed team: of K kinds in all, the first being `robot`
             with `sensor`, robot a is of kind a mod K. All share one form of action and observation
             (missions/action.py, missions/observation/layout.py).

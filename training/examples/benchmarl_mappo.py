@@ -14,11 +14,11 @@ import entropy_explore_env as eee
 class NumbersOnly(BaseParallelWrapper):
     """Infos without text: the mask of actions."""
 
-    def reset(self, seed=None, options=None):  # noqa: ANN001, ANN201, D102
+    def reset(self, seed=None, options=None):
         observations, infos = super().reset(seed, options)
         return observations, {a: {"action_mask": infos[a]["action_mask"]} for a in infos}
 
-    def step(self, actions):  # noqa: ANN001, ANN201, D102
+    def step(self, actions):
         *results, infos = super().step(actions)
         return *results, {a: {"action_mask": infos[a]["action_mask"]} for a in infos}
 
@@ -26,27 +26,27 @@ class NumbersOnly(BaseParallelWrapper):
 class Exploration(PettingZooClass):
     """A scenario as a task of BenchMARL: discrete actions, and a state for centralised critics."""
 
-    def get_env_fun(self, num_envs, continuous_actions, seed, device):  # noqa: ANN001, ANN201, D102
+    def get_env_fun(self, num_envs, continuous_actions, seed, device):
         settings = {"observation": {"flat": True, "panorama_utility": "log2"}, **self.config}
         discrete = {"kind": "discrete", "moves": "axes"}
 
-        def make():  # noqa: ANN202
+        def make():
             team = eee.parallel_env(self.name, action=discrete, reward={"kind": "team"}, **settings)
             return PettingZooWrapper(NumbersOnly(team), return_state=True, seed=seed, device=device)
 
         return make
 
-    def supports_continuous_actions(self):  # noqa: ANN201, D102
+    def supports_continuous_actions(self):
         return False
 
-    def supports_discrete_actions(self):  # noqa: ANN201, D102
+    def supports_discrete_actions(self):
         return True
 
-    def has_state(self):  # noqa: ANN201, D102
+    def has_state(self):
         return True
 
     @staticmethod
-    def env_name():  # noqa: ANN205, D102
+    def env_name():
         return "entropy_explore_env"
 
 

@@ -9,11 +9,11 @@ import entropy_explore_env as eee
 class NumbersOnly(BaseParallelWrapper):
     """Infos without text: whether a robot decides, and which actions make sense."""
 
-    def reset(self, seed=None, options=None):  # noqa: ANN001, ANN201, D102
+    def reset(self, seed=None, options=None):
         observations, infos = super().reset(seed, options)
         return observations, {a: {k: infos[a][k] for k in ("deciding", "action_mask")} for a in infos}
 
-    def step(self, actions):  # noqa: ANN001, ANN201, D102
+    def step(self, actions):
         *results, infos = super().step(actions)
         return *results, {a: {k: infos[a][k] for k in ("deciding", "action_mask")} for a in infos}
 
