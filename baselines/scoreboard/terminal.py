@@ -27,7 +27,7 @@ def show_results(results: Results) -> None:
     measure, reference = results.judged_by[0], results.references[0]
     names = ", ".join(task.name for task in results.suite.tasks)
     table = Table(
-        title=f"{names}; ratios: over {reference}'s",
+        title=f"{names}\nratios: over {reference}'s",
         title_justify="left",
         box=box.SIMPLE_HEAD,
         padding=(0, 1, 0, 0),

@@ -29,8 +29,9 @@ GRID: Mapping[str, Mapping[str, tuple[float, ...]]] = {
     "distance-advantage": {
         "radius": (30, 60, 120),
         "horizon": (30, 61, 120),
-        "crowd": (0, 4, 8, 16, 24),
-        "around": (0.0625, 0.125, 0.25),
+        "opening": (0, 0.05, 0.1, 0.2, 0.3),
+        "passing": (0, 0.06, 0.125),
+        "meanwhile": (0, 0.25, 0.5, 1),
     },
     "information-gain": {"weight": (0.05, 0.15, 0.4, 1, 2), "horizon": (1, 3)},
     "receding-horizon": {"decay": (0.5, 1, 2, 4), "edge": (0.2, 0.4, 0.8), "places": (15, 30, 60)},

@@ -7,20 +7,21 @@ the length of the path through known free space. What would be far to come back 
 frontier cells whose path is no longer than a horizon count; where there is none, the nearest one does.
 
 What there is to gain is no part of the worth; it says which frontier cells are worth going to at all, as in
-the paper. A cell counts if there is a crowd of frontier cells around it, whether they hang together or, far
-from where the robot was, lie between its rays. Where no cell counts, all do: single slivers come last.
-(Unknown voxels in sight, were all that is unknown free, are no measure: through a wall's single unseen voxel
-a wide cone is in sight.)
+the paper. A cell counts if it belongs to a wide opening, that is, to many connected frontier cells, or if
+it is so near that it costs little in passing. Where no cell counts, all do: slivers come last. (Unknown
+voxels in sight, were all that is unknown free, are no measure: through a wall's single unseen voxel a wide
+cone is in sight.)
 
 The mean needs a search from each frontier cell. Most are spared: since d(u, v) ≤ d(u, w) + d(w, v), a cell
 w whose mean is known bounds the advantage of every other one from above, and cells whose bounds are below
 the best advantage so far are never searched from. The choice is the same.
 
-Tuned: `radius`, `horizon`, `crowd` and `around`; see `DistanceAdvantageConfig` and docs/explorers.md.
+Tuned: `radius`, `horizon`, `opening` and `passing`; see `DistanceAdvantageConfig`.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -40,9 +41,10 @@ class DistanceAdvantageConfig:
     Attributes:
         radius: Voxels, along either axis, that u may be off the robot.
         horizon: Longest path, in voxel edges, to a frontier cell that counts though it is not the nearest.
-        crowd: Least number of known free voxels beside unknown ones around a frontier cell that counts; 0 =
-            any counts.
-        around: How far off they may be along either axis, in sensor ranges.
+        opening: Least number of connected known free voxels beside unknown ones, in sensor ranges; 0 = any
+            frontier cell counts.
+        passing: A frontier cell whose path is no longer than this, in sensor ranges, counts anyway.
+        meanwhile: So does one whose path is at most this share of the path to the nearest wide opening.
         detour: u that are farther from the robot than this many radii, by path, do not count; inf = all do.
 
     Raises:
@@ -51,20 +53,21 @@ class DistanceAdvantageConfig:
 
     radius: int = 60
     horizon: float = 61.0
-    crowd: int = 8
-    around: float = 0.125
+    opening: float = 0.1
+    passing: float = 0.06
+    meanwhile: float = 0.5
     detour: float = 8.0
 
     def __post_init__(self) -> None:
         """Check every field."""
         check_count(self, "radius", 1, 1_000_000)
-        check_count(self, "crowd", 0, 1_000_000)
         check_positive(self, "horizon", "detour", finite=False)
-        check(self, "around", "a number from 0 to 1", lambda v: 0.0 <= v <= 1.0)
+        for name in ("opening", "passing", "meanwhile"):
+            check(self, name, "a number from 0 to 1", lambda v: 0.0 <= v <= 1.0)
 
 
-Counts = Callable[[int], bool]
-"""Whether a frontier cell counts."""
+Counts = Callable[[int, float], bool]
+"""Whether a frontier cell, with a path of this length to it, counts."""
 
 
 class DistanceAdvantage(Explorer):
@@ -78,16 +81,17 @@ class DistanceAdvantage(Explorer):
 
     def pick(self, scene: Scene) -> int:
         """See `Explorer`."""
-        config, cells = self.config, scene.cells
-        radius = round(config.around * cells.reach)
-        if config.crowd > 1:
-            picked = self._pick_of(
-                scene, lambda voxel: cells.crowd(voxel, radius, config.crowd) >= config.crowd
-            )
-            if picked != NONE:
-                return picked
-            scene.paths.start(scene.here)
-        return self._pick_of(scene, lambda _: True)
+        config, cells, paths = self.config, scene.cells, scene.paths
+        least = round(config.opening * cells.reach)
+        if least <= 1:
+            return self._pick_of(scene, lambda *_: True)
+        voxel, length = nearest_that_counts(paths, lambda voxel, _: cells.opening(voxel, least) >= least)
+        if voxel == NONE:
+            return self._pick_of(scene, lambda *_: True)
+        near = max(config.passing * cells.reach, config.meanwhile * length)
+        return self._pick_of(
+            scene, lambda voxel, length: length <= near or cells.opening(voxel, least) >= least
+        )
 
     def _pick_of(self, scene: Scene, counts: Counts) -> int:
         """The frontier cell of those that count; NONE = none does."""
@@ -100,21 +104,21 @@ class DistanceAdvantage(Explorer):
             if worth.max() > -np.inf:
                 return best_of(voxels, worth, scene.target)
             paths.start(scene.here)
-        return nearest_that_counts(paths, counts)
+        return nearest_that_counts(paths, counts)[0]
 
 
-def nearest_that_counts(paths: KnownPaths, counts: Counts) -> int:
-    """The nearest frontier cell that counts, by the robot's search; NONE = none does."""
+def nearest_that_counts(paths: KnownPaths, counts: Counts) -> tuple[int, float]:
+    """The nearest frontier cell that counts, by the robot's search, and its length; NONE = none does."""
     tried = set[int]()
     while True:
         voxels, lengths = paths.frontiers_within(paths.reach)
         for place in np.argsort(lengths, kind="stable"):
             voxel = int(voxels[place])
-            if voxel not in tried and counts(voxel):
-                return voxel
+            if voxel not in tried and counts(voxel, float(lengths[place])):
+                return voxel, float(lengths[place])
             tried.add(voxel)
         if paths.exhausted():
-            return NONE
+            return NONE, math.inf
         paths.extend(1.5 * paths.reach)
 
 
@@ -141,7 +145,7 @@ def advantages(
     worth, bounds = np.full(len(voxels), -np.inf), np.full(len(voxels), np.inf)
     place = int(np.argmin(lengths))
     while bounds[place] > worth.max():
-        if counts(int(voxels[place])):
+        if counts(int(voxels[place]), float(lengths[place])):
             least, most = abs(farthest - lengths[place]), farthest + lengths[place]
             mean = paths.mean_length(int(voxels[place]), around, least, most)
             worth[place] = mean - lengths[place]

@@ -79,15 +79,17 @@ class FrontierCells(VoxelCandidates):
         count_from(self._counter, self._map.state, self._size, voxels, self._tree, self._met, gains, weighed)
         return gains
 
-    def crowd(self, voxel: int, radius: int, most: int) -> int:
-        """How many known free voxels beside unknown ones there are around a voxel.
+    def opening(self, voxel: int, most: int) -> int:
+        """How many connected known free voxels beside unknown ones there are where a frontier cell is.
 
         Args:
-            voxel: In the middle.
-            radius: Voxels that they may be off along any axis.
+            voxel: The frontier cell.
             most: No more are counted.
         """
-        return int(count_edges_around(self._map, voxel, radius, most))
+        edges = self._edges_beside(voxel)
+        if len(edges) == 0:
+            return 0
+        return int(count_connected(self._map, edges, np.empty(most + len(edges), np.int64), most))
 
     def crowds(self, voxels: np.ndarray, radius: int, most: int) -> np.ndarray:
         """(K,) how many known free voxels beside unknown ones there are around each of (K,) int32 voxels.
@@ -196,6 +198,37 @@ def fill_nearest_of_blocks(
                         length = cost_to(search, voxel)
                         if length <= reach and length < lengths[place]:
                             voxels[place], lengths[place] = voxel, length
+
+
+@lean_kernel
+def count_connected(frontiers: FrontierMap, edges: np.ndarray, found: np.ndarray, most: int) -> int:
+    """How many EDGE voxels are connected with some of them, by sides, edges or corners; no more than `most`.
+
+    Args:
+        frontiers: Of the robot.
+        edges: (N,) int64, the first of them.
+        found: (≥ most + N,) int64, scratch space.
+        most: Where counting ends.
+    """
+    size, count, place = frontiers.size, 0, 0
+    for edge in edges:
+        found[count] = edge
+        count += 1
+    while place < count and count < most:
+        x, y, z = grid_index(size, found[place])
+        place += 1
+        for i in range(max(x - 1, 0), min(x + 2, size[0])):
+            for j in range(max(y - 1, 0), min(y + 2, size[1])):
+                for k in range(max(z - 1, 0), min(z + 2, size[2])):
+                    near = flat_index(size, i, j, k)
+                    if count < most and frontiers.flags[near] & EDGE:
+                        known = False
+                        for other in range(count):
+                            known = known or found[other] == near
+                        if not known:
+                            found[count] = near
+                            count += 1
+    return min(count, most)
 
 
 @lean_kernel

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy import ndimage
 
 from baselines.strategies.explorers.distance_advantage import (
     DistanceAdvantage,
@@ -46,7 +47,7 @@ def test_advantages_are_the_textbooks_and_the_greatest_of_one_cell_a_block_is_ch
     plan, robot = random_plan(shape, np.random.default_rng(seed))
     scene = scene_of(plan, robot)
     wanted = reference.distance_advantage(plan, robot, radius, horizon)
-    config = DistanceAdvantageConfig(radius=radius, horizon=horizon, crowd=0)
+    config = DistanceAdvantageConfig(radius=radius, horizon=horizon, opening=0.0)
     picked = DistanceAdvantage(config).pick(scene)
     if not wanted:
         assert picked == NONE
@@ -169,16 +170,19 @@ def test_beyond_the_horizon_the_nearest_frontier_is_taken():
     assert cell(plan, InformationGain(InformationGainConfig(horizon=0.1)).pick(scene)) == (27, 1)
 
 
-@given(st.integers(0, 6), seeds)
+@given(seeds)
 @drawn(30)
-def test_a_crowd_is_the_frontier_cells_of_the_textbook_around_a_cell(radius, seed):
+def test_openings_are_the_connected_frontier_cells_of_the_textbook(seed):
     plan, robot = random_plan((23, 17), np.random.default_rng(seed))
     scene = scene_of(plan, robot)
-    frontier = reference.frontier_cells(plan)
-    for place in [robot, *frontier[:5]]:
-        whole = sum(max(abs(x - place[0]), abs(y - place[1])) <= radius for x, y in frontier)
+    there = np.zeros(plan.shape, bool)
+    for place in reference.frontier_cells(plan):
+        there[place] = True
+    labels, _ = ndimage.label(there, np.ones((3, 3)))
+    for place in reference.frontier_cells(plan)[:5]:
+        whole = int((labels == labels[place]).sum())
         voxel = int(np.ravel_multi_index(place, plan.shape))
-        assert [scene.cells.crowd(voxel, radius, most) for most in (2, 5, 1000)] == [
+        assert [scene.cells.opening(voxel, most) for most in (2, 5, 1000)] == [
             min(whole, m) for m in (2, 5, 1000)
         ]
 
@@ -195,15 +199,17 @@ def room_with_a_sliver(apart):
 
 
 @pytest.mark.parametrize(
-    ("crowd", "around", "wanted"), [(0, 0.05, 2), (1, 0.05, 2), (4, 0.05, 24), (4, 0.02, 2), (5, 0.05, 2)]
+    ("apart", "passing", "meanwhile", "wanted"),
+    [(4, 0.0, 0.0, 24), (4, 0.1, 0.0, 2), (7, 0.05, 0.0, 24), (4, 0.0, 0.2, 24), (4, 0.0, 0.25, 2)],
 )
-def test_slivers_wait_by_hand(crowd, around, wanted):
-    """The range is 40 voxels: four frontier cells side by side are a crowd within two voxels, not within one.
+def test_slivers_wait_unless_they_are_near_by_hand(apart, passing, meanwhile, wanted):
+    """The range is 80 voxels: openings of four count, and slivers up to so many shares of it away.
 
-    Where none is a crowd all count, and the nearest one has the greatest advantage.
+    The opening is 18 steps from the robot that is 4 from the sliver: more than a fifth of that, less than a
+    quarter.
     """
-    plan, robot = room_with_a_sliver(4)
-    config = DistanceAdvantageConfig(crowd=crowd, around=around)
+    plan, robot = room_with_a_sliver(apart)
+    config = DistanceAdvantageConfig(opening=0.05, passing=passing, meanwhile=meanwhile)
     assert cell(plan, DistanceAdvantage(config).pick(scene_of(plan, robot)))[0] == wanted
 
 
