@@ -43,12 +43,13 @@ class Claim:
         return asdict(self)
 
 
-def claims_table(claims: Sequence[Claim], interval_digits: int = _DIGITS) -> str:
+def claims_table(claims: Sequence[Claim], interval_digits: int = _DIGITS, given: str = "paper") -> str:
     """The claims as a Markdown table.
 
     Args:
         claims: A row each.
         interval_digits: Significant digits of the ends of intervals.
+        given: Head of the column of figures that were given.
     """
     rows = [
         [
@@ -60,7 +61,7 @@ def claims_table(claims: Sequence[Claim], interval_digits: int = _DIGITS) -> str
         ]
         for claim in claims
     ]
-    return markdown_table(["claim", "paper", "ours", "95 % interval", "holds"], rows)
+    return markdown_table(["claim", given, "ours", "95 % interval", "holds"], rows)
 
 
 def print_claims(claims: Sequence[Claim], paper: str) -> None:

@@ -67,29 +67,53 @@ def share_of_one(robots: int) -> float:
     return 0.5 + 0.5 * robots / (robots - 1)
 
 
+def _pair(scenario: str, robots: int, strategy: str, over: str, under: str) -> tuple[str, str]:
+    """The two cells of a ratio."""
+    return cell_id(scenario, robots, strategy, over), cell_id(scenario, robots, strategy, under)
+
+
 def _ratio(records: Records, scenario: str, robots: int, strategy: str, over: str, under: str) -> Interval:
-    pair = [times(records, cell_id(scenario, robots, strategy, name)) for name in (over, under)]
+    pair = [times(records, cell) for cell in _pair(scenario, robots, strategy, over, under)]
     known = np.isfinite(pair[0]) & np.isfinite(pair[1])
     if not known.any():
         return Interval(math.nan, math.nan, math.nan)
     return ratio_interval(pair[0][known], pair[1][known])
 
 
+def _tells(records: Records, *cells: str) -> bool:
+    """Whether some mission of these cells came to its end: the ratio of missions cut off is 1 by itself."""
+    return any(record.get("finished", False) for cell in cells for record in records[cell])
+
+
 def _of_a_team(records: Records, scenario: str, robots: int, strategy: str) -> list[Claim]:
+    who, prefix = (scenario, robots, strategy), f"{scenario}-{robots}-{strategy}"
     team = f"{strategy}, {scenario}, {robots} robots"
+    alone = {name: LOST_ISOLATED if name == LOST else ISOLATED for name in conditions()}
     found = {
-        name: over_isolated(records, scenario, robots, strategy, name)
+        name: _ratio(records, *who, name, alone[name])
         for name in conditions()
-        if name not in (ISOLATED, LOST_ISOLATED)
+        if name not in alone.values() and _tells(records, *_pair(*who, name, alone[name]))
     }
-    worst = max(found, key=lambda name: (found[name].low, found[name].value))
-    value, low, high = found[worst]
-    text = f"{team}: never slower than in isolation; the worst ratio, with {TEXTS[worst]}"
-    prefix = f"{scenario}-{robots}-{strategy}"
-    claims = [
-        Claim(f"isolated-{prefix}", text, "≤ 1", value, low, high, all(f.low <= 1 for f in found.values()))
+    text = f"{team}: never slower than in isolation"
+    return [
+        _claim(f"isolated-{prefix}", text, 1.0, found),
+        _claim(
+            f"lost-{prefix}",
+            f"{team}: losing one at half time costs at most its share",
+            share_of_one(robots),
+            {LOST: slowdown(records, *who, LOST)}
+            if _tells(records, *_pair(*who, LOST, NOTHING_FAILS))
+            else {},
+        ),
     ]
-    value, low, high = slowdown(records, scenario, robots, strategy, LOST)
-    most = share_of_one(robots)
-    text = f"{team}: losing one at half time costs at most its share; the ratio"
-    return [*claims, Claim(f"lost-{prefix}", text, f"≤ {most:.2f}", value, low, high, low <= most)]
+
+
+def _claim(name: str, text: str, most: float, found: dict[str, Interval]) -> Claim:
+    """That no ratio lies above a number with its whole interval; beside it stands the largest."""
+    allowed = f"≤ {most:.3g}"
+    if not found:
+        return Claim(name, f"{text}: all missions were cut off", allowed, None, None, None, False)
+    worst = max(found, key=lambda condition: (found[condition].low, found[condition].value))
+    value, low, high = found[worst]
+    holds = all(each.low <= most for each in found.values())
+    return Claim(name, f"{text}; at worst: {TEXTS[worst]}", allowed, value, low, high, holds)

@@ -29,7 +29,7 @@ OTHERS = ("burst-0", "range", "sight", LOST, ISOLATED)
 def loss_figure(experiment: Experiment, records: Records) -> tuple[Figure, Table]:
     """Mission time over that without loss, by the share of messages that are lost; isolation at the end."""
     teams = experiment.teams()
-    figure = Figure(figsize=(1.2 + 3.4 * len(teams), 4.6), layout="constrained")
+    figure = Figure(figsize=(2.6 + 3.4 * len(teams), 4.6), layout="constrained")
     panels = figure.subplots(1, len(teams), squeeze=False, sharey=True)[0]
     table: Table = {name: [] for name in _COLUMNS}
     points = [*(loss_name(loss) for loss in LOSSES), ISOLATED]
@@ -49,7 +49,6 @@ def loss_figure(experiment: Experiment, records: Records) -> tuple[Figure, Table
                 _note(table, scenario, robots, strategy, name, each)
         _by_loss(axes, f"{scenario}, {robots} robots")
     panels[0].set_ylabel("mission time over that without faults")
-    figure.supxlabel("messages lost", fontsize=9)
     handles, labels = panels[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=4, frameon=False, fontsize=8)
     return figure, table
@@ -57,6 +56,7 @@ def loss_figure(experiment: Experiment, records: Records) -> tuple[Figure, Table
 
 def _by_loss(axes: Axes, title: str) -> None:
     axes.set_title(title, fontsize=9)
+    axes.set_xlabel("messages lost")
     axes.axhline(1.0, color="0.6", linewidth=0.8)
     axes.axvspan(1.0, 1.2, color="0.94", zorder=0)
     axes.set_xticks([*LOSSES, 1.1], [*(f"{loss:.0%}" for loss in LOSSES), "isolated"], fontsize=8)
@@ -92,7 +92,7 @@ def fault_figure(experiment: Experiment, records: Records) -> tuple[Figure, Tabl
         axes.set_title(TEXTS[name], fontsize=9)
         axes.set_yticks(rows, strategies)
         axes.set_ylim(-0.6, len(strategies) - 0.4)
-    figure.supxlabel("mission time over that without faults", fontsize=9)
+    panels[len(OTHERS) // 2].set_xlabel("mission time over that without faults")
     handles, labels = panels[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=len(teams), frameon=False, fontsize=8)
     return figure, table

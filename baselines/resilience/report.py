@@ -67,7 +67,7 @@ def _text(experiment: Experiment, records: Records, claims: Sequence[Claim], com
         *(_times_table(experiment, records, *team) for team in experiment.teams()),
         f"## Claims: {held} of {len(claims)} hold",
         _HOLDS,
-        claims_table(claims, interval_digits=3),
+        claims_table(claims, 3, given="allowed"),
         "Files: [`loss.csv`](resilience/loss.csv), [`faults.csv`](resilience/faults.csv).",
     ]
     return "\n\n".join(part.strip() for part in parts) + "\n"
@@ -80,8 +80,9 @@ how much of that a fault takes away is what the figures show. Silent teammates c
 
 _HOLDS = """"Never slower than in isolation" compares each condition with the same robots that tell each
 other nothing (where a robot is lost, with isolated robots of which the same one is lost); it fails only where
-a whole interval lies above 1. "At most its share": the team that lost one of A robots at half time needs at
-most ½ + ½ · A/(A - 1) of the time; it fails only where the whole interval lies above that."""
+a whole interval lies above 1, or where all missions were cut off. "At most its share": the team that lost one
+of A robots at half time needs at most ½ + ½ · A/(A - 1) of the time; it fails only where the whole interval
+lies above that, or likewise."""
 
 _SAID = {
     **{

@@ -14,7 +14,7 @@ from PIL import Image
 from entropy_explore_env.errors import MissingExtraError, SettingError
 from entropy_explore_env.reports.animation import Window, animate
 from entropy_explore_env.reports.annotations import Box
-from entropy_explore_env.reports.colours import COLOURS, PAPER, ROBOT_COLOURS, UNKNOWN_COLOUR
+from entropy_explore_env.reports.colours import COLOURS, INK, PAPER, ROBOT_COLOURS, UNKNOWN_COLOUR
 from entropy_explore_env.reports.page_layout import View, lay_out
 from entropy_explore_env.reports.rendering import Frame, draw_frame
 
@@ -378,3 +378,16 @@ def test_larger_pictures_have_larger_details() -> None:
     small, large = lay_out(SHAPE, VOXEL_M, 2, 2, 640, 480), lay_out(SHAPE, VOXEL_M, 2, 2, 1280, 960)
     assert (small.unit, large.unit) == (1, 2)
     assert large.status.height == 2 * small.status.height
+
+
+def test_a_cross_is_drawn_over_a_robot_that_has_stopped():
+    """Beside it nothing changes, and the other robot is drawn as before."""
+    plain = dataclasses.replace(frame_of(), positions_m=np.array([[-1.0, 3.0, 1.25], [0.5, 5.0, 1.25]]))
+    stopped = dataclasses.replace(plain, stopped=(1,))
+    before, after = draw_frame(plain), draw_frame(stopped)
+    changed = np.argwhere((before != after).any(axis=2))
+    view = views_of(plain)["entropy", 2]
+    row, column = pixel_of(view, (5.0, 8.0, 2.0))
+    inside = [p for p in changed if view.top <= p[0] < view.bottom and view.left <= p[1] < view.right]
+    assert inside and all(abs(p[0] - row) <= 10 and abs(p[1] - column) <= 10 for p in inside)
+    assert tuple(after[row, column]) == INK
