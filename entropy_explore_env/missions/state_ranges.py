@@ -245,8 +245,10 @@ def _workspace(scenario: Scenario) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _longest_m(scenario: Scenario) -> float:
-    """Metres that no measured distance is beyond, noise included."""
-    return _farthest_m(scenario) + 100.0 * max(kind.sensor.range_noise_m for kind in scenario.kinds)
+    """Metres that no measured distance is beyond, noise and what is wrong with sensors included."""
+    measured_m = _farthest_m(scenario) + 100.0 * max(kind.sensor.range_noise_m for kind in scenario.kinds)
+    wrong = scenario.faults.sensor
+    return measured_m * max(wrong.range_factor, 1.0) + abs(wrong.range_bias_m)
 
 
 def _farthest_m(scenario: Scenario) -> float:

@@ -377,3 +377,15 @@ def test_signals_and_sight_decide_who_hears():
         ("too far", False): False,
         ("too far", True): False,
     }
+
+
+def test_a_state_of_a_sensor_that_measures_much_too_far_is_one_that_missions_have():
+    """Drawn once: distances far beyond the workspace were taken for what no mission holds."""
+    wrong = {"sensor": {"range_factor": 9.0, "range_bias_m": 1e5}}
+    missions = started(free_box(faults=wrong, channel={"i_min_bits": 0.0, "delay_s": 1.0}))
+    wander(missions, 12, 0)
+    assert missions.state.robots["depth_m"].max() > 1e5 and missions.state.in_flight_rays[..., 3].max() > 1e5
+    other = started(missions.scenario, 3)
+    restore(other, snapshot(missions))
+    assert state_digest(other, 0) == state_digest(missions, 0)
+    assert np.isfinite(missions.observations).all()
