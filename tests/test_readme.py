@@ -1,5 +1,6 @@
 """The README stays short, and what it names and shows is there. Its example runs in tests/test_site.py."""
 
+import json
 import re
 from pathlib import Path
 
@@ -62,3 +63,14 @@ def test_the_addresses_are_those_of_the_project():
     (repository,) = re.findall(r'^Repository = "(.*)"$', project, flags=re.MULTILINE)
     assert f"git clone {repository}\n" in README
     assert f"pip install git+{repository}\n" in README
+
+
+def test_the_model_card_tells_of_every_policy_what_its_file_says():
+    page = (ROOT / "docs" / "model_card.md").read_text(encoding="utf-8")
+    folders = [path.parent for path in (ROOT / "training" / "pretrained").glob("*/policy.json")]
+    assert folders
+    for folder in folders:
+        told = page.split(f"## {folder.name}\n")[1].split("\n## ")[0]
+        progress = json.loads((folder / "policy.json").read_text(encoding="utf-8"))["progress"]
+        assert f"{progress['steps']:,} robot-steps" in told
+        assert f"{progress['validation']['median_s']:g} s" in told

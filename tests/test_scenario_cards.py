@@ -115,3 +115,19 @@ def test_times_come_from_the_tables_of_results(tmp_path):
     bare = SCENARIOS["bhattacharya-cluttered"]
     if bare.name not in scenarios.MISSION_TIMES:
         assert scenario_times.times_table(bare, tmp_path) == ""
+
+
+def test_times_come_from_the_suites_of_the_scoreboard(tmp_path):
+    columns = "task,strategy,missions,finished,{0},{0}_low,{0}_high"
+    for suite, column, row in (
+        ("plans", "time_s_99_seen", "office,nearest-frontier,30,29,312.4,300,330"),
+        ("volumes", "time_s_end", '"office, 3 robots",planned-rate,30,30,150,140,161'),
+        ("teams", "time_s_end", '"office, 8 robots",planned-rate,30,30,99,90,101'),
+    ):
+        folder = tmp_path / "scoreboard" / suite
+        folder.mkdir(parents=True)
+        (folder / "tasks.csv").write_text(f"{columns.format(column)}\n{row}\noffice-3d,random,1,1,7,,\n")
+    text = scenario_times.times_table(SCENARIOS["office"], tmp_path)
+    assert "| 1 robot (to 99 % seen) | `nearest-frontier` | 312 (300 … 330) | 29 of 30 |" in text
+    assert "| 3 robots | `planned-rate` | 150 (140 … 161) | 30 of 30 |" in text
+    assert "8 robots" not in text and "`random`" not in text

@@ -62,24 +62,22 @@ def head_to_head_times(scenario: str, results: Path) -> list[Time]:
     return times
 
 
+SUITES = {"plans": ("time_s_99_seen", " (to 99 % seen)"), "volumes": ("time_s_end", "")}
+"""Suite → its column of times, and what is said of them; teams and channels stand on the page alone."""
+
+
 def scoreboard_times(scenario: str, results: Path) -> list[Time]:
-    """Rows of `scoreboard/*/tasks.csv` whose task is of this scenario: `office`, or `office-3`."""
+    """Rows of `scoreboard/SUITE/tasks.csv` of this scenario: its tasks are `office`, or `office, 3 robots`."""
     times = []
-    for path in sorted((results / "scoreboard").glob("*/tasks.csv")):
-        for row in _rows(path):
-            if row.get("scenario", row.get("task", "")) != scenario:
-                continue
-            seconds = _interval(row.get("time_s_end"), row.get("time_s_end_low"), row.get("time_s_end_high"))
-            times.append(
-                Time(
-                    path.parent.name,
-                    row["strategy"],
-                    row.get("missions", "-"),
-                    row.get("finished", "-"),
-                    seconds,
-                    "scoreboard",
+    for suite, (column, words) in SUITES.items():
+        for row in _rows(results / "scoreboard" / suite / "tasks.csv"):
+            name, _, team = row["task"].partition(", ")
+            if name == scenario:
+                seconds = _interval(*(row.get(column + end) for end in ("", "_low", "_high")))
+                who = (team or "1 robot") + words
+                times.append(
+                    Time(who, row["strategy"], row["missions"], row["finished"], seconds, "scoreboard")
                 )
-            )
     return times
 
 
