@@ -67,7 +67,7 @@ SUITES = {"plans": ("time_s_99_seen", " (to 99 % seen)"), "volumes": ("time_s_en
 
 
 def scoreboard_times(scenario: str, results: Path) -> list[Time]:
-    """Rows of `scoreboard/SUITE/tasks.csv` of this scenario: its tasks are `office`, or `office, 3 robots`."""
+    """Rows of `scoreboard/SUITE/tasks.csv` of this scenario: tasks `office`, or `office, 3 robots`."""
     times = []
     for suite, (column, words) in SUITES.items():
         for row in _rows(results / "scoreboard" / suite / "tasks.csv"):
