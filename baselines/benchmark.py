@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import dataclasses
 import math
-import os
 import shlex
 import sys
 import time
@@ -29,6 +28,7 @@ from baselines.cli.task_options import (
     parsed_for,
     words_of,
 )
+from baselines.cli.worker_options import WorkerOptions
 from baselines.experiments.cells import run_cells
 from baselines.scoreboard.chosen import (
     Entry,
@@ -48,7 +48,7 @@ _MOST_ROBOTS = 1000
 
 
 @dataclass
-class Args:
+class Args(WorkerOptions):
     """Compare strategies."""
 
     suite: str | None = None
@@ -76,8 +76,6 @@ class Args:
     confirm: bool = False
     """Keep missions that other code ran, of each strategy and task whose first mission comes out the same
     when it is run again; else a change of the code runs all again."""
-    jobs: int | None = None
-    """Processes; default: one a processor."""
     out: Path = Path("results/scoreboard")
     """Folder for scoreboard.md and, in scoreboard, its tables and figures."""
     runs: Path | None = None
@@ -89,7 +87,7 @@ class Args:
 def main(words: Sequence[str]) -> int:
     """Run the command."""
     args = parse(Args, words, description=__doc__)
-    suite, changes = _suite(args, words)
+    (suite, changes), workers = _suite(args, words), args.workers
     from baselines.scoreboard.page import write_page  # matplotlib: after the help
     from baselines.scoreboard.results import Results
     from baselines.scoreboard.terminal import printed_results, show_results
@@ -101,7 +99,7 @@ def main(words: Sequence[str]) -> int:
     records = run_cells(
         suite.cells,
         runs,
-        args.jobs or os.cpu_count() or 1,
+        workers,
         f"suite {suite.name}" if args.suite else "strategies",
         quiet=args.json,
         limit_s=args.wall_limit_s,
@@ -130,9 +128,7 @@ def _suite(args: Args, words: Sequence[str]) -> tuple[Suite, list[str]]:
         WorldError: A world file cannot be used.
     """
     seeds = args.seeds if args.seeds is not None else (5 if args.quick else 30)
-    for name, value in (("seeds", seeds), ("jobs", args.jobs)):
-        if value is not None:
-            check_whole(name, value, 1)
+    check_whole("seeds", seeds, 1)
     for name in ("wall_limit_s", "stop_after_s"):
         limit_s = getattr(args, name)
         if limit_s is not None and not 0.0 < limit_s < math.inf:

@@ -8,7 +8,6 @@ Missions are kept, a file each: an interrupted run continues where it was.
 
 from __future__ import annotations
 
-import os
 import statistics
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -16,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from baselines.cli.arguments import make_folder, parse, print_json, run_command
+from baselines.cli.worker_options import WorkerOptions
 from baselines.experiments.cells import Cell, run_cells
 from baselines.experiments.mission import figures_record
 from baselines.experiments.outcome import Record
@@ -30,15 +30,13 @@ REFERENCE = "information-rate-v0"
 
 
 @dataclass
-class Args:
+class Args(WorkerOptions):
     """Measure mission times of the reference strategy in the named scenarios."""
 
     scenarios: str = "all"
     """Named scenarios, commas between."""
     seeds: int = 24
     """Missions in each."""
-    jobs: int | None = None
-    """Processes; default: one a processor."""
     runs: Path = Path("results/mission-times")
     """Folder that keeps the missions."""
     json: bool = False
@@ -48,8 +46,8 @@ class Args:
 def main(words: Sequence[str]) -> int:
     """Run the command."""
     args = parse(Args, words, description=__doc__)
-    for name, value in (("seeds", args.seeds), ("jobs", 1 if args.jobs is None else args.jobs)):
-        check_whole(name, value, 1)
+    check_whole("seeds", args.seeds, 1)
+    workers = args.workers
     names = list(SCENARIOS) if args.scenarios == "all" else args.scenarios.split(",")
     for name in names:
         if name not in SCENARIOS:
@@ -59,7 +57,7 @@ def main(words: Sequence[str]) -> int:
         Cell(name, with_settings(SCENARIOS[name], {"split": "train"}), REFERENCE, args.seeds, figures_record)
         for name in names
     ]
-    records = run_cells(cells, args.runs, args.jobs or os.cpu_count() or 1, "mission times", quiet=args.json)
+    records = run_cells(cells, args.runs, workers, "mission times", quiet=args.json)
     rows = [summary(name, records[name]) for name in names]
     if args.json:
         print_json({"strategy": REFERENCE, "rows": rows})

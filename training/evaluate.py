@@ -8,7 +8,6 @@ prints how long their missions take. `--strategy runs/room-3` takes the best pol
 from __future__ import annotations
 
 import dataclasses
-import os
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -26,9 +25,11 @@ from baselines.cli.task_options import (
     parsed_for,
     tasked,
 )
+from baselines.cli.worker_options import WorkerOptions
 from baselines.experiments.cells import Cell, run_cells
 from baselines.experiments.mission import Surroundings
 from baselines.experiments.outcome import Record
+from baselines.experiments.ray_cluster import RayCluster
 from baselines.experiments.statistics import median_interval, median_ratio_interval
 from baselines.strategies import make_strategy, resolved
 from entropy_explore_env.errors import SettingError
@@ -44,7 +45,7 @@ SIMPLE = ("gradient", "random")
 
 
 @dataclass
-class Args:
+class Args(WorkerOptions):
     """Compare a learned policy with the strategies."""
 
     pretrained: str | None = None
@@ -60,8 +61,6 @@ class Args:
     task: Annotated[TaskOptions, INLINE] = dataclasses.field(default_factory=TaskOptions)
     seeds: int = 100
     """Missions of each strategy, with the seeds 0, 1, …"""
-    jobs: int | None = None
-    """Processes; default: one for each processor."""
     runs: Path = Path("results/evaluation-runs")
     """Folder where missions are kept: a stopped evaluation continues where it was."""
     json: bool = False
@@ -73,8 +72,8 @@ def main(words: Sequence[str]) -> int:
     args = first_parsed(Args, words, __doc__)
     if (args.pretrained is None) == (args.strategy is None):
         raise SettingError("strategy", args.strategy, "given, or else --pretrained, not both")
-    for name, value in (("seeds", args.seeds), ("jobs", 1 if args.jobs is None else args.jobs)):
-        check_whole(name, value, 1)
+    check_whole("seeds", args.seeds, 1)
+    workers = args.workers
     policy = args.strategy if args.pretrained is None else PREFIX + args.pretrained
     assert policy is not None
     trained = load_checkpoint(latest_checkpoint(policy_folder(policy), *POLICIES)).settings
@@ -93,8 +92,7 @@ def main(words: Sequence[str]) -> int:
         make_strategy(name).reset(scenario, np.random.default_rng(0))
     make_folder("runs", args.runs)
     began = time.perf_counter()
-    jobs = args.jobs or os.cpu_count() or 1
-    compared = compare(policy, rivals, scenario, args.seeds, args.runs, jobs, args.json, surroundings)
+    compared = compare(policy, rivals, scenario, args.seeds, args.runs, workers, args.json, surroundings)
     if args.json:
         print_json({**compared, "wall_s": round(time.perf_counter() - began, 1)})
     else:
@@ -127,7 +125,7 @@ def compare(
     scenario: Scenario,
     seeds: int,
     runs: Path,
-    jobs: int,
+    workers: int | RayCluster,
     quiet: bool,
     surroundings: Surroundings | None = None,
 ) -> dict[str, Any]:
@@ -139,7 +137,7 @@ def compare(
         scenario: The missions' scenario.
         seeds: Missions of each.
         runs: Folder where missions are kept.
-        jobs: Processes.
+        workers: Processes of this machine, or a Ray cluster.
         quiet: Whether to show no progress.
         surroundings: World files and starts of the missions; None = those that the scenario says.
 
@@ -156,7 +154,7 @@ def compare(
     cells = [
         Cell(f"{folder}/{name}", scenario, name, seeds, surroundings=around) for name in (policy, *rivals)
     ]
-    records = run_cells(cells, runs, jobs, "evaluation", quiet=quiet)
+    records = run_cells(cells, runs, workers, "evaluation", quiet=quiet)
     missions = {name: records[cell.id] for name, cell in zip((policy, *rivals), cells, strict=True)}
     times = {name: np.array([record["t_mission_s"] for record in own]) for name, own in missions.items()}
     rows = [_row(name, missions[name], times[name], times[policy], name == policy) for name in missions]

@@ -10,7 +10,6 @@ from __future__ import annotations
 import contextlib
 import csv
 import io
-import os
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -20,6 +19,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from baselines.cli.arguments import make_folder, parse, print_json, run_command
+from baselines.cli.worker_options import WorkerOptions
+from baselines.experiments.ray_cluster import RayCluster
 from baselines.experiments.worker_pool import Failure, run_each
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.validation import check_whole
@@ -96,7 +97,7 @@ ABLATION_STEPS = 200_000
 
 
 @dataclass
-class Args:
+class Args(WorkerOptions):
     """Train, evaluate, and write docs/results/ppo.md."""
 
     out: Path = Path("results/ppo")
@@ -104,7 +105,7 @@ class Args:
     runs: Path = Path("results/ppo-runs")
     """Folder where runs and missions are kept."""
     jobs: int | None = None
-    """Runs at a time, each on one thread; default: one for each processor."""
+    """Runs or missions at a time, each on one thread; default: one for each processor."""
     seeds: int = 100
     """Test starts."""
     quick: bool = False
@@ -148,21 +149,20 @@ class TrainingRun(NamedTuple):
 def main(words: Sequence[str]) -> int:
     """Run the command."""
     args = parse(Args, words, description=__doc__)
-    for name, value in (("seeds", args.seeds), ("jobs", 1 if args.jobs is None else args.jobs)):
-        check_whole(name, value, 1)
+    check_whole("seeds", args.seeds, 1)
     make_folder("runs", args.runs)
-    jobs = args.jobs or os.cpu_count() or 1
+    workers = args.workers
     tasks = [Task(task.scenario, 8_192, task.seeds, task.goal) for task in TASKS] if args.quick else TASKS
     steps, starts = (4_096, min(args.seeds, 3)) if args.quick else (ABLATION_STEPS, args.seeds)
     wanted = planned_runs(tasks, steps, args.quick)
     if args.only_train is not None:
         wanted = {name: options for name, options in wanted.items() if name.startswith(args.only_train)}
     if not args.no_training:
-        train(wanted, args.runs, jobs, args.json)
+        train(wanted, args.runs, workers, args.json)
     if args.only_train is not None:
         return 0
     make_folder("out", args.out)
-    results = gather(tasks, steps, args.runs, starts, jobs, args.json)
+    results = gather(tasks, steps, args.runs, starts, workers, args.json)
     from training.experiment_page import write_page  # matplotlib: after the help
 
     page = write_page(args.out, results, "python -m training.experiment --out docs/results")
@@ -194,24 +194,27 @@ def _options(scenario: str, steps: int, seed: int) -> list[str]:
     return ["--scenario", scenario, "--robots", "3", "--total-steps", str(steps), "--seed", str(seed)]
 
 
-def train(runs: Mapping[str, Sequence[str]], folder: Path, jobs: int, quiet: bool) -> None:
+def train(runs: Mapping[str, Sequence[str]], folder: Path, workers: int | RayCluster, quiet: bool) -> None:
     """Train what is missing, each run on one thread.
 
     Args:
         runs: Run → options of `training.ppo`.
         folder: Of all runs.
-        jobs: Processes.
+        workers: Processes of this machine, or a Ray cluster whose machines share the folder: a run that
+            loses its worker goes on from its latest checkpoint, wherever it is begun again.
         quiet: Whether to print nothing.
 
     Raises:
-        SettingError: A run failed; start again to continue the others.
+        SettingError: A run failed, or another machine of the cluster kept it; start again to continue.
     """
     missing = [name for name, options in runs.items() if not _done(folder / name, options)]
     todo = [TrainingRun(folder / name, tuple(runs[name])) for name in missing]
-    for done, (run, result) in enumerate(run_each(_train, todo, jobs), 1):
+    for done, (run, result) in enumerate(run_each(_train, todo, workers), 1):
         name = run.folder.relative_to(folder).as_posix()
         if isinstance(result, Failure):
             raise SettingError("runs", f"{name}: {result.reason}", "runs that end well")
+        if not _done(run.folder, run.options):
+            raise SettingError("runs", str(folder), f"a folder that all machines share: {name} is not in it")
         if not quiet:
             print(f"trained {name}, {len(todo) - done} more runs to come", file=sys.stderr, flush=True)
 
@@ -235,7 +238,7 @@ def _done(run: Path, options: Sequence[str]) -> bool:
 
 
 def gather(
-    tasks: Sequence[Task], steps: int, folder: Path, starts: int, jobs: int, quiet: bool
+    tasks: Sequence[Task], steps: int, folder: Path, starts: int, workers: int | RayCluster, quiet: bool
 ) -> ExperimentResults:
     """Evaluate the first policy of each task, and read all curves."""
     comparisons = {}
@@ -245,7 +248,7 @@ def gather(
         scenario = evaluation_scenario(trained)
         others = [str(folder / task.run(seed)) for seed in range(1, task.seeds)]
         comparisons[task.scenario] = compare(
-            str(policy), [*RIVALS, *others], scenario, starts, folder / "missions", jobs, quiet
+            str(policy), [*RIVALS, *others], scenario, starts, folder / "missions", workers, quiet
         )
     names = [task.run(seed) for task in tasks for seed in range(task.seeds)]
     ablations = {name: [folder / f"ablations/{name}-{seed}" for seed in range(SEEDS)] for name in ABLATIONS}

@@ -16,6 +16,7 @@ from baselines.experiments.confirmation import keep_confirmed
 from baselines.experiments.mission import Surroundings, mission_record, scripted, scripted_env
 from baselines.experiments.outcome import Outcome, Record
 from baselines.experiments.provenance import code_digest, modules_of
+from baselines.experiments.ray_cluster import RayCluster
 from baselines.experiments.runner import Conditions, run_all
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.scenario import Scenario
@@ -131,7 +132,7 @@ def _environment(scenario: Scenario, surroundings: Surroundings | None) -> Entro
 def run_cells(
     cells: Sequence[Cell],
     folder: Path,
-    jobs: int,
+    workers: int | RayCluster,
     title: str,
     quiet: bool,
     limit_s: float = math.inf,
@@ -147,7 +148,7 @@ def run_cells(
     Args:
         cells: The points.
         folder: For one file a mission.
-        jobs: Processes.
+        workers: Processes of this machine, or a Ray cluster.
         title: Of the progress bar.
         quiet: Show no bar.
         limit_s: Of every mission, on the clock.
@@ -161,7 +162,7 @@ def run_cells(
     """
     missions = [CellMission(cell, seed) for cell in cells for seed in range(cell.seeds)]
     missions.sort(key=lambda mission: mission.cell.round + mission.seed)
-    conditions = Conditions(folder, jobs, title, quiet, limit_s, keep_failures, stop_after_s)
+    conditions = Conditions(folder, workers, title, quiet, limit_s, keep_failures, stop_after_s)
     if confirm:
         started_s = time.monotonic()
         keep_confirmed(missions, [mission.cell.group or mission.cell.id for mission in missions], conditions)

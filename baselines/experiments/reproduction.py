@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -10,12 +9,13 @@ from pathlib import Path
 from typing import NamedTuple
 
 from baselines.cli.arguments import given_options, make_folder
+from baselines.cli.worker_options import WorkerOptions
 from baselines.experiments.claims import Claim, report_claims
 from entropy_explore_env.validation import check_whole
 
 
 @dataclass
-class PaperArgs:
+class PaperArgs(WorkerOptions):
     """Options of every reproduction; a paper has its own folders, and more options."""
 
     quick: bool = False
@@ -24,17 +24,10 @@ class PaperArgs:
     """Folder for the report, its figures and tables."""
     runs: Path = Path("results/runs")
     """Folder that keeps the missions."""
-    jobs: int | None = None
-    """Processes; default: one a processor."""
     json: bool = False
     """Print one JSON object and nothing else."""
     strict: bool = False
     """Exit with 1 if a claim does not hold."""
-
-    @property
-    def processes(self) -> int:
-        """How many processes run."""
-        return self.jobs or os.cpu_count() or 1
 
 
 class Reproduced(NamedTuple):
@@ -45,15 +38,17 @@ class Reproduced(NamedTuple):
 
 
 def check_counts(args: PaperArgs, **least: int) -> None:
-    """Check that options that are given are whole numbers, at least so large.
+    """Check that options that are given are whole numbers, at least so large, and where missions are to run.
 
     Raises:
         SettingError: One is not.
+        MissingExtraError: On a cluster, and Ray is not installed.
     """
     for name, smallest in {**least, "jobs": 1}.items():
         value = getattr(args, name)
         if value is not None:
             check_whole(name.replace("_", "-"), value, smallest)
+    assert args.workers  # raises where there is no such cluster
 
 
 def command_line(paper: str, args: PaperArgs) -> str:
@@ -63,7 +58,7 @@ def command_line(paper: str, args: PaperArgs) -> str:
         paper: Name of the package of the paper.
         args: Its options.
     """
-    own = given_options(args, leave_out=("out", "runs", "jobs", "json", "strict"))
+    own = given_options(args, leave_out=("out", "runs", "jobs", "cluster", "json", "strict"))
     return " ".join([f"python -m baselines.papers.{paper}", *own, f"--out {args.out}"])
 
 

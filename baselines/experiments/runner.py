@@ -22,6 +22,7 @@ import numpy as np
 
 from baselines.experiments.outcome import Outcome, Record
 from baselines.experiments.provenance import CodeChangedError
+from baselines.experiments.ray_cluster import RayCluster
 from baselines.experiments.worker_pool import Failure, run_each
 from entropy_explore_env.writing import write_atomically
 
@@ -64,7 +65,7 @@ class Conditions:
 
     Attributes:
         folder: For the files.
-        jobs: Processes; with one the work is done in this process.
+        workers: Processes of this machine, or a Ray cluster; with one process the work is done in this one.
         title: Of the progress bar.
         quiet: Show no bar.
         limit_s: Of every piece of work, on the clock; see `worker_pool.run_each`.
@@ -74,7 +75,7 @@ class Conditions:
     """
 
     folder: Path
-    jobs: int
+    workers: int | RayCluster
     title: str
     quiet: bool
     limit_s: float = math.inf
@@ -110,7 +111,7 @@ def run_all(works: Sequence[Work], conditions: Conditions) -> list[Record]:
     orders = [_Order(works[place], codes[place]) for place in missing]
     places = {id(order): place for order, place in zip(orders, missing, strict=True)}
     results = run_each(
-        _fulfil, orders if ends_s > time.monotonic() else [], conditions.jobs, conditions.limit_s
+        _fulfil, orders if ends_s > time.monotonic() else [], conditions.workers, conditions.limit_s
     )
     for order, result in _progressing(results, len(works) - len(missing), len(works), conditions):
         if isinstance(result, Failure):

@@ -1,4 +1,4 @@
-"""Tasks in a few processes: none can take the others down, each may have a limit on the clock.
+"""Tasks in processes, or on a cluster: none can take the others down, each may have a limit on the clock.
 
 A task that raises, runs past its limit or ends its process is a Failure in its place. The processes are a
 pool of pebble's, which ends and replaces those that are late or gone.
@@ -24,6 +24,8 @@ from types import FrameType
 from typing import Any, TypeVar
 
 from pebble import ProcessExpired, ProcessPool
+
+from baselines.experiments.ray_cluster import RayCluster
 
 Task = TypeVar("Task")
 Result = TypeVar("Result")
@@ -56,27 +58,31 @@ class Failure:
 def run_each(
     work: Callable[[Task], Result],
     tasks: Sequence[Task],
-    jobs: int,
+    workers: int | RayCluster,
     limit_s: float = math.inf,
     apart: bool = False,
 ) -> Generator[tuple[Task, Result | Failure], None, None]:
     """Do the work for every task, and yield results as they come.
 
-    With one job the work is done in this process, under an alarm: ending a late process would cost the next
+    With one process the work is done in this one, under an alarm: ending a late process would cost the next
     task 3-5 s of imports and kernels. The alarm rings between Python's instructions: compiled code that never
-    returns is ended with two jobs or more only, or apart.
+    returns is ended with two processes or more only, apart, or on a cluster.
 
     Args:
         work: A function at the top of a module; what it returns can be pickled.
         tasks: What it takes, likewise.
-        jobs: Processes.
+        workers: How many processes of this machine, or a Ray cluster.
         limit_s: Of every task, on the clock from when it is begun; inf = none.
-        apart: Work in a process of its own also with one job.
+        apart: Work in a process of its own also where there is one.
     """
-    if jobs == 1 and not apart:
+    if isinstance(workers, RayCluster):
+        from baselines.experiments.ray_pool import run_on_cluster
+
+        yield from run_on_cluster(work, tasks, workers, limit_s)
+    elif workers == 1 and not apart:
         yield from ((task, _attempt_in_time(work, task, limit_s)) for task in tasks)
     elif tasks:
-        yield from _run_in_processes(work, tasks, min(jobs, len(tasks)), limit_s)
+        yield from _run_in_processes(work, tasks, min(workers, len(tasks)), limit_s)
 
 
 def _run_in_processes(
@@ -87,7 +93,7 @@ def _run_in_processes(
     timeout = None if math.isinf(limit_s) else limit_s
     try:
         waiting: dict[Future[bytes], Task] = {
-            pool.schedule(_attempt_packed, (work, task), timeout=timeout): task for task in tasks
+            pool.schedule(attempt_packed, (work, task), timeout=timeout): task for task in tasks
         }
         for future in waiting:
             future.add_done_callback(done.put)
@@ -104,11 +110,11 @@ def _outcome(future: Future[bytes], limit_s: float) -> Any:  # noqa: ANN401 - wh
     try:
         return pickle.loads(future.result())
     except FutureTimeoutError:
-        return _late(limit_s)
+        return late(limit_s)
     except ProcessExpired as error:
         return Failure(_ending(error.exitcode))
     except Exception as error:  # the task cannot be passed on, or its result not be read
-        return Failure(_one_line(error), error=error)
+        return failure_of(error)
 
 
 def _ending(code: int) -> str:
@@ -118,7 +124,13 @@ def _ending(code: int) -> str:
     return f"its process ended with exit code {code}"
 
 
-def _late(limit_s: float) -> Failure:
+def failure_of(error: Exception) -> Failure:
+    """That of a task that could not be passed on, or not be begun."""
+    return Failure(_one_line(error), error=error)
+
+
+def late(limit_s: float) -> Failure:
+    """That of a task that ran past its limit."""
     return Failure(f"ran past {limit_s:g} s on the clock", late=True)
 
 
@@ -128,7 +140,7 @@ def _attempt_in_time(work: Callable[[Any], Any], task: object, limit_s: float) -
         with _alarm(limit_s):
             return _attempt(work, task)
     except _AlarmError:
-        return _late(limit_s)
+        return late(limit_s)
 
 
 class _AlarmError(BaseException):
@@ -175,9 +187,9 @@ def _one_line(error: BaseException) -> str:
     return f"{type(error).__name__}: {said}" if said else type(error).__name__
 
 
-def _attempt_packed(work: Callable[[Any], Any], task: object) -> bytes:
-    """The same in a worker, pickled: what cannot be pickled, or read again, would break pebble's pool."""
-    outcome = _attempt(work, task)
+def attempt_packed(work: Callable[[Any], Any], task: object, limit_s: float = math.inf) -> bytes:
+    """The same in a worker, pickled: what cannot be pickled, or read again, would break a pool."""
+    outcome = _attempt_in_time(work, task, limit_s)
     try:
         packed = pickle.dumps(outcome)
         if isinstance(outcome, Failure):

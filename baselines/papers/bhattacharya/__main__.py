@@ -17,6 +17,7 @@ import numpy as np
 from baselines.cli.arguments import parse, run_command
 from baselines.experiments.cells import run_cells
 from baselines.experiments.mission import Record
+from baselines.experiments.ray_cluster import RayCluster
 from baselines.experiments.reproduction import (
     PaperArgs,
     Reproduced,
@@ -43,8 +44,8 @@ class Args(PaperArgs):
     out: Path = Path("results/bhattacharya")
     runs: Path = Path("results/bhattacharya-runs")
     """Folder that keeps the runs."""
-    jobs: int | None = 1
-    """Processes."""
+    jobs: int | None = None
+    """Missions at a time; default: 1, on a cluster one a processor."""
     starts: int | None = None
     """Runs of (a) for each control and kind of start; default: 20, with --quick 5."""
     plans: int | None = None
@@ -83,7 +84,7 @@ def _reproduced(args: Args) -> Reproduced:
 
     amounts = _amounts(args)
     runs = all_runs(amounts.starts, amounts.plans, amounts.small_plans)
-    records = kept_records(runs, args.runs, args.processes, quiet=args.json)
+    records = kept_records(runs, args.runs, _workers(args), quiet=args.json)
     missions = _missions(args, amounts.missions)
     splits, measured = ratios(), _measured(runs)
     claims = [
@@ -92,6 +93,11 @@ def _reproduced(args: Args) -> Reproduced:
     ]
     results = Results(runs, records, splits, measured.seconds, measured.changed, missions, args.runs)
     return Reproduced(write_report(args.out, results, claims, command_line("bhattacharya", args)), claims)
+
+
+def _workers(args: Args) -> int | RayCluster:
+    """One process, if nothing else is asked for: a run is large."""
+    return 1 if args.jobs is None and args.cluster is None else args.workers
 
 
 def _amounts(args: Args) -> Amounts:
@@ -105,7 +111,7 @@ def _missions(args: Args, count: int) -> dict[str, list[Record]]:
     """Records of the missions of (e), unless quick, and of (f)."""
     cells = mission_cells(count, args.corridor) if count else []
     cells = [cell for cell in cells if not (args.quick and cell.id.startswith("flying"))]
-    return run_cells(cells, args.runs, args.processes, "missions", args.json) if cells else {}
+    return run_cells(cells, args.runs, _workers(args), "missions", args.json) if cells else {}
 
 
 class _Measured(NamedTuple):

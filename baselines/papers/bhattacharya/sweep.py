@@ -10,6 +10,7 @@ from typing import Any
 
 from baselines.experiments.outcome import Outcome, Record
 from baselines.experiments.provenance import code_digest
+from baselines.experiments.ray_cluster import RayCluster
 from baselines.experiments.runner import Conditions, run_all
 from baselines.papers.bhattacharya.run import Run
 from baselines.papers.bhattacharya.simulation.belief import Fusion, Sensor
@@ -167,7 +168,9 @@ class KeptRun:
         return self.of.carry_out()
 
 
-def kept_records(runs: Sequence[Run], folder: Path, jobs: int, quiet: bool) -> dict[str, Record]:
+def kept_records(
+    runs: Sequence[Run], folder: Path, workers: int | RayCluster, quiet: bool
+) -> dict[str, Record]:
     """Run what is missing, under a progress bar; id → record."""
-    found = run_all([KeptRun(run) for run in runs], Conditions(folder, jobs, "Bhattacharya", quiet))
+    found = run_all([KeptRun(run) for run in runs], Conditions(folder, workers, "Bhattacharya", quiet))
     return {run.id: record for run, record in zip(runs, found, strict=True)}

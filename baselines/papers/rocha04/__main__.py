@@ -52,7 +52,7 @@ def _reproduced(args: Args) -> Reproduced:
     starts = args.starts or (_QUICK_STARTS if args.quick else _STARTS)
     single_starts = args.starts or (_QUICK_SINGLE_STARTS if args.quick else _STARTS)
     cells = experiment(starts, single_starts, changes=not args.quick)
-    records = run_cells(cells, args.runs, args.processes, "Rocha04", quiet=args.json)
+    records = run_cells(cells, args.runs, args.workers, "Rocha04", quiet=args.json)
     claims = all_claims(records)
     return Reproduced(write_report(args.out, records, claims, command_line("rocha04", args)), claims)
 

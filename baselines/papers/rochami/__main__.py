@@ -50,7 +50,7 @@ def _reproduced(args: Args) -> Reproduced:
     from baselines.papers.rochami.report import write_report  # matplotlib: after the help
 
     cells = experiment(args.starts or (_QUICK_STARTS if args.quick else _STARTS), args.quick)
-    records = run_cells(cells, args.runs, args.processes, "RochaMI", quiet=args.json)
+    records = run_cells(cells, args.runs, args.workers, "RochaMI", quiet=args.json)
     claims = all_claims(records)
     return Reproduced(write_report(args.out, records, claims, command_line("rochami", args)), claims)
 

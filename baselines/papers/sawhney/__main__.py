@@ -65,7 +65,7 @@ def _reproduced(args: Args) -> Reproduced:
     ground = _ground(args)
     dem = None if ground is None else write_model(args.runs) if ground == JACKSBORO else Path(ground)
     cells = experiment(args.starts or usual, flights, args.quick, dem, args.maps, args.teams)
-    records = run_cells(cells, args.runs, args.processes, "Sawhney", quiet=args.json)
+    records = run_cells(cells, args.runs, args.workers, "Sawhney", quiet=args.json)
     claims = all_claims(records)
     return Reproduced(write_report(args.out, records, claims, command_line("sawhney", args), dem), claims)
 

@@ -49,7 +49,7 @@ def _reproduced(args: Args) -> Reproduced:
     from baselines.papers.sujan.report import write_report  # matplotlib: after the help
 
     cells = experiment(args.starts or (_QUICK_STARTS if args.quick else _STARTS), changes=not args.quick)
-    records = run_cells(cells, args.runs, args.processes, "Sujan", quiet=args.json)
+    records = run_cells(cells, args.runs, args.workers, "Sujan", quiet=args.json)
     claims = all_claims(records)
     return Reproduced(write_report(args.out, records, claims, command_line("sujan", args)), claims)
 

@@ -258,7 +258,7 @@ def test_a_worker_with_other_code_does_nothing(tmp_path):
     with pytest.raises(CodeChangedError, match="edited after the experiment began"):
         run_all(works, conditions)
     assert list(tmp_path.iterdir()) == []
-    assert run_all(works, dataclasses.replace(conditions, jobs=1)) == [{"done": True}] * 2
+    assert run_all(works, dataclasses.replace(conditions, workers=1)) == [{"done": True}] * 2
 
 
 def test_a_worker_refuses_files_that_were_edited_after_it_had_started(monkeypatch):
