@@ -1,0 +1,123 @@
+"""A strategy's missions as Parquet, to learn from: `python -m baselines.episodes room --strategy best`.
+
+The folder gets files of --missions-per-file missions each, of rows that docs/episodes.md describes: what each
+robot observed and chose, and what came of it. The same options give the same bytes, whatever ran them; what
+was stopped goes on where it was.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import importlib.util
+import json
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+from baselines.cli.arguments import INLINE, Positional, make_folder, parse, print_json, run_command
+from baselines.cli.task_options import TaskOptions, base_task, parsed_for, tasked
+from baselines.cli.worker_options import WorkerOptions
+from baselines.experiments.runner import Conditions, run_all
+from baselines.strategies import make_strategy, resolved
+from entropy_explore_env.errors import MissingExtraError, SettingError
+from entropy_explore_env.settings import Observation
+from entropy_explore_env.validation import check_whole
+
+RECORDS = "_records"
+"""Folder in --out that says which files are whole; readers of Parquet pass by what begins with _."""
+
+
+@dataclass
+class Args(WorkerOptions):
+    """Write a strategy's missions as Parquet."""
+
+    scenario: Positional[str] = "room"
+    """A named scenario."""
+    strategy: str = "best"
+    """Whose decisions; as in baselines.run."""
+    robots: int = 3
+    """Team size."""
+    missions: int = 100
+    """How many, with the seeds --first-seed, …"""
+    first_seed: int = 0
+    """Seed of the first mission."""
+    missions_per_file: int = 20
+    """A file is written at a time, and whole or not at all."""
+    task: Annotated[TaskOptions, INLINE] = dataclasses.field(default_factory=TaskOptions)
+    observation: Observation = dataclasses.field(default_factory=lambda: Observation(panorama_utility="log2"))
+    """Which parts robots observe; always flat, and only by robots that decide."""
+    out: Path = Path("results/episodes")
+    """Folder for the files."""
+    json: bool = False
+    """Print one JSON object and nothing else."""
+
+
+def main(words: Sequence[str]) -> int:
+    """Run the command."""
+    first = parse(Args, words, description=__doc__)
+    task = base_task(first.scenario, first.task.settings)
+    args = parsed_for(task, first, words, __doc__, robots=task.scenario.robots)
+    for name, least in (("missions", 1), ("missions_per_file", 1), ("first_seed", 0)):
+        check_whole(name, getattr(args, name), least)
+    if importlib.util.find_spec("pyarrow") is None:
+        raise MissingExtraError("pyarrow", "episodes")
+    workers, strategy = args.workers, resolved(args.strategy)
+    make_strategy(strategy)
+    scenario, surroundings = tasked(task.scenario, args.task, args.robots)
+    make_folder("out", args.out)
+    from baselines.offline.recorded_env import observed_scenario
+    from baselines.offline.shards import Shard
+
+    recorded = observed_scenario(scenario, args.observation)
+    shards = [
+        Shard(recorded, strategy, surroundings, args.first_seed + done, missions, str(args.out))
+        for done in range(0, args.missions, args.missions_per_file)
+        for missions in [min(args.missions_per_file, args.missions - done)]
+    ]
+    forget_missing(shards, args.out / RECORDS)
+    records = run_all(shards, Conditions(args.out / RECORDS, workers, "episodes", args.json))
+    for shard, record in zip(shards, records, strict=True):
+        if not is_whole(shard, record):
+            allowed = f"a folder that all machines share: {shard.path.name} is not in it"
+            raise SettingError("out", str(args.out), allowed)
+    counted = ("missions", "decisions", "rows", "bytes")
+    report({name: sum(record[name] for record in records) for name in counted}, args)
+    return 0
+
+
+def forget_missing(shards: Sequence[Any], records: Path) -> None:
+    """Remove the records of files that are gone or of another size: they are written again."""
+    for shard in shards:
+        path = records / f"{shard.file}.json"
+        try:
+            record = json.loads(path.read_text())["record"]
+        except (OSError, ValueError, LookupError, TypeError):
+            continue
+        if not is_whole(shard, record):
+            path.unlink()
+
+
+def is_whole(shard: Any, record: dict[str, Any]) -> bool:  # noqa: ANN401 - a Shard, which needs pyarrow
+    """Whether a shard's file is there, as long as its record says."""
+    return shard.path.is_file() and shard.path.stat().st_size == record.get("bytes")
+
+
+def report(total: dict[str, int], args: Args) -> None:
+    """Say what is in the folder."""
+    robot_steps = total["rows"] - args.robots * total["missions"]
+    per_step = total["bytes"] / robot_steps
+    if args.json:
+        more = {"robot_steps": robot_steps, "bytes_per_robot_step": round(per_step, 1)}
+        print_json({**total, **more, "out": str(args.out)})
+        return
+    print(
+        f"{total['missions']:,} missions, {total['decisions']:,} decisions, {robot_steps:,} robot-steps, "
+        f"{total['bytes'] / 1e6:,.1f} MB: {per_step:,.0f} bytes a robot-step"
+    )
+    print(f"written: {args.out}", file=sys.stderr)
+
+
+if __name__ == "__main__":
+    raise SystemExit(run_command(main))

@@ -1,0 +1,1 @@
+"""Missions as data to learn from, without an environment."""
