@@ -194,6 +194,8 @@ class LearnedPolicy:
 
     def choose(self, views: Sequence[RobotView]) -> list[np.ndarray]:
         """The policy's viewpoint for each view."""
+        if not views:  # all robots drive
+            return []
         observations = np.stack([self._observer.observe(view) for view in views])
         actions = choose_actions(self._policy, observations, self._rng)
         return [self._observer.viewpoint(view, action) for view, action in zip(views, actions, strict=True)]

@@ -2,10 +2,12 @@
 
     python -m training.rllib_ppo --scenario room --robots 3 --runners 2 --out runs/rllib-room
 
-Runs on this machine, or with `--address HOST:PORT` on a Ray cluster (`ray start --head`). Only steps in which
-a robot chose are learned from: `envs.rllib_env` says how. The folder gets `run.json` (the options),
-`progress.csv` (a row for each iteration) and RLlib's checkpoints, of which `--resume FOLDER` takes the
-latest, with the run's options. They are pickles: load only your own.
+Runs on this machine, or with `--address HOST:PORT` on a Ray cluster (`ray start --head`). Networks,
+advantages and normalisation are those of `training.ppo`; only steps in which a robot chose are learned from:
+`envs.rllib_env` says how. The folder gets `run.json` (the options), `progress.csv` (a row for each
+iteration), `curve.csv` (a row for each validation), the best policy, which `training.evaluate` and
+`baselines.run` take as a strategy, and RLlib's checkpoints, of which `--resume FOLDER` takes the latest, with
+the run's options. These are pickles: load only your own.
 """
 # pyright: reportMissingImports=false
 
@@ -20,7 +22,7 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from baselines.cli.arguments import INLINE, WholeNumber, make_folder, run_command
 from baselines.cli.task_options import (
@@ -30,26 +32,28 @@ from baselines.cli.task_options import (
     is_whole_scenario,
     parsed_for,
     settled,
-    tasked,
 )
 from entropy_explore_env.command import INTERRUPTED
 from entropy_explore_env.errors import SettingError
-from entropy_explore_env.scenario import with_settings
 from entropy_explore_env.validation import check_whole
+from training import extra  # noqa: F401 - before what is not there without it
+from training.advantages import DiscountUnit
 from training.errors import NotFiniteError
 from training.interruption import Interruption
 from training.options import check_new, check_options, check_share
 from training.ray_cluster import check_address, start_ray
+from training.rllib_settings import FIGURES, POLICY, configure, environment_settings, policy_of
 from training.run_folder import FILE, resume_command, resumed_options, save_options
 
+if TYPE_CHECKING:
+    from training.rllib_validation import RunValidation
+    from training.validation import Validation
+
 _MODULE = "training.rllib_ppo"
-_CHANGEABLE = frozenset(("total_steps", "address", "runners", "checkpoint_every"))
+_CHANGEABLE = frozenset(("total_steps", "address", "runners", "checkpoint_every", "validate_every"))
 """Options that may differ where a run is continued."""
 _STOPPED = "a checkpoint is written when this iteration is done"
-POLICY = "shared"
 LOSSES = ("total_loss", "policy_loss", "vf_loss", "entropy")
-FIGURES = ("t_mission_s", "finished", "bits_gained_per_bit_sent")
-"""Of each mission; the progress has their means."""
 
 
 @dataclass
@@ -72,29 +76,39 @@ class Args:
     """HOST:PORT of a Ray cluster, or auto for that of this machine; by default this machine alone."""
     runners: int = 2
     """Processes that collect experience; 0: the trainer itself does."""
-    missions: int = 8
+    missions: int = 32
     """Missions in each runner."""
     task: Annotated[TaskOptions, INLINE] = field(default_factory=TaskOptions)
     cost_per_s: float | None = None
     """Cost of a second, as a share of all bits that the mission has to gain; default: the scenario's."""
+
+    features: Literal["gazes", "vector"] = "gazes"
+    """vector: an MLP; gazes: also a small network for gazes, over the panorama."""
     hidden: list[int] = field(default_factory=lambda: [128, 128])
     """Units of the hidden layers of actor and critic."""
-    learning_rate: float = 3e-4
-    """Adam's learning rate at first; it falls linearly to 0."""
-    discount: float = 0.99
-    """Discount factor per decision."""
+    learning_rate: float = 1e-3
+    """Adam's learning rate at first; it falls linearly to a twentieth."""
+    discount: DiscountUnit = "seconds"
+    """What the discount is counted in: seconds or decisions."""
+    gamma: float = 0.9
+    """Discount factor per second, or per decision."""
     gae_lambda: float = 0.95
     """λ of generalised advantage estimation, per decision."""
     clip: float = 0.2
     """Clipping range of PPO's probability ratio."""
-    entropy_bonus: float = 0.01
+    entropy: float = 0.003
     """Weight of the entropy bonus."""
-    batch: int = 4096
+    batch: int = 8192
     """Decisions in an iteration."""
-    minibatch: int = 512
+    minibatch: int = 1024
     """Decisions in a minibatch."""
-    epochs: int = 6
+    epochs: int = 4
     """Passes over an iteration's decisions."""
+
+    validate_every: WholeNumber = 100_000
+    """Decisions between two validations; there is one at the end."""
+    validation_missions: int = 32
+    """Missions in a validation."""
     checkpoint_every: int = 10
     """Iterations between two checkpoints; there is one after the first, and one at the end or at Ctrl-C."""
 
@@ -145,9 +159,11 @@ def check(args: Args) -> None:
     check_whole("minibatch", args.minibatch, 1)
     if args.minibatch > args.batch:
         raise SettingError("minibatch", args.minibatch, f"at most the batch, {args.batch}")
-    check_share("discount", args.discount)
-    if not 0.0 <= args.entropy_bonus < math.inf:
-        raise SettingError("entropy_bonus", args.entropy_bonus, "a number ≥ 0")
+    for name in ("validate_every", "validation_missions"):
+        check_whole(name, getattr(args, name), 1)
+    check_share("gamma", args.gamma)
+    if not 0.0 <= args.entropy < math.inf:
+        raise SettingError("entropy", args.entropy, "a number ≥ 0")
     check_address(args.address)
 
 
@@ -173,112 +189,45 @@ def settled_arguments(args: Args) -> Args:
     return replace(args, task=settled(args.task))
 
 
-def environment_settings(args: Args) -> dict[str, Any]:
-    """The settings of the environment to learn in, RLlib's `env_config`.
-
-    Raises:
-        SettingError: There is no such scenario, or it does not allow the settings.
-        WorldError: A world file cannot be used.
-    """
-    named = base_task(args.scenario, args.task.settings).scenario
-    scenario, surroundings = tasked(named, args.task, args.robots)
-    settings: dict[str, Any] = {
-        "action": {"kind": "discrete", "moves": "axes"},
-        "observation": {"flat": True, "panorama_utility": "log2"},  # what a small network learns best from
-        "reward": {} if args.cost_per_s is None else {"cost_per_s": args.cost_per_s},
-    }
-    return {"scenario": with_settings(scenario, settings), **surroundings.settings()}
-
-
 def train(args: Args, env_settings: dict[str, Any], interruption: Interruption) -> bool:
     """Train, and write progress and checkpoints; False if Ctrl-C ended it early.
 
     Raises:
         NotFiniteError: A loss is not finite; the last checkpoint stays.
     """
+    import torch
+
     from entropy_explore_env.envs.rllib_env import EntropyExploreMultiAgentEnv
+    from training.rllib_validation import RunValidation
 
     assert args.out is not None
+    torch.set_num_threads(1)  # minibatches are small: where runners take the other cores, two are slower
     checkpoint = last_checkpoint(args.out)
     iterations = 0 if checkpoint is None else iterations_of(checkpoint)
     warm_up = EntropyExploreMultiAgentEnv(env_settings)  # compiles the kernels, which every runner would
     observations, _ = warm_up.reset(seed=0)
     warm_up.step({agent: warm_up.action_spaces[agent].sample() for agent in observations})
+    settings = policy_of(args, env_settings)
+    validation = RunValidation(args.out, settings, args.validation_missions, args.validate_every)
     algorithm = configure(args, env_settings, iterations).build_algo()
     try:
         if checkpoint is not None:
             algorithm.restore_from_path(str(checkpoint.resolve()))
-        return iterate(args, algorithm, iterations, interruption)
+        return iterate(args, algorithm, iterations, interruption, validation)
     finally:
         algorithm.stop()
+        validation.close()
         with contextlib.suppress(OSError):
             Path(algorithm.logdir).rmdir()  # RLlib makes a folder in the home folder and leaves it empty
 
 
-def configure(args: Args, env_settings: dict[str, Any], iterations: int = 0) -> Any:  # noqa: ANN401 - PPOConfig
-    """RLlib's settings.
-
-    Args:
-        args: The command's.
-        env_settings: The environment's.
-        iterations: Done before; so the runners of a resumed run do not begin with its first missions
-            again.
-    """
-    from ray.rllib.algorithms.ppo import PPOConfig
-    from ray.rllib.core.rl_module.default_model_config import DefaultModelConfig
-    from ray.rllib.core.rl_module.rl_module import RLModuleSpec
-
-    from entropy_explore_env.envs.rllib_env import EntropyExploreMultiAgentEnv, runner_seed
-
-    network = DefaultModelConfig(
-        fcnet_hiddens=args.hidden,
-        fcnet_activation="tanh",
-        fcnet_kernel_initializer="orthogonal_",
-        vf_share_layers=False,
-    )
-    return (
-        PPOConfig()
-        .environment(
-            EntropyExploreMultiAgentEnv,
-            env_config={**env_settings, "seed": runner_seed(args.seed, 0, 0, iterations)},
-        )
-        .env_runners(num_env_runners=args.runners, num_envs_per_env_runner=args.missions)
-        .fault_tolerance(restart_failed_env_runners=args.address is not None)
-        .multi_agent(policies={POLICY}, policy_mapping_fn=_policy_of, count_steps_by="agent_steps")
-        .rl_module(rl_module_spec=RLModuleSpec(model_config=network))
-        .training(
-            lr=[[0, args.learning_rate], [args.total_steps, 0.0]],
-            gamma=args.discount,
-            lambda_=args.gae_lambda,
-            clip_param=args.clip,
-            entropy_coeff=args.entropy_bonus,
-            use_kl_loss=False,
-            grad_clip=0.5,
-            train_batch_size_per_learner=args.batch,
-            minibatch_size=args.minibatch,
-            num_epochs=args.epochs,
-        )
-        .callbacks(on_episode_end=_log_figures)
-        .debugging(seed=args.seed, log_level="ERROR")
-    )
-
-
-def _policy_of(agent: Any, episode: Any, **others: Any) -> str:  # noqa: ANN401 - RLlib's signature
-    """All robots share one policy."""
-    del agent, episode, others
-    return POLICY
-
-
-def _log_figures(episode: Any, metrics_logger: Any, **others: Any) -> None:  # noqa: ANN401 - RLlib's signature
-    """Log the figures of a mission."""
-    del others
-    figures = next(info["figures"] for info in episode.get_infos(-1).values() if "figures" in info)
-    for name in FIGURES:
-        if figures[name] is not None:
-            metrics_logger.log_value(name, float(figures[name]), window=100)
-
-
-def iterate(args: Args, algorithm: Any, iteration: int, interruption: Interruption) -> bool:  # noqa: ANN401
+def iterate(
+    args: Args,
+    algorithm: Any,  # noqa: ANN401 - RLlib's Algorithm
+    iteration: int,
+    interruption: Interruption,
+    validation: RunValidation,
+) -> bool:
     """Repeat rollout and update until all steps are done, or until Ctrl-C, which returns False.
 
     Args:
@@ -286,6 +235,7 @@ def iterate(args: Args, algorithm: Any, iteration: int, interruption: Interrupti
         algorithm: RLlib's Algorithm.
         iteration: How many are done already.
         interruption: Says whether to stop.
+        validation: Validates the policy when that is due.
 
     Raises:
         NotFiniteError: A loss is not finite.
@@ -296,12 +246,18 @@ def iterate(args: Args, algorithm: Any, iteration: int, interruption: Interrupti
         iteration += 1
         row = progress_row(algorithm.train(), iteration, args.robots)
         steps = int(row["decisions"])
+        if begun and iteration == begun + 1:
+            validation.resume(steps - 1)
         row["seconds"] = round(time.perf_counter() - started, 1)
         append_row(args.out / "progress.csv", row)
         print(progress_line(row), file=sys.stderr, flush=True)
         for name in LOSSES:
             if not math.isfinite(row[name]):
                 raise NotFiniteError(name, row[name], steps)
+        if steps >= min(validation.next_at, args.total_steps):
+            reached = {name: row[name] for name in ("decisions", "robot_steps", "seconds")}
+            found = validation.validate(reached, algorithm.learner_group.get_weights()[POLICY])
+            print(validation_line(steps, found), file=sys.stderr, flush=True)
         due = iteration % args.checkpoint_every == 0 or iteration == begun + 1
         if due or steps >= args.total_steps or interruption.asked:
             save_checkpoint(algorithm, args.out, iteration)
@@ -311,11 +267,15 @@ def iterate(args: Args, algorithm: Any, iteration: int, interruption: Interrupti
 
 
 def progress_row(result: dict[str, Any], iteration: int, robots: int) -> dict[str, float]:
-    """A row of progress.csv from RLlib's result; figures of missions are NaN until one has ended."""
+    """A row of progress.csv from RLlib's result; figures of missions are NaN until one has ended.
+
+    `robot_steps` are those of `training.ppo`: steps of the environment times robots.
+    """
     runners, learner = result["env_runners"], result["learners"][POLICY]
     row: dict[str, float] = {
         "iteration": iteration,
         "decisions": sum(runners["num_agent_steps_sampled_lifetime"].values()),
+        "robot_steps": robots * runners["num_env_steps_sampled_lifetime"],
     }
     row["return"] = float(runners.get("episode_return_mean", math.nan)) / robots
     row.update({name: float(runners.get(name, math.nan)) for name in FIGURES})
@@ -330,6 +290,12 @@ def progress_line(row: dict[str, float]) -> str:
         return f"{begin}  no mission has ended yet"
     ended = f"missions of {row['t_mission_s']:,.0f} s, {row['finished']:.0%} finished"
     return f"{begin}  return {row['return']:>7.3f}  {ended}"
+
+
+def validation_line(steps: int, found: Validation) -> str:
+    """A validation as the terminal shows it."""
+    took = f"missions take {found.median_s:,.1f} s (median), {found.finished:.0%} finished"
+    return f"{steps:>11,} decisions  validated: {took}"
 
 
 def append_row(path: Path, row: dict[str, float]) -> None:

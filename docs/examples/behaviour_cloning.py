@@ -12,7 +12,7 @@ observations = (observations - observations.mean(0)) / observations.std(0).clamp
 layers = torch.nn.Linear(observations.shape[1], 64), torch.nn.Tanh(), torch.nn.Linear(64, actions.shape[1])
 policy = torch.nn.Sequential(*layers)
 optimiser = torch.optim.Adam(policy.parameters(), lr=3e-3)
-for epoch in range(200):
+for _ in range(200):
     loss = torch.nn.functional.mse_loss(policy(observations), actions)
     optimiser.zero_grad(), loss.backward(), optimiser.step()
     print(f"{loss.item():.4f}")

@@ -16,6 +16,7 @@ from training import rllib_ppo, run_folder
 from training.errors import NotFiniteError
 from training.interruption import Interruption
 from training.rllib_ppo import Args, last_checkpoint, main
+from training.validation import Validation
 
 
 @pytest.mark.parametrize(
@@ -26,10 +27,11 @@ from training.rllib_ppo import Args, last_checkpoint, main
         ("--seed -1", "seed = -1"),
         ("--runners -1", "runners = -1"),
         ("--total-steps 0", "total_steps = 0"),
+        ("--validation-missions 0", "validation_missions = 0"),
         ("--minibatch 64 --batch 32", "minibatch = 64: allowed is at most the batch, 32"),
         ("--learning-rate nan", "learning_rate = nan"),
-        ("--discount 1.1", "discount = 1.1"),
-        ("--entropy-bonus -1", "entropy_bonus = -1"),
+        ("--gamma 1.1", "gamma = 1.1"),
+        ("--entropy -1", "entropy = -1"),
         ("--hidden 0", "hidden = [0]"),
         ("--address somewhere", "HOST:PORT of a Ray cluster"),
         ("--resume nowhere", "the folder of a run"),
@@ -82,13 +84,22 @@ class Scripted:
 
     def __init__(self, losses: list[float], disk_full_at: int | None = None) -> None:
         self.losses, self.full, self.done = losses, disk_full_at, 0
+        self.learner_group = self
+
+    def get_weights(self) -> dict[str, str]:
+        return {rllib_ppo.POLICY: "weights"}
 
     def train(self) -> dict[str, Any]:
         self.done += 1
         learner = dict.fromkeys(rllib_ppo.LOSSES, 0.5)
         learner["vf_loss"] = self.losses[self.done - 1]
         steps = {f"robot_{robot}": 50 * self.done for robot in range(2)}
-        runners = {"num_agent_steps_sampled_lifetime": steps, "episode_return_mean": 3.0, "t_mission_s": 7.0}
+        runners = {
+            "num_agent_steps_sampled_lifetime": steps,
+            "num_env_steps_sampled_lifetime": 80 * self.done,
+            "episode_return_mean": 3.0,
+            "t_mission_s": 7.0,
+        }
         return {"env_runners": {**runners, "finished": 1.0}, "learners": {rllib_ppo.POLICY: learner}}
 
     def save_to_path(self, path: str) -> None:
@@ -105,16 +116,34 @@ def args_for(folder: Path, steps: int) -> Args:
 def iterate(args: Args, algorithm: Scripted, iteration: int, asked: bool = False) -> bool:
     interruption = Interruption("it ends")
     interruption.asked = asked
-    return rllib_ppo.iterate(args, algorithm, iteration, interruption)
+    return rllib_ppo.iterate(args, algorithm, iteration, interruption, Unvalidated())
+
+
+class Unvalidated:
+    """Stands in for validations, none of which is due but the last."""
+
+    next_at = math.inf
+
+    def resume(self, decisions: int) -> None:
+        """Nothing is kept."""
+
+    def validate(self, reached: dict[str, float], weights: object) -> Validation:
+        """The same for every policy."""
+        assert set(reached) == {"decisions", "robot_steps", "seconds"} and weights == "weights"
+        return Validation(7.0, 7.0, 1.0, None)
 
 
 def test_checkpoints_come_and_go(tmp_path, capsys):
     assert iterate(args_for(tmp_path, 500), Scripted([0.1] * 5), iteration=0)
     assert [path.name for path in tmp_path.glob("*checkpoint*")] == ["checkpoint-000005"]
     rows = (tmp_path / "progress.csv").read_text().splitlines()
-    assert rows[0].startswith("iteration,decisions,return,t_mission_s,finished") and len(rows) == 6
-    assert rows[1].startswith("1,100,1.5,7.0,1.0,nan,0.5,0.5,0.1,0.5")
-    assert "100 decisions  return   1.500  missions of 7 s, 100% finished" in capsys.readouterr().err
+    assert (
+        rows[0].startswith("iteration,decisions,robot_steps,return,t_mission_s,finished") and len(rows) == 6
+    )
+    assert rows[1].startswith("1,100,160,1.5,7.0,1.0,nan,0.5,0.5,0.1,0.5")
+    said = capsys.readouterr().err
+    assert "100 decisions  return   1.500  missions of 7 s, 100% finished" in said
+    assert said.endswith("500 decisions  validated: missions take 7.0 s (median), 100% finished\n")
 
 
 @pytest.mark.parametrize("bad", [math.nan, math.inf])
@@ -154,7 +183,7 @@ def test_an_interrupted_command_says_how_to_go_on(tmp_path, capsys, monkeypatch)
     monkeypatch.setattr(rllib_ppo, "start_ray", lambda address, runners: Quiet())
     monkeypatch.setattr(rllib_ppo, "train", train)
     run = tmp_path / "run"
-    assert run_command(main, ["--robots", "2", "--batch", "600", "--out", str(run)]) == INTERRUPTED
+    assert run_command(main, ["--robots", "2", "--batch", "2000", "--out", str(run)]) == INTERRUPTED
     assert f"python -m training.rllib_ppo --resume {run}\n" in capsys.readouterr().out
     assert run_command(main, ["--out", str(run)]) == 2
     assert f"--resume {run} continues" in capsys.readouterr().err

@@ -12,7 +12,7 @@ import pytest
 from entropy_explore_env import ActionError, CallOrderError, SettingError, StepFigures, parallel_env
 from entropy_explore_env.envs.conformance import leaves, require_same
 
-pytest.importorskip("ray.rllib", reason="ray[rllib] is not installed: make test-rllib")
+pytest.importorskip("ray.rllib", reason="ray[rllib] is not installed: make test-rllib", exc_type=ImportError)
 
 from ray.rllib.algorithms.ppo import PPOConfig
 from ray.rllib.env.env_context import EnvContext

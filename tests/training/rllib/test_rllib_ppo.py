@@ -4,19 +4,27 @@
 from __future__ import annotations
 
 import csv
+import os
+import signal
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 
-pytest.importorskip("ray.rllib", reason="ray[rllib] is not installed: make test-rllib")
+pytest.importorskip("ray.rllib", reason="ray[rllib] is not installed: make test-rllib", exc_type=ImportError)
 
 from ray.rllib.env.multi_agent_env_runner import MultiAgentEnvRunner
 
 from baselines.cli.arguments import run_command
-from training import ray_cluster
-from training.rllib_ppo import Args, configure, environment_settings, main, parsed
+from baselines.experiments import ray_cluster
+from baselines.experiments.mission import run_mission
+from baselines.strategies import make_strategy
+from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
+from training.checkpoints import latest_checkpoint, load_checkpoint
+from training.rllib_ppo import Args, main, parsed
+from training.rllib_settings import configure, environment_settings
+from training.rllib_validation import read_rows
 
 pytestmark = [  # RLlib's own
     pytest.mark.filterwarnings("ignore::DeprecationWarning"),
@@ -24,7 +32,10 @@ pytestmark = [  # RLlib's own
     pytest.mark.filterwarnings("ignore:.*already in registry"),
 ]
 ROOT = Path(__file__).parents[3]
-SMALL = "--scenario box-7x11x5 --missions 2 --batch 240 --minibatch 60 --epochs 2 --hidden 16"
+SMALL = (
+    "--scenario box-7x11x5 --missions 2 --batch 240 --minibatch 60 --epochs 2 --hidden 16 "
+    "--time-limit-s 60 --validation-missions 2 --validate-every 240"
+)
 
 
 def rows_of(folder: Path) -> list[dict[str, str]]:
@@ -39,7 +50,8 @@ def test_it_trains_with_two_runners_and_resumes(tmp_path):
         [*command, "--total-steps", "480"], cwd=ROOT, capture_output=True, text=True, timeout=900
     )
     assert first.returncode == 0, first.stderr
-    assert first.stderr.count(" decisions ") == 2 and "Warning" not in first.stderr
+    assert first.stderr.count(" decisions  return ") == 2 and "Warning" not in first.stderr
+    assert first.stderr.count(" decisions  validated: ") == 2
     rows = rows_of(tmp_path / "run")
     assert [row["iteration"] for row in rows] == ["1", "2"]
     assert 480 <= float(rows[-1]["decisions"]) < 500
@@ -50,6 +62,60 @@ def test_it_trains_with_two_runners_and_resumes(tmp_path):
     assert [row["iteration"] for row in rows] == ["1", "2", "3"]
     assert 720 <= float(rows[-1]["decisions"]) < 750
     assert [path.name for path in (tmp_path / "run").glob("checkpoint-*")] == ["checkpoint-000003"]
+
+
+def test_its_policy_is_a_strategy_and_learns_on_from_where_it_was(tmp_path):
+    """The kept policy acts in missions; a resumed run has the weights and the normalisation of before."""
+    run = tmp_path / "run"
+    words = [*SMALL.split(), "--runners", "0", "--out", str(run)]
+    assert run_command(main, [*words, "--total-steps", "480"]) == 0
+    curve = read_rows(run / "curve.csv")
+    assert [row["decisions"] for row in curve] == [float(row["decisions"]) for row in rows_of(run)]
+    kept = load_checkpoint(latest_checkpoint(run, "best"))
+    count = float(kept.normalisation["observations_count"])
+    assert count in [row["decisions"] for row in curve]
+    strategy = make_strategy(str(run))
+    env = EntropyExploreEnv("box-7x11x5", robots=3, time_limit_s=30.0)
+    run_mission(env, strategy, seed=0)
+    assert env.missions.state.robots[0]["scans"].min() > 1
+    assert run_command(main, ["--resume", str(run), "--total-steps", "720"]) == 0
+    again = read_rows(run / "curve.csv")
+    assert again[:2] == curve and len(again) == 3 and 720 <= again[2]["decisions"] < 750
+    late = load_checkpoint(latest_checkpoint(run, "best"))
+    assert float(late.normalisation["observations_count"]) in [row["decisions"] for row in again]
+
+
+@pytest.mark.skipif(not Path("/proc/self/cmdline").exists(), reason="looks processes up in /proc")
+def test_a_runner_that_is_killed_is_replaced(tmp_path):
+    mark = f"RUNNERS_OF_{os.getpid()}"
+    command = [sys.executable, "-m", "training.rllib_ppo", *SMALL.split(), "--out", str(tmp_path / "run")]
+    words = [*command, "--total-steps", "1900", "--runners", "2"]
+    with subprocess.Popen(
+        words, cwd=ROOT, stderr=subprocess.PIPE, text=True, env={**os.environ, mark: "1"}
+    ) as run:
+        assert run.stderr is not None
+        lines = iter(run.stderr.readline, "")
+        assert any(" decisions " in line for line in lines), run.poll()
+        runners = processes_with(mark, b"ray::MultiAgentEnvRunner")
+        assert len(runners) == 2
+        os.kill(runners[0], signal.SIGKILL)
+        rest = run.stderr.read()
+    assert run.returncode == 0, rest
+    rows = rows_of(tmp_path / "run")
+    assert 1900 <= float(rows[-1]["decisions"]) < 2200 and "RunnerDied" not in rest
+
+
+def processes_with(mark: str, title: bytes) -> list[int]:
+    """Processes with this in their environment, whose titles begin so."""
+    found = []
+    for path in Path("/proc").glob("[0-9]*/cmdline"):
+        try:
+            ours = mark.encode() in path.with_name("environ").read_bytes()
+            if ours and path.read_bytes().startswith(title):
+                found.append(int(path.parent.name))
+        except OSError:
+            pass
+    return found
 
 
 def missions_of(args: Args, iterations: int) -> list[tuple[int, bytes]]:
