@@ -30,7 +30,7 @@ def start_ray(address: str | None, runners: int) -> Any:  # noqa: ANN401 - a mod
         SettingError: No cluster answers at the address.
         EntropyExploreError: It does not start.
     """
-    # Else Ray says of every runner that it could not be restarted without this process: ray-project/ray#53727.
+    # Else Ray says of each runner that it could not be restarted without this process: ray-project/ray#53727
     os.environ.setdefault("RAY_BACKEND_LOG_LEVEL", "fatal")
     ray = ray_cluster.ray_of("rllib")
     if importlib.util.find_spec("tree") is None:

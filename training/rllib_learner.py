@@ -133,7 +133,7 @@ class DecisionLearner(PPOTorchLearner):
     def configure_optimizers_for_module(self, module_id: str, config: Any = None) -> None:  # noqa: ANN401
         """Adam as Stable-Baselines3 has it."""
         module = self.module[module_id]
-        parameters = self.get_parameters(module)
+        parameters: Any = self.get_parameters(module)
         self.register_optimizer(
             module_id=module_id,
             optimizer=torch.optim.Adam(parameters, eps=_ADAM_EPS),
