@@ -32,6 +32,7 @@ from baselines.cli.task_options import (
     is_whole_scenario,
     parsed_for,
     settled,
+    tasked,
 )
 from entropy_explore_env.command import INTERRUPTED
 from entropy_explore_env.errors import SettingError
@@ -199,6 +200,7 @@ def train(args: Args, env_settings: dict[str, Any], interruption: Interruption) 
 
     from entropy_explore_env.envs.rllib_env import EntropyExploreMultiAgentEnv
     from training.rllib_validation import RunValidation
+    from training.validation import Validator
 
     assert args.out is not None
     torch.set_num_threads(1)  # minibatches are small: where runners take the other cores, two are slower
@@ -208,7 +210,9 @@ def train(args: Args, env_settings: dict[str, Any], interruption: Interruption) 
     observations, _ = warm_up.reset(seed=0)
     warm_up.step({agent: warm_up.action_spaces[agent].sample() for agent in observations})
     settings = policy_of(args, env_settings)
-    validation = RunValidation(args.out, settings, args.validation_missions, args.validate_every)
+    around = tasked(settings.scenario, args.task, args.robots)[1]
+    validator = Validator(settings.scenario, around, args.validation_missions, threads=1)
+    validation = RunValidation(args.out, settings, validator, args.validate_every)
     algorithm = configure(args, env_settings, iterations).build_algo()
     try:
         if checkpoint is not None:

@@ -28,17 +28,17 @@ class RunValidation:
         next_at: Decisions after which the next one is due.
     """
 
-    def __init__(self, out: Path, settings: PolicySettings, missions: int, every: int) -> None:
-        """Make the missions.
+    def __init__(self, out: Path, settings: PolicySettings, validator: Validator, every: int) -> None:
+        """Read what the folder says.
 
         Args:
             out: The run's folder.
             settings: Of the policy.
-            missions: How many missions to validate with.
+            validator: Runs the missions.
             every: Decisions between two validations.
         """
         self._out, self._settings, self._every = out, settings, every
-        self._validator = Validator(settings.scenario, missions, threads=1)
+        self._validator = validator
         self.curve, self.next_at = read_rows(out / CURVE), every
 
     def resume(self, decisions: int) -> None:

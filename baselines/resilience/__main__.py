@@ -81,7 +81,7 @@ def _measured(args: Args, experiment: Experiment) -> Reproduced:
 
     def run(cells: Sequence[Cell], title: str) -> Records:
         limit_s = args.wall_limit_s
-        return run_cells(cells, args.runs, args.processes, title, args.json, limit_s, keep_failures=True)
+        return run_cells(cells, args.runs, args.workers, title, args.json, limit_s, keep_failures=True)
 
     records = run(experiment.first_cells(), "resilience: channels")
     records |= run(experiment.lost_cells(records), "resilience: a robot lost")
