@@ -204,6 +204,8 @@ a robot discovers a second. Promises weigh 1/(1 + promises): a literal 1/n_r wou
 The finishing rule is ours: (V + v)/t with v = {BONUS["plans"]:g} m² in plans and {BONUS["terrains"]:g} m³
 over terrain. `nearest-candidate` and `coordinated-candidate` have
 the metrics of Yamauchi and Burgard on these same candidates; they are not the rules of those papers.
+What holds over them need not hold over `nearest-frontier` and `coordinated-frontier`, which weigh every
+frontier cell and may replan under way (docs/explorers.md); these were not run here.
 Who waits for a synchronous team scans meanwhile, and so leaves up to 2 s after the last has
 scanned."""
 
