@@ -11,12 +11,13 @@ VENV_BENCHMARL := .venv-benchmarl
 STYLE := $(RUN) ruff check . && $(RUN) ruff format --check . && $(VENV)/bin/lint-imports --no-cache
 WARM := $(RUN) entropy_explore_env.warm --processes 1
 
-.PHONY: help demo docs docs-links test test-long boundscheck test-rllib test-benchmarl lint bench reproduce clean
+.PHONY: help demo new-user docs docs-links test test-long boundscheck test-rllib test-benchmarl lint bench reproduce clean
 .NOTPARALLEL:
 
 help:
-	@echo "make demo         three robots map a furnished room by the strategy recommended, shown in results/demo;"
+	@echo "make demo         three robots map an office by the strategy recommended, shown in results/demo;"
 	@echo "                  make demo STRATEGY=gradient: by another one"
+	@echo "make new-user     all that a new user does, in an environment of its own: half an hour"
 	@echo "make docs         the documentation site, into docs/build/html"
 	@echo "make docs-links   whether its links to other sites lead somewhere"
 	@echo "make test         lint, then the tests"
@@ -33,7 +34,11 @@ help:
 STRATEGY ?= best
 
 demo: $(STAMP)baselines
-	$(RUN) baselines.run room-furnished --strategy $(STRATEGY) --robots 3 --seed 0 --out results/demo
+	$(RUN) baselines.run office --strategy $(STRATEGY) --robots 3 --seed 0 --out results/demo
+
+# In a temporary folder, with everything downloaded anew; NEW_USER="--borrow" takes what is installed here.
+new-user: $(STAMP)test
+	$(RUN) tests.new_user $(NEW_USER)
 
 docs: $(STAMP)docs
 	$(RUN) sphinx -b html -W --keep-going -q docs docs/build/html

@@ -1,0 +1,322 @@
+"""The first hour of a new user, from nothing, in a temporary folder: `python -m tests.new_user`.
+
+Installs the checkout in both orders, runs every example of README and site, the demo, training on plans of
+one's own with Ctrl-C in between, a strategy from outside the checkout, builds the site, and uninstalls.
+`--borrow` takes the dependencies of this environment in place of downloading them. It ends at the first step
+that fails, with its output, and exit code 1; the folder then stays.
+"""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses
+import os
+import re
+import shlex
+import shutil
+import signal
+import subprocess
+import sys
+import sysconfig
+import tempfile
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import numpy as np
+from PIL import Image
+
+from tests.code_blocks import blocks
+
+ROOT = Path(__file__).parents[1]
+INTERRUPTED = 130
+_FIRST_STEP = """
+import entropy_explore_env as eee
+env = eee.parallel_env("box-7x11x5", robots=1)
+env.reset(seed=0)
+env.step({"robot_0": env.action_space("robot_0").sample()})
+print(eee.__file__)
+"""
+_ONLY_IN_SOME = ("benchmarl", "ray", "torchrl")
+"""Packages that examples name and that no extra here brings; without them they are skipped."""
+
+
+class StepError(Exception):
+    """A step did not do what a user expects."""
+
+
+@dataclasses.dataclass(frozen=True)
+class User:
+    """Somebody with a fresh environment and a clone.
+
+    Attributes:
+        home: The temporary folder.
+        borrow: Whether dependencies are those of the environment that runs this.
+        training_s: Seconds until Ctrl-C in training.
+    """
+
+    home: Path
+    borrow: bool
+    training_s: float
+
+    @property
+    def clone(self) -> Path:
+        """The checkout."""
+        return self.home / "clone"
+
+    @property
+    def environment(self) -> Path:
+        """The virtual environment."""
+        return self.home / "env"
+
+    @property
+    def python(self) -> Path:
+        """Its interpreter."""
+        return self.environment / ("Scripts" if os.name == "nt" else "bin") / "python"
+
+    def variables(self) -> dict[str, str]:
+        """Of the processes: nothing of this checkout's, and a cache for compiled kernels of their own."""
+        kept = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
+        return {**kept, "XDG_CACHE_HOME": str(self.home / "cache"), "MPLBACKEND": "agg"}
+
+    def call(self, words: Sequence[object], folder: Path | None = None, code: int = 0) -> str:
+        """Run a command; what it wrote.
+
+        Raises:
+            StepError: It ended with another exit code.
+        """
+        ran = subprocess.run(
+            list(map(str, words)),
+            cwd=folder or self.home,
+            env=self.variables(),
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+        )
+        return _checked(words, ran.returncode, ran.stdout, code)
+
+    def run_module(self, command: str, folder: Path | None = None) -> str:
+        """`python -m …` in the clone; what it wrote."""
+        return self.call([self.python, "-m", *shlex.split(command)], folder or self.clone)
+
+    def pip(self, command: str) -> None:
+        """`pip …` in the environment, `.` being the clone; without downloads where dependencies are borrowed.
+
+        Called outside the clone, since `python -c` looks for packages where it is called, as pip does not.
+        """
+        words = [re.sub(r"^\.(?=\[|$)", str(self.clone), word) for word in shlex.split(command)]
+        if self.borrow and words[0] == "install":
+            words[1:1] = ["--no-deps", "--no-build-isolation"]
+        pip = f"import sys; from pip._internal.cli.main import main; sys.exit(main({words!r}))"
+        self.call([self.python, "-c", pip])
+
+    def first_step(self) -> Path:
+        """Import and step, outside the clone; where the package lies."""
+        return Path(self.call([self.python, "-c", _FIRST_STEP]).splitlines()[-1]).parent
+
+    def check_gone(self) -> None:
+        """Raise a StepError if the package can still be imported."""
+        names = self.call([self.python, "-c", "import site; print(site.getsitepackages()[0])"])
+        husk = Path(names.splitlines()[-1]) / "entropy_explore_env"
+        if husk.exists():
+            raise StepError(f"after pip uninstall {husk} is still there")
+
+
+def _checked(words: Sequence[object], code: int, output: str, expected: int = 0) -> str:
+    """The output of a command that ended as expected."""
+    if code != expected:
+        command = shlex.join(map(str, words))
+        raise StepError(f"{command}\nexit code {code}, not {expected}\n{output[-6000:]}")
+    return output
+
+
+def _expect(holds: object, said: str) -> None:
+    if not holds:
+        raise StepError(said)
+
+
+def environment(user: User) -> None:
+    """A clone of what git knows of, and an empty virtual environment."""
+    listed = subprocess.run(
+        ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard"],
+        cwd=ROOT,
+        capture_output=True,
+        check=True,
+    )
+    for name in filter(None, listed.stdout.decode().split("\0")):
+        if (ROOT / name).is_file():
+            (user.clone / name).parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy2(ROOT / name, user.clone / name)
+    without = ["--without-pip"] if user.borrow else []
+    user.call([sys.executable, "-m", "venv", *without, user.environment])
+    if user.borrow:
+        paths = user.call([user.python, "-c", "import sysconfig; print(sysconfig.get_path('purelib'))"])
+        (Path(paths.strip()) / "borrowed.pth").write_text(sysconfig.get_path("purelib") + "\n")
+
+
+def install(user: User) -> None:
+    """Both orders of installing, with an uninstall between them."""
+    user.pip("install -q -e .")
+    _expect(user.first_step() == user.clone / "entropy_explore_env", "an editable install is not the clone")
+    user.pip("install -q .")
+    _expect(user.first_step().is_relative_to(user.environment), "the second install is not what is imported")
+    user.pip("uninstall -y -q entropy_explore_env")
+    user.check_gone()
+    user.pip("install -q .")
+    _expect(user.first_step().is_relative_to(user.environment), "the install is not what is imported")
+    if not user.borrow and sys.platform == "linux" and shutil.which("nvidia-smi") is None:
+        user.pip("install -q torch --index-url https://download.pytorch.org/whl/cpu")
+    user.pip("install -q -e '.[training,worlds,docs]'")
+    _expect(user.first_step() == user.clone / "entropy_explore_env", "the first install shadows the second")
+
+
+def examples(user: User) -> None:
+    """Every code block of README and site."""
+    for block in blocks():
+        needed = [
+            name for name in _ONLY_IN_SOME if re.search(rf"^\s*(import|from) {name}\b", block.text, re.M)
+        ]
+        if not user.borrow and needed:
+            print(f"    {block.name}: skipped, {needed[0]} is in no extra", file=sys.stderr)
+            continue
+        folder = user.home / "examples" / re.sub(r"\W", "-", block.name)
+        folder.mkdir(parents=True)
+        (folder / "example.py").write_text(block.text, encoding="utf-8")
+        words = [user.python, "-c", f"import sys; sys.path.insert(0, {str(user.clone)!r}); {_RUN_FILE}"]
+        user.call(words, folder)
+
+
+_RUN_FILE = "import runpy; runpy.run_path('example.py', run_name='__main__')"
+
+
+def demo(user: User) -> None:
+    """`make demo`, or its command where there is no make; the robots drive."""
+    out = user.clone / "results" / "demo"
+    if shutil.which("make") is None:
+        user.run_module("baselines.run office --strategy best --robots 3 --seed 0 --out results/demo")
+    else:
+        for name in ("pyproject.toml", "requirements/constraints.txt"):
+            os.utime(user.clone / name, (0, 0))  # what the environment holds is installed
+        (user.environment / "installed-baselines").touch()
+        user.call(["make", "demo", f"VENV={user.environment}"], user.clone)
+    missing = [name for name in ("json", "png", "gif", "npz") if not (out / f"mission.{name}").is_file()]
+    _expect(not missing, f"make demo has not written {missing}")
+
+
+def training(user: User) -> None:
+    """Plans of one's own: training, Ctrl-C, going on, a test in another plan, and a mission of the policy."""
+    plans = user.home / "plans"
+    for place, name in enumerate(("learn/one", "learn/two", "validate/one", "test/one")):
+        pixels = np.full((60 + 8 * place, 80), 254, np.uint8)
+        pixels[20:24, : 50 - 6 * place] = pixels[24:50, 44:47] = 0
+        (plans / name).parent.mkdir(parents=True, exist_ok=True)
+        Image.fromarray(pixels).save(plans / f"{name}.png")
+    learn = f"{plans}/learn/one.png {plans}/learn/two.png"
+    words = "training.ppo --scenario office --robots 2 --missions 8 --total-steps 1e9 --no-video"
+    words += f" --validate-every 1e9 --time-limit-s 120 --validation-missions 2 --world {learn}"
+    words += f" --validation-world {plans}/validate/one.png --out {user.home}/runs/mine"
+    said = _interrupted(user, [str(user.python), "-m", *shlex.split(words)])
+    found = re.search(r"python -m (training\.ppo --resume \S+)", said)
+    steps = re.search(r"stopped after ([\d,]+) steps", said)
+    _expect(found and steps, f"Ctrl-C has not said how to go on:\n{said[-3000:]}")
+    assert found is not None and steps is not None
+    more = int(steps[1].replace(",", "")) + 4_000
+    told = user.run_module(f"{found[1]} --total-steps {more}")
+    _expect(f"goes on after {steps[1]} steps" in told, f"the run has not gone on:\n{told[-3000:]}")
+    test = f"--world {plans}/test/one.png --time-limit-s 120"
+    policy = f"--strategy {user.home}/runs/mine"
+    user.run_module(f"training.evaluate {policy} {test} --seeds 2 --against random --jobs 1")
+    user.run_module(f"baselines.run office {policy} {test} --robots 2 --json")
+
+
+def _interrupted(user: User, words: list[str]) -> str:
+    """Start a training, press Ctrl-C after a while and when a checkpoint is there; what it wrote."""
+    process = subprocess.Popen(
+        words,
+        cwd=user.clone,
+        env=user.variables(),
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+    )
+    until, latest = time.monotonic() + user.training_s, time.monotonic() + user.training_s + 300
+    while process.poll() is None and time.monotonic() < latest:
+        if time.monotonic() >= until and any((user.home / "runs" / "mine").glob("step-*")):
+            break
+        time.sleep(0.2)
+    process.send_signal(signal.SIGINT)
+    said, _ = process.communicate(timeout=300)
+    return _checked(words, process.returncode, said, INTERRUPTED)
+
+
+def strategy(user: User) -> None:
+    """A strategy in a file outside the clone, in a mission and in a comparison."""
+    own = user.home / "mine" / "my_strategy.py"
+    own.parent.mkdir()
+    shutil.copy(user.clone / "docs" / "examples" / "own_strategy.py", own)
+    named = f"{own}:NearestUnknown"
+    user.run_module(f"baselines.run box-7x11x5 --strategy {named} --robots 2 --json")
+    out = user.home / "compared"
+    words = f"--scenarios box-7x11x5 --strategies {named} --robots 1,2 --seeds 2 --jobs 1 --out {out}"
+    user.run_module(f"baselines.benchmark {words} --robot.reach-m 1.5")
+    _expect("NearestUnknown" in (out / "scoreboard.md").read_text(encoding="utf-8"), "the page lacks it")
+
+
+def site(user: User) -> None:
+    """The documentation site, without a warning."""
+    said = user.run_module("sphinx -b html -W --keep-going -q docs docs/build/html")
+    _expect(not said and (user.clone / "docs/build/html/index.html").is_file(), f"sphinx says: {said}")
+
+
+def uninstall(user: User) -> None:
+    """Nothing is left that could be imported."""
+    user.pip("uninstall -y -q entropy_explore_env")
+    user.check_gone()
+
+
+STEPS: tuple[Callable[[User], None], ...] = (
+    environment,
+    install,
+    examples,
+    demo,
+    training,
+    strategy,
+    site,
+    uninstall,
+)
+
+
+def main(words: Sequence[str] | None = None) -> int:
+    """Run the steps."""
+    names = [step.__name__ for step in STEPS]
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument(
+        "--borrow", action="store_true", help="dependencies of this environment; no downloads"
+    )
+    parser.add_argument("--training-s", type=float, default=60.0, help="seconds until Ctrl-C in training")
+    parser.add_argument(
+        "--skip", default="", help=f"steps to leave out, commas between: {', '.join(names[2:])}"
+    )
+    args = parser.parse_args(words)
+    skipped = set(filter(None, args.skip.split(",")))
+    if not skipped <= set(names[2:]):
+        parser.error(f"--skip: {args.skip}: names out of {', '.join(names[2:])}")
+    user = User(Path(tempfile.mkdtemp(prefix="new-user-")), args.borrow, args.training_s)
+    for step in STEPS:
+        if step.__name__ in skipped:
+            continue
+        print(f"{step.__name__}: {(step.__doc__ or '').splitlines()[0]}", file=sys.stderr, flush=True)
+        started = time.monotonic()
+        try:
+            step(user)
+        except StepError as error:
+            print(f"{step.__name__} failed: {error}\nthe folder stays: {user.home}", file=sys.stderr)
+            return 1
+        print(f"    done in {time.monotonic() - started:.0f} s", file=sys.stderr, flush=True)
+    shutil.rmtree(user.home)
+    print("all of it works")
+    return 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

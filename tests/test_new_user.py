@@ -1,0 +1,55 @@
+"""The script of a new user's first hour: its steps, and what it says of a failure."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests import new_user
+from tests.new_user import StepError, User, main
+
+
+def test_a_step_that_fails_ends_it_and_leaves_the_folder(tmp_path, monkeypatch, capsys):
+    ran = []
+
+    def good(user: User) -> None:
+        """Does what it should."""
+        ran.append(user.call([sys.executable, "-c", "print('hello')"]))
+
+    def bad(user: User) -> None:
+        """Does not."""
+        user.call([sys.executable, "-c", "print('why'); raise SystemExit(3)"])
+
+    def never(user: User) -> None:
+        """Is not reached."""
+        raise AssertionError(user)
+
+    monkeypatch.setattr(new_user, "STEPS", (good, bad, never))
+    monkeypatch.setattr(new_user.tempfile, "mkdtemp", lambda **_: str(tmp_path))
+    assert main(["--borrow"]) == 1
+    said = capsys.readouterr().err
+    assert ran == ["hello\n"] and "bad failed: " in said and "exit code 3, not 0\nwhy\n" in said
+    assert f"the folder stays: {tmp_path}" in said and tmp_path.is_dir()
+    monkeypatch.setattr(new_user, "STEPS", (good,))
+    assert main([]) == 0 and not tmp_path.exists()
+    with pytest.raises(SystemExit, match="2"):
+        main(["--skip", "dinner"])
+
+
+def test_a_husk_of_the_package_is_named(tmp_path):
+    user = User(tmp_path, borrow=True, training_s=1.0)
+    subprocess.run([sys.executable, "-m", "venv", "--without-pip", str(user.environment)], check=True)
+    user.check_gone()
+    folders = user.call([user.python, "-c", "import site; print(site.getsitepackages()[0])"])
+    (Path(folders.strip()) / "entropy_explore_env").mkdir()
+    with pytest.raises(StepError, match="is still there"):
+        user.check_gone()
+
+
+@pytest.mark.long
+def test_the_first_hour_works(capsys):
+    """All but the examples and the site, which tests of their own run."""
+    assert main(["--borrow", "--training-s", "5", "--skip", "examples,site"]) == 0, capsys.readouterr().err
