@@ -42,8 +42,8 @@ MISSION_TIMES = MappingProxyType(
     }
 )
 """Name → mission times, as `python -m baselines.mission_times` prints them; those of fewer than 20 missions
-are rough: a mission there computes for minutes. The first one in `bhattacharya-cluttered` was not done after a
-quarter of an hour: it has no time, and a second costs nothing."""
+are rough: a mission there computes for minutes. The first one in `bhattacharya-cluttered` was not done after
+a quarter of an hour: it has no time, and a second costs nothing."""
 COST_OF_A_MISSION = 0.2
 """What a mission as long as the median costs, in shares of all bits."""
 
