@@ -39,9 +39,9 @@ class Args:
     """Chooses viewpoints; as in baselines.run."""
     seed: int = 0
     """Of every mission."""
-    pictures: int = 36
+    pictures: int = 28
     """Most pictures in a film."""
-    width: int = 360
+    width: int = 320
     """Of the films, in pixels; their height is three quarters of it."""
     out: Path = Path("docs/films")
     """Folder for the films."""
