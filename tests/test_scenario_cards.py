@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import re
 
 import numpy as np
 import pytest
@@ -19,6 +20,7 @@ from entropy_explore_env.missions.action import action_space
 from entropy_explore_env.missions.observation.layout import ObservationLayout
 from entropy_explore_env.scenario import Scenario, with_settings
 from entropy_explore_env.scenarios import SCENARIOS
+from tests.code_blocks import DOCS
 
 ALL_PARTS = {
     "observation": {"drive": True, "patch": True, "overview": True, "action_mask": True},
@@ -131,3 +133,16 @@ def test_times_come_from_the_suites_of_the_scoreboard(tmp_path):
     assert "| 1 robot (to 99 % seen) | `nearest-frontier` | 312 (300 … 330) | 29 of 30 |" in text
     assert "| 3 robots | `planned-rate` | 150 (140 … 161) | 30 of 30 |" in text
     assert "8 robots" not in text and "`random`" not in text
+
+
+def test_the_reference_lists_all_parts_of_a_scenario():
+    page = (DOCS / "api" / "settings.md").read_text(encoding="utf-8")
+    waiting, named = [SCENARIOS["office-mixed"]], set()
+    while waiting:
+        part = waiting.pop()
+        named.add(type(part).__name__)
+        waiting += [v for v in vars(part).values() if dataclasses.is_dataclass(v)]
+    assert "Scenario" in named and "Robot" in named
+    assert [
+        name for name in sorted(named) if not re.search(rf"autoclass:: .*\b{name}$", page, re.MULTILINE)
+    ] == []

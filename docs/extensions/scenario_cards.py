@@ -304,7 +304,16 @@ def _value(value: object) -> str:
         return f"{value:.6g}"
     if isinstance(value, tuple):
         return "(" + ", ".join(_value(v) for v in value) + ")"
+    if dataclasses.is_dataclass(value):
+        return f"`{_changes(value)}`"
     return f"`{value}`" if isinstance(value, str) else str(value)
+
+
+def _changes(part: Any) -> str:  # noqa: ANN401 - any settings
+    """A part of a part as one makes it, with the fields that differ from their defaults."""
+    fields = [f for f in dataclasses.fields(part) if getattr(part, f.name) != _default(f)]
+    words = ", ".join(f"{f.name}={getattr(part, f.name)!r}" for f in fields)
+    return f"{type(part).__name__}({words})"
 
 
 def _versions(name: str) -> str:
