@@ -62,7 +62,7 @@ def robot_infos(missions: Missions, mission: int) -> list[dict[str, Any]]:
             strict=True,
         )
     ]
-    if missions.scenario.faults.happen:
+    if missions.rules.faults is not None:
         for name, now in failing(missions.state.faults[mission], time_s).items():
             for info, failed in zip(infos, now.tolist(), strict=True):
                 info[name] = failed

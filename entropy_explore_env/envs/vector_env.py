@@ -252,7 +252,7 @@ class EntropyExploreVectorEnv(VectorEnv[Any, Any, Any]):
         infos: dict[str, Any] = {name: clocks[name].copy() for name in ("time_s", "end")}
         for name in ("deciding", "entropy_bits", "own_bits", "received_bits"):
             infos[name] = self._of_robots(robots[name]).copy()
-        if self.missions.scenario.faults.happen:
+        if self.missions.rules.faults is not None:
             now = failing(self.missions.state.faults, clocks["time_s"][:, None])
             infos.update({name: self._of_robots(failed) for name, failed in now.items()})
         infos["world_number"] = self.missions.world_numbers.copy()
