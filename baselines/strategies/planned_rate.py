@@ -55,6 +55,8 @@ _CLEAR = 1.1
 """How far it keeps clear, in sums of the two radii."""
 _POOR, _NOTHING_BITS = 0.02, 1e-6
 """A robot that is shut in leaves where a scan brings less than this share of the most bits ever expected."""
+_DREGS_SHARE = 0.01
+"""What bits are worth at least, next to others above the dregs: so that there is a best where all are."""
 _ELSEWHERE = 16
 """Places that are drawn where nothing is left nearby."""
 
@@ -91,6 +93,8 @@ class _Memory:
     """Decisions until far places are looked at again on the same spot."""
     blocked: int = 0
     """Decisions during which it keeps clear of teammates."""
+    free_at: np.ndarray | None = None
+    """(3,) the last place from which a path led anywhere."""
 
 
 def explores_frontiers(scenario: Scenario, kind: RobotKind) -> bool:
@@ -134,13 +138,13 @@ class PlannedRate:
             belief_of(view),
             announced_cones(view),
             view.no_fly_mask(),
-            _Weigher(memory, view),
+            _Weigher(memory, view, self._planner.recipe_of(view.robot).dregs),
         )
         chosen, expected = self._best(situation, memory, view)
         stays = bool((chosen[:3] == here[:3]).all())
-        exits = self._exits(view, situation) if stays and expected < _POOR * memory.most_bits else []
+        exits = self._exits(view, situation, memory) if stays and expected < _POOR * memory.most_bits else []
         if len(exits) > 0:
-            chosen, expected = exits[int(self._rng.integers(len(exits)))], 0.0
+            chosen, expected = exits[0], 0.0
         elif expected <= _NOTHING_BITS or (memory.blocked and self._rng.uniform() < 0.5):
             chosen, expected = self._elsewhere(view, situation), 0.0
         memory.chosen, memory.expected = chosen.copy(), expected
@@ -196,17 +200,21 @@ class PlannedRate:
                 return stop
         return None
 
-    def _exits(self, view: RobotView, situation: Situation) -> Sequence[np.ndarray]:
-        """Viewpoints (5,) next to a robot that its belief shuts in; none where it can get anywhere else."""
+    def _exits(self, view: RobotView, situation: Situation, memory: _Memory) -> np.ndarray:
+        """(K, 5) viewpoints next to a robot that its belief shuts in; none where it can get anywhere else.
+
+        The way out is the way that it came, so the nearest to where it was last free comes first.
+        """
         if view.kind.robot.navigator != "planned":
-            return []
-        grid = view.scenario.grid
-        drawn = np.stack([grid.in_grid_units(random_viewpoint(view, self._rng)) for _ in range(_ELSEWHERE)])
-        travel = self._planner.start_search(situation)
-        if np.isfinite(self._planner.seconds_to(situation, travel, drawn)).any():
-            return []
+            return np.zeros((0, 5))
+        if not self._planner.is_shut_in(situation, self._planner.start_search(situation)):
+            memory.free_at = situation.here[:3].copy()
+            return np.zeros((0, 5))
         exits = self._planner.exits(situation)
-        return list(exits[situation.weigh(exits, np.ones(len(exits))) > 0.0])
+        exits = exits[situation.weigh(exits, np.ones(len(exits))) > 0.0]
+        if memory.free_at is None or np.linalg.norm(memory.free_at - situation.here[:3]) < 1.0:
+            return self._rng.permutation(exits)
+        return exits[np.argsort(np.linalg.norm(exits[:, :3] - memory.free_at, axis=1), kind="stable")]
 
     def _elsewhere(self, view: RobotView, situation: Situation) -> np.ndarray:
         """(5,) a random viewpoint in grid units: of some, one that a path leads to, past all teammates."""
@@ -225,7 +233,8 @@ class PlannedRate:
 class _Weigher:
     """What expected bits are worth to a robot that has experienced what it remembers."""
 
-    def __init__(self, memory: _Memory, view: RobotView) -> None:
+    def __init__(self, memory: _Memory, view: RobotView, dregs: float = 0.0) -> None:
+        self._dregs = dregs * memory.most_bits
         self._avoided, self._all_around = memory.avoided, sees_all_around(view.kind.sensor)
         grid = view.scenario.grid
         self._here = grid.in_grid_units(view.pose)[:3]
@@ -239,6 +248,8 @@ class _Weigher:
 
     def __call__(self, viewpoints: np.ndarray, bits: np.ndarray) -> np.ndarray:
         """(K,) the bits of viewpoints (K, 5) in grid units, or less."""
+        if self._dregs > 0.0:
+            bits = np.maximum(bits - self._dregs, _DREGS_SHARE * bits)
         for viewpoint, share, _ in self._avoided:
             alike = np.linalg.norm(viewpoints[:, :3] - viewpoint[:3], axis=1) < _ALIKE_EDGES
             if share > 0.0 and not self._all_around:

@@ -42,6 +42,8 @@ _AROUND_CORNERS = 1.6
 """Longest path to a place within reach, in reaches."""
 _FIRST_RADIUS = 3.0
 """Length of the paths that are searched first for far places, in reaches; then twice as much, and so on."""
+_AWAY = 2
+"""Who gets so many voxels beyond what its body touches is not shut in."""
 _PITCH_SPREAD = 0.5
 """Standard deviation of the pitch at far places, radians."""
 
@@ -209,23 +211,35 @@ class CandidatePlanner:
         farthest = _AROUND_CORNERS * maker.within.reach + 1.0
         resume_search(travel.search, travel.lattice, travel.costs, farthest)
 
+    def is_shut_in(self, situation: Situation, travel: Travel) -> bool:
+        """Whether no path leads the robot away from the voxels that its body touches, by its belief."""
+        maker = self._maker(situation.robot)
+        extent = int(np.abs(travel.lattice.footprint).max(initial=0))
+        ring = _cube(extent + _AWAY, maker.planar)
+        ring = ring[np.abs(ring).max(axis=1) == extent + _AWAY]
+        around = self._beside(situation, ring)
+        return not np.isfinite(self.seconds_to(situation, travel, around)).any()
+
     def exits(self, situation: Situation) -> np.ndarray:
         """(K, 5) viewpoints on the neighbouring voxels that the latest search reached.
 
         A body that does not fit where it is, by its belief, leaves by one of them, and searches anew there.
         """
-        maker, here = self._maker(situation.robot), situation.here
-        layers = (0,) if maker.planar else (-1, 0, 1)
-        steps = np.array([s for s in itertools.product((-1, 0, 1), (-1, 0, 1), layers) if any(s)], float)
+        maker = self._maker(situation.robot)
+        viewpoints = self._beside(situation, _cube(1, maker.planar))
+        seconds = np.empty(len(viewpoints))
+        self._fill_seconds(maker, situation.here, viewpoints, math.inf, seconds)
+        return viewpoints[np.isfinite(seconds)]
+
+    def _beside(self, situation: Situation, steps: np.ndarray) -> np.ndarray:
+        """(K, 5) viewpoints on the voxels that lie (N, 3) steps from the robot's; K ≤ N are in the grid."""
+        here = situation.here
         viewpoints = np.tile(here, (len(steps), 1))
         viewpoints[:, :3] = np.floor(here[:3]) + 0.5 + steps
-        if maker.planar:
+        if self._maker(situation.robot).planar:
             viewpoints[:, 2] = here[2]
         inside = ((viewpoints[:, :3] > 0.0) & (viewpoints[:, :3] < self._grid.shape)).all(axis=1)
-        viewpoints = viewpoints[inside]
-        seconds = np.empty(len(viewpoints))
-        self._fill_seconds(maker, here, viewpoints, math.inf, seconds)
-        return viewpoints[np.isfinite(seconds)]
+        return viewpoints[inside]
 
     def _evaluated(
         self,
@@ -364,6 +378,12 @@ class CandidatePlanner:
             pitch = _PITCH_SPREAD * rng.normal(size=len(gazes) - 1)
             gazes[1:, 4] = np.clip(pitch, -0.5 * math.pi, 0.5 * math.pi)
         return gazes[int(np.argmax(self.bits_at(situation, gazes)))]
+
+
+def _cube(half: int, planar: bool) -> np.ndarray:
+    """(N, 3) float64 steps in voxels, all but none, up to `half` along each axis; of planar robots flat."""
+    across, layers = range(-half, half + 1), range(1) if planar else range(-half, half + 1)
+    return np.array([s for s in itertools.product(across, across, layers) if any(s)], float)
 
 
 def _drawn(maker: _Maker, here: np.ndarray, rng: np.random.Generator) -> np.ndarray:

@@ -39,6 +39,8 @@ class Recipe:
             the most bits ever expected; 1 = whenever one could be worth more.
         keep: A far place, once chosen, is kept unless another is worth this many times as much.
         block_m: Edge of the blocks that far places are taken from.
+        dregs: What any scan of known ground still brings, as a share of the most bits ever expected of one:
+            bits below that are worth next to nothing, and bits above it so much less.
     """
 
     exponent: float
@@ -59,11 +61,12 @@ class Recipe:
     far_below: float = 1.0
     keep: float = 1.15
     block_m: float = 1.0
+    dregs: float = 0.0
 
     def __post_init__(self) -> None:
         """Check every field."""
         check_positive(self, "exponent", "keep", "block_m")
-        check_not_negative(self, "yaw_spread", "pitch_spread", "far_below")
+        check_not_negative(self, "yaw_spread", "pitch_spread", "far_below", "dregs")
         for name in ("stop_probability", "gap_probability"):
             check(self, name, "a number from 0 to 1", lambda v: 0.0 <= v <= 1.0)
         check_count(self, "draw_thinning", 1, 1000)
@@ -105,6 +108,7 @@ NARROW_PLANNED = Recipe(
     far_gazes=3,
     way_gazes=24,
     block_m=1.6,
+    dregs=0.0025,
 )
 """Narrow fields of view, on planned paths."""
 

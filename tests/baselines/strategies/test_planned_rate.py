@@ -101,17 +101,31 @@ def test_where_nothing_is_left_nearby_it_goes_elsewhere(view, monkeypatch):
 def test_only_a_robot_that_its_belief_shuts_in_leaves_by_the_voxels_next_to_it(view):
     strategy, grid = PlannedRate(), view.scenario.grid
     strategy.reset(view.scenario, np.random.default_rng(0))
-    here = grid.in_grid_units(view.pose)
+    here, memory = grid.in_grid_units(view.pose), _Memory()
 
     def exits(mean):
         belief = planned_rate.belief_of(view)._replace(mean=mean.reshape(-1))
         situation = planned_rate.Situation(0, here, belief, planned_rate.announced_cones(view))
-        return np.array(strategy._exits(view, situation))
+        return strategy._exits(view, situation, memory)
 
     free = np.zeros(grid.shape, np.float32)
     assert len(exits(free)) == 0
+    np.testing.assert_array_equal(memory.free_at, here[:3])
     x, y = here[:2].astype(int)
     shut = np.ones(grid.shape, np.float32)
     shut[x - 1 : x + 2, y - 1 : y + 2] = 0.0
     found = exits(shut)
     assert len(found) > 0 and (np.abs(found[:, :2] - here[:2]) < 2.0).all()
+    memory.free_at = here[:3] + np.array([5.0, 0.0, 0.0])
+    back = exits(shut)
+    assert sorted(map(tuple, back)) == sorted(map(tuple, found))
+    assert back[0, 0] == back[:, 0].max() > here[0] > back[-1, 0]
+
+
+def test_what_any_scan_brings_is_worth_next_to_nothing(view):
+    """Of 1,000 bits at most, one in a hundred is dregs: the first ten of any scan."""
+    weigh = _Weigher(_Memory(most_bits=1000.0), view, 0.01)
+    viewpoints = np.zeros((3, 5))
+    np.testing.assert_allclose(weigh(viewpoints, np.array([5.0, 20.0, 510.0])), [0.05, 10.0, 500.0])
+    untouched = _Weigher(_Memory(most_bits=1000.0), view)(viewpoints, np.array([5.0, 20.0, 510.0]))
+    np.testing.assert_array_equal(untouched, [5.0, 20.0, 510.0])
