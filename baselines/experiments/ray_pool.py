@@ -129,7 +129,8 @@ class _Sweep:
         """Give the cluster the next task; a Failure if it cannot be pickled."""
         attempt = self._waiting.popleft()
         try:
-            packed = pickle.dumps((self._work, self._tasks[attempt.place]))
+            # Of the command itself, `__main__`, workers have nothing: cloudpickle sends its functions whole.
+            packed = self._ray.cloudpickle.dumps((self._work, self._tasks[attempt.place]))
         except Exception as error:
             return attempt, failure_of(error)
         self._running[self._remote.remote(packed, self._limit_s)] = attempt

@@ -6,6 +6,7 @@ from __future__ import annotations
 import os
 import random
 import signal
+import subprocess
 import sys
 import threading
 import time
@@ -83,7 +84,7 @@ def test_results_errors_limits_and_lost_workers(two_workers, tmp_path, monkeypat
     monkeypatch.setattr(ray_pool, "ATTEMPTS", 2)
     monkeypatch.setattr(ray_pool, "GRACE_S", 0.5)
     squares = [("square", number) for number in range(5)]
-    unpicklable = ("square", lambda: None)
+    unpicklable = ("square", threading.Lock())
     tasks = [*squares, ("raise", 0), ("lambda", 0), unpicklable, ("swallow", 0), ("die", 0)]
     once = ("die once", str(tmp_path / "died"))
     found: dict[Any, Any] = dict(run_each(work, [*tasks, once], LOCAL, 1.0))
@@ -199,3 +200,24 @@ def test_an_address_where_no_cluster_answers_is_one_line(tmp_path, capsys, monke
     assert run_command(mission_times, [*words, "--runs", str(tmp_path)]) == 2
     said = capsys.readouterr().err
     assert said == "error: cluster = '127.0.0.1:9': allowed is that of a Ray cluster that answers\n"
+
+
+COMMAND = """
+from baselines.experiments.ray_cluster import RayCluster
+from baselines.experiments.worker_pool import run_each
+
+def double(number):
+    return 2 * number
+
+if __name__ == "__main__":
+    print(sorted(run_each(double, [1, 2, 3], RayCluster("local", 1))))
+"""
+
+
+def test_a_command_s_own_functions_reach_workers(tmp_path):
+    """As in `python -m training.experiment`, whose work is `__main__`'s."""
+    (tmp_path / "command.py").write_text(COMMAND)
+    words = [sys.executable, str(tmp_path / "command.py")]
+    env = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[3])}
+    ran = subprocess.run(words, env=env, capture_output=True, text=True, timeout=300)
+    assert ran.stdout == "[(1, 2), (2, 4), (3, 6)]\n", ran.stderr
