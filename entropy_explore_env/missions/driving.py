@@ -20,6 +20,7 @@ from entropy_explore_env.missions.poses import (
     profile_of,
     share_left,
     to_grid_units,
+    within_grid,
 )
 from entropy_explore_env.missions.redecision import braking_metres, resting_place
 from entropy_explore_env.robots.motion import (
@@ -290,7 +291,7 @@ def drive_leg(params, collision, robots, index, time_s, crossing):
     """
     own = params[index]
     goal, begin = robots[index].goal, path_point(robots[index], robots[index].corners)
-    start, finish = to_grid_units(own, begin), to_grid_units(own, goal)
+    start, finish = within_grid(own, begin), to_grid_units(own, goal)
     length = distance_between(start, finish)
     if length <= 0.0:
         return 0.0, _ARRIVED
@@ -391,7 +392,7 @@ def end_drive(params, robot, passed, time_s):
 def rest_blocked(params, footprint, mean, robot, passed, crossing):
     """Whether the rest of a planned path, from where the robot scanned, is believed blocked."""
     size, radius = grid_size(params), params.body_radius_m / params.voxel_size_m
-    start = to_grid_units(params, robot.scan_pose)
+    start = within_grid(params, robot.scan_pose)
     for number in range(passed, robot.waypoints):
         finish = to_grid_units(params, point(robot.path[number]))
         if line_believed_blocked(mean, size, footprint, radius, start, finish, crossing):

@@ -23,7 +23,7 @@ from entropy_explore_env.missions.poses import (
     distance_between,
     grid_size,
     pose_at,
-    to_grid_units,
+    within_grid,
 )
 from entropy_explore_env.missions.state import Beliefs
 from entropy_explore_env.robots.channel import (
@@ -244,7 +244,7 @@ def unpack_measurements(params, tracer, sender, scan, pose, packed, count):
         packed: (B, 5), see `pack_measurements`.
         count: How many there are.
     """
-    size, start, sensor = grid_size(params), to_grid_units(params, pose), tracer.sensors[sender]
+    size, start, sensor = grid_size(params), within_grid(params, pose), tracer.sensors[sender]
     for i in range(count):
         ray, stored = scan.rays[i], packed[i]
         scan.order[i] = i

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from entropy_explore_env.compilation.kernels import lean_kernel
-from entropy_explore_env.missions.poses import to_grid_units
+from entropy_explore_env.missions.poses import to_grid_units, within_grid
 from entropy_explore_env.missions.redecision import decide, note_braking, note_change
 from entropy_explore_env.missions.rules import ActionSet
 from entropy_explore_env.missions.state import MissionEnd
@@ -78,7 +78,7 @@ def plan_missions(planning, navigator, kind, braking, continuous, discrete, firs
 @lean_kernel
 def plan_drive(params, navigator, mean, precision, no_fly, choice):
     """Write a robot's path to its viewpoint: waypoints in metres, and how it ends if nothing stops it."""
-    start, goal = to_grid_units(params, choice.start), to_grid_units(params, choice.viewpoint)
+    start, goal = within_grid(params, choice.start), to_grid_units(params, choice.viewpoint)
     path, origin = choice.path, params.origin_m
     choice.waypoints, choice.path_end = plan_path(navigator, mean, precision, no_fly, start, goal, path)
     for number in range(choice.waypoints):

@@ -24,6 +24,18 @@ def to_grid_units(params, position):
 
 
 @inlined_kernel
+def within_grid(params, position):
+    """(x, y, z) in grid units of a place in the workspace, in metres, map frame.
+
+    A place on the workspace's upper faces may be rounded past them, by most where the map's origin is far
+    away. It is brought back: rays begin inside, and none has a negative length.
+    """
+    x, y, z = to_grid_units(params, position)
+    most_x, most_y, most_z = grid_size(params)
+    return min(max(x, 0.0), float(most_x)), min(max(y, 0.0), float(most_y)), min(max(z, 0.0), float(most_z))
+
+
+@inlined_kernel
 def grid_size(params):
     """(X, Y, Z) voxels of the workspace."""
     return params.size[0], params.size[1], params.size[2]

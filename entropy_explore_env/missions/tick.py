@@ -42,7 +42,7 @@ from entropy_explore_env.missions.messages import (
     send_batch,
 )
 from entropy_explore_env.missions.phases import broadcast_all, collect_batch, next_broadcast
-from entropy_explore_env.missions.poses import copy_numbers, grid_size, pose_at, to_grid_units
+from entropy_explore_env.missions.poses import copy_numbers, grid_size, pose_at, to_grid_units, within_grid
 from entropy_explore_env.missions.redecision import decide, note_braking, note_change
 from entropy_explore_env.missions.reward import reward_robots
 from entropy_explore_env.missions.scoring import holds_enough, note_progress, note_seen, score_scan
@@ -401,7 +401,7 @@ def scan_and_share(mission, sensor, index, work):
     params, robot = team.params[index], team.robots[index]
     scan = first_rays(work.scan, params.rays)
     x, y, z, yaw, pitch = pose_at(params, robot, clock.time_s)
-    pose = SensorPose(to_grid_units(params, (x, y, z)), yaw, pitch)
+    pose = SensorPose(within_grid(params, (x, y, z)), yaw, pitch)
     bodies = work.bodies[: place_bodies(team, sensor, index, clock.time_s, pose, work.bodies)]
     scene = Scene(mission.truth, grid_size(params), params.voxel_size_m, bodies)
     take_scan(scan, sensor, scene, pose, robot.sensor_rng)

@@ -14,7 +14,7 @@ from entropy_explore_env.missions.poses import pose_at
 from entropy_explore_env.robots.range_sensor import Scene, SensorPose, new_scan, sensor_model, take_scan
 from entropy_explore_env.settings import Grid, RangeSensor, gaussian_entropy_bits
 from tests.reference import rocha04
-from tests.reference.scenes import as_reference, free_box, put, started, wander
+from tests.reference.scenes import as_reference, free_box, put, random_actions, started, wander
 
 EVERYTHING = {
     "panorama": True,
@@ -301,3 +301,30 @@ def test_parts_left_out_leave_no_numbers():
     assert list(only.layout.split(only.observations[0, 0])) == ["team"]
     alone = started(free_box(robots=1))
     assert list(alone.layout.split(alone.observations[0, 0])) == ["panorama", "self"]
+
+
+def test_a_place_on_a_face_that_rounding_takes_past_it_is_still_inside():
+    """1e9 m from the map's origin, where a metre has eight digits left: no ray begins outside."""
+    grid = Grid((7, 11, 5), 0.08945617475586909, (966007922.5094144, 268677512.72424054, 239985185.11960912))
+    scenario = free_box(
+        grid=grid,
+        robots=2,
+        robot={"reach_m": math.inf, "body_radius_m": 0.0},
+        observation={**EVERYTHING, "panorama_yaws": 8},
+    )
+    missions = started(scenario)
+    low, high = (bound.astype(np.float32) for bound in (missions.layout.low, missions.layout.high))
+    past, origin = 0, np.asarray(grid.origin_m)
+    for number in range(30):
+        place = origin + np.random.default_rng(number).uniform(0.0, 1.0, 3) * grid.size_m
+        axis = number % 3
+        place[axis] = origin[axis] + grid.size_m[axis]
+        past += (place[axis] - origin[axis]) / grid.voxel_size_m > grid.shape[axis]
+        put(missions, 0, (*place, 0.3 * number, 0.1))
+        missions._observe(0, 0, 1)
+        assert ((missions.observations >= low) & (missions.observations <= high)).all()
+        missions.step(*random_actions(missions, np.random.default_rng(number)))
+        assert ((missions.observations >= low) & (missions.observations <= high)).all()
+        assert missions.state.robots["path_m"].min() >= 0.0
+        assert missions.state.scan_range_m.min() >= 0.0
+    assert past > 5

@@ -7,7 +7,7 @@ import math
 from entropy_explore_env.belief.raycast import STOP_AT_COVERED
 from entropy_explore_env.compilation.kernels import lean_kernel
 from entropy_explore_env.missions.action import ROUNDING
-from entropy_explore_env.missions.poses import pose_at, to_grid_units
+from entropy_explore_env.missions.poses import pose_at, within_grid
 
 
 @lean_kernel
@@ -74,5 +74,5 @@ def mask_missions(params, actions, missions, robots, mean, out):
     for mission in range(out.shape[0]):
         for robot in range(out.shape[1]):
             own = params[robot]
-            start = to_grid_units(own, pose_at(own, robots[mission, robot], missions[mission].time_s))
+            start = within_grid(own, pose_at(own, robots[mission, robot], missions[mission].time_s))
             write_mask(own, actions, start, mean[mission, robot], out[mission, robot])

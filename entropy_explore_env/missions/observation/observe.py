@@ -14,7 +14,7 @@ from entropy_explore_env.missions.observation.own_state import observe_self
 from entropy_explore_env.missions.observation.panorama import observe_panorama
 from entropy_explore_env.missions.observation.patch import observe_patch
 from entropy_explore_env.missions.observation.team import observe_team
-from entropy_explore_env.missions.poses import pose_at, speed_at, to_grid_units
+from entropy_explore_env.missions.poses import pose_at, speed_at, within_grid
 
 
 class Known(NamedTuple):
@@ -69,7 +69,7 @@ def observe_robot(rules, offsets, robot, known, crossing, out):
         out: (F,) float32, filled in.
     """
     params, sensor = rules.params[robot], rules.sensors.params[robot]
-    start = to_grid_units(params, known.pose)
+    start = within_grid(params, known.pose)
     observe_panorama(offsets.panorama, params, sensor, rules.panorama, start, known, crossing, out)
     observe_self(offsets.self_state, params, offsets.kinds, known, out)
     observe_drive(offsets.drive, params, known, out)
