@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from entropy_explore_env.belief.measurement_model import Return
-from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel
+from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel, record_type
 
 _NOTHING = int(Return.NOTHING)
 
@@ -26,7 +26,7 @@ Settings keep a ratio above 1e-16, so that a product that is not yet below stays
 """
 
 
-RAY = np.dtype(
+RAY = record_type(
     [
         ("direction", "f8", (3,)),  # unit vector, map frame
         ("cos_pitch", "f8"),  # of that direction
@@ -37,7 +37,6 @@ RAY = np.dtype(
         ("free", "i8"),  # leading voxels that measure coverage 0
         ("voxels", "i8"),  # voxels on the ray
     ],
-    align=True,
 )
 """One ray of a scan, as it is processed."""
 
@@ -80,7 +79,7 @@ def fuse_ray(mean, precision, crossed, coverage, free, n, measured):
     Returns:
         Utility in bits, ≥ 0.
     """
-    gain, bits, shrink = np.float32(measured), 0.0, 1.0
+    gain, bits, shrink = np.float32(measured), 0.0, np.float64(1.0)
     for i in range(free):
         voxel = np.uint32(crossed[i])
         before = precision[voxel]
@@ -91,7 +90,7 @@ def fuse_ray(mean, precision, crossed, coverage, free, n, measured):
         shrink *= share
         if shrink < _FOLD_BELOW:
             bits -= math.log2(shrink)
-            shrink = 1.0
+            shrink = np.float64(1.0)
     for i in range(free, n):
         voxel = np.uint32(crossed[i])
         before = precision[voxel]
@@ -102,7 +101,7 @@ def fuse_ray(mean, precision, crossed, coverage, free, n, measured):
         shrink *= share
         if shrink < _FOLD_BELOW:
             bits -= math.log2(shrink)
-            shrink = 1.0
+            shrink = np.float64(1.0)
     return 0.5 * (bits - math.log2(shrink))
 
 
@@ -116,12 +115,12 @@ def expected_utility(precision, crossed, n, measured):
         n: Number of crossed voxels.
         measured: Precision of the measurement, 1/σ(d)².
     """
-    bits, growth, gain = 0.0, 1.0, np.float32(measured)
+    bits, growth, gain = 0.0, np.float64(1.0), np.float32(measured)
     for i in range(n):
         growth *= np.float32(1.0) + gain / precision[np.uint32(crossed[i])]
         if growth > 1.0 / _FOLD_BELOW:
             bits += math.log2(growth)
-            growth = 1.0
+            growth = np.float64(1.0)
     return 0.5 * (bits + math.log2(growth))
 
 

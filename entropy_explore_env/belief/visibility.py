@@ -20,16 +20,15 @@ import numpy as np
 
 from entropy_explore_env.belief.raycast import ONE_BEHIND, OPEN_END, STOP_AT_COVERED, Crossing, Line, cast_ray
 from entropy_explore_env.belief.voxel_index import flat_index
-from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel
+from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel, record_type
 
-CONE = np.dtype(
+CONE = record_type(
     [
         ("apex", "f8", (3,)),  # grid units
         ("gaze", "f8", (3,)),  # unit vector, map frame
         ("radius", "f8"),  # r, voxel edges
         ("cosine", "f8"),  # of α
     ],
-    align=True,
 )
 """What a robot sees, or will see, from a viewpoint."""
 
@@ -196,7 +195,7 @@ def visible_bits(cone, size, precision, known_precision, occlusion, marks):
     Returns:
         (H, I): H(Cⁱ) and I(Cⁱ; Tⁱ) in bits, H ≥ I ≥ 0.
     """
-    own, shared, own_growth, shared_growth = 0.0, 0.0, 1.0, 1.0
+    own, shared, own_growth, shared_growth = 0.0, 0.0, np.float64(1.0), np.float64(1.0)
     first_x, last_x = _span(cone, 0, size[0])
     first_y, last_y = _span(cone, 1, size[1])
     for i in range(first_x, last_x):
@@ -212,7 +211,7 @@ def visible_bits(cone, size, precision, known_precision, occlusion, marks):
                         own_growth *= ratio
                     if own_growth > _FOLD_ABOVE or shared_growth > _FOLD_ABOVE:
                         own, shared = own + math.log2(own_growth), shared + math.log2(shared_growth)
-                        own_growth, shared_growth = 1.0, 1.0
+                        own_growth, shared_growth = np.float64(1.0), np.float64(1.0)
     own, shared = own + math.log2(own_growth), shared + math.log2(shared_growth)
     return 0.5 * (own + shared), 0.5 * shared
 
@@ -220,10 +219,10 @@ def visible_bits(cone, size, precision, known_precision, occlusion, marks):
 @lean_kernel
 def marked_bits(precision, known_precision, marks):
     """Entropy that the marked voxels cover together: H(T), or a team's without one (RochaMI, eq. 9)."""
-    bits, growth = 0.0, 1.0
+    bits, growth = 0.0, np.float64(1.0)
     for voxel in range(len(marks)):
         if marks[voxel] > 0:
             growth *= max(known_precision / precision[voxel], 1.0)
             if growth > _FOLD_ABOVE:
-                bits, growth = bits + math.log2(growth), 1.0
+                bits, growth = bits + math.log2(growth), np.float64(1.0)
     return 0.5 * (bits + math.log2(growth))

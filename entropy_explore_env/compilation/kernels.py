@@ -6,6 +6,7 @@ import os
 from collections.abc import Callable
 from typing import Any
 
+import numpy as np
 from numba import typeof
 from numba.core import config
 
@@ -31,6 +32,28 @@ def _compiled(**options: Any) -> Callable[[Callable[..., Any]], Any]:  # noqa: A
         return Kernel(function, targetoptions=dict(options))
 
     return decorate
+
+
+class InterpretedRecord(np.void):
+    """An element of a structured array whose fields are attributes, those named as NumPy's own among them."""
+
+    def __getattribute__(self, name: str) -> Any:  # noqa: ANN401 - whatever the field holds
+        """A field, or what NumPy calls so."""
+        there = np.void.__getattribute__(self, "dtype").fields
+        return self[name] if there and name in there else np.void.__getattribute__(self, name)
+
+    def __setattr__(self, name: str, value: object) -> None:
+        """Change a field of the array."""
+        self[name] = value
+
+
+def record_type(fields: list[tuple[Any, ...]]) -> np.dtype[Any]:
+    """A structured type, aligned, whose elements have their fields as attributes, as kernels need.
+
+    Compiled code reads any structured type so; where NUMBA_DISABLE_JIT=1 kernels are interpreted.
+    """
+    aligned = np.dtype(fields, align=True)
+    return np.dtype((InterpretedRecord, aligned)) if getattr(config, "DISABLE_JIT", False) else aligned
 
 
 kernel = _compiled(**_OPTIONS)

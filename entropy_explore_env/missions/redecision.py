@@ -20,10 +20,8 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from entropy_explore_env.belief.raycast import point
-from entropy_explore_env.compilation.kernels import lean_kernel
+from entropy_explore_env.compilation.kernels import lean_kernel, record_type
 from entropy_explore_env.missions.action import decode_action
 from entropy_explore_env.missions.poses import (
     copy_numbers,
@@ -35,7 +33,7 @@ from entropy_explore_env.missions.poses import (
 )
 from entropy_explore_env.missions.state import WAYPOINTS
 
-CHOICE = np.dtype(
+CHOICE = record_type(
     [
         ("pose", "f8", (5,)),  # where the robot is
         ("start", "f8", (3,)),  # where the path that it chose begins: there, or where it has come to rest
@@ -49,7 +47,6 @@ CHOICE = np.dtype(
         ),  # how many there are; 0 = straight to the viewpoint, which is the first of `path`
         ("path_end", "i8"),  # code of a MoveEnd: how the drive ends if nothing stops it
     ],
-    align=True,
 )
 """What a robot has chosen in a step, until it departs. Scratch memory: nothing in it is state."""
 

@@ -8,12 +8,13 @@ from typing import NamedTuple
 import numpy as np
 
 from entropy_explore_env.belief.pooling import Cells, new_cells, no_cells
+from entropy_explore_env.compilation.kernels import record_type
 from entropy_explore_env.robots.faults import FAULT_PARAMS
 from entropy_explore_env.robots.range_sensor import TeamSensors, team_sensors
 from entropy_explore_env.scenario import Scenario
 from entropy_explore_env.settings import Observation, Robot
 
-PARAMS = np.dtype(
+PARAMS = record_type(
     [
         ("size", "i8", (3,)),  # X, Y, Z voxels
         ("voxel_size_m", "f8"),
@@ -70,7 +71,6 @@ PARAMS = np.dtype(
         ("panorama_log", "?"),
         ("track_truth", "?"),
     ],
-    align=True,
 )
 """The parameters of a scenario for one of its robots, in the units of `settings`; inf = never, or all."""
 

@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from entropy_explore_env.belief.pooling import Cells
+from entropy_explore_env.compilation.kernels import record_type
 from entropy_explore_env.missions.rules import collision_radii_m
 from entropy_explore_env.scenario import Scenario
 
@@ -44,7 +45,7 @@ def goals_reached(ends: np.ndarray) -> np.ndarray:
     return (ends == MissionEnd.MAPPED.code) | (ends == MissionEnd.SEEN.code)
 
 
-MISSION = np.dtype(
+MISSION = record_type(
     [
         ("entropy_start_bits", "f8"),  # H(0), Rocha04 eq. 25
         ("entropy_end_bits", "f8"),  # H_th, the threshold that ends the mission
@@ -67,7 +68,6 @@ MISSION = np.dtype(
         ("explored_end", "i8"),  # so many explored visible voxels end the mission, if so it ends,
         ("explored_free_end", "i8"),  # and so many free ones
     ],
-    align=True,
 )
 
 PROGRESS = (0.5, 0.9, 0.99, 1.0)
@@ -79,7 +79,7 @@ SEEN_MARKS = (0.5, 0.9, 0.95, 0.99, 1.0)
 WAYPOINTS = 32
 """Most points that a planned path leads to, one after the other."""
 
-ROBOT = np.dtype(
+ROBOT = record_type(
     [
         ("entropy_bits", "f8"),  # of its map, carried by H -= I (Rocha04, eq. 29)
         ("deciding", "?"),  # whether it chooses a viewpoint in the next step
@@ -130,7 +130,6 @@ ROBOT = np.dtype(
         ("messages_lost", "i8"),  # per teammate that a message did not reach by chance
         ("messages_out_of_range", "i8"),  # per teammate that was too far away for a message
     ],
-    align=True,
 )
 
 FAULT = np.dtype(
@@ -159,17 +158,16 @@ FAULT = np.dtype(
 COUNTED = ROBOT.names[ROBOT.names.index("distance_m") :] if ROBOT.names else ()
 """Fields of ROBOT that count from the mission's start."""
 
-HEARD = np.dtype(
+HEARD = record_type(
     [
         ("heard_s", "f8"),  # when the last message that arrived was sent; -1 = none did
         ("pose", "f8", (5,)),  # where its sender was
         ("announced_s", "f8"),  # when the last announcement that arrived was sent; -1 = none did
         ("announced", "f8", (7,)),  # its viewpoint, r̂ and α̂
     ],
-    align=True,
 )
 
-MESSAGE = np.dtype(
+MESSAGE = record_type(
     [
         ("due_s", "f8"),  # when it arrives; inf = a free slot
         ("sent_s", "f8"),
@@ -179,23 +177,20 @@ MESSAGE = np.dtype(
         ("pose", "f8", (5,)),  # where the sender was
         ("announced", "f8", (7,)),
     ],
-    align=True,
 )
 
-PHASES = np.dtype(
+PHASES = record_type(
     [
         ("broadcasts", "i8"),  # how often the robots have broadcast
         ("collecting", "i8"),  # the buffer, 0 or 1, that takes in new batches; the other one is broadcast
     ],
-    align=True,
 )
 
-BATCH = np.dtype(
+BATCH = record_type(
     [
         ("pose", "f8", (5,)),  # where the scan was taken
         ("count", "i8"),  # measurements of it
     ],
-    align=True,
 )
 
 

@@ -26,7 +26,7 @@ from entropy_explore_env.belief.raycast import (
     longest_crossing,
     point,
 )
-from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel
+from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel, record_type
 from entropy_explore_env.randomness import draw_gaussian
 from entropy_explore_env.settings import Grid, RangeSensor, centred_angles
 
@@ -36,7 +36,7 @@ NEAREST = 1e-3
 _UNREADABLE = 2.0
 """True coverage of a solid voxel that gives no return; 1 is that of others."""
 
-SENSOR_PARAMS = np.dtype(
+SENSOR_PARAMS = record_type(
     [
         ("max_range_m", "f8"),
         ("min_range_m", "f8"),
@@ -47,7 +47,6 @@ SENSOR_PARAMS = np.dtype(
         ("columns", "i8"),
         ("rows", "i8"),
     ],
-    align=True,
 )
 """The parameters of a RangeSensor."""
 

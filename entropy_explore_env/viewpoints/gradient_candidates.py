@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from entropy_explore_env.belief.fields import remaining_entropy_gradient
-from entropy_explore_env.compilation.kernels import lean_kernel
+from entropy_explore_env.compilation.kernels import lean_kernel, record_type
 
-CANDIDATE = np.dtype(
+CANDIDATE = record_type(
     [
         ("place", "f8", (3,)),  # the voxel's centre, grid units; planar robots: at their sensor's height
         ("yaw", "f8"),
@@ -17,7 +15,6 @@ CANDIDATE = np.dtype(
         ("steepness", "f8"),  # ‖∇H‖, bits per voxel edge
         ("distance", "f8"),  # from the robot, grid units
     ],
-    align=True,
 )
 """A voxel, and the gaze along the gradient there."""
 _TOLERANCE = 1e-6

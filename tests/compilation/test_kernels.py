@@ -200,3 +200,35 @@ def test_without_numba_kernels_are_functions(tmp_path):
     package(tmp_path)
     code = "from mine.caller import caller; print(caller(1.0), type(caller).__name__)"
     assert run(code, tmp_path, NUMBA_DISABLE_JIT="1") == "11.0 function"
+
+
+INTERPRETED = """
+import numpy as np
+from entropy_explore_env.missions.simulation import Missions
+from entropy_explore_env.reports.state_values import state_digest
+from entropy_explore_env.scenario import with_settings
+from entropy_explore_env.scenarios import BOX
+
+missions = Missions(with_settings(BOX, {"robots": 3, "world": "furnished", "track_truth": True,
+    "channel": {"delay_s": 1.0, "loss_probability": 0.2}, "sensor": {"scan_every_m": 0.3, "range_noise_m": 0.1},
+    "robot": {"navigator": "planned", "redecide": "on_scan"}}))
+missions.reset(0, 0)
+rng = np.random.default_rng(0)
+for _ in range(12):
+    missions.step(rng.uniform(-1.0, 1.0, (1, 3, 5)), np.zeros((1, 3), np.int64))
+print(state_digest(missions, 0))
+"""
+
+
+def test_interpreted_kernels_give_the_bits_of_compiled_ones():
+    digests = set()
+    for disabled in ("0", "1"):
+        ran = subprocess.run(
+            [sys.executable, "-W", "ignore", "-c", INTERPRETED],
+            env={**os.environ, "NUMBA_DISABLE_JIT": disabled},
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+        digests.add(ran.stdout)
+    assert len(digests) == 1 and len(next(iter(digests))) == 65

@@ -21,12 +21,12 @@ from entropy_explore_env.belief.raycast import (
 )
 from entropy_explore_env.belief.visibility import in_cone, visible_bits
 from entropy_explore_env.belief.voxel_index import flat_index
-from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel
+from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel, record_type
 from entropy_explore_env.robots.motion import distance_to_teammate, line_believed_blocked
 
-MATE = np.dtype([("begin", "f8", (3,)), ("end", "f8", (3,)), ("touching", "f8")], align=True)
+MATE = record_type([("begin", "f8", (3,)), ("end", "f8", (3,)), ("touching", "f8")])
 """Where a teammate was heard to be, and to drive to, in grid units; `touching`: sum of the two radii."""
-FACTORS = np.dtype(
+FACTORS = record_type(
     [
         ("distance_cost", "f8"),  # κ
         ("scale_bits", "f8"),  # ξ of eq. 12; inf = λ is 1
@@ -34,7 +34,6 @@ FACTORS = np.dtype(
         ("static_reach", "?"),  # whether ρ depends on what is believed covered
         ("known_precision", "f8"),  # 1/σ² of a voxel that counts as known
     ],
-    align=True,
 )
 """Parameters of eq. 13."""
 

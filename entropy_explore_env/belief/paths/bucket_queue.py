@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel
+from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel, record_type
 
 BUCKETS = 1024
 """Buckets of the ring, a power of two; keys beyond the ring go into the last one."""
@@ -21,14 +21,13 @@ _BLOCK_ENTRIES = 15
 """Voxels of a block: with the number of the next block they fill 64 bytes."""
 _NO_BLOCK = -1
 
-_STATE = np.dtype(
+_STATE = record_type(
     [
         ("current", "i8"),  # number of the bucket that is processed now
         ("entries", "i8"),  # voxels in all buckets
         ("unused", "i8"),  # first of the blocks that were never used
         ("free", "i8"),  # first block of the list of emptied ones; -1 = none
     ],
-    align=True,
 )
 
 

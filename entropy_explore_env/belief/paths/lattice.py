@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from entropy_explore_env.belief.raycast import STOP_AT_COVERED
-from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel
+from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel, record_type
 from entropy_explore_env.errors import SettingError
 
 IMPASSABLE, FREE, UNKNOWN = 0, 1, 2
@@ -37,7 +37,7 @@ So paths of equal length compare equal, and ties do not depend on rounding.
 _BLOCK_VOXELS = 32
 """Voxels that are classified together: it takes little more time than one, and most are needed soon."""
 
-MOVE = np.dtype(
+MOVE = record_type(
     [
         ("step", "i8", (3,)),  # -1, 0 or 1 along x, y and z
         ("code", "i8"),  # 9 (x + 1) + 3 (y + 1) + z + 1
@@ -47,7 +47,6 @@ MOVE = np.dtype(
         ("first", "i8"),  # slice of `footprint_offsets`: voxels that the body newly touches after the step
         ("last", "i8"),  # one past the last
     ],
-    align=True,
 )
 """A step to a neighbouring voxel."""
 
