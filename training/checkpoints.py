@@ -22,6 +22,7 @@ import shutil
 import zipfile
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -38,6 +39,7 @@ from training.errors import CheckpointError
 from training.networks import FEATURES
 
 FORMAT = 1
+_MOST_WEIGHTS = 1 << 26
 _KEPT = 2
 """How many of a run's latest checkpoints of a kind stay, in case the newest one turns out unreadable."""
 
@@ -203,7 +205,7 @@ def load_checkpoint(folder: Path, training: bool = False) -> Checkpoint:
         loaded.trainer = TrainerState(
             _tensors(folder / "training.safetensors", digests),
             _arrays(folder / "training.npz", digests),
-            json.loads(_content(folder / "training.json", digests)),
+            _counters(folder / "training.json", digests),
         )
     return loaded
 
@@ -215,6 +217,10 @@ def _settings(folder: Path, head: Mapping[str, Any]) -> PolicySettings:
         raise CheckpointError(f"{folder}: features", features, "one of " + ", ".join(FEATURES))
     if not isinstance(hidden, list) or not all(type(units) is int and 0 < units <= 65536 for units in hidden):
         raise CheckpointError(f"{folder}: hidden", hidden, "a list of whole numbers from 1 to 65536")
+    if sum(one * other for one, other in pairwise(hidden)) > _MOST_WEIGHTS:
+        raise CheckpointError(
+            f"{folder}: hidden", hidden, f"layers with at most {_MOST_WEIGHTS} weights between"
+        )
     try:
         return PolicySettings(scenario_of(head.get("scenario", {})), features, tuple(hidden))
     except EntropyExploreError as error:
@@ -238,7 +244,19 @@ def _tensors(file: Path, digests: Mapping[str, Any]) -> dict[str, torch.Tensor]:
     try:
         return tensors_of(_content(file, digests))
     except SafetensorError as error:
-        raise CheckpointError("checkpoint", str(file), f"safetensors ({error})") from None
+        said = " ".join(str(error).split())[:200]
+        raise CheckpointError("checkpoint", str(file), f"safetensors ({said})") from None
+
+
+def _counters(file: Path, digests: Mapping[str, Any]) -> dict[str, Any]:
+    content = _content(file, digests)
+    try:
+        counters = json.loads(content)
+    except (ValueError, RecursionError):
+        counters = None
+    if not isinstance(counters, dict):
+        raise CheckpointError("checkpoint", str(file), "JSON with an object")
+    return counters
 
 
 def _arrays(file: Path, digests: Mapping[str, Any]) -> dict[str, np.ndarray]:
@@ -249,8 +267,11 @@ def _arrays(file: Path, digests: Mapping[str, Any]) -> dict[str, np.ndarray]:
                 raise ValueError("its arrays are compressed: a small file could fill the memory")
         with np.load(io.BytesIO(content), allow_pickle=False) as arrays:
             return {name: arrays[name] for name in arrays.files}
-    except (ValueError, zipfile.BadZipFile, EOFError, OSError) as error:
-        raise CheckpointError("checkpoint", str(file), f"NumPy's npz without objects ({error})") from None
+    except CheckpointError:
+        raise
+    except Exception as error:  # of a broken archive: zipfile and NumPy raise a dozen kinds
+        said = " ".join(str(error).split())[:200]
+        raise CheckpointError("checkpoint", str(file), f"NumPy's npz without objects ({said})") from None
 
 
 def _npz(arrays: Mapping[str, np.ndarray]) -> bytes:
