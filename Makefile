@@ -11,7 +11,7 @@ VENV_BENCHMARL := .venv-benchmarl
 STYLE := $(RUN) ruff check . && $(RUN) ruff format --check . && $(VENV)/bin/lint-imports --no-cache
 WARM := $(RUN) entropy_explore_env.warm --processes 1
 
-.PHONY: help demo new-user docs docs-links test test-long boundscheck test-rllib test-benchmarl lint bench reproduce clean
+.PHONY: help demo new-user docs docs-links test test-long boundscheck test-rllib test-benchmarl lint bench reliability reproduce clean
 .NOTPARALLEL:
 
 help:
@@ -27,6 +27,7 @@ help:
 	@echo "make test-benchmarl   the tutorial with BenchMARL"
 	@echo "make lint         ruff, pyright and the contracts of imports"
 	@echo "make bench        speed against peers"
+	@echo "make reliability  goes on with the proofs of docs/results/reliability.md: many hours"
 	@echo "make reproduce    the experiments of the five papers, into docs/results: many hours"
 	@echo "make clean        remove the environments, builds and caches; results stay"
 
@@ -73,6 +74,12 @@ lint: $(STAMP)dev
 
 bench: $(STAMP)training $(STAMP)bench
 	$(RUN) benchmarks.speed
+
+# What was played is kept in results; what is missing is played.
+reliability: $(STAMP)dev
+	-for folder in missions belief robots; do \
+		$(RUN) benchmarks.reliability.mutants entropy_explore_env/$$folder --sample 100; done
+	$(RUN) benchmarks.reliability --page docs/results/reliability.md
 
 reproduce: $(STAMP)baselines
 	$(RUN) baselines.papers.rocha04 --out docs/results

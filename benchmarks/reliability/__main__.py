@@ -2,22 +2,31 @@
 
 Each proof is many small cases, played in a process that may hang or crash, with the assertions of kernels
 compiled in. What came of a case is kept in `results/reliability`, a line each: a run that was stopped goes on
-where it was. The page is made of all that is kept. `--quick` plays a few minutes of each.
+where it was. The page is made of all that is kept, and of what `benchmarks.reliability.mutants` and
+`benchmarks.reliability.coverage` kept. `--quick` plays a few minutes of each.
 """
 
 from __future__ import annotations
 
+import hashlib
 import json
+import math
 import os
+import platform
 import sys
+import time
 from collections.abc import Callable, Sequence
+from contextlib import closing
 from dataclasses import dataclass
+from functools import cache
+from importlib import metadata
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import entropy_explore_env
 from baselines.cli.arguments import parse, run_command
 from baselines.experiments.worker_pool import Failure, run_each
-from benchmarks.reliability import determinism, settings_fuzz, soak, state_fuzz
+from benchmarks.reliability import determinism, file_fuzz, kills, settings_fuzz, soak, state_fuzz
 from benchmarks.reliability.page import Kept, page
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.writing import write_atomically
@@ -26,24 +35,42 @@ FAILED = 1
 Row = dict[str, Any]
 
 
+def _one(row: Row) -> int:
+    """What a case counts for: itself."""
+    del row
+    return 1
+
+
 class Proof(NamedTuple):
     """One kind of case."""
 
     play: Callable[[int], Row]
     """A case, by its number; what it raises is a failure."""
     quick: int
-    """Cases of a quick run."""
+    """What a quick run comes to."""
     full: int
     limit_s: float
     """Of a case, on the clock."""
+    counts: Callable[[Row], int] = _one
+    """What a case comes to, in the unit of `quick` and `full`."""
 
 
 PROOFS = {
     "settings": Proof(settings_fuzz.play_number, 300, 10_000, 600.0),
     "states": Proof(state_fuzz.play_number, 1_000, 20_000, 120.0),
     "determinism": Proof(determinism.play_number, 2 * determinism.VARIANTS, 40 * determinism.VARIANTS, 600.0),
-    "soak": Proof(soak.play_number, 10, 2_000, 3600.0),
+    "kills": Proof(kills.play_number, 2 * kills.KILLS, 200, 600.0, kills.kills_of),
+    "files": Proof(
+        file_fuzz.play_number,
+        len(file_fuzz.LOADERS) * file_fuzz.BATCH,
+        len(file_fuzz.LOADERS) * file_fuzz.FILES,
+        600.0,
+        file_fuzz.files_of,
+    ),
+    "soak": Proof(soak.play_number, 1_000_000, soak.ROBOT_STEPS, 600.0, soak.robot_steps),
 }
+_MOST_CASES = 20_000
+"""Of a proof whose cases count for more than themselves."""
 
 
 @dataclass(frozen=True)
@@ -53,13 +80,17 @@ class Args:
     Attributes:
         proofs: Which; nothing = all of them.
         quick: A few minutes.
+        limit_s: Seconds of a proof after which no other case is begun; what is missing can be played later.
         results: Folder of what is kept.
+        mutants: Folder of what `benchmarks.reliability.mutants` kept.
         page: The page to write; nothing = none.
     """
 
     proofs: tuple[str, ...] = ()
     quick: bool = False
+    limit_s: float = math.inf
     results: Path = Path("results/reliability")
+    mutants: Path = Path("results/mutants")
     page: Path | None = None
 
 
@@ -72,28 +103,59 @@ def main(words: Sequence[str]) -> int:
     os.environ["ENTROPY_EXPLORE_ASSERT"] = "1"
     for name in args.proofs or PROOFS:
         proof = PROOFS[name]
-        carry_on(proof, args.results / f"{name}.jsonl", proof.quick if args.quick else proof.full)
-    kept = {name: Kept(rows_of(args.results / f"{name}.jsonl"), PROOFS[name].full) for name in PROOFS}
-    text = page(kept)
+        wanted = proof.quick if args.quick else proof.full
+        carry_on(proof, args.results / f"{name}.jsonl", wanted, args.limit_s)
+    kept = {name: _kept(proof, args.results / f"{name}.jsonl") for name, proof in PROOFS.items()}
+    folders = {file.stem: rows_of(file) for file in sorted(args.mutants.glob("*.jsonl"))}
+    text = page(kept, folders, rows_of(args.results / "coverage.jsonl"), versions())
     print(text)
     if args.page is not None:
         write_atomically(args.page, text.encode())
     return FAILED if any("failure" in row for each in kept.values() for row in each.rows) else 0
 
 
-def carry_on(proof: Proof, file: Path, cases: int) -> None:
-    """Play the cases from 0 that are not kept yet."""
+def _kept(proof: Proof, file: Path) -> Kept:
+    rows = rows_of(file)
+    return Kept(rows, sum(map(proof.counts, rows)), proof.full)
+
+
+def versions() -> dict[str, str]:
+    """Of what results depend on."""
+    names = ("numpy", "numba", "scipy", "torch", "gymnasium")
+    return {"Python": platform.python_version(), **{name: metadata.version(name) for name in names}}
+
+
+def carry_on(proof: Proof, file: Path, wanted: int, limit_s: float = math.inf) -> None:
+    """Play the cases from 0 that are not kept yet, until all that are kept come to what is wanted."""
+    begun_s = time.monotonic()
     file.parent.mkdir(parents=True, exist_ok=True)
-    known = {row["number"] for row in rows_of(file)}
-    missing = [number for number in range(cases) if number not in known]
-    with file.open("a", encoding="utf-8") as kept:
-        for number, outcome in run_each(proof.play, missing, 1, proof.limit_s, apart=True):
+    rows = rows_of(file)
+    known, reached = {row["number"] for row in rows}, sum(map(proof.counts, rows))
+    cases = wanted if proof.counts is _one else _MOST_CASES
+    missing = [number for number in range(cases) if number not in known] if reached < wanted else []
+    with (
+        file.open("a", encoding="utf-8") as kept,
+        closing(run_each(proof.play, missing, 1, proof.limit_s, apart=True)) as outcomes,
+    ):
+        for number, outcome in outcomes:
             row = {"failure": outcome.reason} if isinstance(outcome, Failure) else outcome
-            kept.write(json.dumps({"number": number, **row}) + "\n")
+            row = {"number": number, **row, "library": library_digest()}
+            kept.write(json.dumps(row) + "\n")
             kept.flush()
-            print(f"\r{file.stem}: {number + 1} of {cases}", end="", file=sys.stderr)
+            reached += proof.counts(row)
+            print(f"\r{file.stem}: {reached:,} of {wanted:,}", end="", file=sys.stderr)
+            if reached >= wanted or time.monotonic() - begun_s > limit_s:
+                break
     if missing:
         print(file=sys.stderr)
+
+
+@cache
+def library_digest() -> str:
+    """What the library's sources are, in a few letters: rows of other sources were played by other code."""
+    folder = Path(entropy_explore_env.__file__).parent
+    sources = b"".join(path.read_bytes() for path in sorted(folder.rglob("*.py")))
+    return hashlib.sha256(sources).hexdigest()[:12]
 
 
 def rows_of(file: Path) -> list[Row]:

@@ -1,10 +1,12 @@
 """Mutation testing: small faults put into a file's functions, and whether the tests find each of them.
 
-    python -m benchmarks.reliability.mutants entropy_explore_env/missions/tick.py --sample 30
+    python -m benchmarks.reliability.mutants entropy_explore_env/missions --sample 100
 
 A fault is a comparison or a sum turned round, a condition denied, a number off by one, a statement left out.
-Each runs in a copy of the checkout. A fault is found where a test fails or the tests take too long. Results
-are kept in `results/mutants`, a line each; what has one is not run again.
+Each runs in a copy of the checkout. A fault is found where a test fails or takes too long. Kernels are
+interpreted, because compiling them takes most of a minute for each fault; so only the tests that pass that
+way within a second or two are run, those of the file itself first. Results are kept in `results/mutants`, a
+line each; what has one is not run again.
 """
 
 from __future__ import annotations
@@ -19,12 +21,13 @@ import shutil
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from baselines.cli.arguments import Positional, parse, run_command
+from benchmarks.reliability.quick_tests import LIMIT, PASSED
 from entropy_explore_env.errors import SettingError
 
 SURVIVED = 1
@@ -52,14 +55,15 @@ class Mutant(NamedTuple):
 
 @dataclass(frozen=True)
 class Args:
-    """Put faults into a file's functions, and see whether the tests find them.
+    """Put faults into the functions of a file, or of a folder's files, and see whether the tests find them.
 
     Attributes:
-        path: The file, from the root of the checkout.
+        path: The file or the folder, from the root of the checkout.
         sample: How many faults are drawn; 0 = all.
         seed: Of the draw.
-        tests: What pytest runs; nothing = the folder of tests of the file's package, and the golden missions.
-        limit_s: Of the tests for one fault.
+        tests: What pytest runs; nothing = the folder of tests of the package, and that of missions.
+        test_s: Seconds of the processor that a test may take without a fault, to be run at all.
+        limit_s: On the clock, of the tests for one fault.
         out: Folder of the results.
     """
 
@@ -67,6 +71,7 @@ class Args:
     sample: int = 30
     seed: int = 0
     tests: tuple[str, ...] = ()
+    test_s: float = 1.5
     limit_s: float = 900.0
     out: Path = Path("results/mutants")
 
@@ -174,42 +179,75 @@ def _replaced(tree: ast.Module, old: ast.stmt, new: ast.stmt) -> str:
     raise LookupError(_head(old))
 
 
+class Drawn(NamedTuple):
+    """A fault, and the file that it is put into."""
+
+    path: Path
+    mutant: Mutant
+
+    @property
+    def digest(self) -> str:
+        """What it is known by."""
+        return hashlib.sha256(f"{self.path}{self.mutant.source}".encode()).hexdigest()[:16]
+
+
+def drawn_faults(root: Path, path: Path, sample: int, seed: int) -> tuple[list[Drawn], int]:
+    """Faults drawn from a file or the files of a folder, and how many there are in all."""
+    files = sorted((root / path).rglob("*.py")) if (root / path).is_dir() else [root / path]
+    every = [
+        Drawn(file.relative_to(root), mutant)
+        for file in files
+        for mutant in mutants_of(file.read_text("utf-8"))
+    ]
+    chosen = every if sample <= 0 else random.Random(seed).sample(every, min(sample, len(every)))
+    return chosen, len(every)
+
+
 def main(words: Sequence[str]) -> int:
     """Run the command; 1 where a fault was not found."""
     args = parse(Args, words)
     root, path = Path(__file__).parents[2], Path(args.path)
-    if not (root / path).is_file() or path.suffix != ".py":
-        raise SettingError("path", args.path, "a Python file, from the root of the checkout")
-    every = mutants_of((root / path).read_text("utf-8"))
-    drawn = (
-        every if args.sample <= 0 else random.Random(args.seed).sample(every, min(args.sample, len(every)))
-    )
-    tests = args.tests or (str(Path("tests", *path.parts[1:-1])), "tests/golden")
+    if not (root / path).is_dir() and (not (root / path).is_file() or path.suffix != ".py"):
+        raise SettingError("path", args.path, "a Python file or a folder, from the root of the checkout")
+    drawn, every = drawn_faults(root, path, args.sample, args.seed)
     args.out.mkdir(parents=True, exist_ok=True)
     kept = args.out / f"{'.'.join(path.with_suffix('').parts)}.jsonl"
-    known = (
-        {row["digest"]: row for row in map(json.loads, kept.read_text("utf-8").splitlines())}
-        if kept.exists()
-        else {}
-    )
-    survivors = 0
-    with tempfile.TemporaryDirectory() as folder:
-        _copy(root, Path(folder))
-        for number, mutant in enumerate(sorted(drawn), 1):
-            digest = hashlib.sha256(f"{mutant.source}{tests}".encode()).hexdigest()
-            if digest not in known:
-                (Path(folder) / path).write_text(mutant.source, "utf-8")
-                found = _found(Path(folder), tests, args.limit_s)
-                known[digest] = {"digest": digest, "line": mutant.line, "what": mutant.what, "found": found}
-                with kept.open("a", encoding="utf-8") as file:
-                    file.write(json.dumps(known[digest]) + "\n")
-            found = known[digest]["found"]
-            survivors += not found
-            print(
-                f"{number}/{len(drawn)} line {mutant.line}: {found or 'SURVIVED'}: {mutant.what}", flush=True
-            )
-    print(f"{len(drawn) - survivors} of {len(drawn)} faults were found, of {len(every)} that there are")
+    lines = kept.read_text("utf-8").splitlines() if kept.exists() else []
+    known = {row["digest"]: row for row in map(json.loads, lines)}
+    if any(fault.digest not in known for fault in drawn):
+        package = path.parts[1] if (root / path).is_dir() else path.parent.parts[1]
+        tests = args.tests or tuple(dict.fromkeys((f"tests/{package}", "tests/missions")))
+        with tempfile.TemporaryDirectory() as folder:
+            _copy(root, Path(folder))
+            quick = _quick_tests(Path(folder), tests, args.test_s)
+            print(f"{len(quick)} tests are quick enough", flush=True)
+            for fault in drawn:
+                if fault.digest not in known:
+                    row = _row(Path(folder), fault, quick, args.limit_s)
+                    known[fault.digest] = row
+                    with kept.open("a", encoding="utf-8") as file:
+                        file.write(json.dumps(row) + "\n")
+                    print(
+                        f"{row['path']}:{row['line']}: {row['found'] or 'SURVIVED'}: {row['what']}",
+                        flush=True,
+                    )
+    survivors = sum(not known[fault.digest]["found"] for fault in drawn)
+    print(f"{len(drawn) - survivors} of {len(drawn)} faults were found, of {every} that there are")
     return SURVIVED if survivors else 0
+
+
+def _row(folder: Path, fault: Drawn, quick: Sequence[str], limit_s: float) -> dict[str, Any]:
+    """What came of a fault in a copy of the checkout."""
+    file, mutant = folder / fault.path, fault.mutant
+    sound = file.read_bytes()
+    file.write_text(mutant.source, "utf-8")
+    own = f"test_{fault.path.stem}.py"
+    try:
+        found = _found(folder, sorted(quick, key=lambda test: own not in test), limit_s)
+    finally:
+        file.write_bytes(sound)
+    what = {"path": str(fault.path), "line": mutant.line, "what": mutant.what, "found": found}
+    return {"digest": fault.digest, **what}
 
 
 def _copy(root: Path, folder: Path) -> None:
@@ -223,21 +261,40 @@ def _copy(root: Path, folder: Path) -> None:
             shutil.copyfile(root / name, folder / name)
 
 
+def _quick_tests(folder: Path, tests: Sequence[str], test_s: float) -> list[str]:
+    """Names of the tests that pass with interpreted kernels within so many seconds each."""
+    passed = folder / "passed.txt"
+    _pytest(folder, tests, {LIMIT: str(test_s), PASSED: str(passed)}, None)
+    return passed.read_text("utf-8").splitlines()
+
+
 def _found(folder: Path, tests: Sequence[str], limit_s: float) -> str:
     """Which test failed, or "late"; empty = none did."""
-    words = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", *tests]
-    kernels = str(folder / "kernels")  # of faults: they would drive others from the user's folder
-    variables = {**os.environ, "PYTHONPATH": str(folder), "NUMBA_CACHE_DIR": kernels}
+    (folder / "chosen.txt").write_text("\n".join(tests), "utf-8")
     try:
-        done = subprocess.run(
-            words, cwd=folder, env=variables, capture_output=True, text=True, timeout=limit_s, check=False
-        )
+        done = _pytest(folder, ["-x", "@chosen.txt"], {LIMIT: "30"}, limit_s)
     except subprocess.TimeoutExpired:
         return "late"
     if done.returncode == 0:
         return ""
     failed = [line for line in done.stdout.splitlines() if line.startswith(("FAILED", "ERROR"))]
     return failed[0].partition(" - ")[0] if failed else f"exit code {done.returncode}"
+
+
+def _pytest(
+    folder: Path, words: Sequence[str], variables: Mapping[str, str], limit_s: float | None
+) -> subprocess.CompletedProcess[str]:
+    """Run pytest in a copy of the checkout, with interpreted kernels."""
+    plugins = ["-p", "no:cacheprovider", "-p", "benchmarks.reliability.quick_tests"]
+    return subprocess.run(
+        [sys.executable, "-m", "pytest", "-q", "-W", "ignore", *plugins, *words],
+        cwd=folder,
+        env={**os.environ, "PYTHONPATH": str(folder), "NUMBA_DISABLE_JIT": "1", **variables},
+        capture_output=True,
+        text=True,
+        timeout=limit_s,
+        check=False,
+    )
 
 
 if __name__ == "__main__":

@@ -3,43 +3,109 @@
 from __future__ import annotations
 
 from collections import Counter, defaultdict
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
+from benchmarks.reliability.file_fuzz import FILES
 from benchmarks.reliability.settings_fuzz import STEPS, WATCHDOG_S
-from benchmarks.reliability.soak import ROBOT_STEPS
 
-_SETTLED = 20
-"""Cases of soak after which memory is taken for settled: 10⁶ robot-steps."""
+Row = Mapping[str, Any]
+_SETTLED_STEPS = 1_000_000
+"""Robot-steps of a process after which its memory is taken for settled."""
+_MUTANTS, _SHARE_FOUND, _SHARE_COVERED = 300, 0.9, 0.95
 
 
 class Kept(NamedTuple):
     """What is kept of a proof."""
 
-    rows: Sequence[Mapping[str, Any]]
-    planned: int
-    """Cases of a full run."""
+    rows: Sequence[Row]
+    reached: int
+    """What the rows come to: cases, robot-steps, kills or files."""
+    asked: int
+    """What a full run comes to."""
 
 
-def page(kept: Mapping[str, Kept]) -> str:
-    """The page as Markdown."""
+def page(
+    kept: Mapping[str, Kept],
+    mutants: Mapping[str, Sequence[Row]],
+    coverage: Sequence[Row],
+    versions: Mapping[str, str],
+) -> str:
+    """The page as Markdown.
+
+    Args:
+        kept: Of each proof.
+        mutants: Of each file or folder whose faults were drawn.
+        coverage: A row a source file.
+        versions: Of what results depend on.
+    """
     lines = [
         "# Reliability",
         "",
-        "Made by `python -m benchmarks.reliability --page` and the path of this file.",
+        "Made by `python -m benchmarks.reliability --page docs/results/reliability.md`, with "
+        + ", ".join(f"{name} {version}" for name, version in versions.items())
+        + ". What was played is kept, and the page says how much of what is asked for it comes to: "
+        "`make reliability` goes on from there.",
         "",
     ]
-    for name, (title, summary) in _SUMMARIES.items():
-        rows, planned = kept[name]
-        played = [row for row in rows if "failure" not in row]
+    lines += [_overview(kept, mutants, coverage), ""]
+    for name, (title, unit, summary) in _SUMMARIES.items():
+        rows, reached, asked = kept[name]
         failed = [row for row in rows if "failure" in row]
-        lines += [f"## {title}", "", f"{len(rows):,} of {planned:,} cases played, {len(failed):,} failed."]
+        lines += [f"## {title}", "", f"{reached:,} of {asked:,} {unit}; {len(failed):,} cases failed."]
+        played = [row for row in rows if "failure" not in row]
         lines += [summary(played)] if played else []
+        lines += [_played_by(rows)] if rows else []
         lines += ["", *(f"- case {row['number']}: {row['failure'][:300]}" for row in failed[:20]), ""]
-    return "\n".join(lines).rstrip() + "\n"
+    lines += ["## Faults in formulas", "", _mutants(mutants), ""]
+    lines += ["## Branches", "", _coverage(coverage), ""]
+    return "\n".join(_without_double(lines)).rstrip() + "\n"
 
 
-def _settings(rows: Sequence[Mapping[str, Any]]) -> str:
+def _without_double(lines: Iterable[str]) -> list[str]:
+    """Lines without an empty one after another."""
+    found: list[str] = []
+    for line in lines:
+        if line or not found or found[-1]:
+            found.append(line)
+    return found
+
+
+def _overview(kept: Mapping[str, Kept], mutants: Mapping[str, Sequence[Row]], coverage: Sequence[Row]) -> str:
+    """What is asked for and not reached, in one list."""
+    missing = [
+        f"{_SUMMARIES[name][0]}: {each.reached:,} of {each.asked:,} {_SUMMARIES[name][1]}"
+        for name, each in kept.items()
+        if each.reached < each.asked
+    ]
+    faults = {row["digest"]: row for rows in mutants.values() for row in rows}
+    if len(faults) < _MUTANTS:
+        missing.append(f"Faults in formulas: {len(faults)} of {_MUTANTS} drawn")
+    if faults and _share_found(faults.values()) < _SHARE_FOUND:
+        missing.append(
+            f"Faults in formulas: {_share_found(faults.values()):.0%} found, {_SHARE_FOUND:.0%} asked for"
+        )
+    if not coverage:
+        missing.append("Branches: not measured")
+    elif _share_covered(coverage) < _SHARE_COVERED:
+        missing.append(f"Branches: {_share_covered(coverage):.1%} covered, {_SHARE_COVERED:.0%} asked for")
+    failed = sum("failure" in row for each in kept.values() for row in each.rows)
+    said = f"Cases that failed: {failed}."
+    return (
+        f"{said} Asked for and not reached:\n\n" + "\n".join(f"- {m}" for m in missing) if missing else said
+    )
+
+
+def _played_by(rows: Sequence[Row]) -> str:
+    """By how many states of the library's sources."""
+    states = Counter(row.get("library", "an older one") for row in rows)
+    if len(states) == 1:
+        return f"All of them by the library whose sources have the digest {next(iter(states))}."
+    latest = rows[-1].get("library")
+    return f"They were played by {len(states)} states of the library's sources, the latest {latest}."
+
+
+def _settings(rows: Sequence[Row]) -> str:
     refused = Counter(field for row in rows for field in row["refused"])
     most = ", ".join(f"{field} ({count:,})" for field, count in refused.most_common(3))
     slowest = max(row["seconds"] for row in rows)
@@ -51,7 +117,7 @@ def _settings(rows: Sequence[Mapping[str, Any]]) -> str:
     )
 
 
-def _states(rows: Sequence[Mapping[str, Any]]) -> str:
+def _states(rows: Sequence[Row]) -> str:
     refused = sum(bool(row["refused"]) for row in rows)
     return (
         f"Each is a saved state, one number changed. {refused:,} were refused by name and changed nothing; "
@@ -59,7 +125,7 @@ def _states(rows: Sequence[Mapping[str, Any]]) -> str:
     )
 
 
-def _determinism(rows: Sequence[Mapping[str, Any]]) -> str:
+def _determinism(rows: Sequence[Row]) -> str:
     digests = defaultdict(set)
     for row in rows:
         digests[row["scenario"]].add(row["digest"])
@@ -67,23 +133,134 @@ def _determinism(rows: Sequence[Mapping[str, Any]]) -> str:
     variants = len({row["variant"] for row in rows})
     said = f"differences in drawn scenarios {differing}" if differing else "no difference"
     return (
-        f"{len(digests):,} drawn scenarios, each in {variants} processes that differ in processor level, "
-        f"threads, missions beside it, hash seed and start method: {said}."
+        f"{len(digests):,} drawn scenarios, each in up to {variants} processes that differ in processor "
+        f"level, threads, missions beside it, hash seed and start method: {said}."
     )
 
 
-def _soak(rows: Sequence[Mapping[str, Any]]) -> str:
-    said = f"{len(rows) * ROBOT_STEPS:,} robot-steps, the contract checked at each."
-    memory = [row["resident_mib"] for row in sorted(rows, key=lambda row: row["number"])]
-    if len(memory) <= _SETTLED:
-        return said
-    settled, end = memory[_SETTLED], memory[-1]
-    return f"{said} Resident memory was {settled:.0f} MiB after 10⁶, and {end:.0f} MiB at the end."
+def _kills(rows: Sequence[Row]) -> str:
+    moments = sorted(count for row in rows for count in row["missions_kept"])
+    written = sum(row["checkpoints_written"] for row in rows)
+    return (
+        f"As many kills of sweeps, when {moments[0]} to {moments[-1]} of their 24 missions were kept, and as "
+        f"many of a trainer that wrote {written:,} checkpoints. No mission and no checkpoint was "
+        "lost, and every "
+        "sweep ended with the bytes of one that nobody stopped."
+    )
 
 
-_SUMMARIES: Mapping[str, tuple[str, Callable[[Sequence[Mapping[str, Any]]], str]]] = {
-    "settings": ("Drawn settings", _settings),
-    "states": ("Changed states", _states),
-    "determinism": ("Determinism", _determinism),
-    "soak": ("Soak", _soak),
+def _files(rows: Sequence[Row]) -> str:
+    table = [
+        f"{FILES:,} of each loader are asked for. Each must be read or refused by a named error, in little "
+        "time and memory, run nothing and read nothing outside its folder. Ended: the reading "
+        "process died and "
+        "was started anew, and an error was raised. Most MiB: the most that the process which reads "
+        "had held.",
+        "",
+        "| loader | files | read | refused | of these ended | most s | most MiB |",
+        "| --- | ---: | ---: | ---: | ---: | ---: | ---: |",
+    ]
+    loaders = dict.fromkeys(row["loader"] for row in rows)
+    for loader in loaders:
+        own = [row for row in rows if row["loader"] == loader]
+        files, loaded, killed = (sum(row[name] for row in own) for name in ("files", "loaded", "killed"))
+        most_s, most_mib = max(row["most_s"] for row in own), max(row["most_mib"] for row in own)
+        cells = (loader, f"{files:,}", f"{loaded:,}", f"{files - loaded:,}", f"{killed:,}")
+        table.append("| " + " | ".join((*cells, f"{most_s:.2f}", f"{most_mib:.0f}")) + " |")
+    return "\n".join(table) + "\n"
+
+
+def _soak(rows: Sequence[Row]) -> str:
+    ordered = sorted(rows, key=lambda row: row["number"])
+    within = max(row["resident_mib"] / row["settled_mib"] - 1.0 for row in ordered)
+    lines = [
+        "At each step: observations in their spaces, rewards finite, time never backwards, ends said, bits "
+        "gained equal to the entropy lost, every number of the state in its range; every voxel each "
+        "200 steps.",
+        f"Within a case resident memory grew by {max(within, 0.0):.1%} at most after its first fifth.",
+        *_memory(ordered),
+        "",
+        "| scenario | robot-steps | missions | robot-steps/s |",
+        "| --- | ---: | ---: | ---: |",
+    ]
+    for name in dict.fromkeys(row["scenario"] for row in ordered):
+        own = [row for row in ordered if row["scenario"] == name]
+        steps, missions, seconds = (
+            sum(row[k] for row in own) for k in ("robot_steps", "missions", "seconds")
+        )
+        lines.append(f"| {name} | {steps:,} | {missions:,} | {steps / seconds:,.0f} |")
+    return "\n".join(lines) + "\n"
+
+
+def _memory(rows: Sequence[Row]) -> Iterable[str]:
+    """How far the memory of each process grew after its first 10⁶ robot-steps, at its end and at most."""
+    for process in dict.fromkeys(row["process"] for row in rows):
+        steps, settled = 0, 0.0
+        own = [row for row in rows if row["process"] == process]
+        later: list[float] = []
+        for row in own:
+            if steps >= _SETTLED_STEPS:
+                settled = settled or row["settled_mib"]
+                later.append(row["resident_mib"])
+            steps += row["robot_steps"]
+        if later:
+            yield (
+                f"A process of {steps:,} robot-steps held {settled:.0f} MiB after the first 10⁶, then "
+                f"{max(later):.0f} MiB at most and {later[-1]:.0f} MiB at its end; scenarios take turns."
+            )
+
+
+def _share_found(rows: Iterable[Row]) -> float:
+    found = [bool(row["found"]) for row in rows]
+    return sum(found) / len(found)
+
+
+def _mutants(mutants: Mapping[str, Sequence[Row]]) -> str:
+    faults = {row["digest"]: row for rows in mutants.values() for row in rows}
+    if not faults:
+        return "None drawn yet: `python -m benchmarks.reliability.mutants entropy_explore_env/missions`."
+    lines = [
+        f"{len(faults)} faults put into formulas, one at a time (`python -m "
+        "benchmarks.reliability.mutants`); "
+        f"{_share_found(faults.values()):.1%} were found by a test. Only tests that are quick with "
+        "interpreted kernels were run, so that a fault not found here may be found by others.",
+        "",
+        "| file | faults | found |",
+        "| --- | ---: | ---: |",
+    ]
+    for path in sorted({row["path"] for row in faults.values()}):
+        own = [row for row in faults.values() if row["path"] == path]
+        lines.append(f"| {path} | {len(own)} | {sum(bool(row['found']) for row in own)} |")
+    survivors = [row for row in faults.values() if not row["found"]]
+    lines += ["", *(f"- not found: {row['path']}:{row['line']}: `{row['what']}`" for row in survivors)]
+    return "\n".join(lines)
+
+
+def _share_covered(rows: Sequence[Row]) -> float:
+    return sum(row["covered"] for row in rows) / max(sum(row["branches"] for row in rows), 1)
+
+
+def _coverage(rows: Sequence[Row]) -> str:
+    if not rows:
+        return "Not measured yet: `python -m benchmarks.reliability.coverage`."
+    lines = [
+        f"With kernels interpreted, {_share_covered(rows):.1%} of branches were taken by the tests that are "
+        "quick that way (`python -m benchmarks.reliability.coverage`).",
+        "",
+        "| folder | branches | taken |",
+        "| --- | ---: | ---: |",
+    ]
+    for folder in dict.fromkeys(row["path"].rpartition("/")[0] for row in rows):
+        own = [row for row in rows if row["path"].rpartition("/")[0] == folder]
+        lines.append(f"| {folder} | {sum(row['branches'] for row in own)} | {_share_covered(own):.1%} |")
+    return "\n".join(lines)
+
+
+_SUMMARIES: Mapping[str, tuple[str, str, Callable[[Sequence[Row]], str]]] = {
+    "settings": ("Drawn settings", "scenarios", _settings),
+    "states": ("Changed states", "states", _states),
+    "determinism": ("Determinism", "processes", _determinism),
+    "kills": ("Kills", "kills", _kills),
+    "files": ("Changed files", "files", _files),
+    "soak": ("Soak", "robot-steps", _soak),
 }

@@ -150,5 +150,8 @@ def _check(env: EntropyExploreEnv, observations: dict, rewards: dict, earlier_s:
 
 
 def play_number(number: int) -> dict[str, Any]:
-    """The case of a number, as what is kept of it."""
-    return dataclasses.asdict(play(Task(number)))
+    """The case of a number, as what is kept of it.
+
+    One in a hundred has any parts of an observation: others would compile for hours.
+    """
+    return dataclasses.asdict(play(Task(number, few_kernels=number % 100 > 0)))

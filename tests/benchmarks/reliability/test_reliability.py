@@ -1,18 +1,27 @@
-"""The command of the proofs: what is kept is not played again, failures are counted and shown."""
+"""The command of the proofs, a bounded run of each, and the page: what is kept, failed and missing."""
 
 from __future__ import annotations
 
 import json
+import random
 
+import numpy as np
 import pytest
 
 from benchmarks.reliability import __main__ as command
-from benchmarks.reliability import determinism, page, soak
+from benchmarks.reliability import determinism, kills, page, soak
 from benchmarks.reliability.__main__ import PROOFS, Proof, carry_on, main, rows_of
 from benchmarks.reliability.page import Kept
-from entropy_explore_env.errors import SettingError
+from benchmarks.reliability.settings_fuzz import BrokenPromiseError
+from entropy_explore_env.envs.vector_env import EntropyExploreVectorEnv
+from entropy_explore_env.errors import RecordError, SettingError
 
-EMPTY = {name: Kept((), 10) for name in PROOFS}
+EMPTY = {name: Kept((), 0, 10) for name in PROOFS}
+NO_MORE = ({}, (), {"numpy": "2"})
+
+
+def kept(name, rows):
+    return page.page({**EMPTY, name: Kept(rows, len(rows), 10)}, *NO_MORE)
 
 
 def fails_at_three(number):
@@ -24,11 +33,11 @@ def fails_at_three(number):
 def test_a_run_goes_on_where_it_was(tmp_path, capsys):
     file, proof = tmp_path / "kept" / "squares.jsonl", Proof(fails_at_three, 2, 5, 60.0)
     carry_on(proof, file, 2)
-    assert rows_of(file) == [{"number": 0, "square": 0}, {"number": 1, "square": 1}]
+    assert [row["square"] for row in rows_of(file)] == [0, 1]
     carry_on(proof, file, 5)
     rows = sorted(rows_of(file), key=lambda row: row["number"])
     assert [row.get("square") for row in rows] == [0, 1, 4, None, 16]
-    assert rows[3] == {"number": 3, "failure": "ValueError: three"}
+    assert (rows[3]["number"], rows[3]["failure"]) == (3, "ValueError: three")
     before = file.read_bytes()
     carry_on(proof, file, 5)
     assert file.read_bytes() == before
@@ -43,10 +52,17 @@ def test_the_page_says_what_was_played_and_what_failed(tmp_path, monkeypatch, ca
         {"number": 2, "failure": "ran past 600 s on the clock"},
     ]
     (tmp_path / "settings.jsonl").write_text("".join(json.dumps(row) + "\n" for row in rows))
-    where = ["--results", str(tmp_path), "--page", str(tmp_path / "page.md")]
+    where = [
+        "--results",
+        str(tmp_path),
+        "--mutants",
+        str(tmp_path / "none"),
+        "--page",
+        str(tmp_path / "page.md"),
+    ]
     assert main(where) == 1
     text = (tmp_path / "page.md").read_text("utf-8")
-    assert "3 of 10,000 cases played, 1 failed." in text and "- case 2: ran past 600 s" in text
+    assert "3 of 10,000 scenarios; 1 cases failed." in text and "- case 2: ran past 600 s" in text
     assert "slowest took 1.2 s; 4 episodes" in text and "Robot.reach_m (1)" in text
     (tmp_path / "settings.jsonl").unlink()
     assert main(where) == 0
@@ -60,14 +76,56 @@ def test_digests_that_differ_and_memory_that_grows_are_shown():
     same = [told, {**told, "variant": 1, "number": 1}]
     other = [*same, {**told, "variant": 2, "digest": "b", "number": 2}]
     for rows, said in (
-        (same, "1 drawn scenarios, each in 2"),
+        (same, "1 drawn scenarios, each in up to 2"),
         (same, "no difference"),
         (other, "scenarios [4]"),
     ):
-        assert said in page.page({**EMPTY, "determinism": Kept(rows, 10)})
-    rows = [{"number": n, "resident_mib": 100.0 + n, "episodes": 1} for n in range(25)]
-    text = page.page({**EMPTY, "soak": Kept(rows[::-1], 30)})
-    assert "1,250,000 robot-steps" in text and "120 MiB after 10⁶, and 124 MiB" in text
+        assert said in kept("determinism", rows)
+    case = {"scenario": "room", "robot_steps": 600_000, "missions": 2, "seconds": 6.0, "process": 1}
+    rows = [{**case, "number": n, "settled_mib": 100.0 + n, "resident_mib": 101.0 + n} for n in range(5)]
+    text = kept("soak", rows[::-1])
+    assert "| room | 3,000,000 | 10 | 100,000 |" in text and "by 1.0% at most" in text
+    assert "3,000,000 robot-steps held 102 MiB after the first 10⁶, then 105 MiB at most" in text
+
+
+def test_the_page_says_what_is_asked_for_and_not_reached():
+    faults = [
+        {"digest": "a", "path": "x/y.py", "line": 3, "what": "1  ->  2", "found": "late"},
+        {"digest": "b", "path": "x/y.py", "line": 4, "what": "2  ->  3", "found": ""},
+    ]
+    branches = [
+        {"path": "x/y.py", "branches": 8, "covered": 6},
+        {"path": "x/z.py", "branches": 2, "covered": 2},
+    ]
+    text = page.page(EMPTY, {"x": faults}, branches, {"numpy": "2"})
+    assert "- Kills: 0 of 10 kills" in text and "- Faults in formulas: 2 of 300 drawn" in text
+    assert "- Faults in formulas: 50% found, 90% asked for" in text and "80.0% covered" in text
+    assert "| x/y.py | 2 | 1 |" in text and "- not found: x/y.py:4: `2  ->  3`" in text
+    assert "| x | 10 | 80.0% |" in text and "with numpy 2." in text
+
+
+def test_rows_of_other_sources_are_told_apart():
+    rows = [{"number": n, "refused": [], "seconds": 0.5, "episodes": 1, "library": "ab"} for n in range(2)]
+    assert "whose sources have the digest ab." in kept("settings", rows)
+    assert "2 states of the library's sources" in kept("settings", [*rows, {**rows[0], "library": "cd"}])
+
+
+def test_a_proof_stops_at_what_is_asked_for_and_at_its_time(tmp_path, capsys):
+    counted = Proof(counts_for_seven, 10, 20, 60.0, seven)
+    carry_on(counted, tmp_path / "sevens.jsonl", 20)
+    assert [row["number"] for row in rows_of(tmp_path / "sevens.jsonl")] == [0, 1, 2]
+    carry_on(counted, tmp_path / "sevens.jsonl", 70, limit_s=0.0)
+    assert len(rows_of(tmp_path / "sevens.jsonl")) == 4
+    assert len({row["library"] for row in rows_of(tmp_path / "sevens.jsonl")}) == 1
+    assert "sevens: 28 of 70" in capsys.readouterr().err
+
+
+def counts_for_seven(number):
+    return {"seven": 7}
+
+
+def seven(row):
+    return row["seven"]
 
 
 def test_a_digest_does_not_depend_on_threads_or_company():
@@ -76,5 +134,47 @@ def test_a_digest_does_not_depend_on_threads_or_company():
 
 
 def test_a_piece_of_soak(monkeypatch):
-    monkeypatch.setattr(soak, "ROBOT_STEPS", 60)
-    assert soak.play_number(0)["resident_mib"] > 10.0
+    monkeypatch.setattr(soak, "CASE_S", 0.2)
+    box = list(soak.SCENARIOS).index("box-7x11x5")
+    row = soak.play_number(box)
+    assert row["resident_mib"] > 10.0 and row["scenario"] == "box-7x11x5"
+    assert soak.robot_steps(row) >= 256 and soak.robot_steps({"failure": "x"}) == 0
+
+
+@pytest.fixture
+def soaked():
+    env = EntropyExploreVectorEnv("box-7x11x5", 3)
+    env.reset(seed=0)
+    before = soak._moment(env)
+    return env, before, env.step(np.full(env.action_space.shape, 0.3, np.float32))
+
+
+def test_what_leaves_the_contract_is_found_in_a_soak(soaked):
+    env, before, stepped = soaked
+    soak.check_step(env, stepped, before, maps=True)
+    with pytest.raises(BrokenPromiseError, match="time went from"):
+        soak.check_step(env, stepped, before._replace(time_s=before.time_s + 9.0), maps=False)
+    with pytest.raises(BrokenPromiseError, match="bits gained"):
+        soak.check_step(env, stepped, before._replace(entropy_bits=before.entropy_bits + 1.0), maps=False)
+    with pytest.raises(BrokenPromiseError, match="rewards"):
+        soak.check_step(env, (stepped[0], stepped[1] * np.nan, *stepped[2:]), before, maps=False)
+    with pytest.raises(BrokenPromiseError, match="missions end"):
+        soak.check_step(env, (*stepped[:2], ~stepped[2], *stepped[3:]), before, maps=False)
+    env.missions.mean[1, 0, 2, 3, 4] = 1.5
+    soak.check_step(env, stepped, before, maps=False)
+    with pytest.raises(RecordError, match=r"mean\[1, 0"):
+        soak.check_step(env, stepped, before, maps=True)
+    env.missions.observations[2, 1, 5] = np.nan
+    env.missions.observations[0, 0, 0] = -1.0
+    with pytest.raises(BrokenPromiseError, match="2 numbers of observations"):
+        soak.check_step(env, stepped, before, maps=False)
+
+
+def test_a_few_kills_of_a_trainer(tmp_path, monkeypatch):
+    monkeypatch.setattr(kills, "KILLS", 3)
+    assert kills.kill_trainer(tmp_path / "run", random.Random(0)) >= 3
+
+
+@pytest.mark.long
+def test_kills_of_a_sweep(tmp_path):
+    assert len(kills.kill_sweep(tmp_path / "sweep", random.Random(0))) == kills.KILLS

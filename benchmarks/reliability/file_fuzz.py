@@ -1,0 +1,64 @@
+"""Changed files of every kind that the library and the trainers read: worlds, records, checkpoints.
+
+Files of worlds are changed and read by `tests/worlds/fuzz.py`, in the reading process that reads them for
+people; records and checkpoints by `saved_files`.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from benchmarks.reliability.saved_files import KINDS, play_files
+
+BATCH = 500
+"""Files of a case."""
+FILES = 100_000
+"""Asked for of each loader."""
+WORLDS = (
+    "octomap",
+    "map_server",
+    "image",
+    "height png",
+    "pcd",
+    "ply",
+    "obj",
+    "stl",
+    "glb",
+    "height npz",
+    "geotiff",
+    "world npz",
+)
+"""Loaders of worlds, as tests/worlds/samples.py names them."""
+LOADERS = (*KINDS, *WORLDS)
+
+
+def play_number(number: int) -> dict[str, Any]:
+    """Change and read the next batch of files of one loader; the loaders take turns."""
+    batch, which = divmod(number, len(LOADERS))
+    loader, seed = LOADERS[which], batch * len(LOADERS) + which
+    with tempfile.TemporaryDirectory() as folder:
+        if loader in KINDS:
+            kind = KINDS[loader](Path(folder))
+            found = play_files(kind, Path(folder) / "changed", BATCH, seed)
+        else:
+            found = _play_worlds(loader, Path(folder), seed)
+    wrong = found.pop("wrong")
+    row = {"loader": loader, **found}
+    return {**row, "failure": f"{loader}: " + "; ".join(wrong[:5])} if wrong else row
+
+
+def _play_worlds(loader: str, folder: Path, seed: int) -> dict[str, Any]:
+    from tests.worlds.fuzz import fuzz
+    from tests.worlds.samples import samples
+
+    found = asdict(fuzz(samples()[loader], BATCH, seed, folder))
+    del found["causes"]
+    return found
+
+
+def files_of(row: dict[str, Any]) -> int:
+    """What a case counts for; one that ended with an error of its own for nothing."""
+    return row.get("files", 0)

@@ -1,0 +1,184 @@
+"""Sweeps and trainers killed at drawn moments: nothing that was done is lost, results are the same bytes.
+
+A sweep is killed several times before its last mission, and then ends; all that it writes, but times on the
+clock, is compared with what one wrote that nobody stopped. A trainer that does nothing but write checkpoints
+is killed while it does; the latest that is found has to be whole, and no older than the last that it wrote.
+"""
+
+from __future__ import annotations
+
+import io
+import os
+import random
+import re
+import signal
+import tempfile
+import time
+from collections.abc import Callable
+from contextlib import redirect_stderr, redirect_stdout
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from benchmarks.reliability.settings_fuzz import BrokenPromiseError
+
+KILLS = 10
+"""Of a case."""
+_SWEEP = ("--scenarios", "box-7x11x5", "--robots", "1,2", "--time-limit-s", "150")
+_WORDS = (*_SWEEP, "--strategies", "gradient", "--seeds", "6", "--jobs", "1")
+_MISSIONS = 24
+"""Two strategies (the baseline is added), two team sizes, six seeds."""
+_MILLISECONDS = re.compile(rb"\| [0-9.,-]+ \| [0-9.,-]+ \|$", re.MULTILINE)
+"""The last two columns of the page's tables."""
+_WAIT_S = 300.0
+
+
+def play_number(number: int) -> dict[str, Any]:
+    """Kill a sweep and a trainer, each KILLS times.
+
+    Raises:
+        BrokenPromiseError: Something was lost, or came out otherwise.
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        moments = random.Random(number)
+        kept = kill_sweep(Path(folder) / "sweep", moments)
+        written = kill_trainer(Path(folder) / "trainer", moments)
+    return {"kills": KILLS, "missions_kept": kept, "checkpoints_written": written}
+
+
+def kills_of(row: dict[str, Any]) -> int:
+    """What a case counts for; one that failed for nothing."""
+    return row.get("kills", 0)
+
+
+def kill_sweep(folder: Path, moments: random.Random) -> list[int]:
+    """Kill a sweep; how many missions were kept each time."""
+    expected = _undisturbed()
+    kept: list[int] = []
+    targets = sorted(moments.sample(range(_MISSIONS - 1), KILLS))
+    for target in targets:
+        child = _start(lambda: _sweep(folder))
+        _until(lambda target=target: len(_missions(folder)) >= target, child)
+        time.sleep(moments.uniform(0.0, 0.01))
+        _kill(child)
+        kept.append(len(_missions(folder)))
+        if kept != sorted(kept):
+            raise BrokenPromiseError(f"a mission was lost: {kept}")
+        if kept[-1] >= _MISSIONS:
+            raise BrokenPromiseError("the sweep had ended before it was killed: no kill at all")
+    _sweep(folder)
+    found = contents(folder)
+    differing = [name for name in expected.keys() | found.keys() if expected.get(name) != found.get(name)]
+    if differing:
+        raise BrokenPromiseError(f"killed after {kept} missions, other bytes in {sorted(differing)}")
+    return kept
+
+
+@cache
+def _undisturbed() -> dict[str, bytes]:
+    with tempfile.TemporaryDirectory() as folder:
+        _sweep(Path(folder))
+        return contents(Path(folder))
+
+
+def _sweep(folder: Path) -> None:
+    from baselines import benchmark
+    from baselines.cli.arguments import run_command
+
+    with redirect_stdout(io.StringIO()), redirect_stderr(io.StringIO()):
+        code = run_command(benchmark.main, [*_WORDS, "--out", str(folder)])
+    if code:
+        raise BrokenPromiseError(f"the sweep ended with exit code {code}")
+
+
+def _missions(folder: Path) -> list[Path]:
+    return list(folder.rglob("seed-*.json"))
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    """All that a sweep wrote but missions and the clock; what a kill left of half files is nobody's."""
+    return {
+        str(path.relative_to(folder)): _MILLISECONDS.sub(b"|", path.read_bytes())
+        for path in sorted(folder.rglob("*"))
+        if path.is_file() and "runs" not in path.parts and path.name[0] != "." and path.name != "timing.csv"
+    }
+
+
+def kill_trainer(folder: Path, moments: random.Random) -> int:
+    """Kill who writes checkpoints; how many were written.
+
+    Each says in a file of its own, `told`, that it is written.
+    """
+    from training.checkpoints import latest_checkpoint, load_checkpoint
+
+    folder.mkdir()
+    told = folder.with_name("told")
+    told.write_text("0")
+    for _ in range(KILLS):
+        before = int(told.read_text())
+        child = _start(lambda before=before: _write_checkpoints(folder, told, before))
+        _until(lambda before=before: int(told.read_text() or 0) > before, child)
+        time.sleep(moments.uniform(0.0, 0.1))
+        _kill(child)
+        least = int(told.read_text() or before + 1)
+        steps = load_checkpoint(latest_checkpoint(folder, "step"), training=True).progress["steps"]
+        if steps < least:
+            raise BrokenPromiseError(
+                f"checkpoint {least} was written, and {steps} is the latest that is found"
+            )
+        told.write_text(str(steps))
+    return int(told.read_text())
+
+
+def _write_checkpoints(folder: Path, told: Path, before: int) -> None:
+    import torch
+
+    from entropy_explore_env.scenarios import BOX
+    from training.checkpoints import (
+        Checkpoint,
+        PolicySettings,
+        TrainerState,
+        checkpoint_name,
+        save_checkpoint,
+    )
+
+    steps = before
+    while True:
+        steps += 1
+        weights = {"layer": torch.full((100, 100), float(steps))}
+        state = TrainerState({"moments": torch.full((1000,), float(steps))}, {}, {"steps": steps})
+        kept = Checkpoint(PolicySettings(BOX), {"steps": steps}, weights, {}, state)
+        save_checkpoint(folder / checkpoint_name("step", steps), kept)
+        told.write_text(str(steps))
+
+
+def _start(work: Callable[[], None]) -> int:
+    """Do work in a forked process, which shares the imports and kernels; its number."""
+    child = os.fork()
+    if child == 0:
+        code = 1
+        try:
+            work()
+            code = 0
+        finally:
+            os._exit(code)
+    return child
+
+
+def _until(happened: Callable[[], bool], child: int) -> None:
+    """Wait until something has happened, or the process has ended.
+
+    Raises:
+        BrokenPromiseError: Neither comes.
+    """
+    begun_s = time.monotonic()
+    while not happened() and os.waitid(os.P_PID, child, os.WEXITED | os.WNOHANG | os.WNOWAIT) is None:
+        if time.monotonic() - begun_s > _WAIT_S:
+            _kill(child)
+            raise BrokenPromiseError(f"nothing happened for {_WAIT_S:g} s")
+        time.sleep(0.0005)
+
+
+def _kill(child: int) -> None:
+    os.kill(child, signal.SIGKILL)
+    os.waitpid(child, 0)

@@ -1,0 +1,283 @@
+"""What the library saves itself, changed: records of missions, and checkpoints of policies.
+
+Both hold digests of their content. So half of the changes are made inside, and the digests made right again:
+what reads the content has to bear anything, not only what it wrote. Each file must be read or refused by a
+named error, in little time and memory.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import json
+import resource
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
+from entropy_explore_env.errors import EntropyExploreError
+from entropy_explore_env.missions.simulation import Missions
+from entropy_explore_env.reports.mission_record import (
+    CommandRecorder,
+    given_worlds_of,
+    load_record,
+    reset_options_of,
+    save_record,
+)
+from entropy_explore_env.reports.record_versions import named_digest
+from entropy_explore_env.scenario import with_settings
+from entropy_explore_env.scenarios import BOX
+
+Change = Callable[[bytes, np.random.Generator], bytes]
+MOST_S = 5.0
+"""Of the processor, to read a file and to make what it describes."""
+MOST_GROWTH_MIB = 1024
+"""By which the process may grow."""
+_VALUES: tuple[Any, ...] = (None, True, -1, 0, 1e308, 2**40, 2**70, "x", "", [], {}, [[]], float("nan"))
+
+
+class Kind(NamedTuple):
+    """Files of one kind."""
+
+    files: dict[str, bytes]
+    """Name → content, sound."""
+    load: Callable[[Path], object]
+    """Reads those of a folder."""
+    repair: Callable[[dict[str, bytes]], dict[str, bytes]]
+    """Makes the digests right again, where that can be."""
+
+
+def truncated(data: bytes, rng: np.random.Generator) -> bytes:
+    """Without its end."""
+    return data[: int(rng.integers(0, len(data)))]
+
+
+def flipped(data: bytes, rng: np.random.Generator) -> bytes:
+    """With one to eight bits turned."""
+    changed = bytearray(data or b"0")
+    for _ in range(int(rng.integers(1, 9))):
+        changed[int(rng.integers(len(changed)))] ^= 1 << int(rng.integers(8))
+    return bytes(changed)
+
+
+def overwritten(data: bytes, rng: np.random.Generator) -> bytes:
+    """With some bytes replaced by noise."""
+    start, length = int(rng.integers(len(data))), int(rng.integers(1, 65))
+    return data[:start] + rng.bytes(length) + data[start + length :]
+
+
+def doubled(data: bytes, rng: np.random.Generator) -> bytes:
+    """With a piece some hundred times."""
+    start = int(rng.integers(len(data)))
+    piece = data[start : start + int(rng.integers(1, 200))]
+    return data[:start] + piece * int(rng.integers(2, 400)) + data[start:]
+
+
+def another_value(data: bytes, rng: np.random.Generator) -> bytes:
+    """JSON with one value replaced by one of another kind or size."""
+    try:
+        content = json.loads(data)
+    except ValueError:
+        content = None
+    if not isinstance(content, dict | list):
+        return flipped(data, rng)
+    holder: Any = content
+    while True:
+        keys = list(holder) if isinstance(holder, dict) else range(len(holder))
+        if not len(keys):
+            return json.dumps([]).encode()
+        key = keys[int(rng.integers(len(keys)))]
+        if not isinstance(holder[key], dict | list) or not holder[key] or rng.random() < 0.2:
+            holder[key] = _VALUES[int(rng.integers(len(_VALUES)))]
+            return json.dumps(content).encode()
+        holder = holder[key]
+
+
+def another_array(data: bytes, rng: np.random.Generator) -> bytes:
+    """An archive with one array of another shape or type, with other numbers, or gone."""
+    try:
+        with np.load(io.BytesIO(data)) as archive:
+            arrays = dict(archive)
+    except Exception:  # no archive
+        return another_value(data, rng)
+    name = list(arrays)[int(rng.integers(len(arrays)))]
+    array, which = arrays[name], int(rng.integers(6))
+    if which == 0:
+        del arrays[name]
+    elif which == 1:
+        arrays[name] = array[..., None]
+    elif which == 2:
+        arrays[name] = np.zeros(array.shape, ("f4", "i1", "U3", "c16", "?", "f8")[int(rng.integers(6))])
+    elif which == 3:
+        arrays[name] = np.resize(array, int(rng.integers(0, 50)))
+    elif which == 4:
+        arrays[f"{name}_"] = array
+    elif array.dtype.kind == "U":
+        text = another_value(str(array).encode(), rng).decode("utf-8", "replace")
+        arrays[name] = np.asarray(text)
+    else:
+        arrays[name] = _other_numbers(array, rng)
+    buffer = io.BytesIO()
+    np.savez(buffer, **arrays)
+    return buffer.getvalue()
+
+
+def _other_numbers(array: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """An array of its shape and type, with bytes of another number throughout."""
+    number = (0.0, -1.0, 2.0**31, np.inf, np.nan)[int(rng.integers(5))]
+    filled = np.full(array.size * array.itemsize // 8 + 1, number).tobytes()
+    return np.frombuffer(filled[: array.size * array.itemsize], array.dtype).reshape(array.shape)
+
+
+CHANGES: tuple[Change, ...] = (
+    truncated,
+    flipped,
+    overwritten,
+    doubled,
+    another_value,
+    another_array,
+    another_array,
+)
+
+
+def record_files(folder: Path) -> Kind:
+    """The record of a short mission, with starts that were given."""
+    env = EntropyExploreEnv(with_settings(BOX, {"channel": {"delay_s": 1.0}}))
+    env.reset(seed=5)
+    starts = env.missions.state.robots[0]["origin"].copy()
+    env.reset(seed=5, options={"starts": starts})
+    recorder = CommandRecorder(env.missions)
+    for agent in env.possible_agents:
+        env.action_space(agent).seed(1)
+    for _ in range(3):
+        actions = {agent: env.action_space(agent).sample() for agent in env.agents}
+        recorder.command(actions)
+        env.step(actions)
+        recorder.note()
+    save_record(recorder.record("random"), folder / "mission.npz")
+    return Kind({"mission.npz": (folder / "mission.npz").read_bytes()}, _play_record, _with_checksum)
+
+
+def _play_record(folder: Path) -> object:
+    """Read a record, and start its mission."""
+    record = load_record(folder / "mission.npz")
+    env = EntropyExploreEnv(record.scenario, **given_worlds_of(record))
+    env.reset(seed=record.seed, options=reset_options_of(record))
+    return env
+
+
+def _with_checksum(files: dict[str, bytes]) -> dict[str, bytes]:
+    try:
+        with np.load(io.BytesIO(files["mission.npz"])) as archive:
+            arrays = {name: array for name, array in archive.items() if name != "checksum"}
+        digest = named_digest({name: np.asarray(arrays[name]) for name in sorted(arrays)})
+        buffer = io.BytesIO()
+        np.savez(buffer, **arrays, checksum=np.asarray(digest))
+    except Exception:  # nothing there to be digested
+        return files
+    return {"mission.npz": buffer.getvalue()}
+
+
+def checkpoint_files(folder: Path) -> Kind:
+    """A checkpoint of a small policy, with its trainer's state."""
+    import torch
+
+    from training.checkpoints import Checkpoint, PolicySettings, TrainerState, save_checkpoint
+    from training.normalisation import Normaliser
+    from training.policy import make_policy, weights_of
+
+    form = {"action": {"kind": "discrete", "moves": "axes"}, "observation": {"flat": True}}
+    settings = PolicySettings(with_settings(BOX, form), "vector", (6, 5))
+    stats = Normaliser(Missions(settings.scenario).layout.size)
+    kept = Checkpoint(
+        settings,
+        {"steps": 12},
+        weights_of(make_policy(settings)),
+        stats.arrays("observations") | Normaliser().arrays("returns"),
+        TrainerState({"a": torch.arange(3)}, {"x": np.zeros(2, [("p", "f8"), ("q", "?")])}, {"big": 2**127}),
+    )
+    save_checkpoint(folder / "best-000000000012", kept)
+    files = {path.name: path.read_bytes() for path in sorted((folder / "best-000000000012").iterdir())}
+    return Kind(files, _load_checkpoint, _with_digests)
+
+
+def _load_checkpoint(folder: Path) -> object:
+    """Read a checkpoint, and make its policy."""
+    from training.checkpoints import load_checkpoint
+    from training.policy import load_policy
+
+    return load_policy(load_checkpoint(folder, training=True))
+
+
+def _with_digests(files: dict[str, bytes]) -> dict[str, bytes]:
+    try:
+        head = json.loads(files["policy.json"])
+        for name in head["sha256"]:
+            head["sha256"][name] = hashlib.sha256(files[name]).hexdigest()
+    except Exception:  # the head itself is spoiled
+        return files
+    return {**files, "policy.json": json.dumps(head).encode()}
+
+
+KINDS: dict[str, Callable[[Path], Kind]] = {"record": record_files, "checkpoint": checkpoint_files}
+
+
+def play_files(kind: Kind, folder: Path, count: int, seed: int) -> dict[str, Any]:
+    """Change files, read them, and say what came of it: `wrong` lists what must not be, file by file.
+
+    Args:
+        kind: Of the files.
+        folder: Where they are written.
+        count: How many times.
+        seed: Of the changes.
+    """
+    found: dict[str, Any] = {"files": count, "loaded": 0, "killed": 0, "most_s": 0.0, "wrong": []}
+    folder.mkdir(exist_ok=True)
+    before_mib = _peak_mib()
+    with _little_memory():
+        for number in range(count):
+            rng = np.random.default_rng([seed, number])
+            name = list(kind.files)[int(rng.integers(len(kind.files)))]
+            change = CHANGES[int(rng.integers(len(CHANGES)))]
+            files = {**kind.files, name: change(kind.files[name], rng)}
+            for each, content in (kind.repair(files) if rng.random() < 0.5 else files).items():
+                (folder / each).write_bytes(content)
+            begun_s, complaint = time.process_time(), ""
+            try:
+                kind.load(folder)
+                found["loaded"] += 1
+            except EntropyExploreError as error:
+                complaint = "an error of more than a line" if "\n" in str(error) else ""
+            except Exception as error:
+                complaint = f"{type(error).__name__}: {error}"
+            spent_s = time.process_time() - begun_s
+            found["most_s"] = max(found["most_s"], spent_s)
+            if spent_s > MOST_S:
+                complaint = complaint or f"{spent_s:.1f} s"
+            if complaint:
+                found["wrong"].append(f"[{seed}, {number}] {change.__name__} of {name}: {complaint[:150]}")
+    found["most_mib"] = _peak_mib()
+    if found["most_mib"] - before_mib > MOST_GROWTH_MIB:
+        found["wrong"].append(f"grew to {found['most_mib']:.0f} MiB")
+    return found
+
+
+def _peak_mib() -> float:
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+
+
+@contextmanager
+def _little_memory() -> Iterator[None]:
+    """While the process may take 4 GiB more than it has, so that a file cannot take the machine's."""
+    pages = int(Path("/proc/self/statm").read_text("ascii").split()[0]) if Path("/proc").exists() else 0
+    before = resource.getrlimit(resource.RLIMIT_AS)
+    resource.setrlimit(resource.RLIMIT_AS, (pages * resource.getpagesize() + (4 << 30), before[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_AS, before)
