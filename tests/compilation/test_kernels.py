@@ -210,7 +210,7 @@ from entropy_explore_env.scenario import with_settings
 from entropy_explore_env.scenarios import BOX
 
 missions = Missions(with_settings(BOX, {"robots": 3, "world": "furnished", "track_truth": True,
-    "channel": {"delay_s": 1.0, "loss_probability": 0.2}, "sensor": {"scan_every_m": 0.3, "range_noise_m": 0.1},
+    "channel": {"delay_s": 1.0, "loss_probability": 0.2}, "sensor": {"scan_every_m": 0.3},
     "robot": {"navigator": "planned", "redecide": "on_scan"}}))
 missions.reset(0, 0)
 rng = np.random.default_rng(0)
