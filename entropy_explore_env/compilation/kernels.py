@@ -42,7 +42,7 @@ class InterpretedRecord(np.void):
         there = np.void.__getattribute__(self, "dtype").fields
         return self[name] if there and name in there else np.void.__getattribute__(self, name)
 
-    def __setattr__(self, name: str, value: object) -> None:
+    def __setattr__(self, name: str, value: Any) -> None:  # noqa: ANN401
         """Change a field of the array."""
         self[name] = value
 
