@@ -177,7 +177,7 @@ def passes(air, team, mate, place, time_s):
     if air is None:  # known while compiling: nothing of the rest is compiled
         return True
     shared, there = team.params[0], point(pose_at(team.params[mate], team.robots[mate], time_s))
-    start, finish = to_grid_units(shared, place), to_grid_units(shared, there)
+    start, finish = within_grid(shared, place), within_grid(shared, there)
     walls_m = edges_in_walls(air, grid_size(shared), start, finish) * shared.voxel_size_m
     if shared.line_of_sight:
         return walls_m == 0.0

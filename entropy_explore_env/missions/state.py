@@ -132,7 +132,7 @@ ROBOT = record_type(
     ],
 )
 
-FAULT = np.dtype(
+FAULT = record_type(
     [
         # when each outage begins and ends; inf = never
         ("stop_s", "f8"),
@@ -152,7 +152,6 @@ FAULT = np.dtype(
         ("messages_repeated", "i8"),  # that arrived twice
         ("messages_late", "i8"),  # that were sent late
     ],
-    align=True,
 )
 
 COUNTED = ROBOT.names[ROBOT.names.index("distance_m") :] if ROBOT.names else ()

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from entropy_explore_env.belief.measurement_model import Return
-from entropy_explore_env.compilation.kernels import lean_kernel
+from entropy_explore_env.compilation.kernels import lean_kernel, record_type
 from entropy_explore_env.randomness import draw_uniform
 from entropy_explore_env.robots.range_sensor import NEAREST, trace_measurement
 
 _NOTHING, _HIT = int(Return.NOTHING), int(Return.HIT)
 
-FAULT_PARAMS = np.dtype(
+FAULT_PARAMS = record_type(
     [
         # of its sensor
         ("lost_rays", "f8"),
@@ -23,7 +21,6 @@ FAULT_PARAMS = np.dtype(
         ("late", "f8"),
         ("late_s", "f8"),
     ],
-    align=True,
 )
 """What is wrong with a robot all through a mission, in the units of `fault_settings`."""
 

@@ -9,6 +9,8 @@ import pytest
 
 from entropy_explore_env.missions import simulation as missions_module
 from entropy_explore_env.missions.poses import pose_at
+from entropy_explore_env.missions.state import LatestScans
+from entropy_explore_env.missions.tick import note_scan
 from entropy_explore_env.missions.view import view_of
 from entropy_explore_env.robots.motion import MoveEnd
 from entropy_explore_env.robots.range_sensor import Return
@@ -309,3 +311,29 @@ def test_nobody_hears_anything(channel):
     deaf = started(free_box(robots=3, channel={"burst": 0, "announcements": False}), seed=2)
     wander(deaf, 20, 0)
     np.testing.assert_array_equal(deaf.state.precision, missions.state.precision)
+
+
+def test_a_measurement_of_no_less_than_i_min_is_not_redundant():
+    """Equation 43 asks for at least I_min; what measured nothing is neither redundant nor sent."""
+    missions = started(free_box(robots=2))
+    state, scan = missions.state, missions._work[0].scan
+    latest = LatestScans(state.scan_range_m[0], state.scan_returned[0], state.scan_utility_bits[0])
+    state.robots["i_min_bits"] = 0.25
+    scan.rays["returned"], scan.utility[:] = Return.HIT, 0.5
+    scan.utility[:3] = 0.25, 0.125, 0.75
+    scan.rays["returned"][3], scan.utility[3] = Return.NOTHING, 0.0
+    note_scan(state.robots[0][1], latest, scan, 1)
+    assert state.robots["redundant"].tolist() == [[0, 1]]
+    assert scan.utility[:4].tolist() == [0.25, 0.125, 0.75, -1.0]
+    assert state.scan_utility_bits[0, 1, :4].tolist() == [0.25, 0.125, 0.75, 0.0]
+
+
+def test_a_body_that_a_ray_only_grazes_is_as_large_as_it_is():
+    """Voxels of 0.5 m: a body of 0.3 m, past which the ray goes at 0.25 m or at 0.35 m."""
+    for apart_m, returned in ((0.25, Return.NOTHING), (0.35, Return.HIT)):
+        missions = started(free_box(robot={"body_radius_m": 0.3}, sensor=ONE_RAY))
+        first = (1.75, 0.75, 1.25, math.pi / 2, 0.0)
+        put(missions, 0, first)
+        put(missions, 1, (1.75 + apart_m, 3.75, 1.25, math.pi / 2, 0.0))
+        toward(missions, first, (1.75 + apart_m, 3.75, 1.25, math.pi / 2, 0.0))
+        assert missions.state.scan_returned[0, 0, 0] == returned

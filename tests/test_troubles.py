@@ -1,0 +1,134 @@
+"""Troubles of the machine: full disks, folders that cannot be written, no home, clocks that jump.
+
+Nothing half written stays, what was there before is still there, one line says what happened, and who goes on
+later comes to the same bytes. A full disk is a limit on the size of files here: both are errors of writing.
+"""
+
+from __future__ import annotations
+
+import itertools
+import os
+import resource
+import time
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+from numba.core import config
+
+from baselines import benchmark
+from baselines.cli.arguments import run_command
+from benchmarks.reliability.kills import contents
+from entropy_explore_env.compilation import announcement
+from entropy_explore_env.compilation.folder import MAX_DAYS, SUFFIX, remove_old_kernels
+from entropy_explore_env.compilation.kernels import lean_kernel
+
+TINY = ("--scenarios", "box-7x11x5", "--robots", "1", "--time-limit-s", "40", "--strategies", "gradient")
+SWEEP = (*TINY, "--seeds", "2", "--jobs", "1", "--out")
+UNWRITABLE = Path("/proc/nowhere")
+DAY_S = 86400.0
+
+needs_proc = pytest.mark.skipif(not Path("/proc/self").exists(), reason="a folder that nobody can write")
+
+
+@contextmanager
+def files_of_at_most(size):
+    """While a file cannot be longer than so many bytes, in this process."""
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, before[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+
+
+@pytest.fixture(scope="module")
+def undisturbed(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("undisturbed")
+    assert run_command(benchmark.main, [*SWEEP, str(folder)]) == 0
+    return contents(folder)
+
+
+@pytest.mark.parametrize("size", [300, 3000, 20_000], ids=["at a mission", "at a table", "at a figure"])
+def test_a_sweep_on_a_full_disk_says_so_and_goes_on_later(undisturbed, tmp_path, capsys, size):
+    with files_of_at_most(size):
+        assert run_command(benchmark.main, [*SWEEP, str(tmp_path)]) != 0
+    said = capsys.readouterr()
+    assert said.err.splitlines()[-1].endswith("File too large") and "Traceback" not in said.err
+    assert all(path.stat().st_size < size for path in tmp_path.rglob("*") if path.is_file())
+    assert not [path for path in tmp_path.rglob(".*") if path.is_file()], "no temporary file stays"
+    assert run_command(benchmark.main, [*SWEEP, str(tmp_path)]) == 0
+    assert contents(tmp_path) == undisturbed
+
+
+@needs_proc
+def test_a_folder_that_cannot_be_written_is_refused_by_name_before_a_mission_runs(capsys):
+    assert run_command(benchmark.main, [*SWEEP, str(UNWRITABLE)]) == 2
+    said = capsys.readouterr()
+    assert said.err.startswith("error: out = '/proc/nowhere': allowed is a folder") and said.out == ""
+
+
+def test_a_checkpoint_on_a_full_disk_leaves_the_one_before(tmp_path):
+    import torch
+
+    from entropy_explore_env.scenarios import BOX
+    from training.checkpoints import Checkpoint, PolicySettings, latest_checkpoint, save_checkpoint
+
+    def checkpoint(steps):
+        return Checkpoint(PolicySettings(BOX), {"steps": steps}, {"layer": torch.zeros(1000)}, {})
+
+    save_checkpoint(tmp_path / "step-1", checkpoint(1))
+    for size in (100, 2000):
+        with files_of_at_most(size), pytest.raises(OSError, match="too large"):
+            save_checkpoint(tmp_path / "step-2", checkpoint(2))
+        assert [path.name for path in tmp_path.iterdir()] == ["step-1"]
+    assert latest_checkpoint(tmp_path, "step").name == "step-1"
+
+
+@lean_kernel
+def doubled(number):
+    return 2 * number
+
+
+@pytest.fixture
+def kernels(tmp_path, monkeypatch):
+    """A folder of kernels of its own, and what is said of it."""
+    monkeypatch.setattr(config, "CACHE_DIR", str(tmp_path / "kernels"))
+    said = []
+    monkeypatch.setattr(announcement, "explain_not_kept", lambda folder, error: said.append(error))
+    return tmp_path / "kernels", said
+
+
+def test_kernels_work_on_a_full_disk_and_leave_no_half_file(kernels):
+    folder, said = kernels
+    with files_of_at_most(1000):
+        assert doubled(1.5) == 3.0
+    assert said and not [path for path in folder.rglob("*") if path.is_file()]
+
+
+@needs_proc
+@pytest.mark.parametrize("variable", ["HOME", "XDG_CACHE_HOME"])
+def test_kernels_work_without_a_home_and_without_a_cache_that_can_be_written(kernels, monkeypatch, variable):
+    monkeypatch.setattr(config, "CACHE_DIR", "")
+    monkeypatch.delenv("XDG_CACHE_HOME", raising=False)
+    monkeypatch.setenv(variable, str(UNWRITABLE))
+    number = {"HOME": 3, "XDG_CACHE_HOME": 4 + 0j}[variable]  # types that nothing was compiled for
+    assert doubled(number) == 2 * number
+    assert len(kernels[1]) == 1
+
+
+def test_a_sweep_does_not_mind_a_clock_that_jumps(undisturbed, tmp_path, monkeypatch):
+    sound, jumps = time.time, itertools.cycle((0.0, -400 * DAY_S, 5e8, -3600.0, 1e-3))
+    monkeypatch.setattr(time, "time", lambda: sound() + next(jumps))
+    assert run_command(benchmark.main, [*SWEEP, str(tmp_path)]) == 0
+    assert contents(tmp_path) == undisturbed
+
+
+def test_a_clock_that_jumps_removes_only_kernels_that_look_old(tmp_path):
+    now = time.time()
+    for name, days in (("future", -1000.0), ("new", 0.0), ("old", MAX_DAYS + 1.0)):
+        kernel = tmp_path / f"{name}{SUFFIX}"
+        kernel.write_bytes(b"x")
+        os.utime(kernel, (now, now - days * DAY_S))
+    remove_old_kernels(tmp_path)
+    assert sorted(path.stem for path in tmp_path.iterdir()) == ["future", "new"]
