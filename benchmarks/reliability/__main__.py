@@ -81,6 +81,7 @@ class Args:
         proofs: Which; nothing = all of them.
         quick: A few minutes.
         limit_s: Seconds of a proof after which no other case is begun; what is missing can be played later.
+            0 = nothing is played, the page is made of what is kept.
         results: Folder of what is kept.
         mutants: Folder of what `benchmarks.reliability.mutants` kept.
         page: The page to write; nothing = none.
@@ -132,7 +133,9 @@ def carry_on(proof: Proof, file: Path, wanted: int, limit_s: float = math.inf) -
     rows = rows_of(file)
     known, reached = {row["number"] for row in rows}, sum(map(proof.counts, rows))
     cases = wanted if proof.counts is _one else _MOST_CASES
-    missing = [number for number in range(cases) if number not in known] if reached < wanted else []
+    missing = [number for number in range(cases) if number not in known]
+    if reached >= wanted or limit_s <= 0.0:
+        missing = []
     with (
         file.open("a", encoding="utf-8") as kept,
         closing(run_each(proof.play, missing, 1, proof.limit_s, apart=True)) as outcomes,

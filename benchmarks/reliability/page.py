@@ -98,10 +98,12 @@ def _overview(kept: Mapping[str, Kept], mutants: Mapping[str, Sequence[Row]], co
 
 def _played_by(rows: Sequence[Row]) -> str:
     """By how many states of the library's sources."""
-    states = Counter(row.get("library", "an older one") for row in rows)
+    states = Counter(row["library"] for row in rows if "library" in row)
+    if not states:
+        return "Which state of the library's sources played them was not noted."
     if len(states) == 1:
         return f"All of them by the library whose sources have the digest {next(iter(states))}."
-    latest = rows[-1].get("library")
+    latest = [row["library"] for row in rows if "library" in row][-1]
     return f"They were played by {len(states)} states of the library's sources, the latest {latest}."
 
 

@@ -115,6 +115,8 @@ def test_a_proof_stops_at_what_is_asked_for_and_at_its_time(tmp_path, capsys):
     carry_on(counted, tmp_path / "sevens.jsonl", 20)
     assert [row["number"] for row in rows_of(tmp_path / "sevens.jsonl")] == [0, 1, 2]
     carry_on(counted, tmp_path / "sevens.jsonl", 70, limit_s=0.0)
+    assert len(rows_of(tmp_path / "sevens.jsonl")) == 3
+    carry_on(counted, tmp_path / "sevens.jsonl", 70, limit_s=1e-9)
     assert len(rows_of(tmp_path / "sevens.jsonl")) == 4
     assert len({row["library"] for row in rows_of(tmp_path / "sevens.jsonl")}) == 1
     assert "sevens: 28 of 70" in capsys.readouterr().err
