@@ -30,7 +30,7 @@ def figure_scans(records: Records, robots: int) -> tuple[Figure, dict[str, list[
                 table.setdefault(f"{name}_{column}", []).extend(values.tolist())
     shares.set(xlabel="scans of the team", ylabel="share mapped", ylim=(0, 1))
     ways.set(xlabel="scans of the team", ylabel="way of the team (m)", ylim=(0, None))
-    shares.legend(frameon=False)
+    ways.legend(frameon=False, loc="upper left")
     team = "one robot, 90°, 15 m" if robots == 1 else "two robots, 75°, 10 m"
     worlds = len(records[cell_id(robots, "v")])
     figure.suptitle(f"Fig. {20 if robots == 1 else 22}: {team}; means of {worlds} worlds")
