@@ -80,6 +80,9 @@ def test_claims_by_hand():
     slow = records_of({NOTHING_FAILS: base, LOST: [1.3 * t for t in base], LOST_ISOLATED: [80.0] * 5})
     _, isolated, lost = all_claims(ONE, slow)
     assert isolated.holds and not lost.holds and lost.low == pytest.approx(1.3)
+    noisy = records_of({NOTHING_FAILS: base, LOST: [30.0, 80.0, 40.0, 55.0, 40.0], LOST_ISOLATED: base})
+    _, isolated, _ = all_claims(ONE, noisy)  # 0.98 on average, but too few seeds to show it
+    assert not isolated.holds and isolated.ours < 1.0 < 1.05 < isolated.high
 
 
 def test_missions_that_were_cut_off_show_nothing():
