@@ -21,6 +21,8 @@ from entropy_explore_env.validation import is_number
 _MAGIC = b"EEMS\x01"
 _HEADER = np.dtype([("shape", "<u4", (3,)), ("nodes", "<u4"), ("leaves", "<u4")])
 _SPLIT, _EMPTY, _LEAF = 0, 1, 2
+_SPLIT_KNOWN = 3
+"""A split region of which every voxel was measured; written as _SPLIT."""
 _GREY_LEVELS = 32
 """Intervals of coverage whose histogram is taken."""
 _MEANS = 255
@@ -55,7 +57,7 @@ class _Scratch(NamedTuple):
     """Working space of `_cut`."""
 
     stack: np.ndarray
-    """(S, 6) int64, of `_new_stack`."""
+    """(S, 7) int64, of `_new_stack`."""
     counts: np.ndarray
     """(32,) int64, zeros: the histogram of one region."""
 
@@ -132,8 +134,8 @@ def decode_map(data: bytes, shape: tuple[int, int, int]) -> MapSummary:
 
 
 def _new_stack() -> np.ndarray:
-    """(S, 6) int64: regions that are still to be visited."""
-    return np.empty((7 * _DEEPEST + 1, 6), np.int64)
+    """(S, 7) int64: regions that are still to be visited, and whether all of each is known to be measured."""
+    return np.zeros((7 * _DEEPEST + 1, 7), np.int64)
 
 
 def _packed(kinds: np.ndarray) -> np.ndarray:
@@ -154,11 +156,14 @@ def _begin(stack, shape):
     """Put the whole map on an empty stack."""
     for axis in range(3):
         stack[0, axis], stack[0, 3 + axis] = 0, shape[axis]
+    stack[0, 6] = 0
 
 
 @inlined_kernel
-def _push_parts(region, stack, depth):
+def _push_parts(region, stack, depth, known):
     """Put the parts of a region on the stack: cut in two along each axis that has two voxels or more.
+
+    `known` says whether all of the region was measured, so that its parts need not be asked.
 
     Returns:
         The new depth; parts come off in the order of x, y, z.
@@ -172,6 +177,7 @@ def _push_parts(region, stack, depth):
             stack[depth, axis] = middle if second else low
             stack[depth, 3 + axis] = high if second else middle
             empty = empty or (second == 1 and middle == high)
+        stack[depth, 6] = known
         if not empty:
             depth += 1
     return depth
@@ -216,11 +222,11 @@ def _cut(mean, precision, threshold, scratch, kinds, leaves):
     while depth > 0:
         depth -= 1
         region = _top(stack, depth)
-        kind = _kind_of(mean, precision, threshold, region, scratch.counts)
-        kinds[nodes] = kind
+        kind = _kind_of(mean, precision, threshold, region, stack[depth, 6] == 1, scratch.counts)
+        kinds[nodes] = _SPLIT if kind == _SPLIT_KNOWN else kind
         nodes += 1
-        if kind == _SPLIT:
-            depth = _push_parts(region, stack, depth)
+        if kind == _SPLIT or kind == _SPLIT_KNOWN:
+            depth = _push_parts(region, stack, depth, int(kind == _SPLIT_KNOWN))
         elif kind == _LEAF:
             leaves[0, count], leaves[1, count] = _leaf_of(mean, precision, region)
             count += 1
@@ -228,33 +234,40 @@ def _cut(mean, precision, threshold, scratch, kinds, leaves):
 
 
 @lean_kernel
-def _kind_of(mean, precision, threshold, region, counts):
-    """Whether a region is split, empty or a leaf: by what was measured, and by eqs. 1-2."""
+def _kind_of(mean, precision, threshold, region, known, counts):
+    """Whether a region is split, empty or a leaf: by what was measured, and by eqs. 1-2.
+
+    `known` says that all of it was measured.
+    """
     low, high = region.low, region.high
     total = (high[0] - low[0]) * (high[1] - low[1]) * (high[2] - low[2])
-    first = _is_known(precision[low[0], low[1], low[2]])
-    if total == 1:
-        return _LEAF if first else _EMPTY
-    for i in range(low[0], high[0]):
-        for j in range(low[1], high[1]):
-            for k in range(low[2], high[2]):
-                if _is_known(precision[i, j, k]) != first:
-                    return _SPLIT
-    if not first:
-        return _EMPTY
-    return _LEAF if _information_bits(mean, region, total, counts) <= threshold else _SPLIT
+    if not known:
+        first = _is_known(precision[low[0], low[1], low[2]])
+        for i in range(low[0], high[0]):
+            for j in range(low[1], high[1]):
+                for k in range(low[2], high[2]):
+                    if _is_known(precision[i, j, k]) != first:
+                        return _SPLIT
+        if not first:
+            return _EMPTY
+    if total == 1 or _information_bits(mean, region, total, counts) <= threshold:
+        return _LEAF
+    return _SPLIT_KNOWN
 
 
 @lean_kernel
 def _information_bits(mean, region, total, counts):
     """-Σ q log2 q over the histogram of a region's coverages in equal intervals (Sujan, eqs. 1-2)."""
     low, high = region.low, region.high
+    least, most = _GREY_LEVELS, -1
     for i in range(low[0], high[0]):
         for j in range(low[1], high[1]):
             for k in range(low[2], high[2]):
-                counts[min(int(mean[i, j, k] * _GREY_LEVELS), _GREY_LEVELS - 1)] += 1
+                level = min(int(mean[i, j, k] * _GREY_LEVELS), _GREY_LEVELS - 1)
+                counts[level] += 1
+                least, most = min(least, level), max(most, level)
     bits = 0.0
-    for level in range(_GREY_LEVELS):
+    for level in range(least, most + 1):
         share = counts[level] / total
         counts[level] = 0
         bits -= share * math.log2(share) if share > 0.0 else 0.0
@@ -308,7 +321,7 @@ def _grow(kinds, leaves, stack, mean, precision):
         if kind == _SPLIT:
             if high[0] - low[0] + high[1] - low[1] + high[2] - low[2] == 3:
                 return False
-            depth = _push_parts(region, stack, depth)
+            depth = _push_parts(region, stack, depth, 0)
         elif kind == _LEAF:
             if count == leaves.shape[1]:
                 return False
