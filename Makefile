@@ -105,20 +105,13 @@ $(STAMP)%: pyproject.toml requirements/constraints.txt
 	@$(RUN) pip install -qq --disable-pip-version-check -c requirements/constraints.txt -e ".[$*]"
 	@touch $@
 
-$(VENV_RLLIB)/installed: pyproject.toml requirements/constraints-rllib.txt
-	@$(VENV_RLLIB)/bin/python -m pip --version >/dev/null 2>&1 || $(PYTHON) -m venv $(VENV_RLLIB)
-	@echo "installing entropy_explore_env[rllib] in $(VENV_RLLIB), a minute or two the first time ..." >&2
-	$(call cpu_torch,$(VENV_RLLIB)/bin/python,requirements/constraints-rllib.txt)
-	@$(VENV_RLLIB)/bin/python -m pip install -qq --disable-pip-version-check \
-		-c requirements/constraints-rllib.txt -e ".[rllib]" "pytest>=8.2" "hypothesis>=6.100"
-	@touch $@
-
-$(VENV_BENCHMARL)/installed: pyproject.toml requirements/constraints-benchmarl.txt
-	@$(VENV_BENCHMARL)/bin/python -m pip --version >/dev/null 2>&1 || $(PYTHON) -m venv $(VENV_BENCHMARL)
-	@echo "installing entropy_explore_env[benchmarl] in $(VENV_BENCHMARL), a minute or two the first time ..." >&2
-	$(call cpu_torch,$(VENV_BENCHMARL)/bin/python,requirements/constraints-benchmarl.txt)
-	@$(VENV_BENCHMARL)/bin/python -m pip install -qq --disable-pip-version-check \
-		-c requirements/constraints-benchmarl.txt -e ".[benchmarl]" "pytest>=8.2" "hypothesis>=6.100"
+# Environments beside .venv, each with an extra whose pins contradict the others'.
+.venv-%/installed: pyproject.toml requirements/constraints-%.txt
+	@$(@D)/bin/python -m pip --version >/dev/null 2>&1 || $(PYTHON) -m venv $(@D)
+	@echo "installing entropy_explore_env[$*] in $(@D), a minute or two the first time ..." >&2
+	$(call cpu_torch,$(@D)/bin/python,requirements/constraints-$*.txt)
+	@$(@D)/bin/python -m pip install -qq --disable-pip-version-check \
+		-c requirements/constraints-$*.txt -e ".[$*]" "pytest>=8.2" "hypothesis>=6.100"
 	@touch $@
 
 clean:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.validation import check, check_kind, check_within, is_whole
@@ -149,13 +149,7 @@ class Faults:
     @property
     def parts(self) -> dict[str, Outage | SensorFault | RadioFault]:
         """Name → what may go wrong."""
-        return {
-            "stop": self.stop,
-            "blind": self.blind,
-            "silent": self.silent,
-            "sensor": self.sensor,
-            "radio": self.radio,
-        }
+        return {each.name: getattr(self, each.name) for each in fields(self)}
 
     @property
     def happen(self) -> bool:

@@ -114,7 +114,7 @@ def _told(faults: dict[str, int]) -> str | None:
 
 
 def standing_still(figures: dict[str, Any], moved_m: float) -> list[str]:
-    """A warning of each robot that drove less than so many metres and was blocked, or did not finish the map.
+    """A warning of each robot that hardly drove and was blocked, or did not finish the map.
 
     In a room without obstacles a robot may well map all from where it starts.
     """

@@ -257,7 +257,7 @@ def worlds_of(options: TaskOptions, files: Sequence[str] | None = None) -> dict[
         files: In place of the options' own.
 
     Raises:
-        SettingError: Something is asked of world files, and there is none.
+        SettingError: An option of world files is given without a file.
     """
     reading = options.world_file
     worlds = options.world if files is None else files

@@ -31,7 +31,7 @@ class RayCluster:
 
     Attributes:
         address: HOST:PORT, `auto` or `local`.
-        at_once: At most so many tasks at a time; None = as many as there are processors.
+        at_once: Limit of tasks that run at a time; None = the number of processors.
     """
 
     address: str
@@ -62,7 +62,11 @@ def ray_of(extra: str) -> Any:  # noqa: ANN401 - a module that may not be there
 
 
 def start_here(ray: Any, cores: int) -> None:  # noqa: ANN401 - the module
-    """Start a cluster of this machine alone, which offers so many cores.
+    """Start a cluster of this machine alone.
+
+    Args:
+        ray: The module.
+        cores: How many it offers to tasks.
 
     Raises:
         EntropyExploreError: It does not start.

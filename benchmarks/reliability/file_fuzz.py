@@ -1,7 +1,7 @@
 """Changed files of every kind that the library and the trainers read: worlds, records, checkpoints.
 
-Files of worlds are changed and read by `tests/worlds/fuzz.py`, in the reading process that reads them for
-people; records and checkpoints by `saved_files`.
+Files of worlds are changed and read by `world_files`, in the reading process that reads them for people;
+records and checkpoints by `saved_files`.
 """
 
 from __future__ import annotations
@@ -12,6 +12,8 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.reliability.saved_files import KINDS, play_files
+from benchmarks.reliability.world_files import fuzz
+from benchmarks.reliability.world_samples import samples
 
 BATCH = 500
 """Files of a case."""
@@ -31,7 +33,7 @@ WORLDS = (
     "geotiff",
     "world npz",
 )
-"""Loaders of worlds, as tests/worlds/samples.py names them."""
+"""Loaders of worlds, as `world_samples` names them."""
 LOADERS = (*KINDS, *WORLDS)
 
 
@@ -51,9 +53,6 @@ def play_number(number: int) -> dict[str, Any]:
 
 
 def _play_worlds(loader: str, folder: Path, seed: int) -> dict[str, Any]:
-    from tests.worlds.fuzz import fuzz
-    from tests.worlds.samples import samples
-
     found = asdict(fuzz(samples()[loader], BATCH, seed, folder))
     del found["causes"]
     return found

@@ -19,6 +19,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from benchmarks.reliability.changed_bytes import doubled, flipped, overwritten, truncated
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.errors import EntropyExploreError
 from entropy_explore_env.missions.simulation import Missions
@@ -50,32 +51,6 @@ class Kind(NamedTuple):
     """Reads those of a folder."""
     repair: Callable[[dict[str, bytes]], dict[str, bytes]]
     """Makes the digests right again, where that can be."""
-
-
-def truncated(data: bytes, rng: np.random.Generator) -> bytes:
-    """Without its end."""
-    return data[: int(rng.integers(0, len(data)))]
-
-
-def flipped(data: bytes, rng: np.random.Generator) -> bytes:
-    """With one to eight bits turned."""
-    changed = bytearray(data or b"0")
-    for _ in range(int(rng.integers(1, 9))):
-        changed[int(rng.integers(len(changed)))] ^= 1 << int(rng.integers(8))
-    return bytes(changed)
-
-
-def overwritten(data: bytes, rng: np.random.Generator) -> bytes:
-    """With some bytes replaced by noise."""
-    start, length = int(rng.integers(len(data))), int(rng.integers(1, 65))
-    return data[:start] + rng.bytes(length) + data[start + length :]
-
-
-def doubled(data: bytes, rng: np.random.Generator) -> bytes:
-    """With a piece some hundred times."""
-    start = int(rng.integers(len(data)))
-    piece = data[start : start + int(rng.integers(1, 200))]
-    return data[:start] + piece * int(rng.integers(2, 400)) + data[start:]
 
 
 def another_value(data: bytes, rng: np.random.Generator) -> bytes:

@@ -23,6 +23,7 @@ from baselines.cli.progress import standing_still
 from baselines.cli.world_options import Reading
 from baselines.experiments.mission import run_mission, scripted
 from baselines.strategies import ALIASES, STRATEGIES, make_strategy
+from benchmarks.reliability.world_samples import pgm
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.missions.state import MissionEnd
 from entropy_explore_env.reports.metrics import mission_figures
@@ -30,7 +31,6 @@ from entropy_explore_env.reports.mission_record import load_record
 from entropy_explore_env.scenario import with_settings
 from entropy_explore_env.scenarios import BOX
 from entropy_explore_env.worlds.load import LOAD_OPTIONS
-from tests.worlds.samples import pgm
 
 ROOT = Path(__file__).parents[2]
 NAMED = (

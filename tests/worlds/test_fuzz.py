@@ -1,4 +1,4 @@
-"""Broken and hostile files of every kind: `python -m tests.worlds.fuzz` reads as many as one likes."""
+"""Broken and hostile files of every kind; `benchmarks.reliability.world_files` reads as many as one likes."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from tests.worlds.fuzz import MUTATORS, Outcome, fuzz, mutants, table
-from tests.worlds.samples import samples
+from benchmarks.reliability.world_files import MUTATORS, Outcome, fuzz, mutants, table
+from benchmarks.reliability.world_samples import samples
 
 FEW, MANY = 40, 500
 """Files a loader. Most of their time goes into starting the reader again after it crashed."""

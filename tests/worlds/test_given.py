@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from benchmarks.reliability.world_samples import pgm, plan
 from entropy_explore_env.errors import EntropyExploreError, SettingError, WorldError
 from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.settings import Grid
@@ -17,7 +18,6 @@ from entropy_explore_env.worlds.load import load_world, save_world, world_bytes,
 from entropy_explore_env.worlds.recipes.catalogue import RECIPES
 from entropy_explore_env.worlds.world import World
 from tests.reference.scenes import free_box, wander
-from tests.worlds.samples import pgm, plan
 
 SHAPE = (9, 12, 7)
 GRID = Grid(SHAPE, 0.4, (-1.0, 2.0, 0.5))

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import entropy_explore_env
+from benchmarks.reliability.world_samples import npz, pgm, plan, samples
 from entropy_explore_env import EntropyExploreEnv, EntropyExploreVectorEnv
 from entropy_explore_env.envs.episodes import require_same, snapshot
 from entropy_explore_env.errors import SettingError, WorldError
@@ -19,7 +20,6 @@ from entropy_explore_env.worlds.files.process import kept_reader
 from entropy_explore_env.worlds.load import FORMATS, load_world, save_world, with_world, world_from_file
 from entropy_explore_env.worlds.world import World
 from tests.reference.scenes import free_box
-from tests.worlds.samples import npz, pgm, plan, samples
 
 REAL = Path(__file__).parents[2].parent / "shared" / "worlds"
 FILES = sorted(path for path in REAL.rglob("*") if path.suffix in FORMATS) if REAL.exists() else []

@@ -24,6 +24,11 @@ def by_scan(records: Records, cell: str, field: str, scans: int = SCANS) -> np.n
     return np.stack([np.pad(row, (0, scans + 1 - len(row)), mode="edge") for row in rows])
 
 
+def at_end(records: Records, cell: str, field: str) -> np.ndarray:
+    """(N,) a figure of each mission after its last scan."""
+    return np.asarray([record[field][-1] for record in records[cell]], float)
+
+
 def mapped(records: Records, cell: str) -> np.ndarray:
     """(N,) mean share mapped over the scans of each mission: how much is mapped for the same scans."""
     return np.asarray(by_scan(records, cell, "mapped")[:, 1:].mean(axis=1))
@@ -31,7 +36,7 @@ def mapped(records: Records, cell: str) -> np.ndarray:
 
 def mapped_per_metre(records: Records, cell: str) -> np.ndarray:
     """(N,) share mapped at the end, over the way of the team in hundreds of metres."""
-    share, way_m = (by_scan(records, cell, field)[:, -1] for field in ("mapped", "driven_m_by_scan"))
+    share, way_m = (at_end(records, cell, field) for field in ("mapped", "driven_m_by_scan"))
     return np.asarray(100.0 * share / np.maximum(way_m, 1.0))
 
 
@@ -74,7 +79,7 @@ def _ratio_claims(records: Records, robots: int) -> list[Claim]:
         than = f"({method}) {METHODS[method]}"
         text = f"{_team(robots)}: (i) random poses map less for each metre than {than}; ratio"
         claims.append(Claim(f"worst-{robots}-{method}", text, "< 1", ratio, low, high, high < 1))
-    ways = [by_scan(records, cell_id(robots, name), "driven_m_by_scan")[:, -1] for name in ("v", "iii")]
+    ways = [at_end(records, cell_id(robots, name), "driven_m_by_scan") for name in ("v", "iii")]
     ratio, low, high = ratio_interval(*ways)
     text = f"{_team(robots)}: (v) drives slightly more than (iii) most-unmapped; ratio"
     return [*claims, Claim(f"way-{robots}", text, "> 1", ratio, low, high, low > 1)]

@@ -12,7 +12,7 @@ from baselines.cli.figures import STYLE, png
 from baselines.experiments.claims import Claim, claims_table
 from baselines.experiments.statistics import mean_interval, ratio_interval
 from baselines.experiments.tables import csv_table, markdown_table
-from baselines.papers.sujan.claims import Records, by_scan, mapped, mapped_per_metre
+from baselines.papers.sujan.claims import Records, at_end, mapped, mapped_per_metre
 from baselines.papers.sujan.figures import figure_scans
 from baselines.papers.sujan.sweep import CHANGES, METHODS, OTHERS, SCANS, TEAMS, cell_id
 from entropy_explore_env.writing import write_atomically
@@ -64,7 +64,7 @@ def _text(records: Records, claims: Sequence[Claim], command: str) -> str:
 
 def _row(records: Records, cell: str, first: list[str]) -> list[str]:
     """A cell's figures, after what it is."""
-    share, way_m = (by_scan(records, cell, field)[:, -1] for field in ("mapped", "driven_m_by_scan"))
+    share, way_m = (at_end(records, cell, field) for field in ("mapped", "driven_m_by_scan"))
     return [
         *first,
         "{:.3f} ({:.3f} … {:.3f})".format(*mean_interval(mapped(records, cell))),
@@ -115,10 +115,7 @@ def _reading(records: Records) -> str:
     base, most_unmapped = (mapped(records, cell_id(1, method)) for method in ("v", "iii"))
     changed = {name: mapped(records, cell_id(1, f"v-{name}")) for name in ("half", "linear", "half-linear")}
     ratios = {name: _ratio(values, base) for name, values in changed.items()}
-    ways = [
-        by_scan(records, cell_id(1, name), "driven_m_by_scan")[:, -1].mean()
-        for name in ("v-half-linear", "iii")
-    ]
+    ways = [at_end(records, cell_id(1, name), "driven_m_by_scan").mean() for name in ("v-half-linear", "iii")]
     return _READING.format(
         half=ratios["half"],
         linear=ratios["linear"],

@@ -11,12 +11,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from benchmarks.reliability.world_samples import npz, saved_world
 from entropy_explore_env.errors import WorldError
 from entropy_explore_env.settings import Grid
 from entropy_explore_env.worlds.load import load_world, save_world
 from entropy_explore_env.worlds.world import World
 from tests.reference.scenes import SHAPES, drawn, random_cover, seeds
-from tests.worlds.samples import npz, saved_world
 
 finite = st.floats(-1e6, 1e6)
 
@@ -121,45 +121,29 @@ def test_pickles_bombs_and_lying_headers_are_refused_unread(tmp_path, monkeypatc
         load_world(path)
 
 
-def test_what_is_unknown_is_kept_and_an_archive_that_contradicts_itself_is_refused(tmp_path):
+@pytest.mark.parametrize("name", ["unknown", "unreadable"])
+def test_a_mask_of_some_solid_voxels_is_kept_and_a_contradicting_one_refused(tmp_path, name):
     occupied = np.random.default_rng(0).random((7, 11, 5)) < 0.5
-    unknown = occupied & (np.random.default_rng(1).random((7, 11, 5)) < 0.5)
-    world = World(Grid(occupied.shape, 0.5), occupied, "hall", unknown=unknown)
+    mask = occupied & (np.random.default_rng(1).random((7, 11, 5)) < 0.5)
+    other = {"unknown": "unreadable", "unreadable": "unknown"}[name]
+    world = World(Grid(occupied.shape, 0.5), occupied, "hall", **{name: mask})
     save_world(world, tmp_path / "hall.npz")
     again = load_world(tmp_path / "hall.npz")
-    np.testing.assert_array_equal(again.unknown, unknown)
+    np.testing.assert_array_equal(getattr(again, name), mask)
     np.testing.assert_array_equal(again.occupied, occupied)
+    assert getattr(again, other) is None
     coarse = load_world(tmp_path / "hall.npz", 1.0)
     assert coarse.unknown is not None and not (coarse.unknown & ~coarse.occupied).any()
     entries = dict(np.load(tmp_path / "hall.npz"))
-    entries["unknown"] = np.packbits(~occupied)
+    entries[name] = np.packbits(~occupied)
     np.savez(tmp_path / "wrong.npz", **entries)
-    with pytest.raises(WorldError, match="unknown voxels count as solid"):
+    with pytest.raises(WorldError, match=f"{name} voxels count as solid"):
         load_world(tmp_path / "wrong.npz")
-    for wrong in (~occupied, unknown[:3], unknown.astype(int), "x"):
-        with pytest.raises(WorldError, match=r"World\.unknown"):
-            World(Grid(occupied.shape, 0.5), occupied, "hall", unknown=wrong)
-
-
-def test_surfaces_without_return_are_kept_and_those_that_contradict_the_rest_are_refused(tmp_path):
-    occupied = np.random.default_rng(0).random((7, 11, 5)) < 0.5
-    unreadable = occupied & (np.random.default_rng(1).random((7, 11, 5)) < 0.5)
-    world = World(Grid(occupied.shape, 0.5), occupied, "hall", unreadable=unreadable)
-    save_world(world, tmp_path / "hall.npz")
-    again = load_world(tmp_path / "hall.npz")
-    np.testing.assert_array_equal(again.unreadable, unreadable)
-    np.testing.assert_array_equal(again.occupied, occupied)
-    assert again.unknown is None
-    entries = dict(np.load(tmp_path / "hall.npz"))
-    entries["unreadable"] = np.packbits(~occupied)
-    np.savez(tmp_path / "wrong.npz", **entries)
-    with pytest.raises(WorldError, match="unreadable voxels count as solid"):
-        load_world(tmp_path / "wrong.npz")
-    for wrong in (~occupied, unreadable[:3], unreadable.astype(int), "x"):
-        with pytest.raises(WorldError, match=r"World\.unreadable"):
-            World(Grid(occupied.shape, 0.5), occupied, "hall", unreadable=wrong)
+    for wrong in (~occupied, mask[:3], mask.astype(int), "x"):
+        with pytest.raises(WorldError, match=rf"World\.{name}"):
+            World(Grid(occupied.shape, 0.5), occupied, "hall", **{name: wrong})
     with pytest.raises(WorldError, match="no voxels that are unknown"):
-        World(Grid(occupied.shape, 0.5), occupied, "hall", unknown=unreadable, unreadable=unreadable)
+        World(Grid(occupied.shape, 0.5), occupied, "hall", unknown=mask, unreadable=mask)
 
 
 def test_resampled_voxels_are_unreadable_where_most_of_what_is_solid_in_them_is(tmp_path):

@@ -7,11 +7,11 @@ import math
 import numpy as np
 import pytest
 
+from benchmarks.reliability.world_samples import geotiff, heights, npz
 from entropy_explore_env.errors import SettingError, WorldError
 from entropy_explore_env.worlds.files.elevation import columns, degrees_as_metres
 from entropy_explore_env.worlds.files.voxels import Options
 from entropy_explore_env.worlds.load import load_world
-from tests.worlds.samples import geotiff, heights, npz
 
 HILLS = np.array([[0.0, 0.4, 0.6], [2.0, 3.0, 1.0]])
 """(X, Y) metres; with voxels of 1 m the floor is at -1 m and voxel centres at -0.5, 0.5, 1.5, 2.5 m."""

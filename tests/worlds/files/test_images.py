@@ -8,9 +8,9 @@ import zlib
 import numpy as np
 import pytest
 
+from benchmarks.reliability.world_samples import pgm, png
 from entropy_explore_env.errors import SettingError, WorldError
 from entropy_explore_env.worlds.load import load_world
-from tests.worlds.samples import pgm, png
 
 
 def load(tmp_path, data, name="plan.png", **options):

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from benchmarks.reliability.world_samples import YAML, pgm, plan, png
 from entropy_explore_env.errors import WorldError
 from entropy_explore_env.worlds.files.map_server import labels_of
 from entropy_explore_env.worlds.load import load_world
-from tests.worlds.samples import YAML, pgm, plan, png
 
 UNKNOWN, FREE, SOLID = -1, 0, 1
 OPAQUE = np.float32(255.0)

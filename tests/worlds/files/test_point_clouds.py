@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from benchmarks.reliability.world_samples import pcd, ply, points
 from entropy_explore_env.errors import SettingError, WorldError
 from entropy_explore_env.worlds.files import point_clouds
 from entropy_explore_env.worlds.files.voxels import Options
 from entropy_explore_env.worlds.load import load_world
-from tests.worlds.samples import pcd, ply, points
 
 
 def expected(voxel_m):

@@ -10,11 +10,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from benchmarks.reliability.world_samples import mesh, pgm, plan
 from entropy_explore_env.errors import WorldError
 from entropy_explore_env.worlds.files import process
 from entropy_explore_env.worlds.files.process import Format, ReaderProcess, kept_reader
 from entropy_explore_env.worlds.load import load_world
-from tests.worlds.samples import mesh, pgm, plan
 
 IMAGE = Format("images", "PNG or PGM image")
 

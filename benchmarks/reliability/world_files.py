@@ -1,8 +1,8 @@
 """Broken and hostile files of every kind, made from seeds, and what the loaders make of them.
 
 A mutated file must give a World or a named error within 2 s of computing and 512 MiB, run nothing and read
-nothing outside its folder. `python -m tests.worlds.fuzz --files 10000 --out docs/results/fuzz.md` runs so
-many files a loader and writes the table.
+nothing outside its folder. `python -m benchmarks.reliability.world_files --files 10000 --out FILE` runs so
+many files a loader and writes the table docs/results/fuzz.md.
 """
 
 from __future__ import annotations
@@ -24,31 +24,15 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks.reliability.changed_bytes import doubled, flipped, overwritten, truncated
+from benchmarks.reliability.world_samples import Sample, glb_of_json, samples
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.worlds.files.process import CPU_S, ReaderProcess, kept_reader
 from entropy_explore_env.worlds.load import load_world
 from entropy_explore_env.writing import write_atomically
-from tests.worlds.samples import Sample, glb_of_json, samples
 
 MOST_S, MOST_MIB = 2.0, 512
 _SIZES = (b"0", b"-1", b"65536", b"2147483647", b"4294967295", b"99999999999999999999", b"1e308", b"nan")
-
-
-def truncated(data: bytes, rng: np.random.Generator) -> bytes:
-    return data[: int(rng.integers(0, len(data)))]
-
-
-def flipped(data: bytes, rng: np.random.Generator) -> bytes:
-    """One to eight bits."""
-    changed = bytearray(data)
-    for _ in range(int(rng.integers(1, 9))):
-        changed[int(rng.integers(len(data)))] ^= 1 << int(rng.integers(8))
-    return bytes(changed)
-
-
-def noise(data: bytes, rng: np.random.Generator) -> bytes:
-    start, length = int(rng.integers(len(data))), int(rng.integers(1, 65))
-    return data[:start] + rng.bytes(length) + data[start + length :]
 
 
 def absurd_text(data: bytes, rng: np.random.Generator) -> bytes:
@@ -66,13 +50,6 @@ def absurd_binary(data: bytes, rng: np.random.Generator) -> bytes:
     start = int(rng.integers(max(1, min(len(data), 4096) - 4)))
     word = struct.pack(("<I", ">I")[int(rng.integers(2))], values[int(rng.integers(len(values)))])
     return data[:start] + word + data[start + 4 :]
-
-
-def doubled(data: bytes, rng: np.random.Generator) -> bytes:
-    """A piece of the file a few hundred times."""
-    start = int(rng.integers(len(data)))
-    piece = data[start : start + int(rng.integers(1, 200))]
-    return data[:start] + piece * int(rng.integers(2, 400)) + data[start:]
 
 
 def _undated(name: str) -> zipfile.ZipInfo:
@@ -120,7 +97,7 @@ def repaired_png(data: bytes, rng: np.random.Generator) -> bytes:
 def repaired_zip(data: bytes, rng: np.random.Generator) -> bytes:
     """Changed arrays in a sound archive; a bomb of zeros; a pickle that would write a file."""
     if not data.startswith(b"PK"):
-        return noise(data, rng)
+        return overwritten(data, rng)
     which = int(rng.integers(4))
     with zipfile.ZipFile(io.BytesIO(data)) as archive:
         members = {name: archive.read(name) for name in archive.namelist()}
@@ -212,7 +189,7 @@ def hostile_glb(data: bytes, rng: np.random.Generator) -> bytes:
 MUTATORS: tuple[Callable[[bytes, np.random.Generator], bytes], ...] = (
     truncated,
     flipped,
-    noise,
+    overwritten,
     absurd_text,
     absurd_binary,
     doubled,
@@ -312,11 +289,11 @@ def table(outcomes: dict[str, Outcome], count: int) -> str:
     lines = [
         "# Broken and hostile files",
         "",
-        f"`python -m tests.worlds.fuzz --files {count}`: mutants of small files of every kind, from",
-        f"seeds. Each must give a world or a named error within {MOST_S:g} s of computing and {MOST_MIB}",
-        "MiB, run nothing and read nothing outside its folder. Ended: the reading process died and was",
-        "started anew, and an error was raised. Most MiB: the most that the reading process or the command",
-        "itself had held by then.",
+        f"`python -m benchmarks.reliability.world_files --files {count}`: mutants of small files of every",
+        f"kind, from seeds. Each must give a world or a named error within {MOST_S:g} s of computing and",
+        f"{MOST_MIB} MiB, run nothing and read nothing outside its folder. Ended: the reading process died",
+        "and was started anew, and an error was raised. Most MiB: the most that the reading process or the",
+        "command itself had held by then.",
         "",
         "| loader | files | loaded | refused | of these ended | most s | most MiB | wrong |",
         "| --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: |",

@@ -23,17 +23,19 @@ class Sample(NamedTuple):
     options: dict[str, Any]
 
 
-def plan(rows=7, columns=11, seed=0):
+def plan(rows: int = 7, columns: int = 11, seed: int = 0) -> np.ndarray:
     """(rows, columns) uint8 shades of a plan: black walls, white floor, grey unknown."""
     shades = np.random.default_rng(seed).choice([0, 205, 254, 254, 254], (rows, columns))
     return shades.astype(np.uint8)
 
 
-def pgm(shades):
+def pgm(shades: np.ndarray) -> bytes:
+    """A PGM of (rows, columns) uint8 shades."""
     return b"P5\n%d %d\n255\n" % (shades.shape[1], shades.shape[0]) + shades.tobytes()
 
 
-def png(pixels):
+def png(pixels: np.ndarray) -> bytes:
+    """A PNG of these pixels."""
     from PIL import Image
 
     buffer = io.BytesIO()
@@ -41,7 +43,8 @@ def png(pixels):
     return buffer.getvalue()
 
 
-def octomap_bytes(suffix):
+def octomap_bytes(suffix: str) -> bytes:
+    """An OctoMap tree, `.bt` or `.ot`."""
     import octomap
 
     tree = octomap.OcTree(0.2)
@@ -55,11 +58,13 @@ def octomap_bytes(suffix):
         return path.read_bytes()
 
 
-def points(count=60):
+def points(count: int = 60) -> np.ndarray:
+    """(count, 3) float32 places."""
     return np.random.default_rng(1).uniform(0.0, SHAPE, (count, 3)).astype(np.float32)
 
 
-def pcd(encoding):
+def pcd(encoding: str) -> bytes:
+    """A PCD of `points`."""
     from pypcd4.pypcd4 import Encoding, PointCloud
 
     buffer = io.BytesIO()
@@ -67,7 +72,7 @@ def pcd(encoding):
     return buffer.getvalue()
 
 
-def ply(binary):
+def ply(binary: bool) -> bytes:
     """Points only, by hand."""
     some = points()
     form = b"binary_little_endian" if binary else b"ascii"
@@ -76,29 +81,39 @@ def ply(binary):
     return head + (some.tobytes() if binary else b"".join(b"%g %g %g\n" % tuple(p) for p in some.tolist()))
 
 
-def mesh(kind):
+def mesh(kind: str) -> bytes:
+    """A box and a ramp in a format of trimesh."""
     import trimesh
 
     box = trimesh.creation.box(bounds=[[0, 0, 0], [2, 3, 1]])
     ramp = trimesh.Trimesh(
         [[4, 0, 0], [7, 0, 0], [4, 5, 0], [4, 0, 4]], [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]]
     )
-    written = trimesh.util.concatenate([box, ramp]).export(file_type=kind)
+    both: Any = trimesh.util.concatenate([box, ramp])
+    written = both.export(file_type=kind)
     return written.encode() if isinstance(written, str) else written
 
 
-def heights(rows=11, columns=7):
+def heights(rows: int = 11, columns: int = 7) -> np.ndarray:
     """(rows, columns) float32 metres."""
     return np.random.default_rng(2).uniform(10.0, 14.0, (rows, columns)).astype(np.float32)
 
 
-def npz(**arrays):
+def npz(**arrays: Any) -> bytes:  # noqa: ANN401 - whatever an archive may hold
+    """A NumPy archive of these arrays."""
     buffer = io.BytesIO()
     np.savez_compressed(buffer, **arrays)
     return buffer.getvalue()
 
 
-def geotiff(samples, scale=(1.0, 1.0, 0.0), tie=(0.0, 0.0, 0.0, 100.0, 200.0, 0.0), model=1, **more):
+def geotiff(
+    samples: np.ndarray,
+    scale: tuple[float, ...] = (1.0, 1.0, 0.0),
+    tie: tuple[float, ...] = (0.0, 0.0, 0.0, 100.0, 200.0, 0.0),
+    model: int = 1,
+    **more: Any,  # noqa: ANN401 - options of tifffile
+) -> bytes:
+    """A GeoTIFF of (rows, columns) heights."""
     import tifffile
 
     keys = (1, 1, 0, 1, 1024, 0, 1, model)
@@ -109,7 +124,8 @@ def geotiff(samples, scale=(1.0, 1.0, 0.0), tie=(0.0, 0.0, 0.0, 100.0, 200.0, 0.
     return buffer.getvalue()
 
 
-def saved_world():
+def saved_world() -> bytes:
+    """A world of this library, with a ceiling."""
     from entropy_explore_env.settings import Grid
     from entropy_explore_env.worlds.load import save_world
     from entropy_explore_env.worlds.world import World
@@ -122,7 +138,7 @@ def saved_world():
         return (Path(folder) / "lab.npz").read_bytes()
 
 
-def glb_of_json(gltf, blob=b""):
+def glb_of_json(gltf: dict[str, Any], blob: bytes = b"") -> bytes:
     """A GLB with this JSON, for what no writer would write."""
     text = json.dumps(gltf).encode()
     text += b" " * (-len(text) % 4)
