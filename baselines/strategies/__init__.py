@@ -21,7 +21,8 @@ from baselines.strategies.gradient import GradientStrategy
 from baselines.strategies.information_rate_v0 import InformationRate, InformationRateConfig
 from baselines.strategies.loading import entry_points, is_reference, make_referenced, module_of
 from baselines.strategies.mutual_information import MutualInformation, MutualInformationConfig
-from baselines.strategies.next_best_view import NextBestView, NextBestViewConfig, Raster, RasterConfig
+from baselines.strategies.next_best_view import NextBestView, NextBestViewConfig
+from baselines.strategies.next_best_view.raster import Raster, RasterConfig
 from baselines.strategies.planned_rate import PlannedRate
 from baselines.strategies.protocol import Strategy
 from baselines.strategies.random_walk import RandomWalk

@@ -98,14 +98,14 @@ def _world_bytes(scenario: Scenario, batch: Batch) -> int:
     for kind in set(scenario.kinds):
         layouts += 2 * voxels + 8 * (voxels if scenario.layer_of(kind.robot) is None else planar)
     if batch.given:
-        own_masks = any(world.ceiling is not None or world.unreadable is not None for world in batch.given)
-        ceiling, held = own_masks, len(batch.given) * layouts
+        collisions_apart = any(w.ceiling is not None or w.unreadable is not None for w in batch.given)
+        held = len(batch.given) * layouts
     else:
-        from_file = scenario.world not in RECIPES  # such a world may have a ceiling
-        ceiling = from_file or "terrain" in scenario.world
+        from_file = scenario.world not in RECIPES  # such a world may have a ceiling, or unreadable voxels
+        collisions_apart = from_file or "terrain" in scenario.world
         worlds = 1 if from_file or scenario.world == "empty" else batch.missions
-        held = worlds * (layouts + voxels + (4 * planar if ceiling else 0))
-    if not ceiling:
+        held = worlds * (layouts + voxels + (4 * planar if collisions_apart else 0))
+    if not collisions_apart:  # what robots collide with is what rays are cast through
         return held
     radii = collision_radii_m(scenario)
     planned = any(kind.robot.navigator == "planned" for kind in scenario.kinds)

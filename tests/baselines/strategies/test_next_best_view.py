@@ -10,7 +10,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from baselines.strategies import make_strategy
-from baselines.strategies.next_best_view import NextBestView, NextBestViewConfig, RasterConfig
+from baselines.strategies.next_best_view import NextBestView, NextBestViewConfig
 from baselines.strategies.next_best_view.expected_view import (
     extrapolated,
     look,
@@ -19,6 +19,7 @@ from baselines.strategies.next_best_view.expected_view import (
     occupancy_map,
     voxels_in_view,
 )
+from baselines.strategies.next_best_view.raster import RasterConfig
 from baselines.strategies.next_best_view.rating import UNCERTAINTY, new_information, pose_distance, rating
 from entropy_explore_env.belief.fields import Belief, occupancy_probability
 from entropy_explore_env.errors import SettingError
