@@ -39,11 +39,18 @@ from entropy_explore_env.errors import SettingError
 from entropy_explore_env.validation import check_whole
 from training import extra  # noqa: F401 - before what is not there without it
 from training.advantages import DiscountUnit
-from training.errors import NotFiniteError
+from training.errors import NotFiniteError, SilentRunnersError
 from training.interruption import Interruption
 from training.options import check_new, check_options, check_share
 from training.ray_cluster import check_address, start_ray
-from training.rllib_settings import FIGURES, POLICY, configure, environment_settings, policy_of
+from training.rllib_settings import (
+    FIGURES,
+    POLICY,
+    SAMPLE_TIMEOUT_S,
+    configure,
+    environment_settings,
+    policy_of,
+)
 from training.run_folder import FILE, resume_command, resumed_options, save_options
 
 if TYPE_CHECKING:
@@ -54,6 +61,8 @@ _MODULE = "training.rllib_ppo"
 _CHANGEABLE = frozenset(("total_steps", "address", "runners", "checkpoint_every", "validate_every"))
 """Options that may differ where a run is continued."""
 _STOPPED = "a checkpoint is written when this iteration is done"
+MOST_SILENT = 3
+"""Iterations in a row in which no runner reports, before the run ends."""
 LOSSES = ("total_loss", "policy_loss", "vf_loss", "entropy")
 
 
@@ -243,12 +252,22 @@ def iterate(
 
     Raises:
         NotFiniteError: A loss is not finite.
+        SilentRunnersError: No runner has reported for some iterations.
     """
     assert args.out is not None
-    begun, steps, started = iteration, 0, time.perf_counter()
+    begun, steps, silent, started = iteration, 0, 0, time.perf_counter()
     while steps < args.total_steps:
-        iteration += 1
-        row = progress_row(algorithm.train(), iteration, args.robots)
+        result = algorithm.train()
+        if decisions_of(result) == steps:
+            silent += 1
+            if silent == MOST_SILENT:
+                raise SilentRunnersError(args.runners, MOST_SILENT * SAMPLE_TIMEOUT_S, steps)
+            print(f"{steps:>11,} decisions  no runner has reported: once more", file=sys.stderr, flush=True)
+            if interruption.asked:
+                return False
+            continue
+        iteration, silent = iteration + 1, 0
+        row = progress_row(result, iteration, args.robots)
         steps = int(row["decisions"])
         if begun and iteration == begun + 1:
             validation.resume(steps - 1)
@@ -270,6 +289,11 @@ def iterate(
     return True
 
 
+def decisions_of(result: dict[str, Any]) -> float:
+    """Robots' decisions since the run began, from RLlib's result."""
+    return sum(result["env_runners"].get("num_agent_steps_sampled_lifetime", {}).values())
+
+
 def progress_row(result: dict[str, Any], iteration: int, robots: int) -> dict[str, float]:
     """A row of progress.csv from RLlib's result; figures of missions are NaN until one has ended.
 
@@ -278,7 +302,7 @@ def progress_row(result: dict[str, Any], iteration: int, robots: int) -> dict[st
     runners, learner = result["env_runners"], result["learners"][POLICY]
     row: dict[str, float] = {
         "iteration": iteration,
-        "decisions": sum(runners["num_agent_steps_sampled_lifetime"].values()),
+        "decisions": decisions_of(result),
         "robot_steps": robots * runners["num_env_steps_sampled_lifetime"],
     }
     row["return"] = float(runners.get("episode_return_mean", math.nan)) / robots

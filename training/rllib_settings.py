@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 POLICY = "shared"
 FIGURES = ("t_mission_s", "finished", "bits_gained_per_bit_sent")
 """Of each mission; the progress has their means."""
+SAMPLE_TIMEOUT_S = 300.0
+"""On the clock: an iteration goes on without runners that have not reported by then."""
 _VALUE_LOSS = 0.5
 """Weight of the critic's loss, as Stable-Baselines3 has it."""
 
@@ -64,7 +66,11 @@ def configure(args: Args, env_settings: dict[str, Any], iterations: int = 0) -> 
             EntropyExploreMultiAgentEnv,
             env_config={**env_settings, "seed": runner_seed(args.seed, 0, 0, iterations)},
         )
-        .env_runners(num_env_runners=args.runners, num_envs_per_env_runner=args.missions)
+        .env_runners(
+            num_env_runners=args.runners,
+            num_envs_per_env_runner=args.missions,
+            sample_timeout_s=SAMPLE_TIMEOUT_S,
+        )
         .fault_tolerance(restart_failed_env_runners=True)
         .multi_agent(policies={POLICY}, policy_mapping_fn=_policy_of, count_steps_by="agent_steps")
         .rl_module(

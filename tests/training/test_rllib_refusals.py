@@ -13,7 +13,7 @@ import pytest
 from baselines.cli.arguments import run_command
 from entropy_explore_env.command import INTERRUPTED
 from training import rllib_ppo, run_folder
-from training.errors import NotFiniteError
+from training.errors import NotFiniteError, SilentRunnersError
 from training.interruption import Interruption
 from training.rllib_ppo import Args, last_checkpoint, main
 from training.validation import Validation
@@ -80,9 +80,9 @@ def test_without_ray_the_extra_is_named(tmp_path, capsys, monkeypatch):
 
 
 class Scripted:
-    """Stands in for RLlib's Algorithm: 100 decisions an iteration, its losses as told."""
+    """Stands in for RLlib's Algorithm: 100 decisions an iteration, its losses as told; None = no report."""
 
-    def __init__(self, losses: list[float], disk_full_at: int | None = None) -> None:
+    def __init__(self, losses: list[float | None], disk_full_at: int | None = None) -> None:
         self.losses, self.full, self.done = losses, disk_full_at, 0
         self.learner_group = self
 
@@ -90,9 +90,10 @@ class Scripted:
         return {rllib_ppo.POLICY: "weights"}
 
     def train(self) -> dict[str, Any]:
-        self.done += 1
         learner = dict.fromkeys(rllib_ppo.LOSSES, 0.5)
-        learner["vf_loss"] = self.losses[self.done - 1]
+        loss = self.losses.pop(0)
+        self.done += loss is not None
+        learner["vf_loss"] = math.nan if loss is None else loss
         steps = {f"robot_{robot}": 50 * self.done for robot in range(2)}
         runners = {
             "num_agent_steps_sampled_lifetime": steps,
@@ -152,6 +153,19 @@ def test_a_loss_that_is_not_finite_stops_and_keeps_the_last_checkpoint(bad, tmp_
         iterate(args_for(tmp_path, 900), Scripted([0.1, 0.1, 0.1, bad]), iteration=0)
     kept = last_checkpoint(tmp_path)
     assert kept is not None and (kept / "iteration").read_text() == "2"
+
+
+def test_an_iteration_without_decisions_is_repeated_and_many_end_the_run(tmp_path, capsys):
+    once = Scripted([None, 0.1, None, None, 0.1])
+    assert iterate(args_for(tmp_path, 200), once, iteration=0)
+    assert [row.split(",")[:2] for row in (tmp_path / "progress.csv").read_text().splitlines()[1:]] == [
+        ["1", "100"],
+        ["2", "200"],
+    ]
+    assert capsys.readouterr().err.count("no runner has reported: once more") == 3
+    with pytest.raises(SilentRunnersError, match="none of 2 runners reported within 900 s, after 100 dec"):
+        iterate(args_for(tmp_path, 900), Scripted([0.1, None, None, None, 0.1]), iteration=0)
+    assert not iterate(args_for(tmp_path, 900), Scripted([None, 0.1]), iteration=0, asked=True)
 
 
 def test_a_full_disk_keeps_the_last_checkpoint(tmp_path):
