@@ -329,11 +329,12 @@ def _inflated(mask: np.ndarray, radius: float, boundary: bool) -> np.ndarray:
     if 2.0 * radius > max(mask.shape):
         return np.full(mask.shape, boundary or mask.any())
     reach = math.ceil(radius - 0.5)
-    pads = (reach, reach, 0 if mask.shape[2] == 1 else reach)
-    offsets = np.ogrid[tuple(slice(-pad, pad + 1) for pad in pads)]
-    gaps = [np.maximum(np.abs(axis) - 0.5, 0.0) for axis in offsets]
-    sphere = gaps[0] ** 2 + gaps[1] ** 2 + gaps[2] ** 2 < radius**2 - 1e-9
-    padded = np.pad(mask, [(pad, pad) for pad in pads], constant_values=boundary)
-    inflated = ndimage.binary_dilation(padded, sphere)
-    inside = tuple(slice(pad, pad + n) for pad, n in zip(pads, mask.shape, strict=True))
-    return np.asarray(inflated[inside])
+    gaps = np.maximum(np.abs(np.arange(-reach, reach + 1)) - 0.5, 0.0).astype(np.float32)
+    outside = 0.0 if boundary else math.inf
+    squared = np.where(mask, np.float32(0.0), np.float32(math.inf))  # distances to the mask, edge by edge
+    for axis in range(2 if mask.shape[2] == 1 else 3):
+        along = tuple(len(gaps) if each == axis else 1 for each in range(3))
+        squared = ndimage.grey_erosion(
+            squared, structure=-(gaps**2).reshape(along), mode="constant", cval=outside
+        )
+    return squared < radius**2 - 1e-9

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from entropy_explore_env.errors import WorldError
 from entropy_explore_env.scenario import with_settings
 from entropy_explore_env.settings import Grid, Robot
-from entropy_explore_env.worlds.world import Collision, World
+from entropy_explore_env.worlds.world import Collision, World, no_fly_mask
 from tests.reference.scenes import drawn, free_box, random_cover, seeds
 
 SIZE = (7, 11, 5)
@@ -285,3 +285,14 @@ def test_a_body_that_fits_nowhere():
     with pytest.raises(WorldError) as raised:
         world_of(np.zeros(SIZE, bool)).layout(free_box(robot={"body_radius_m": 2.0}))
     assert str(raised.value) == "world = 'by hand': allowed is a world with room for a body of radius 2.0 m"
+
+
+def test_a_body_larger_than_all_but_one_side_of_a_world():
+    """A filter with a table of all the voxels that it covers asks for more memory than there is."""
+    assert (world_of(np.zeros((1, 48, 12), bool)).collision_mask(11.1) > 0).all()
+    ceiling = np.full((1, 96), 12)
+    ceiling[0, 20] = 3
+    along = np.maximum(np.abs(np.arange(96) - 20) - 0.5, 0.0)
+    below = np.maximum(2.5 - np.arange(12), 0.0)
+    expected = along[:, None] ** 2 + below**2 < 22.2**2
+    np.testing.assert_array_equal(no_fly_mask(ceiling, 12, 22.2)[0], expected)
