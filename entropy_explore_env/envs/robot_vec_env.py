@@ -56,13 +56,15 @@ class RobotVecEnv(VecEnv):
     `l` and the mission's seconds `t`; and `figures`: those of `mission_figures`, and `infos.END_FIGURES`.
 
     Attributes:
-        vector_env: The missions.
+        vector_env: The missions, of the class `_missions_of`.
         deciding: (N,) bool, whether the rows' next actions count.
         decided: (N,) bool, whether those of the latest step did.
         elapsed_s: (N,) float64, how long the latest step was.
         ended: (N,) bool, whether the row's mission ended in the latest step.
         rewards: (N,) float64, of the latest step.
     """
+
+    _missions_of: type[EntropyExploreVectorEnv] = EntropyExploreVectorEnv
 
     def __init__(
         self,
@@ -90,7 +92,7 @@ class RobotVecEnv(VecEnv):
             SettingError: A setting is unknown or out of its range.
             WorldError: The world cannot be used.
         """
-        self.vector_env = EntropyExploreVectorEnv(
+        self.vector_env = self._missions_of(
             scenario,
             missions,
             threads=threads,
@@ -113,8 +115,7 @@ class RobotVecEnv(VecEnv):
         self.deciding, self.elapsed_s = np.ones(rows, bool), np.zeros(rows)
         self.rewards, self._returns = np.zeros(rows), np.zeros(rows)
         self._steps, self._time_s = np.zeros(rows, np.int64), np.zeros(missions)
-        observation = self.vector_env.missions.layout.space()
-        super().__init__(rows, observation, action_space(self.scenario))
+        super().__init__(rows, self.vector_env.robot_space(), action_space(self.scenario))
 
     def reset(self) -> Any:  # noqa: ANN401 - an array, or a dict of them
         """Start all missions.

@@ -110,7 +110,7 @@ class EntropyExploreVectorEnv(VectorEnv[Any, Any, Any]):
         }
         self.render_mode = render_mode
         robots = self.scenario.robots
-        space, observation = action_space(self.scenario), self.missions.layout.space()
+        space, observation = action_space(self.scenario), self.robot_space()
         self._checker = ActionChecker(space)
         self._masks = action_masks and self.scenario.action.kind == "discrete"
         self.single_action_space = space if robots == 1 else batch_space(space, robots)
@@ -123,6 +123,14 @@ class EntropyExploreVectorEnv(VectorEnv[Any, Any, Any]):
         )
         painted = self.num_envs if render_mode == "rgb_array" else 1
         self._painters = [Painter(render_mode, mission) for mission in range(painted)]
+
+    def robot_space(self) -> spaces.Space:
+        """A new space object of one robot's observation."""
+        return self.missions.layout.space()
+
+    def _vectors(self) -> np.ndarray:
+        """(E, A, F) float32, a new array: what the robots observe at this moment."""
+        return self.missions.observations.copy()
 
     def reset(
         self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
@@ -224,7 +232,7 @@ class EntropyExploreVectorEnv(VectorEnv[Any, Any, Any]):
         mask = np.zeros(self.num_envs, bool)
         mask[ended] = True
         last_observations = np.empty(self.num_envs, object)
-        observations = self._of_robots(self.missions.observations.copy())
+        observations = self._of_robots(self._vectors())
         for mission in ended:
             last_observations[mission] = self.missions.layout.split(observations[mission])
         self.missions.reset_some(ended.tolist(), [None] * len(ended))
@@ -244,7 +252,7 @@ class EntropyExploreVectorEnv(VectorEnv[Any, Any, Any]):
         return values[:, 0] if self.scenario.robots == 1 else values
 
     def _observations(self) -> np.ndarray | dict[str, np.ndarray]:
-        return self.missions.layout.split(self._of_robots(self.missions.observations.copy()))
+        return self.missions.layout.split(self._of_robots(self._vectors()))
 
     def _infos(self, earned: np.ndarray | None = None) -> dict[str, Any]:
         """The infos of this moment; `earned`, (E, A), are the rewards of a step, a reset brings none."""
