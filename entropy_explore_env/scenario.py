@@ -146,7 +146,7 @@ class Scenario:
             raise SettingError("Robot.reach_m", robot.reach_m, allowed)
         if self.action.kind == "discrete" and self.action.moves == "all":  # along the axes there are few
             steps = math.floor(robot.reach_m / self.grid.voxel_size_m + 1e-9)
-            axes = self.grid.shape[:2] if self.planar else self.grid.shape
+            axes = self.grid.shape[:2] if self.in_planes else self.grid.shape
             moves = math.prod(2 * min(steps, n - 1) + 1 for n in axes)
             actions = moves * self.action.yaws * self.action.pitches
             if actions > MAX_ACTIONS:
@@ -159,6 +159,10 @@ class Scenario:
         if layer is not None and layer >= self.grid.shape[2]:
             allowed = f"below the workspace's height ({self.grid.size_m[2]} m)"
             raise SettingError("Robot.sensor_height_m", robot.sensor_height_m, allowed)
+        ground = self.ground_layer_of(robot)
+        if ground is not None and ground < 0:
+            allowed = f"at least a voxel ({self.grid.voxel_size_m} m) less than sensor_height_m"
+            raise SettingError("Robot.above_ground_m", robot.above_ground_m, allowed)
 
     def _check_faults(self) -> None:
         """Check that faults are those of robots that there are, and fit the channel."""
@@ -261,10 +265,27 @@ class Scenario:
     @property
     def planar(self) -> bool:
         """Whether the whole team stays in planes and looks level."""
+        return all(self.looks_level(kind.robot) for kind in self.kinds)
+
+    @property
+    def in_planes(self) -> bool:
+        """Whether the whole team stays in planes, wherever it looks."""
         return all(self.layer_of(kind.robot) is not None for kind in self.kinds)
 
+    def looks_level(self, robot: Robot) -> bool:
+        """Whether a kind of robot stays in a plane and its sensor never looks up or down."""
+        return self.layer_of(robot) is not None and (self.grid.flat or not robot.tilts)
+
+    def ground_layer_of(self, robot: Robot) -> int | None:
+        """Voxel layer of the ground that must carry a kind of robot, < 0 below all; None if it needs none."""
+        layer = self.layer_of(robot)
+        if self.grid.flat or layer is None or robot.above_ground_m is None:
+            return None
+        below_m = robot.sensor_height_m - robot.above_ground_m
+        return math.floor(below_m / self.grid.voxel_size_m + 1e-9) - 1
+
     def layer_of(self, robot: Robot) -> int | None:
-        """Voxel layer in which a kind of robot and its sensor stay, looking level; None if it flies.
+        """Voxel layer in which a kind of robot and its sensor stay; None if it flies.
 
         Planar robots have one, and in 2-D worlds any robot.
         """

@@ -227,6 +227,29 @@ OCCLUSIONS = Scenario(
 """Sujan's 100 × 100 m with convex occlusions, one robot with a view of 90° and 15 m. Cells of 0.5 m, speed
 and reach are ours; with two robots the paper takes 75° and 10 m."""
 
+CLIFF = Scenario(
+    name="cliff",
+    reward=usual_reward("cliff"),
+    grid=Grid((120, 96, 36), 0.125),
+    world="cliff",
+    robots=1,
+    robot=Robot(
+        motion="planar",
+        reach_m=3.0,
+        max_speed_m_s=0.3,
+        acceleration_m_s2=0.3,
+        body_radius_m=0.3,
+        sensor_height_m=4.0,
+        tilts=True,
+        above_ground_m=1.0,
+    ),
+    sensor=RangeSensor((math.pi / 2, math.pi / 4), math.pi / 90, max_range_m=6.0),
+    ending=Ending(time_limit_s=3600.0),
+)
+"""A plateau 3 m above the floor, a cliff, and rocky ground below, a part of it unreadable: Sujan's cliff, for
+one rover with a camera on a mast, which pans and tilts. 15 × 12 m, mast, view and speed are ours. The ground
+must carry the rover: at the edge a drive ends."""
+
 LAB = Scenario(
     name="lab",
     reward=usual_reward("lab"),
@@ -281,6 +304,7 @@ SCENARIOS = MappingProxyType(
             TERRAIN_SMOOTH,
             TERRAIN_ROUGH,
             OCCLUSIONS,
+            CLIFF,
             LAB,
             BHATTACHARYA_OFFICE,
             BHATTACHARYA_CLUTTERED,

@@ -100,7 +100,8 @@ class Robot:
     """How a robot moves: from rest to rest, straight (Rocha04, table 1) or on a planned way.
 
     Attributes:
-        motion: `free` flies anywhere; `planar` keeps the height of its sensor and looks level.
+        motion: `free` flies anywhere; `planar` keeps the height of its sensor and, unless it `tilts`, looks
+            level.
         navigator: `straight` drives straight to the viewpoint; `planned` takes the cheapest way through
             the robot's own belief, below the ceiling where the world has one (all robots know where it
             is), without stopping at its corners.
@@ -113,6 +114,10 @@ class Robot:
         turn_rate_rad_s: Of yaw and pitch, while driving, 1e-4 to 1e6; inf = at once.
         body_radius_m: The body is a ball; 0 = a point that blocks nobody. At most 1e6.
         sensor_height_m: Planar robots: height of the sensor above the workspace's floor, 0 to 1e6.
+        tilts: Planar robots: whether the sensor also looks up and down, as a camera on a mast; not in 2-D.
+        above_ground_m: Planar robots: the sensor's height above the ground that must carry the robot, 1e-6 to
+            1e6. A drive ends before a place below which some of the body's circle has no solid voxel there
+            (MoveEnd.EDGE). None, and in 2-D: it needs no ground.
         when_blocked: After a drive that a teammate cut short (MoveEnd.TEAMMATE), who may move on: `wander`
             decides anew at once, and our strategies then wander; `wait` stands still first. Either way
             the robot scans where it stopped, as after every drive, before that.
@@ -133,6 +138,8 @@ class Robot:
     turn_rate_rad_s: float = math.pi / 2
     body_radius_m: float = 0.1
     sensor_height_m: float = 0.5
+    tilts: bool = False
+    above_ground_m: float | None = None
     when_blocked: Literal["wander", "wait"] = "wander"
     blocked_wait_s: float = 5.0
     redecide: Literal["at_stop", "on_scan"] | float = "at_stop"
@@ -147,6 +154,9 @@ class Robot:
         check_within(self, "acceleration_m_s2", least=1e-4, most=1e6)
         check_within(self, "turn_rate_rad_s", least=1e-4, most=1e6, inf=True)
         check_within(self, "body_radius_m", "sensor_height_m", least=0, most=1e6)
+        check_kind(self, "tilts", bool)
+        if self.above_ground_m is not None:
+            check(self, "above_ground_m", "None, or a number from 1e-6 to 1e6", lambda v: 1e-6 <= v <= 1e6)
         check_choice(self, "when_blocked", Literal["wander", "wait"])
         check_within(self, "blocked_wait_s", least=1e-4, most=1e5)
         periodic = is_number(self.redecide) and MIN_REDECIDE_S <= self.redecide < math.inf

@@ -153,7 +153,7 @@ class InformationRate:
     def _drawn(self, view: RobotView, here: np.ndarray, stop: np.ndarray | None) -> np.ndarray:
         """(K, 5) viewpoints in grid units: half on the spot, half within reach; or all at a stop."""
         count = self.config.candidates
-        drawn = draw_gazes(here, count, view.planar, self._rng)
+        drawn = draw_gazes(here, count, view.level, self._rng)
         if stop is not None:
             drawn[:, :3] = stop
             return drawn
@@ -166,7 +166,7 @@ class InformationRate:
         scan = self._model_of(view).scan
         near = best.repeat(max(self.config.candidates // (4 * len(best)), 1), axis=0)
         spread = 0.5 * max(float(np.ptp(scan.yaws)), float(np.ptp(scan.pitches)), 0.1)
-        vary_gazes(near, spread, view.planar, self._rng)
+        vary_gazes(near, spread, view.level, self._rng)
         if moving:
             within = surroundings(view.scenario.grid, view.kind.robot, view.planar)
             vary_places(near, here, within, self._rng)

@@ -62,4 +62,5 @@ class Stopwatch:
 
 def random_viewpoint(view: RobotView, rng: np.random.Generator) -> np.ndarray:
     """(5,) a viewpoint drawn uniformly within a robot's reach, the gaze in any direction."""
-    return uniform_viewpoint(view.scenario.grid, view.kind.robot.reach_m, view.pose, view.planar, rng)
+    grid, reach_m = view.scenario.grid, view.kind.robot.reach_m
+    return uniform_viewpoint(grid, reach_m, view.pose, view.planar, view.level, rng)

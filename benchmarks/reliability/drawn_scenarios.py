@@ -72,6 +72,7 @@ FIELDS: Mapping[type, Mapping[str, Numbers | Sequence[Any]]] = MappingProxyType(
             "turn_rate_rad_s": Numbers(1e-4, 1e6, 0.1, 10.0, also=(math.inf,)),
             "body_radius_m": _length(1e-6, 1e6, 0.1, 2.5, 0.0),
             "sensor_height_m": _length(1e-6, 1e6, 0.5, 4.0, 0.0),
+            "tilts": _SWITCH,
             "when_blocked": ("wander", "wait"),
             "blocked_wait_s": Numbers(1e-4, 1e5, 0.1, 20.0),
             "redecide": Numbers(0.01, 1e6, 0.1, 10.0, also=("at_stop", "on_scan")),

@@ -61,7 +61,7 @@ def decode_action(params, actions, pose, continuous, discrete, viewpoint):
         for axis in range(axes):
             voxel = math.floor((pose[axis] - params.origin_m[axis]) / params.voxel_size_m) + move[axis]
             viewpoint[axis] = params.origin_m[axis] + (voxel + 0.5) * params.voxel_size_m
-        viewpoint[3], viewpoint[4] = gaze[0], 0.0 if params.planar else gaze[1]
+        viewpoint[3], viewpoint[4] = gaze[0], 0.0 if params.level else gaze[1]
     else:
         for axis in range(axes):
             if math.isinf(params.reach_m):
@@ -71,7 +71,7 @@ def decode_action(params, actions, pose, continuous, discrete, viewpoint):
             else:
                 viewpoint[axis] = pose[axis] + continuous[axis] * params.reach_m
         viewpoint[3] = continuous[params.action_axes] * math.pi
-        viewpoint[4] = 0.0 if params.planar else continuous[params.action_axes + 1] * math.pi / 2.0
+        viewpoint[4] = 0.0 if params.level else continuous[params.action_axes + 1] * math.pi / 2.0
     if not math.isinf(params.reach_m):
         length = 0.0
         for axis in range(axes):
@@ -120,7 +120,7 @@ def encode_viewpoint(
     ends = settings["origin_m"][:axes] + (corner + moves + 0.5) * settings["voxel_size_m"]
     move = int(np.argmin(((ends - wanted[:axes]) ** 2).sum(axis=1)))
     pitches = settings["pitches"]
-    if settings["planar"]:
+    if settings["level"]:
         yaws = rules.actions.gazes[::pitches, 0]
         gaze = int(np.argmax(np.cos(yaws - wanted[3]))) * pitches + (pitches - 1) // 2
     else:

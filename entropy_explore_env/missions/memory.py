@@ -12,7 +12,8 @@ from entropy_explore_env.belief.raycast import longest_crossing
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.missions.observation.layout import observation_parts
 from entropy_explore_env.missions.rules import (
-    collision_radii_m,
+    POINT,
+    collision_bodies,
     discrete_moves,
     gaze_set,
     overview_shape,
@@ -107,9 +108,9 @@ def _world_bytes(scenario: Scenario, batch: Batch) -> int:
         held = worlds * (layouts + voxels + (4 * planar if collisions_apart else 0))
     if not collisions_apart:  # what robots collide with is what rays are cast through
         return held
-    radii = collision_radii_m(scenario)
+    bodies = collision_bodies(scenario)
     planned = any(kind.robot.navigator == "planned" for kind in scenario.kinds)
-    masks = batch.missions * voxels * ((len(radii) if planned else 0) + (4 if radii == [0.0] else 0))
+    masks = batch.missions * voxels * ((len(bodies) if planned else 0) + (4 if bodies == [POINT] else 0))
     return held + masks
 
 

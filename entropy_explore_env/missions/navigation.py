@@ -38,7 +38,7 @@ class Planning(NamedTuple):
     precision: np.ndarray
     """(E, A, V) float32."""
     no_fly: np.ndarray
-    """(E·N, V) bool, for the N radii of bodies as in MissionState.collision: where a body would reach above
+    """(E·N, V) bool, for the N bodies as in MissionState.collision: where a body would reach above
     the ceiling, which robots that plan know; (E·N, 0) = no mission has one."""
 
 
@@ -67,7 +67,7 @@ def plan_missions(planning, navigator, kind, braking, continuous, discrete, firs
                     decide(own, planning.actions, robot, clock.time_s, chosen, number, choice)
                     note_change(own, robot, choice, braking)
                     mean, precision = planning.mean[mission, index], planning.precision[mission, index]
-                    no_fly = planning.no_fly[mission * own.radii + own.radius_number]
+                    no_fly = planning.no_fly[mission * own.bodies + own.body_number]
                     if choice.changed:
                         plan_drive(own, navigator, mean, precision, no_fly, choice)
                         note_braking(own, robot, clock.time_s, choice, braking)

@@ -29,8 +29,9 @@ PARAMS = record_type(
         ("pitches", "i8"),  # of discrete gazes
         # of the robot
         ("kind", "i8"),  # the number of its kind
-        ("radius_number", "i8"),  # the number of its radius among `collision_radii_m`
+        ("body_number", "i8"),  # its number among `collision_bodies`
         ("planar", "?"),
+        ("level", "?"),  # whether it is planar and never looks up or down
         ("planned", "?"),  # whether it plans its paths
         ("reach_m", "f8"),
         ("max_speed_m_s", "f8"),
@@ -44,7 +45,7 @@ PARAMS = record_type(
         ("scan_every_m", "f8"),
         ("rays", "i8"),  # R of its sensor
         # of all
-        ("radii", "i8"),  # how many `collision_radii_m` there are
+        ("bodies", "i8"),  # how many `collision_bodies` there are
         ("burst", "i8"),
         ("i_min_bits", "f8"),
         ("i_min_fill", "f8"),  # 0 = I_min stays as it is
@@ -104,7 +105,7 @@ class Rules(NamedTuple):
 def rules_of(scenario: Scenario) -> Rules:
     """The rules of a scenario."""
     ending, channel = scenario.ending, scenario.channel
-    radii = collision_radii_m(scenario)
+    bodies = collision_bodies(scenario)
     shared = {
         "size": scenario.grid.shape,
         "voxel_size_m": scenario.grid.voxel_size_m,
@@ -114,7 +115,7 @@ def rules_of(scenario: Scenario) -> Rules:
         "discrete": scenario.action.kind == "discrete",
         "action_axes": 2 if scenario.planar else 3,
         "pitches": 1 if scenario.planar else scenario.action.pitches,
-        "radii": len(radii),
+        "bodies": len(bodies),
         "burst": min(channel.burst, max(kind.sensor.rays for kind in scenario.kinds)),
         "i_min_bits": channel.i_min_bits,
         "i_min_fill": channel.i_min_fill or 0.0,
@@ -148,8 +149,9 @@ def rules_of(scenario: Scenario) -> Rules:
         robot, sensor = scenario.kind_of(number).robot, scenario.kind_of(number).sensor
         own = params[number]
         own["kind"] = number % len(scenario.kinds)
-        own["radius_number"] = radii.index(_collision_radius_m(scenario, robot))
+        own["body_number"] = bodies.index(_collision_body(scenario, robot))
         own["planar"] = scenario.layer_of(robot) is not None
+        own["level"] = scenario.looks_level(robot)
         own["planned"] = robot.navigator == "planned"
         for name in ("reach_m", "max_speed_m_s", "acceleration_m_s2", "turn_rate_rad_s", "body_radius_m"):
             own[name] = getattr(robot, name)
@@ -188,14 +190,28 @@ def fault_params(scenario: Scenario) -> np.ndarray | None:
     return params
 
 
-def collision_radii_m(scenario: Scenario) -> list[float]:
-    """The radii of the team's bodies that need a collision mask of their own; 0 = only the voxel it is in."""
-    return list(dict.fromkeys(_collision_radius_m(scenario, kind.robot) for kind in scenario.kinds))
+class Body(NamedTuple):
+    """What a collision mask depends on."""
+
+    radius_m: float
+    """0 = only the voxel that it is in counts."""
+    ground_layer: int | None
+    """Layer of the ground that must carry it; None = it needs none."""
 
 
-def _collision_radius_m(scenario: Scenario, robot: Robot) -> float:
+POINT = Body(0.0, None)
+"""A body that collides with solid voxels alone, so that it needs no collision mask of its own."""
+
+
+def collision_bodies(scenario: Scenario) -> list[Body]:
+    """The team's bodies that differ in what they collide with."""
+    return list(dict.fromkeys(_collision_body(scenario, kind.robot) for kind in scenario.kinds))
+
+
+def _collision_body(scenario: Scenario, robot: Robot) -> Body:
     small = robot.body_radius_m <= 0.5 * scenario.grid.voxel_size_m + 1e-9
-    return 0.0 if small else robot.body_radius_m
+    ground = scenario.ground_layer_of(robot)
+    return Body(0.0 if small and ground is None else robot.body_radius_m, ground)
 
 
 def overview_shape(scenario: Scenario) -> tuple[int, int, int] | None:
@@ -226,7 +242,7 @@ def discrete_moves(scenario: Scenario) -> np.ndarray:
     reach_m = max(kind.robot.reach_m for kind in scenario.kinds)
     reach = reach_m / scenario.grid.voxel_size_m + 1e-9
     farthest = [min(math.floor(reach), n - 1) for n in scenario.grid.shape]
-    if scenario.planar:
+    if scenario.in_planes:
         farthest[2] = 0
     axes_only = scenario.action.moves == "axes"
     offsets = _along_axes(farthest) if axes_only else _within_box(farthest)

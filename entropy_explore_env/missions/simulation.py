@@ -132,7 +132,7 @@ class Missions:
         self.layout = ObservationLayout(scenario)
         self._offsets = part_offsets(scenario, self.layout)
         self.state: MissionState = new_state(scenario, self.count, self.rules.cells)
-        self._no_fly = np.zeros((self.count * int(self.rules.params["radii"][0]), 0), np.bool_)
+        self._no_fly = np.zeros((self.count * int(self.rules.params["bodies"][0]), 0), np.bool_)
         self.worlds: list[World | None] = [None] * self.count
         self.world_numbers = np.full(self.count, -1, np.int64)
         self.options = [DRAWN] * self.count
@@ -292,7 +292,7 @@ class Missions:
         """What is in the way of the team's bodies."""
         for robot in range(min(len(self.scenario.kinds), self.scenario.robots)):
             params, kind = self.rules.params[robot], self.scenario.kind_of(robot)
-            row = mission * params["radii"] + params["radius_number"]
+            row = mission * params["bodies"] + params["body_number"]
             self.state.collision[row] = world.layout(self.scenario, kind).collision_mask.ravel()
             if self._no_fly.size:
                 self._no_fly[row] = world.no_fly_mask(kind.robot.body_radius_m).ravel()

@@ -113,10 +113,14 @@ def _settle_in_plane(scenario: Scenario, robot: int, pose: np.ndarray) -> None:
         if abs(pose[4]) > math.pi / 2:
             raise SettingError(f"starts[{robot}]", pose.tolist(), "a pitch from -π/2 to π/2")
         return
-    if abs(pose[2] - height_m) > _ROUNDING or abs(pose[4]) > _ROUNDING:
-        allowed = f"z = {height_m:.6g} and pitch = 0, where this planar robot stays"
-        raise SettingError(f"starts[{robot}]", pose.tolist(), allowed)
-    pose[2], pose[4] = height_m, 0.0
+    level = scenario.looks_level(scenario.kind_of(robot).robot)
+    steepest = _ROUNDING if level else math.pi / 2
+    if abs(pose[2] - height_m) > _ROUNDING or abs(pose[4]) > steepest:
+        allowed = f"z = {height_m:.6g} and pitch {'= 0' if level else 'from -π/2 to π/2'}"
+        raise SettingError(f"starts[{robot}]", pose.tolist(), f"{allowed}, where this planar robot stays")
+    pose[2] = height_m
+    if level:
+        pose[4] = 0.0
 
 
 def _check_place(scenario: Scenario, world: World, robot: int, pose: np.ndarray) -> None:
@@ -129,7 +133,11 @@ def _check_place(scenario: Scenario, world: World, robot: int, pose: np.ndarray)
     voxel = tuple(np.minimum(grid.voxel_of(pose[:3]), np.asarray(grid.shape) - 1).tolist())
     collision = Collision(int(world.layout(scenario, scenario.kind_of(robot)).collision_mask[voxel]))
     if collision is not Collision.NONE:
-        hit = {Collision.SOLID: "something solid or the boundary", Collision.GROUND: "the ground"}
-        what = hit.get(collision, "the ceiling")
-        allowed = f"a place where the body fits: in voxel {voxel} it hits {what}"
+        hit = {
+            Collision.SOLID: "hits something solid or the boundary",
+            Collision.GROUND: "hits the ground",
+            Collision.EDGE: "has no ground below",
+        }
+        what = hit.get(collision, "hits the ceiling")
+        allowed = f"a place where the body fits: in voxel {voxel} it {what}"
         raise SettingError(name, pose.tolist(), allowed)

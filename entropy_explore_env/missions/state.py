@@ -15,7 +15,7 @@ import numpy as np
 
 from entropy_explore_env.belief.pooling import Cells
 from entropy_explore_env.compilation.kernels import record_type
-from entropy_explore_env.missions.rules import collision_radii_m
+from entropy_explore_env.missions.rules import POINT, collision_bodies
 from entropy_explore_env.scenario import Scenario
 
 
@@ -199,7 +199,7 @@ class MissionState(NamedTuple):
     truth: np.ndarray
     """(E, V) float32 true coverage, 0 or 1."""
     collision: np.ndarray
-    """(E·N, V) float32 collision masks, a Collision each, for the N radii of bodies that need one, mission by
+    """(E·N, V) float32 collision masks, a Collision each, for the N bodies that need one, mission by
     mission; `truth` itself where all bodies are small and there is no ceiling."""
     mean: np.ndarray
     """(E, A, V) float32 expected coverage by each robot's belief."""
@@ -316,10 +316,10 @@ def state_arrays(
     e, a, r = missions, scenario.robots, max(kind.sensor.rays for kind in scenario.kinds)
     v, q, b = scenario.grid.voxels, scenario.message_slots, min(scenario.channel.burst, r)
     s, tracked = scenario.phase_batches, scenario.grid.voxels if scenario.track_truth else 0
-    radii, in_phases = collision_radii_m(scenario), a if scenario.phase_batches else 0
+    bodies, in_phases = collision_bodies(scenario), a if scenario.phase_batches else 0
     arrays: dict[str, tuple[tuple[int, ...], Any]] = {
         "truth": ((e, v), np.float32),
-        "collision": ((0 if radii == [0.0] else e * len(radii), v), np.float32),
+        "collision": ((0 if bodies == [POINT] else e * len(bodies), v), np.float32),
         "mean": ((e, a, v), np.float32),
         "precision": ((e, a, v), np.float32),
         "pooled": ((e, a, 2, cells), np.float64),

@@ -114,7 +114,7 @@ def step_missions(rules, state, choices, work, continuous, discrete, first, last
         first: The first mission.
         last: One past the last.
     """
-    masks = rules.params[0].radii
+    masks = rules.params[0].bodies
     for m in range(first, last):
         mission = Mission(
             state.missions[m],
@@ -193,7 +193,7 @@ def depart(team, clock, in_flight, collision, choices, work):
     for index in range(len(team.robots)):
         robot, own = team.robots[index], team.params[index]
         if robot.deciding and choices[index].changed:
-            start_drive(team, collision[own.radius_number], choices[index], index, clock.time_s, work)
+            start_drive(team, collision[own.body_number], choices[index], index, clock.time_s, work)
             announce(team, clock, in_flight, index, work.recipients)
         elif robot.deciding:
             keep_drive(own, robot, clock.time_s, work.braking)

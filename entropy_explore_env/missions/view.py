@@ -160,8 +160,13 @@ class RobotView:
 
     @property
     def planar(self) -> bool:
-        """Whether it stays in its plane and looks level."""
+        """Whether it stays in its plane."""
         return self.scenario.layer_of(self.kind.robot) is not None
+
+    @property
+    def level(self) -> bool:
+        """Whether it stays in its plane and never looks up or down."""
+        return self.scenario.looks_level(self.kind.robot)
 
     def scan_places(self, path_m: np.ndarray) -> np.ndarray:
         """Where the robot would scan under way on a path from its place, the scan at its end not among them.

@@ -153,7 +153,7 @@ def _most_added(scenario: Scenario, kind: RobotKind, world: World) -> float:
     truth, added = true_coverage(world.occupied, world.unreadable), 0.0
     scene = Scene(truth, grid.shape, grid.voxel_size_m, np.zeros((0, 4)))
     voxels = np.stack(np.unravel_index(rng.choice(layout.starts, _FLOOR_SCANS), grid.shape), axis=-1)
-    steepest = _STEEPEST_RAD if scenario.layer_of(kind.robot) is None else 0.0
+    steepest = 0.0 if scenario.looks_level(kind.robot) else _STEEPEST_RAD
     for voxel in voxels + 0.5:
         start, yaw = tuple(voxel.tolist()), rng.uniform(-math.pi, math.pi)
         pitch = rng.uniform(-steepest, steepest)

@@ -41,6 +41,7 @@ class MoveEnd(enum.Enum):
     SEEN = "A scan under way showed that the rest of the path is blocked: the robot stands where it was."
     UNDER_WAY = "The drive goes on: the robot decides again without stopping."
     FAILED = "A fault stopped the robot where it was."
+    EDGE = "The ground ends there: the robot stands in the last voxel in which all of it is carried."
 
     @property
     def code(self) -> int:
@@ -50,7 +51,7 @@ class MoveEnd(enum.Enum):
 
 _ARRIVED, _WALL = MoveEnd.ARRIVED.code, MoveEnd.WALL.code
 _OBSTACLE, _GROUND, _CEILING = MoveEnd.OBSTACLE.code, MoveEnd.GROUND.code, MoveEnd.CEILING.code
-_ENDS_AT = (_ARRIVED, _OBSTACLE, _GROUND, _CEILING)
+_ENDS_AT = (_ARRIVED, _OBSTACLE, _GROUND, _CEILING, MoveEnd.EDGE.code)
 """How a drive ends at each Collision."""
 _TOUCH = 1e-6
 """Bodies stop this far apart, in voxel edges, so that rounding cannot make them overlap."""

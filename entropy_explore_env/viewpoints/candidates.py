@@ -124,6 +124,7 @@ class _Maker:
         self.exact = robot_model(scenario, kind, recipe.thinning, recipe.stop_probability)
         layer = scenario.layer_of(kind.robot)
         self.planar, self.layer = layer is not None, -1 if layer is None else int(layer)
+        self.level = scenario.looks_level(kind.robot)
         self.planned = kind.robot.navigator == "planned"
         self.within = surroundings(scenario.grid, kind.robot, self.planar)
         self.reach = min(kind.robot.reach_m / scenario.grid.voxel_size_m, float(sum(scenario.grid.shape)))
@@ -337,7 +338,7 @@ class CandidatePlanner:
         viewpoints = viewpoints[np.argsort(worth)[-recipe.far_places :]].repeat(recipe.far_gazes, axis=0)
         if not maker.all_around:
             viewpoints[:, 3] = rng.uniform(-math.pi, math.pi, len(viewpoints))
-            if not maker.planar:
+            if not maker.level:
                 pitch = _PITCH_SPREAD * rng.normal(size=len(viewpoints))
                 viewpoints[:, 4] = np.clip(pitch, -0.5 * math.pi, 0.5 * math.pi)
         return viewpoints if kept is None else np.concatenate([viewpoints, kept[None]])
@@ -374,7 +375,7 @@ class CandidatePlanner:
             return stop
         gazes = np.tile(stop, (maker.recipe.way_gazes, 1))
         gazes[1:, 3] = rng.uniform(-math.pi, math.pi, len(gazes) - 1)
-        if not maker.planar:
+        if not maker.level:
             pitch = _PITCH_SPREAD * rng.normal(size=len(gazes) - 1)
             gazes[1:, 4] = np.clip(pitch, -0.5 * math.pi, 0.5 * math.pi)
         return gazes[int(np.argmax(self.bits_at(situation, gazes)))]
@@ -401,7 +402,7 @@ def _drawn(maker: _Maker, here: np.ndarray, rng: np.random.Generator) -> np.ndar
         drawn[recipe.gazes :, 4] = np.arcsin(rng.uniform(-1.0, 1.0, others))
     if recipe.places > 0:
         drawn[-recipe.places :, : within.axes] = draw_places(here, recipe.places, within, rng)
-    _normalise(drawn, maker.planar, here[4])
+    _normalise(drawn, maker.level, here[4])
     return drawn
 
 
@@ -412,7 +413,7 @@ def _vary(
     viewpoints[:, 3] += spread * rng.normal(size=len(viewpoints))
     viewpoints[:, 4] += spread * rng.normal(size=len(viewpoints))
     _shift(viewpoints, here, maker.within, rng)
-    _normalise(viewpoints, maker.planar, here[4])
+    _normalise(viewpoints, maker.level, here[4])
 
 
 def _shift(viewpoints: np.ndarray, here: np.ndarray, within: Surroundings, rng: np.random.Generator) -> None:
@@ -425,10 +426,10 @@ def _shift(viewpoints: np.ndarray, here: np.ndarray, within: Surroundings, rng: 
     viewpoints[moved, :axes] = np.clip(here[:axes] + step / length[:, None], 0.5, within.last)[moved]
 
 
-def _normalise(viewpoints: np.ndarray, planar: bool, level: float) -> None:
-    """Bring gazes into their ranges, in place; planar robots keep their pitch."""
+def _normalise(viewpoints: np.ndarray, level: bool, pitch: float) -> None:
+    """Bring gazes into their ranges, in place; robots that look level keep their pitch."""
     viewpoints[:, 3] = (viewpoints[:, 3] + math.pi) % (2.0 * math.pi) - math.pi
-    if planar:
-        viewpoints[:, 4] = level
+    if level:
+        viewpoints[:, 4] = pitch
     else:
         viewpoints[:, 4] = np.clip(viewpoints[:, 4], -0.5 * math.pi, 0.5 * math.pi)

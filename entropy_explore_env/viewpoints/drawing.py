@@ -31,11 +31,11 @@ def surroundings(grid: Grid, robot: Robot, planar: bool) -> Surroundings:
     return Surroundings(axes, reach, np.asarray(grid.shape[:axes]) - 0.5)
 
 
-def draw_gazes(here: np.ndarray, count: int, planar: bool, rng: np.random.Generator) -> np.ndarray:
-    """(K, 5) viewpoints at one place (5,) with random gazes; planar robots look level."""
+def draw_gazes(here: np.ndarray, count: int, level: bool, rng: np.random.Generator) -> np.ndarray:
+    """(K, 5) viewpoints at one place (5,) with random gazes, on the level or anywhere."""
     drawn = np.tile(here, (count, 1))
     drawn[:, 3] = rng.uniform(-math.pi, math.pi, count)
-    drawn[:, 4] = 0.0 if planar else np.arcsin(rng.uniform(-1.0, 1.0, count))
+    drawn[:, 4] = 0.0 if level else np.arcsin(rng.uniform(-1.0, 1.0, count))
     return drawn
 
 
@@ -48,11 +48,11 @@ def draw_places(here: np.ndarray, count: int, within: Surroundings, rng: np.rand
     return np.clip(here[:axes] + step, 0.5, within.last)
 
 
-def vary_gazes(viewpoints: np.ndarray, spread: float, planar: bool, rng: np.random.Generator) -> None:
+def vary_gazes(viewpoints: np.ndarray, spread: float, level: bool, rng: np.random.Generator) -> None:
     """Turn (K, 5) viewpoints by normal errors of this many radians, in place."""
     viewpoints[:, 3] += spread * rng.normal(size=len(viewpoints))
     viewpoints[:, 3] = (viewpoints[:, 3] + math.pi) % (2.0 * math.pi) - math.pi
-    if not planar:
+    if not level:
         tilted = viewpoints[:, 4] + spread * rng.normal(size=len(viewpoints))
         viewpoints[:, 4] = np.clip(tilted, -0.5 * math.pi, 0.5 * math.pi)
 
@@ -73,15 +73,16 @@ def vary_places(
 
 
 def uniform_viewpoint(
-    grid: Grid, reach_m: float, pose: np.ndarray, planar: bool, rng: np.random.Generator
+    grid: Grid, reach_m: float, pose: np.ndarray, planar: bool, level: bool, rng: np.random.Generator
 ) -> np.ndarray:
     """A viewpoint drawn uniformly within reach, inside the workspace; the gaze in any direction.
 
     Args:
         grid: The workspace.
         reach_m: Largest distance of the viewpoint; inf allowed.
-        pose: (5,) of the robot, map frame; planar robots stay in their plane and look level.
-        planar: Whether the robot is planar.
+        pose: (5,) of the robot, map frame.
+        planar: Whether the robot stays in its plane.
+        level: Whether it looks level.
         rng: To draw from.
 
     Returns:
@@ -101,5 +102,5 @@ def uniform_viewpoint(
             viewpoint[:axes] = place
             break
     viewpoint[3] = rng.uniform(-math.pi, math.pi)
-    viewpoint[4] = 0.0 if planar else math.asin(rng.uniform(-1.0, 1.0))
+    viewpoint[4] = 0.0 if level else math.asin(rng.uniform(-1.0, 1.0))
     return viewpoint

@@ -30,6 +30,8 @@ class Collision(enum.IntEnum):
     """A solid voxel of a world with a ceiling: the terrain."""
     CEILING = 3
     """The ceiling: the body would reach into the no-fly zone."""
+    EDGE = 4
+    """Nothing, but no ground carries all of the body."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -116,27 +118,32 @@ class World:
         x, y, z = self.grid.shape
         return f"World({self.name!r}, {x} × {y} × {z} voxels of {self.grid.voxel_size_m:g} m)"
 
-    def collision_mask(self, body_radius_m: float) -> np.ndarray:
+    def collision_mask(self, body_radius_m: float, ground_layer: int | None = None) -> np.ndarray:
         """Where the centre of a spherical body cannot be, judged at voxel centres.
 
         Args:
             body_radius_m: Radius of the body in metres; up to half a voxel, the body fits wherever its
                 voxel is free.
+            ground_layer: Layer of the ground that must carry the body's circle; None = it needs none.
 
         Returns:
             (X, Y, Z) uint8, a Collision each. Where a body collides with several things, the first of
-            ground, ceiling and boundary counts.
+            ground, ceiling, boundary and edge counts.
 
         Raises:
             WorldError: The radius is no finite number ≥ 0.
         """
         radius = self._in_voxels(body_radius_m)
         solid = _inflated(self.occupied, radius, boundary=True)
-        if self.ceiling is None:
+        if self.ceiling is None and ground_layer is None:
             return solid.view(np.uint8)
         mask = solid.astype(np.uint8)
-        mask[self.no_fly_mask(body_radius_m)] = Collision.CEILING
-        mask[_inflated(self.occupied, radius, boundary=False)] = Collision.GROUND
+        if self.ceiling is not None:
+            mask[self.no_fly_mask(body_radius_m)] = Collision.CEILING
+            mask[_inflated(self.occupied, radius, boundary=False)] = Collision.GROUND
+        if ground_layer is not None:
+            missing = _inflated(~self.occupied[:, :, ground_layer : ground_layer + 1], radius, boundary=False)
+            mask[(mask == Collision.NONE) & missing] = Collision.EDGE
         return mask
 
     def no_fly_mask(self, body_radius_m: float) -> np.ndarray:
@@ -157,7 +164,7 @@ class World:
         return body_radius_m / self.grid.voxel_size_m
 
     @cached_property
-    def _layouts(self) -> dict[tuple[float, int | None, int, _LevelView | None], Layout]:
+    def _layouts(self) -> dict[tuple[float, int | None, int | None, int, _PlaneView | None], Layout]:
         return {}
 
     def layout(self, scenario: Scenario, kind: RobotKind | None = None) -> Layout:
@@ -175,11 +182,13 @@ class World:
         if kind is not None:
             check_instance("kind", kind, RobotKind)
         robot, sensor = (scenario.robot, scenario.sensor) if kind is None else (kind.robot, kind.sensor)
-        layer, level_view = scenario.layer_of(robot), None
+        layer, plane_view = scenario.layer_of(robot), None
         if layer is not None and not scenario.grid.flat:
-            steepest_rad = 0.5 * (sensor.rows - 1) * sensor.angular_step_rad
-            level_view = _LevelView(robot.sensor_height_m, steepest_rad, sensor.max_range_m)
-        key = (robot.body_radius_m, layer, sensor.voxels_behind, level_view)
+            half_rad = 0.5 * (sensor.rows - 1) * sensor.angular_step_rad
+            steepest_rad = half_rad if scenario.looks_level(robot) else 0.5 * math.pi
+            plane_view = _PlaneView(robot.sensor_height_m, steepest_rad, sensor.max_range_m)
+        ground = scenario.ground_layer_of(robot)
+        key = (robot.body_radius_m, layer, ground, sensor.voxels_behind, plane_view)
         if key not in self._layouts:
             self._layouts[key] = self._compute_layout(*key)
         return self._layouts[key]
@@ -198,9 +207,14 @@ class World:
         return int(self.visible(scenario).sum())
 
     def _compute_layout(
-        self, body_radius_m: float, layer: int | None, voxels_behind: int, level_view: _LevelView | None
+        self,
+        body_radius_m: float,
+        layer: int | None,
+        ground_layer: int | None,
+        voxels_behind: int,
+        plane_view: _PlaneView | None,
     ) -> Layout:
-        collision_mask = self.collision_mask(body_radius_m)
+        collision_mask = self.collision_mask(body_radius_m, ground_layer)
         fits = collision_mask == Collision.NONE
         if layer is not None:
             fits[:, :, :layer] = fits[:, :, layer + 1 :] = False
@@ -209,6 +223,8 @@ class World:
             allowed = f"a world with room for a body of radius {body_radius_m} m"
             if layer is not None and not self.grid.flat:
                 allowed += f" in layer {layer}, where planar robots stay"
+            if ground_layer is not None:
+                allowed += f", above ground in layer {ground_layer}"
             raise WorldError("world", self.name, allowed)
         labels, _ = connected_components(~self.occupied)
         visible = np.isin(labels, np.unique(labels[starts]))
@@ -216,16 +232,16 @@ class World:
             within = None if self.unreadable is None else ~self.unreadable
             behind = ndimage.binary_dilation(visible, iterations=voxels_behind, mask=within)
             visible |= behind & self.occupied
-        if level_view is not None:
-            visible &= self._within_view(np.any(starts, axis=2), level_view)
+        if plane_view is not None:
+            visible &= self._within_view(np.any(starts, axis=2), plane_view)
         return Layout(collision_mask, np.flatnonzero(starts), visible)
 
-    def _within_view(self, positions: np.ndarray, view: _LevelView) -> np.ndarray:
-        """Which voxels a level sensor can have in its field of view, occlusions disregarded.
+    def _within_view(self, positions: np.ndarray, view: _PlaneView) -> np.ndarray:
+        """Which voxels a sensor in a plane can have in its field of view, occlusions disregarded.
 
         A voxel that is dz above or below the sensor is in view from |dz|/tan φ away, φ the steepest ray. It
         is visible if some position is at least so far away, and some position within range. The positions
-        are connected, so then one position is both.
+        are connected, so then one position is both. A sensor that looks straight down sees all within range.
 
         Args:
             positions: (X, Y) bool, where robots can be.
@@ -243,9 +259,11 @@ class World:
             np.maximum(farthest, np.hypot(x - i, y - j), out=farthest)
         nearest = np.asarray(ndimage.distance_transform_edt(~positions))
         centres_m = (np.arange(self.grid.shape[2]) + 0.5) * edge_m
-        rises_m = np.abs(centres_m - view.sensor_height_m) - 0.5 * edge_m
-        needed = np.maximum(rises_m, 0.0) / max(math.tan(view.steepest_rad), 1e-9) / edge_m
+        rises_m = np.maximum(np.abs(centres_m - view.sensor_height_m) - 0.5 * edge_m, 0.0)
         range_ = view.max_range_m / edge_m
+        if view.steepest_rad >= 0.5 * math.pi:
+            return np.hypot(nearest[:, :, None], rises_m / edge_m) <= range_
+        needed = rises_m / max(math.tan(view.steepest_rad), 1e-9) / edge_m
         return (farthest[:, :, None] >= needed) & (np.maximum(nearest[:, :, None], needed) <= range_)
 
 
@@ -257,8 +275,8 @@ def _kept(array: np.ndarray) -> np.ndarray:
     return array
 
 
-class _LevelView(NamedTuple):
-    """The field of view of a sensor that always looks level.
+class _PlaneView(NamedTuple):
+    """The field of view of a sensor that stays in a plane.
 
     Attributes:
         sensor_height_m: Above the workspace's floor.
@@ -285,8 +303,8 @@ class Layout:
         starts: (N,) flat indices of the voxels where it may start: the largest connected component of
             those in which it fits.
         visible: (X, Y, Z) bool, the voxels that can be observed from there at all: the free space that is
-            connected to the starts, and the surface of the solid voxels around it; for robots with a
-            level sensor only what can be in its field of view.
+            connected to the starts, and the surface of the solid voxels around it; for robots in a
+            plane only what can be in its field of view.
     """
 
     collision_mask: np.ndarray

@@ -82,6 +82,31 @@ def test_a_robot_stops_before_what_is_solid_and_says_why():
     assert robots["blocked_moves"][0] == 2
 
 
+def test_a_rover_stops_where_the_ground_ends_and_says_so(monkeypatch):
+    """Ground up to z = 1 for y < 3.5, without the corner where x < 1; the rover's circle must be carried."""
+    ground = np.zeros((7, 11, 5), bool)
+    ground[:, :7, :2] = True
+    ground[:2, 5:, 1] = False
+    world = World(Grid((7, 11, 5), 0.5), ground, "step")
+    monkeypatch.setattr(missions_module, "make_world", lambda *_: world)
+    rover = {"motion": "planar", "sensor_height_m": 1.75, "above_ground_m": 0.75, "body_radius_m": 0.3}
+    missions = started(free_box(robots=1, robot={**rover, "reach_m": 4.0, "tilts": True}))
+    put(missions, 0, (2.25, 1.25, 1.75, 0.0, 0.0))
+    robots = toward(missions, (2.25, 4.75, 1.75, 0.0, 0.9))
+    assert list(MoveEnd)[robots["move_end"][0]] is MoveEnd.EDGE
+    assert robots["goal"][0] == pytest.approx([2.25, 2.75, 1.75, 0.0, 0.9])  # voxel 6 touches the edge at 3.5
+    robots = toward(missions, (2.25, 1.75, 1.75, 0.0, 0.9))
+    assert list(MoveEnd)[robots["move_end"][0]] is MoveEnd.ARRIVED
+    robots = toward(missions, (1.75, 1.75, 1.75, 0.0, -0.4))
+    assert robots["goal"][0, 4] == pytest.approx(-0.4)
+    robots = toward(missions, (0.75, 2.4, 1.75, 0.0, 0.0))
+    assert list(MoveEnd)[robots["move_end"][0]] is MoveEnd.EDGE
+    flying = {"motion": "free", "above_ground_m": 0.75, "reach_m": 4.0}
+    missions = started(free_box(robots=1, robot=flying))
+    put(missions, 0, (2.25, 1.25, 1.75, 0.0, 0.0))
+    assert list(MoveEnd)[toward(missions, (2.25, 4.75, 1.75, 0.0, 0.0))["move_end"][0]] is MoveEnd.ARRIVED
+
+
 def test_a_robot_stays_between_ground_and_ceiling_and_says_which_of_them_stopped_it(monkeypatch):
     """Ground up to z = 0.5; closed to robots, not to rays, from z = 2 on."""
     ground = np.zeros((7, 11, 5), bool)

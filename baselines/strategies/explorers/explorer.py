@@ -35,7 +35,14 @@ from entropy_explore_env.missions.view import RobotView
 from entropy_explore_env.robots.motion import MoveEnd
 from entropy_explore_env.scenario import Scenario
 
-_STOPPED = (MoveEnd.OBSTACLE, MoveEnd.GROUND, MoveEnd.CEILING, MoveEnd.WALL, MoveEnd.NO_PATH)
+_STOPPED = (
+    MoveEnd.OBSTACLE,
+    MoveEnd.GROUND,
+    MoveEnd.CEILING,
+    MoveEnd.EDGE,
+    MoveEnd.WALL,
+    MoveEnd.NO_PATH,
+)
 """Ends of a drive to a place that cannot be reached, whatever the belief says."""
 _GAZES = 4
 """A place is dropped when the robot has looked from it in so many directions."""

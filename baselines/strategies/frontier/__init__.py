@@ -43,7 +43,15 @@ _WITHIN_REACH = 0.999
 """Share of the reach that is used, so that rounding never moves a place towards the robot."""
 _DELAY = 1.5
 """Others may be under way this many times the estimated time, which does not include stops at corners."""
-_EARLY = (MoveEnd.OBSTACLE, MoveEnd.GROUND, MoveEnd.CEILING, MoveEnd.WALL, MoveEnd.TEAMMATE, MoveEnd.NO_PATH)
+_EARLY = (
+    MoveEnd.OBSTACLE,
+    MoveEnd.GROUND,
+    MoveEnd.CEILING,
+    MoveEnd.EDGE,
+    MoveEnd.WALL,
+    MoveEnd.TEAMMATE,
+    MoveEnd.NO_PATH,
+)
 
 
 @dataclass(frozen=True)

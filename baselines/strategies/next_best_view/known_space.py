@@ -134,9 +134,11 @@ class KnownSpace(ABC):
         return stop
 
     def pose_in(self, view: RobotView, voxel: int, yaw: float, pitch: float) -> np.ndarray:
-        """(5,) a pose in the middle of a voxel; planar robots stay at their height and look level."""
+        """(5,) a pose in the middle of a voxel; planar robots stay at their height."""
         grid = self._scenario.grid
         place = grid.centre_of(np.stack(np.unravel_index(voxel, grid.shape)))
         if view.planar:
-            place[2], pitch = view.pose[2], 0.0
+            place[2] = view.pose[2]
+        if view.level:
+            pitch = 0.0
         return np.array([*place, yaw, pitch])

@@ -15,8 +15,8 @@ def write_mask(params, actions, start, mean, out):
     """Mark the discrete actions that make sense by the robot's own belief.
 
     A move makes sense if it ends inside the workspace, within reach, in a voxel that is not
-    believed covered; to stay always does. Planar robots have no use for moves up and down, nor for more
-    than one of the gazes of a yaw.
+    believed covered; to stay always does. Planar robots have no use for moves up and down, nor, if they look
+    level, for more than one of the gazes of a yaw.
 
     Args:
         params: PARAMS of the robot.
@@ -39,7 +39,7 @@ def write_mask(params, actions, start, mean, out):
         sensible = move == 0 or (inside and near and mean[voxel] <= STOP_AT_COVERED)
         for gaze in range(gazes):
             level = gaze % params.pitches == (params.pitches - 1) // 2
-            out[move * gazes + gaze] = 1 if sensible and (level or not params.planar) else 0
+            out[move * gazes + gaze] = 1 if sensible and (level or not params.level) else 0
 
 
 @lean_kernel

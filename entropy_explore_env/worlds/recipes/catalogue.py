@@ -11,6 +11,7 @@ from entropy_explore_env.settings import Grid
 from entropy_explore_env.worlds.recipes.bhattacharya_cluttered import bhattacharya_cluttered
 from entropy_explore_env.worlds.recipes.bhattacharya_office import bhattacharya_office
 from entropy_explore_env.worlds.recipes.cave import cave
+from entropy_explore_env.worlds.recipes.cliff import cliff
 from entropy_explore_env.worlds.recipes.cluttered import cluttered
 from entropy_explore_env.worlds.recipes.corridor import corridor
 from entropy_explore_env.worlds.recipes.empty import empty
@@ -35,6 +36,7 @@ RECIPES: Mapping[str, Callable[[Grid, np.random.Generator], World]] = MappingPro
         "terrain-smooth": smooth_terrain,
         "terrain-rough": rough_terrain,
         "occlusions": occlusions,
+        "cliff": cliff,
         "lab": lab,
         "bhattacharya-office": bhattacharya_office,
         "bhattacharya-cluttered": bhattacharya_cluttered,

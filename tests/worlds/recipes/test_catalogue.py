@@ -15,7 +15,15 @@ from entropy_explore_env.worlds.recipes.catalogue import RECIPES
 
 BODY_M = 0.3
 NATURAL = {name: scenario for name, scenario in SCENARIOS.items() if scenario.world in RECIPES}
-SEEDS = {"bhattacharya-cluttered": 3, "cave": 12, "hybrid": 15, "cluttered": 15, "occlusions": 20, "lab": 30}
+SEEDS = {
+    "bhattacharya-cluttered": 3,
+    "cave": 12,
+    "hybrid": 15,
+    "cluttered": 15,
+    "occlusions": 20,
+    "lab": 30,
+    "cliff": 20,
+}
 """Worlds a scenario; 50 where a world takes a millisecond or two."""
 FREE_SHARE = {
     "room": (1.0, 1.0),
@@ -32,6 +40,7 @@ FREE_SHARE = {
     "terrain-smooth": (0.4, 0.85),
     "terrain-rough": (0.4, 0.8),
     "occlusions": (0.85, 0.9),
+    "cliff": (0.5, 0.75),
     "lab": (0.88, 0.98),
     "bhattacharya-office": (0.94, 0.98),
     "bhattacharya-cluttered": (0.85, 0.88),
@@ -51,6 +60,7 @@ OTHER_GRIDS = {
     "terrain-smooth": [Grid((31, 47, 29), 0.3), Grid((9, 7, 8), 1.0)],
     "terrain-rough": [Grid((31, 47, 29), 0.3), Grid((9, 7, 8), 1.0)],
     "occlusions": [Grid((101, 83, 1), 0.6), Grid((47, 53, 4), 1.0)],
+    "cliff": [Grid((31, 47, 20), 0.3), Grid((23, 17, 9), 0.5), Grid((67, 53, 31), 0.15)],
     "lab": [Grid((37, 43, 1), 0.1), Grid((17, 13, 7), 0.3), Grid((9, 7, 3), 0.6)],
     "bhattacharya-office": [Grid((61, 83, 1), 0.25), Grid((53, 37, 6), 0.4), Grid((15, 17, 1), 1.0)],
     "bhattacharya-cluttered": [Grid((211, 173, 1), 0.1), Grid((61, 47, 4), 0.5), Grid((29, 37, 1), 1.0)],
@@ -65,10 +75,14 @@ SMALLEST_M = {
     "terrain-smooth": (6.0, 6.0),
     "terrain-rough": (6.0, 6.0),
     "occlusions": (40.0, 40.0),
+    "cliff": (8.0, 6.0),
     "lab": (4.0, 3.0),
     "bhattacharya-office": (14.0, 12.0),
     "bhattacharya-cluttered": (20.0, 16.0),
 }
+
+HILLY = {"terrain", "terrain-smooth", "terrain-rough", "cliff"}
+"""Recipes of worlds in 3-D alone."""
 
 
 def parts(room):
@@ -132,7 +146,7 @@ def test_every_recipe_is_tried_on_other_grids_and_on_too_small_ones():
 @pytest.mark.parametrize("name", SMALLEST_M)
 def test_a_grid_that_is_too_small_is_refused_by_name(name):
     edge_m, (longest, shortest) = 0.2, SMALLEST_M[name]
-    high = round(5.4 / edge_m) if name.startswith("terrain") else 1
+    high = round(5.4 / edge_m) if name in HILLY else 1
     long, short = round(longest / edge_m), round(shortest / edge_m)
     assert RECIPES[name](Grid((long, short, high), edge_m), np.random.default_rng(0)).occupied.any()
     assert RECIPES[name](Grid((short, long, high), edge_m), np.random.default_rng(1)).occupied.any()
@@ -146,7 +160,7 @@ def test_a_grid_that_is_too_small_is_refused_by_name(name):
         assert raised.value.field == "Grid.shape" and raised.value.value == shape
 
 
-@pytest.mark.parametrize("name", [name for name in SMALLEST_M if not name.startswith("terrain")])
+@pytest.mark.parametrize("name", [name for name in SMALLEST_M if name not in HILLY])
 def test_voxels_in_which_rooms_and_ways_get_lost_are_refused_by_name(name):
     """A net of corridors over voxels of 1,000 km was never finished."""
     draws = np.random.default_rng(0)
