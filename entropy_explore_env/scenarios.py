@@ -243,7 +243,7 @@ CLIFF = Scenario(
         tilts=True,
         above_ground_m=1.0,
     ),
-    sensor=RangeSensor((math.pi / 2, math.pi / 4), math.pi / 90, max_range_m=6.0),
+    sensor=RangeSensor((math.pi / 2, math.pi / 4), math.pi / 180, max_range_m=6.0),
     ending=Ending(time_limit_s=3600.0),
 )
 """A plateau 3 m above the floor, a cliff, and rocky ground below, a part of it unreadable: Sujan's cliff, for

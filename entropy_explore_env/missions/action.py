@@ -3,9 +3,9 @@
 A viewpoint is (x, y, z, yaw, pitch): map frame, metres, radians, pitch downwards.
 
 Continuous, Box(-1, 1): displacement in shares of the reach (x, y, z; planar robots x, y), yaw/π
-and, unless planar, pitch/(π/2). A displacement longer than the reach is shortened to it. Where the
-reach is infinite, the first numbers are a place in the workspace instead: along each axis -1 is the
-centre of the first voxel and 1 that of the last.
+and, unless the whole team looks level, pitch/(π/2). A displacement longer than the reach is shortened to
+it. Where the reach is infinite, the first numbers are a place in the workspace instead: along each axis -1
+is the centre of the first voxel and 1 that of the last.
 
 Discrete: number m·D + g means move m of `discrete_moves` (a voxel offset from the robot's voxel, to
 that voxel's centre) and gaze g of the D in `gaze_set`.
@@ -146,6 +146,6 @@ def _encoded_box(settings: np.void, pose: np.ndarray, wanted: np.ndarray, axes: 
     yaw = (wanted[3] + math.pi) % (2.0 * math.pi) - math.pi
     action = np.zeros(3 if settings["action_axes"] == 2 else 5)
     action[:axes], action[settings["action_axes"]] = move, yaw / math.pi
-    if not settings["planar"]:
+    if not settings["level"]:
         action[4] = wanted[4] / (math.pi / 2.0)
     return np.clip(action, -1.0, 1.0).astype(np.float32)

@@ -22,7 +22,7 @@ def test_the_defaults_make_a_policy_for_every_named_scenario(name):
     ppo.check(args)
     task = ppo.training_task(args)
     scenario, state = task.scenario, ppo.set_up(args, task)
-    moves = 5 if scenario.planar else 7
+    moves = 5 if scenario.in_planes else 7
     gazes = args.yaws * (1 if scenario.planar else args.pitches)
     actions = state.envs.action_space
     assert isinstance(actions, spaces.Discrete) and actions.n == moves * gazes

@@ -65,7 +65,7 @@ def cliff(grid: Grid, rng: np.random.Generator) -> World:
     _scatter_rocks(height_m, ~plateau & ~band, edge_m, rng)
     height_m = np.minimum(height_m, PLATEAU_M - _GAP_M)
     height_m[band & ~plateau] = _GROUND_M  # nothing of a rock beside it
-    ground = np.maximum(np.rint(height_m / edge_m), 1).astype(np.int32)
+    ground = np.asarray(np.maximum(np.rint(height_m / edge_m), 1), np.int32)
     ground[plateau] = round(PLATEAU_M / edge_m)
     occupied = np.arange(layers) < ground[:, :, None]
     return World(grid, occupied, "cliff", unreadable=occupied & (band & ~plateau)[:, :, None])
@@ -94,7 +94,7 @@ def _scatter_rocks(height_m: np.ndarray, rocky: np.ndarray, edge_m: float, rng: 
     piled = piles[rng.integers(len(piles), size=len(diameters))]
     piled = piled + _PILE_M * rng.standard_normal(piled.shape)
     columns = np.floor(piled / edge_m).astype(int)
-    inside = ((columns >= 0) & (columns < rocky.shape)).all(axis=1)
+    inside = np.all((columns >= 0) & (columns < rocky.shape), axis=1)
     inside[inside] = rocky[tuple(columns[inside].T)]
     in_piles = inside & (rng.random(len(diameters)) < _PILED)
     centres[in_piles] = piled[in_piles]
