@@ -21,8 +21,8 @@ from baselines.cli.task_options import TaskOptions, base_task, first_parsed, par
 from baselines.cli.worker_options import WorkerOptions
 from baselines.experiments.runner import Conditions, run_all
 from baselines.strategies import make_strategy, resolved
+from entropy_explore_env.decision_settings import Observation
 from entropy_explore_env.errors import MissingExtraError, SettingError
-from entropy_explore_env.settings import Observation
 from entropy_explore_env.validation import check_whole
 
 RECORDS = "_records"

@@ -25,10 +25,10 @@ from baselines.experiments.ray_cluster import LOCAL, RayCluster, ray_of, start_h
 from baselines.experiments.tables import markdown_table
 from baselines.experiments.worker_pool import Failure, run_each
 from baselines.strategies import make_strategy
+from entropy_explore_env.decision_settings import Observation
 from entropy_explore_env.envs.vector_env import EntropyExploreVectorEnv
 from entropy_explore_env.scenario import with_settings
 from entropy_explore_env.scenarios import ROOM
-from entropy_explore_env.settings import Observation
 from entropy_explore_env.validation import check_whole
 from entropy_explore_env.writing import write_atomically
 

@@ -12,6 +12,7 @@ from __future__ import annotations
 import gymnasium
 import pettingzoo
 
+from entropy_explore_env.decision_settings import Action, Observation
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv, env, parallel_env
 from entropy_explore_env.envs.rewards import StepFigures
 from entropy_explore_env.envs.single_env import SingleRobotEnv
@@ -34,17 +35,7 @@ from entropy_explore_env.robots.channel import Delivery
 from entropy_explore_env.robots.motion import MoveEnd
 from entropy_explore_env.scenario import Scenario, with_settings
 from entropy_explore_env.scenarios import SCENARIOS, find_scenario
-from entropy_explore_env.settings import (
-    Action,
-    Channel,
-    Ending,
-    Grid,
-    Observation,
-    RangeSensor,
-    Reward,
-    Robot,
-    RobotKind,
-)
+from entropy_explore_env.settings import Channel, Ending, Grid, RangeSensor, Reward, Robot, RobotKind
 from entropy_explore_env.version import VERSION
 from entropy_explore_env.worlds.load import load_octomap, load_world, make_world, save_world
 from entropy_explore_env.worlds.world import World

@@ -25,6 +25,7 @@ class Stream(enum.IntEnum):
     CHANNEL = 3
     STRATEGY = 4
     FAULTS = 5
+    CANDIDATES = 6
 
 
 def seed_sequence(seed: int, episode: int, stream: Stream) -> np.random.SeedSequence:

@@ -287,7 +287,7 @@ class Channel:
         delay_s: From sending to hearing, 0 to 3600.
         announcements: Whether robots announce the viewpoints that they choose.
         silent_after_s: A teammate counts as silent when no message has come from it for longer than this,
-            1e-3 to 1e9, beyond what one decision of it may take (`missions.view.silent_since`). What it
+            1e-3 to 1e9, beyond what one decision of it may take (`missions.silence.is_silent`). What it
             announced is free for others then: `TeammateView.silent`. inf = never.
         phase_s: Length of a phase of the broadcast, 1e-3 to 3600; 0 = batches are sent at once.
         repeats: How often a phase's batches are sent in the next phase, evenly spread over it; 1e-3 s apart
@@ -406,89 +406,3 @@ class Reward:
         """Check every field."""
         check_choice(self, "kind", Literal["individual", "team"])
         check_within(self, "cost_per_s", least=0, most=1e6)
-
-
-@dataclass(frozen=True)
-class Action:
-    """How a viewpoint is written as an action.
-
-    Attributes:
-        kind: `continuous`, a Box(-1, 1); or `discrete`, moves by whole voxels × gaze directions.
-        moves: Discrete moves: `all` voxels within reach, or `axes`: stay, and as far as reach and voxels
-            allow along each axis, both ways, which is 7 moves (5 of planar robots) to learn from.
-        yaws: Discrete gazes around the horizon.
-        pitches: Discrete gazes up and down, from -π/4 to π/4; planar robots have one, level.
-    """
-
-    kind: Literal["continuous", "discrete"] = "continuous"
-    moves: Literal["all", "axes"] = "all"
-    yaws: int = 16
-    pitches: int = 3
-
-    def __post_init__(self) -> None:
-        """Check every field."""
-        check_choice(self, "kind", Literal["continuous", "discrete"])
-        check_choice(self, "moves", Literal["all", "axes"])
-        check_count(self, "yaws", 1, 360)
-        check_count(self, "pitches", 1, 90)
-
-
-@dataclass(frozen=True)
-class Observation:
-    """Which parts an observation has; a part that is left out costs nothing.
-
-    Attributes:
-        panorama: Utility and free distance of rays around the robot, by its own belief.
-        panorama_yaws: Directions around the horizon; None = 16, in 2-D worlds 32.
-        panorama_pitches: Directions up and down, from -π/4 to π/4; planar robots have one.
-        panorama_utility: `bits`, or `log2` for log2(1 + bits), which suits networks.
-        self_state: The robot's pose, time, remaining entropy and whether it decides (part `self`).
-        drive: The robot's speed and the viewpoint that it chose last, for those that decide under way.
-        team: Where teammates were last heard, and what they announced.
-        patch: The belief around the robot.
-        patch_shape: Its voxels along x, y and z; odd, the robot in the middle.
-        overview: The whole belief, pooled.
-        overview_shape: Cells of the pooled belief along x, y and z, at most the world's.
-        action_mask: Discrete actions: whether the mask is part of the observation, too.
-        flat: One Box of all parts, in the order of this list.
-        while_busy: Whether robots that cannot choose observe, too. False: they observe zeros until they
-            decide or the mission is over, which costs nothing.
-    """
-
-    panorama: bool = True
-    panorama_yaws: int | None = None
-    panorama_pitches: int = 3
-    panorama_utility: Literal["bits", "log2"] = "bits"
-    self_state: bool = True
-    drive: bool = False
-    team: bool = True
-    patch: bool = False
-    patch_shape: tuple[int, int, int] = (11, 11, 5)
-    overview: bool = False
-    overview_shape: tuple[int, int, int] = (8, 8, 4)
-    action_mask: bool = False
-    flat: bool = False
-    while_busy: bool = True
-
-    def __post_init__(self) -> None:
-        """Check every field."""
-        for name in (
-            "panorama",
-            "self_state",
-            "drive",
-            "team",
-            "patch",
-            "overview",
-            "action_mask",
-            "flat",
-            "while_busy",
-        ):
-            check_kind(self, name, bool)
-        if self.panorama_yaws is not None:
-            check_count(self, "panorama_yaws", 1, 360)
-        check_count(self, "panorama_pitches", 1, 90)
-        check_choice(self, "panorama_utility", Literal["bits", "log2"])
-        check_counts(self, "patch_shape", 1, 255)
-        if not all(n % 2 for n in self.patch_shape):
-            raise SettingError("Observation.patch_shape", self.patch_shape, "odd numbers only")
-        check_counts(self, "overview_shape", 1, 64)

@@ -10,20 +10,11 @@ import pickle
 import numpy as np
 import pytest
 
+from entropy_explore_env.decision_settings import Action, Observation
 from entropy_explore_env.errors import EntropyExploreError, SettingError
 from entropy_explore_env.scenario import Scenario, with_settings
 from entropy_explore_env.scenarios import BOX, ROOM, SCENARIOS, find_scenario
-from entropy_explore_env.settings import (
-    Action,
-    Channel,
-    Ending,
-    Grid,
-    Observation,
-    RangeSensor,
-    Reward,
-    Robot,
-    RobotKind,
-)
+from entropy_explore_env.settings import Channel, Ending, Grid, RangeSensor, Reward, Robot, RobotKind
 
 NAN, INF = math.nan, math.inf
 NO_NUMBERS = ("1", None, True, [1.0], NAN)
@@ -122,6 +113,7 @@ REFUSED = {
     (Action, "moves"): KIND,
     (Action, "yaws"): (*COUNT, 0, 361),
     (Action, "pitches"): (*COUNT, 0, 91),
+    (Action, "candidates"): (*COUNT, 0, 65),
     (Observation, "panorama"): SWITCH,
     (Observation, "panorama_yaws"): ("16", True, NAN, 0, 361, 16.0),
     (Observation, "panorama_pitches"): (*COUNT, 0, 91),
@@ -142,6 +134,8 @@ REFUSED = {
     (Observation, "overview"): SWITCH,
     (Observation, "overview_shape"): ((8, 8), [8, 8, 4], (0, 8, 4), (65, 8, 4), (8.0, 8, 4), None),
     (Observation, "action_mask"): SWITCH,
+    (Observation, "candidates"): SWITCH,
+    (Observation, "overlaps"): SWITCH,
     (Observation, "flat"): SWITCH,
     (Observation, "while_busy"): SWITCH,
     (Scenario, "name"): (None, 1),

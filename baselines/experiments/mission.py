@@ -14,12 +14,12 @@ import numpy as np
 from baselines.experiments.outcome import Record
 from baselines.strategies import make_strategy
 from baselines.strategies.protocol import Strategy
+from entropy_explore_env.decision_settings import Observation
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.errors import ActionError
 from entropy_explore_env.reports.metrics import mission_figures
 from entropy_explore_env.reports.recording import Recorder
 from entropy_explore_env.scenario import Scenario, with_settings
-from entropy_explore_env.settings import Observation
 
 NOTHING_OBSERVED = Observation(panorama=False, self_state=False, team=False)
 """Strategies read RobotViews: an observation for networks would cost time for nothing."""

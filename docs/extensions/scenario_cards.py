@@ -167,11 +167,16 @@ def _numbers(numbers: Iterable[Numbers]) -> str:
 
 
 def _actions(scenario: Scenario) -> str:
-    """Both kinds of actions."""
+    """All kinds of actions."""
     numbers = action_numbers(scenario)
     text = (
         "## Actions\n\nAn action is a viewpoint within reach: where to go and where to look. "
         f"`continuous`, the default, is a Box of {len(numbers)} numbers.\n\n{_numbers(numbers)}\n\n"
+    )
+    text += (
+        '`action={"kind": "candidates", "candidates": 24}` is a Discrete of 24: the number of one of the '
+        "viewpoints that a planner proposes to the robot, its own choice first. The parts `candidates` and "
+        "`context` of the observation say what they are worth; infos hold the mask.\n\n"
     )
     if any(math.isinf(kind.robot.reach_m) for kind in scenario.kinds):
         return text + "Discrete actions need a finite reach."
@@ -192,7 +197,8 @@ def _actions(scenario: Scenario) -> str:
 
 def _observation(scenario: Scenario) -> str:
     """Every number of the default observation, and of the parts on request."""
-    asked = with_settings(scenario, {"observation": {"drive": True, "patch": True, "overview": True}})
+    everything = {"drive": True, "patch": True, "overview": True, "overlaps": True}
+    asked = with_settings(scenario, {"observation": everything, "action": {"kind": "candidates"}})
     default = observation_numbers(scenario)
     lines = [
         "## Observation",
@@ -202,7 +208,11 @@ def _observation(scenario: Scenario) -> str:
     ]
     for name, part in observation_numbers(asked).items():
         request = "" if name in default else f', on request: `observation={{"{name}": True}}`'
-        rows = f"; each of {part.rows} rows is a teammate" if part.rows > 1 or name == "team" else ""
+        if name in ("candidates", "context", "overlaps"):
+            on_request = "" if name != "overlaps" else ' and `observation={"overlaps": True}`'
+            request = f', with `action={{"kind": "candidates"}}`{on_request}'
+        each = "candidate" if name == "candidates" else "teammate"
+        rows = f"; each of {part.rows} rows is a {each}" if part.rows > 1 or name == "team" else ""
         lines.append(f"**`{name}`**, shape {part.shape}{rows}{request}\n\n{_numbers(part.numbers)}")
     rules = rules_of(scenario)
     if "panorama" in default:

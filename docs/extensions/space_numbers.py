@@ -11,6 +11,7 @@ from entropy_explore_env.missions.action import action_space
 from entropy_explore_env.missions.observation.layout import ObservationLayout, Part
 from entropy_explore_env.missions.rules import rules_of
 from entropy_explore_env.scenario import Scenario
+from entropy_explore_env.viewpoints.candidate_features import CONTEXT, FEATURES
 
 
 class Numbers(NamedTuple):
@@ -74,7 +75,8 @@ class PartNumbers(NamedTuple):
 
     Attributes:
         shape: Of its array.
-        rows: How often its numbers come one after the other: in `team` once for each teammate, else once.
+        rows: How often its numbers come one after the other: in `team` once for each teammate, in
+            `candidates` once for each candidate, else once.
         numbers: Those of a row, in their order, none left out and none twice.
     """
 
@@ -92,7 +94,7 @@ def observation_numbers(scenario: Scenario) -> dict[str, PartNumbers]:
 def _part_numbers(name: str, part: Part, scenario: Scenario) -> PartNumbers:
     """A part's numbers, with their indices and the bounds of their space."""
     high = np.broadcast_to(part.high, part.shape).ravel()
-    rows = part.shape[0] if name == "team" else 1
+    rows = part.shape[0] if name in ("team", "candidates") else 1
     numbers: list[Numbers] = []
     first = 0
     for count, meaning, unit, least in _told(name, part, scenario):
@@ -127,12 +129,18 @@ def _told(name: str, part: Part, scenario: Scenario) -> list[_Told]:
             _Told(cells, "1 outside the workspace", "-"),
             _Told(cells, "1 where a teammate was last heard", "-"),
         ]
+    if name in ("candidates", "context"):
+        features = FEATURES if name == "candidates" else CONTEXT
+        return [_Told(1, feature.meaning, feature.unit, feature.least) for feature in features]
+    if name == "overlaps":
+        shared = "share of the voxels of each two candidates, of those of the one that sees fewer"
+        return [_Told(math.prod(part.shape), shared, "share")]
     if name == "overview":
         return [
             _Told(cells, "mean entropy of each block of the map: 1 unknown, 0 known well enough", "share"),
             _Told(cells, "mean expected coverage of each block", "-"),
         ]
-    return [_Told(math.prod(part.shape), "1 for each discrete action that makes sense", "-")]
+    return [_Told(math.prod(part.shape), "1 for each action by number that makes sense", "-")]
 
 
 def _own_state(kinds: int) -> list[_Told]:

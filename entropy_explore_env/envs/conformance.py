@@ -298,7 +298,7 @@ def bad_actions(task: Task, good: np.ndarray) -> dict[str, Any]:
     """What must be refused in place of a robot's action or of a VectorEnv's, by what is wrong with it."""
     wrong: dict[str, Any] = {"None": None, "text": "up", "a dict": {}, "ragged": [[0.0], [0.0, 0.0]]}
     wrong |= {"complex": good * 1j, "too many": np.stack([good, good]), "an object": object()}
-    if task.scenario.action.kind == "discrete":
+    if task.scenario.action.by_number:
         wrong |= {"negative": np.full_like(good, -1), "past": np.full_like(good, task.choices)}
         return {**wrong, "NaN": np.full(good.shape, math.nan), "bool": np.ones(good.shape, bool)}
     entries = {"NaN": math.nan, "inf": math.inf, "-inf": -math.inf, "above": 1.01, "below": -1.01}

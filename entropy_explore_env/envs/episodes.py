@@ -11,6 +11,7 @@ import numpy as np
 
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.envs.vector_env import EntropyExploreVectorEnv
+from entropy_explore_env.missions.observation.layout import action_count
 from entropy_explore_env.missions.rules import rules_of
 from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.scenario import Scenario
@@ -58,14 +59,13 @@ class Task:
 
     @functools.cached_property
     def choices(self) -> int:
-        """Number of discrete actions."""
-        rules = rules_of(self.scenario)
-        return len(rules.actions.moves) * len(rules.actions.gazes)
+        """Number of actions where they are numbers."""
+        return action_count(self.scenario, rules_of(self.scenario))
 
     def actions(self, mission: int, episode: int, step: int, kind: int = 0) -> np.ndarray:
         """A team's actions, (A, N) float32 or (A,) int64; another `kind` gives other ones."""
         rng = np.random.default_rng([self.seed + mission, episode, step, kind])
-        if self.scenario.action.kind == "discrete":
+        if self.scenario.action.by_number:
             return rng.integers(0, self.choices, self.scenario.robots)
         shape = (self.scenario.robots, 3 if self.scenario.planar else 5)
         return rng.uniform(-1.0, 1.0, shape).astype(np.float32)

@@ -33,7 +33,7 @@ def robot_infos(missions: Missions, mission: int) -> list[dict[str, Any]]:
     Keys: `deciding` (whether its next action counts), `time_s`, `world_number` (the world's, which `reset`
     takes as its option `world`; -1 where no recipe made it), `entropy_bits`, `own_bits` and
     `received_bits` (taken from its map in this step), `move_end` and `end` (names of a MoveEnd and
-    a MissionEnd), and `action_mask` where actions are discrete; when the mission is over, `figures`:
+    a MissionEnd), and `action_mask` where actions are numbers; when the mission is over, `figures`:
     those of `mission_figures`, and beside them the two of END_FIGURES. Where the scenario has faults
     also `stopped`, `blind` and `silent`: whether the robot fails so now.
     """
@@ -66,7 +66,7 @@ def robot_infos(missions: Missions, mission: int) -> list[dict[str, Any]]:
         for name, now in failing(missions.state.faults[mission], time_s).items():
             for info, failed in zip(infos, now.tolist(), strict=True):
                 info[name] = failed
-    if missions.scenario.action.kind == "discrete":
+    if missions.scenario.action.by_number:
         for info, mask in zip(infos, missions.action_masks()[mission], strict=True):
             info["action_mask"] = mask
     if clock["end"]:

@@ -9,18 +9,9 @@ import os
 from collections.abc import Mapping, Sequence
 from typing import Any, Literal, TypedDict
 
+from entropy_explore_env.decision_settings import Action, Observation
 from entropy_explore_env.fault_settings import Faults
-from entropy_explore_env.settings import (
-    Action,
-    Channel,
-    Ending,
-    Grid,
-    Observation,
-    RangeSensor,
-    Reward,
-    Robot,
-    RobotKind,
-)
+from entropy_explore_env.settings import Channel, Ending, Grid, RangeSensor, Reward, Robot, RobotKind
 from entropy_explore_env.worlds.world import World
 
 

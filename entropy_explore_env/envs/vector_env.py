@@ -112,7 +112,7 @@ class EntropyExploreVectorEnv(VectorEnv[Any, Any, Any]):
         robots = self.scenario.robots
         space, observation = action_space(self.scenario), self.robot_space()
         self._checker = ActionChecker(space)
-        self._masks = action_masks and self.scenario.action.kind == "discrete"
+        self._masks = action_masks and self.scenario.action.by_number
         self.single_action_space = space if robots == 1 else batch_space(space, robots)
         self.single_observation_space = (
             observation if robots == 1 else short_repr(batch_space(observation, robots))

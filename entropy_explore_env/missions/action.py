@@ -10,6 +10,9 @@ is the centre of the first voxel and 1 that of the last.
 Discrete: number m·D + g means move m of `discrete_moves` (a voxel offset from the robot's voxel, to
 that voxel's centre) and gaze g of the D in `gaze_set`.
 
+Candidates: the number of one of the viewpoints that were proposed to the robot when it began to decide
+(`viewpoints/proposals`); that of one that does not exist means the first, the planner's own choice.
+
 All robots of a team have the same actions. Where only some fly, the numbers for height and pitch mean
 nothing to the others; a discrete move beyond a robot's own reach is shortened to it.
 """
@@ -34,6 +37,8 @@ def action_space(scenario: Scenario) -> spaces.Box | spaces.Discrete:
     """A new space object of one robot's action."""
     if scenario.action.kind == "continuous":
         return spaces.Box(-1.0, 1.0, (3 if scenario.planar else 5,), np.float32)
+    if scenario.action.kind == "candidates":
+        return spaces.Discrete(scenario.action.candidates)
     rules = rules_of(scenario)
     return spaces.Discrete(len(rules.actions.moves) * len(rules.actions.gazes))
 
@@ -46,7 +51,8 @@ def decode_action(params, actions, pose, continuous, discrete, viewpoint):
         params: PARAMS of the robot.
         actions: ActionSet.
         pose: (5,) float64, its pose.
-        continuous: (N,) float64 action; not read where actions are discrete.
+        continuous: (N,) float64 action; where a candidate was chosen, (5,) its viewpoint; not read where
+            actions are discrete.
         discrete: Number of the action; not read where actions are continuous.
         viewpoint: (5,) float64, filled in; within reach of the pose.
     """
@@ -62,6 +68,10 @@ def decode_action(params, actions, pose, continuous, discrete, viewpoint):
             voxel = math.floor((pose[axis] - params.origin_m[axis]) / params.voxel_size_m) + move[axis]
             viewpoint[axis] = params.origin_m[axis] + (voxel + 0.5) * params.voxel_size_m
         viewpoint[3], viewpoint[4] = gaze[0], 0.0 if params.level else gaze[1]
+    elif params.proposed:
+        for axis in range(axes):
+            viewpoint[axis] = continuous[axis]
+        viewpoint[3], viewpoint[4] = continuous[3], 0.0 if params.level else continuous[4]
     else:
         for axis in range(axes):
             if math.isinf(params.reach_m):
@@ -83,22 +93,28 @@ def decode_action(params, actions, pose, continuous, discrete, viewpoint):
 
 
 def encode_viewpoint(
-    rules: Rules, pose: np.ndarray, viewpoint: np.ndarray, robot: int = 0
+    rules: Rules,
+    pose: np.ndarray,
+    viewpoint: np.ndarray,
+    robot: int = 0,
+    candidates: np.ndarray | None = None,
 ) -> np.ndarray | np.int64:
     """The action that sends a robot to a viewpoint.
 
     Continuous actions hold it up to float32 rounding; a place beyond the reach is pulled onto it.
     Discrete actions hold it exactly if it is the centre of a voxel within reach with a gaze of the
-    set; otherwise the nearest move and the nearest gaze are taken.
+    set; otherwise the nearest move and the nearest gaze are taken. Of candidates the nearest one is taken,
+    by voxel edges and radians.
 
     Args:
         rules: The scenario.
         pose: (5,) the robot's pose.
         viewpoint: (5,) x, y, z, yaw, pitch.
         robot: Its number.
+        candidates: (K, 5) viewpoints that were proposed to it, where actions are their numbers.
 
     Returns:
-        (N,) float32, or an int64.
+        (N,) float32, or an int64; 0 where nothing is proposed.
 
     Raises:
         ActionError: The viewpoint has the wrong shape or is not finite.
@@ -112,6 +128,8 @@ def encode_viewpoint(
     wanted = wanted.astype(np.float64)
     settings = rules.params[robot]
     axes = 2 if settings["planar"] else 3
+    if settings["proposed"]:
+        return _nearest_candidate(settings, wanted, candidates)
     if not settings["discrete"]:
         return _encoded_box(settings, pose, wanted, axes)
     corner = np.floor((pose[:axes] - settings["origin_m"][:axes]) / settings["voxel_size_m"])
@@ -129,6 +147,15 @@ def encode_viewpoint(
         alike = np.cos(pitch) * toward * np.cos(yaw - wanted[3]) + np.sin(pitch) * math.sin(wanted[4])
         gaze = int(np.argmax(alike))
     return np.int64(move * len(rules.actions.gazes) + gaze)
+
+
+def _nearest_candidate(settings: np.void, wanted: np.ndarray, candidates: np.ndarray | None) -> np.int64:
+    """The number of the candidate that is nearest to a viewpoint."""
+    if candidates is None or len(candidates) == 0:
+        return np.int64(0)
+    places = np.linalg.norm(candidates[:, :3] - wanted[:3], axis=1) / settings["voxel_size_m"]
+    turns = np.abs((candidates[:, 3] - wanted[3] + math.pi) % (2.0 * math.pi) - math.pi)
+    return np.int64(np.argmin(places + turns + np.abs(candidates[:, 4] - wanted[4])))
 
 
 def _encoded_box(settings: np.void, pose: np.ndarray, wanted: np.ndarray, axes: int) -> np.ndarray:

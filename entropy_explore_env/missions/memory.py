@@ -22,6 +22,7 @@ from entropy_explore_env.missions.state import state_arrays
 from entropy_explore_env.robots.navigator import navigator_bytes
 from entropy_explore_env.robots.range_sensor import scan_bytes
 from entropy_explore_env.scenario import Scenario
+from entropy_explore_env.viewpoints.proposals.model import proposal_bytes
 from entropy_explore_env.worlds.recipes.catalogue import RECIPES
 from entropy_explore_env.worlds.world import World
 
@@ -36,6 +37,9 @@ _SETTING_OF_PART = {
     "team": "Observation.team",
     "patch": "Observation.patch_shape",
     "overview": "Observation.overview_shape",
+    "candidates": "Action.candidates",
+    "context": "Observation.candidates",
+    "overlaps": "Observation.overlaps",
     "action_mask": "Observation.action_mask",
 }
 """Part of an observation → the setting that makes it smaller, or leaves it out."""
@@ -78,6 +82,7 @@ def memory_needs(scenario: Scenario, batch: Batch) -> list[Need]:
     phases = sum(size for name, size in sizes.items() if name.startswith("phase"))
     scans = sum(sizes[name] for name in ("scan_range_m", "scan_returned", "scan_utility_bits"))
     robots = sum(sizes[name] for name in ("missions", "robots", "heard", "faults"))
+    proposed = sizes["candidates"] + sizes["experience"]
     maps = sum(sizes[name] for name in _MAPS) + _world_bytes(scenario, batch)
     burst = "Channel.burst" if scenario.channel.burst > 1 else "robots"
     return [
@@ -87,6 +92,7 @@ def memory_needs(scenario: Scenario, batch: Batch) -> list[Need]:
         Need("scans", scans, "RangeSensor.angular_step_rad"),
         Need("delayed messages", delayed, "Channel.delay_s" if scenario.robots < 100 else burst),
         Need("the broadcast in phases", phases, "Channel.phase_s"),
+        Need("candidates", proposed, "Action.candidates"),
         *_observation_needs(scenario, batch),
         *_scratch_needs(scenario, batch),
     ]
@@ -139,10 +145,12 @@ def _scratch_needs(scenario: Scenario, batch: Batch) -> list[Need]:
     if scenario.action.kind == "discrete":
         gazes = gaze_set(scenario.action.yaws, 1 if scenario.planar else scenario.action.pitches)
         masks = batch.missions * scenario.robots * len(discrete_moves(scenario)) * len(gazes)
+    proposing = proposal_bytes(scenario) if scenario.action.kind == "candidates" else 0
     most = "threads" if batch.threads > 1 else None
     return [
         Need("rays of a scan", scans, most or "RangeSensor.angular_step_rad"),
         Need("paths", batch.threads * plans, most or "Grid.voxel_size_m"),
+        Need("proposing candidates", batch.threads * proposing, most or "Grid.voxel_size_m"),
         Need("action masks", masks, "Robot.reach_m"),
     ]
 

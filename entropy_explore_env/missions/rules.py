@@ -9,10 +9,11 @@ import numpy as np
 
 from entropy_explore_env.belief.pooling import Cells, new_cells, no_cells
 from entropy_explore_env.compilation.kernels import record_type
+from entropy_explore_env.decision_settings import Observation
 from entropy_explore_env.robots.faults import FAULT_PARAMS
 from entropy_explore_env.robots.range_sensor import TeamSensors, team_sensors
 from entropy_explore_env.scenario import Scenario
-from entropy_explore_env.settings import Observation, Robot
+from entropy_explore_env.settings import Robot
 
 PARAMS = record_type(
     [
@@ -22,6 +23,7 @@ PARAMS = record_type(
         ("prior_precision", "f8"),
         ("end_precision", "f8"),
         ("discrete", "?"),
+        ("proposed", "?"),  # whether actions are numbers of candidates
         (
             "action_axes",
             "i8",
@@ -113,6 +115,7 @@ def rules_of(scenario: Scenario) -> Rules:
         "prior_precision": np.float32(scenario.sigma_prior**-2),
         "end_precision": ending.sigma_end**-2,
         "discrete": scenario.action.kind == "discrete",
+        "proposed": scenario.action.kind == "candidates",
         "action_axes": 2 if scenario.planar else 3,
         "pitches": 1 if scenario.planar else scenario.action.pitches,
         "bodies": len(bodies),

@@ -23,6 +23,7 @@ from entropy_explore_env.missions.navigation import Planning, plan_missions
 from entropy_explore_env.missions.observation.layout import ObservationLayout, part_offsets
 from entropy_explore_env.missions.observation.mask import mask_missions
 from entropy_explore_env.missions.observation.observe import Observed, observe_missions
+from entropy_explore_env.missions.proposals import Proposing, propose_missions
 from entropy_explore_env.missions.redecision import CHOICE
 from entropy_explore_env.missions.reset_options import DRAWN, ResetOptions
 from entropy_explore_env.missions.rules import rules_of
@@ -38,6 +39,8 @@ from entropy_explore_env.robots.range_sensor import true_coverage
 from entropy_explore_env.scenario import Scenario
 from entropy_explore_env.settings import Grid, gaussian_entropy_bits
 from entropy_explore_env.validation import check_instance, check_whole, is_whole
+from entropy_explore_env.viewpoints.proposals.model import Proposer, new_proposers
+from entropy_explore_env.viewpoints.proposals.records import Kind
 from entropy_explore_env.worlds.given import checked_worlds, in_given_worlds, world_in_turn
 from entropy_explore_env.worlds.load import make_world, require_unchanged, world_of_file
 from entropy_explore_env.worlds.splits import draw_world_number
@@ -71,6 +74,7 @@ class _Calls(NamedTuple):
     state: MissionState
     planning: Planning
     observed: Observed
+    proposing: Proposing
     step: Callable[..., None] | None
     """None = not called yet, like the next one."""
     observe: Callable[..., None] | None
@@ -149,6 +153,10 @@ class Missions:
         self._calls: _Calls | None = None
         self._choices = np.zeros((self.count, self.scenario.robots), CHOICE)
         self._navigators = [new_navigators(self.scenario) for _ in range(self.threads)]
+        proposed = self.scenario.action.kind == "candidates"
+        self._proposers: list[list[Proposer]] = [
+            new_proposers(self.scenario) if proposed else [] for _ in range(self.threads)
+        ]
         self._work: list[Workspace] = [
             new_workspace(self.scenario, navigators) for navigators in self._navigators
         ]
@@ -257,7 +265,8 @@ class Missions:
         if differs and self.state.collision is self.state.truth:
             self.state = self.state._replace(collision=self.state.truth.copy())
         state = self.state
-        if world.ceiling is not None and not self._no_fly.size and self._navigators[0]:
+        knows_ceiling = self._navigators[0] or self._proposers[0]
+        if world.ceiling is not None and not self._no_fly.size and knows_ceiling:
             self._no_fly = np.zeros((len(self._no_fly), self.grid.voxels), np.bool_)
         if world is not self.worlds[mission]:
             self.worlds[mission] = world
@@ -286,6 +295,10 @@ class Missions:
         state.heard[mission]["heard_s"] = state.heard[mission]["announced_s"] = -1.0
         state.in_flight[mission]["due_s"] = np.inf
         draw_faults(self.scenario, number, episode, state.faults[mission])
+        remembering = state.experience[mission]
+        remembering["candidates_rng"][:, 0] = splitmix_states(
+            number, episode, Stream.CANDIDATES, len(remembering)
+        )
         self._observe(0, mission, mission + 1)
 
     def _set_collision_masks(self, mission: int, world: World) -> None:
@@ -352,7 +365,7 @@ class Missions:
         """Advance every mission that is not over by one step.
 
         Args:
-            continuous: (E, A, N) actions; ignored where actions are discrete.
+            continuous: (E, A, N) actions; ignored where actions are numbers.
             discrete: (E, A) actions; ignored where they are continuous.
 
         Returns:
@@ -370,12 +383,22 @@ class Missions:
             raise ActionError(
                 "actions", (continuous.shape, discrete.shape), f"shapes {team} (, N) and {team}"
             )
+        if self._proposers[0]:
+            continuous = self._chosen_viewpoints(discrete)
         if self.threads == 1:
             self._step_range(0, 0, self.count, continuous, discrete)
         else:
             self._step_threaded(continuous, discrete)
         end_of_step()
         return self.observations
+
+    def _chosen_viewpoints(self, numbers: np.ndarray) -> np.ndarray:
+        """(E, A, 5) the viewpoints of the candidates with these numbers (E, A)."""
+        candidates = self.state.candidates["viewpoint"]
+        if ((numbers < 0) | (numbers >= candidates.shape[2])).any():
+            raise ActionError("actions", numbers, f"whole numbers from 0 to {candidates.shape[2] - 1}")
+        chosen = np.take_along_axis(candidates, numbers[..., None, None], axis=2)[:, :, 0]
+        return np.ascontiguousarray(chosen)
 
     def _step_range(
         self, thread: int, first: int, last: int, continuous: np.ndarray, discrete: np.ndarray
@@ -393,9 +416,11 @@ class Missions:
 
     def _observe(self, thread: int, first: int, last: int) -> None:
         """Write the observations of the missions `first` … `last` - 1."""
+        calls, scan = self._bound_calls(), self._work[thread].scan
+        for kind, proposer in enumerate(self._proposers[thread]):
+            propose_missions(calls.proposing, proposer, kind, self._offsets, first, last, self.observations)
         if not self.layout.size:
             return
-        calls, scan = self._bound_calls(), self._work[thread].scan
         crossing = Crossing(scan.crossed[0], scan.entered)
         arguments = (self.rules, self._offsets, calls.observed, crossing, first, last, self.observations)
         observe = calls.observe
@@ -414,7 +439,18 @@ class Missions:
                 params, actions, *shown, self._choices, state.mean, state.precision, self._no_fly
             )
             observed = Observed(*shown, state.heard, state.mean, state.precision, state.pooled)
-            self._calls = calls = _Calls(state, planning, observed, None, None)
+            proposing = Proposing(
+                params,
+                *shown,
+                state.heard,
+                state.mean,
+                state.precision,
+                state.scan_utility_bits,
+                state.candidates,
+                state.experience,
+                self._no_fly,
+            )
+            self._calls = calls = _Calls(state, planning, observed, proposing, None, None)
         return calls
 
     def _step_threaded(self, continuous: np.ndarray, discrete: np.ndarray) -> None:
@@ -429,8 +465,17 @@ class Missions:
         self._pool.run(work)
 
     def action_masks(self) -> np.ndarray:
-        """(E, A, N) int8: 1 for each discrete action that makes sense by the robot's own belief."""
+        """(E, A, N) int8: 1 for each action by number that makes sense by the robot's own belief.
+
+        Of candidates: for each that there is; for robots that do not decide, for the first one.
+        """
         rules, state = self.rules, self.state
+        if self._proposers[0]:
+            running = state.missions["end"] == MissionEnd.RUNNING.code
+            decides = state.robots["deciding"] & running[:, None]
+            there = (state.candidates["kind"] != Kind.NONE) & decides[..., None]
+            there[..., 0] = True
+            return there.astype(np.int8)
         actions = len(rules.actions.moves) * len(rules.actions.gazes)
         masks = np.empty((self.count, self.scenario.robots, actions), np.int8)
         mask_missions(rules.params, rules.actions, state.missions, state.robots, state.mean, masks)
@@ -448,6 +493,7 @@ class Missions:
         """All but the threads and their scratch space."""
         kept = dict(self.__dict__)
         del kept["_pool"], kept["_work"], kept["_navigators"], kept["_calls"], kept["_choices"]
+        del kept["_proposers"]
         return kept
 
     def __setstate__(self, kept: dict[str, object]) -> None:

@@ -17,6 +17,7 @@ from entropy_explore_env.belief.pooling import Cells
 from entropy_explore_env.compilation.kernels import record_type
 from entropy_explore_env.missions.rules import POINT, collision_bodies
 from entropy_explore_env.scenario import Scenario
+from entropy_explore_env.viewpoints.proposals.records import CANDIDATE, EXPERIENCE
 
 
 class MissionEnd(enum.Enum):
@@ -244,6 +245,11 @@ class MissionState(NamedTuple):
     """(E, A, A) int8: whether b has what a broadcasts; see `missions/phases.py`."""
     faults: np.ndarray
     """(E, A) FAULT; (E, 0) where nothing goes wrong."""
+    candidates: np.ndarray
+    """(E, A, K) CANDIDATE, those proposed when a robot decided last; (E, 0, 0) where actions are others, as
+    the next."""
+    experience: np.ndarray
+    """(E, A) EXPERIENCE, what a robot remembers for its candidates."""
 
 
 class Beliefs(NamedTuple):
@@ -316,6 +322,7 @@ def state_arrays(
     e, a, r = missions, scenario.robots, max(kind.sensor.rays for kind in scenario.kinds)
     v, q, b = scenario.grid.voxels, scenario.message_slots, min(scenario.channel.burst, r)
     s, tracked = scenario.phase_batches, scenario.grid.voxels if scenario.track_truth else 0
+    proposed = a if scenario.action.kind == "candidates" else 0
     bodies, in_phases = collision_bodies(scenario), a if scenario.phase_batches else 0
     arrays: dict[str, tuple[tuple[int, ...], Any]] = {
         "truth": ((e, v), np.float32),
@@ -341,6 +348,8 @@ def state_arrays(
         "phase_rays": ((e, in_phases, 2, s, b, 5), np.float64),
         "phase_heard": ((e, in_phases, a), np.int8),
         "faults": ((e, a if scenario.faults.happen else 0), FAULT),
+        "candidates": ((e, proposed, scenario.action.candidates if proposed else 0), CANDIDATE),
+        "experience": ((e, proposed), EXPERIENCE),
     }
     return {name: (shape, np.dtype(kind)) for name, (shape, kind) in arrays.items()}
 

@@ -20,6 +20,7 @@ from entropy_explore_env.robots.motion import MoveEnd
 from entropy_explore_env.robots.range_sensor import Return
 from entropy_explore_env.scenario import Scenario
 from entropy_explore_env.settings import MAX_VOXELS
+from entropy_explore_env.viewpoints.proposals.records import REMEMBERED, Kind
 
 FROM_WORLD = ("truth", "collision", "visible")
 """Arrays of the state that follow from a mission's world, which its seed and what was given determine."""
@@ -55,7 +56,8 @@ def check_ranges(scenario: Scenario, arrays: Mapping[str, np.ndarray], maps: boo
         RecordError: A number is in no mission of the scenario; the message names `array.field`.
     """
     voxels_and_rays = (_maps, _scans) if maps else ()
-    for part in (_missions, _robots, _heard, _messages, _phases, _faults, *voxels_and_rays):
+    small = (_missions, _robots, _heard, _messages, _phases, _faults, _candidates, _experience)
+    for part in (*small, *voxels_and_rays):
         for values in part(scenario, arrays):
             _check(values)
 
@@ -220,6 +222,43 @@ def _faults(scenario: Scenario, arrays: Mapping[str, np.ndarray]) -> Iterator[Va
     yield Values("faults.stopped", faults["stopped"], 0, 1)
     for name in COUNTED:
         yield Values(f"faults.{name}", faults[name], 0, _MOST)
+
+
+def _candidates(scenario: Scenario, arrays: Mapping[str, np.ndarray]) -> Iterator[Values]:
+    """CANDIDATE; before the first decision all are zeros."""
+    candidates = arrays["candidates"]
+    low, high = _workspace(scenario)
+    yield from _poses(
+        "candidates.viewpoint", candidates["viewpoint"], np.minimum(low, 0.0), np.maximum(high, 0.0)
+    )
+    yield from _poses("candidates.goal", candidates["goal"], *_grid_corners(scenario))
+    yield Values("candidates.bits", candidates["bits"], 0.0, _MOST)
+    yield Values("candidates.kind", candidates["kind"], 0, max(Kind))
+
+
+def _experience(scenario: Scenario, arrays: Mapping[str, np.ndarray]) -> Iterator[Values]:
+    """EXPERIENCE."""
+    kept = arrays["experience"]
+    corners = _grid_corners(scenario)
+    for name in ("most_bits", "best_rate", "far_value"):
+        yield Values(f"experience.{name}", kept[name], 0.0, _HUGE)
+    for name in ("going", "looked_far", "was_free"):
+        yield Values(f"experience.{name}", kept[name], 0, 1)
+    yield Values("experience.patience", kept["patience"], -_MOST, _MOST)
+    yield Values("experience.blocked", kept["blocked"], 0, _MOST)
+    yield Values("experience.failures", kept["failures"], 0, REMEMBERED)
+    yield from _poses("experience.goal", kept["goal"], *corners)
+    for name in ("far_at", "free_at"):
+        yield Values(f"experience.{name}", kept[name], *corners)
+    far = _farthest_m(scenario) / scenario.grid.voxel_size_m
+    yield from _poses("experience.failed", kept["failed"], corners[0] - far, corners[1] + far)
+    yield Values("experience.share", kept["share"], 0.0, 1.0)
+    yield Values("experience.forget_at", kept["forget_at"], 0.0, _MOST)
+
+
+def _grid_corners(scenario: Scenario) -> tuple[np.ndarray, np.ndarray]:
+    """(3,) each: the lower and the upper corner of the workspace, in grid units."""
+    return np.zeros(3) - _ROUNDING, np.asarray(scenario.grid.shape, np.float64) + _ROUNDING
 
 
 def _poses(name: str, poses: np.ndarray, low: np.ndarray, high: np.ndarray) -> Iterator[Values]:

@@ -5,7 +5,6 @@ Strategies see this and nothing else; the truth is not in it.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,14 +12,13 @@ import numpy as np
 from entropy_explore_env.missions.action import ROUNDING, encode_viewpoint
 from entropy_explore_env.missions.poses import place_at, pose_at, share_left, speed_at
 from entropy_explore_env.missions.rules import Rules
+from entropy_explore_env.missions.silence import is_silent
 from entropy_explore_env.missions.simulation import Missions
-from entropy_explore_env.robots.motion import MoveEnd, driving_time
+from entropy_explore_env.robots.motion import MoveEnd
 from entropy_explore_env.scenario import Scenario
 from entropy_explore_env.settings import RobotKind
+from entropy_explore_env.viewpoints.proposals.records import Kind
 from entropy_explore_env.worlds.world import no_fly_mask
-
-_DETOURS = 2.0
-"""Times of the straight drive that a drive may take."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,6 +111,10 @@ class RobotView:
         scan: Its latest scan.
         teammates: Robot number → what it heard of it.
         heard: (A,) HEARD, the same as it came, also of teammates that are silent since: for observations.
+        gained_bits: Taken from its map by its own scans since the start.
+        heard_bits: Taken from its map by teammates' measurements since the start.
+        candidates: (K, 5) the viewpoints that are proposed to it, the planner's own choice first; none where
+            actions are no numbers of candidates, or it does not decide.
         ceiling: (X, Y) int32, in each column the lowest layer of the no-fly zone (an exposure surface
             is known beforehand); None = no such zone.
     """
@@ -136,6 +138,9 @@ class RobotView:
     scan: ScanView
     teammates: dict[int, TeammateView]
     heard: np.ndarray
+    gained_bits: float
+    heard_bits: float
+    candidates: np.ndarray
     ceiling: np.ndarray | None
     rules: Rules
 
@@ -151,7 +156,7 @@ class RobotView:
 
     def action_for(self, viewpoint: np.ndarray) -> np.ndarray | np.int64:
         """The action that sends the robot to a viewpoint (5,): see `encode_viewpoint`."""
-        return encode_viewpoint(self.rules, self.pose, viewpoint, self.robot)
+        return encode_viewpoint(self.rules, self.pose, viewpoint, self.robot, self.candidates)
 
     @property
     def kind(self) -> RobotKind:
@@ -237,9 +242,21 @@ def view_of(missions: Missions, mission: int, robot: int) -> RobotView:
             if mate != robot
         },
         heard=read_only(heard.copy()),
+        gained_bits=float(own["gained_bits"]),
+        heard_bits=float(own["heard_bits"]),
+        candidates=_candidates(missions, mission, robot),
         ceiling=None if world is None else world.ceiling,
         rules=rules,
     )
+
+
+def _candidates(missions: Missions, mission: int, robot: int) -> np.ndarray:
+    """(K, 5) the viewpoints that are proposed to a robot that decides; none where actions are others."""
+    state = missions.state
+    if not state.candidates.size or not state.robots[mission, robot]["deciding"]:
+        return read_only(np.zeros((0, 5)))
+    candidates = state.candidates[mission, robot]
+    return read_only(candidates["viewpoint"][candidates["kind"] != Kind.NONE])
 
 
 def _since_scan_m(params: np.void, own: np.void, time_s: float) -> float:
@@ -262,7 +279,7 @@ def _path_ahead(params: np.void, own: np.void, time_s: float) -> np.ndarray:
 
 
 def _teammate(params: np.void, heard: np.void, time_s: float) -> TeammateView:
-    silent = silent_since(params, heard, time_s)
+    silent = bool(is_silent(params, heard, time_s))
     announced = np.zeros(7) if silent else heard["announced"].copy()
     return TeammateView(
         heard_s=float(heard["heard_s"]),
@@ -273,30 +290,6 @@ def _teammate(params: np.void, heard: np.void, time_s: float) -> TeammateView:
         half_angle_rad=float(announced[6]),
         silent=silent,
     )
-
-
-def silent_since(params: np.void, heard: np.void, time_s: float) -> bool:
-    """Whether a teammate that was heard counts as silent: see `Channel.silent_after_s`.
-
-    Until it must be heard again it may drive, for twice the time of the straight drive to the viewpoint that
-    it announced, turn half round, scan, and wait behind a teammate; its message may wait for the end of a
-    phase, and be delayed.
-
-    Args:
-        params: PARAMS of the teammate.
-        heard: HEARD of it.
-        time_s: Now.
-    """
-    unheard_s = time_s - float(heard["heard_s"])
-    if heard["heard_s"] < 0.0 or unheard_s <= params["silent_after_s"]:
-        return False
-    drive_m = 0.0
-    if heard["announced_s"] >= 0.0:
-        drive_m = float(np.linalg.norm(heard["announced"][:3] - heard["pose"][:3]))
-    drive_s = _DETOURS * driving_time(drive_m, params["max_speed_m_s"], params["acceleration_m_s2"])
-    stands_s = math.pi / params["turn_rate_rad_s"] + params["scan_time_s"] + params["blocked_wait_s"]
-    message_s = params["phase_s"] + params["delay_s"]
-    return bool(unheard_s > params["silent_after_s"] + drive_s + stands_s + message_s)
 
 
 def read_only(array: np.ndarray) -> np.ndarray:

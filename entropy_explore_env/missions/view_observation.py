@@ -9,14 +9,15 @@ import numpy as np
 
 from entropy_explore_env.belief.pooling import Pool, pool_belief
 from entropy_explore_env.belief.raycast import Crossing
+from entropy_explore_env.decision_settings import Action, Observation
 from entropy_explore_env.missions.action import decode_action
 from entropy_explore_env.missions.observation.layout import ObservationLayout, part_offsets
 from entropy_explore_env.missions.observation.observe import Known, observe_robot
 from entropy_explore_env.missions.rules import rules_of
 from entropy_explore_env.missions.view import RobotView
+from entropy_explore_env.missions.view_candidates import ViewProposer, writable
 from entropy_explore_env.robots.range_sensor import new_scan
 from entropy_explore_env.scenario import Scenario, with_settings
-from entropy_explore_env.settings import Action, Observation
 
 
 class ViewObserver:
@@ -27,13 +28,20 @@ class ViewObserver:
         layout: What an observation is made of.
     """
 
-    def __init__(self, scenario: Scenario, observation: Observation, action: Action) -> None:
-        """Make room for one observation.
+    def __init__(
+        self,
+        scenario: Scenario,
+        observation: Observation,
+        action: Action,
+        rng: np.random.Generator | None = None,
+    ) -> None:
+        """Make room for one observation; where actions are candidates, begin a mission.
 
         Args:
             scenario: What views are of.
             observation: What the policy observes.
             action: How it writes viewpoints.
+            rng: What candidates are drawn from, where actions are candidates; None = always the same draws.
         """
         self.scenario = with_settings(scenario, {"observation": observation, "action": action})
         self.layout = ObservationLayout(self.scenario)
@@ -43,6 +51,10 @@ class ViewObserver:
         scan = new_scan(scenario.grid, sensors, 1)
         self._crossing = Crossing(scan.crossed[0], scan.entered)
         self._pooled = np.zeros((2, len(self._rules.cells.voxels)))
+        self._proposer: ViewProposer | None = None
+        if action.kind == "candidates":
+            drawn_from = np.random.default_rng(0) if rng is None else rng
+            self._proposer = ViewProposer(self.scenario, drawn_from, observation.overlaps)
 
     def observe(self, view: RobotView) -> np.ndarray:
         """The flat observation of a robot.
@@ -53,7 +65,7 @@ class ViewObserver:
         Returns:
             (F,) float32.
         """
-        mean, precision = _writable(view.mean), _writable(view.precision)
+        mean, precision = writable(view.mean), writable(view.precision)
         out = np.zeros(self.layout.size, np.float32)
         params = self._rules.params[view.robot]
         if len(self._rules.cells.voxels):
@@ -73,7 +85,25 @@ class ViewObserver:
             self._pooled,
         )
         observe_robot(self._rules, self._offsets, view.robot, known, self._crossing, out)
+        if self._proposer is not None:
+            self._describe_candidates(self._proposer, view, out)
         return out
+
+    def _describe_candidates(self, proposer: ViewProposer, view: RobotView, out: np.ndarray) -> None:
+        """Fill in the parts of a flat observation about candidates; zeros while the robot is busy."""
+        mask = np.zeros(self.scenario.action.candidates)
+        mask[0] = 1.0
+        parts: dict[str, np.ndarray] = {}
+        if view.deciding:
+            mask[: len(proposer.propose(view))] = 1.0
+            parts["candidates"] = proposer.features(view.robot)
+            parts["context"] = proposer.context(view.robot)
+            parts["overlaps"] = proposer.overlaps(view.robot)
+        parts["action_mask"] = mask
+        for name, values in parts.items():
+            if name in self.layout.parts:
+                part = self.layout.parts[name]
+                out[part.start : part.stop] = values.reshape(-1)
 
     def viewpoint(self, view: RobotView, action: np.ndarray | int) -> np.ndarray:
         """Where an action of the policy sends a robot.
@@ -85,6 +115,8 @@ class ViewObserver:
         Returns:
             (5,) viewpoint: x, y, z, yaw, pitch; map frame, metres, radians.
         """
+        if self._proposer is not None:
+            return self._proposer.viewpoint(view.robot, int(action))
         discrete = self.scenario.action.kind == "discrete"
         continuous = np.zeros(5) if discrete else np.asarray(action, np.float64)
         viewpoint, params, number = (
@@ -94,10 +126,3 @@ class ViewObserver:
         )
         decode_action(params, self._rules.actions, view.pose, continuous, number, viewpoint)
         return viewpoint
-
-
-def _writable(array: np.ndarray) -> np.ndarray:
-    """(V,) an array of a view in the one type for which observing is compiled; nothing writes to it."""
-    flat = array.reshape(-1).view()
-    flat.setflags(write=True)
-    return flat

@@ -90,6 +90,15 @@ _FIELDS_TODAY: Mapping[str, str] = MappingProxyType(
 )
 """`array.field` in records → the field's name today, where it is another one."""
 
+FIELDS_CANDIDATES = ("viewpoint", "goal", "bits", "kind")
+"""Fields of `candidates`, where actions are candidates."""
+
+FIELDS_EXPERIENCE = (
+    "candidates_rng most_bits best_rate going goal far_value looked_far far_at patience blocked was_free "
+    "free_at failures failed share forget_at".split()
+)
+"""Fields of `experience`, likewise."""
+
 FOLLOWS_FROM_WORLD = ("blocked", "visible")
 """Values that the true world and the scenario determine; the digest leaves them out."""
 
@@ -107,8 +116,8 @@ def state_values(missions: Missions, mission: int) -> dict[str, np.ndarray]:
 
     Returns:
         Name → array, a view of the state, in the order of the digest. The phases of the broadcast, what an
-        ending by what was seen needs, what decisions under way need, and faults are there only where they are
-        used.
+        ending by what was seen needs, what decisions under way need, faults and candidates are there
+        only where they are used.
     """
     values: dict[str, np.ndarray] = {}
     for name, read in _ARRAYS.items():
@@ -128,6 +137,10 @@ def state_values(missions: Missions, mission: int) -> dict[str, np.ndarray]:
         values.update(
             {f"faults.{field}": missions.state.faults[field][mission, ...] for field in FIELDS_FAULTS}
         )
+    if missions.scenario.action.kind == "candidates":
+        proposed, kept = missions.state.candidates, missions.state.experience
+        values.update({f"candidates.{field}": proposed[field][mission, ...] for field in FIELDS_CANDIDATES})
+        values.update({f"experience.{field}": kept[field][mission, ...] for field in FIELDS_EXPERIENCE})
     return values
 
 

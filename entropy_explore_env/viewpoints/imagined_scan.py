@@ -70,6 +70,33 @@ def _imagine_ray(belief, scan, gap_probability, start, direction, count, scratch
 
 
 @lean_kernel
+def imagine_scan(belief, scan, gap_probability, at, scratch):
+    """Add the precision that a scan from a viewpoint should bring to `scratch.added`.
+
+    Args:
+        belief: A Belief.
+        scan: A ScanModel.
+        gap_probability: Probability that an unknown voxel beside a covered one stops a ray.
+        at: (5,) x, y, z in grid units, yaw, pitch.
+        scratch: A ScanScratch.
+
+    Returns:
+        How many voxels are in `scratch.touched`.
+    """
+    count = 0
+    for column in range(len(scan.yaws)):
+        yaw = at[3] + scan.yaws[column]
+        along, across = math.cos(yaw), math.sin(yaw)
+        for row in range(len(scan.pitches)):
+            pitch = at[4] + scan.pitches[row]
+            level = math.cos(pitch)
+            direction = (along * level, across * level, -math.sin(pitch))
+            start = (at[0], at[1], at[2])
+            count = _imagine_ray(belief, scan, gap_probability, start, direction, count, scratch)
+    return count
+
+
+@lean_kernel
 def imagined_bits(belief, scan, gap_probability, viewpoints, cones, scratch, bits):
     """Fill in the bits that a scan from each viewpoint should take from the robot's map.
 
@@ -83,14 +110,5 @@ def imagined_bits(belief, scan, gap_probability, viewpoints, cones, scratch, bit
         bits: (K,) float64, filled in.
     """
     for k in range(len(viewpoints)):
-        at, count = viewpoints[k], 0
-        for column in range(len(scan.yaws)):
-            yaw = at[3] + scan.yaws[column]
-            along, across = math.cos(yaw), math.sin(yaw)
-            for row in range(len(scan.pitches)):
-                pitch = at[4] + scan.pitches[row]
-                level = math.cos(pitch)
-                direction = (along * level, across * level, -math.sin(pitch))
-                start = (at[0], at[1], at[2])
-                count = _imagine_ray(belief, scan, gap_probability, start, direction, count, scratch)
+        count = imagine_scan(belief, scan, gap_probability, viewpoints[k], scratch)
         bits[k] = gathered_bits(belief, cones, scratch, count)

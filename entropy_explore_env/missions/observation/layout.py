@@ -22,7 +22,12 @@ Parts, in this order, each only if the scenario's settings ask for it (D directi
                            outside the workspace, 1 where a teammate was last heard
     overview  (2, x, y, z) the whole belief, averaged over blocks: normalised entropy, expected
                            coverage
-    action_mask (N,)       1 for each discrete action that makes sense
+    candidates (K, F)      candidates as actions: their features, `viewpoints.candidate_features.FEATURES`;
+                           zeros for those that there are not, and while the robot is busy
+    context   (C,)         what is true of all of them, `viewpoints.candidate_features.CONTEXT`; likewise
+    overlaps  (K, K)       voxels that two of them see, as a share of those of the one that sees fewer
+    action_mask (N,)       1 for each action by number that makes sense, or candidate that there is; for a
+                           busy robot, which has no candidates, the first is 1
 
 Normalised entropy is 1 at the prior and 0 at the voxel entropy that ends a mission (clipped).
 A busy robot observes from where it is under way, or zeros if the scenario says so. Only a robot's own
@@ -45,6 +50,7 @@ from entropy_explore_env.missions.observation.patch import PATCH_CHANNELS
 from entropy_explore_env.missions.observation.team import TEAMMATE_VALUES
 from entropy_explore_env.missions.rules import Rules, overview_shape, rules_of
 from entropy_explore_env.scenario import Scenario
+from entropy_explore_env.viewpoints.candidate_features import CONTEXT, FEATURES
 
 _Space = TypeVar("_Space", bound=spaces.Space)
 
@@ -155,14 +161,35 @@ def observation_parts(scenario: Scenario) -> dict[str, Part]:
         limits["patch"] = ((PATCH_CHANNELS, *settings.patch_shape), 0.0, one)
     if (cells := overview_shape(scenario)) is not None:
         limits["overview"] = ((OVERVIEW_CHANNELS, *cells), 0.0, one)
-    if settings.action_mask and scenario.action.kind == "discrete":
-        limits["action_mask"] = ((len(rules.actions.moves) * len(rules.actions.gazes),), 0.0, one)
+    if scenario.action.kind == "candidates":
+        limits.update(_candidate_parts(scenario))
+    if settings.action_mask and scenario.action.by_number:
+        limits["action_mask"] = ((action_count(scenario, rules),), 0.0, one)
     parts, start = {}, 0
     for name, (shape, low, high) in limits.items():
         stop = start + math.prod(shape)
         parts[name] = Part(start, stop, shape, low, high)
         start = stop
     return parts
+
+
+def _candidate_parts(scenario: Scenario) -> dict[str, tuple[tuple[int, ...], float, np.ndarray]]:
+    """Shapes and bounds of the parts that describe candidates."""
+    most, one = scenario.action.candidates, np.ones(1)
+    parts: dict[str, tuple[tuple[int, ...], float, np.ndarray]] = {}
+    if scenario.observation.candidates:
+        parts["candidates"] = ((most, len(FEATURES)), -1.0, one)
+        parts["context"] = ((len(CONTEXT),), 0.0, one)
+    if scenario.observation.overlaps:
+        parts["overlaps"] = ((most, most), 0.0, one)
+    return parts
+
+
+def action_count(scenario: Scenario, rules: Rules) -> int:
+    """Number of actions where they are numbers."""
+    if scenario.action.kind == "candidates":
+        return scenario.action.candidates
+    return len(rules.actions.moves) * len(rules.actions.gazes)
 
 
 def _most_utility_bits(scenario: Scenario, rules: Rules) -> float:
@@ -185,6 +212,12 @@ class PartOffsets(NamedTuple):
     patch: int | None
     overview: int | None
     action_mask: int | None
+    """Of discrete actions."""
+    candidates: int
+    """-1 = it is left out, like the next three."""
+    context: int
+    overlaps: int
+    candidate_mask: int
     patch_shape: tuple[int, int, int]
     kinds: int
     """K, of robots; 0 if all are alike."""
@@ -195,9 +228,13 @@ class PartOffsets(NamedTuple):
 def part_offsets(scenario: Scenario, layout: ObservationLayout) -> PartOffsets:
     """What compiled code needs of a layout."""
     begin = {name: part.start for name, part in layout.parts.items()}
-    patch = scenario.observation.patch_shape
+    patch, mask = scenario.observation.patch_shape, begin.pop("action_mask", None)
+    proposed = scenario.action.kind == "candidates"
     return PartOffsets(
-        *map(begin.get, ("panorama", "self", "drive", "team", "patch", "overview", "action_mask")),
+        *map(begin.get, ("panorama", "self", "drive", "team", "patch", "overview")),
+        action_mask=None if proposed else mask,
+        **{name: begin.get(name, -1) for name in ("candidates", "context", "overlaps")},
+        candidate_mask=mask if proposed and mask is not None else -1,
         patch_shape=(int(patch[0]), int(patch[1]), int(patch[2])),
         kinds=len(scenario.kinds) if len(scenario.kinds) > 1 else 0,
         while_busy=scenario.observation.while_busy,

@@ -1,0 +1,114 @@
+"""How robots decide: how a viewpoint is written as an action, and what is observed; frozen, checked once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from entropy_explore_env.errors import SettingError
+from entropy_explore_env.validation import check_choice, check_count, check_counts, check_kind
+
+MAX_CANDIDATES = 64
+"""Viewpoints that a robot can be proposed: who sees a voxel is noted in the bits of a 64-bit number."""
+
+
+@dataclass(frozen=True)
+class Action:
+    """How a viewpoint is written as an action.
+
+    Attributes:
+        kind: `continuous`, a Box(-1, 1); `discrete`, moves by whole voxels × gaze directions; or
+            `candidates`, the number of one of the viewpoints that a planner proposes to the robot.
+        moves: Discrete moves: `all` voxels within reach, or `axes`: stay, and as far as reach and voxels
+            allow along each axis, both ways, which is 7 moves (5 of planar robots) to learn from.
+        yaws: Discrete gazes around the horizon.
+        pitches: Discrete gazes up and down, from -π/4 to π/4; planar robots have one, level.
+        candidates: K, viewpoints that are proposed at most, 1 to 64; the first is the planner's own choice.
+    """
+
+    kind: Literal["continuous", "discrete", "candidates"] = "continuous"
+    moves: Literal["all", "axes"] = "all"
+    yaws: int = 16
+    pitches: int = 3
+    candidates: int = 24
+
+    def __post_init__(self) -> None:
+        """Check every field."""
+        check_choice(self, "kind", Literal["continuous", "discrete", "candidates"])
+        check_choice(self, "moves", Literal["all", "axes"])
+        check_count(self, "yaws", 1, 360)
+        check_count(self, "pitches", 1, 90)
+        check_count(self, "candidates", 1, MAX_CANDIDATES)
+
+    @property
+    def by_number(self) -> bool:
+        """Whether an action is a whole number."""
+        return self.kind != "continuous"
+
+
+@dataclass(frozen=True)
+class Observation:
+    """Which parts an observation has; a part that is left out costs nothing.
+
+    Attributes:
+        panorama: Utility and free distance of rays around the robot, by its own belief.
+        panorama_yaws: Directions around the horizon; None = 16, in 2-D worlds 32.
+        panorama_pitches: Directions up and down, from -π/4 to π/4; planar robots have one.
+        panorama_utility: `bits`, or `log2` for log2(1 + bits), which suits networks.
+        self_state: The robot's pose, time, remaining entropy and whether it decides (part `self`).
+        drive: The robot's speed and the viewpoint that it chose last, for those that decide under way.
+        team: Where teammates were last heard, and what they announced.
+        patch: The belief around the robot.
+        patch_shape: Its voxels along x, y and z; odd, the robot in the middle.
+        overview: The whole belief, pooled.
+        overview_shape: Cells of the pooled belief along x, y and z, at most the world's.
+        candidates: Candidates as actions: the features of each, and what is true of all of them (parts
+            `candidates` and `context`).
+        overlaps: Candidates as actions: how much of what one sees another sees, too.
+        action_mask: Actions by number: whether the mask is part of the observation, too.
+        flat: One Box of all parts, in the order of this list.
+        while_busy: Whether robots that cannot choose observe, too. False: they observe zeros until they
+            decide or the mission is over, which costs nothing.
+    """
+
+    panorama: bool = True
+    panorama_yaws: int | None = None
+    panorama_pitches: int = 3
+    panorama_utility: Literal["bits", "log2"] = "bits"
+    self_state: bool = True
+    drive: bool = False
+    team: bool = True
+    patch: bool = False
+    patch_shape: tuple[int, int, int] = (11, 11, 5)
+    overview: bool = False
+    overview_shape: tuple[int, int, int] = (8, 8, 4)
+    candidates: bool = True
+    overlaps: bool = False
+    action_mask: bool = False
+    flat: bool = False
+    while_busy: bool = True
+
+    def __post_init__(self) -> None:
+        """Check every field."""
+        for name in (
+            "panorama",
+            "self_state",
+            "drive",
+            "team",
+            "patch",
+            "overview",
+            "candidates",
+            "overlaps",
+            "action_mask",
+            "flat",
+            "while_busy",
+        ):
+            check_kind(self, name, bool)
+        if self.panorama_yaws is not None:
+            check_count(self, "panorama_yaws", 1, 360)
+        check_count(self, "panorama_pitches", 1, 90)
+        check_choice(self, "panorama_utility", Literal["bits", "log2"])
+        check_counts(self, "patch_shape", 1, 255)
+        if not all(n % 2 for n in self.patch_shape):
+            raise SettingError("Observation.patch_shape", self.patch_shape, "odd numbers only")
+        check_counts(self, "overview_shape", 1, 64)

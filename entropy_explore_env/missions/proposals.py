@@ -1,0 +1,244 @@
+"""Candidates for the robots of missions, and the parts of an observation that say what was proposed.
+
+A call of its own after each step, so that none of it is compiled where actions are no candidates.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from entropy_explore_env.belief.fields import Belief
+from entropy_explore_env.belief.paths.lattice import Costs
+from entropy_explore_env.compilation.kernels import lean_kernel
+from entropy_explore_env.missions.poses import copy_numbers, grid_size, pose_at, to_grid_units, within_grid
+from entropy_explore_env.missions.silence import silent_since
+from entropy_explore_env.missions.state import MissionEnd
+from entropy_explore_env.viewpoints.candidate_features import CONTEXT, FEATURES
+from entropy_explore_env.viewpoints.proposals.features import (
+    Facts,
+    write_context,
+    write_features,
+    write_overlaps,
+)
+from entropy_explore_env.viewpoints.proposals.propose import propose
+from entropy_explore_env.viewpoints.proposals.records import Kind
+from entropy_explore_env.viewpoints.proposals.situation import LastDecision, Situation
+
+_RUNNING = MissionEnd.RUNNING.code
+_NONE = int(Kind.NONE)
+_WIDTH, _CONTEXT = len(FEATURES), len(CONTEXT)
+
+
+class Knowledge(NamedTuple):
+    """What one robot knows, as candidates are proposed to it; map frame."""
+
+    pose: tuple[float, float, float, float, float]
+    time_s: float
+    entropy_bits: float
+    gained_bits: float
+    """Taken from its map by its own scans."""
+    heard_bits: float
+    """Taken from its map by teammates' measurements."""
+    target: np.ndarray
+    """(5,) the viewpoint that it chose last."""
+    came_bits: float
+    """Taken from its map by its latest scan."""
+    move_end: int
+    under_way: bool
+    heard: np.ndarray
+    """(A,) HEARD."""
+    mean: np.ndarray
+    """(V,) float32."""
+    precision: np.ndarray
+    """(V,) float32."""
+    no_fly: np.ndarray
+    """(V,) bool, where its body would reach above the ceiling; (0,) = nowhere."""
+
+
+class Proposing(NamedTuple):
+    """What candidates of E missions are proposed from, and where they are kept: arrays of MissionState."""
+
+    params: np.ndarray
+    """(A,) PARAMS."""
+    missions: np.ndarray
+    """(E,) MISSION."""
+    robots: np.ndarray
+    """(E, A) ROBOT."""
+    heard: np.ndarray
+    """(E, A, A) HEARD."""
+    mean: np.ndarray
+    """(E, A, V) float32."""
+    precision: np.ndarray
+    """(E, A, V) float32."""
+    utility_bits: np.ndarray
+    """(E, A, R) float64, of the rays of the latest scans."""
+    candidates: np.ndarray
+    """(E, A, K) CANDIDATE."""
+    experience: np.ndarray
+    """(E, A) EXPERIENCE."""
+    no_fly: np.ndarray
+    """(E·N, V) bool: see `navigation.Planning`."""
+
+
+@lean_kernel
+def _hear(params, robot, knowledge, scratch):
+    """Fill in the teammates that were heard, and the views that they announced; returns how many of each."""
+    mates, cones = 0, 0
+    for number in range(len(knowledge.heard)):
+        heard, own = knowledge.heard[number], params[number]
+        if number == robot or heard.heard_s < 0.0:
+            continue
+        mate = scratch.mates[mates]
+        mates += 1
+        copy_numbers(to_grid_units(own, heard.pose), mate.place, 3)
+        mate.max_speed_m_s, mate.acceleration_m_s2 = own.max_speed_m_s, own.acceleration_m_s2
+        mate.scan_time_s, mate.body_radius = own.scan_time_s, own.body_radius_m / own.voxel_size_m
+        mate.silent = silent_since(own, heard, knowledge.time_s)
+        if heard.announced_s >= 0.0 and heard.announced[5] > 0.0 and not mate.silent:
+            cone, there = scratch.cones[cones], heard.announced
+            cones += 1
+            copy_numbers(to_grid_units(own, there), cone.apex, 3)
+            level = math.cos(there[4])
+            cone.gaze[0], cone.gaze[1] = math.cos(there[3]) * level, math.sin(there[3]) * level
+            cone.gaze[2] = -math.sin(there[4])
+            cone.radius, cone.cosine = there[5] / own.voxel_size_m, math.cos(there[6])
+    return mates, cones
+
+
+@lean_kernel
+def _entropy_left(params, entropy_bits):
+    """Share of a map's entropy that is left: 1 at the start, 0 with all voxels known."""
+    voxels = params.size[0] * params.size[1] * params.size[2]
+    least = 0.5 * voxels * math.log2(2.0 * math.pi * math.e / params.end_precision)
+    span = 0.5 * voxels * math.log2(params.end_precision / params.prior_precision)
+    return min(max((entropy_bits - least) / span, 0.0), 1.0)
+
+
+@lean_kernel
+def propose_to(params, robot, knowledge, proposer, candidates, experience, parts):
+    """Propose candidates to one robot.
+
+    Args:
+        params: (A,) PARAMS.
+        robot: Its number.
+        knowledge: Knowledge of it.
+        proposer: Proposer of its kind.
+        candidates: (K,) CANDIDATE, its former ones; replaced.
+        experience: EXPERIENCE, changed in place.
+        parts: (candidates, context, overlaps), each a (N,) float32 to fill in, of which any may be empty.
+    """
+    own, scratch = params[robot], proposer.scratch
+    place = within_grid(own, knowledge.pose)
+    copy_numbers(place, scratch.here, 3)
+    scratch.here[3], scratch.here[4] = knowledge.pose[3], knowledge.pose[4]
+    copy_numbers(to_grid_units(own, knowledge.target), scratch.target, 3)
+    scratch.target[3], scratch.target[4] = knowledge.target[3], knowledge.target[4]
+    mates, cones = _hear(params, robot, knowledge, scratch)
+    mean, precision, none = knowledge.mean, knowledge.precision, knowledge.mean[:0]
+    known, cost = proposer.exact.known_precision, proposer.unknown_cost
+    situation = Situation(
+        Belief(mean, precision, grid_size(own)),
+        Costs(mean, precision, known, cost, none, 1.0, knowledge.no_fly),
+        scratch.here,
+        scratch.cones[:cones],
+        scratch.mates[:mates],
+        experience,
+    )
+    copy_numbers(knowledge.target, scratch.target_m, 5)
+    decision = LastDecision(
+        scratch.target,
+        scratch.target_m,
+        own.voxel_size_m,
+        knowledge.came_bits,
+        knowledge.move_end,
+        knowledge.under_way,
+    )
+    features, context, overlaps = parts
+    described = len(features) > 0 or len(context) > 0
+    found = propose(proposer, situation, decision, candidates, described)
+    if described:
+        bits = knowledge.gained_bits + knowledge.heard_bits
+        facts = Facts(
+            _entropy_left(own, knowledge.entropy_bits),
+            knowledge.heard_bits / bits if bits > 0.0 else 0.0,
+            knowledge.time_s,
+            knowledge.under_way,
+            len(knowledge.heard) - 1,
+        )
+        write_features(proposer, situation, found, features)
+        write_context(proposer, situation, facts, found, context)
+    if len(overlaps) > 0:
+        write_overlaps(proposer, found.count, overlaps)
+    for k in range(len(candidates)):
+        at = candidates[k].viewpoint
+        for axis in range(3):
+            at[axis] = own.origin_m[axis] + at[axis] * own.voxel_size_m
+
+
+@lean_kernel
+def _end(begin, size):
+    """(begin, end) of a part of an observation; (0, 0) where it is left out."""
+    return (begin, begin + size) if begin >= 0 else (0, 0)
+
+
+@lean_kernel
+def propose_missions(proposing, proposer, kind, offsets, first, last, out):
+    """Propose candidates to the robots of one kind that decide, and write the parts of their observations.
+
+    Args:
+        proposing: Proposing.
+        proposer: Proposer of this kind, not shared with another thread.
+        kind: Its number.
+        offsets: PartOffsets.
+        first: The first mission.
+        last: One past the last.
+        out: (E, A, F) float32, of which those parts are filled in: with zeros for robots that do not decide.
+    """
+    most = proposing.candidates.shape[2]
+    features, context = _end(offsets.candidates, most * _WIDTH), _end(offsets.context, _CONTEXT)
+    overlaps, masked = _end(offsets.overlaps, most * most), _end(offsets.candidate_mask, most)
+    for mission in range(first, last):
+        clock = proposing.missions[mission]
+        for index in range(proposing.robots.shape[1]):
+            own, params = proposing.robots[mission, index], proposing.params[index]
+            if params.kind != kind:
+                continue
+            row, candidates = out[mission, index], proposing.candidates[mission, index]
+            parts = (
+                row[features[0] : features[1]],
+                row[context[0] : context[1]],
+                row[overlaps[0] : overlaps[1]],
+            )
+            decides = own.deciding and clock.end == _RUNNING
+            if decides:
+                came = 0.0
+                for ray in range(params.rays):
+                    came += proposing.utility_bits[mission, index, ray]
+                knowledge = Knowledge(
+                    pose_at(params, own, clock.time_s),
+                    clock.time_s,
+                    own.entropy_bits,
+                    own.gained_bits,
+                    own.heard_bits,
+                    own.target,
+                    came,
+                    own.move_end,
+                    own.under_way,
+                    proposing.heard[mission, index],
+                    proposing.mean[mission, index],
+                    proposing.precision[mission, index],
+                    proposing.no_fly[mission * params.bodies + params.body_number],
+                )
+                experience = proposing.experience[mission, index]
+                propose_to(proposing.params, index, knowledge, proposer, candidates, experience, parts)
+            else:
+                for part in parts:
+                    for number in range(len(part)):
+                        part[number] = 0.0
+            mask = row[masked[0] : masked[1]]
+            for number in range(len(mask)):
+                there = candidates[number].kind != _NONE if decides else number == 0 and offsets.while_busy
+                mask[number] = 1.0 if there else 0.0

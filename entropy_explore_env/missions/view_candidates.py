@@ -1,0 +1,108 @@
+"""Candidates out of what one robot knows, for strategies and policies in whatever form actions have."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from entropy_explore_env.missions.proposals import Knowledge, propose_to
+from entropy_explore_env.missions.rules import Rules, rules_of
+from entropy_explore_env.missions.view import RobotView
+from entropy_explore_env.scenario import Scenario
+from entropy_explore_env.viewpoints.candidate_features import CONTEXT, FEATURES
+from entropy_explore_env.viewpoints.proposals.model import new_proposers
+from entropy_explore_env.viewpoints.proposals.records import CANDIDATE, EXPERIENCE, Kind
+
+_NO_CEILING = np.zeros(0, np.bool_)
+
+
+class ViewProposer:
+    """Proposes candidates to the robots of one mission, decision by decision, as missions do.
+
+    What a robot remembers from one decision to the next is in here. The draws are the same as in missions
+    whose actions are candidates, but for the random numbers.
+    """
+
+    def __init__(self, scenario: Scenario, rng: np.random.Generator, overlaps: bool = False) -> None:
+        """A mission begins.
+
+        Args:
+            scenario: With candidates as actions; views may be of a scenario with others.
+            rng: The random streams of the robots are drawn from it.
+            overlaps: Whether overlaps are wanted.
+        """
+        team, most = scenario.robots, scenario.action.candidates
+        self._rules: Rules = rules_of(scenario)
+        self._proposers = new_proposers(scenario)
+        self._candidates = np.zeros((team, most), CANDIDATE)
+        self._experience = np.zeros(team, EXPERIENCE)
+        self._experience["candidates_rng"][:, 0] = rng.integers(0, 2**64, team, np.uint64)
+        self._features = np.zeros((team, most, len(FEATURES)), np.float32)
+        self._context = np.zeros((team, len(CONTEXT)), np.float32)
+        self._overlaps = np.zeros((team, most, most if overlaps else 0), np.float32)
+        self._proposed_s = np.full(team, -1.0)
+
+    def propose(self, view: RobotView) -> np.ndarray:
+        """The viewpoints that are proposed to a robot that decides; asked again at the same time, the same.
+
+        Args:
+            view: Of the robot, which decides.
+
+        Returns:
+            (n, 5) float64, map frame, the planner's own choice first; n ≥ 1.
+        """
+        robot = view.robot
+        if self._proposed_s[robot] != view.time_s:
+            self._proposed_s[robot] = view.time_s
+            self._propose(view)
+        candidates = self._candidates[robot]
+        return candidates["viewpoint"][candidates["kind"] != Kind.NONE]
+
+    def _propose(self, view: RobotView) -> None:
+        robot, no_fly = view.robot, view.no_fly_mask()
+        x, y, z, yaw, pitch = view.pose.tolist()
+        knowledge = Knowledge(
+            (x, y, z, yaw, pitch),
+            view.time_s,
+            view.entropy_bits,
+            view.gained_bits,
+            view.heard_bits,
+            view.target.copy(),
+            float(view.scan.utility_bits.sum()),
+            view.move_end.code,
+            view.under_way,
+            view.heard.copy(),
+            writable(view.mean),
+            writable(view.precision),
+            _NO_CEILING if no_fly is None else no_fly.reshape(-1),
+        )
+        parts = (
+            self._features[robot].reshape(-1),
+            self._context[robot],
+            self._overlaps[robot].reshape(-1),
+        )
+        proposer = self._proposers[int(self._rules.params[robot]["kind"])]
+        candidates, experience = self._candidates[robot], self._experience[robot]
+        propose_to(self._rules.params, robot, knowledge, proposer, candidates, experience, parts)
+
+    def features(self, robot: int) -> np.ndarray:
+        """(K, F) float32 of the candidates proposed to a robot last: `candidate_features.FEATURES`."""
+        return self._features[robot]
+
+    def context(self, robot: int) -> np.ndarray:
+        """(C,) float32 of the same moment: `candidate_features.CONTEXT`."""
+        return self._context[robot]
+
+    def overlaps(self, robot: int) -> np.ndarray:
+        """(K, K) float32 of the same candidates, where overlaps are wanted."""
+        return self._overlaps[robot]
+
+    def viewpoint(self, robot: int, number: int) -> np.ndarray:
+        """(5,) the viewpoint of a candidate proposed last, map frame; of one that is none, the first."""
+        return self._candidates[robot, number]["viewpoint"].copy()
+
+
+def writable(array: np.ndarray) -> np.ndarray:
+    """(V,) an array of a view in the one type for which kernels are compiled; nothing writes to it."""
+    flat = array.reshape(-1).view()
+    flat.setflags(write=True)
+    return flat

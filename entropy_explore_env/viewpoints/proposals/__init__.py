@@ -1,0 +1,1 @@
+"""Proposing candidate viewpoints to a robot in one compiled call, for policies and for strategies."""

@@ -1,0 +1,248 @@
+"""Far places that could be worth more than any nearer one, and the first stops on the way to them."""
+
+from __future__ import annotations
+
+import math
+
+from entropy_explore_env.belief.paths.planning import resume_search
+from entropy_explore_env.belief.paths.search import extract_path
+from entropy_explore_env.belief.paths.string_pulling import Path, string_pull
+from entropy_explore_env.belief.raycast import STOP_AT_COVERED
+from entropy_explore_env.belief.voxel_index import flat_index, grid_index
+from entropy_explore_env.compilation.kernels import lean_kernel
+from entropy_explore_env.randomness import draw_gaussian, draw_uniform
+from entropy_explore_env.viewpoints.far_places import fill_blocks
+from entropy_explore_env.viewpoints.imagined_scan import imagined_bits
+from entropy_explore_env.viewpoints.proposals.nearby import copy_viewpoint, value_of, voxel_at
+from entropy_explore_env.viewpoints.proposals.situation import distance_apart, worth_bits
+from entropy_explore_env.viewpoints.travel import travel_seconds
+
+_FIRST_RADIUS = 3.0
+"""Length of the paths that are searched first for far places, in reaches; then twice as much, and so on."""
+_PITCH_SPREAD = 0.5
+"""Standard deviation of the pitch at far places, radians."""
+_FOLD_ABOVE = 1e250
+"""A product is folded into bits before it could leave a float64."""
+_WITHIN = 1.0 - 1e-6
+"""Of the reach: actions are float32."""
+
+
+@lean_kernel
+def block_bits_around(blocks, i, j, k):
+    """Remaining bits of a block and of its neighbours."""
+    total, count = 0.0, blocks.bits.shape
+    for x in range(max(i - 1, 0), min(i + 2, count[0])):
+        for y in range(max(j - 1, 0), min(j + 2, count[1])):
+            for z in range(max(k - 1, 0), min(k + 2, count[2])):
+                total += blocks.bits[x, y, z]
+    return total
+
+
+@lean_kernel
+def _draw_gaze(proposer, rng, at):
+    """Draw a gaze for a far place; sensors that see all around keep it."""
+    if proposer.all_around:
+        return
+    at[3] = math.pi * (2.0 * draw_uniform(rng) - 1.0)
+    if not proposer.level:
+        at[4] = min(max(_PITCH_SPREAD * draw_gaussian(rng), -0.5 * math.pi), 0.5 * math.pi)
+
+
+@lean_kernel
+def _insert_place(proposer, situation, place, worth, count):
+    """Insert a place among the far ones that are worth most, in order; returns how many there are."""
+    far, worths = proposer.scratch.far, proposer.scratch.worth
+    most = proposer.recipe.far_places
+    if count == most and worth <= worths[count - 1]:
+        return count
+    at = min(count, most - 1)
+    while at > 0 and worths[at - 1] < worth:
+        worths[at] = worths[at - 1]
+        copy_viewpoint(far.viewpoints[at - 1], far.viewpoints[at])
+        at -= 1
+    worths[at] = worth
+    _put_place(proposer, situation, place, far.viewpoints[at])
+    return min(count + 1, most)
+
+
+@lean_kernel
+def _put_place(proposer, situation, place, at):
+    """Write the viewpoint at the centre of a voxel, with the robot's present gaze."""
+    x, y, z = grid_index(situation.belief.size, place)
+    copy_viewpoint(situation.here, at)
+    at[0], at[1] = x + 0.5, y + 0.5
+    if not proposer.planar:
+        at[2] = z + 0.5
+
+
+@lean_kernel
+def _far_viewpoints(proposer, situation, radius):
+    """Fill in the places worth most by the bits of their blocks, a few gazes each; returns how many."""
+    scratch, blocks, recipe = proposer.scratch, proposer.blocks, proposer.recipe
+    belief, here, far, shape = situation.belief, situation.here, scratch.far, blocks.bits.shape
+    if recipe.far_places == 0:
+        return 0
+    start, window = voxel_at(belief.size, here), math.ceil(radius)
+    fill_blocks(scratch.search, belief, proposer.target_precision, proposer.layer, start, window, blocks)
+    count, one = 0, len(far.viewpoints) - 1
+    viewpoint, seconds = far.viewpoints[one : one + 1], far.seconds[one : one + 1]
+    edge_m, drive = proposer.exact.voxel_size_m, proposer.drive
+    for i in range(shape[0]):
+        for j in range(shape[1]):
+            for k in range(shape[2]):
+                place = blocks.place[i, j, k]
+                bits = block_bits_around(blocks, i, j, k) if place >= 0 else 0.0
+                if bits > 0.0:
+                    _put_place(proposer, situation, place, viewpoint[0])
+                    travel_seconds(
+                        scratch.search, belief.size, drive, edge_m, here, viewpoint, proposer.reach, seconds
+                    )
+                    worth = value_of(proposer, bits, seconds[0])
+                    count = _insert_place(proposer, situation, place, worth, count)
+    for place in range(count - 1, -1, -1):
+        for gaze in range(recipe.far_gazes - 1, -1, -1):
+            at = far.viewpoints[place * recipe.far_gazes + gaze]
+            copy_viewpoint(far.viewpoints[place], at)
+    for number in range(count * recipe.far_gazes):
+        _draw_gaze(proposer, situation.experience.candidates_rng, far.viewpoints[number])
+    return count * recipe.far_gazes
+
+
+@lean_kernel
+def propose_far(proposer, situation):
+    """Fill `scratch.far` with far viewpoints; the nearer half of the world first.
+
+    Paths are searched farther and farther until no place beyond could be worth more. The goal to which the
+    robot is on its way comes last, if there is one.
+
+    Args:
+        proposer: A Proposer; paths within reach have been searched.
+        situation: A Situation.
+
+    Returns:
+        (count, value): how many there are, and what the best is worth.
+    """
+    scratch, experience, belief = proposer.scratch, situation.experience, situation.belief
+    far, size, drive = scratch.far, belief.size, proposer.drive
+    everywhere = float(size[0] + size[1] + size[2]) * proposer.unknown_cost
+    radius, edge_m = _FIRST_RADIUS * proposer.within, proposer.exact.voxel_size_m
+    while True:
+        radius = min(radius, everywhere)
+        resume_search(scratch.search, proposer.lattice, situation.costs, radius)
+        count = _far_viewpoints(proposer, situation, radius)
+        if experience.going:
+            copy_viewpoint(experience.goal, far.viewpoints[count])
+            count += 1
+        viewpoints, seconds = far.viewpoints[:count], far.seconds[:count]
+        here, gap = situation.here, proposer.recipe.gap_probability
+        travel_seconds(scratch.search, size, drive, edge_m, here, viewpoints, proposer.reach, seconds)
+        bits = far.bits[:count]
+        imagined_bits(belief, proposer.exact, gap, viewpoints, situation.cones, scratch.scan, bits)
+        best = 0.0
+        for k in range(count):
+            far.bits[k] = worth_bits(proposer, situation, far.viewpoints[k], far.bits[k])
+            far.values[k] = value_of(proposer, far.bits[k], far.seconds[k])
+            best = max(best, far.values[k])
+        beyond = value_of(proposer, experience.most_bits, max(radius * edge_m / drive.max_speed_m_s, 1e-9))
+        if radius >= everywhere or best >= beyond:
+            return count, best
+        radius *= 2.0
+
+
+@lean_kernel
+def first_stop(proposer, situation, goal, stop):
+    """Fill in where a robot has to drive first to get to a goal.
+
+    Args:
+        proposer: A Proposer, with the search that reached the goal.
+        situation: A Situation.
+        goal: (5,) in grid units.
+        stop: (5,) filled in: the goal where it is within reach, or the last place of the path that is.
+
+    Returns:
+        Whether there is a path.
+    """
+    scratch, here, size = proposer.scratch, situation.here, situation.belief.size
+    search, lattice, path = scratch.search, proposer.lattice, scratch.path
+    copy_viewpoint(goal, stop)
+    count = extract_path(search, lattice, voxel_at(size, goal), path)
+    if count == 0:
+        return False
+    reach = proposer.reach * _WITHIN
+    if not proposer.planned:
+        for axis in range(3):
+            scratch.ends[0, axis], scratch.ends[1, axis] = here[axis], goal[axis]
+        way = Path(path, count, scratch.ends[0], scratch.ends[1])
+        if string_pull(search, lattice, situation.costs, way, scratch.waypoints) == 0:
+            return False
+        corner = scratch.waypoints[0]
+        share = min(1.0, reach / max(distance_apart(corner, here), 1e-9))
+        for axis in range(3):
+            stop[axis] = here[axis] + share * (corner[axis] - here[axis])
+        return True
+    if distance_apart(goal, here) <= reach:
+        return True
+    last = path[0]
+    for number in range(count):
+        x, y, z = grid_index(size, path[number])
+        height = here[2] if lattice.layer >= 0 else z + 0.5
+        away = (x + 0.5 - here[0]) ** 2 + (y + 0.5 - here[1]) ** 2 + (height - here[2]) ** 2
+        if math.sqrt(away) > reach:
+            break
+        last = path[number]
+    x, y, z = grid_index(size, last)
+    stop[0], stop[1] = x + 0.5, y + 0.5
+    stop[2] = here[2] if lattice.layer >= 0 else z + 0.5
+    return True
+
+
+@lean_kernel
+def gaze_on_the_way(proposer, situation, gazes, goal, stop):
+    """Give a stop on the way to a goal the best of some gazes; returns the bits that a scan should bring.
+
+    Args:
+        proposer: A Proposer.
+        situation: A Situation.
+        gazes: How many are tried at most; the goal's is the first one.
+        goal: (5,) in grid units.
+        stop: (5,) its place; the gaze is filled in.
+    """
+    scratch, gap = proposer.scratch, proposer.recipe.gap_probability
+    if distance_apart(goal, stop) < 1e-6 or proposer.all_around:
+        gazes = 1
+    tried, bits = scratch.gazes[:gazes], scratch.gaze_bits[:gazes]
+    for number in range(gazes):
+        copy_viewpoint(stop, tried[number])
+        if number > 0:
+            _draw_gaze(proposer, situation.experience.candidates_rng, tried[number])
+    imagined_bits(situation.belief, proposer.exact, gap, tried, situation.cones, scratch.scan, bits)
+    best, most = 0, -1.0
+    for number in range(gazes):
+        worth = worth_bits(proposer, situation, tried[number], bits[number])
+        if worth > most:
+            best, most = number, worth
+    copy_viewpoint(tried[best], stop)
+    return most
+
+
+@lean_kernel
+def remaining_bits_by_block(proposer, belief):
+    """Fill in the remaining bits of all blocks of a map; returns their sum."""
+    blocks, target, size = proposer.blocks, proposer.target_precision, belief.size
+    shape, edge, total = blocks.bits.shape, blocks.edge, 0.0
+    for i in range(shape[0]):
+        for j in range(shape[1]):
+            for k in range(shape[2]):
+                bits, growth = 0.0, 1.0
+                for x in range(i * edge, min((i + 1) * edge, size[0])):
+                    for y in range(j * edge, min((j + 1) * edge, size[1])):
+                        for z in range(k * edge, min((k + 1) * edge, size[2])):
+                            voxel = flat_index(size, x, y, z)
+                            if belief.precision[voxel] < target and belief.mean[voxel] <= STOP_AT_COVERED:
+                                growth *= target / belief.precision[voxel]
+                                if growth > _FOLD_ABOVE:
+                                    bits += math.log2(growth)
+                                    growth = 1.0
+                blocks.bits[i, j, k] = 0.5 * (bits + math.log2(growth))
+                total += blocks.bits[i, j, k]
+    return total

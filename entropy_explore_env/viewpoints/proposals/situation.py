@@ -1,0 +1,206 @@
+"""What a robot's candidates depend on, and what it remembers of what did not come, in grid units."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from entropy_explore_env.belief.fields import Belief
+from entropy_explore_env.belief.paths.lattice import Costs
+from entropy_explore_env.compilation.kernels import lean_kernel
+from entropy_explore_env.robots.motion import MoveEnd
+from entropy_explore_env.viewpoints.proposals.records import REMEMBERED, Kind
+
+_NONE, _FAR = int(Kind.NONE), int(Kind.FAR)
+_TEAMMATE = MoveEnd.TEAMMATE.code
+_MISSED = 0.01
+"""A drive that ended farther than this from where it should, in voxel edges, was cut short."""
+DISAPPOINTING = 0.1
+"""Viewpoints are remembered that brought less than this share of what was expected."""
+_ALIKE_EDGES, _ALIKE_RAD = 1.0, 0.1
+"""Viewpoints that differ by less are the same to a robot that remembers one."""
+_SAME_EDGES, _SAME_RAD = 2e-3, 2e-3
+"""A viewpoint that was chosen is the candidate that differs by less: actions may be float32."""
+_FORGET_EDGES = 6.0
+"""How far away from where it was a robot forgets what brought nothing."""
+_BLOCKED_DECISIONS = 4
+"""Decisions during which a robot keeps clear of a teammate that was in its way."""
+_CLEAR = 1.1
+"""How far it keeps clear, in sums of the two radii."""
+_DREGS_SHARE = 0.01
+"""What bits are worth at least, next to others above the dregs: so that there is a best where all are."""
+
+
+class Situation(NamedTuple):
+    """What one robot's candidates depend on."""
+
+    belief: Belief
+    costs: Costs
+    """Of traversal, by the belief."""
+    here: np.ndarray
+    """(5,) its pose, place in grid units."""
+    cones: np.ndarray
+    """(M,) CONE, which are left to teammates."""
+    mates: np.ndarray
+    """(M,) MATE, teammates that were heard."""
+    experience: np.record
+    """EXPERIENCE."""
+
+
+class LastDecision(NamedTuple):
+    """What a robot chose last, and what came of it."""
+
+    target: np.ndarray
+    """(5,) the viewpoint, grid units."""
+    target_m: np.ndarray
+    """(5,) the same in the map frame."""
+    voxel_size_m: float
+    came_bits: float
+    """Bits that its latest scan took from its map."""
+    move_end: int
+    """Code of a MoveEnd."""
+    under_way: bool
+    """Whether it still drives there."""
+
+
+@lean_kernel
+def turned(angle, other):
+    """How far an angle is from another, 0 to π."""
+    return abs((angle - other + math.pi) % (2.0 * math.pi) - math.pi)
+
+
+@lean_kernel
+def distance_apart(a, b):
+    """Distance between two places, the first three numbers of each."""
+    return math.sqrt((a[0] - b[0]) ** 2 + (a[1] - b[1]) ** 2 + (a[2] - b[2]) ** 2)
+
+
+@lean_kernel
+def chosen_number(candidates, decision):
+    """Number of the candidate that a robot chose last; -1 = it chose something else."""
+    for number in range(len(candidates)):
+        at, target = candidates[number].viewpoint, decision.target_m
+        if (
+            candidates[number].kind != _NONE
+            and distance_apart(at, target) < _SAME_EDGES * decision.voxel_size_m
+            and turned(at[3], target[3]) < _SAME_RAD
+            and abs(at[4] - target[4]) < _SAME_RAD
+        ):
+            return number
+    return -1
+
+
+@lean_kernel
+def learn(experience, candidates, decision, here):
+    """Compare what came with what was expected, and remember what is not worth another try.
+
+    Args:
+        experience: EXPERIENCE, changed in place.
+        candidates: (K,) CANDIDATE among which it chose.
+        decision: LastDecision.
+        here: (5,) where the robot is, grid units.
+    """
+    number = chosen_number(candidates, decision)
+    experience.going = False
+    if number >= 0 and candidates[number].kind == _FAR:
+        experience.going = True
+        for i in range(5):
+            experience.goal[i] = candidates[number].goal[i]
+    if decision.under_way:
+        return
+    _forget(experience, here)
+    experience.blocked = max(experience.blocked - 1, 0)
+    if decision.move_end == _TEAMMATE:
+        experience.blocked = _BLOCKED_DECISIONS
+    missed = distance_apart(decision.target, here)
+    expected = candidates[number].bits if number >= 0 else 0.0
+    came = max(decision.came_bits, 0.0)
+    if missed > _MISSED:
+        _remember(experience, decision.target, 0.0, max(2.0 * missed, _FORGET_EDGES))
+        experience.going = False
+    elif came < DISAPPOINTING * expected:
+        _remember(experience, decision.target, came / expected, _FORGET_EDGES)
+
+
+@lean_kernel
+def _forget(experience, here):
+    """Forget the failures that lie far behind."""
+    kept = 0
+    for number in range(experience.failures):
+        if distance_apart(experience.failed[number], here) < experience.forget_at[number]:
+            _move(experience, number, kept)
+            kept += 1
+    experience.failures = kept
+
+
+@lean_kernel
+def _move(experience, source, target):
+    """Write a failure in place of another."""
+    for i in range(5):
+        experience.failed[target, i] = experience.failed[source, i]
+    experience.share[target] = experience.share[source]
+    experience.forget_at[target] = experience.forget_at[source]
+
+
+@lean_kernel
+def _remember(experience, viewpoint, share, forget_at):
+    """Remember a failure, in place of the oldest where there are too many."""
+    if experience.failures == REMEMBERED:
+        for number in range(REMEMBERED - 1):
+            _move(experience, number + 1, number)
+        experience.failures = REMEMBERED - 1
+    number = experience.failures
+    for i in range(5):
+        experience.failed[number, i] = viewpoint[i]
+    experience.share[number], experience.forget_at[number] = share, forget_at
+    experience.failures = number + 1
+
+
+@lean_kernel
+def trust_in(experience, all_around, at):
+    """Share of the expected bits that viewpoints like this one brought; 1 where none was a failure."""
+    trust = 1.0
+    for number in range(experience.failures):
+        failed, share = experience.failed[number], experience.share[number]
+        if distance_apart(failed, at) >= _ALIKE_EDGES:
+            continue
+        if share > 0.0 and not all_around:
+            if turned(failed[3], at[3]) >= _ALIKE_RAD or abs(failed[4] - at[4]) >= _ALIKE_RAD:
+                continue
+        trust *= share
+    return trust
+
+
+@lean_kernel
+def worth_bits(proposer, situation, at, bits):
+    """What expected bits at a viewpoint (5,) are worth to a robot that remembers what it has experienced."""
+    experience = situation.experience
+    if proposer.recipe.dregs > 0.0:
+        bits = max(bits - proposer.recipe.dregs * experience.most_bits, _DREGS_SHARE * bits)
+    bits *= trust_in(experience, proposer.all_around, at)
+    if experience.blocked > 0:
+        for mate in situation.mates:
+            clear = _CLEAR * (mate.body_radius + proposer.drive.body_radius)
+            if mate.body_radius > 0.0 and _comes_near(situation.here, at, mate.place, clear):
+                return 0.0
+    return bits
+
+
+@lean_kernel
+def _comes_near(here, there, body, clear):
+    """Whether a straight drive brings a robot nearer to a body than allowed.
+
+    Where they touch already, only drives away from it are free.
+    """
+    length, along = 0.0, 0.0
+    for axis in range(3):
+        step = there[axis] - here[axis]
+        length += step * step
+        along += step * (body[axis] - here[axis])
+    share = min(max(along / max(length, 1e-12), 0.0), 1.0)
+    gap = 0.0
+    for axis in range(3):
+        gap += (here[axis] + share * (there[axis] - here[axis]) - body[axis]) ** 2
+    return length > 1e-12 and math.sqrt(gap) < clear and share > 0.0
