@@ -16,6 +16,11 @@ from entropy_explore_env.missions.snapshot import restore, snapshot
 
 MISSIONS, ROBOTS = 3, 2
 SEEDS = [11, 5, 2**70]
+FAULTS: dict[str, Any] = {
+    "stop": {"at_s": 9.0, "lasts_s": 8.0, "robots": (0,)},
+    "blind": {"at_s": 4.0, "lasts_s": 10.0},
+    "radio": {"garbled": 0.3, "repeated": 0.3, "late": 0.3, "late_s": 5.0},
+}
 SHORT: dict[str, Any] = {
     "decision_period_s": None,
     "action": Action("discrete", moves="axes"),
@@ -36,9 +41,17 @@ def actions_of(rows: RobotVecEnv, rng: np.random.Generator) -> np.ndarray:
 @pytest.mark.parametrize("robots", [1, ROBOTS])
 @pytest.mark.parametrize("kind", ["discrete", "continuous"])
 @pytest.mark.parametrize("flat", [True, False])
-def test_rows_are_the_robots_of_the_vector_environment(robots: int, kind: Any, flat: bool) -> None:
+@pytest.mark.parametrize("faults", [{}, FAULTS])
+def test_rows_are_the_robots_of_the_vector_environment(
+    robots: int, kind: Any, flat: bool, faults: dict[str, Any]
+) -> None:
     """Row e·A + a is robot a of mission e: what it observes, earns, and when it may choose."""
-    settings = {"action": Action(kind), "observation": Observation(flat=flat), "time_limit_s": 30.0}
+    settings = {
+        "action": Action(kind),
+        "observation": Observation(flat=flat),
+        "time_limit_s": 30.0,
+        "faults": faults,
+    }
     rows = made(robots, **settings)
     env = EntropyExploreVectorEnv(
         "box-7x11x5", MISSIONS, robots=robots, autoreset_mode="SameStep", **{**SHORT, **settings}

@@ -37,16 +37,23 @@ BOX: dict[str, Any] = {
     "reward": {"cost_per_s": 0.01},
 }
 
+FAULTS = {
+    "stop": {"at_s": 9.0, "lasts_s": 8.0, "robots": (0,)},
+    "blind": {"at_s": 4.0, "lasts_s": 10.0},
+    "radio": {"garbled": 0.3, "repeated": 0.3, "late": 0.3, "late_s": 5.0},
+}
+
 
 def chosen(env: Any, agents: Any, rng: np.random.Generator) -> dict[str, Any]:
     return {agent: int(rng.integers(env.action_spaces[agent].n)) for agent in agents}
 
 
+@pytest.mark.parametrize("faults", [{}, FAULTS])
 @pytest.mark.parametrize("period", [0.25, 1.0, None])
-def test_it_plays_the_mission_of_the_parallel_env_and_rewards_add_up(period):
+def test_it_plays_the_mission_of_the_parallel_env_and_rewards_add_up(period, faults):
     """Observations are those of the deciding robots, rewards the sums since they decided last."""
-    env = EntropyExploreMultiAgentEnv({**BOX, "decision_period_s": period})
-    team = parallel_env(**BOX, decision_period_s=period)
+    env = EntropyExploreMultiAgentEnv({**BOX, "decision_period_s": period, "faults": faults})
+    team = parallel_env(**BOX, decision_period_s=period, faults=faults)
     observations, _ = env.reset(seed=4)
     expected, _ = team.reset(seed=4)
     assert list(observations) == team.agents
