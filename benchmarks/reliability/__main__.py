@@ -26,7 +26,15 @@ from typing import Any, NamedTuple
 import entropy_explore_env
 from baselines.cli.arguments import parse, run_command
 from baselines.experiments.worker_pool import Failure, run_each
-from benchmarks.reliability import determinism, file_fuzz, kills, settings_fuzz, soak, state_fuzz
+from benchmarks.reliability import (
+    determinism,
+    file_fuzz,
+    kills,
+    settings_fuzz,
+    soak,
+    state_fuzz,
+    training_runs,
+)
 from benchmarks.reliability.page import Kept, page
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.writing import write_atomically
@@ -66,6 +74,13 @@ PROOFS = {
         len(file_fuzz.LOADERS) * file_fuzz.FILES,
         600.0,
         file_fuzz.files_of,
+    ),
+    "training": Proof(
+        training_runs.play_number,
+        training_runs.ROBOT_STEPS,
+        len(training_runs.TRAINERS) * training_runs.ROBOT_STEPS,
+        7200.0,
+        training_runs.robot_steps,
     ),
     "soak": Proof(soak.play_number, 1_000_000, soak.ROBOT_STEPS, 600.0, soak.robot_steps),
 }

@@ -172,6 +172,21 @@ def _files(rows: Sequence[Row]) -> str:
     return "\n".join(table) + "\n"
 
 
+def _training(rows: Sequence[Row]) -> str:
+    lines = [
+        "Runs that are killed at drawn moments, with all that they started, and resumed. All reached their "
+        "end; every figure of their validations and every weight of the policies that they keep is finite.",
+        "",
+        "| trainer | robot-steps | kills |",
+        "| --- | ---: | ---: |",
+    ]
+    for name in dict.fromkeys(row["trainer"] for row in rows):
+        own = [row for row in rows if row["trainer"] == name]
+        steps, kills = (sum(row[figure] for row in own) for figure in ("robot_steps", "kills"))
+        lines.append(f"| `{name}` | {steps:,} | {kills} |")
+    return "\n".join(lines) + "\n"
+
+
 def _soak(rows: Sequence[Row]) -> str:
     ordered = sorted(rows, key=lambda row: row["number"])
     within = max(row["resident_mib"] / row["settled_mib"] - 1.0 for row in ordered)
@@ -264,5 +279,6 @@ _SUMMARIES: Mapping[str, tuple[str, str, Callable[[Sequence[Row]], str]]] = {
     "determinism": ("Determinism", "processes", _determinism),
     "kills": ("Kills", "kills", _kills),
     "files": ("Changed files", "files", _files),
+    "training": ("Training", "robot-steps", _training),
     "soak": ("Soak", "robot-steps", _soak),
 }

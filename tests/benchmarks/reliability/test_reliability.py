@@ -81,6 +81,8 @@ def test_digests_that_differ_and_memory_that_grows_are_shown():
         (other, "scenarios [4]"),
     ):
         assert said in kept("determinism", rows)
+    runs = [{"trainer": "a", "robot_steps": 1_200_000 + n, "kills": 3, "number": n} for n in range(2)]
+    assert "| `a` | 2,400,001 | 6 |" in kept("training", runs)
     case = {"scenario": "room", "robot_steps": 600_000, "missions": 2, "seconds": 6.0, "process": 1}
     rows = [{**case, "number": n, "settled_mib": 100.0 + n, "resident_mib": 101.0 + n} for n in range(5)]
     text = kept("soak", rows[::-1])
