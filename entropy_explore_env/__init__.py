@@ -27,6 +27,7 @@ from entropy_explore_env.errors import (
     WorldError,
 )
 from entropy_explore_env.fault_settings import Faults, Outage, RadioFault, SensorFault
+from entropy_explore_env.localization_settings import Fiducials, Localization
 from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.missions.state import MissionEnd
 from entropy_explore_env.missions.view import RobotView
@@ -54,7 +55,9 @@ __all__ = [
     "EntropyExploreError",
     "EntropyExploreVectorEnv",
     "Faults",
+    "Fiducials",
     "Grid",
+    "Localization",
     "MissingExtraError",
     "MissionEnd",
     "Missions",

@@ -26,6 +26,8 @@ class Stream(enum.IntEnum):
     STRATEGY = 4
     FAULTS = 5
     CANDIDATES = 6
+    LOCALIZATION = 7
+    FIDUCIALS = 8
 
 
 def seed_sequence(seed: int, episode: int, stream: Stream) -> np.random.SeedSequence:

@@ -14,6 +14,7 @@ import numpy as np
 from entropy_explore_env.decision_settings import Action, Observation
 from entropy_explore_env.errors import SettingError, did_you_mean
 from entropy_explore_env.fault_settings import Faults
+from entropy_explore_env.localization_settings import Fiducials
 from entropy_explore_env.settings import Channel, Ending, Grid, RangeSensor, Reward, Robot, RobotKind
 from entropy_explore_env.validation import (
     check,
@@ -64,6 +65,8 @@ class Scenario:
             truth: for figures only, nobody acts on it. It costs one more map a mission. True by itself where
             the ending asks for what was seen.
         faults: What goes wrong with robots; nothing by default.
+        fiducials: Landmarks by which robots that drift correct what they believe of their poses
+            (`Robot.localization`); none by default.
     """
 
     name: str
@@ -80,6 +83,7 @@ class Scenario:
     extra_kinds: tuple[RobotKind, ...] = ()
     channel: Channel = field(default_factory=Channel)
     faults: Faults = field(default_factory=Faults)
+    fiducials: Fiducials = field(default_factory=Fiducials)
     ending: Ending = field(default_factory=Ending)
     reward: Reward = field(default_factory=Reward)
     action: Action = field(default_factory=Action)
@@ -115,6 +119,7 @@ class Scenario:
             self._check_drives(kind)
         self._check_broadcasts()
         self._check_faults()
+        self._check_fiducials()
         rays = max(kind.sensor.rays for kind in self.kinds)
         allowed = f"so short that at most {MAX_MESSAGES} messages are under way at once"
         name, longest_s = ("Channel.delay_s", self.channel.delay_s)
@@ -164,6 +169,16 @@ class Scenario:
         if self.faults.radio.late > 0.0 and self.channel.phase_s > 0.0:
             allowed = "0 where batches are broadcast in phases"
             raise SettingError("RadioFault.late", self.faults.radio.late, allowed)
+
+    def _check_fiducials(self) -> None:
+        """Check that given fiducials are in the workspace."""
+        low = np.asarray(self.grid.origin_m)
+        high, axes = low + self.grid.size_m, 2 if self.grid.flat else 3
+        for place in self.fiducials.positions_m:
+            where = np.asarray(place)
+            if ((where < low) | (where >= high))[:axes].any():
+                allowed = f"places from {low.tolist()} to {high.tolist()} m, the workspace"
+                raise SettingError("Fiducials.positions_m", place, allowed)
 
     def _check_drives(self, kind: RobotKind) -> None:
         """Check that a drive takes a day at most and few scans, so that a step soon returns."""
@@ -254,6 +269,11 @@ class Scenario:
         return math.ceil(min(decisions, 2.0**62)) + 1
 
     @property
+    def drifts(self) -> bool:
+        """Whether some robot's estimate of its pose ever differs from the truth."""
+        return any(kind.robot.localization.drifts for kind in self.kinds)
+
+    @property
     def planar(self) -> bool:
         """Whether the whole team stays in planes and looks level."""
         return all(self.looks_level(kind.robot) for kind in self.kinds)
@@ -312,6 +332,7 @@ _PARTS: tuple[tuple[str, type], ...] = (
     ("sensor", RangeSensor),
     ("channel", Channel),
     ("faults", Faults),
+    ("fiducials", Fiducials),
     ("ending", Ending),
     ("reward", Reward),
     ("action", Action),

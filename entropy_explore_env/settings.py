@@ -9,6 +9,7 @@ from typing import Literal
 import numpy as np
 
 from entropy_explore_env.errors import SettingError
+from entropy_explore_env.localization_settings import Localization
 from entropy_explore_env.radio_settings import Signal
 from entropy_explore_env.validation import (
     check,
@@ -127,6 +128,7 @@ class Robot:
             `on_scan` at every scan under way, which its sensor must take (`RangeSensor.scan_every_m`); with a
             number whenever so many seconds, at least 0.01, have passed since it last decided. It drives on
             meanwhile; missions/redecision.py says what a new decision does to the drive.
+        localization: How well the robot knows where it is; exactly by default.
     """
 
     motion: Literal["free", "planar"] = "free"
@@ -143,6 +145,7 @@ class Robot:
     when_blocked: Literal["wander", "wait"] = "wander"
     blocked_wait_s: float = 5.0
     redecide: Literal["at_stop", "on_scan"] | float = "at_stop"
+    localization: Localization = field(default_factory=Localization)
 
     def __post_init__(self) -> None:
         """Check every field."""
@@ -163,6 +166,7 @@ class Robot:
         if not periodic and not (isinstance(self.redecide, str) and self.redecide in _REDECIDE):
             allowed = f"one of {', '.join(_REDECIDE)}, or a finite number of seconds ≥ {MIN_REDECIDE_S}"
             raise SettingError("Robot.redecide", self.redecide, allowed)
+        check_kind(self, "localization", Localization)
 
 
 @dataclass(frozen=True)

@@ -65,6 +65,7 @@ REFUSED = {
     (Robot, "when_blocked"): KIND,
     (Robot, "blocked_wait_s"): (*POSITIVE, TINY, 0.9e-4, 1.1e5, INF),
     (Robot, "redecide"): (None, True, [1.0], NAN, INF, 0.0, -1.0, 0.0099, "on_scans", "AT_STOP", "1", ""),
+    (Robot, "localization"): (None, Reward(), "exact"),
     (Scenario, "start_radius_m"): (*POSITIVE, TINY, 1.1e6),
     (RangeSensor, "field_of_view_rad"): (
         0.5,
@@ -153,6 +154,7 @@ REFUSED = {
     (Scenario, "channel"): (None, Reward()),
     (Scenario, "ending"): (None, Reward()),
     (Scenario, "faults"): (None, Reward(), "none"),
+    (Scenario, "fiducials"): (None, Reward(), 3),
     (Scenario, "reward"): (None, Ending(), "team"),
     (Scenario, "action"): (None, Reward(), "discrete"),
     (Scenario, "observation"): (None, Reward()),

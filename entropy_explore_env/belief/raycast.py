@@ -223,3 +223,37 @@ def cast_ray(coverage, size, line, stop_above, hit_at_length, behind, crossing):
             n += 1
             voxel, at, faces = _next_voxel(voxel, steps, faces, gaps)
     return RayEnd(reached, n, end)
+
+
+@inlined_kernel
+def cast_range(coverage, size, line, stop_above):
+    """Walk along a line until something ends it, as `cast_ray` does, but note no voxels.
+
+    Args:
+        coverage: (V,) float32.
+        size: (X, Y, Z) voxels.
+        line: Line; it starts inside the workspace.
+        stop_above: Coverage that stops the ray.
+
+    Returns:
+        (length, covered, reason): that of `cast_ray`, the coverage of the voxel that the ray met, 0 if it met
+        none, and OPEN, OBSTACLE or WALL.
+    """
+    x = _axis(line.start[0], line.direction[0], size[0])
+    y = _axis(line.start[1], line.direction[1], size[1])
+    z = _axis(line.start[2], line.direction[2], size[2])
+    voxel = flat_index(size, x.index, y.index, z.index)
+    steps = _Axes(x.step * (size[1] * size[2]), y.step * size[2], z.step)
+    faces, gaps = _Axes(x.face, y.face, z.face), _Axes(x.gap, y.gap, z.gap)
+    stops = _ticks(line.length)
+    until = min(min(x.last, y.last, z.last), stops)
+    while True:
+        voxel, at, faces = _next_voxel(voxel, steps, faces, gaps)
+        if at >= until:
+            break
+        covered = coverage[np.uint64(voxel)]
+        if covered > stop_above:
+            return at * _EDGES, covered, OBSTACLE
+    if at >= stops:
+        return line.length, np.float32(0.0), OPEN
+    return at * _EDGES, np.float32(0.0), WALL

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from entropy_explore_env.missions.faults import failing
+from entropy_explore_env.missions.localization import pose_errors
 from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.missions.state import MissionEnd
 from entropy_explore_env.reports.metrics import mission_figures
@@ -35,7 +36,9 @@ def robot_infos(missions: Missions, mission: int) -> list[dict[str, Any]]:
     `received_bits` (taken from its map in this step), `move_end` and `end` (names of a MoveEnd and
     a MissionEnd), and `action_mask` where actions are numbers; when the mission is over, `figures`:
     those of `mission_figures`, and beside them the two of END_FIGURES. Where the scenario has faults
-    also `stopped`, `blind` and `silent`: whether the robot fails so now.
+    also `stopped`, `blind` and `silent`: whether the robot fails so now. Where robots drift also
+    `pose_error_m` and `pose_error_rad`: so far off was what the robot believed of its pose
+    when it last scanned or decided under way; nobody acts on it.
     """
     clock = missions.state.missions[mission]
     robots = missions.state.robots[mission]
@@ -66,6 +69,10 @@ def robot_infos(missions: Missions, mission: int) -> list[dict[str, Any]]:
         for name, now in failing(missions.state.faults[mission], time_s).items():
             for info, failed in zip(infos, now.tolist(), strict=True):
                 info[name] = failed
+    if missions.rules.localization is not None:
+        errors = pose_errors(missions.state.estimates[mission])
+        for info, (off_m, off_rad) in zip(infos, errors.tolist(), strict=True):
+            info["pose_error_m"], info["pose_error_rad"] = off_m, off_rad
     if missions.scenario.action.by_number:
         for info, mask in zip(infos, missions.action_masks()[mission], strict=True):
             info["action_mask"] = mask

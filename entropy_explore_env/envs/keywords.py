@@ -11,6 +11,7 @@ from typing import Any, Literal, TypedDict
 
 from entropy_explore_env.decision_settings import Action, Observation
 from entropy_explore_env.fault_settings import Faults
+from entropy_explore_env.localization_settings import Fiducials
 from entropy_explore_env.settings import Channel, Ending, Grid, RangeSensor, Reward, Robot, RobotKind
 from entropy_explore_env.worlds.world import World
 
@@ -32,6 +33,7 @@ class ScenarioSettings(TypedDict, total=False):
     extra_kinds: tuple[RobotKind, ...]
     channel: Channel | Mapping[str, Any]
     faults: Faults | Mapping[str, Any]
+    fiducials: Fiducials | Mapping[str, Any]
     ending: Ending | Mapping[str, Any]
     reward: Reward | Mapping[str, Any]
     action: Action | Mapping[str, Any]

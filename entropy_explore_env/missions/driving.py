@@ -9,6 +9,12 @@ import math
 
 from entropy_explore_env.belief.raycast import Line, point
 from entropy_explore_env.compilation.kernels import lean_kernel
+from entropy_explore_env.missions.localization import (
+    believed_pose,
+    choice_into_world,
+    estimate_of,
+    into_workspace,
+)
 from entropy_explore_env.missions.poses import (
     copy_numbers,
     distance_between,
@@ -23,6 +29,7 @@ from entropy_explore_env.missions.poses import (
     within_grid,
 )
 from entropy_explore_env.missions.redecision import braking_metres, resting_place
+from entropy_explore_env.robots.localization import believed_point
 from entropy_explore_env.robots.motion import (
     MoveEnd,
     SpeedProfile,
@@ -47,13 +54,14 @@ def start_drive(team, collision, choice, index, time_s, work):
     Args:
         team: Team.
         collision: (V,) float32, a Collision each, for its body.
-        choice: CHOICE of the robot.
+        choice: CHOICE of the robot, as it means it; turned into the world where that differs.
         index: Which robot.
         time_s: When it departs.
         work: Workspace.
     """
     params, robots = team.params, team.robots
     own, robot, goal = params[index], robots[index], robots[index].goal
+    choice_into_world(estimate_of(team.localization, index), own, robot, choice, time_s)
     rests = leave_path(own, robot, time_s, work.braking)
     free = take_path(robot, choice, rests, work.braking)
     robot.depart_s = robot.decided_s = time_s
@@ -138,7 +146,6 @@ def take_path(robot, choice, rests, braking):
     robot.path_m = 0.0
     copy_numbers(choice.pose, robot.origin, 5)
     copy_numbers(choice.viewpoint, robot.goal, 5)
-    copy_numbers(choice.viewpoint, robot.target, 5)
     if choice.brakes:
         return brake_first(robot, choice, rests, braking)
     robot.waypoints, robot.path_end = choice.waypoints, choice.path_end
@@ -348,7 +355,7 @@ def plan_scan(params, robot):
 
 
 @lean_kernel
-def continue_drive(params, footprint, mean, robot, time_s, crossing):
+def continue_drive(params, footprint, mean, robot, estimate, time_s, crossing):
     """After a scan under way: see whether the rest of a planned path is believed blocked.
 
     Then the drive ends, or a robot that decides under way does so now; some do so at every such scan.
@@ -358,6 +365,7 @@ def continue_drive(params, footprint, mean, robot, time_s, crossing):
         footprint: (B, 3) int64, offsets of the voxels that its body touches.
         mean: (V,) float32, the robot's expected coverage.
         robot: Its ROBOT.
+        estimate: ESTIMATE of its pose; None = exact.
         time_s: When it scanned.
         crossing: Crossing, scratch space.
     """
@@ -366,7 +374,7 @@ def continue_drive(params, footprint, mean, robot, time_s, crossing):
     decides = params.redecide_on_scan
     if params.planned:
         passed = place_at(params, robot, time_s)[3]
-        if rest_blocked(params, footprint, mean, robot, passed, crossing):
+        if rest_blocked(params, footprint, mean, robot, estimate, passed, crossing):
             if params.redecide_on_scan or not math.isinf(params.redecide_every_s):
                 robot.path_blocked = decides = True
             else:
@@ -389,12 +397,21 @@ def end_drive(params, robot, passed, time_s):
 
 
 @lean_kernel
-def rest_blocked(params, footprint, mean, robot, passed, crossing):
+def believed_corner(estimate, params, corner):
+    """(x, y, z) of a path's corner, in the workspace, where a robot believes it to be."""
+    x, y, z = believed_point(estimate, point(corner))
+    if estimate is None:  # known while compiling: nothing of the rest is compiled
+        return x, y, z
+    return into_workspace(params, 0, x), into_workspace(params, 1, y), into_workspace(params, 2, z)
+
+
+@lean_kernel
+def rest_blocked(params, footprint, mean, robot, estimate, passed, crossing):
     """Whether the rest of a planned path, from where the robot scanned, is believed blocked."""
     size, radius = grid_size(params), params.body_radius_m / params.voxel_size_m
-    start = within_grid(params, robot.scan_pose)
+    start = within_grid(params, believed_pose(estimate, params, robot.scan_pose))
     for number in range(passed, robot.waypoints):
-        finish = to_grid_units(params, point(robot.path[number]))
+        finish = to_grid_units(params, believed_corner(estimate, params, robot.path[number]))
         if line_believed_blocked(mean, size, footprint, radius, start, finish, crossing):
             return True
         start = finish

@@ -221,6 +221,15 @@ def takes_in(faults, robot, index, time_s, bits):
 
 
 @lean_kernel
+def blinded(faults, index, time_s):
+    """Whether a robot's scans measure nothing by a fault."""
+    if faults is None:  # known while compiling: nothing of the rest is compiled
+        return False
+    state = faults.states[index]
+    return state.blind_s <= time_s < state.blind_until_s
+
+
+@lean_kernel
 def spoil(faults, index, scan, sensor, scene, pose, time_s):
     """Let a scan measure what the robot's sensor measures as it is.
 
@@ -236,7 +245,7 @@ def spoil(faults, index, scan, sensor, scene, pose, time_s):
     if faults is None:  # known while compiling: nothing of the rest is compiled
         return
     params, state = faults.params[index], faults.states[index]
-    if state.blind_s <= time_s < state.blind_until_s:
+    if blinded(faults, index, time_s):
         drop_scan(scan)
         state.blind_scans += 1
     else:

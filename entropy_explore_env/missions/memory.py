@@ -78,10 +78,11 @@ def memory_needs(scenario: Scenario, batch: Batch) -> list[Need]:
         name: math.prod(shape) * kind.itemsize
         for name, (shape, kind) in state_arrays(scenario, missions, cells).items()
     }
-    delayed = sum(sizes[name] for name in ("in_flight", "in_flight_to", "in_flight_rays"))
+    delayed = sum(size for name, size in sizes.items() if name.startswith("in_flight"))
     phases = sum(size for name, size in sizes.items() if name.startswith("phase"))
     scans = sum(sizes[name] for name in ("scan_range_m", "scan_returned", "scan_utility_bits"))
-    robots = sum(sizes[name] for name in ("missions", "robots", "heard", "faults"))
+    robots = sum(sizes[name] for name in ("missions", "robots", "heard", "faults", "estimates"))
+    robots += sizes["fiducials"]
     proposed = sizes["candidates"] + sizes["experience"]
     maps = sum(sizes[name] for name in _MAPS) + _world_bytes(scenario, batch)
     burst = "Channel.burst" if scenario.channel.burst > 1 else "robots"

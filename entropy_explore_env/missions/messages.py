@@ -18,6 +18,15 @@ from entropy_explore_env.missions.faults import (
     radio_silent,
     takes_in,
 )
+from entropy_explore_env.missions.localization import (
+    TeamLocalization,
+    believed_pose,
+    believed_scan_pose,
+    covariance_bits,
+    estimate_of,
+    note_covariance,
+    weigh_batch,
+)
 from entropy_explore_env.missions.poses import (
     copy_numbers,
     distance_between,
@@ -56,6 +65,8 @@ class Team(NamedTuple):
     """None = nothing goes wrong, like the next one known while compiling."""
     air: Air | None = None
     """What messages pass through; None = the channel reaches by distance alone."""
+    localization: TeamLocalization | None = None
+    """None = all robots know where they are."""
 
 
 class Tracer(NamedTuple):
@@ -95,15 +106,23 @@ def hear_batch(team, maps, scan, index, count):
 
 
 @lean_kernel
-def note_message(robot, heard, position, sent_s, count):
+def note_message(robot, heard, position, sent_s, count, bits):
     """Count a message that a robot hears, and note where its sender was, unless newer ones came before.
+
+    Args:
+        robot: ROBOT that hears it.
+        heard: HEARD of its sender.
+        position: (x, y, z, yaw, pitch), where the sender believed to be.
+        sent_s: When.
+        count: Measurements in it; -1 = an announcement.
+        bits: What it costs.
 
     Returns:
         Whether it is an announcement, and the newest.
     """
     robot.messages_received += 1
     robot.measurements_received += max(count, 0)
-    robot.bits_received += message_bits(count)
+    robot.bits_received += bits
     if sent_s >= heard.heard_s:
         heard.heard_s = sent_s
         copy_numbers(position, heard.pose, 5)
@@ -122,11 +141,16 @@ def write_announcement(robot, announced):
 
 
 @lean_kernel
-def message_bits(count):
-    """What a message costs: a batch of `count` measurements, or an announcement (count = -1)."""
+def message_bits(localization, count):
+    """What a message costs: a batch of `count` measurements, or an announcement (count = -1).
+
+    Args:
+        localization: Of the Team: where robots drift, batches carry their senders' covariances.
+        count: Measurements in it.
+    """
     if count < 0:
         return BITS_PER_ANNOUNCEMENT
-    return BITS_PER_BATCH + count * BITS_PER_MEASUREMENT
+    return BITS_PER_BATCH + count * BITS_PER_MEASUREMENT + covariance_bits(localization)
 
 
 @lean_kernel
@@ -186,7 +210,7 @@ def passes(air, team, mate, place, time_s):
 
 
 @lean_kernel
-def enqueue(clock, robot, in_flight, index, count, recipients, delay_s):
+def enqueue(clock, team, in_flight, index, count, recipients, delay_s):
     """Put a message into a free slot; returns the slot, or -1 where there is none: the message is gone.
 
     There is one in every mission: `Scenario.message_slots` counts how many messages can be under way at once.
@@ -194,7 +218,7 @@ def enqueue(clock, robot, in_flight, index, count, recipients, delay_s):
 
     Args:
         clock: MISSION.
-        robot: ROBOT of the sender.
+        team: Team.
         in_flight: InFlight.
         index: The sender's number.
         count: Measurements in it; -1 = an announcement.
@@ -215,7 +239,13 @@ def enqueue(clock, robot, in_flight, index, count, recipients, delay_s):
     clock.enqueued += 1
     message.sender = index
     message.count = count
-    copy_numbers(robot.origin if count < 0 else robot.scan_pose, message.pose, 5)
+    robot, localization = team.robots[index], team.localization
+    if count < 0:
+        here = believed_pose(estimate_of(localization, index), team.params[index], robot.origin)
+        copy_numbers(here, message.pose, 5)
+    else:
+        copy_numbers(believed_scan_pose(localization, robot, index), message.pose, 5)
+        note_covariance(localization, index, in_flight.covariances, slot)
     write_announcement(robot, message.announced)
     copy_numbers(recipients, in_flight.recipients[slot], len(recipients))
     return slot
@@ -270,17 +300,18 @@ def send_batch(team, maps, clock, in_flight, scan, index, count, recipients):
     """
     robot = team.robots[index]
     delay_s = team.params[0].delay_s + draw_lateness(team.faults, index)
-    count_sent(robot, count)
+    time_s, bits = clock.time_s, message_bits(team.localization, count)
+    count_sent(robot, count, bits)
     reached = transmit(team, index, point(robot.scan_pose), clock.time_s, recipients)
     if reached and delay_s > 0.0:
-        slot = enqueue(clock, robot, in_flight, index, count, recipients, delay_s)
+        slot = enqueue(clock, team, in_flight, index, count, recipients, delay_s)
         if slot >= 0:
             pack_measurements(scan, count, in_flight.rays[slot])
         return
-    time_s, bits = clock.time_s, message_bits(count)
+    here = believed_scan_pose(team.localization, robot, index)
     for mate in range(len(team.robots)):
         if recipients[mate] and takes_in(team.faults, team.robots[mate], mate, time_s, bits):
-            note_message(team.robots[mate], team.heard[mate, index], robot.scan_pose, time_s, count)
+            note_message(team.robots[mate], team.heard[mate, index], here, time_s, count, bits)
             hear_batch(team, maps, scan, mate, count)
 
 
@@ -290,26 +321,27 @@ def announce(team, clock, in_flight, index, recipients):
     robot, shared = team.robots[index], team.params[0]
     if len(team.robots) == 1 or not shared.announcements:
         return
-    count_sent(robot, _ANNOUNCEMENT)
+    time_s, bits = clock.time_s, message_bits(team.localization, _ANNOUNCEMENT)
+    count_sent(robot, _ANNOUNCEMENT, bits)
     delay_s = shared.delay_s + draw_lateness(team.faults, index)
     reached = transmit(team, index, point(robot.origin), clock.time_s, recipients)
     if reached and delay_s > 0.0:
-        enqueue(clock, robot, in_flight, index, _ANNOUNCEMENT, recipients, delay_s)
+        enqueue(clock, team, in_flight, index, _ANNOUNCEMENT, recipients, delay_s)
         return
-    time_s, bits = clock.time_s, message_bits(_ANNOUNCEMENT)
+    here = believed_pose(estimate_of(team.localization, index), team.params[index], robot.origin)
     for mate in range(len(team.robots)):
         if recipients[mate] and takes_in(team.faults, team.robots[mate], mate, time_s, bits):
             heard = team.heard[mate, index]
-            if note_message(team.robots[mate], heard, robot.origin, time_s, _ANNOUNCEMENT):
+            if note_message(team.robots[mate], heard, here, time_s, _ANNOUNCEMENT, bits):
                 write_announcement(robot, heard.announced)
 
 
 @lean_kernel
-def count_sent(robot, count):
-    """Count a message that a robot sends: a batch of `count` measurements, or an announcement (-1)."""
+def count_sent(robot, count, bits):
+    """Count a message that a robot sends, and its bits: `count` measurements, or an announcement (-1)."""
     robot.messages_sent += 1
     robot.measurements_sent += max(count, 0)
-    robot.bits_sent += message_bits(count)
+    robot.bits_sent += bits
 
 
 @lean_kernel
@@ -325,14 +357,16 @@ def receive(team, maps, in_flight, slot, tracer, scan):
         scan: Scan, scratch space.
     """
     message = in_flight.messages[slot]
-    time_s, bits = message.due_s, message_bits(message.count)
+    time_s, bits = message.due_s, message_bits(team.localization, message.count)
     message.due_s = math.inf
     packed, sender = in_flight.rays[slot], message.sender
     unpack_measurements(team.params[0], tracer, sender, scan, message.pose, packed, message.count)
+    edge_m = team.params[0].voxel_size_m
+    weigh_batch(team.localization, in_flight.covariances, slot, scan, message.count, edge_m)
     for mate in range(len(team.robots)):
         if in_flight.recipients[slot, mate] and takes_in(team.faults, team.robots[mate], mate, time_s, bits):
             heard = team.heard[mate, sender]
-            if note_message(team.robots[mate], heard, message.pose, message.sent_s, message.count):
+            if note_message(team.robots[mate], heard, message.pose, message.sent_s, message.count, bits):
                 copy_numbers(message.announced, heard.announced, 7)
             elif message.count >= 0:
                 hear_batch(team, maps, scan, mate, message.count)

@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from entropy_explore_env.compilation.kernels import lean_kernel
+from entropy_explore_env.missions.localization import estimate_in
 from entropy_explore_env.missions.poses import to_grid_units, within_grid
 from entropy_explore_env.missions.redecision import decide, note_braking, note_change
 from entropy_explore_env.missions.rules import ActionSet
@@ -40,6 +41,8 @@ class Planning(NamedTuple):
     no_fly: np.ndarray
     """(E·N, V) bool, for the N bodies as in MissionState.collision: where a body would reach above
     the ceiling, which robots that plan know; (E·N, 0) = no mission has one."""
+    estimates: np.ndarray | None
+    """(E, A) ESTIMATE; None = all robots know where they are."""
 
 
 @lean_kernel
@@ -64,13 +67,14 @@ def plan_missions(planning, navigator, kind, braking, continuous, discrete, firs
                 if robot.deciding and own.kind == kind:
                     choice = planning.choices[mission, index]
                     chosen, number = continuous[mission, index], discrete[mission, index]
-                    decide(own, planning.actions, robot, clock.time_s, chosen, number, choice)
+                    estimate = estimate_in(planning.estimates, mission, index)
+                    decide(own, planning.actions, robot, estimate, clock.time_s, chosen, number, choice)
                     note_change(own, robot, choice, braking)
                     mean, precision = planning.mean[mission, index], planning.precision[mission, index]
                     no_fly = planning.no_fly[mission * own.bodies + own.body_number]
                     if choice.changed:
                         plan_drive(own, navigator, mean, precision, no_fly, choice)
-                        note_braking(own, robot, clock.time_s, choice, braking)
+                        note_braking(own, robot, estimate, clock.time_s, choice, braking)
                         if choice.brakes:
                             plan_drive(own, navigator, mean, precision, no_fly, choice)
 

@@ -18,6 +18,13 @@ from entropy_explore_env.missions.faults import (
     switched_off,
     takes_in,
 )
+from entropy_explore_env.missions.localization import (
+    believed_pose,
+    believed_scan_pose,
+    estimate_of,
+    note_covariance,
+    weigh_batch,
+)
 from entropy_explore_env.missions.messages import (
     count_sent,
     hear_batch,
@@ -44,7 +51,7 @@ def next_broadcast(params, phases):
 
 
 @lean_kernel
-def collect_batch(robot, buffers, phases, scan, index, count):
+def collect_batch(team, buffers, phases, scan, index, count):
     """Put `count` measurements of `scan.order` into a robot's collecting buffer.
 
     It has room in every mission, see `Scenario.phase_batches`; a state from outside may have none left.
@@ -56,10 +63,28 @@ def collect_batch(robot, buffers, phases, scan, index, count):
     if place == buffers.batches.shape[2]:
         return
     batch = buffers.batches[index, side, place]
-    copy_numbers(robot.scan_pose, batch.pose, 5)
+    copy_numbers(believed_scan_pose(team.localization, team.robots[index], index), batch.pose, 5)
+    collect_covariance(team.localization, buffers, index, side, place)
     batch.count = count
     pack_measurements(scan, count, buffers.rays[index, side, place])
     buffers.counts[index, side] = place + 1
+
+
+@lean_kernel
+def collect_covariance(localization, buffers, index, side, place):
+    """Put the covariance of a robot's latest scan beside the batch at a place of its buffer."""
+    if localization is None:  # known while compiling: nothing of the rest is compiled
+        return
+    note_covariance(localization, index, buffers.covariances[index, side], place)
+
+
+@lean_kernel
+def weigh_collected(localization, voxel_size_m, buffers, index, side, place, scan):
+    """Lower the precision of a collected batch's measurements, unpacked into `scan`, by its covariance."""
+    if localization is None:  # known while compiling: nothing of the rest is compiled
+        return
+    count, covariances = buffers.batches[index, side, place].count, buffers.covariances[index, side]
+    weigh_batch(localization, covariances, place, scan, count, voxel_size_m)
 
 
 @lean_kernel
@@ -106,8 +131,9 @@ def broadcast(team, maps, buffers, side, index, time_s, tracer, scan):
     robots, robot, params = team.robots, team.robots[index], team.params
     batches, heard = buffers.counts[index, side], buffers.heard[index]
     here = pose_at(params[index], robot, time_s)
+    said = believed_pose(estimate_of(team.localization, index), params[index], here)
     silent = radio_silent(team.faults, index, time_s)
-    bits = buffer_bits(buffers.batches[index, side], batches)
+    bits = buffer_bits(team.localization, buffers.batches[index, side], batches)
     for mate in range(len(robots)):
         if mate == index:
             continue
@@ -126,29 +152,33 @@ def broadcast(team, maps, buffers, side, index, time_s, tracer, scan):
             heard[mate] = _AGAIN if heard[mate] == _HAS_IT else _NOW
     for place in range(batches):
         batch = buffers.batches[index, side, place]
-        count_sent(robot, batch.count)
+        batch_bits = message_bits(team.localization, batch.count)
+        count_sent(robot, batch.count, batch_bits)
         packed, traced = buffers.rays[index, side, place], False
         for mate in range(len(robots)):
             if heard[mate] == _AGAIN:
                 robots[mate].messages_received += 1
-                robots[mate].bits_received += message_bits(batch.count)
+                robots[mate].bits_received += batch_bits
             elif heard[mate] == _NOW:
                 if not traced:
                     unpack_measurements(params[0], tracer, index, scan, batch.pose, packed, batch.count)
+                    weigh_collected(
+                        team.localization, params[0].voxel_size_m, buffers, index, side, place, scan
+                    )
                     traced = True
-                note_message(robots[mate], team.heard[mate, index], here, time_s, batch.count)
+                note_message(robots[mate], team.heard[mate, index], said, time_s, batch.count, batch_bits)
                 hear_batch(team, maps, scan, mate, batch.count)
     for mate in range(len(robots)):
         if heard[mate] > _HAS_IT:
             team.heard[mate, index].heard_s = time_s
-            copy_numbers(here, team.heard[mate, index].pose, 5)
+            copy_numbers(said, team.heard[mate, index].pose, 5)
             heard[mate] = _HAS_IT
 
 
 @lean_kernel
-def buffer_bits(batches, count):
+def buffer_bits(localization, batches, count):
     """What a broadcast of the first `count` of (S,) BATCH costs."""
     bits = 0
     for place in range(count):
-        bits += message_bits(batches[place].count)
+        bits += message_bits(localization, batches[place].count)
     return bits

@@ -13,6 +13,7 @@ import numpy as np
 from entropy_explore_env.belief.fields import Belief
 from entropy_explore_env.belief.paths.lattice import Costs
 from entropy_explore_env.compilation.kernels import lean_kernel
+from entropy_explore_env.missions.localization import believed_pose, estimate_in
 from entropy_explore_env.missions.poses import copy_numbers, grid_size, pose_at, to_grid_units, within_grid
 from entropy_explore_env.missions.silence import silent_since
 from entropy_explore_env.missions.state import MissionEnd
@@ -81,6 +82,8 @@ class Proposing(NamedTuple):
     """(E, A) EXPERIENCE."""
     no_fly: np.ndarray
     """(E·N, V) bool: see `navigation.Planning`."""
+    estimates: np.ndarray | None
+    """(E, A) ESTIMATE; None = all robots know where they are."""
 
 
 @lean_kernel
@@ -217,8 +220,9 @@ def propose_missions(proposing, proposer, kind, offsets, first, last, out):
                 came = 0.0
                 for ray in range(params.rays):
                     came += proposing.utility_bits[mission, index, ray]
+                estimate = estimate_in(proposing.estimates, mission, index)
                 knowledge = Knowledge(
-                    pose_at(params, own, clock.time_s),
+                    believed_pose(estimate, params, pose_at(params, own, clock.time_s)),
                     clock.time_s,
                     own.entropy_bits,
                     own.gained_bits,

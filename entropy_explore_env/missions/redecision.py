@@ -23,6 +23,7 @@ import math
 from entropy_explore_env.belief.raycast import point
 from entropy_explore_env.compilation.kernels import lean_kernel, record_type
 from entropy_explore_env.missions.action import decode_action
+from entropy_explore_env.missions.localization import believe_pose
 from entropy_explore_env.missions.poses import (
     copy_numbers,
     distance_between,
@@ -32,6 +33,7 @@ from entropy_explore_env.missions.poses import (
     speed_at,
 )
 from entropy_explore_env.missions.state import WAYPOINTS
+from entropy_explore_env.robots.localization import believed_point
 
 CHOICE = record_type(
     [
@@ -61,13 +63,14 @@ _STANDS_M = 1e-9
 
 
 @lean_kernel
-def decide(params, actions, robot, time_s, continuous, discrete, choice):
-    """Write what a robot that decides has chosen, as if it began a drive.
+def decide(params, actions, robot, estimate, time_s, continuous, discrete, choice):
+    """Write what a robot that decides has chosen, as if it began a drive from where it believes to be.
 
     Args:
         params: PARAMS of the robot.
         actions: ActionSet.
         robot: ROBOT.
+        estimate: ESTIMATE of its pose; None = exact.
         time_s: Now.
         continuous: (N,) float64 action.
         discrete: Number of the action.
@@ -76,6 +79,7 @@ def decide(params, actions, robot, time_s, continuous, discrete, choice):
     copy_numbers(robot.goal, choice.pose, 5)
     if robot.under_way:
         copy_numbers(pose_at(params, robot, time_s), choice.pose, 5)
+    believe_pose(estimate, params, choice.pose)
     decode_action(params, actions, choice.pose, continuous, discrete, choice.viewpoint)
     copy_numbers(choice.pose, choice.start, 3)
     copy_numbers(choice.viewpoint, choice.path[0], 3)
@@ -134,12 +138,13 @@ def resting_place(params, robot, time_s, braking_m):
 
 
 @lean_kernel
-def note_braking(params, robot, time_s, choice, braking):
+def note_braking(params, robot, estimate, time_s, choice, braking):
     """Find out whether a robot under way has to come to rest before the path that it chose.
 
     Args:
         params: PARAMS of the robot.
         robot: ROBOT.
+        estimate: ESTIMATE of its pose; None = exact.
         time_s: Now.
         choice: CHOICE; `brakes` and `start` are filled in.
         braking: Of the Workspace.
@@ -151,6 +156,7 @@ def note_braking(params, robot, time_s, choice, braking):
     braking_m = braking_metres(params, robot, time_s)
     if braking_m > 0.0:
         x, y, z, _ = resting_place(params, robot, time_s, braking_m)
+        x, y, z = believed_point(estimate, (x, y, z))
         if not keeps_speed(choice, (x, y, z), braking_m):
             choice.brakes = True
             copy_numbers((x, y, z), choice.start, 3)

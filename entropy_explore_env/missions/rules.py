@@ -11,6 +11,7 @@ from entropy_explore_env.belief.pooling import Cells, new_cells, no_cells
 from entropy_explore_env.compilation.kernels import record_type
 from entropy_explore_env.decision_settings import Observation
 from entropy_explore_env.robots.faults import FAULT_PARAMS
+from entropy_explore_env.robots.localization import LOCALIZATION_PARAMS
 from entropy_explore_env.robots.range_sensor import TeamSensors, team_sensors
 from entropy_explore_env.scenario import Scenario
 from entropy_explore_env.settings import Robot
@@ -102,6 +103,8 @@ class Rules(NamedTuple):
     """(D, 3) float64 unit vectors of the panorama's rays; D = 0 without it."""
     faults: np.ndarray | None
     """(A,) FAULT_PARAMS; None = nothing goes wrong."""
+    localization: np.ndarray | None
+    """(A,) LOCALIZATION_PARAMS; None = all robots know where they are."""
 
 
 def rules_of(scenario: Scenario) -> Rules:
@@ -172,6 +175,7 @@ def rules_of(scenario: Scenario) -> Rules:
         cells=no_cells(size) if overview is None else new_cells(size, overview),
         panorama=panorama_directions(scenario),
         faults=fault_params(scenario),
+        localization=localization_params(scenario),
     )
 
 
@@ -190,6 +194,26 @@ def fault_params(scenario: Scenario) -> np.ndarray | None:
         rows = list(fault.robots) or slice(None)
         for name in fields:
             params[name][rows] = getattr(fault, name)
+    return params
+
+
+def localization_params(scenario: Scenario) -> np.ndarray | None:
+    """(A,) LOCALIZATION_PARAMS, how each robot localises itself; None = all know where they are."""
+    if not scenario.drifts:
+        return None
+    params, fiducials = np.zeros(scenario.robots, LOCALIZATION_PARAMS), scenario.fiducials
+    for number in range(scenario.robots):
+        kind, own = scenario.kind_of(number), params[number]
+        drift, sensor = kind.robot.localization, kind.sensor
+        flies = scenario.layer_of(kind.robot) is None
+        for part in ("m", "rad"):
+            own[f"xy_per_{part}"] = getattr(drift, f"xy_m_per_sqrt_{part}") ** 2
+            own[f"z_per_{part}"] = getattr(drift, f"z_m_per_sqrt_{part}") ** 2 if flies else 0.0
+            own[f"yaw_per_{part}"] = getattr(drift, f"yaw_rad_per_sqrt_{part}") ** 2
+        own["range_m"] = min(fiducials.range_m, sensor.max_range_m)
+        own["range_sigma_m"], own["bearing_sigma_rad"] = fiducials.range_sigma_m, fiducials.bearing_sigma_rad
+        own["half_yaw_rad"] = 0.5 * sensor.columns * sensor.angular_step_rad
+        own["half_pitch_rad"] = math.pi if scenario.grid.flat else 0.5 * sensor.rows * sensor.angular_step_rad
     return params
 
 

@@ -18,6 +18,7 @@ from entropy_explore_env.compilation.announcement import end_of_step
 from entropy_explore_env.compilation.kernels import entry_point
 from entropy_explore_env.errors import ActionError, CallOrderError, SettingError
 from entropy_explore_env.missions.faults import draw_faults
+from entropy_explore_env.missions.localization import begin_estimates, fiducial_places
 from entropy_explore_env.missions.memory import Batch, check_memory
 from entropy_explore_env.missions.navigation import Planning, plan_missions
 from entropy_explore_env.missions.observation.layout import ObservationLayout, part_offsets
@@ -66,6 +67,8 @@ class Start(NamedTuple):
     """What of it was given."""
     world_number: int | None
     """Of the world, where a recipe made it."""
+    fiducials: np.ndarray
+    """(F, 3) float64."""
 
 
 class _Calls(NamedTuple):
@@ -176,6 +179,11 @@ class Missions:
         """(E, A, X, Y, Z) float32 1/σ² by each robot's belief; a view."""
         return self.state.precision.reshape(self.count, self.scenario.robots, *self.grid.shape)
 
+    @property
+    def estimates(self) -> np.ndarray | None:
+        """(E, A) ESTIMATE, what robots believe of their poses; None = all know where they are."""
+        return None if self.rules.localization is None else self.state.estimates
+
     def reset(self, mission: int, seed: int | None = None, options: ResetOptions = DRAWN) -> None:
         """Start a mission anew: world, starts and random streams drawn, beliefs at the prior.
 
@@ -253,11 +261,12 @@ class Missions:
             poses = checked_starts(self.scenario, world, options.starts)
         else:
             poses = start_poses(self.scenario, world, generator(seed, episode, Stream.STARTS))
-        return Start(mission, seed, episode, world, poses, options, number)
+        fiducials = fiducial_places(self.scenario, world, seed, episode)
+        return Start(mission, seed, episode, world, poses, options, number, fiducials)
 
     def _begin(self, start: Start) -> None:
         """Put the mission into its world, with beliefs at the prior, and observe."""
-        mission, number, episode, world, poses, options, world_number = start
+        mission, number, episode, world, poses, options, world_number, fiducials = start
         self.seeds[mission], self.episodes[mission] = number, episode
         self.options[mission] = options
         self.world_numbers[mission] = -1 if world_number is None else world_number
@@ -299,6 +308,8 @@ class Missions:
         remembering["candidates_rng"][:, 0] = splitmix_states(
             number, episode, Stream.CANDIDATES, len(remembering)
         )
+        begin_estimates(number, episode, poses, state.estimates[mission])
+        state.fiducials[mission] = fiducials
         self._observe(0, mission, mission + 1)
 
     def _set_collision_masks(self, mission: int, world: World) -> None:
@@ -435,20 +446,19 @@ class Missions:
         if calls is None or calls.state is not state or calls.planning.no_fly is not self._no_fly:
             params, actions = self.rules.params, self.rules.actions
             shown = (state.missions, state.robots)
-            planning = Planning(
-                params, actions, *shown, self._choices, state.mean, state.precision, self._no_fly
-            )
-            observed = Observed(*shown, state.heard, state.mean, state.precision, state.pooled)
+            maps, estimates = (state.mean, state.precision), self.estimates
+            planning = Planning(params, actions, *shown, self._choices, *maps, self._no_fly, estimates)
+            observed = Observed(*shown, state.heard, *maps, state.pooled, estimates)
             proposing = Proposing(
                 params,
                 *shown,
                 state.heard,
-                state.mean,
-                state.precision,
+                *maps,
                 state.scan_utility_bits,
                 state.candidates,
                 state.experience,
                 self._no_fly,
+                estimates,
             )
             self._calls = calls = _Calls(state, planning, observed, proposing, None, None)
         return calls
@@ -478,7 +488,8 @@ class Missions:
             return there.astype(np.int8)
         actions = len(rules.actions.moves) * len(rules.actions.gazes)
         masks = np.empty((self.count, self.scenario.robots, actions), np.int8)
-        mask_missions(rules.params, rules.actions, state.missions, state.robots, state.mean, masks)
+        told = (state.missions, state.robots, self.estimates)
+        mask_missions(rules.params, rules.actions, *told, state.mean, masks)
         return masks
 
     def over(self, mission: int) -> MissionEnd:

@@ -16,6 +16,7 @@ import numpy as np
 from entropy_explore_env.belief.pooling import Cells
 from entropy_explore_env.compilation.kernels import record_type
 from entropy_explore_env.missions.rules import POINT, collision_bodies
+from entropy_explore_env.robots.localization import COVARIANCE_NUMBERS, ESTIMATE
 from entropy_explore_env.scenario import Scenario
 from entropy_explore_env.viewpoints.proposals.records import CANDIDATE, EXPERIENCE
 
@@ -250,6 +251,14 @@ class MissionState(NamedTuple):
     the next."""
     experience: np.ndarray
     """(E, A) EXPERIENCE, what a robot remembers for its candidates."""
+    estimates: np.ndarray
+    """(E, A) ESTIMATE; (E, 0), and the next three empty, where all robots know where they are."""
+    fiducials: np.ndarray
+    """(E, F, 3) float64, their places in the world."""
+    in_flight_covariances: np.ndarray
+    """(E, Q, 10) float64, of their senders' poses: see `robots.localization.pack_covariance`."""
+    phase_covariances: np.ndarray
+    """(E, A, 2, S, 10) float64, likewise."""
 
 
 class Beliefs(NamedTuple):
@@ -294,6 +303,8 @@ class InFlight(NamedTuple):
     """(Q, A) bool."""
     rays: np.ndarray
     """(Q, B, 5) float64."""
+    covariances: np.ndarray
+    """(Q, 10) float64."""
 
 
 class PhaseBuffers(NamedTuple):
@@ -307,6 +318,8 @@ class PhaseBuffers(NamedTuple):
     """(A, 2, S, B, 5) float64."""
     heard: np.ndarray
     """(A, A) int8."""
+    covariances: np.ndarray
+    """(A, 2, S, 10) float64."""
 
 
 def state_arrays(
@@ -324,6 +337,7 @@ def state_arrays(
     s, tracked = scenario.phase_batches, scenario.grid.voxels if scenario.track_truth else 0
     proposed = a if scenario.action.kind == "candidates" else 0
     bodies, in_phases = collision_bodies(scenario), a if scenario.phase_batches else 0
+    drifting, numbers = scenario.drifts, COVARIANCE_NUMBERS
     arrays: dict[str, tuple[tuple[int, ...], Any]] = {
         "truth": ((e, v), np.float32),
         "collision": ((0 if bodies == [POINT] else e * len(bodies), v), np.float32),
@@ -350,6 +364,10 @@ def state_arrays(
         "faults": ((e, a if scenario.faults.happen else 0), FAULT),
         "candidates": ((e, proposed, scenario.action.candidates if proposed else 0), CANDIDATE),
         "experience": ((e, proposed), EXPERIENCE),
+        "estimates": ((e, a if drifting else 0), ESTIMATE),
+        "fiducials": ((e, scenario.fiducials.count if drifting else 0, 3), np.float64),
+        "in_flight_covariances": ((e, q if drifting else 0, numbers), np.float64),
+        "phase_covariances": ((e, in_phases if drifting else 0, 2, s, numbers), np.float64),
     }
     return {name: (shape, np.dtype(kind)) for name, (shape, kind) in arrays.items()}
 

@@ -27,6 +27,8 @@ FROM_WORLD = ("truth", "collision", "visible")
 _MOST = 1e15
 """Of seconds, metres, bits and counts: more than any mission comes to, and exact in a float64."""
 _HUGE = 1e300
+_LARGEST_COVARIANCE = 1e60
+"""In m² and rad²: more than drifts come to, and its square is a float64."""
 _LARGEST_PRECISION = 1e37
 _ROUNDING = 1e-6
 _TURN = 4.0 * math.pi
@@ -57,7 +59,7 @@ def check_ranges(scenario: Scenario, arrays: Mapping[str, np.ndarray], maps: boo
     """
     voxels_and_rays = (_maps, _scans) if maps else ()
     small = (_missions, _robots, _heard, _messages, _phases, _faults, _candidates, _experience)
-    for part in (*small, *voxels_and_rays):
+    for part in (*small, _localization, *voxels_and_rays):
         for values in part(scenario, arrays):
             _check(values)
 
@@ -259,6 +261,30 @@ def _experience(scenario: Scenario, arrays: Mapping[str, np.ndarray]) -> Iterato
 def _grid_corners(scenario: Scenario) -> tuple[np.ndarray, np.ndarray]:
     """(3,) each: the lower and the upper corner of the workspace, in grid units."""
     return np.zeros(3) - _ROUNDING, np.asarray(scenario.grid.shape, np.float64) + _ROUNDING
+
+
+def _localization(scenario: Scenario, arrays: Mapping[str, np.ndarray]) -> Iterator[Values]:
+    """ESTIMATE, fiducials, and the covariances of batches. An estimate is in the workspace."""
+    estimates = arrays["estimates"]
+    low, high = _workspace(scenario)
+    far_m = _farthest_m(scenario)
+    yield Values("estimates.place", estimates["place"], low, high)
+    yield from _poses("estimates.scan_pose", estimates["scan_pose"], low, high)
+    yield Values("estimates.yaw", estimates["yaw"], -_TURN, _TURN)
+    yield Values("estimates.driven_m", estimates["driven_m"], -1.0, _MOST)
+    off = np.array([far_m, far_m, far_m, math.pi + _ROUNDING])
+    yield Values("estimates.error", estimates["error"], -off, off)
+    spread = np.where(np.eye(4, dtype=bool), 0.0, -_LARGEST_COVARIANCE)
+    yield Values("estimates.covariance", estimates["covariance"], spread, _LARGEST_COVARIANCE)
+    for name in ("squared_m2", "squared_rad2"):
+        yield Values(f"estimates.{name}", estimates[name], 0.0, _HUGE)
+    yield Values("estimates.sightings", estimates["sightings"], 0, _MOST)
+    yield Values("fiducials", arrays["fiducials"], low, high)
+    packed = {"estimates.packed": estimates["packed"]}
+    for name in ("in_flight_covariances", "phase_covariances"):
+        packed[name] = arrays[name]
+    for name, numbers in packed.items():
+        yield Values(name, numbers, -_LARGEST_COVARIANCE, _LARGEST_COVARIANCE)
 
 
 def _poses(name: str, poses: np.ndarray, low: np.ndarray, high: np.ndarray) -> Iterator[Values]:

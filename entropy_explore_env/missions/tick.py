@@ -24,12 +24,23 @@ from entropy_explore_env.missions.driving import (
 )
 from entropy_explore_env.missions.faults import (
     all_gone,
+    blinded,
     faults_of,
     gone,
     next_stop,
     note_stop,
     spoil,
     stops_counted,
+)
+from entropy_explore_env.missions.localization import (
+    believe_scan,
+    believed_pose,
+    estimate_of,
+    localization_of,
+    measure,
+    note_motion,
+    note_scan_pose,
+    sight_fiducials,
 )
 from entropy_explore_env.missions.messages import (
     Maps,
@@ -62,7 +73,6 @@ from entropy_explore_env.robots.range_sensor import (
     first_rays,
     in_view,
     sensor_of,
-    take_scan,
     visibility_parameters,
 )
 
@@ -124,14 +134,24 @@ def step_missions(rules, state, choices, work, continuous, discrete, first, last
                 state.heard[m],
                 faults_of(rules.faults, state.faults, m),
                 air_of(work.air, state.truth[m]),
+                localization_of(rules.localization, state.estimates, state.fiducials, m),
             ),
             Maps(Beliefs(state.mean[m], state.precision[m], state.pooled[m]), rules.cells),
             JointMap(state.joint_mean[m], state.joint_precision[m], state.visible[m]),
             LatestScans(state.scan_range_m[m], state.scan_returned[m], state.scan_utility_bits[m]),
-            InFlight(state.in_flight[m], state.in_flight_to[m], state.in_flight_rays[m]),
+            InFlight(
+                state.in_flight[m],
+                state.in_flight_to[m],
+                state.in_flight_rays[m],
+                state.in_flight_covariances[m],
+            ),
             state.phases[m],
             PhaseBuffers(
-                state.phase_counts[m], state.phase_batches[m], state.phase_rays[m], state.phase_heard[m]
+                state.phase_counts[m],
+                state.phase_batches[m],
+                state.phase_rays[m],
+                state.phase_heard[m],
+                state.phase_covariances[m],
             ),
             state.truth[m],
         )
@@ -171,9 +191,10 @@ def choose(team, clock, actions, continuous, discrete, choices, braking):
         robot.own_bits = 0.0
         robot.received_bits = 0.0
         if robot.deciding and not own.planned:
-            decide(own, actions, robot, clock.time_s, continuous[index], discrete[index], choices[index])
-            note_change(own, robot, choices[index], braking)
-            note_braking(own, robot, clock.time_s, choices[index], braking)
+            choice, estimate = choices[index], estimate_of(team.localization, index)
+            decide(own, actions, robot, estimate, clock.time_s, continuous[index], discrete[index], choice)
+            note_change(own, robot, choice, braking)
+            note_braking(own, robot, estimate, clock.time_s, choice, braking)
 
 
 @lean_kernel
@@ -240,12 +261,18 @@ def advance(mission, sensors, work):
             broadcast_all(team, maps, mission.buffers, mission.phases, clock.time_s, tracer, scan)
         elif event.kind == _FAULT:
             until_s = note_stop(team.faults, event.number)
+            note_motion(
+                team.localization, params[event.number], robots[event.number], event.number, clock.time_s
+            )
             halt(params[event.number], robots[event.number], clock.time_s, until_s)
             if math.isinf(shared.period_s):
                 stop_s = min(next_decision(params, robots), shared.time_limit_s)
         elif robots[event.number].waiting:
             robots[event.number].deciding = True
         elif robots[event.number].next_scan_s > event.time_s:
+            note_motion(
+                team.localization, params[event.number], robots[event.number], event.number, clock.time_s
+            )
             redecide(robots[event.number], clock.time_s)
         else:
             scan_at(mission, sensors, event.number, work)
@@ -321,12 +348,14 @@ def scan_at(mission, sensors, index, work):
         work: Workspace.
     """
     time_s, params, own = mission.clock.time_s, mission.team.params[index], mission.team.robots[index]
+    localization = mission.team.localization
+    note_motion(localization, params, own, index, time_s)
     scan_and_share(mission, sensor_of(sensors, index), index, work)
     if time_s >= own.ready_s:
         stop(params, own, time_s)
     else:
         footprint, mean = work.footprints[params.kind], mission.maps.beliefs.mean[index]
-        continue_drive(params, footprint, mean, own, time_s, work.drive)
+        continue_drive(params, footprint, mean, own, estimate_of(localization, index), time_s, work.drive)
 
 
 @lean_kernel
@@ -404,19 +433,24 @@ def scan_and_share(mission, sensor, index, work):
     pose = SensorPose(within_grid(params, (x, y, z)), yaw, pitch)
     bodies = work.bodies[: place_bodies(team, sensor, index, clock.time_s, pose, work.bodies)]
     scene = Scene(mission.truth, grid_size(params), params.voxel_size_m, bodies)
-    take_scan(scan, sensor, scene, pose, robot.sensor_rng)
+    if not blinded(team.faults, index, clock.time_s):
+        sight_fiducials(team.localization, params, index, sensor, scene, pose)
+    measure(team.localization, scan, sensor, scene, pose, robot.sensor_rng)
     spoil(team.faults, index, scan, sensor, scene, pose, clock.time_s)
+    here = believed_pose(estimate_of(team.localization, index), params, (x, y, z, yaw, pitch))
+    believe_scan(team.localization, index, scan, sensor.params[0], scene, within_grid(params, here))
     for ray in range(len(scan.order)):
         scan.order[ray] = ray
     bits = fuse_measurements(team, mission.maps, scan, index, len(scan.order))
     robot.entropy_bits -= bits
     robot.own_bits += bits
     robot.gained_bits += bits
-    robot.depth_m, robot.half_angle_rad, measurements = visibility_parameters(scan.rays, yaw, pitch)
+    robot.depth_m, robot.half_angle_rad, measurements = visibility_parameters(scan.rays, here[3], pitch)
     robot.scans += 1
     robot.measurements += measurements
     robot.i_min_bits = robot.next_i_min_bits
     copy_numbers((x, y, z, yaw, pitch), robot.scan_pose, 5)
+    note_scan_pose(team.localization, index, here)
     note_scan(robot, mission.latest, scan, index)
     if params.track_truth:
         score_scan(clock, mission.joint, mission.truth, scan, params.prior_precision)
@@ -451,7 +485,7 @@ def share(mission, scan, index, recipients):
     if count > 0 and params.phase_s == 0.0:
         send_batch(team, mission.maps, mission.clock, mission.in_flight, scan, index, count, recipients)
     elif count > 0:
-        collect_batch(robot, mission.buffers, mission.phases, scan, index, count)
+        collect_batch(team, mission.buffers, mission.phases, scan, index, count)
 
 
 @lean_kernel

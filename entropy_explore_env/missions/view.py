@@ -5,15 +5,17 @@ Strategies see this and nothing else; the truth is not in it.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from entropy_explore_env.missions.action import ROUNDING, encode_viewpoint
+from entropy_explore_env.missions.localization import believed_pose
 from entropy_explore_env.missions.poses import place_at, pose_at, share_left, speed_at
 from entropy_explore_env.missions.rules import Rules
 from entropy_explore_env.missions.silence import is_silent
 from entropy_explore_env.missions.simulation import Missions
+from entropy_explore_env.robots.localization import believed_point
 from entropy_explore_env.robots.motion import MoveEnd
 from entropy_explore_env.scenario import Scenario
 from entropy_explore_env.settings import RobotKind
@@ -99,7 +101,9 @@ class RobotView:
         under_way: Whether it does so while it drives on. Where it chooses `target` again, nothing changes.
         speed_m_s: Its speed on its path; 0 while it stands.
         since_scan_m: Metres that it has driven since its latest scan.
-        pose: (5,) x, y, z, yaw, pitch: map frame, metres, radians, pitch downwards.
+        pose: (5,) x, y, z, yaw, pitch: map frame, metres, radians, pitch downwards. Where the robot drifts
+            (`Robot.localization`) this is its estimate: its map, scans, target and path are where it believes
+            them to be, and what it chooses is meant so.
         mean: (X, Y, Z) float32, expected coverage.
         precision: (X, Y, Z) float32, 1/σ² of it.
         entropy_bits: Entropy of its map.
@@ -117,6 +121,9 @@ class RobotView:
             actions are no numbers of candidates, or it does not decide.
         ceiling: (X, Y) int32, in each column the lowest layer of the no-fly zone (an exposure surface
             is known beforehand); None = no such zone.
+        covariance: (4, 4) float64 of the pose's x, y, z and yaw, m and rad; 0 where it is exact. Of the
+            latest event at which the estimate changed: while the robot drives on it is uncertain by more.
+        fiducials_m: (F, 3) places of the fiducials by which it corrects its estimate (`Fiducials`).
     """
 
     robot: int
@@ -143,6 +150,8 @@ class RobotView:
     candidates: np.ndarray
     ceiling: np.ndarray | None
     rules: Rules
+    covariance: np.ndarray = field(default_factory=lambda: np.zeros((4, 4)))
+    fiducials_m: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
 
     def __repr__(self) -> str:
         """Who it is, when and where, not what it holds to be true."""
@@ -213,6 +222,9 @@ def view_of(missions: Missions, mission: int, robot: int) -> RobotView:
     own, here = state.robots[mission, robot], (mission, robot)
     heard, rays = state.heard[here], int(rules.params[robot]["rays"])
     world = missions.worlds[mission]
+    estimate = None if missions.estimates is None else missions.estimates[here]
+    scan_pose = own["scan_pose"] if estimate is None else estimate["scan_pose"]
+    exact, params = np.zeros((4, 4)), rules.params[robot]
     return RobotView(
         robot=robot,
         scenario=missions.scenario,
@@ -221,17 +233,17 @@ def view_of(missions: Missions, mission: int, robot: int) -> RobotView:
         under_way=bool(own["under_way"]),
         speed_m_s=float(speed_at(rules.params[robot], own, time_s)),
         since_scan_m=_since_scan_m(rules.params[robot], own, time_s),
-        pose=np.array(pose_at(rules.params[robot], own, time_s)),
+        pose=np.array(believed_pose(estimate, params, pose_at(params, own, time_s))),
         mean=read_only(state.mean[here].reshape(shape)),
         precision=read_only(state.precision[here].reshape(shape)),
         entropy_bits=float(own["entropy_bits"]),
         move_end=MoveEnd.UNDER_WAY if own["under_way"] else list(MoveEnd)[own["move_end"]],
         target=own["target"].copy(),
-        path=_path_ahead(rules.params[robot], own, time_s),
+        path=_path_ahead(rules.params[robot], own, estimate, time_s),
         depth_m=float(own["depth_m"]),
         half_angle_rad=float(own["half_angle_rad"]),
         scan=ScanView(
-            own["scan_pose"].copy(),
+            scan_pose.copy(),
             read_only(state.scan_range_m[here][:rays]),
             read_only(state.scan_returned[here][:rays]),
             read_only(state.scan_utility_bits[here][:rays]),
@@ -247,6 +259,8 @@ def view_of(missions: Missions, mission: int, robot: int) -> RobotView:
         candidates=_candidates(missions, mission, robot),
         ceiling=None if world is None else world.ceiling,
         rules=rules,
+        covariance=read_only(exact if estimate is None else estimate["covariance"].copy()),
+        fiducials_m=read_only(state.fiducials[mission].copy()),
     )
 
 
@@ -268,14 +282,17 @@ def _since_scan_m(params: np.void, own: np.void, time_s: float) -> float:
     return max(float(own["scan_lead_m"] + driven_m - scanned_m), 0.0)
 
 
-def _path_ahead(params: np.void, own: np.void, time_s: float) -> np.ndarray:
+def _path_ahead(params: np.void, own: np.void, estimate: np.void | None, time_s: float) -> np.ndarray:
     """(N, 3) where a robot means to drive, whatever will stop it."""
     if own["deciding"] and not own["under_way"]:
         return np.zeros((0, 3))
     if own["waypoints"] == 0:
         return own["target"][None, :3].copy()
     passed = place_at(params, own, time_s)[3]
-    return own["path"][passed : own["waypoints"]].copy()
+    ahead = own["path"][passed : own["waypoints"]].copy()
+    for corner in ahead:
+        corner[:] = believed_point(estimate, (float(corner[0]), float(corner[1]), float(corner[2])))
+    return ahead
 
 
 def _teammate(params: np.void, heard: np.void, time_s: float) -> TeammateView:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from entropy_explore_env.missions.faults import fault_counts
+from entropy_explore_env.missions.localization import localization_figures
 from entropy_explore_env.missions.poses import driven_metres
 from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.missions.state import COUNTED, SEEN_MARKS
@@ -50,8 +51,8 @@ def mission_figures(missions: Missions, mission: int, floor: bool | None = None)
         `messages_lost`; `entropy_start_bits`, `entropy_threshold_bits`, `entropy_end_bits`,
         `entropy_mean_bits` over the team; `balance`: the coefficient of variation of the bits that the
         robots gained themselves; `distance_m`, `blocked_moves`; `per_robot`: a list of the counts of
-        each robot. If the scenario has faults, also `faults`: see `fault_counts`. If it tracks the truth,
-        also `joint`: see `joint_figures`.
+        each robot. If the scenario has faults, also `faults`: see `fault_counts`. If robots drift, also
+        `localization`: see `localization_figures`. If it tracks the truth, also `joint`: see `joint_figures`.
     """
     clock, robots = missions.state.missions[mission], missions.state.robots[mission]
     faults = missions.state.faults[mission]
@@ -86,9 +87,16 @@ def mission_figures(missions: Missions, mission: int, floor: bool | None = None)
         "distance_m": float(robots["distance_m"].sum()),
         "blocked_moves": int(robots["blocked_moves"].sum()),
         **({"faults": fault_counts(faults)} if len(faults) else {}),
+        **({"localization": localization_told(missions, mission)} if missions.scenario.drifts else {}),
         **({"joint": joint_figures(missions, mission)} if missions.scenario.track_truth else {}),
         "per_robot": [{name: robot[name].item() for name in COUNTED} for robot in robots],
     }
+
+
+def localization_told(missions: Missions, mission: int) -> dict[str, float | int | None]:
+    """How wrong a mission's robots were about their poses: see `localization_figures`."""
+    robots, estimates = missions.state.robots[mission], missions.state.estimates[mission]
+    return localization_figures(estimates, int(robots["scans"].sum()))
 
 
 def _reached(clock: np.void, place: int) -> float | None:

@@ -77,6 +77,15 @@ FIELDS_FAULTS = (
 )
 """Fields of `faults`, where the scenario has any."""
 
+FIELDS_LOCALIZATION = (
+    "place yaw driven_m error covariance packed scan_pose localization_rng sightings "
+    "squared_m2 squared_rad2".split()
+)
+"""Fields of `estimates`, where some robot drifts."""
+
+ARRAYS_LOCALIZATION = ("fiducials", "in_flight_covariances", "phase_covariances")
+"""Further arrays there."""
+
 _FIELDS_TODAY: Mapping[str, str] = MappingProxyType(
     {
         "missions.letters": "enqueued",
@@ -116,8 +125,8 @@ def state_values(missions: Missions, mission: int) -> dict[str, np.ndarray]:
 
     Returns:
         Name → array, a view of the state, in the order of the digest. The phases of the broadcast, what an
-        ending by what was seen needs, what decisions under way need, faults and candidates are there
-        only where they are used.
+        ending by what was seen needs, what decisions under way need, faults, candidates and localization are
+        there only where they are used.
     """
     values: dict[str, np.ndarray] = {}
     for name, read in _ARRAYS.items():
@@ -141,6 +150,10 @@ def state_values(missions: Missions, mission: int) -> dict[str, np.ndarray]:
         proposed, kept = missions.state.candidates, missions.state.experience
         values.update({f"candidates.{field}": proposed[field][mission, ...] for field in FIELDS_CANDIDATES})
         values.update({f"experience.{field}": kept[field][mission, ...] for field in FIELDS_EXPERIENCE})
+    if missions.scenario.drifts:
+        estimates = missions.state.estimates
+        values.update({f"estimates.{field}": estimates[field][mission, ...] for field in FIELDS_LOCALIZATION})
+        values.update({name: getattr(missions.state, name)[mission] for name in ARRAYS_LOCALIZATION})
     return values
 
 

@@ -2,7 +2,8 @@
 
 One measurement is a 3-D vector from the sensor to what it saw, three 32-bit numbers: 96 bits. Every
 message opens with its sender's pose, five numbers: 160 bits. An announcement adds a viewpoint
-(position, yaw, pitch) with r̂ and α̂ (RochaMI), seven numbers: 384 bits in all. A broadcast is charged
+(position, yaw, pitch) with r̂ and α̂ (RochaMI), seven numbers: 384 bits in all. Where robots drift, each
+batch carries the covariance of its sender's pose, ten numbers: 320 bits more. A broadcast is charged
 once to its sender and once to each teammate that hears it. What reaches whom is a matter of distance, of
 free sight through the true world, or of a signal that walls weaken.
 """
@@ -31,6 +32,7 @@ from entropy_explore_env.randomness import draw_uniform
 BITS_PER_MEASUREMENT = 96
 BITS_PER_BATCH = 160
 BITS_PER_ANNOUNCEMENT = 384
+BITS_PER_COVARIANCE = 320
 _LEAST_I_MIN_BITS = 1e-6
 """So low that it forbids nothing, and so high that it is back within some dozen scans."""
 

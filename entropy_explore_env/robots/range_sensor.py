@@ -22,6 +22,8 @@ from entropy_explore_env.belief.raycast import (
     STOP_AT_COVERED,
     Crossing,
     Line,
+    RayEnd,
+    cast_range,
     cast_ray,
     longest_crossing,
     point,
@@ -295,11 +297,10 @@ def take_scan(scan, model, scene, pose, rng):
     reach = params.max_range_m / scene.voxel_size_m
     for index in range(len(scan.rays)):
         ray = scan.rays[index]
-        direction = point(ray.direction)
         length, voxels, end = cast_ray(
             scene.occupied,
             scene.size,
-            Line(start, direction, reach),
+            Line(start, point(ray.direction), reach),
             STOP_AT_COVERED,
             OPEN_END,
             behind,
@@ -307,21 +308,63 @@ def take_scan(scan, model, scene, pose, rng):
         )
         no_return = end == OBSTACLE and ends_unreadable(scene.occupied, scan.crossed[index], voxels, behind)
         ray.voxels = voxels - 1 if end == OBSTACLE and params.voxels_behind == 0 else voxels
-        ray.length = length
-        ray.range_m = length * scene.voxel_size_m
-        error = params.noise_m * draw_gaussian(rng) if params.noise_m > 0.0 else 0.0
-        ray.returned = _FREE if end == OPEN else _HIT
-        if no_return or (len(scene.bodies) > 0 and body_distance(start, direction, scene.bodies) < length):
-            ray.returned = _NOTHING
-            ray.range_m = 0.0
-        elif end == OPEN or error == 0.0:
-            weigh_measurement(scan, index, params, scene.size, start)
-        else:
-            ray.length = min(max(length + error / scene.voxel_size_m, NEAREST), reach)
+        moved = measure_ray(ray, params, scene, start, RayEnd(length, voxels, end), no_return, rng)
+        if ray.returned == _NOTHING:
+            continue
+        if moved:
             trace_measurement(scan, index, params, scene.size, scene.voxel_size_m, start, scene.occupied)
-        if ray.returned == _HIT and ray.range_m < params.min_range_m:
-            ray.returned = _NOTHING
-            ray.range_m = 0.0
+        else:
+            weigh_measurement(scan, index, params, scene.size, start)
+
+
+@lean_kernel
+def measure_ranges(scan, model, scene, pose, rng):
+    """What the sensor measures, as `take_scan`, without the voxels on its rays.
+
+    For a robot that believes to be somewhere else: to it these voxels mean nothing.
+    """
+    params, start = model.params[0], pose.start
+    point_rays(model, pose.yaw, pose.pitch, scan.rays)
+    reach = params.max_range_m / scene.voxel_size_m
+    for index in range(len(scan.rays)):
+        ray = scan.rays[index]
+        line = Line(start, point(ray.direction), reach)
+        length, covered, end = cast_range(scene.occupied, scene.size, line, STOP_AT_COVERED)
+        measure_ray(ray, params, scene, start, RayEnd(length, 0, end), covered >= _UNREADABLE, rng)
+
+
+@inlined_kernel
+def measure_ray(ray, params, scene, start, end, no_return, rng):
+    """What comes back along a ray that was cast through the true world, and from how far away.
+
+    Args:
+        ray: RAY; length, distance and Return are filled in.
+        params: SENSOR_PARAMS.
+        scene: Scene.
+        start: (x, y, z), the sensor in grid units.
+        end: RayEnd.
+        no_return: Whether it ended at a voxel that gives no return.
+        rng: (1,) uint64 random state.
+
+    Returns:
+        Whether noise has moved its end: then the voxels that were crossed are not those of the measurement.
+    """
+    reach = params.max_range_m / scene.voxel_size_m
+    ray.length, ray.range_m = end.length, end.length * scene.voxel_size_m
+    error = params.noise_m * draw_gaussian(rng) if params.noise_m > 0.0 else 0.0
+    ray.returned = _FREE if end.reason == OPEN else _HIT
+    moved, direction = False, point(ray.direction)
+    if no_return or (len(scene.bodies) > 0 and body_distance(start, direction, scene.bodies) < end.length):
+        ray.returned = _NOTHING
+        ray.range_m = 0.0
+    elif end.reason != OPEN and error != 0.0:
+        moved = True
+        ray.length = min(max(end.length + error / scene.voxel_size_m, NEAREST), reach)
+        ray.range_m = ray.length * scene.voxel_size_m
+    if ray.returned == _HIT and ray.range_m < params.min_range_m:
+        ray.returned = _NOTHING
+        ray.range_m = 0.0
+    return moved
 
 
 @inlined_kernel

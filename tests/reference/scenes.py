@@ -119,6 +119,9 @@ def put(missions: Missions, robot: int, pose: Any, mission: int = 0) -> None:
     """Stand a robot that decides somewhere."""
     for field in ("origin", "goal", "target", "scan_pose"):
         missions.state.robots[mission, robot][field] = pose
+    if missions.estimates is not None:
+        own = missions.estimates[mission, robot]
+        own["place"], own["yaw"], own["scan_pose"] = pose[:3], pose[3], pose
 
 
 def build(missions: Missions, solid: np.ndarray, mission: int = 0) -> None:

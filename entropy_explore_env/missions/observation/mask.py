@@ -7,6 +7,7 @@ import math
 from entropy_explore_env.belief.raycast import STOP_AT_COVERED
 from entropy_explore_env.compilation.kernels import lean_kernel
 from entropy_explore_env.missions.action import ROUNDING
+from entropy_explore_env.missions.localization import believed_pose, estimate_in
 from entropy_explore_env.missions.poses import pose_at, within_grid
 
 
@@ -60,7 +61,7 @@ def observe_mask(begin, params, actions, start, mean, row):
 
 
 @lean_kernel
-def mask_missions(params, actions, missions, robots, mean, out):
+def mask_missions(params, actions, missions, robots, estimates, mean, out):
     """Fill (E, A, N) int8, the masks of all robots' discrete actions.
 
     Args:
@@ -68,11 +69,13 @@ def mask_missions(params, actions, missions, robots, mean, out):
         actions: ActionSet.
         missions: (E,) MISSION.
         robots: (E, A) ROBOT.
+        estimates: (E, A) ESTIMATE; None = all robots know where they are.
         mean: (E, A, V) float32.
         out: Filled in.
     """
     for mission in range(out.shape[0]):
         for robot in range(out.shape[1]):
             own = params[robot]
-            start = within_grid(own, pose_at(own, robots[mission, robot], missions[mission].time_s))
+            pose = pose_at(own, robots[mission, robot], missions[mission].time_s)
+            start = within_grid(own, believed_pose(estimate_in(estimates, mission, robot), own, pose))
             write_mask(own, actions, start, mean[mission, robot], out[mission, robot])

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from entropy_explore_env.compilation.kernels import lean_kernel
+from entropy_explore_env.missions.localization import believed_pose, estimate_in
 from entropy_explore_env.missions.observation.mask import observe_mask
 from entropy_explore_env.missions.observation.overview import observe_overview
 from entropy_explore_env.missions.observation.own_drive import observe_drive
@@ -21,7 +22,7 @@ class Known(NamedTuple):
     """What one robot knows, as its observation is made from it."""
 
     pose: tuple[float, float, float, float, float]
-    """x, y, z, yaw, pitch."""
+    """x, y, z, yaw, pitch, as the robot believes it to be."""
     time_s: float
     entropy_bits: float
     """Entropy of its map."""
@@ -54,6 +55,8 @@ class Observed(NamedTuple):
     """(E, A, V) float32."""
     pooled: np.ndarray
     """(E, A, 2, C) float64."""
+    estimates: np.ndarray | None
+    """(E, A) ESTIMATE; None = all robots know where they are."""
 
 
 @lean_kernel
@@ -100,8 +103,9 @@ def observe_missions(rules, offsets, observed, crossing, first, last, out):
                 for place in range(len(row)):
                     row[place] = 0.0
                 continue
+            pose = pose_at(rules.params[robot], own, clock.time_s)
             known = Known(
-                pose_at(rules.params[robot], own, clock.time_s),
+                believed_pose(estimate_in(observed.estimates, mission, robot), rules.params[robot], pose),
                 clock.time_s,
                 own.entropy_bits,
                 own.deciding,

@@ -1,0 +1,98 @@
+"""How well robots know where they are, as settings: what driving adds to the error, what takes it back."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, fields
+
+from entropy_explore_env.errors import SettingError
+from entropy_explore_env.validation import check_count, check_within, is_number
+
+MAX_FIDUCIALS = 1000
+
+
+@dataclass(frozen=True)
+class Localization:
+    """How a robot's estimate of its pose (x, y, z, yaw) drifts away from the truth; by default it does not.
+
+    The errors of dead reckoning are independent from one piece of a drive to the next. So their variance
+    grows with the distance, not their standard deviation, as that of a random walk: with
+    `xy_m_per_sqrt_m=0.02` the standard deviation of x, and that of y, is 0.02 m after a metre, 0.04 m after
+    four and 0.2 m after a hundred. What an error of the yaw does to the place of a robot that drives on comes
+    on top of it: after L more metres that is L times the error. A robot starts exactly where it believes, and
+    a planar one knows its height throughout.
+
+    Attributes:
+        xy_m_per_sqrt_m: Of x and of y, after a metre driven; 0 to 100.
+        z_m_per_sqrt_m: Of the height of a robot that flies, after a metre driven; 0 to 100.
+        yaw_rad_per_sqrt_m: Of the yaw, after a metre driven; 0 to 10.
+        xy_m_per_sqrt_rad: Of x and of y, after a turn of a radian; 0 to 100.
+        z_m_per_sqrt_rad: Of the height of a robot that flies, after a turn of a radian; 0 to 100.
+        yaw_rad_per_sqrt_rad: Of the yaw, after a turn of a radian; 0 to 10.
+    """
+
+    xy_m_per_sqrt_m: float = 0.0
+    z_m_per_sqrt_m: float = 0.0
+    yaw_rad_per_sqrt_m: float = 0.0
+    xy_m_per_sqrt_rad: float = 0.0
+    z_m_per_sqrt_rad: float = 0.0
+    yaw_rad_per_sqrt_rad: float = 0.0
+
+    def __post_init__(self) -> None:
+        """Check every field."""
+        for each in fields(self):
+            check_within(self, each.name, least=0, most=10 if each.name.startswith("yaw") else 100)
+
+    @property
+    def drifts(self) -> bool:
+        """Whether the estimate ever differs from the truth."""
+        return any(getattr(self, each.name) > 0.0 for each in fields(self))
+
+
+@dataclass(frozen=True)
+class Fiducials:
+    """Landmarks of the world whose places all robots know; by default there are none.
+
+    A robot that scans sights those that are within `range_m` and its sensor's range, in its sensor's field of
+    view, and not behind anything solid or a teammate's body. It knows which one it sees. What it sees, where
+    the landmark is from the robot, corrects its estimate of its pose. They matter to robots that drift
+    (`Localization`); nothing else changes with them.
+
+    Attributes:
+        number: How many are drawn in each mission, 0 to 1000, on surfaces that robots can see: beside a face
+            that separates a free voxel from a solid one, or from the workspace's end.
+        positions_m: Their places instead, (x, y, z) each, in the map frame: in free space. In a 2-D world z
+            does not matter.
+        range_m: How far away they are sighted, 1e-6 to 1e6; inf = as far as the sensor sees.
+        range_sigma_m: Standard deviation of a sighting along the line of sight, 1e-6 to 1e6.
+        bearing_sigma_rad: Of its direction, sideways and up, 1e-6 to 10.
+    """
+
+    number: int = 0
+    positions_m: tuple[tuple[float, float, float], ...] = ()
+    range_m: float = math.inf
+    range_sigma_m: float = 0.05
+    bearing_sigma_rad: float = 0.01
+
+    def __post_init__(self) -> None:
+        """Check every field."""
+        check_count(self, "number", 0, MAX_FIDUCIALS)
+        places = self.positions_m
+        if (
+            not isinstance(places, tuple)
+            or len(places) > MAX_FIDUCIALS
+            or not all(isinstance(place, tuple) and len(place) == 3 for place in places)
+            or not all(is_number(number) and abs(number) <= 2e9 for place in places for number in place)
+        ):
+            allowed = f"a tuple of at most {MAX_FIDUCIALS} places (x, y, z), each number from -2e9 to 2e9"
+            raise SettingError("Fiducials.positions_m", places, allowed)
+        if self.number > 0 and places:
+            raise SettingError("Fiducials.number", self.number, "0 where positions_m are given")
+        check_within(self, "range_m", least=1e-6, most=1e6, inf=True)
+        check_within(self, "range_sigma_m", least=1e-6, most=1e6)
+        check_within(self, "bearing_sigma_rad", least=1e-6, most=10)
+
+    @property
+    def count(self) -> int:
+        """F, how many there are in a mission."""
+        return self.number or len(self.positions_m)

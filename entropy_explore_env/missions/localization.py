@@ -1,0 +1,468 @@
+"""What a mission's robots believe of their poses: when that changes, and what it does to drives and scans.
+
+The team drives and scans in the world; a robot plans, fuses, announces and observes where it believes to be.
+An estimate changes at events: where a robot scans, decides under way, or is stopped by a fault. A drive
+follows its path as the robot's estimate had it when it departed: what drifts meanwhile is made good by its
+next decision. A robot knows that it is in the workspace, so an estimate beyond it is taken to the nearest
+place in it. Where no robot of the scenario drifts `TeamLocalization` is None, and nothing of all this is
+compiled.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from entropy_explore_env.belief.measurement_model import Return
+from entropy_explore_env.belief.raycast import OPEN, STOP_AT_COVERED, Line, cast_range, point
+from entropy_explore_env.compilation.kernels import lean_kernel
+from entropy_explore_env.errors import WorldError
+from entropy_explore_env.missions.poses import copy_numbers, pose_at, share_left
+from entropy_explore_env.randomness import Stream, generator, splitmix_states
+from entropy_explore_env.robots.channel import BITS_PER_COVARIANCE
+from entropy_explore_env.robots.localization import (
+    advance_estimate,
+    believed_point,
+    believed_yaw,
+    correct_estimate,
+    pack_covariance,
+    point_in_world,
+    sighting_error,
+    weigh_by_covariance,
+    within_half_turn,
+)
+from entropy_explore_env.robots.range_sensor import (
+    body_distance,
+    measure_ranges,
+    take_scan,
+    trace_measurement,
+)
+from entropy_explore_env.scenario import Scenario
+from entropy_explore_env.worlds.world import World
+
+_NOTHING = int(Return.NOTHING)
+_ON_FACE = 0.49
+"""How far from a voxel's middle a drawn fiducial is, in edges: on the surface beside it, and still free."""
+_INSIDE = 1e-6
+"""How far within the workspace's upper faces an estimate is taken, in edges: these belong to no voxel."""
+_NEAREST_M = 1e-6
+"""A fiducial nearer than this has no direction."""
+
+
+class TeamLocalization(NamedTuple):
+    """What one mission's robots believe of their poses."""
+
+    params: np.ndarray
+    """(A,) LOCALIZATION_PARAMS."""
+    estimates: np.ndarray
+    """(A,) ESTIMATE, a slice of MissionState."""
+    fiducials: np.ndarray
+    """(F, 3) float64, places in the world, likewise."""
+
+
+def begin_estimates(seed: int, episode: int, poses: np.ndarray, estimates: np.ndarray) -> None:
+    """Let robots know exactly where they start, and set their random states.
+
+    Args:
+        seed: Of the mission.
+        episode: See `Missions.draw_episode`.
+        poses: (A, 5) float64.
+        estimates: (A,) ESTIMATE of zeros, filled in; empty where nobody drifts.
+    """
+    if len(estimates):
+        estimates["place"], estimates["yaw"], estimates["scan_pose"] = poses[:, :3], poses[:, 3], poses
+        words = splitmix_states(seed, episode, Stream.LOCALIZATION, len(poses))
+        estimates["localization_rng"][:, 0] = words
+
+
+def fiducial_places(scenario: Scenario, world: World, seed: int, episode: int) -> np.ndarray:
+    """Where a mission's fiducials are, drawn or given.
+
+    Drawn ones are on surfaces of voxels that robots can see: of a team that stays in planes, in these planes.
+
+    Returns:
+        (F, 3) float64, metres, map frame; none where nobody drifts.
+
+    Raises:
+        WorldError: One that is given is in something solid, or there are not so many surfaces.
+    """
+    settings, grid = scenario.fiducials, world.grid
+    if not scenario.drifts or not settings.count:
+        return np.zeros((0, 3))
+    if settings.positions_m:
+        places = np.array(settings.positions_m, np.float64)
+        if grid.flat:
+            places[:, 2] = grid.centre_of(np.zeros(3))[2]
+        voxels = np.clip(grid.voxel_of(places), 0, np.asarray(grid.shape) - 1)
+        inside = world.occupied[tuple(voxels.T)]
+        if inside.any():
+            place = settings.positions_m[int(np.argmax(inside))]
+            raise WorldError(
+                "Fiducials.positions_m", place, "a place in free space: it is in something solid"
+            )
+        return places
+    voxels, faces = _surfaces(scenario, world)
+    if len(voxels) < settings.number:
+        allowed = f"at most {len(voxels)}, the free voxels beside something solid that robots can see"
+        raise WorldError("Fiducials.number", settings.number, allowed)
+    drawn = generator(seed, episode, Stream.FIDUCIALS).permutation(len(voxels))[: settings.number]
+    return grid.centre_of(voxels[drawn]) + _ON_FACE * grid.voxel_size_m * faces[drawn]
+
+
+def pose_errors(estimates: np.ndarray) -> np.ndarray:
+    """How wrong one mission's robots were about their poses when they last scanned, or decided under way.
+
+    Args:
+        estimates: (A,) ESTIMATE.
+
+    Returns:
+        (A, 2) float64: distance in metres between where a robot believed to be and where it was, and what its
+        yaw was off in radians, ≥ 0.
+    """
+    error = estimates["error"]
+    return np.stack([np.sqrt((error[:, :3] ** 2).sum(axis=1)), np.abs(error[:, 3])], axis=1)
+
+
+def localization_figures(estimates: np.ndarray, scans: int) -> dict[str, float | int | None]:
+    """How wrong a team was about its poses, for tables and records.
+
+    Args:
+        estimates: (A,) ESTIMATE.
+        scans: That it has taken.
+
+    Returns:
+        `rms_error_m` and `rms_error_rad`, root mean square over all scans: None before the first one;
+        `mean_error_m` and `mean_error_rad` of the robots at last; `sightings` of fiducials.
+    """
+    errors = pose_errors(estimates)
+    squares = (float(estimates["squared_m2"].sum()), float(estimates["squared_rad2"].sum()))
+    rms_m, rms_rad = (math.sqrt(total / scans) if scans else None for total in squares)
+    return {
+        "rms_error_m": rms_m,
+        "rms_error_rad": rms_rad,
+        "mean_error_m": float(errors[:, 0].mean()),
+        "mean_error_rad": float(errors[:, 1].mean()),
+        "sightings": int(estimates["sightings"].sum()),
+    }
+
+
+def _surfaces(scenario: Scenario, world: World) -> tuple[np.ndarray, np.ndarray]:
+    """(N, 3) free voxels beside something solid, and (N, 3) directions to its first such face, in C order."""
+    solid = np.pad(world.occupied, 1, constant_values=True)
+    free = world.visible(scenario) & ~world.occupied
+    if scenario.in_planes:
+        layers = {scenario.layer_of(kind.robot) for kind in scenario.kinds}
+        for layer in range(free.shape[2]):
+            free[:, :, layer] &= layer in layers
+    towards = np.zeros((*free.shape, 3))
+    found = np.zeros(free.shape, np.bool_)
+    for axis in range(2 if scenario.in_planes else 3):
+        for side in (-1, 1):
+            beside = np.roll(solid, -side, axis)[1:-1, 1:-1, 1:-1] & free & ~found
+            towards[beside, axis] = side
+            found |= beside
+    voxels = np.argwhere(found)
+    return voxels, towards[found]
+
+
+@lean_kernel
+def localization_of(params, estimates, fiducials, mission):
+    """TeamLocalization of a mission; None where nobody drifts.
+
+    Args:
+        params: (A,) LOCALIZATION_PARAMS, or None.
+        estimates: (E, A) ESTIMATE.
+        fiducials: (E, F, 3) float64.
+        mission: Its number.
+    """
+    if params is None:  # known while compiling: nothing of the rest is compiled
+        return None
+    return TeamLocalization(params, estimates[mission], fiducials[mission])
+
+
+@lean_kernel
+def estimate_of(localization, index):
+    """ESTIMATE of a robot; None where nobody drifts.
+
+    Args:
+        localization: TeamLocalization, or None.
+        index: The robot's number.
+    """
+    if localization is None:  # known while compiling: nothing of the rest is compiled
+        return None
+    return localization.estimates[index]
+
+
+@lean_kernel
+def estimate_in(estimates, mission, index):
+    """ESTIMATE of a robot of a mission, out of (E, A) ESTIMATE; None where there are none."""
+    if estimates is None:  # known while compiling: nothing of the rest is compiled
+        return None
+    return estimates[mission, index]
+
+
+@lean_kernel
+def believed_pose(estimate, params, pose):
+    """Pose (x, y, z, yaw, pitch), in the workspace, at which a robot that is at a true one believes to be.
+
+    Args:
+        estimate: ESTIMATE, or None.
+        params: PARAMS of the robot.
+        pose: Of the robot, in the world.
+    """
+    if estimate is None:  # known while compiling: nothing of the rest is compiled
+        return pose[0], pose[1], pose[2], pose[3], pose[4]
+    x, y, z = believed_point(estimate, point(pose))
+    return (
+        into_workspace(params, 0, x),
+        into_workspace(params, 1, y),
+        into_workspace(params, 2, z),
+        believed_yaw(estimate, pose[3]),
+        pose[4],
+    )
+
+
+@lean_kernel
+def believe_pose(estimate, params, pose):
+    """Turn a robot's true pose (5,), in place, into where it believes to be: see `believed_pose`."""
+    if estimate is None:  # known while compiling: nothing of the rest is compiled
+        return
+    copy_numbers(believed_pose(estimate, params, pose), pose, 5)
+
+
+@lean_kernel
+def into_workspace(params, axis, number):
+    """A coordinate in metres: itself, if it is in the workspace, or the nearest one that is."""
+    low, edge = params.origin_m[axis], params.voxel_size_m
+    high = low + params.size[axis] * edge
+    if number < low:
+        return low
+    if number >= high:
+        inside = high - _INSIDE * edge
+        return inside if inside < high else high - 0.5 * edge
+    return number
+
+
+@lean_kernel
+def note_motion(localization, params, robot, index, time_s):
+    """Carry a robot's estimate on to where it is at an event.
+
+    Args:
+        localization: TeamLocalization, or None.
+        params: PARAMS of the robot.
+        robot: Its ROBOT.
+        index: Its number.
+        time_s: Of the event.
+    """
+    if localization is None:  # known while compiling: nothing of the rest is compiled
+        return
+    estimate = localization.estimates[index]
+    pose = pose_at(params, robot, time_s)
+    driven_m = robot.distance_m - share_left(params, robot, time_s) * robot.path_m
+    advance_estimate(estimate, localization.params[index], point(pose), pose[3], driven_m)
+    keep_in_workspace(estimate, params)
+
+
+@lean_kernel
+def keep_in_workspace(estimate, params):
+    """Bring an estimate back into the workspace, at the event at which it changes."""
+    for axis in range(3):
+        believed = estimate.place[axis] + estimate.error[axis]
+        inside = into_workspace(params, axis, believed)
+        if inside != believed:
+            estimate.error[axis] = inside - estimate.place[axis]
+
+
+@lean_kernel
+def choice_into_world(estimate, params, robot, choice, time_s):
+    """Turn what a robot chose, where it believes to be, into a drive through the world from where it is.
+
+    Args:
+        estimate: ESTIMATE, or None.
+        params: PARAMS of the robot.
+        robot: ROBOT, before it departs; its target becomes the viewpoint as the robot means it.
+        choice: CHOICE, changed in place.
+        time_s: When it departs.
+    """
+    copy_numbers(choice.viewpoint, robot.target, 5)
+    if estimate is None:  # known while compiling: nothing of the rest is compiled
+        return
+    copy_numbers(robot.goal, choice.pose, 5)
+    if robot.under_way:
+        copy_numbers(pose_at(params, robot, time_s), choice.pose, 5)
+    copy_numbers(point_in_world(estimate, point(choice.viewpoint)), choice.viewpoint, 3)
+    choice.viewpoint[3] = within_half_turn(choice.viewpoint[3] - estimate.error[3])
+    for number in range(max(choice.waypoints, 1)):
+        copy_numbers(point_in_world(estimate, point(choice.path[number])), choice.path[number], 3)
+
+
+@lean_kernel
+def sight_fiducials(localization, params, index, sensor, scene, pose):
+    """Correct a robot's estimate by the fiducials that it sights in a scan, by number.
+
+    Args:
+        localization: TeamLocalization, or None.
+        params: PARAMS of the robot.
+        index: Its number.
+        sensor: SensorModel of the robot.
+        scene: Scene.
+        pose: SensorPose.
+    """
+    if localization is None:  # known while compiling: nothing of the rest is compiled
+        return
+    estimate, own = localization.estimates[index], localization.params[index]
+    for number in range(len(localization.fiducials)):
+        fiducial = localization.fiducials[number]
+        away = (
+            fiducial[0] - estimate.place[0],
+            fiducial[1] - estimate.place[1],
+            fiducial[2] - estimate.place[2],
+        )
+        if not in_sight(own, sensor.params[0], scene, pose, away):
+            continue
+        error = sighting_error(away, own.range_sigma_m, own.bearing_sigma_rad, estimate.localization_rng)
+        x, y, z = away[0] + error[0], away[1] + error[1], away[2] + error[2]
+        along, across = math.cos(estimate.error[3]), math.sin(estimate.error[3])
+        seen = along * x - across * y, across * x + along * y, z
+        expected = (
+            away[0] - estimate.error[0],
+            away[1] - estimate.error[1],
+            away[2] - estimate.error[2],
+        )
+        correct_estimate(estimate, seen, expected, own.range_sigma_m, own.bearing_sigma_rad)
+    keep_in_workspace(estimate, params)
+
+
+@lean_kernel
+def in_sight(params, sensor, scene, pose, away):
+    """Whether a scan sights a landmark: in range, in its field of view, nothing before it.
+
+    Args:
+        params: LOCALIZATION_PARAMS of the robot.
+        sensor: SENSOR_PARAMS of its sensor.
+        scene: Scene.
+        pose: SensorPose.
+        away: (x, y, z), from the robot to the landmark, metres.
+    """
+    x, y, z = away
+    distance = math.sqrt(x * x + y * y + z * z)
+    if distance > params.range_m or distance < max(sensor.min_range_m, _NEAREST_M):
+        return False
+    turn = within_half_turn(math.atan2(y, x) - pose.yaw)
+    tilt = math.atan2(-z, math.sqrt(x * x + y * y)) - pose.pitch
+    if abs(within_half_turn(turn)) > params.half_yaw_rad or abs(tilt) > params.half_pitch_rad:
+        return False
+    direction = x / distance, y / distance, z / distance
+    line = Line(pose.start, direction, distance / scene.voxel_size_m)
+    _, _, end = cast_range(scene.occupied, scene.size, line, STOP_AT_COVERED)
+    return end == OPEN and body_distance(pose.start, direction, scene.bodies) >= line.length
+
+
+@lean_kernel
+def measure(localization, scan, sensor, scene, pose, rng):
+    """What a robot's sensor measures from where it truly is: all of the scan only where nobody drifts."""
+    if localization is None:  # known while compiling: nothing of the rest is compiled
+        take_scan(scan, sensor, scene, pose, rng)
+        return
+    measure_ranges(scan, sensor, scene, pose, rng)
+
+
+@lean_kernel
+def believe_scan(localization, index, scan, sensor, scene, pose):
+    """Let a scan be what its robot takes it for: measured from where it believes to be, and less precise.
+
+    Args:
+        localization: TeamLocalization, or None.
+        index: The robot's number.
+        scan: Scan as it was taken in the world; its rays are turned, and their voxels those of the belief.
+        sensor: SENSOR_PARAMS of the robot.
+        scene: Scene.
+        pose: (x, y, z), where the robot believes to be, in grid units.
+    """
+    if localization is None:  # known while compiling: nothing of the rest is compiled
+        return
+    estimate = localization.estimates[index]
+    along, across = math.cos(estimate.error[3]) - 1.0, math.sin(estimate.error[3])
+    for number in range(len(scan.rays)):
+        ray = scan.rays[number]
+        x, y = ray.direction[0], ray.direction[1]
+        ray.direction[0] += along * x - across * y
+        ray.direction[1] += across * x + along * y
+        if ray.returned != _NOTHING:
+            trace_measurement(scan, number, sensor, scene.size, scene.voxel_size_m, pose, scene.occupied)
+    pack_covariance(estimate.covariance, estimate.packed)
+    weigh_by_covariance(scan.rays, len(scan.rays), estimate.packed, scene.voxel_size_m)
+
+
+@lean_kernel
+def note_scan_pose(localization, index, pose):
+    """Keep where a robot believes to have scanned, and count how wrong it was.
+
+    Args:
+        localization: TeamLocalization, or None.
+        index: The robot's number.
+        pose: (x, y, z, yaw, pitch), where it believes to have been.
+    """
+    if localization is None:  # known while compiling: nothing of the rest is compiled
+        return
+    estimate = localization.estimates[index]
+    error = estimate.error
+    copy_numbers(pose, estimate.scan_pose, 5)
+    estimate.squared_m2 += error[0] * error[0] + error[1] * error[1] + error[2] * error[2]
+    estimate.squared_rad2 += error[3] * error[3]
+
+
+@lean_kernel
+def believed_scan_pose(localization, robot, index):
+    """(x, y, z, yaw, pitch) where a robot believes to have taken its latest scan."""
+    if localization is None:  # known while compiling: nothing of the rest is compiled
+        return whole_pose(robot.scan_pose)
+    return whole_pose(localization.estimates[index].scan_pose)
+
+
+@lean_kernel
+def whole_pose(pose):
+    """(x, y, z, yaw, pitch) from an array (5,)."""
+    return pose[0], pose[1], pose[2], pose[3], pose[4]
+
+
+@lean_kernel
+def note_covariance(localization, index, covariances, slot):
+    """Put the covariance of a robot's latest scan beside a batch of its measurements, if batches have one.
+
+    Args:
+        localization: TeamLocalization, or None.
+        index: The robot's number.
+        covariances: (Q, 10) float64, of batches; changed in place.
+        slot: Of the batch.
+    """
+    if localization is None:  # known while compiling: nothing of the rest is compiled
+        return
+    copy_numbers(localization.estimates[index].packed, covariances[slot], covariances.shape[1])
+
+
+@lean_kernel
+def weigh_batch(localization, covariances, slot, scan, count, voxel_size_m):
+    """Lower the precision of a batch's measurements by the covariance beside it, if batches have one.
+
+    Args:
+        localization: TeamLocalization, or None.
+        covariances: (Q, 10) float64, of batches.
+        slot: Of the batch.
+        scan: Scan that its measurements were unpacked into.
+        count: How many there are.
+        voxel_size_m: Edge of a voxel.
+    """
+    if localization is None:  # known while compiling: nothing of the rest is compiled
+        return
+    weigh_by_covariance(scan.rays, count, covariances[slot], voxel_size_m)
+
+
+@lean_kernel
+def covariance_bits(localization):
+    """What the covariance of its sender's pose adds to a batch of measurements."""
+    if localization is None:  # known while compiling: nothing of the rest is compiled
+        return 0
+    return BITS_PER_COVARIANCE

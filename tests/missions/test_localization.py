@@ -1,0 +1,493 @@
+"""Missions in which robots drift: by hand, beside exact ones, in teams, copied, batched, drawn, refused."""
+
+from __future__ import annotations
+
+import copy
+import math
+import pickle
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
+from entropy_explore_env.envs.vector_env import EntropyExploreVectorEnv
+from entropy_explore_env.errors import RecordError, SettingError, WorldError
+from entropy_explore_env.localization_settings import Fiducials, Localization
+from entropy_explore_env.missions.localization import fiducial_places
+from entropy_explore_env.missions.poses import pose_at
+from entropy_explore_env.missions.simulation import Missions
+from entropy_explore_env.missions.snapshot import restore, snapshot
+from entropy_explore_env.missions.view import view_of
+from entropy_explore_env.missions.view_observation import ViewObserver
+from entropy_explore_env.reports.metrics import mission_figures
+from entropy_explore_env.reports.mission_record import CommandRecorder, load_record, same_end, save_record
+from entropy_explore_env.reports.state_values import state_digest
+from entropy_explore_env.robots.channel import BITS_PER_BATCH, BITS_PER_COVARIANCE, BITS_PER_MEASUREMENT
+from entropy_explore_env.scenario import with_settings
+from entropy_explore_env.settings_json import scenario_from_json, settings_json
+from entropy_explore_env.worlds.load import make_world
+from entropy_explore_env.worlds.world import World
+from tests.missions.test_tick import toward
+from tests.reference.scenes import build, drawn, free_box, put, random_actions, seeds, started, wander
+
+SOME = {
+    "xy_m_per_sqrt_m": 0.05,
+    "z_m_per_sqrt_m": 0.02,
+    "yaw_rad_per_sqrt_m": 0.02,
+    "yaw_rad_per_sqrt_rad": 0.02,
+}
+STAY = (1.75, 1.75, 1.25, 0.0, 0.0)
+DRIFTING = {"robot": {"localization": SOME}}
+RATES = tuple(f"{what}_per_{part}" for what in ("xy", "z", "yaw") for part in ("m", "rad"))
+CHANNELS = ({}, {"delay_s": 0.7}, {"phase_s": 1.5, "repeats": 2})
+
+
+def frozen(scenario, **kept):
+    """Missions of robots that could drift, and do not: kernels are those of robots that drift."""
+    missions = started(scenario, **kept)
+    params = missions.rules.localization
+    assert params is not None
+    for name in RATES:
+        params[name] = 0.0
+    return missions
+
+
+@drawn(12)
+@given(
+    seeds,
+    st.sampled_from(CHANNELS),
+    st.sampled_from(["straight", "planned"]),
+    st.sampled_from(["at_stop", "on_scan", 0.6]),
+    st.booleans(),
+)
+def test_without_any_error_a_mission_is_that_of_exact_robots_bit_for_bit(
+    seed, channel, navigator, redecide, planar
+):
+    robot = {"navigator": navigator, "redecide": redecide, "motion": "planar" if planar else "free"}
+    changes = {
+        "world": "furnished",
+        "robots": 3,
+        "sensor": {"scan_every_m": 0.4, "range_noise_m": 0.05, "max_range_m": 2.0},
+        "channel": {"i_min_bits": 0.0, **channel},
+        "observation": {"overview": True, "patch": True, "drive": True},
+    }
+    exact = started(free_box(robot=robot, **changes), seed=seed)
+    drifting = free_box(robot={**robot, "localization": SOME}, fiducials={"number": 3}, **changes)
+    other = frozen(drifting, seed=seed)
+    for missions in (exact, other):
+        wander(missions, 15, 1)
+    assert (exact.observations == other.observations).all()
+    for name in ("mean", "precision", "scan_range_m", "scan_utility_bits", "in_flight_rays", "phase_rays"):
+        assert (getattr(exact.state, name) == getattr(other.state, name)).all(), name
+    for field in exact.state.robots.dtype.names or ():
+        if not field.startswith("bits_"):
+            assert (exact.state.robots[field] == other.state.robots[field]).all(), field
+    estimates = other.state.estimates
+    assert (estimates["error"] == 0.0).all() and (estimates["covariance"] == 0.0).all()
+    for robot_number in range(3):
+        views = [view_of(missions, 0, robot_number) for missions in (exact, other)]
+        assert (views[0].pose == views[1].pose).all() and (views[0].path == views[1].path).all()
+        assert (views[0].scan.pose == views[1].scan.pose).all()
+
+
+def test_an_error_of_a_voxel_moves_the_map_by_a_voxel():
+    """The robot believes to be an edge farther along y; what it sees before the walls comes out so."""
+    sensor, turned = {"max_range_m": 1.2}, {"turn_rate_rad_s": math.inf}
+    maps = []
+    for error in (0.0, 0.5):
+        missions = frozen(free_box(robots=1, sensor=sensor, robot={**turned, "localization": SOME}))
+        put(missions, 0, STAY)
+        missions.state.estimates["error"][0, 0] = 0.0, error, 0.0, 0.0
+        here = np.add(STAY, (0.0, error, 0.0, 0.0, 0.0))
+        assert view_of(missions, 0, 0).pose.tolist() == here.tolist()
+        robots = toward(missions, np.add(here, (0.0, 0.5, 0.0, 0.3, 0.1)))
+        assert robots["goal"][0] == pytest.approx([1.75, 2.25, 1.25, 0.3, 0.1], abs=1e-6)
+        assert robots["target"][0][1] == pytest.approx(2.25 + error, abs=1e-6)
+        maps.append((missions.mean[0, 0].copy(), missions.precision[0, 0].copy()))
+    (exact, known), (moved, as_known) = maps
+    assert (known > known.min()).sum() > 5
+    np.testing.assert_allclose(moved[:, 1:], exact[:, :-1], atol=1e-5)
+    np.testing.assert_allclose(as_known[:, 1:], known[:, :-1], rtol=1e-4)
+
+
+def test_a_robot_that_is_wrong_about_its_yaw_drives_and_looks_elsewhere():
+    """A quarter turn off: meaning to drive along x, and to look so, it drives and looks along -y."""
+    missions = frozen(free_box(robots=1, robot={"turn_rate_rad_s": math.inf, "localization": SOME}))
+    put(missions, 0, (1.75, 2.75, 1.25, 0.5, 0.0))
+    missions.state.estimates["error"][0, 0, 3] = math.pi / 2
+    assert view_of(missions, 0, 0).pose[3] == pytest.approx(0.5 + math.pi / 2)
+    robots = toward(missions, (2.25, 2.75, 1.25, 0.0, 0.0))
+    assert robots["goal"][0] == pytest.approx([1.75, 2.25, 1.25, -math.pi / 2, 0.0], abs=1e-6)
+    view = view_of(missions, 0, 0)
+    assert view.pose == pytest.approx([2.25, 2.75, 1.25, 0.0, 0.0], abs=1e-6)
+    assert view.scan.pose == pytest.approx(view.pose, abs=1e-12)
+    assert view.scan.range_m[view.scan.returned > 0].mean() == pytest.approx(
+        2.25, rel=0.05
+    )  # to the wall y = 0
+    assert missions.mean[0, 0, 6, 5, 2] == pytest.approx(0.0, abs=1e-3)  # which it takes for one beyond x
+
+
+def test_true_walls_stop_a_robot_that_believes_to_be_elsewhere():
+    solid = np.zeros((7, 11, 5), bool)
+    solid[:, 5] = True
+    missions = frozen(free_box(robots=1, robot={"turn_rate_rad_s": math.inf, "localization": SOME}))
+    build(missions, solid)
+    put(missions, 0, (1.75, 2.25, 1.25, 0.0, 0.0))
+    missions.state.estimates["error"][0, 0, 1] = -0.5
+    robots = toward(missions, (1.75, 2.75, 1.25, 0.0, 0.0))  # truly at 2.75 is the wall
+    assert robots["blocked_moves"][0] == 1 and robots["goal"][0][1] < 2.5
+    assert view_of(missions, 0, 0).pose[1] == pytest.approx(robots["goal"][0][1] - 0.5)
+
+
+def test_an_estimate_beyond_the_workspace_is_taken_into_it():
+    missions = frozen(free_box(robots=1, robot={"localization": SOME}))
+    put(missions, 0, (3.2, 5.2, 0.3, 0.0, 0.0))
+    missions.state.estimates["error"][0, 0] = 2.0, -30.0, -1.0, 0.0
+    assert view_of(missions, 0, 0).pose[:3] == pytest.approx([3.5, 0.0, 0.0], abs=1e-6)
+    for _ in range(12):
+        robots = toward(missions, (3.4, 0.1, 0.1, 0.4, 0.2))
+        view, estimate = view_of(missions, 0, 0), missions.state.estimates[0, 0]
+        assert ((view.pose[:3] >= 0.0) & (view.pose[:3] < [3.5, 5.5, 2.5])).all()
+        assert view.pose[:3] == pytest.approx(estimate["place"] + estimate["error"][:3])
+    assert robots["scans"][0] == 12 and np.isfinite(missions.mean).all()
+
+
+@pytest.mark.parametrize("channel", CHANNELS)
+def test_teammates_fuse_in_the_sender_s_frame_with_the_sender_s_covariance(channel):
+    """Robot 0, an edge off and uncertain, scans; robot 1 sees nothing itself and holds the same map."""
+    told = {}
+    for uncertain in (0.0, 0.5):
+        scenario = free_box(
+            robot={"turn_rate_rad_s": math.inf, "localization": SOME, "body_radius_m": 0.0},
+            channel={"burst": 100, "i_min_bits": 0.0, "announcements": False, **channel},
+            faults={"blind": {"at_s": 1e-3, "robots": (1,)}},
+            decision_period_s=1.0,
+        )
+        missions = frozen(scenario)
+        put(missions, 0, STAY)
+        put(missions, 1, (0.75, 4.75, 1.25, 0.0, 0.0))
+        missions.state.estimates["error"][0, 0] = 0.0, 0.5, 0.0, 0.0
+        missions.state.estimates["covariance"][0, 0] = np.diag([uncertain, 0.0, 0.0, 0.1 * uncertain]) ** 2
+        for _ in range(5):
+            robots = toward(missions, view_of(missions, 0, 0).pose, (0.75, 4.75, 1.25, 0.0, 0.0))
+        assert missions.state.heard[0, 1, 0]["pose"] == pytest.approx([1.75, 2.25, 1.25, 0.0, 0.0])
+        bits = BITS_PER_BATCH + BITS_PER_COVARIANCE + BITS_PER_MEASUREMENT * 28
+        assert robots["bits_received"][1] == robots["messages_received"][1] * bits
+        batches = int(robots["measurements_received"][1]) // 28
+        own, mates = missions.precision[0]
+        prior = float(missions.rules.params["prior_precision"][0])
+        seen, scans = own > 2.0 * prior, int(robots["scans"][0])
+        np.testing.assert_allclose(  # of as many scans: the latest may be under way
+            (mates[seen] - prior) / batches, (own[seen] - prior) / scans, rtol=1e-3
+        )
+        np.testing.assert_allclose(missions.mean[0, 1], missions.mean[0, 0], atol=1e-2)
+        told[uncertain] = float(own[seen].max()) / scans
+    assert told[0.5] < 0.3 * told[0.0]
+
+
+@pytest.mark.parametrize("flat", [False, True])
+def test_errors_are_as_large_as_robots_hold_them_to_be(flat):
+    """Normalised squares of 150 missions' errors (NEES), of 3 numbers or 4: within 99.9 % of χ².
+
+    The robots begin in the middle of a large box: near its walls, which no estimate leaves, they know more.
+    """
+    drift = {"xy_m_per_sqrt_m": 0.02, "z_m_per_sqrt_m": 0.03, "yaw_rad_per_sqrt_m": 0.01}
+    drift |= {"xy_m_per_sqrt_rad": 0.01, "yaw_rad_per_sqrt_rad": 0.02}
+    scenario = free_box(
+        grid={"shape": (27, 31, 21)},
+        robots=1,
+        robot={"localization": drift, "motion": "planar" if flat else "free"},
+        sensor={"field_of_view_rad": (2 * math.pi, math.pi / 3), "angular_step_rad": math.pi / 6},
+        fiducials={"number": 0 if flat else 4},
+    )
+    missions = Missions(scenario, 150)
+    missions.reset_some(range(150), list(range(150)))
+    for mission in range(150):
+        put(missions, 0, (6.75, 7.75, 0.75 if flat else 5.25, 0.0, 0.0), mission)
+    wander(missions, 25, 3)
+    numbers = [0, 1, 3] if flat else [0, 1, 2, 3]
+    squares = 0.0
+    for estimate in missions.state.estimates[:, 0]:
+        error, covariance = estimate["error"][numbers], estimate["covariance"][np.ix_(numbers, numbers)]
+        squares += error @ np.linalg.inv(covariance) @ error
+    freedom = 150 * len(numbers)
+    assert abs(squares - freedom) < 3.3 * math.sqrt(2 * freedom)
+    estimates = missions.state.estimates
+    assert (estimates["sightings"] > 0).any() != flat and (estimates["error"][..., :2] != 0.0).all()
+
+
+def test_fiducials_are_sighted_in_range_in_view_and_not_behind_anything():
+    places = ((1.75, 4.0, 1.25), (1.75, 1.0, 1.25), (3.0, 1.75, 1.25))
+    scenario = free_box(
+        robot={"turn_rate_rad_s": math.inf, "localization": SOME, "body_radius_m": 0.1},
+        fiducials={"positions_m": places, "range_m": 2.5},
+    )
+    north, south, east = math.pi / 2, -math.pi / 2, 0.0
+
+    def sightings(yaw, mate=(0.25, 5.25, 0.25, 0.0, 0.0), solid=None, **fiducials):
+        missions = frozen(with_settings(scenario, {"fiducials": fiducials}))
+        if solid is not None:
+            build(missions, solid)
+        put(missions, 0, (*STAY[:3], yaw, 0.0))
+        put(missions, 1, mate)
+        toward(missions, (*STAY[:3], yaw, 0.0), mate)
+        return int(missions.state.estimates["sightings"][0, 0])
+
+    assert [sightings(yaw) for yaw in (north, south, east, math.pi)] == [1, 1, 1, 0]
+    assert sightings(north, range_m=2.0) == 0  # 2.25 m away
+    assert [sightings(north + turn) for turn in (0.28, 0.32)] == [1, 0]  # half of 7 rays, 5° apart, is 17.5°
+    assert sightings(north, mate=(1.75, 3.0, 1.25, 0.0, 0.0)) == 0
+    assert sightings(north, mate=(1.75, 4.75, 1.25, 0.0, 0.0)) == 1  # behind it
+    wall = np.zeros((7, 11, 5), bool)
+    wall[:, 6] = True
+    assert sightings(north, solid=wall) == 0 and sightings(south, solid=wall) == 1
+
+
+def test_sightings_take_back_what_driving_added():
+    told = []
+    for number in (0, 6):
+        missions = Missions(
+            free_box(
+                robots=1,
+                robot={"localization": SOME},
+                sensor={"field_of_view_rad": (2 * math.pi, math.pi / 3), "angular_step_rad": math.pi / 12},
+                fiducials={"number": number, "range_sigma_m": 0.01, "bearing_sigma_rad": 0.005},
+            ),
+            20,
+        )
+        missions.reset_some(range(20), list(range(20)))
+        wander(missions, 40, 0)
+        told.append([mission_figures(missions, mission)["localization"] for mission in range(20)])
+    lost, found = ([figures["rms_error_m"] for figures in each] for each in told)
+    assert np.mean(found) < 0.3 * np.mean(lost)
+    assert all(figures["sightings"] == 0 for figures in told[0])
+
+
+@drawn(15)
+@given(seeds, st.sampled_from(["furnished", "empty", "office"]))
+def test_drawn_fiducials_are_on_surfaces_that_robots_can_see(seed, world):
+    grid = {"shape": (31, 23, 1), "voxel_size_m": 0.5} if world == "office" else {}
+    scenario = free_box(world=world, grid=grid, fiducials={"number": 5}, **DRIFTING)
+    truth = make_world(scenario, seed % 100)
+    places = fiducial_places(scenario, truth, seed, 0)
+    voxels = truth.grid.voxel_of(places)
+    solid = np.pad(truth.occupied, 1, constant_values=True)
+    assert len({tuple(voxel) for voxel in voxels.tolist()}) == 5
+    for place, voxel in zip(places, voxels, strict=True):
+        assert truth.visible(scenario)[tuple(voxel)] and not truth.occupied[tuple(voxel)]
+        towards = np.rint((place - truth.grid.centre_of(voxel)) / (0.49 * truth.grid.voxel_size_m)).astype(
+            int
+        )
+        assert np.abs(towards).sum() == 1 and solid[tuple(voxel + 1 + towards)]
+    assert (places == fiducial_places(scenario, truth, seed, 0)).all()
+    assert (places != fiducial_places(scenario, truth, seed + 1, 0)).any()
+
+
+def test_fiducials_where_none_can_be_are_refused_before_anything_changes():
+    with pytest.raises(
+        SettingError, match=r"Fiducials.positions_m = \(1.0, 6.0, 1.0\): allowed is places from"
+    ):
+        free_box(fiducials={"positions_m": ((1.0, 6.0, 1.0),)})
+    occupied = np.zeros((7, 11, 5), bool)
+    occupied[3, 4, 2] = True
+    box = World(free_box().grid, occupied, "one block")
+    inside = free_box(fiducials={"positions_m": ((1.0, 1.0, 1.0), (1.75, 2.25, 1.25))}, **DRIFTING)
+    env = EntropyExploreEnv(inside, world=box)
+    with pytest.raises(
+        WorldError, match=r"Fiducials.positions_m = \(1.75, 2.25, 1.25\): allowed is a place in free"
+    ):
+        env.reset(seed=0)
+    many = started(free_box(fiducials={"number": 200}, **DRIFTING))
+    before = state_digest(many, 0)
+    many.rules = many.rules._replace()  # a reset that cannot be done leaves all as it was
+    object.__setattr__(many.scenario.fiducials, "number", 900)
+    with pytest.raises(WorldError, match=r"Fiducials.number = 900: allowed is at most 250"):
+        many.reset(0, 1)
+    object.__setattr__(many.scenario.fiducials, "number", 200)
+    assert state_digest(many, 0) == before
+
+
+@pytest.mark.parametrize(
+    ("kind", "field", "value"),
+    [
+        (Localization, "xy_m_per_sqrt_m", -0.1),
+        (Localization, "z_m_per_sqrt_rad", math.inf),
+        (Localization, "yaw_rad_per_sqrt_m", math.nan),
+        (Localization, "yaw_rad_per_sqrt_rad", 10.1),
+        (Localization, "xy_m_per_sqrt_rad", "0.1"),
+        (Localization, "z_m_per_sqrt_m", True),
+        (Fiducials, "number", -1),
+        (Fiducials, "number", 1001),
+        (Fiducials, "number", 2.0),
+        (Fiducials, "positions_m", [(0.0, 0.0, 0.0)]),
+        (Fiducials, "positions_m", ((0.0, 0.0),)),
+        (Fiducials, "positions_m", ((0.0, 0.0, math.nan),)),
+        (Fiducials, "range_m", 0.0),
+        (Fiducials, "range_sigma_m", 0.0),
+        (Fiducials, "bearing_sigma_rad", -0.1),
+    ],
+)
+def test_other_settings_are_refused_by_name(kind, field, value):
+    with pytest.raises(SettingError) as raised:
+        kind(**{field: value})
+    assert str(raised.value).startswith(f"{kind.__name__}.{field} = ")
+    with pytest.raises(SettingError, match=r"Fiducials.number = 2: allowed is 0 where positions_m"):
+        Fiducials(number=2, positions_m=((0.0, 0.0, 0.0),))
+
+
+def test_settings_go_through_json_and_exact_robots_cost_nothing():
+    fiducials = {"positions_m": ((1.0, 1.0, 1.0), (0.5, 2.0, 0.25)), "range_m": 4.0}
+    scenario = free_box(fiducials=fiducials, **DRIFTING)
+    assert scenario_from_json(settings_json(scenario)) == scenario and scenario.drifts
+    exact = free_box(fiducials=fiducials)
+    assert not exact.drifts and not Localization().drifts
+    missions = started(exact)
+    assert missions.rules.localization is None and missions.estimates is None
+    assert missions.state.estimates.size == missions.state.fiducials.size == 0
+    assert (view_of(missions, 0, 0).covariance == 0.0).all()
+    assert "localization" not in mission_figures(missions, 0)
+
+
+def test_what_a_robot_sees_and_says_is_where_it_believes_to_be():
+    """Views, observations and policies' observations of a drifted robot are made from its estimate alone."""
+    scenario = free_box(robots=2, fiducials={"number": 2}, decision_period_s=1.0, **DRIFTING)
+    missions = started(scenario)
+    wander(missions, 30, 0)
+    state = missions.state
+    observer = ViewObserver(scenario, scenario.observation, scenario.action)
+    time_s = float(state.missions["time_s"][0])
+    for robot in range(2):
+        view, own = view_of(missions, 0, robot), state.robots[0, robot]
+        estimate = state.estimates[0, robot]
+        pose = np.array(pose_at(missions.rules.params[robot], own, time_s))
+        assert (np.abs(view.pose - pose)[[0, 1, 3]] > 1e-4).all() and view.pose[4] == pose[4]
+        assert (view.covariance == estimate["covariance"]).all() and not view.covariance.flags.writeable
+        assert (view.fiducials_m == state.fiducials[0]).all()
+        np.testing.assert_array_equal(observer.observe(view), missions.observations[0, robot])
+        mate = view_of(missions, 0, 1 - robot).teammates[robot]
+        sent = np.array([estimate["scan_pose"], mate.pose])
+        assert (mate.pose != own["scan_pose"]).any() and np.abs(sent[0] - sent[1])[:3].max() < 1.0
+
+
+def drifting(**changes):
+    return free_box(
+        robots=3,
+        robot={"localization": SOME, "redecide": "on_scan"},
+        sensor={"scan_every_m": 0.4, "range_noise_m": 0.02},
+        channel={"i_min_bits": 0.0, "loss_probability": 0.1, "delay_s": 0.3},
+        fiducials={"number": 4},
+        **changes,
+    )
+
+
+def test_missions_that_drift_do_not_depend_on_batches_or_threads():
+    scenario = drifting(decision_period_s=1.0)
+    batch = Missions(scenario, 5, threads=2)
+    batch.reset_some(range(5), list(range(10, 15)))
+    rng = np.random.default_rng(0)
+    actions = [random_actions(batch, rng) for _ in range(30)]
+    for continuous, discrete in actions:
+        batch.step(continuous, discrete)
+    assert (batch.state.estimates["sightings"] > 0).any() and batch.state.estimates["error"].all()
+    for mission in range(5):
+        alone = started(scenario, 10 + mission)
+        for continuous, discrete in actions:
+            alone.step(continuous[mission : mission + 1], discrete[mission : mission + 1])
+        assert state_digest(alone, 0) == state_digest(batch, mission)
+
+
+@pytest.mark.parametrize("channel", CHANNELS)
+def test_copies_pickles_and_snapshots_go_on_alike(channel):
+    scenario = with_settings(drifting(), {"channel": {"delay_s": 0.0, **channel}})
+    missions = started(scenario)
+    wander(missions, 25, 0)
+    others = [copy.deepcopy(missions), pickle.loads(pickle.dumps(missions)), started(scenario, 99)]
+    restore(others[2], snapshot(missions))
+    wander(missions, 25, 1)
+    for other in others:
+        wander(other, 25, 1)
+        assert state_digest(other, 0) == state_digest(missions, 0)
+    changed = pickle.loads(pickle.dumps(missions))
+    changed.state.estimates["covariance"][0, 0, 1, 1] += 1e-9
+    assert state_digest(changed, 0) != state_digest(missions, 0)
+
+
+@pytest.mark.parametrize(
+    ("field", "value"),
+    [
+        ("place", math.nan),
+        ("place", -3.0),
+        ("error", 1e9),
+        ("covariance", math.inf),
+        ("covariance", -1.0),
+        ("packed", 1e99),
+        ("scan_pose", 1e3),
+        ("yaw", 50.0),
+        ("driven_m", -5.0),
+        ("sightings", -1),
+        ("squared_m2", -1.0),
+    ],
+)
+def test_a_saved_state_with_impossible_estimates_is_refused(field, value):
+    missions = started(drifting())
+    wander(missions, 5, 0)
+    saved, before = snapshot(missions), state_digest(missions, 0)
+    saved["estimates"] = saved["estimates"].copy()
+    saved["estimates"][field] = value
+    with pytest.raises(RecordError, match=f"estimates.{field}"):
+        restore(missions, saved)
+    assert state_digest(missions, 0) == before
+
+
+def test_a_record_runs_again_bit_for_bit(tmp_path):
+    env = EntropyExploreEnv(drifting(max_cycles=50))
+    env.reset(seed=4)
+    recorder, rng = CommandRecorder(env.missions), np.random.default_rng(3)
+    while env.agents:
+        actions = {agent: rng.uniform(-1, 1, 5).astype(np.float32) for agent in env.agents}
+        recorder.command(actions)
+        env.step(actions)
+        recorder.note()
+    save_record(recorder.record("drawn"), tmp_path / "mission.npz")
+    record = load_record(tmp_path / "mission.npz")
+    assert record.scenario == env.scenario and same_end(record, env.missions)
+    again = EntropyExploreEnv(record.scenario)
+    again.reset(seed=record.seed)
+    for command in record.commands:
+        again.step(dict(zip(record.scenario.agents, command, strict=True)))
+    assert same_end(record, again.missions)
+
+
+def test_drift_changes_neither_worlds_starts_nor_noise_nor_losses():
+    changes = {"robots": 3, "world": "furnished", "channel": {"loss_probability": 0.3}}
+    told = []
+    for robot in ({}, {"localization": SOME}):
+        missions = started(free_box(robot=robot, sensor={"range_noise_m": 0.1}, **changes))
+        put(missions, 0, STAY)
+        robots = toward(missions, *(view_of(missions, 0, robot).pose for robot in range(3)))
+        told.append(
+            [missions.state.truth.copy(), robots["origin"], robots["sensor_rng"], robots["channel_rng"]]
+        )
+    for one, other in zip(*told, strict=True):
+        assert (one == other).all()
+
+
+def test_infos_and_figures_say_how_wrong_robots_are():
+    scenario = free_box(decision_period_s=1.0, max_cycles=12, **DRIFTING)
+    env, envs = EntropyExploreEnv(scenario), EntropyExploreVectorEnv(scenario, num_envs=2)
+    _, told = env.reset(seed=0)
+    envs.reset(seed=0)
+    assert {info["pose_error_m"] for info in told.values()} == {0.0}
+    rng = np.random.default_rng(0)
+    while env.agents:
+        actions = {agent: rng.uniform(-1, 1, 5).astype(np.float32) for agent in env.agents}
+        _, _, _, _, infos = env.step(actions)
+    figures = infos["robot_0"]["figures"]["localization"]
+    estimates, robots = env.missions.state.estimates[0], env.missions.state.robots[0]
+    assert figures["rms_error_m"] == math.sqrt(estimates["squared_m2"].sum() / robots["scans"].sum())
+    assert figures["rms_error_rad"] == math.sqrt(estimates["squared_rad2"].sum() / robots["scans"].sum())
+    errors = [info["pose_error_m"] for info in infos.values()]
+    assert figures["mean_error_m"] == pytest.approx(np.mean(errors)) and min(errors) > 0.0
+    assert min(info["pose_error_rad"] for info in infos.values()) > 0.0
