@@ -58,7 +58,7 @@ def code_digest(*modules: str, strategy: str | None = None) -> str:
             hasher.update(file.read_bytes())
     elif strategy is not None:
         files |= imported(strategies.strategy_module(strategy))
-        maker = strategies.STRATEGIES.get(strategies.resolved(strategy))
+        maker = strategies.scripted_maker(strategies.resolved(strategy))
         hasher.update(repr(strategy.rpartition(":")[2] if maker is None else _described(maker)).encode())
     for name, file in sorted(files.items()):
         hasher.update(f"{name} {_module(file).digest}\n".encode())

@@ -22,6 +22,7 @@ from baselines.strategies.information_rate_v0 import InformationRate, Informatio
 from baselines.strategies.loading import entry_points, is_reference, make_referenced, module_of
 from baselines.strategies.mutual_information import MutualInformation, MutualInformationConfig
 from baselines.strategies.next_best_view import NextBestView, NextBestViewConfig
+from baselines.strategies.next_best_view.cliff import CliffConfig, CliffMapping
 from baselines.strategies.next_best_view.raster import Raster, RasterConfig
 from baselines.strategies.planned_rate import PlannedRate
 from baselines.strategies.protocol import Strategy
@@ -68,6 +69,17 @@ STRATEGIES: MappingProxyType[str, Callable[[], Strategy]] = MappingProxyType(
 )
 """Name → a function that makes the strategy."""
 
+CLIFF_STRATEGIES: MappingProxyType[str, Callable[[], Strategy]] = MappingProxyType(
+    {
+        "cliff-raster-fixed-yaw": partial(CliffMapping, CliffConfig("raster", turning=False)),
+        "cliff-raster": partial(CliffMapping, CliffConfig("raster")),
+        "cliff-straight-edge": partial(CliffMapping, CliffConfig(edge="line", interest_decay=0.0)),
+        "cliff-polygon-edge": partial(CliffMapping, CliffConfig(interest_decay=0.0)),
+        "cliff-next-best-view": CliffMapping,
+    }
+)
+"""The same of strategies for rovers above a cliff alone; who asks for all strategies does not mean them."""
+
 ALIASES: MappingProxyType[str, str] = MappingProxyType(
     {"best": "planned-rate", "information-rate": "information-rate-v0"}
 )
@@ -93,11 +105,17 @@ def make_strategy(name: str) -> Strategy:
         MissingExtraError: A policy was asked for, and what runs it is not installed.
     """
     name = resolved(name)
-    if name in STRATEGIES:
-        return STRATEGIES[name]()
+    maker = scripted_maker(name)
+    if maker is not None:
+        return maker()
     if is_learned(name):
         return learned_policies().make_policy_strategy(name)
     return make_referenced(_reference(name))
+
+
+def scripted_maker(name: str) -> Callable[[], Strategy] | None:
+    """What makes the strategy of the package with this name; None = there is none."""
+    return STRATEGIES.get(name) or CLIFF_STRATEGIES.get(name)
 
 
 def resolved(name: str) -> str:
@@ -115,8 +133,8 @@ def strategy_module(name: str) -> str | Path:
         SettingError: No strategy has this name.
     """
     name = resolved(name)
-    if name in STRATEGIES:
-        made_by = STRATEGIES[name]
+    made_by = scripted_maker(name)
+    if made_by is not None:
         while isinstance(made_by, partial):
             made_by = made_by.func
         return made_by.__module__
@@ -130,7 +148,7 @@ def _reference(name: str) -> str:
     declared = entry_points()
     if name in declared:
         return declared[name]
-    known = [*STRATEGIES, *ALIASES, *declared]
+    known = [*STRATEGIES, *CLIFF_STRATEGIES, *ALIASES, *declared]
     alike = difflib.get_close_matches(name, known, n=1)
     meant = f" (did you mean {alike[0]}?)" if alike else ""
     allowed = (
@@ -141,7 +159,7 @@ def _reference(name: str) -> str:
 
 def is_learned(name: str) -> bool:
     """Whether a name means a learned policy."""
-    return resolved(name) not in STRATEGIES and (name.startswith(_PRETRAINED) or Path(name).is_dir())
+    return scripted_maker(resolved(name)) is None and (name.startswith(_PRETRAINED) or Path(name).is_dir())
 
 
 def learned_policies() -> ModuleType:

@@ -1,0 +1,144 @@
+"""What a camera over an elevation map is expected to show, and what it is worth (Sujan, eqs. 3 and 5).
+
+Eq. 5 as printed, sgn(x)·∫₀ˣ + ½ with x = ray_z - Ob_z, is above ½ for rays below an obstacle, too: its
+integral ends at |x|. So the factor is Φ(x/σ), the probability that the obstacle is lower than the ray. Of
+eq. 3's braces the entropy of P_V/2 is meant: -(p log2 p + (1 - p) log2(1 - p)). Lengths are in voxel edges.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel
+
+_CLEAR = 4.0
+"""Standard deviations above an obstacle from which on a ray passes it for sure."""
+_HIDDEN = 1e-3
+"""Columns that are less likely to be seen than this count as hidden."""
+
+
+class Ground(NamedTuple):
+    """A robot's elevation map for compiled code."""
+
+    height: np.ndarray
+    """(X, Y) float64 above the workspace's floor, completed."""
+    sigma: np.ndarray
+    """(X, Y) float64 > 0."""
+    measurements: np.ndarray
+    """(X, Y) float64, n_grid of eq. 3; 0 = not known."""
+    interest: np.ndarray
+    """(X, Y) float64, eq. 9."""
+
+
+class Camera(NamedTuple):
+    """The view of a range sensor for compiled code."""
+
+    half_yaw: float
+    half_pitch: float
+    reach: float
+    """Voxel edges; inf allowed."""
+
+
+@lean_kernel
+def visibility(ground, camera, x, y):
+    """P_V of eq. 5: the probability that no column on the line to a camera hides the top of a column.
+
+    The ray's height above a column is that in the middle of its way over it. The column itself, and the
+    camera's, hide nothing.
+
+    Args:
+        ground: Ground.
+        camera: (x, y, z) of the camera.
+        x: The column.
+        y: The column.
+    """
+    columns_x, columns_y = ground.height.shape
+    at_x, at_y, at_z = x + 0.5, y + 0.5, ground.height[x, y]
+    along_x, along_y, rise = camera[0] - at_x, camera[1] - at_y, camera[2] - at_z
+    step_x, step_y = 1 if along_x > 0.0 else -1, 1 if along_y > 0.0 else -1
+    share_x = 1.0 / abs(along_x) if along_x != 0.0 else math.inf  # of the line, for each column crossed
+    share_y = 1.0 / abs(along_y) if along_y != 0.0 else math.inf
+    next_x, next_y = 0.5 * share_x, 0.5 * share_y
+    entered = min(next_x, next_y)
+    seen, i, j = 1.0, x, y
+    while entered < 1.0:
+        if next_x <= next_y:
+            i += step_x
+            next_x += share_x
+        else:
+            j += step_y
+            next_y += share_y
+        left = min(next_x, next_y)
+        if left >= 1.0 or not (0 <= i < columns_x and 0 <= j < columns_y):
+            break
+        above = at_z + 0.5 * (entered + left) * rise - ground.height[i, j]
+        entered = left
+        if above < _CLEAR * ground.sigma[i, j]:
+            seen *= 0.5 * math.erfc(-above / (ground.sigma[i, j] * math.sqrt(2.0)))
+            if seen < _HIDDEN:
+                return 0.0
+    return seen
+
+
+@inlined_kernel
+def in_view(camera, pose, x, y, z):
+    """Whether a point lies in the view of a camera: within its yaw, its pitch and its reach."""
+    along_x, along_y, below = x - pose[0], y - pose[1], pose[2] - z
+    level = math.sqrt(along_x * along_x + along_y * along_y)
+    if level * level + below * below > camera.reach * camera.reach or level == 0.0:
+        return False
+    turned = math.atan2(along_y, along_x) - pose[3]
+    turned -= 2.0 * math.pi * math.floor(turned / (2.0 * math.pi) + 0.5)
+    return abs(turned) <= camera.half_yaw and abs(math.atan2(below, level) - pose[4]) <= camera.half_pitch
+
+
+@inlined_kernel
+def column_bits(seen):
+    """The entropy of P_V/2 in bits, 0 for P_V = 0 and 1 for P_V = 1."""
+    p = 0.5 * seen
+    return 0.0 if p <= 0.0 else -(p * math.log2(p) + (1.0 - p) * math.log2(1.0 - p))
+
+
+@lean_kernel
+def fill_new_information(ground, camera, most, poses, bits):
+    """NI of eq. 3 for each of K poses, each column weighed by the interest in it.
+
+    Args:
+        ground: Ground.
+        camera: Camera.
+        most: n_max, measurements of a column from which on nothing more is learned.
+        poses: (K, 5) float64: x, y, z in voxel edges, yaw, pitch.
+        bits: (K,) float64, filled in.
+    """
+    columns_x, columns_y = ground.height.shape
+    for k in range(len(poses)):
+        pose, total = poses[k], 0.0
+        low_x, high_x = _span(pose[0], camera.reach, columns_x)
+        low_y, high_y = _span(pose[1], camera.reach, columns_y)
+        for x in range(low_x, high_x):
+            for y in range(low_y, high_y):
+                missing = (most - ground.measurements[x, y]) * ground.interest[x, y] / most
+                if missing > 0.0 and in_view(camera, pose, x + 0.5, y + 0.5, ground.height[x, y]):
+                    total += missing * column_bits(visibility(ground, (pose[0], pose[1], pose[2]), x, y))
+        bits[k] = total
+
+
+@lean_kernel
+def fill_visibility(ground, camera, pose, seen):
+    """P_V of every column from one pose (5,), 0 outside the view; `seen` (X, Y) float64 is filled in."""
+    for x in range(seen.shape[0]):
+        for y in range(seen.shape[1]):
+            seen[x, y] = 0.0
+            if in_view(camera, pose, x + 0.5, y + 0.5, ground.height[x, y]):
+                seen[x, y] = visibility(ground, (pose[0], pose[1], pose[2]), x, y)
+
+
+@inlined_kernel
+def _span(middle, reach, most):
+    """First and last but one of the columns along an axis that can be in reach."""
+    if math.isinf(reach):
+        return 0, most
+    return max(math.floor(middle - reach), 0), min(math.floor(middle + reach) + 1, most)
