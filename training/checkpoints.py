@@ -35,11 +35,13 @@ from safetensors.torch import save as bytes_of
 from entropy_explore_env.errors import EntropyExploreError
 from entropy_explore_env.scenario import Scenario
 from entropy_explore_env.settings_json import scenario_of, settings_of
+from entropy_explore_env.viewpoints.candidate_features import FEATURES_VERSION
 from training.errors import CheckpointError
-from training.networks import FEATURES
+from training.networks import NETWORKS
 
 FORMAT = 1
 _MOST_WEIGHTS = 1 << 26
+_MOST_PRIVILEGED = 1024
 _KEPT = 2
 """How many of a run's latest checkpoints of a kind stay, in case the newest one turns out unreadable."""
 
@@ -50,13 +52,17 @@ class PolicySettings:
 
     Attributes:
         scenario: The scenario of training; its observations and actions are the policy's.
-        features: The networks that read observations: a name of FEATURES.
-        hidden: Units of each hidden layer of actor and critic.
+        features: The networks that read observations: a name of NETWORKS.
+        hidden: Units of each hidden layer of actor and critic; over candidates one number, the units of each.
+        privileged: Numbers that follow an observation in training, which only the critic reads.
+        features_version: Of the features of candidates, `FEATURES_VERSION`; None = it does not observe them.
     """
 
     scenario: Scenario
     features: str = "vector"
     hidden: tuple[int, ...] = (128, 128)
+    privileged: int = 0
+    features_version: int | None = None
 
 
 @dataclass(frozen=True)
@@ -113,6 +119,8 @@ def save_checkpoint(folder: Path, checkpoint: Checkpoint) -> None:
             "format": FORMAT,
             "features": checkpoint.settings.features,
             "hidden": list(checkpoint.settings.hidden),
+            "privileged": checkpoint.settings.privileged,
+            "features_version": checkpoint.settings.features_version,
             "progress": checkpoint.progress,
             "sha256": {name: hashlib.sha256(content).hexdigest() for name, content in files.items()},
             "scenario": settings_of(checkpoint.settings.scenario),
@@ -213,16 +221,24 @@ def load_checkpoint(folder: Path, training: bool = False) -> Checkpoint:
 def _settings(folder: Path, head: Mapping[str, Any]) -> PolicySettings:
     """The PolicySettings that a head describes."""
     features, hidden = head.get("features"), head.get("hidden")
-    if not isinstance(features, str) or features not in FEATURES:
-        raise CheckpointError(f"{folder}: features", features, "one of " + ", ".join(FEATURES))
+    if not isinstance(features, str) or features not in NETWORKS:
+        raise CheckpointError(f"{folder}: features", features, "one of " + ", ".join(NETWORKS))
     if not isinstance(hidden, list) or not all(type(units) is int and 0 < units <= 65536 for units in hidden):
         raise CheckpointError(f"{folder}: hidden", hidden, "a list of whole numbers from 1 to 65536")
     if sum(one * other for one, other in pairwise(hidden)) > _MOST_WEIGHTS:
         raise CheckpointError(
             f"{folder}: hidden", hidden, f"layers with at most {_MOST_WEIGHTS} weights between"
         )
+    privileged, version = head.get("privileged", 0), head.get("features_version")
+    if type(privileged) is not int or not 0 <= privileged <= _MOST_PRIVILEGED:
+        raise CheckpointError(f"{folder}: privileged", privileged, f"from 0 to {_MOST_PRIVILEGED}")
+    current = FEATURES_VERSION if features == "candidates" else None
+    if version != current or isinstance(version, bool):
+        allowed = f"{current}: its features of candidates are not those of this library"
+        raise CheckpointError(f"{folder}: features_version", version, allowed)
     try:
-        return PolicySettings(scenario_of(head.get("scenario", {})), features, tuple(hidden))
+        scenario = scenario_of(head.get("scenario", {}))
+        return PolicySettings(scenario, features, tuple(hidden), privileged, version)
     except EntropyExploreError as error:
         raise CheckpointError(f"{folder}: scenario", str(error), "settings of this version") from None
 

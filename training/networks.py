@@ -20,6 +20,7 @@ from entropy_explore_env.errors import SettingError
 from entropy_explore_env.missions.action import action_space
 from entropy_explore_env.missions.observation.layout import ObservationLayout, Part
 from entropy_explore_env.scenario import Scenario
+from training.candidate_network import CandidatePolicy, candidate_parts
 from training.distributions import MoveAndGaze
 
 _MAPS = ("patch", "overview")
@@ -253,23 +254,37 @@ FEATURES: Mapping[str, type[VectorFeatures]] = {
 """Networks that read observations, by the name of the option `--features`."""
 
 
+NETWORKS = (*FEATURES, "candidates")
+"""Names of networks; those over candidates, in `candidate_network`, read observations as they are."""
+
+
 def policy_class(features: str) -> type[ActorCriticPolicy]:
-    """The policy that goes with a name of FEATURES."""
-    return GazePolicy if features == "gazes" else ActorCriticPolicy
+    """The policy that goes with a name of NETWORKS."""
+    return {"gazes": GazePolicy, "candidates": CandidatePolicy}.get(features, ActorCriticPolicy)
 
 
-def policy_settings(features: str, scenario: Scenario, hidden: tuple[int, ...]) -> dict[str, Any]:
+def policy_keywords(
+    features: str, scenario: Scenario, hidden: tuple[int, ...], privileged: int = 0
+) -> dict[str, Any]:
     """`policy_kwargs` of a Stable-Baselines3 policy: orthogonal weights, tanh, separate actor and critic.
 
     Args:
-        features: A name of FEATURES.
+        features: A name of NETWORKS.
         scenario: Whose observations and actions.
-        hidden: Units of the hidden layers.
+        hidden: Units of the hidden layers; over candidates one number, the units of each.
+        privileged: Numbers that follow an observation in training, for the critic over candidates.
 
     Raises:
-        SettingError: The networks cannot have the scenario's actions or panorama.
+        SettingError: The networks cannot have the scenario's actions or observations.
     """
     layout = ObservationLayout(scenario)
+    if features == "candidates":
+        return {
+            "parts": candidate_parts(layout),
+            "privileged": privileged,
+            "width": hidden[0],
+            "ortho_init": False,
+        }
     settings: dict[str, Any] = {
         "features_extractor_class": FEATURES[features],
         "features_extractor_kwargs": {"layout": layout},

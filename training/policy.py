@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 import torch
+from gymnasium import spaces
 from stable_baselines3.common.policies import ActorCriticPolicy
 from torch.distributions import Categorical, Normal
 
@@ -17,9 +18,11 @@ from entropy_explore_env.missions.observation.layout import ObservationLayout
 from entropy_explore_env.missions.view import RobotView
 from entropy_explore_env.missions.view_observation import ViewObserver
 from entropy_explore_env.scenario import Scenario
+from entropy_explore_env.viewpoints.candidate_features import FEATURES_VERSION
+from training.candidate_network import CandidatePolicy
 from training.checkpoints import Checkpoint, PolicySettings, latest_checkpoint, load_checkpoint
 from training.errors import CheckpointError
-from training.networks import VectorFeatures, policy_class, policy_settings
+from training.networks import VectorFeatures, policy_class, policy_keywords
 from training.normalisation import Normaliser
 
 _SHARED = ("pi_features_extractor.", "vf_features_extractor.")
@@ -36,12 +39,28 @@ def make_policy(
     settings: PolicySettings, schedule: Callable[[float], float] = lambda remaining: 0.0
 ) -> ActorCriticPolicy:
     """A policy with fresh weights, as Stable-Baselines3 trains it."""
+    size = ObservationLayout(settings.scenario).size + settings.privileged
     return policy_class(settings.features)(
-        ObservationLayout(settings.scenario).flat_space(),
+        spaces.Box(-np.inf, np.inf, (size,), np.float32),
         action_space(settings.scenario),
         schedule,
-        **policy_settings(settings.features, settings.scenario, settings.hidden),
+        **policy_keywords(settings.features, settings.scenario, settings.hidden, settings.privileged),
     )
+
+
+def settings_of_policy(
+    scenario: Scenario, features: str, hidden: tuple[int, ...], privileged: int = 0
+) -> PolicySettings:
+    """The settings of a new policy.
+
+    Args:
+        scenario: Of training.
+        features: A name of NETWORKS.
+        hidden: Units of the hidden layers; over candidates one number, the units of each.
+        privileged: Numbers that follow an observation in training, for the critic over candidates.
+    """
+    version = FEATURES_VERSION if features == "candidates" else None
+    return PolicySettings(scenario, features, hidden, privileged, version)
 
 
 def load_policy(checkpoint: Checkpoint) -> ActorCriticPolicy:
@@ -71,7 +90,8 @@ def load_weights(policy: ActorCriticPolicy, checkpoint: Checkpoint) -> None:
             raise CheckpointError(f"weights: {name}", shape, allowed)
         if not torch.isfinite(given).all():
             raise CheckpointError(f"weights: {name}", "not finite", "finite numbers")
-    stats = Normaliser(ObservationLayout(checkpoint.settings.scenario).size)
+    size = ObservationLayout(checkpoint.settings.scenario).size + checkpoint.settings.privileged
+    stats = Normaliser(size)
     stats.load_arrays("observations", checkpoint.normalisation)
     policy.load_state_dict(checkpoint.weights, strict=False)
     normalise_observations(policy, stats)
@@ -84,9 +104,9 @@ def weights_of(policy: ActorCriticPolicy) -> dict[str, torch.Tensor]:
 
 
 def normalise_observations(policy: ActorCriticPolicy, stats: Normaliser) -> None:
-    """Let a policy's networks see normalised observations."""
-    assert isinstance(policy.features_extractor, VectorFeatures)
-    policy.features_extractor.normalise_by(stats.mean, stats.std)
+    """Let a policy's networks see normalised observations; features of candidates are scaled as they are."""
+    if isinstance(policy.features_extractor, VectorFeatures):
+        policy.features_extractor.normalise_by(stats.mean, stats.std)
 
 
 def choose_actions(
@@ -95,7 +115,7 @@ def choose_actions(
     """Actions for observations, without touching the random state that training draws from.
 
     Args:
-        policy: Chooses.
+        policy: Chooses; one over candidates always takes its likeliest action, which needs no draw.
         observations: (N, F) float32.
         rng: Draws the actions from the policy's distribution; None = its likeliest actions.
 
@@ -105,7 +125,7 @@ def choose_actions(
     with torch.inference_mode():
         chosen = policy.get_distribution(torch.as_tensor(observations)).distribution
         if isinstance(chosen, Categorical):
-            if rng is None:
+            if rng is None or isinstance(policy, CandidatePolicy):
                 return chosen.logits.argmax(dim=1).numpy()
             return torch.multinomial(chosen.probs, 1, generator=rng)[:, 0].numpy()
         assert isinstance(chosen, Normal)
@@ -139,7 +159,8 @@ def misfit(scenario: Scenario, trained: Scenario) -> Misfit | None:
     kinds = [len(each.kinds) for each in (scenario, trained)]
     if "team" in differing:
         return Misfit("robots", scenario.robots, trained.robots)
-    if scenario.planar != trained.planar:  # so that the panorama, the gazes and the moves differ
+    over_candidates = trained.action.kind == "candidates"
+    if scenario.planar != trained.planar and not over_candidates:  # panorama, gazes and moves differ
         return Misfit("motion of the robots", _motion(scenario), _motion(trained))
     if "self" in differing and kinds[0] != kinds[1]:
         return Misfit("kinds of robots", *kinds)
@@ -159,7 +180,8 @@ class LearnedPolicy:
     """The strategy of a checkpoint: every robot's policy observes that robot's own RobotView.
 
     As in training, actions are drawn from the policy's distribution; the mission's random stream for
-    strategies seeds the draws.
+    strategies seeds the draws. A policy over candidates takes its likeliest ones; its planner draws them from
+    that stream.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -183,7 +205,7 @@ class LearnedPolicy:
                 actions that this scenario does not have.
         """
         trained = self._checkpoint.settings.scenario
-        self._observer = ViewObserver(scenario, trained.observation, trained.action)
+        self._observer = ViewObserver(scenario, trained.observation, trained.action, rng)
         reason = misfit(self._observer.scenario, trained)
         if reason is None and scenario.action.kind == "discrete" and scenario.action != trained.action:
             reason = Misfit("Scenario.action", scenario.action, f"continuous, or {trained.action}")

@@ -21,9 +21,8 @@ import shlex
 import warnings
 from collections.abc import Mapping, Sequence
 from contextlib import closing
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import torch
@@ -31,34 +30,25 @@ from stable_baselines3 import PPO
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import Logger, TensorBoardOutputFormat
 
-from baselines.cli.arguments import INLINE, WholeNumber, make_folder, print_json, run_command
-from baselines.cli.task_options import (
-    TaskOptions,
-    absolute_files,
-    base_task,
-    first_parsed,
-    is_whole_scenario,
-    parsed_for,
-    settled,
-    tasked,
-)
+from baselines.cli.arguments import make_folder, print_json, run_command
+from baselines.cli.task_options import base_task
 from entropy_explore_env.command import INTERRUPTED
+from entropy_explore_env.envs.privileged_vec_env import PrivilegedVecEnv
+from entropy_explore_env.envs.rewards import StepFigures
 from entropy_explore_env.envs.robot_vec_env import RobotVecEnv
-from entropy_explore_env.errors import SettingError
-from entropy_explore_env.scenario import with_settings
-from entropy_explore_env.validation import check_whole
 from entropy_explore_env.writing import write_atomically
 from training import extra  # noqa: F401 - before what is not there without it
-from training.advantages import DecisionBuffer, DiscountUnit
+from training.advantages import DecisionBuffer
 from training.best_mission import draw_best_mission
-from training.checkpoints import PolicySettings, checkpoint_name, forget_later, save_checkpoint
+from training.candidate_network import actor_frozen
+from training.checkpoints import checkpoint_name, forget_later, save_checkpoint
 from training.decision_ppo import DecisionPPO
 from training.errors import NotFiniteError
 from training.interruption import Interruption
-from training.networks import policy_class, policy_settings
+from training.networks import policy_class, policy_keywords
 from training.normalisation import Normaliser
-from training.options import check_options, check_share
-from training.policy import normalise_observations, weights_of
+from training.policy import normalise_observations, settings_of_policy, weights_of
+from training.ppo_options import OWN, Args, check, parsed, settled_arguments, training_task
 from training.progress import MissionFigures, Progress
 from training.resuming import (
     TrainingState,
@@ -67,6 +57,7 @@ from training.resuming import (
     restore_state,
     save_policy,
     save_state,
+    start_from,
 )
 from training.run_folder import options_json, resume_command, resumed_options, save_options
 from training.seeds import learning_seeds
@@ -77,92 +68,14 @@ from training.validation import Validator
 _MODULE = "training.ppo"
 _CHANGEABLE = frozenset(("video", "threads", "json", "total_steps", "validate_every", "checkpoint_every"))
 """Options that may differ where a run is continued."""
-OWN = {"ending": {"time_limit_s": 2000.0}}
-"""What training changes of named scenarios: longer missions would teach little and take all the time."""
 _STOPPED = "a checkpoint is written when this rollout and its update are done"
 _RETURNS_MEMORY = 2e5
 """Decisions, about, whose returns normalise: the latest ones, since returns grow as the policy learns."""
 
 
-@dataclass
-class Args:
-    """Train a policy with PPO."""
-
-    scenario: str = "room"
-    """Named scenario: room, room-furnished, office, … (the README lists them)."""
-    robots: int = 3
-    """Robots in a team."""
-    missions: int = 64
-    """Missions simulated at a time."""
-    total_steps: WholeNumber = 2_500_000
-    """Steps to train for, counted per robot."""
-    seed: int = 0
-    """Seed of weights, missions and all other draws."""
-    out: Path | None = None
-    """Folder of a new run; default: runs/SCENARIO-ROBOTS."""
-    resume: Path | None = None
-    """Folder of a run to continue from its latest checkpoint, with the settings that it was started with."""
-    threads: int = 2
-    """Threads for missions and for updates; choosing actions takes one."""
-    json: bool = False
-    """Print one JSON object and nothing else."""
-
-    reward: Literal["individual", "team"] = "individual"
-    """individual: bits that the robot's own scans take from its map; team: bits that the team's maps lose."""
-    cost_per_s: float | None = None
-    """Cost of a second, as a share of all bits that the mission has to gain; default: the scenario's."""
-    task: Annotated[TaskOptions, INLINE] = dataclasses.field(default_factory=TaskOptions)
-    validation_world: tuple[str, ...] = ()
-    """World files of validation, read as those of --world; default: the same as those learned in."""
-
-    features: Literal["gazes", "vector", "maps"] = "gazes"
-    """vector: an MLP; gazes: also a small network for gazes, over the panorama; maps: also convolutions."""
-    overview: bool = False
-    """Observe the whole belief, pooled to a few cells; with vector features as plain numbers."""
-    patch: bool = False
-    """Observe the belief around the robot; needs `--features maps`."""
-    hidden: tuple[int, ...] = (128, 128)
-    """Units of the hidden layers of actor and critic."""
-    actions: Literal["discrete", "continuous"] = "discrete"
-    """discrete: 7 moves × yaws × pitches; continuous: any viewpoint within reach."""
-    yaws: int = 16
-    """Gazes, and rays of the panorama, around the horizon."""
-    pitches: int = 7
-    """Gazes, and rays of the panorama, from -45° to 45°."""
-
-    rollout_steps: int = 128
-    """Steps of each mission between two updates."""
-    epochs: int = 4
-    """Passes over a rollout's decisions in an update."""
-    batch: int = 1024
-    """Decisions in a minibatch."""
-    learning_rate: float = 1e-3
-    """Adam's learning rate at first; it falls linearly to a twentieth."""
-    discount: DiscountUnit = "seconds"
-    """What the discount is counted in: seconds or decisions."""
-    gamma: float = 0.9
-    """Discount factor per second, or per decision."""
-    gae_lambda: float = 0.95
-    """λ of generalised advantage estimation, per decision."""
-    clip: float = 0.2
-    """Clipping range of PPO's probability ratio."""
-    entropy: float = 0.003
-    """Weight of the entropy bonus."""
-
-    validate_every: WholeNumber = 250_000
-    """Steps between two validations."""
-    validation_missions: int = 32
-    """Missions in a validation."""
-    video: bool = True
-    """At the end, run a mission of the best policy and write it as a picture and an animation."""
-    checkpoint_every: WholeNumber = 500_000
-    """Steps between two checkpoints, the first after the first update: what a run that is killed loses at
-    most; one that Ctrl-C stops loses nothing."""
-
-
 def main(words: Sequence[str]) -> int:
     """Run the command."""
-    args, changed = parsed(words), {}
+    args, changed = parsed(words, __doc__), {}
     if args.resume is not None:
         args, changed = resumed_options(Args, args.resume, words, _CHANGEABLE, __doc__, settled_arguments)
     named = base_task(args.scenario, args.task.settings, OWN).scenario
@@ -179,6 +92,8 @@ def main(words: Sequence[str]) -> int:
         checkpoint = checkpoint_to_resume(out)
     torch.set_num_threads(args.threads)
     state = set_up(args, task)
+    if args.start is not None and checkpoint is None:
+        start_from(state, args.start)
     if args.resume is None:
         save_options(out, args, _MODULE, words)
     state.options, state.command = options_json(args), shlex.join(["python", "-m", _MODULE, *words])
@@ -231,83 +146,21 @@ def say_stopped(out: Path, steps: int, as_json: bool) -> int:
     return INTERRUPTED
 
 
-def check(args: Args) -> None:
-    """Raise a SettingError where an option is out of its range."""
-    check_options(args)
-    for name in ("threads", "rollout_steps", "validate_every", "validation_missions"):
-        check_whole(name, getattr(args, name), 1)
-    check_share("gamma", args.gamma)
-    if not 0.0 <= args.entropy < np.inf:
-        raise SettingError("entropy", args.entropy, "a number ≥ 0")
-    if args.patch and args.features != "maps":
-        raise SettingError("patch", args.patch, "used with --features maps, whose networks read it")
-
-
-def parsed(words: Sequence[str]) -> Args:
-    """The arguments of a command line; what is not given is the scenario's own.
-
-    Raises:
-        UsageError: The words do not fit.
-        SettingError: There is no such scenario.
-    """
-    first = first_parsed(Args, words, __doc__)
-    task = base_task(first.scenario, first.task.settings, OWN)
-    robots = {"robots": task.scenario.robots} if is_whole_scenario(first.task.settings) else {}
-    args = parsed_for(task, first, words, __doc__, **robots)
-    return settled_arguments(args)
-
-
-def settled_arguments(args: Args) -> Args:
-    """The same arguments wherever the run is continued.
-
-    Raises:
-        SettingError: A file of JSON does not hold what it should.
-    """
-    files = absolute_files(args.validation_world)
-    return dataclasses.replace(args, task=settled(args.task), validation_world=files)
-
-
-def training_task(args: Args) -> TrainingTask:
-    """What the policy learns in.
-
-    Raises:
-        SettingError: An option is not allowed.
-        WorldError: A world file cannot be used.
-    """
-    named = base_task(args.scenario, args.task.settings, OWN).scenario
-    scenario, surroundings = tasked(named, args.task, args.robots)
-    scenario = with_settings(
-        scenario,
-        {
-            "robots": args.robots,
-            "reward": {
-                "kind": args.reward,
-                **({} if args.cost_per_s is None else {"cost_per_s": args.cost_per_s}),
-            },
-            "action": {"kind": args.actions, "moves": "axes", "yaws": args.yaws, "pitches": args.pitches},
-            "observation": {
-                "panorama_yaws": args.yaws,
-                "panorama_pitches": args.pitches,
-                "panorama_utility": "log2",
-                "overview": args.overview,
-                "patch": args.patch,
-                "flat": True,
-                "while_busy": False,
-            },
-        },
-    )
-    return TrainingTask(scenario, surroundings)
-
-
 def set_up(args: Args, task: TrainingTask) -> TrainingState:
     """Missions to learn from, and PPO with fresh weights."""
-    seeds, around = learning_seeds(args.seed, args.missions), task.surroundings.settings()
-    envs = RobotVecEnv(task.scenario, args.missions, threads=args.threads, seeds=seeds, **around)
-    scenario = envs.scenario
+    around = task.surroundings.settings()
+    if args.reward == "seconds":
+        around["reward_function"] = less_the_seconds
+    rows_of = PrivilegedVecEnv if args.critic == "privileged" else RobotVecEnv
+    seeds = learning_seeds(args.seed, args.missions)
+    envs = rows_of(task.scenario, args.missions, threads=args.threads, seeds=seeds, **around)
+    layout = envs.vector_env.missions.layout
+    size = int(np.prod(envs.observation_space.shape or ()))
+    settings = settings_of_policy(envs.scenario, args.networks, args.layers, size - layout.size)
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", message="You have specified a mini-batch")  # ours are of even size
         model = DecisionPPO(
-            policy_class(args.features),
+            policy_class(settings.features),
             envs,
             learning_rate=lambda remaining: args.learning_rate * max(remaining, 0.05),
             n_steps=args.rollout_steps,
@@ -317,6 +170,7 @@ def set_up(args: Args, task: TrainingTask) -> TrainingState:
             gae_lambda=args.gae_lambda,
             clip_range=args.clip,
             ent_coef=args.entropy,
+            target_kl=args.target_kl,
             rollout_buffer_class=DecisionBuffer,
             rollout_buffer_kwargs={
                 "envs": envs,
@@ -324,17 +178,18 @@ def set_up(args: Args, task: TrainingTask) -> TrainingState:
                 "return_stats": Normaliser(memory=_RETURNS_MEMORY),
                 "rng": np.random.default_rng(args.seed),
             },
-            policy_kwargs=policy_settings(args.features, scenario, tuple(args.hidden)),
+            policy_kwargs=policy_keywords(
+                settings.features, settings.scenario, settings.hidden, settings.privileged
+            ),
             seed=args.seed,
             device="cpu",
         )
-    return TrainingState(
-        PolicySettings(scenario, args.features, tuple(args.hidden)),
-        model,
-        envs,
-        Normaliser(envs.vector_env.missions.layout.size),
-        Progress(args.validate_every),
-    )
+    return TrainingState(settings, model, envs, Normaliser(size), Progress(args.validate_every))
+
+
+def less_the_seconds(figures: StepFigures) -> np.ndarray:
+    """The reward of a step: less the seconds that it took, (E, A)."""
+    return -figures.elapsed_s
 
 
 def train(args: Args, state: TrainingState, bar: TrainingBar, interruption: Interruption) -> None:
@@ -382,7 +237,8 @@ def rollout_and_update(args: Args, state: TrainingState, callback: BaseCallback)
             model.collect_rollouts(state.envs, callback, buffer, args.rollout_steps)
         observations = buffer.observations[buffer.complete]
         # Epochs of minibatches with PPO's clipped loss (stable_baselines3.PPO.train).
-        with progress.timed("learning_s"):
+        warming = model.num_timesteps <= args.critic_first * args.rollout_steps * state.envs.num_envs
+        with progress.timed("learning_s"), actor_frozen(model.policy, warming):
             model.update()
     except (ValueError, RuntimeError):  # PyTorch's, of a distribution that is not finite
         check_finite(model)

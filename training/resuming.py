@@ -23,7 +23,7 @@ from training.checkpoints import (
 from training.errors import CheckpointError
 from training.normalisation import Normaliser
 from training.options import check_new
-from training.policy import load_weights, weights_of
+from training.policy import POLICIES, load_weights, misfit, weights_of
 from training.progress import Progress
 from training.run_folder import FILE
 
@@ -153,6 +153,27 @@ def checkpoint_to_resume(folder: Path) -> Checkpoint | None:
         forget_later(folder, "best", 0)
         return None
     return load_checkpoint(latest, training=True)
+
+
+def start_from(state: TrainingState, folder: Path) -> None:
+    """Begin a new run with the weights of another, and with the scale of what its critic learned.
+
+    Args:
+        state: Of the new run.
+        folder: A run or a checkpoint.
+
+    Raises:
+        CheckpointError: It cannot be read, or its networks are others.
+    """
+    checkpoint = load_checkpoint(latest_checkpoint(folder, *POLICIES))
+    ours, theirs = state.settings, checkpoint.settings
+    for name in ("features", "hidden", "privileged"):
+        if getattr(theirs, name) != getattr(ours, name):
+            raise CheckpointError(f"{folder}: {name}", getattr(theirs, name), f"{getattr(ours, name)}")
+    if (differs := misfit(theirs.scenario, ours.scenario)) is not None:
+        raise CheckpointError(f"{folder}: {differs.what}", differs.given, f"{differs.trained}")
+    load_weights(state.model.policy, checkpoint)
+    state.buffer.return_stats.load_arrays("returns", checkpoint.normalisation)
 
 
 def check_unused(folder: Path) -> None:

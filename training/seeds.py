@@ -4,7 +4,7 @@
 | --- | --- |
 | tables and tests | 0, 1, 2, … |
 | validation | 2³² + 0, 1, 2, … |
-| learning | ≥ 2⁶³, drawn for each run |
+| learning, and labels of roll-outs | ≥ 2⁶³, drawn for each run |
 """
 
 from __future__ import annotations
@@ -12,11 +12,18 @@ from __future__ import annotations
 import numpy as np
 
 _VALIDATION, _LEARNING = 2**32, 2**63
+_LABELS_KEY = 1
 
 
-def validation_seeds(missions: int) -> list[int]:
-    """The first seeds for validation; every run has the same, so that runs compare."""
-    return [_VALIDATION + mission for mission in range(missions)]
+def validation_seeds(missions: int, first: int = 0) -> list[int]:
+    """Seeds for validation from a first one on; every run has the same, so that runs compare."""
+    return [_VALIDATION + first + mission for mission in range(missions)]
+
+
+def label_seeds(seed: int, shard: int, missions: int) -> list[int]:
+    """Seeds of the missions of one file of roll-out labels; those of learning, and never one twice."""
+    sequence = np.random.SeedSequence(entropy=seed, spawn_key=(_LABELS_KEY, shard))
+    return [_LEARNING + int(drawn) for drawn in sequence.generate_state(missions, np.uint64)]
 
 
 def learning_seeds(seed: int, missions: int) -> list[int]:

@@ -35,7 +35,9 @@ class Validation:
 class Validator:
     """The same missions every time: worlds of the validation split, where robots decide whenever they can."""
 
-    def __init__(self, scenario: Scenario, surroundings: Surroundings, missions: int, threads: int) -> None:
+    def __init__(
+        self, scenario: Scenario, surroundings: Surroundings, missions: int, threads: int, first: int = 0
+    ) -> None:
         """Make the missions.
 
         Args:
@@ -43,13 +45,14 @@ class Validator:
             surroundings: World files and starts of the missions.
             missions: How many missions to run.
             threads: Threads that share them.
+            first: How many of the seeds for validation are left out before.
         """
         validation = with_settings(scenario, {"split": "validation", "decision_period_s": None})
         around = surroundings.settings()
         self._env = EntropyExploreVectorEnv(
             validation, missions, threads=threads, action_masks=False, **around
         )
-        self._seeds = validation_seeds(missions)
+        self._seeds = validation_seeds(missions, first)
 
     def validate(
         self, policy: ActorCriticPolicy, stop: Callable[[], bool] = lambda: False
@@ -60,19 +63,10 @@ class Validator:
             policy: Chooses.
             stop: Asked at every step whether to stop before the end; the result is None then.
         """
-        env, rng = self._env, torch.Generator().manual_seed(0)
-        missions, robots = env.num_envs, env.scenario.robots
-        observations, _ = env.reset(seed=self._seeds)
-        figures: list[dict[str, float] | None] = [None] * missions
-        while any(each is None for each in figures):
-            if stop():
-                return None
-            actions = choose_actions(policy, observations.reshape(missions * robots, -1), rng)
-            shape = (missions, robots) if robots > 1 else (missions,)
-            observations, _, _, _, infos = env.step(actions.reshape(shape + actions.shape[1:]))
-            for mission in np.flatnonzero(infos.get("_figures", ())).tolist():
-                figures[mission] = figures[mission] or infos["figures"][mission]
-        ended = [each for each in figures if each is not None]
+        rng = torch.Generator().manual_seed(0)
+        ended = self.run(lambda observations: choose_actions(policy, observations, rng), stop)
+        if ended is None:
+            return None
         times_s = np.array([each["t_mission_s"] for each in ended])
         gained_per_sent = [each["bits_gained_per_bit_sent"] for each in ended]
         defined = [each for each in gained_per_sent if each is not None]
@@ -82,6 +76,32 @@ class Validator:
             float(np.mean([each["finished"] for each in ended])),
             float(np.mean(defined)) if defined else None,
         )
+
+    def run(
+        self, choose: Callable[[np.ndarray], np.ndarray], stop: Callable[[], bool] = lambda: False
+    ) -> list[dict[str, float]] | None:
+        """Run each mission to its end.
+
+        Args:
+            choose: From observations of all robots (E·A, F) to their actions (E·A, ...).
+            stop: Asked at every step whether to stop before the end; the result is None then.
+
+        Returns:
+            The figures of each mission.
+        """
+        env = self._env
+        missions, robots = env.num_envs, env.scenario.robots
+        observations, _ = env.reset(seed=self._seeds)
+        figures: list[dict[str, float] | None] = [None] * missions
+        while any(each is None for each in figures):
+            if stop():
+                return None
+            actions = choose(observations.reshape(missions * robots, -1))
+            shape = (missions, robots) if robots > 1 else (missions,)
+            observations, _, _, _, infos = env.step(actions.reshape(shape + actions.shape[1:]))
+            for mission in np.flatnonzero(infos.get("_figures", ())).tolist():
+                figures[mission] = figures[mission] or infos["figures"][mission]
+        return [each for each in figures if each is not None]
 
     def close(self) -> None:
         """End the threads."""

@@ -14,7 +14,7 @@ from entropy_explore_env.missions.observation.layout import ObservationLayout
 from entropy_explore_env.scenario import Scenario, with_settings
 from entropy_explore_env.scenarios import find_scenario
 from training.checkpoints import PolicySettings
-from training.networks import GazeHeads, MapFeatures, VectorFeatures, policy_settings
+from training.networks import GazeHeads, MapFeatures, VectorFeatures, policy_keywords
 from training.normalisation import Normaliser
 from training.policy import choose_actions, make_policy, normalise_observations, weights_of
 
@@ -136,7 +136,7 @@ def test_continuous_actions_stay_in_their_box() -> None:
 def test_gazes_want_a_ray_for_each_gaze(change: dict[str, Any]) -> None:
     there = with_settings(scenario(), change)
     with pytest.raises(SettingError, match="a ray for each gaze"):
-        policy_settings("gazes", there, (8,))
+        policy_keywords("gazes", there, (8,))
 
 
 @pytest.mark.parametrize("features", ["gazes", "vector"])

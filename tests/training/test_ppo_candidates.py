@@ -1,0 +1,146 @@
+"""PPO over candidates: it begins as the planner, learns, and resumes bitwise."""
+
+from __future__ import annotations
+
+import contextlib
+import csv
+import io
+import json
+from contextlib import closing
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+
+from baselines.experiments.mission import Surroundings
+from entropy_explore_env.command import BAD_INPUT
+from entropy_explore_env.envs.privileged_vec_env import PrivilegedVecEnv
+from entropy_explore_env.missions.privileged import PRIVILEGED
+from entropy_explore_env.viewpoints.candidate_features import FEATURES_VERSION
+from tests.training.test_ppo import checkpoint_bits
+from training import ppo
+from training.advantages import DecisionBuffer
+from training.candidate_network import CandidatePolicy
+from training.checkpoints import latest_checkpoint, load_checkpoint
+from training.policy import make_policy_strategy
+from training.ppo_options import parsed, training_task
+from training.validation import Validator
+
+TINY = (
+    "--scenario box-7x11x5 --robots 2 --actions candidates --candidates 5 --width 8 --missions 2 --threads 1 "
+    "--rollout-steps 16 --batch 16 --epochs 2 --validation-missions 1 --time-limit-s 40 --validate-every 128 "
+    "--checkpoint-every 64 --reward seconds --gamma 1.0 --critic privileged --no-video --json"
+).split()
+
+
+def learn(out: Path, *more: str, steps: int = 192) -> int:
+    with contextlib.redirect_stdout(io.StringIO()):
+        return ppo.run_command(ppo.main, [*TINY, "--out", str(out), "--total-steps", str(steps), *more])
+
+
+@pytest.fixture(scope="module")
+def trained(tmp_path_factory):
+    out = tmp_path_factory.mktemp("candidates") / "run"
+    assert learn(out) == 0
+    return out
+
+
+def test_a_run_learns_and_its_policy_is_a_strategy(trained):
+    first, last = (load_checkpoint(folder) for folder in sorted(trained.glob("step-*")))
+    assert first.settings.features == "candidates" and first.settings.hidden == (8,)
+    assert first.settings.privileged == len(PRIVILEGED)
+    assert first.settings.features_version == FEATURES_VERSION
+    changed = [name for name in first.weights if not torch.equal(first.weights[name], last.weights[name])]
+    assert any(".actor." in name for name in changed) and any(".critic." in name for name in changed)
+    with (trained / "curve.csv").open() as file:
+        assert [int(row["steps"]) for row in csv.DictReader(file)] == [128, 192]
+    make_policy_strategy(str(trained))
+
+
+def test_fresh_weights_do_exactly_what_the_planner_does():
+    task = training_task(parsed(TINY))
+    state = ppo.set_up(parsed(TINY), task)
+    assert isinstance(state.envs, PrivilegedVecEnv) and isinstance(state.model.policy, CandidatePolicy)
+    with closing(Validator(state.settings.scenario, Surroundings(), 3, threads=1)) as validator:
+        planner = validator.run(lambda seen: np.zeros(len(seen), np.int64))
+        policy = validator.validate(state.model.policy)
+    assert planner is not None and policy is not None
+    assert policy.mean_s == pytest.approx(np.mean([each["t_mission_s"] for each in planner]), abs=1e-9)
+
+
+def test_rewards_are_less_the_seconds():
+    state = ppo.set_up(parsed(TINY), training_task(parsed(TINY)))
+    state.envs.reset()
+    for _ in range(5):
+        _, rewards, _, _ = state.envs.step(np.zeros(4, np.int64))
+        assert np.allclose(rewards, -state.envs.elapsed_s) and (rewards < 0.0).all()
+
+
+def test_in_the_first_updates_only_the_critic_learns_and_a_run_can_begin_with_weights(trained, tmp_path):
+    out = tmp_path / "run"
+    assert learn(out, "--critic-first", "2", "--start", str(trained), steps=128) == 0
+    begun = load_checkpoint(latest_checkpoint(trained, "best", "step")).weights
+    kept = load_checkpoint(latest_checkpoint(out, "step")).weights
+    assert all(torch.equal(begun[name], kept[name]) for name in begun if ".actor." in name)
+    assert not all(torch.equal(begun[name], kept[name]) for name in begun if ".critic." in name)
+    assert learn(tmp_path / "on", "--critic-first", "1", "--start", str(trained), steps=128) == 0
+    moved = load_checkpoint(latest_checkpoint(tmp_path / "on", "step")).weights
+    assert not all(torch.equal(begun[name], moved[name]) for name in begun if ".actor." in name)
+
+
+def test_a_resumed_run_ends_bitwise_like_an_uninterrupted_one(trained, tmp_path, monkeypatch):
+    class Killed(BaseException):
+        """Stands for a kill."""
+
+    compute, rollouts = DecisionBuffer.compute_returns_and_advantage, []
+
+    def die(*args, **kwargs):
+        if len(rollouts) == 2:
+            raise Killed
+        rollouts.append(1)
+        return compute(*args, **kwargs)
+
+    out = tmp_path / "run"
+    with monkeypatch.context() as patch:
+        patch.setattr(DecisionBuffer, "compute_returns_and_advantage", die)
+        with pytest.raises(Killed):
+            learn(out)
+    assert 0 < int(latest_checkpoint(out, "step").name.rpartition("-")[2]) < 192
+    with contextlib.redirect_stdout(io.StringIO()):
+        assert ppo.run_command(ppo.main, ["--resume", str(out)]) == 0
+    assert checkpoint_bits(out) == checkpoint_bits(trained)
+
+
+def test_weights_of_other_networks_are_refused(trained, tmp_path, capsys):
+    assert learn(tmp_path / "run", "--start", str(trained), "--width", "12") == BAD_INPUT
+    assert "hidden" in capsys.readouterr().err
+    assert learn(tmp_path / "two", "--start", str(trained), "--critic", "observed") == BAD_INPUT
+    assert "privileged" in capsys.readouterr().err
+    assert learn(tmp_path / "three", "--start", str(trained), "--candidates", "4") == BAD_INPUT
+    assert "candidates" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["--width", "6"],
+        ["--features", "maps"],
+        ["--overview"],
+        ["--candidates", "65"],
+        ["--target-kl", "0"],
+        ["--critic-first", "-1"],
+        ["--actions", "discrete"],
+        ["--actions", "discrete", "--critic", "observed", "--critic-first", "2"],
+    ],
+)
+def test_options_that_do_not_go_together_are_refused(words, tmp_path, capsys):
+    assert learn(tmp_path / "run", *words) == BAD_INPUT
+    assert len(capsys.readouterr().err.splitlines()) == 1
+
+
+def test_checkpoints_of_earlier_versions_have_no_candidates(trained):
+    head = json.loads((latest_checkpoint(trained, "best") / "policy.json").read_text())
+    assert {"privileged", "features_version"} <= head.keys()
+    pretrained = load_checkpoint(latest_checkpoint(Path("training/pretrained/room"), "best", "step"))
+    assert pretrained.settings.privileged == 0 and pretrained.settings.features_version is None
