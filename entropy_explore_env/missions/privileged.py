@@ -18,6 +18,7 @@ from entropy_explore_env.errors import CallOrderError, SettingError
 from entropy_explore_env.missions.poses import pose_at
 from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.missions.state import MissionEnd, MissionState
+from entropy_explore_env.scenario import with_settings
 
 _FOLD = 1e150
 """Ratios of voxels are multiplied up to this before their logarithm is taken."""
@@ -141,14 +142,15 @@ def copy_missions(source: Missions, rows: Sequence[int], target: Missions, at: S
     Args:
         source: Where they are; it stays as it is.
         rows: (N,) numbers of missions in it; one may be there several times.
-        target: Other missions of the same scenario.
+        target: Other missions of the same scenario. They may observe something else: then their observations
+            are those that they had, until the next step.
         at: (N,) numbers of missions in it that are replaced.
 
     Raises:
         SettingError: The scenarios differ, or there are no such missions. Nothing has changed then.
         CallOrderError: A mission was never reset.
     """
-    if target is source or target.scenario != source.scenario:
+    if target is source or not _same_states(source, target):
         allowed = "other missions of the same scenario as the source"
         raise SettingError("target", target.scenario.name, allowed)
     wanted, places = np.asarray(rows, np.int64), np.asarray(at, np.int64)
@@ -168,11 +170,18 @@ def copy_missions(source: Missions, rows: Sequence[int], target: Missions, at: S
         per_mission = len(array) // source.count  # one row a mission but for collision masks
         shape = (-1, per_mission, *array.shape[1:])
         kept.reshape(shape)[places] = array.reshape(shape)[wanted]
-    target.observations[places] = source.observations[wanted]
+    if target.scenario == source.scenario:
+        target.observations[places] = source.observations[wanted]
     target.world_numbers[places] = source.world_numbers[wanted]
     for row, place in zip(wanted.tolist(), places.tolist(), strict=True):
         for name in ("worlds", "options", "seeds", "episodes"):
             getattr(target, name)[place] = getattr(source, name)[row]
+
+
+def _same_states(one: Missions, other: Missions) -> bool:
+    """Whether two batches differ in nothing but their number, their threads and what is observed."""
+    alike = with_settings(other.scenario, {"observation": one.scenario.observation}) == one.scenario
+    return alike and one.state.pooled.shape[1:] == other.state.pooled.shape[1:]
 
 
 def reseed(missions: Missions, at: Sequence[int], keys: Sequence[int]) -> None:

@@ -40,7 +40,7 @@ from entropy_explore_env.robots.range_sensor import true_coverage
 from entropy_explore_env.scenario import Scenario
 from entropy_explore_env.settings import Grid, gaussian_entropy_bits
 from entropy_explore_env.validation import check_instance, check_whole, is_whole
-from entropy_explore_env.viewpoints.proposals.model import Proposer, new_proposers
+from entropy_explore_env.viewpoints.proposals.model import Proposer, new_proposers, thinned
 from entropy_explore_env.viewpoints.proposals.records import Kind
 from entropy_explore_env.worlds.given import checked_worlds, in_given_worlds, world_in_turn
 from entropy_explore_env.worlds.load import make_world, require_unchanged, world_of_file
@@ -320,6 +320,10 @@ class Missions:
             self.state.collision[row] = world.layout(self.scenario, kind).collision_mask.ravel()
             if self._no_fly.size:
                 self._no_fly[row] = world.no_fly_mask(kind.robot.body_radius_m).ravel()
+
+    def think_less(self, divisor: int) -> None:
+        """Let so many times fewer viewpoints be drawn and refined as candidates from now on."""
+        self._proposers = [[thinned(each, divisor) for each in thread] for thread in self._proposers]
 
     def take_no_fly_zones(self, source: Missions, rows: np.ndarray, at: np.ndarray) -> None:
         """Take over the no-fly zones of another batch's missions, and room for collision masks of their own.

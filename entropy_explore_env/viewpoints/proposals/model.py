@@ -279,6 +279,22 @@ def new_proposers(scenario: Scenario) -> list[Proposer]:
     return [_proposer(scenario, kind, scratch) for kind in scenario.kinds]
 
 
+def thinned(proposer: Proposer, divisor: int) -> Proposer:
+    """A proposer in the same memory that draws and refines so many times fewer viewpoints.
+
+    Args:
+        proposer: Which stays as it is.
+        divisor: 1 = it does not change.
+    """
+    recipe = proposer.recipe
+    fewer = {
+        name: -(-getattr(recipe, name) // divisor)
+        for name in ("gazes", "turns", "places", "refined", "far_places", "way_gazes")
+    }
+    refinements = min(recipe.refinements, max(1, recipe.refinements // divisor))
+    return proposer._replace(recipe=recipe._replace(**fewer, refinements=refinements))
+
+
 def _proposer(scenario: Scenario, kind: RobotKind, scratch: ProposalScratch) -> Proposer:
     recipe, grid = recipe_for(kind), scenario.grid
     drawn = robot_model(scenario, kind, recipe.draw_thinning, recipe.stop_probability)

@@ -1,0 +1,268 @@
+"""The three stages in small: labels that repeat, a command that goes on where it was, and what it refuses."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from baselines.cli.arguments import run_command
+from baselines.strategies import make_strategy
+from entropy_explore_env.command import BAD_INPUT
+from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
+from entropy_explore_env.envs.vector_env import EntropyExploreVectorEnv
+from entropy_explore_env.missions.privileged import mission_times, running
+from entropy_explore_env.missions.view import view_of
+from entropy_explore_env.scenario import with_settings
+from entropy_explore_env.scenarios import find_scenario
+from training.checkpoints import latest_checkpoint
+from training.errors import CheckpointError, LabelsError, RollOutError
+from training.policy_improvement import __main__ as command
+from training.policy_improvement import labelling, rollouts
+from training.policy_improvement.labelling import LabelSettings, label_missions, write_labels
+from training.policy_improvement.rollouts import BatchMissions, Branch, RollOuts, Thinking, candidates_to_try
+from training.policy_improvement.shards import shard_file
+
+TINY = (
+    "--tasks box-7x11x5:2 --threads 1 --candidates 6 --width 8 --compared 3 --shards 2 --missions 2 "
+    "--every 6 --branches 3 --draws 2 --horizon 4 --epochs 3 --batch 8 --ppo-steps 192 --json"
+).split()
+TINY.append(
+    "--ppo-options=--missions 2 --rollout-steps 16 --batch 16 --epochs 1 --validation-missions 2 "
+    "--validate-every 96 --time-limit-s 60"
+)
+
+
+def scenario(robots: int = 2, name: str = "box-7x11x5"):
+    return command.task_of(f"{name}:{robots}", 6)
+
+
+def settings(**changes) -> LabelSettings:
+    made = LabelSettings((scenario(),), 2, 3, 2, Thinking(4, 1), 6, 2, 0)
+    return made._replace(**changes)
+
+
+def improve(*more: str) -> int:
+    return run_command(command.main, [*TINY, *more])
+
+
+def printed(*more: str) -> dict:
+    text = io.StringIO()
+    with contextlib.redirect_stdout(text):
+        assert improve(*more) == 0
+    return json.loads(text.getvalue())
+
+
+@pytest.fixture(scope="module")
+def improved(tmp_path_factory):
+    """A run of all stages, and what it printed."""
+    out = tmp_path_factory.mktemp("improved") / "run"
+    return out, printed("--out", str(out))
+
+
+def test_all_stages_run_and_are_compared_with_the_planner(improved):
+    out, said = improved
+    assert set(said) == {"labels", "regression", "ppo"} and said["labels"]["states"] > 5
+    for stage in ("regression", "ppo"):
+        (compared,) = said[stage]["compared"]
+        assert compared["missions"] == 3 and compared["finished"] == compared["planner_finished"] == 3
+        assert 0.0 < compared["ratio_low"] <= compared["ratio"] <= compared["ratio_high"]
+    assert said["regression"]["loss_after"] <= said["regression"]["loss_before"]
+    assert sorted(each.name for each in (out / "labels").iterdir()) == [
+        "labels-00000.npz",
+        "labels-00001.npz",
+    ]
+
+
+def test_the_same_command_does_not_do_anything_again(improved, monkeypatch):
+    out, said = improved
+    for module, name in (
+        (labelling, "label_missions"),
+        (command, "regress"),
+        (command, "compare_with_planner"),
+    ):
+        monkeypatch.setattr(module, name, None)
+    monkeypatch.setattr(command.ppo, "main", None)
+    assert printed("--out", str(out)) == said
+
+
+def test_stages_run_one_by_one_and_a_missing_one_is_named(improved, tmp_path, capsys):
+    assert improve("--out", str(tmp_path), "--stage", "regression") == BAD_INPUT
+    assert "labels-00000.npz" in capsys.readouterr().err
+    assert improve("--out", str(tmp_path), "--stage", "ppo") == BAD_INPUT
+    assert "regression" in capsys.readouterr().err
+    out, said = improved
+    assert printed("--out", str(out), "--stage", "regression") == {"regression": said["regression"]}
+
+
+def test_the_policy_is_a_strategy_in_missions_of_any_team_and_evaluates(improved):
+    out, _ = improved
+    for robots, name in ((1, "box-7x11x5"), (3, "box-7x11x5")):
+        strategy = make_strategy(str(out / "regression"))
+        env = EntropyExploreEnv(with_settings(find_scenario(name), {"robots": robots}))
+        env.reset(seed=3)
+        strategy.reset(env.scenario, env.missions.strategy_generator(0))
+        chosen = strategy.choose([view_of(env.missions, 0, robot) for robot in range(robots)])
+        assert len(chosen) == robots and all(np.isfinite(each).all() for each in chosen)
+        again = make_strategy(str(out / "regression"))
+        again.reset(env.scenario, env.missions.strategy_generator(0))
+        views = [view_of(env.missions, 0, robot) for robot in range(robots)]
+        assert all(map(np.array_equal, chosen, again.choose(views)))
+
+
+def test_other_features_are_refused_by_name(improved, tmp_path):
+    out, _ = improved
+    folder = latest_checkpoint(out / "regression", "best")
+    head = json.loads((folder / "policy.json").read_text())
+    assert head["features_version"] is not None
+    broken = tmp_path / "best-1"
+    broken.mkdir()
+    for file in folder.iterdir():
+        (broken / file.name).write_bytes(file.read_bytes())
+    (broken / "policy.json").write_text(json.dumps(head | {"features_version": 10_000}))
+    with pytest.raises(CheckpointError, match="features_version"):
+        make_strategy(str(broken))
+    (broken / "policy.json").write_text(json.dumps(head | {"privileged": -1}))
+    with pytest.raises(CheckpointError, match="privileged"):
+        make_strategy(str(broken))
+
+
+def test_labels_are_the_same_for_any_threads_and_whatever_was_there_before(tmp_path):
+    one, seeds = label_missions(settings(), 1, 1)
+    two, again = label_missions(settings(), 1, 2)
+    assert seeds == again and min(seeds) >= 2**63
+    for name, array in one._asdict().items():
+        assert np.array_equal(array, getattr(two, name), equal_nan=array.dtype.kind == "f"), name
+    assert write_labels(settings(), tmp_path, 2, 1, stopped=lambda: shard_file(tmp_path, 0).is_file()) == 1
+    assert write_labels(settings(), tmp_path, 2, 1) == 2
+    kept = labelling.load_shard(shard_file(tmp_path, 1), settings().origin)
+    assert np.array_equal(kept.seconds, one.seconds, equal_nan=True)
+    with pytest.raises(LabelsError, match="these options"):
+        write_labels(settings(seed=1), tmp_path, 2, 1)
+
+
+def test_labels_of_other_code_are_refused(tmp_path, monkeypatch):
+    write_labels(settings(), tmp_path, 1, 1)
+    monkeypatch.setattr(labelling, "code_digest", lambda *modules: "another")
+    with pytest.raises(LabelsError, match="version of the code"):
+        write_labels(settings(), tmp_path, 1, 1)
+
+
+def test_labels_hold_together():
+    """Time to the end falls along a mission; branches differ; the planner's own branch comes first."""
+    labels, _ = label_missions(settings(missions=3), 0, 1)
+    there = labels.candidates >= 0
+    assert there[:, 0].all() and there.sum() > len(there)
+    assert np.isfinite(labels.seconds[there]).all() and np.isnan(labels.seconds[~there]).all()
+    assert (labels.seconds[there] > 0.0).all() and labels.to_go_s.min() > 0.0
+    assert (labels.candidates[:, 0] == 0).all()
+    for mission in range(3):
+        own = labels.moments_to_go_s[labels.moments_mission == mission]
+        assert (np.diff(own) <= 0.0).all() and own.min() > 0.0
+    ended = labels.ended & there[:, :, None]
+    assert ended.any() and (there[:, :, None] & ~labels.ended).any()
+
+
+def test_without_a_horizon_the_planners_branch_ends_as_the_mission_itself_does():
+    """With the mission's own random numbers and its own planner, the branch is the mission."""
+    batch, there = BatchMissions(scenario(), 1, 1), scenario()
+    batch.missions.reset_some([0], [2**63 + 7])
+    acts = labelling.planner_acts
+    for _ in range(5):
+        batch.step(acts(batch))
+    runs = RollOuts(there, (1, 2, 1), Thinking(0, 1), 1)
+    monkey = pytest.MonkeyPatch()
+    monkey.setattr(rollouts, "reseed", lambda *given: None)
+    runs.add(batch, Branch(0, 0, np.array([0]), 5))
+    began_s = mission_times(batch.missions)[0]
+    outcomes = runs.run()
+    monkey.undo()
+    while running(batch.missions)[0]:
+        batch.step(acts(batch))
+    assert outcomes.ended[0, 0, 0] and np.isnan(outcomes.seconds[0, 1, 0])
+    assert outcomes.seconds[0, 0, 0] == pytest.approx(mission_times(batch.missions)[0] - began_s, rel=1e-6)
+
+
+def test_branches_share_their_luck_and_draws_do_not():
+    """The same candidate tried twice comes to the same second, in each draw to another."""
+    batch = BatchMissions(scenario(), 2, 1)
+    batch.missions.reset_some([0, 1], [2**63 + 7, 2**63 + 8])
+    runs = RollOuts(scenario(), (2, 3, 3), Thinking(5, 2), 1)
+    for mission in range(2):
+        runs.add(batch, Branch(mission, 1, np.array([0, 2, 0]), 5))
+    assert runs.full
+    seconds = runs.run().seconds
+    assert np.array_equal(seconds[:, 0], seconds[:, 2]) and not np.array_equal(seconds[:, 0], seconds[:, 1])
+    assert len(np.unique(seconds[0, 0])) > 1
+    assert not runs.full
+
+
+def test_a_roll_out_that_makes_no_headway_is_named(monkeypatch):
+    batch = BatchMissions(scenario(), 1, 1)
+    batch.missions.reset_some([0], [2**63 + 7])
+    runs = RollOuts(scenario(), (1, 2, 1), Thinking(0, 1), 1)
+    runs.add(batch, Branch(0, 0, np.array([0, 1]), 5))
+    monkeypatch.setattr(rollouts, "_MOST_STEPS", 0)
+    with pytest.raises(RollOutError, match=f"seed {2**63 + 7}, episode 0 of box-7x11x5"):
+        runs.run()
+
+
+def test_what_is_tried_by_hand():
+    """The planner's choice, half of the others by score, the rest drawn; never one that does not exist."""
+    batch = BatchMissions(scenario(), 1, 1)
+    parts = batch.parts
+    features = np.zeros((6, parts.candidates.shape[1]))
+    features[:, parts.score] = [0.2, 0.9, 1.0, 0.8, 0.95, 0.1]
+    features[2, parts.chosen] = 1.0
+    exists = np.array([True, True, True, True, False, True])
+    rng = np.random.default_rng(0)
+    tried = [candidates_to_try(features, exists, parts, 4, rng) for _ in range(30)]
+    assert all(each[:3].tolist() == [2, 1, 3] for each in tried)
+    assert {int(each[3]) for each in tried} == {0, 5}
+    assert sorted(candidates_to_try(features, exists, parts, 6, rng).tolist()) == [0, 1, 2, 3, 5]
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["--tasks", "nowhere:2"],
+        ["--tasks", "room"],
+        ["--tasks", "room:0"],
+        ["--branches", "1"],
+        ["--branches", "7"],
+        ["--draws", "0"],
+        ["--width", "6"],
+        ["--learning-rate", "0"],
+        ["--horizon", "-1"],
+    ],
+)
+def test_bad_options_are_refused_before_anything_is_written(words, tmp_path, capsys):
+    out = tmp_path / "run"
+    assert improve(*words, "--out", str(out)) == BAD_INPUT
+    assert len(capsys.readouterr().err.splitlines()) == 1 and not out.exists()
+
+
+def test_a_policy_can_lead_the_missions_that_are_labelled(improved, tmp_path):
+    """The next round: labels where the policy goes wrong, and learning goes on from its weights."""
+    out, _ = improved
+    said = printed("--out", str(tmp_path), "--policy", str(out / "ppo"), "--stage", "labels")
+    assert said["labels"]["states"] > 0
+    assert "regression" in printed(
+        "--out", str(tmp_path), "--policy", str(out / "ppo"), "--stage", "regression"
+    )
+    assert (
+        improve("--out", str(tmp_path), "--stage", "regression") == BAD_INPUT
+    )  # the planner's labels are others
+
+
+def test_roll_outs_think_less_and_observe_nothing():
+    runs = RollOuts(scenario(), (1, 2, 1), Thinking(5, 3), 1)
+    whole = EntropyExploreVectorEnv(scenario(), 1, action_masks=False).missions
+    thin, full = (each._proposers[0][0].recipe for each in (runs._missions, whole))
+    assert thin.gazes == -(-full.gazes // 3) and thin.refined < full.refined and thin.keep == full.keep
+    assert runs._missions.observations.size == 0
+    assert Path(labelling.__file__).name == "labelling.py"

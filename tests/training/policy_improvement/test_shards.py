@@ -1,0 +1,60 @@
+"""Shards of labels: what was written comes back, and what cannot be used is refused by name."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tests.training.policy_improvement.test_regression import labels
+from training.errors import LabelsError
+from training.policy_improvement.shards import Labels, Origin, load_shard, save_shard, shard_file
+
+HERE = Origin("a" * 64, "b" * 64)
+
+
+def test_labels_come_back_as_they_were_written(tmp_path):
+    told, file = labels(1.0, states=20), shard_file(tmp_path, 3)
+    save_shard(file, told, HERE, [2**63 + 5])
+    back = load_shard(file, HERE)
+    assert file.name == "labels-00003.npz" and [each.name for each in tmp_path.iterdir()] == [file.name]
+    for name, array in told._asdict().items():
+        assert np.array_equal(array, getattr(back, name), equal_nan=array.dtype.kind == "f"), name
+    both = Labels.joined([told, back])
+    assert len(both.observations) == 40 and np.array_equal(both.candidates[20:], told.candidates)
+
+
+@pytest.mark.parametrize(
+    ("origin", "said"),
+    [
+        (HERE._replace(code="c" * 64), "version of the code"),
+        (HERE._replace(settings="c" * 64), "these options"),
+    ],
+)
+def test_labels_of_other_code_or_settings_are_refused(tmp_path, origin, said):
+    file = shard_file(tmp_path, 0)
+    save_shard(file, labels(1.0, states=5), HERE, [1])
+    with pytest.raises(LabelsError, match=said):
+        load_shard(file, origin)
+
+
+def test_broken_shards_are_refused(tmp_path):
+    file, told = shard_file(tmp_path, 0), labels(1.0, states=5)
+    save_shard(file, told, HERE, [1])
+    whole = file.read_bytes()
+    file.write_bytes(whole[: len(whole) // 2])
+    with pytest.raises(LabelsError, match="as it was written"):
+        load_shard(file, HERE)
+    with pytest.raises(LabelsError, match="as it was written"):
+        load_shard(tmp_path / "none.npz", HERE)
+    np.savez(file, format=np.zeros(1))
+    with pytest.raises(LabelsError, match="head"):
+        load_shard(file, HERE)
+    changes = {
+        "seconds": told.seconds[:, :, :2],
+        "to_go_s": told.to_go_s.astype(np.float64),
+        "at_end": np.full_like(told.at_end, np.nan),
+    }
+    for name, array in changes.items():
+        save_shard(file, told._replace(**{name: array}), HERE, [1])
+        with pytest.raises(LabelsError):
+            load_shard(file, HERE)
