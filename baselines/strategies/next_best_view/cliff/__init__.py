@@ -43,7 +43,7 @@ _AHEAD_RAD = math.radians(30.0)
 """How far raster looks down."""
 _UNKNOWN_SIGMA = 1.0
 """Of heights that are not measured, in voxel edges."""
-_COMPLETION_M = 0.02
+_COMPLETION_M = 0.05
 """To which unknown heights are completed."""
 _SAME_PLACE = 0.75
 """Voxel edges: a rover this near has arrived."""
@@ -115,7 +115,9 @@ class Memory:
     known: ElevationMap | None = None
     """At the latest decision."""
     height_m: np.ndarray | None = None
-    """(X, Y) completed at the latest decision."""
+    """(X, Y) completed at the latest decision, within the window."""
+    window: tuple[slice, slice] = (slice(0, None), slice(0, None))
+    """The columns that can be seen from where something is known, and a few more."""
     goal: np.ndarray | None = None
     """(5,) pose that it is under way to."""
     visibility: np.ndarray | None = None
@@ -168,9 +170,8 @@ class CliffMapping:
             memory.goal = None
         memory.known = known
         grid = self._scenario.grid
-        memory.height_m = completed(known.height_m, known.known, _COMPLETION_M, memory.height_m)
-        memory.height_m[memory.stood & ~known.known] = self._ground_m(view)
         self._stand(view, memory)
+        self._complete(view, memory)
         reachable = memory.paths.start(self._safe(view, memory, here), here)
         if memory.goal is not None and not reachable[self._column(memory.goal)]:
             memory.goal = None
@@ -196,6 +197,24 @@ class CliffMapping:
             self.looks[view.robot] = []
             self._stand(view, self._memories[view.robot])
         return self._memories[view.robot]
+
+    def _complete(self, view: RobotView, memory: Memory) -> None:
+        """Fill in unknown heights as far as the sensor reaches from columns that are known."""
+        known = memory.known
+        assert known is not None
+        anywhere = known.known | memory.stood
+        reach = math.ceil(min(self._camera(view).reach, sum(anywhere.shape))) + 1
+        rows, columns = (np.flatnonzero(anywhere.any(axis=axis)) for axis in (1, 0))
+        memory.window = (
+            slice(max(int(rows[0]) - reach, 0), int(rows[-1]) + reach + 1),
+            slice(max(int(columns[0]) - reach, 0), int(columns[-1]) + reach + 1),
+        )
+        heights = np.where(memory.stood & ~known.known, self._ground_m(view), known.height_m)
+        if memory.height_m is None:
+            memory.height_m = np.full(heights.shape, heights[anywhere].min())
+        here = memory.window
+        filled = completed(heights[here], anywhere[here], _COMPLETION_M, memory.height_m[here])
+        memory.height_m[here] = filled
 
     def _measured(self, view: RobotView) -> ElevationMap:
         scenario = self._scenario
@@ -242,14 +261,18 @@ class CliffMapping:
         assert memory.known is not None and memory.height_m is not None
         config, edge_m = self.config, self._scenario.grid.voxel_size_m
         wheel = config.wheel_m / edge_m
-        carrying = np.abs(memory.known.height_m - self._ground_m(view)) <= config.wheel_m
-        carrying = (carrying & memory.known.known) | memory.stood
-        edge = find_edge(memory.height_m, here, config.wheel_m, wheel, wheel)
+        window = memory.window
+        carrying = np.abs(memory.known.height_m[window] - self._ground_m(view)) <= config.wheel_m
+        carrying = (carrying & memory.known.known[window]) | memory.stood[window]
+        here = here[0] - window[0].start, here[1] - window[1].start
+        edge = find_edge(memory.height_m[window], here, config.wheel_m, wheel, wheel)
         if config.choice == "information":
             line = config.edge == "line"
             within = behind_line(edge, here) if line else inside_polygon(edge.polygon, carrying.shape)
-            carrying &= within | memory.stood
-        return safe_columns(carrying, view.kind.robot.body_radius_m / edge_m)
+            carrying &= within | memory.stood[window]
+        safe = np.zeros(memory.stood.shape, bool)
+        safe[window] = safe_columns(carrying, view.kind.robot.body_radius_m / edge_m)
+        return safe
 
     def _raster(self, view: RobotView, memory: Memory, reachable: np.ndarray) -> np.ndarray:
         """The next place of the lattice, row by row; the rover's own pose where none is left."""

@@ -83,16 +83,42 @@ def visibility(ground, camera, x, y):
     return seen
 
 
+class View(NamedTuple):
+    """What a camera sees from one pose, without occlusions; slopes are those of lines downwards."""
+
+    gaze_x: float
+    gaze_y: float
+    cos_half_yaw: float
+    low_slope: float
+    high_slope: float
+    square_reach: float
+
+
 @inlined_kernel
-def in_view(camera, pose, x, y, z):
-    """Whether a point lies in the view of a camera: within its yaw, its pitch and its reach."""
+def view_from(camera, pose):
+    """The View of a camera from a pose (5,)."""
+    low, high = pose[4] - camera.half_pitch, pose[4] + camera.half_pitch
+    return View(
+        math.cos(pose[3]),
+        math.sin(pose[3]),
+        math.cos(min(camera.half_yaw, math.pi)),
+        math.tan(low) if low > -0.5 * math.pi else -math.inf,
+        math.tan(high) if high < 0.5 * math.pi else math.inf,
+        camera.reach * camera.reach,
+    )
+
+
+@inlined_kernel
+def in_view(view, pose, x, y, z):
+    """Whether a point lies in a View from a pose: in its yaw, pitch and reach, not straight below."""
     along_x, along_y, below = x - pose[0], y - pose[1], pose[2] - z
-    level = math.sqrt(along_x * along_x + along_y * along_y)
-    if level * level + below * below > camera.reach * camera.reach or level == 0.0:
+    square = along_x * along_x + along_y * along_y
+    if square + below * below > view.square_reach or square == 0.0:
         return False
-    turned = math.atan2(along_y, along_x) - pose[3]
-    turned -= 2.0 * math.pi * math.floor(turned / (2.0 * math.pi) + 0.5)
-    return abs(turned) <= camera.half_yaw and abs(math.atan2(below, level) - pose[4]) <= camera.half_pitch
+    level = math.sqrt(square)
+    if along_x * view.gaze_x + along_y * view.gaze_y < view.cos_half_yaw * level:
+        return False
+    return view.low_slope * level <= below <= view.high_slope * level
 
 
 @inlined_kernel
@@ -116,12 +142,13 @@ def fill_new_information(ground, camera, most, poses, bits):
     columns_x, columns_y = ground.height.shape
     for k in range(len(poses)):
         pose, total = poses[k], 0.0
+        view = view_from(camera, pose)
         low_x, high_x = _span(pose[0], camera.reach, columns_x)
         low_y, high_y = _span(pose[1], camera.reach, columns_y)
         for x in range(low_x, high_x):
             for y in range(low_y, high_y):
                 missing = (most - ground.measurements[x, y]) * ground.interest[x, y] / most
-                if missing > 0.0 and in_view(camera, pose, x + 0.5, y + 0.5, ground.height[x, y]):
+                if missing > 0.0 and in_view(view, pose, x + 0.5, y + 0.5, ground.height[x, y]):
                     total += missing * column_bits(visibility(ground, (pose[0], pose[1], pose[2]), x, y))
         bits[k] = total
 
@@ -129,10 +156,11 @@ def fill_new_information(ground, camera, most, poses, bits):
 @lean_kernel
 def fill_visibility(ground, camera, pose, seen):
     """P_V of every column from one pose (5,), 0 outside the view; `seen` (X, Y) float64 is filled in."""
+    view = view_from(camera, pose)
     for x in range(seen.shape[0]):
         for y in range(seen.shape[1]):
             seen[x, y] = 0.0
-            if in_view(camera, pose, x + 0.5, y + 0.5, ground.height[x, y]):
+            if in_view(view, pose, x + 0.5, y + 0.5, ground.height[x, y]):
                 seen[x, y] = visibility(ground, (pose[0], pose[1], pose[2]), x, y)
 
 
