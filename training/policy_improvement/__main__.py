@@ -29,8 +29,7 @@ from entropy_explore_env.command import INTERRUPTED
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.missions.observation.layout import ObservationLayout
 from entropy_explore_env.missions.privileged import PRIVILEGED
-from entropy_explore_env.scenario import Scenario, with_settings
-from entropy_explore_env.scenarios import find_scenario
+from entropy_explore_env.scenario import Scenario
 from entropy_explore_env.validation import check_whole, is_whole
 from entropy_explore_env.writing import write_atomically
 from training import extra, ppo  # noqa: F401 - extra: before what is not there without it
@@ -57,7 +56,7 @@ from training.policy_improvement.labelling import (
 )
 from training.policy_improvement.regression import RegressionSettings, as_json, regress
 from training.policy_improvement.rollouts import Thinking
-from training.ppo_options import OWN, candidate_form
+from training.policy_improvement.tasks import task_of
 
 STAGES = ("labels", "regression", "ppo")
 _RESULT = "result.json"
@@ -172,19 +171,6 @@ def check(args: Args) -> None:
         raise SettingError("learning_rate", args.learning_rate, "a number above 0")
     if not args.tasks:
         raise SettingError("tasks", args.tasks, "at least one NAME:ROBOTS")
-
-
-def task_of(name: str, candidates: int) -> Scenario:
-    """The scenario NAME:ROBOTS, with candidates as actions.
-
-    Raises:
-        SettingError: There is no such scenario, or no such team.
-    """
-    scenario, _, robots = name.partition(":")
-    if not robots.isdecimal() or int(robots) < 1:
-        raise SettingError("tasks", name, "NAME:ROBOTS, a named scenario and a number of robots")
-    changes = {"robots": int(robots), "decision_period_s": None, **OWN, **candidate_form(candidates)}
-    return with_settings(find_scenario(scenario), changes)
 
 
 def label(args: Args, tasks: list[Scenario], interruption: Interruption) -> dict[str, Any] | None:

@@ -113,8 +113,8 @@ class Branch(NamedTuple):
     robot: int
     candidates: np.ndarray
     """(≤ B,) int64, numbers of the candidates that its branches begin with; the planner's choice first."""
-    key: int
-    """Of its random numbers: draw d of all of its branches has key + d."""
+    key: int | None
+    """Of its random numbers: draw d of all of its branches has key + d. None = the mission's own."""
 
 
 class RollOuts:
@@ -152,7 +152,8 @@ class RollOuts:
         used = len(branch.candidates) * draws
         at = np.arange(first, first + used)
         copy_missions(source.missions, [branch.mission] * used, self._missions, at.tolist())
-        reseed(self._missions, at.tolist(), [branch.key + row % draws for row in range(used)])
+        if branch.key is not None:
+            reseed(self._missions, at.tolist(), [branch.key + row % draws for row in range(used)])
         self._waiting.append(branch)
 
     def run(self) -> Outcomes:

@@ -26,6 +26,7 @@ from training.policy_improvement import labelling, rollouts
 from training.policy_improvement.labelling import LabelSettings, label_missions, write_labels
 from training.policy_improvement.rollouts import BatchMissions, Branch, RollOuts, Thinking, candidates_to_try
 from training.policy_improvement.shards import shard_file
+from training.policy_improvement.tasks import task_of
 
 TINY = (
     "--tasks box-7x11x5:2 --threads 1 --candidates 6 --width 8 --compared 3 --shards 2 --missions 2 "
@@ -38,7 +39,7 @@ TINY.append(
 
 
 def scenario(robots: int = 2, name: str = "box-7x11x5"):
-    return command.task_of(f"{name}:{robots}", 6)
+    return task_of(f"{name}:{robots}", 6)
 
 
 def settings(**changes) -> LabelSettings:
@@ -175,12 +176,9 @@ def test_without_a_horizon_the_planners_branch_ends_as_the_mission_itself_does()
     for _ in range(5):
         batch.step(acts(batch))
     runs = RollOuts(there, (1, 2, 1), Thinking(0, 1), 1)
-    monkey = pytest.MonkeyPatch()
-    monkey.setattr(rollouts, "reseed", lambda *given: None)
-    runs.add(batch, Branch(0, 0, np.array([0]), 5))
+    runs.add(batch, Branch(0, 0, np.array([0]), None))
     began_s = mission_times(batch.missions)[0]
     outcomes = runs.run()
-    monkey.undo()
     while running(batch.missions)[0]:
         batch.step(acts(batch))
     assert outcomes.ended[0, 0, 0] and np.isnan(outcomes.seconds[0, 1, 0])
