@@ -133,6 +133,20 @@ def decode_map(data: bytes, shape: tuple[int, int, int]) -> MapSummary:
     return summary
 
 
+def tree_bits(data: bytes) -> int:
+    """Bits of the tree of a summary that `encode_map` made, before zlib packs it.
+
+    Raises:
+        RecordError: It is no summary.
+    """
+    if not isinstance(data, bytes) or not data.startswith(_MAGIC):
+        raise RecordError("map summary", type(data).__name__, "what encode_map returns")
+    try:
+        return 8 * len(zlib.decompress(data[len(_MAGIC) :]))
+    except zlib.error:
+        raise RecordError("map summary", f"{len(data)} bytes", "what encode_map returns") from None
+
+
 def _new_stack() -> np.ndarray:
     """(S, 7) int64: regions that are still to be visited, and whether all of each is known to be measured."""
     return np.zeros((7 * _DEEPEST + 1, 7), np.int64)

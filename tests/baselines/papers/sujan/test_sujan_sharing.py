@@ -1,0 +1,65 @@
+"""`python -m baselines.papers.sujan.sharing`: what summaries of maps come to, claims, report."""
+
+from __future__ import annotations
+
+import json
+import zlib
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from baselines.cli.arguments import run_command
+from baselines.papers.sujan.sharing import __main__ as sharing
+from baselines.papers.sujan.sharing import sweep
+from baselines.papers.sujan.sharing.claims import all_claims
+from baselines.papers.sujan.sharing.mission import THRESHOLDS_BITS
+from baselines.papers.sujan.sharing.sweep import MAKERS
+from entropy_explore_env.errors import RecordError
+from entropy_explore_env.robots.map_summary import encode_map, tree_bits
+
+
+def test_bits_of_a_tree_are_those_that_zlib_packs():
+    rng = np.random.default_rng(0)
+    mean, precision = rng.random((7, 11, 5), np.float32), np.full((7, 11, 5), 9.0, np.float32)
+    data = encode_map(mean, precision, 0.0)
+    header = 5 * 4
+    assert tree_bits(data) >= 8 * (header + 2 * mean.size)  # all voxels differ: a leaf each
+    assert tree_bits(encode_map(mean, precision, 5.0)) <= 8 * (header + 1 + 2)
+    for broken in (b"", b"EEMS\x01nonsense", data[:-3], 7, b"EEMS\x02" + data[5:]):
+        with pytest.raises(RecordError, match="map summary"):
+            tree_bits(broken)  # type: ignore[arg-type]
+    assert zlib.decompress(data[5:])
+
+
+def test_claims_by_hand():
+    tree, packed = [640.0] * len(THRESHOLDS_BITS), [64.0] * len(THRESHOLDS_BITS)
+    record = {"full_bits": 6400, "full_packed_bits": 100, "tree_bits": tree, "packed_bits": packed}
+    records = {name: [dict(record) for _ in range(3)] for name in MAKERS}
+    claims = {claim.id: claim for claim in all_claims(records)}
+    assert len(claims) == 9 and all(claim.holds for claim in claims.values())
+    assert claims["tree-office"].ours == pytest.approx(0.1)
+    assert claims["lossless-terrain"].ours == pytest.approx(0.64)
+    for other in records["office"]:
+        other["full_packed_bits"] = 60
+    assert not {claim.id: claim for claim in all_claims(records)}["lossless-office"].holds
+
+
+def test_the_command_writes_its_page(tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr(sweep, "SCANS", 4)
+    words = ["--worlds", "1", "--jobs", "1", "--json", "--out", str(tmp_path), "--runs", str(tmp_path / "r")]
+    monkeypatch.setattr("sys.argv", ["sujan.sharing", *words])
+    assert run_command(sharing.main) == 0
+    assert len(json.loads(capsys.readouterr().out)["claims"]) == 9
+    page = (tmp_path / "sujan-sharing.md").read_text()
+    assert "python -m baselines.papers.sujan.sharing --worlds 1" in page and page.count("## ") == 1 + len(
+        MAKERS
+    )
+    with Image.open(tmp_path / "sujan-sharing" / "bits.png") as picture:
+        assert picture.width > 800
+    (file,) = (tmp_path / "r" / "office").glob("*.json")
+    record = json.loads(file.read_text())["record"]
+    assert record["full_bits"] == 64 * 240 * 180 and 0 < record["measured"] < 240 * 180
+    assert record["tree_bits"] == sorted(record["tree_bits"], reverse=True)
+    assert record["rms_error"] == sorted(record["rms_error"]) and record["rms_error"][0] < 0.01
+    assert all(p < t for p, t in zip(record["packed_bits"], record["tree_bits"], strict=True))
