@@ -184,7 +184,7 @@ class Floor:
         """Note the voxels of a few scans."""
         self._lists = [self._listed(fusion, i) for i in range(_FLOOR_SCANS)]
         self._mean, self._precision = fusion.mean.copy(), fusion.precision.copy()
-        self._gain = np.float32(measurement_precision(3.0, sensor.sigma_min, sensor.sigma_slope_per_m))
+        self._gain = np.float32(measurement_precision(3.0, sensor.sigma_min, sensor.sigma_slope_per_m, 1.0))
         self.voxels = _FLOOR_PASSES * sum(len(crossed) for crossed, _ in self._lists)
         self.run()
 

@@ -178,7 +178,9 @@ class RangeSensor:
         angular_step_rad: Between neighbouring rays.
         max_range_m: Farthest return, 1e-6 to 1e6; inf = the workspace's boundary, which is a wall.
         sigma_min: Standard deviation of coverage right before the sensor (eq. 5).
-        sigma_slope_per_m: Its growth with the measured distance, ζ (eq. 5), 0 to 1e6.
+        sigma_slope_per_m: Its growth with the measured distance, ζ (eq. 5), 0 to 1e6; per mⁿ.
+        sigma_exponent: n, with which power of the distance it grows, 0.25 to 4: 1 as in eq. 5; 2 is that of
+            stereo cameras (Sujan, eq. 4).
         range_noise_m: Standard deviation of the measured distance, 0 to 1e6.
         voxels_behind: Voxels behind the hit that a ray still updates (as covered: eq. 4).
         scan_time_s: A scan takes this long, 1e-4 to 1e5, standing still.
@@ -194,6 +196,7 @@ class RangeSensor:
     max_range_m: float = math.inf
     sigma_min: float = 0.08
     sigma_slope_per_m: float = 0.006
+    sigma_exponent: float = 1.0
     range_noise_m: float = 0.0
     voxels_behind: int = 1
     scan_time_s: float = 0.5
@@ -219,6 +222,7 @@ class RangeSensor:
         check_within(self, "sigma_slope_per_m", "range_noise_m", least=0, most=1e6)
         check(self, "min_range_m", "a number ≥ 0 below max_range_m", lambda v: 0 <= v < self.max_range_m)
         check(self, "sigma_min", "a number from 1e-4 to 1e4", lambda v: 1e-4 <= v <= 1e4)
+        check_within(self, "sigma_exponent", least=0.25, most=4)
         check_count(self, "voxels_behind", 0, 1000)
         if self.rays > 1_000_000:
             raise SettingError(

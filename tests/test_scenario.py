@@ -85,6 +85,7 @@ REFUSED = {
     (RangeSensor, "min_range_m"): (*NOT_NEGATIVE, INF),
     (RangeSensor, "sigma_min"): (*POSITIVE, INF, 0.9e-4, 1.1e4),
     (RangeSensor, "sigma_slope_per_m"): (*NOT_NEGATIVE, 1.1e6, HUGE),
+    (RangeSensor, "sigma_exponent"): (*POSITIVE, INF, 0.2, 4.1),
     (RangeSensor, "range_noise_m"): (*NOT_NEGATIVE, 1.1e6, HUGE),
     (RangeSensor, "voxels_behind"): (*COUNT, 1001),
     (RangeSensor, "scan_time_s"): (*POSITIVE, TINY, 0.9e-4, 1.1e5, INF),

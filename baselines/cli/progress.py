@@ -78,6 +78,9 @@ _ROWS: tuple[tuple[str, str, Callable[[Any], str]], ...] = (
     ("entropy of the joint map", "joint_bits", lambda v: f"{v:,.0f} bits"),
     ("driven", "distance_m", lambda v: f"{v:,.1f} m"),
     ("blocked moves", "blocked_moves", lambda v: f"{v:,}"),
+    ("error of what robots believe of their place, rms", "rms_error_m", lambda v: f"{v:.3f} m"),
+    ("the same of their yaw", "rms_error_rad", lambda v: f"{v:.4f} rad"),
+    ("sightings of fiducials", "sightings", lambda v: f"{v:,}"),
     ("faults", "faults_told", str),
     ("computed, compiled and drawn in", "wall_s", lambda v: f"{v:,.2f} s"),
 )
@@ -140,7 +143,8 @@ def print_table(figures: dict[str, Any], written: list[Path], scenario: Scenario
     reached = ", ".join("-" if mark is None else f"{mark:,.0f}" for mark in marks)
     none = all(mark is None for mark in marks)
     joint = figures.get("joint", {})
-    values = {**figures, **joint, "reached": "-" if none else reached + " s"}
+    values = {**figures, **joint, **figures.get("localization", {})}
+    values |= {"reached": "-" if none else reached + " s"}
     values["joint_bits"] = joint.get("entropy_bits")
     values["faults_told"] = _told(figures.get("faults", {}))
     for label, shown in _setting(scenario):

@@ -17,6 +17,7 @@ import numpy as np
 
 from entropy_explore_env.decision_settings import Action, Observation
 from entropy_explore_env.fault_settings import Faults, Outage, RadioFault, SensorFault
+from entropy_explore_env.localization_settings import Fiducials, Localization
 from entropy_explore_env.radio_settings import Signal
 from entropy_explore_env.scenario import Scenario
 from entropy_explore_env.settings import Channel, Ending, Grid, RangeSensor, Reward, Robot, RobotKind
@@ -72,11 +73,26 @@ FIELDS: Mapping[type, Mapping[str, Numbers | Sequence[Any]]] = MappingProxyType(
             "max_range_m": _length(1e-6, 1e6, 1.0, 20.0, math.inf),
             "sigma_min": Numbers(1e-4, 1e4, 0.01, 1.0),
             "sigma_slope_per_m": Numbers(1e-6, 1e6, 1e-3, 0.1, also=(0.0,)),
+            "sigma_exponent": Numbers(0.25, 4.0, 0.5, 3.0),
             "range_noise_m": _length(1e-6, 1e6, 0.01, 1.0, 0.0),
             "voxels_behind": _count(0, 1000, 0, 4),
             "scan_time_s": Numbers(1e-4, 1e5, 0.01, 5.0),
             "scan_every_m": _length(1e-3, 1e6, 0.3, 5.0, math.inf),
             "min_range_m": _length(1e-6, 1e6, 0.1, 3.0, 0.0),
+        },
+        Localization: {
+            "xy_m_per_sqrt_m": _length(1e-6, 100.0, 0.01, 0.5, 0.0),
+            "z_m_per_sqrt_m": _length(1e-6, 100.0, 0.01, 0.5, 0.0),
+            "yaw_rad_per_sqrt_m": Numbers(1e-6, 10.0, 1e-3, 0.3, also=(0.0,)),
+            "xy_m_per_sqrt_rad": _length(1e-6, 100.0, 0.01, 0.5, 0.0),
+            "z_m_per_sqrt_rad": _length(1e-6, 100.0, 0.01, 0.5, 0.0),
+            "yaw_rad_per_sqrt_rad": Numbers(1e-6, 10.0, 1e-3, 0.3, also=(0.0,)),
+        },
+        Fiducials: {
+            "number": _count(0, 1000, 0, 8),
+            "range_m": _length(1e-6, 1e6, 1.0, 20.0, math.inf),
+            "range_sigma_m": _length(1e-6, 1e6, 0.01, 1.0),
+            "bearing_sigma_rad": Numbers(1e-6, 10.0, 1e-3, 0.3),
         },
         Channel: {
             "burst": _count(0, 1_000_000, 0, 200),
@@ -175,8 +191,8 @@ def draw_scenario(rng: np.random.Generator, few_kernels: bool = False) -> Drawn:
     Args:
         rng: Where from.
         few_kernels: Observations have the default parts, or all, and channels reach by more than distance
-            where there are faults, and only there: others have kernels of their own, which take seconds to
-            compile.
+            where there are faults, and only there, and so do robots drift: others have kernels of their own,
+            which take seconds to compile.
 
     Raises:
         EntropyExploreError: Settings were drawn that do not fit each other. Draw again.
@@ -192,10 +208,24 @@ def draw_scenario(rng: np.random.Generator, few_kernels: bool = False) -> Drawn:
     def part(kind: type, **own: Any) -> Any:  # noqa: ANN401 - an object of the kind
         return kind(**{field: draw(kind, field) for field in FIELDS[kind]}, **own)
 
-    kinds = [RobotKind(part(Robot), _sensor(rng, part)) for _ in range(int(rng.choice([1, 1, 1, 2, 3])))]
     own = {field: draw(Scenario, field) for field in FIELDS[Scenario]}
     given = rng.random() < 0.3
     faults = _faults(rng, part, own["robots"])
+    drifts = faults.happen if few_kernels else rng.random() >= _DEFAULT
+
+    def localization() -> Localization:
+        drawn = part(Localization)
+        if not drifts:
+            return Localization()
+        return drawn if drawn.drifts else dataclasses.replace(drawn, yaw_rad_per_sqrt_m=0.01)
+
+    kinds = [
+        RobotKind(
+            part(Robot, localization=localization(), above_ground_m=_above_ground_m(rng, grid)),
+            _sensor(rng, part),
+        )
+        for _ in range(int(rng.choice([1, 1, 1, 2, 3])))
+    ]
     scenario = Scenario(
         name="drawn",
         grid=grid,
@@ -205,6 +235,7 @@ def draw_scenario(rng: np.random.Generator, few_kernels: bool = False) -> Drawn:
         extra_kinds=tuple(kinds[1:]),
         channel=_channel(part, faults.happen, few_kernels),
         faults=faults,
+        fiducials=_fiducials(rng, part, grid),
         ending=part(Ending),
         reward=part(Reward),
         action=part(Action),
@@ -268,6 +299,22 @@ def _faults(rng: np.random.Generator, part: Callable[..., Any], robots: int) -> 
     outages = {name: part(Outage, robots=some()) for name in ("stop", "blind", "silent")}
     sensor, radio = part(SensorFault, robots=some()), part(RadioFault, robots=some())
     return Faults(**outages, sensor=sensor, radio=radio)
+
+
+def _above_ground_m(rng: np.random.Generator, grid: Grid) -> float | None:
+    """In one of twenty kinds of robots a height above ground: few worlds have ground that carries them."""
+    return float(rng.uniform(0.5, 3.0)) * grid.voxel_size_m if rng.random() < 0.05 else None
+
+
+def _fiducials(rng: np.random.Generator, part: Callable[..., Any], grid: Grid) -> Fiducials:
+    """Fiducials drawn by each mission, or some places of the grid, which may be in something solid."""
+    drawn = part(Fiducials)
+    if rng.random() < 0.7:
+        return drawn
+    shares = rng.uniform(0.0, 1.0, (int(rng.integers(1, 4)), 3)) * 0.999
+    places = np.asarray(grid.origin_m) + shares * grid.size_m
+    given = tuple((float(x), float(y), float(z)) for x, y, z in places)
+    return dataclasses.replace(drawn, number=0, positions_m=given)
 
 
 def _channel(part: Callable[..., Any], faulty: bool, few_kernels: bool) -> Channel:

@@ -29,9 +29,13 @@ _EDGE = 0.5 + 0.8660254037844387
 
 
 @inlined_kernel
-def measurement_precision(range_m, sigma_min, sigma_slope_per_m):
-    """Precision of the coverage that one ray measures, 1/σ(d)² with σ(d) = σ_min + ζ·d (eq. 5)."""
-    sigma = sigma_min + sigma_slope_per_m * range_m
+def measurement_precision(range_m, sigma_min, sigma_slope_per_m, sigma_exponent):
+    """Precision of the coverage that one ray measures, 1/σ(d)² with σ(d) = σ_min + ζ·dⁿ.
+
+    With n = 1 that is Rocha04's eq. 5; stereo cameras have n = 2 (Sujan, eq. 4: σ = S·T·Lⁿ).
+    """
+    grown = range_m if sigma_exponent == 1.0 else range_m**sigma_exponent
+    sigma = sigma_min + sigma_slope_per_m * grown
     return 1.0 / (sigma * sigma)
 
 

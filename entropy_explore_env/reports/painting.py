@@ -9,10 +9,11 @@ import numpy as np
 
 from entropy_explore_env.errors import CallOrderError, SettingError
 from entropy_explore_env.missions.faults import failing
+from entropy_explore_env.missions.localization import pose_errors
 from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.reports.animation import Window
 from entropy_explore_env.reports.projection import shares_left
-from entropy_explore_env.reports.recording import DrivenPaths, poses_now
+from entropy_explore_env.reports.recording import DrivenPaths, believed_poses_now, poses_now
 from entropy_explore_env.reports.rendering import Frame, draw_frame
 from entropy_explore_env.worlds.given import GIVEN
 from entropy_explore_env.worlds.recipes.catalogue import RECIPES
@@ -107,6 +108,9 @@ class Painter:
     def paint(self, missions: Missions) -> np.ndarray:
         """Draw this moment of the mission: the belief of robot_0, and the whole team.
 
+        Robots that drift are drawn where they believe to be, which is the map's frame, with an ellipse of two
+        standard deviations and a line to where they are; the paths are those that they truly drove.
+
         Args:
             missions: The curves and the driven paths show the moments at which they were watched.
 
@@ -115,7 +119,8 @@ class Painter:
         """
         robots = missions.state.robots[self._number]
         time_s = float(missions.state.missions[self._number]["time_s"])
-        poses = poses_now(missions, self._number)
+        poses = believed_poses_now(missions, self._number)
+        drifts, estimates = missions.scenario.drifts, missions.state.estimates[self._number]
         shares = np.stack(self._shares) if self._shares else np.zeros((0, len(robots)))
         stopped = np.zeros(len(robots), bool)
         if missions.scenario.faults.happen:
@@ -126,6 +131,7 @@ class Painter:
             f"scans {robots['scans'].sum():,}",
             f"rays sent {robots['measurements_sent'].sum():,}",
             f"driven {robots['distance_m'].sum():,.1f} m",
+            *((f"pose error {pose_errors(estimates)[:, 0].max():.2f} m at most",) if drifts else ()),
             *((f"stopped {stopped.sum()} of {len(robots)}",) if missions.scenario.faults.happen else ()),
         )
         frame = Frame(
@@ -142,6 +148,8 @@ class Painter:
             title=f"{world_name(missions, self._number)}: belief of robot_0",
             status=status,
             stopped=tuple(np.flatnonzero(stopped).tolist()),
+            covariances_m2=estimates["covariance"][:, :3, :3],
+            true_m=poses_now(missions, self._number)[:, :3] if drifts else np.zeros((0, 3)),
         )
         return draw_frame(frame)
 

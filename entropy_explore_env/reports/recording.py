@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from entropy_explore_env.missions.localization import believed_pose
 from entropy_explore_env.missions.poses import place_at, pose_at
 from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.robots.motion import MoveEnd
@@ -19,6 +20,16 @@ def poses_now(missions: Missions, mission: int) -> np.ndarray:
     time_s = float(missions.state.missions[mission]["time_s"])
     numbers, robots = missions.rules.params, missions.state.robots[mission]
     return np.stack([np.array(pose_at(numbers[a], robot, time_s)) for a, robot in enumerate(robots)])
+
+
+def believed_poses_now(missions: Missions, mission: int) -> np.ndarray:
+    """(A, 5) float64 where a mission's robots believe to be: `poses_now` where nobody drifts."""
+    poses = poses_now(missions, mission)
+    if missions.estimates is None:
+        return poses
+    params, estimates = missions.rules.params, missions.estimates[mission]
+    believed = [believed_pose(estimates[a], params[a], pose) for a, pose in enumerate(poses)]
+    return np.array(believed)
 
 
 class DrivenPaths:

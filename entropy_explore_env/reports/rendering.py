@@ -6,7 +6,7 @@ views that would be a few pixels high are exaggerated in height, as their titles
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from PIL import Image, ImageDraw
@@ -31,6 +31,9 @@ _TITLE_SIZE = 20
 """Of the font, in units."""
 _GAZE = 11
 """Length of the line that shows where a robot looks, in units."""
+_ELLIPSE_POINTS = 49
+_SIGMAS = 2.0
+"""Of the ellipses around estimated places: 86 % of true ones are inside."""
 _STATUS_LINES = 8
 """At most this many are drawn."""
 _LEAST_WIDTH, _LEAST_HEIGHT = 480, 360
@@ -55,6 +58,9 @@ class Frame:
         title: One line.
         status: Lines such as "time 123 s"; at most eight are drawn.
         stopped: Numbers of robots that a fault has stopped: a cross is drawn over them.
+        covariances_m2: (A, 3, 3), of positions that are estimates: an ellipse of two standard deviations is
+            drawn around each; (0, 3, 3) = none are.
+        true_m: (A, 3), where the robots truly are then: a line leads there; (0, 3) = none is drawn.
     """
 
     entropy_share: np.ndarray
@@ -70,6 +76,8 @@ class Frame:
     title: str
     status: tuple[str, ...] = ()
     stopped: tuple[int, ...] = ()
+    covariances_m2: np.ndarray = field(default_factory=lambda: np.zeros((0, 3, 3)))
+    true_m: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
 
     def __post_init__(self) -> None:
         """Check that the arrays fit each other."""
@@ -88,6 +96,10 @@ class Frame:
         for name, shape in wanted.items():
             if np.shape(getattr(self, name)) != shape:
                 raise SettingError(f"Frame.{name}", np.shape(getattr(self, name)), f"a shape {shape}")
+        for name, rest in (("covariances_m2", (3, 3)), ("true_m", (3,))):
+            if np.shape(getattr(self, name)) not in ((0, *rest), (robots, *rest)):
+                allowed = f"a shape {(robots, *rest)}, or {(0, *rest)}"
+                raise SettingError(f"Frame.{name}", np.shape(getattr(self, name)), allowed)
         if len(self.paths_m) not in (0, robots):
             raise SettingError("Frame.paths_m", len(self.paths_m), f"0 or {robots} paths")
 
@@ -171,6 +183,13 @@ def _draw_robots(picture: Image.Image, view: View, frame: Frame, unit: int) -> N
     for robot, path_m in enumerate(frame.paths_m):
         points = view.place(np.reshape(path_m, (-1, 3)), origin_m, size_m)
         draw.line(points[np.isfinite(points).all(axis=1)].ravel().tolist(), robot_colour(robot), unit)
+    for robot, covariance in enumerate(frame.covariances_m2):
+        outline_m = _ellipse(frame.positions_m[robot], covariance, view.up)
+        points = view.place(outline_m, origin_m, size_m)
+        draw.line(points.ravel().tolist(), robot_colour(robot), 2 * unit)
+    for robot, true_m in enumerate(frame.true_m):
+        points = view.place(np.stack([frame.positions_m[robot], true_m]), origin_m, size_m)
+        draw.line(points.ravel().tolist(), robot_colour(robot), unit)
     for robot, (x, y) in enumerate(view.place(frame.targets_m, origin_m, size_m).tolist()):
         if np.isfinite(x + y):
             draw_ring(draw, (x, y), unit, robot_colour(robot))
@@ -187,6 +206,17 @@ def _draw_robots(picture: Image.Image, view: View, frame: Frame, unit: int) -> N
             draw_disc(draw, (x, y), MARK_RADIUS * unit, robot_colour(robot))
             if robot in frame.stopped:
                 draw_cross(draw, (x, y), unit)
+
+
+def _ellipse(centre_m: np.ndarray, covariance_m2: np.ndarray, up: int) -> np.ndarray:
+    """(N, 3) closed outline of two standard deviations around a place, in the plane of x and axis `up`."""
+    axes = [0, up]
+    variances, directions = np.linalg.eigh(np.asarray(covariance_m2)[np.ix_(axes, axes)])
+    angles = np.linspace(0.0, 2.0 * np.pi, _ELLIPSE_POINTS)
+    around = np.stack([np.cos(angles), np.sin(angles)], axis=1) * np.sqrt(np.maximum(variances, 0.0))
+    points = np.repeat(np.asarray(centre_m, np.float64)[None], _ELLIPSE_POINTS, axis=0)
+    points[:, axes] += _SIGMAS * around @ directions.T
+    return points
 
 
 def _draw_curves(draw: ImageDraw.ImageDraw, box: Box, frame: Frame, unit: int) -> None:

@@ -45,6 +45,7 @@ SENSOR_PARAMS = record_type(
         ("noise_m", "f8"),
         ("sigma_min", "f8"),
         ("sigma_slope_per_m", "f8"),
+        ("sigma_exponent", "f8"),
         ("voxels_behind", "i8"),
         ("columns", "i8"),
         ("rows", "i8"),
@@ -118,7 +119,7 @@ def sensor_model(sensor: RangeSensor) -> SensorModel:
     params["max_range_m"], params["noise_m"] = sensor.max_range_m, sensor.range_noise_m
     params["min_range_m"] = sensor.min_range_m
     params["sigma_min"], params["sigma_slope_per_m"] = sensor.sigma_min, sensor.sigma_slope_per_m
-    params["voxels_behind"] = sensor.voxels_behind
+    params["sigma_exponent"], params["voxels_behind"] = sensor.sigma_exponent, sensor.voxels_behind
     params["columns"], params["rows"] = sensor.columns, sensor.rows
     step = sensor.angular_step_rad
     return SensorModel(centred_angles(sensor.columns, step), centred_angles(sensor.rows, step), params)
@@ -246,7 +247,9 @@ def body_distance(start, direction, bodies):
 def weigh_measurement(scan, index, params, size, start):
     """Measured coverage (eq. 4) and its precision (eq. 5) for a ray with its crossing filled in."""
     ray = scan.rays[index]
-    ray.precision = measurement_precision(ray.range_m, params.sigma_min, params.sigma_slope_per_m)
+    ray.precision = measurement_precision(
+        ray.range_m, params.sigma_min, params.sigma_slope_per_m, params.sigma_exponent
+    )
     ray.free = ray.voxels
     if ray.returned == _HIT:
         crossing = Crossing(scan.crossed[index], scan.entered)

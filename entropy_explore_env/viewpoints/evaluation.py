@@ -93,6 +93,7 @@ def robot_model(
         min_range_m=float(sensor.min_range_m),
         sigma_min=float(sensor.sigma_min),
         sigma_slope_per_m=float(sensor.sigma_slope_per_m),
+        sigma_exponent=float(sensor.sigma_exponent),
         voxels_behind=int(sensor.voxels_behind),
         known_precision=float(KNOWN_RATIO / scenario.sigma_prior**2),
         stop_probability=float(stop_probability),

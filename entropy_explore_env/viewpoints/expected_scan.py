@@ -27,6 +27,7 @@ class ScanModel(NamedTuple):
     min_range_m: float
     sigma_min: float
     sigma_slope_per_m: float
+    sigma_exponent: float
     voxels_behind: int
     known_precision: float
     """Voxels with less precision are unknown."""
@@ -101,7 +102,9 @@ def expected_scan_bits(belief, scan, viewpoint, cones, scratch):
             range_m = length * scan.voxel_size_m
             if end != OPEN and range_m < scan.min_range_m:
                 continue
-            gain = scan.sensor_rays * measurement_precision(range_m, scan.sigma_min, scan.sigma_slope_per_m)
+            gain = scan.sensor_rays * measurement_precision(
+                range_m, scan.sigma_min, scan.sigma_slope_per_m, scan.sigma_exponent
+            )
             for i in range(n):
                 voxel = np.uint32(scratch.crossed[i])
                 if scratch.added[voxel] == 0.0:

@@ -52,7 +52,9 @@ def _imagine_ray(belief, scan, gap_probability, start, direction, count, scratch
     if end != OPEN and range_m < scan.min_range_m:
         return count
     share = 1.0
-    gain = scan.sensor_rays * measurement_precision(range_m, scan.sigma_min, scan.sigma_slope_per_m)
+    gain = scan.sensor_rays * measurement_precision(
+        range_m, scan.sigma_min, scan.sigma_slope_per_m, scan.sigma_exponent
+    )
     for i in range(n):
         voxel = scratch.crossed[i]
         if scratch.added[voxel] == 0.0:

@@ -30,7 +30,7 @@ SENSOR = rocha04.Sensor(0.25, 0.08, 0.006)
 
 
 def precision_of(range_m, sensor=SENSOR):
-    return measurement_precision(float(range_m), sensor.sigma_min, sensor.zeta_per_m)
+    return measurement_precision(float(range_m), sensor.sigma_min, sensor.zeta_per_m, 1.0)
 
 
 def cross(size, start, direction, length, behind=1):
@@ -53,8 +53,16 @@ def fuse(mean, precision, crossed, coverage, free, n, gain):
 @drawn(40)
 @given(st.floats(0.0, 50.0), st.floats(1e-3, 5.0), st.floats(0.0, 0.5))
 def test_the_precision_of_a_measurement_is_that_of_equation_5(range_m, sigma_min, zeta):
-    ours = measurement_precision(range_m, sigma_min, zeta)
+    ours = measurement_precision(range_m, sigma_min, zeta, 1.0)
     assert ours == pytest.approx(rocha04.measured_sigma(range_m, sigma_min, zeta) ** -2, rel=1e-12)
+
+
+@pytest.mark.parametrize("exponent", [0.5, 1.0, 2.0, 3.0])
+def test_noise_grows_with_a_power_of_the_distance(exponent):
+    """Sujan, eq. 4: σ = σ_min + ζ dⁿ."""
+    ours = measurement_precision(3.0, 0.1, 0.02, exponent)
+    assert ours == pytest.approx((0.1 + 0.02 * 3.0**exponent) ** -2)
+    assert measurement_precision(3.0, 0.1, 0.02, 1.0) == 1.0 / (0.1 + 0.02 * 3.0) ** 2
 
 
 @drawn(250)

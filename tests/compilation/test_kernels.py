@@ -108,7 +108,7 @@ def test_a_kernel_of_ones_own_may_call_one_of_the_library(tmp_path):
     code = (
         "from entropy_explore_env.belief.measurement_model import measurement_precision\n"
         "from entropy_explore_env.compilation.kernels import kernel\n\n\n"
-        "@kernel\ndef caller(x):\n    return measurement_precision(x, 0.5, 0.0) + {}\n"
+        "@kernel\ndef caller(x):\n    return measurement_precision(x, 0.5, 0.0, 1.0) + {}\n"
     )
     call = CALL.format(package="mine")
     (made / "caller.py").write_text(code.format("0.0"))

@@ -11,8 +11,10 @@ from entropy_explore_env.belief.entropy import map_entropy_bits
 from entropy_explore_env.belief.map_update import fuse_scan
 from entropy_explore_env.belief.measurement_model import Return
 from entropy_explore_env.missions.poses import pose_at
+from entropy_explore_env.missions.view import view_of
 from entropy_explore_env.robots.range_sensor import Scene, SensorPose, new_scan, sensor_model, take_scan
 from entropy_explore_env.settings import Grid, RangeSensor, gaussian_entropy_bits
+from entropy_explore_env.viewpoints.evaluation import robot_model
 from tests.reference import rocha04
 from tests.reference.scenes import as_reference, free_box, put, random_actions, started, wander
 
@@ -328,3 +330,30 @@ def test_a_place_on_a_face_that_rounding_takes_past_it_is_still_inside():
         assert missions.state.robots["path_m"].min() >= 0.0
         assert missions.state.scan_range_m.min() >= 0.0
     assert past > 5
+
+
+def test_noise_that_grows_with_a_power_of_the_distance_is_in_scans_and_in_what_is_expected_of_them():
+    """Along one ray of length d, ζ dⁿ with n = 2 is what n = 1 gives with ζ d in place of ζ.
+
+    The robot scans backwards, and the panorama says what a ray ahead would bring, which is as long.
+    """
+    told = []
+    for exponent, slope in ((2.0, 0.03), (1.0, 0.03 * 1.75), (1.0, 0.03)):
+        sensor = {"field_of_view_rad": (0.0, 0.0), "sigma_slope_per_m": slope, "sigma_exponent": exponent}
+        missions = started(
+            free_box(
+                robots=1,
+                robot={"turn_rate_rad_s": math.inf},
+                sensor=sensor,
+                observation={"panorama_yaws": 1, "panorama_pitches": 1, "flat": True},
+            )
+        )
+        put(missions, 0, (1.75, 2.75, 1.25, 0.0, 0.0))
+        model = robot_model(missions.scenario, missions.scenario.kinds[0], 1)
+        missions.step(np.array([[[0.0, 0.0, 0.0, 1.0, 0.0]]]), np.zeros((1, 1), np.int64))
+        assert view_of(missions, 0, 0).scan.range_m == pytest.approx([1.75])
+        told.append((missions.precision[0, 0].copy(), missions.observations[0, 0, :1].copy()))
+        assert (model.scan.sigma_exponent, model.scan.sigma_slope_per_m) == (exponent, slope)
+    np.testing.assert_allclose(told[0][0], told[1][0], rtol=1e-6)
+    np.testing.assert_allclose(told[0][1], told[1][1], rtol=1e-6)
+    assert told[0][0].max() < 0.9 * told[2][0].max() and (told[0][1] < 0.99 * told[2][1]).all()

@@ -9,6 +9,7 @@ import pytest
 
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.missions.simulation import Missions
+from entropy_explore_env.missions.view import view_of
 from entropy_explore_env.reports import painting
 from entropy_explore_env.reports.painting import (
     RENDER_MODES,
@@ -21,7 +22,7 @@ from entropy_explore_env.reports.recording import poses_now
 from entropy_explore_env.reports.rendering import Frame, draw_frame
 from entropy_explore_env.settings import Grid
 from entropy_explore_env.worlds.world import World
-from tests.reference.scenes import free_box, random_actions, started
+from tests.reference.scenes import free_box, random_actions, started, wander
 
 FLAT = {"grid": Grid((13, 9, 1), 0.5, (-3.0, 1.0, 0.0)), "world": "furnished"}
 SCENES = [pytest.param({}, id="box"), pytest.param(FLAT, id="flat")]
@@ -245,3 +246,17 @@ def test_modes_are_checked():
     for mode in ("ansi", "", "RGB_ARRAY"):
         with pytest.raises(SettingError, match=r"render_mode.*human"):
             check_render_mode(mode)
+
+
+def test_robots_that_drift_are_drawn_where_they_believe_to_be(frames):
+    missions = started(free_box(robot={"localization": {"xy_m_per_sqrt_m": 0.1}}, decision_period_s=1.0))
+    wander(missions, 8, 0)
+    Painter("rgb_array").paint(missions)
+    frame, estimates = frames[-1], missions.state.estimates[0]
+    views = [view_of(missions, 0, robot) for robot in range(2)]
+    np.testing.assert_array_equal(frame.positions_m, [view.pose[:3] for view in views])
+    np.testing.assert_array_equal(frame.true_m, poses_now(missions, 0)[:, :3])
+    np.testing.assert_array_equal(frame.covariances_m2, estimates["covariance"][:, :3, :3])
+    assert (frame.true_m[:, :2] != frame.positions_m[:, :2]).all()
+    largest = np.linalg.norm(estimates["error"][:, :3], axis=1).max()
+    assert frame.status[-1] == f"pose error {largest:.2f} m at most"

@@ -391,3 +391,40 @@ def test_a_cross_is_drawn_over_a_robot_that_has_stopped():
     inside = [p for p in changed if view.top <= p[0] < view.bottom and view.left <= p[1] < view.right]
     assert inside and all(abs(p[0] - row) <= 10 and abs(p[1] - column) <= 10 for p in inside)
     assert tuple(after[row, column]) == INK
+
+
+@pytest.mark.parametrize("up", [1, 2])
+def test_an_ellipse_of_two_standard_deviations_is_drawn_around_an_estimate(up: int) -> None:
+    """A quarter of a metre along x, half of that upwards: it reaches twice as far."""
+    place, along, upwards = (3.5, 5.5, 2.5), 2.0 * 0.25, 2.0 * 0.125
+    frame = frame_of(robots=1)
+    position = (ORIGIN_M + np.array(place) * VOXEL_M)[None]
+    variances = np.full(3, 1e-6)
+    variances[0], variances[up] = 0.25**2, 0.125**2
+    frame = dataclasses.replace(frame, positions_m=position, targets_m=np.full((1, 3), np.nan))
+    drawn = dataclasses.replace(frame, covariances_m2=np.diag(variances)[None])
+    before, after = draw_frame(frame), draw_frame(drawn)
+    view = views_of(frame)["coverage", up]
+    changed = (before != after).any(axis=2)
+    for right, above in ((along, 0.0), (-along, 0.0), (0.0, upwards), (0.0, -upwards)):
+        voxel = list(place)
+        voxel[0] += right / VOXEL_M
+        voxel[up] += above / VOXEL_M
+        row, column = pixel_of(view, tuple(voxel))
+        assert changed[row - 1 : row + 2, column - 1 : column + 2].any()
+    row, column = pixel_of(view, place)
+    assert not changed[row, column]
+    with pytest.raises(
+        SettingError, match=r"Frame.covariances_m2 = \(2, 3, 3\): allowed is a shape \(1, 3, 3\)"
+    ):
+        dataclasses.replace(frame, covariances_m2=np.zeros((2, 3, 3)))
+
+
+def test_a_line_leads_from_an_estimate_to_where_the_robot_is() -> None:
+    frame = dataclasses.replace(
+        frame_of(robots=1), positions_m=ORIGIN_M[None] + VOXEL_M * np.array([[1.5, 2.5, 2.5]])
+    )
+    drawn = dataclasses.replace(frame, true_m=ORIGIN_M[None] + VOXEL_M * np.array([[5.5, 8.5, 2.5]]))
+    row, column = pixel_of(views_of(frame)["entropy", 1], (4.5, 7.0, 2.5))
+    changed = (draw_frame(frame) != draw_frame(drawn)).any(axis=2)
+    assert changed[row - 1 : row + 2, column - 1 : column + 2].any()

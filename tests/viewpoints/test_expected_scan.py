@@ -38,6 +38,7 @@ def model(stop_probability=0.0, known_precision=0.0, rays=1.0, sensor=SENSOR):
         sensor.min_range_m,
         sensor.sigma_min,
         sensor.sigma_slope_per_m,
+        sensor.sigma_exponent,
         sensor.voxels_behind,
         known_precision,
         stop_probability,

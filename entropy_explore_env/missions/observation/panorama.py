@@ -36,7 +36,9 @@ def observe_panorama(begin, params, sensor, directions, start, known, crossing, 
             known.mean, size, line, STOP_AT_COVERED, OPEN_END, sensor.voxels_behind, crossing
         )
         range_m = sensor.max_range_m if end == OPEN else length * params.voxel_size_m
-        measured = measurement_precision(range_m, sensor.sigma_min, sensor.sigma_slope_per_m)
+        measured = measurement_precision(
+            range_m, sensor.sigma_min, sensor.sigma_slope_per_m, sensor.sigma_exponent
+        )
         bits = expected_utility(known.precision, crossing.voxels, n, measured)
         if end != OPEN and range_m < sensor.min_range_m:
             bits = 0.0
