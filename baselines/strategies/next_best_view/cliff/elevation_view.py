@@ -42,6 +42,15 @@ class Camera(NamedTuple):
     """Voxel edges; inf allowed."""
 
 
+@inlined_kernel
+def normal_share(x):
+    """Φ(x) to 1e-7, by Abramowitz & Stegun 1964, eq. 26.2.17: faster than by `erfc`."""
+    t = 1.0 / (1.0 + 0.2316419 * abs(x))
+    tail = t * (0.319381530 + t * (-0.356563782 + t * (1.781477937 + t * (-1.821255978 + t * 1.330274429))))
+    tail *= math.exp(-0.5 * x * x) * 0.3989422804014327
+    return 1.0 - tail if x > 0.0 else tail
+
+
 @lean_kernel
 def visibility(ground, camera, x, y):
     """P_V of eq. 5: the probability that no column on the line to a camera hides the top of a column.
@@ -77,7 +86,7 @@ def visibility(ground, camera, x, y):
         above = at_z + 0.5 * (entered + left) * rise - ground.height[i, j]
         entered = left
         if above < _CLEAR * ground.sigma[i, j]:
-            seen *= 0.5 * math.erfc(-above / (ground.sigma[i, j] * math.sqrt(2.0)))
+            seen *= normal_share(above / ground.sigma[i, j])
             if seen < _HIDDEN:
                 return 0.0
     return seen
