@@ -209,23 +209,24 @@ def training_task(args: Args) -> TrainingTask:
     reward: dict[str, Any] = {} if args.reward == "seconds" else {"kind": args.reward}
     if args.cost_per_s is not None:
         reward["cost_per_s"] = args.cost_per_s
-    form = candidate_form(args.candidates) if args.over_candidates else _panorama_form(args)
+    if args.over_candidates:
+        form = candidate_form(args.candidates)
+    else:
+        form = panorama_form(args.actions, args.yaws, args.pitches)
+        form["observation"] |= {"overview": args.overview, "patch": args.patch, "while_busy": False}
     scenario = with_settings(scenario, {"robots": args.robots, "reward": reward, **form})
     return TrainingTask(scenario, surroundings)
 
 
-def _panorama_form(args: Args) -> dict[str, Any]:
-    """Actions and observation of a policy that looks at a panorama."""
+def panorama_form(kind: str, yaws: int, pitches: int) -> dict[str, dict[str, Any]]:
+    """Actions and observation of a policy that looks at a panorama, with a ray for each gaze."""
     return {
-        "action": {"kind": args.actions, "moves": "axes", "yaws": args.yaws, "pitches": args.pitches},
+        "action": {"kind": kind, "moves": "axes", "yaws": yaws, "pitches": pitches},
         "observation": {
-            "panorama_yaws": args.yaws,
-            "panorama_pitches": args.pitches,
+            "panorama_yaws": yaws,
+            "panorama_pitches": pitches,
             "panorama_utility": "log2",
-            "overview": args.overview,
-            "patch": args.patch,
             "flat": True,
-            "while_busy": False,
         },
     }
 

@@ -42,6 +42,7 @@ from training.advantages import DiscountUnit
 from training.errors import NotFiniteError, SilentRunnersError
 from training.interruption import Interruption
 from training.options import check_new, check_options, check_share
+from training.ppo_options import OWN
 from training.ray_cluster import check_address, start_ray
 from training.rllib_settings import (
     FIGURES,
@@ -96,6 +97,10 @@ class Args:
     """vector: an MLP; gazes: also a small network for gazes, over the panorama."""
     hidden: list[int] = field(default_factory=lambda: [128, 128])
     """Units of the hidden layers of actor and critic."""
+    yaws: int = 16
+    """Gazes, and rays of the panorama, around the horizon."""
+    pitches: int = 7
+    """Gazes, and rays of the panorama, from -45° to 45°."""
     learning_rate: float = 1e-3
     """Adam's learning rate at first; it falls linearly to a twentieth."""
     discount: DiscountUnit = "seconds"
@@ -130,7 +135,7 @@ def main(words: Sequence[str]) -> int:
         args, changed = resumed_options(Args, resume, words, _CHANGEABLE, __doc__, settled_arguments)
         said = "".join(f"; {name} was {value}" for name, value in changed.items())
         print(f"{resume}: {_where(resume)}{said}", file=sys.stderr)
-    named = base_task(args.scenario, args.task.settings).scenario
+    named = base_task(args.scenario, args.task.settings, OWN).scenario
     args.out = args.out or Path("runs") / f"rllib-{named.name}-{args.robots}"
     if args.cost_per_s is None:
         args.cost_per_s = named.reward.cost_per_s
@@ -185,7 +190,7 @@ def parsed(words: Sequence[str]) -> Args:
         SettingError: There is no such scenario.
     """
     first = first_parsed(Args, words, __doc__)
-    task = base_task(first.scenario, first.task.settings)
+    task = base_task(first.scenario, first.task.settings, OWN)
     robots = {"robots": task.scenario.robots} if is_whole_scenario(first.task.settings) else {}
     return settled_arguments(parsed_for(task, first, words, __doc__, **robots))
 

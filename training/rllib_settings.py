@@ -10,6 +10,7 @@ from baselines.cli.task_options import base_task, tasked
 from entropy_explore_env.scenario import with_settings
 from training.advantages import Discounting
 from training.checkpoints import PolicySettings
+from training.ppo_options import OWN, panorama_form
 
 if TYPE_CHECKING:
     from training.rllib_ppo import Args
@@ -30,14 +31,11 @@ def environment_settings(args: Args) -> dict[str, Any]:
         SettingError: There is no such scenario, or it does not allow the settings.
         WorldError: A world file cannot be used.
     """
-    named = base_task(args.scenario, args.task.settings).scenario
+    named = base_task(args.scenario, args.task.settings, OWN).scenario
     scenario, surroundings = tasked(named, args.task, args.robots)
-    settings: dict[str, Any] = {
-        "action": {"kind": "discrete", "moves": "axes"},
-        "observation": {"flat": True, "panorama_utility": "log2"},  # what a small network learns best from
-        "reward": {} if args.cost_per_s is None else {"cost_per_s": args.cost_per_s},
-    }
-    return {"scenario": with_settings(scenario, settings), **surroundings.settings()}
+    reward = {} if args.cost_per_s is None else {"cost_per_s": args.cost_per_s}
+    form = panorama_form("discrete", args.yaws, args.pitches)
+    return {"scenario": with_settings(scenario, {"reward": reward, **form}), **surroundings.settings()}
 
 
 def policy_of(args: Args, env_settings: dict[str, Any]) -> PolicySettings:
