@@ -67,8 +67,10 @@ class TrainingBar:
     def show_validation(self, steps: int, validation: Validation) -> None:
         """Print what the validation after so many steps found."""
         self._progress.update(self._task, latest=f"missions take {validation.median_s:,.0f} s")
+        ratio = validation.planner_ratio
+        beside = "" if ratio is None else f", {ratio:.3f} times as long as the planner's"
         self._console.print(
-            f"{steps:>12,} steps: missions take {validation.median_s:,.1f} s (median), "
+            f"{steps:>12,} steps: missions take {validation.median_s:,.1f} s (median){beside}, "
             f"{validation.finished:.0%} finished",
             soft_wrap=True,
         )

@@ -12,6 +12,7 @@ from stable_baselines3.common.policies import ActorCriticPolicy
 from baselines.experiments.mission import Surroundings
 from entropy_explore_env.envs.vector_env import EntropyExploreVectorEnv
 from entropy_explore_env.scenario import Scenario, with_settings
+from training.candidate_network import CandidatePolicy
 from training.policy import choose_actions
 from training.seeds import validation_seeds
 
@@ -24,12 +25,15 @@ class Validation:
         mean_s, median_s: Mission time; a mission that was cut off counts with the time limit.
         finished: Share of the missions that were mapped.
         bits_per_bit: Bits that teammates gained for each bit sent; None where nothing was sent.
+        planner_ratio: Of a policy over candidates, the geometric mean of its mission times over those of the
+            planner itself on the same starts; None of others.
     """
 
     mean_s: float
     median_s: float
     finished: float
     bits_per_bit: float | None
+    planner_ratio: float | None = None
 
 
 class Validator:
@@ -53,6 +57,7 @@ class Validator:
             validation, missions, threads=threads, action_masks=False, **around
         )
         self._seeds = validation_seeds(missions, first)
+        self._planner_s: np.ndarray | None = None
 
     def validate(
         self, policy: ActorCriticPolicy, stop: Callable[[], bool] = lambda: False
@@ -75,7 +80,16 @@ class Validator:
             float(np.median(times_s)),
             float(np.mean([each["finished"] for each in ended])),
             float(np.mean(defined)) if defined else None,
+            self._planner_ratio(times_s) if isinstance(policy, CandidatePolicy) else None,
         )
+
+    def _planner_ratio(self, times_s: np.ndarray) -> float:
+        """Geometric mean of mission times (E,) over those of the planner, which leads the missions once."""
+        if self._planner_s is None:
+            led = self.run(lambda observations: np.zeros(len(observations), np.int64))  # 0 = its own choice
+            assert led is not None
+            self._planner_s = np.array([each["t_mission_s"] for each in led])
+        return float(np.exp(np.log(times_s / self._planner_s).mean()))
 
     def run(
         self, choose: Callable[[np.ndarray], np.ndarray], stop: Callable[[], bool] = lambda: False

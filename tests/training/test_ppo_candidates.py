@@ -54,7 +54,9 @@ def test_a_run_learns_and_its_policy_is_a_strategy(trained):
     changed = [name for name in first.weights if not torch.equal(first.weights[name], last.weights[name])]
     assert any(".actor." in name for name in changed) and any(".critic." in name for name in changed)
     with (trained / "curve.csv").open() as file:
-        assert [int(row["steps"]) for row in csv.DictReader(file)] == [128, 192]
+        rows = list(csv.DictReader(file))
+    assert [int(row["steps"]) for row in rows] == [128, 192]
+    assert all(0.3 < float(row["planner_ratio"]) < 3.0 for row in rows)
     make_policy_strategy(str(trained))
 
 
@@ -67,6 +69,7 @@ def test_fresh_weights_do_exactly_what_the_planner_does():
         policy = validator.validate(state.model.policy)
     assert planner is not None and policy is not None
     assert policy.mean_s == pytest.approx(np.mean([each["t_mission_s"] for each in planner]), abs=1e-9)
+    assert policy.planner_ratio == pytest.approx(1.0, abs=1e-12)
 
 
 def test_rewards_are_less_the_seconds():
