@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import itertools
 import math
 
@@ -175,6 +176,22 @@ def test_no_rover_drives_over_the_edge(name):
         assert set(ends) == {MoveEnd.ARRIVED} and missions.state.robots[0, 0]["scans"] >= 16
         places.add(float(missions.state.robots[0, 0]["distance_m"]) > 0.5)
     assert True in places
+
+
+def test_a_goal_that_cannot_be_reached_is_given_up_and_teams_map_on():
+    env = scripted_env(with_settings(CLIFF, {**QUICK, "robots": 2, "max_cycles": 24}))
+    made, ends = CliffMapping(), set()
+
+    def note(env):
+        ends.update(list(MoveEnd)[end] for end in env.missions.state.robots[0]["move_end"])
+
+    run_mission(env, made, 2, note)
+    assert MoveEnd.EDGE not in ends and (env.missions.state.robots[0]["distance_m"] > 1.0).all()
+    view, memory = view_of(env.missions, 0, 0), made._memories[0]
+    memory.goal = view.pose + np.array([1.0, 0.0, 0.0, 0.0, 0.0])
+    goal, looks = memory.goal, len(made.looks[0])
+    made.choose([dataclasses.replace(view, move_end=MoveEnd.TEAMMATE)])
+    assert memory.goal is not goal and len(made.looks[0]) == looks + 1
 
 
 def test_interest_falls_where_nothing_answers_and_nowhere_else():

@@ -34,6 +34,7 @@ from baselines.strategies.next_best_view.rating import pose_distance, rating
 from entropy_explore_env.belief.elevation import ElevationMap, completed, elevation_map
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.missions.view import RobotView
+from entropy_explore_env.robots.motion import MoveEnd
 from entropy_explore_env.scenario import Scenario
 from entropy_explore_env.validation import check_choice, check_count, check_kind, check_positive, check_within
 
@@ -45,6 +46,8 @@ _UNKNOWN_SIGMA = 1.0
 """Of heights that are not measured, in voxel edges."""
 _COMPLETION_M = 0.05
 """To which unknown heights are completed."""
+_GOES_ON = (MoveEnd.ARRIVED, MoveEnd.UNDER_WAY)
+"""Ends of a drive after which a rover keeps its goal."""
 _SAME_PLACE = 0.75
 """Voxel edges: a rover this near has arrived."""
 
@@ -168,6 +171,8 @@ class CliffMapping:
         if memory.goal is not None and self._arrived(view, memory.goal):
             self._learn(view, memory, known)
             memory.goal = None
+        elif view.move_end not in _GOES_ON:
+            memory.goal = memory.visibility = None
         memory.known = known
         grid = self._scenario.grid
         self._stand(view, memory)
