@@ -238,6 +238,19 @@ def test_a_number_that_no_float_holds_is_refused_in_a_short_line():
     assert len(str(caught.value)) < 300
 
 
+def test_rovers_stay_in_their_plane_and_look_up_and_down_but_not_in_plans():
+    rover = {"motion": "planar", "sensor_height_m": 1.75, "above_ground_m": 0.75, "tilts": True}
+    scenario = with_settings(BOX, {"robot": rover})
+    assert scenario.in_planes and not scenario.planar and not scenario.looks_level(scenario.robot)
+    assert (scenario.layer_of(scenario.robot), scenario.ground_layer_of(scenario.robot)) == (3, 1)
+    level = with_settings(scenario, {"robot": {"tilts": False, "above_ground_m": None}})
+    assert level.planar and level.in_planes and level.ground_layer_of(level.robot) is None
+    flying = with_settings(scenario, {"robot": {"motion": "free"}})
+    assert not flying.in_planes and flying.ground_layer_of(flying.robot) is None
+    plan = with_settings(scenario, {"grid": Grid((7, 11, 1), 0.5)})
+    assert plan.planar and plan.ground_layer_of(plan.robot) is None
+
+
 def test_settings_that_do_not_fit_each_other_are_refused():
     discrete = {"action": {"kind": "discrete"}}
     for settings, field in (

@@ -115,6 +115,23 @@ def test_with_infinite_reach_an_action_is_a_place_from_the_first_voxel_s_centre_
             np.testing.assert_allclose(again[:3], expected, atol=1e-6)
 
 
+@pytest.mark.parametrize("kind", ["continuous", "discrete"])
+def test_rovers_keep_their_height_and_take_the_pitch(kind):
+    """Their moves lie in the plane, though the team's actions have a number for it."""
+    rover = {"motion": "planar", "tilts": True, "reach_m": 1.0, "sensor_height_m": 1.25}
+    action = {"kind": kind, "yaws": 4, "pitches": 3}
+    scenario = free_box(robots=1, robot=rover, action=action, observation={"panorama": False})
+    rules, space, grid = rules_of(scenario), action_space(scenario), scenario.grid
+    pose = np.array([*grid.centre_of(np.array([3, 5, 2])), 0.7, 0.3])
+    wanted = np.array([pose[0] + 0.5, pose[1] - 0.5, 2.0, math.pi / 2, math.pi / 4])
+    action = encode_viewpoint(rules, pose, wanted)
+    assert space.contains(action)
+    got = decode(rules, pose, action)
+    assert got == pytest.approx([*wanted[:2], pose[2], math.pi / 2, math.pi / 4], abs=1e-6)
+    if kind == "discrete":
+        assert (rules.actions.moves[:, 2] == 0).all() and len(rules.actions.gazes) == 12
+
+
 @pytest.mark.parametrize("motion", ["free", "planar"])
 @pytest.mark.parametrize(
     "grid", [ODD_GRID, Grid((7, 11, 5), 0.25, (-0.125, -0.125, -0.125)), Grid((9, 6, 1), 0.1)]
