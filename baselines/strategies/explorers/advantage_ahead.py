@@ -1,20 +1,29 @@
-"""How `planned-rate` explores plans: distance advantage, less what turning costs, wide openings first.
+"""How `planned-rate` explores plans: openings first, by advantage, what they show, and what turning costs.
 
-    v* = argmax over frontier cells v of mean over u of d(u, v) - w(v) d(robot, v) - b |turn(v)| / π - t(v)
+    v* = argmax over openings v of mean over u of d(u, v) - d(robot, v) + g ln V(v) - b |turn(v)| / π - t(v)
 
 Ours. The mean is that of distance advantage (Ericson, Pedro & Jensfelt 2025): what would be far to come back
-to is taken now. turn(v) is the angle between the way that the robot has come and the way to v: who turns
-round brakes, and drives what it has driven already. w is 1 for wide openings, those with many known free
-voxels beside unknown ones around them, and more for slivers; where the mission may leave something unseen,
-slivers are left until there is no opening any more. t(v) is how near v is to where teammates go.
+to is taken now. An opening is a frontier cell around which many known free voxels lie beside unknown ones, and
+from which many unknown voxels are in sight. V is their number, at most as many as would lie behind an opening
+of this width in a strip of a given depth: through a wall's single unseen voxel a wide cone is in sight. turn(v)
+is the angle between the way that the robot has come and the way to v: who turns round brakes, and drives what
+it has driven already. t(v) is how near v is to where teammates go.
 
-Tuned: `sliver` and `turn`; see `AheadConfig`.
+Only openings whose path is no longer than a horizon count; where there is none, those a little farther off do,
+without means. All other frontier cells, slivers between rays and single voxels of walls, wait until there is no
+opening any more, since most are seen in passing. Then they are visited on short open tours, as in `tour`, each
+by the robot that is nearer to it than teammates' targets are. A sliver
+that the robot is about to leave behind is visited before if that is a short way round, measured by how far it
+is from the sliver to the nearest frontier cell elsewhere: what lies alone would be far to come back to.
+
+Tuned: see docs/explorers.md.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -22,26 +31,40 @@ from baselines.strategies.explorers.coordinated_frontier import taken
 from baselines.strategies.explorers.explorer import Explorer, Scene
 from baselines.strategies.explorers.nearest_frontier import best_of
 from baselines.strategies.explorers.teammates import centres_of, team_of
+from baselines.strategies.explorers.tour import Tour, TourConfig
 from entropy_explore_env.scenario import Scenario
-from entropy_explore_env.validation import check, check_not_negative, check_positive
+from entropy_explore_env.validation import check_not_negative, check_positive
 
 _DETOUR = 8.0
 """Free cells count in means if the path to them is no longer than this many radii."""
 _STOOD = 1e-3
 """A robot that is nearer to where it was, in voxel edges, has not moved."""
+_EXTENSION = 1.5
+"""Where too little is found, the search goes this many times as far."""
+_TOUR = TourConfig(most_near=40, most_far=20)
+"""Of slivers."""
+_ALONE = 1.0
+"""Longest distance from a sliver to other frontier cells that counts, in sensor ranges."""
+_STAY = 1.5
+"""A way round that was begun may be this many times as long."""
 
 
 @dataclass(frozen=True)
 class AheadConfig:
-    """Around which place means are taken, and what counts how much.
+    """Around which place means are taken, what an opening is, and what counts how much.
 
     Attributes:
-        radius: How far, along either axis, u may be off the robot, in sensor ranges; of the frontier cells
-            whose path is longer only the best of those that are nearest counts.
+        radius: How far, along either axis, u may be off the robot, in sensor ranges; openings whose path is
+            longer wait.
         around: How far, along either axis, an opening reaches around a frontier cell, in sensor ranges.
         opening: Least number of known free voxels beside unknown ones there, in sensor ranges.
-        sliver: w of frontier cells that are no opening, at least 1.
+        area: Least unknown area in sight of an opening, in squared sensor ranges.
+        depth: V is at most as many voxels as the opening has, times this many sensor ranges.
+        gain: g, in sensor ranges.
         turn: b, what it costs to turn round, in sensor ranges.
+        passing: How long the way round by a sliver may be that would be left behind, over the distance from it to
+            the nearest frontier cell elsewhere; 0 = none is visited in passing.
+        elsewhere: Farther off than this, along either axis, in sensor ranges.
         ahead: Where on the path to a frontier cell its direction is taken, in sensor ranges.
 
     Raises:
@@ -50,20 +73,34 @@ class AheadConfig:
 
     radius: float = 0.75
     around: float = 0.125
-    opening: float = 0.1
-    sliver: float = 1.5
+    opening: float = 0.125
+    area: float = 0.03
+    depth: float = 0.25
+    gain: float = 0.25
     turn: float = 0.375
+    passing: float = 0.5
+    elsewhere: float = 0.125
     ahead: float = 0.1
 
     def __post_init__(self) -> None:
         """Check every field."""
-        check_positive(self, "radius", "around", "opening", "ahead")
-        check_not_negative(self, "turn")
-        check(self, "sliver", "a number ≥ 1", lambda w: w >= 1.0)
+        check_positive(self, "radius", "around", "depth", "elsewhere", "ahead")
+        check_not_negative(self, "opening", "area", "gain", "turn", "passing")
+
+
+class _Openings(NamedTuple):
+    """Openings that can be gone to; K of them."""
+
+    voxels: np.ndarray
+    """(K,) int32"""
+    lengths: np.ndarray
+    """(K,) of the paths to them, voxel edges."""
+    seen: np.ndarray
+    """(K,) V, at least 1."""
 
 
 class AdvantageAhead(Explorer):
-    """Goes to what lies ahead, and would be far to come back to."""
+    """Goes to what lies ahead, shows much, and would be far to come back to."""
 
     rule = "planned-rate"
 
@@ -74,54 +111,108 @@ class AdvantageAhead(Explorer):
     def reset(self, scenario: Scenario, rng: np.random.Generator) -> None:
         """A new mission begins."""
         super().reset(scenario, rng)
-        ending = scenario.ending
-        self._leaves_some = bool(ending.unseen_free_voxels) or (ending.seen_share or 1.0) < 1.0
         self._came: dict[int, tuple[np.ndarray, np.ndarray]] = {}
+        self._slivers = Tour(_TOUR)
 
     def pick(self, scene: Scene) -> int:
         """See `Explorer`."""
         heading = self._heading(scene)
         horizon = self.config.radius * scene.cells.reach + 1.0
-        voxels, lengths = self._counting(scene, *scene.paths.frontiers_within(horizon))
-        if len(voxels) == 0:
-            voxels, lengths = scene.paths.nearest_frontiers()
-            if self._leaves_some:
-                voxels, lengths = scene.paths.frontiers_within(math.inf)
-                wide = self._is_wide(scene, voxels)
-                kept = wide if wide.any() else np.ones(len(voxels), bool)
-                voxels, lengths = voxels[kept], lengths[kept]
-            return best_of(voxels, -self._costs(scene, voxels, lengths, heading), scene.target)
-        costs = self._costs(scene, voxels, lengths, heading)
-        if len(voxels) == 1:
-            return int(voxels[0])
-        return best_of(voxels, self._advantages(scene, voxels, lengths, costs), scene.target)
+        openings = self._openings(scene, *scene.paths.frontiers_within(horizon))
+        if len(openings.voxels) > 1:
+            worth = self._advantages(scene, openings, self._costs(scene, openings, heading))
+            return self._by_way_of(scene, best_of(openings.voxels, worth, scene.target))
+        if len(openings.voxels) == 0:
+            openings = self._farther(scene, horizon)
+        if len(openings.voxels) == 0:
+            return self._tour(scene)
+        costs = self._costs(scene, openings, heading)
+        return self._by_way_of(scene, best_of(openings.voxels, -costs, scene.target))
 
-    def _is_wide(self, scene: Scene, voxels: np.ndarray) -> np.ndarray:
-        """(K,) bool, whether (K,) frontier cells are wide openings."""
-        radius = max(round(self.config.around * scene.cells.reach), 1)
-        least = max(round(self.config.opening * scene.cells.reach), 1)
-        return scene.cells.crowds(voxels, radius, least) >= least
+    def _tour(self, scene: Scene) -> int:
+        """The sliver to visit next where there is no opening."""
+        reach, most = scene.paths.reach, _TOUR.most_near + _TOUR.most_far
+        while True:
+            voxels, lengths = scene.paths.frontiers_within(reach)
+            if len(voxels) >= most or scene.paths.exhausted():
+                own = self._own(scene, voxels, lengths)
+                return self._slivers.pick_among(scene, voxels[own], lengths[own])
+            reach *= _EXTENSION
 
-    def _counting(
-        self, scene: Scene, voxels: np.ndarray, lengths: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Those frontier cells, and lengths, that count as long as there is an opening."""
-        if not self._leaves_some:
-            return voxels, lengths
-        wide = self._is_wide(scene, voxels)
-        return voxels[wide], lengths[wide]
+    def _own(self, scene: Scene, voxels: np.ndarray, lengths: np.ndarray) -> np.ndarray:
+        """(K,) bool, frontier cells that are nearer to the robot than to where teammates go; all if none is."""
+        own, places = np.ones(len(voxels), bool), centres_of(scene, voxels)
+        for target in team_of(scene).targets:
+            own &= lengths <= np.linalg.norm(places - target, axis=1)
+        return own if own.any() else np.ones(len(voxels), bool)
 
-    def _costs(
-        self, scene: Scene, voxels: np.ndarray, lengths: np.ndarray, heading: np.ndarray
-    ) -> np.ndarray:
-        """(K,) what it costs to go to (K,) frontier cells now, in voxel edges; at least the path's length."""
-        reach, places = scene.cells.reach, centres_of(scene, voxels)
-        costs = np.where(self._is_wide(scene, voxels), 1.0, self.config.sliver) * lengths
+    def _by_way_of(self, scene: Scene, goal: int) -> int:
+        """The goal, or a sliver that the way to it leaves behind, and that would be far to come back to."""
+        paths, reach, config = scene.paths, scene.cells.reach, self.config
+        paths.start(scene.here)
+        farthest = config.passing * _ALONE * reach
+        voxels, lengths = paths.frontiers_within(farthest)
+        if config.passing == 0.0 or len(voxels) == 0:
+            return goal
+        while not math.isfinite(paths.lengths_to(np.array([goal], np.int32))[0]):
+            paths.extend(_EXTENSION * paths.reach)
+        route = paths.route_to(goal)
+        ahead = int(route[min(max(round(config.around * reach), 1), len(route) - 1)])
+        onward = float(paths.lengths_to(np.array([ahead], np.int32))[0])
+        paths.start(ahead)
+        paths.extend(2.0 * farthest)
+        back = paths.lengths_to(voxels)
+        round_about = lengths + back - onward
+        begun = voxels == scene.target
+        left = (back >= lengths + 0.5 * onward) & (round_about <= farthest)
+        left |= begun & (round_about <= _STAY * farthest)
+        for place in np.flatnonzero(left)[np.argsort((lengths - 1e6 * begun)[left], kind="stable")]:
+            far = config.passing * self._apart(scene, int(voxels[place]))
+            if round_about[place] <= (_STAY * far if begun[place] else far):
+                return int(voxels[place])
+        return goal
+
+    def _apart(self, scene: Scene, voxel: int) -> float:
+        """How far it is from a frontier cell to the nearest one elsewhere, in voxel edges."""
+        reach = scene.cells.reach
+        elsewhere = self.config.elsewhere * reach
+        scene.paths.start(voxel)
+        voxels, lengths = scene.paths.frontiers_within(_ALONE * reach)
+        off = np.abs(centres_of(scene, voxels) - centres_of(scene, np.array([voxel], np.int32)))
+        return float(lengths[off.max(axis=1) > elsewhere].min(initial=_ALONE * reach))
+
+    def _farther(self, scene: Scene, reach: float) -> _Openings:
+        """The openings that the search finds first beyond a reach; none where there is none at all."""
+        found = _Openings(np.empty(0, np.int32), np.empty(0), np.empty(0))
+        if len(self._openings(scene, *scene.cells.of_blocks()).voxels) == 0:
+            return found
+        while len(found.voxels) == 0 and not scene.paths.exhausted():
+            before, reach = reach, _EXTENSION * reach
+            voxels, lengths = scene.paths.frontiers_within(reach)
+            found = self._openings(scene, voxels[lengths > before], lengths[lengths > before])
+        return found
+
+    def _openings(self, scene: Scene, voxels: np.ndarray, lengths: np.ndarray) -> _Openings:
+        """The openings among (K,) frontier cells with (K,) lengths."""
+        config, cells = self.config, scene.cells
+        radius, least = max(round(config.around * cells.reach), 1), round(config.opening * cells.reach)
+        widest = (2 * radius + 1) ** 2
+        counts = cells.crowds(voxels, radius, widest)
+        wide = counts >= least
+        voxels, lengths, counts = voxels[wide], lengths[wide], counts[wide]
+        seen = np.minimum(cells.gains(voxels), config.depth * cells.reach * counts)
+        ample = seen >= config.area * cells.reach**2
+        return _Openings(voxels[ample], lengths[ample], np.maximum(seen[ample], 1.0))
+
+    def _costs(self, scene: Scene, openings: _Openings, heading: np.ndarray) -> np.ndarray:
+        """(K,) what it costs to go to openings now, less what they show; in voxel edges."""
+        reach, places = scene.cells.reach, centres_of(scene, openings.voxels)
+        costs = openings.lengths - self.config.gain * reach * np.log(openings.seen)
         for target in team_of(scene).targets:
             costs += reach * taken(places, target, reach)
-        if len(voxels) > 0 and heading.any():
+        if len(openings.voxels) > 0 and heading.any() and self.config.turn > 0.0:
             ahead = max(round(self.config.ahead * reach), 1)
-            routes = [scene.paths.route_to(int(voxel)) for voxel in voxels]
+            routes = [scene.paths.route_to(int(voxel)) for voxel in openings.voxels]
             first = np.array([route[min(ahead, len(route) - 1)] for route in routes], np.int32)
             here = scene.view.scenario.grid.in_grid_units(scene.view.pose)[:2]
             way = centres_of(scene, first)[:, :2] - here
@@ -139,14 +230,13 @@ class AdvantageAhead(Explorer):
         self._came[robot] = here, way
         return way
 
-    def _advantages(
-        self, scene: Scene, voxels: np.ndarray, lengths: np.ndarray, costs: np.ndarray
-    ) -> np.ndarray:
+    def _advantages(self, scene: Scene, openings: _Openings, costs: np.ndarray) -> np.ndarray:
         """(K,) mean lengths less costs, as far as it takes to know the greatest; -inf where it cannot be.
 
         Bounds are those of `distance-advantage`: d(u, v) ≤ d(u, w) + d(w, v).
         """
         paths, radius = scene.paths, round(self.config.radius * scene.cells.reach)
+        voxels, lengths = openings.voxels, openings.lengths
         paths.extend(_DETOUR * radius)
         around = paths.around(scene.here, radius)
         farthest = float(paths.lengths_to(around).max(initial=0.0))

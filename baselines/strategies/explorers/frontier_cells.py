@@ -119,6 +119,11 @@ class FrontierCells(VoxelCandidates):
         found = voxels != NONE
         return voxels[found], lengths[found]
 
+    def of_blocks(self) -> tuple[np.ndarray, np.ndarray]:
+        """(K,) int32 a frontier cell of each block that has any, whether a path leads to it or not; (K,) zeros."""
+        voxels = self._map.voxel[self._map.voxel != NONE]
+        return voxels, np.zeros(len(voxels))
+
     def drop(self, voxel: int, with_edges: bool) -> None:
         """Take out a frontier cell until the map changes around it.
 

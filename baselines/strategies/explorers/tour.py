@@ -73,7 +73,16 @@ class Tour(Explorer):
 
     def pick(self, scene: Scene) -> int:
         """See `Explorer`."""
-        voxels, lengths = scene.paths.frontiers_within(math.inf)
+        return self.pick_among(scene, *scene.paths.frontiers_within(math.inf))
+
+    def pick_among(self, scene: Scene, voxels: np.ndarray, lengths: np.ndarray) -> int:
+        """The first place of a tour through what (K,) frontier cells stand for; NONE = there are none.
+
+        Args:
+            scene: What the robot knows; its search has reached the cells.
+            voxels: (K,) int32, the cells.
+            lengths: (K,) of the paths to them, in voxel edges.
+        """
         if len(voxels) <= 1:
             return best_of(voxels, -lengths, scene.target)
         order = np.argsort(lengths, kind="stable")

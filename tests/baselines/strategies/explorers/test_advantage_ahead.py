@@ -48,12 +48,18 @@ def straight(length=30):
     return plan
 
 
+BARE = {"opening": 0.0, "area": 0.0, "gain": 0.0, "turn": 0.0, "passing": 0.0}
+"""With these every frontier cell is an opening, and only lengths count."""
+
+
 @given(st.sampled_from([(17, 11), (31, 14), (90, 13)]), seeds)
 @drawn(40)
-def test_where_neither_turns_nor_slivers_cost_anything_it_is_distance_advantage(shape, seed):
+def test_where_neither_turns_nor_what_is_seen_count_it_is_distance_advantage(shape, seed):
     plan, robot = random_plan(shape, np.random.default_rng(seed))
-    voxel = DistanceAdvantage(DistanceAdvantageConfig(opening=0.0)).pick(scene_of(plan, robot))
-    ours = picked(plan, robot, AheadConfig(sliver=1.0, turn=0.0)) if voxel >= 0 else None
+    scene = scene_of(plan, robot)
+    voxel = DistanceAdvantage(DistanceAdvantageConfig(opening=0.0)).pick(scene)
+    reached = len(scene_of(plan, robot).paths.frontiers_within(61.0)[0])
+    ours = picked(plan, robot, AheadConfig(**BARE)) if voxel >= 0 and reached else None
     assert ours is None or ours == cell(plan, voxel)
 
 
@@ -62,15 +68,20 @@ def test_where_neither_turns_nor_slivers_cost_anything_it_is_distance_advantage(
 )
 def test_it_goes_on_where_it_came_for_unless_turning_costs_nothing_by_hand(came_from, turn, wanted):
     """The left end is 10 steps away, the right one 17; means are alike, and half a range is 40 steps."""
-    assert picked(straight(), (11, 1), AheadConfig(turn=turn), came_from) == (wanted, 1)
+    config = AheadConfig(**BARE | {"turn": turn})
+    assert picked(straight(), (11, 1), config, came_from) == (wanted, 1)
 
 
-@pytest.mark.parametrize(("ending", "wanted"), [({}, 2), ({"unseen_free_voxels": 5}, 24)])
-def test_slivers_wait_where_something_may_stay_unseen_by_hand(ending, wanted):
+OPENINGS = {"around": 0.05, "opening": 0.05, "area": 1e-4, "turn": 0.0, "passing": 0.0}
+"""An opening has four known free voxels beside unknown ones, none farther than four voxels along either axis."""
+
+
+@pytest.mark.parametrize("ending", [{}, {"unseen_free_voxels": 5}])
+def test_slivers_wait_by_hand(ending):
     """The sliver is four steps off and the opening 18."""
     plan, robot = room_with_a_sliver(4)
-    config = AheadConfig(opening=0.05, around=0.05, turn=0.0)
-    assert picked(plan, robot, config, ending=ending)[0] == wanted
+    assert picked(plan, robot, AheadConfig(**OPENINGS), ending=ending)[0] == 24
+    assert picked(plan, robot, AheadConfig(**OPENINGS | {"opening": 0.0, "gain": 0.0}), ending=ending)[0] == 2
 
 
 @pytest.mark.parametrize("ending", [{}, {"seen_share": 0.9}, {"unseen_free_voxels": 5}])
@@ -80,20 +91,81 @@ def test_slivers_count_where_there_is_nothing_else(ending):
     assert picked(plan, robot, ending=ending) == (2, 4)
 
 
-def test_slivers_cost_more_than_openings_by_hand():
-    """From the middle, the sliver is 11 steps off and the opening 12: the means favour neither by so much."""
-    plan, robot = room_with_a_sliver(11)
-    cells = {
-        sliver: picked(plan, robot, AheadConfig(opening=0.05, around=0.05, turn=0.0, sliver=sliver))[0]
-        for sliver in (1.0, 3.0)
-    }
-    assert cells == {1.0: 2, 3.0: 24}
+@pytest.mark.parametrize(("area", "wanted"), [(1e-4, 24), (1e-2, 2)])
+def test_openings_that_show_little_are_slivers_by_hand(area, wanted):
+    """Four voxels are unknown beyond the opening: 0.0006 squared ranges of 80 voxels."""
+    plan, robot = room_with_a_sliver(4)
+    assert picked(plan, robot, AheadConfig(**OPENINGS | {"area": area}))[0] == wanted
 
 
-def test_a_robot_leaves_the_end_to_which_another_goes_by_hand():
+def room_with_two_ends():
+    """Known rooms, a wall with a gap between them; 4 unknown voxels at the left end, 80 at the right one."""
+    plan = np.full((70, 9), reference.WALL, np.int8)
+    plan[25:46, 1:8] = reference.FREE
+    plan[35, 2:8] = reference.WALL
+    plan[24, 3:7] = reference.UNKNOWN
+    plan[46:66, 3:7] = reference.UNKNOWN
+    return plan
+
+
+@pytest.mark.parametrize(("gain", "depth", "wanted"), [(0.0, 0.25, 25), (0.25, 0.25, 45), (0.25, 0.0125, 25)])
+def test_what_shows_more_is_worth_a_longer_way_by_hand(gain, depth, wanted):
+    """Eight steps and two more to the left, ten and two to the right; ln 20 quarters of a range are 60 steps.
+
+    A depth of one voxel says that no more lies behind the one than behind the other.
+    """
+    config = AheadConfig(**OPENINGS | {"gain": gain, "depth": depth})
+    assert picked(room_with_two_ends(), (34, 1), config)[0] == wanted
+
+
+def corridor_with_a_sliver():
+    """A corridor that is open at the right, and at whose left end a voxel of its wall is unknown."""
+    plan = np.full((60, 7), reference.WALL, np.int8)
+    plan[2:50, 2:5] = reference.FREE
+    plan[50:58, 2:5] = plan[2, 1] = reference.UNKNOWN
+    return plan
+
+
+ROUND_ABOUT = OPENINGS | {"around": 0.0375, "opening": 0.0375, "passing": 0.5}
+
+
+@pytest.mark.parametrize(
+    ("robot", "passing", "wanted"), [(11, 0.5, 2), (11, 0.0, 49), (11, 0.2, 49), (20, 0.5, 49)]
+)
+def test_a_sliver_that_would_be_left_behind_is_visited_before_by_hand(robot, passing, wanted):
+    """From place 11 the way round by it is 19 steps, from place 20 it is 37; other frontier cells are 47 off."""
+    config = AheadConfig(**ROUND_ABOUT | {"passing": passing})
+    assert picked(corridor_with_a_sliver(), (robot, 3), config)[0] == wanted
+
+
+def test_slivers_on_the_way_are_left_to_be_seen_in_passing():
+    plan = corridor_with_a_sliver()
+    plan[30, 1] = reference.UNKNOWN
+    assert picked(plan, (26, 3), AheadConfig(**ROUND_ABOUT))[0] == 49
+    assert picked(plan, (32, 3), AheadConfig(**ROUND_ABOUT))[0] == 30
+
+
+def test_slivers_near_the_goal_of_a_teammate_are_left_to_it_by_hand():
     plan = straight()
     assert picked(plan, (8, 1)) == (1, 1)
     assert picked(plan, (8, 1), mates=[mate((4, 1), (1, 1))]) == (28, 1)
+    plan[-1, 1] = reference.WALL
+    assert picked(plan, (8, 1), mates=[mate((4, 1), (1, 1))]) == (1, 1)
+
+
+def test_openings_beyond_the_horizon_come_before_slivers_by_hand():
+    plan = np.full((130, 9), reference.WALL, np.int8)
+    plan[2:125, 1:8] = reference.FREE
+    plan[125, 2:6] = plan[1, 4] = reference.UNKNOWN
+    assert picked(plan, (6, 4), AheadConfig(**OPENINGS))[0] == 124
+    plan[125, 2:6] = reference.WALL
+    assert picked(plan, (60, 4), AheadConfig(**OPENINGS)) == (2, 4)
+
+
+def test_a_robot_leaves_the_end_to_which_another_goes_by_hand():
+    plan, config = straight(), AheadConfig(**BARE)
+    assert picked(plan, (8, 1), config) == (1, 1)
+    assert picked(plan, (8, 1), config, mates=[mate((4, 1), (1, 1))]) == (28, 1)
 
 
 @given(seeds)
