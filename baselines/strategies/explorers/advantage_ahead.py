@@ -1,20 +1,22 @@
 """How `planned-rate` explores plans: openings first, by advantage, what they show, and what turning costs.
 
-    v* = argmax over openings v of mean over u of d(u, v) - d(robot, v) + g ln V(v) - b |turn(v)| / π - t(v)
+    v* = argmax over openings v of
+         mean over u of d(u, v) - d(robot, v) + g ln V(v) - b |turn(v)| / π - t(v)
 
 Ours. The mean is that of distance advantage (Ericson, Pedro & Jensfelt 2025): what would be far to come back
-to is taken now. An opening is a frontier cell around which many known free voxels lie beside unknown ones, and
-from which many unknown voxels are in sight. V is their number, at most as many as would lie behind an opening
-of this width in a strip of a given depth: through a wall's single unseen voxel a wide cone is in sight. turn(v)
-is the angle between the way that the robot has come and the way to v: who turns round brakes, and drives what
-it has driven already. t(v) is how near v is to where teammates go.
+to is taken now. An opening is a frontier cell around which many known free voxels lie beside unknown ones,
+and from which many unknown voxels are in sight; one stands for all that are around it. V is how many these
+are, at most as many as would lie behind an opening of this width in a strip of a given depth: through a
+wall's single unseen voxel a wide cone is in sight. turn(v) is the angle between the way that the robot has
+come and the way to v: who turns round brakes, and drives what it has driven already. t(v) is how near v is
+to where teammates go.
 
-Only openings whose path is no longer than a horizon count; where there is none, those a little farther off do,
-without means. All other frontier cells, slivers between rays and single voxels of walls, wait until there is no
-opening any more, since most are seen in passing. Then they are visited on short open tours, as in `tour`, each
-by the robot that is nearer to it than teammates' targets are. A sliver
-that the robot is about to leave behind is visited before if that is a short way round, measured by how far it
-is from the sliver to the nearest frontier cell elsewhere: what lies alone would be far to come back to.
+Only openings whose path is no longer than a horizon count; where there is none, those a little farther off
+do, without means. All other frontier cells, slivers between rays and single voxels of walls, wait until
+there is no opening any more, since most are seen in passing. Then they are visited on short open tours, as
+in `tour`, each by the robot that is nearer to it than teammates' targets are. A sliver that the robot is
+about to leave behind is visited before if that is a short way round, measured by how far it is from the
+sliver to the nearest frontier cell elsewhere: what lies alone would be far to come back to.
 
 Tuned: see docs/explorers.md.
 """
@@ -35,7 +37,9 @@ from baselines.strategies.explorers.tour import Tour, TourConfig
 from entropy_explore_env.scenario import Scenario
 from entropy_explore_env.validation import check_not_negative, check_positive
 
-_DETOUR = 8.0
+_WIDEST = 90
+"""Voxels that u may be off the robot at most: means over more take too long."""
+_DETOUR = 4.0
 """Free cells count in means if the path to them is no longer than this many radii."""
 _STOOD = 1e-3
 """A robot that is nearer to where it was, in voxel edges, has not moved."""
@@ -56,14 +60,15 @@ class AheadConfig:
     Attributes:
         radius: How far, along either axis, u may be off the robot, in sensor ranges; openings whose path is
             longer wait.
-        around: How far, along either axis, an opening reaches around a frontier cell, in sensor ranges.
+        around: How far, along either axis, an opening reaches around a frontier cell, in sensor ranges; as
+            wide are the cells of a grid of which one opening each counts.
         opening: Least number of known free voxels beside unknown ones there, in sensor ranges.
         area: Least unknown area in sight of an opening, in squared sensor ranges.
         depth: V is at most as many voxels as the opening has, times this many sensor ranges.
         gain: g, in sensor ranges.
         turn: b, what it costs to turn round, in sensor ranges.
-        passing: How long the way round by a sliver may be that would be left behind, over the distance from it to
-            the nearest frontier cell elsewhere; 0 = none is visited in passing.
+        passing: How long the way round by a sliver may be that would be left behind, over the distance from
+            it to the nearest frontier cell elsewhere; 0 = none is visited in passing.
         elsewhere: Farther off than this, along either axis, in sensor ranges.
         ahead: Where on the path to a frontier cell its direction is taken, in sensor ranges.
 
@@ -140,7 +145,7 @@ class AdvantageAhead(Explorer):
             reach *= _EXTENSION
 
     def _own(self, scene: Scene, voxels: np.ndarray, lengths: np.ndarray) -> np.ndarray:
-        """(K,) bool, frontier cells that are nearer to the robot than to where teammates go; all if none is."""
+        """(K,) bool, frontier cells that are nearer to the robot than to where teammates go; all if none."""
         own, places = np.ones(len(voxels), bool), centres_of(scene, voxels)
         for target in team_of(scene).targets:
             own &= lengths <= np.linalg.norm(places - target, axis=1)
@@ -154,9 +159,11 @@ class AdvantageAhead(Explorer):
         voxels, lengths = paths.frontiers_within(farthest)
         if config.passing == 0.0 or len(voxels) == 0:
             return goal
-        while not math.isfinite(paths.lengths_to(np.array([goal], np.int32))[0]):
+        while math.isinf(paths.lengths_to(np.array([goal], np.int32))[0]) and not paths.exhausted():
             paths.extend(_EXTENSION * paths.reach)
         route = paths.route_to(goal)
+        if len(route) == 0:
+            return goal
         ahead = int(route[min(max(round(config.around * reach), 1), len(route) - 1)])
         onward = float(paths.lengths_to(np.array([ahead], np.int32))[0])
         paths.start(ahead)
@@ -199,6 +206,8 @@ class AdvantageAhead(Explorer):
         widest = (2 * radius + 1) ** 2
         counts = cells.crowds(voxels, radius, widest)
         wide = counts >= least
+        wide[wide] = _first_of_cells(centres_of(scene, voxels[wide]), lengths[wide], radius)
+        wide |= (voxels == scene.target) & (counts >= least)
         voxels, lengths, counts = voxels[wide], lengths[wide], counts[wide]
         seen = np.minimum(cells.gains(voxels), config.depth * cells.reach * counts)
         ample = seen >= config.area * cells.reach**2
@@ -235,7 +244,7 @@ class AdvantageAhead(Explorer):
 
         Bounds are those of `distance-advantage`: d(u, v) ≤ d(u, w) + d(w, v).
         """
-        paths, radius = scene.paths, round(self.config.radius * scene.cells.reach)
+        paths, radius = scene.paths, min(round(self.config.radius * scene.cells.reach), _WIDEST)
         voxels, lengths = openings.voxels, openings.lengths
         paths.extend(_DETOUR * radius)
         around = paths.around(scene.here, radius)
@@ -250,3 +259,12 @@ class AdvantageAhead(Explorer):
             bounds[np.isfinite(worth)] = -np.inf
             place = int(np.argmax(bounds))
         return worth
+
+
+def _first_of_cells(places: np.ndarray, lengths: np.ndarray, edge: int) -> np.ndarray:
+    """(K,) bool, of (K, 3) places those with the shortest of (K,) paths in their cells of a coarse grid."""
+    order = np.argsort(lengths, kind="stable")
+    _, first = np.unique(np.floor(places[order] / edge).astype(np.int64), axis=0, return_index=True)
+    chosen = np.zeros(len(places), bool)
+    chosen[order[first]] = True
+    return chosen

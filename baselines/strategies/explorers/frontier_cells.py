@@ -120,7 +120,7 @@ class FrontierCells(VoxelCandidates):
         return voxels[found], lengths[found]
 
     def of_blocks(self) -> tuple[np.ndarray, np.ndarray]:
-        """(K,) int32 a frontier cell of each block that has any, whether a path leads to it or not; (K,) zeros."""
+        """(K,) int32 a frontier cell of each block, whether or not a path leads to it; (K,) float64 zeros."""
         voxels = self._map.voxel[self._map.voxel != NONE]
         return voxels, np.zeros(len(voxels))
 
