@@ -49,6 +49,8 @@ _TOUR = TourConfig(most_near=40, most_far=20)
 """Of slivers."""
 _ALONE = 1.0
 """Longest distance from a sliver to other frontier cells that counts, in sensor ranges."""
+_TRIED, _FIRST = 3, 1e6
+"""Slivers that are looked at, the nearest ones; a length that puts the one that it is under way to first."""
 _STAY = 1.5
 """A way round that was begun may be this many times as long."""
 
@@ -173,7 +175,8 @@ class AdvantageAhead(Explorer):
         begun = voxels == scene.target
         left = (back >= lengths + 0.5 * onward) & (round_about <= farthest)
         left |= begun & (round_about <= _STAY * farthest)
-        for place in np.flatnonzero(left)[np.argsort((lengths - 1e6 * begun)[left], kind="stable")]:
+        order = np.argsort((lengths - _FIRST * begun)[left], kind="stable")[:_TRIED]
+        for place in np.flatnonzero(left)[order]:
             far = config.passing * self._apart(scene, int(voxels[place]))
             if round_about[place] <= (_STAY * far if begun[place] else far):
                 return int(voxels[place])
