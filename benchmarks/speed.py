@@ -19,6 +19,7 @@ from typing import Any
 from baselines.cli.arguments import parse, print_json, run_command
 from baselines.experiments.machine import processor
 from benchmarks.deciding import deciding_rows
+from benchmarks.drifting import drifting_rows
 from benchmarks.exploring import exploring_rows, mission_row
 from benchmarks.fusion import fusion_rows
 from benchmarks.learning import learning_rows
@@ -38,6 +39,7 @@ JOBS: tuple[tuple[str, Callable[[Effort], list[Row]]], ...] = (
     ("ParallelEnv beside mpe2 simple_spread", spread_rows),
     ("VectorEnv beside the ParallelEnv, on one and two threads", vector_rows),
     ("where a step's time goes", profile_rows),
+    ("robots that drift", drifting_rows),
     ("shortest paths beside SciPy", planning_rows),
     ("decisions of strategies", deciding_rows),
     ("learning", learning_rows),

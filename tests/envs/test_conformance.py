@@ -69,6 +69,21 @@ def test_a_team_with_faults_conforms(in_this_process: int, period_s: float | Non
     assert len(said) == in_this_process
 
 
+@pytest.mark.parametrize("period_s", [None, 1.0])
+def test_a_team_that_drifts_conforms(in_this_process: int, period_s: float | None) -> None:
+    drift = {"xy_m_per_sqrt_m": 0.05, "z_m_per_sqrt_rad": 0.01, "yaw_rad_per_sqrt_m": 0.02}
+    settings = {
+        "robot": {"localization": drift, "redecide": "on_scan"},
+        "sensor": {"scan_every_m": 0.4},
+        "fiducials": {"number": 4},
+        "channel": {"i_min_bits": 0.0, "delay_s": 0.3},
+        "decision_period_s": period_s,
+    }
+    said: list[str] = []
+    check_conformance(BOX, robots=3, steps=25, report=said.append, **settings)
+    assert len(said) == in_this_process
+
+
 @pytest.mark.long
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("robots", range(1, 6))
