@@ -25,6 +25,7 @@ from baselines.strategies.next_best_view import NextBestView, NextBestViewConfig
 from baselines.strategies.next_best_view.cliff import CliffConfig, CliffMapping
 from baselines.strategies.next_best_view.raster import Raster, RasterConfig
 from baselines.strategies.planned_rate import PlannedRate
+from baselines.strategies.planner_choice import PlannerChoice
 from baselines.strategies.protocol import Strategy
 from baselines.strategies.random_walk import RandomWalk
 from baselines.strategies.voronoi import VoronoiConfig, VoronoiCoverage
@@ -39,6 +40,7 @@ STRATEGIES: MappingProxyType[str, Callable[[], Strategy]] = MappingProxyType(
         "mutual-information": MutualInformation,
         "ground-gradient": partial(MutualInformation, MutualInformationConfig(coordinated=False)),
         "planned-rate": PlannedRate,
+        "planner-choice": PlannerChoice,
         "information-rate-v0": InformationRate,
         "information-per-scan": partial(
             InformationRate, InformationRateConfig(per_scan=True, candidates=120)

@@ -10,7 +10,7 @@ from entropy_explore_env.belief.paths.search import cost_to
 from entropy_explore_env.compilation.kernels import lean_kernel
 from entropy_explore_env.randomness import draw_uniform
 from entropy_explore_env.viewpoints.proposals.far import first_stop, gaze_on_the_way, propose_far
-from entropy_explore_env.viewpoints.proposals.nearby import copy_viewpoint, start_paths, voxel_at
+from entropy_explore_env.viewpoints.proposals.nearby import copy_viewpoint, start_paths, value_of, voxel_at
 from entropy_explore_env.viewpoints.proposals.records import Kind
 from entropy_explore_env.viewpoints.proposals.situation import (
     DISAPPOINTING,
@@ -24,6 +24,8 @@ _FAR_EVERY, _PATIENCE = 8, 4
 """Decisions on one spot until far places are looked at again, and where straight drives found none."""
 _FAR_SHARE = 4
 """One in so many candidates, at least one, may be far."""
+_NEAR_SHARE = 4
+"""One in so many candidates may be a place within reach that is worth less than gazes on the spot."""
 _TRIED_STOPS = 6
 """Far places of which the planner looks at the first stop; and gazes at stops that it does not choose."""
 _POOR, _NOTHING_BITS = 0.02, 1e-6
@@ -291,7 +293,8 @@ def _is_other(proposer, number, count):
 def select(proposer, situation, size, choice, kept):
     """Select the candidates out of the pool: their numbers are left in `scratch.taken`, the choice first.
 
-    Far ones come next, then those nearby that are worth most; none sees much the same as another.
+    Far ones come next; then a quarter may be the best places within reach, and the rest is what is worth
+    most of all nearby. None sees much the same as another.
 
     Args:
         proposer: A Proposer.
@@ -306,7 +309,7 @@ def select(proposer, situation, size, choice, kept):
     scratch, belief = proposer.scratch, situation.belief
     pool, taken, order = scratch.pool, scratch.taken, scratch.found
     most, count, marked = len(taken), 0, 0
-    tries = 2 * most
+    tries, places = 2 * most, most // _NEAR_SHARE
     for k in range(size):
         order[k] = k
     for place in range(-2, size):
@@ -315,7 +318,7 @@ def select(proposer, situation, size, choice, kept):
         if must and (number < 0 or (place == -1 and kept == choice)):
             continue
         if not must:
-            _bring_first(pool, order, place, size)
+            _bring_first(pool, order, place, size, places > 0)
             number = order[place]
             if pool.values[number] <= 0.0 or not _is_other(proposer, number, count):
                 continue
@@ -326,26 +329,43 @@ def select(proposer, situation, size, choice, kept):
         if look_from(proposer, situation, pool.goals[number], count, most_common):
             taken[count] = number
             marked = mark_view(proposer, belief, count, marked)
+            _note_exactly(proposer, situation, number, scratch.views[count].bits)
             count += 1
+            places -= int(pool.kinds[number] == _NEAR)
     clear_marks(proposer, marked)
     return count
 
 
 @lean_kernel
-def _bring_first(pool, order, place, size):
+def _note_exactly(proposer, situation, number, bits):
+    """Put the bits that all rays should bring in place of those of fewer; not of what has no path."""
+    pool = proposer.scratch.pool
+    if pool.seconds[number] < math.inf:
+        pool.bits[number] = worth_bits(proposer, situation, pool.goals[number], bits)
+        pool.values[number] = value_of(proposer, pool.bits[number], pool.seconds[number])
+        if pool.kinds[number] != _FAR:
+            pool.stop_bits[number] = pool.bits[number]
+
+
+@lean_kernel
+def _bring_first(pool, order, place, size, places):
     """Bring the number of what comes first of the rest of the pool to a place of the order."""
     first = place
     for other in range(place + 1, size):
-        if _comes_first(pool, order[other], order[first]):
+        if _comes_first(pool, order[other], order[first], places):
             first = other
     order[place], order[first] = order[first], order[place]
 
 
 @lean_kernel
-def _comes_first(pool, number, other):
-    """Whether a viewpoint of the pool is looked at before another: far ones are, then by value."""
-    far, other_far = pool.kinds[number] == _FAR, pool.kinds[other] == _FAR
-    return far if far != other_far else pool.values[number] > pool.values[other]
+def _comes_first(pool, number, other, places):
+    """Whether a viewpoint of the pool is looked at before another: far ones, then `places`, then by value."""
+    kind, other_kind = pool.kinds[number], pool.kinds[other]
+    if kind != other_kind and (kind == _FAR or other_kind == _FAR):
+        return kind == _FAR
+    if kind != other_kind and places:
+        return kind == _NEAR
+    return pool.values[number] > pool.values[other]
 
 
 @lean_kernel

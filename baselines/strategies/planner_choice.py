@@ -1,0 +1,32 @@
+"""The strategy `planner-choice`: of the candidates that a policy chooses among, the planner's own choice.
+
+Ours. It is `planned-rate` by bits per time, in a compiled call a decision (`viewpoints/proposals`), and what
+a policy that chooses among candidates begins as. It has nothing of the frontier cells by which `planned-rate`
+explores plans where robots decide under way, or which end by what is seen.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from entropy_explore_env.missions.view import RobotView
+from entropy_explore_env.missions.view_candidates import ViewProposer
+from entropy_explore_env.scenario import Scenario, with_settings
+
+
+class PlannerChoice:
+    """Chooses the first of the candidates."""
+
+    def reset(self, scenario: Scenario, rng: np.random.Generator) -> None:
+        """A new mission begins."""
+        self._proposed = scenario.action.kind == "candidates"
+        if not self._proposed:
+            scenario = with_settings(scenario, {"action": {"kind": "candidates"}})
+            self._proposer = ViewProposer(scenario, rng)
+
+    def choose(self, views: Sequence[RobotView]) -> list[np.ndarray]:
+        """The viewpoint of each view; where candidates are the actions, one of those that were proposed."""
+        proposed = [view.candidates if self._proposed else self._proposer.propose(view) for view in views]
+        return [candidates[0].copy() for candidates in proposed]
