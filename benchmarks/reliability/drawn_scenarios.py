@@ -144,10 +144,11 @@ FIELDS: Mapping[type, Mapping[str, Numbers | Sequence[Any]]] = MappingProxyType(
             "cost_per_s": Numbers(1e-9, 1e6, 1e-4, 1.0, also=(0.0,)),
         },
         Action: {
-            "kind": ("continuous", "discrete"),
+            "kind": ("continuous", "discrete", "candidates"),
             "moves": ("all", "axes"),
             "yaws": _count(1, 360, 1, 16),
             "pitches": _count(1, 90, 1, 5),
+            "candidates": _count(1, 64, 1, 32),
         },
         Observation: {
             "panorama": _SWITCH,
@@ -159,6 +160,8 @@ FIELDS: Mapping[type, Mapping[str, Numbers | Sequence[Any]]] = MappingProxyType(
             "team": _SWITCH,
             "patch": _SWITCH,
             "overview": _SWITCH,
+            "candidates": _SWITCH,
+            "overlaps": _SWITCH,
             "action_mask": _SWITCH,
             "flat": _SWITCH,
             "while_busy": _SWITCH,

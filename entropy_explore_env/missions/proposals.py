@@ -195,14 +195,14 @@ def propose_missions(proposing, proposer, kind, offsets, first, last, out):
         proposing: Proposing.
         proposer: Proposer of this kind, not shared with another thread.
         kind: Its number.
-        offsets: PartOffsets.
+        offsets: CandidateOffsets.
         first: The first mission.
         last: One past the last.
         out: (E, A, F) float32, of which those parts are filled in: with zeros for robots that do not decide.
     """
     most = proposing.candidates.shape[2]
     features, context = _end(offsets.candidates, most * _WIDTH), _end(offsets.context, _CONTEXT)
-    overlaps, masked = _end(offsets.overlaps, most * most), _end(offsets.candidate_mask, most)
+    overlaps, masked = _end(offsets.overlaps, most * most), _end(offsets.action_mask, most)
     for mission in range(first, last):
         clock = proposing.missions[mission]
         for index in range(proposing.robots.shape[1]):

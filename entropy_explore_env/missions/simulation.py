@@ -21,7 +21,7 @@ from entropy_explore_env.missions.faults import draw_faults
 from entropy_explore_env.missions.localization import begin_estimates, fiducial_places
 from entropy_explore_env.missions.memory import Batch, check_memory
 from entropy_explore_env.missions.navigation import Planning, plan_missions
-from entropy_explore_env.missions.observation.layout import ObservationLayout, part_offsets
+from entropy_explore_env.missions.observation.layout import ObservationLayout, candidate_offsets, part_offsets
 from entropy_explore_env.missions.observation.mask import mask_missions
 from entropy_explore_env.missions.observation.observe import Observed, observe_missions
 from entropy_explore_env.missions.proposals import Proposing, propose_missions
@@ -138,6 +138,7 @@ class Missions:
         self.rules = rules_of(scenario)
         self.layout = ObservationLayout(scenario)
         self._offsets = part_offsets(scenario, self.layout)
+        self._candidate_offsets = candidate_offsets(scenario, self.layout)
         self.state: MissionState = new_state(scenario, self.count, self.rules.cells)
         self._no_fly = np.zeros((self.count * int(self.rules.params["bodies"][0]), 0), np.bool_)
         self.worlds: list[World | None] = [None] * self.count
@@ -433,7 +434,9 @@ class Missions:
         """Write the observations of the missions `first` … `last` - 1."""
         calls, scan = self._bound_calls(), self._work[thread].scan
         for kind, proposer in enumerate(self._proposers[thread]):
-            propose_missions(calls.proposing, proposer, kind, self._offsets, first, last, self.observations)
+            propose_missions(
+                calls.proposing, proposer, kind, self._candidate_offsets, first, last, self.observations
+            )
         if not self.layout.size:
             return
         crossing = Crossing(scan.crossed[0], scan.entered)

@@ -101,7 +101,10 @@ def view_from(
 def _in_cone(cone: Mapping[str, np.ndarray], voxel: Voxel) -> bool:
     away = np.array(voxel) + 0.5 - cone["apex"]
     length = float(np.linalg.norm(away))
-    return length <= cone["radius"] and float(away @ cone["gaze"]) >= length * cone["cosine"] - 1e-9
+    return (
+        length <= float(cone["radius"])
+        and float(away @ cone["gaze"]) >= length * float(cone["cosine"]) - 1e-9
+    )
 
 
 def slivers(believed: Map, seen: set[Voxel]) -> int:

@@ -14,6 +14,7 @@ from hypothesis import settings
 from hypothesis import strategies as st
 
 from entropy_explore_env.belief.raycast import Crossing, longest_crossing
+from entropy_explore_env.missions.observation.layout import action_count
 from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.scenario import Scenario, with_settings
 from entropy_explore_env.scenarios import BOX
@@ -102,7 +103,7 @@ def random_actions(missions: Missions, rng: np.random.Generator) -> tuple[np.nda
     robots, rules = missions.scenario.robots, missions.rules
     axes = 3 if missions.scenario.planar else 5
     boxes = rng.uniform(-1.0, 1.0, (missions.count, robots, axes)).astype(np.float32).astype(np.float64)
-    numbers = rng.integers(0, len(rules.actions.moves) * len(rules.actions.gazes), (missions.count, robots))
+    numbers = rng.integers(0, action_count(missions.scenario, rules), (missions.count, robots))
     return boxes, numbers
 
 

@@ -213,11 +213,6 @@ class PartOffsets(NamedTuple):
     overview: int | None
     action_mask: int | None
     """Of discrete actions."""
-    candidates: int
-    """-1 = it is left out, like the next three."""
-    context: int
-    overlaps: int
-    candidate_mask: int
     patch_shape: tuple[int, int, int]
     kinds: int
     """K, of robots; 0 if all are alike."""
@@ -225,16 +220,32 @@ class PartOffsets(NamedTuple):
     """Whether robots that do not decide observe, too."""
 
 
+class CandidateOffsets(NamedTuple):
+    """Where the parts about candidates begin, for compiled code of its own; -1 = one is left out."""
+
+    candidates: int
+    context: int
+    overlaps: int
+    action_mask: int
+    while_busy: bool
+    """Whether robots that do not decide observe, too."""
+
+
+def candidate_offsets(scenario: Scenario, layout: ObservationLayout) -> CandidateOffsets:
+    """What compiled code needs of a layout to write what is about candidates."""
+    names = ("candidates", "context", "overlaps", "action_mask")
+    begin = [layout.parts[name].start if name in layout.parts else -1 for name in names]
+    return CandidateOffsets(*begin, while_busy=scenario.observation.while_busy)
+
+
 def part_offsets(scenario: Scenario, layout: ObservationLayout) -> PartOffsets:
     """What compiled code needs of a layout."""
     begin = {name: part.start for name, part in layout.parts.items()}
-    patch, mask = scenario.observation.patch_shape, begin.pop("action_mask", None)
-    proposed = scenario.action.kind == "candidates"
+    patch = scenario.observation.patch_shape
+    if scenario.action.kind == "candidates":  # which are written elsewhere
+        begin.pop("action_mask", None)
     return PartOffsets(
-        *map(begin.get, ("panorama", "self", "drive", "team", "patch", "overview")),
-        action_mask=None if proposed else mask,
-        **{name: begin.get(name, -1) for name in ("candidates", "context", "overlaps")},
-        candidate_mask=mask if proposed and mask is not None else -1,
+        *map(begin.get, ("panorama", "self", "drive", "team", "patch", "overview", "action_mask")),
         patch_shape=(int(patch[0]), int(patch[1]), int(patch[2])),
         kinds=len(scenario.kinds) if len(scenario.kinds) > 1 else 0,
         while_busy=scenario.observation.while_busy,

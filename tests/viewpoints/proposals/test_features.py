@@ -49,7 +49,7 @@ class Moment:
             self.recipe.stop_probability,
         )
         self.mates, self.cones = [], []
-        for mate, heard in env.missions_view(mission, robot).teammates.items():
+        for mate, heard in view_of(missions, mission, robot).teammates.items():
             if heard.heard_s >= 0.0 and not heard.silent:
                 self.mates.append((mate, grid.in_grid_units(heard.pose)))
             if heard.announced_s >= 0.0 and heard.depth_m > 0.0:
@@ -95,7 +95,6 @@ def moments():
         observation={"action_mask": True, "overlaps": True},
         channel={"i_min_bits": 0.01},
     )
-    env.missions_view = lambda mission, robot: view_of(env.missions, mission, robot)
     observations, _ = env.reset(seed=11)
     rng, found = np.random.default_rng(2), []
     for step in range(36):

@@ -1,0 +1,211 @@
+"""Candidates as state: saved, restored, pickled, batched, replayed and seen through views."""
+
+import copy
+import math
+import pickle
+
+import numpy as np
+import pytest
+
+from entropy_explore_env import parallel_env
+from entropy_explore_env.decision_settings import Action, Observation
+from entropy_explore_env.errors import ActionError, RecordError
+from entropy_explore_env.missions.snapshot import restore, snapshot
+from entropy_explore_env.missions.view import view_of
+from entropy_explore_env.missions.view_candidates import ViewProposer
+from entropy_explore_env.missions.view_observation import ViewObserver
+from entropy_explore_env.randomness import Stream, splitmix_states
+from entropy_explore_env.reports.mission_record import (
+    CommandRecorder,
+    load_record,
+    reset_options_of,
+    same_end,
+    save_record,
+)
+from entropy_explore_env.reports.state_values import state_digest
+from entropy_explore_env.scenario import with_settings
+from entropy_explore_env.viewpoints.candidate_features import CONTEXT, FEATURES
+from entropy_explore_env.viewpoints.proposals.records import Kind
+from tests.reference.scenes import free_box, random_actions, started, wander
+
+MOST = 9
+ACTION = Action("candidates", candidates=MOST)
+SEEN = Observation(panorama=False, action_mask=True, overlaps=True)
+
+
+def walked(steps=8, seed=1, missions=2, **changes):
+    these = started(free_box(**{"action": ACTION, "observation": SEEN, **changes}), seed, missions)
+    wander(these, steps, seed)
+    return these
+
+
+def everything(missions):
+    digests = [state_digest(missions, mission) for mission in range(missions.count)]
+    return digests, missions.observations.tobytes()
+
+
+@pytest.mark.parametrize("way", ["restored", "copied", "pickled"])
+def test_missions_go_on_bitwise_from_where_they_were(way):
+    missions = walked()
+    if way == "restored":
+        others = walked(3, 20)
+        restore(others, snapshot(missions))
+    else:
+        others = copy.deepcopy(missions) if way == "copied" else pickle.loads(pickle.dumps(missions))
+    assert everything(others) == everything(missions)
+    for each in (missions, others):
+        wander(each, 10, 3)
+    assert everything(others) == everything(missions)
+
+
+def test_a_mission_is_the_same_alone_and_in_a_batch():
+    batch = walked(12, 4, missions=3)
+    for mission in range(3):
+        alone, rng = started(batch.scenario, 4 + mission), np.random.default_rng(4)
+        for _ in range(12):
+            _, numbers = random_actions(batch, rng)
+            alone.step(np.zeros((1, 2, 1)), numbers[mission : mission + 1])
+        assert state_digest(alone, 0) == state_digest(batch, mission)
+        np.testing.assert_array_equal(alone.observations[0], batch.observations[mission])
+
+
+def test_candidates_are_part_of_the_digest_where_they_are_actions():
+    missions = walked()
+    before = state_digest(missions, 0)
+    missions.state.experience[0, 1]["patience"] += 1
+    assert state_digest(missions, 0) != before
+    without = started(free_box())
+    assert without.state.candidates.size == without.state.experience.size == 0
+
+
+def test_a_record_is_replayed_bitwise(tmp_path):
+    env = parallel_env(free_box(action=ACTION, observation=SEEN))
+    env.reset(seed=3)
+    recorder, rng = CommandRecorder(env.missions), np.random.default_rng(0)
+    for _ in range(15):
+        actions = {agent: np.int64(rng.integers(MOST)) for agent in env.agents}
+        recorder.command(actions)
+        env.step(actions)
+        recorder.note()
+    save_record(recorder.record("chance"), tmp_path / "mission.npz")
+    record = load_record(tmp_path / "mission.npz")
+    again = parallel_env(record.scenario)
+    again.reset(seed=record.seed, options=reset_options_of(record))
+    for commands in record.commands:
+        again.step(dict(zip(again.agents, commands, strict=True)))
+    assert same_end(record, again.missions)
+
+
+SPOILED = [
+    ("candidates", "viewpoint", 1e9),
+    ("candidates", "goal", math.nan),
+    ("candidates", "goal", 13.0),
+    ("candidates", "kind", 4),
+    ("candidates", "bits", -1.0),
+    ("experience", "failures", 17),
+    ("experience", "goal", -13.0),
+    ("experience", "failed", math.inf),
+    ("experience", "share", 1.5),
+    ("experience", "far_at", math.nan),
+    ("experience", "most_bits", math.nan),
+    ("experience", "blocked", -1),
+]
+
+
+@pytest.mark.parametrize(("name", "field", "value"), SPOILED)
+def test_a_number_that_no_mission_holds_is_refused_by_name(name, field, value):
+    arrays, others = snapshot(walked()), walked(3, 8)
+    before = everything(others)
+    array = arrays[name][field]
+    array[(-1,) * array.ndim] = value
+    with pytest.raises(RecordError) as raised:
+        restore(others, arrays)
+    assert raised.value.field.startswith(f"{name}.{field}")
+    assert everything(others) == before
+
+
+def test_numbers_beyond_the_candidates_are_refused():
+    missions = walked()
+    before = everything(missions)
+    for number in (-1, MOST):
+        with pytest.raises(ActionError, match=f"from 0 to {MOST - 1}"):
+            missions.step(np.zeros((2, 2, 1)), np.full((2, 2), number))
+    assert everything(missions) == before
+
+
+def test_views_hold_the_candidates_and_write_them_as_actions():
+    missions = walked()
+    deciding = np.argwhere(missions.state.robots["deciding"])
+    assert len(deciding) and len(deciding) < 4
+    for mission, robot in np.ndindex(2, 2):
+        view = view_of(missions, mission, robot)
+        if not view.deciding:
+            assert view.candidates.shape == (0, 5)
+            continue
+        kinds = missions.state.candidates[mission, robot]["kind"]
+        assert len(view.candidates) == (kinds != Kind.NONE).sum() > 1
+        for number, viewpoint in enumerate(view.candidates):
+            nudged = viewpoint + np.array([1e-4, 0, 0, 2.0 * math.pi, 0])
+            assert view.action_for(viewpoint) == view.action_for(nudged) == number
+        with pytest.raises(ValueError, match="read-only"):
+            view.candidates[0] = 0.0
+
+
+def test_a_view_is_proposed_what_a_mission_is():
+    """From the same random state the same candidates and features, bitwise."""
+    fresh = started(free_box(action=ACTION, observation=SEEN), 5)
+    proposer = ViewProposer(fresh.scenario, np.random.default_rng(0), overlaps=True)
+    proposer._experience["candidates_rng"][:, 0] = splitmix_states(5, 0, Stream.CANDIDATES, 2)
+    for _ in range(12):
+        for robot in range(2):
+            view = view_of(fresh, 0, robot)
+            if view.deciding:
+                proposed = proposer.propose(view)
+                np.testing.assert_array_equal(proposed, view.candidates)
+                np.testing.assert_array_equal(proposer.propose(view), proposed)  # asked again, the same
+                parts = fresh.layout.split(fresh.observations[0, robot])
+                np.testing.assert_array_equal(proposer.features(robot), parts["candidates"])
+                np.testing.assert_array_equal(proposer.context(robot), parts["context"])
+                np.testing.assert_array_equal(proposer.overlaps(robot), parts["overlaps"])
+        wander(fresh, 1, 7)
+
+
+def test_a_policy_observes_and_acts_through_views_of_other_actions():
+    missions = started(free_box(), 2)
+    observer = ViewObserver(missions.scenario, SEEN, ACTION, np.random.default_rng(4))
+    view = view_of(missions, 0, 1)
+    parts = observer.layout.split(observer.observe(view))
+    assert parts["candidates"].shape == (MOST, len(FEATURES)) and parts["context"].shape == (len(CONTEXT),)
+    there = parts["candidates"].any(axis=1)
+    np.testing.assert_array_equal(parts["action_mask"], there)
+    first, none = observer.viewpoint(view, 0), observer.viewpoint(view, MOST - 1)
+    assert np.linalg.norm(first[:3] - view.pose[:3]) <= view.kind.robot.reach_m * (1 + 1e-9)
+    assert there[MOST - 1] or (none == first).all()
+
+
+def test_who_drives_on_has_the_viewpoint_to_which_it_drives_among_its_candidates():
+    settings = {"robot": {"redecide": 0.4, "navigator": "planned"}, "decision_period_s": None}
+    missions = walked(0, 3, 1, **settings)
+    rng, under_way = np.random.default_rng(1), 0
+    for _ in range(40):
+        robots = missions.state.robots[0]
+        for robot in np.flatnonzero(robots["deciding"] & robots["under_way"]):
+            view = view_of(missions, 0, int(robot))
+            apart = np.abs(view.candidates - view.target).max(axis=1)
+            number = int(np.argmin(apart))
+            assert apart[number] < 1e-6
+            kept = missions.layout.split(missions.observations[0, robot])["candidates"][number, 5]
+            assert kept == 1.0
+            under_way += 1
+        missions.step(np.zeros((1, 2, 1)), rng.integers(0, MOST, (1, 2)))
+    assert under_way > 3
+
+
+def test_where_actions_are_others_nothing_of_it_is_called(monkeypatch):
+    def refuse(*_):
+        raise AssertionError("proposed")
+
+    monkeypatch.setattr("entropy_explore_env.missions.simulation.propose_missions", refuse)
+    wander(started(with_settings(free_box(), {"action": {"kind": "discrete"}})), 2, 0)
+    with pytest.raises(AssertionError, match="proposed"):
+        started(free_box(action=ACTION))
