@@ -66,8 +66,10 @@ from training.training_task import TrainingTask, validation_task
 from training.validation import Validator
 
 _MODULE = "training.ppo"
-_CHANGEABLE = frozenset(("video", "threads", "json", "total_steps", "validate_every", "checkpoint_every"))
-"""Options that may differ where a run is continued."""
+_CHANGEABLE = frozenset(
+    ("video", "threads", "json", "total_steps", "validate_every", "checkpoint_every", "start")
+)
+"""Options that may differ where a run is continued; where it began does not matter any more."""
 _STOPPED = "a checkpoint is written when this rollout and its update are done"
 _RETURNS_MEMORY = 2e5
 """Decisions, about, whose returns normalise: the latest ones, since returns grow as the policy learns."""
@@ -93,7 +95,7 @@ def main(words: Sequence[str]) -> int:
     torch.set_num_threads(args.threads)
     state = set_up(args, task)
     if args.start is not None and checkpoint is None:
-        start_from(state, args.start)
+        start_from(state, Path(args.start))
     if args.resume is None:
         save_options(out, args, _MODULE, words)
     state.options, state.command = options_json(args), shlex.join(["python", "-m", _MODULE, *words])

@@ -21,6 +21,7 @@ from baselines.cli.task_options import (
     settled,
     tasked,
 )
+from entropy_explore_env.command import home_path
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.scenario import with_settings
 from entropy_explore_env.validation import check_whole, is_whole
@@ -109,7 +110,7 @@ class Args:
     """An update ends when the policy has moved about this far, in nats; default: after all of its epochs."""
     critic_first: int = 0
     """Updates at the beginning in which only the critic learns."""
-    start: Path | None = None
+    start: str | None = None
     """A run or a checkpoint whose weights to begin with; default: fresh ones."""
 
     validate_every: WholeNumber = 250_000
@@ -194,7 +195,8 @@ def settled_arguments(args: Args) -> Args:
         SettingError: A file of JSON does not hold what it should.
     """
     files = absolute_files(args.validation_world)
-    return dataclasses.replace(args, task=settled(args.task), validation_world=files)
+    start = None if args.start is None else str(home_path(args.start).absolute())
+    return dataclasses.replace(args, task=settled(args.task), validation_world=files, start=start)
 
 
 def training_task(args: Args) -> TrainingTask:

@@ -57,9 +57,10 @@ from training.policy_improvement.labelling import (
 from training.policy_improvement.regression import RegressionSettings, as_json, regress
 from training.policy_improvement.rollouts import Thinking
 from training.policy_improvement.tasks import task_of
+from training.run_folder import FILE
 
 STAGES = ("labels", "regression", "ppo")
-_RESULT = "result.json"
+_RESULT, _BEGINNING = "result.json", "begins-with.txt"
 _STOPPED = "the shard that is under way is written first"
 
 
@@ -238,13 +239,14 @@ def learn_by_ppo(args: Args, tasks: list[Scenario], interruption: Interruption) 
     """Stage 3; None if Ctrl-C stopped it."""
     folder = args.out / "ppo"
     started = latest_checkpoint(args.out / "regression", *POLICIES)
-    digest = _digest(args.tasks[0], args.ppo_steps, args.ppo_options, args.seed, args.compared)
+    weights = weights_digest(_policy_in(started))
+    digest = _digest(weights, ppo_words(args, tasks[0]), args.compared)
     if (known := _known(folder, digest)) is not None:
         return known
-    if (folder / "run.json").is_file():
-        words = ["--resume", str(folder), "--total-steps", str(args.ppo_steps)]
-    else:
-        words = [*ppo_words(args, tasks[0]), "--start", str(started), "--out", str(folder)]
+    begun = (folder / FILE).is_file()
+    _check_beginning(folder, weights, begun)
+    words = [*ppo_words(args, tasks[0]), "--start", str(started.absolute())]
+    words += ["--resume" if begun else "--out", str(folder)]
     shown = contextlib.redirect_stdout(io.StringIO()) if args.json else contextlib.nullcontext()
     with shown:
         ended = ppo.main([*words, "--threads", str(args.threads), *(["--json"] if args.json else [])])
@@ -254,6 +256,21 @@ def learn_by_ppo(args: Args, tasks: list[Scenario], interruption: Interruption) 
     curve = (folder / "curve.csv").read_text("utf-8").strip().splitlines()
     found = {"line": f"{args.ppo_steps:,} steps, {len(curve) - 1} validations"}
     return _finished(args, tasks[:1], "ppo", policy, found, digest)
+
+
+def _check_beginning(folder: Path, weights: str, begun: bool) -> None:
+    """Note which weights a run of PPO begins with; one that is begun goes on with no others.
+
+    Raises:
+        CheckpointError: The run in the folder began with other weights.
+    """
+    noted = folder / _BEGINNING
+    if begun and noted.is_file() and noted.read_text("utf-8").strip() != weights:
+        allowed = (
+            "those that the run in it began with: the regression is another one since; remove the folder"
+        )
+        raise CheckpointError(f"{folder}: weights to begin with", f"{weights[:12]}…", allowed)
+    write_atomically(noted, weights + "\n")
 
 
 def ppo_words(args: Args, task: Scenario) -> list[str]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import io
 import json
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -89,6 +90,24 @@ def test_the_same_command_does_not_do_anything_again(improved, monkeypatch):
         monkeypatch.setattr(module, name, None)
     monkeypatch.setattr(command.ppo, "main", None)
     assert printed("--out", str(out)) == said
+
+
+def test_ppo_goes_on_with_more_steps_but_not_from_other_weights_or_with_other_options(
+    improved, tmp_path, capsys
+):
+    folder = tmp_path / "run"
+    shutil.copytree(improved[0], folder)
+    on = ["--out", str(folder), "--stage", "ppo"]
+    said = printed(*on, "--ppo-steps", "256")
+    assert "256 steps" in said["ppo"]["line"]
+    assert improve(*on, "--ppo-options=--clip 0.1") == BAD_INPUT
+    assert "as in the run in" in capsys.readouterr().err
+    assert printed("--out", str(folder), "--stage", "regression", "--epochs", "9")["regression"]["states"] > 0
+    weights = latest_checkpoint(folder / "regression", "best") / "policy.json"
+    assert weights.is_file()
+    (folder / "ppo" / "begins-with.txt").write_text("others")
+    assert improve(*on) == BAD_INPUT
+    assert "weights to begin with" in capsys.readouterr().err
 
 
 def test_stages_run_one_by_one_and_a_missing_one_is_named(improved, tmp_path, capsys):
