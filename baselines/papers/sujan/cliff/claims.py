@@ -36,6 +36,12 @@ def looks_of(records: Records, method: int, field: str, steps: int) -> np.ndarra
     return np.stack([np.pad(row, (0, steps - len(row))) for row in rows])
 
 
+def interest_in(records: Records, part: str, steps: int) -> np.ndarray:
+    """(N,) mean interest of method 5 in columns below the cliff, `unreadable` or `readable`, after steps."""
+    rows = [record[f"interest_{part}"] for record in records[cell_id(5)]]
+    return np.array([row[min(LOOKS + steps, len(row) - 1)] for row in rows])
+
+
 def steps_needed(records: Records) -> np.ndarray:
     """(N,) steps of method 5 until it has mapped what method 3 has after MORE, over MORE."""
     wanted = new_columns(records, 3)[:, MORE]
@@ -79,13 +85,13 @@ def _look_claims(records: Records) -> list[Claim]:
     ratio, low, high = ratio_interval(answered[5], answered[3])
     text = f"of what its looks should show, method 5 obtains more than method 3, in {MORE} steps; ratio"
     claims = [Claim("answered", text, "> 1", ratio, low, high, low > 1)]
-    dark, lit = (
-        np.array([record[name][min(LOOKS + FEW, len(record[name]) - 1)] for record in records[cell_id(5)]])
-        for name in ("interest_unreadable", "interest_readable")
-    )
-    ratio, low, high = ratio_interval(dark, lit)
-    text = f"after {FEW} steps of method 5 interest is less in what is unreadable than in the rest; ratio"
-    claims.append(Claim("interest", text, "< 1", ratio, low, high, high < 1))
+    for steps in (FEW, STEPS):
+        dark, lit = (interest_in(records, part, steps) for part in ("unreadable", "readable"))
+        ratio, low, high = ratio_interval(dark, lit)
+        text = (
+            f"after {steps} steps of method 5 interest is less in unreadable than in readable ground; ratio"
+        )
+        claims.append(Claim(f"interest-{steps}", text, "< 1", ratio, low, high, high < 1))
     stops = sum(record["edge_stops"] for method in METHODS for record in records[cell_id(method)])
     text = "drives that the edge ended, of all methods"
     return [*claims, Claim("edge", text, 0, stops, None, None, stops == 0)]

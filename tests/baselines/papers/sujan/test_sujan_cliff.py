@@ -65,7 +65,7 @@ def test_claims_by_hand():
     claims = {claim.id: claim for claim in all_claims(records)}
     assert all(claim.holds for claim in claims.values())
     assert claims["ten-10"].ours == pytest.approx(10.0) and claims["half"].ours == 0.5
-    assert claims["answered"].ours == pytest.approx(2.0) and claims["interest"].ours == 0.5
+    assert claims["answered"].ours == pytest.approx(2.0) and claims["interest-10"].ours == 0.5
     records[cell_id(2)][1] = record_of(2, obtained=(40, 20), edge_stops=2)
     records[cell_id(5)] = [record_of(6, interest=(1.0, 1.0)) for _ in range(3)]
     claims = {claim.id: claim for claim in all_claims(records)}
@@ -112,7 +112,7 @@ def test_the_command_writes_its_page_and_goes_on_where_it_was(tmp_path, capsys, 
     monkeypatch.setattr("sys.argv", ["sujan.cliff", *words])
     assert run_command(cliff.main) == 0
     printed = json.loads(capsys.readouterr().out)
-    assert printed["paper"] == "Sujan's cliff" and len(printed["claims"]) == 12
+    assert printed["paper"] == "Sujan's cliff" and len(printed["claims"]) == 13
     page = (tmp_path / "sujan-cliff.md").read_text()
     assert "python -m baselines.papers.sujan.cliff --worlds 1" in page and "cliff-next-best-view" in page
     for name in ("figure-7", "figure-9", "figure-24", "figure-25", "figure-26"):
