@@ -1,8 +1,8 @@
 """The task on a command line: one definition of the options for commands that run missions.
 
 A scenario, a named one or a file of settings, and what is changed of it: worlds, starts, robots, sensor,
-channel, ending. Options that are not given have the scenario's own values, which the help shows; a command
-with several scenarios reads its words once for each of them.
+channel, fiducials, ending. Options that are not given have the scenario's own values, which the help shows;
+a command with several scenarios reads its words once for each of them.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ from baselines.experiments.mission import Surroundings
 from entropy_explore_env.command import allow_read_memory
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.errors import SettingError
+from entropy_explore_env.localization_settings import Fiducials
 from entropy_explore_env.scenario import Scenario, with_settings
 from entropy_explore_env.scenarios import ROOM, find_scenario
 from entropy_explore_env.settings import Channel, Ending, RangeSensor, Robot, RobotKind
@@ -67,6 +68,7 @@ class TaskOptions:
     robot: Robot = field(default_factory=Robot)
     sensor: RangeSensor = field(default_factory=RangeSensor)
     channel: Channel = field(default_factory=Channel)
+    fiducials: Fiducials = field(default_factory=Fiducials)
     ending: Ending = field(default_factory=Ending)
     time_limit_s: float | None = None
     """Short for --ending.time-limit-s."""
@@ -99,6 +101,7 @@ class BaseTask(NamedTuple):
             robot=scenario.robot,
             sensor=scenario.sensor,
             channel=scenario.channel,
+            fiducials=scenario.fiducials,
             ending=scenario.ending,
         )
 
@@ -219,7 +222,8 @@ def tasked(
         WorldError: A world file cannot be used.
     """
     ending = dataclasses.replace(options.ending, time_limit_s=limit_s(options))
-    names = ("split", "start_radius_m", "decision_period_s", "robot", "sensor", "channel")
+    names = ("split", "start_radius_m", "decision_period_s", "robot", "sensor")
+    names += ("channel", "fiducials")
     settings: dict[str, Any] = {"ending": ending, **{name: getattr(options, name) for name in names}}
     if robots is not None:
         settings["robots"] = robots
@@ -313,8 +317,13 @@ def words_of(options: TaskOptions, task: BaseTask) -> dict[str, list[str]]:
             continue
         if name in _FILES:
             value = [_file_name(each) for each in ([value] if isinstance(value, str) else value)]
-        words[name] = [f"--{option}", *map(_word, value if isinstance(value, list) else [value])]
+        words[name] = [f"--{option}", *map(_word, _flattened(value))]
     return words
+
+
+def _flattened(value: object) -> list[object]:
+    """The numbers and texts of a value, lists of lists of them one after the other."""
+    return [each for part in value for each in _flattened(part)] if isinstance(value, list) else [value]
 
 
 def _word(value: object) -> str:

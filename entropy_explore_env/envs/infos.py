@@ -71,7 +71,7 @@ def robot_infos(missions: Missions, mission: int) -> list[dict[str, Any]]:
                 info[name] = failed
     if missions.rules.localization is not None:
         errors = pose_errors(missions.state.estimates[mission])
-        for info, (off_m, off_rad) in zip(infos, errors.tolist(), strict=True):
+        for info, (off_m, off_rad) in zip(infos, errors, strict=True):
             info["pose_error_m"], info["pose_error_rad"] = off_m, off_rad
     if missions.scenario.action.by_number:
         for info, mask in zip(infos, missions.action_masks()[mission], strict=True):

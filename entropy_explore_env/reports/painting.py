@@ -131,7 +131,7 @@ class Painter:
             f"scans {robots['scans'].sum():,}",
             f"rays sent {robots['measurements_sent'].sum():,}",
             f"driven {robots['distance_m'].sum():,.1f} m",
-            *((f"pose error {pose_errors(estimates)[:, 0].max():.2f} m at most",) if drifts else ()),
+            *((f"pose error {max(pose_errors(estimates))[0]:.2f} m at most",) if drifts else ()),
             *((f"stopped {stopped.sum()} of {len(robots)}",) if missions.scenario.faults.happen else ()),
         )
         frame = Frame(

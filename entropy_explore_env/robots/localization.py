@@ -320,4 +320,4 @@ def weigh_by_covariance(rays, count, packed, voxel_size_m):
         x, y = ray.direction[0] * ray.range_m, ray.direction[1] * ray.range_m
         off = place + 2.0 * (x * y_yaw - y * x_yaw) + (x * x + y * y) * yaw
         if off > 0.0:
-            ray.precision = 1.0 / (1.0 / ray.precision + off * share)
+            ray.precision = ray.precision / (1.0 + ray.precision * off * share)

@@ -126,6 +126,7 @@ def test_options_are_settled_so_that_they_are_the_same_everywhere(plans, tmp_pat
 def test_what_differs_from_the_scenario_is_told_as_words_that_say_it_again(plans):
     task = base_task("office")
     words = "--robot.redecide on_scan --channel.no-announcements --ending.time-limit-s 0.1 --split test"
+    words += " --robot.localization.yaw-rad-per-sqrt-m 0.01 --fiducials.positions-m 1 2 0.5 3 2 0.5"
     words = [*words.split(), "--world", *plans, "--height-m", "2.5", "--read-memory-mib", "600"]
     given = parse(TaskOptions, words, default=task.defaults())
     told = [word for option in words_of(given, task).values() for word in option]
