@@ -5,8 +5,10 @@
 Runs the same starts with the planner among its own candidates; with a clairvoyant, who at every `--every`-th
 decision tries the eight best of them in branches of the mission as it will happen, led to their ends (or to a
 horizon and a learned time to go) by the planner, and keeps the best; with `planned-rate`, from whose kind of
-candidates these are drawn; and with `planned-rate` restricted to the discrete actions of `training.ppo`. No
-policy over the candidates can be expected to gain more than the clairvoyant, which knows the world.
+candidates these are drawn; and with `planned-rate` restricted to the discrete actions of `training.ppo`.
+
+The clairvoyant knows the world, which no policy does, but it looks one choice ahead: it is a measure and no
+bound. Where it gains little, little is to be expected of a policy.
 """
 
 from __future__ import annotations

@@ -10,20 +10,24 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import torch
 
 from baselines.cli.arguments import run_command
 from baselines.strategies import make_strategy
 from entropy_explore_env.command import BAD_INPUT
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.envs.vector_env import EntropyExploreVectorEnv
-from entropy_explore_env.missions.privileged import mission_times, running
+from entropy_explore_env.missions.privileged import PRIVILEGED, mission_times, running
 from entropy_explore_env.missions.view import view_of
 from entropy_explore_env.scenario import with_settings
 from entropy_explore_env.scenarios import find_scenario
+from training.candidate_network import CandidatePolicy
 from training.checkpoints import latest_checkpoint
 from training.errors import CheckpointError, LabelsError, RollOutError
+from training.policy import make_policy, settings_of_policy
 from training.policy_improvement import __main__ as command
 from training.policy_improvement import labelling, rollouts
+from training.policy_improvement.comparison import compare_with_planner
 from training.policy_improvement.labelling import LabelSettings, label_missions, write_labels
 from training.policy_improvement.rollouts import BatchMissions, Branch, RollOuts, Thinking, candidates_to_try
 from training.policy_improvement.shards import shard_file
@@ -108,6 +112,19 @@ def test_ppo_goes_on_with_more_steps_but_not_from_other_weights_or_with_other_op
     (folder / "ppo" / "begins-with.txt").write_text("others")
     assert improve(*on) == BAD_INPUT
     assert "weights to begin with" in capsys.readouterr().err
+
+
+def test_a_policy_that_has_learned_nothing_is_the_planner_on_every_start():
+    there = scenario(2)
+    fresh = make_policy(settings_of_policy(there, "candidates", (8,), len(PRIVILEGED)))
+    assert isinstance(fresh, CandidatePolicy)
+    found = compare_with_planner(fresh, there, 3, 1)
+    assert found.ratio == found.ratio_low == found.ratio_high == found.mean_ratio == found.worst_tenth == 1.0
+    assert found.faster == 0 and found.policy_s == found.planner_s and found.finished == 3
+    torch.nn.init.normal_(fresh.actor.residual.weight, std=30.0)
+    other = compare_with_planner(fresh, there, 3, 1)
+    assert other.planner_s == found.planner_s and other.policy_s != found.policy_s
+    assert other.mean_ratio_low <= other.mean_ratio <= other.mean_ratio_high
 
 
 def test_stages_run_one_by_one_and_a_missing_one_is_named(improved, tmp_path, capsys):
