@@ -118,6 +118,15 @@ def test_a_scenario_full_of_chance_conforms() -> None:
     check_conformance(BOX, steps=25, robots=3, channel=channel, sensor={"range_noise_m": 0.1})
 
 
+@pytest.mark.long
+@pytest.mark.parametrize("redecide", ["at_stop", 0.7])
+def test_candidates_as_actions_conform(redecide: str | float) -> None:
+    observation = {"action_mask": True, "overlaps": True, "drive": True}
+    robot = {"redecide": redecide, "navigator": "planned"}
+    action = {"kind": "candidates", "candidates": 10}
+    check_conformance(BOX, steps=20, robots=3, action=action, observation=observation, robot=robot)
+
+
 def test_bad_settings_are_refused() -> None:
     with pytest.raises(SettingError, match=r"Scenario\.speed"):
         check_conformance(BOX, speed=3)

@@ -151,3 +151,22 @@ def test_a_limit_of_the_group_of_processes_counts(monkeypatch, tmp_path) -> None
         monkeypatch.setattr(memory, "_LAST_GROUP", tmp_path / "memory.max")
         there_is = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
         assert memory.memory_there_is() == (limit or there_is)
+
+
+def test_what_is_counted_for_candidates_is_what_missions_hold() -> None:
+    settings = {"robots": 2, "action": {"kind": "candidates"}, "observation": {"overlaps": True}}
+    EntropyExploreVectorEnv("room", 1, **settings).reset(seed=1)  # what is compiled
+    gc.collect()
+    tracemalloc.start()
+    try:
+        batch = EntropyExploreVectorEnv("room", 3, **settings)
+        batch.reset(seed=1)
+        told = batch.step(np.zeros((3, 2), np.int64))
+        gc.collect()
+        held = tracemalloc.get_traced_memory()[0]
+    finally:
+        tracemalloc.stop()
+    counted = sum(need.bytes for need in memory_needs(batch.scenario, Batch(3, 1)))
+    starts = 8 * batch.scenario.grid.voxels * 3
+    assert 0.97 * held - PYTHON_BYTES < counted < 1.05 * held + starts, (counted, held)
+    del told

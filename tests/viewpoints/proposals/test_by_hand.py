@@ -1,0 +1,168 @@
+"""What candidates see and what a robot learns, computed by hand; candidates in beliefs drawn at random."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+
+from entropy_explore_env.belief.fields import Belief
+from entropy_explore_env.belief.paths.lattice import belief_costs, new_lattice
+from entropy_explore_env.belief.paths.planning import shortest_path
+from entropy_explore_env.belief.paths.search import new_search
+from entropy_explore_env.belief.visibility import CONE
+from entropy_explore_env.robots.motion import MoveEnd
+from entropy_explore_env.scenario import with_settings
+from entropy_explore_env.scenarios import BOX
+from entropy_explore_env.settings import RangeSensor
+from entropy_explore_env.viewpoints.candidate_features import COLUMNS
+from entropy_explore_env.viewpoints.evaluation import is_line_free, new_scratch, robot_model
+from entropy_explore_env.viewpoints.proposals.model import MATE, new_proposers
+from entropy_explore_env.viewpoints.proposals.records import CANDIDATE, EXPERIENCE, Kind
+from entropy_explore_env.viewpoints.proposals.situation import LastDecision, Situation, learn, trust_in
+from entropy_explore_env.viewpoints.proposals.views import clear_marks, look_from, mark_view
+from tests.reference.scenes import drawn, free_box, put, random_belief, seeds, started
+
+SIZE, MOST = (7, 11, 5), 6
+ACTION = {"kind": "candidates", "candidates": MOST}
+ONE_RAY = with_settings(
+    BOX, {"sensor": RangeSensor((0.0, 0.0), 0.1, max_range_m=9.0, voxels_behind=0), "action": ACTION}
+)
+ALONG_X = np.array([0.5, 5.5, 2.5, 0.0, 0.0])
+BACK = np.array([6.5, 5.5, 2.5, math.pi, 0.0])
+PRIOR = 1.0 / 900.0
+
+
+def unknown_world():
+    mean, precision = np.zeros(SIZE, np.float32), np.full(SIZE, PRIOR, np.float32)
+    costs = belief_costs(mean, precision, PRIOR)
+    experience = np.zeros(1, EXPERIENCE)[0]
+    belief = Belief(mean.reshape(-1), precision.reshape(-1), SIZE)
+    nobody = np.zeros(0, CONE), np.zeros(0, MATE)
+    return precision, Situation(belief, costs, ALONG_X.copy(), *nobody, experience)
+
+
+def test_one_ray_through_seven_unknown_voxels():
+    """The wall is 3.5 m less half a voxel away; each unknown voxel lets 0.98 of the gain through."""
+    precision, situation = unknown_world()
+    proposer = new_proposers(ONE_RAY)[0]
+    precision[:, 7, 2] = 100.0  # known: row 6 would be left one voxel thick
+    assert look_from(proposer, situation, ALONG_X, 0, 0.9)
+    view, sensor = proposer.scratch.views[0], ONE_RAY.sensor
+    gain = (sensor.sigma_min + sensor.sigma_slope_per_m * 3.25) ** -2
+    gains = [gain * 0.98**number for number in range(7)]
+    bits = sum(0.5 * math.log2(1.0 + g / PRIOR) for g in gains)
+    again = sum(0.5 * math.log2(1.0 + g / (PRIOR + g)) for g in gains)
+    assert view["bits"] == view["all_bits"] == pytest.approx(bits, rel=1e-5)
+    assert view["again_bits"] == pytest.approx(again, rel=1e-5)
+    assert (view["seen"], view["unknown"]) == (7, 7)
+    assert view["distance"] == pytest.approx(0 + 1 + 2 + 3 + 4 + 5 + 6)
+    assert mark_view(proposer, situation.belief, 0, 0) == 7
+    assert view["slivers"] == 7
+    assert not look_from(proposer, situation, BACK, 1, 0.9)
+    assert proposer.scratch.common[1, 0] == 7
+    assert look_from(proposer, situation, BACK, 1, 2.0)
+    assert mark_view(proposer, situation.belief, 1, 7) == 7
+    clear_marks(proposer, 7)
+    assert [proposer.scratch.views[k]["unique"] for k in range(2)] == pytest.approx([3.5, 3.5])
+    assert not proposer.scratch.marks.any() and not proposer.scratch.scan.added.any()
+
+
+def decision(target, came_bits, move_end=MoveEnd.ARRIVED, under_way=False):
+    target = np.asarray(target, float)
+    in_metres = np.concatenate([0.5 * target[:3], target[3:]])
+    return LastDecision(target, in_metres, 0.5, came_bits, move_end.code, under_way)
+
+
+@pytest.fixture
+def proposed():
+    """What was proposed: a gaze that should bring 50 bits, and the first stop on the way to a far place."""
+    candidates, experience = np.zeros(MOST, CANDIDATE), np.zeros(1, EXPERIENCE)[0]
+    for number, (at, kind) in enumerate([(ALONG_X, Kind.SPOT), (BACK, Kind.FAR)]):
+        candidates[number]["viewpoint"] = [*(0.5 * at[:3]), *at[3:]]
+        candidates[number]["goal"], candidates[number]["kind"] = at + np.array([0, 2, 0, 0, 0]), kind
+        candidates[number]["bits"] = 50.0
+    return candidates, experience
+
+
+def test_what_brought_a_tenth_or_more_is_no_failure(proposed):
+    candidates, experience = proposed
+    learn(experience, candidates, decision(ALONG_X, 5.0), ALONG_X)
+    assert experience["failures"] == 0 and not experience["going"]
+    assert trust_in(experience, False, ALONG_X) == 1.0
+
+
+def test_what_brought_less_is_remembered_until_it_is_far_behind(proposed):
+    candidates, experience = proposed
+    learn(experience, candidates, decision(ALONG_X, 4.0), ALONG_X)
+    assert experience["failures"] == 1
+    alike, turned = ALONG_X + np.array([0.5, 0, 0, 0.05, 0]), ALONG_X + np.array([0, 0, 0, 0.2, 0])
+    assert trust_in(experience, False, alike) == pytest.approx(4.0 / 50.0)
+    assert trust_in(experience, False, turned) == 1.0
+    assert trust_in(experience, True, turned) == pytest.approx(4.0 / 50.0)
+    away = ALONG_X + np.array([6.1, 0, 0, 0, 0])
+    learn(experience, candidates, decision(away, 60.0), away)
+    assert experience["failures"] == 0
+
+
+def test_a_drive_that_was_cut_short_loses_its_goal_and_its_trust(proposed):
+    candidates, experience = proposed
+    learn(experience, candidates, decision(BACK, 60.0), BACK)
+    assert experience["going"] and experience["goal"].tolist() == (BACK + np.array([0, 2, 0, 0, 0])).tolist()
+    short = BACK - np.array([2.0, 0, 0, 0, 0])
+    learn(experience, candidates, decision(BACK, 60.0, MoveEnd.TEAMMATE), short)
+    assert not experience["going"] and experience["blocked"] == 4
+    assert trust_in(experience, False, BACK) == 0.0
+
+
+def test_who_drives_on_judges_nothing_and_keeps_its_goal(proposed):
+    candidates, experience = proposed
+    learn(experience, candidates, decision(BACK, 0.0, under_way=True), ALONG_X)
+    assert experience["going"] and experience["failures"] == 0
+
+
+def test_more_failures_than_are_remembered_push_out_the_oldest(proposed):
+    candidates, experience = proposed
+    for number in range(20):
+        target = ALONG_X + np.array([0, 0, 0, 0.3 * number, 0])
+        candidates[0]["viewpoint"] = [*(0.5 * target[:3]), *target[3:]]
+        learn(experience, candidates, decision(target, 1.0), target)
+    assert experience["failures"] == 16
+    assert trust_in(experience, False, ALONG_X + np.array([0, 0, 0, 0.3 * 3, 0])) == 1.0
+    assert trust_in(experience, False, ALONG_X + np.array([0, 0, 0, 0.3 * 4, 0])) == pytest.approx(0.02)
+
+
+@drawn(20)
+@given(seeds)
+def test_candidates_in_any_belief_can_be_reached_as_they_claim(seed):
+    rng = np.random.default_rng(seed)
+    planned = bool(rng.integers(2))
+    robot = {"navigator": "planned" if planned else "straight", "reach_m": float(rng.uniform(0.3, 3.0))}
+    missions = started(free_box(action=ACTION, robot=robot, observation={"panorama": False}), seed)
+    mean, precision = random_belief(SIZE, seed)
+    missions.state.mean[0], missions.state.precision[0] = mean.reshape(-1), precision.reshape(-1)
+    place = rng.uniform(0.05, 0.95, 3) * SIZE
+    put(missions, 0, [*(0.5 * place), rng.uniform(-3, 3), rng.uniform(-1, 1)])
+    missions.step(np.zeros((1, 2, 1)), np.zeros((1, 2), int))  # a gaze from there, or a drive
+    for number in np.flatnonzero(missions.state.robots[0]["deciding"]):
+        own, candidates = missions.state.robots[0, number], missions.state.candidates[0, number]
+        there = candidates[candidates["kind"] != Kind.NONE]
+        here = own["goal"][:3] / 0.5
+        rows = missions.layout.split(missions.observations[0, number])["candidates"]
+        assert np.isfinite(rows).all() and np.abs(rows).max() <= 1.0
+        belief = Belief(missions.state.mean[0, number], missions.state.precision[0, number], SIZE)
+        model = robot_model(missions.scenario, missions.scenario.kinds[0])
+        for k, candidate in enumerate(there):
+            at = candidate["viewpoint"][:3] / 0.5
+            assert (at >= 0.0).all() and (at <= SIZE).all()
+            assert np.linalg.norm(at - here) <= robot["reach_m"] / 0.5 * (1 + 1e-9)
+            if candidate["kind"] != Kind.NEAR or rows[k, COLUMNS["score"]] == 0.0 or rows[k, 8] == 1.0:
+                continue
+            if planned:
+                costs = belief_costs(belief.mean, belief.precision, PRIOR, 1.0)
+                lattice = new_lattice(SIZE, missions.scenario.robot.body_radius_m / 0.5, None)
+                ends = [int(np.ravel_multi_index(tuple(p.astype(int)), SIZE)) for p in (here, at)]
+                assert math.isfinite(shortest_path(new_search(mean.size), lattice, costs, *ends)[0])
+            else:
+                radius = missions.scenario.robot.body_radius_m / 0.5
+                assert is_line_free(belief, here, at - here, radius, new_scratch(BOX.grid, [model]))
