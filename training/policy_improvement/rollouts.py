@@ -30,7 +30,6 @@ from entropy_explore_env.missions.privileged import (
 from entropy_explore_env.scenario import Scenario, with_settings
 from training.candidate_network import CandidateParts, candidate_parts
 from training.errors import RollOutError
-from training.seeds import label_seeds
 
 _NOTHING = dict.fromkeys(("panorama", "self_state", "team", "candidates", "overlaps", "action_mask"), False)
 _MOST_STEPS = 50
@@ -150,6 +149,9 @@ class RollOuts:
         place, (_, branches, draws) = len(self._waiting), self.shape
         first = place * branches * draws
         used = len(branch.candidates) * draws
+        unbegun = [row for row, episode in enumerate(self._missions.episodes) if episode < 0]
+        if unbegun:  # rows that no branch uses must be missions, too, if only to be left alone
+            copy_missions(source.missions, [branch.mission] * len(unbegun), self._missions, unbegun)
         at = np.arange(first, first + used)
         copy_missions(source.missions, [branch.mission] * used, self._missions, at.tolist())
         if branch.key is not None:
@@ -165,7 +167,7 @@ class RollOuts:
         missions, team = self._missions, self._env.scenario.robots
         waiting, self._waiting = self._waiting, []
         actions, alive = self._first_actions(waiting)
-        self._park(~alive)
+        stop(missions, ~alive)
         rows = missions.count
         began_s, decisions = mission_times(missions), np.zeros(rows, np.int64)
         most = self._horizon * team if self._horizon else np.iinfo(np.int64).max
@@ -200,14 +202,6 @@ class RollOuts:
             actions[own, branch.robot] = branch.candidates.repeat(draws)
             alive[own] = True
         return actions, alive
-
-    def _park(self, idle: np.ndarray) -> None:
-        """End missions that no branch uses, those that were never begun, too."""
-        missions = self._missions
-        unused = [row for row in np.flatnonzero(idle).tolist() if missions.episodes[row] < 0]
-        if unused:
-            missions.reset_some(unused, label_seeds(0, 0, len(unused)))
-        stop(missions, idle)
 
     def _check_headway(self, alive: np.ndarray, steps: int) -> None:
         """Raise a RollOutError where a branch has taken more steps than any should."""

@@ -232,7 +232,7 @@ def test_branches_share_their_luck_and_draws_do_not():
     seconds = runs.run().seconds
     assert np.array_equal(seconds[:, 0], seconds[:, 2]) and not np.array_equal(seconds[:, 0], seconds[:, 1])
     assert len(np.unique(seconds[0, 0])) > 1
-    assert not runs.full
+    assert not runs.full and len(runs.run().seconds) == 0
 
 
 def test_a_roll_out_that_makes_no_headway_is_named(monkeypatch):
