@@ -9,9 +9,9 @@ looking at the ground all around it. Then
   edge a straight line (method 3) or a polygon (method 4), without or with the interest function (method 5).
 
 Unknown columns have the mean height of their neighbours (fig. 7). Ours: a rover drives only where all of its
-body stands on columns that were measured, or on which it stood before; poses are drawn uniformly and look
-down by up to 60°; the height of an unknown column has a standard deviation of a voxel edge; raster looks 30°
-down and, where no place is left, scans again from where it is.
+body, and a column more, stands on columns that were measured, or on which it stood before; poses are drawn
+uniformly and look down by up to 60°; unknown heights have a standard deviation of a voxel edge; raster looks
+30° down and, where no place is left, scans again from where it is.
 """
 
 from __future__ import annotations
@@ -48,6 +48,8 @@ _COMPLETION_M = 0.05
 """To which unknown heights are completed."""
 _GOES_ON = (MoveEnd.ARRIVED, MoveEnd.UNDER_WAY)
 """Ends of a drive after which a rover keeps its goal."""
+_MARGIN = 1.0
+"""Columns that a rover keeps from those that may not carry it: at the edge a map can be a column wrong."""
 _SAME_PLACE = 0.75
 """Voxel edges: a rover this near has arrived."""
 
@@ -267,7 +269,10 @@ class CliffMapping:
         config, edge_m = self.config, self._scenario.grid.voxel_size_m
         wheel = config.wheel_m / edge_m
         window = memory.window
-        carrying = np.abs(memory.known.height_m[window] - self._ground_m(view)) <= config.wheel_m
+        above_m = memory.known.height_m[window] - self._ground_m(view)
+        carrying = (above_m > -edge_m) & (
+            above_m <= config.wheel_m
+        )  # the highest voxel is that of the ground
         carrying = (carrying & memory.known.known[window]) | memory.stood[window]
         here = here[0] - window[0].start, here[1] - window[1].start
         edge = find_edge(memory.height_m[window], here, config.wheel_m, wheel, wheel)
@@ -276,7 +281,7 @@ class CliffMapping:
             within = behind_line(edge, here) if line else inside_polygon(edge.polygon, carrying.shape)
             carrying &= within | memory.stood[window]
         safe = np.zeros(memory.stood.shape, bool)
-        safe[window] = safe_columns(carrying, view.kind.robot.body_radius_m / edge_m)
+        safe[window] = safe_columns(carrying, view.kind.robot.body_radius_m / edge_m + _MARGIN)
         return safe
 
     def _raster(self, view: RobotView, memory: Memory, reachable: np.ndarray) -> np.ndarray:
