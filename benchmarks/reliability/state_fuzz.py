@@ -18,11 +18,14 @@ from entropy_explore_env.scenarios import BOX
 
 STEPS = 20
 _BOX = {"robots": 3, "world": "furnished", "track_truth": True}
+_DRIFT = {"xy_m_per_sqrt_m": 0.05, "z_m_per_sqrt_m": 0.02, "yaw_rad_per_sqrt_m": 0.05}
 SETTINGS: tuple[dict[str, Any], ...] = (
     {"channel": {"delay_s": 3.0, "i_min_bits": 0.0}, "decision_period_s": None},
     {"channel": {"phase_s": 2.0, "repeats": 2, "i_min_fill": 0.5}},
     {"robot": {"navigator": "planned", "redecide": "on_scan"}, "sensor": {"scan_every_m": 0.3}},
     {"robot": {"when_blocked": "wait", "redecide": 0.7, "motion": "planar"}, "action": {"kind": "discrete"}},
+    {"robot": {"localization": _DRIFT}, "fiducials": {"number": 5}, "channel": {"delay_s": 0.7}},
+    {"robot": {"localization": _DRIFT, "redecide": 0.6}, "channel": {"phase_s": 1.5, "repeats": 2}},
 )
 """Of the missions whose states are changed, so that every part of a state is in use."""
 _NUMBERS = (np.nan, np.inf, -np.inf, -1.0, 0.0, 1.0, 1e9, -1e9, 1e300, 5e-324)

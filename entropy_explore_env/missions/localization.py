@@ -236,7 +236,7 @@ def into_workspace(params, axis, number):
     """A coordinate in metres: itself, if it is in the workspace, or the nearest one that is."""
     low, edge = params.origin_m[axis], params.voxel_size_m
     high = low + params.size[axis] * edge
-    if number < low:
+    if not number >= low:  # nor is NaN
         return low
     if number >= high:
         inside = high - _INSIDE * edge

@@ -275,7 +275,13 @@ def _localization(scenario: Scenario, arrays: Mapping[str, np.ndarray]) -> Itera
     off = np.array([far_m, far_m, far_m, math.pi + _ROUNDING])
     yield Values("estimates.error", estimates["error"], -off, off)
     spread = np.where(np.eye(4, dtype=bool), 0.0, -_LARGEST_COVARIANCE)
-    yield Values("estimates.covariance", estimates["covariance"], spread, _LARGEST_COVARIANCE)
+    covariance = estimates["covariance"]
+    yield Values("estimates.covariance", covariance, spread, _LARGEST_COVARIANCE)
+    slack = _ROUNDING * np.trace(covariance, axis1=2, axis2=3)[..., None]
+    off_by = np.abs(covariance - covariance.swapaxes(2, 3)).max(axis=(2, 3), initial=0.0)[..., None]
+    yield Values("estimates.covariance, asymmetry", off_by, 0.0, slack)
+    least = np.linalg.eigvalsh(covariance)
+    yield Values("estimates.covariance, eigenvalues", least, -slack, 4.0 * _LARGEST_COVARIANCE)
     for name in ("squared_m2", "squared_rad2"):
         yield Values(f"estimates.{name}", estimates[name], 0.0, _HUGE)
     yield Values("estimates.sightings", estimates["sightings"], 0, _MOST)

@@ -262,6 +262,8 @@ def take_in(covariance, axis, expected, off, variance, taken):
     gain_2, gain_3 = dot4(covariance[2], h), dot4(covariance[3], h)
     gains = gain_0, gain_1, gain_2, gain_3
     spread = max(dot4(gains, h), 0.0) + variance  # below 0: rounding, or a state from outside
+    if not math.isfinite(spread):  # so uncertain that numbers do not hold it
+        return taken
     surprise = axis[0] * off[0] + axis[1] * off[1] + axis[2] * off[2] - dot4(taken, h)
     for row in range(4):
         for column in range(4):
