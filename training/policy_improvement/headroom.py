@@ -14,7 +14,7 @@ bound. Where it gains little, little is to be expected of a policy.
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
@@ -90,47 +90,44 @@ def main(words: Sequence[str]) -> int:
     task = task_of(f"{args.scenario}:{args.robots}", args.candidates)
     if args.out is not None:
         make_folder("out", args.out)
-    found = measure(args, task)
-    if args.out is not None:
-        write_found(args.out, found)
+    for found in measure(args, task):
+        if args.out is not None:  # after each row, so that a kill loses no more than the next one
+            write_atomically(args.out / "headroom.json", json.dumps(found, indent=1, allow_nan=False) + "\n")
+        if not args.json:
+            print(found["rows"][-1]["line"], flush=True)
     if args.json:
         print_json(found)
-    else:
-        for row in found["rows"]:
-            print(row["line"])
     return 0
 
 
-def write_found(out: Path, found: dict[str, Any]) -> None:
-    """Write what was measured as JSON."""
-    write_atomically(out / "headroom.json", json.dumps(found, indent=1, allow_nan=False) + "\n")
+def measure(args: Args, task: Scenario) -> Iterator[dict[str, Any]]:
+    """Mission times of all, on the same starts, and their ratios to the planner's; after each what is known.
 
-
-def measure(args: Args, task: Scenario) -> dict[str, Any]:
-    """Mission times of all, on the same starts, and their ratios to the planner's.
-
-    Returns:
+    Yields:
         `scenario`, `robots`, `missions`; `rows`: of each its `name`, `median_s`, `finished`, the `ratio` of
         medians and the geometric mean of ratios (`mean_ratio`), each with `_low` and `_high`, and a `line`.
     """
     seeds = label_seeds(args.seed, _SHARD, args.missions)
+    options = {name: getattr(args, name) for name in ("every", "horizon", "divisor", "tries")}
+    found = {"scenario": task.name, "robots": task.robots, "missions": args.missions, **options}
     planner = lead_by_planner(task, seeds, args.threads)
+    rows: list[dict[str, Any]] = []
+    for name, own_s in _all_times(args, task, seeds, planner):
+        rows.append(_row(name, own_s, planner.times_s, task))
+        yield {**found, "rows": list(rows)}
+
+
+def _all_times(
+    args: Args, task: Scenario, seeds: Sequence[int], planner: PlannerMissions
+) -> Iterator[tuple[str, np.ndarray]]:
+    """Names, and the lengths of their missions."""
+    yield "planner", planner.times_s
     to_go = learn_time_to_go(planner.moments, planner.moments_to_go_s) if args.horizon else None
     with closing(Clairvoyant(task, seeds, args, to_go)) as clairvoyant:
-        times = {"planner": planner.times_s, "clairvoyant": clairvoyant.run()}
-    if args.action_sets:
-        for name in ACTION_SETS:
-            strategy = RestrictedPlanner() if name == "restricted" else make_strategy(name)
-            times[name] = strategy_times(task, strategy, seeds)
-    rows = [_row(name, own_s, times["planner"], task) for name, own_s in times.items()]
-    options = {"every": args.every, "horizon": args.horizon, "divisor": args.divisor, "tries": args.tries}
-    return {
-        "scenario": task.name,
-        "robots": task.robots,
-        "missions": args.missions,
-        **options,
-        "rows": rows,
-    }
+        yield "clairvoyant", clairvoyant.run()
+    for name in ACTION_SETS if args.action_sets else ():
+        strategy = RestrictedPlanner() if name == "restricted" else make_strategy(name)
+        yield name, strategy_times(task, strategy, seeds)
 
 
 @dataclass(frozen=True)
