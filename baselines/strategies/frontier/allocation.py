@@ -34,8 +34,11 @@ from entropy_explore_env.settings import RobotKind
 
 _LOST_AFTER = 2.0
 """A silent robot counts as under way for this many times a drive along all sides of the workspace."""
+_FIRST_REACH = 0.25
+"""Paths are searched so far at first, in sensor ranges: most choices are nearer, and a search over a whole
+range costs more than counting the few candidates beyond that could be better."""
 _EXTENSION = 1.4
-"""Paths are searched up to the sensor's range, then this many times as far until that is enough."""
+"""Then they are searched this many times as far until that is enough."""
 
 
 class Value(Protocol):
@@ -219,7 +222,7 @@ class Allocator:
         pose = view.pose if robot == view.robot else view.teammates[robot].pose
         whole = float(sum(self._scenario.grid.shape))
         if robot not in path_costs:
-            near = self.candidates.reach if self._lazy else math.inf
+            near = _FIRST_REACH * self.candidates.reach if self._lazy else math.inf
             path_costs[robot] = self._path_costs(pose, near if near < whole else math.inf)
         weighed = np.full(len(path_costs[robot].edges), np.nan)
         choice, sure = self._best_of(robot, path_costs[robot], taken, weighed)
@@ -229,7 +232,7 @@ class Allocator:
                 pose, farther if farther < whole else math.inf, path_costs[robot]
             )
             choice, sure = self._best_of(robot, path_costs[robot], taken, weighed)
-        if choice is None and robot == view.robot:
+        if choice is None and robot == view.robot and len(self.candidates.listed(all_of_them=True)[0]) > 0:
             whole_map = self._path_costs(pose, math.inf, path_costs[robot])
             everywhere = np.empty(self._scenario.grid.voxels)
             costs_to_all(self.search, everywhere)
