@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 import time
 
@@ -15,7 +16,7 @@ from entropy_explore_env.belief.visibility import CONE, cone_of, mark_cone, visi
 from entropy_explore_env.compilation.kernels import kernel
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.scenario import Scenario, with_settings
-from entropy_explore_env.scenarios import CLIFF, LAB, ROOM
+from entropy_explore_env.scenarios import CLIFF, LAB, OFFICE, ROOM
 from entropy_explore_env.settings import Grid
 
 TEAMMATES = 9
@@ -72,6 +73,13 @@ def overlap_bits(
     for place in range(len(cones) - 1):
         mark_cone(cones[place], size, None, marks)
     return visible_bits(cones[len(cones) - 1], size, precision, known_precision, None, marks)[1]
+
+
+def plan_row(name: str, path: str, grid: Grid, steps: int) -> Row:
+    """A decision of `planned-rate` in a plan's file, where it decides at every scan under way."""
+    plan = dataclasses.replace(OFFICE, name=name, world=path, grid=grid)
+    under_way = {"robot": {"redecide": "on_scan", "body_radius_m": 0.0}, "sensor": {"scan_every_m": 0.5}}
+    return decision_row(with_settings(plan, under_way), 1, "planned-rate", steps, 50.0)
 
 
 def decision_row(scenario: Scenario, robots: int, strategy: str, steps: int, most_ms: float) -> Row:

@@ -6,10 +6,12 @@ import math
 
 import numpy as np
 
-from benchmarks.deciding import decision_row, mutual_information_row, overlap_bits
+from baselines.scoreboard.suites import WORLDS
+from benchmarks.deciding import decision_row, mutual_information_row, overlap_bits, plan_row
 from benchmarks.rows import Effort
 from entropy_explore_env.belief.visibility import CONE, cone_of
 from entropy_explore_env.scenarios import BOX
+from entropy_explore_env.worlds.load import load_world
 
 TINY = Effort(rounds=2, steps=6)
 
@@ -19,6 +21,13 @@ def test_rows_are_measured():
     assert overlap.unit == "ms" and overlap.goal == "< 0.2 ms" and overlap.ours > 0
     decision = decision_row(BOX, 2, "information-rate-v0", TINY.steps, 5.0)
     assert decision.unit == "ms" and decision.goal == "< 5 ms" and decision.ours > 0
+
+
+def test_decisions_are_measured_in_a_plans_file():
+    world = WORLDS / "depot.npz"
+    row = plan_row("depot", str(world), load_world(world).grid, TINY.steps)
+    assert row.job == "a decision of planned-rate, depot, 1 robots" and row.goal == "< 50 ms"
+    assert row.unit == "ms" and row.ours > 0
 
 
 def test_overlap_by_hand():

@@ -38,7 +38,7 @@ from entropy_explore_env.scenario import Scenario
 from entropy_explore_env.validation import check_not_negative, check_positive
 
 _WIDEST = 90
-"""Voxels that u may be off the robot at most: means over more take too long."""
+"""Voxels: means over more, or of paths that are longer, take too long."""
 _DETOUR = 4.0
 """Free cells count in means if the path to them is no longer than this many radii."""
 _STOOD = 1e-3
@@ -60,8 +60,8 @@ class AheadConfig:
     """Around which place means are taken, what an opening is, and what counts how much.
 
     Attributes:
-        radius: How far, along either axis, u may be off the robot, in sensor ranges; openings whose path is
-            longer wait.
+        radius: How far, along either axis, u may be off the robot, in sensor ranges, at most 90 voxels;
+            openings whose path is longer wait.
         around: How far, along either axis, an opening reaches around a frontier cell, in sensor ranges; as
             wide are the cells of a grid of which one opening each counts.
         opening: Least number of known free voxels beside unknown ones there, in sensor ranges.
@@ -124,7 +124,7 @@ class AdvantageAhead(Explorer):
     def pick(self, scene: Scene) -> int:
         """See `Explorer`."""
         heading = self._heading(scene)
-        horizon = self.config.radius * scene.cells.reach + 1.0
+        horizon = self._radius(scene) + 1.0
         openings = self._openings(scene, *scene.paths.frontiers_within(horizon))
         if len(openings.voxels) > 1:
             worth = self._advantages(scene, openings, self._costs(scene, openings, heading))
@@ -135,6 +135,10 @@ class AdvantageAhead(Explorer):
             return self._tour(scene)
         costs = self._costs(scene, openings, heading)
         return self._by_way_of(scene, best_of(openings.voxels, -costs, scene.target))
+
+    def _radius(self, scene: Scene) -> int:
+        """Voxels that u may be off the robot."""
+        return min(round(self.config.radius * scene.cells.reach), _WIDEST)
 
     def _tour(self, scene: Scene) -> int:
         """The sliver to visit next where there is no opening."""
@@ -247,7 +251,7 @@ class AdvantageAhead(Explorer):
 
         Bounds are those of `distance-advantage`: d(u, v) ≤ d(u, w) + d(w, v).
         """
-        paths, radius = scene.paths, min(round(self.config.radius * scene.cells.reach), _WIDEST)
+        paths, radius = scene.paths, self._radius(scene)
         voxels, lengths = openings.voxels, openings.lengths
         paths.extend(_DETOUR * radius)
         around = paths.around(scene.here, radius)
