@@ -248,14 +248,16 @@ class CliffMapping:
     def _stand(self, view: RobotView, memory: Memory) -> None:
         """Note the columns that the body covers where it is: they carry it."""
         grid = self._scenario.grid
-        x, y = np.ogrid[: grid.shape[0], : grid.shape[1]]
         here = (view.pose[:2] - np.asarray(grid.origin_m)[:2]) / grid.voxel_size_m
         radius = view.kind.robot.body_radius_m / grid.voxel_size_m
-        gaps = (
-            np.maximum(np.abs(x + 0.5 - here[0]) - 0.5, 0.0),
-            np.maximum(np.abs(y + 0.5 - here[1]) - 0.5, 0.0),
-        )
-        memory.stood |= gaps[0] ** 2 + gaps[1] ** 2 < radius**2
+        low = np.maximum(np.floor(here - radius).astype(int), 0)
+        high = np.floor(here + radius).astype(int) + 1
+        beside = memory.stood[low[0] : high[0], low[1] : high[1]]
+        x, y = np.ogrid[: beside.shape[0], : beside.shape[1]]
+        gaps = [
+            np.maximum(np.abs(at + 0.5 - to) - 0.5, 0.0) for at, to in zip((x, y), here - low, strict=True)
+        ]
+        beside |= gaps[0] ** 2 + gaps[1] ** 2 < radius**2
 
     def _safe(self, view: RobotView, memory: Memory, here: tuple[int, int]) -> np.ndarray:
         """(X, Y) bool, in the middle of which columns the rover may stand."""

@@ -166,9 +166,11 @@ def fill_new_information(ground, camera, most, poses, bits):
 def fill_visibility(ground, camera, pose, seen):
     """P_V of every column from one pose (5,), 0 outside the view; `seen` (X, Y) float64 is filled in."""
     view = view_from(camera, pose)
-    for x in range(seen.shape[0]):
-        for y in range(seen.shape[1]):
-            seen[x, y] = 0.0
+    seen[:] = 0.0
+    low_x, high_x = _span(pose[0], camera.reach, seen.shape[0])
+    low_y, high_y = _span(pose[1], camera.reach, seen.shape[1])
+    for x in range(low_x, high_x):
+        for y in range(low_y, high_y):
             if in_view(view, pose, x + 0.5, y + 0.5, ground.height[x, y]):
                 seen[x, y] = visibility(ground, (pose[0], pose[1], pose[2]), x, y)
 
