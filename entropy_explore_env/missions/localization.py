@@ -16,39 +16,29 @@ from typing import NamedTuple
 import numpy as np
 
 from entropy_explore_env.belief.measurement_model import Return
-from entropy_explore_env.belief.raycast import OPEN, STOP_AT_COVERED, Line, cast_range, point
+from entropy_explore_env.belief.raycast import point
 from entropy_explore_env.compilation.kernels import lean_kernel
-from entropy_explore_env.errors import WorldError
 from entropy_explore_env.missions.poses import copy_numbers, pose_at, share_left
-from entropy_explore_env.randomness import Stream, generator, splitmix_states
+from entropy_explore_env.randomness import Stream, splitmix_states
 from entropy_explore_env.robots.channel import BITS_PER_COVARIANCE
 from entropy_explore_env.robots.localization import (
     advance_estimate,
     believed_point,
     believed_yaw,
-    correct_estimate,
     pack_covariance,
     point_in_world,
-    sighting_error,
     weigh_by_covariance,
     within_half_turn,
 )
 from entropy_explore_env.robots.range_sensor import (
-    body_distance,
     measure_ranges,
     take_scan,
     trace_measurement,
 )
-from entropy_explore_env.scenario import Scenario
-from entropy_explore_env.worlds.world import World
 
 _NOTHING = int(Return.NOTHING)
-_ON_FACE = 0.49
-"""How far from a voxel's middle a drawn fiducial is, in edges: on the surface beside it, and still free."""
 _INSIDE = 1e-6
 """How far within the workspace's upper faces an estimate is taken, in edges: these belong to no voxel."""
-_NEAREST_M = 1e-6
-"""A fiducial nearer than this has no direction."""
 
 
 class TeamLocalization(NamedTuple):
@@ -75,40 +65,6 @@ def begin_estimates(seed: int, episode: int, poses: np.ndarray, estimates: np.nd
         estimates["place"], estimates["yaw"], estimates["scan_pose"] = poses[:, :3], poses[:, 3], poses
         words = splitmix_states(seed, episode, Stream.LOCALIZATION, len(poses))
         estimates["localization_rng"][:, 0] = words
-
-
-def fiducial_places(scenario: Scenario, world: World, seed: int, episode: int) -> np.ndarray:
-    """Where a mission's fiducials are, drawn or given.
-
-    Drawn ones are on surfaces of voxels that robots can see: of a team that stays in planes, in these planes.
-
-    Returns:
-        (F, 3) float64, metres, map frame; none where nobody drifts.
-
-    Raises:
-        WorldError: One that is given is in something solid, or there are not so many surfaces.
-    """
-    settings, grid = scenario.fiducials, world.grid
-    if not scenario.drifts or not settings.count:
-        return np.zeros((0, 3))
-    if settings.positions_m:
-        places = np.array(settings.positions_m, np.float64)
-        if grid.flat:
-            places[:, 2] = grid.centre_of(np.zeros(3))[2]
-        voxels = np.clip(grid.voxel_of(places), 0, np.asarray(grid.shape) - 1)
-        inside = world.occupied[tuple(voxels.T)]
-        if inside.any():
-            place = settings.positions_m[int(np.argmax(inside))]
-            raise WorldError(
-                "Fiducials.positions_m", place, "a place in free space: it is in something solid"
-            )
-        return places
-    voxels, faces = _surfaces(scenario, world)
-    if len(voxels) < settings.number:
-        allowed = f"at most {len(voxels)}, the free voxels beside something solid that robots can see"
-        raise WorldError("Fiducials.number", settings.number, allowed)
-    drawn = generator(seed, episode, Stream.FIDUCIALS).permutation(len(voxels))[: settings.number]
-    return grid.centre_of(voxels[drawn]) + _ON_FACE * grid.voxel_size_m * faces[drawn]
 
 
 def pose_errors(estimates: np.ndarray) -> list[tuple[float, float]]:
@@ -145,25 +101,6 @@ def localization_figures(estimates: np.ndarray, scans: int) -> dict[str, float |
         "mean_error_rad": sum(off_rad for _, off_rad in errors) / len(errors),
         "sightings": int(estimates["sightings"].sum()),
     }
-
-
-def _surfaces(scenario: Scenario, world: World) -> tuple[np.ndarray, np.ndarray]:
-    """(N, 3) free voxels beside something solid, and (N, 3) directions to its first such face, in C order."""
-    solid = np.pad(world.occupied, 1, constant_values=True)
-    free = world.visible(scenario) & ~world.occupied
-    if scenario.in_planes:
-        layers = {scenario.layer_of(kind.robot) for kind in scenario.kinds}
-        for layer in range(free.shape[2]):
-            free[:, :, layer] &= layer in layers
-    towards = np.zeros((*free.shape, 3))
-    found = np.zeros(free.shape, np.bool_)
-    for axis in range(2 if scenario.in_planes else 3):
-        for side in (-1, 1):
-            beside = np.roll(solid, -side, axis)[1:-1, 1:-1, 1:-1] & free & ~found
-            towards[beside, axis] = side
-            found |= beside
-    voxels = np.argwhere(found)
-    return voxels, towards[found]
 
 
 @lean_kernel
@@ -295,68 +232,6 @@ def choice_into_world(estimate, params, robot, choice, time_s):
     choice.viewpoint[3] = within_half_turn(choice.viewpoint[3] - estimate.error[3])
     for number in range(max(choice.waypoints, 1)):
         copy_numbers(point_in_world(estimate, point(choice.path[number])), choice.path[number], 3)
-
-
-@lean_kernel
-def sight_fiducials(localization, params, index, sensor, scene, pose):
-    """Correct a robot's estimate by the fiducials that it sights in a scan, by number.
-
-    Args:
-        localization: TeamLocalization, or None.
-        params: PARAMS of the robot.
-        index: Its number.
-        sensor: SensorModel of the robot.
-        scene: Scene.
-        pose: SensorPose.
-    """
-    if localization is None:  # known while compiling: nothing of the rest is compiled
-        return
-    estimate, own = localization.estimates[index], localization.params[index]
-    for number in range(len(localization.fiducials)):
-        fiducial = localization.fiducials[number]
-        away = (
-            fiducial[0] - estimate.place[0],
-            fiducial[1] - estimate.place[1],
-            fiducial[2] - estimate.place[2],
-        )
-        if not in_sight(own, sensor.params[0], scene, pose, away):
-            continue
-        error = sighting_error(away, own.range_sigma_m, own.bearing_sigma_rad, estimate.localization_rng)
-        x, y, z = away[0] + error[0], away[1] + error[1], away[2] + error[2]
-        along, across = math.cos(estimate.error[3]), math.sin(estimate.error[3])
-        seen = along * x - across * y, across * x + along * y, z
-        expected = (
-            away[0] - estimate.error[0],
-            away[1] - estimate.error[1],
-            away[2] - estimate.error[2],
-        )
-        correct_estimate(estimate, seen, expected, own.range_sigma_m, own.bearing_sigma_rad)
-    keep_in_workspace(estimate, params)
-
-
-@lean_kernel
-def in_sight(params, sensor, scene, pose, away):
-    """Whether a scan sights a landmark: in range, in its field of view, nothing before it.
-
-    Args:
-        params: LOCALIZATION_PARAMS of the robot.
-        sensor: SENSOR_PARAMS of its sensor.
-        scene: Scene.
-        pose: SensorPose.
-        away: (x, y, z), from the robot to the landmark, metres.
-    """
-    x, y, z = away
-    distance = math.sqrt(x * x + y * y + z * z)
-    if distance > params.range_m or distance < max(sensor.min_range_m, _NEAREST_M):
-        return False
-    turn = within_half_turn(math.atan2(y, x) - pose.yaw)
-    tilt = math.atan2(-z, math.sqrt(x * x + y * y)) - pose.pitch
-    if abs(within_half_turn(turn)) > params.half_yaw_rad or abs(tilt) > params.half_pitch_rad:
-        return False
-    direction = x / distance, y / distance, z / distance
-    line = Line(pose.start, direction, distance / scene.voxel_size_m)
-    _, _, end = cast_range(scene.occupied, scene.size, line, STOP_AT_COVERED)
-    return end == OPEN and body_distance(pose.start, direction, scene.bodies) >= line.length
 
 
 @lean_kernel

@@ -18,7 +18,8 @@ from entropy_explore_env.compilation.announcement import end_of_step
 from entropy_explore_env.compilation.kernels import entry_point
 from entropy_explore_env.errors import ActionError, CallOrderError, SettingError
 from entropy_explore_env.missions.faults import draw_faults
-from entropy_explore_env.missions.localization import begin_estimates, fiducial_places
+from entropy_explore_env.missions.fiducials import fiducial_places
+from entropy_explore_env.missions.localization import begin_estimates
 from entropy_explore_env.missions.memory import Batch, check_memory
 from entropy_explore_env.missions.navigation import Planning, plan_missions
 from entropy_explore_env.missions.observation.layout import ObservationLayout, candidate_offsets, part_offsets

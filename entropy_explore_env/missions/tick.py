@@ -32,6 +32,7 @@ from entropy_explore_env.missions.faults import (
     spoil,
     stops_counted,
 )
+from entropy_explore_env.missions.fiducials import sight_fiducials
 from entropy_explore_env.missions.localization import (
     believe_scan,
     believed_pose,
@@ -40,7 +41,6 @@ from entropy_explore_env.missions.localization import (
     measure,
     note_motion,
     note_scan_pose,
-    sight_fiducials,
 )
 from entropy_explore_env.missions.messages import (
     Maps,

@@ -15,7 +15,7 @@ from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.envs.vector_env import EntropyExploreVectorEnv
 from entropy_explore_env.errors import RecordError, SettingError, WorldError
 from entropy_explore_env.localization_settings import Fiducials, Localization
-from entropy_explore_env.missions.localization import fiducial_places
+from entropy_explore_env.missions.fiducials import fiducial_places
 from entropy_explore_env.missions.poses import pose_at
 from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.missions.snapshot import restore, snapshot
