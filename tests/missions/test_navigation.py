@@ -160,6 +160,7 @@ def test_walls_make_the_scenarios_plan():
         "terrain",
         "terrain-smooth",
         "terrain-rough",
+        "cliff",
     }
 
 

@@ -347,7 +347,8 @@ def test_it_reads_the_public_fields_of_its_view_and_changes_nothing(wandering):
     watched = [Watched(view) for view in views]
     for view, choice in zip(watched, map(chosen, watched), strict=True):  # type: ignore[arg-type]
         assert choice.shape == (5,)
-        assert view.seen <= {field.name for field in dataclasses.fields(RobotView)} | {"kind", "planar"}
+        derived = {"kind", "planar", "level"}
+        assert view.seen <= {field.name for field in dataclasses.fields(RobotView)} | derived
         assert "teammates" not in view.seen  # Rocha04's rule does not look at them
     assert [array.tobytes() for array in missions.state] == before
 
