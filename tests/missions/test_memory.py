@@ -51,15 +51,23 @@ def drawn(rng: np.random.Generator) -> tuple[str, dict[str, Any], int, int]:
     return str(rng.choice(some)), settings, int(rng.integers(1, 9)), int(rng.integers(1, 3))
 
 
+def stepped(
+    scenario: str, settings: dict[str, Any], missions: int, threads: int
+) -> tuple[EntropyExploreVectorEnv, object]:
+    """An environment after a reset and a step, and what it told."""
+    batch = EntropyExploreVectorEnv(scenario, missions, threads=threads, **settings)
+    batch.reset(seed=1)
+    space = batch.action_space
+    return batch, batch.step(np.zeros(space.shape, space.dtype))
+
+
 def held_bytes(scenario: str, settings: dict[str, Any], missions: int, threads: int) -> tuple[int, int]:
-    """What was counted, and what an environment holds after a reset and a step."""
+    """What was counted, and what an environment holds after a reset and a step, with nothing to compile."""
+    stepped(scenario, settings, 1, threads)
     gc.collect()
     tracemalloc.start()
     try:
-        batch = EntropyExploreVectorEnv(scenario, missions, threads=threads, **settings)
-        batch.reset(seed=1)
-        shape = batch.action_space.shape
-        told = batch.step(np.zeros(shape, np.float32))
+        batch, told = stepped(scenario, settings, missions, threads)
         gc.collect()
         held = tracemalloc.get_traced_memory()[0]
     finally:
@@ -73,7 +81,6 @@ def held_bytes(scenario: str, settings: dict[str, Any], missions: int, threads: 
 def check_count(numbers: range) -> None:
     for number in numbers:
         asked = drawn(np.random.default_rng(number))
-        EntropyExploreVectorEnv(asked[0], 1).reset(seed=1)  # what is kept for all, and compiled
         counted, held = held_bytes(*asked)
         scenario = find_scenario(asked[0])
         starts = 8 * scenario.grid.voxels * asked[2]  # they are counted as if all voxels were free
@@ -155,18 +162,6 @@ def test_a_limit_of_the_group_of_processes_counts(monkeypatch, tmp_path) -> None
 
 def test_what_is_counted_for_candidates_is_what_missions_hold() -> None:
     settings = {"robots": 2, "action": {"kind": "candidates"}, "observation": {"overlaps": True}}
-    EntropyExploreVectorEnv("room", 1, **settings).reset(seed=1)  # what is compiled
-    gc.collect()
-    tracemalloc.start()
-    try:
-        batch = EntropyExploreVectorEnv("room", 3, **settings)
-        batch.reset(seed=1)
-        told = batch.step(np.zeros((3, 2), np.int64))
-        gc.collect()
-        held = tracemalloc.get_traced_memory()[0]
-    finally:
-        tracemalloc.stop()
-    counted = sum(need.bytes for need in memory_needs(batch.scenario, Batch(3, 1)))
-    starts = 8 * batch.scenario.grid.voxels * 3
+    counted, held = held_bytes("room", settings, 3, 1)
+    starts = 8 * find_scenario("room").grid.voxels * 3
     assert 0.97 * held - PYTHON_BYTES < counted < 1.05 * held + starts, (counted, held)
-    del told
