@@ -28,6 +28,7 @@ class Stream(enum.IntEnum):
     CANDIDATES = 6
     LOCALIZATION = 7
     FIDUCIALS = 8
+    SIGHTINGS = 9
 
 
 def seed_sequence(seed: int, episode: int, stream: Stream) -> np.random.SeedSequence:

@@ -28,6 +28,8 @@ from training.run_folder import FILE
 
 GOAL = 1.2
 """The median mission time of another trainer is to be at most this many times that of the first."""
+_TASK = ("scenario", "robots", "task", "cost_per_s", "validation_missions")
+"""Options in which runs must not differ."""
 _STEPS = {"training.ppo": "steps", "training.rllib_ppo": "robot_steps"}
 """Trainer → the column of its curve that counts robot-steps."""
 
@@ -60,8 +62,8 @@ class Run(NamedTuple):
     command: str
     trainer: str
     """What tells it from others but the seed."""
-    scenario: str
-    robots: int
+    task: dict[str, Any]
+    """What it learns and validates in."""
     seed: int
     curve: list[Validated]
 
@@ -78,13 +80,7 @@ def main(words: Sequence[str]) -> int:
     runs = [read_run(folder) for folder in args.runs]
     if not runs:
         raise SettingError("runs", (), "at least one folder of a run")
-    for run in runs[1:]:
-        if (run.scenario, run.robots) != (runs[0].scenario, runs[0].robots):
-            raise SettingError(
-                "runs",
-                f"{run.scenario}, {run.robots} robots",
-                f"runs in one scenario: {runs[0].scenario}, {runs[0].robots} robots",
-            )
+    check_comparable(runs)
     make_folder("out", args.out)
     from training.trainer_curves import curves_csv, curves_png  # matplotlib: after the help
 
@@ -93,6 +89,20 @@ def main(words: Sequence[str]) -> int:
     write_atomically(args.out / "trainers.md", page(runs))
     print(f"written: {args.out / 'trainers.md'}", file=sys.stderr)
     return 0
+
+
+def check_comparable(runs: Sequence[Run]) -> None:
+    """Raise a SettingError where runs differ in what they learn in, or were not validated early enough."""
+    first, steps = runs[0], min(run.curve[-1].robot_steps for run in runs)
+    for run in runs:
+        for name, value in run.task.items():
+            if value != first.task[name]:
+                allowed = f"that of the first: {first.task[name]}"
+                raise SettingError(f"runs: {name} of {run.command}", value, allowed)
+        if run.curve[0].robot_steps > steps:
+            given = f"validated after {run.curve[0].robot_steps:,.0f} robot-steps at first"
+            allowed = f"a validation within {steps:,.0f}, the shortest run"
+            raise SettingError(f"runs: {run.command}", given, allowed)
 
 
 def read_run(folder: Path) -> Run:
@@ -115,7 +125,11 @@ def read_run(folder: Path) -> Run:
     if not curve:
         raise SettingError("runs", str(folder), "a folder of a run that has been validated")
     return Run(
-        started["command"], _trainer(module, args), args["scenario"], args["robots"], args["seed"], curve
+        started["command"],
+        _trainer(module, args),
+        {name: args.get(name) for name in _TASK},
+        args["seed"],
+        curve,
     )
 
 
@@ -153,10 +167,10 @@ def page(runs: Sequence[Run]) -> str:
             "# What trainers learn in the same number of steps\n",
             "Made by `python -m training.trainer_comparison`, the folders of these runs after it:\n",
             commands + "\n",
-            f"The scenario {runs[0].scenario} with {runs[0].robots} robots. All validate in the same "
-            "missions, which they do not learn from. The table has the policy that each run keeps after "
-            f"{steps:,} robot-steps, which all of them reached: the one with the least mean time so far. A "
-            f"ratio is that of medians, to {first}.\n",
+            f"The scenario {runs[0].task['scenario']} with {runs[0].task['robots']} robots. All validate in "
+            "the same missions, which they do not learn from. The table has the policy that each run keeps "
+            f"after {steps:,} robot-steps, which all of them reached: the one with the least mean time so "
+            f"far. A ratio is that of medians, to {first}. Learning rates fall until a run's last step.\n",
             markdown_table(head, rows),
             "![Mission time in validations over robot-steps](trainers/curves.png)\n",
         ]

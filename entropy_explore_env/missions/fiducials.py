@@ -99,7 +99,7 @@ def sight_fiducials(localization, params, index, sensor, scene, pose):
         )
         if not in_sight(own, sensor.params[0], scene, pose, away):
             continue
-        error = sighting_error(away, own.range_sigma_m, own.bearing_sigma_rad, estimate.localization_rng)
+        error = sighting_error(away, own.range_sigma_m, own.bearing_sigma_rad, estimate.sighting_rng)
         x, y, z = away[0] + error[0], away[1] + error[1], away[2] + error[2]
         along, across = math.cos(estimate.error[3]), math.sin(estimate.error[3])
         seen = along * x - across * y, across * x + along * y, z
@@ -110,6 +110,19 @@ def sight_fiducials(localization, params, index, sensor, scene, pose):
         )
         correct_estimate(estimate, seen, expected, own.range_sigma_m, own.bearing_sigma_rad)
     keep_in_workspace(estimate, params)
+
+
+@lean_kernel
+def in_view(params, turn, tilt):
+    """Whether a direction so many radians beside and below the gaze is in the field of view.
+
+    Args:
+        params: LOCALIZATION_PARAMS of the robot.
+        turn: In radians, of any number of turns; so is `tilt`.
+        tilt: Downwards.
+    """
+    aside, down = abs(within_half_turn(turn)), abs(within_half_turn(tilt))
+    return aside <= params.half_yaw_rad and down <= params.half_pitch_rad
 
 
 @lean_kernel
@@ -127,9 +140,12 @@ def in_sight(params, sensor, scene, pose, away):
     distance = math.sqrt(x * x + y * y + z * z)
     if distance > params.range_m or distance < max(sensor.min_range_m, _NEAREST_M):
         return False
-    turn = within_half_turn(math.atan2(y, x) - pose.yaw)
-    tilt = math.atan2(-z, math.sqrt(x * x + y * y)) - pose.pitch
-    if abs(within_half_turn(turn)) > params.half_yaw_rad or abs(tilt) > params.half_pitch_rad:
+    turn = math.atan2(y, x) - pose.yaw
+    pitch = math.atan2(-z, math.sqrt(x * x + y * y))
+    # A view that is tilted past the vertical has the landmark behind it, at a pitch beyond a right angle.
+    if not in_view(params, turn, pitch - pose.pitch) and not in_view(
+        params, turn + math.pi, math.pi - pitch - pose.pitch
+    ):
         return False
     direction = x / distance, y / distance, z / distance
     line = Line(pose.start, direction, distance / scene.voxel_size_m)

@@ -2,10 +2,10 @@
 
 The team drives and scans in the world; a robot plans, fuses, announces and observes where it believes to be.
 An estimate changes at events: where a robot scans, decides under way, or is stopped by a fault. A drive
-follows its path as the robot's estimate had it when it departed: what drifts meanwhile is made good by its
-next decision. A robot knows that it is in the workspace, so an estimate beyond it is taken to the nearest
-place in it. Where no robot of the scenario drifts `TeamLocalization` is None, and nothing of all this is
-compiled.
+follows its path as the robot's estimate had it when it departed: what drifts meanwhile is made good by the
+next decision that changes its viewpoint. A robot knows that it is in the workspace, so an estimate beyond it
+is taken to the nearest place in it. Where no robot of the scenario drifts `TeamLocalization` is None, and
+nothing of all this is compiled.
 """
 
 from __future__ import annotations
@@ -63,12 +63,12 @@ def begin_estimates(seed: int, episode: int, poses: np.ndarray, estimates: np.nd
     """
     if len(estimates):
         estimates["place"], estimates["yaw"], estimates["scan_pose"] = poses[:, :3], poses[:, 3], poses
-        words = splitmix_states(seed, episode, Stream.LOCALIZATION, len(poses))
-        estimates["localization_rng"][:, 0] = words
+        for name, stream in (("drift_rng", Stream.LOCALIZATION), ("sighting_rng", Stream.SIGHTINGS)):
+            estimates[name][:, 0] = splitmix_states(seed, episode, stream, len(poses))
 
 
 def pose_errors(estimates: np.ndarray) -> list[tuple[float, float]]:
-    """How wrong one mission's robots were about their poses when they last scanned, or decided under way.
+    """How wrong one mission's robots were about their poses at the latest changes of their estimates.
 
     Args:
         estimates: (A,) ESTIMATE.

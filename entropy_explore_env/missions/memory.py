@@ -110,7 +110,7 @@ def _world_bytes(scenario: Scenario, batch: Batch) -> int:
         held = len(batch.given) * layouts
     else:
         from_file = scenario.world not in RECIPES  # such a world may have a ceiling, or unreadable voxels
-        collisions_apart = from_file or "terrain" in scenario.world
+        collisions_apart = from_file or any(name in scenario.world for name in ("terrain", "cliff"))
         worlds = 1 if from_file or scenario.world == "empty" else batch.missions
         held = worlds * (layouts + voxels + (4 * planar if collisions_apart else 0))
     if not collisions_apart:  # what robots collide with is what rays are cast through

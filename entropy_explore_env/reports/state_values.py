@@ -78,7 +78,7 @@ FIELDS_FAULTS = (
 """Fields of `faults`, where the scenario has any."""
 
 FIELDS_LOCALIZATION = (
-    "place yaw driven_m error covariance packed scan_pose localization_rng sightings "
+    "place yaw driven_m error covariance packed scan_pose drift_rng sighting_rng sightings "
     "squared_m2 squared_rad2".split()
 )
 """Fields of `estimates`, where some robot drifts."""

@@ -42,7 +42,8 @@ ESTIMATE = record_type(
         ("covariance", "f8", (4, 4)),  # of x, y, z, yaw, as the robot holds it to be
         ("packed", "f8", (10,)),  # the covariance at its latest scan, as batches of measurements carry it
         ("scan_pose", "f8", (5,)),  # where it believes to have taken its latest scan: x, y, z, yaw, pitch
-        ("localization_rng", "u8", (1,)),  # random state of drift and sightings
+        ("drift_rng", "u8", (1,)),  # random state of drift
+        ("sighting_rng", "u8", (1,)),  # of errors of sightings, so that fiducials do not change the drift
         # counted from the mission's start
         ("sightings", "i8"),
         ("squared_m2", "f8"),  # squared error of the place, summed over scans
@@ -53,6 +54,8 @@ ESTIMATE = record_type(
 
 COVARIANCE_NUMBERS = 10
 """Different numbers of a covariance of four."""
+_NO_DISTANCE_M = 1e-9
+"""What is nearer has no direction, and is taken for this far away."""
 _LEVEL = 1e-9
 """A direction with a shorter horizontal part is vertical: any horizontal one is sideways to it."""
 
@@ -127,7 +130,7 @@ def advance_estimate(estimate, params, place, yaw, driven_m):
     xy = params.xy_per_m * metres + params.xy_per_rad * turned
     z = params.z_per_m * metres + params.z_per_rad * turned
     heading = params.yaw_per_m * metres + params.yaw_per_rad * turned
-    rng = estimate.localization_rng
+    rng = estimate.drift_rng
     add_drift(error, covariance, 0, xy, rng)
     add_drift(error, covariance, 1, xy, rng)
     add_drift(error, covariance, 2, z, rng)
@@ -192,10 +195,16 @@ def sighting_error(relative, range_sigma_m, bearing_sigma_rad, rng):
 
 
 @inlined_kernel
+def length(vector):
+    """Of (x, y, z)."""
+    return math.sqrt(vector[0] * vector[0] + vector[1] * vector[1] + vector[2] * vector[2])
+
+
+@inlined_kernel
 def sight_axes(relative):
     """(ahead, sideways, up, distance): unit vectors at right angles, the first along a line of sight."""
     x, y, z = relative
-    distance = math.sqrt(x * x + y * y + z * z)
+    distance = max(length(relative), _NO_DISTANCE_M)
     ahead = x / distance, y / distance, z / distance
     level = math.sqrt(ahead[0] * ahead[0] + ahead[1] * ahead[1])
     side = (1.0, 0.0, 0.0)
@@ -219,8 +228,9 @@ def correct_estimate(estimate, seen, expected, range_sigma_m, bearing_sigma_rad)
         z - h(x̂) = seen - expected = H e + v,   H = [I | ẑ × expected],   v ~ N(0, R)              (14, 15)
         K = Σ Hᵀ (H Σ Hᵀ + R)⁻¹,   x̂' = x̂ - K (z - h(x̂)),   Σ' = (I - K H) Σ                       (16)
 
-    R is diagonal along the line of sight, sideways and up, so these three numbers are taken in one after the
-    other, which comes to the same without an inverse.
+    R is diagonal along the line of sight, sideways and up, and the bearing's part of it grows with the
+    distance, seen or expected, whichever is larger. So these three numbers are taken in one after the other,
+    which comes to the same without an inverse.
 
     Args:
         estimate: ESTIMATE, changed in place.
@@ -230,7 +240,7 @@ def correct_estimate(estimate, seen, expected, range_sigma_m, bearing_sigma_rad)
         bearing_sigma_rad: Of its direction, > 0.
     """
     ahead, side, up, distance = sight_axes(seen)
-    sigma = distance * bearing_sigma_rad
+    sigma = max(distance, length(expected)) * bearing_sigma_rad  # noise may have seen it much too near
     off = seen[0] - expected[0], seen[1] - expected[1], seen[2] - expected[2]
     none = (0.0, 0.0, 0.0, 0.0)
     taken = take_in(estimate.covariance, ahead, expected, off, range_sigma_m * range_sigma_m, none)

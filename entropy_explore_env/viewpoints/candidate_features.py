@@ -1,9 +1,9 @@
 """The features of candidate viewpoints, and of a robot's situation: names, meanings, scaling; one table.
 
-All lie in [-1, 1] and are ratios, so that they mean the same in any world, whatever its size, its voxels,
-its sensor, and whatever the team. What one voxel adds to them is told with it: a view sees the voxels of
-which a scan from there should take at least `SEEN_BITS` each. Policies depend on the order and the meaning of
-the features: whoever changes one raises `FEATURES_VERSION`.
+All lie in [-1, 1]. All but `bits_log`, `seconds` and `time` are ratios, so that they mean the same in any
+world, whatever its size, its voxels, its sensor, and whatever the team. What one voxel adds to them is told
+with it: a view sees the voxels of which a scan from there should take at least `SEEN_BITS` each. Policies
+depend on the order and the meaning of the features: whoever changes one raises `FEATURES_VERSION`.
 """
 
 from __future__ import annotations

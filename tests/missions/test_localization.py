@@ -245,6 +245,40 @@ def test_fiducials_are_sighted_in_range_in_view_and_not_behind_anything():
     assert sightings(north, solid=wall) == 0 and sightings(south, solid=wall) == 1
 
 
+def test_a_gaze_straight_down_sights_what_is_ahead_below_and_behind():
+    x, y, z = STAY[:3]
+    for place, sighted in (
+        ((x, y + 0.1, z - 1.0), 1),
+        ((x, y - 0.1, z - 1.0), 1),
+        ((x, y - 0.9, z - 1.0), 0),
+        ((x, y, z + 0.5), 0),
+    ):
+        missions = frozen(
+            free_box(
+                robot={"turn_rate_rad_s": math.inf, "localization": SOME},
+                fiducials={"positions_m": (place,)},
+            )
+        )
+        put(missions, 0, (*STAY[:3], math.pi / 2, math.pi / 2))
+        put(missions, 1, (0.25, 0.25, 0.25, 0.0, 0.0))
+        toward(missions, (*STAY[:3], math.pi / 2, math.pi / 2), (0.25, 0.25, 0.25, 0.0, 0.0))
+        assert missions.state.estimates["sightings"][0, 0] == sighted, place
+
+
+def test_fiducials_do_not_change_how_robots_drift():
+    states = []
+    for number in (0, 6):
+        around = {"field_of_view_rad": (2 * math.pi, math.pi / 3), "angular_step_rad": math.pi / 12}
+        scenario = free_box(robot={"localization": SOME}, sensor=around, fiducials={"number": number})
+        missions = Missions(scenario, 1)
+        missions.reset_some([0], [3])
+        wander(missions, 4, 0)
+        states.append(missions.state.estimates[0].copy())
+    assert (states[1]["sightings"] > 0).any()
+    assert (states[0]["drift_rng"] == states[1]["drift_rng"]).all()
+    assert (states[0]["sighting_rng"] != states[1]["sighting_rng"]).any()
+
+
 def test_sightings_take_back_what_driving_added():
     told = []
     for number in (0, 6):

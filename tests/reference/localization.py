@@ -32,10 +32,10 @@ def jacobian(state, landmark, step=1e-6):
     return np.stack(columns, axis=1)
 
 
-def sighting_noise(seen, range_sigma, bearing_sigma):
-    """R of eq. 16: variance along the line of sight, and at right angles to it."""
-    distance = np.linalg.norm(seen)
-    along = np.outer(seen, seen) / distance**2
+def sighting_noise(seen, range_sigma, bearing_sigma, expected_m):
+    """R of eq. 16: variance along the line of sight, and at right angles to it at the larger distance."""
+    along = np.outer(seen, seen) / (seen @ seen)
+    distance = max(np.linalg.norm(seen), expected_m)
     return range_sigma**2 * along + (distance * bearing_sigma) ** 2 * (np.eye(3) - along)
 
 

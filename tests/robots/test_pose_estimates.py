@@ -34,7 +34,7 @@ def estimate_at(place=PLACE, yaw=0.3, error=(0.0, 0.0, 0.0, 0.0), covariance=Non
     estimate["place"], estimate["yaw"], estimate["error"] = place, yaw, error
     if covariance is not None:
         estimate["covariance"] = covariance
-    estimate["localization_rng"] = seed
+    estimate["drift_rng"] = seed
     return estimate[0]
 
 
@@ -141,9 +141,9 @@ def test_a_correction_is_that_of_the_reference(seed):
     estimate = estimate_at(PLACE, rng.uniform(-3, 3), error, covariance)
     landmark = np.array(PLACE) + rng.normal(size=3) * 3.0
     believed, seen, as_turned = sighting(rng, estimate, landmark)
-    noise = reference.sighting_noise(seen, 0.05, 0.02)
-    state, wanted = reference.corrected(believed, covariance, landmark, seen, noise)
     expected = tuple(landmark - believed[:3])
+    noise = reference.sighting_noise(seen, 0.05, 0.02, np.linalg.norm(expected))
+    state, wanted = reference.corrected(believed, covariance, landmark, seen, noise)
     correct_estimate(estimate, tuple(as_turned), expected, 0.05, 0.02)
     after = np.array([*estimate["place"], estimate["yaw"]]) + estimate["error"]
     np.testing.assert_allclose(after, state, atol=1e-6)

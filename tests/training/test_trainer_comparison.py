@@ -47,8 +47,10 @@ def test_other_folders_and_other_scenarios_are_refused(tmp_path, capsys):
     good = write_run(tmp_path / "a", "training.ppo", [(100, 60, 50)])
     other = write_run(tmp_path / "b", "training.ppo", [(100, 60, 50)], scenario="office")
     empty = write_run(tmp_path / "c", "training.ppo", [])
+    late = write_run(tmp_path / "d", "training.ppo", [(101, 60, 50)])
     for wrong, said in (
-        (other, "runs in one scenario: room, 3 robots"),
+        (other, "allowed is that of the first: room"),
+        (late, "a validation within 100, the shortest run"),
         (empty, "has been validated"),
         (tmp_path, "has been validated"),
     ):
