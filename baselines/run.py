@@ -29,14 +29,17 @@ class Args:
     """Run a mission of a strategy and show it."""
 
     scenario: Positional[str] = "room"
-    """A named scenario: room, office, cave, … (the README lists them)."""
+    """A named scenario: room, office, cave, … (docs/environments.md lists them)."""
     strategy: str = "gradient"
-    """Chooses viewpoints: best (planned-rate, which we recommend), random, gradient, gradient-plane,
-    mutual-information, ground-gradient, information-rate-v0, information-per-scan, voronoi, voronoi-gradient,
-    voronoi-nearest, per-time-visibility, nearest-candidate, coordinated-candidate, nearest-frontier,
-    coordinated-frontier, assigned-frontier, information-gain, distance-advantage, receding-horizon, tour; a
-    learned policy: pretrained:room, or the folder of a run of training.ppo; or a class of your own:
-    my_package.my_module:MyStrategy, or path/to/file.py:MyStrategy."""
+    """Chooses viewpoints: best (planned-rate, which we recommend), planner-choice, random, gradient,
+    gradient-plane, mutual-information, ground-gradient, information-rate-v0, information-per-scan,
+    voronoi, voronoi-gradient, voronoi-nearest, per-time-visibility, nearest-candidate,
+    coordinated-candidate, nearest-frontier, coordinated-frontier, assigned-frontier, information-gain,
+    distance-advantage, receding-horizon, tour, next-best-view, most-unmapped, least-mapped,
+    random-known, raster, raster-fixed-yaw; above a cliff: cliff-next-best-view, cliff-polygon-edge,
+    cliff-straight-edge, cliff-raster, cliff-raster-fixed-yaw; a learned policy: pretrained:room, or
+    the folder of a run of training.ppo; or a class of your own: my_package.my_module:MyStrategy, or
+    path/to/file.py:MyStrategy."""
     robots: int = 3
     """Team size."""
     seed: int = 0

@@ -16,7 +16,7 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from baselines.cli.arguments import INLINE, make_folder, print_json, run_command
+from baselines.cli.arguments import INLINE, make_folder, parse, print_json, run_command
 from baselines.cli.task_options import (
     TaskOptions,
     base_task,
@@ -71,6 +71,7 @@ def main(words: Sequence[str]) -> int:
     """Run the command."""
     args = first_parsed(Args, words, __doc__)
     if (args.pretrained is None) == (args.strategy is None):
+        parse(Args, words, description=__doc__)  # the help, if it is asked for
         raise SettingError("strategy", args.strategy, "given, or else --pretrained, not both")
     check_whole("seeds", args.seeds, 1)
     workers = args.workers
@@ -197,8 +198,10 @@ def show(compared: dict[str, Any]) -> None:
     from rich.console import Console
     from rich.table import Table
 
-    seeds = compared["seeds"]
-    table = Table(title=f"{compared['scenario']}, {compared['robots']} robots, {seeds} test missions each")
+    seeds, robots = compared["seeds"], compared["robots"]
+    table = Table(
+        title=f"{compared['scenario']}, {robots} robot{'s' * (robots != 1)}, {seeds} test missions each"
+    )
     table.add_column("strategy", overflow="fold", min_width=17)
     for head in ("mission time", "finished", "scans", "ratio", "faster"):
         table.add_column(head, justify="right")

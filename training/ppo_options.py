@@ -39,7 +39,7 @@ class Args:
     """Train a policy with PPO."""
 
     scenario: str = "room"
-    """Named scenario: room, room-furnished, office, … (the README lists them)."""
+    """Named scenario: room, room-furnished, office, … (docs/environments.md lists them)."""
     robots: int = 3
     """Robots in a team."""
     missions: int = 64

@@ -72,7 +72,7 @@ class Args:
     """Train a policy with RLlib's PPO."""
 
     scenario: str = "room"
-    """Named scenario: room, room-furnished, office, … (the README lists them)."""
+    """Named scenario: room, room-furnished, office, … (docs/environments.md lists them)."""
     robots: int = 3
     """Robots in a team."""
     total_steps: WholeNumber = 1_000_000

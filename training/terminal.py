@@ -59,7 +59,7 @@ class TrainingBar:
         elif self._lines and now_s >= self._next_s and steps > self._first_steps:
             self._next_s = now_s + LINE_EVERY_S
             speed = (steps - self._first_steps) / max(now_s - self._began_s, 1e-9)
-            left_min = (self._total - steps) / max(speed, 1e-9) / 60.0
+            left_min = max(self._total - steps, 0) / max(speed, 1e-9) / 60.0
             self.say(
                 f"{steps:>12,} steps of {self._total:,}, {speed:,.0f} a second, {left_min:,.0f} min left"
             )

@@ -34,8 +34,9 @@ def fiducial_places(scenario: Scenario, world: World, seed: int, episode: int) -
         WorldError: One that is given is in something solid, or there are not so many surfaces.
     """
     settings, grid = scenario.fiducials, world.grid
-    if not scenario.drifts or not settings.count:
-        return np.zeros((0, 3))
+    none = np.zeros((0, 3))
+    if not settings.count:
+        return none
     if settings.positions_m:
         places = np.array(settings.positions_m, np.float64)
         if grid.flat:
@@ -47,7 +48,9 @@ def fiducial_places(scenario: Scenario, world: World, seed: int, episode: int) -
             raise WorldError(
                 "Fiducials.positions_m", place, "a place in free space: it is in something solid"
             )
-        return places
+        return places if scenario.drifts else none
+    if not scenario.drifts:
+        return none
     voxels, faces = _surfaces(scenario, world)
     if len(voxels) < settings.number:
         allowed = f"at most {len(voxels)}, the free voxels beside something solid that robots can see"

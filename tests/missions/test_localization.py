@@ -327,12 +327,13 @@ def test_fiducials_where_none_can_be_are_refused_before_anything_changes():
     occupied = np.zeros((7, 11, 5), bool)
     occupied[3, 4, 2] = True
     box = World(free_box().grid, occupied, "one block")
-    inside = free_box(fiducials={"positions_m": ((1.0, 1.0, 1.0), (1.75, 2.25, 1.25))}, **DRIFTING)
-    env = EntropyExploreEnv(inside, world=box)
-    with pytest.raises(
-        WorldError, match=r"Fiducials.positions_m = \(1.75, 2.25, 1.25\): allowed is a place in free"
-    ):
-        env.reset(seed=0)
+    for drifting in ({}, DRIFTING):
+        inside = free_box(fiducials={"positions_m": ((1.0, 1.0, 1.0), (1.75, 2.25, 1.25))}, **drifting)
+        env = EntropyExploreEnv(inside, world=box)
+        with pytest.raises(
+            WorldError, match=r"Fiducials.positions_m = \(1.75, 2.25, 1.25\): allowed is a place in free"
+        ):
+            env.reset(seed=0)
     many = started(free_box(fiducials={"number": 200}, **DRIFTING))
     before = state_digest(many, 0)
     many.rules = many.rules._replace()  # a reset that cannot be done leaves all as it was
