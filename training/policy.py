@@ -172,6 +172,21 @@ def misfit(scenario: Scenario, trained: Scenario) -> Misfit | None:
     return Misfit("actions", *actions) if actions[0] != actions[1] else None
 
 
+def check_same_networks(folder: Path, theirs: PolicySettings, ours: PolicySettings) -> None:
+    """Raise a CheckpointError where a policy's weights cannot go on in a policy of other settings.
+
+    Args:
+        folder: Of the weights, for the message.
+        theirs: Settings that the weights were learned with.
+        ours: Settings of the policy that is to begin with them.
+    """
+    for name in ("features", "hidden", "privileged"):
+        if getattr(theirs, name) != getattr(ours, name):
+            raise CheckpointError(f"{folder}: {name}", getattr(theirs, name), f"{getattr(ours, name)}")
+    if (differs := misfit(theirs.scenario, ours.scenario)) is not None:
+        raise CheckpointError(f"{folder}: {differs.what}", differs.given, f"{differs.trained}")
+
+
 def _motion(scenario: Scenario) -> str:
     return "in a plane, looking level" if scenario.planar else "flying"
 

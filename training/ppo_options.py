@@ -153,21 +153,32 @@ def check(args: Args) -> None:
         raise SettingError("target_kl", args.target_kl, "a number above 0")
     check_whole("critic_first", args.critic_first, 0)
     _check_candidates(args)
+    _check_costs(args)
+
+
+_WITHOUT_CANDIDATES = ("features", "overview", "patch", "hidden", "yaws", "pitches")
+_WITH_CANDIDATES = ("critic", "critic_first", "width", "candidates")
 
 
 def _check_candidates(args: Args) -> None:
-    """Raise a SettingError where options of actions and networks do not go together."""
-    if not args.over_candidates:
-        for name in ("critic", "critic_first"):
-            if getattr(args, name) not in ("observed", 0):
-                raise SettingError(name, getattr(args, name), "left out without --actions candidates")
-        return
-    if not is_whole(args.width, HEADS, 1024) or args.width % HEADS:
+    """Raise a SettingError where options of actions and networks do not go together, or would be ignored."""
+    ignored = _WITHOUT_CANDIDATES if args.over_candidates else _WITH_CANDIDATES
+    word = "with" if args.over_candidates else "without"
+    defaults = Args()
+    for name in ignored:
+        if getattr(args, name) != getattr(defaults, name):
+            raise SettingError(name, getattr(args, name), f"left out {word} --actions candidates")
+    if args.over_candidates and (not is_whole(args.width, HEADS, 1024) or args.width % HEADS):
         raise SettingError("width", args.width, f"a multiple of {HEADS}, at most 1024")
-    for name in ("features", "overview", "patch"):
-        default = next(each.default for each in dataclasses.fields(Args) if each.name == name)
-        if getattr(args, name) != default:
-            raise SettingError(name, getattr(args, name), f"{default} with --actions candidates")
+
+
+def _check_costs(args: Args) -> None:
+    """Raise a SettingError where a cost is given that the reward does not have."""
+    if args.reward != "seconds":
+        return
+    own = base_task(args.scenario, args.task.settings, OWN).scenario.reward.cost_per_s  # as a run keeps it
+    if args.cost_per_s not in (None, own):
+        raise SettingError("cost_per_s", args.cost_per_s, "left out with --reward seconds")
 
 
 def parsed(words: Sequence[str], description: str | None = None) -> Args:

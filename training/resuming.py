@@ -23,7 +23,7 @@ from training.checkpoints import (
 from training.errors import CheckpointError
 from training.normalisation import Normaliser
 from training.options import check_new
-from training.policy import POLICIES, load_weights, misfit, weights_of
+from training.policy import POLICIES, check_same_networks, load_weights, weights_of
 from training.progress import Progress
 from training.run_folder import FILE
 
@@ -166,12 +166,7 @@ def start_from(state: TrainingState, folder: Path) -> None:
         CheckpointError: It cannot be read, or its networks are others.
     """
     checkpoint = load_checkpoint(latest_checkpoint(folder, *POLICIES))
-    ours, theirs = state.settings, checkpoint.settings
-    for name in ("features", "hidden", "privileged"):
-        if getattr(theirs, name) != getattr(ours, name):
-            raise CheckpointError(f"{folder}: {name}", getattr(theirs, name), f"{getattr(ours, name)}")
-    if (differs := misfit(theirs.scenario, ours.scenario)) is not None:
-        raise CheckpointError(f"{folder}: {differs.what}", differs.given, f"{differs.trained}")
+    check_same_networks(folder, checkpoint.settings, state.settings)
     load_weights(state.model.policy, checkpoint)
     state.buffer.return_stats.load_arrays("returns", checkpoint.normalisation)
 

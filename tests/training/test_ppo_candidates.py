@@ -142,6 +142,32 @@ def test_options_that_do_not_go_together_are_refused(words, tmp_path, capsys):
     assert len(capsys.readouterr().err.splitlines()) == 1
 
 
+PLAIN = "--scenario box-7x11x5 --robots 2 --no-video --total-steps 64".split()
+
+
+@pytest.mark.parametrize(
+    ("words", "name"),
+    [
+        ("--actions candidates --hidden 64 64", "hidden"),
+        ("--actions candidates --yaws 8", "yaws"),
+        ("--actions candidates --pitches 3", "pitches"),
+        ("--width 8", "width"),
+        ("--actions continuous --candidates 5", "candidates"),
+        ("--reward seconds --cost-per-s 0.5", "cost_per_s"),
+    ],
+)
+def test_options_that_would_be_ignored_are_refused(words, name, tmp_path, capsys):
+    out = tmp_path / "run"
+    assert ppo.run_command(ppo.main, [*PLAIN, *words.split(), "--out", str(out)]) == BAD_INPUT
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.partition(" = ")[0].endswith(name) and "left out with" in line and not out.exists()
+
+
+def test_options_that_are_read_are_not_refused():
+    for words in ("--hidden 64 64 --yaws 8 --pitches 3 --cost-per-s 0.5", "--actions candidates --width 8"):
+        ppo.check(parsed([*PLAIN, *words.split()]))
+
+
 def test_checkpoints_of_earlier_versions_have_no_candidates(trained):
     head = json.loads((latest_checkpoint(trained, "best") / "policy.json").read_text())
     assert {"privileged", "features_version"} <= head.keys()

@@ -36,6 +36,7 @@ from training import extra, ppo  # noqa: F401 - extra: before what is not there 
 from training.candidate_network import HEADS, WIDTH, CandidatePolicy
 from training.checkpoints import (
     Checkpoint,
+    PolicySettings,
     checkpoint_name,
     latest_checkpoint,
     load_checkpoint,
@@ -44,7 +45,14 @@ from training.checkpoints import (
 from training.errors import CheckpointError
 from training.interruption import Interruption
 from training.normalisation import Normaliser
-from training.policy import POLICIES, load_policy, make_policy, settings_of_policy, weights_of
+from training.policy import (
+    POLICIES,
+    check_same_networks,
+    load_policy,
+    make_policy,
+    settings_of_policy,
+    weights_of,
+)
 from training.policy_improvement.comparison import compare_with_planner
 from training.policy_improvement.labelling import (
     LabelSettings,
@@ -127,6 +135,8 @@ def main(words: Sequence[str]) -> int:
     tasks = [task_of(name, args.candidates) for name in args.tasks]
     torch.set_num_threads(args.threads)
     wanted = STAGES if args.stage == "all" else (args.stage,)
+    if wanted != ("ppo",):
+        label_settings(args, tasks)  # refuses --policy before anything is written
     results: dict[str, Any] = {}
     for stage in wanted:
         make_folder("out", args.out / stage)
@@ -195,8 +205,12 @@ def label(args: Args, tasks: list[Scenario], interruption: Interruption) -> dict
 
 
 def label_settings(args: Args, tasks: list[Scenario]) -> tuple[LabelSettings, CandidatePolicy | None]:
-    """What decides the labels, and the policy whose missions are labelled; None = the planner."""
-    policy = None if args.policy is None else _policy_in(args.policy)
+    """What decides the labels, and the policy whose missions are labelled; None = the planner.
+
+    Raises:
+        CheckpointError: The policy cannot be read, or its networks or candidates are others.
+    """
+    policy = None if args.policy is None else _policy_in(args.policy, described(args, tasks))
     settings = LabelSettings(
         tuple(tasks),
         args.missions,
@@ -211,6 +225,11 @@ def label_settings(args: Args, tasks: list[Scenario]) -> tuple[LabelSettings, Ca
     return settings, policy
 
 
+def described(args: Args, tasks: list[Scenario]) -> PolicySettings:
+    """Settings of the policy that is learned."""
+    return settings_of_policy(tasks[0], "candidates", (args.width,), len(PRIVILEGED))
+
+
 def learn_labels(args: Args, tasks: list[Scenario], interruption: Interruption) -> dict[str, Any] | None:
     """Stage 2."""
     settings, led_by = label_settings(args, tasks)
@@ -219,9 +238,8 @@ def learn_labels(args: Args, tasks: list[Scenario], interruption: Interruption) 
     digest = _digest(settings.origin, args.shards, learning, args.width, args.compared)
     if (known := _known(args.out / "regression", digest)) is not None:
         return known
-    described = settings_of_policy(tasks[0], "candidates", (args.width,), len(PRIVILEGED))
     torch.manual_seed(args.seed)
-    policy = make_policy(described)
+    policy = make_policy(described(args, tasks))
     assert isinstance(policy, CandidatePolicy)
     if led_by is not None:  # a further round goes on from the policy that led the missions
         policy.load_state_dict(led_by.state_dict())
@@ -231,7 +249,7 @@ def learn_labels(args: Args, tasks: list[Scenario], interruption: Interruption) 
     found = {**as_json(result), "line": result.line()}
     progress = {"steps": 0, "regression": found}
     folder = args.out / "regression" / checkpoint_name("best", 0)
-    save_checkpoint(folder, Checkpoint(described, progress, weights_of(policy), statistics))
+    save_checkpoint(folder, Checkpoint(described(args, tasks), progress, weights_of(policy), statistics))
     return _finished(args, tasks, "regression", policy, found, digest)
 
 
@@ -329,13 +347,15 @@ def _digest(*options: object) -> str:
     return hashlib.sha256(repr(options).encode()).hexdigest()
 
 
-def _policy_in(folder: Path) -> CandidatePolicy:
+def _policy_in(folder: Path, wanted: PolicySettings | None = None) -> CandidatePolicy:
     """The policy of a run.
 
     Raises:
-        CheckpointError: There is none, or it is none over candidates.
+        CheckpointError: There is none, or it is not over candidates, or not of the settings that are wanted.
     """
     checkpoint = load_checkpoint(latest_checkpoint(folder, *POLICIES))
+    if wanted is not None:
+        check_same_networks(folder, checkpoint.settings, wanted)
     policy = load_policy(checkpoint)
     if not isinstance(policy, CandidatePolicy):
         raise CheckpointError(f"{folder}: features", checkpoint.settings.features, "candidates")

@@ -68,9 +68,9 @@ class LabelSettings(NamedTuple):
         described = hashlib.sha256(repr(self).encode()).hexdigest()
         return Origin(code_digest(__name__), described)
 
-    def scenario_of(self, shard: int) -> Scenario:
-        """The scenario of a shard."""
-        return self.scenarios[shard % len(self.scenarios)]
+    def task_of(self, shard: int) -> int:
+        """The number of the scenario of a shard."""
+        return shard % len(self.scenarios)
 
 
 Acting = Callable[[BatchMissions], np.ndarray]
@@ -168,7 +168,8 @@ class _Shard:
         self._first = number * settings.missions
         self._seeds = label_seeds(settings.seed, number, settings.missions)
         self._rng = np.random.default_rng([settings.seed, number])
-        scenario = settings.scenario_of(number)
+        self._task = settings.task_of(number)
+        scenario = settings.scenarios[self._task]
         self._batch = BatchMissions(scenario, settings.missions, threads)
         self._batch.missions.reset_some(range(settings.missions), self._seeds)
         shape = (settings.states, settings.branches, settings.draws)
@@ -244,9 +245,11 @@ class _Shard:
             at_end,
             (ends_s[mission] - state_s).astype(np.float32),
             mission + self._first,
+            np.full(len(mission), self._task, np.int64),
             np.array([numbers for numbers, _, _ in self._moments], np.float32),
             (ends_s[moment] - moment_s).astype(np.float32),
             moment + self._first,
+            np.full(len(moment), self._task, np.int64),
         )
 
 

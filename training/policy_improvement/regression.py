@@ -5,15 +5,17 @@ draws of the random numbers that branches share,
 
     y_k = 1/D Σ_d (t_c,d - t_k,d),    t = seconds to the end or the horizon, and the learned time to go there.
 
-Differences of logits are regressed on them, y_k ≈ ρ (l_k - l_c) with one learned ρ > 0 seconds, so that the
-likeliest candidate is the one that is expected to save most. Averages over worlds are learned, not what was
-best in one: of which world a robot is in it knows no more than it observes.
+Differences of logits are regressed on them, y_k / s ≈ ρ (l_k - l_c), with the median s of |y_k| in the
+state's task and one learned ρ > 0, so that the likeliest candidate is the one that is expected to save most.
+Each task has its own s and its own time to go: the same share of what is left takes other seconds in another
+scenario. Averages over worlds are learned, not what was best in one: of which world a robot is in it knows no
+more than it observes.
 """
 
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -21,15 +23,17 @@ import numpy as np
 import torch
 from torch.nn import functional
 
-from baselines.experiments.statistics import mean_interval
+from baselines.experiments.statistics import Interval, ratio_interval
 from training.candidate_network import CandidatePolicy
-from training.errors import DivergedError
+from training.errors import DivergedError, LabelsError
 from training.normalisation import Normaliser
 from training.policy_improvement.shards import Labels
 from training.policy_improvement.time_to_go import TimeToGo, learn_time_to_go
 
 _HELD_OUT = 5
-"""Every fifth mission is not learned from."""
+"""Every fifth mission of a task is not learned from."""
+_LEAST_STATES = 2
+"""Of a task: one to learn from, and one that is held out."""
 _DIVERGED = 10.0
 _RHO_RATE = 0.01
 """Learning rate of ln ρ at most: at ρ = 0 nothing would be learned, nor would anything diverge."""
@@ -48,16 +52,17 @@ class Savings(NamedTuple):
     """(N, B, D) float32, of each draw."""
 
 
-def savings_of(labels: Labels, to_go: TimeToGo | None) -> Savings:
+def savings_of(labels: Labels, to_go: Mapping[int, TimeToGo]) -> Savings:
     """The seconds that branches saved.
 
     Args:
         labels: Of roll-outs.
-        to_go: Completes branches that were cut off; None = none was.
+        to_go: By task, completes branches that were cut off; empty = none was.
     """
     total = labels.seconds.astype(np.float64)
-    if to_go is not None:
-        total = total + np.where(labels.ended, 0.0, to_go.seconds(labels.at_end))
+    for task, own in to_go.items():
+        of = labels.task == task
+        total[of] += np.where(labels.ended[of], 0.0, own.seconds(labels.at_end[of]))
     saved = total[:, :1] - total
     draws = saved.shape[2]
     spread = saved.std(axis=2, ddof=1) if draws > 1 else np.full(saved.shape[:2], np.nan)
@@ -69,13 +74,17 @@ def savings_of(labels: Labels, to_go: TimeToGo | None) -> Savings:
 class RegressionResult:
     """What a regression came to, on missions that it did not learn from, but for the first two.
 
+    The epoch is picked on these same missions: `loss_after` and `saved_s` are better than they would be on
+    missions that had no part in that.
+
     Attributes:
         states, held_out: States with labels: all, and those of missions that were not learned from.
         loss_before, loss_after: Of differences, before learning and of the weights that are kept.
         epoch: After which the kept weights were; 0 = before learning, so that the policy is the planner.
         to_go_error_s: Median absolute error of the time to go.
         saved_s, saved_low_s, saved_high_s: Seconds that the policy's choices among the branches save against
-            the planner's, a decision; mean with its 95 % interval.
+            the planner's, a decision; mean with its 95 % interval, of a bootstrap over missions, since states
+            of one mission are alike; without ends (NaN) where only one mission is held out.
         best_s: Seconds that the best branch saves a decision, chosen by half of the draws and measured by
             the others, so that luck does not count.
         noise_s: Root mean square standard error of a label.
@@ -98,7 +107,8 @@ class RegressionResult:
         return (
             f"{self.states} states, {self.held_out} held out; loss {self.loss_before:.4f} → "
             f"{self.loss_after:.4f} (epoch {self.epoch}); a choice saves {self.saved_s:+.3f} s "
-            f"({self.saved_low_s:+.3f} … {self.saved_high_s:+.3f}), the best branch {self.best_s:+.3f} s; "
+            f"({self.saved_low_s:+.3f} … {self.saved_high_s:+.3f}; the epoch is picked on these missions), "
+            f"the best branch {self.best_s:+.3f} s; "
             f"labels ± {self.noise_s:.3f} s, time to go ± {self.to_go_error_s:.1f} s"
         )
 
@@ -120,7 +130,7 @@ class _Rows(NamedTuple):
     observations: torch.Tensor
     candidates: torch.Tensor
     saved: torch.Tensor
-    """(N, B) in units of the median saving."""
+    """(N, B) in units of the median saving of the state's task."""
     there: torch.Tensor
     """(N, B) bool, branches to learn from: all but the planner's own."""
     value: torch.Tensor
@@ -144,20 +154,19 @@ def regress(
         What it came to, and mean and deviation of the values that the critic learned.
 
     Raises:
+        LabelsError: A task has too few states to learn from some and hold out others.
         DivergedError: The loss grows out of bounds, or is not finite.
     """
-    held = labels.mission % _HELD_OUT == _HELD_OUT - 1
-    if held.all() or not held.any():  # too few missions to hold any out: the last states stand for them
-        held = np.arange(len(labels.mission)) >= 0.8 * len(labels.mission)
-    to_go, error_s = _time_to_go(labels, settings.seed)
-    savings = savings_of(labels, None if labels.ended[labels.candidates >= 0].all() else to_go)
+    held = held_out_states(labels)
+    to_go, error_s = _times_to_go(labels, settings.seed)
+    savings = savings_of(labels, {} if labels.ended[labels.candidates >= 0].all() else to_go)
     rows, returns = _rows(labels, savings, ~held)
     torch.manual_seed(settings.seed)
     learner = _Learner(policy, rows, torch.as_tensor(held), settings)
     before, after, epoch = learner.learn()
     choice = _chosen_branches(policy, rows).numpy()
     gained = savings.mean_s[np.arange(len(choice)), choice][held]
-    saved = mean_interval(gained)
+    saved = saved_interval(gained, labels.mission[held])
     noise_s = (
         float(np.sqrt(np.nanmean(savings.error_s[held][:, 1:] ** 2))) if savings.draws_s.shape[2] > 1 else 0.0
     )
@@ -175,21 +184,79 @@ def regress(
     return result, returns
 
 
-def _time_to_go(labels: Labels, seed: int) -> tuple[TimeToGo, float]:
-    """The time to go, learned from all moments, and its error on missions that were held out for that."""
-    held = labels.moments_mission % _HELD_OUT == _HELD_OUT - 1
-    if held.any() and not held.all():
-        tried = learn_time_to_go(labels.moments[~held], labels.moments_to_go_s[~held], seed)
-        error_s = float(np.median(np.abs(tried.seconds(labels.moments[held]) - labels.moments_to_go_s[held])))
-    else:
-        error_s = float("nan")
-    return learn_time_to_go(labels.moments, labels.moments_to_go_s, seed), error_s
+def held_out_states(labels: Labels) -> np.ndarray:
+    """(N,) bool, the states that are not learned from: at least one of each task, and not all of it.
+
+    They are those of every fifth mission of a task; of its last mission with states where these are none, or
+    all; of a single mission the last fifth of its states.
+
+    Raises:
+        LabelsError: A task has fewer than two states.
+    """
+    held = np.isin(labels.mission, _held_out_missions(labels))
+    for task in _tasks(labels) or [0]:
+        own = np.flatnonzero(labels.task == task)
+        if len(own) < _LEAST_STATES:
+            allowed = f"at least {_LEAST_STATES}, to learn from some and hold out others: label more missions"
+            raise LabelsError(f"states of task {task}", len(own), allowed)
+        if held[own].any() and not held[own].all():
+            continue
+        missions = np.unique(labels.mission[own])
+        held[own] = labels.mission[own] == missions[-1]
+        if len(missions) == 1:
+            held[own] = np.arange(len(own)) >= min(0.8 * len(own), len(own) - 1)
+    return held
+
+
+def _held_out_missions(labels: Labels) -> np.ndarray:
+    """Every fifth mission of each task."""
+    missions = np.concatenate([labels.mission, labels.moments_mission])
+    of_task = np.concatenate([labels.task, labels.moments_task])
+    each = [np.unique(missions[of_task == task])[_HELD_OUT - 1 :: _HELD_OUT] for task in _tasks(labels)]
+    return np.concatenate([np.zeros(0, np.int64), *each])
+
+
+def _tasks(labels: Labels) -> list[int]:
+    return np.unique(np.concatenate([labels.task, labels.moments_task])).tolist()
+
+
+def saved_interval(saved_s: np.ndarray, mission: np.ndarray) -> Interval:
+    """Mean saving of a decision, and its interval, for which missions are resampled with all their states.
+
+    Args:
+        saved_s: (N,) of each state.
+        mission: (N,) their missions; of a single one the interval has no ends (NaN).
+    """
+    _, place = np.unique(mission, return_inverse=True)
+    sums, counts = np.bincount(place, saved_s.astype(np.float64)), np.bincount(place)
+    if len(counts) == 1:
+        return Interval(float(sums[0] / counts[0]), float("nan"), float("nan"))
+    return ratio_interval(sums, counts)
+
+
+def _times_to_go(labels: Labels, seed: int) -> tuple[dict[int, TimeToGo], float]:
+    """The time to go of each task, learned from its moments, and the error on missions held out for that."""
+    held = np.isin(labels.moments_mission, _held_out_missions(labels))
+    learned, errors_s = {}, [np.zeros(0)]
+    for task in np.unique(labels.moments_task).tolist():
+        of = labels.moments_task == task
+        learned[task] = learn_time_to_go(labels.moments[of], labels.moments_to_go_s[of], seed)
+        rest, tested = of & ~held, of & held
+        if rest.any() and tested.any():
+            tried = learn_time_to_go(labels.moments[rest], labels.moments_to_go_s[rest], seed)
+            errors_s.append(np.abs(tried.seconds(labels.moments[tested]) - labels.moments_to_go_s[tested]))
+    errors = np.concatenate(errors_s)
+    return learned, float(np.median(errors)) if len(errors) else float("nan")
 
 
 def _rows(labels: Labels, savings: Savings, learned: np.ndarray) -> tuple[_Rows, Normaliser]:
     """States as tensors, and mean and deviation of values."""
     there = (labels.candidates >= 0) & (np.arange(labels.candidates.shape[1]) > 0)
-    scale_s = max(float(np.median(np.abs(savings.mean_s[there & learned[:, None]]))), 1e-6)
+    scale_s = np.ones((len(learned), 1), np.float32)
+    for task in np.unique(labels.task):
+        of = labels.task == task
+        told = np.abs(savings.mean_s[there & (of & learned)[:, None]])
+        scale_s[of] = max(float(np.median(told)), 1e-6) if len(told) else 1.0
     returns = Normaliser()
     returns.update(-labels.to_go_s[learned])
     saved = np.where(there, savings.mean_s, 0.0) / scale_s

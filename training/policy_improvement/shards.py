@@ -17,7 +17,7 @@ import numpy as np
 from entropy_explore_env.writing import write_atomically
 from training.errors import LabelsError
 
-FORMAT = 1
+FORMAT = 2
 _HEAD = "head"
 
 
@@ -38,12 +38,16 @@ class Labels(NamedTuple):
     """(N,) float32, seconds that the mission itself still took."""
     mission: np.ndarray
     """(N,) int64, number of the mission, over all shards."""
+    task: np.ndarray
+    """(N,) int64, number of the task that the mission is of."""
     moments: np.ndarray
     """(T, P) float32, privileged numbers along the missions."""
     moments_to_go_s: np.ndarray
     """(T,) float32, seconds that the mission still took."""
     moments_mission: np.ndarray
     """(T,) int64, number of the mission."""
+    moments_task: np.ndarray
+    """(T,) int64, number of its task."""
 
     @classmethod
     def joined(cls, parts: list[Labels]) -> Labels:
@@ -59,9 +63,11 @@ _KINDS = {
     "at_end": np.float32,
     "to_go_s": np.float32,
     "mission": np.int64,
+    "task": np.int64,
     "moments": np.float32,
     "moments_to_go_s": np.float32,
     "moments_mission": np.int64,
+    "moments_task": np.int64,
 }
 
 
@@ -125,8 +131,10 @@ def _check_shapes(file: Path, labels: Labels) -> None:
         "at_end": (*labels.seconds.shape, *labels.at_end.shape[3:]),
         "to_go_s": (states,),
         "mission": (states,),
+        "task": (states,),
         "moments_to_go_s": (moments,),
         "moments_mission": (moments,),
+        "moments_task": (moments,),
     }
     for name, shape in shapes.items():
         given = getattr(labels, name)

@@ -6,7 +6,6 @@ import contextlib
 import io
 import json
 import shutil
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -293,10 +292,48 @@ def test_a_policy_can_lead_the_missions_that_are_labelled(improved, tmp_path):
     )  # the planner's labels are others
 
 
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--width", "12"], "hidden"),
+        (["--candidates", "5"], "observation candidates"),
+        (["--policy", "training/pretrained/room"], "features"),
+        (["--policy", "nowhere"], "nowhere"),
+    ],
+)
+def test_a_leading_policy_of_other_networks_is_refused_by_name(improved, tmp_path, capsys, words, said):
+    out = tmp_path / "run"
+    assert improve("--out", str(out), "--policy", str(improved[0] / "regression"), *words) == BAD_INPUT
+    (line,) = capsys.readouterr().err.splitlines()
+    assert said in line and not out.exists()
+
+
+def test_a_leading_policy_with_another_critic_is_refused_by_name(tmp_path, capsys):
+    learned = tmp_path / "observed"
+    words = "--scenario box-7x11x5 --robots 2 --actions candidates --candidates 6 --width 8 --missions 2"
+    steps = (
+        "--threads 1 --rollout-steps 16 --batch 16 --epochs 1 --total-steps 64 --validation-missions 1 "
+        "--time-limit-s 40"
+    )
+    with contextlib.redirect_stdout(io.StringIO()):
+        assert command.ppo.main([*words.split(), *steps.split(), "--no-video", "--out", str(learned)]) == 0
+    assert improve("--out", str(tmp_path / "run"), "--policy", str(learned)) == BAD_INPUT
+    assert "privileged = 0" in capsys.readouterr().err
+
+
+def test_labels_know_their_task():
+    both = settings(scenarios=(scenario(), scenario(1)))
+    for shard, task in ((0, 0), (1, 1), (2, 0)):
+        labels, _ = label_missions(both, shard, 1)
+        assert (labels.task == task).all() and labels.task.shape == labels.mission.shape
+        assert (
+            labels.moments_task == task
+        ).all() and labels.moments_task.shape == labels.moments_mission.shape
+
+
 def test_roll_outs_think_less_and_observe_nothing():
     runs = RollOuts(scenario(), (1, 2, 1), Thinking(5, 3), 1)
     whole = EntropyExploreVectorEnv(scenario(), 1, action_masks=False).missions
     thin, full = (each._proposers[0][0].recipe for each in (runs._missions, whole))
     assert thin.gazes == -(-full.gazes // 3) and thin.refined < full.refined and thin.keep == full.keep
     assert runs._missions.observations.size == 0
-    assert Path(labelling.__file__).name == "labelling.py"
