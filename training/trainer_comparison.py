@@ -96,13 +96,20 @@ def check_comparable(runs: Sequence[Run]) -> None:
     first, steps = runs[0], min(run.curve[-1].robot_steps for run in runs)
     for run in runs:
         for name, value in run.task.items():
-            if value != first.task[name]:
+            if not _alike(value, first.task[name]):
                 allowed = f"that of the first: {first.task[name]}"
                 raise SettingError(f"runs: {name} of {run.command}", value, allowed)
         if run.curve[0].robot_steps > steps:
             given = f"validated after {run.curve[0].robot_steps:,.0f} robot-steps at first"
             allowed = f"a validation within {steps:,.0f}, the shortest run"
             raise SettingError(f"runs: {run.command}", given, allowed)
+
+
+def _alike(one: object, other: object) -> bool:
+    """Whether settings are the same; those that an earlier version had not are not compared."""
+    if isinstance(one, dict) and isinstance(other, dict):
+        return all(_alike(one[name], other[name]) for name in one.keys() & other.keys())
+    return one == other
 
 
 def read_run(folder: Path) -> Run:

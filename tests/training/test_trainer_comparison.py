@@ -15,7 +15,14 @@ def write_run(folder: Path, module: str, curve: list[tuple[float, float, float]]
     rows = "".join(f"{steps},7,{mean},{median}\n" for steps, mean, median in curve)
     folder.mkdir()
     (folder / "curve.csv").write_text(f"{column},seconds,mean_s,median_s\n{rows}", "utf-8")
-    settled = {"scenario": "room", "robots": 3, "seed": 0, "runners": 2, **args}
+    settled = {
+        "scenario": "room",
+        "robots": 3,
+        "seed": 0,
+        "runners": 2,
+        "task": {"robot": {"speed": 1}},
+        **args,
+    }
     started = {"command": f"python -m {module} --out {folder.name}", "args": settled}
     (folder / "run.json").write_text(json.dumps(started), "utf-8")
     return folder
@@ -24,7 +31,13 @@ def write_run(folder: Path, module: str, curve: list[tuple[float, float, float]]
 def test_policies_are_compared_that_were_kept_after_steps_that_all_runs_reached(tmp_path):
     runs = [
         write_run(tmp_path / "a", "training.ppo", [(100, 60, 50), (200, 40, 30), (300, 10, 10)]),
-        write_run(tmp_path / "b", "training.ppo", [(150, 50, 40), (210, 55, 20)], seed=1),
+        write_run(
+            tmp_path / "b",
+            "training.ppo",
+            [(150, 50, 40), (210, 55, 20)],
+            seed=1,
+            task={"robot": {"speed": 1, "new": 3}},
+        ),
         write_run(tmp_path / "c", "training.rllib_ppo", [(100, 90, 70), (205, 50, 39), (220, 20, 20)]),
         write_run(tmp_path / "d", "training.rllib_ppo", [(190, 90, 49), (400, 20, 20)], runners=1),
     ]
@@ -47,9 +60,11 @@ def test_other_folders_and_other_scenarios_are_refused(tmp_path, capsys):
     good = write_run(tmp_path / "a", "training.ppo", [(100, 60, 50)])
     other = write_run(tmp_path / "b", "training.ppo", [(100, 60, 50)], scenario="office")
     empty = write_run(tmp_path / "c", "training.ppo", [])
+    faster = write_run(tmp_path / "e", "training.ppo", [(100, 60, 50)], task={"robot": {"speed": 2}})
     late = write_run(tmp_path / "d", "training.ppo", [(101, 60, 50)])
     for wrong, said in (
         (other, "allowed is that of the first: room"),
+        (faster, "{'robot': {'speed': 2}}: allowed is that of the first: {'robot': {'speed': 1}}"),
         (late, "a validation within 100, the shortest run"),
         (empty, "has been validated"),
         (tmp_path, "has been validated"),
