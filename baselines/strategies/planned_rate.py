@@ -39,6 +39,8 @@ from entropy_explore_env.viewpoints.travel import Travel
 
 _MISSED = 0.01
 """A drive that ended farther than this from where it should, in voxel edges, was cut short."""
+_ARRIVALS = (MoveEnd.ARRIVED, MoveEnd.CORNERS)
+"""How drives end that nothing cut short. A robot that drifts may believe to stand elsewhere all the same."""
 _DISAPPOINTING = 0.1
 """Viewpoints are remembered that brought less than this share of what was expected."""
 _ALIKE_EDGES, _ALIKE_RAD = 1.0, 0.1
@@ -132,13 +134,15 @@ class PlannedRate:
         memory, grid = self._memories[view.robot], view.scenario.grid
         here = grid.in_grid_units(view.pose)
         _experience(memory, view, here)
+        weigher = _Weigher(memory, view, self._planner.recipe_of(view.robot).dregs)
         situation = Situation(
             view.robot,
             here,
             belief_of(view),
             announced_cones(view),
             view.no_fly_mask(),
-            _Weigher(memory, view, self._planner.recipe_of(view.robot).dregs),
+            weigher,
+            weigher.trust,
         )
         chosen, expected = self._best(situation, memory, view)
         stays = bool((chosen[:3] == here[:3]).all())
@@ -194,7 +198,7 @@ class PlannedRate:
             if values[best] <= value:
                 break
             stop = self._planner.towards(situation, travel, far.viewpoints[best], self._rng)
-            if stop is not None and situation.weigh(stop[None], np.ones(1))[0] >= _DISAPPOINTING:
+            if stop is not None and situation.trust(stop[None])[0] >= _DISAPPOINTING:
                 memory.goal = far.viewpoints[best].copy()
                 memory.most_bits = max(memory.most_bits, float(far.bits[best]))
                 return stop
@@ -211,7 +215,7 @@ class PlannedRate:
             memory.free_at = situation.here[:3].copy()
             return np.zeros((0, 5))
         exits = self._planner.exits(situation)
-        exits = exits[situation.weigh(exits, np.ones(len(exits))) > 0.0]
+        exits = exits[situation.trust(exits) > 0.0]
         if memory.free_at is None or np.linalg.norm(memory.free_at - situation.here[:3]) < 1.0:
             return self._rng.permutation(exits)
         return exits[np.argsort(np.linalg.norm(exits[:, :3] - memory.free_at, axis=1), kind="stable")]
@@ -220,14 +224,14 @@ class PlannedRate:
         """(5,) a random viewpoint in grid units: of some, one that a path leads to, past all teammates."""
         grid = view.scenario.grid
         drawn = np.stack([grid.in_grid_units(random_viewpoint(view, self._rng)) for _ in range(_ELSEWHERE)])
-        worth = situation.weigh(drawn, np.ones(len(drawn)))
+        trust = situation.trust(drawn)
         if view.kind.robot.navigator == "planned":
             travel = self._planner.start_search(situation)
-            worth *= np.isfinite(self._planner.seconds_to(situation, travel, drawn))
+            trust *= np.isfinite(self._planner.seconds_to(situation, travel, drawn))
             exits = self._planner.exits(situation)
-            if not worth.any() and len(exits) > 0:
-                drawn, worth = exits, situation.weigh(exits, np.ones(len(exits)))
-        return drawn[int(self._rng.choice(np.flatnonzero(worth == worth.max())))]
+            if not trust.any() and len(exits) > 0:
+                drawn, trust = exits, situation.trust(exits)
+        return drawn[int(self._rng.choice(np.flatnonzero(trust == trust.max())))]
 
 
 class _Weigher:
@@ -250,6 +254,17 @@ class _Weigher:
         """(K,) the bits of viewpoints (K, 5) in grid units, or less."""
         if self._dregs > 0.0:
             bits = np.maximum(bits - self._dregs, _DREGS_SHARE * bits)
+        return self._lessened(viewpoints, bits)
+
+    def trust(self, viewpoints: np.ndarray) -> np.ndarray:
+        """(K,) share of the expected bits that viewpoints (K, 5) like these brought; 0 past a body.
+
+        Whether a place is worth driving to at all is asked of this share: dregs are bits, and no part of it.
+        """
+        return self._lessened(viewpoints, np.ones(len(viewpoints)))
+
+    def _lessened(self, viewpoints: np.ndarray, bits: np.ndarray) -> np.ndarray:
+        """(K,) bits, less where viewpoints like these brought less, and 0 past a teammate's body."""
         for viewpoint, share, _ in self._avoided:
             alike = np.linalg.norm(viewpoints[:, :3] - viewpoint[:3], axis=1) < _ALIKE_EDGES
             if share > 0.0 and not self._all_around:
@@ -285,7 +300,8 @@ def _experience(memory: _Memory, view: RobotView, here: np.ndarray) -> None:
     came = max(float(view.scan.utility_bits.sum()), 0.0)
     if view.move_end is MoveEnd.TEAMMATE:
         memory.blocked = _BLOCKED_DECISIONS
-    if missed > _MISSED:
+    drifted = view.move_end in _ARRIVALS and bool(view.covariance.any())
+    if missed > _MISSED and not drifted:
         memory.avoided.append(_Remembered(memory.chosen, 0.0, max(2.0 * missed, _FORGET_EDGES)))
         memory.goal = None
     elif came < _DISAPPOINTING * memory.expected:

@@ -140,6 +140,17 @@ def estimate_in(estimates, mission, index):
 
 
 @lean_kernel
+def is_uncertain(estimate):
+    """Whether a robot's pose is an estimate of a covariance that is not 0; `estimate` None = it is exact."""
+    if estimate is None:  # known while compiling: nothing of the rest is compiled
+        return False
+    for number in range(4):
+        if estimate.covariance[number, number] > 0.0:
+            return True
+    return False
+
+
+@lean_kernel
 def believed_pose(estimate, params, pose):
     """Pose (x, y, z, yaw, pitch), in the workspace, at which a robot that is at a true one believes to be.
 

@@ -13,7 +13,7 @@ import numpy as np
 from entropy_explore_env.belief.fields import Belief
 from entropy_explore_env.belief.paths.lattice import Costs
 from entropy_explore_env.compilation.kernels import lean_kernel
-from entropy_explore_env.missions.localization import believed_pose, estimate_in
+from entropy_explore_env.missions.localization import believed_pose, estimate_in, is_uncertain
 from entropy_explore_env.missions.poses import copy_numbers, grid_size, pose_at, to_grid_units, within_grid
 from entropy_explore_env.missions.silence import silent_since
 from entropy_explore_env.missions.state import MissionEnd
@@ -49,6 +49,8 @@ class Knowledge(NamedTuple):
     """Taken from its map by its latest scan."""
     move_end: int
     under_way: bool
+    uncertain: bool
+    """Whether its pose is an estimate, of a covariance that is not 0."""
     heard: np.ndarray
     """(A,) HEARD."""
     mean: np.ndarray
@@ -158,6 +160,7 @@ def propose_to(params, robot, knowledge, proposer, candidates, experience, parts
         knowledge.came_bits,
         knowledge.move_end,
         knowledge.under_way,
+        knowledge.uncertain,
     )
     features, context, overlaps = parts
     described = len(features) > 0 or len(context) > 0
@@ -231,6 +234,7 @@ def propose_missions(proposing, proposer, kind, offsets, first, last, out):
                     came,
                     own.move_end,
                     own.under_way,
+                    is_uncertain(estimate),
                     proposing.heard[mission, index],
                     proposing.mean[mission, index],
                     proposing.precision[mission, index],

@@ -70,6 +70,7 @@ class ViewProposer:
             float(view.scan.utility_bits.sum()),
             view.move_end.code,
             view.under_way,
+            bool(view.covariance.any()),
             view.heard.copy(),
             writable(view.mean),
             writable(view.precision),

@@ -94,6 +94,11 @@ def as_expected(viewpoints: np.ndarray, bits: np.ndarray) -> np.ndarray:
     return bits
 
 
+def fully_trusted(viewpoints: np.ndarray) -> np.ndarray:
+    """(K,) ones: every viewpoint (K, 5) is taken to bring what is expected of it."""
+    return np.ones(len(viewpoints))
+
+
 @dataclass(frozen=True)
 class Situation:
     """What a robot's candidates depend on.
@@ -105,6 +110,8 @@ class Situation:
         cones: (M,) CONE, which are left to teammates.
         no_fly: (X, Y, Z) bool, voxels that may not be entered; None = all may.
         weigh: Changes the expected bits (K,) of viewpoints (K, 5) by what the robot has experienced.
+        trust: Share in [0, 1] of the expected bits that viewpoints (K, 5) like these brought, (K,); 0 where a
+            teammate is in the way.
     """
 
     robot: int
@@ -113,6 +120,7 @@ class Situation:
     cones: np.ndarray
     no_fly: np.ndarray | None = None
     weigh: Callable[[np.ndarray, np.ndarray], np.ndarray] = as_expected
+    trust: Callable[[np.ndarray], np.ndarray] = fully_trusted
 
 
 class _Maker:

@@ -15,6 +15,7 @@ from entropy_explore_env.viewpoints.proposals.records import Kind
 from entropy_explore_env.viewpoints.proposals.situation import (
     DISAPPOINTING,
     distance_apart,
+    trust_and_clearance,
     turned,
     worth_bits,
 )
@@ -93,7 +94,7 @@ def add_far(proposer, situation, size, value, most):
             continue
         gazes = recipe.way_gazes if choosing else min(recipe.way_gazes, _TRIED_STOPS)
         pool.stop_bits[size] = gaze_on_the_way(proposer, situation, gazes, goal, stop)
-        if worth_bits(proposer, situation, stop, 1.0) < DISAPPOINTING:
+        if trust_and_clearance(proposer, situation, stop) < DISAPPOINTING:
             continue
         copy_viewpoint(goal, pool.goals[size])
         pool.bits[size], pool.seconds[size] = far.bits[number], far.seconds[number]
@@ -170,7 +171,9 @@ def _find_exit(proposer, situation, out):
                 if x == 0 and y == 0 and z == 0:
                     continue
                 _neighbour(proposer, situation, (x, y, z), at)
-                if _is_reached(proposer, situation, at) and worth_bits(proposer, situation, at, 1.0) > 0.0:
+                if not _is_reached(proposer, situation, at):
+                    continue
+                if trust_and_clearance(proposer, situation, at) > 0.0:
                     away = draw_uniform(experience.candidates_rng)
                     if from_free:
                         away = distance_apart(experience.free_at, at)
@@ -200,11 +203,11 @@ def _draw_elsewhere(proposer, situation, out):
         at[3] = math.pi * (2.0 * draw_uniform(rng) - 1.0)
         if not proposer.level:
             at[4] = math.asin(2.0 * draw_uniform(rng) - 1.0)
-        worth = worth_bits(proposer, situation, at, 1.0)
+        trust = trust_and_clearance(proposer, situation, at)
         if proposer.planned and not _is_reached(proposer, situation, at):
-            worth = 0.0
-        if worth > best:
-            best = worth
+            trust = 0.0
+        if trust > best:
+            best = trust
             copy_viewpoint(at, out)
     if best <= 0.0 and proposer.planned:
         _find_exit(proposer, situation, out)

@@ -15,6 +15,7 @@ from entropy_explore_env.viewpoints.proposals.records import REMEMBERED, Kind
 
 _NONE, _FAR = int(Kind.NONE), int(Kind.FAR)
 _TEAMMATE = MoveEnd.TEAMMATE.code
+_ARRIVED, _CORNERS = MoveEnd.ARRIVED.code, MoveEnd.CORNERS.code
 _MISSED = 0.01
 """A drive that ended farther than this from where it should, in voxel edges, was cut short."""
 DISAPPOINTING = 0.1
@@ -63,6 +64,8 @@ class LastDecision(NamedTuple):
     """Code of a MoveEnd."""
     under_way: bool
     """Whether it still drives there."""
+    uncertain: bool
+    """Whether its pose is an estimate: nothing cut a drive short that ended elsewhere, where it arrived."""
 
 
 @lean_kernel
@@ -103,7 +106,8 @@ def learn(experience, candidates, decision, here):
         here: (5,) where the robot is, grid units.
     """
     number = chosen_number(candidates, decision)
-    experience.going = False
+    if number >= 0 or not decision.under_way:  # who is under way to what is out of reach keeps its goal
+        experience.going = False
     if number >= 0 and candidates[number].kind == _FAR:
         experience.going = True
         for i in range(5):
@@ -117,7 +121,8 @@ def learn(experience, candidates, decision, here):
     missed = distance_apart(decision.target, here)
     expected = candidates[number].bits if number >= 0 else 0.0
     came = max(decision.came_bits, 0.0)
-    if missed > _MISSED:
+    arrived = decision.move_end == _ARRIVED or decision.move_end == _CORNERS
+    if missed > _MISSED and not (arrived and decision.uncertain):
         _remember(experience, decision.target, 0.0, max(2.0 * missed, _FORGET_EDGES))
         experience.going = False
     elif came < DISAPPOINTING * expected:
@@ -179,13 +184,22 @@ def worth_bits(proposer, situation, at, bits):
     experience = situation.experience
     if proposer.recipe.dregs > 0.0:
         bits = max(bits - proposer.recipe.dregs * experience.most_bits, _DREGS_SHARE * bits)
-    bits *= trust_in(experience, proposer.all_around, at)
+    return bits * trust_and_clearance(proposer, situation, at)
+
+
+@lean_kernel
+def trust_and_clearance(proposer, situation, at):
+    """Share of the expected bits that viewpoints like this one brought; 0 where a teammate is in the way.
+
+    Whether a place is worth driving to at all is asked of this share, not of `worth_bits`: dregs are bits.
+    """
+    experience = situation.experience
     if experience.blocked > 0:
         for mate in situation.mates:
             clear = _CLEAR * (mate.body_radius + proposer.drive.body_radius)
             if mate.body_radius > 0.0 and _comes_near(situation.here, at, mate.place, clear):
                 return 0.0
-    return bits
+    return trust_in(experience, proposer.all_around, at)
 
 
 @lean_kernel

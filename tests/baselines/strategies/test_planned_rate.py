@@ -10,12 +10,21 @@ import pytest
 from baselines.experiments.mission import run_mission, scripted
 from baselines.strategies import planned_rate
 from baselines.strategies.information_rate_v0 import InformationRate
-from baselines.strategies.planned_rate import PlannedRate, _comes_near, _experience, _Memory, _Weigher
+from baselines.strategies.planned_rate import (
+    PlannedRate,
+    _comes_near,
+    _experience,
+    _Memory,
+    _Remembered,
+    _Weigher,
+)
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.reports.metrics import mission_figures
 from entropy_explore_env.robots.motion import MoveEnd
 from entropy_explore_env.scenario import with_settings
 from entropy_explore_env.scenarios import BOX, OFFICE, ROOM, find_scenario
+from entropy_explore_env.viewpoints.candidates import Candidates
+from entropy_explore_env.viewpoints.recipe import NARROW_PLANNED
 
 
 def figures_of(strategy, scenario=ROOM, seed=0, **settings):
@@ -129,3 +138,52 @@ def test_what_any_scan_brings_is_worth_next_to_nothing(view):
     np.testing.assert_allclose(weigh(viewpoints, np.array([5.0, 20.0, 510.0])), [0.05, 10.0, 500.0])
     untouched = _Weigher(_Memory(most_bits=1000.0), view)(viewpoints, np.array([5.0, 20.0, 510.0]))
     np.testing.assert_array_equal(untouched, [5.0, 20.0, 510.0])
+
+
+def far_stop(view, monkeypatch, most_bits, avoided=()):
+    """The first stop towards the best far place of a robot that remembers the most bits ever expected."""
+    strategy, stop = PlannedRate(), view.scenario.grid.in_grid_units(view.pose) + np.array([3.0, 0, 0, 0, 0])
+    strategy.reset(view.scenario, np.random.default_rng(0))
+    far = Candidates(stop[None] + 9.0, np.array([500.0]), np.array([5.0]), view.kind)
+    monkeypatch.setattr(strategy._planner, "far", lambda *_: far)
+    monkeypatch.setattr(strategy._planner, "towards", lambda *_: stop)
+    memory = _Memory(most_bits=most_bits, avoided=[_Remembered(stop, share, 6.0) for share in avoided])
+    weigher = _Weigher(memory, view, NARROW_PLANNED.dregs)
+    here, belief = view.scenario.grid.in_grid_units(view.pose), planned_rate.belief_of(view)
+    no_cones = planned_rate.announced_cones(view)
+    situation = planned_rate.Situation(0, here, belief, no_cones, None, weigher, weigher.trust)
+    travel = strategy._planner.start_search(situation)
+    return strategy._far_stop(situation, travel, memory, 0.0, NARROW_PLANNED), stop
+
+
+@pytest.mark.parametrize("most_bits", [0.0, 1e4])
+def test_a_far_stop_is_taken_however_many_bits_were_ever_expected(view, monkeypatch, most_bits):
+    """Of 1e4 bits, 25 are dregs: more than the one bit of which trust in a stop was asked."""
+    taken, stop = far_stop(view, monkeypatch, most_bits)
+    np.testing.assert_array_equal(taken, stop)
+    assert far_stop(view, monkeypatch, most_bits, avoided=[0.2])[0] is not None
+    assert far_stop(view, monkeypatch, most_bits, avoided=[0.2, 0.4])[0] is None
+
+
+def test_trust_is_what_is_left_of_bits_without_dregs(view):
+    here = view.scenario.grid.in_grid_units(view.pose)
+    memory = _Memory(most_bits=1e4, avoided=[_Remembered(here, 0.25, 6.0)])
+    viewpoints = np.stack([here, here + np.array([2.0, 0.0, 0.0, 0.0, 0.0])])
+    weigher = _Weigher(memory, view, NARROW_PLANNED.dregs)
+    np.testing.assert_array_equal(weigher.trust(viewpoints), [0.25, 1.0])
+    np.testing.assert_allclose(weigher(viewpoints, np.array([125.0, 125.0])), [25.0, 100.0])
+
+
+@pytest.mark.parametrize("end", list(MoveEnd))
+@pytest.mark.parametrize("drifts", [False, True])
+def test_a_drive_with_drift_was_cut_short_if_something_ended_it(view, end, drifts):
+    """Without drift it was wherever the robot stands elsewhere than it meant to."""
+    here = view.scenario.grid.in_grid_units(view.pose)
+    covariance = np.diag([1e-4, 1e-4, 0.0, 1e-6]) if drifts else np.zeros((4, 4))
+    after = dataclasses.replace(view, move_end=end, covariance=covariance)
+    goal = here + np.array([9.0, 0.0, 0.0, 0.0, 0.0])
+    memory = _Memory(chosen=here + np.array([0.3, 0.0, 0.0, 0.0, 0.0]), goal=goal)
+    _experience(memory, after, here)
+    arrived = drifts and end in (MoveEnd.ARRIVED, MoveEnd.CORNERS)
+    assert (memory.goal is goal) == arrived
+    assert [each.share for each in memory.avoided] == ([] if arrived else [0.0])

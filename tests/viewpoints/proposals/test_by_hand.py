@@ -11,16 +11,18 @@ from entropy_explore_env.belief.paths.lattice import belief_costs, new_lattice
 from entropy_explore_env.belief.paths.planning import shortest_path
 from entropy_explore_env.belief.paths.search import new_search
 from entropy_explore_env.belief.visibility import CONE
+from entropy_explore_env.localization_settings import Localization
 from entropy_explore_env.robots.motion import MoveEnd
 from entropy_explore_env.scenario import with_settings
 from entropy_explore_env.scenarios import BOX
-from entropy_explore_env.settings import RangeSensor
+from entropy_explore_env.settings import Grid, RangeSensor
 from entropy_explore_env.viewpoints.candidate_features import COLUMNS
 from entropy_explore_env.viewpoints.evaluation import is_line_free, new_scratch, robot_model
 from entropy_explore_env.viewpoints.proposals.model import MATE, new_proposers
 from entropy_explore_env.viewpoints.proposals.records import CANDIDATE, EXPERIENCE, Kind
 from entropy_explore_env.viewpoints.proposals.situation import LastDecision, Situation, learn, trust_in
 from entropy_explore_env.viewpoints.proposals.views import clear_marks, look_from, mark_view
+from entropy_explore_env.viewpoints.recipe import NARROW_PLANNED, recipe_for
 from tests.reference.scenes import drawn, free_box, put, random_belief, seeds, started
 
 SIZE, MOST = (7, 11, 5), 6
@@ -68,10 +70,10 @@ def test_one_ray_through_seven_unknown_voxels():
     assert not proposer.scratch.marks.any() and not proposer.scratch.scan.added.any()
 
 
-def decision(target, came_bits, move_end=MoveEnd.ARRIVED, under_way=False):
+def decision(target, came_bits, move_end=MoveEnd.ARRIVED, under_way=False, uncertain=False):
     target = np.asarray(target, float)
     in_metres = np.concatenate([0.5 * target[:3], target[3:]])
-    return LastDecision(target, in_metres, 0.5, came_bits, move_end.code, under_way)
+    return LastDecision(target, in_metres, 0.5, came_bits, move_end.code, under_way, uncertain)
 
 
 @pytest.fixture
@@ -119,6 +121,81 @@ def test_who_drives_on_judges_nothing_and_keeps_its_goal(proposed):
     candidates, experience = proposed
     learn(experience, candidates, decision(BACK, 0.0, under_way=True), ALONG_X)
     assert experience["going"] and experience["failures"] == 0
+
+
+def test_who_is_under_way_beyond_reach_keeps_its_goal_until_it_stops(proposed):
+    """Its target was pulled within reach when it was proposed again, so that it is like no candidate."""
+    candidates, experience = proposed
+    learn(experience, candidates, decision(BACK, 60.0), BACK)
+    goal = experience["goal"].tolist()
+    beyond = BACK + np.array([0, 4.0, 0, 0, 0])
+    learn(experience, candidates, decision(beyond, 0.0, under_way=True), ALONG_X)
+    assert experience["going"] and experience["goal"].tolist() == goal
+    learn(experience, candidates, decision(ALONG_X, 0.0, under_way=True), ALONG_X)
+    assert not experience["going"]  # it chose a gaze nearby instead
+    learn(experience, candidates, decision(BACK, 60.0), BACK)
+    learn(experience, candidates, decision(beyond, 60.0), beyond)
+    assert not experience["going"]
+
+
+@pytest.mark.parametrize("end", [MoveEnd.ARRIVED, MoveEnd.CORNERS])
+def test_who_drifts_is_where_it_meant_to_be_if_nothing_cut_its_drive_short(proposed, end):
+    candidates, experience = proposed
+    off = BACK + np.array([-0.3, 0.2, 0, 0.01, 0])
+    learn(experience, candidates, decision(BACK, 60.0, end, uncertain=True), off)
+    assert experience["going"] and experience["failures"] == 0
+    learn(experience, candidates, decision(BACK, 4.0, end, uncertain=True), off)
+    assert trust_in(experience, False, BACK) == pytest.approx(4.0 / 50.0)
+    learn(experience, candidates, decision(BACK, 60.0, MoveEnd.OBSTACLE, uncertain=True), off)
+    assert not experience["going"] and trust_in(experience, False, BACK) == 0.0
+
+
+def test_who_does_not_drift_is_judged_by_where_it_stands(proposed):
+    candidates, experience = proposed
+    learn(experience, candidates, decision(BACK, 60.0, MoveEnd.CORNERS), BACK - np.array([0.3, 0, 0, 0, 0]))
+    assert not experience["going"] and trust_in(experience, False, BACK) == 0.0
+
+
+def far_kinds(most_bits):
+    """Kinds of the candidates of a robot in a box of which it knows all but the far end."""
+    robot = {"navigator": "planned", "reach_m": 1.0}
+    sensor = RangeSensor((math.pi / 6, math.pi / 12), math.pi / 36, max_range_m=4.0)
+    box = free_box(grid=Grid((31, 11, 5), 0.5), robots=1, robot=robot, sensor=sensor, action=ACTION)
+    missions = started(box, seed=3)
+    assert recipe_for(missions.scenario.kinds[0]) is NARROW_PLANNED
+    put(missions, 0, [1.25, 2.75, 1.25, 0.0, 0.0])
+    mean = missions.state.mean[0, 0].reshape(31, 11, 5)
+    precision = missions.state.precision[0, 0].reshape(31, 11, 5)
+    mean[:26], precision[:26] = 0.0, 1e6
+    missions.state.experience[0, 0]["most_bits"] = most_bits
+    missions.step(np.zeros((1, 1, 1)), np.zeros((1, 1), int))
+    return missions.state.candidates[0, 0]["kind"].tolist()
+
+
+@pytest.mark.parametrize("most_bits", [0.0, 1e4])
+def test_far_places_are_proposed_however_many_bits_were_ever_expected(most_bits):
+    """Of 1e4 bits, 25 are dregs: more than the one bit of which trust in a stop was asked."""
+    assert Kind.FAR in far_kinds(most_bits)
+
+
+def test_nothing_is_remembered_of_free_drives_with_drift():
+    drift = {"localization": Localization(xy_m_per_sqrt_m=0.05, z_m_per_sqrt_m=0.05)}
+    robot = {"reach_m": 1.0, **drift}
+    missions = started(free_box(robots=1, robot=robot, world="empty", action=ACTION), seed=1)
+    own, experience = missions.state.robots[0, 0], missions.state.experience[0, 0]
+    assert missions.estimates is not None
+    off_edges, drives = 0.0, 0
+    rng = np.random.default_rng(0)
+    for _ in range(12):
+        target, free = own["target"].copy(), own["move_end"] == MoveEnd.ARRIVED.code
+        missed = np.linalg.norm(missions.estimates[0, 0]["place"] - target[:3]) / 0.5
+        if free and own["scans"] > 0:
+            failed = experience["failed"][: experience["failures"]]
+            unreached = failed[experience["share"][: experience["failures"]] == 0.0]
+            assert not any(np.allclose(each[:3] * 0.5, target[:3]) for each in unreached)
+            off_edges, drives = max(off_edges, missed), drives + 1
+        missions.step(np.zeros((1, 1, 5)), rng.integers(0, MOST, (1, 1)))
+    assert drives >= 6 and off_edges > 0.01
 
 
 def test_more_failures_than_are_remembered_push_out_the_oldest(proposed):
