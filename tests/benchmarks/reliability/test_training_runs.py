@@ -39,7 +39,7 @@ def test_a_run_that_ends_before_it_is_killed_is_told(tmp_path):
 @pytest.mark.parametrize("cell", ["nan", "inf"])
 def test_a_figure_that_is_not_finite_is_found(tmp_path, cell):
     curve = tmp_path / "curve.csv"
-    curve.write_text("steps,mean_s,bits_per_bit\n100,7.5,\n200,7.0,0.5\n")
+    curve.write_text("steps,mean_s,bits_per_bit,planner_ratio\n100,7.5,,\n200,7.0,0.5,1.1\n")
     assert check_curve(curve, "steps") == 200
     curve.write_text(f"steps,mean_s,bits_per_bit\n100,7.5,\n200,{cell},0.5\n")
     with pytest.raises(BrokenPromiseError, match=f"mean_s is {cell} after 200 steps"):
