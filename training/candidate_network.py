@@ -31,6 +31,7 @@ from torch.nn import functional
 
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.missions.observation.layout import ObservationLayout, Part
+from entropy_explore_env.validation import is_whole
 from entropy_explore_env.viewpoints.candidate_features import COLUMNS
 
 WIDTH = 64
@@ -46,6 +47,12 @@ _LEAST_SCORE = 1e-3
 """Smaller scores count as this one."""
 _NEVER = -1e8
 """Logit of a candidate that does not exist: its probability is exactly 0 in float32."""
+
+
+def check_width(width: int) -> None:
+    """Raise a SettingError unless networks may be so wide."""
+    if not is_whole(width, HEADS, 1024) or width % HEADS:
+        raise SettingError("width", width, f"a multiple of {HEADS}, at most 1024")
 
 
 class CandidateParts(NamedTuple):

@@ -24,9 +24,9 @@ from baselines.cli.task_options import (
 from entropy_explore_env.command import home_path
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.scenario import with_settings
-from entropy_explore_env.validation import check_whole, is_whole
+from entropy_explore_env.validation import check_whole
 from training.advantages import DiscountUnit
-from training.candidate_network import HEADS, WIDTH
+from training.candidate_network import WIDTH, check_width
 from training.options import check_options, check_share
 from training.training_task import TrainingTask
 
@@ -168,8 +168,8 @@ def _check_candidates(args: Args) -> None:
     for name in ignored:
         if getattr(args, name) != getattr(defaults, name):
             raise SettingError(name, getattr(args, name), f"left out {word} --actions candidates")
-    if args.over_candidates and (not is_whole(args.width, HEADS, 1024) or args.width % HEADS):
-        raise SettingError("width", args.width, f"a multiple of {HEADS}, at most 1024")
+    if args.over_candidates:
+        check_width(args.width)
 
 
 def _check_costs(args: Args) -> None:

@@ -34,33 +34,28 @@ from entropy_explore_env.scenario import Scenario
 from entropy_explore_env.settings import RobotKind
 from entropy_explore_env.viewpoints.candidates import CandidatePlanner, Situation
 from entropy_explore_env.viewpoints.evaluation import sees_all_around
+from entropy_explore_env.viewpoints.planner_rules import (
+    ALIKE_EDGES,
+    ALIKE_RAD,
+    BLOCKED_DECISIONS,
+    CLEAR,
+    DISAPPOINTING,
+    DREGS_SHARE,
+    ELSEWHERE,
+    FAR_EVERY,
+    FORGET_EDGES,
+    MISSED_EDGES,
+    NOTHING_BITS,
+    PATIENCE,
+    POOR,
+    REMEMBERED,
+    TRIED_STOPS,
+)
 from entropy_explore_env.viewpoints.recipe import Recipe
 from entropy_explore_env.viewpoints.travel import Travel
 
-_MISSED = 0.01
-"""A drive that ended farther than this from where it should, in voxel edges, was cut short."""
 _ARRIVALS = (MoveEnd.ARRIVED, MoveEnd.CORNERS)
 """How drives end that nothing cut short. A robot that drifts may believe to stand elsewhere all the same."""
-_DISAPPOINTING = 0.1
-"""Viewpoints are remembered that brought less than this share of what was expected."""
-_ALIKE_EDGES, _ALIKE_RAD = 1.0, 0.1
-"""Viewpoints that differ by less are the same to a robot that remembers one."""
-_FORGET_EDGES, _REMEMBERED = 6.0, 16
-"""How far away from where it was a robot forgets what it could not do, and how much it remembers at most."""
-_FAR_EVERY, _PATIENCE = 8, 4
-"""Decisions on one spot until far places are looked at again, and where straight drives found none."""
-_TRIED_STOPS = 6
-"""Far places of which the first stop is looked at."""
-_BLOCKED_DECISIONS = 4
-"""Decisions during which a robot keeps clear of a teammate that was in its way."""
-_CLEAR = 1.1
-"""How far it keeps clear, in sums of the two radii."""
-_POOR, _NOTHING_BITS = 0.02, 1e-6
-"""A robot that is shut in leaves where a scan brings less than this share of the most bits ever expected."""
-_DREGS_SHARE = 0.01
-"""What bits are worth at least, next to others above the dregs: so that there is a best where all are."""
-_ELSEWHERE = 16
-"""Places that are drawn where nothing is left nearby."""
 
 
 class _Remembered(NamedTuple):
@@ -146,10 +141,10 @@ class PlannedRate:
         )
         chosen, expected = self._best(situation, memory, view)
         stays = bool((chosen[:3] == here[:3]).all())
-        exits = self._exits(view, situation, memory) if stays and expected < _POOR * memory.most_bits else []
+        exits = self._exits(view, situation, memory) if stays and expected < POOR * memory.most_bits else []
         if len(exits) > 0:
             chosen, expected = exits[0], 0.0
-        elif expected <= _NOTHING_BITS or (memory.blocked and self._rng.uniform() < 0.5):
+        elif expected <= NOTHING_BITS or (memory.blocked and self._rng.uniform() < 0.5):
             chosen, expected = self._elsewhere(view, situation), 0.0
         memory.chosen, memory.expected = chosen.copy(), expected
         viewpoint = chosen.copy()
@@ -190,15 +185,15 @@ class PlannedRate:
         far = self._planner.far(situation, travel, memory.most_bits, memory.goal, self._rng)
         values = far.values(recipe.exponent)
         memory.far_value, memory.far_at = float(values.max(initial=0.0)), situation.here[:3].copy()
-        memory.patience = _FAR_EVERY if recipe.far_below >= 1.0 else _PATIENCE
+        memory.patience = FAR_EVERY if recipe.far_below >= 1.0 else PATIENCE
         if memory.goal is not None and len(values) > 0:
             values[-1] *= recipe.keep
         memory.goal = None
-        for best in np.argsort(-values)[:_TRIED_STOPS].tolist():
+        for best in np.argsort(-values)[:TRIED_STOPS].tolist():
             if values[best] <= value:
                 break
             stop = self._planner.towards(situation, travel, far.viewpoints[best], self._rng)
-            if stop is not None and situation.trust(stop[None])[0] >= _DISAPPOINTING:
+            if stop is not None and situation.trust(stop[None])[0] >= DISAPPOINTING:
                 memory.goal = far.viewpoints[best].copy()
                 memory.most_bits = max(memory.most_bits, float(far.bits[best]))
                 return stop
@@ -223,7 +218,7 @@ class PlannedRate:
     def _elsewhere(self, view: RobotView, situation: Situation) -> np.ndarray:
         """(5,) a random viewpoint in grid units: of some, one that a path leads to, past all teammates."""
         grid = view.scenario.grid
-        drawn = np.stack([grid.in_grid_units(random_viewpoint(view, self._rng)) for _ in range(_ELSEWHERE)])
+        drawn = np.stack([grid.in_grid_units(random_viewpoint(view, self._rng)) for _ in range(ELSEWHERE)])
         trust = situation.trust(drawn)
         if view.kind.robot.navigator == "planned":
             travel = self._planner.start_search(situation)
@@ -248,12 +243,12 @@ class _Weigher:
                 radius_m = view.scenario.kind_of(mate).robot.body_radius_m
                 if heard.heard_s >= 0.0 and radius_m > 0.0:
                     touching = (radius_m + view.kind.robot.body_radius_m) / grid.voxel_size_m
-                    self._bodies.append((grid.in_grid_units(heard.pose)[:3], _CLEAR * touching))
+                    self._bodies.append((grid.in_grid_units(heard.pose)[:3], CLEAR * touching))
 
     def __call__(self, viewpoints: np.ndarray, bits: np.ndarray) -> np.ndarray:
         """(K,) the bits of viewpoints (K, 5) in grid units, or less."""
         if self._dregs > 0.0:
-            bits = np.maximum(bits - self._dregs, _DREGS_SHARE * bits)
+            bits = np.maximum(bits - self._dregs, DREGS_SHARE * bits)
         return self._lessened(viewpoints, bits)
 
     def trust(self, viewpoints: np.ndarray) -> np.ndarray:
@@ -266,10 +261,10 @@ class _Weigher:
     def _lessened(self, viewpoints: np.ndarray, bits: np.ndarray) -> np.ndarray:
         """(K,) bits, less where viewpoints like these brought less, and 0 past a teammate's body."""
         for viewpoint, share, _ in self._avoided:
-            alike = np.linalg.norm(viewpoints[:, :3] - viewpoint[:3], axis=1) < _ALIKE_EDGES
+            alike = np.linalg.norm(viewpoints[:, :3] - viewpoint[:3], axis=1) < ALIKE_EDGES
             if share > 0.0 and not self._all_around:
                 turn = np.abs((viewpoints[:, 3] - viewpoint[3] + math.pi) % (2.0 * math.pi) - math.pi)
-                alike &= np.maximum(turn, np.abs(viewpoints[:, 4] - viewpoint[4])) < _ALIKE_RAD
+                alike &= np.maximum(turn, np.abs(viewpoints[:, 4] - viewpoint[4])) < ALIKE_RAD
             bits = np.where(alike, bits * share, bits)
         for body, touching in self._bodies:
             bits = np.where(_comes_near(self._here, viewpoints[:, :3], body, touching), 0.0, bits)
@@ -292,17 +287,17 @@ def _experience(memory: _Memory, view: RobotView, here: np.ndarray) -> None:
     """Compare what came with what was expected, and remember what is not worth another try."""
     memory.avoided = [
         each for each in memory.avoided if np.linalg.norm(each.viewpoint[:3] - here[:3]) < each.forget_at
-    ][-_REMEMBERED:]
+    ][-REMEMBERED:]
     memory.blocked = max(memory.blocked - 1, 0)
     if memory.chosen is None:
         return
     missed = float(np.linalg.norm(memory.chosen[:3] - here[:3]))
     came = max(float(view.scan.utility_bits.sum()), 0.0)
     if view.move_end is MoveEnd.TEAMMATE:
-        memory.blocked = _BLOCKED_DECISIONS
+        memory.blocked = BLOCKED_DECISIONS
     drifted = view.move_end in _ARRIVALS and bool(view.covariance.any())
-    if missed > _MISSED and not drifted:
-        memory.avoided.append(_Remembered(memory.chosen, 0.0, max(2.0 * missed, _FORGET_EDGES)))
+    if missed > MISSED_EDGES and not drifted:
+        memory.avoided.append(_Remembered(memory.chosen, 0.0, max(2.0 * missed, FORGET_EDGES)))
         memory.goal = None
-    elif came < _DISAPPOINTING * memory.expected:
-        memory.avoided.append(_Remembered(memory.chosen, came / memory.expected, _FORGET_EDGES))
+    elif came < DISAPPOINTING * memory.expected:
+        memory.avoided.append(_Remembered(memory.chosen, came / memory.expected, FORGET_EDGES))

@@ -14,6 +14,7 @@ from entropy_explore_env.belief.fields import Belief
 from entropy_explore_env.belief.paths.lattice import Costs
 from entropy_explore_env.compilation.kernels import lean_kernel
 from entropy_explore_env.missions.localization import believed_pose, estimate_in, is_uncertain
+from entropy_explore_env.missions.observation.own_state import entropy_left
 from entropy_explore_env.missions.poses import copy_numbers, grid_size, pose_at, to_grid_units, within_grid
 from entropy_explore_env.missions.silence import silent_since
 from entropy_explore_env.missions.state import MissionEnd
@@ -114,15 +115,6 @@ def _hear(params, robot, knowledge, scratch):
 
 
 @lean_kernel
-def _entropy_left(params, entropy_bits):
-    """Share of a map's entropy that is left: 1 at the start, 0 with all voxels known."""
-    voxels = params.size[0] * params.size[1] * params.size[2]
-    least = 0.5 * voxels * math.log2(2.0 * math.pi * math.e / params.end_precision)
-    span = 0.5 * voxels * math.log2(params.end_precision / params.prior_precision)
-    return min(max((entropy_bits - least) / span, 0.0), 1.0)
-
-
-@lean_kernel
 def propose_to(params, robot, knowledge, proposer, candidates, experience, parts):
     """Propose candidates to one robot.
 
@@ -168,7 +160,7 @@ def propose_to(params, robot, knowledge, proposer, candidates, experience, parts
     if described:
         bits = knowledge.gained_bits + knowledge.heard_bits
         facts = Facts(
-            _entropy_left(own, knowledge.entropy_bits),
+            entropy_left(own, knowledge.entropy_bits),
             knowledge.heard_bits / bits if bits > 0.0 else 0.0,
             knowledge.time_s,
             knowledge.under_way,

@@ -17,9 +17,9 @@ from entropy_explore_env.belief.voxel_index import flat_index
 from entropy_explore_env.compilation.kernels import lean_kernel
 from entropy_explore_env.robots.motion import driving_time, turning_time
 
-_STRAIGHTENED = 0.96
+STRAIGHTENED = 0.96
 """Length of a path after string pulling, as a share of the sum of its steps."""
-_WITHIN = 1.0 - 1e-6
+WITHIN = 1.0 - 1e-6
 """Of the reach: actions are float32."""
 
 
@@ -57,7 +57,7 @@ def travel_seconds(search, size, drive, voxel_size_m, here, viewpoints, reach, s
         straight = math.sqrt((at[0] - here[0]) ** 2 + (at[1] - here[1]) ** 2 + (at[2] - here[2]) ** 2)
         length = 0.0
         if straight > 1e-9:
-            length = max(straight, _STRAIGHTENED * cost_to(search, voxel))
+            length = max(straight, STRAIGHTENED * cost_to(search, voxel))
         if math.isinf(length):
             seconds[k] = math.inf
             continue
@@ -87,16 +87,16 @@ def first_stop(travel: Travel, goal: np.ndarray, reach: float, planned: bool) ->
     count = extract_path(travel.search, travel.lattice, voxel, np.empty(0, np.int32))
     if count == 0:
         return None
-    if planned and np.linalg.norm(goal - start) <= reach * _WITHIN:
+    if planned and np.linalg.norm(goal - start) <= reach * WITHIN:
         return goal.copy()
     path = np.empty(count, np.int32)
     extract_path(travel.search, travel.lattice, voxel, path)
     if not planned:
         points = string_pulled(travel.search, travel.lattice, travel.costs, path, start.copy(), goal.copy())
         step = points[0] - start
-        return start + step * min(1.0, reach * _WITHIN / max(float(np.linalg.norm(step)), 1e-9))
+        return start + step * min(1.0, reach * WITHIN / max(float(np.linalg.norm(step)), 1e-9))
     places = np.stack(np.unravel_index(path, size), axis=-1) + 0.5
     if travel.lattice.layer >= 0:
         places[:, 2] = start[2]
-    outside = np.flatnonzero(np.linalg.norm(places - start, axis=1) > reach * _WITHIN)
+    outside = np.flatnonzero(np.linalg.norm(places - start, axis=1) > reach * WITHIN)
     return places[max(int(outside[0]) - 1, 0)] if len(outside) else places[-1]

@@ -19,14 +19,9 @@ from entropy_explore_env.missions.snapshot import restore, snapshot
 from entropy_explore_env.missions.state import FAULT, MissionEnd
 from entropy_explore_env.randomness import Stream
 from entropy_explore_env.reports.metrics import mission_figures
-from entropy_explore_env.reports.mission_record import (
-    CommandRecorder,
-    load_record,
-    same_end,
-    save_record,
-)
 from entropy_explore_env.reports.state_values import state_digest
 from entropy_explore_env.robots.motion import MoveEnd
+from tests.missions.replays import check_replay
 from tests.missions.test_tick import toward
 from tests.reference.scenes import build, free_box, put, random_actions, started, wander
 
@@ -297,23 +292,10 @@ def test_a_robot_that_stands_still_for_ever_is_in_a_saved_state_only_where_robot
 
 
 def test_a_record_runs_again_bit_for_bit(tmp_path):
-    env = EntropyExploreEnv(faulty(max_cycles=60))
+    env, rng = EntropyExploreEnv(faulty(max_cycles=60)), np.random.default_rng(3)
     env.reset(seed=4)
-    recorder, rng = CommandRecorder(env.missions), np.random.default_rng(3)
-    while env.agents:
-        actions = {agent: rng.uniform(-1, 1, 5).astype(np.float32) for agent in env.agents}
-        recorder.command(actions)
-        env.step(actions)
-        recorder.note()
-    save_record(recorder.record("drawn"), tmp_path / "mission.npz")
-    record = load_record(tmp_path / "mission.npz")
+    record = check_replay(env, lambda: rng.uniform(-1, 1, 5).astype(np.float32), None, tmp_path / "m.npz")
     assert record.scenario.faults == faulty().faults
-    assert same_end(record, env.missions)
-    again = EntropyExploreEnv(record.scenario)
-    again.reset(seed=record.seed)
-    for command in record.commands:
-        again.step(dict(zip(record.scenario.agents, command, strict=True)))
-    assert same_end(record, again.missions)
 
 
 def test_infos_say_who_fails_now():

@@ -7,25 +7,19 @@ import pickle
 import numpy as np
 import pytest
 
-from entropy_explore_env import parallel_env
 from entropy_explore_env.decision_settings import Action, Observation
+from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.errors import ActionError, RecordError
 from entropy_explore_env.missions.snapshot import restore, snapshot
 from entropy_explore_env.missions.view import view_of
 from entropy_explore_env.missions.view_candidates import ViewProposer
 from entropy_explore_env.missions.view_observation import ViewObserver
 from entropy_explore_env.randomness import Stream, splitmix_states
-from entropy_explore_env.reports.mission_record import (
-    CommandRecorder,
-    load_record,
-    reset_options_of,
-    same_end,
-    save_record,
-)
 from entropy_explore_env.reports.state_values import state_digest
 from entropy_explore_env.scenario import with_settings
 from entropy_explore_env.viewpoints.candidate_features import CONTEXT, FEATURES
 from entropy_explore_env.viewpoints.proposals.records import Kind
+from tests.missions.replays import check_replay
 from tests.reference.scenes import free_box, random_actions, started, wander
 
 MOST = 9
@@ -79,21 +73,9 @@ def test_candidates_are_part_of_the_digest_where_they_are_actions():
 
 
 def test_a_record_is_replayed_bitwise(tmp_path):
-    env = parallel_env(free_box(action=ACTION, observation=SEEN))
+    env, rng = EntropyExploreEnv(free_box(action=ACTION, observation=SEEN)), np.random.default_rng(0)
     env.reset(seed=3)
-    recorder, rng = CommandRecorder(env.missions), np.random.default_rng(0)
-    for _ in range(15):
-        actions = {agent: np.int64(rng.integers(MOST)) for agent in env.agents}
-        recorder.command(actions)
-        env.step(actions)
-        recorder.note()
-    save_record(recorder.record("chance"), tmp_path / "mission.npz")
-    record = load_record(tmp_path / "mission.npz")
-    again = parallel_env(record.scenario)
-    again.reset(seed=record.seed, options=reset_options_of(record))
-    for commands in record.commands:
-        again.step(dict(zip(again.agents, commands, strict=True)))
-    assert same_end(record, again.missions)
+    check_replay(env, lambda: np.int64(rng.integers(MOST)), 15, tmp_path / "mission.npz")
 
 
 SPOILED = [

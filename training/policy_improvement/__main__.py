@@ -33,7 +33,7 @@ from entropy_explore_env.scenario import Scenario
 from entropy_explore_env.validation import check_whole, is_whole
 from entropy_explore_env.writing import write_atomically
 from training import extra, ppo  # noqa: F401 - extra: before what is not there without it
-from training.candidate_network import HEADS, WIDTH, CandidatePolicy
+from training.candidate_network import WIDTH, CandidatePolicy, check_width
 from training.checkpoints import (
     Checkpoint,
     PolicySettings,
@@ -176,8 +176,7 @@ def check(args: Args) -> None:
             "branches", args.branches, f"a whole number from 2 to {args.candidates}, the candidates"
         )
     check_whole("draws", args.draws, 1)
-    if not is_whole(args.width, HEADS, 1024) or args.width % HEADS:
-        raise SettingError("width", args.width, f"a multiple of {HEADS}, at most 1024")
+    check_width(args.width)
     if not 0.0 < args.learning_rate < float("inf"):
         raise SettingError("learning_rate", args.learning_rate, "a number above 0")
     if not args.tasks:

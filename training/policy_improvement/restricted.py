@@ -18,12 +18,11 @@ from entropy_explore_env.missions.view_observation import ViewObserver
 from entropy_explore_env.scenario import Scenario
 from entropy_explore_env.viewpoints.candidates import CandidatePlanner, Situation
 from entropy_explore_env.viewpoints.evaluation import new_scratch, robot_model, straight_seconds
+from entropy_explore_env.viewpoints.planner_rules import DISAPPOINTING
 
 ACTIONS = Action(kind="discrete", moves="axes", yaws=16, pitches=7)
 """Those of `training.ppo`: 7 moves × 16 yaws × 7 pitches; of planar robots 5 × 16."""
 _MASK = Observation(panorama=False, self_state=False, team=False, action_mask=True, flat=True)
-_DISAPPOINTING = 0.1
-"""An action that brought less than this share of what was expected is not tried at the same place again."""
 
 
 class RestrictedPlanner:
@@ -67,7 +66,7 @@ class RestrictedPlanner:
     def _remember(self, view: RobotView) -> None:
         """Note what brought nothing."""
         latest = self._latest.get(view.robot)
-        if latest is not None and float(view.scan.utility_bits.sum()) < _DISAPPOINTING * latest[1]:
+        if latest is not None and float(view.scan.utility_bits.sum()) < DISAPPOINTING * latest[1]:
             self._tried.setdefault(view.robot, set()).add(latest[0])
 
     def _seconds(self, view: RobotView, situation: Situation, places: np.ndarray) -> np.ndarray:

@@ -30,10 +30,16 @@ def observe_self(begin, params, kinds, known, row):
     out[3], out[4] = math.cos(known.pose[3]), math.sin(known.pose[3])
     out[5], out[6] = math.cos(known.pose[4]), math.sin(known.pose[4])
     out[7] = min(known.time_s / params.time_limit_s, 1.0)
-    voxels = params.size[0] * params.size[1] * params.size[2]
-    least = 0.5 * voxels * math.log2(2.0 * math.pi * math.e / params.end_precision)
-    span = 0.5 * voxels * math.log2(params.end_precision / params.prior_precision)
-    out[8] = min(max((known.entropy_bits - least) / span, 0.0), 1.0)
+    out[8] = entropy_left(params, known.entropy_bits)
     out[9] = 1.0 if known.deciding else 0.0
     for kind in range(kinds):
         out[SELF_VALUES + kind] = 1.0 if kind == params.kind else 0.0
+
+
+@lean_kernel
+def entropy_left(params, entropy_bits):
+    """Share of a map's entropy that is left: 1 at the start, 0 with all voxels known."""
+    voxels = params.size[0] * params.size[1] * params.size[2]
+    least = 0.5 * voxels * math.log2(2.0 * math.pi * math.e / params.end_precision)
+    span = 0.5 * voxels * math.log2(params.end_precision / params.prior_precision)
+    return min(max((entropy_bits - least) / span, 0.0), 1.0)

@@ -15,7 +15,7 @@ from entropy_explore_env.viewpoints.far_places import fill_blocks
 from entropy_explore_env.viewpoints.imagined_scan import imagined_bits
 from entropy_explore_env.viewpoints.proposals.nearby import copy_viewpoint, value_of, voxel_at
 from entropy_explore_env.viewpoints.proposals.situation import distance_apart, worth_bits
-from entropy_explore_env.viewpoints.travel import travel_seconds
+from entropy_explore_env.viewpoints.travel import WITHIN, travel_seconds
 
 _FIRST_RADIUS = 3.0
 """Length of the paths that are searched first for far places, in reaches; then twice as much, and so on."""
@@ -23,8 +23,6 @@ _PITCH_SPREAD = 0.5
 """Standard deviation of the pitch at far places, radians."""
 _FOLD_ABOVE = 1e250
 """A product is folded into bits before it could leave a float64."""
-_WITHIN = 1.0 - 1e-6
-"""Of the reach: actions are float32."""
 
 
 @lean_kernel
@@ -168,7 +166,7 @@ def first_stop(proposer, situation, goal, stop):
     count = extract_path(search, lattice, voxel_at(size, goal), path)
     if count == 0:
         return False
-    reach = proposer.reach * _WITHIN
+    reach = proposer.reach * WITHIN
     if not proposer.planned:
         for axis in range(3):
             scratch.ends[0, axis], scratch.ends[1, axis] = here[axis], goal[axis]

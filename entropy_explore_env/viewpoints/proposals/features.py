@@ -9,17 +9,17 @@ from entropy_explore_env.belief.paths.search import cost_to
 from entropy_explore_env.compilation.kernels import lean_kernel
 from entropy_explore_env.robots.motion import driving_time
 from entropy_explore_env.viewpoints.candidate_features import COLUMNS, CONTEXT_COLUMNS, FEATURES
+from entropy_explore_env.viewpoints.planner_rules import REMEMBERED
 from entropy_explore_env.viewpoints.proposals.far import block_bits_around
 from entropy_explore_env.viewpoints.proposals.nearby import voxel_at
-from entropy_explore_env.viewpoints.proposals.records import REMEMBERED, Kind
+from entropy_explore_env.viewpoints.proposals.records import Kind
 from entropy_explore_env.viewpoints.proposals.situation import distance_apart, trust_in
+from entropy_explore_env.viewpoints.travel import STRAIGHTENED
 
 _SPOT, _NEAR, _FAR = int(Kind.SPOT), int(Kind.NEAR), int(Kind.FAR)
 _WIDTH = len(FEATURES)
 _NEXT_BEST = 0.99
 """Score of what is worth as much as the planner's choice without being it."""
-_STRAIGHTENED = 0.96
-"""Length of a path after string pulling, as a share of the sum of its steps."""
 _HALF_SECONDS, _HALF_TIME_S, _HALF_MATES, _MOST_LOG_BITS = 10.0, 300.0, 2.0, 20.0
 (
     _SCORE, _CHOSEN, _ON_SPOT, _IS_NEAR, _IS_FAR, _KEPT, _BITS, _BITS_LOG, _SECONDS, _SOONNESS, _RATE,
@@ -83,7 +83,7 @@ def _path_length(proposer, situation, goal, kind):
     if straight > 1e-9 and (proposer.planned or kind == _FAR):
         cost = cost_to(proposer.scratch.search, voxel_at(situation.belief.size, goal))
         if cost < math.inf:
-            return max(straight, _STRAIGHTENED * cost)
+            return max(straight, STRAIGHTENED * cost)
     return straight
 
 

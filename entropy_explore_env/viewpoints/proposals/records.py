@@ -5,9 +5,7 @@ from __future__ import annotations
 import enum
 
 from entropy_explore_env.compilation.kernels import record_type
-
-REMEMBERED = 16
-"""Failures that a robot remembers at most."""
+from entropy_explore_env.viewpoints.planner_rules import REMEMBERED
 
 
 class Kind(enum.IntEnum):

@@ -9,11 +9,19 @@ import numpy as np
 from entropy_explore_env.belief.paths.search import cost_to
 from entropy_explore_env.compilation.kernels import lean_kernel
 from entropy_explore_env.randomness import draw_uniform
+from entropy_explore_env.viewpoints.planner_rules import (
+    DISAPPOINTING,
+    ELSEWHERE,
+    FAR_EVERY,
+    NOTHING_BITS,
+    PATIENCE,
+    POOR,
+    TRIED_STOPS,
+)
 from entropy_explore_env.viewpoints.proposals.far import first_stop, gaze_on_the_way, propose_far
 from entropy_explore_env.viewpoints.proposals.nearby import copy_viewpoint, start_paths, value_of, voxel_at
 from entropy_explore_env.viewpoints.proposals.records import Kind
 from entropy_explore_env.viewpoints.proposals.situation import (
-    DISAPPOINTING,
     distance_apart,
     trust_and_clearance,
     turned,
@@ -21,20 +29,14 @@ from entropy_explore_env.viewpoints.proposals.situation import (
 )
 from entropy_explore_env.viewpoints.proposals.views import clear_marks, look_from, mark_view
 
-_FAR_EVERY, _PATIENCE = 8, 4
-"""Decisions on one spot until far places are looked at again, and where straight drives found none."""
 _FAR_SHARE = 4
 """One in so many candidates, at least one, may be far."""
 _NEAR_SHARE = 4
 """One in so many candidates may be a place within reach that is worth less than gazes on the spot."""
-_TRIED_STOPS = 6
-"""Far places of which the planner looks at the first stop; and gazes at stops that it does not choose."""
-_POOR, _NOTHING_BITS = 0.02, 1e-6
-"""A robot that is shut in leaves where a scan brings less than this share of the most bits ever expected."""
 _AWAY = 2
 """Who gets so many voxels beyond what its body touches is not shut in."""
-_ELSEWHERE, _DRAWS = 16, 64
-"""Places that are drawn where nothing is left nearby, and how often each until it lies within reach."""
+_DRAWS = 64
+"""How often a place elsewhere is drawn until it lies within reach."""
 _ALIKE_REACH, _ALIKE_WIDTH = 0.1, 0.25
 """Viewpoints nearer than this, in reaches and in widths of the view, are alike."""
 MOST_COMMON = 0.9
@@ -75,7 +77,7 @@ def add_far(proposer, situation, size, value, most):
     experience.far_value, experience.looked_far = best, True
     for axis in range(3):
         experience.far_at[axis] = situation.here[axis]
-    experience.patience = _FAR_EVERY if recipe.far_below >= 1.0 else _PATIENCE
+    experience.patience = FAR_EVERY if recipe.far_below >= 1.0 else PATIENCE
     far, pool, choice, first = scratch.far, scratch.pool, -1, size
     if experience.going and count > 0:
         far.values[count - 1] *= recipe.keep
@@ -88,11 +90,11 @@ def add_far(proposer, situation, size, value, most):
         if worth <= 0.0 or size - first == most:
             break
         far.values[number] = -1.0
-        choosing = choice < 0 and worth > value and tried < _TRIED_STOPS
+        choosing = choice < 0 and worth > value and tried < TRIED_STOPS
         stop, goal = pool.viewpoints[size], far.viewpoints[number]
         if _goal_taken(pool, first, size, goal) or not first_stop(proposer, situation, goal, stop):
             continue
-        gazes = recipe.way_gazes if choosing else min(recipe.way_gazes, _TRIED_STOPS)
+        gazes = recipe.way_gazes if choosing else min(recipe.way_gazes, TRIED_STOPS)
         pool.stop_bits[size] = gaze_on_the_way(proposer, situation, gazes, goal, stop)
         if trust_and_clearance(proposer, situation, stop) < DISAPPOINTING:
             continue
@@ -188,7 +190,7 @@ def _draw_elsewhere(proposer, situation, out):
     """Fill in (5,) a random viewpoint: of some, one that a path leads to, past all teammates."""
     rng, here, at = situation.experience.candidates_rng, situation.here, proposer.scratch.gazes[0]
     size, axes, best = situation.belief.size, proposer.axes, -1.0
-    for _ in range(_ELSEWHERE):
+    for _ in range(ELSEWHERE):
         copy_viewpoint(here, at)
         for _ in range(_DRAWS):
             squared = 0.0
@@ -240,7 +242,7 @@ def choose(proposer, situation, size, most_far):
     expected, odd = pool.stop_bits[best], pool.viewpoints[size]
     stays = distance_apart(pool.viewpoints[best], situation.here) == 0.0
     leaves = False
-    if proposer.planned and stays and expected < _POOR * experience.most_bits:
+    if proposer.planned and stays and expected < POOR * experience.most_bits:
         if _is_shut_in(proposer, situation):
             leaves = _find_exit(proposer, situation, odd)
         else:
@@ -249,7 +251,7 @@ def choose(proposer, situation, size, most_far):
                 experience.free_at[axis] = situation.here[axis]
     if not leaves:
         wanders = experience.blocked > 0 and draw_uniform(experience.candidates_rng) < 0.5
-        if expected > _NOTHING_BITS and not wanders:
+        if expected > NOTHING_BITS and not wanders:
             return size, best
         _draw_elsewhere(proposer, situation, odd)
     _add_odd(proposer, situation, size)

@@ -11,27 +11,24 @@ from entropy_explore_env.belief.fields import Belief
 from entropy_explore_env.belief.paths.lattice import Costs
 from entropy_explore_env.compilation.kernels import lean_kernel
 from entropy_explore_env.robots.motion import MoveEnd
-from entropy_explore_env.viewpoints.proposals.records import REMEMBERED, Kind
+from entropy_explore_env.viewpoints.planner_rules import (
+    ALIKE_EDGES,
+    ALIKE_RAD,
+    BLOCKED_DECISIONS,
+    CLEAR,
+    DISAPPOINTING,
+    DREGS_SHARE,
+    FORGET_EDGES,
+    MISSED_EDGES,
+    REMEMBERED,
+)
+from entropy_explore_env.viewpoints.proposals.records import Kind
 
 _NONE, _FAR = int(Kind.NONE), int(Kind.FAR)
 _TEAMMATE = MoveEnd.TEAMMATE.code
 _ARRIVED, _CORNERS = MoveEnd.ARRIVED.code, MoveEnd.CORNERS.code
-_MISSED = 0.01
-"""A drive that ended farther than this from where it should, in voxel edges, was cut short."""
-DISAPPOINTING = 0.1
-"""Viewpoints are remembered that brought less than this share of what was expected."""
-_ALIKE_EDGES, _ALIKE_RAD = 1.0, 0.1
-"""Viewpoints that differ by less are the same to a robot that remembers one."""
 _SAME_EDGES, _SAME_RAD = 2e-3, 2e-3
 """A viewpoint that was chosen is the candidate that differs by less: actions may be float32."""
-_FORGET_EDGES = 6.0
-"""How far away from where it was a robot forgets what brought nothing."""
-_BLOCKED_DECISIONS = 4
-"""Decisions during which a robot keeps clear of a teammate that was in its way."""
-_CLEAR = 1.1
-"""How far it keeps clear, in sums of the two radii."""
-_DREGS_SHARE = 0.01
-"""What bits are worth at least, next to others above the dregs: so that there is a best where all are."""
 
 
 class Situation(NamedTuple):
@@ -117,16 +114,16 @@ def learn(experience, candidates, decision, here):
     _forget(experience, here)
     experience.blocked = max(experience.blocked - 1, 0)
     if decision.move_end == _TEAMMATE:
-        experience.blocked = _BLOCKED_DECISIONS
+        experience.blocked = BLOCKED_DECISIONS
     missed = distance_apart(decision.target, here)
     expected = candidates[number].bits if number >= 0 else 0.0
     came = max(decision.came_bits, 0.0)
     arrived = decision.move_end == _ARRIVED or decision.move_end == _CORNERS
-    if missed > _MISSED and not (arrived and decision.uncertain):
-        _remember(experience, decision.target, 0.0, max(2.0 * missed, _FORGET_EDGES))
+    if missed > MISSED_EDGES and not (arrived and decision.uncertain):
+        _remember(experience, decision.target, 0.0, max(2.0 * missed, FORGET_EDGES))
         experience.going = False
     elif came < DISAPPOINTING * expected:
-        _remember(experience, decision.target, came / expected, _FORGET_EDGES)
+        _remember(experience, decision.target, came / expected, FORGET_EDGES)
 
 
 @lean_kernel
@@ -169,10 +166,10 @@ def trust_in(experience, all_around, at):
     trust = 1.0
     for number in range(experience.failures):
         failed, share = experience.failed[number], experience.share[number]
-        if distance_apart(failed, at) >= _ALIKE_EDGES:
+        if distance_apart(failed, at) >= ALIKE_EDGES:
             continue
         if share > 0.0 and not all_around:
-            if turned(failed[3], at[3]) >= _ALIKE_RAD or abs(failed[4] - at[4]) >= _ALIKE_RAD:
+            if turned(failed[3], at[3]) >= ALIKE_RAD or abs(failed[4] - at[4]) >= ALIKE_RAD:
                 continue
         trust *= share
     return trust
@@ -183,7 +180,7 @@ def worth_bits(proposer, situation, at, bits):
     """What expected bits at a viewpoint (5,) are worth to a robot that remembers what it has experienced."""
     experience = situation.experience
     if proposer.recipe.dregs > 0.0:
-        bits = max(bits - proposer.recipe.dregs * experience.most_bits, _DREGS_SHARE * bits)
+        bits = max(bits - proposer.recipe.dregs * experience.most_bits, DREGS_SHARE * bits)
     return bits * trust_and_clearance(proposer, situation, at)
 
 
@@ -196,7 +193,7 @@ def trust_and_clearance(proposer, situation, at):
     experience = situation.experience
     if experience.blocked > 0:
         for mate in situation.mates:
-            clear = _CLEAR * (mate.body_radius + proposer.drive.body_radius)
+            clear = CLEAR * (mate.body_radius + proposer.drive.body_radius)
             if mate.body_radius > 0.0 and _comes_near(situation.here, at, mate.place, clear):
                 return 0.0
     return trust_in(experience, proposer.all_around, at)
