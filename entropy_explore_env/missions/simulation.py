@@ -1,87 +1,34 @@
-"""Robots in worlds, many missions at once: the arrays, how they are reset, and a step's compiled calls."""
+"""Robots in worlds, many missions at once: the arrays, how they are reset, and how they step."""
 
 from __future__ import annotations
 
 import dataclasses
-import math
 import os
-from collections.abc import Callable, Iterable, Sequence
-from typing import NamedTuple
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from entropy_explore_env.belief.entropy import map_entropy_bits
-from entropy_explore_env.belief.map_update import PRIOR_MEAN
-from entropy_explore_env.belief.pooling import fresh_sums
-from entropy_explore_env.belief.raycast import Crossing
 from entropy_explore_env.compilation.announcement import end_of_step
-from entropy_explore_env.compilation.kernels import entry_point
 from entropy_explore_env.errors import ActionError, CallOrderError, SettingError
-from entropy_explore_env.missions.faults import draw_faults
-from entropy_explore_env.missions.fiducials import fiducial_places
-from entropy_explore_env.missions.localization import begin_estimates
+from entropy_explore_env.missions.compiled_step import Arrays, CompiledStep
+from entropy_explore_env.missions.episode import FixedWorlds, Start, draw_start, fill_start
 from entropy_explore_env.missions.memory import Batch, check_memory
-from entropy_explore_env.missions.navigation import Planning, plan_missions
-from entropy_explore_env.missions.observation.layout import ObservationLayout, candidate_offsets, part_offsets
-from entropy_explore_env.missions.observation.mask import mask_missions
-from entropy_explore_env.missions.observation.observe import Observed, observe_missions
-from entropy_explore_env.missions.proposals import Proposing, propose_missions
-from entropy_explore_env.missions.redecision import CHOICE
+from entropy_explore_env.missions.observation.layout import ObservationLayout
 from entropy_explore_env.missions.reset_options import DRAWN, ResetOptions
 from entropy_explore_env.missions.rules import rules_of
-from entropy_explore_env.missions.starts import checked_starts, start_poses
 from entropy_explore_env.missions.state import MissionEnd, MissionState, new_state
 from entropy_explore_env.missions.state_ranges import FROM_WORLD, check_ranges
-from entropy_explore_env.missions.threads import Threads
-from entropy_explore_env.missions.tick import step_missions
-from entropy_explore_env.missions.workspace import Workspace, new_workspace
-from entropy_explore_env.randomness import Stream, check_seed, generator, splitmix_states
-from entropy_explore_env.robots.navigator import new_navigators
+from entropy_explore_env.randomness import Stream, check_seed, generator
 from entropy_explore_env.robots.range_sensor import true_coverage
 from entropy_explore_env.scenario import Scenario
-from entropy_explore_env.settings import Grid, gaussian_entropy_bits
+from entropy_explore_env.settings import Grid
 from entropy_explore_env.validation import check_instance, check_whole, is_whole
-from entropy_explore_env.viewpoints.proposals.model import Proposer, new_proposers, thinned
-from entropy_explore_env.viewpoints.proposals.records import Kind
-from entropy_explore_env.worlds.given import checked_worlds, in_given_worlds, world_in_turn
-from entropy_explore_env.worlds.load import make_world, require_unchanged, world_of_file
-from entropy_explore_env.worlds.splits import draw_world_number
+from entropy_explore_env.worlds.given import checked_worlds, in_given_worlds
+from entropy_explore_env.worlds.load import world_of_file
 from entropy_explore_env.worlds.world import World
 
-_CHUNKS_PER_THREAD = 4
-"""Missions differ in work; smaller chunks even it out."""
 _MOST_MISSIONS = 2**31 - 1
 _ENDS = list(MissionEnd)
-
-
-class Start(NamedTuple):
-    """What a mission starts with."""
-
-    mission: int
-    seed: int
-    episode: int
-    """How many resets without a seed it is behind the seed's own."""
-    world: World
-    poses: np.ndarray
-    """(A, 5) float64."""
-    options: ResetOptions
-    """What of it was given."""
-    world_number: int | None
-    """Of the world, where a recipe made it."""
-    fiducials: np.ndarray
-    """(F, 3) float64."""
-
-
-class _Calls(NamedTuple):
-    """The compiled calls of a step, bound to the arrays of their missions."""
-
-    state: MissionState
-    planning: Planning
-    observed: Observed
-    proposing: Proposing
-    step: Callable[..., None] | None
-    """None = not called yet, like the next one."""
-    observe: Callable[..., None] | None
 
 
 class Missions:
@@ -138,8 +85,6 @@ class Missions:
         self.count = int(count)
         self.rules = rules_of(scenario)
         self.layout = ObservationLayout(scenario)
-        self._offsets = part_offsets(scenario, self.layout)
-        self._candidate_offsets = candidate_offsets(scenario, self.layout)
         self.state: MissionState = new_state(scenario, self.count, self.rules.cells)
         self._no_fly = np.zeros((self.count * int(self.rules.params["bodies"][0]), 0), np.bool_)
         self.worlds: list[World | None] = [None] * self.count
@@ -150,21 +95,11 @@ class Missions:
         self.seeds = [0] * self.count
         self.episodes = [-1] * self.count
         self.observations = np.zeros((self.count, scenario.robots, self.layout.size), np.float32)
-        self._make_working_space()
+        self._make_compiled_step()
 
-    def _make_working_space(self) -> None:
-        """Threads, scratch memory for each and, where robots plan, navigators; none of it is state."""
-        self._pool = Threads(self.threads)
-        self._calls: _Calls | None = None
-        self._choices = np.zeros((self.count, self.scenario.robots), CHOICE)
-        self._navigators = [new_navigators(self.scenario) for _ in range(self.threads)]
-        proposed = self.scenario.action.kind == "candidates"
-        self._proposers: list[list[Proposer]] = [
-            new_proposers(self.scenario) if proposed else [] for _ in range(self.threads)
-        ]
-        self._work: list[Workspace] = [
-            new_workspace(self.scenario, navigators) for navigators in self._navigators
-        ]
+    def _make_compiled_step(self) -> None:
+        """Threads and their memory; none of it is state."""
+        self._compiled_step = CompiledStep(self.scenario, self.rules, self.layout, self.count, self.threads)
 
     @property
     def grid(self) -> Grid:
@@ -184,7 +119,7 @@ class Missions:
     @property
     def estimates(self) -> np.ndarray | None:
         """(E, A) ESTIMATE, what robots believe of their poses; None = all know where they are."""
-        return None if self.rules.localization is None else self.state.estimates
+        return self._compiled_step.estimates_of(self.state)
 
     def reset(self, mission: int, seed: int | None = None, options: ResetOptions = DRAWN) -> None:
         """Start a mission anew: world, starts and random streams drawn, beliefs at the prior.
@@ -246,73 +181,31 @@ class Missions:
 
     def draw_episode(self, mission: int, seed: int, episode: int, options: ResetOptions) -> Start:
         """What a mission would start with as an episode of a seed; nothing changes. See `reset`."""
-        options = options.filled_up(self.every_reset)
-        number = options.world_number
-        if options.world is not None:
-            world = options.world
-        elif self.given:
-            world = world_in_turn(self.given, seed, episode)
-        elif self._read is not None:
-            require_unchanged(self.scenario, self._read)
-            world = self._read
-        else:
-            if number is None:
-                number = draw_world_number(self.scenario.split, generator(seed, episode, Stream.WORLD))
-            world = make_world(self.scenario, number)
-        if options.starts is not None:
-            poses = checked_starts(self.scenario, world, options.starts)
-        else:
-            poses = start_poses(self.scenario, world, generator(seed, episode, Stream.STARTS))
-        fiducials = fiducial_places(self.scenario, world, seed, episode)
-        return Start(mission, seed, episode, world, poses, options, number, fiducials)
+        fixed = FixedWorlds(self.given, self._read)
+        filled = options.filled_up(self.every_reset)
+        return draw_start(self.scenario, fixed, mission, seed, episode, filled)
 
     def _begin(self, start: Start) -> None:
         """Put the mission into its world, with beliefs at the prior, and observe."""
-        mission, number, episode, world, poses, options, world_number, fiducials = start
-        self.seeds[mission], self.episodes[mission] = number, episode
-        self.options[mission] = options
-        self.world_numbers[mission] = -1 if world_number is None else world_number
+        mission, world = start.mission, start.world
+        self.seeds[mission], self.episodes[mission] = start.seed, start.episode
+        self.options[mission] = start.options
+        self.world_numbers[mission] = -1 if start.world_number is None else start.world_number
         differs = world.ceiling is not None or world.unreadable is not None
         if differs and self.state.collision is self.state.truth:
             self.state = self.state._replace(collision=self.state.truth.copy())
-        state = self.state
-        knows_ceiling = self._navigators[0] or self._proposers[0]
-        if world.ceiling is not None and not self._no_fly.size and knows_ceiling:
+        if world.ceiling is not None and not self._no_fly.size and self._compiled_step.knows_ceiling:
             self._no_fly = np.zeros((len(self._no_fly), self.grid.voxels), np.bool_)
         if world is not self.worlds[mission]:
             self.worlds[mission] = world
-            state.truth[mission] = true_coverage(world.occupied, world.unreadable)
+            self.state.truth[mission] = true_coverage(world.occupied, world.unreadable)
             self._set_collision_masks(mission, world)
-        for array in state[4:]:
-            array[mission] = np.zeros((), array.dtype)
-        state.mean[mission] = PRIOR_MEAN
-        state.precision[mission] = self.rules.params["prior_precision"][0]
-        state.pooled[mission] = fresh_sums(self.rules.cells)
-        if self.scenario.track_truth:
-            state.joint_mean[mission] = PRIOR_MEAN
-            state.joint_precision[mission] = self.rules.params["prior_precision"][0]
-            self._set_seen_goal(mission, world)
-        for field in ("reached_s", "seen_s", "seen_m"):
-            state.missions[mission][field] = -1.0
-        self._set_entropies(mission, world.visible_voxels(self.scenario))
-        robots = state.robots[mission]
-        for field in ("origin", "goal", "target", "scan_pose"):
-            robots[field] = poses
-        robots["deciding"] = True
-        robots["redecide_s"] = np.inf
-        robots["i_min_bits"] = robots["next_i_min_bits"] = self.scenario.channel.i_min_bits
-        robots["sensor_rng"][:, 0] = splitmix_states(number, episode, Stream.SENSOR, len(robots))
-        robots["channel_rng"][:, 0] = splitmix_states(number, episode, Stream.CHANNEL, len(robots))
-        state.heard[mission]["heard_s"] = state.heard[mission]["announced_s"] = -1.0
-        state.in_flight[mission]["due_s"] = np.inf
-        draw_faults(self.scenario, number, episode, state.faults[mission])
-        remembering = state.experience[mission]
-        remembering["candidates_rng"][:, 0] = splitmix_states(
-            number, episode, Stream.CANDIDATES, len(remembering)
-        )
-        begin_estimates(number, episode, poses, state.estimates[mission])
-        state.fiducials[mission] = fiducials
-        self._observe(0, mission, mission + 1)
+        fill_start(self.scenario, self.rules, self.state, start)
+        self._compiled_step.observe(self._arrays(), mission, mission + 1)
+
+    def _arrays(self) -> Arrays:
+        """What a step reads and changes."""
+        return Arrays(self.state, self._no_fly, self.observations)
 
     def _set_collision_masks(self, mission: int, world: World) -> None:
         """What is in the way of the team's bodies."""
@@ -323,9 +216,9 @@ class Missions:
             if self._no_fly.size:
                 self._no_fly[row] = world.no_fly_mask(kind.robot.body_radius_m).ravel()
 
-    def think_less(self, divisor: int) -> None:
-        """Let so many times fewer viewpoints be drawn and refined as candidates from now on."""
-        self._proposers = [[thinned(each, divisor) for each in thread] for thread in self._proposers]
+    def thin_candidates(self, divisor: int) -> None:
+        """Draw and refine so many times fewer viewpoints as candidates from now on."""
+        self._compiled_step.thin_candidates(divisor)
 
     def take_no_fly_zones(self, source: Missions, rows: np.ndarray, at: np.ndarray) -> None:
         """Take over the no-fly zones of another batch's missions, and room for collision masks of their own.
@@ -344,28 +237,6 @@ class Missions:
             masks[at] = 0
             if source._no_fly.size:
                 masks[at] = source._no_fly.reshape(source.count, -1, self.grid.voxels)[rows]
-
-    def _set_seen_goal(self, mission: int, world: World) -> None:
-        """What can be seen, and how much of it has to be where that ends the mission."""
-        clock, ending = self.state.missions[mission], self.scenario.ending
-        visible = world.visible(self.scenario)
-        self.state.visible[mission] = visible.ravel()
-        clock["visible"], clock["visible_free"] = visible.sum(), (visible & ~world.occupied).sum()
-        if ending.seen_share is not None:
-            clock["explored_end"] = math.ceil(ending.seen_share * clock["visible"] - 1e-9)
-        if ending.unseen_free_voxels is not None:
-            clock["explored_free_end"] = clock["visible_free"] - ending.unseen_free_voxels
-
-    def _set_entropies(self, mission: int, visible_voxels: int) -> None:
-        """H(0) by eq. 25, and H_th: voxels that can be seen at σ_end, the others at the prior."""
-        prior = np.full((1, 1, 1), self.rules.params["prior_precision"][0], np.float32)
-        voxel_bits = float(map_entropy_bits(prior))
-        known_bits = gaussian_entropy_bits(self.scenario.ending.sigma_end)
-        hidden = self.grid.voxels - visible_voxels
-        clock = self.state.missions[mission]
-        clock["entropy_start_bits"] = clock["joint_bits"] = self.grid.voxels * voxel_bits
-        clock["entropy_end_bits"] = visible_voxels * known_bits + hidden * voxel_bits
-        self.state.robots[mission]["entropy_bits"] = clock["entropy_start_bits"]
 
     def strategy_generator(self, mission: int) -> np.random.Generator:
         """The random stream of whoever chooses the actions in this mission's episode.
@@ -400,12 +271,9 @@ class Missions:
             raise ActionError(
                 "actions", (continuous.shape, discrete.shape), f"shapes {team} (, N) and {team}"
             )
-        if self._proposers[0]:
+        if self._compiled_step.proposes:
             continuous = self._chosen_viewpoints(discrete)
-        if self.threads == 1:
-            self._step_range(0, 0, self.count, continuous, discrete)
-        else:
-            self._step_threaded(continuous, discrete)
+        self._compiled_step.step(self._arrays(), continuous, discrete)
         end_of_step()
         return self.observations
 
@@ -417,88 +285,12 @@ class Missions:
         chosen = np.take_along_axis(candidates, numbers[..., None, None], axis=2)[:, :, 0]
         return np.ascontiguousarray(chosen)
 
-    def _step_range(
-        self, thread: int, first: int, last: int, continuous: np.ndarray, discrete: np.ndarray
-    ) -> None:
-        calls, work = self._bound_calls(), self._work[thread]
-        for kind, navigator in self._navigators[thread].items():
-            plan_missions(calls.planning, navigator, kind, work.braking, continuous, discrete, first, last)
-        arguments = (self.rules, self.state, self._choices, work, continuous, discrete, first, last)
-        step = calls.step
-        if step is None:
-            step = entry_point(step_missions, *arguments)
-            self._calls = calls._replace(step=step)
-        step(*arguments)
-        self._observe(thread, first, last)
-
-    def _observe(self, thread: int, first: int, last: int) -> None:
-        """Write the observations of the missions `first` … `last` - 1."""
-        calls, scan = self._bound_calls(), self._work[thread].scan
-        for kind, proposer in enumerate(self._proposers[thread]):
-            propose_missions(
-                calls.proposing, proposer, kind, self._candidate_offsets, first, last, self.observations
-            )
-        if not self.layout.size:
-            return
-        crossing = Crossing(scan.crossed[0], scan.entered)
-        arguments = (self.rules, self._offsets, calls.observed, crossing, first, last, self.observations)
-        observe = calls.observe
-        if observe is None:
-            observe = entry_point(observe_missions, *arguments)
-            self._calls = calls._replace(observe=observe)
-        observe(*arguments)
-
-    def _bound_calls(self) -> _Calls:
-        """What a step calls, for the arrays as they are: some are replaced when a world has a ceiling."""
-        calls, state = self._calls, self.state
-        if calls is None or calls.state is not state or calls.planning.no_fly is not self._no_fly:
-            params, actions = self.rules.params, self.rules.actions
-            shown = (state.missions, state.robots)
-            maps, estimates = (state.mean, state.precision), self.estimates
-            planning = Planning(params, actions, *shown, self._choices, *maps, self._no_fly, estimates)
-            observed = Observed(*shown, state.heard, *maps, state.pooled, estimates)
-            proposing = Proposing(
-                params,
-                *shown,
-                state.heard,
-                *maps,
-                state.scan_utility_bits,
-                state.candidates,
-                state.experience,
-                self._no_fly,
-                estimates,
-            )
-            self._calls = calls = _Calls(state, planning, observed, proposing, None, None)
-        return calls
-
-    def _step_threaded(self, continuous: np.ndarray, discrete: np.ndarray) -> None:
-        """Share the missions among threads: each takes the next chunk as soon as it is free."""
-        size = max(1, self.count // (self.threads * _CHUNKS_PER_THREAD))
-        chunks = iter(range(0, self.count, size))
-
-        def work(thread: int) -> None:
-            for first in chunks:
-                self._step_range(thread, first, min(first + size, self.count), continuous, discrete)
-
-        self._pool.run(work)
-
     def action_masks(self) -> np.ndarray:
         """(E, A, N) int8: 1 for each action by number that makes sense by the robot's own belief.
 
         Of candidates: for each that there is; for robots that do not decide, for the first one.
         """
-        rules, state = self.rules, self.state
-        if self._proposers[0]:
-            running = state.missions["end"] == MissionEnd.RUNNING.code
-            decides = state.robots["deciding"] & running[:, None]
-            there = (state.candidates["kind"] != Kind.NONE) & decides[..., None]
-            there[..., 0] = True
-            return there.astype(np.int8)
-        actions = len(rules.actions.moves) * len(rules.actions.gazes)
-        masks = np.empty((self.count, self.scenario.robots, actions), np.int8)
-        told = (state.missions, state.robots, self.estimates)
-        mask_missions(rules.params, rules.actions, *told, state.mean, masks)
-        return masks
+        return self._compiled_step.action_masks(self.state)
 
     def over(self, mission: int) -> MissionEnd:
         """Why the mission is over, or MissionEnd.RUNNING."""
@@ -506,17 +298,16 @@ class Missions:
 
     def close(self) -> None:
         """End the threads; the missions can still be stepped."""
-        self._pool.close()
+        self._compiled_step.close()
 
     def __getstate__(self) -> dict[str, object]:
-        """All but the threads and their scratch space."""
+        """All but the threads and their memory."""
         kept = dict(self.__dict__)
-        del kept["_pool"], kept["_work"], kept["_navigators"], kept["_calls"], kept["_choices"]
-        del kept["_proposers"]
+        del kept["_compiled_step"]
         return kept
 
     def __setstate__(self, kept: dict[str, object]) -> None:
-        """Take the arrays back and make new scratch space.
+        """Take the arrays back and make new threads.
 
         Raises:
             RecordError: A number of the state is in no mission of the scenario.
@@ -525,7 +316,7 @@ class Missions:
         begun = np.array(self.episodes) >= 0
         arrays = {name: array for name, array in self.state._asdict().items() if name not in FROM_WORLD}
         check_ranges(self.scenario, {name: array[begun] for name, array in arrays.items()})
-        self._make_working_space()
+        self._make_compiled_step()
 
 
 def _for_kernels(actions: np.ndarray, dtype: type[np.generic]) -> np.ndarray:

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from entropy_explore_env.missions import simulation as missions_module
+from entropy_explore_env.missions import episode
 from entropy_explore_env.missions.poses import place_at, pose_at
 from entropy_explore_env.missions.view import view_of
 from entropy_explore_env.robots.motion import MoveEnd
@@ -225,7 +225,7 @@ def test_unknown_ground_ends_a_path_by_name_and_a_ceiling_is_known(monkeypatch, 
     ground = np.zeros(grid.shape, bool)
     ground[:, :, 0] = True
     world = World(grid, ground, "plain", ceiling=np.full((7, 11), 3, np.int32))
-    monkeypatch.setattr(missions_module, "make_world", lambda *_: world)
+    monkeypatch.setattr(episode, "make_world", lambda *_: world)
     missions = started(planner(grid=grid))
     believed = np.zeros(grid.shape, bool)
     believed[3, 2:9] = True

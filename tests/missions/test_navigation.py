@@ -122,7 +122,7 @@ def test_threads_batches_and_pickling_change_nothing():
         if step == 20:
             batch.close()
             batch = pickle.loads(pickle.dumps(batch))
-            assert len(batch._navigators) == 2
+            assert len(batch._compiled_step.navigators) == 2
     for mission, one in enumerate(alone):
         for name, all_of_them, own in zip(batch.state._fields, batch.state, one.state, strict=True):
             assert all_of_them[mission].tobytes() == own[0].tobytes(), name
@@ -137,9 +137,9 @@ def test_the_memory_of_plans_is_not_pickled_and_taken_only_where_robots_plan():
     missions = started(WANDERERS)
     assert "_navigators" not in missions.__getstate__()
     wide = with_settings(WANDERERS, {"robot": {"body_radius_m": 0.4}})
-    assert Missions(wide)._work[0].footprints.size > 0
+    assert Missions(wide)._compiled_step.work[0].footprints.size > 0
     straight = Missions(with_settings(wide, {"robot": {"navigator": "straight"}}))
-    assert not straight._navigators[0] and straight._work[0].footprints.size == 0
+    assert not straight._compiled_step.navigators[0] and straight._compiled_step.work[0].footprints.size == 0
 
 
 def test_messages_of_scans_under_way_find_free_slots():

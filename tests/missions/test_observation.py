@@ -323,7 +323,7 @@ def test_a_place_on_a_face_that_rounding_takes_past_it_is_still_inside():
         place[axis] = origin[axis] + grid.size_m[axis]
         past += (place[axis] - origin[axis]) / grid.voxel_size_m > grid.shape[axis]
         put(missions, 0, (*place, 0.3 * number, 0.1))
-        missions._observe(0, 0, 1)
+        missions._compiled_step.observe(missions._arrays(), 0, 1)
         assert ((missions.observations >= low) & (missions.observations <= high)).all()
         missions.step(*random_actions(missions, np.random.default_rng(number)))
         assert ((missions.observations >= low) & (missions.observations <= high)).all()

@@ -187,7 +187,7 @@ def test_where_actions_are_others_nothing_of_it_is_called(monkeypatch):
     def refuse(*_):
         raise AssertionError("proposed")
 
-    monkeypatch.setattr("entropy_explore_env.missions.simulation.propose_missions", refuse)
+    monkeypatch.setattr("entropy_explore_env.missions.compiled_step.propose_missions", refuse)
     wander(started(with_settings(free_box(), {"action": {"kind": "discrete"}})), 2, 0)
     with pytest.raises(AssertionError, match="proposed"):
         started(free_box(action=ACTION))

@@ -424,7 +424,7 @@ def test_the_scratch_space_holds_the_farthest_drive():
     sensor = {"max_range_m": 0.3, "field_of_view_rad": (0.0, 0.0)}
     missions = Missions(free_box(robot={"reach_m": math.inf}, sensor=sensor))
     needed = longest_crossing(*missions.grid.shape, math.inf, 1)
-    for work in missions._work:
+    for work in missions._compiled_step.work:
         assert min(len(work.drive.voxels), len(work.drive.entered)) >= needed
 
 

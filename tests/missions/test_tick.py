@@ -7,10 +7,10 @@ import math
 import numpy as np
 import pytest
 
-from entropy_explore_env.missions import simulation as missions_module
+from entropy_explore_env.missions import episode
 from entropy_explore_env.missions.poses import pose_at
+from entropy_explore_env.missions.scanning import note_scan
 from entropy_explore_env.missions.state import LatestScans
-from entropy_explore_env.missions.tick import note_scan
 from entropy_explore_env.missions.view import view_of
 from entropy_explore_env.robots.motion import MoveEnd
 from entropy_explore_env.robots.range_sensor import Return
@@ -88,7 +88,7 @@ def test_a_rover_stops_where_the_ground_ends_and_says_so(monkeypatch):
     ground[:, :7, :2] = True
     ground[:2, 5:, 1] = False
     world = World(Grid((7, 11, 5), 0.5), ground, "step")
-    monkeypatch.setattr(missions_module, "make_world", lambda *_: world)
+    monkeypatch.setattr(episode, "make_world", lambda *_: world)
     rover = {"motion": "planar", "sensor_height_m": 1.75, "above_ground_m": 0.75, "body_radius_m": 0.3}
     missions = started(free_box(robots=1, robot={**rover, "reach_m": 4.0, "tilts": True}))
     put(missions, 0, (2.25, 1.25, 1.75, 0.0, 0.0))
@@ -112,7 +112,7 @@ def test_a_robot_stays_between_ground_and_ceiling_and_says_which_of_them_stopped
     ground = np.zeros((7, 11, 5), bool)
     ground[:, :, 0] = True
     world = World(Grid((7, 11, 5), 0.5), ground, "plain", ceiling=np.full((7, 11), 4, np.int32))
-    monkeypatch.setattr(missions_module, "make_world", lambda *_: world)
+    monkeypatch.setattr(episode, "make_world", lambda *_: world)
     missions = started(free_box(robots=1))
     put(missions, 0, (1.75, 2.75, 1.25, 0.0, 0.0))
     robots = toward(missions, (1.75, 2.75, 2.2, 0.0, 0.0))
@@ -341,7 +341,7 @@ def test_nobody_hears_anything(channel):
 def test_a_measurement_of_no_less_than_i_min_is_not_redundant():
     """Equation 43 asks for at least I_min; what measured nothing is neither redundant nor sent."""
     missions = started(free_box(robots=2))
-    state, scan = missions.state, missions._work[0].scan
+    state, scan = missions.state, missions._compiled_step.work[0].scan
     latest = LatestScans(state.scan_range_m[0], state.scan_returned[0], state.scan_utility_bits[0])
     state.robots["i_min_bits"] = 0.25
     scan.rays["returned"], scan.utility[:] = Return.HIT, 0.5

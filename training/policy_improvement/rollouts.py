@@ -136,7 +136,7 @@ class RollOuts:
         )  # features would cost more than the choice
         self._env = EntropyExploreVectorEnv(unseen, int(np.prod(shape)), threads=threads, action_masks=False)
         self._missions = self._env.missions
-        self._missions.think_less(thinking.divisor)
+        self._missions.thin_candidates(thinking.divisor)
         self._waiting: list[Branch] = []
 
     @property

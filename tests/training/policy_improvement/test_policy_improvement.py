@@ -334,6 +334,6 @@ def test_labels_know_their_task():
 def test_roll_outs_think_less_and_observe_nothing():
     runs = RollOuts(scenario(), (1, 2, 1), Thinking(5, 3), 1)
     whole = EntropyExploreVectorEnv(scenario(), 1, action_masks=False).missions
-    thin, full = (each._proposers[0][0].recipe for each in (runs._missions, whole))
+    thin, full = (each._compiled_step.proposers[0][0].recipe for each in (runs._missions, whole))
     assert thin.gazes == -(-full.gazes // 3) and thin.refined < full.refined and thin.keep == full.keep
     assert runs._missions.observations.size == 0

@@ -1,0 +1,93 @@
+"""Which event of a mission is next, compiled.
+
+A robot stops by a fault; a message arrives; the robots broadcast; a robot scans, has waited, or decides
+under way. `next_event` alone says which of them is next, also of those at one instant.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from entropy_explore_env.compilation.kernels import lean_kernel
+from entropy_explore_env.missions.faults import next_stop, stops_counted
+from entropy_explore_env.missions.messages import next_message
+from entropy_explore_env.missions.phases import next_broadcast
+
+NO_EVENT, MESSAGE_ARRIVES, BROADCAST_DUE, ROBOT_DUE, ROBOT_STOPS = range(5)
+"""Kinds of events."""
+
+
+class Event(NamedTuple):
+    """What happens next in a mission."""
+
+    kind: int
+    """A robot stops by a fault, a message arrives, the robots broadcast, a robot scans, has waited or decides
+    under way; or nothing."""
+    number: int
+    """The slot of the message, or the number of the robot; 0 for others."""
+    time_s: float
+    """When; inf = never."""
+
+
+@lean_kernel
+def next_event(shared, robots, messages, phases, faults):
+    """The earliest Event.
+
+    Of those at one instant robots that stop come first; then messages, in the order of sending; then the
+    broadcast of all robots; then robots by number.
+
+    Args:
+        shared: PARAMS of any robot.
+        robots: (A,) ROBOT.
+        messages: (Q,) MESSAGE.
+        phases: PHASES of the mission.
+        faults: TeamFaults, or None.
+    """
+    slot, due_s = next_message(messages)
+    broadcast_s = next_broadcast(shared, phases)
+    robot, robot_s = next_robot(robots)
+    stopping, stopping_s = next_stop(faults)
+    soonest_s = min(due_s, broadcast_s, robot_s, stopping_s)
+    if math.isinf(soonest_s):
+        return Event(NO_EVENT, 0, soonest_s)
+    if stopping_s == soonest_s:
+        return Event(ROBOT_STOPS, stopping, soonest_s)
+    if due_s == soonest_s:
+        return Event(MESSAGE_ARRIVES, slot, soonest_s)
+    if broadcast_s == soonest_s:
+        return Event(BROADCAST_DUE, 0, soonest_s)
+    return Event(ROBOT_DUE, robot, soonest_s)
+
+
+@lean_kernel
+def next_robot(robots):
+    """(robot, time) of the next that scans, under way or at its stop, has waited, or may decide under way.
+
+    The time is inf if all of them stand and decide.
+    """
+    soonest, soonest_s = 0, math.inf
+    for index in range(len(robots)):
+        robot = robots[index]
+        if not robot.deciding or robot.under_way:
+            due_s = robot.next_scan_s if robot.under_way else min(robot.next_scan_s, robot.redecide_s)
+            if due_s < soonest_s:
+                soonest, soonest_s = index, due_s
+    return soonest, soonest_s
+
+
+@lean_kernel
+def events_handled(robots, messages, phases, faults):
+    """A number that every event makes greater, so that none is met twice: asserted in debug builds.
+
+    A message frees its slot. A broadcast is counted. A robot counts its scan; or it decides, having waited or
+    driven since it last decided; or it puts that off. A scan may send a message, begin the wait of a robot
+    that could decide, and set when it decides next: it counts for more than these three. So does a stop,
+    after which a robot does not decide. Arguments as those of `next_event`.
+    """
+    handled = phases.broadcasts + 4 * stops_counted(faults)
+    for robot in robots:
+        handled += 4 * robot.scans + int(robot.deciding) + int(math.isinf(robot.redecide_s))
+    for message in messages:
+        handled -= int(not math.isinf(message.due_s))
+    return handled

@@ -1,0 +1,116 @@
+"""One scan of one robot in a mission, compiled: measure → fuse → select → send."""
+
+from __future__ import annotations
+
+from entropy_explore_env.compilation.kernels import lean_kernel
+from entropy_explore_env.missions.faults import blinded, spoil
+from entropy_explore_env.missions.fiducials import sight_fiducials
+from entropy_explore_env.missions.localization import (
+    believe_scan,
+    believed_pose,
+    estimate_of,
+    measure,
+    note_scan_pose,
+)
+from entropy_explore_env.missions.messages import fuse_measurements, send_batch
+from entropy_explore_env.missions.phases import collect_batch
+from entropy_explore_env.missions.poses import copy_numbers, grid_size, pose_at, to_grid_units, within_grid
+from entropy_explore_env.missions.scoring import note_seen, score_scan
+from entropy_explore_env.robots.channel import select_measurements, steered_i_min
+from entropy_explore_env.robots.range_sensor import (
+    Return,
+    Scene,
+    SensorPose,
+    first_rays,
+    in_view,
+    visibility_parameters,
+)
+
+_NOTHING = int(Return.NOTHING)
+
+
+@lean_kernel
+def scan_and_share(mission, sensor, index, work):
+    """A robot measures from where it is, fuses, and sends what is most useful.
+
+    Args:
+        mission: Mission, changed in place.
+        sensor: SensorModel of the robot.
+        index: Its number.
+        work: Workspace.
+    """
+    clock, team = mission.clock, mission.team
+    params, robot = team.params[index], team.robots[index]
+    scan = first_rays(work.scan, params.rays)
+    x, y, z, yaw, pitch = pose_at(params, robot, clock.time_s)
+    pose = SensorPose(within_grid(params, (x, y, z)), yaw, pitch)
+    bodies = work.bodies[: place_bodies(team, sensor, index, clock.time_s, pose, work.bodies)]
+    scene = Scene(mission.truth, grid_size(params), params.voxel_size_m, bodies)
+    if not blinded(team.faults, index, clock.time_s):
+        sight_fiducials(team.localization, params, index, sensor, scene, pose)
+    measure(team.localization, scan, sensor, scene, pose, robot.sensor_rng)
+    spoil(team.faults, index, scan, sensor, scene, pose, clock.time_s)
+    here = believed_pose(estimate_of(team.localization, index), params, (x, y, z, yaw, pitch))
+    believe_scan(team.localization, index, scan, sensor.params[0], scene, within_grid(params, here))
+    for ray in range(len(scan.order)):
+        scan.order[ray] = ray
+    bits = fuse_measurements(team, mission.maps, scan, index, len(scan.order))
+    robot.entropy_bits -= bits
+    robot.own_bits += bits
+    robot.gained_bits += bits
+    robot.depth_m, robot.half_angle_rad, measurements = visibility_parameters(scan.rays, here[3], pitch)
+    robot.scans += 1
+    robot.measurements += measurements
+    robot.i_min_bits = robot.next_i_min_bits
+    copy_numbers((x, y, z, yaw, pitch), robot.scan_pose, 5)
+    note_scan_pose(team.localization, index, here)
+    note_scan(robot, mission.latest, scan, index)
+    if params.track_truth:
+        score_scan(clock, mission.joint, mission.truth, scan, params.prior_precision)
+        note_seen(team.params, clock, team.robots)
+    if len(team.robots) > 1 and params.burst > 0:
+        share(mission, scan, index, work.recipients)
+
+
+@lean_kernel
+def note_scan(robot, latest, scan, index):
+    """Keep what a scan measured; rays that measured nothing get utility -1, so that none is sent."""
+    for ray in range(len(scan.rays)):
+        latest.range_m[index, ray] = scan.rays[ray].range_m
+        latest.returned[index, ray] = scan.rays[ray].returned
+        latest.utility_bits[index, ray] = scan.utility[ray]
+        if scan.rays[ray].returned == _NOTHING:
+            scan.utility[ray] = -1.0
+        elif scan.utility[ray] < robot.i_min_bits:
+            robot.redundant += 1
+
+
+@lean_kernel
+def share(mission, scan, index, recipients):
+    """Select the most useful measurements of a robot's scan, and send them, now or in the next phase."""
+    team, params = mission.team, mission.team.params[index]
+    robot = team.robots[index]
+    count = select_measurements(scan.utility, params.burst, robot.i_min_bits, scan.order)
+    if params.i_min_fill > 0.0:
+        robot.next_i_min_bits = steered_i_min(
+            robot.i_min_bits, scan.utility, params.burst, params.i_min_fill, params.i_min_gain
+        )
+    if count > 0 and params.phase_s == 0.0:
+        send_batch(team, mission.maps, mission.clock, mission.in_flight, scan, index, count, recipients)
+    elif count > 0:
+        collect_batch(team, mission.buffers, mission.phases, scan, index, count)
+
+
+@lean_kernel
+def place_bodies(team, sensor, index, time_s, pose, bodies):
+    """Put the teammates' bodies that the robot may see, in grid units, into `bodies`; returns how many."""
+    count = 0
+    for mate in range(len(team.robots)):
+        params = team.params[mate]
+        if mate != index and params.body_radius_m > 0.0:
+            place = to_grid_units(params, pose_at(params, team.robots[mate], time_s))
+            copy_numbers(place, bodies[count], 3)
+            bodies[count, 3] = params.body_radius_m / params.voxel_size_m
+            if in_view(sensor, pose, bodies[count]):
+                count += 1
+    return count
