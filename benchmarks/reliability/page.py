@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 
 from benchmarks.reliability.file_fuzz import FILES
 from benchmarks.reliability.settings_fuzz import STEPS, WATCHDOG_S
+from benchmarks.reliability.soak import CHANNELS, FLOOR, MAPS_EVERY, QUICK
 
 Row = Mapping[str, Any]
 _SETTLED_STEPS = 1_000_000
@@ -192,21 +193,37 @@ def _soak(rows: Sequence[Row]) -> str:
     within = max(row["resident_mib"] / row["settled_mib"] - 1.0 for row in ordered)
     lines = [
         "At each step: observations in their spaces, rewards finite, time never backwards, ends said, bits "
-        "gained equal to the entropy lost, every number of the state in its range; every voxel each "
-        "200 steps.",
+        "gained equal to the entropy lost, every number of the state in its range, the rays of messages on "
+        f"their way among them; every voxel, and all other rays, each {MAPS_EVERY} steps.",
+        f"First every scenario is played over each of {len(CHANNELS)} channels for {FLOOR:,} robot-steps; "
+        f"what is then left is shared, by time, among those that step quickest: {', '.join(QUICK)}. "
+        f"{_pairs(ordered)}",
         f"Within a case resident memory grew by {max(within, 0.0):.1%} at most after its first fifth.",
         *_memory(ordered),
+        "",
+        "Robot-steps a second are of one core's own time, with everything that is checked.",
         "",
         "| scenario | robot-steps | missions | robot-steps/s |",
         "| --- | ---: | ---: | ---: |",
     ]
     for name in dict.fromkeys(row["scenario"] for row in ordered):
-        own = [row for row in ordered if row["scenario"] == name]
-        steps, missions, seconds = (
-            sum(row[k] for row in own) for k in ("robot_steps", "missions", "seconds")
-        )
-        lines.append(f"| {name} | {steps:,} | {missions:,} | {steps / seconds:,.0f} |")
+        lines.append(_soaked(name, [row for row in ordered if row["scenario"] == name]))
+    lines.append(_soaked("all", ordered))
     return "\n".join(lines) + "\n"
+
+
+def _pairs(rows: Sequence[Row]) -> str:
+    """How many pairs of a scenario and a channel were played, and for how long at least."""
+    steps: Counter[tuple[str, int]] = Counter()
+    for row in rows:
+        steps[row["scenario"], row["channel"]] += row["robot_steps"]
+    return f"So far {len(steps)} of these pairs were played, each for {min(steps.values()):,} or more."
+
+
+def _soaked(name: str, rows: Sequence[Row]) -> str:
+    """A line of the table of the soak."""
+    steps, missions, cpu_s = (sum(row[k] for row in rows) for k in ("robot_steps", "missions", "cpu_s"))
+    return f"| {name} | {steps:,} | {missions:,} | {steps / cpu_s:,.0f} |"
 
 
 def _memory(rows: Sequence[Row]) -> Iterable[str]:

@@ -46,21 +46,22 @@ class Values(NamedTuple):
     """Another number that is allowed."""
 
 
-def check_ranges(scenario: Scenario, arrays: Mapping[str, np.ndarray], maps: bool = True) -> None:
+def check_ranges(scenario: Scenario, arrays: Mapping[str, np.ndarray], voxels_and_rays: bool = True) -> None:
     """Check every number of a saved state.
 
     Args:
         scenario: Of the missions.
         arrays: The arrays of a MissionState by name, of the shapes and types that missions of the scenario
             have; those that follow from the world may be missing. Missions of other numbers do not matter.
-        maps: Whether to look at every voxel of maps and every ray of scans, too, which takes longest.
+        voxels_and_rays: Whether to look at every voxel of maps and every ray of scans and messages, too,
+            which takes longest.
 
     Raises:
         RecordError: A number is in no mission of the scenario; the message names `array.field`.
     """
-    voxels_and_rays = (_maps, _scans) if maps else ()
+    large = (_maps, _scans, _message_rays) if voxels_and_rays else ()
     small = (_missions, _robots, _heard, _messages, _phases, _faults, _candidates, _experience)
-    for part in (*small, _localization, *voxels_and_rays):
+    for part in (*small, _localization, *large):
         for values in part(scenario, arrays):
             _check(values)
 
@@ -157,7 +158,7 @@ def _heard(scenario: Scenario, arrays: Mapping[str, np.ndarray]) -> Iterator[Val
 
 
 def _messages(scenario: Scenario, arrays: Mapping[str, np.ndarray]) -> Iterator[Values]:
-    """MESSAGE, to whom, and what is in it."""
+    """MESSAGE, and to whom."""
     messages, rays = arrays["in_flight"], arrays["in_flight_rays"]
     clock = arrays["missions"]
     time_s, under_way = clock["time_s"][:, None], np.isfinite(messages["due_s"])
@@ -176,12 +177,10 @@ def _messages(scenario: Scenario, arrays: Mapping[str, np.ndarray]) -> Iterator[
     cone = np.array([_longest_m(scenario), math.pi + _ROUNDING])
     yield Values("in_flight.announced", messages["announced"][..., 5:], 0.0, cone)
     yield Values("in_flight_to", arrays["in_flight_to"], 0, 1)
-    used = np.arange(rays.shape[2]) < np.where(under_way, messages["count"], 0)[..., None]
-    yield from _packed(scenario, "in_flight_rays", rays, used)
 
 
 def _phases(scenario: Scenario, arrays: Mapping[str, np.ndarray]) -> Iterator[Values]:
-    """PHASES, and the buffers of the broadcast."""
+    """PHASES, and the buffers of the broadcast without their rays."""
     phases, counts = arrays["phases"], arrays["phase_counts"]
     batches, rays = arrays["phase_batches"], arrays["phase_rays"]
     yield Values("phases.broadcasts", phases["broadcasts"], 0, _MOST)
@@ -193,8 +192,30 @@ def _phases(scenario: Scenario, arrays: Mapping[str, np.ndarray]) -> Iterator[Va
     low, high = _workspace(scenario)
     wide = np.where(filled[..., None], 0.0, _MOST)
     yield from _poses("phase_batches.pose", batches["pose"], low - wide, high + wide)
-    used = np.arange(rays.shape[4]) < np.where(filled, batches["count"], 0)[..., None]
-    yield from _packed(scenario, "phase_rays", rays, used)
+
+
+def rays_of_messages(arrays: Mapping[str, np.ndarray]) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+    """The rays of delayed messages and of broadcasts, and how many of each message are in use.
+
+    Args:
+        arrays: As of `check_ranges`.
+
+    Returns:
+        By the name of the array: (..., B, 5) rays and (...) counts.
+    """
+    messages, batches = arrays["in_flight"], arrays["phase_batches"]
+    under_way = np.isfinite(messages["due_s"])
+    filled = np.arange(batches.shape[3]) < arrays["phase_counts"][..., None]
+    return {
+        "in_flight_rays": (arrays["in_flight_rays"], np.where(under_way, messages["count"], 0)),
+        "phase_rays": (arrays["phase_rays"], np.where(filled, batches["count"], 0)),
+    }
+
+
+def _message_rays(scenario: Scenario, arrays: Mapping[str, np.ndarray]) -> Iterator[Values]:
+    """What is in messages."""
+    for name, (rays, counts) in rays_of_messages(arrays).items():
+        yield from _packed(scenario, name, rays, np.arange(rays.shape[-2]) < counts[..., None])
 
 
 def _maps(scenario: Scenario, arrays: Mapping[str, np.ndarray]) -> Iterator[Values]:
@@ -306,10 +327,14 @@ def _packed(scenario: Scenario, name: str, rays: np.ndarray, used: np.ndarray) -
     yield Values(
         f"{name}, length of a direction", squares, np.where(used, 1.0 - _ROUNDING, 0.0), 1.0 + _ROUNDING
     )
-    longest = _longest_m(scenario) / scenario.grid.voxel_size_m
-    yield Values(f"{name}, distance", rays[..., 3], 0.0, longest)
+    yield Values(f"{name}, distance", rays[..., 3], 0.0, longest_ray(scenario))
     yield Values(f"{name}, Return", rays[..., 4], min(Return), max(Return))
     yield Values(f"{name}, Return", rays[..., 4] % 1.0, 0.0, 0.0)
+
+
+def longest_ray(scenario: Scenario) -> float:
+    """Grid units that no measured distance in a message is beyond."""
+    return _longest_m(scenario) / scenario.grid.voxel_size_m
 
 
 def _workspace(scenario: Scenario) -> tuple[np.ndarray, np.ndarray]:

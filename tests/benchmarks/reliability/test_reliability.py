@@ -5,16 +5,13 @@ from __future__ import annotations
 import json
 import random
 
-import numpy as np
 import pytest
 
 from benchmarks.reliability import __main__ as command
 from benchmarks.reliability import determinism, kills, page, soak
 from benchmarks.reliability.__main__ import PROOFS, Proof, carry_on, main, rows_of
 from benchmarks.reliability.page import Kept
-from benchmarks.reliability.settings_fuzz import BrokenPromiseError
-from entropy_explore_env.envs.vector_env import EntropyExploreVectorEnv
-from entropy_explore_env.errors import RecordError, SettingError
+from entropy_explore_env.errors import SettingError
 
 EMPTY = {name: Kept((), 0, 10) for name in PROOFS}
 NO_MORE = ({}, (), {"numpy": "2"})
@@ -83,10 +80,21 @@ def test_digests_that_differ_and_memory_that_grows_are_shown():
         assert said in kept("determinism", rows)
     runs = [{"trainer": "a", "robot_steps": 1_200_000 + n, "kills": 3, "number": n} for n in range(2)]
     assert "| `a` | 2,400,001 | 6 |" in kept("training", runs)
-    case = {"scenario": "room", "robot_steps": 600_000, "missions": 2, "seconds": 6.0, "process": 1}
+    case = {
+        "scenario": "room",
+        "channel": 1,
+        "robot_steps": 600_000,
+        "missions": 2,
+        "cpu_s": 6.0,
+        "process": 1,
+    }
     rows = [{**case, "number": n, "settled_mib": 100.0 + n, "resident_mib": 101.0 + n} for n in range(5)]
     text = kept("soak", rows[::-1])
-    assert "| room | 3,000,000 | 10 | 100,000 |" in text and "by 1.0% at most" in text
+    assert "| room | 3,000,000 | 10 | 100,000 |" in text and "| all | 3,000,000 | 10 | 100,000 |" in text
+    assert (
+        "So far 1 of these pairs were played, each for 3,000,000 or more." in text
+        and "by 1.0% at most" in text
+    )
     assert "3,000,000 robot-steps held 102 MiB after the first 10⁶, then 105 MiB at most" in text
 
 
@@ -139,39 +147,14 @@ def test_a_digest_does_not_depend_on_threads_or_company():
 
 def test_a_piece_of_soak(monkeypatch):
     monkeypatch.setattr(soak, "CASE_S", 0.2)
+    monkeypatch.setattr(soak, "FLOOR", 3_000)
     box = list(soak.SCENARIOS).index("box-7x11x5")
     row = soak.play_number(box)
-    assert row["resident_mib"] > 10.0 and row["scenario"] == "box-7x11x5"
-    assert soak.robot_steps(row) >= 256 and soak.robot_steps({"failure": "x"}) == 0
-
-
-@pytest.fixture
-def soaked():
-    env = EntropyExploreVectorEnv("box-7x11x5", 3)
-    env.reset(seed=0)
-    before = soak._moment(env)
-    return env, before, env.step(np.full(env.action_space.shape, 0.3, np.float32))
-
-
-def test_what_leaves_the_contract_is_found_in_a_soak(soaked):
-    env, before, stepped = soaked
-    soak.check_step(env, stepped, before, maps=True)
-    with pytest.raises(BrokenPromiseError, match="time went from"):
-        soak.check_step(env, stepped, before._replace(time_s=before.time_s + 9.0), maps=False)
-    with pytest.raises(BrokenPromiseError, match="bits gained"):
-        soak.check_step(env, stepped, before._replace(entropy_bits=before.entropy_bits + 1.0), maps=False)
-    with pytest.raises(BrokenPromiseError, match="rewards"):
-        soak.check_step(env, (stepped[0], stepped[1] * np.nan, *stepped[2:]), before, maps=False)
-    with pytest.raises(BrokenPromiseError, match="missions end"):
-        soak.check_step(env, (*stepped[:2], ~stepped[2], *stepped[3:]), before, maps=False)
-    env.missions.mean[1, 0, 2, 3, 4] = 1.5
-    soak.check_step(env, stepped, before, maps=False)
-    with pytest.raises(RecordError, match=r"mean\[1, 0"):
-        soak.check_step(env, stepped, before, maps=True)
-    env.missions.observations[2, 1, 5] = np.nan
-    env.missions.observations[0, 0, 0] = -1.0
-    with pytest.raises(BrokenPromiseError, match="2 numbers of observations"):
-        soak.check_step(env, stepped, before, maps=False)
+    assert row["resident_mib"] > 10.0 and (row["scenario"], row["channel"]) == ("box-7x11x5", 0)
+    assert 3_000 <= soak.robot_steps(row) < 3_600 and soak.robot_steps({"failure": "x"}) == 0
+    more = len(soak.CHANNELS) * len(soak.SCENARIOS) + len(soak.QUICK)
+    row = soak.play_number(more - more % (len(soak.CHANNELS) * len(soak.QUICK)))
+    assert (row["scenario"], row["channel"]) == ("box-7x11x5", 0) and row["cpu_s"] >= 0.2
 
 
 def test_a_few_kills_of_a_trainer(tmp_path, monkeypatch):
