@@ -11,7 +11,8 @@ from entropy_explore_env.compilation.kernels import lean_kernel
 from entropy_explore_env.errors import WorldError
 from entropy_explore_env.missions.localization import keep_in_workspace
 from entropy_explore_env.randomness import Stream, generator
-from entropy_explore_env.robots.localization import correct_estimate, sighting_error, within_half_turn
+from entropy_explore_env.robots.localization import correct_estimate, sighting_error
+from entropy_explore_env.robots.pose_covariance import in_field_of_view
 from entropy_explore_env.robots.range_sensor import body_distance
 from entropy_explore_env.scenario import Scenario
 from entropy_explore_env.worlds.world import World
@@ -116,19 +117,6 @@ def sight_fiducials(localization, params, index, sensor, scene, pose):
 
 
 @lean_kernel
-def in_view(params, turn, tilt):
-    """Whether a direction so many radians beside and below the gaze is in the field of view.
-
-    Args:
-        params: LOCALIZATION_PARAMS of the robot.
-        turn: In radians, of any number of turns; so is `tilt`.
-        tilt: Downwards.
-    """
-    aside, down = abs(within_half_turn(turn)), abs(within_half_turn(tilt))
-    return aside <= params.half_yaw_rad and down <= params.half_pitch_rad
-
-
-@lean_kernel
 def in_sight(params, sensor, scene, pose, away):
     """Whether a scan sights a landmark: in range, in its field of view, nothing before it.
 
@@ -143,12 +131,7 @@ def in_sight(params, sensor, scene, pose, away):
     distance = math.sqrt(x * x + y * y + z * z)
     if distance > params.range_m or distance < max(sensor.min_range_m, _NEAREST_M):
         return False
-    turn = math.atan2(y, x) - pose.yaw
-    pitch = math.atan2(-z, math.sqrt(x * x + y * y))
-    # A view that is tilted past the vertical has the landmark behind it, at a pitch beyond a right angle.
-    if not in_view(params, turn, pitch - pose.pitch) and not in_view(
-        params, turn + math.pi, math.pi - pitch - pose.pitch
-    ):
+    if not in_field_of_view(params, pose.yaw, pose.pitch, away):
         return False
     direction = x / distance, y / distance, z / distance
     line = Line(pose.start, direction, distance / scene.voxel_size_m)

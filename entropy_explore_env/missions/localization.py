@@ -28,8 +28,8 @@ from entropy_explore_env.robots.localization import (
     pack_covariance,
     point_in_world,
     weigh_by_covariance,
-    within_half_turn,
 )
+from entropy_explore_env.robots.pose_covariance import within_half_turn
 from entropy_explore_env.robots.range_sensor import (
     measure_ranges,
     take_scan,

@@ -12,6 +12,14 @@ import math
 
 from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel, record_type
 from entropy_explore_env.randomness import draw_gaussian
+from entropy_explore_env.robots.pose_covariance import (
+    drift_variances,
+    sight_axes,
+    spread_yaw_error,
+    take_in_sighting,
+    turn_between,
+    within_half_turn,
+)
 
 LOCALIZATION_PARAMS = record_type(
     [
@@ -54,10 +62,6 @@ ESTIMATE = record_type(
 
 COVARIANCE_NUMBERS = 10
 """Different numbers of a covariance of four."""
-_NO_DISTANCE_M = 1e-9
-"""What is nearer has no direction, and is taken for this far away."""
-_LEVEL = 1e-9
-"""A direction with a shorter horizontal part is vertical: any horizontal one is sideways to it."""
 
 
 @lean_kernel
@@ -121,15 +125,13 @@ def advance_estimate(estimate, params, place, yaw, driven_m):
     """
     error, covariance = estimate.error, estimate.covariance
     x, y = place[0] - estimate.place[0], place[1] - estimate.place[1]
-    turned = abs((yaw - estimate.yaw + math.pi) % (2.0 * math.pi) - math.pi)
+    turned = turn_between(estimate.yaw, yaw)
     metres = max(driven_m - estimate.driven_m, 0.0)
     along, across = math.cos(error[3]) - 1.0, math.sin(error[3])
     error[0] += along * x - across * y
     error[1] += across * x + along * y
     spread_yaw_error(covariance, -(across * x + (along + 1.0) * y), (along + 1.0) * x - across * y)
-    xy = params.xy_per_m * metres + params.xy_per_rad * turned
-    z = params.z_per_m * metres + params.z_per_rad * turned
-    heading = params.yaw_per_m * metres + params.yaw_per_rad * turned
+    xy, z, heading = drift_variances(params, metres, turned)
     rng = estimate.drift_rng
     add_drift(error, covariance, 0, xy, rng)
     add_drift(error, covariance, 1, xy, rng)
@@ -139,30 +141,6 @@ def advance_estimate(estimate, params, place, yaw, driven_m):
     for axis in range(3):
         estimate.place[axis] = place[axis]
     estimate.yaw, estimate.driven_m = yaw, driven_m
-
-
-@inlined_kernel
-def within_half_turn(angle):
-    """An angle in [-π, π]: itself, if it is, or what is left of it without whole turns."""
-    if abs(angle) <= math.pi:
-        return angle
-    return (angle + math.pi) % (2.0 * math.pi) - math.pi
-
-
-@lean_kernel
-def spread_yaw_error(covariance, to_x, to_y):
-    """F Σ Fᵀ, in place, with F the identity but for ∂x/∂yaw = `to_x` and ∂y/∂yaw = `to_y`."""
-    for column in range(4):
-        by_yaw = covariance[3, column]
-        covariance[0, column] += to_x * by_yaw
-        covariance[1, column] += to_y * by_yaw
-    for row in range(4):
-        by_yaw = covariance[row, 3]
-        covariance[row, 0] += to_x * by_yaw
-        covariance[row, 1] += to_y * by_yaw
-    for row in range(1, 4):
-        for column in range(row):  # equal but for rounding
-            covariance[row, column] = covariance[column, row]
 
 
 @inlined_kernel
@@ -194,30 +172,6 @@ def sighting_error(relative, range_sigma_m, bearing_sigma_rad, rng):
     )
 
 
-@inlined_kernel
-def length(vector):
-    """Of (x, y, z)."""
-    return math.sqrt(vector[0] * vector[0] + vector[1] * vector[1] + vector[2] * vector[2])
-
-
-@inlined_kernel
-def sight_axes(relative):
-    """(ahead, sideways, up, distance): unit vectors at right angles, the first along a line of sight."""
-    x, y, z = relative
-    distance = max(length(relative), _NO_DISTANCE_M)
-    ahead = x / distance, y / distance, z / distance
-    level = math.sqrt(ahead[0] * ahead[0] + ahead[1] * ahead[1])
-    side = (1.0, 0.0, 0.0)
-    if level > _LEVEL:
-        side = -ahead[1] / level, ahead[0] / level, 0.0
-    up = (
-        ahead[1] * side[2] - ahead[2] * side[1],
-        ahead[2] * side[0] - ahead[0] * side[2],
-        ahead[0] * side[1] - ahead[1] * side[0],
-    )
-    return ahead, side, up, distance
-
-
 @lean_kernel
 def correct_estimate(estimate, seen, expected, range_sigma_m, bearing_sigma_rad):
     """Correct an estimate by a sighting of a landmark: the extended Kalman filter of Sujan, eqs. 14-16.
@@ -239,59 +193,11 @@ def correct_estimate(estimate, seen, expected, range_sigma_m, bearing_sigma_rad)
         range_sigma_m: Standard deviation of `seen` along it, > 0.
         bearing_sigma_rad: Of its direction, > 0.
     """
-    ahead, side, up, distance = sight_axes(seen)
-    sigma = max(distance, length(expected)) * bearing_sigma_rad  # noise may have seen it much too near
-    off = seen[0] - expected[0], seen[1] - expected[1], seen[2] - expected[2]
-    none = (0.0, 0.0, 0.0, 0.0)
-    taken = take_in(estimate.covariance, ahead, expected, off, range_sigma_m * range_sigma_m, none)
-    taken = take_in(estimate.covariance, side, expected, off, sigma * sigma, taken)
-    taken = take_in(estimate.covariance, up, expected, off, sigma * sigma, taken)
+    taken = take_in_sighting(estimate.covariance, seen, expected, range_sigma_m, bearing_sigma_rad)
     for number in range(4):
         estimate.error[number] -= taken[number]
     estimate.error[3] = within_half_turn(estimate.error[3])
     estimate.sightings += 1
-
-
-@inlined_kernel
-def take_in(covariance, axis, expected, off, variance, taken):
-    """Take in what a sighting says along one axis.
-
-    Args:
-        covariance: (4, 4) float64, changed in place.
-        axis: Unit vector.
-        expected: As of `correct_estimate`.
-        off: What was seen less what was expected.
-        variance: Of what was seen, along the axis.
-        taken: (x, y, z, yaw), what the axes before have taken from the estimate.
-
-    Returns:
-        The same, with what this axis takes.
-    """
-    h = axis[0], axis[1], axis[2], axis[1] * expected[0] - axis[0] * expected[1]
-    gain_0, gain_1 = dot4(covariance[0], h), dot4(covariance[1], h)
-    gain_2, gain_3 = dot4(covariance[2], h), dot4(covariance[3], h)
-    gains = gain_0, gain_1, gain_2, gain_3
-    spread = max(dot4(gains, h), 0.0) + variance  # below 0: rounding, or a state from outside
-    if not math.isfinite(spread):  # so uncertain that numbers do not hold it
-        return taken
-    surprise = axis[0] * off[0] + axis[1] * off[1] + axis[2] * off[2] - dot4(taken, h)
-    for row in range(4):
-        for column in range(4):
-            covariance[row, column] -= gains[row] * gains[column] / spread
-        covariance[row, row] = max(covariance[row, row], 0.0)
-    step = surprise / spread
-    return (
-        taken[0] + gain_0 * step,
-        taken[1] + gain_1 * step,
-        taken[2] + gain_2 * step,
-        taken[3] + gain_3 * step,
-    )
-
-
-@inlined_kernel
-def dot4(a, b):
-    """The sum of the products of four numbers each."""
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3]
 
 
 @lean_kernel

@@ -74,3 +74,48 @@ def point_covariance(covariance, yaw, seen):
 def merged(one, other):
     """Eq. 21: the covariance of a point that two measurements say something of."""
     return one @ (np.eye(len(one)) - np.linalg.inv(one + other) @ one)
+
+
+def foreseen(covariance, pose, path, viewpoint, every_m, since_m, variances, landmarks, sees, noise):
+    """Σ at the end of a drive: piece by piece from scan to scan, matrices alone (eq. 23's LE is made of it).
+
+    Args:
+        covariance: (4, 4).
+        pose: (5,).
+        path: (N, 3) points.
+        viewpoint: (5,).
+        every_m: Metres between scans under way.
+        since_m: Driven since the latest scan.
+        variances: Of x and y, z, yaw a metre, and the same three a radian.
+        landmarks: (F, 3).
+        sees: place, landmark → whether a scan there sights it.
+        noise: Standard deviations of sightings: along, and of the direction.
+    """
+    points, scans, walked, due = [np.asarray(pose[:3], float)], [], 0.0, every_m - since_m
+    for end in np.asarray(path, float):
+        leg = np.linalg.norm(end - points[-1])
+        while due < walked + leg - 1e-12:
+            scans.append((points[-1] + (end - points[-1]) * (due - walked) / leg, due))
+            due += every_m
+        walked += leg
+        points.append(end)
+    scans.append((points[-1], walked))
+    turn = abs(math.remainder(viewpoint[3] - pose[3], 2.0 * math.pi))
+    at, done = points[0], 0.0
+    for place, metres in scans:
+        carry = np.eye(4)
+        carry[0, 3], carry[1, 3] = -(place - at)[1], (place - at)[0]
+        xy, z, yaw = (
+            variances[i] * (metres - done) + variances[i + 3] * (turn if done == 0.0 else 0.0)
+            for i in range(3)
+        )
+        covariance = carry @ covariance @ carry.T + np.diag([xy, xy, z, yaw])
+        for landmark in landmarks:
+            away = np.asarray(landmark, float) - place
+            if sees(place, landmark):
+                state = np.array([*place, viewpoint[3]])
+                r = turned(-viewpoint[3])
+                seen_noise = r @ sighting_noise(away, *noise, np.linalg.norm(away)) @ r.T
+                _, covariance = corrected(state, covariance, landmark, measured(state, landmark), seen_noise)
+        at, done = place, metres
+    return covariance

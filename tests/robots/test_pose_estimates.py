@@ -20,8 +20,8 @@ from entropy_explore_env.robots.localization import (
     point_in_world,
     sighting_error,
     weigh_by_covariance,
-    within_half_turn,
 )
+from entropy_explore_env.robots.pose_covariance import within_half_turn
 from tests.reference import localization as reference
 from tests.reference.scenes import drawn, seeds
 

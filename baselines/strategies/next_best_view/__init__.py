@@ -3,7 +3,7 @@
 Sujan & Meggiolaro, "Simultaneous Localization and Mapping for Mobile Robot Teams with Visual Sensors". Of m
 poses drawn in known free space (P_occ < 0.05) that a known free path reaches, a robot takes (sect. 3.1)
 
-- `next-best-view`: the one with the best rating RF = (NI - w_d·d)·(1 - P_occ) (eq. 23), method (v);
+- `next-best-view`: the one with the best rating RF = (NI - w_d·d - w_LE·LE)·(1 - P_occ) (eq. 23), method (v);
 - `most-unmapped`: the one that shows the largest unmapped region, method (iii);
 - `least-mapped`: the one that shows the smallest mapped region, method (iv);
 - `random-known`: the first, method (i).
@@ -12,8 +12,9 @@ poses drawn in known free space (P_occ < 0.05) that a known free path reaches, a
 directions there, or (`raster-fixed-yaw`) in one. Teams share their maps, and each robot chooses by itself.
 
 Unknown cells of a plan take the mean occupancy of their neighbours, for `next-best-view` alone, as in the
-paper. A voxel that should have been visible and did not answer loses interest (eq. 9). A robot is taken to
-know where it is, so that the paper's localization error LE is 0.
+paper. A voxel that should have been visible and did not answer loses interest (eq. 9). LE, which the paper
+leaves open, is how much less exact points will be that the robot measures there: what the way adds to the
+covariance of its pose, less what landmarks take back that it should sight on it; 0 where it does not drift.
 
 Ours, where the paper says nothing: poses are drawn uniformly, a new set at each decision; the spacing of
 raster's places; where its latest scan showed no new voxel, methods (iii) and (iv) take a random pose, since
@@ -39,6 +40,7 @@ from baselines.strategies.next_best_view.expected_view import (
     voxels_in_view,
 )
 from baselines.strategies.next_best_view.known_space import KnownSpace, Memory
+from baselines.strategies.next_best_view.localization_error import LocalizationError
 from baselines.strategies.next_best_view.rating import UNCERTAINTY, new_information, pose_distance, rating
 from entropy_explore_env.missions.view import RobotView
 from entropy_explore_env.scenario import Scenario
@@ -61,6 +63,7 @@ class NextBestViewConfig:
         choice: `information`, `most-unmapped`, `least-mapped` or `random`: see the top of the file.
         poses: m, drawn at each decision.
         distance_weight: w_d, bits a metre or radian, against w_NI = 1.
+        error_weight: w_LE, bits a metre of error, likewise.
         measure: New information by eq. 8, `uncertainty`, which the paper thinks better, or by eqs. 6-7,
             `stretched`; `linear` is eq. 8 with q in place of -q log2 q, ours.
         extrapolated: Whether unknown cells of a plan take the mean occupancy of their neighbours; else ½.
@@ -73,6 +76,7 @@ class NextBestViewConfig:
     choice: Choice = "information"
     poses: int = 100
     distance_weight: float = 0.01
+    error_weight: float = 0.0
     measure: Measure = "uncertainty"
     extrapolated: bool = True
     interest_decay: float = 1.0
@@ -83,7 +87,7 @@ class NextBestViewConfig:
         check_choice(self, "measure", Measure)
         check_kind(self, "extrapolated", bool)
         check_count(self, "poses", 1, 100_000)
-        check_within(self, "distance_weight", "interest_decay", least=0.0, most=1e6)
+        check_within(self, "distance_weight", "error_weight", "interest_decay", least=0.0, most=1e6)
 
 
 class NextBestView(KnownSpace):
@@ -104,6 +108,7 @@ class NextBestView(KnownSpace):
             for kind, model in self._models.items()
         }
         longest = max(model.longest_ray for model in self._models.values())
+        self._error: LocalizationError | None = None
         self._view, self._scratch = new_view(voxels), new_scratch(voxels, longest + 1)
 
     def pick(self, view: RobotView, memory: Memory, reachable: np.ndarray) -> np.ndarray | None:
@@ -121,6 +126,7 @@ class NextBestView(KnownSpace):
         if self.config.choice == "information" and self.config.extrapolated:
             known = extrapolated(known, memory.occupancy)
             memory.occupancy = known.occupancy
+        self._error = LocalizationError(view, memory.paths) if self.config.error_weight > 0.0 else None
         best, expected = poses[0], memory.expected
         most = -math.inf
         for pose in poses:
@@ -153,4 +159,6 @@ class NextBestView(KnownSpace):
         linear, most = config.measure == "linear", self._most_in_view[view.kind]
         bits = new_information(self._view.shares, most, weights, linear)
         occupancy = float(known.occupancy[voxel_of(view, pose)])
-        return rating(bits, pose_distance(view.pose, pose), config.distance_weight, occupancy)
+        error_m = 0.0 if self._error is None else self._error.at(pose)
+        costs = config.distance_weight * pose_distance(view.pose, pose) + config.error_weight * error_m
+        return rating(bits, costs, occupancy)

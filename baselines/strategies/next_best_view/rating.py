@@ -41,13 +41,12 @@ def pose_distance(pose: np.ndarray, viewpoint: np.ndarray) -> float:
     return float(np.linalg.norm(apart))
 
 
-def rating(information_bits: float, distance: float, distance_weight: float, occupancy: float) -> float:
-    """RF of eq. 23 with w_NI = 1, for a robot that knows where it is: its w_LE·LE is 0.
+def rating(information_bits: float, costs_bits: float, occupancy: float) -> float:
+    """RF of eq. 23 with w_NI = 1.
 
     Args:
         information_bits: NI.
-        distance: d.
-        distance_weight: w_d, bits a metre or radian.
+        costs_bits: w_d·d + w_LE·LE.
         occupancy: Probability that the place is occupied.
     """
-    return (information_bits - distance_weight * distance) * (1.0 - occupancy)
+    return (information_bits - costs_bits) * (1.0 - occupancy)

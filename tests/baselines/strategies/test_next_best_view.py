@@ -29,8 +29,9 @@ from entropy_explore_env.scenario import with_settings
 from entropy_explore_env.scenarios import find_scenario
 from entropy_explore_env.settings import Grid
 from entropy_explore_env.viewpoints.evaluation import robot_model
+from tests.missions.test_tick import toward
 from tests.reference import rocha04, sujan
-from tests.reference.scenes import drawn, seeds
+from tests.reference.scenes import drawn, seeds, started
 
 SHAPES = [(7, 11, 5), (13, 9, 1)]
 PRIOR = 30.0**-2
@@ -125,9 +126,10 @@ def test_ratings_by_hand():
     turn = 2.0 * math.pi - 6.0
     assert pose_distance(pose, viewpoint) == pytest.approx(math.sqrt(25.0 + turn**2))
     assert pose.tolist() == [1.0, 2.0, 0.5, 3.0, 0.0]
-    assert rating(2.0, 10.0, 0.05, 0.2) == pytest.approx(1.5 * 0.8)
-    by_paper = sujan.rating(2.0, pose, viewpoint, 0.1, 0.04)
-    assert rating(2.0, pose_distance(pose, viewpoint), 0.1, 0.04) == pytest.approx(by_paper)
+    assert rating(2.0, 0.5, 0.2) == pytest.approx(1.5 * 0.8)
+    by_paper = sujan.rating(2.0, pose, viewpoint, 0.1, 0.04, 3.0, -0.2)
+    costs = 0.1 * pose_distance(pose, viewpoint) + 3.0 * -0.2
+    assert rating(2.0, costs, 0.04) == pytest.approx(by_paper)
     shares = np.zeros((2, 20))
     shares[1, 9] = 8.0  # an eighth of the largest view, at p = 0.475: 3 bits of 1/8, almost wholly uncertain
     assert new_information(shares, 64.0, None) == pytest.approx(3.0 / 8.0)
@@ -245,3 +247,40 @@ def test_settings_out_of_range_are_named():
             NextBestViewConfig(**bad)
     with pytest.raises(SettingError, match=r"RasterConfig\.spacing"):
         RasterConfig(spacing=0.0)
+
+
+def drifting_mission(error_weight, drift=0.05):
+    """How unsure of its pose a robot is over 16 decisions in a hall with two landmarks, and its choices."""
+    task = with_settings(
+        scenario_of((25, 21, 1)),
+        {
+            "robots": 1,
+            "robot": {"localization": {"xy_m_per_sqrt_m": drift, "yaw_rad_per_sqrt_m": 0.2 * drift}},
+            "sensor": {"max_range_m": 4.0},
+            "fiducials": {"positions_m": ((0.6, 5.0, 0.25), (12.0, 5.0, 0.25))},
+        },
+    )
+    missions, unsure, chosen = started(task, 3), 0.0, []
+    strategy = NextBestView(NextBestViewConfig(error_weight=error_weight, distance_weight=0.0))
+    strategy.reset(task, np.random.default_rng(4))
+    for _ in range(16):
+        view = view_of(missions, 0, 0)
+        chosen.append(strategy.choose([view])[0])
+        toward(missions, chosen[-1])
+        unsure += float(np.trace(view_of(missions, 0, 0).covariance))
+    return unsure, chosen
+
+
+def test_who_weighs_the_localization_error_knows_its_pose_better():
+    careless, careful = drifting_mission(0.0)[0], drifting_mission(50.0)[0]
+    assert 0.0 < careful < 0.7 * careless
+
+
+def test_exact_robots_have_no_localization_error():
+    chosen = [drifting_mission(weight, drift=0.0)[1] for weight in (0.0, 50.0)]
+    assert (np.array(chosen[0]) == np.array(chosen[1])).all()
+
+
+def test_a_weight_of_the_localization_error_below_0_is_refused():
+    with pytest.raises(SettingError, match=r"error_weight.*-0\.1"):
+        NextBestViewConfig(error_weight=-0.1)

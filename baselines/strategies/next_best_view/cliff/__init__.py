@@ -321,7 +321,7 @@ class CliffMapping:
         scaled, bits = self._in_edges(poses), np.empty(config.poses)
         fill_new_information(ground, camera, float(config.most_measurements), scaled, bits)
         worth = [
-            rating(new, pose_distance(view.pose, pose), config.distance_weight, 0.0)
+            rating(new, config.distance_weight * pose_distance(view.pose, pose), 0.0)
             for new, pose in zip(bits.tolist(), poses, strict=True)
         ]
         best = int(np.argmax(worth))

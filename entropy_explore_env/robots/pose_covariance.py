@@ -1,0 +1,184 @@
+"""The covariance of a pose (x, y, z, yaw): what motion does to it, what sightings of landmarks take from it.
+
+Map frame, metres, radians. What covariances become does not depend on what a sighting measures, so that a
+robot can tell beforehand how well it will know its pose.
+"""
+
+from __future__ import annotations
+
+import math
+
+from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel
+
+_NO_DISTANCE_M = 1e-9
+"""What is nearer has no direction, and is taken for this far away."""
+_LEVEL = 1e-9
+"""A direction with a shorter horizontal part is vertical: any horizontal one is sideways to it."""
+
+
+@inlined_kernel
+def within_half_turn(angle):
+    """An angle in [-π, π]: itself, if it is, or what is left of it without whole turns."""
+    if abs(angle) <= math.pi:
+        return angle
+    return (angle + math.pi) % (2.0 * math.pi) - math.pi
+
+
+@lean_kernel
+def spread_yaw_error(covariance, to_x, to_y):
+    """F Σ Fᵀ, in place, with F the identity but for ∂x/∂yaw = `to_x` and ∂y/∂yaw = `to_y`."""
+    for column in range(4):
+        by_yaw = covariance[3, column]
+        covariance[0, column] += to_x * by_yaw
+        covariance[1, column] += to_y * by_yaw
+    for row in range(4):
+        by_yaw = covariance[row, 3]
+        covariance[row, 0] += to_x * by_yaw
+        covariance[row, 1] += to_y * by_yaw
+    for row in range(1, 4):
+        for column in range(row):  # equal but for rounding
+            covariance[row, column] = covariance[column, row]
+
+
+@inlined_kernel
+def drift_variances(params, metres, turned):
+    """(of x and of y, of z, of the yaw): the variances that a piece of a drive adds.
+
+    Args:
+        params: LOCALIZATION_PARAMS.
+        metres: Driven, ≥ 0.
+        turned: Radians, ≥ 0.
+    """
+    return (
+        params.xy_per_m * metres + params.xy_per_rad * turned,
+        params.z_per_m * metres + params.z_per_rad * turned,
+        params.yaw_per_m * metres + params.yaw_per_rad * turned,
+    )
+
+
+@inlined_kernel
+def turn_between(yaw, other):
+    """Radians of the shortest turn from one yaw to another, ≥ 0."""
+    return abs((other - yaw + math.pi) % (2.0 * math.pi) - math.pi)
+
+
+@lean_kernel
+def in_field_of_view(params, yaw, pitch, away):
+    """Whether a landmark is in the field of view of a gaze.
+
+    Args:
+        params: LOCALIZATION_PARAMS of the robot.
+        yaw: Of the gaze.
+        pitch: Downwards.
+        away: (x, y, z), from the robot to the landmark.
+    """
+    x, y, z = away
+    turn = math.atan2(y, x) - yaw
+    down = math.atan2(-z, math.sqrt(x * x + y * y))
+    # A view that is tilted past the vertical has the landmark behind it, at a pitch beyond a right angle.
+    return within_half_view(params, turn, down - pitch) or within_half_view(
+        params, turn + math.pi, math.pi - down - pitch
+    )
+
+
+@lean_kernel
+def within_half_view(params, turn, tilt):
+    """Whether a direction so many radians beside and below the gaze is in the field of view.
+
+    Args:
+        params: LOCALIZATION_PARAMS of the robot.
+        turn: In radians, of any number of turns; so is `tilt`.
+        tilt: Downwards.
+    """
+    aside, down = abs(within_half_turn(turn)), abs(within_half_turn(tilt))
+    return aside <= params.half_yaw_rad and down <= params.half_pitch_rad
+
+
+@inlined_kernel
+def length(vector):
+    """Of (x, y, z)."""
+    return math.sqrt(vector[0] * vector[0] + vector[1] * vector[1] + vector[2] * vector[2])
+
+
+@inlined_kernel
+def sight_axes(relative):
+    """(ahead, sideways, up, distance): unit vectors at right angles, the first along a line of sight."""
+    x, y, z = relative
+    distance = max(length(relative), _NO_DISTANCE_M)
+    ahead = x / distance, y / distance, z / distance
+    level = math.sqrt(ahead[0] * ahead[0] + ahead[1] * ahead[1])
+    side = (1.0, 0.0, 0.0)
+    if level > _LEVEL:
+        side = -ahead[1] / level, ahead[0] / level, 0.0
+    up = (
+        ahead[1] * side[2] - ahead[2] * side[1],
+        ahead[2] * side[0] - ahead[0] * side[2],
+        ahead[0] * side[1] - ahead[1] * side[0],
+    )
+    return ahead, side, up, distance
+
+
+@inlined_kernel
+def take_in(covariance, axis, expected, off, variance, taken):
+    """Take in what a sighting says along one axis.
+
+    Args:
+        covariance: (4, 4) float64, changed in place.
+        axis: Unit vector.
+        expected: As of `take_in_sighting`.
+        off: What was seen less what was expected.
+        variance: Of what was seen, along the axis.
+        taken: (x, y, z, yaw), what the axes before have taken from the estimate.
+
+    Returns:
+        The same, with what this axis takes.
+    """
+    h = axis[0], axis[1], axis[2], axis[1] * expected[0] - axis[0] * expected[1]
+    gain_0, gain_1 = dot4(covariance[0], h), dot4(covariance[1], h)
+    gain_2, gain_3 = dot4(covariance[2], h), dot4(covariance[3], h)
+    gains = gain_0, gain_1, gain_2, gain_3
+    spread = max(dot4(gains, h), 0.0) + variance  # below 0: rounding, or a state from outside
+    if not math.isfinite(spread):  # so uncertain that numbers do not hold it
+        return taken
+    surprise = axis[0] * off[0] + axis[1] * off[1] + axis[2] * off[2] - dot4(taken, h)
+    for row in range(4):
+        for column in range(4):
+            covariance[row, column] -= gains[row] * gains[column] / spread
+        covariance[row, row] = max(covariance[row, row], 0.0)
+    step = surprise / spread
+    return (
+        taken[0] + gain_0 * step,
+        taken[1] + gain_1 * step,
+        taken[2] + gain_2 * step,
+        taken[3] + gain_3 * step,
+    )
+
+
+@inlined_kernel
+def dot4(a, b):
+    """The sum of the products of four numbers each."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3]
+
+
+@lean_kernel
+def take_in_sighting(covariance, seen, expected, range_sigma_m, bearing_sigma_rad):
+    """Take in a sighting of a landmark: three numbers, along the line of sight, sideways and up (eq. 16).
+
+    Args:
+        covariance: (4, 4) float64, changed in place.
+        seen: (x, y, z), from the robot to the landmark as measured, turned by the yaw that it believes.
+        expected: (x, y, z), from where the robot believes to be to where the landmark is; the same as `seen`
+            before the sighting is made.
+        range_sigma_m: Standard deviation of `seen` along it, > 0.
+        bearing_sigma_rad: Of its direction, > 0.
+
+    Returns:
+        (x, y, z, yaw), what the sighting takes from the estimate.
+    """
+    ahead, side, up, distance = sight_axes(seen)
+    sigma = max(distance, length(expected)) * bearing_sigma_rad  # noise may have seen it much too near
+    off = seen[0] - expected[0], seen[1] - expected[1], seen[2] - expected[2]
+    none = (0.0, 0.0, 0.0, 0.0)
+    taken = take_in(covariance, ahead, expected, off, range_sigma_m * range_sigma_m, none)
+    taken = take_in(covariance, side, expected, off, sigma * sigma, taken)
+    return take_in(covariance, up, expected, off, sigma * sigma, taken)
