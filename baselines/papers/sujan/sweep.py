@@ -73,7 +73,7 @@ def experiment(starts: int, changes: bool) -> list[Cell]:
 
 
 def _cell(robots: int, method: str, strategy: str, starts: int, run: Run) -> Cell:
-    return Cell(cell_id(robots, method), scenario_of(robots), strategy, starts, run, _in_the_middle(robots))
+    return Cell(cell_id(robots, method), scenario_of(robots), strategy, starts, run, in_the_middle(robots))
 
 
 def scenario_of(robots: int) -> Scenario:
@@ -93,7 +93,7 @@ def scenario_of(robots: int) -> Scenario:
     return with_settings(OCCLUSIONS, settings)
 
 
-def _in_the_middle(robots: int) -> Surroundings:
+def in_the_middle(robots: int) -> Surroundings:
     """All missions start in the middle; two robots a metre apart."""
     middle = [0.5 * size for size in OCCLUSIONS.grid.size_m]
     places = [[middle[0] + robot - 0.5 * (robots - 1), *middle[1:], 0.0, 0.0] for robot in range(robots)]

@@ -1,0 +1,79 @@
+"""`python -m baselines.papers.sujan.localization`: errors over the way, claims, report."""
+
+from __future__ import annotations
+
+import json
+import math
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from baselines.cli.arguments import run_command
+from baselines.papers.sujan.localization import __main__ as localization
+from baselines.papers.sujan.localization.claims import all_claims, errors_by_way, rms_error_m, time_to_map
+from baselines.papers.sujan.localization.sweep import drifting, experiment, in_world
+
+
+def record_of(error_m, wrong=0.02):
+    """A mission of three scans, the second after 100 m, the last after 400 m."""
+    return {
+        "error_m": [0.0, error_m, error_m],
+        "driven_m_by_scan": [0.0, 100.0, 400.0],
+        "time_s": [1.0, 110.0, 420.0],
+        "mapped": [0.1, 0.2, 0.5],
+        "wrong": [0.0, 0.5, wrong],
+    }
+
+
+def test_errors_over_the_way_by_hand():
+    records = {"a": [record_of(2.0), record_of(0.4)]}
+    errors = errors_by_way(records, "a")
+    assert errors.shape == (2, 31)
+    assert errors[0, [0, 5, 10, 30]].tolist() == [0.0, 1.0, 2.0, 2.0]
+    squares = sum((0.2 * step) ** 2 for step in range(10)) + 21 * 4.0
+    assert rms_error_m(records, "a")[0] == pytest.approx(math.sqrt(squares / 31))
+    assert time_to_map(records, "a", 0.2).tolist() == [110.0, 110.0]
+    assert time_to_map(records, "a", 0.9).tolist() == [420.0, 420.0]
+
+
+def test_as_many_fiducials_are_drawn_as_are_to_be_within_reach():
+    assert (
+        in_world(1, "near") == 57 and in_world(10, "far") == 141
+    )  # 10⁴ m² over π 7.5², ten times over π 15²
+    task = drifting(3, "near", 20)
+    assert task.fiducials.number == 170 and task.fiducials.range_m == 7.5 and task.ending.max_cycles == 20
+    assert task.drifts and drifting(0, "far", 20).fiducials.number == 0
+
+
+def test_claims_by_hand():
+    cells = {cell.id: cell for cell in experiment(2)}
+    assert len(cells) == 13
+    records = {name: [record_of(1.0), record_of(1.1)] for name in cells}
+    records["fiducials-10-near"] = [record_of(0.5), record_of(0.5)]
+    records["fiducials-3-far-weight-0.3"] = [record_of(1.0, 0.01), record_of(1.0, 0.01)]
+    claims = {claim.id: claim for claim in all_claims(records)}
+    assert len(claims) == 15
+    assert {name for name, claim in claims.items() if claim.holds} == {
+        "number-near-10",
+        "near-10",
+        "weight-3-0.3",
+    }
+    assert claims["near-10"].ours == pytest.approx(1.0 / 2.1)
+    assert claims["weight-3-0.3"].ours == pytest.approx(0.5)
+
+
+def test_the_command_writes_its_page(tmp_path, capsys, monkeypatch):
+    words = ["--worlds", "1", "--scans", "3", "--jobs", "1", "--json"]
+    folders = ["--out", str(tmp_path), "--runs", str(tmp_path / "r")]
+    monkeypatch.setattr("sys.argv", ["sujan.localization", *words, *folders])
+    assert run_command(localization.main) == 0
+    assert len(json.loads(capsys.readouterr().out)["claims"]) == 15
+    page = (tmp_path / "sujan-localization.md").read_text()
+    assert "python -m baselines.papers.sujan.localization --worlds 1 --scans 3" in page
+    with Image.open(tmp_path / "sujan-localization" / "figure-19.png") as picture:
+        assert picture.width > 800
+    (file,) = (tmp_path / "r" / "fiducials-10-near").glob("*.json")
+    record = json.loads(file.read_text())["record"]
+    assert len(record["error_m"]) == record["scans"] == 3
+    assert np.all(np.diff(record["driven_m_by_scan"]) >= 0.0) and np.all(np.diff(record["mapped"]) >= 0.0)
