@@ -27,7 +27,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from baselines.cli.arguments import Positional, parse, run_command
-from benchmarks.reliability.quick_tests import LIMIT, PASSED
+from benchmarks.reliability.quick_tests import LIMIT, TOLD, names_of, told_in
 from entropy_explore_env.errors import SettingError
 
 SURVIVED = 1
@@ -263,9 +263,9 @@ def _copy(root: Path, folder: Path) -> None:
 
 def _quick_tests(folder: Path, tests: Sequence[str], test_s: float) -> list[str]:
     """Names of the tests that pass with interpreted kernels within so many seconds each."""
-    passed = folder / "passed.txt"
-    _pytest(folder, tests, {LIMIT: str(test_s), PASSED: str(passed)}, None)
-    return passed.read_text("utf-8").splitlines()
+    told = folder / "told.txt"
+    _pytest(folder, tests, {LIMIT: str(test_s), TOLD: str(told)}, None)
+    return names_of(told_in(told))
 
 
 def _found(folder: Path, tests: Sequence[str], limit_s: float) -> str:

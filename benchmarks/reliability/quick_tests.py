@@ -1,20 +1,32 @@
-"""A plugin of pytest for interpreted kernels: a clock for each test, and a list of those that passed.
+"""A plugin of pytest for interpreted kernels: a clock for each test, and a list of what became of them.
 
-A test that takes longer than QUICK_TEST_S of the processor fails, whatever it waits for. Names of tests that
-pass are appended to the file QUICK_TESTS_PASSED, where that is set: the quickest can be run again.
+A test that takes longer than QUICK_TEST_S of the processor fails, whatever it waits for. The outcome of each
+test, its seconds and its name are appended to the file QUICK_TESTS_TOLD, where that is set: the quickest can
+be run again. Where coverage is measured, it is told which test runs.
 """
 
 from __future__ import annotations
 
 import os
 import signal
-from collections.abc import Generator
+import time
+from collections.abc import Generator, Sequence
 from pathlib import Path
 from types import FrameType
+from typing import NamedTuple
 
 import pytest
 
-LIMIT, PASSED = "QUICK_TEST_S", "QUICK_TESTS_PASSED"
+LIMIT, TOLD = "QUICK_TEST_S", "QUICK_TESTS_TOLD"
+
+
+class Told(NamedTuple):
+    """What became of a test."""
+
+    name: str
+    passed: bool
+    seconds: float
+    """Of the processor."""
 
 
 class TooSlowError(BaseException):
@@ -27,21 +39,58 @@ def _ring(number: int, frame: FrameType | None) -> None:
 
 
 @pytest.hookimpl(wrapper=True)
+def pytest_runtest_protocol(item: pytest.Item) -> Generator[None, object, object]:
+    """Tell coverage which test begins, where it is measured."""
+    measuring = _measuring()
+    if measuring is not None:
+        measuring.switch_context(item.nodeid)  # type: ignore[attr-defined]
+    try:
+        return (yield)
+    finally:
+        if measuring is not None:
+            measuring.switch_context("")  # type: ignore[attr-defined]
+
+
+def _measuring() -> object | None:
+    """The coverage that is being measured, if any."""
+    try:
+        from coverage import Coverage
+    except ImportError:
+        return None
+    return Coverage.current()
+
+
+@pytest.hookimpl(wrapper=True)
 def pytest_runtest_call(item: pytest.Item) -> Generator[None, object, object]:
     """Run a test under the clock."""
-    del item
     before = signal.signal(signal.SIGPROF, _ring)
     signal.setitimer(signal.ITIMER_PROF, float(os.environ.get(LIMIT, "60")))
+    begun_s = time.process_time()
     try:
         return (yield)
     finally:
         signal.setitimer(signal.ITIMER_PROF, 0.0)
         signal.signal(signal.SIGPROF, before)
+        item.user_properties.append(("seconds", time.process_time() - begun_s))
 
 
 def pytest_runtest_logreport(report: pytest.TestReport) -> None:
-    """Note a test that passed."""
-    file = os.environ.get(PASSED)
-    if file and report.when == "call" and report.passed:
-        with Path(file).open("a", encoding="utf-8") as passed:
-            passed.write(f"{report.nodeid}\n")
+    """Note what became of a test."""
+    file = os.environ.get(TOLD)
+    if file and report.when == "call":
+        seconds = dict(report.user_properties).get("seconds", 0.0)
+        with Path(file).open("a", encoding="utf-8") as told:
+            told.write(f"{report.outcome}\t{seconds:.4f}\t{report.nodeid}\n")
+
+
+def told_in(file: Path) -> list[Told]:
+    """What is told in a file."""
+    if not file.exists():
+        return []
+    lines = (line.split("\t", 2) for line in file.read_text("utf-8").splitlines())
+    return [Told(name, outcome == "passed", float(seconds)) for outcome, seconds, name in lines]
+
+
+def names_of(tests: Sequence[Told]) -> list[str]:
+    """Of those that passed."""
+    return [test.name for test in tests if test.passed]

@@ -21,7 +21,7 @@ from entropy_explore_env.scenarios import SCENARIOS
 
 ROBOT_STEPS = 100_000_000
 """Asked for in all."""
-FLOOR = 50_000
+FLOOR = 20_000
 """Robot-steps of every scenario over every channel."""
 CASE_S = 10.0
 """Of the processor, for the steps of a case beyond the floor."""

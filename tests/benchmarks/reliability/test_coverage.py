@@ -1,4 +1,4 @@
-"""Branches that tests take: a row a file, and folders that there are not are refused."""
+"""Branches that tests take: files of tests one by one, a row a source file, named errors."""
 
 from __future__ import annotations
 
@@ -7,11 +7,18 @@ import json
 import pytest
 
 from benchmarks.reliability import coverage
+from benchmarks.reliability.quick_tests import Told, told_in
 from entropy_explore_env.errors import SettingError
 
 
 def summary(branches, covered):
-    return {"summary": {"num_branches": branches, "covered_branches": covered}}
+    counts = {"num_branches": branches, "covered_branches": covered}
+    return {"summary": counts, "missing_branches": [[3, 7]] if covered < branches else []}
+
+
+def row(name, covered, files=2):
+    path = f"entropy_explore_env/{name}.py"
+    return {"path": path, "branches": 4, "covered": covered, "files": files, "of_files": 2}
 
 
 def test_rows_of_other_folders_stay_and_files_without_branches_are_left_out(tmp_path, monkeypatch, capsys):
@@ -19,18 +26,55 @@ def test_rows_of_other_folders_stay_and_files_without_branches_are_left_out(tmp_
         "files": {
             "entropy_explore_env/belief/b.py": summary(4, 3),
             "entropy_explore_env/belief/a.py": summary(0, 0),
+            "entropy_explore_env/robots/x.py": summary(4, 0),
         }
     }
-    monkeypatch.setattr(coverage, "measured", lambda folders, test_s: coverage.rows_of(report))
-    kept = tmp_path / "coverage.jsonl"
-    rows = [
-        {"path": f"entropy_explore_env/{name}/x.py", "branches": 2, "covered": 1}
-        for name in ("belief", "robots")
-    ]
-    kept.write_text("".join(json.dumps(row) + "\n" for row in rows))
-    assert coverage.main(["--folders", "belief", "--out", str(kept)]) == 0
-    found = [json.loads(line) for line in kept.read_text().splitlines()]
-    assert found == [rows[1], {"path": "entropy_explore_env/belief/b.py", "branches": 4, "covered": 3}]
-    assert "belief/b.py: 3 of 4" in capsys.readouterr().out
+    monkeypatch.setattr(coverage, "test_files", lambda root, folders: ["tests/a.py", "tests/b.py"])
+    monkeypatch.setattr(coverage, "measure", lambda file, kept, test_s: touch(coverage.data_of(file, kept)))
+    monkeypatch.setattr(coverage, "report_of", lambda data: report)
+    out, where = tmp_path / "coverage.jsonl", ["--kept", str(tmp_path / "kept")]
+    rows = [row("belief/x", 1), row("robots/x", 1)]
+    out.write_text("".join(json.dumps(each) + "\n" for each in rows))
+    words = ["--folders", "belief", "--out", str(out), *where]
+    assert coverage.main([*words, "--missing"]) == 0
+    assert [json.loads(line) for line in out.read_text().splitlines()] == [rows[1], row("belief/b", 3)]
+    said = capsys.readouterr().out
+    assert "belief/b.py: 3 of 4" in said and "belief/b.py:3 -> 7" in said and "2 of 2 files" in said
+    assert coverage.main([*words, "--kept", str(tmp_path / "none"), "--limit-s", "0"]) == 0
+    assert json.loads(out.read_text().splitlines()[-1]) == row("belief/b", 3, files=0)
     with pytest.raises(SettingError, match="one of belief, robots"):
         coverage.main(["--folders", "worlds"])
+
+
+def touch(path):
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.touch()
+
+
+def test_a_file_of_tests_is_measured_once_with_the_names_of_its_tests(tmp_path):
+    file = "tests/belief/paths/test_bucket_queue.py"
+    coverage.measure(file, tmp_path, 10.0)
+    data = coverage.data_of(file, tmp_path)
+    told = told_in(data.with_suffix(".tests"))
+    assert told and all(test.name.startswith(f"{file}::test_") and test.seconds < 10.0 for test in told)
+    rows = {each["path"]: each for each in coverage.rows_of(coverage.report_of([data]))}
+    queue = rows["entropy_explore_env/belief/paths/bucket_queue.py"]
+    assert 0 < queue["covered"] <= queue["branches"]
+    before = data.stat()
+    coverage.measure(file, tmp_path, 10.0)
+    assert data.stat() == before
+
+
+def test_what_is_told_of_tests_is_read_back(tmp_path):
+    (tmp_path / "told").write_text("passed\t0.25\ta::b[c\td]\nfailed\t1.5\ta::e\n")
+    assert told_in(tmp_path / "told") == [Told("a::b[c\td]", True, 0.25), Told("a::e", False, 1.5)]
+    assert told_in(tmp_path / "none") == []
+
+
+def test_other_sources_are_measured_anew(tmp_path):
+    (tmp_path / "entropy_explore_env" / "belief").mkdir(parents=True)
+    source = tmp_path / "entropy_explore_env" / "belief" / "a.py"
+    source.write_text("1")
+    before = coverage.sources_digest(tmp_path)
+    source.write_text("2")
+    assert coverage.sources_digest(tmp_path) != before and len(before) == 12
