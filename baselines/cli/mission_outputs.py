@@ -183,7 +183,7 @@ class MissionLog:
 
     def _write_folder(self, folder: Path, figures: dict[str, Any]) -> list[Path]:
         """The figures with their series, and the picture of curves and maps."""
-        from baselines.cli.figures import mission_picture
+        from baselines.cli.mission_picture import mission_picture
 
         recorder = self.recorder
         rows = recorder.sampled_moments(_SERIES_POINTS)

@@ -6,6 +6,7 @@ Pixels; a point is (x, y), x to the right, y down. `unit` is the size of a pictu
 
 from __future__ import annotations
 
+import enum
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,6 +17,7 @@ from entropy_explore_env.reports.colours import (
     COLOURS,
     FAINT,
     INK,
+    PAPER,
     ROBOT_COLOURS,
     UNKNOWN_COLOUR,
     Colour,
@@ -30,6 +32,15 @@ MARK_RADIUS = 4
 """Of the marks of robots and viewpoints, in units."""
 _SWATCH = 8
 """Height of a colour key, in units."""
+
+
+class Mark(enum.Enum):
+    """What a picture marks beside robots; the value is what its legend says."""
+
+    VIEWPOINT = "chosen viewpoint"
+    ESTIMATE = "pose estimate, 2 sigma"
+    TRUE_PLACE = "where it truly is"
+    FIDUCIAL = "fiducial"
 
 
 @dataclass(frozen=True)
@@ -91,6 +102,37 @@ def draw_cross(draw: ImageDraw.ImageDraw, centre: tuple[float, float], unit: int
     arm = (MARK_RADIUS + 3) * unit
     for side in (-1, 1):
         draw.line((x - arm, y - side * arm, x + arm, y + side * arm), INK, 2 * unit)
+
+
+def draw_edged_line(
+    draw: ImageDraw.ImageDraw, points: np.ndarray, width: int, colour: Colour | None = None
+) -> None:
+    """A line with dark edges through (N, 2) points, for any background; without a colour, all of it dark."""
+    corners = points.ravel().tolist()
+    draw.line(corners, INK, width + 2)
+    if colour is not None:
+        draw.line(corners, colour, width)
+
+
+def draw_diamond(
+    draw: ImageDraw.ImageDraw, centre: tuple[float, float], unit: int, colour: Colour | None = None
+) -> None:
+    """The mark of where a robot truly is that does not know it: light, with an edge of its colour."""
+    for radius, fill in ((MARK_RADIUS * unit + 1, INK), (MARK_RADIUS * unit, colour or INK)):
+        draw.polygon(_corners(centre, radius, 4), fill)
+    draw.polygon(_corners(centre, (MARK_RADIUS - 2) * unit, 4), PAPER)
+
+
+def draw_triangle(draw: ImageDraw.ImageDraw, centre: tuple[float, float], unit: int) -> None:
+    """The mark of a fiducial: a light triangle with a dark edge."""
+    draw.polygon(_corners(centre, (MARK_RADIUS + 1) * unit, 3), INK)
+    draw.polygon(_corners(centre, (MARK_RADIUS - 1) * unit, 3), PAPER)
+
+
+def _corners(centre: tuple[float, float], radius: float, number: int) -> list[tuple[float, float]]:
+    """Corners of a regular polygon that stands on a corner or, with three of them, on a side."""
+    angles = 2.0 * np.pi * np.arange(number) / number - np.pi / 2.0
+    return [(centre[0] + radius * np.cos(angle), centre[1] + radius * np.sin(angle)) for angle in angles]
 
 
 def _around(centre: tuple[float, float], radius: float) -> tuple[float, float, float, float]:
@@ -159,13 +201,13 @@ def _round_length(most: float) -> float:
     return float(max(step * decade for step in (1, 2, 5) if step * decade <= most * (1 + 1e-9)))
 
 
-def legend_rows(robots: int) -> int:
-    """Lines of the legend that name robots."""
-    return (min(robots, len(ROBOT_COLOURS)) + 1) // 2
+def legend_rows(robots: int, marks: tuple[Mark, ...]) -> int:
+    """Lines of the legend: two robots each, and one for each mark."""
+    return (min(robots, len(ROBOT_COLOURS)) + 1) // 2 + len(marks)
 
 
-def draw_legend(draw: ImageDraw.ImageDraw, box: Box, robots: int, unit: int) -> None:
-    """The colours of the robots, two in a row, and the mark of a chosen viewpoint."""
+def draw_legend(draw: ImageDraw.ImageDraw, box: Box, robots: int, marks: tuple[Mark, ...], unit: int) -> None:
+    """The colours of the robots, two in a row, and what the marks mean."""
     shown, inset = min(robots, len(ROBOT_COLOURS)), (MARK_RADIUS + 1) * unit
     for robot in range(shown):
         left = box.left + robot % 2 * box.width // 2
@@ -173,9 +215,23 @@ def draw_legend(draw: ImageDraw.ImageDraw, box: Box, robots: int, unit: int) -> 
         draw_disc(draw, (left + inset, middle), MARK_RADIUS * unit, robot_colour(robot))
         more = ", …" if robot + shown < robots else ""
         write(draw, (left + 2 * inset + 4 * unit, middle), f"robot {robot}{more}", TEXT_SIZE * unit, "lm")
-    middle = box.top + (legend_rows(robots) + 0.5) * LINE_HEIGHT * unit
-    draw_ring(draw, (box.left + inset, middle), unit)
-    write(draw, (box.left + 2 * inset + 4 * unit, middle), "chosen viewpoint", TEXT_SIZE * unit, "lm")
+    for row, mark in enumerate(marks, start=legend_rows(robots, ())):
+        place = box.left + inset, box.top + (row + 0.5) * LINE_HEIGHT * unit
+        _draw_mark(draw, mark, place, unit)
+        write(draw, (box.left + 2 * inset + 4 * unit, place[1]), mark.value, TEXT_SIZE * unit, "lm")
+
+
+def _draw_mark(draw: ImageDraw.ImageDraw, mark: Mark, place: tuple[float, float], unit: int) -> None:
+    """A mark as the legend shows it."""
+    if mark is Mark.VIEWPOINT:
+        draw_ring(draw, place, unit)
+    elif mark is Mark.TRUE_PLACE:
+        draw_diamond(draw, place, unit)
+    elif mark is Mark.FIDUCIAL:
+        draw_triangle(draw, place, unit)
+    else:
+        x, y, wide, high = *place, (MARK_RADIUS + 1) * unit, (MARK_RADIUS - 1) * unit
+        draw.ellipse((x - wide, y - high, x + wide, y + high), outline=INK, width=2 * unit)
 
 
 def draw_axes(draw: ImageDraw.ImageDraw, box: Box, unit: int) -> None:

@@ -14,6 +14,7 @@ from entropy_explore_env.reports.annotations import (
     LINE_HEIGHT,
     TEXT_SIZE,
     Box,
+    Mark,
     draw_axes,
     draw_key,
     draw_legend,
@@ -98,7 +99,13 @@ class _Arrangement:
 
 @lru_cache(maxsize=16)
 def lay_out(
-    shape: tuple[int, int, int], voxel_size_m: float, robots: int, lines: int, width: int, height: int
+    shape: tuple[int, int, int],
+    voxel_size_m: float,
+    robots: int,
+    marks: tuple[Mark, ...],
+    lines: int,
+    width: int,
+    height: int,
 ) -> PageLayout:
     """Arrange maps, curves, legend and status, and draw what does not change.
 
@@ -106,19 +113,21 @@ def lay_out(
         shape: Voxels (X, Y, Z).
         voxel_size_m: Edge of a voxel.
         robots: Team size A.
+        marks: What the legend explains beside the robots.
         lines: Number of status lines.
         width: Of the picture in pixels.
         height: Of the picture in pixels.
     """
     unit = max(1, min(width // 560, height // 420))
-    text_rows = lines + legend_rows(robots) + 2
+    named = legend_rows(robots, marks)
+    text_rows = lines + named + 1
     below = max(_BELOW, text_rows * LINE_HEIGHT) * unit
     choices = [
         _arranged(shape, width, height, unit, *columns_and_panel)
         for columns_and_panel in ((2, 0), (2, below), (1, below))
     ]
     best = max(choices, key=lambda choice: choice.scale)
-    status, legend, curves = _panel_boxes(best.panel, robots, lines, unit)
+    status, legend, curves = _panel_boxes(best.panel, named, lines, unit)
     page = Image.new("RGB", (width, height), PAPER)
     draw = ImageDraw.Draw(page)
     for view in best.views:
@@ -127,7 +136,7 @@ def lay_out(
     for quantity in ("entropy", "coverage"):
         lowest = [view for view in best.views if view.quantity == quantity][-1]
         draw_key(page, quantity, lowest, unit, best.scale / voxel_size_m if quantity == "entropy" else None)
-    draw_legend(draw, legend, robots, unit)
+    draw_legend(draw, legend, robots, marks, unit)
     draw_axes(draw, curves, unit)
     return PageLayout(unit, best.views, curves, status, page)
 
@@ -181,13 +190,13 @@ def _arranged(
     return _Arrangement(scale, tuple(views), panel)
 
 
-def _panel_boxes(panel: Box, robots: int, lines: int, unit: int) -> tuple[Box, Box, Box]:
-    """Status, legend and the axes of the curves within the side panel."""
+def _panel_boxes(panel: Box, named: int, lines: int, unit: int) -> tuple[Box, Box, Box]:
+    """Status, legend of so many lines and the axes of the curves within the side panel."""
     narrow = panel.width < 1.6 * panel.height
     column = panel.width if narrow else _SIDE * unit
     status = Box(panel.left, panel.top, column, lines * LINE_HEIGHT * unit)
     legend_top = status.bottom + (_GAP * unit if lines else 0)
-    legend = Box(panel.left, legend_top, column, (legend_rows(robots) + 1) * LINE_HEIGHT * unit)
+    legend = Box(panel.left, legend_top, column, named * LINE_HEIGHT * unit)
     left, top = panel.left, legend.bottom + 2 * _GAP * unit
     if not narrow:
         left, top = panel.left + column + 2 * _GAP * unit, panel.top

@@ -150,6 +150,7 @@ class Painter:
             stopped=tuple(np.flatnonzero(stopped).tolist()),
             covariances_m2=estimates["covariance"][:, :3, :3],
             true_m=poses_now(missions, self._number)[:, :3] if drifts else np.zeros((0, 3)),
+            fiducials_m=missions.state.fiducials[self._number],
         )
         return draw_frame(frame)
 

@@ -18,9 +18,13 @@ from entropy_explore_env.reports.annotations import (
     MARK_RADIUS,
     TEXT_SIZE,
     Box,
+    Mark,
     draw_cross,
+    draw_diamond,
     draw_disc,
+    draw_edged_line,
     draw_ring,
+    draw_triangle,
     write,
 )
 from entropy_explore_env.reports.colours import COLOURS, INK, UNKNOWN_LEVEL, robot_colour
@@ -61,6 +65,7 @@ class Frame:
         covariances_m2: (A, 3, 3), of positions that are estimates: an ellipse of two standard deviations is
             drawn around each; (0, 3, 3) = none are.
         true_m: (A, 3), where the robots truly are then: a line leads there; (0, 3) = none is drawn.
+        fiducials_m: (F, 3), landmarks.
     """
 
     entropy_share: np.ndarray
@@ -78,6 +83,7 @@ class Frame:
     stopped: tuple[int, ...] = ()
     covariances_m2: np.ndarray = field(default_factory=lambda: np.zeros((0, 3, 3)))
     true_m: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
+    fiducials_m: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
 
     def __post_init__(self) -> None:
         """Check that the arrays fit each other."""
@@ -90,6 +96,7 @@ class Frame:
             "positions_m": (robots, 3),
             "gazes_rad": (robots, 2),
             "targets_m": (robots, 3),
+            "fiducials_m": (len(self.fiducials_m), 3),
         }
         if times:
             wanted["curve_share"] = (times, robots)
@@ -102,6 +109,17 @@ class Frame:
                 raise SettingError(f"Frame.{name}", np.shape(getattr(self, name)), allowed)
         if len(self.paths_m) not in (0, robots):
             raise SettingError("Frame.paths_m", len(self.paths_m), f"0 or {robots} paths")
+
+    @property
+    def marks(self) -> tuple[Mark, ...]:
+        """What is marked beside the robots."""
+        shown = {
+            Mark.VIEWPOINT: True,
+            Mark.ESTIMATE: len(self.covariances_m2) > 0,
+            Mark.TRUE_PLACE: len(self.true_m) > 0,
+            Mark.FIDUCIAL: len(self.fiducials_m) > 0,
+        }
+        return tuple(mark for mark, there in shown.items() if there)
 
 
 def draw_frame(frame: Frame, width: int = 640, height: int = 480) -> np.ndarray:
@@ -127,7 +145,7 @@ def draw_frame(frame: Frame, width: int = 640, height: int = 480) -> np.ndarray:
             raise SettingError(name, value, f"at least {least} pixels")
     status = frame.status[:_STATUS_LINES]
     shape, robots = np.shape(frame.entropy_share), len(frame.positions_m)
-    layout = lay_out(shape, float(frame.voxel_size_m), robots, len(status), width, height)
+    layout = lay_out(shape, float(frame.voxel_size_m), robots, frame.marks, len(status), width, height)
     page, unit = layout.page.copy(), layout.unit
     draw = ImageDraw.Draw(page)
     _write_title(draw, frame.title, width - 2 * MARGIN * unit, unit)
@@ -176,20 +194,21 @@ def _pooled(values: np.ndarray, view: View, pool: np.ufunc) -> np.ndarray:
 
 
 def _draw_robots(picture: Image.Image, view: View, frame: Frame, unit: int) -> None:
-    """Driven paths, chosen viewpoints, then the robots with their gazes, each in its robot's colour."""
+    """Driven paths, fiducials, chosen viewpoints, robots with their gazes, then where they truly are.
+
+    What belongs to a robot has its colour.
+    """
     draw = ImageDraw.Draw(picture)
     origin_m = np.asarray(frame.origin_m, dtype=np.float64)
     size_m = np.array(np.shape(frame.entropy_share)) * frame.voxel_size_m
     for robot, path_m in enumerate(frame.paths_m):
         points = view.place(np.reshape(path_m, (-1, 3)), origin_m, size_m)
         draw.line(points[np.isfinite(points).all(axis=1)].ravel().tolist(), robot_colour(robot), unit)
+    for x, y in view.place(frame.fiducials_m, origin_m, size_m).tolist():
+        draw_triangle(draw, (x, y), unit)
     for robot, covariance in enumerate(frame.covariances_m2):
-        outline_m = _ellipse(frame.positions_m[robot], covariance, view.up)
-        points = view.place(outline_m, origin_m, size_m)
-        draw.line(points.ravel().tolist(), robot_colour(robot), 2 * unit)
-    for robot, true_m in enumerate(frame.true_m):
-        points = view.place(np.stack([frame.positions_m[robot], true_m]), origin_m, size_m)
-        draw.line(points.ravel().tolist(), robot_colour(robot), unit)
+        points = view.place(estimate_outline(frame.positions_m[robot], covariance, view.up), origin_m, size_m)
+        draw_edged_line(draw, points, 2 * unit, robot_colour(robot))
     for robot, (x, y) in enumerate(view.place(frame.targets_m, origin_m, size_m).tolist()):
         if np.isfinite(x + y):
             draw_ring(draw, (x, y), unit, robot_colour(robot))
@@ -206,9 +225,14 @@ def _draw_robots(picture: Image.Image, view: View, frame: Frame, unit: int) -> N
             draw_disc(draw, (x, y), MARK_RADIUS * unit, robot_colour(robot))
             if robot in frame.stopped:
                 draw_cross(draw, (x, y), unit)
+    for robot, true_m in enumerate(frame.true_m):
+        points = view.place(np.stack([frame.positions_m[robot], true_m]), origin_m, size_m)
+        draw_edged_line(draw, points, unit, robot_colour(robot))
+        x, y = points[1].tolist()
+        draw_diamond(draw, (x, y), unit, robot_colour(robot))
 
 
-def _ellipse(centre_m: np.ndarray, covariance_m2: np.ndarray, up: int) -> np.ndarray:
+def estimate_outline(centre_m: np.ndarray, covariance_m2: np.ndarray, up: int) -> np.ndarray:
     """(N, 3) closed outline of two standard deviations around a place, in the plane of x and axis `up`."""
     axes = [0, up]
     variances, directions = np.linalg.eigh(np.asarray(covariance_m2)[np.ix_(axes, axes)])

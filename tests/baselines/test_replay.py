@@ -29,7 +29,7 @@ class Ran(NamedTuple):
 
 @pytest.fixture
 def command(capsys, monkeypatch):
-    monkeypatch.setattr("baselines.cli.figures.mission_picture", lambda *_: b"picture")
+    monkeypatch.setattr("baselines.cli.mission_picture.mission_picture", lambda *_: b"picture")
 
     def ran(main, *words: str | Path) -> Ran:
         code = run_command(main, [str(word) for word in words])

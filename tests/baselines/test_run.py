@@ -394,7 +394,7 @@ def test_a_long_mission_keeps_its_ends_and_not_too_many_moments(command, tmp_pat
 
 def fake_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
     """Save the time that matplotlib takes."""
-    monkeypatch.setattr("baselines.cli.figures.mission_picture", lambda *_: b"picture")
+    monkeypatch.setattr("baselines.cli.mission_picture.mission_picture", lambda *_: b"picture")
 
 
 def test_the_table_says_what_was_written(command, tmp_path, monkeypatch):

@@ -9,17 +9,26 @@ from pathlib import Path
 import numpy as np
 import pygame
 import pytest
-from PIL import Image
+from PIL import Image, ImageDraw
 
 from entropy_explore_env.errors import MissingExtraError, SettingError
+from entropy_explore_env.reports import annotations
 from entropy_explore_env.reports.animation import Window, animate
-from entropy_explore_env.reports.annotations import Box
-from entropy_explore_env.reports.colours import COLOURS, INK, PAPER, ROBOT_COLOURS, UNKNOWN_COLOUR
+from entropy_explore_env.reports.annotations import Box, Mark, draw_legend, legend_rows
+from entropy_explore_env.reports.colours import (
+    COLOURS,
+    INK,
+    PAPER,
+    ROBOT_COLOURS,
+    UNKNOWN_COLOUR,
+    robot_colour,
+)
 from entropy_explore_env.reports.page_layout import View, lay_out
 from entropy_explore_env.reports.rendering import Frame, draw_frame
 
 SHAPE = (7, 11, 5)
 VOXEL_M = 0.5
+PLAIN = (Mark.VIEWPOINT,)
 ORIGIN_M = np.array([-2.0, 1.0, 0.25])
 WORLDS = [(7, 11, 5), (41, 41, 17), (120, 80, 1), (300, 120, 30), (20, 23, 90), (400, 40, 1), (1, 2, 3)]
 
@@ -46,13 +55,18 @@ def frame_of(shape: tuple[int, int, int] = SHAPE, robots: int = 2, times: int = 
 def views_of(frame: Frame, width: int = 640, height: int = 480) -> dict[tuple[str, int], View]:
     """The maps of the picture by what they show and the axis that points up."""
     shape, robots = frame.entropy_share.shape, len(frame.positions_m)
-    layout = lay_out(shape, frame.voxel_size_m, robots, len(frame.status), width, height)
+    layout = lay_out(shape, frame.voxel_size_m, robots, frame.marks, len(frame.status), width, height)
     return {(view.quantity, view.up): view for view in layout.views}
 
 
 def part(picture: np.ndarray, box: Box) -> np.ndarray:
     """What lies inside a box of a picture; not a copy."""
     return picture[box.top : box.bottom, box.left : box.right]
+
+
+def part_around(picture: np.ndarray, row: int, column: int, reach: int) -> np.ndarray:
+    """The pixels at most so far from one."""
+    return picture[row - reach : row + reach + 1, column - reach : column + reach + 1]
 
 
 def pixel_of(view: View, voxel: tuple[float, float, float]) -> tuple[int, int]:
@@ -205,7 +219,7 @@ def test_drawing_changes_none_of_its_inputs() -> None:
 def test_curves_begin_at_the_upper_left_and_end_at_the_last_time() -> None:
     times, shares = np.array([0.0, 30.0]), np.array([[1.0], [0.0]])
     picture = draw_frame(dataclasses.replace(frame_of(robots=1), curve_s=times, curve_share=shares))
-    box = lay_out(SHAPE, VOXEL_M, 1, 2, 640, 480).curves
+    box = lay_out(SHAPE, VOXEL_M, 1, PLAIN, 2, 640, 480).curves
     assert tuple(picture[box.top, box.left]) == ROBOT_COLOURS[0]
     assert tuple(picture[box.top + box.height - 1, box.left + box.width - 1]) == ROBOT_COLOURS[0]
     y, x = box.height // 2, box.width // 2
@@ -365,7 +379,7 @@ def test_text_stays_in_the_picture_however_long_it_is() -> None:
     short = dataclasses.replace(frame_of(), title="a", status=("b",) * 12)
     long = dataclasses.replace(short, title="Größe " * 99, status=("c" * 999,) * 12)
     assert (draw_frame(short) != draw_frame(long)).any()
-    layout = lay_out(SHAPE, VOXEL_M, 2, 8, 640, 480)
+    layout = lay_out(SHAPE, VOXEL_M, 2, tuple(Mark), 8, 640, 480)
     for frame in (short, long):
         picture = draw_frame(frame)
         assert (picture[:, -4:] == PAPER).all(), "nothing runs over the edge"
@@ -375,7 +389,7 @@ def test_text_stays_in_the_picture_however_long_it_is() -> None:
 
 
 def test_larger_pictures_have_larger_details() -> None:
-    small, large = lay_out(SHAPE, VOXEL_M, 2, 2, 640, 480), lay_out(SHAPE, VOXEL_M, 2, 2, 1280, 960)
+    small, large = (lay_out(SHAPE, VOXEL_M, 2, PLAIN, 2, 640 * n, 480 * n) for n in (1, 2))
     assert (small.unit, large.unit) == (1, 2)
     assert large.status.height == 2 * small.status.height
 
@@ -420,11 +434,51 @@ def test_an_ellipse_of_two_standard_deviations_is_drawn_around_an_estimate(up: i
         dataclasses.replace(frame, covariances_m2=np.zeros((2, 3, 3)))
 
 
-def test_a_line_leads_from_an_estimate_to_where_the_robot_is() -> None:
+def test_a_line_leads_from_an_estimate_to_the_mark_of_where_the_robot_is() -> None:
+    """The mark is light, with an edge of the robot's colour, and stands out where the two places are one."""
     frame = dataclasses.replace(
         frame_of(robots=1), positions_m=ORIGIN_M[None] + VOXEL_M * np.array([[1.5, 2.5, 2.5]])
     )
     drawn = dataclasses.replace(frame, true_m=ORIGIN_M[None] + VOXEL_M * np.array([[5.5, 8.5, 2.5]]))
-    row, column = pixel_of(views_of(frame)["entropy", 1], (4.5, 7.0, 2.5))
-    changed = (draw_frame(frame) != draw_frame(drawn)).any(axis=2)
-    assert changed[row - 1 : row + 2, column - 1 : column + 2].any()
+    picture, view = draw_frame(drawn), views_of(drawn)["entropy", 1]
+    row, column = pixel_of(view, (4.5, 7.0, 2.5))
+    assert tuple(robot_colour(0)) in map(tuple, part_around(picture, row, column, 2).reshape(-1, 3))
+    row, column = pixel_of(view, (5.5, 8.5, 2.5))
+    assert tuple(picture[row, column]) == PAPER
+    known = draw_frame(dataclasses.replace(frame, true_m=frame.positions_m))
+    row, column = pixel_of(view, (1.5, 2.5, 2.5))
+    assert tuple(known[row, column]) == PAPER and tuple(draw_frame(frame)[row, column]) == robot_colour(0)
+
+
+def test_fiducials_are_light_triangles_in_every_map() -> None:
+    place = (2.5, 4.5, 1.5)
+    frame = frame_of(robots=1)
+    drawn = dataclasses.replace(frame, fiducials_m=(ORIGIN_M + VOXEL_M * np.array(place))[None])
+    before, after = draw_frame(frame), draw_frame(drawn)
+    for view in views_of(drawn).values():
+        row, column = pixel_of(view, place)
+        assert tuple(after[row, column]) == PAPER != tuple(before[row, column])
+        assert INK in map(tuple, part_around(after, row, column, 8).reshape(-1, 3))
+    with pytest.raises(SettingError, match=r"Frame.fiducials_m = \(2, 2\): allowed is a shape \(2, 3\)"):
+        dataclasses.replace(frame, fiducials_m=np.zeros((2, 2)))
+
+
+def test_the_legend_explains_what_is_marked_and_nothing_else(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A line for each mark, below the robots, and none of them outside the legend's box."""
+    frame = frame_of(robots=3)
+    assert frame.marks == PLAIN
+    drifting = dataclasses.replace(
+        frame, covariances_m2=np.zeros((3, 3, 3)), true_m=frame.positions_m, fiducials_m=np.zeros((4, 3))
+    )
+    assert drifting.marks == tuple(Mark)
+    written: dict[str, float] = {}
+    monkeypatch.setattr(annotations, "write", lambda _, place, text, *__: written.update({text: place[1]}))
+    for marks in (PLAIN, tuple(Mark)):
+        written.clear()
+        page = Image.new("RGB", (200, 200), PAPER)
+        box = Box(20, 30, 150, 14 * legend_rows(3, marks))
+        draw_legend(ImageDraw.Draw(page), box, 3, marks, 1)
+        assert list(written) == ["robot 0", "robot 1", "robot 2", *(mark.value for mark in marks)]
+        assert list(written.values()) == [37.0, 37.0, 51.0, *(65.0 + 14.0 * row for row in range(len(marks)))]
+        drawn = np.argwhere((np.asarray(page) != PAPER).any(axis=2))
+        assert drawn.min() >= 20 and drawn[:, 0].max() < box.bottom

@@ -1,0 +1,127 @@
+"""The picture of a whole mission: what lies on which of its maps."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+
+from baselines.cli import mission_picture as pictures
+from baselines.cli.mission_picture import mission_picture
+from entropy_explore_env.localization_settings import Fiducials
+from entropy_explore_env.missions.simulation import Missions
+from entropy_explore_env.reports.recording import Recorder, believed_poses_now, poses_now
+from entropy_explore_env.settings import Grid
+from entropy_explore_env.worlds.world import World
+from tests.reference.scenes import free_box, random_actions, started
+
+GRID = Grid((7, 11, 5), 0.5, (-2.0, 1.0, 0.25))
+DRIFT = {"localization": {"xy_m_per_sqrt_m": 0.2, "yaw_rad_per_sqrt_m": 0.05}}
+LANDMARKS = ((-1.0, 2.0, 1.5), (0.5, 5.0, 1.0), (1.0, 3.0, 2.0))
+
+
+def recorded(missions: Missions, steps: int = 6) -> Recorder:
+    """A mission of some random steps."""
+    recorder, rng = Recorder(missions), np.random.default_rng(0)
+    for step in range(steps + 1):
+        if step:
+            missions.step(*random_actions(missions, rng))
+        recorder.note()
+    return recorder
+
+
+@pytest.fixture
+def drawn(monkeypatch):
+    """The figures that were drawn."""
+    figures: list[Figure] = []
+    monkeypatch.setattr(pictures, "png", lambda figure: figures.append(figure) or b"")
+    return figures
+
+
+def marks(axes, marker: str) -> np.ndarray:
+    """(N, 2) where marks of a kind are."""
+    places = [np.stack(line.get_data(), axis=1) for line in axes.lines if line.get_marker() == marker]
+    return np.concatenate(places) if places else np.zeros((0, 2))
+
+
+def panels_of(figure: Figure) -> list:
+    """The axes of the maps: entropy left, what is known, the true world."""
+    return [axes for axes in figure.axes if axes.images and axes.get_title()]
+
+
+def test_robots_that_drift_stand_where_they_believe_to_be_beside_where_they_are(drawn):
+    fiducials = Fiducials(positions_m=LANDMARKS)
+    scenario = free_box(robots=2, robot=DRIFT, fiducials=fiducials, grid=GRID)
+    recorder = recorded(started(scenario))
+    mission_picture(recorder, "box", "random", truth=True)
+    missions, figure = recorder.missions, drawn[0]
+    believed, true = (poses(missions, 0)[:, :2] for poses in (believed_poses_now, poses_now))
+    assert np.abs(believed - true).min(axis=1).max() > 0.0
+    panels = panels_of(figure)
+    assert len(panels) == 3
+    for axes in panels:
+        np.testing.assert_allclose(marks(axes, "^"), np.array(LANDMARKS)[:, :2])
+        np.testing.assert_allclose(marks(axes, "s"), true)
+        knows = axes.get_title().startswith("What")
+        np.testing.assert_allclose(marks(axes, "D"), believed if knows else np.zeros((0, 2)))
+        for robot in range(2 if knows else 0):
+            lines = [np.stack(line.get_data(), axis=1) for line in axes.lines]
+            assert any(np.array_equal(line, np.stack([believed[robot], true[robot]])) for line in lines)
+            around = [line for line in lines if len(line) > 40 and np.allclose(line[0], line[-1])]
+            sigma = np.sqrt(missions.state.estimates[0][robot]["covariance"][0, 0])
+            reach = [np.abs(line[:, 0] - believed[robot, 0]).max() for line in around]
+            assert any(np.isclose(each, 2.0 * sigma, rtol=0.01) for each in reach)
+    (legend,) = figure.legends
+    assert [text.get_text() for text in legend.texts] == [
+        "start",
+        "end: where it truly is",
+        "end: where it believes to be, with an ellipse of 2 σ",
+        "fiducial",
+    ]
+
+
+def test_robots_that_know_where_they_are_have_no_estimates(drawn):
+    mission_picture(recorded(started(free_box(robots=1))), "box", "random")
+    (figure,) = drawn
+    assert [text.get_text() for text in figure.legends[0].texts] == ["start", "end"]
+    assert not any(len(marks(axes, mark)) for axes in figure.axes for mark in "D^")
+
+
+def test_ground_below_open_sky_is_shown_from_above(drawn):
+    """Heights of 0.25 + 0.5 k metres where robot_0 has measured; elsewhere nothing is claimed."""
+    heights = np.random.default_rng(1).integers(1, 3, (7, 11))
+    solid = np.arange(5) < heights[..., None]
+    missions = Missions(free_box(robots=1, grid=GRID, world="given"), given=[World(GRID, solid, "hills")])
+    missions.reset(0, 0)
+    missions.state.mean[0, 0], missions.state.precision[0, 0] = solid.ravel(), 1e6
+    missions.state.precision[0, 0].reshape(7, 11, 5)[:3] = missions.rules.params["prior_precision"][0]
+    recorder = Recorder(missions)
+    recorder.note()
+    mission_picture(recorder, "hills", "random", truth=True)
+    panels = panels_of(drawn[0])
+    left, known_m, true_m = (np.ma.asarray(axes.images[0].get_array()).T for axes in panels)
+    np.testing.assert_allclose(true_m, 0.25 + 0.5 * heights)
+    np.testing.assert_allclose(known_m[3:], 0.25 + 0.5 * heights[3:])
+    assert np.ma.getmaskarray(known_m)[:3].all() and not np.ma.getmaskarray(known_m)[3:].any()
+    np.testing.assert_allclose(left[:3], 1.0)
+    np.testing.assert_allclose(left[3:], 0.0)
+    assert all("from above" in axes.get_title() for axes in panels)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        pytest.param(lambda solid: solid[2:4, 3, 4].fill(True), id="overhang"),
+        pytest.param(lambda solid: solid[:, 1:].fill(False), id="empty"),
+        pytest.param(lambda solid: solid[:, 1:].fill(True), id="walls to the roof"),
+    ],
+)
+def test_what_is_no_open_ground_is_cut_at_a_layer(change):
+    solid = np.arange(5) < np.random.default_rng(2).integers(1, 4, (7, 11, 1))
+    np.testing.assert_array_equal(pictures._open_ground(solid), solid.sum(axis=2))
+    change(solid)
+    assert pictures._open_ground(solid) is None
+
+
+def test_a_plan_is_no_open_ground():
+    assert pictures._open_ground(np.random.default_rng(3).random((13, 9, 1)) < 0.9) is None
