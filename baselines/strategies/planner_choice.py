@@ -1,8 +1,7 @@
 """The strategy `planner-choice`: of the candidates that a policy chooses among, the planner's own choice.
 
-Ours. It is `planned-rate` by bits per time, in a compiled call a decision (`viewpoints/proposals`), and what
-a policy that chooses among candidates begins as. It has nothing of the frontier cells by which `planned-rate`
-explores plans where robots decide under way, or which end by what is seen.
+Ours. It is `planned-rate` without the frontier cells by which that one explores some plans, and what a policy
+that chooses among candidates begins as.
 """
 
 from __future__ import annotations

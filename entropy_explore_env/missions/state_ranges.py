@@ -20,7 +20,7 @@ from entropy_explore_env.robots.motion import MoveEnd
 from entropy_explore_env.robots.range_sensor import Return
 from entropy_explore_env.scenario import Scenario
 from entropy_explore_env.settings import MAX_VOXELS
-from entropy_explore_env.viewpoints.planner_rules import REMEMBERED
+from entropy_explore_env.viewpoints.proposals.planner_rules import REMEMBERED
 from entropy_explore_env.viewpoints.proposals.records import Kind
 
 FROM_WORLD = ("truth", "collision", "visible")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from entropy_explore_env.missions.proposals import Knowledge, propose_to
@@ -11,6 +13,7 @@ from entropy_explore_env.scenario import Scenario
 from entropy_explore_env.viewpoints.candidate_features import CONTEXT, FEATURES
 from entropy_explore_env.viewpoints.proposals.model import new_proposers
 from entropy_explore_env.viewpoints.proposals.records import CANDIDATE, EXPERIENCE, Kind
+from entropy_explore_env.viewpoints.recipe import Recipe
 
 _NO_CEILING = np.zeros(0, np.bool_)
 
@@ -22,17 +25,24 @@ class ViewProposer:
     whose actions are candidates, but for the random numbers.
     """
 
-    def __init__(self, scenario: Scenario, rng: np.random.Generator, overlaps: bool = False) -> None:
+    def __init__(
+        self,
+        scenario: Scenario,
+        rng: np.random.Generator,
+        overlaps: bool = False,
+        recipes: Mapping[int, Recipe] | None = None,
+    ) -> None:
         """A mission begins.
 
         Args:
             scenario: With candidates as actions; views may be of a scenario with others.
             rng: The random streams of the robots are drawn from it.
             overlaps: Whether overlaps are wanted.
+            recipes: Number of a kind of robot → its recipe; None, and of others: `recipe_for`.
         """
         team, most = scenario.robots, scenario.action.candidates
         self._rules: Rules = rules_of(scenario)
-        self._proposers = new_proposers(scenario)
+        self._proposers = new_proposers(scenario, recipes)
         self._candidates = np.zeros((team, most), CANDIDATE)
         self._experience = np.zeros(team, EXPERIENCE)
         self._experience["candidates_rng"][:, 0] = rng.integers(0, 2**64, team, np.uint64)

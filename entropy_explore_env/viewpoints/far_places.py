@@ -90,11 +90,12 @@ def fill_blocks(search, belief, target_precision, layer, start, radius, blocks):
                 blocks.bits[i, j, k], blocks.place[i, j, k] = bits, place
 
 
-def bits_around(blocks: Blocks) -> np.ndarray:
-    """(I, J, K) float64, the bits of each block and of its neighbours."""
-    total = blocks.bits
-    for axis in range(3):
-        wider = np.pad(total, [(1, 1) if axis == other else (0, 0) for other in range(3)])
-        n = total.shape[axis]
-        total = np.sum([np.take(wider, np.arange(first, first + n), axis) for first in range(3)], axis=0)
+@lean_kernel
+def block_bits_around(blocks, i, j, k):
+    """Remaining bits of a block and of its neighbours."""
+    total, count = 0.0, blocks.bits.shape
+    for x in range(max(i - 1, 0), min(i + 2, count[0])):
+        for y in range(max(j - 1, 0), min(j + 2, count[1])):
+            for z in range(max(k - 1, 0), min(k + 2, count[2])):
+                total += blocks.bits[x, y, z]
     return total

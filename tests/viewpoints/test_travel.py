@@ -1,4 +1,4 @@
-"""Seconds of planned drives, and the first stop on a path: a plan with one wall, by hand."""
+"""Seconds of planned drives: a plan with one wall, by hand."""
 
 from __future__ import annotations
 
@@ -11,34 +11,33 @@ from entropy_explore_env.belief.paths.lattice import belief_costs, new_lattice
 from entropy_explore_env.belief.paths.planning import ANY_GOAL, search_paths
 from entropy_explore_env.belief.paths.search import new_search
 from entropy_explore_env.viewpoints.evaluation import DriveModel
-from entropy_explore_env.viewpoints.travel import Travel, first_stop, travel_seconds
+from entropy_explore_env.viewpoints.travel import travel_seconds
 
 SIZE, EDGE_M = (9, 13, 1), 0.5
 DRIVE = DriveModel(1.0, 1.0, math.pi / 2, 0.5, 0.0)
 
 
 @pytest.fixture
-def travel():
+def search():
     """A robot at (1.5, 1.5); a wall at x = 4 that is open at y = 12."""
     mean = np.zeros(SIZE, np.float32)
     mean[4, :12] = 1.0
     costs = belief_costs(mean, np.full(SIZE, 100.0, np.float32), 1e-3)
-    search, lattice = new_search(mean.size), new_lattice(SIZE)
-    start = np.array([1.5, 1.5, 0.5])
+    found, lattice = new_search(mean.size), new_lattice(SIZE)
     source = np.array([np.ravel_multi_index((1, 1, 0), SIZE)], np.int32)
-    search_paths(search, lattice, costs, source, ANY_GOAL, math.inf)
-    return Travel(search, lattice, costs, start)
+    search_paths(found, lattice, costs, source, ANY_GOAL, math.inf)
+    return found
 
 
-def seconds_of(travel, viewpoints, reach=math.inf):
+def seconds_of(search, viewpoints, reach=math.inf):
     here, seconds = np.array([1.5, 1.5, 0.5, 0.0, 0.0]), np.full(len(viewpoints), np.nan)
-    travel_seconds(travel.search, SIZE, DRIVE, EDGE_M, here, np.array(viewpoints, float), reach, seconds)
+    travel_seconds(search, SIZE, DRIVE, EDGE_M, here, np.array(viewpoints, float), reach, seconds)
     return seconds
 
 
-def test_seconds_are_those_of_the_longer_of_drive_and_turn_and_of_the_scan(travel):
+def test_seconds_are_those_of_the_longer_of_drive_and_turn_and_of_the_scan(search):
     stay, turn, ahead, wall = seconds_of(
-        travel,
+        search,
         [
             (1.5, 1.5, 0.5, 0.0, 0.0),
             (1.5, 1.5, 0.5, -math.pi / 2, 0.0),
@@ -51,26 +50,12 @@ def test_seconds_are_those_of_the_longer_of_drive_and_turn_and_of_the_scan(trave
     assert math.isinf(wall)
 
 
-def test_paths_around_corners_are_longer_than_the_straight_line(travel):
-    (around,) = seconds_of(travel, [(6.5, 1.5, 0.5, 0.0, 0.0)])
+def test_paths_around_corners_are_longer_than_the_straight_line(search):
+    (around,) = seconds_of(search, [(6.5, 1.5, 0.5, 0.0, 0.0)])
     steps = 2 * (8 + 3 * math.sqrt(2.0)) + 2 - 1  # up to the gap and down again; corners are not cut
     assert 0.9 * steps * EDGE_M < around - 1.5 < 1.1 * steps * EDGE_M
 
 
-def test_long_paths_take_hops_of_equal_length_with_a_scan_each(travel):
-    (hops,) = seconds_of(travel, [(1.5, 9.5, 0.5, 0.0, 0.0)], reach=4.0)
+def test_long_paths_take_hops_of_equal_length_with_a_scan_each(search):
+    (hops,) = seconds_of(search, [(1.5, 9.5, 0.5, 0.0, 0.0)], reach=4.0)
     assert hops == pytest.approx(2 * (2.0 + 1.0 + 0.5))
-
-
-def test_the_first_stop_is_the_goal_or_the_last_place_within_reach(travel):
-    goal = np.array([1.5, 9.5, 0.5])
-    np.testing.assert_array_equal(first_stop(travel, goal, 8.1, True), goal)
-    np.testing.assert_array_equal(first_stop(travel, goal, 3.2, True), (1.5, 4.5, 0.5))
-    behind = first_stop(travel, np.array([6.5, 1.5, 0.5]), 3.0, True)
-    assert behind is not None and 2.0 <= np.linalg.norm(behind - travel.start) <= 3.0 and behind[0] < 4.0
-    assert first_stop(travel, np.array([4.5, 3.5, 0.5]), 3.0, True) is None
-
-
-def test_straight_drivers_stop_on_the_straight_part_of_the_path(travel):
-    stop = first_stop(travel, np.array([1.5, 9.5, 0.5]), 3.2, False)
-    np.testing.assert_allclose(stop, (1.5, 1.5 + 3.2, 0.5), rtol=1e-5)

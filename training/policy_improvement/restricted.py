@@ -7,18 +7,25 @@ again.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
 
 from baselines.strategies.knowledge import announced_cones, belief_of
+from entropy_explore_env.belief.fields import Belief
+from entropy_explore_env.belief.paths.lattice import belief_costs
+from entropy_explore_env.belief.paths.planning import ANY_GOAL, search_paths
 from entropy_explore_env.decision_settings import Action, Observation
 from entropy_explore_env.missions.view import RobotView
 from entropy_explore_env.missions.view_observation import ViewObserver
 from entropy_explore_env.scenario import Scenario
-from entropy_explore_env.viewpoints.candidates import CandidatePlanner, Situation
-from entropy_explore_env.viewpoints.evaluation import new_scratch, robot_model, straight_seconds
-from entropy_explore_env.viewpoints.planner_rules import DISAPPOINTING
+from entropy_explore_env.viewpoints.evaluation import straight_seconds
+from entropy_explore_env.viewpoints.imagined_scan import imagined_bits
+from entropy_explore_env.viewpoints.proposals.model import Proposer, new_proposers
+from entropy_explore_env.viewpoints.proposals.nearby import AROUND_CORNERS
+from entropy_explore_env.viewpoints.proposals.planner_rules import DISAPPOINTING
+from entropy_explore_env.viewpoints.travel import travel_seconds
 
 ACTIONS = Action(kind="discrete", moves="axes", yaws=16, pitches=7)
 """Those of `training.ppo`: 7 moves × 16 yaws × 7 pitches; of planar robots 5 × 16."""
@@ -31,13 +38,8 @@ class RestrictedPlanner:
     def reset(self, scenario: Scenario, rng: np.random.Generator) -> None:
         """A new mission begins."""
         self._rng = rng
-        self._planner = CandidatePlanner(scenario)
+        self._proposers = new_proposers(scenario)
         self._observer = ViewObserver(scenario, _MASK, ACTIONS)
-        self._models = [
-            robot_model(scenario, kind, 1, self._planner.recipe_of(number).stop_probability)
-            for number, kind in enumerate(scenario.kinds)
-        ]
-        self._scratch = new_scratch(scenario.grid, self._models)
         self._tried: dict[int, set[tuple[float, ...]]] = {}
         self._latest: dict[int, tuple[tuple[float, ...], float]] = {}
 
@@ -52,10 +54,12 @@ class RestrictedPlanner:
         grid = view.scenario.grid
         here = grid.in_grid_units(view.pose)
         places = np.stack([grid.in_grid_units(viewpoint) for viewpoint in viewpoints])
-        situation = Situation(view.robot, here, belief_of(view), announced_cones(view), view.no_fly_mask())
-        bits = self._planner.bits_at(situation, places)
-        seconds = self._seconds(view, situation, places)
-        exponent = self._planner.recipe_of(view.robot).exponent
+        proposer, belief = self._proposers[view.robot % len(self._proposers)], belief_of(view)
+        bits = np.empty(len(places))
+        gap, cones, scratch = proposer.recipe.gap_probability, announced_cones(view), proposer.scratch.scan
+        imagined_bits(belief, proposer.exact, gap, places, cones, scratch, bits)
+        seconds = _seconds(view, proposer, belief, here, places)
+        exponent = proposer.recipe.exponent
         worth = np.where(np.isfinite(seconds), bits / np.maximum(seconds, 1e-9) ** exponent, 0.0)
         tried = self._tried.get(view.robot, set())
         worth[[_key(viewpoint) in tried for viewpoint in viewpoints]] = 0.0
@@ -69,16 +73,24 @@ class RestrictedPlanner:
         if latest is not None and float(view.scan.utility_bits.sum()) < DISAPPOINTING * latest[1]:
             self._tried.setdefault(view.robot, set()).add(latest[0])
 
-    def _seconds(self, view: RobotView, situation: Situation, places: np.ndarray) -> np.ndarray:
-        """(K,) seconds until scans at viewpoints (K, 5), grid units; inf = there is no path."""
-        if view.kind.robot.navigator == "planned":
-            return self._planner.seconds_to(situation, self._planner.start_search(situation), places)
-        model, seconds = self._models[view.robot % len(self._models)], np.empty(len(places))
-        edge_m = model.scan.voxel_size_m
-        straight_seconds(
-            situation.belief, edge_m, model.drive, situation.here, places, self._scratch, seconds
-        )
+
+def _seconds(
+    view: RobotView, proposer: Proposer, belief: Belief, here: np.ndarray, places: np.ndarray
+) -> np.ndarray:
+    """(K,) seconds until scans at viewpoints (K, 5), grid units; inf = there is no path."""
+    edge_m, scratch, seconds = view.scenario.grid.voxel_size_m, proposer.scratch, np.empty(len(places))
+    if not proposer.planned:
+        straight_seconds(belief, edge_m, proposer.drive, here, places, scratch.scan, seconds)
         return seconds
+    no_fly, prior = view.no_fly_mask(), view.scenario.sigma_prior**-2
+    no_fly = None if no_fly is None else no_fly.reshape(-1)
+    costs = belief_costs(belief.mean, belief.precision, prior, proposer.unknown_cost, no_fly)
+    at = np.clip(here[:3].astype(np.int64), 0, np.array(belief.size) - 1)
+    source = np.array([np.ravel_multi_index(tuple(at), belief.size)], np.int32)
+    farthest = AROUND_CORNERS * proposer.within + 1.0
+    search_paths(scratch.search, proposer.lattice, costs, source, ANY_GOAL, farthest)
+    travel_seconds(scratch.search, belief.size, proposer.drive, edge_m, here, places, math.inf, seconds)
+    return seconds
 
 
 def _key(viewpoint: np.ndarray) -> tuple[float, ...]:

@@ -11,7 +11,7 @@ from entropy_explore_env.belief.raycast import STOP_AT_COVERED
 from entropy_explore_env.belief.voxel_index import flat_index, grid_index
 from entropy_explore_env.compilation.kernels import lean_kernel
 from entropy_explore_env.randomness import draw_gaussian, draw_uniform
-from entropy_explore_env.viewpoints.far_places import fill_blocks
+from entropy_explore_env.viewpoints.far_places import block_bits_around, fill_blocks
 from entropy_explore_env.viewpoints.imagined_scan import imagined_bits
 from entropy_explore_env.viewpoints.proposals.nearby import copy_viewpoint, value_of, voxel_at
 from entropy_explore_env.viewpoints.proposals.situation import distance_apart, worth_bits
@@ -23,17 +23,6 @@ _PITCH_SPREAD = 0.5
 """Standard deviation of the pitch at far places, radians."""
 _FOLD_ABOVE = 1e250
 """A product is folded into bits before it could leave a float64."""
-
-
-@lean_kernel
-def block_bits_around(blocks, i, j, k):
-    """Remaining bits of a block and of its neighbours."""
-    total, count = 0.0, blocks.bits.shape
-    for x in range(max(i - 1, 0), min(i + 2, count[0])):
-        for y in range(max(j - 1, 0), min(j + 2, count[1])):
-            for z in range(max(k - 1, 0), min(k + 2, count[2])):
-                total += blocks.bits[x, y, z]
-    return total
 
 
 @lean_kernel

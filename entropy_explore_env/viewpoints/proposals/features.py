@@ -9,9 +9,9 @@ from entropy_explore_env.belief.paths.search import cost_to
 from entropy_explore_env.compilation.kernels import lean_kernel
 from entropy_explore_env.robots.motion import driving_time
 from entropy_explore_env.viewpoints.candidate_features import COLUMNS, CONTEXT_COLUMNS, FEATURES
-from entropy_explore_env.viewpoints.planner_rules import REMEMBERED
-from entropy_explore_env.viewpoints.proposals.far import block_bits_around
+from entropy_explore_env.viewpoints.far_places import block_bits_around
 from entropy_explore_env.viewpoints.proposals.nearby import voxel_at
+from entropy_explore_env.viewpoints.proposals.planner_rules import REMEMBERED
 from entropy_explore_env.viewpoints.proposals.records import Kind
 from entropy_explore_env.viewpoints.proposals.situation import distance_apart, trust_in
 from entropy_explore_env.viewpoints.travel import STRAIGHTENED

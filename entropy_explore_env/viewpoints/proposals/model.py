@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -209,9 +210,13 @@ def _new_pool(size: int) -> Pool:
     )
 
 
-def _sizes(scenario: Scenario) -> tuple[int, int, int, int]:
+def _recipes_of(scenario: Scenario, given: Mapping[int, Recipe] | None = None) -> list[Recipe]:
+    """The recipe of each kind of robot of a team."""
+    return [(given or {}).get(number) or recipe_for(kind) for number, kind in enumerate(scenario.kinds)]
+
+
+def _sizes(scenario: Scenario, recipes: Sequence[Recipe]) -> tuple[int, int, int, int]:
     """The largest pool, far places and gazes of the team's recipes, and the longest ray."""
-    recipes = [recipe_for(kind) for kind in scenario.kinds]
     candidates = scenario.action.candidates
     near = max(r.gazes + r.turns + r.places + r.refinements * max(r.refined, 3) for r in recipes)
     far = max(r.far_places * r.far_gazes for r in recipes) + 1
@@ -224,9 +229,9 @@ def _sizes(scenario: Scenario) -> tuple[int, int, int, int]:
     return near + candidates + _SPARE, far, gazes, longest + sum(shape)
 
 
-def _new_scratch(scenario: Scenario) -> ProposalScratch:
+def _new_scratch(scenario: Scenario, recipes: Sequence[Recipe]) -> ProposalScratch:
     voxels, candidates = scenario.grid.voxels, scenario.action.candidates
-    pool, far, gazes, longest = _sizes(scenario)
+    pool, far, gazes, longest = _sizes(scenario, recipes)
     mates = max(scenario.robots - 1, 0)
     return ProposalScratch(
         scan=new_scan_scratch(voxels, longest),
@@ -258,25 +263,34 @@ def _new_scratch(scenario: Scenario) -> ProposalScratch:
 def proposal_bytes(scenario: Scenario) -> int:
     """Bytes of the memory that a thread's proposers share, once searches have reached all voxels."""
     voxels, candidates = scenario.grid.voxels, scenario.action.candidates
-    pool, far, _, longest = _sizes(scenario)
-    blocks = sum(_block_count(scenario, kind) for kind in scenario.kinds)
+    recipes = _recipes_of(scenario)
+    pool, far, _, longest = _sizes(scenario, recipes)
+    blocks = sum(_block_count(scenario, recipe) for recipe in recipes)
     per_voxel = 8 + 4 + 8 + 4  # added and touched, path, marks, seen
     kept = 14 * 8 * (pool + far) + candidates * (8 * candidates + VIEW.itemsize)
     return search_bytes(voxels) + per_voxel * voxels + 12 * longest + kept + 16 * blocks
 
 
-def _edge(scenario: Scenario, kind: RobotKind) -> int:
-    return max(1, round(recipe_for(kind).block_m / scenario.grid.voxel_size_m))
+def _edge(scenario: Scenario, recipe: Recipe) -> int:
+    return max(1, round(recipe.block_m / scenario.grid.voxel_size_m))
 
 
-def _block_count(scenario: Scenario, kind: RobotKind) -> int:
-    return math.prod(math.ceil(n / _edge(scenario, kind)) for n in scenario.grid.shape)
+def _block_count(scenario: Scenario, recipe: Recipe) -> int:
+    return math.prod(math.ceil(n / _edge(scenario, recipe)) for n in scenario.grid.shape)
 
 
-def new_proposers(scenario: Scenario) -> list[Proposer]:
-    """A proposer for each kind of robot of a team; they share memory, for one thread."""
-    scratch = _new_scratch(scenario)
-    return [_proposer(scenario, kind, scratch) for kind in scenario.kinds]
+def new_proposers(scenario: Scenario, recipes: Mapping[int, Recipe] | None = None) -> list[Proposer]:
+    """A proposer for each kind of robot of a team; they share memory, for one thread.
+
+    Args:
+        scenario: With candidates as actions.
+        recipes: Number of a kind → its recipe; None, and of others: `recipe_for`.
+    """
+    used = _recipes_of(scenario, recipes)
+    scratch = _new_scratch(scenario, used)
+    return [
+        _proposer(scenario, kind, recipe, scratch) for kind, recipe in zip(scenario.kinds, used, strict=True)
+    ]
 
 
 def thinned(proposer: Proposer, divisor: int) -> Proposer:
@@ -295,8 +309,8 @@ def thinned(proposer: Proposer, divisor: int) -> Proposer:
     return proposer._replace(recipe=recipe._replace(**fewer, refinements=refinements))
 
 
-def _proposer(scenario: Scenario, kind: RobotKind, scratch: ProposalScratch) -> Proposer:
-    recipe, grid = recipe_for(kind), scenario.grid
+def _proposer(scenario: Scenario, kind: RobotKind, recipe: Recipe, scratch: ProposalScratch) -> Proposer:
+    grid = scenario.grid
     drawn = robot_model(scenario, kind, recipe.draw_thinning, recipe.stop_probability)
     exact = robot_model(scenario, kind, recipe.thinning, recipe.stop_probability)
     layer = scenario.layer_of(kind.robot)
@@ -319,6 +333,6 @@ def _proposer(scenario: Scenario, kind: RobotKind, scratch: ProposalScratch) -> 
         view_width_rad=float(max(*kind.sensor.field_of_view_rad, kind.sensor.angular_step_rad)),
         target_precision=float(scenario.ending.sigma_end**-2),
         unknown_cost=float(kind.robot.unknown_cost),
-        blocks=new_blocks(grid.shape, _edge(scenario, kind)),
+        blocks=new_blocks(grid.shape, _edge(scenario, recipe)),
         scratch=scratch,
     )

@@ -21,7 +21,7 @@ _SHRINK = 0.7
 """How much less refined viewpoints differ from one refinement to the next."""
 _SHIFT = 0.2
 """Standard deviation by which refined places differ along an axis, in reaches."""
-_AROUND_CORNERS = 1.6
+AROUND_CORNERS = 1.6
 """Longest path to a place within reach, in reaches."""
 
 
@@ -38,7 +38,7 @@ def start_paths(proposer, situation):
     scratch, size = proposer.scratch, situation.belief.size
     scratch.source[0] = voxel_at(size, situation.here)
     start_search(scratch.search, proposer.lattice, situation.costs, scratch.source)
-    farthest = _AROUND_CORNERS * proposer.within + 1.0
+    farthest = AROUND_CORNERS * proposer.within + 1.0
     resume_search(scratch.search, proposer.lattice, situation.costs, farthest)
 
 

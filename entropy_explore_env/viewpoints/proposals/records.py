@@ -5,7 +5,7 @@ from __future__ import annotations
 import enum
 
 from entropy_explore_env.compilation.kernels import record_type
-from entropy_explore_env.viewpoints.planner_rules import REMEMBERED
+from entropy_explore_env.viewpoints.proposals.planner_rules import REMEMBERED
 
 
 class Kind(enum.IntEnum):

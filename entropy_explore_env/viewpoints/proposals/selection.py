@@ -9,7 +9,9 @@ import numpy as np
 from entropy_explore_env.belief.paths.search import cost_to
 from entropy_explore_env.compilation.kernels import lean_kernel
 from entropy_explore_env.randomness import draw_uniform
-from entropy_explore_env.viewpoints.planner_rules import (
+from entropy_explore_env.viewpoints.proposals.far import first_stop, gaze_on_the_way, propose_far
+from entropy_explore_env.viewpoints.proposals.nearby import copy_viewpoint, start_paths, value_of, voxel_at
+from entropy_explore_env.viewpoints.proposals.planner_rules import (
     DISAPPOINTING,
     ELSEWHERE,
     FAR_EVERY,
@@ -18,8 +20,6 @@ from entropy_explore_env.viewpoints.planner_rules import (
     POOR,
     TRIED_STOPS,
 )
-from entropy_explore_env.viewpoints.proposals.far import first_stop, gaze_on_the_way, propose_far
-from entropy_explore_env.viewpoints.proposals.nearby import copy_viewpoint, start_paths, value_of, voxel_at
 from entropy_explore_env.viewpoints.proposals.records import Kind
 from entropy_explore_env.viewpoints.proposals.situation import (
     distance_apart,

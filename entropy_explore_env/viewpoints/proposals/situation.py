@@ -11,7 +11,7 @@ from entropy_explore_env.belief.fields import Belief
 from entropy_explore_env.belief.paths.lattice import Costs
 from entropy_explore_env.compilation.kernels import lean_kernel
 from entropy_explore_env.robots.motion import MoveEnd
-from entropy_explore_env.viewpoints.planner_rules import (
+from entropy_explore_env.viewpoints.proposals.planner_rules import (
     ALIKE_EDGES,
     ALIKE_RAD,
     BLOCKED_DECISIONS,

@@ -1,7 +1,4 @@
-"""When a planner gives up a viewpoint, keeps clear, looks far and goes elsewhere: numbers of its rules.
-
-The compiled planner that proposes candidates and the strategy `planned-rate` go by the same ones.
-"""
+"""When a planner gives up a viewpoint, keeps clear, looks far and goes elsewhere: numbers of its rules."""
 
 from __future__ import annotations
 

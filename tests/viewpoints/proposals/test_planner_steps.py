@@ -1,0 +1,201 @@
+"""The planner's steps one by one: nearby and far viewpoints, first stops, worth, ways out, and elsewhere."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+
+from entropy_explore_env.belief.fields import Belief
+from entropy_explore_env.belief.paths.lattice import belief_costs
+from entropy_explore_env.belief.visibility import CONE
+from entropy_explore_env.scenario import with_settings
+from entropy_explore_env.scenarios import BOX, OFFICE
+from entropy_explore_env.settings import Grid
+from entropy_explore_env.viewpoints.proposals.far import first_stop, propose_far
+from entropy_explore_env.viewpoints.proposals.model import MATE, new_proposers
+from entropy_explore_env.viewpoints.proposals.nearby import propose_nearby, start_paths
+from entropy_explore_env.viewpoints.proposals.records import EXPERIENCE, Kind
+from entropy_explore_env.viewpoints.proposals.selection import choose
+from entropy_explore_env.viewpoints.proposals.situation import Situation, trust_and_clearance, worth_bits
+from entropy_explore_env.viewpoints.recipe import ALL_AROUND, NARROW_PLANNED, NARROW_STRAIGHT
+
+ACTION = {"kind": "candidates", "candidates": 1}
+PLAN = with_settings(
+    OFFICE,
+    {
+        "grid": Grid((50, 70, 1), 0.1),
+        "robots": 1,
+        "robot": {"body_radius_m": 0.0, "reach_m": 1.5},
+        "action": ACTION,
+    },
+)
+HERE = np.array([10.5, 5.5, 0.5, 0.3, 0.0])
+UNKNOWN = 1.0 / 900.0
+
+
+def situation_of(scenario, mean, precision, here=HERE, mates=(), most_bits=0.0):
+    """What a robot's candidates depend on; it has experienced nothing."""
+    experience = np.zeros(1, EXPERIENCE)[0]
+    experience["candidates_rng"], experience["most_bits"] = 7, most_bits
+    heard = np.zeros(len(mates), MATE)
+    for mate, (place, body_radius) in zip(heard, mates, strict=True):
+        mate["place"], mate["body_radius"] = place, body_radius
+    mean, precision = mean.reshape(-1).astype(np.float32), precision.reshape(-1).astype(np.float32)
+    unknown_cost = scenario.robot.unknown_cost
+    costs = belief_costs(mean, precision, scenario.sigma_prior**-2, unknown_cost, np.zeros(len(mean), bool))
+    belief = Belief(mean, precision, scenario.grid.shape)
+    return Situation(belief, costs, here.copy(), np.zeros(0, CONE), heard, experience)
+
+
+def half_known_plan(**changes):
+    """A plan whose part below y = 20 is known and free, with a wall at x = 25 up to there."""
+    mean, precision = np.full(PLAN.grid.shape, 0.5), np.full(PLAN.grid.shape, UNKNOWN)
+    mean[:, :20], precision[:, :20] = 0.0, 2000.0
+    mean[25, :18] = 1.0
+    return situation_of(PLAN, mean, precision, **changes)
+
+
+def test_nearby_viewpoints_of_a_flying_robot_lie_within_reach_and_inside():
+    box, shape = with_settings(BOX, {"action": ACTION}), BOX.grid.shape
+    proposer, here = new_proposers(box)[0], np.array([3.2, 5.1, 2.4, 0.3, -0.2])
+    situation = situation_of(box, np.full(shape, 0.5), np.full(shape, UNKNOWN), here)
+    pool, size = proposer.scratch.pool, propose_nearby(proposer, situation)
+    viewpoints = pool.viewpoints[:size]
+    apart = np.linalg.norm(viewpoints[:, :3] - here[:3], axis=1)
+    assert 0.0 < apart.max() <= 2.0 * (1 + 1e-9) and (viewpoints[:, :3] > 0.0).all()
+    assert (viewpoints[:, :3] < shape).all() and np.abs(viewpoints[:, 3]).max() <= math.pi
+    assert (pool.kinds[:size] == np.where(apart == 0.0, Kind.SPOT, Kind.NEAR)).all()
+    assert (pool.bits[:size] > 0.0).any() and (pool.seconds[:size] >= BOX.sensor.scan_time_s).all()
+
+
+def test_refining_never_loses_the_best():
+    best = []
+    for refinements in (0, 1, 2, 3):
+        recipe = dataclasses.replace(ALL_AROUND, exponent=0.3, refinements=refinements)
+        proposer, situation = new_proposers(PLAN, {0: recipe})[0], half_known_plan()
+        start_paths(proposer, situation)
+        propose_nearby(proposer, situation)
+        best.append(proposer.scratch.pool.values[proposer.scratch.found[0]])
+    assert best == sorted(best) and best[-1] > best[0]
+
+
+@pytest.fixture
+def far():
+    """A proposer and a situation, after far places were proposed, the goal of the robot among them."""
+    proposer, situation = new_proposers(PLAN)[0], half_known_plan(most_bits=1e9)
+    experience = situation.experience
+    experience["going"], experience["goal"] = True, (40.5, 30.5, 0.5, 0.3, 0.0)
+    start_paths(proposer, situation)
+    count, best = propose_far(proposer, situation)
+    return proposer, situation, count, best
+
+
+def test_far_places_are_reached_uncertain_and_the_goal_is_last(far):
+    proposer, situation, count, best = far
+    places = proposer.scratch.far
+    np.testing.assert_array_equal(places.viewpoints[count - 1], situation.experience["goal"])
+    assert count == ALL_AROUND.far_places + 1 and best == places.values[:count].max() > 0.0
+    assert np.isfinite(places.seconds[:count]).all() and (places.viewpoints[:count, 3] == 0.3).all()
+    assert np.median(places.viewpoints[:count, 1]) > 15.0  # unknown is what lies beyond y = 20
+    straight = np.linalg.norm(places.viewpoints[:count, :3] - HERE[:3], axis=1) * 0.1
+    assert (places.seconds[:count] > straight / PLAN.robot.max_speed_m_s).all()
+
+
+def test_the_first_stop_on_the_way_is_within_reach_and_free(far):
+    proposer, situation, _, _ = far
+    stop = np.zeros(5)
+    assert first_stop(proposer, situation, np.array([10.5, 30.5, 0.5, 0.3, 0.0]), stop)
+    assert 10.0 < np.linalg.norm(stop[:3] - HERE[:3]) <= 15.0
+    near = np.array([13.5, 5.5, 0.5, 1.0, 0.0])
+    assert first_stop(proposer, situation, near, stop)
+    np.testing.assert_array_equal(stop, near)
+    behind = np.array([30.5, 3.5, 0.5, 0.0, 0.0])
+    assert first_stop(proposer, situation, behind, stop) and stop[0] < 25.0
+    assert not first_stop(proposer, situation, np.array([25.5, 3.5, 0.5, 0.0, 0.0]), stop)
+
+
+def test_robots_that_drive_straight_stop_on_the_straight_part_of_the_path():
+    straight = with_settings(PLAN, {"robot": {"navigator": "straight"}})
+    proposer, situation = new_proposers(straight)[0], half_known_plan(most_bits=1e9)
+    start_paths(proposer, situation)
+    propose_far(proposer, situation)
+    stop = np.zeros(5)
+    assert first_stop(proposer, situation, np.array([10.5, 40.5, 0.5, 0.0, 0.0]), stop)
+    np.testing.assert_allclose(stop[:3], (10.5, 5.5 + 15.0, 0.5), rtol=1e-5)
+
+
+def test_what_any_scan_brings_is_worth_next_to_nothing():
+    """Of 1,000 bits at most, 0.25 % is dregs: the first 2.5 of any scan."""
+    dull = new_proposers(PLAN, {0: dataclasses.replace(NARROW_PLANNED, dregs=0.0025)})[0]
+    plain, situation = new_proposers(PLAN)[0], half_known_plan(most_bits=1000.0)
+    worth = [worth_bits(dull, situation, HERE, bits) for bits in (2.0, 4.5, 502.5)]
+    np.testing.assert_allclose(worth, [0.02, 2.0, 500.0])
+    assert [worth_bits(plain, situation, HERE, bits) for bits in (2.0, 4.5)] == [2.0, 4.5]
+
+
+def test_a_robot_that_a_teammate_blocked_keeps_clear_of_it():
+    bodies = with_settings(PLAN, {"robot": {"body_radius_m": 0.15}})
+    proposer = new_proposers(bodies)[0]
+    situation = half_known_plan(mates=[((20.5, 5.5, 0.5), 1.5)])
+    ahead, behind = (HERE + np.array([dx, 0.0, 0.0, 0.0, 0.0]) for dx in (8.0, -8.0))
+    assert trust_and_clearance(proposer, situation, ahead) == 1.0
+    situation.experience["blocked"] = 2
+    worth = [trust_and_clearance(proposer, situation, at) for at in (ahead, behind, HERE)]
+    assert worth == [0.0, 1.0, 1.0]
+
+
+def test_bodies_that_touch_may_part():
+    bodies = with_settings(PLAN, {"robot": {"body_radius_m": 0.15}})
+    proposer = new_proposers(bodies)[0]
+    situation = half_known_plan(mates=[((11.5, 5.5, 0.5), 1.5)])
+    situation.experience["blocked"] = 2
+    steps = [(-2.0, 0.0), (3.0, 0.0), (0.0, 2.0), (0.0, 0.0), (0.5, 2.0)]
+    places = [HERE + np.array([dx, dy, 0.0, 0.0, 0.0]) for dx, dy in steps]
+    worth = [trust_and_clearance(proposer, situation, at) for at in places]
+    assert worth == [1.0, 0.0, 1.0, 1.0, 0.0]
+
+
+def choice_of(situation):
+    """The viewpoint that the planner chooses."""
+    proposer = new_proposers(PLAN)[0]
+    start_paths(proposer, situation)
+    size, number = choose(proposer, situation, propose_nearby(proposer, situation), 1)
+    assert number < size
+    return proposer.scratch.pool.viewpoints[number].copy()
+
+
+def known_plan(shut):
+    """A plan of which all is known: free, or covered next to the robot's own voxel and beyond."""
+    mean = np.ones(PLAN.grid.shape) if shut else np.zeros(PLAN.grid.shape)
+    x, y = HERE[:2].astype(int)
+    mean[x - 1 : x + 2, y - 1 : y + 2] = 0.0
+    return situation_of(PLAN, mean, np.full(PLAN.grid.shape, 1e15), most_bits=1000.0)
+
+
+def test_where_nothing_is_left_it_goes_elsewhere():
+    chosen = choice_of(known_plan(shut=False))
+    assert 0.5 < np.linalg.norm(chosen[:3] - HERE[:3]) <= 15.0
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_only_a_robot_that_its_belief_shuts_in_leaves_the_way_it_came(side):
+    """By the voxel next to it that is nearest to where it was last free."""
+    free = known_plan(shut=False)
+    choice_of(free)
+    assert free.experience["was_free"]
+    np.testing.assert_array_equal(free.experience["free_at"], HERE[:3])
+    shut = known_plan(shut=True)
+    shut.experience["was_free"], shut.experience["free_at"] = (
+        True,
+        HERE[:3] + np.array([5.0 * side, 0.0, 0.0]),
+    )
+    np.testing.assert_array_equal(choice_of(shut)[:3], HERE[:3] + np.array([side, 0.0, 0.0]))
+
+
+def test_each_kind_has_its_recipe():
+    given = new_proposers(PLAN, {0: NARROW_STRAIGHT})[0].recipe
+    assert given.exponent == NARROW_STRAIGHT.exponent and given.turns == NARROW_STRAIGHT.turns
+    assert new_proposers(PLAN)[0].recipe.exponent == ALL_AROUND.exponent
