@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -117,7 +118,7 @@ def _parts(results: Results, tasks: list[Row], overall: list[Row], command: str)
     for task in suite.tasks:
         rows = [row for row in tasks if row["task"] == task.name]
         if rows:
-            parts += [f"### {task.name}", _about(task), _task_table(results, rows)]
+            parts += [f"### {task.name}", about(task), _task_table(results, rows)]
     failed = failed_rows(results)
     if failed:
         parts += ["### Missions that failed", _failed_table(failed)]
@@ -221,7 +222,7 @@ def _plain(text: str) -> str:
     return "".join(f"\\{sign}" if sign in r"\`*_{}[]<>()#!|~" else sign for sign in text)
 
 
-def _about(task: Task) -> str:
+def about(task: Task) -> str:
     """What kind of missions a task has."""
     scenario = task.scenario
     grid, around = scenario.grid, task.places[0].surroundings
@@ -233,6 +234,9 @@ def _about(task: Task) -> str:
         names = [f"`{name}`" for name in dict.fromkeys(file.name for file in files)]
         worlds = f"world file{'s' if len(names) > 1 else ''} {', '.join(names)}"
     team = f"{scenario.robots} {kind} robot" + ("s" if scenario.robots > 1 else "")
+    sensor = scenario.sensor
+    if math.isfinite(sensor.scan_every_m):
+        team += f" that scans {sensor.rays} rays of {sensor.max_range_m:g} m every {sensor.scan_every_m:g} m"
     return (
         f"{task.missions} starts, {worlds}, {shape} voxels of {grid.voxel_size_m:g} m, {team}, "
         f"time limit {scenario.ending.time_limit_s:,.0f} s."

@@ -11,6 +11,10 @@ Worlds of recipes are those of the test split, which nothing was tuned on; missi
 every strategy. The dungeons are those of ARiADNE (Cao et al., ICRA 2023): a sensor of 80 cells, a robot
 without a body, the start mark as start, and the end when at most 250 free cells are unseen. In the other
 plans robots have no body either, so that all cells can be seen.
+
+In all plans the lidar has 720 rays, as the dungeons' authors have it and as real ones have, and reaches 80
+cells, so that rays are 0.7 cells apart there; the scenarios have 180, which leave single cells unknown
+between them. It scans every 0.5 m of the way.
 """
 
 from __future__ import annotations
@@ -42,6 +46,8 @@ STARTS_A_TASK, QUICK_STARTS = 30, 2
 QUICK_DUNGEONS = 4
 SCAN_EVERY_M = 0.5
 """Plans: everybody scans, and may replan, whenever so much of the way is driven."""
+ANGULAR_STEP_RAD = math.pi / 360
+"""Plans: between two rays of the lidar."""
 DUNGEON_UNSEEN = 250
 _UNLIMITED, _LOSSY = 1_000_000, 0.5
 
@@ -227,11 +233,11 @@ def team_name(name: str, robots: int) -> str:
 
 
 def _explored(scenario: Scenario, ending: Mapping[str, Any]) -> Scenario:
-    """A scenario whose one robot replans at every scan and has no body, with another end of the mission."""
+    """A scenario whose one robot replans at every scan and has no body, with the suite's lidar and an end."""
     changes = {
         "robots": 1,
         "robot": {"redecide": "on_scan", "body_radius_m": 0.0},
-        "sensor": {"scan_every_m": SCAN_EVERY_M},
+        "sensor": {"scan_every_m": SCAN_EVERY_M, "angular_step_rad": ANGULAR_STEP_RAD},
         "ending": {**ending, "time_limit_s": 7200.0},
     }
     return with_settings(scenario, changes)
@@ -272,7 +278,7 @@ def _dungeons(count: int | None, every: int = 1) -> Task:
         rows = list(csv.DictReader(file))[::every][:count]
     seen_from_afar = {
         "robot": {"reach_m": 8.0},
-        "sensor": {"max_range_m": 8.0, "angular_step_rad": math.pi / 360},
+        "sensor": {"max_range_m": 8.0},
         "track_truth": True,
     }
     base = _explored(SCENARIOS["office"], {"unseen_free_voxels": DUNGEON_UNSEEN})

@@ -11,6 +11,7 @@ from PIL import Image
 
 from baselines.scoreboard import suites
 from baselines.scoreboard.pack_worlds import dungeon
+from baselines.scoreboard.page import about
 from baselines.scoreboard.suites import DUNGEON_UNSEEN, SUITES, WORLDS, find_suite
 from entropy_explore_env import load_world
 from entropy_explore_env.errors import SettingError, WorldError
@@ -63,12 +64,20 @@ def test_plans_replan_at_every_scan_until_everything_is_seen():
     for task in find_suite("plans", False, TEAMS).tasks:
         scenario = task.scenario
         assert (scenario.robot.redecide, scenario.sensor.scan_every_m) == ("on_scan", suites.SCAN_EVERY_M)
+        assert (scenario.sensor.rays, scenario.sensor.max_range_m) == (720, 8.0)
         if task.name == "dungeons":
             assert scenario.ending.unseen_free_voxels == DUNGEON_UNSEEN == 250
             assert scenario.sensor.max_range_m == 80 * scenario.grid.voxel_size_m
             assert scenario.robot.body_radius_m == 0.0
         else:
             assert scenario.ending.seen_share == 1.0
+
+
+def test_the_page_says_with_what_plans_are_scanned():
+    plan, *_ = find_suite("plans", True, TEAMS).tasks
+    assert "1 ground robot that scans 720 rays of 8 m every 0.5 m, time limit" in about(plan)
+    team, *_ = find_suite("teams", True, TEAMS).tasks
+    assert "2 flying robots, time limit" in about(team)
 
 
 def test_mission_k_of_every_task_is_run_in_round_k():
