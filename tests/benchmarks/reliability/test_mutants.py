@@ -1,13 +1,22 @@
-"""Faults put into a file: each is one change, in functions only."""
+"""Faults put into a file: each is one change, in functions only; tests are run until one finds it."""
 
 from __future__ import annotations
 
 import ast
+import json
 import shutil
 from pathlib import Path
 
-from benchmarks.reliability import mutants
-from benchmarks.reliability.mutants import mutants_of
+import pytest
+
+from benchmarks.reliability import mutant_runs, mutants
+from benchmarks.reliability.coverage import ROOT
+from benchmarks.reliability.faults_in_source import mutants_of
+from benchmarks.reliability.mutant_runs import LATE, Host
+from benchmarks.reliability.mutants import Args, Drawn, main, row_of
+from benchmarks.reliability.quick_tests import Told
+from benchmarks.reliability.reached_lines import Reached
+from entropy_explore_env.errors import SettingError
 
 SOURCE = '''
 """A file."""
@@ -50,36 +59,16 @@ def test_every_kind_of_fault_is_made_once_and_the_rest_stays():
         assert sum(one != other for one, other in zip(lines, whole, strict=True)) == 1
 
 
-TESTS = """
-import time
-
-def test_quick():
-    assert True
-
-def test_wrong():
-    assert False
-
-def test_slow():
-    begun_s = time.process_time()
-    while time.process_time() - begun_s < 60.0:
-        try:
-            time.process_time()
-        except Exception:
-            pass
-"""
-
-
-def test_quick_tests_are_those_that_pass_in_time(tmp_path):
-    (tmp_path / "test_some.py").write_text(TESTS)
-    shutil.copytree(Path(mutants.__file__).parent, tmp_path / "benchmarks" / "reliability")
-    (tmp_path / "benchmarks" / "__init__.py").touch()  # or another checkout's would be taken
-    quick = mutants._quick_tests(tmp_path, ["test_some.py"], 0.3)
-    assert quick == ["test_some.py::test_quick"]
-    assert mutants._found(tmp_path, quick, 60.0) == ""
-    assert (
-        mutants._found(tmp_path, [*quick, "test_some.py::test_wrong"], 60.0)
-        == "FAILED test_some.py::test_wrong"
-    )
+def test_faults_of_kernels_only_and_the_lines_of_a_statement():
+    compiled = SOURCE.replace("def count", "@lean_kernel\ndef count")
+    assert mutants_of(SOURCE, kernels=True) == []
+    found = mutants_of(compiled, kernels=True)
+    assert [mutant.what for mutant in found] == [mutant.what for mutant in mutants_of(compiled)]
+    lines = compiled.splitlines()
+    for mutant in found:
+        assert lines[mutant.lines[0] - 1].strip().startswith(mutant.what.partition("  ->")[0][:5])
+    condition = next(mutant for mutant in found if mutant.what.startswith("if value < LIMIT"))
+    assert len(condition.lines) == 1
 
 
 def test_faults_of_a_folder_are_drawn_from_all_its_files(tmp_path):
@@ -89,5 +78,106 @@ def test_faults_of_a_folder_are_drawn_from_all_its_files(tmp_path):
     drawn, every = mutants.drawn_faults(tmp_path, Path("package"), 10, 0)
     assert every == 24 and len(drawn) == len({fault.digest for fault in drawn}) == 10
     assert {str(fault.path) for fault in drawn} == {"package/one.py", "package/inner/two.py"}
-    assert drawn == mutants.drawn_faults(tmp_path, Path("package"), 10, 0)[0]
+    again = mutants.drawn_faults(tmp_path, Path("package"), 10, 0)[0]
+    assert [fault.digest for fault in drawn] == [fault.digest for fault in again]
     assert len(mutants.drawn_faults(tmp_path, Path("package/one.py"), 0, 0)[0]) == 12
+
+
+def test_the_tests_of_a_line_are_its_own_first_then_the_quickest():
+    told = {
+        name: Told(name, passed, seconds)
+        for name, passed, seconds in (
+            ("a/test_own.py::slow", True, 2.0),
+            ("a/test_own.py::late", True, 9.0),
+            ("a/test_other.py::quick", True, 0.1),
+            ("a/test_other.py::quicker", True, 0.05),
+            ("a/test_other.py::failed", False, 0.01),
+            ("a/test_other.py::elsewhere", True, 0.01),
+        )
+    }
+    lines = {"x/own.py": {3: set(told) - {"a/test_other.py::elsewhere"}, 5: {"a/test_other.py::elsewhere"}}}
+    reached = Reached(lines, told)
+    ordered = ["a/test_own.py::slow", "a/test_other.py::quicker", "a/test_other.py::quick"]
+    assert reached.tests_of("x/own.py", range(3, 5), 3.0, 30.0) == ordered
+    assert reached.tests_of("x/own.py", range(3, 5), 3.0, 2.07) == ordered[:2]
+    assert reached.tests_of("x/own.py", range(3, 5), 3.0, 0.5) == ordered[:1]
+    assert reached.tests_of("x/own.py", range(4, 5), 3.0, 30.0) == []
+    assert reached.tests_of("x/none.py", range(3, 5), 3.0, 30.0) == []
+
+
+KERNEL = """
+def doubled(value):
+    return value * 2
+"""
+TESTS = """
+import time
+
+from entropy_explore_env.some import doubled
+
+def test_sound():
+    assert True
+
+def test_doubled():
+    assert doubled(3) == 6
+
+def test_wrong():
+    assert False
+
+def test_waits():
+    while doubled(1) != 2:
+        time.sleep(0.01)
+"""
+
+
+@pytest.fixture
+def host(tmp_path):
+    for package in ("benchmarks", "benchmarks/reliability", "entropy_explore_env", "tests"):
+        (tmp_path / package).mkdir(parents=True)
+        (tmp_path / package / "__init__.py").touch()
+    for name in ("mutant_runs.py", "quick_tests.py"):
+        shutil.copy(Path(mutant_runs.__file__).parent / name, tmp_path / "benchmarks" / "reliability")
+    (tmp_path / "entropy_explore_env" / "some.py").write_text(KERNEL)
+    (tmp_path / "tests" / "test_some.py").write_text(TESTS)
+    with Host(tmp_path) as running:
+        yield running
+
+
+def test_faults_are_found_one_after_another_by_the_first_test_that_fails(host):
+    path, sound, doubled, wrong, waits = (
+        Path("entropy_explore_env/some.py"),
+        *(f"tests/test_some.py::test_{name}" for name in ("sound", "doubled", "wrong", "waits")),
+    )
+    thrice = KERNEL.replace("2", "3")
+    assert host.first_failure(path, KERNEL, [sound, doubled], 60.0) is None
+    assert host.first_failure(path, thrice, [sound, doubled], 60.0) == doubled
+    assert host.first_failure(path, KERNEL.replace("2", "2.0"), [doubled], 60.0) is None
+    assert host.first_failure(path, thrice, [waits], 3.0) == LATE
+    assert host.first_failure(path, "def doubled(", [doubled], 60.0) is not None
+    assert (host.folder / path).read_text() == KERNEL
+    assert host.passes_soundly(doubled) and not host.passes_soundly(wrong)
+    drawn = Drawn(path, mutants_of(KERNEL)[0])
+    told = {name: Told(name, True, 0.1 * place) for place, name in enumerate((wrong, sound, doubled))}
+    reached = Reached({str(path): {3: set(told)}}, told)
+    row = row_of(host, drawn, reached, Args())
+    assert (row["found"], row["tests"], row["line"]) == (doubled, 3, 3)
+    assert row["what"] == "return value * 2  ->  return value * 3"
+    assert row_of(host, drawn, Reached({}, told), Args())["found"] == ""
+
+
+def test_a_folder_that_is_not_measured_is_refused(tmp_path):
+    for path in ("entropy_explore_env/worlds", "benchmarks", "entropy_explore_env/missions/none.py"):
+        with pytest.raises(SettingError, match="path"):
+            main([path, "--out", str(tmp_path)])
+
+
+def test_what_is_known_is_not_run_again(tmp_path, capsys):
+    path = Path("entropy_explore_env/belief/fields.py")
+    drawn, _ = mutants.drawn_faults(ROOT, path, 2, 0)
+    rows = [
+        {"digest": fault.digest, "path": str(path), "line": 1, "what": "x", "found": found, "tests": 2}
+        for fault, found in zip(drawn, ("late", ""), strict=True)
+    ]
+    kept = tmp_path / "entropy_explore_env.belief.fields.jsonl"
+    kept.write_text("".join(json.dumps(row) + "\n" for row in rows))
+    assert main([str(path), "--sample", "2", "--no-kernels", "--out", str(tmp_path)]) == 1
+    assert "1 of 2 faults were found, 2 drawn of" in capsys.readouterr().out

@@ -102,15 +102,17 @@ def test_the_page_says_what_is_asked_for_and_not_reached():
     faults = [
         {"digest": "a", "path": "x/y.py", "line": 3, "what": "1  ->  2", "found": "late"},
         {"digest": "b", "path": "x/y.py", "line": 4, "what": "2  ->  3", "found": ""},
+        {"digest": "c", "path": "x/y.py", "line": 5, "what": "3  ->  4", "found": "", "tests": 0},
     ]
     branches = [
         {"path": "x/y.py", "branches": 8, "covered": 6, "files": 3, "of_files": 4},
         {"path": "x/z.py", "branches": 2, "covered": 2, "files": 3, "of_files": 4},
     ]
     text = page.page(EMPTY, {"x": faults}, branches, {"numpy": "2"})
-    assert "- Kills: 0 of 10 kills" in text and "- Faults in formulas: 2 of 300 drawn" in text
-    assert "- Faults in formulas: 50% found, 90% asked for" in text and "80.0% covered" in text
-    assert "| x/y.py | 2 | 1 |" in text and "- not found: x/y.py:4: `2  ->  3`" in text
+    assert "- Kills: 0 of 10 kills" in text and "- Faults in formulas: 3 of 300 drawn" in text
+    assert "- Faults in formulas: 33% found, 90% asked for" in text and "80.0% covered" in text
+    assert "| x/y.py | 3 | 1 |" in text and "- not found: x/y.py:4: `2  ->  3`" in text
+    assert "- no test takes its line: x/y.py:5: `3  ->  4`" in text
     assert "; 3 of 4 files of tests were run" in text
     assert "| x | 10 | 80.0% |" in text and "with numpy 2." in text
 

@@ -1,0 +1,65 @@
+"""Which tests take a line of a source, out of what `benchmarks.reliability.coverage` keeps."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from benchmarks.reliability.quick_tests import Told, told_in
+
+
+@dataclass(frozen=True)
+class Reached:
+    """What tests take.
+
+    Attributes:
+        lines: Path of a source → line → names of tests.
+        told: Name of a test → what became of it.
+    """
+
+    lines: Mapping[str, Mapping[int, set[str]]]
+    told: Mapping[str, Told]
+
+    def tests_of(self, path: str, lines: Iterable[int], test_s: float, tests_s: float) -> list[str]:
+        """Names of the tests that take one of some lines: those of the file itself first, then the quickest.
+
+        Args:
+            path: Of the source, from the root of the checkout.
+            lines: Of the source.
+            test_s: Seconds that a test may take.
+            tests_s: Seconds of all of them together; the first is run in any case.
+        """
+        taken = self.lines.get(path, {})
+        names = set().union(*(taken.get(line, set()) for line in lines))
+        tests = [self.told[name] for name in names if name in self.told]
+        own = f"test_{Path(path).stem}.py"
+        tests = sorted(
+            (test for test in tests if test.passed and test.seconds <= test_s),
+            key=lambda test: (own not in test.name, test.seconds, test.name),
+        )
+        chosen: list[str] = []
+        for test in tests:
+            tests_s -= test.seconds
+            if tests_s >= 0.0 or not chosen:
+                chosen.append(test.name)
+        return chosen
+
+
+def reached_lines(folder: Path) -> Reached:
+    """What the tests took of which data are kept in a folder."""
+    from coverage import CoverageData
+
+    lines: dict[str, dict[int, set[str]]] = defaultdict(lambda: defaultdict(set))
+    told: dict[str, Told] = {}
+    for file in sorted(folder.glob("*.coverage")):
+        told |= {test.name: test for test in told_in(file.with_suffix(".tests"))}
+        data = CoverageData(str(file))
+        data.read()
+        for measured in data.measured_files():
+            path = measured[measured.rindex("entropy_explore_env/") :]
+            for line, contexts in data.contexts_by_lineno(measured).items():
+                lines[path][line] |= {context for context in contexts if context}
+        data.close()
+    return Reached(lines, told)
