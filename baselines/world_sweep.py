@@ -32,7 +32,7 @@ from baselines.experiments.mission import run_mission, scripted_env
 from baselines.experiments.tables import markdown_table
 from baselines.strategies import make_strategy, resolved
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
-from entropy_explore_env.errors import SettingError, WorldError
+from entropy_explore_env.errors import SettingError, WorldError, counted
 from entropy_explore_env.reports.metrics import mission_figures
 from entropy_explore_env.writing import write_atomically
 
@@ -97,9 +97,8 @@ def main(words: Sequence[str]) -> int:
             print(f"{number + 1} of {len(files)}: {names[number]}", file=sys.stderr, flush=True)
         rows.append({**explore(path, plans if is_plan(path) else others), "world": names[number]})
     if args.out is not None:
-        about = (
-            f"Made by `{_command(plans, others)}`: strategy {resolved(args.strategy)}, {args.robots} robots, "
-        )
+        team = counted(args.robots, "robot")
+        about = f"Made by `{_command(plans, others)}`: strategy {resolved(args.strategy)}, {team}, "
         limits = dict.fromkeys(f"{limit_s(one.options):g} s" for one in (plans, others))
         about += f"seed {args.seed}; missions are cut off after {' and '.join(limits)}."
         write_atomically(args.out, f"# Worlds explored\n\n{about}\n\n{table(rows)}\n")

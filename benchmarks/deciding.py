@@ -15,6 +15,7 @@ from benchmarks.rows import Effort, Goal, Row, alone, timed
 from entropy_explore_env.belief.visibility import CONE, cone_of, mark_cone, visible_bits
 from entropy_explore_env.compilation.kernels import kernel
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
+from entropy_explore_env.errors import counted
 from entropy_explore_env.scenario import Scenario, with_settings
 from entropy_explore_env.scenarios import CLIFF, LAB, OFFICE, ROOM
 from entropy_explore_env.settings import Grid
@@ -88,5 +89,5 @@ def decision_row(scenario: Scenario, robots: int, strategy: str, steps: int, mos
     run_mission(env, make_strategy(strategy), 0)  # compiled now
     watch = Stopwatch(make_strategy(strategy), time.thread_time)
     run_mission(env, watch, 1)
-    job = f"a decision of {strategy}, {scenario.name}, {robots} robots"
+    job = f"a decision of {strategy}, {scenario.name}, {counted(robots, 'robot')}"
     return alone(job, watch.decisions_ms, "ms", Goal("<", most_ms, "ms"))

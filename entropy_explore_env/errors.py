@@ -50,6 +50,11 @@ def did_you_mean(word: object, known: Iterable[str]) -> str:
     return f"; did you mean {alike[0]}?" if alike else ""
 
 
+def counted(number: int, noun: str) -> str:
+    """How many there are of something, as in `1 robot` and `3 robots`."""
+    return f"{number} {noun}{'s' * (number != 1)}"
+
+
 class EntropyExploreError(ValueError):
     """A request of the caller that cannot be met; the message is one line."""
 

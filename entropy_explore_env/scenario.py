@@ -114,6 +114,8 @@ class Scenario:
             raise SettingError(
                 "Ending.sigma_end", self.ending.sigma_end, f"below sigma_prior = {self.sigma_prior}"
             )
+        if self.observation.overlaps and self.action.kind != "candidates":
+            raise SettingError("Observation.overlaps", True, "False, unless Action.kind is 'candidates'")
         for kind in self.kinds:
             self._check_kind(kind.robot)
             self._check_drives(kind)

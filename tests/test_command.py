@@ -13,7 +13,7 @@ import pytest
 from baselines.cli import arguments as checkout
 from entropy_explore_env import command
 from entropy_explore_env.command import BAD_INPUT, INTERRUPTED, LineParser, UsageError
-from entropy_explore_env.errors import CallOrderError, SettingError, WorldError
+from entropy_explore_env.errors import CallOrderError, SettingError, WorldError, counted
 
 
 @pytest.fixture(params=[command.run_command, checkout.run_command], ids=["library", "checkout"])
@@ -124,3 +124,7 @@ def test_whole_numbers_have_exponents_and_paths_begin_at_home(monkeypatch, tmp_p
     for words in (["--number", "1.5", "a"], ["~nobody-of-this-name/a"]):
         with pytest.raises(UsageError):
             parser.parse_args(words)
+
+
+def test_one_is_counted_as_one():
+    assert [counted(n, "robot") for n in (0, 1, 2)] == ["0 robots", "1 robot", "2 robots"]

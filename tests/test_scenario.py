@@ -257,6 +257,8 @@ def test_settings_that_do_not_fit_each_other_are_refused():
         ({"ending": {"sigma_end": 30.0}}, "Ending.sigma_end"),
         ({"sigma_prior": 0.01}, "Ending.sigma_end"),
         ({**discrete, "robot": {"reach_m": INF}}, "Action.kind"),
+        ({**discrete, "observation": {"overlaps": True}}, "Observation.overlaps"),
+        ({"observation": {"overlaps": True}}, "Observation.overlaps"),
         ({**discrete, "robot": {"reach_m": 0.49}}, "Robot.reach_m"),
         ({"robot": {"motion": "planar", "sensor_height_m": 2.5}}, "Robot.sensor_height_m"),
         (  # 0.85 < 17 · 0.05 in floating-point numbers, but 0.85 / 0.05 is 17

@@ -32,7 +32,7 @@ from baselines.experiments.outcome import Record
 from baselines.experiments.ray_cluster import RayCluster
 from baselines.experiments.statistics import median_interval, median_ratio_interval
 from baselines.strategies import make_strategy, resolved
-from entropy_explore_env.errors import SettingError
+from entropy_explore_env.errors import SettingError, counted
 from entropy_explore_env.scenario import Scenario, with_settings
 from entropy_explore_env.scenarios import SCENARIOS, find_scenario
 from entropy_explore_env.validation import check_whole
@@ -52,8 +52,9 @@ class Args(WorkerOptions):
     """A policy that comes with the project: room."""
     strategy: str | None = None
     """The folder of a run of training.ppo, or of one of its checkpoints."""
-    against: str = "gradient,random,information-rate-v0"
-    """Strategies to compare with, as in baselines.run, separated by commas."""
+    against: str | None = None
+    """Strategies to compare with, as in baselines.run, separated by commas; default:
+    gradient,random,information-rate-v0, and for a policy over candidates planner-choice before them."""
     scenario: str | None = None
     """Named scenario; default: that of training, with its robots, sensors and channel."""
     robots: int | None = None
@@ -88,7 +89,8 @@ def main(words: Sequence[str]) -> int:
     if trained.scenario.world not in made and not elsewhere:
         raise SettingError("world", "left out", "world files to test in, as the policy learned in files")
     scenario, surroundings = tasked(base.scenario, args.task, args.robots)
-    rivals = list(dict.fromkeys(map(resolved, args.against.split(","))))
+    against = default_rivals(trained.scenario) if args.against is None else args.against.split(",")
+    rivals = list(dict.fromkeys(map(resolved, against)))
     for name in (policy, *rivals):
         make_strategy(name).reset(scenario, np.random.default_rng(0))
     make_folder("runs", args.runs)
@@ -99,6 +101,12 @@ def main(words: Sequence[str]) -> int:
     else:
         show(compared)
     return 0
+
+
+def default_rivals(trained: Scenario) -> list[str]:
+    """Strategies that a policy is compared with; one over candidates also with the planner's own choice."""
+    planner = ["planner-choice"] if trained.action.kind == "candidates" else []
+    return [*planner, *SIMPLE, "information-rate-v0"]
 
 
 def evaluation_scenario(
@@ -199,9 +207,7 @@ def show(compared: dict[str, Any]) -> None:
     from rich.table import Table
 
     seeds, robots = compared["seeds"], compared["robots"]
-    table = Table(
-        title=f"{compared['scenario']}, {robots} robot{'s' * (robots != 1)}, {seeds} test missions each"
-    )
+    table = Table(title=f"{compared['scenario']}, {counted(robots, 'robot')}, {seeds} test missions each")
     table.add_column("strategy", overflow="fold", min_width=17)
     for head in ("mission time", "finished", "scans", "ratio", "faster"):
         table.add_column(head, justify="right")

@@ -222,7 +222,7 @@ class LearnedPolicy:
         trained = self._checkpoint.settings.scenario
         self._observer = ViewObserver(scenario, trained.observation, trained.action, rng)
         reason = misfit(self._observer.scenario, trained)
-        if reason is None and scenario.action.kind == "discrete" and scenario.action != trained.action:
+        if reason is None and scenario.action.by_number and scenario.action != trained.action:
             reason = Misfit("Scenario.action", scenario.action, f"continuous, or {trained.action}")
         if reason is not None:
             allowed = f"{reason.trained}, as the policy was trained"

@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import dataclasses
 import shlex
+import sys
 import warnings
 from collections.abc import Mapping, Sequence
 from contextlib import closing
@@ -92,6 +93,8 @@ def main(words: Sequence[str]) -> int:
         make_folder("out", out)
     else:
         checkpoint = checkpoint_to_resume(out)
+        if checkpoint is None and not args.json:
+            print(f"no checkpoint in {out}: from the beginning{told(changed)}", file=sys.stderr, flush=True)
     torch.set_num_threads(args.threads)
     state = set_up(args, task)
     if args.start is not None and checkpoint is None:
@@ -106,8 +109,7 @@ def main(words: Sequence[str]) -> int:
         if checkpoint is not None:
             restore_state(state, checkpoint)
             forget_later(out, "best", state.model.num_timesteps)
-        if args.resume is not None:
-            bar.say(beginning(out, checkpoint is not None, state.model.num_timesteps, changed))
+            bar.say(f"{out} goes on after {state.model.num_timesteps:,} steps{told(changed)}")
         train(args, state, bar, interruption)
     if not finished(args, state):
         return say_stopped(out, state.model.num_timesteps, args.json)
@@ -130,12 +132,9 @@ def finished(args: Args, state: TrainingState) -> bool:
     return steps >= args.total_steps and state.progress.validated(steps)
 
 
-def beginning(out: Path, found: bool, steps: int, changed: Mapping[str, object]) -> str:
-    """What is said of a run that is continued: from where, and with which options changed."""
-    told = "".join(f"; {name} was {value}" for name, value in changed.items())
-    if not found:
-        return f"no checkpoint in {out}: from the beginning{told}"
-    return f"{out} goes on after {steps:,} steps{told}"
+def told(changed: Mapping[str, object]) -> str:
+    """What is said of options that differ from those that a run was started with."""
+    return "".join(f"; {name} was {value}" for name, value in changed.items())
 
 
 def say_stopped(out: Path, steps: int, as_json: bool) -> int:

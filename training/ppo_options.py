@@ -33,6 +33,9 @@ from training.training_task import TrainingTask
 OWN = {"ending": {"time_limit_s": 2000.0}}
 """What training changes of named scenarios: longer missions would teach little and take all the time."""
 
+_UPDATES, _LEAST = 8, (8, 16)
+"""Of a short run by default: its updates, and the least missions and steps of a rollout."""
+
 
 @dataclass
 class Args:
@@ -43,7 +46,7 @@ class Args:
     robots: int = 3
     """Robots in a team."""
     missions: int = 64
-    """Missions simulated at a time."""
+    """Missions simulated at a time; fewer by default where --total-steps is small."""
     total_steps: WholeNumber = 2_500_000
     """Steps to train for, counted per robot."""
     seed: int = 0
@@ -89,7 +92,7 @@ class Args:
     """Gazes, and rays of the panorama, from -45° to 45°."""
 
     rollout_steps: int = 128
-    """Steps of each mission between two updates."""
+    """Steps of each mission between two updates; fewer by default where --total-steps is small."""
     epochs: int = 4
     """Passes over a rollout's decisions in an update."""
     batch: int = 1024
@@ -195,8 +198,20 @@ def parsed(words: Sequence[str], description: str | None = None) -> Args:
     first = first_parsed(Args, words, description)
     task = base_task(first.scenario, first.task.settings, OWN)
     robots = {"robots": task.scenario.robots} if is_whole_scenario(first.task.settings) else {}
-    args = parsed_for(task, first, words, description, **robots)
+    named = dataclasses.replace(first, **robots)
+    args = parsed_for(task, first, words, description, **robots, **rollout_that_fits(named))
     return settled_arguments(args)
+
+
+def rollout_that_fits(args: Args) -> dict[str, int]:
+    """Missions and steps of a rollout, by default: in a short run at most an eighth of it, if that can be.
+
+    Both are halved in turn, down to 8 missions and 16 steps.
+    """
+    missions, steps = Args.missions, Args.rollout_steps
+    while args.robots * missions * steps * _UPDATES > args.total_steps and (missions, steps) != _LEAST:
+        missions, steps = (missions, steps // 2) if steps > missions else (missions // 2, steps)
+    return {"missions": missions, "rollout_steps": steps}
 
 
 def settled_arguments(args: Args) -> Args:

@@ -22,7 +22,7 @@ import numpy as np
 
 from baselines.cli.arguments import Positional, make_folder, parse, run_command
 from baselines.experiments.tables import markdown_table
-from entropy_explore_env.errors import SettingError
+from entropy_explore_env.errors import SettingError, counted
 from entropy_explore_env.writing import write_atomically
 from training.run_folder import FILE
 
@@ -168,13 +168,14 @@ def page(runs: Sequence[Run]) -> str:
             [*cells, *(("", "") if name == first else (f"{share:.2f}", "yes" if share <= GOAL else "no"))]
         )
     head = ["trainer", "median mission time of each seed, s", "median of these", "ratio", f"≤ {GOAL:g}"]
+    team = counted(runs[0].task["robots"], "robot")
     commands = "\n".join(f"    {run.command}" for run in runs)
     return "\n".join(
         [
             "# What trainers learn in the same number of steps\n",
             "Made by `python -m training.trainer_comparison`, the folders of these runs after it:\n",
             commands + "\n",
-            f"The scenario {runs[0].task['scenario']} with {runs[0].task['robots']} robots. All validate in "
+            f"The scenario {runs[0].task['scenario']} with {team}. All validate in "
             "the same missions, which they do not learn from. The table has the policy that each run keeps "
             f"after {steps:,} robot-steps, which all of them reached: the one with the least mean time so "
             f"far. A ratio is that of medians, to {first}. Learning rates fall until a run's last step.\n",

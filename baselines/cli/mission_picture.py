@@ -13,6 +13,7 @@ from matplotlib.patheffects import withStroke
 
 from baselines.cli.figures import COLOURS, STYLE, extent_of, png
 from entropy_explore_env.belief.elevation import elevation_map
+from entropy_explore_env.errors import counted
 from entropy_explore_env.reports.painting import entropy_share
 from entropy_explore_env.reports.recording import Recorder, believed_poses_now
 from entropy_explore_env.reports.rendering import estimate_outline
@@ -83,10 +84,8 @@ def mission_picture(recorder: Recorder, title: str, strategy: str, truth: bool =
         _draw_map(figure, covered, coverage, recorder, believed=True)
         marks = _legend(recorder)
         figure.legend(handles=marks, loc="outside lower left", ncols=len(marks), frameon=False, fontsize=8)
-        team = f"{robots} robot{'s' if robots > 1 else ''}"
-        figure.suptitle(
-            f"{title}, {strategy}, {team}, seed {missions.seeds[0]}", x=0.01, ha="left", fontsize=11
-        )
+        what = f"{title}, {strategy}, {counted(robots, 'robot')}, seed {missions.seeds[0]}"
+        figure.suptitle(what, x=0.01, ha="left", fontsize=11)
         return png(figure)
 
 

@@ -241,8 +241,8 @@ def draw_scenario(rng: np.random.Generator, few_kernels: bool = False) -> Drawn:
         fiducials=_fiducials(rng, part, grid),
         ending=part(Ending),
         reward=part(Reward),
-        action=part(Action),
-        observation=_observation(rng, part, few_kernels),
+        action=(action := part(Action)),
+        observation=_observation(rng, part, few_kernels, action),
         **own,
     )
     return Drawn(scenario, tuple(_world(rng, grid) for _ in range(2)) if given else ())
@@ -328,11 +328,15 @@ def _channel(part: Callable[..., Any], faulty: bool, few_kernels: bool) -> Chann
     return channel
 
 
-def _observation(rng: np.random.Generator, part: Callable[..., Any], few_kernels: bool) -> Observation:
-    """Parts of an observation, with a small patch and overview."""
+def _observation(
+    rng: np.random.Generator, part: Callable[..., Any], few_kernels: bool, action: Action
+) -> Observation:
+    """Parts of an observation, with a small patch and overview; overlaps are those of candidates alone."""
     patch = tuple(int(2 * n + 1) for n in rng.integers(0, 6, 3))
     overview = tuple(int(n) for n in rng.integers(1, 12, 3))
     drawn = part(Observation, patch_shape=patch, overview_shape=overview)
+    if action.kind != "candidates":
+        drawn = dataclasses.replace(drawn, overlaps=False)
     if not few_kernels:
         return drawn
     every = bool(rng.random() < 0.5)

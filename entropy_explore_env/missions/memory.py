@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from entropy_explore_env.belief.raycast import longest_crossing
-from entropy_explore_env.errors import SettingError
+from entropy_explore_env.errors import SettingError, counted
 from entropy_explore_env.missions.observation.layout import observation_parts
 from entropy_explore_env.missions.rules import (
     POINT,
@@ -174,9 +174,10 @@ def check_memory(scenario: Scenario, batch: Batch) -> None:
     if isinstance(value, bool):
         lower = "do without"
     also = " or ".join(f"fewer {what}" for what in ("missions", "robots") if not most.setting.endswith(what))
+    asked = f"{counted(batch.missions, 'mission')} of {counted(scenario.robots, 'robot')}"
     allowed = (
-        f"what fits into {there_is / 2**30:.1f} GiB of memory: {batch.missions} missions of "
-        f"{scenario.robots} robots need {needed / 2**30:.1f} GiB, {most.bytes / 2**30:.1f} of them for "
+        f"what fits into {there_is / 2**30:.1f} GiB of memory: {asked} "
+        f"need{'s' * (batch.missions == 1)} {needed / 2**30:.1f} GiB, {most.bytes / 2**30:.1f} of them for "
         f"{most.purpose}; {lower} {most.setting}, or have {also}"
     )
     raise SettingError(most.setting, value, allowed)

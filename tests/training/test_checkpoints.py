@@ -204,6 +204,7 @@ def test_a_policy_is_a_strategy_like_any_other(saved, tmp_path):
     [
         ({"robots": 3}, "robots = 3"),
         ({"robots": 2, "action": {"kind": "discrete"}}, "Scenario.action"),
+        ({"robots": 2, "action": {"kind": "candidates"}}, "Scenario.action = Action.kind='candidates'"),
         ({"robots": 2, "extra_kinds": find_scenario("office-mixed").extra_kinds}, "kinds of robots = 2"),
         ({"robots": 2, "robot": {"motion": "planar"}}, "motion of the robots = 'in a plane"),
     ],
@@ -253,6 +254,14 @@ def test_evaluate_puts_a_policy_beside_strategies(saved, tmp_path, capsys):
     assert "robots = 3" in capsys.readouterr().err
     shutil.rmtree(saved.parent)
     assert evaluate.run_command(evaluate.main, words) == BAD_INPUT
+
+
+def test_a_policy_over_candidates_is_compared_with_the_planner_unasked():
+    """It begins as the planner: whether it became better than that is the question."""
+    over = with_settings(SCENARIO, {"action": {"kind": "candidates"}})
+    others = ["gradient", "random", "information-rate-v0"]
+    assert evaluate.default_rivals(SCENARIO) == others
+    assert evaluate.default_rivals(over) == ["planner-choice", *others]
 
 
 def test_evaluation_takes_worlds_that_training_never_sees():

@@ -210,6 +210,38 @@ def test_a_run_without_a_checkpoint_begins_again_and_says_so(tmp_path, capsys):
     assert f"{out} goes on after 384 steps; total_steps was 96" in capsys.readouterr().err
 
 
+def test_that_a_run_begins_again_is_said_at_once(uninterrupted, tmp_path, monkeypatch, capsys):
+    out = tmp_path / "run"
+    out.mkdir()
+    shutil.copy(uninterrupted[0] / "run.json", out)
+
+    def refuse(*_: object) -> None:
+        raise NotFiniteError("set-up", float("nan"), 0)
+
+    monkeypatch.setattr(ppo, "set_up", refuse)
+    command = json.loads((out / "run.json").read_text())
+    command["args"]["json"] = False
+    (out / "run.json").write_text(json.dumps(command))
+    assert resume(out) == BAD_INPUT
+    assert capsys.readouterr().err.startswith(f"no checkpoint in {out}: from the beginning\n")
+
+
+@pytest.mark.parametrize(
+    ("words", "rollout"),
+    [
+        ("--robots 3 --total-steps 196_608", (64, 128)),  # 8 updates of 3 · 64 · 128 steps
+        ("--robots 3 --total-steps 196_607", (64, 64)),
+        ("--robots 1 --total-steps 10_000", (32, 32)),
+        ("--robots 1 --total-steps 5_000", (16, 32)),
+        ("--robots 4 --total-steps 1", (8, 16)),
+        ("--robots 1 --total-steps 100 --missions 64", (64, 16)),
+    ],
+)
+def test_a_short_run_has_short_rollouts_unless_it_is_told(words, rollout):
+    args = ppo.parsed(words.split())
+    assert (args.missions, args.rollout_steps) == rollout
+
+
 def test_a_run_is_neither_overwritten_nor_continued_with_other_options(uninterrupted, tmp_path, capsys):
     out = uninterrupted[0]
     assert learn(out) == BAD_INPUT

@@ -25,14 +25,14 @@ from typing import Any, Literal
 import torch
 
 from baselines.cli.arguments import make_folder, parse, print_json, run_command
-from entropy_explore_env.command import INTERRUPTED
+from entropy_explore_env.command import INTERRUPTED, UsageError
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.missions.observation.layout import ObservationLayout
 from entropy_explore_env.missions.privileged import PRIVILEGED
 from entropy_explore_env.scenario import Scenario
 from entropy_explore_env.validation import check_whole, is_whole
 from entropy_explore_env.writing import write_atomically
-from training import extra, ppo  # noqa: F401 - extra: before what is not there without it
+from training import extra, ppo, ppo_options  # noqa: F401 - extra: before what is not there without it
 from training.candidate_network import WIDTH, CandidatePolicy, check_width
 from training.checkpoints import (
     Checkpoint,
@@ -69,6 +69,8 @@ from training.run_folder import FILE
 
 STAGES = ("labels", "regression", "ppo")
 _RESULT, _BEGINNING = "result.json", "begins-with.txt"
+_OF_THE_STAGES = ("scenario", "robots", "actions", "candidates", "width", "critic", "start", "out", "resume")
+"""Options of training.ppo that this command says."""
 _STOPPED = "the shard that is under way is written first"
 
 
@@ -135,6 +137,8 @@ def main(words: Sequence[str]) -> int:
     tasks = [task_of(name, args.candidates) for name in args.tasks]
     torch.set_num_threads(args.threads)
     wanted = STAGES if args.stage == "all" else (args.stage,)
+    if "ppo" in wanted:
+        check_ppo(args, tasks[0])  # before the stages that it comes after
     if wanted != ("ppo",):
         label_settings(args, tasks)  # refuses --policy before anything is written
     results: dict[str, Any] = {}
@@ -316,7 +320,32 @@ def ppo_words(args: Args, task: Scenario) -> list[str]:
         "seed": str(args.seed),
     }
     words = [word for name, value in chosen.items() for word in (f"--{name}", value)]
-    return [*words, "--no-video", *shlex.split(args.ppo_options)]
+    return [*words, "--no-video", *_split(args.ppo_options)]
+
+
+def _split(options: str) -> list[str]:
+    """The words of a text as a command line has them."""
+    try:
+        return shlex.split(options)
+    except ValueError as error:
+        allowed = f"options as on a command line ({error})"
+        raise SettingError("ppo_options", options, allowed) from None
+
+
+def check_ppo(args: Args, task: Scenario) -> None:
+    """Raise a SettingError where the third stage would refuse its options, or they would undo the others."""
+    words = _split(args.ppo_options)
+    for name in _OF_THE_STAGES:
+        option = f"--{name}"
+        if any(word == option or word.startswith(f"{option}=") for word in words):
+            raise SettingError("ppo_options", args.ppo_options, f"no {option}, which the stages say")
+    try:
+        options = ppo_options.parsed(ppo_words(args, task))
+        ppo_options.check(options)
+        ppo_options.training_task(options)
+    except (SettingError, UsageError) as error:
+        allowed = f"options of training.ppo: {error}"
+        raise SettingError("ppo_options", args.ppo_options, allowed) from None
 
 
 def _finished(

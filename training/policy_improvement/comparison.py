@@ -11,6 +11,7 @@ import numpy as np
 
 from baselines.experiments.mission import Surroundings
 from baselines.experiments.statistics import geometric_ratio_interval, median_ratio_interval
+from entropy_explore_env.errors import counted
 from entropy_explore_env.scenario import Scenario
 from training.candidate_network import CandidatePolicy
 from training.policy import choose_actions
@@ -53,10 +54,11 @@ class Comparison:
     def line(self) -> str:
         """The comparison in one line."""
         return (
-            f"{self.scenario}, {self.robots} robots, {self.missions} starts: {self.policy_s:.1f} s against "
-            f"{self.planner_s:.1f} s of the planner; ratio of medians {self.ratio:.3f} "
-            f"({self.ratio_low:.3f} … {self.ratio_high:.3f}), mean of ratios {self.mean_ratio:.3f} "
-            f"({self.mean_ratio_low:.3f} … {self.mean_ratio_high:.3f}), faster on {self.faster}"
+            f"{self.scenario}, {counted(self.robots, 'robot')}, {self.missions} starts: "
+            f"{self.policy_s:.1f} s against {self.planner_s:.1f} s of the planner; "
+            f"ratio of medians {self.ratio:.3f} ({self.ratio_low:.3f} … {self.ratio_high:.3f}), "
+            f"mean of ratios {self.mean_ratio:.3f} ({self.mean_ratio_low:.3f} … {self.mean_ratio_high:.3f}), "
+            f"faster on {self.faster}"
         )
 
     def as_json(self) -> dict[str, Any]:

@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 
 from baselines.cli.arguments import make_folder, parse, print_json, run_command
-from baselines.experiments.mission import run_mission, scripted_env
+from baselines.experiments.mission import run_mission, scripted, scripted_env
 from baselines.experiments.statistics import geometric_ratio_interval, median_ratio_interval
 from baselines.strategies import make_strategy
 from baselines.strategies.protocol import Strategy
@@ -214,8 +214,7 @@ class Clairvoyant:
 
 def strategy_times(task: Scenario, strategy: Strategy, seeds: Sequence[int]) -> np.ndarray:
     """(E,) seconds that a strategy's missions take on the same starts; it may choose any viewpoint."""
-    there = with_settings(task, {"action": {"kind": "continuous"}})
-    env = scripted_env(there)
+    env = scripted_env(with_settings(scripted(task), {"action": {"kind": "continuous"}}))
     times = []
     for seed in seeds:
         run_mission(env, strategy, seed)

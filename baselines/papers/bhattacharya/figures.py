@@ -15,6 +15,7 @@ from baselines.experiments.outcome import Record
 from baselines.papers.bhattacharya.run import Run, start_cells
 from baselines.papers.bhattacharya.splitting import SHAPE, robot_cells, split, unknown_region
 from entropy_explore_env.belief.paths.geodesic_cells import new_tessellation, tessellate
+from entropy_explore_env.errors import counted
 
 _PALE = 0.72
 _BORDER = (0.12, 0.47, 0.71)
@@ -62,7 +63,7 @@ def figure_2(office: Run) -> Figure:
         cells = _tessellated(occupied, places)
         axes.imshow(_cell_picture(occupied[:, :, 0], cells), origin="lower", interpolation="nearest")
         _draw_paths(axes, np.array([places]), occupied.shape[1])
-        _bare(axes, f"{run.shape[0]} × {run.shape[1]} cells, {run.robots} robots")
+        _bare(axes, f"{run.shape[0]} × {run.shape[1]} cells, {counted(run.robots, 'robot')}")
     figure.suptitle("Fig. 2: geodesic cells", x=0.01, ha="left")
     return figure
 

@@ -45,6 +45,7 @@ from baselines.papers.bhattacharya.sweep import (
     exploration_id,
 )
 from baselines.papers.bhattacharya.timing import Seconds
+from entropy_explore_env.errors import counted
 from entropy_explore_env.writing import write_atomically
 
 
@@ -85,7 +86,9 @@ def write_report(folder: Path, results: Results, claims: Sequence[Claim], comman
             run = runs[exploration_id(floor, variant, FLOORS[floor].middle, 0)]
             with np.load(results.folder / f"{run.id}.npz") as maps:
                 size = f"{run.shape[0]} × {run.shape[1]} cells"
-                title = f"{size}, {run.robots} robots, range {run.rules.sensor.range_cells:g}; {name}"
+                title = (
+                    f"{size}, {counted(run.robots, 'robot')}, range {run.rules.sensor.range_cells:g}; {name}"
+                )
                 picture = figure_6(run, results.records[run.id], dict(maps), title)
             write_atomically(beside / f"figure-6-{variant}.png", png(picture))
         lines = [

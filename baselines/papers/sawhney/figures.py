@@ -24,6 +24,7 @@ from baselines.papers.sawhney.claims import (
     worlds_in,
 )
 from baselines.papers.sawhney.sweep import cell_id
+from entropy_explore_env.errors import counted
 
 Table = dict[str, list[object]]
 
@@ -161,5 +162,5 @@ def figure_curves(records: Records, part: str) -> tuple[Figure, Table]:
         axes.set(xlabel="simulated time (s)", title=world)
     panels[0].set_ylabel("explored")
     panels[0].legend(frameon=False, fontsize=7, loc="lower right")
-    figure.suptitle(f"{PARTS[part]}: a mission of {n} robots (seed 0)", fontsize=10)
+    figure.suptitle(f"{PARTS[part]}: a mission of {counted(n, 'robot')} (seed 0)", fontsize=10)
     return figure, table

@@ -11,7 +11,7 @@ import pytest
 import torch
 
 from baselines.cli.arguments import run_command
-from baselines.experiments.mission import run_mission, scripted_env
+from baselines.experiments.mission import run_mission, scripted, scripted_env
 from entropy_explore_env.command import BAD_INPUT
 from entropy_explore_env.reports.metrics import mission_figures
 from entropy_explore_env.scenario import with_settings
@@ -52,7 +52,7 @@ def test_the_command_compares_all_on_the_same_starts(tmp_path):
 
 
 def test_restricted_choices_are_actions_of_the_set():
-    task = with_settings(task_of("box-7x11x5:1", 5), {"action": {"kind": "continuous"}})
+    task = with_settings(scripted(task_of("box-7x11x5:1", 5)), {"action": {"kind": "continuous"}})
     env, seen = scripted_env(task), []
 
     class Watched(RestrictedPlanner):

@@ -135,6 +135,33 @@ def test_stages_run_one_by_one_and_a_missing_one_is_named(improved, tmp_path, ca
     assert printed("--out", str(out), "--stage", "regression") == {"regression": said["regression"]}
 
 
+def test_it_acts_in_candidates_of_its_own_number_only(improved):
+    """Elsewhere it proposes its own candidates; where actions are numbers they must be its own."""
+    strategy, there = make_strategy(str(improved[0] / "regression")), scenario()
+    strategy.reset(there, np.random.default_rng(0))
+    fewer = with_settings(there, {"action": {"candidates": 4}})
+    with pytest.raises(CheckpointError, match=r"Scenario.action = .*candidates=4.*candidates=6"):
+        strategy.reset(fewer, np.random.default_rng(0))
+
+
+@pytest.mark.parametrize(
+    ("options", "named"),
+    [
+        ("--bad 3", "--bad"),
+        ("--clip often", "clip"),
+        ("--gamma 7", "gamma = 7.0"),
+        ("--actions discrete", "no --actions"),
+        ("--out=elsewhere", "no --out"),
+        ("--batch '", "quotation"),
+    ],
+)
+def test_options_of_ppo_are_checked_before_the_first_stage(options, named, tmp_path, capsys):
+    assert improve("--out", str(tmp_path / "run"), f"--ppo-options={options}") == BAD_INPUT
+    said = capsys.readouterr().err
+    assert "ppo_options" in said and named in said and said.count("\n") == 1
+    assert not (tmp_path / "run").exists()
+
+
 def test_the_policy_is_a_strategy_in_missions_of_any_team_and_evaluates(improved):
     out, _ = improved
     for robots, name in ((1, "box-7x11x5"), (3, "box-7x11x5")):
