@@ -27,7 +27,7 @@ from entropy_explore_env.errors import SettingError
 from entropy_explore_env.writing import write_atomically
 
 ROOT = Path(__file__).parents[2]
-FOLDERS = ("belief", "robots", "viewpoints", "missions")
+FOLDERS = ("belief", "robots", "missions")
 KEPT = Path("results/reliability/branches")
 _LEFT_OUT = ("raise AssertionError", "if ASSERTING", "if TYPE_CHECKING")
 """Lines whose branches no sound mission takes, or that are there for type checkers."""
