@@ -43,6 +43,9 @@ class Args(PaperArgs):
     """Simulated time after which missions are cut off."""
     wall_limit_s: float = 300.0
     """Time on the clock after which a mission is ended, and counts as failed."""
+    confirm: bool = False
+    """Keep missions that other code ran, of each strategy and team whose first mission comes out the same
+    when it is run again; else a change of the code runs all again."""
 
 
 def main(words: Sequence[str]) -> int:
@@ -81,7 +84,16 @@ def _measured(args: Args, experiment: Experiment) -> Reproduced:
 
     def run(cells: Sequence[Cell], title: str) -> Records:
         limit_s = args.wall_limit_s
-        return run_cells(cells, args.runs, args.workers, title, args.json, limit_s, keep_failures=True)
+        return run_cells(
+            cells,
+            args.runs,
+            args.workers,
+            title,
+            args.json,
+            limit_s,
+            keep_failures=True,
+            confirm=args.confirm,
+        )
 
     records = run(experiment.first_cells(), "resilience: channels")
     records |= run(experiment.lost_cells(records), "resilience: a robot lost")
@@ -94,6 +106,8 @@ def _command(args: Args, experiment: Experiment) -> str:
     words = ["python -m baselines.resilience"]
     if args.quick:
         words.append("--quick")
+    if args.confirm:
+        words.append("--confirm")
     for name, values in (("scenarios", experiment.scenarios), ("robots", experiment.robots)):
         words.append(f"--{name} {','.join(map(str, values))}")
     if experiment.strategies != STRATEGIES:

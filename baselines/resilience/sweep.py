@@ -115,8 +115,9 @@ class Experiment:
         return cells
 
     def _cell(self, scenario: str, robots: int, strategy: str, name: str, settings: dict[str, Any]) -> Cell:
-        task = self._task(scenario, robots, settings)
-        return Cell(cell_id(scenario, robots, strategy, name), task, strategy, self.seeds, figures_record)
+        task, group = self._task(scenario, robots, settings), f"{scenario}-{robots}/{strategy}"
+        cell = cell_id(scenario, robots, strategy, name)
+        return Cell(cell, task, strategy, self.seeds, figures_record, group=group)
 
     def _task(self, name: str, robots: int, settings: dict[str, Any]) -> Scenario:
         shared = {"robots": robots, "time_limit_s": self.time_limit_s}

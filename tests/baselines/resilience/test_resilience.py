@@ -8,6 +8,7 @@ import math
 import numpy as np
 import pytest
 
+from baselines.experiments import cells
 from baselines.resilience import __main__ as command
 from baselines.resilience.claims import all_claims, nothing_breaks, share_of_one, slowdown
 from baselines.resilience.sweep import (
@@ -134,3 +135,27 @@ def test_the_command_writes_a_page_resumes_and_says_it_as_json(tmp_path, capsys)
     for name in ("loss.png", "loss.csv", "faults.png", "faults.csv"):
         assert (tmp_path / "resilience" / name).stat().st_size > 100
     assert len(list((tmp_path / "runs").rglob("seed-*.json"))) == 40
+
+
+def test_what_other_code_ran_is_kept_where_a_sample_comes_out_the_same(tmp_path, capsys, monkeypatch):
+    words = ["--quick", "--scenarios", "box-7x11x5", "--robots", "2", "--strategies", "random,voronoi"]
+    words += ["--time-limit-s", "20", "--jobs", "1", "--out", str(tmp_path), "--runs", str(tmp_path / "runs")]
+    command.main(words)
+    before = (tmp_path / "resilience.md").read_text()
+    assert "--confirm" not in before
+    run, begun = cells.CellMission.run, []
+
+    def counted(mission):
+        begun.append(mission.cell.group)
+        return run(mission)
+
+    monkeypatch.setattr(cells.CellMission, "run", counted)
+    monkeypatch.setattr(cells.Cell, "code_digest", lambda cell: "other")
+    command.main([*words, "--confirm"])
+    groups = [f"box-7x11x5-2/{strategy}" for strategy in ("random", "voronoi")]
+    assert sorted(begun) == sorted(groups * 2)  # teams are whole, then one robot is lost
+    after = (tmp_path / "resilience.md").read_text()
+    assert after == before.replace("--quick", "--quick --confirm")
+    command.main(words)
+    assert len(begun) == 4
+    capsys.readouterr()
