@@ -89,6 +89,7 @@ reproduce: $(STAMP)baselines
 	$(RUN) baselines.papers.sujan --out docs/results
 	$(RUN) baselines.papers.sujan.cliff --out docs/results
 	$(RUN) baselines.papers.sujan.localization --out docs/results
+	$(RUN) baselines.papers.sujan.drift --out docs/results
 	$(RUN) baselines.papers.sujan.sharing --out docs/results
 
 # PyTorch's CPU build, unless there is an NVIDIA GPU: pip's own index brings gigabytes of CUDA libraries on Linux.

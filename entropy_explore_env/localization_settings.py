@@ -29,6 +29,9 @@ class Localization:
         xy_m_per_sqrt_rad: Of x and of y, after a turn of a radian; 0 to 100.
         z_m_per_sqrt_rad: Of the height of a robot that flies, after a turn of a radian; 0 to 100.
         yaw_rad_per_sqrt_rad: Of the yaw, after a turn of a radian; 0 to 10.
+        margin_m: How much wider than its body a robot that drifts plans its paths, so that a small error does
+            not lead it into a wall; 0 to 100. A voxel's edge or two do, where passages are wide enough; true
+            obstacles still stop its body alone.
     """
 
     xy_m_per_sqrt_m: float = 0.0
@@ -37,6 +40,7 @@ class Localization:
     xy_m_per_sqrt_rad: float = 0.0
     z_m_per_sqrt_rad: float = 0.0
     yaw_rad_per_sqrt_rad: float = 0.0
+    margin_m: float = 0.0
 
     def __post_init__(self) -> None:
         """Check every field."""
@@ -46,7 +50,7 @@ class Localization:
     @property
     def drifts(self) -> bool:
         """Whether the estimate ever differs from the truth."""
-        return any(getattr(self, each.name) > 0.0 for each in fields(self))
+        return any(getattr(self, each.name) > 0.0 for each in fields(self) if each.name != "margin_m")
 
 
 @dataclass(frozen=True)

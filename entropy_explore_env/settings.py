@@ -168,6 +168,12 @@ class Robot:
             raise SettingError("Robot.redecide", self.redecide, allowed)
         check_kind(self, "localization", Localization)
 
+    @property
+    def planning_radius_m(self) -> float:
+        """How wide a body it plans its paths for: its own, wider by the margin where it drifts."""
+        wider_m = self.localization.margin_m if self.localization.drifts else 0.0
+        return self.body_radius_m + wider_m
+
 
 @dataclass(frozen=True)
 class RangeSensor:

@@ -13,6 +13,7 @@ import numpy as np
 
 from baselines.experiments.outcome import Record
 from baselines.strategies import make_strategy
+from baselines.strategies.drift_guard import DriftGuard
 from baselines.strategies.protocol import Strategy
 from entropy_explore_env.decision_settings import Observation
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
@@ -97,6 +98,7 @@ def run_mission(
     after_step: Callable[[EntropyExploreEnv], None] | None = None,
     before_step: Callable[[Mapping[str, Any]], None] | None = None,
     options: dict[str, Any] | None = None,
+    guarded: bool = True,
 ) -> None:
     """Reset the environment and let a strategy act until the mission is over.
 
@@ -107,8 +109,11 @@ def run_mission(
         after_step: Called after the reset and after every step.
         before_step: Called with the actions before every step.
         options: Of the reset: where the robots start, and in which world.
+        guarded: Whether robots that drift back off from what blocks them: see `strategies.drift_guard`.
     """
     env.reset(seed=seed, options=options)
+    if guarded and env.scenario.drifts:
+        strategy = DriftGuard(strategy)
     strategy.reset(env.scenario, env.strategy_generator())
     actions = {agent: _idle_action(env, agent) for agent in env.agents}
     if after_step is not None:

@@ -49,11 +49,13 @@ class Navigator(NamedTuple):
     """(V,) int32, voxels of the path."""
     ends: np.ndarray
     """(2, 3) float64, start and finish of the path."""
+    breaks_out: bool
+    """Whether it drives straight to its goal where it believes to be walled in: see `new_navigator`."""
 
 
 def lattice_of(scenario: Scenario, robot: Robot) -> Lattice:
     """Steps of a kind of robot between voxel centres."""
-    radius = robot.body_radius_m / scenario.grid.voxel_size_m
+    radius = robot.planning_radius_m / scenario.grid.voxel_size_m
     return new_lattice(scenario.grid.shape, radius, scenario.layer_of(robot))
 
 
@@ -70,7 +72,8 @@ def new_navigators(scenario: Scenario) -> dict[int, Navigator]:
             first = navigators[number] = new_navigator(scenario, robot)
         else:
             lattice, cost = lattice_of(scenario, robot), float(robot.unknown_cost)
-            navigators[number] = first._replace(lattice=lattice, unknown_cost=cost)
+            breaks_out = breaks_out_of(robot)
+            navigators[number] = first._replace(lattice=lattice, unknown_cost=cost, breaks_out=breaks_out)
     return navigators
 
 
@@ -84,7 +87,11 @@ def footprints(navigators: Mapping[int, Navigator], kinds: int) -> np.ndarray:
 
 
 def new_navigator(scenario: Scenario, robot: Robot) -> Navigator:
-    """Memory for the plans of one kind of robot."""
+    """Memory for the plans of one kind of robot.
+
+    A robot that keeps a margin may believe to stand nearer to a wall than that, where no path leads out,
+    though it can drive: then it drives straight, and what is truly in the way stops it.
+    """
     prior_precision = float(np.float32(scenario.sigma_prior**-2))
     return Navigator(
         search=new_search(scenario.grid.voxels),
@@ -94,7 +101,13 @@ def new_navigator(scenario: Scenario, robot: Robot) -> Navigator:
         source=np.zeros(1, np.int32),
         path=np.empty(scenario.grid.voxels, np.int32),
         ends=np.zeros((2, 3)),
+        breaks_out=breaks_out_of(robot),
     )
+
+
+def breaks_out_of(robot: Robot) -> bool:
+    """Whether a kind of robot plans for a body wider than its own."""
+    return robot.planning_radius_m > robot.body_radius_m
 
 
 def navigator_bytes(scenario: Scenario) -> int:
@@ -204,6 +217,12 @@ def plan_path(navigator, mean, precision, no_fly, start, goal, waypoints):
             return 1, _ARRIVED
     code = _ARRIVED
     found = _search_path(navigator, costs, source, wanted)
+    if found == source and found != wanted and inside and navigator.breaks_out:
+        x, y, z = grid_index(lattice.size, source)
+        if not is_passable(mark_of(search, lattice, costs, source, x, y, z)):
+            for axis in range(3):
+                waypoints[0, axis] = finish[axis]
+            return 1, _ARRIVED
     if found != wanted or not inside:
         code = _NO_PATH
         x, y, z = grid_index(lattice.size, found)

@@ -103,12 +103,12 @@ def robot_model(
         acceleration_m_s2=float(robot.acceleration_m_s2),
         turn_rate_rad_s=float(robot.turn_rate_rad_s),
         scan_time_s=float(sensor.scan_time_s),
-        body_radius=float(robot.body_radius_m / edge),
+        body_radius=float(robot.planning_radius_m / edge),
     )
     return RobotModel(
         scan,
         drive,
-        lattice=new_lattice(grid.shape, robot.body_radius_m / edge, scenario.layer_of(robot)),
+        lattice=new_lattice(grid.shape, robot.planning_radius_m / edge, scenario.layer_of(robot)),
         longest_ray=longest_crossing(*grid.shape, sensor.max_range_m / edge, sensor.voxels_behind + 1),
     )
 

@@ -104,6 +104,37 @@ def test_who_cannot_get_nearer_stays_where_it_is():
     assert (points.tolist(), end) == ([[2.7, 4.6, 0.5]], MoveEnd.NO_PATH)
 
 
+DRIFT = {"xy_m_per_sqrt_m": 0.01}
+
+
+def test_a_margin_keeps_paths_of_robots_that_drift_clear_of_what_is_covered():
+    """Body 0.1 m in voxels of 0.5 m: beside the wall is free for it, with 0.5 m more it is not."""
+    solid, ends = wall(open_from=8), ((1.5, 1.5, 0.5), (5.5, 1.5, 0.5))
+    nearest = {}
+    for margin_m in (0.0, 0.5):
+        scenario = planner(localization={**DRIFT, "margin_m": margin_m})
+        points, end = plan(scenario, solid, *ends)
+        assert end is MoveEnd.ARRIVED
+        nearest[margin_m] = points[:-1, 1].min()
+    assert nearest == {0.0: 8.5, 0.5: 9.5}
+    exact = planner(localization={"margin_m": 0.5})
+    assert plan(exact, solid, *ends)[0].tolist() == plan(planner(), solid, *ends)[0].tolist()
+
+
+def test_who_believes_to_stand_within_its_margin_drives_straight_where_no_path_leads_out():
+    solid = np.zeros(FLAT.shape, bool)
+    solid[:, [0, 2]] = True
+    for margin_m, ends in ((0.0, MoveEnd.NO_PATH), (0.5, MoveEnd.ARRIVED)):
+        scenario = planner(localization={**DRIFT, "margin_m": margin_m})
+        points, end = plan(scenario, solid, (3.5, 1.5, 0.5), (3.5, 8.5, 0.5))
+        assert end is ends
+    assert points.tolist() == [[3.5, 8.5, 0.5]]
+    points, end = plan(
+        planner(localization={**DRIFT, "margin_m": 0.5}), wall(11), (1.5, 4.5, 0.5), (5.5, 4.5, 0.5)
+    )
+    assert end is MoveEnd.NO_PATH  # it stands clear, and no way leads through the wall
+
+
 def test_planar_robots_keep_their_height_and_may_pass_under_what_is_above_them():
     grid, solid = Grid((7, 11, 5), 0.5), np.zeros((7, 11, 5), bool)
     solid[3, :9, 1:3] = True

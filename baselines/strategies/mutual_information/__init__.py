@@ -180,7 +180,7 @@ class MutualInformation:
             return None
         cone = self._own_cone(view, depth_m / edge)
         x, y, z = position.tolist()
-        model, body_radius = self._model_of(view), view.kind.robot.body_radius_m / edge
+        model, body_radius = self._model_of(view), view.kind.robot.planning_radius_m / edge
         best = best_candidate(
             candidates,
             self._order(candidates, radius),
@@ -258,7 +258,7 @@ class MutualInformation:
 
 def _kind_model(scenario: Scenario, kind: RobotKind) -> _KindModel:
     grid, sensor = scenario.grid, kind.sensor
-    radius = kind.robot.body_radius_m / grid.voxel_size_m
+    radius = kind.robot.planning_radius_m / grid.voxel_size_m
     widest = 0.5 * sensor.angular_step_rad * math.hypot(sensor.columns - 1, sensor.rows - 1)
     longest = longest_crossing(*grid.shape, math.inf, 1)
     return _KindModel(

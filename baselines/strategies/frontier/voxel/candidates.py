@@ -56,7 +56,7 @@ class VoxelCandidates(Candidates[FrontierMap]):
         grid, layer = scenario.grid, scenario.layer_of(kind.robot)
         edge = grid.voxel_size_m
         spacing = self._spacing(frontiers.spacing_m, edge)
-        self._map = new_frontier_map(grid.shape, kind.robot.body_radius_m / edge, layer, spacing)
+        self._map = new_frontier_map(grid.shape, kind.robot.planning_radius_m / edge, layer, spacing)
         self._excluded = self._map.flags
         self._counter = new_counter(grid.voxels, grid.shape)
         self._pitches = _pitches(kind, layer is None)

@@ -1,0 +1,69 @@
+"""`python -m baselines.papers.sujan.drift`: cells, claims, report."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+from PIL import Image
+
+from baselines.cli.arguments import run_command
+from baselines.papers.sujan.drift import __main__ as drift
+from baselines.papers.sujan.drift import sweep
+from baselines.papers.sujan.drift.claims import all_claims
+from baselines.papers.sujan.drift.sweep import STRATEGIES, experiment, task
+
+
+def record_of(time_s, blocked):
+    return {"t_mission_s": time_s, "blocked_moves": blocked}
+
+
+def test_levels_are_factors_of_the_same_drift():
+    low, high = (task(level, 0.1, 50.0).robot.localization for level in ("low", "high"))
+    assert low.xy_m_per_sqrt_m == pytest.approx(0.006) and low.yaw_rad_per_sqrt_rad == pytest.approx(0.003)
+    assert high.yaw_rad_per_sqrt_m == 0.01 and high.margin_m == low.margin_m == 0.1
+    exact = task("none", 0.1, 50.0)
+    assert not exact.drifts and exact.robot.localization.margin_m == 0.0
+    assert exact.ending.seen_share == 0.9 and exact.ending.time_limit_s == 50.0
+
+
+def test_claims_by_hand():
+    cells = {cell.id: cell for cell in experiment(3)}
+    assert len(cells) == 3 * len(STRATEGIES) + 4
+    assert not cells["nearest-frontier-low-plain"].record.guarded
+    records = {name: [record_of(100.0, 2), record_of(120.0, 2)] for name in cells}
+    records["voronoi-high"] = [record_of(130.0, 2), record_of(156.0, 2)]
+    records["nearest-frontier-low-plain"] = [record_of(200.0, 90), record_of(240.0, 70)]
+    claims = {claim.id: claim for claim in all_claims(records)}
+    assert len(claims) == 2 * len(STRATEGIES) + 8
+    assert claims["time-voronoi-high"].ours == pytest.approx(1.3)
+    failed = {name for name, claim in claims.items() if not claim.holds}
+    unchanged = {"nearest-frontier-high", "information-rate-v0-low", "information-rate-v0-high"}
+    assert failed == {"time-voronoi-high"} | {
+        f"{what}-{n}" for what in ("blocked", "guard") for n in unchanged
+    }
+    assert claims["blocked-nearest-frontier-low"].ours == -78.0
+    assert claims["guard-nearest-frontier-low"].ours == pytest.approx(0.5)
+
+
+def test_the_command_writes_its_page(tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr(sweep, "STRATEGIES", {"random": ""})
+    monkeypatch.setattr(sweep, "PLAIN", ("random",))
+    monkeypatch.setattr("baselines.papers.sujan.drift.claims.STRATEGIES", {"random": ""})
+    monkeypatch.setattr("baselines.papers.sujan.drift.claims.PLAIN", ("random",))
+    monkeypatch.setattr("baselines.papers.sujan.drift.report.STRATEGIES", {"random": ""})
+    monkeypatch.setattr("baselines.papers.sujan.drift.report.PLAIN", ("random",))
+    monkeypatch.setattr(drift, "_QUICK_LIMIT_S", 8.0)
+    words = ["--quick", "--worlds", "1", "--jobs", "1", "--json"]
+    folders = ["--out", str(tmp_path), "--runs", str(tmp_path / "r")]
+    monkeypatch.setattr("sys.argv", ["sujan.drift", *words, *folders])
+    assert run_command(drift.main) == 0
+    assert len(json.loads(capsys.readouterr().out)["claims"]) == 6
+    page = (tmp_path / "sujan-drift.md").read_text()
+    assert "python -m baselines.papers.sujan.drift --quick --worlds 1" in page and "random, plain" in page
+    with Image.open(tmp_path / "sujan-drift" / "drift.png") as picture:
+        assert picture.width > 800
+    (file,) = (tmp_path / "r" / "random-high-plain").glob("*.json")
+    record = json.loads(file.read_text())["record"]
+    assert record["localization"]["rms_error_m"] > 0.0
+    assert 0 <= record["most_blocked"] <= record["blocked_moves"]
