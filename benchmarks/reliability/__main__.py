@@ -35,7 +35,7 @@ from benchmarks.reliability import (
     state_fuzz,
     training_runs,
 )
-from benchmarks.reliability.page import Kept, page
+from benchmarks.reliability.page import Kept, page, read_rows
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.writing import write_atomically
 
@@ -122,8 +122,8 @@ def main(words: Sequence[str]) -> int:
         wanted = proof.quick if args.quick else proof.full
         carry_on(proof, args.results / f"{name}.jsonl", wanted, args.limit_s)
     kept = {name: _kept(proof, args.results / f"{name}.jsonl") for name, proof in PROOFS.items()}
-    folders = {file.stem: rows_of(file) for file in sorted(args.mutants.glob("*.jsonl"))}
-    text = page(kept, folders, rows_of(args.results / "coverage.jsonl"), versions())
+    folders = {file.stem: read_rows(file) for file in sorted(args.mutants.glob("*.jsonl"))}
+    text = page(kept, folders, read_rows(args.results / "coverage.jsonl"), versions())
     print(text)
     if args.page is not None:
         write_atomically(args.page, text.encode())
@@ -131,7 +131,7 @@ def main(words: Sequence[str]) -> int:
 
 
 def _kept(proof: Proof, file: Path) -> Kept:
-    rows = rows_of(file)
+    rows = read_rows(file)
     return Kept(rows, sum(map(proof.counts, rows)), proof.full)
 
 
@@ -145,7 +145,7 @@ def carry_on(proof: Proof, file: Path, wanted: int, limit_s: float = math.inf) -
     """Play the cases from 0 that are not kept yet, until all that are kept come to what is wanted."""
     begun_s = time.monotonic()
     file.parent.mkdir(parents=True, exist_ok=True)
-    rows = rows_of(file)
+    rows = read_rows(file)
     known, reached = {row["number"] for row in rows}, sum(map(proof.counts, rows))
     cases = wanted if proof.counts is _one else _MOST_CASES
     missing = [number for number in range(cases) if number not in known]
@@ -174,11 +174,6 @@ def library_digest() -> str:
     folder = Path(entropy_explore_env.__file__).parent
     sources = b"".join(path.read_bytes() for path in sorted(folder.rglob("*.py")))
     return hashlib.sha256(sources).hexdigest()[:12]
-
-
-def rows_of(file: Path) -> list[Row]:
-    """What is kept in a file."""
-    return [json.loads(line) for line in file.read_text("utf-8").splitlines()] if file.exists() else []
 
 
 if __name__ == "__main__":

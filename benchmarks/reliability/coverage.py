@@ -22,6 +22,7 @@ from pathlib import Path
 from typing import Any
 
 from baselines.cli.arguments import parse, run_command
+from benchmarks.reliability.page import read_rows
 from benchmarks.reliability.quick_tests import LIMIT, TOLD
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.writing import write_atomically
@@ -67,7 +68,7 @@ def main(words: Sequence[str]) -> int:
             measure(file, kept, args.test_s)
     missing = [file for file in files if not data_of(file, kept).exists()]
     report = report_of([data_of(file, kept) for file in files if file not in missing])
-    rows = [row for row in _rows(args.out) if row["path"].split("/")[1] not in args.folders]
+    rows = [row for row in read_rows(args.out) if row["path"].split("/")[1] not in args.folders]
     rows += [
         {**row, "files": len(files) - len(missing), "of_files": len(files)}
         for row in rows_of(report)
@@ -81,10 +82,6 @@ def main(words: Sequence[str]) -> int:
             print("".join(f"{path}:{a} -> {b}\n" for a, b in told["missing_branches"]), end="")
     print(f"{len(files) - len(missing)} of {len(files)} files of tests were run")
     return 0
-
-
-def _rows(file: Path) -> list[dict[str, Any]]:
-    return [json.loads(line) for line in file.read_text("utf-8").splitlines()] if file.exists() else []
 
 
 def sources_digest(root: Path) -> str:

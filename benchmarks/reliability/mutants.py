@@ -28,6 +28,7 @@ from baselines.cli.arguments import Positional, parse, run_command
 from benchmarks.reliability.coverage import FOLDERS, KEPT, ROOT, measure, sources_digest, test_files
 from benchmarks.reliability.faults_in_source import Mutant, mutants_of
 from benchmarks.reliability.mutant_runs import Host
+from benchmarks.reliability.page import read_rows
 from benchmarks.reliability.reached_lines import Reached, reached_lines
 from entropy_explore_env.errors import SettingError
 
@@ -46,6 +47,7 @@ class Args:
         test_s: Seconds of the processor that a test may take without a fault, to be run at all.
         tests_s: Of all tests that are run for a fault, as they take without it.
         limit_s: On the clock, of the tests for one fault.
+        retry: Run those again that no test found.
         stop_s: Seconds on the clock after which no other fault is begun.
         kept: Folder of what files of tests took, as of `benchmarks.reliability.coverage`.
         out: Folder of the results.
@@ -58,6 +60,7 @@ class Args:
     test_s: float = 3.0
     tests_s: float = 30.0
     limit_s: float = 300.0
+    retry: bool = False
     stop_s: float = math.inf
     kept: Path = KEPT
     out: Path = Path("results/mutants")
@@ -100,8 +103,9 @@ def main(words: Sequence[str]) -> int:
     drawn, every = drawn_faults(ROOT, path, args.sample, args.seed, args.kernels)
     args.out.mkdir(parents=True, exist_ok=True)
     kept = args.out / f"{'.'.join(path.with_suffix('').parts)}.jsonl"
-    lines = kept.read_text("utf-8").splitlines() if kept.exists() else []
-    known = {row["digest"]: row for row in map(json.loads, lines)}
+    known = {row["digest"]: row for row in read_rows(kept)}
+    if args.retry:
+        known = {digest: row for digest, row in known.items() if row["found"]}
     missing = [fault for fault in drawn if fault.digest not in known]
     begun_s = time.monotonic()
     if missing:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import json
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from pathlib import Path
 from typing import Any, NamedTuple
 
 from benchmarks.reliability.file_fuzz import FILES
@@ -24,6 +26,11 @@ class Kept(NamedTuple):
     """What the rows come to: cases, robot-steps, kills or files."""
     asked: int
     """What a full run comes to."""
+
+
+def read_rows(file: Path) -> list[dict[str, Any]]:
+    """What is kept in a file, a line each."""
+    return [json.loads(line) for line in file.read_text("utf-8").splitlines()] if file.exists() else []
 
 
 def page(

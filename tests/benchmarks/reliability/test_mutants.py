@@ -170,7 +170,7 @@ def test_a_folder_that_is_not_measured_is_refused(tmp_path):
             main([path, "--out", str(tmp_path)])
 
 
-def test_what_is_known_is_not_run_again(tmp_path, capsys):
+def test_what_is_known_is_not_run_again_unless_no_test_found_it(tmp_path, capsys, monkeypatch):
     path = Path("entropy_explore_env/belief/fields.py")
     drawn, _ = mutants.drawn_faults(ROOT, path, 2, 0)
     rows = [
@@ -181,3 +181,7 @@ def test_what_is_known_is_not_run_again(tmp_path, capsys):
     kept.write_text("".join(json.dumps(row) + "\n" for row in rows))
     assert main([str(path), "--sample", "2", "--no-kernels", "--out", str(tmp_path)]) == 1
     assert "1 of 2 faults were found, 2 drawn of" in capsys.readouterr().out
+    again = ["--retry", "--stop-s", "0", "--kept", str(tmp_path / "none")]
+    monkeypatch.setattr(mutants, "_reached", lambda kept, package: Reached({}, {}))
+    assert main([str(path), "--sample", "2", "--no-kernels", "--out", str(tmp_path), *again]) == 0
+    assert "1 of 1 faults were found, 2 drawn of" in capsys.readouterr().out

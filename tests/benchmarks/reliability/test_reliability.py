@@ -9,8 +9,8 @@ import pytest
 
 from benchmarks.reliability import __main__ as command
 from benchmarks.reliability import determinism, kills, page, soak
-from benchmarks.reliability.__main__ import PROOFS, Proof, carry_on, main, rows_of
-from benchmarks.reliability.page import Kept
+from benchmarks.reliability.__main__ import PROOFS, Proof, carry_on, main
+from benchmarks.reliability.page import Kept, read_rows
 from entropy_explore_env.errors import SettingError
 
 EMPTY = {name: Kept((), 0, 10) for name in PROOFS}
@@ -30,9 +30,9 @@ def fails_at_three(number):
 def test_a_run_goes_on_where_it_was(tmp_path, capsys):
     file, proof = tmp_path / "kept" / "squares.jsonl", Proof(fails_at_three, 2, 5, 60.0)
     carry_on(proof, file, 2)
-    assert [row["square"] for row in rows_of(file)] == [0, 1]
+    assert [row["square"] for row in read_rows(file)] == [0, 1]
     carry_on(proof, file, 5)
-    rows = sorted(rows_of(file), key=lambda row: row["number"])
+    rows = sorted(read_rows(file), key=lambda row: row["number"])
     assert [row.get("square") for row in rows] == [0, 1, 4, None, 16]
     assert (rows[3]["number"], rows[3]["failure"]) == (3, "ValueError: three")
     before = file.read_bytes()
@@ -126,12 +126,12 @@ def test_rows_of_other_sources_are_told_apart():
 def test_a_proof_stops_at_what_is_asked_for_and_at_its_time(tmp_path, capsys):
     counted = Proof(counts_for_seven, 10, 20, 60.0, seven)
     carry_on(counted, tmp_path / "sevens.jsonl", 20)
-    assert [row["number"] for row in rows_of(tmp_path / "sevens.jsonl")] == [0, 1, 2]
+    assert [row["number"] for row in read_rows(tmp_path / "sevens.jsonl")] == [0, 1, 2]
     carry_on(counted, tmp_path / "sevens.jsonl", 70, limit_s=0.0)
-    assert len(rows_of(tmp_path / "sevens.jsonl")) == 3
+    assert len(read_rows(tmp_path / "sevens.jsonl")) == 3
     carry_on(counted, tmp_path / "sevens.jsonl", 70, limit_s=1e-9)
-    assert len(rows_of(tmp_path / "sevens.jsonl")) == 4
-    assert len({row["library"] for row in rows_of(tmp_path / "sevens.jsonl")}) == 1
+    assert len(read_rows(tmp_path / "sevens.jsonl")) == 4
+    assert len({row["library"] for row in read_rows(tmp_path / "sevens.jsonl")}) == 1
     assert "sevens: 28 of 70" in capsys.readouterr().err
 
 

@@ -1,0 +1,117 @@
+"""A Ray cluster of two machines, of which one is lost in the middle of a sweep: nothing is lost with it."""
+# pyright: reportMissingImports=false
+
+from __future__ import annotations
+
+import os
+import sys
+import threading
+import time
+from pathlib import Path
+
+import pytest
+
+from baselines.experiments.cells import Cell, run_cells
+from baselines.experiments.ray_cluster import RayCluster
+from baselines.experiments.worker_pool import run_each
+from entropy_explore_env.scenario import with_settings
+from entropy_explore_env.scenarios import BOX
+
+ray = pytest.importorskip("ray", reason="ray is not installed: pip install 'entropy_explore_env[cluster]'")
+
+pytestmark = [
+    pytest.mark.long,  # two machines are begun
+    pytest.mark.filterwarnings("ignore::DeprecationWarning"),  # Ray's own
+    pytest.mark.filterwarnings("ignore::FutureWarning"),
+    pytest.mark.filterwarnings("ignore::ResourceWarning"),
+]
+SHORT = with_settings(BOX, {"time_limit_s": 60.0})
+CELLS = (Cell("walk", SHORT, "random", 12), Cell("steep", SHORT, "gradient", 8))
+
+
+@pytest.fixture
+def machines(monkeypatch):
+    """A cluster of two machines of one processor each, this process in it, and the second of them."""
+    from ray.cluster_utils import Cluster
+
+    monkeypatch.setenv("RAY_USAGE_STATS_ENABLED", "0")
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(Path(__file__).parent), *sys.path]))
+    own = {"num_cpus": 1, "object_store_memory": 10**8, "include_dashboard": False}
+    cluster = Cluster(initialize_head=True, head_node_args=own)
+    second = cluster.add_node(num_cpus=1, object_store_memory=10**8, resources={"second": 1})
+    ray.init(address=cluster.address, logging_level="ERROR", log_to_driver=False)
+    cluster.wait_for_nodes()
+    yield cluster, second
+    ray.shutdown()
+    cluster.shutdown()
+
+
+def second_machine() -> str:
+    """Ray's name of the second machine, while there is one."""
+    return next(node["NodeID"] for node in ray.nodes() if node["Alive"] and "second" in node["Resources"])
+
+
+def alive_machines() -> int:
+    """How many machines there are, once Ray has noticed that one is gone."""
+    until_s = time.monotonic() + 60.0
+    while (alive := sum(node["Alive"] for node in ray.nodes())) > 1 and time.monotonic() < until_s:
+        time.sleep(0.1)
+    return alive
+
+
+def slow_square(task):
+    """A square, half a second later; what is begun where is noted in a file."""
+    number, folder = task
+    with Path(folder, str(number)).open("a", encoding="ascii") as trace:
+        trace.write(ray.get_runtime_context().get_node_id() + "\n")
+    time.sleep(0.5)
+    return number**2
+
+
+def begun_on(machine: str, folder: Path) -> list[str]:
+    """Which tasks were begun on a machine."""
+    return sorted(path.name for path in folder.iterdir() if machine in path.read_text("ascii").split())
+
+
+def test_tasks_of_a_machine_that_is_lost_are_begun_again_elsewhere(machines, tmp_path):
+    cluster, second = machines
+    lost, seen = second_machine(), []
+
+    def lose() -> None:
+        while not (begun := begun_on(lost, tmp_path)):
+            time.sleep(0.01)
+        seen.extend(begun)
+        cluster.remove_node(second, allow_graceful=False)
+
+    loser = threading.Thread(target=lose)
+    loser.start()
+    tasks = [(number, str(tmp_path)) for number in range(12)]
+    found = dict(run_each(slow_square, tasks, RayCluster(cluster.address)))
+    loser.join()
+    assert found == {task: task[0] ** 2 for task in tasks}
+    assert alive_machines() == 1
+    again = [name for name in seen if len((tmp_path / name).read_text("ascii").split()) > 1]
+    assert again == seen  # it was in the middle of them
+    for name in again:
+        assert (tmp_path / name).read_text("ascii").split()[-1] != lost
+
+
+def content(folder: Path) -> dict[str, bytes]:
+    return {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
+def test_a_sweep_that_loses_a_machine_leaves_the_same_bytes(machines, tmp_path):
+    cluster, second = machines
+    whole = run_cells(CELLS, tmp_path / "here", 1, "here", True)
+
+    def lose() -> None:
+        while len(list((tmp_path / "there").rglob("seed-*.json"))) < 4:
+            time.sleep(0.01)
+        cluster.remove_node(second, allow_graceful=False)
+
+    loser = threading.Thread(target=lose)
+    loser.start()
+    found = run_cells(CELLS, tmp_path / "there", RayCluster(cluster.address), "there", True)
+    loser.join()
+    assert found == whole and content(tmp_path / "there") == content(tmp_path / "here")
+    assert alive_machines() == 1
