@@ -16,7 +16,7 @@ from PIL import Image
 
 from baselines.cli.arguments import make_folder, parse, run_command
 from baselines.experiments.mission import run_mission, scripted_env
-from baselines.strategies import make_strategy, resolved
+from baselines.strategies import make_strategy, recommended
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.reports.animation import Film, animate
@@ -35,8 +35,8 @@ class Args:
 
     scenarios: str = "all"
     """Named scenarios, commas between."""
-    strategy: str = "best"
-    """Chooses viewpoints; as in baselines.run."""
+    strategy: str | None = None
+    """Chooses viewpoints, as in baselines.run; default: the one that is recommended in each scenario."""
     seed: int = 0
     """Of every mission."""
     pictures: int = 28
@@ -57,11 +57,13 @@ def main(words: Sequence[str]) -> int:
     for name in names:
         if name not in SCENARIOS:
             raise SettingError("scenarios", name, "all, or names out of " + ", ".join(SCENARIOS))
-    make_strategy(resolved(args.strategy))
+    strategies = [args.strategy or recommended(name) for name in names]
+    for strategy in strategies:
+        make_strategy(strategy)
     make_folder("out", args.out)
-    for number, name in enumerate(names, 1):
+    for number, (name, strategy) in enumerate(zip(names, strategies, strict=True), 1):
         print(f"{number} of {len(names)}: {name}", file=sys.stderr, flush=True)
-        film = filmed(SCENARIOS[name], args.strategy, args.seed, args.pictures)
+        film = filmed(SCENARIOS[name], strategy, args.seed, args.pictures)
         path = args.out / f"{name}.gif"
         animate((shrunk(picture, args.width) for picture in film.pictures(_LAST)), path, _FRAME_S)
         print(f"{path}, {path.stat().st_size / 1000:,.0f} kB")
@@ -87,7 +89,7 @@ def filmed(scenario: Scenario, strategy: str, seed: int, pictures: int) -> Film:
             assert picture is not None  # in this mode there is one
             film.add(time_s, picture)
 
-    run_mission(scripted_env(scenario), make_strategy(resolved(strategy)), seed, note)
+    run_mission(scripted_env(scenario), make_strategy(strategy), seed, note)
     return film
 
 

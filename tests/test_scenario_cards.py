@@ -101,6 +101,16 @@ def test_a_card_says_what_the_scenario_sets(name, tmp_path):
             assert f"| `{field.name}` | " in text, (part, field.name)
     assert f"| `robots` | {scenario.robots} | " in text
     assert f"[{name}]({name}.md)" in gallery()
+    (words,) = re.findall(r"^    python -m (baselines.run .*)$", text, re.MULTILINE)
+    strategy = "cliff-next-best-view" if name == "cliff" else "best"
+    assert f"{name} --robots {scenario.robots} --strategy {strategy} " in words
+
+
+def test_numbers_of_actions_that_robots_ignore_are_named():
+    """The cliff's rover pans and tilts in its plane; of the mixed team only some fly."""
+    for name, ignored in (("cliff", [2]), ("office-mixed", [2, 4]), ("room", []), ("office", [])):
+        told = action_numbers(SCENARIOS[name])
+        assert [n.first for n in told if "means nothing" in n.meaning] == ignored
 
 
 def test_times_come_from_the_tables_of_results(tmp_path):

@@ -87,6 +87,8 @@ ALIASES: MappingProxyType[str, str] = MappingProxyType(
 )
 """Other name → the name that records and tables hold: of what we recommend, and of former versions."""
 
+_RECOMMENDED = MappingProxyType({"cliff": "cliff-next-best-view"})
+"""Named scenario → what we recommend in it, where that is another one than elsewhere."""
 
 _LEARNED = "training.policy"
 """Makes strategies of learned policies. It is looked up when one is asked for, so that strategies need
@@ -118,6 +120,11 @@ def make_strategy(name: str) -> Strategy:
 def scripted_maker(name: str) -> Callable[[], Strategy] | None:
     """What makes the strategy of the package with this name; None = there is none."""
     return STRATEGIES.get(name) or CLIFF_STRATEGIES.get(name)
+
+
+def recommended(scenario: str) -> str:
+    """The name of the strategy that we recommend in a named scenario."""
+    return _RECOMMENDED.get(scenario, "best")
 
 
 def resolved(name: str) -> str:

@@ -8,11 +8,12 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from baselines.strategies import recommended, resolved
 from docs.extensions.attribute_docs import attribute_docs, constant_docs
 from docs.extensions.scenario_times import times_table
 from docs.extensions.space_numbers import Numbers, action_numbers, discrete_actions, observation_numbers
 from entropy_explore_env import environment_id, scenarios
-from entropy_explore_env.errors import SettingError
+from entropy_explore_env.errors import SettingError, counted
 from entropy_explore_env.missions.rules import rules_of
 from entropy_explore_env.scenario import Scenario, with_settings
 from entropy_explore_env.scenarios import MISSION_TIMES, SCENARIOS
@@ -62,8 +63,7 @@ def gallery() -> str:
     rows = [
         [
             f"[![{name}]({name}.png)]({name}.md)",
-            f"[{name}]({name}.md)<br>`{environment_id(name)}`",
-            _about(name),
+            f"[{name}]({name}.md), `{environment_id(name)}`<br>{_about(name)}",
         ]
         for name in SCENARIOS
     ]
@@ -75,7 +75,7 @@ A scenario is a task: a kind of world, a team, what it may do, and when it is ov
 name.
 These pages are written from the code when the site is built.
 
-{table(["", "scenario", "world and team"], rows)}
+{table(["a world", "scenario"], rows)}
 
 ```{{toctree}}
 :hidden:
@@ -105,6 +105,7 @@ def card(scenario: Scenario, docs: Path) -> str:
         f'env = eee.parallel_env("{name}")\nobservations, infos = env.reset(seed=0)\n```',
         f"Ids: `{environment_id(name)}` for `gymnasium.make` (one robot, a step is a decision),\n"
         "`gymnasium.make_vec` (many missions at once), and `pettingzoo.make` with `parallel` or `aec`.",
+        _mission(scenario),
         _world(scenario),
         _actions(scenario),
         _observation(scenario),
@@ -115,6 +116,18 @@ def card(scenario: Scenario, docs: Path) -> str:
         _versions(name),
     ]
     return "\n\n".join(part for part in parts if part) + "\n"
+
+
+def _mission(scenario: Scenario) -> str:
+    """The command that runs a mission, by the strategy that is recommended there."""
+    name, strategy = scenario.name, recommended(scenario.name)
+    called = f"`{resolved(strategy)}`" + (f" (`{strategy}`)" if resolved(strategy) != strategy else "")
+    team = counted(scenario.robots, "robot")
+    words = f"{name} --robots {scenario.robots} --strategy {strategy} --out results/{name}"
+    return (
+        f"A mission of {team} by the strategy that we recommend here, {called}:\n\n"
+        f"    python -m baselines.run {words}"
+    )
 
 
 def _about(name: str) -> str:

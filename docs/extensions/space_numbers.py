@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from typing import NamedTuple
 
 import numpy as np
@@ -180,13 +181,24 @@ def action_numbers(scenario: Scenario) -> list[Numbers]:
         told = [f"{axis} of the viewpoint in the workspace: -1 the first voxel, 1 the last" for axis in "xyz"]
     else:
         told = [f"displacement along {axis}, in shares of the reach" for axis in "xyz"]
+    if not scenario.planar:
+        told[2] += _ignored_by(scenario.layer_of(kind.robot) is not None for kind in scenario.kinds)
     told = [*told[: 2 if scenario.planar else 3], "yaw of the gaze, in π radians"]
     if not scenario.planar:
-        told.append("pitch of the gaze, downwards, in π/2 radians")
+        level = _ignored_by(scenario.looks_level(kind.robot) for kind in scenario.kinds)
+        told.append("pitch of the gaze, downwards, in π/2 radians" + level)
     space = action_space(scenario)
     if (len(told),) != space.shape:
         raise ValueError(f"{len(told)} numbers are told of, an action has the shape {space.shape}")
     return [Numbers(i, 1, meaning, "share", -1.0, 1.0) for i, meaning in enumerate(told)]
+
+
+def _ignored_by(kinds: Iterable[bool]) -> str:
+    """What is said of a number of an action that means nothing to some kinds of robots."""
+    ignored = list(kinds)
+    if not any(ignored):
+        return ""
+    return f"; means nothing {'here: all robots stay in a plane' if all(ignored) else 'to ground robots'}"
 
 
 def discrete_actions(scenario: Scenario) -> tuple[int, int]:

@@ -20,7 +20,7 @@ from entropy_explore_env.missions.silence import silent_since
 from entropy_explore_env.missions.state import MissionEnd
 from entropy_explore_env.viewpoints.candidate_features import CONTEXT, FEATURES
 from entropy_explore_env.viewpoints.proposals.features import (
-    Facts,
+    RobotStatus,
     write_context,
     write_features,
     write_overlaps,
@@ -34,8 +34,8 @@ _NONE = int(Kind.NONE)
 _WIDTH, _CONTEXT = len(FEATURES), len(CONTEXT)
 
 
-class Knowledge(NamedTuple):
-    """What one robot knows, as candidates are proposed to it; map frame."""
+class PlannerInput(NamedTuple):
+    """What candidates are proposed to one robot from, all of which it knows; map frame."""
 
     pose: tuple[float, float, float, float, float]
     time_s: float
@@ -90,11 +90,11 @@ class Proposing(NamedTuple):
 
 
 @lean_kernel
-def _hear(params, robot, knowledge, scratch):
+def _hear(params, robot, given, scratch):
     """Fill in the teammates that were heard, and the views that they announced; returns how many of each."""
     mates, cones = 0, 0
-    for number in range(len(knowledge.heard)):
-        heard, own = knowledge.heard[number], params[number]
+    for number in range(len(given.heard)):
+        heard, own = given.heard[number], params[number]
         if number == robot or heard.heard_s < 0.0:
             continue
         mate = scratch.mates[mates]
@@ -102,7 +102,7 @@ def _hear(params, robot, knowledge, scratch):
         copy_numbers(to_grid_units(own, heard.pose), mate.place, 3)
         mate.max_speed_m_s, mate.acceleration_m_s2 = own.max_speed_m_s, own.acceleration_m_s2
         mate.scan_time_s, mate.body_radius = own.scan_time_s, own.body_radius_m / own.voxel_size_m
-        mate.silent = silent_since(own, heard, knowledge.time_s)
+        mate.silent = silent_since(own, heard, given.time_s)
         if heard.announced_s >= 0.0 and heard.announced[5] > 0.0 and not mate.silent:
             cone, there = scratch.cones[cones], heard.announced
             cones += 1
@@ -115,61 +115,61 @@ def _hear(params, robot, knowledge, scratch):
 
 
 @lean_kernel
-def propose_to(params, robot, knowledge, proposer, candidates, experience, parts):
+def propose_to(params, robot, given, proposer, candidates, experience, parts):
     """Propose candidates to one robot.
 
     Args:
         params: (A,) PARAMS.
         robot: Its number.
-        knowledge: Knowledge of it.
+        given: PlannerInput of it.
         proposer: Proposer of its kind.
         candidates: (K,) CANDIDATE, its former ones; replaced.
         experience: EXPERIENCE, changed in place.
         parts: (candidates, context, overlaps), each a (N,) float32 to fill in, of which any may be empty.
     """
     own, scratch = params[robot], proposer.scratch
-    place = within_grid(own, knowledge.pose)
+    place = within_grid(own, given.pose)
     copy_numbers(place, scratch.here, 3)
-    scratch.here[3], scratch.here[4] = knowledge.pose[3], knowledge.pose[4]
-    copy_numbers(to_grid_units(own, knowledge.target), scratch.target, 3)
-    scratch.target[3], scratch.target[4] = knowledge.target[3], knowledge.target[4]
-    mates, cones = _hear(params, robot, knowledge, scratch)
-    mean, precision, none = knowledge.mean, knowledge.precision, knowledge.mean[:0]
+    scratch.here[3], scratch.here[4] = given.pose[3], given.pose[4]
+    copy_numbers(to_grid_units(own, given.target), scratch.target, 3)
+    scratch.target[3], scratch.target[4] = given.target[3], given.target[4]
+    mates, cones = _hear(params, robot, given, scratch)
+    mean, precision, none = given.mean, given.precision, given.mean[:0]
     known, cost = proposer.exact.known_precision, proposer.unknown_cost
     situation = Situation(
         Belief(mean, precision, grid_size(own)),
-        Costs(mean, precision, known, cost, none, 1.0, knowledge.no_fly),
+        Costs(mean, precision, known, cost, none, 1.0, given.no_fly),
         scratch.here,
         scratch.cones[:cones],
         scratch.mates[:mates],
         experience,
     )
-    copy_numbers(knowledge.target, scratch.target_m, 5)
+    copy_numbers(given.target, scratch.target_m, 5)
     decision = LastDecision(
         scratch.target,
         scratch.target_m,
         own.voxel_size_m,
-        knowledge.came_bits,
-        knowledge.move_end,
-        knowledge.under_way,
-        knowledge.uncertain,
+        given.came_bits,
+        given.move_end,
+        given.under_way,
+        given.uncertain,
     )
     features, context, overlaps = parts
     described = len(features) > 0 or len(context) > 0
-    found = propose(proposer, situation, decision, candidates, described)
+    selection = propose(proposer, situation, decision, candidates, described)
     if described:
-        bits = knowledge.gained_bits + knowledge.heard_bits
-        facts = Facts(
-            entropy_left(own, knowledge.entropy_bits),
-            knowledge.heard_bits / bits if bits > 0.0 else 0.0,
-            knowledge.time_s,
-            knowledge.under_way,
-            len(knowledge.heard) - 1,
+        bits = given.gained_bits + given.heard_bits
+        status = RobotStatus(
+            entropy_left(own, given.entropy_bits),
+            given.heard_bits / bits if bits > 0.0 else 0.0,
+            given.time_s,
+            given.under_way,
+            len(given.heard) - 1,
         )
-        write_features(proposer, situation, found, features)
-        write_context(proposer, situation, facts, found, context)
+        write_features(proposer, situation, selection, features)
+        write_context(proposer, situation, status, selection, context)
     if len(overlaps) > 0:
-        write_overlaps(proposer, found.count, overlaps)
+        write_overlaps(proposer, selection.count, overlaps)
     for k in range(len(candidates)):
         at = candidates[k].viewpoint
         for axis in range(3):
@@ -216,7 +216,7 @@ def propose_missions(proposing, proposer, kind, offsets, first, last, out):
                 for ray in range(params.rays):
                     came += proposing.utility_bits[mission, index, ray]
                 estimate = estimate_in(proposing.estimates, mission, index)
-                knowledge = Knowledge(
+                given = PlannerInput(
                     believed_pose(estimate, params, pose_at(params, own, clock.time_s)),
                     clock.time_s,
                     own.entropy_bits,
@@ -233,7 +233,7 @@ def propose_missions(proposing, proposer, kind, offsets, first, last, out):
                     proposing.no_fly[mission * params.bodies + params.body_number],
                 )
                 experience = proposing.experience[mission, index]
-                propose_to(proposing.params, index, knowledge, proposer, candidates, experience, parts)
+                propose_to(proposing.params, index, given, proposer, candidates, experience, parts)
             else:
                 for part in parts:
                     for number in range(len(part)):

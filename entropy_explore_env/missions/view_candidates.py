@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from entropy_explore_env.missions.proposals import Knowledge, propose_to
+from entropy_explore_env.missions.proposals import PlannerInput, propose_to
 from entropy_explore_env.missions.rules import Rules, rules_of
 from entropy_explore_env.missions.view import RobotView
 from entropy_explore_env.scenario import Scenario
@@ -70,7 +70,7 @@ class ViewProposer:
     def _propose(self, view: RobotView) -> None:
         robot, no_fly = view.robot, view.no_fly_mask()
         x, y, z, yaw, pitch = view.pose.tolist()
-        knowledge = Knowledge(
+        given = PlannerInput(
             (x, y, z, yaw, pitch),
             view.time_s,
             view.entropy_bits,
@@ -93,7 +93,7 @@ class ViewProposer:
         )
         proposer = self._proposers[int(self._rules.params[robot]["kind"])]
         candidates, experience = self._candidates[robot], self._experience[robot]
-        propose_to(self._rules.params, robot, knowledge, proposer, candidates, experience, parts)
+        propose_to(self._rules.params, robot, given, proposer, candidates, experience, parts)
 
     def features(self, robot: int) -> np.ndarray:
         """(K, F) float32 of the candidates proposed to a robot last: `candidate_features.FEATURES`."""

@@ -13,10 +13,10 @@ import math
 from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel, record_type
 from entropy_explore_env.randomness import draw_gaussian
 from entropy_explore_env.robots.pose_covariance import (
+    correct_by_sighting,
     drift_variances,
     sight_axes,
     spread_yaw_error,
-    take_in_sighting,
     turn_between,
     within_half_turn,
 )
@@ -193,7 +193,7 @@ def correct_estimate(estimate, seen, expected, range_sigma_m, bearing_sigma_rad)
         range_sigma_m: Standard deviation of `seen` along it, > 0.
         bearing_sigma_rad: Of its direction, > 0.
     """
-    taken = take_in_sighting(estimate.covariance, seen, expected, range_sigma_m, bearing_sigma_rad)
+    taken = correct_by_sighting(estimate.covariance, seen, expected, range_sigma_m, bearing_sigma_rad)
     for number in range(4):
         estimate.error[number] -= taken[number]
     estimate.error[3] = within_half_turn(estimate.error[3])

@@ -119,13 +119,13 @@ def sight_axes(relative):
 
 
 @inlined_kernel
-def take_in(covariance, axis, expected, off, variance, taken):
-    """Take in what a sighting says along one axis.
+def correct_along(covariance, axis, expected, off, variance, taken):
+    """Correct a pose by what a sighting says along one axis, as a Kalman filter does.
 
     Args:
         covariance: (4, 4) float64, changed in place.
         axis: Unit vector.
-        expected: As of `take_in_sighting`.
+        expected: As of `correct_by_sighting`.
         off: What was seen less what was expected.
         variance: Of what was seen, along the axis.
         taken: (x, y, z, yaw), what the axes before have taken from the estimate.
@@ -161,8 +161,8 @@ def dot4(a, b):
 
 
 @lean_kernel
-def take_in_sighting(covariance, seen, expected, range_sigma_m, bearing_sigma_rad):
-    """Take in a sighting of a landmark: three numbers, along the line of sight, sideways and up (eq. 16).
+def correct_by_sighting(covariance, seen, expected, range_sigma_m, bearing_sigma_rad):
+    """Correct a pose by a sighting: three numbers, along the line of sight, sideways and up (eq. 16).
 
     Args:
         covariance: (4, 4) float64, changed in place.
@@ -179,6 +179,6 @@ def take_in_sighting(covariance, seen, expected, range_sigma_m, bearing_sigma_ra
     sigma = max(distance, length(expected)) * bearing_sigma_rad  # noise may have seen it much too near
     off = seen[0] - expected[0], seen[1] - expected[1], seen[2] - expected[2]
     none = (0.0, 0.0, 0.0, 0.0)
-    taken = take_in(covariance, ahead, expected, off, range_sigma_m * range_sigma_m, none)
-    taken = take_in(covariance, side, expected, off, sigma * sigma, taken)
-    return take_in(covariance, up, expected, off, sigma * sigma, taken)
+    taken = correct_along(covariance, ahead, expected, off, range_sigma_m * range_sigma_m, none)
+    taken = correct_along(covariance, side, expected, off, sigma * sigma, taken)
+    return correct_along(covariance, up, expected, off, sigma * sigma, taken)

@@ -14,10 +14,10 @@ import numpy as np
 from entropy_explore_env.belief.raycast import STOP_AT_COVERED, Line, cast_range, point
 from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel
 from entropy_explore_env.robots.pose_covariance import (
+    correct_by_sighting,
     drift_variances,
     in_field_of_view,
     spread_yaw_error,
-    take_in_sighting,
     turn_between,
 )
 
@@ -148,7 +148,7 @@ def move_and_sight(covariance, surveyor, drive, event, here, metres, turned):
         landmark = surveyor.landmarks_m[number]
         away = landmark[0] - here[0], landmark[1] - here[1], landmark[2] - here[2]
         if should_be_in_sight(surveyor, drive.viewpoint, here, away):
-            take_in_sighting(covariance, away, away, params.range_sigma_m, params.bearing_sigma_rad)
+            correct_by_sighting(covariance, away, away, params.range_sigma_m, params.bearing_sigma_rad)
 
 
 @lean_kernel

@@ -34,7 +34,7 @@ class Recipe:
         refined: How many each time.
         far_places: Uncertain places that are evaluated beyond those within reach.
         far_gazes: Gazes at each.
-        way_gazes: Gazes that are evaluated at a stop on the way to one.
+        waypoint_gazes: Gazes that are evaluated at a stop on the way to one.
         far_below: Far places are looked for where the best viewpoint nearby brings less than this share of
             the most bits ever expected; 1 = whenever one could be worth more.
         keep: A far place, once chosen, is kept unless another is worth this many times as much.
@@ -57,7 +57,7 @@ class Recipe:
     refined: int = 12
     far_places: int = 24
     far_gazes: int = 1
-    way_gazes: int = 1
+    waypoint_gazes: int = 1
     far_below: float = 1.0
     keep: float = 1.15
     block_m: float = 1.0
@@ -73,7 +73,7 @@ class Recipe:
         check_count(self, "thinning", 1, 1000)
         for name in ("gazes", "turns", "places", "refinements", "far_places"):
             check_count(self, name, 0, 100_000)
-        for name in ("refined", "far_gazes", "way_gazes"):
+        for name in ("refined", "far_gazes", "waypoint_gazes"):
             check_count(self, name, 1, 100_000)
         check(self, "places", "above 0 where neither gazes nor turns are drawn", self._any_drawn)
 
@@ -106,7 +106,7 @@ NARROW_PLANNED = Recipe(
     refined=20,
     far_places=12,
     far_gazes=3,
-    way_gazes=24,
+    waypoint_gazes=24,
     block_m=1.6,
     dregs=0.0025,
 )

@@ -208,9 +208,9 @@ def _views_of_known(world: World, scale: float) -> list[_View]:
 
 
 def _metres(value: float) -> str:
-    """A length with at most four digits, two where it is below a metre; whole metres from 1000 m on."""
+    """A length with at most four digits, three where it is below a metre; whole metres from 1000 m on."""
     if 0 < abs(value) < 1:
-        return f"{value:.2g}"
+        return f"{value:.3g}"
     return f"{value:.4g}" if abs(value) < 1000 else f"{value:.0f}"
 
 

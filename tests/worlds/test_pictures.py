@@ -68,7 +68,7 @@ def test_long_names_and_sizes_from_a_millimetre_to_a_hundred_kilometres_fit():
 
 
 def test_lengths_are_not_said_more_exactly_than_anybody_reads():
-    lengths = {0.05: "0.05", 0.08333: "0.083", 0.0: "0", 38.96: "38.96", 74.4012: "74.4", -20.0: "-20"}
+    lengths = {0.05: "0.05", 0.08333: "0.0833", 0.0: "0", 38.96: "38.96", 74.4012: "74.4", -20.0: "-20"}
     lengths |= {999.96: "1000", 1339.22: "1339", 29983.67: "29984", 12.0: "12"}
     assert [_metres(length) for length in lengths] == list(lengths.values())
 

@@ -63,7 +63,7 @@ from training.policy_improvement.labelling import (
     write_labels,
 )
 from training.policy_improvement.regression import RegressionSettings, as_json, regress
-from training.policy_improvement.rollouts import Thinking
+from training.policy_improvement.rollouts import RollOutEffort
 from training.policy_improvement.tasks import task_of
 from training.run_folder import FILE
 
@@ -219,7 +219,7 @@ def label_settings(args: Args, tasks: list[Scenario]) -> tuple[LabelSettings, Ca
         args.missions,
         args.branches,
         args.draws,
-        Thinking(args.horizon, args.divisor),
+        RollOutEffort(args.horizon, args.divisor),
         args.every,
         args.states,
         args.seed,

@@ -35,7 +35,7 @@ from entropy_explore_env.validation import check_whole
 from entropy_explore_env.writing import write_atomically
 from training import extra  # noqa: F401 - before what is not there without it
 from training.policy_improvement.restricted import RestrictedPlanner
-from training.policy_improvement.rollouts import PLANNER, BatchMissions, Branch, RollOuts, Thinking
+from training.policy_improvement.rollouts import PLANNER, BatchMissions, Branch, RollOutEffort, RollOuts
 from training.policy_improvement.tasks import task_of
 from training.policy_improvement.time_to_go import TimeToGo, learn_time_to_go
 from training.seeds import label_seeds
@@ -171,8 +171,8 @@ class Clairvoyant:
         self._args, self._to_go = args, to_go
         self._batch = BatchMissions(task, len(seeds), args.threads)
         self._batch.missions.reset_some(range(len(seeds)), list(seeds))
-        thinking = Thinking(args.horizon, args.divisor)
-        self._rollouts = RollOuts(self._batch.scenario, (1, args.tries, 1), thinking, args.threads)
+        effort = RollOutEffort(args.horizon, args.divisor)
+        self._rollouts = RollOuts(self._batch.scenario, (1, args.tries, 1), effort, args.threads)
         self._decided = np.zeros((len(seeds), task.robots), np.int64)
 
     def run(self) -> np.ndarray:

@@ -26,8 +26,8 @@ from training.policy_improvement.rollouts import (
     BatchMissions,
     Branch,
     Outcomes,
+    RollOutEffort,
     RollOuts,
-    Thinking,
     candidates_to_try,
 )
 from training.policy_improvement.shards import Labels, Origin, load_shard, save_shard, shard_file
@@ -45,7 +45,7 @@ class LabelSettings(NamedTuple):
         missions: Of a shard.
         branches: B, candidates that are tried at a state, the planner's choice among them.
         draws: D, random numbers over which a label is averaged.
-        thinking: How far branches go, and how hard their planner thinks.
+        effort: How far branches go, and how many viewpoints their planner draws.
         every: A decision of so many is labelled, on average.
         states: States whose branches run at once.
         seed: Of missions and draws.
@@ -56,7 +56,7 @@ class LabelSettings(NamedTuple):
     missions: int
     branches: int
     draws: int
-    thinking: Thinking
+    effort: RollOutEffort
     every: int
     states: int
     seed: int
@@ -173,7 +173,7 @@ class _Shard:
         self._batch = BatchMissions(scenario, settings.missions, threads)
         self._batch.missions.reset_some(range(settings.missions), self._seeds)
         shape = (settings.states, settings.branches, settings.draws)
-        self._rollouts = RollOuts(self._batch.scenario, shape, settings.thinking, threads)
+        self._rollouts = RollOuts(self._batch.scenario, shape, settings.effort, threads)
         self._observed: list[np.ndarray] = []
         self._tried: list[np.ndarray] = []
         self._states: list[tuple[int, float]] = []

@@ -95,8 +95,8 @@ class Outcomes(NamedTuple):
     """(N, B, D, P) float32, the first robot's privileged numbers there."""
 
 
-class Thinking(NamedTuple):
-    """How far branches go, and how hard the planner thinks that leads them."""
+class RollOutEffort(NamedTuple):
+    """How far branches go, and how many viewpoints the planner draws that leads them."""
 
     horizon: int = 30
     """Decisions a robot until a branch is cut off; 0 = never."""
@@ -120,23 +120,23 @@ class RollOuts:
     """Room for the branches of several states at once."""
 
     def __init__(
-        self, scenario: Scenario, shape: tuple[int, int, int], thinking: Thinking, threads: int
+        self, scenario: Scenario, shape: tuple[int, int, int], effort: RollOutEffort, threads: int
     ) -> None:
         """Make missions for them.
 
         Args:
             scenario: Of the missions that are branched, with the grid of their worlds.
             shape: (N, B, D).
-            thinking: How far branches go, and how hard their planner thinks.
+            effort: How far branches go, and how many viewpoints their planner draws.
             threads: Threads that share the missions.
         """
-        self.shape, self._horizon = shape, thinking.horizon
+        self.shape, self._horizon = shape, effort.horizon
         unseen = with_settings(
             scenario, {"observation": _NOTHING}
         )  # features would cost more than the choice
         self._env = EntropyExploreVectorEnv(unseen, int(np.prod(shape)), threads=threads, action_masks=False)
         self._missions = self._env.missions
-        self._missions.thin_candidates(thinking.divisor)
+        self._missions.thin_candidates(effort.divisor)
         self._waiting: list[Branch] = []
 
     @property

@@ -33,8 +33,8 @@ _HALF_SECONDS, _HALF_TIME_S, _HALF_MATES, _MOST_LOG_BITS = 10.0, 300.0, 2.0, 20.
 ) = CONTEXT_COLUMNS.values()  # fmt: skip
 
 
-class Facts(NamedTuple):
-    """What is true of a robot beside its belief and its pose."""
+class RobotStatus(NamedTuple):
+    """What `write_context` says of a robot beside its belief and its pose."""
 
     entropy: float
     """Share of its map's entropy that is left."""
@@ -45,8 +45,8 @@ class Facts(NamedTuple):
     teammates: int
 
 
-class Found(NamedTuple):
-    """What was selected."""
+class Selection(NamedTuple):
+    """The candidates that were selected, in numbers."""
 
     count: int
     """Candidates."""
@@ -131,13 +131,13 @@ def _contest(proposer, situation, goal, seconds):
 
 
 @lean_kernel
-def write_features(proposer, situation, found, out):
+def write_features(proposer, situation, selection, out):
     """Fill in the features of all candidates; zeros for those that there are not.
 
     Args:
         proposer: A Proposer, with what was selected; its blocks hold the map's remaining bits.
         situation: A Situation.
-        found: Found.
+        selection: Selection.
         out: (K·F,) float32, filled in.
     """
     scratch, experience = proposer.scratch, situation.experience
@@ -145,13 +145,13 @@ def write_features(proposer, situation, found, out):
     for number in range(len(out)):
         out[number] = 0.0
     best_rate, fewest_s, choice = 0.0, math.inf, pool.values[taken[0]]
-    for k in range(found.count):
+    for k in range(selection.count):
         seconds = pool.seconds[taken[k]]
         best_rate = max(best_rate, _rate(pool.bits[taken[k]], seconds))
         fewest_s = min(fewest_s, seconds)
         choice = max(choice, pool.values[taken[k]])
     experience.best_rate = max(experience.best_rate, best_rate)
-    for k in range(found.count):
+    for k in range(selection.count):
         row, number = out[k * _WIDTH : (k + 1) * _WIDTH], taken[k]
         bits, seconds, value = pool.bits[number], pool.seconds[number], pool.values[number]
         rate = _rate(bits, seconds)
@@ -164,12 +164,12 @@ def write_features(proposer, situation, found, out):
         row[_RATE] = clip(rate / best_rate)
         row[_RATE_EVER] = clip(rate / experience.best_rate)
         better = 0
-        for other in range(found.count):
+        for other in range(selection.count):
             better += int(pool.values[taken[other]] > value)
-        row[_RANK] = 1.0 - better / max(found.count - 1, 1)
-        row[_KEPT] = 1.0 if number == found.kept or _is_goal(situation, pool, number) else 0.0
+        row[_RANK] = 1.0 - better / max(selection.count - 1, 1)
+        row[_KEPT] = 1.0 if number == selection.kept or _is_goal(situation, pool, number) else 0.0
         _write_view(proposer, k, row)
-        _write_place(proposer, situation, number, found, row)
+        _write_place(proposer, situation, number, selection, row)
 
 
 @lean_kernel
@@ -200,7 +200,7 @@ def _write_view(proposer, k, row):
 
 
 @lean_kernel
-def _write_place(proposer, situation, number, found, row):
+def _write_place(proposer, situation, number, selection, row):
     """Fill in the features of where a viewpoint of the pool is, and of the way to it."""
     pool, here, size = proposer.scratch.pool, situation.here, situation.belief.size
     at, goal, kind = pool.viewpoints[number], pool.goals[number], pool.kinds[number]
@@ -209,8 +209,8 @@ def _write_place(proposer, situation, number, found, row):
     row[_IS_NEAR] = 1.0 if kind == _NEAR else 0.0
     row[_IS_FAR] = 1.0 if kind == _FAR else 0.0
     straight, path = distance_apart(goal, here), _path_length(proposer, situation, goal, kind)
-    away = _distance_to_remaining(proposer.blocks, goal, found.remaining)
-    row[_ELSEWHERE] = 1.0 - _share_around(proposer, size, goal, found.remaining)
+    away = _distance_to_remaining(proposer.blocks, goal, selection.remaining)
+    row[_ELSEWHERE] = 1.0 - _share_around(proposer, size, goal, selection.remaining)
     row[_ADVANTAGE] = min(max((away - path) / diagonal, -1.0), 1.0)
     row[_DIRECTNESS] = clip(straight / path) if path > 1e-9 else 1.0
     row[_DISTANCE] = clip(straight / diagonal)
@@ -226,20 +226,20 @@ def _write_place(proposer, situation, number, found, row):
 
 
 @lean_kernel
-def write_context(proposer, situation, facts, found, out):
+def write_context(proposer, situation, status, selection, out):
     """Fill in the features of a robot's situation.
 
     Args:
         proposer: A Proposer, with what was selected.
         situation: A Situation.
-        facts: Facts.
-        found: Found.
+        status: RobotStatus.
+        selection: Selection.
         out: (C,) float32, filled in.
     """
     scratch, experience, drive = proposer.scratch, situation.experience, proposer.drive
     pool, taken, size = scratch.pool, scratch.taken, situation.belief.size
     most_bits, best_rate, heard, nearest = 0.0, 0.0, 0, math.inf
-    for k in range(found.count):
+    for k in range(selection.count):
         bits = pool.bits[taken[k]]
         most_bits = max(most_bits, bits)
         best_rate = max(best_rate, _rate(bits, pool.seconds[taken[k]]))
@@ -250,19 +250,19 @@ def write_context(proposer, situation, facts, found, out):
     reach_m = proposer.reach * proposer.exact.voxel_size_m
     once_s = driving_time(reach_m, drive.max_speed_m_s, drive.acceleration_m_s2) + drive.scan_time_s
     once_s += 0.5 * math.pi / drive.turn_rate_rad_s
-    out[_C_ENTROPY], out[_C_REPORTED] = clip(facts.entropy), clip(facts.reported)
+    out[_C_ENTROPY], out[_C_REPORTED] = clip(status.entropy), clip(status.reported)
     out[_C_BITS] = clip(most_bits / experience.most_bits)
     out[_C_RATE] = clip(best_rate / experience.best_rate)
-    out[_C_FAR] = clip(found.far_value / (found.far_value + found.near_value))
-    out[_C_AROUND] = _share_around(proposer, size, situation.here, found.remaining)
-    out[_C_TIME] = facts.time_s / (facts.time_s + _HALF_TIME_S)
-    out[_C_CANDIDATES] = found.count / len(taken)
-    out[_C_MATES] = facts.teammates / (facts.teammates + _HALF_MATES)
-    out[_C_HEARD] = clip(heard / max(facts.teammates, 1))
+    out[_C_FAR] = clip(selection.far_value / (selection.far_value + selection.near_value))
+    out[_C_AROUND] = _share_around(proposer, size, situation.here, selection.remaining)
+    out[_C_TIME] = status.time_s / (status.time_s + _HALF_TIME_S)
+    out[_C_CANDIDATES] = selection.count / len(taken)
+    out[_C_MATES] = status.teammates / (status.teammates + _HALF_MATES)
+    out[_C_HEARD] = clip(heard / max(status.teammates, 1))
     out[_C_NEAREST] = clip(nearest / _diagonal(size))
     out[_C_BLOCKED] = 1.0 if experience.blocked > 0 else 0.0
     out[_C_FAILURES] = experience.failures / REMEMBERED
-    out[_C_UNDER_WAY] = 1.0 if facts.under_way else 0.0
+    out[_C_UNDER_WAY] = 1.0 if status.under_way else 0.0
     out[_C_PLANAR] = 1.0 if proposer.planar else 0.0
     out[_C_ALL_AROUND] = 1.0 if proposer.all_around else 0.0
     out[_C_SCAN_TIME] = clip(drive.scan_time_s / once_s)

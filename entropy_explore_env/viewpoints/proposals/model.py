@@ -71,7 +71,7 @@ class RecipeNumbers(NamedTuple):
     """Whether those drawn are imagined with fewer rays than those refined."""
     far_places: int
     far_gazes: int
-    way_gazes: int
+    waypoint_gazes: int
     far_below: float
     keep: float
     dregs: float
@@ -191,7 +191,7 @@ def recipe_numbers(recipe: Recipe, kind: RobotKind) -> RecipeNumbers:
         thinned=recipe.thinning != recipe.draw_thinning,
         far_places=int(recipe.far_places),
         far_gazes=int(recipe.far_gazes),
-        way_gazes=int(recipe.way_gazes),
+        waypoint_gazes=int(recipe.waypoint_gazes),
         far_below=float(recipe.far_below),
         keep=float(recipe.keep),
         dregs=float(recipe.dregs),
@@ -220,7 +220,7 @@ def _sizes(scenario: Scenario, recipes: Sequence[Recipe]) -> tuple[int, int, int
     candidates = scenario.action.candidates
     near = max(r.gazes + r.turns + r.places + r.refinements * max(r.refined, 3) for r in recipes)
     far = max(r.far_places * r.far_gazes for r in recipes) + 1
-    gazes = max(max(r.way_gazes for r in recipes), 8)
+    gazes = max(max(r.waypoint_gazes for r in recipes), 8)
     edge_m, shape = scenario.grid.voxel_size_m, scenario.grid.shape
     longest = max(
         longest_crossing(*shape, kind.sensor.max_range_m / edge_m, kind.sensor.voxels_behind + 1)
@@ -303,7 +303,7 @@ def thinned(proposer: Proposer, divisor: int) -> Proposer:
     recipe = proposer.recipe
     fewer = {
         name: -(-getattr(recipe, name) // divisor)
-        for name in ("gazes", "turns", "places", "refined", "far_places", "way_gazes")
+        for name in ("gazes", "turns", "places", "refined", "far_places", "waypoint_gazes")
     }
     refinements = min(recipe.refinements, max(1, recipe.refinements // divisor))
     return proposer._replace(recipe=recipe._replace(**fewer, refinements=refinements))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from entropy_explore_env.compilation.kernels import lean_kernel
 from entropy_explore_env.viewpoints.proposals.far import remaining_bits_by_block
-from entropy_explore_env.viewpoints.proposals.features import Found
+from entropy_explore_env.viewpoints.proposals.features import Selection
 from entropy_explore_env.viewpoints.proposals.nearby import (
     copy_viewpoint,
     evaluate,
@@ -30,7 +30,7 @@ def propose(proposer, situation, decision, candidates, described):
         described: Whether features will be written.
 
     Returns:
-        Found.
+        Selection.
     """
     experience, pool = situation.experience, proposer.scratch.pool
     learn(experience, candidates, decision, situation.here)
@@ -53,7 +53,7 @@ def propose(proposer, situation, decision, candidates, described):
     count = select(proposer, situation, size, choice, kept)
     remaining = remaining_bits_by_block(proposer, situation.belief) if described else 0.0
     _write_candidates(proposer, situation.here, candidates, count)
-    return Found(count, kept, near_value, far_value, remaining)
+    return Selection(count, kept, near_value, far_value, remaining)
 
 
 @lean_kernel

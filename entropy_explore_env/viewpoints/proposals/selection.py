@@ -94,7 +94,7 @@ def add_far(proposer, situation, size, value, most):
         stop, goal = pool.viewpoints[size], far.viewpoints[number]
         if _goal_taken(pool, first, size, goal) or not first_stop(proposer, situation, goal, stop):
             continue
-        gazes = recipe.way_gazes if choosing else min(recipe.way_gazes, TRIED_STOPS)
+        gazes = recipe.waypoint_gazes if choosing else min(recipe.waypoint_gazes, TRIED_STOPS)
         pool.stop_bits[size] = gaze_on_the_way(proposer, situation, gazes, goal, stop)
         if trust_and_clearance(proposer, situation, stop) < DISAPPOINTING:
             continue

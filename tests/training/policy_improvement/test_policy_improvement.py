@@ -28,7 +28,13 @@ from training.policy_improvement import __main__ as command
 from training.policy_improvement import labelling, rollouts
 from training.policy_improvement.comparison import compare_with_planner
 from training.policy_improvement.labelling import LabelSettings, label_missions, write_labels
-from training.policy_improvement.rollouts import BatchMissions, Branch, RollOuts, Thinking, candidates_to_try
+from training.policy_improvement.rollouts import (
+    BatchMissions,
+    Branch,
+    RollOutEffort,
+    RollOuts,
+    candidates_to_try,
+)
 from training.policy_improvement.shards import shard_file
 from training.policy_improvement.tasks import task_of
 
@@ -47,7 +53,7 @@ def scenario(robots: int = 2, name: str = "box-7x11x5"):
 
 
 def settings(**changes) -> LabelSettings:
-    made = LabelSettings((scenario(),), 2, 3, 2, Thinking(4, 1), 6, 2, 0)
+    made = LabelSettings((scenario(),), 2, 3, 2, RollOutEffort(4, 1), 6, 2, 0)
     return made._replace(**changes)
 
 
@@ -237,7 +243,7 @@ def test_without_a_horizon_the_planners_branch_ends_as_the_mission_itself_does()
     acts = labelling.planner_acts
     for _ in range(5):
         batch.step(acts(batch))
-    runs = RollOuts(there, (1, 2, 1), Thinking(0, 1), 1)
+    runs = RollOuts(there, (1, 2, 1), RollOutEffort(0, 1), 1)
     runs.add(batch, Branch(0, 0, np.array([0]), None))
     began_s = mission_times(batch.missions)[0]
     outcomes = runs.run()
@@ -251,7 +257,7 @@ def test_branches_share_their_luck_and_draws_do_not():
     """The same candidate tried twice comes to the same second, in each draw to another."""
     batch = BatchMissions(scenario(), 2, 1)
     batch.missions.reset_some([0, 1], [2**63 + 7, 2**63 + 8])
-    runs = RollOuts(scenario(), (2, 3, 3), Thinking(5, 2), 1)
+    runs = RollOuts(scenario(), (2, 3, 3), RollOutEffort(5, 2), 1)
     for mission in range(2):
         runs.add(batch, Branch(mission, 1, np.array([0, 2, 0]), 5))
     assert runs.full
@@ -264,7 +270,7 @@ def test_branches_share_their_luck_and_draws_do_not():
 def test_a_roll_out_that_makes_no_headway_is_named(monkeypatch):
     batch = BatchMissions(scenario(), 1, 1)
     batch.missions.reset_some([0], [2**63 + 7])
-    runs = RollOuts(scenario(), (1, 2, 1), Thinking(0, 1), 1)
+    runs = RollOuts(scenario(), (1, 2, 1), RollOutEffort(0, 1), 1)
     runs.add(batch, Branch(0, 0, np.array([0, 1]), 5))
     monkeypatch.setattr(rollouts, "_MOST_STEPS", 0)
     with pytest.raises(RollOutError, match=f"seed {2**63 + 7}, episode 0 of box-7x11x5"):
@@ -358,8 +364,8 @@ def test_labels_know_their_task():
         ).all() and labels.moments_task.shape == labels.moments_mission.shape
 
 
-def test_roll_outs_think_less_and_observe_nothing():
-    runs = RollOuts(scenario(), (1, 2, 1), Thinking(5, 3), 1)
+def test_roll_outs_draw_fewer_viewpoints_and_observe_nothing():
+    runs = RollOuts(scenario(), (1, 2, 1), RollOutEffort(5, 3), 1)
     whole = EntropyExploreVectorEnv(scenario(), 1, action_masks=False).missions
     thin, full = (each._compiled_step.proposers[0][0].recipe for each in (runs._missions, whole))
     assert thin.gazes == -(-full.gazes // 3) and thin.refined < full.refined and thin.keep == full.keep
