@@ -106,7 +106,7 @@ def main(words: Sequence[str]) -> int:
             rows.append(plan_row(args.plan.stem, str(args.plan), plan.grid, effort.steps))
     about = {**machine(), "command": " ".join(["python -m benchmarks.speed", *words])}
     if args.out is not None:
-        write_atomically(args.out, markdown(about, rows))
+        write_atomically(args.out, markdown(about, rows, args.only))
     if args.json:
         print_json({"machine": about, "rows": [dataclasses.asdict(row) for row in rows]})
     else:
@@ -185,10 +185,10 @@ def print_table(about: dict[str, Any], rows: Sequence[Row]) -> None:
     console.print(sentence(about), highlight=False)
 
 
-def markdown(about: dict[str, Any], rows: Sequence[Row]) -> str:
-    """The page for `docs/results/`: table, machine, command."""
+def markdown(about: dict[str, Any], rows: Sequence[Row], only: str | None = None) -> str:
+    """The page for `docs/results/`: table, machine, command; of all jobs, or of those that a word names."""
     lines = [
-        "# Speed beside peers",
+        "# Speed beside peers" + (f": {only}" if only else ""),
         "",
         f"Made by `{about['command']}`. One process, one thread unless said. Each job and its peer take "
         "turns; figures are medians over the rounds, ratios are medians of the rounds' ratios.",
