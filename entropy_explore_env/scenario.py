@@ -122,7 +122,6 @@ class Scenario:
         self._check_broadcasts()
         self._check_faults()
         self._check_fiducials()
-        rays = max(kind.sensor.rays for kind in self.kinds)
         allowed = f"so short that at most {MAX_MESSAGES} messages are under way at once"
         name, longest_s = ("Channel.delay_s", self.channel.delay_s)
         if self.faults.radio.late > 0.0 and self.faults.radio.late_s > self.channel.delay_s:
@@ -130,9 +129,9 @@ class Scenario:
         if self.message_slots > MAX_MESSAGES:
             raise SettingError(name, longest_s, allowed)
         allowed = f"so short that at most {MAX_IN_FLIGHT} measurements are under way at once"
-        if self.message_slots * max(min(self.channel.burst, rays), 1) > MAX_IN_FLIGHT:
+        if self.message_slots * max(self.batch_measurements, 1) > MAX_IN_FLIGHT:
             raise SettingError(name, longest_s, allowed)
-        if 2 * self.robots * self.phase_batches * max(min(self.channel.burst, rays), 1) > MAX_IN_FLIGHT:
+        if 2 * self.robots * self.phase_batches * max(self.batch_measurements, 1) > MAX_IN_FLIGHT:
             raise SettingError("Channel.phase_s", self.channel.phase_s, allowed)
 
     def _check_kind(self, robot: Robot) -> None:
@@ -252,6 +251,25 @@ class Scenario:
     def phase_batches(self) -> int:
         """Batches that a robot can collect in a phase of the broadcast; 0 where they are sent at once."""
         return 0 if self.channel.phase_s == 0.0 else self._scans_within(self.channel.phase_s)
+
+    @property
+    def shares_summaries(self) -> bool:
+        """Whether robots send summaries of maps to each other."""
+        return self.channel.content == "summaries" and self.channel.burst > 0 and self.robots > 1
+
+    @property
+    def batch_measurements(self) -> int:
+        """Most measurements of a batch: no more than a scan has rays; 0 where summaries are sent."""
+        rays = max(kind.sensor.rays for kind in self.kinds)
+        return 0 if self.shares_summaries else min(self.channel.burst, rays)
+
+    @property
+    def summary_slots(self) -> int:
+        """Summaries of one robot that can be under way at once."""
+        if not self.shares_summaries or self.longest_delay_s == 0.0:
+            return 0
+        sent = self.longest_delay_s / max(self.channel.summary_every_s, 1e-9)
+        return min(math.floor(min(sent, 1e9)) + 2, self._scans_within(self.longest_delay_s))
 
     def _scans_within(self, time_s: float) -> int:
         """Scans that a robot can take in this time, and two more."""

@@ -279,15 +279,25 @@ def centred_angles(samples: int, step_rad: float) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Channel:
-    """What robots tell each other: the most useful measurements of a scan (Rocha04, eqs. 42-43).
+    """What robots tell each other: the most useful measurements of a scan (Rocha04, eqs. 42-43), or maps.
 
     A batch is sent at once (Rocha04) or, with `phase_s`, broadcast in phases (Bhattacharya 2010, sect. 5.3):
     a phase's batches wait for its end, are repeated all through the next phase, and who has them already
     ignores them. Either way `burst` and `i_min_bits` select what is in a batch: as many as there are rays,
     and 0, send everything that was newly measured.
 
+    With `content = "summaries"` robots send no batches. At the end of a scan, if `summary_every_s` have
+    passed since it last did so, a robot sends a quadtree of all that it measured itself since then (Sujan,
+    sect. 2.4; robots/map_summary.py). Nothing is selected, so I_min cannot be steered, and summaries are not
+    sent in phases. Range, reach, loss, delay and faults do to a summary what they do to a batch.
+
     Attributes:
-        burst: Most measurements of one batch; 0 shares none.
+        content: `measurements` or `summaries`.
+        summary_every_s: Least time from one summary of a robot to its next one, 1e-3 to 3600; 0 = at every
+            scan.
+        summary_threshold_bits: Most information content of a region of a summary that is told by one mean
+            and one σ, 0 to 5: 0 = only what is alike, 5 = all that was measured throughout.
+        burst: Most measurements of one batch; 0 shares none, and no summaries either.
         i_min_bits: I_min, the least utility of a measurement that is worth sending, 0 to 1e6.
         i_min_fill: None keeps I_min. A number lets each robot steer its own, from i_min_bits on, so that
             on average over its scans so many bursts of measurements reach it (Rocha04, sect. 5.1.1).
@@ -308,6 +318,9 @@ class Channel:
             or more.
     """
 
+    content: Literal["measurements", "summaries"] = "measurements"
+    summary_every_s: float = 10.0
+    summary_threshold_bits: float = 0.5
     burst: int = 64
     i_min_bits: float = 0.3219
     i_min_fill: float | None = None
@@ -324,6 +337,9 @@ class Channel:
 
     def __post_init__(self) -> None:
         """Check every field."""
+        check_choice(self, "content", Literal["measurements", "summaries"])
+        check_within(self, "summary_every_s", least=1e-3, most=3600, zero=True)
+        check_within(self, "summary_threshold_bits", least=0, most=5)
         check_count(self, "burst", 0, 1_000_000)
         check_within(self, "i_min_bits", least=0, most=1e6)
         if self.i_min_fill is not None:
@@ -343,6 +359,11 @@ class Channel:
             raise SettingError("Channel.repeats", self.repeats, "so few that they are 1e-3 s apart or more")
         if self.phase_s > 0.0 and self.delay_s > 0.0:
             raise SettingError("Channel.delay_s", self.delay_s, "0 where batches are broadcast in phases")
+        if self.content == "summaries":
+            if self.phase_s > 0.0:
+                raise SettingError("Channel.phase_s", self.phase_s, "0 where robots send summaries")
+            if self.i_min_fill is not None:
+                raise SettingError("Channel.i_min_fill", self.i_min_fill, "None where robots send summaries")
 
 
 @dataclass(frozen=True)

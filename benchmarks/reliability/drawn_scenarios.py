@@ -107,6 +107,9 @@ FIELDS: Mapping[type, Mapping[str, Numbers | Sequence[Any]]] = MappingProxyType(
             "silent_after_s": Numbers(1e-3, 1e9, 1.0, 60.0, also=(math.inf,)),
             "phase_s": Numbers(1e-3, 3600.0, 0.5, 30.0, also=(0.0,)),
             "repeats": _count(1, 1000, 1, 5),
+            "content": ("measurements", "summaries"),
+            "summary_every_s": Numbers(1e-3, 3600.0, 0.3, 20.0, also=(0.0,)),
+            "summary_threshold_bits": Numbers(1e-6, 5.0, 0.1, 2.0, also=(0.0,)),
         },
         Signal: {
             "power_dbm": (-100.0, 0.0, 20.0, 100.0),
@@ -194,8 +197,8 @@ def draw_scenario(rng: np.random.Generator, few_kernels: bool = False) -> Drawn:
     Args:
         rng: Where from.
         few_kernels: Observations have the default parts, or all, and channels reach by more than distance
-            where there are faults, and only there, and so do robots drift: others have kernels of their own,
-            which take seconds to compile.
+            where there are faults, and only there, and so do robots drift; summaries are sent there alone:
+            others have kernels of their own, which take seconds to compile.
 
     Raises:
         EntropyExploreError: Settings were drawn that do not fit each other. Draw again.
@@ -325,6 +328,8 @@ def _channel(part: Callable[..., Any], faulty: bool, few_kernels: bool) -> Chann
     channel = part(Channel, signal=part(Signal))
     if few_kernels and faulty == (channel.reach == "distance"):
         channel = dataclasses.replace(channel, reach="signal" if faulty else "distance")
+    if few_kernels and not faulty:
+        channel = dataclasses.replace(channel, content="measurements")
     return channel
 
 

@@ -43,6 +43,8 @@ CHANNELS: tuple[dict[str, Any], ...] = (
     {"burst": 0, "announcements": False},
     {"reach": "line_of_sight"},
     {"reach": "signal"},
+    {"content": "summaries"},
+    {"content": "summaries", "summary_every_s": 1.0, "delay_s": 2.0},
 )
 _FLOOR_CASES = tuple(itertools.product(CHANNELS, SCENARIOS))
 _MORE_CASES = tuple(itertools.product(CHANNELS, QUICK))

@@ -26,6 +26,7 @@ SETTINGS: tuple[dict[str, Any], ...] = (
     {"robot": {"when_blocked": "wait", "redecide": 0.7, "motion": "planar"}, "action": {"kind": "discrete"}},
     {"robot": {"localization": _DRIFT}, "fiducials": {"number": 5}, "channel": {"delay_s": 0.7}},
     {"robot": {"localization": _DRIFT, "redecide": 0.6}, "channel": {"phase_s": 1.5, "repeats": 2}},
+    {"channel": {"content": "summaries", "summary_every_s": 1.0, "delay_s": 3.0}, "decision_period_s": None},
 )
 """Of the missions whose states are changed, so that every part of a state is in use."""
 _NUMBERS = (np.nan, np.inf, -np.inf, -1.0, 0.0, 1.0, 1e9, -1e9, 1e300, 5e-324)

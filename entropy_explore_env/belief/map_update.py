@@ -105,6 +105,51 @@ def fuse_ray(mean, precision, crossed, coverage, free, n, measured):
     return 0.5 * (bits - math.log2(shrink))
 
 
+@lean_kernel
+def gather_ray(mean, precision, crossed, coverage, free, n, measured):
+    """Fuse one range measurement into a map that may know nothing: like `fuse_ray`, from precision 0 on.
+
+    A measurement whose precision is too small for a float32 changes nothing.
+    """
+    gain = np.float32(measured)
+    if gain <= np.float32(0.0):
+        return
+    for i in range(n):
+        voxel, said = np.uint32(crossed[i]), coverage[i] if i >= free else np.float32(0.0)
+        before = precision[voxel]
+        precision[voxel] = before + gain
+        mean[voxel] = said + (mean[voxel] - said) * (before / (before + gain))
+
+
+@lean_kernel
+def fuse_row(mean, precision, first, last, coverage, measured):
+    """Fuse one Gaussian of coverage into each of the voxels `first` … `last` - 1 (Rocha04, eqs. 17-18).
+
+    Args:
+        mean: (V,) float32, changed in place.
+        precision: (V,) float32, > 0, changed in place.
+        first: Number of the first voxel.
+        last: One past the last.
+        coverage: float32, the mean that is fused.
+        measured: float32, its 1/σ².
+
+    Returns:
+        Utility in bits, ≥ 0, as of `fuse_ray`.
+    """
+    bits, shrink = 0.0, np.float64(1.0)
+    for voxel in range(first, last):
+        before = precision[voxel]
+        after = before + measured
+        share = before / after
+        precision[voxel] = after
+        mean[voxel] = coverage + (mean[voxel] - coverage) * share
+        shrink *= share
+        if shrink < _FOLD_BELOW:
+            bits -= math.log2(shrink)
+            shrink = np.float64(1.0)
+    return 0.5 * (bits - math.log2(shrink))
+
+
 @inlined_kernel
 def expected_utility(precision, crossed, n, measured):
     """Utility in bits that a ray over these voxels would bring; nothing is changed (eq. 27).

@@ -126,12 +126,24 @@ def fuse_pooled_scan(scan, count, mean, precision, pool):
 @lean_kernel
 def _pool_ray(pool, mean, precision, crossed, n, sign):
     """Add (sign 1) or take away (-1) what the `n` voxels of a ray contribute to their cells."""
-    cells, sums = pool.cells, pool.sums
-    prior, end = pool.prior_precision, pool.end_precision
-    size_y, size_z = cells.size[1], cells.size[2]
     for i in range(n):
-        voxel = crossed[i]
-        column = voxel // size_z
-        cell = cells.x[column // size_y] + cells.y[column % size_y] + cells.z[voxel - column * size_z]
-        sums[0, cell] += sign * normalised_entropy(prior, end, np.float64(precision[voxel]))
-        sums[1, cell] += sign * np.float64(mean[voxel])
+        _pool_voxel(pool, mean, precision, np.int64(crossed[i]), sign)
+
+
+@lean_kernel
+def pool_row(pool, mean, precision, first, last, sign):
+    """Add (sign 1) or take away (-1) what the voxels `first` … `last` - 1 contribute to their cells."""
+    for voxel in range(first, last):
+        _pool_voxel(pool, mean, precision, voxel, sign)
+
+
+@inlined_kernel
+def _pool_voxel(pool, mean, precision, voxel, sign):
+    """Add (sign 1) or take away (-1) what a voxel contributes to its cell."""
+    cells, sums = pool.cells, pool.sums
+    size_y, size_z = cells.size[1], cells.size[2]
+    column = voxel // size_z
+    cell = cells.x[column // size_y] + cells.y[column % size_y] + cells.z[voxel - column * size_z]
+    known = np.float64(precision[voxel])
+    sums[0, cell] += sign * normalised_entropy(pool.prior_precision, pool.end_precision, known)
+    sums[1, cell] += sign * np.float64(mean[voxel])

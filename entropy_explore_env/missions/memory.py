@@ -19,6 +19,7 @@ from entropy_explore_env.missions.rules import (
     overview_shape,
 )
 from entropy_explore_env.missions.state import state_arrays
+from entropy_explore_env.robots.map_summary import summary_bytes
 from entropy_explore_env.robots.navigator import navigator_bytes
 from entropy_explore_env.robots.range_sensor import scan_bytes
 from entropy_explore_env.scenario import Scenario
@@ -28,7 +29,10 @@ from entropy_explore_env.worlds.world import World
 
 _SPACE_BYTES = 10
 """Of a number of an observation in its space: two float32 bounds, and whether there are these bounds."""
-_MAPS = ("truth", "collision", "mean", "precision", "joint_mean", "joint_precision", "visible")
+_MAPS = (
+    *("truth", "collision", "mean", "precision", "joint_mean", "joint_precision", "visible"),
+    *("own_mean", "own_precision"),
+)
 _LAST_GROUP = Path("/sys/fs/cgroup/memory.max")
 _SETTING_OF_PART = {
     "panorama": "Observation.panorama_yaws",
@@ -82,7 +86,7 @@ def memory_needs(scenario: Scenario, batch: Batch) -> list[Need]:
     phases = sum(size for name, size in sizes.items() if name.startswith("phase"))
     scans = sum(sizes[name] for name in ("scan_range_m", "scan_returned", "scan_utility_bits"))
     robots = sum(sizes[name] for name in ("missions", "robots", "heard", "faults", "estimates"))
-    robots += sizes["fiducials"]
+    robots += sizes["fiducials"] + sizes["summaries"]
     proposed = sizes["candidates"] + sizes["experience"]
     maps = sum(sizes[name] for name in _MAPS) + _world_bytes(scenario, batch)
     burst = "Channel.burst" if scenario.channel.burst > 1 else "robots"
@@ -148,11 +152,13 @@ def _scratch_needs(scenario: Scenario, batch: Batch) -> list[Need]:
         masks = batch.missions * scenario.robots * len(discrete_moves(scenario)) * len(gazes)
     proposing = proposal_bytes(scenario) if scenario.action.kind == "candidates" else 0
     most = "threads" if batch.threads > 1 else None
+    summaries = batch.threads * (grid.voxels + summary_bytes(grid.voxels)) if scenario.shares_summaries else 0
     return [
         Need("rays of a scan", scans, most or "RangeSensor.angular_step_rad"),
         Need("paths", batch.threads * plans, most or "Grid.voxel_size_m"),
         Need("proposing candidates", batch.threads * proposing, most or "Grid.voxel_size_m"),
         Need("action masks", masks, "Robot.reach_m"),
+        Need("writing summaries", summaries, most or "Grid.voxel_size_m"),
     ]
 
 

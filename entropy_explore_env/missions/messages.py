@@ -27,6 +27,7 @@ from entropy_explore_env.missions.localization import (
     note_covariance,
     weigh_batch,
 )
+from entropy_explore_env.missions.own_maps import TeamSummaries
 from entropy_explore_env.missions.poses import (
     copy_numbers,
     distance_between,
@@ -67,6 +68,8 @@ class Team(NamedTuple):
     """What messages pass through; None = the channel reaches by distance alone."""
     localization: TeamLocalization | None = None
     """None = all robots know where they are."""
+    summaries: TeamSummaries | None = None
+    """None = robots send measurements, and no summaries."""
 
 
 class Tracer(NamedTuple):

@@ -64,6 +64,8 @@ PARAMS = record_type(
         ("silent_after_s", "f8"),
         ("phase_s", "f8"),
         ("repeats", "i8"),
+        ("summary_every_s", "f8"),  # 0 where no summaries are sent
+        ("summary_threshold_bits", "f8"),
         ("period_s", "f8"),  # length of a step; inf = until the next robot has to decide
         ("all_maps", "?"),
         ("shared_maps", "?"),  # those of all robots that still work
@@ -137,6 +139,8 @@ def rules_of(scenario: Scenario) -> Rules:
         "silent_after_s": channel.silent_after_s,
         "phase_s": channel.phase_s,
         "repeats": channel.repeats,
+        "summary_every_s": channel.summary_every_s if scenario.shares_summaries else 0.0,
+        "summary_threshold_bits": channel.summary_threshold_bits,
         "period_s": math.inf if scenario.decision_period_s is None else scenario.decision_period_s,
         "all_maps": ending.termination == "all",
         "shared_maps": ending.termination == "shared",

@@ -13,9 +13,11 @@ from entropy_explore_env.missions.localization import (
     note_scan_pose,
 )
 from entropy_explore_env.missions.messages import fuse_measurements, send_batch
+from entropy_explore_env.missions.own_maps import note_measured
 from entropy_explore_env.missions.phases import collect_batch
 from entropy_explore_env.missions.poses import copy_numbers, grid_size, pose_at, to_grid_units, within_grid
 from entropy_explore_env.missions.scoring import note_seen, score_scan
+from entropy_explore_env.missions.summaries import share_summary
 from entropy_explore_env.robots.channel import select_measurements, steered_i_min
 from entropy_explore_env.robots.range_sensor import (
     Return,
@@ -87,16 +89,23 @@ def note_scan(robot, latest, scan, index):
 
 @lean_kernel
 def share(mission, scan, index, recipients):
-    """Select the most useful measurements of a robot's scan, and send them, now or in the next phase."""
+    """Select the most useful measurements of a robot's scan, and send them, now or in the next phase.
+
+    Where robots send summaries, send one if it is time.
+    """
     team, params = mission.team, mission.team.params[index]
     robot = team.robots[index]
+    note_measured(team.summaries, index, scan, grid_size(params))
+    clock, in_flight = mission.clock, mission.in_flight
+    if share_summary(team.summaries, team, mission.maps, clock, in_flight, index, recipients):
+        return
     count = select_measurements(scan.utility, params.burst, robot.i_min_bits, scan.order)
     if params.i_min_fill > 0.0:
         robot.next_i_min_bits = steered_i_min(
             robot.i_min_bits, scan.utility, params.burst, params.i_min_fill, params.i_min_gain
         )
     if count > 0 and params.phase_s == 0.0:
-        send_batch(team, mission.maps, mission.clock, mission.in_flight, scan, index, count, recipients)
+        send_batch(team, mission.maps, clock, in_flight, scan, index, count, recipients)
     elif count > 0:
         collect_batch(team, mission.buffers, mission.phases, scan, index, count)
 

@@ -17,6 +17,7 @@ from entropy_explore_env.belief.pooling import Cells
 from entropy_explore_env.compilation.kernels import record_type
 from entropy_explore_env.missions.rules import POINT, collision_bodies
 from entropy_explore_env.robots.localization import COVARIANCE_NUMBERS, ESTIMATE
+from entropy_explore_env.robots.map_summary import PARCEL, SUMMARY, summary_bytes
 from entropy_explore_env.scenario import Scenario
 from entropy_explore_env.viewpoints.proposals.records import CANDIDATE, EXPERIENCE
 
@@ -259,6 +260,17 @@ class MissionState(NamedTuple):
     """(E, Q, 10) float64, of their senders' poses: see `robots.localization.pack_covariance`."""
     phase_covariances: np.ndarray
     """(E, A, 2, S, 10) float64, likewise."""
+    own_mean: np.ndarray
+    """(E, A, V) float32 expected coverage by what a robot measured itself since its latest summary; empty,
+    like all that follow, where robots send no summaries."""
+    own_precision: np.ndarray
+    """(E, A, V) float32 its 1/σ²; 0 = not measured since then."""
+    summaries: np.ndarray
+    """(E, A) SUMMARY."""
+    in_flight_parcels: np.ndarray
+    """(E, Q) PARCEL, of each delayed message."""
+    in_flight_summaries: np.ndarray
+    """(E, A·K, M) uint8, summaries under way: K places of a robot, as `robots.map_summary` writes them."""
 
 
 class Beliefs(NamedTuple):
@@ -333,11 +345,12 @@ def state_arrays(
         cells: C, of the overview.
     """
     e, a, r = missions, scenario.robots, max(kind.sensor.rays for kind in scenario.kinds)
-    v, q, b = scenario.grid.voxels, scenario.message_slots, min(scenario.channel.burst, r)
+    v, q, b = scenario.grid.voxels, scenario.message_slots, scenario.batch_measurements
     s, tracked = scenario.phase_batches, scenario.grid.voxels if scenario.track_truth else 0
     proposed = a if scenario.action.kind == "candidates" else 0
     bodies, in_phases = collision_bodies(scenario), a if scenario.phase_batches else 0
     drifting, numbers = scenario.drifts, COVARIANCE_NUMBERS
+    sharing, places = a if scenario.shares_summaries else 0, a * scenario.summary_slots
     arrays: dict[str, tuple[tuple[int, ...], Any]] = {
         "truth": ((e, v), np.float32),
         "collision": ((0 if bodies == [POINT] else e * len(bodies), v), np.float32),
@@ -368,6 +381,11 @@ def state_arrays(
         "fiducials": ((e, scenario.fiducials.count if drifting else 0, 3), np.float64),
         "in_flight_covariances": ((e, q if drifting else 0, numbers), np.float64),
         "phase_covariances": ((e, in_phases if drifting else 0, 2, s, numbers), np.float64),
+        "own_mean": ((e, sharing, v), np.float32),
+        "own_precision": ((e, sharing, v), np.float32),
+        "summaries": ((e, sharing), SUMMARY),
+        "in_flight_parcels": ((e, q if sharing else 0), PARCEL),
+        "in_flight_summaries": ((e, places, summary_bytes(v) if places else 0), np.uint8),
     }
     return {name: (shape, np.dtype(kind)) for name, (shape, kind) in arrays.items()}
 

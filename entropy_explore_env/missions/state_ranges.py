@@ -16,6 +16,7 @@ import numpy as np
 from entropy_explore_env.errors import RecordError
 from entropy_explore_env.missions.faults import COUNTED, OUTAGES
 from entropy_explore_env.missions.state import WAYPOINTS, MissionEnd
+from entropy_explore_env.robots.map_summary import is_summary
 from entropy_explore_env.robots.motion import MoveEnd
 from entropy_explore_env.robots.range_sensor import Return
 from entropy_explore_env.scenario import Scenario
@@ -59,9 +60,9 @@ def check_ranges(scenario: Scenario, arrays: Mapping[str, np.ndarray], voxels_an
     Raises:
         RecordError: A number is in no mission of the scenario; the message names `array.field`.
     """
-    large = (_maps, _scans, _message_rays) if voxels_and_rays else ()
+    large = (_maps, _scans, _message_rays, _own_maps) if voxels_and_rays else ()
     small = (_missions, _robots, _heard, _messages, _phases, _faults, _candidates, _experience)
-    for part in (*small, _localization, *large):
+    for part in (*small, _localization, _summaries, *large):
         for values in part(scenario, arrays):
             _check(values)
 
@@ -216,6 +217,34 @@ def _message_rays(scenario: Scenario, arrays: Mapping[str, np.ndarray]) -> Itera
     """What is in messages."""
     for name, (rays, counts) in rays_of_messages(arrays).items():
         yield from _packed(scenario, name, rays, np.arange(rays.shape[-2]) < counts[..., None])
+
+
+def _summaries(scenario: Scenario, arrays: Mapping[str, np.ndarray]) -> Iterator[Values]:
+    """SUMMARY and PARCEL."""
+    summaries, parcels = arrays["summaries"], arrays["in_flight_parcels"]
+    size, time_s = np.asarray(scenario.grid.shape), arrays["missions"]["time_s"][:, None]
+    yield Values("summaries.sent_s", summaries["sent_s"], 0.0, time_s)
+    yield Values("summaries.sent", summaries["sent"], 0, _MOST)
+    yield Values("summaries.low", summaries["low"], 0, size)
+    yield Values("summaries.high", summaries["high"], summaries["low"], size)
+    places, longest = arrays["in_flight_summaries"].shape[1:]
+    yield Values("in_flight_parcels.place", parcels["place"], 0, max(places - 1, 0))
+    if parcels.size:
+        under_way = np.isfinite(arrays["in_flight"]["due_s"])
+        yield Values("in_flight_parcels.bytes", parcels["bytes"], 0, np.where(under_way, longest, 0))
+
+
+def _own_maps(scenario: Scenario, arrays: Mapping[str, np.ndarray]) -> Iterator[Values]:
+    """What robots measured since their latest summaries, and the summaries under way."""
+    yield Values("own_mean", arrays["own_mean"], -_ROUNDING, 1.0 + _ROUNDING)
+    yield Values("own_precision", arrays["own_precision"], 0.0, _LARGEST_PRECISION)
+    parcels, contents = arrays["in_flight_parcels"], arrays["in_flight_summaries"]
+    for mission, slot in np.argwhere(parcels["bytes"] > 0):
+        parcel = parcels[mission, slot]
+        content = contents[mission, parcel["place"], : parcel["bytes"]].tobytes()
+        if not is_summary(content, scenario.grid.shape):
+            found = f"{len(content)} bytes"
+            raise RecordError(f"in_flight_summaries[{mission}, {parcel['place']}]", found, "a whole summary")
 
 
 def _maps(scenario: Scenario, arrays: Mapping[str, np.ndarray]) -> Iterator[Values]:

@@ -32,6 +32,7 @@ from entropy_explore_env.missions.events import (
 from entropy_explore_env.missions.faults import faults_of, note_stop
 from entropy_explore_env.missions.localization import estimate_of, localization_of, note_motion
 from entropy_explore_env.missions.messages import Maps, Team, Tracer, announce, receive
+from entropy_explore_env.missions.own_maps import summaries_of
 from entropy_explore_env.missions.phases import broadcast_all
 from entropy_explore_env.missions.redecision import decide, note_braking, note_change
 from entropy_explore_env.missions.reward import reward_robots
@@ -45,6 +46,7 @@ from entropy_explore_env.missions.state import (
     MissionEnd,
     PhaseBuffers,
 )
+from entropy_explore_env.missions.summaries import receive_summary
 from entropy_explore_env.robots.channel import Air
 from entropy_explore_env.robots.range_sensor import sensor_of
 
@@ -94,6 +96,7 @@ def step_missions(rules, state, choices, work, continuous, discrete, first, last
                 faults_of(rules.faults, state.faults, m),
                 air_of(work.air, state.truth[m]),
                 localization_of(rules.localization, state.estimates, state.fiducials, m),
+                summaries_of(work.tree, state, m),
             ),
             Maps(Beliefs(state.mean[m], state.precision[m], state.pooled[m]), rules.cells),
             JointMap(state.joint_mean[m], state.joint_precision[m], state.visible[m]),
@@ -215,7 +218,8 @@ def advance(mission, sensors, work):
         earlier_s = clock.time_s
         clock.time_s = max(clock.time_s, event.time_s)
         if event.kind == MESSAGE_ARRIVES:
-            receive(team, maps, mission.in_flight, event.number, tracer, scan)
+            if not receive_summary(team.summaries, team, maps, mission.in_flight, event.number):
+                receive(team, maps, mission.in_flight, event.number, tracer, scan)
         elif event.kind == BROADCAST_DUE:
             broadcast_all(team, maps, mission.buffers, mission.phases, clock.time_s, tracer, scan)
         elif event.kind == ROBOT_STOPS:

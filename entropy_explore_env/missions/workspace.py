@@ -11,6 +11,8 @@ import numpy as np
 from entropy_explore_env.belief.map_update import Scan
 from entropy_explore_env.belief.raycast import Crossing, longest_crossing
 from entropy_explore_env.missions.state import WAYPOINTS
+from entropy_explore_env.robots.map_summary import new_summary_tree
+from entropy_explore_env.robots.map_tree import Tree
 from entropy_explore_env.robots.navigator import Navigator, footprints
 from entropy_explore_env.robots.range_sensor import new_scan
 from entropy_explore_env.scenario import Scenario
@@ -31,6 +33,8 @@ class Workspace(NamedTuple):
     """(A,) bool, whom a message reaches."""
     air: Crossing | None
     """Voxels between two robots; None = the channel reaches by distance alone: nothing else is compiled."""
+    tree: Tree | None
+    """For summaries of maps; None = robots send none: nothing of that is compiled."""
     footprints: np.ndarray
     """(K, B, 3) int64, offsets of the voxels that bodies of each kind of robot touch; B = 0 if none plans."""
 
@@ -48,6 +52,7 @@ def new_workspace(scenario: Scenario, navigators: Mapping[int, Navigator]) -> Wo
         bodies=np.zeros((scenario.robots, 4)),
         recipients=np.zeros(scenario.robots, np.bool_),
         air=_new_air(scenario),
+        tree=new_summary_tree(grid.voxels) if scenario.shares_summaries else None,
         footprints=footprints(navigators, len(kinds))
         if navigators
         else np.zeros((len(kinds), 0, 3), np.int64),

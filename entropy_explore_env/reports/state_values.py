@@ -86,6 +86,15 @@ FIELDS_LOCALIZATION = (
 ARRAYS_LOCALIZATION = ("fiducials", "in_flight_covariances", "phase_covariances")
 """Further arrays there."""
 
+FIELDS_SUMMARIES = ("sent_s", "sent", "low", "high")
+"""Fields of `summaries`, where robots send summaries."""
+
+FIELDS_PARCELS = ("place", "bytes")
+"""Fields of `in_flight_parcels`, likewise."""
+
+ARRAYS_SUMMARIES = ("own_mean", "own_precision", "in_flight_summaries")
+"""Further arrays there."""
+
 _FIELDS_TODAY: Mapping[str, str] = MappingProxyType(
     {
         "missions.letters": "enqueued",
@@ -125,8 +134,8 @@ def state_values(missions: Missions, mission: int) -> dict[str, np.ndarray]:
 
     Returns:
         Name → array, a view of the state, in the order of the digest. The phases of the broadcast, what an
-        ending by what was seen needs, what decisions under way need, faults, candidates and localization are
-        there only where they are used.
+        ending by what was seen needs, what decisions under way need, faults, candidates, localization and
+        summaries are there only where they are used.
     """
     values: dict[str, np.ndarray] = {}
     for name, read in _ARRAYS.items():
@@ -154,6 +163,11 @@ def state_values(missions: Missions, mission: int) -> dict[str, np.ndarray]:
         estimates = missions.state.estimates
         values.update({f"estimates.{field}": estimates[field][mission, ...] for field in FIELDS_LOCALIZATION})
         values.update({name: getattr(missions.state, name)[mission] for name in ARRAYS_LOCALIZATION})
+    if missions.scenario.shares_summaries:
+        kept, parcels = missions.state.summaries, missions.state.in_flight_parcels
+        values.update({f"summaries.{field}": kept[field][mission, ...] for field in FIELDS_SUMMARIES})
+        values.update({f"parcels.{field}": parcels[field][mission, ...] for field in FIELDS_PARCELS})
+        values.update({name: getattr(missions.state, name)[mission] for name in ARRAYS_SUMMARIES})
     return values
 
 

@@ -1,40 +1,69 @@
-"""A map as a quadtree of interest regions, compressed: what fits through a narrow channel (Sujan, sect. 2.4).
+"""A map as a summary: a quadtree of interest regions, compressed: what fits through a narrow channel (Sujan).
 
-A region in which every voxel was measured becomes one leaf if the information content of the histogram of its
-coverages (eqs. 1-2) is not above a threshold; else it is cut in two along each axis: quadrants in plans,
-octants in 3-D. A region that nobody measured is left out. A leaf says one mean and one σ for all its voxels,
-never a smaller σ than the map has in any of them. What remains is packed without loss by zlib.
+Step 4 of the paper (sect. 2.4). A summary is two bytes that say what it is, a checksum (CRC-32) over the
+grid's shape and over what follows, and the tree of `map_tree`, packed without loss by a range coder. Missions
+call the kernels, so that what they count is what `encode_map` returns.
 """
 
 from __future__ import annotations
 
 import math
-import zlib
 from typing import NamedTuple
 
 import numpy as np
 
-from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel
+from entropy_explore_env.compilation.kernels import lean_kernel, record_type
 from entropy_explore_env.errors import RecordError, SettingError
+from entropy_explore_env.robots.map_tree import (
+    Tree,
+    begin_walk,
+    new_tree,
+    read_leaf,
+    tree_bytes,
+    write_tree,
+)
+from entropy_explore_env.robots.range_coder import begin_reading, begin_writing, end_writing
 from entropy_explore_env.validation import is_number
 
-_MAGIC = b"EEMS\x01"
-_HEADER = np.dtype([("shape", "<u4", (3,)), ("nodes", "<u4"), ("leaves", "<u4")])
-_SPLIT, _EMPTY, _LEAF = 0, 1, 2
-_SPLIT_KNOWN = 3
-"""A split region of which every voxel was measured; written as _SPLIT."""
-_GREY_LEVELS = 32
-"""Intervals of coverage whose histogram is taken."""
-_MEANS = 255
-"""Steps of a leaf's mean coverage from 0 to 1."""
-_FINEST, _STEPS = 2.0**-10, 16.0
-"""Least σ that a leaf can say, and steps to twice as much: 255 steps end at 61."""
-_LEAST_PRECISION = (_FINEST * 2.0 ** (255 / _STEPS)) ** -2
-"""A precision below this one, of a σ that no leaf can say, counts as none."""
-_SLACK = 1.0 - 1e-6
-"""What a leaf says of precision, rounded to float32, stays below what it was made from."""
-_DEEPEST = 64
-"""Levels of a tree, at most; a stack holds at most seven siblings of each."""
+_MAGIC = np.uint8(0xE5)
+"""The first byte; the second one is a form."""
+_LEARNED, _FLAT = np.uint8(2), np.uint8(3)
+"""Forms: contexts learn; or all decisions count as equally likely, so that the summary is never too long."""
+_CHECKSUM, _FIRST = 2, 6
+"""Where the checksum begins, and the tree."""
+_BITS_PER_NODE, _BITS_PER_LEAF = 2, 16
+"""Of a tree that is not packed: a kind, and codes of mean and σ."""
+
+
+SUMMARY = record_type(
+    [
+        ("sent_s", "f8"),  # when the robot sent its latest summary; 0 = it has not
+        ("sent", "i8"),  # how many it has sent
+        # the box in which it has measured since then
+        ("low", "i8", (3,)),  # its first voxel
+        ("high", "i8", (3,)),  # one past its last one; zeros = it has measured nothing
+    ],
+)
+"""What a robot of a mission keeps for its next summary, beside the map."""
+
+PARCEL = record_type(
+    [
+        ("place", "i8"),  # of the summary that a delayed message carries
+        ("bytes", "i8"),  # its length; 0 = it carries none
+    ],
+)
+"""What a delayed message of a mission carries."""
+
+
+def _checksum_steps() -> np.ndarray:
+    """(256,) uint32: what a byte does to a CRC-32 (ISO 3309)."""
+    steps = np.arange(256, dtype=np.uint32)
+    for _ in range(8):
+        steps = np.where(steps & 1, steps >> 1 ^ np.uint32(0xEDB88320), steps >> 1).astype(np.uint32)
+    return steps
+
+
+_STEPS = _checksum_steps()
 
 
 class MapSummary(NamedTuple):
@@ -46,20 +75,14 @@ class MapSummary(NamedTuple):
     """(X, Y, Z) float32, 1/σ²; 0 where it says nothing."""
 
 
-class _Region(NamedTuple):
-    """A box of voxels: from `low` up to, not including, `high`."""
-
-    low: tuple[int, int, int]
-    high: tuple[int, int, int]
+def summary_bytes(voxels: int) -> int:
+    """Bytes that no summary of a map of so many voxels exceeds."""
+    return _FIRST + tree_bytes(voxels)
 
 
-class _Scratch(NamedTuple):
-    """Working space of `_cut`."""
-
-    stack: np.ndarray
-    """(S, 7) int64, of `_new_stack`."""
-    counts: np.ndarray
-    """(32,) int64, zeros: the histogram of one region."""
+def new_summary_tree(voxels: int) -> Tree:
+    """Working space for writing and reading summaries of maps of so many voxels."""
+    return new_tree(np.zeros(summary_bytes(voxels), np.uint8), voxels)
 
 
 def encode_map(mean: np.ndarray, precision: np.ndarray, threshold_bits: float) -> bytes:
@@ -85,13 +108,11 @@ def encode_map(mean: np.ndarray, precision: np.ndarray, threshold_bits: float) -
         raise SettingError("mean", "values outside", "coverages from 0 to 1")
     if not (np.min(precision) >= 0.0 and np.max(precision) < math.inf):
         raise SettingError("precision", "values outside", "finite numbers ≥ 0")
-    means, known = np.asarray(mean, np.float32), np.asarray(precision, np.float32)
-    kinds, leaves = np.empty(2 * means.size, np.uint8), np.empty((2, means.size), np.uint8)
-    scratch = _Scratch(_new_stack(), np.zeros(_GREY_LEVELS, np.int64))
-    nodes, count = _cut(means, known, float(threshold_bits), scratch, kinds, leaves)
-    header = np.array([(mean.shape, nodes, count)], _HEADER)
-    content = np.concatenate([_packed(kinds[:nodes]), leaves[0, :count], leaves[1, :count]])
-    return _MAGIC + zlib.compress(header.tobytes() + content.tobytes(), 1)
+    held = [np.ascontiguousarray(array, np.float32).ravel() for array in (mean, precision)]
+    x, y, z = mean.shape
+    shape, corner, tree = (x, y, z), (0, 0, 0), new_summary_tree(mean.size)
+    length = write_summary(tree, *held, shape, corner, shape, float(threshold_bits))
+    return tree.coder.data[:length].tobytes()
 
 
 def decode_map(data: bytes, shape: tuple[int, int, int]) -> MapSummary:
@@ -104,249 +125,128 @@ def decode_map(data: bytes, shape: tuple[int, int, int]) -> MapSummary:
     Raises:
         RecordError: It is no summary, cut, broken, or of a map of another shape.
     """
-    allowed = f"the whole summary of a map of {shape[0]} × {shape[1]} × {shape[2]} voxels"
-    found = f"{len(data)} bytes" if isinstance(data, bytes) else type(data).__name__
-    refused = RecordError("map summary", found, allowed)
-    voxels = math.prod(shape)
-    if not isinstance(data, bytes) or not data.startswith(_MAGIC):
-        raise refused
-    most = _HEADER.itemsize + 3 * voxels + 1
-    unpacking = zlib.decompressobj()
-    try:
-        content = unpacking.decompress(data[len(_MAGIC) :], most)
-    except zlib.error:
-        raise refused from None
-    if not unpacking.eof or unpacking.unused_data or len(content) < _HEADER.itemsize:
-        raise refused
-    header = np.frombuffer(content, _HEADER, 1)[0]
-    nodes, count = int(header["nodes"]), int(header["leaves"])
-    packed = (nodes + 3) // 4
-    if tuple(header["shape"].tolist()) != tuple(shape) or nodes > 2 * voxels or count > voxels:
-        raise refused
-    if len(content) != _HEADER.itemsize + packed + 2 * count:
-        raise refused
-    body = np.frombuffer(content, np.uint8, offset=_HEADER.itemsize)
-    kinds, leaves = _unpacked(body[:packed], nodes), body[packed:].reshape(2, count)
-    summary = MapSummary(np.full(shape, 0.5, np.float32), np.zeros(shape, np.float32))
-    if not _grow(kinds, leaves, _new_stack(), summary.mean, summary.precision):
-        raise refused
-    return summary
+    tree = _opened(data, shape)
+    mean, precision = np.full(shape, 0.5, np.float32), np.zeros(shape, np.float32)
+    _fill(tree, mean.ravel(), precision.ravel())
+    return MapSummary(mean, precision)
 
 
-def tree_bits(data: bytes) -> int:
-    """Bits of the tree of a summary that `encode_map` made, before zlib packs it.
+def tree_bits(data: bytes, shape: tuple[int, int, int]) -> int:
+    """Bits of a summary's tree before it is packed: two a node, sixteen a leaf.
+
+    Args:
+        data: From `encode_map`.
+        shape: (X, Y, Z) of the map.
 
     Raises:
-        RecordError: It is no summary.
+        RecordError: As of `decode_map`.
     """
-    if not isinstance(data, bytes) or not data.startswith(_MAGIC):
-        raise RecordError("map summary", type(data).__name__, "what encode_map returns")
-    try:
-        return 8 * len(zlib.decompress(data[len(_MAGIC) :]))
-    except zlib.error:
-        raise RecordError("map summary", f"{len(data)} bytes", "what encode_map returns") from None
+    tree = _opened(data, shape)
+    while read_leaf(tree):
+        pass
+    walk = tree.walk[0]
+    return _BITS_PER_NODE * int(walk["nodes"]) + _BITS_PER_LEAF * int(walk["leaves"])
 
 
-def _new_stack() -> np.ndarray:
-    """(S, 7) int64: regions that are still to be visited, and whether all of each is known to be measured."""
-    return np.zeros((7 * _DEEPEST + 1, 7), np.int64)
+def is_summary(data: object, shape: tuple[int, int, int]) -> bool:
+    """Whether something is the whole summary of a map (X, Y, Z)."""
+    if not isinstance(data, bytes) or not _FIRST <= len(data) <= summary_bytes(math.prod(shape)):
+        return False
+    x, y, z = shape
+    known = data[0] == _MAGIC and data[1] in (_LEARNED, _FLAT)
+    told = int.from_bytes(data[_CHECKSUM:_FIRST], "little")
+    return known and checksum(_bytes_of(data), np.int64(len(data)), (x, y, z)) == told
 
 
-def _packed(kinds: np.ndarray) -> np.ndarray:
-    """Four kinds of nodes a byte."""
-    padded = np.zeros(-(-len(kinds) // 4) * 4, np.uint8)
-    padded[: len(kinds)] = kinds
-    quarters = padded.reshape(-1, 4)
-    return quarters[:, 0] | quarters[:, 1] << 2 | quarters[:, 2] << 4 | quarters[:, 3] << 6
+def _bytes_of(data: bytes) -> np.ndarray:
+    """(M,) uint8, of the kind for which kernels are compiled."""
+    return np.frombuffer(data, np.uint8).copy()
 
 
-def _unpacked(packed: np.ndarray, nodes: int) -> np.ndarray:
-    """(nodes,) uint8 kinds; see `_packed`."""
-    return np.stack([packed >> shift & 3 for shift in (0, 2, 4, 6)], axis=1).ravel()[:nodes].copy()
+def _opened(data: bytes, shape: tuple[int, int, int]) -> Tree:
+    """The tree of a summary, of which nothing is read yet."""
+    if not is_summary(data, shape):
+        found = f"{len(data)} bytes" if isinstance(data, bytes) else type(data).__name__
+        allowed = f"the whole summary of a map of {shape[0]} × {shape[1]} × {shape[2]} voxels"
+        raise RecordError("map summary", found, allowed)
+    tree, (x, y, z) = new_tree(_bytes_of(data), 0), shape
+    open_summary(tree, len(data), (x, y, z))
+    return tree
 
 
-@inlined_kernel
-def _begin(stack, shape):
-    """Put the whole map on an empty stack."""
+@lean_kernel
+def write_summary(tree, mean, precision, size, low, high, threshold_bits):
+    """Write the summary of a map into the data of a Tree; returns how many bytes it has.
+
+    Args:
+        tree: Tree, with room for `summary_bytes`.
+        mean: (V,) float32, mean coverage.
+        precision: (V,) float32, 1/σ² of what is to be sent; looked at in the box only.
+        size: (X, Y, Z) voxels.
+        low: (x, y, z), of the box in which alone something was measured.
+        high: Its end, not included.
+        threshold_bits: Most information content of a leaf.
+    """
+    data, length = tree.coder.data, 0
+    for flat in range(2):
+        begin_writing(tree.coder, _FIRST, flat == 1)
+        begin_walk(tree, size, low, high)
+        write_tree(tree, mean, precision, threshold_bits)
+        length = end_writing(tree.coder, _FIRST)
+        data[0], data[1] = _MAGIC, _FLAT if flat == 1 else _LEARNED
+        if length <= len(data):
+            break
+    crc = checksum(data, length, size)
+    for place in range(4):
+        data[_CHECKSUM + place] = np.uint8((crc >> (8 * place)) & 255)
+    return length
+
+
+@lean_kernel
+def open_summary(tree, length, size):
+    """Begin to read the summary in the first bytes of a Tree's data; returns whether its form is known.
+
+    Its checksum is not looked at: a message of a mission arrives whole, or not at all.
+
+    Args:
+        tree: Tree.
+        length: Bytes of the summary, at least 6.
+        size: (X, Y, Z) voxels of the map.
+    """
+    data = tree.coder.data
+    if data[0] != _MAGIC or (data[1] != _LEARNED and data[1] != _FLAT):
+        return False
+    begin_reading(tree.coder, _FIRST, length, data[1] == _FLAT)
+    begin_walk(tree, size, (0, 0, 0), size)
+    return True
+
+
+@lean_kernel
+def checksum(data, length, size):
+    """CRC-32 of a grid's shape, three numbers of 32 bits with the least byte first, its form and its tree.
+
+    Args:
+        data: (M,) uint8, a summary in its first bytes.
+        length: How many it has.
+        size: (X, Y, Z) voxels.
+    """
+    crc = 0xFFFFFFFF
     for axis in range(3):
-        stack[0, axis], stack[0, 3 + axis] = 0, shape[axis]
-    stack[0, 6] = 0
-
-
-@inlined_kernel
-def _push_parts(region, stack, depth, known):
-    """Put the parts of a region on the stack: cut in two along each axis that has two voxels or more.
-
-    `known` says whether all of the region was measured, so that its parts need not be asked.
-
-    Returns:
-        The new depth; parts come off in the order of x, y, z.
-    """
-    for part in range(7, -1, -1):
-        empty = False
-        for axis in range(3):
-            low, high = region.low[axis], region.high[axis]
-            middle = low + (high - low + 1) // 2
-            second = (part >> (2 - axis)) & 1
-            stack[depth, axis] = middle if second else low
-            stack[depth, 3 + axis] = high if second else middle
-            empty = empty or (second == 1 and middle == high)
-        stack[depth, 6] = known
-        if not empty:
-            depth += 1
-    return depth
-
-
-@inlined_kernel
-def _top(stack, depth):
-    """The _Region at a depth of the stack."""
-    at = stack[depth]
-    return _Region((at[0], at[1], at[2]), (at[3], at[4], at[5]))
-
-
-@inlined_kernel
-def _is_known(precision):
-    """Whether a precision is worth sending: σ is within what a leaf can say."""
-    return precision >= _LEAST_PRECISION
-
-
-@inlined_kernel
-def _sigma_code(variance):
-    """The least code whose σ is not below that of a variance."""
-    return max(math.ceil(0.5 * _STEPS * math.log2(variance / (_FINEST * _FINEST))), 0)
+        for place in range(4):
+            crc = (crc >> 8) ^ np.int64(_STEPS[(crc ^ (size[axis] >> (8 * place))) & 255])
+    crc = (crc >> 8) ^ np.int64(_STEPS[(crc ^ np.int64(data[1])) & 255])
+    for place in range(_FIRST, length):
+        crc = (crc >> 8) ^ np.int64(_STEPS[(crc ^ np.int64(data[place])) & 255])
+    return crc ^ 0xFFFFFFFF
 
 
 @lean_kernel
-def _cut(mean, precision, threshold, scratch, kinds, leaves):
-    """Cut a map into leaves, depth first.
-
-    Args:
-        mean: (X, Y, Z) float32.
-        precision: (X, Y, Z) float32.
-        threshold: Most information content of a leaf, bits.
-        scratch: _Scratch.
-        kinds: (N,) uint8, filled with the kinds of the nodes.
-        leaves: (2, N) uint8, filled with codes of mean and σ of the leaves.
-
-    Returns:
-        (nodes, leaves): how many.
-    """
-    nodes, count, depth, stack = 0, 0, 1, scratch.stack
-    _begin(stack, mean.shape)
-    while depth > 0:
-        depth -= 1
-        region = _top(stack, depth)
-        kind = _kind_of(mean, precision, threshold, region, stack[depth, 6] == 1, scratch.counts)
-        kinds[nodes] = _SPLIT if kind == _SPLIT_KNOWN else kind
-        nodes += 1
-        if kind == _SPLIT or kind == _SPLIT_KNOWN:
-            depth = _push_parts(region, stack, depth, int(kind == _SPLIT_KNOWN))
-        elif kind == _LEAF:
-            leaves[0, count], leaves[1, count] = _leaf_of(mean, precision, region)
-            count += 1
-    return nodes, count
-
-
-@lean_kernel
-def _kind_of(mean, precision, threshold, region, known, counts):
-    """Whether a region is split, empty or a leaf: by what was measured, and by eqs. 1-2.
-
-    `known` says that all of it was measured.
-    """
-    low, high = region.low, region.high
-    total = (high[0] - low[0]) * (high[1] - low[1]) * (high[2] - low[2])
-    if not known:
-        first = _is_known(precision[low[0], low[1], low[2]])
-        for i in range(low[0], high[0]):
-            for j in range(low[1], high[1]):
-                for k in range(low[2], high[2]):
-                    if _is_known(precision[i, j, k]) != first:
-                        return _SPLIT
-        if not first:
-            return _EMPTY
-    if total == 1 or _information_bits(mean, region, total, counts) <= threshold:
-        return _LEAF
-    return _SPLIT_KNOWN
-
-
-@lean_kernel
-def _information_bits(mean, region, total, counts):
-    """-Σ q log2 q over the histogram of a region's coverages in equal intervals (Sujan, eqs. 1-2)."""
-    low, high = region.low, region.high
-    least, most = _GREY_LEVELS, -1
-    for i in range(low[0], high[0]):
-        for j in range(low[1], high[1]):
-            for k in range(low[2], high[2]):
-                level = min(int(mean[i, j, k] * _GREY_LEVELS), _GREY_LEVELS - 1)
-                counts[level] += 1
-                least, most = min(least, level), max(most, level)
-    bits = 0.0
-    for level in range(least, most + 1):
-        share = counts[level] / total
-        counts[level] = 0
-        bits -= share * math.log2(share) if share > 0.0 else 0.0
-    return bits
-
-
-@lean_kernel
-def _leaf_of(mean, precision, region):
-    """(mean, σ) codes of a leaf: σ² is that of its least known voxel and the spread of its coverages."""
-    low, high = region.low, region.high
-    total, count, least = 0.0, 0, math.inf
-    for i in range(low[0], high[0]):
-        for j in range(low[1], high[1]):
-            for k in range(low[2], high[2]):
-                total += np.float64(mean[i, j, k])
-                least = min(least, np.float64(precision[i, j, k]))
-                count += 1
-    code = int(total / count * _MEANS + 0.5)
-    said, spread = code / _MEANS, 0.0
-    for i in range(low[0], high[0]):
-        for j in range(low[1], high[1]):
-            for k in range(low[2], high[2]):
-                error = np.float64(mean[i, j, k]) - said
-                spread += error * error
-    return code, min(_sigma_code(1.0 / least + spread / count), 255)
-
-
-@lean_kernel
-def _grow(kinds, leaves, stack, mean, precision):
-    """Fill in what the leaves of a tree say.
-
-    Args:
-        kinds: (N,) uint8, from outside.
-        leaves: (2, M) uint8.
-        stack: Of `_new_stack`.
-        mean: (X, Y, Z) float32, filled where there is a leaf.
-        precision: (X, Y, Z) float32, likewise.
-
-    Returns:
-        Whether the tree is whole, and has just these nodes and leaves.
-    """
-    nodes, count, depth = 0, 0, 1
-    _begin(stack, mean.shape)
-    while depth > 0:
-        if nodes == len(kinds):
-            return False
-        depth -= 1
-        region, kind = _top(stack, depth), kinds[nodes]
-        nodes += 1
-        low, high = region.low, region.high
-        if kind == _SPLIT:
-            if high[0] - low[0] + high[1] - low[1] + high[2] - low[2] == 3:
-                return False
-            depth = _push_parts(region, stack, depth, 0)
-        elif kind == _LEAF:
-            if count == leaves.shape[1]:
-                return False
-            said = np.float32(leaves[0, count] / _MEANS)
-            sigma = _FINEST * 2.0 ** (leaves[1, count] / _STEPS)
-            known = np.float32(_SLACK / (sigma * sigma))
-            count += 1
-            for i in range(low[0], high[0]):
-                for j in range(low[1], high[1]):
-                    for k in range(low[2], high[2]):
-                        mean[i, j, k], precision[i, j, k] = said, known
-        elif kind != _EMPTY:
-            return False
-    return nodes == len(kinds) and count == leaves.shape[1]
+def _fill(tree, mean, precision):
+    """Fill (V,) with what the leaves of a summary say that was opened."""
+    size, leaf = tree.walk[0].size, tree.leaf[0]
+    while read_leaf(tree):
+        for i in range(leaf.low[0], leaf.high[0]):
+            for j in range(leaf.low[1], leaf.high[1]):
+                row = (i * size[1] + j) * size[2]
+                for voxel in range(row + leaf.low[2], row + leaf.high[2]):
+                    mean[voxel], precision[voxel] = leaf.mean, leaf.precision

@@ -31,8 +31,10 @@ def drawn(rng: np.random.Generator) -> tuple[str, dict[str, Any], int, int]:
     """A scenario, settings, missions and threads."""
     some = ("room", "room-furnished", "office", "office-3d", "terrain", "lab", "office-mixed")
     settings: dict[str, Any] = {"robots": int(rng.integers(1, 12))}
-    channel = [{"delay_s": float(rng.uniform(0, 60))}, {"phase_s": float(rng.uniform(0.1, 60))}, {}]
-    settings["channel"] = {**channel[rng.integers(3)], "burst": int(rng.integers(1, 200))}
+    delay_s = float(rng.uniform(0, 60))
+    channel = [{"delay_s": delay_s}, {"phase_s": float(rng.uniform(0.1, 60))}, {}]
+    channel.append({"content": "summaries", "delay_s": delay_s * rng.integers(2)})
+    settings["channel"] = {**channel[rng.integers(4)], "burst": int(rng.integers(1, 200))}
     patch = tuple(int(n) for n in 2 * rng.integers(0, 16, 3) + 1)
     settings["observation"] = {
         "drive": bool(rng.integers(2)),
@@ -109,6 +111,7 @@ def test_what_is_counted_is_what_missions_of_many_settings_hold() -> None:
         ({"grid": {"voxel_size_m": 0.5, "shape": (1200, 1100, 1000)}}, "Grid.voxel_size_m"),
         ({"num_envs": 2000, "channel": {"delay_s": 3600.0}}, "Channel.delay_s"),
         ({"num_envs": 20_000, "channel": {"phase_s": 3600.0}}, "Channel.phase_s"),
+        ({"num_envs": 10_000, "channel": {"content": "summaries", "delay_s": 3600.0}}, "Channel.delay_s"),
         ({"num_envs": 30_000, "sensor": {"angular_step_rad": 1e-3}}, "RangeSensor.angular_step_rad"),
         ({"num_envs": 400_000, "action": {"kind": "discrete"}, "robot": {"reach_m": 3.5}}, "Robot.reach_m"),
     ],

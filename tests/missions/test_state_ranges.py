@@ -18,6 +18,7 @@ from tests.reference.scenes import free_box, started, wander
 
 DELAYED = {"delay_s": 3.0, "i_min_bits": 0.0}
 IN_PHASES = {"phase_s": 4.0, "i_min_bits": 0.0}
+SUMMARIES = {"content": "summaries", "summary_every_s": 1.0, "delay_s": 3.0}
 SPOILED = [
     ("robots", "corners", 10**8, DELAYED),
     ("robots", "corners", 1, DELAYED),  # of a straight drive
@@ -61,6 +62,15 @@ SPOILED = [
     ("phase_heard", "", 4, IN_PHASES),
     ("phase_batches", "count", 9, IN_PHASES),
     ("phase_rays", "", math.inf, IN_PHASES),
+    ("summaries", "sent_s", 1e9, SUMMARIES),
+    ("summaries", "sent", -1, SUMMARIES),
+    ("summaries", "low", -1, SUMMARIES),
+    ("summaries", "high", 12, SUMMARIES),
+    ("in_flight_parcels", "place", 10, SUMMARIES),
+    ("in_flight_parcels", "bytes", 10**8, SUMMARIES),
+    ("in_flight_parcels", "bytes", -1, SUMMARIES),
+    ("own_mean", "", math.nan, SUMMARIES),
+    ("own_precision", "", -1.0, SUMMARIES),
     ("mean", "", math.nan, DELAYED),
     ("mean", "", 1.1, DELAYED),
     ("precision", "", 0.0, DELAYED),
@@ -101,7 +111,7 @@ def test_a_number_that_no_mission_holds_is_refused_by_name(name, field, value, c
     assert everything(others)[:4] == before
 
 
-@pytest.mark.parametrize("channel", [DELAYED, IN_PHASES])
+@pytest.mark.parametrize("channel", [DELAYED, IN_PHASES, SUMMARIES])
 def test_a_state_as_it_was_is_taken_whenever_it_was_saved(channel):
     missions, others = walked(channel, 0), walked(channel, 5, 8)
     for step in range(40):
@@ -147,6 +157,17 @@ def test_bytes_that_are_no_booleans_are_refused():
     arrays["in_flight_to"].view(np.uint8)[0, 0, 0] = 7
     with pytest.raises(RecordError, match=r"in_flight_to\[0, 0, 0\] = 7"):
         check_ranges(walked(DELAYED).scenario, arrays)
+
+
+def test_a_summary_under_way_that_is_not_whole_is_refused():
+    missions = walked(SUMMARIES, 30)
+    arrays = snapshot(missions)
+    mission, slot = np.argwhere(arrays["in_flight_parcels"]["bytes"] > 0)[0]
+    place = arrays["in_flight_parcels"][mission, slot]["place"]
+    check_ranges(missions.scenario, arrays)
+    arrays["in_flight_summaries"][mission, place, 6] ^= 4
+    with pytest.raises(RecordError, match=rf"in_flight_summaries\[{mission}, {place}\]"):
+        check_ranges(missions.scenario, arrays)
 
 
 def test_what_follows_from_the_world_is_in_no_saved_state():

@@ -48,7 +48,7 @@ def record_summaries(env: EntropyExploreEnv, strategy: str, seed: int) -> Record
         data = encode_map(mean, precision, threshold)
         said = decode_map(data, mean.shape).mean[measured]
         held = mean[measured]
-        record["tree_bits"].append(tree_bits(data))
+        record["tree_bits"].append(tree_bits(data, mean.shape))
         record["packed_bits"].append(8 * len(data))
         record["rms_error"].append(round(float(np.sqrt(((said - held) ** 2).mean())), 6))
         flipped = (said > STOP_AT_COVERED) != (held > STOP_AT_COVERED)

@@ -34,10 +34,10 @@ def write_report(folder: Path, records: Records, claims: Sequence[Claim], comman
 _ABOUT = """\
 Written by `{command}`: the map that one robot has after {scans} scans,
 in {worlds} worlds of each scenario. A full map holds two 32-bit numbers a voxel. A quadtree (an octree in
-3-D) is what `encode_map` makes of it: two bits a node, sixteen a leaf; compressed, by zlib. Errors are those
-of the mean coverage of voxels that were measured; wrong are those whose side of ½ changes. A leaf's σ is
-coarser than the map's, and never smaller: that is part of what a quadtree saves. Claims are at the
-threshold of 0.5 bits, with 95 % paired bootstrap intervals over worlds. No mission sends summaries yet."""
+3-D) is what `encode_map` makes of it: two bits a node, sixteen a leaf; compressed, by its range coder. Errors
+are those of the mean coverage of voxels that were measured; wrong are those whose side of ½ changes. A
+leaf's σ is coarser than the map's, and never smaller: that is part of what a quadtree saves. Claims are at
+the threshold of 0.5 bits, with 95 % paired bootstrap intervals over worlds."""
 
 
 def _text(records: Records, claims: Sequence[Claim], command: str) -> str:
