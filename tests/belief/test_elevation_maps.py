@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from entropy_explore_env.belief.elevation import completed, elevation_map
+from entropy_explore_env.belief.elevation import _relax, completed, elevation_map
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.settings import Grid
 from tests.reference.scenes import drawn, seeds
@@ -101,6 +101,18 @@ def test_a_wide_gap_is_bridged_in_a_straight_line():
     heights[-1] = 39.9
     expected = np.linspace(0.0, 39.9, 400)
     np.testing.assert_allclose(completed(heights, known), np.repeat(expected[:, None], 3, 1), atol=2e-4)
+
+
+def test_a_relaxation_ends_after_its_sweeps_or_at_its_tolerance():
+    for sweeps, tolerance, expected in (
+        (1, 0.0, [2.0, 3.5]),
+        (2, 0.0, [2.25, 3.625]),
+        (9, 9.0, [2.0, 3.5]),
+    ):
+        heights = np.pad(np.array([[1.0], [0.0], [3.0], [5.0]]), 1)
+        shares = np.pad(np.array([[0.0], [0.5], [0.5], [0.0]]), 1)
+        _relax(heights, shares, 1.0, sweeps, tolerance)
+        assert heights[1:5, 1].tolist() == [1.0, *expected, 5.0]
 
 
 def test_nothing_known_is_level_and_all_known_stays():

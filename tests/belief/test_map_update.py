@@ -142,6 +142,10 @@ def test_utility_of_long_rays_is_folded_without_loss(n):
     bits = fuse_ray(mean, precision, crossed, coverage, n, n, 1e8)
     assert bits == pytest.approx(n * math.log2(1e8), rel=1e-6)
     assert promised == pytest.approx(n * math.log2(1e8), rel=1e-6)
+    mean, precision = np.full(n, 0.5, np.float32), np.full(n, 1e-8, np.float32)
+    bits = fuse_ray(mean, precision, crossed, coverage + np.float32(0.75), 0, n, 1e8)  # all of it covered
+    assert bits == pytest.approx(n * math.log2(1e8), rel=1e-6)
+    assert mean == pytest.approx(0.75) and precision == pytest.approx(1e8)
 
 
 def test_a_measurement_that_says_nothing_new_brings_nothing():

@@ -17,6 +17,7 @@ from entropy_explore_env.belief.raycast import (
     TICKS,
     WALL,
     Line,
+    cast_range,
     cast_ray,
     longest_crossing,
 )
@@ -68,6 +69,21 @@ def test_a_measured_distance_crosses_the_same_voxels_whatever_they_hold(ray, len
         ours, _ = cast(cover, start, direction, length, behind, hit_at_length=True, stop=NEVER_STOP)
         assert ours.voxels == flat_index(theirs.voxels, size)
         assert (ours.length, ours.end) == (pytest.approx(theirs.length), theirs.end)
+
+
+@drawn(60)
+@given(rays(), seeds, st.sampled_from([0.0, 0.05, 0.3]), st.sampled_from([0.5, 3.0, math.inf]))
+def test_a_range_is_that_of_the_ray_and_says_what_it_met(ray, seed, share, length):
+    size, start, direction = ray
+    cover = random_cover(size, share, seed)
+    line = Line(tuple(start.tolist()), tuple(direction.tolist()), length)
+    whole = cast_ray(cover.ravel(), size, line, STOP_AT_COVERED, False, 1, ray_space(size, length, 1))
+    crossing = ray_space(size, length, 1)
+    cast_ray(cover.ravel(), size, line, STOP_AT_COVERED, False, 1, crossing)
+    at, covered, reason = cast_range(cover.ravel(), size, line, STOP_AT_COVERED)
+    assert (at, reason) == (whole.length, whole.reason)
+    met = cover.ravel()[crossing.voxels[whole.voxels - 1]] if reason == OBSTACLE else 0.0
+    assert covered == met
 
 
 @drawn(60)

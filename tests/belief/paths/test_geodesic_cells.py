@@ -11,7 +11,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from entropy_explore_env.belief.paths.geodesic_cells import UNREACHED, new_tessellation, tessellate
+from entropy_explore_env.belief.paths.geodesic_cells import (
+    UNREACHED,
+    extract_path,
+    new_tessellation,
+    tessellate,
+)
 from entropy_explore_env.errors import SettingError
 from tests.reference.scenes import SHAPES, drawn, seeds
 
@@ -151,3 +156,51 @@ def test_all_impassable_and_free_of_charge():
     space = new_tessellation((3, 5, 1))
     tessellate(space, np.zeros((3, 5, 1)), np.array([7]), length_cost=1.0)  # only length costs
     assert space.costs[0, 0, 0] == pytest.approx(1.0 + math.sqrt(2.0))
+
+
+def path_cost(rates, path, length_cost, by_length):
+    """Cost of a path of neighbours, as `slow_costs` counts it; all that lies between two must be passable."""
+    total, places = 0.0, [tuple(int(i) for i in np.unravel_index(voxel, rates.shape)) for voxel in path]
+    for here, there in itertools.pairwise(places):
+        step = [b - a for a, b in zip(here, there, strict=True)]
+        assert max(map(abs, step)) == 1
+        box = tuple(slice(min(a, b), max(a, b) + 1) for a, b in zip(here, there, strict=True))
+        assert np.isfinite(rates[box]).all()
+        length = math.sqrt(sum(map(abs, step)))
+        mean = 0.5 * (float(rates[here]) + float(rates[there]))
+        total += mean * (length if by_length else 1.0) + length_cost * length
+    return total
+
+
+@pytest.mark.parametrize(("length_cost", "by_length"), [(0.0, True), (0.7, False), (0.7, True)])
+def test_a_path_is_the_one_that_the_costs_of_its_cell_come_from(length_cost, by_length):
+    rates, rng = drawn_rates((7, 11, 5), 4, 0.3)
+    sources = rng.choice(np.flatnonzero(np.isfinite(rates)), 3, replace=False)
+    space = new_tessellation(rates.shape)
+    tessellate(space, rates, sources, length_cost, by_length)
+    costs, cells = space.costs.reshape(-1), space.cells.reshape(-1)
+    for voxel in rng.choice(np.flatnonzero(np.isfinite(costs)), 12):
+        path = extract_path(space, rates, int(voxel), length_cost, by_length)
+        assert path[0] == sources[cells[voxel]] and path[-1] == voxel
+        assert (cells[path] == cells[voxel]).all()
+        assert path_cost(rates, path, length_cost, by_length) == pytest.approx(costs[voxel], rel=1e-9)
+
+
+def test_where_no_source_comes_and_for_other_costs_there_is_no_path():
+    rates = np.ones((5, 3, 1), np.float32)
+    rates[2] = np.inf
+    space = new_tessellation(rates.shape)
+    tessellate(space, rates, np.array([0]), 0.0, True)
+    assert extract_path(space, rates, 14, 0.0, True).tolist() == []
+    assert extract_path(space, rates, 0, 0.0, True).tolist() == [0]
+    assert extract_path(space, rates, 5, 0.0, True).tolist() in ([0, 4, 5], [0, 1, 5])
+    rates[1, 2] = np.inf
+    assert extract_path(space, rates, 5, 0.0, True).tolist() == []
+
+
+@pytest.mark.parametrize("sources", [[0, 4], [4, 0]])
+def test_what_is_as_near_to_two_sources_belongs_to_the_earlier(sources):
+    space = new_tessellation((5, 1, 1))
+    tessellate(space, np.ones((5, 1, 1), np.float32), np.array(sources), 0.0, True)
+    near, far = (0, 1) if sources[0] == 0 else (1, 0)
+    assert space.cells.reshape(-1).tolist() == [near, near, 0, far, far]

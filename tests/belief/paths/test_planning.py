@@ -360,6 +360,17 @@ def test_a_search_leaves_the_memory_of_what_it_does_not_reach_alone():
     assert np.count_nonzero(search.cost != -1.0) <= 11 * 11
 
 
+@pytest.mark.parametrize("radius", [0.0, 1.5])
+def test_given_costs_hold_for_bodies_of_any_size(radius):
+    costs = np.full(FLAT, 2.0, np.float32)
+    costs[4, :, 0] = math.inf
+    costs[4, 3, 0] = 5.0
+    ends = flat_index([(0, 3, 0), (8, 3, 0)], FLAT)
+    cost, path = shortest_path(new_search(54), new_lattice(FLAT, radius), field_costs(costs), *ends)
+    assert cost == pytest.approx(6 * 2.0 + 2 * 3.5)
+    assert path.tolist() == flat_index([(i, 3, 0) for i in range(9)], FLAT)
+
+
 @pytest.mark.parametrize(
     ("ask", "field"),
     [
@@ -368,6 +379,8 @@ def test_a_search_leaves_the_memory_of_what_it_does_not_reach_alone():
         (lambda: new_lattice(SIZE, 0.0, 5), "layer"),
         (lambda: belief_costs(*known(np.zeros(SIZE, bool)), PRIOR, 0.99), "unknown_cost"),
         (lambda: belief_costs(*known(np.zeros(SIZE, bool)), PRIOR, math.inf), "unknown_cost"),
+        (lambda: belief_costs(*known(np.zeros(SIZE, bool)), PRIOR, 1.0, np.zeros(SIZE)), "no_fly"),
+        (lambda: belief_costs(*known(np.zeros(SIZE, bool)), PRIOR, 1.0, np.zeros(7, bool)), "no_fly"),
         (lambda: field_costs(np.zeros(SIZE, np.float32)), "per_edge"),
         (lambda: field_costs(np.full(SIZE, math.nan, np.float32)), "per_edge"),
         (lambda: field_costs(np.array([1.0, 1.1e6, math.inf], np.float32)), "per_edge"),
