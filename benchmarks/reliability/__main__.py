@@ -66,7 +66,13 @@ class Proof(NamedTuple):
 PROOFS = {
     "settings": Proof(settings_fuzz.play_number, 300, 10_000, 600.0),
     "states": Proof(state_fuzz.play_number, 1_000, 20_000, 120.0),
-    "determinism": Proof(determinism.play_number, 2 * determinism.VARIANTS, 40 * determinism.VARIANTS, 600.0),
+    "determinism": Proof(
+        determinism.play_number,
+        determinism.SCENARIOS_EACH * 2,
+        40 * determinism.VARIANTS,
+        1800.0,
+        determinism.plays_of,
+    ),
     "kills": Proof(kills.play_number, 2 * kills.KILLS, 200, 600.0, kills.kills_of),
     "files": Proof(
         file_fuzz.play_number,

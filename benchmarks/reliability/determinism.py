@@ -1,7 +1,8 @@
 """The same drawn scenario in processes that differ in all that must not matter: the same bits.
 
 Processes differ in the processor that kernels are compiled for, in threads, in how many missions there are
-beside the one that is compared, and in Python's hash seed; each is a fresh one, one of them forked.
+beside the one that is compared, and in Python's hash seed; each is a fresh one, some of them forked. A
+process plays several scenarios, because its start and its kernels take most of its time.
 """
 
 from __future__ import annotations
@@ -14,9 +15,11 @@ import sys
 from typing import Any
 
 import numpy as np
+from gymnasium import spaces
 
 from benchmarks.reliability.drawn_scenarios import Drawn, draw_scenario
 from entropy_explore_env.errors import EntropyExploreError
+from entropy_explore_env.missions.action import action_space
 from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.reports.state_values import state_digest
 
@@ -25,22 +28,30 @@ PROCESSORS = ("", "generic", "haswell")
 """As NUMBA_CPU_NAME has them; empty = this one."""
 _CASES = tuple(itertools.product(PROCESSORS, (1, 2), (1, 3)))
 VARIANTS = len(_CASES)
+SCENARIOS_EACH = 10
+"""Played by a process."""
 
 
 def play_number(number: int) -> dict[str, Any]:
-    """One drawn scenario in one variant: the digest of its state after some steps."""
-    scenario, variant = divmod(number, VARIANTS)
+    """Some drawn scenarios in one variant: the digest of the state of each after some steps."""
+    block, variant = divmod(number, VARIANTS)
+    first = block * SCENARIOS_EACH
     processor, threads, missions = _CASES[variant]
     variables = {**os.environ, "PYTHONHASHSEED": str(number), "PYTHONPATH": os.pathsep.join(sys.path)}
     if processor:
         variables |= {"NUMBA_CPU_NAME": processor, "NUMBA_CPU_FEATURES": ""}
     if processor == "haswell":
         variables["NUMBA_CPU_FEATURES"] = "+avx2,+fma,+bmi,+bmi2"
-    words = [sys.executable, "-W", "ignore", "-m", __name__, str(scenario), str(threads), str(missions)]
+    words = [sys.executable, "-W", "ignore", "-m", __name__, str(first), str(threads), str(missions)]
     done = subprocess.run(words, env=variables, capture_output=True, text=True, check=False)
     if done.returncode:
         raise RuntimeError(f"exit code {done.returncode}: {done.stderr.strip()[-300:]}")
-    return {"scenario": scenario, "variant": variant, "digest": json.loads(done.stdout)}
+    return {"first": first, "variant": variant, "digests": json.loads(done.stdout)}
+
+
+def plays_of(row: dict[str, Any]) -> int:
+    """What a case counts for; one that failed for nothing."""
+    return len(row.get("digests", ()))
 
 
 def digest_of(number: int, threads: int, missions: int) -> str:
@@ -51,7 +62,8 @@ def digest_of(number: int, threads: int, missions: int) -> str:
     team = Missions(drawn.scenario, missions, threads, drawn.given)
     team.reset_some(range(missions), [number] * missions)
     rng = np.random.default_rng(number)
-    axes, choices = 5, len(team.rules.actions.moves) * len(team.rules.actions.gazes)
+    axes, space = 5, action_space(drawn.scenario)
+    choices = int(space.n) if isinstance(space, spaces.Discrete) else 1
     for _ in range(STEPS):
         boxes = rng.uniform(-1.0, 1.0, (1, drawn.scenario.robots, axes)).astype(np.float32).astype(np.float64)
         numbers = rng.integers(0, choices, (1, drawn.scenario.robots))
@@ -74,4 +86,5 @@ if __name__ == "__main__":
         child = os.fork()
         if child:
             sys.exit(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]))
-    print(json.dumps(digest_of(*(int(word) for word in sys.argv[1:4]))))
+    begin, *company = (int(word) for word in sys.argv[1:4])
+    print(json.dumps([digest_of(number, *company) for number in range(begin, begin + SCENARIOS_EACH)]))

@@ -136,15 +136,18 @@ def _states(rows: Sequence[Row]) -> str:
 
 
 def _determinism(rows: Sequence[Row]) -> str:
-    digests = defaultdict(set)
+    digests, variants = defaultdict(set), defaultdict(set)
     for row in rows:
-        digests[row["scenario"]].add(row["digest"])
+        for number, digest in enumerate(row["digests"], row["first"]):
+            digests[number].add(digest)
+            variants[number].add(row["variant"])
     differing = sorted(number for number, found in digests.items() if len(found) > 1)
-    variants = len({row["variant"] for row in rows})
+    several = sum(len(found) > 1 for found in variants.values())
     said = f"differences in drawn scenarios {differing}" if differing else "no difference"
     return (
-        f"{len(digests):,} drawn scenarios, each in up to {variants} processes that differ in processor "
-        f"level, threads, missions beside it, hash seed and start method: {said}."
+        f"{len(digests):,} drawn scenarios, {several:,} of them in several and up to "
+        f"{max(map(len, variants.values()))} processes that differ in processor level, threads, missions "
+        f"beside it, hash seed and start method: {said}."
     )
 
 
@@ -306,7 +309,7 @@ def _coverage(rows: Sequence[Row]) -> str:
 _SUMMARIES: Mapping[str, tuple[str, str, Callable[[Sequence[Row]], str]]] = {
     "settings": ("Drawn settings", "scenarios", _settings),
     "states": ("Changed states", "states", _states),
-    "determinism": ("Determinism", "processes", _determinism),
+    "determinism": ("Determinism", "plays of a scenario", _determinism),
     "kills": ("Kills", "kills", _kills),
     "files": ("Changed files", "files", _files),
     "training": ("Training", "robot-steps", _training),

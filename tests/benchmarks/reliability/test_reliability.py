@@ -69,11 +69,12 @@ def test_the_page_says_what_was_played_and_what_failed(tmp_path, monkeypatch, ca
 
 
 def test_digests_that_differ_and_memory_that_grows_are_shown():
-    told = {"variant": 0, "scenario": 4, "digest": "a", "number": 0}
-    same = [told, {**told, "variant": 1, "number": 1}]
-    other = [*same, {**told, "variant": 2, "digest": "b", "number": 2}]
+    told = {"variant": 0, "first": 3, "digests": ["a", "b"], "number": 0}
+    same = [told, {**told, "variant": 1, "number": 1}, {**told, "first": 5, "number": 3}]
+    other = [*same, {**told, "variant": 2, "digests": ["a", "c"], "number": 2}]
+    assert sum(map(determinism.plays_of, [*other, {"failure": "x"}])) == 8
     for rows, said in (
-        (same, "1 drawn scenarios, each in up to 2"),
+        (same, "4 drawn scenarios, 2 of them in several and up to 2 processes"),
         (same, "no difference"),
         (other, "scenarios [4]"),
     ):
@@ -141,6 +142,18 @@ def counts_for_seven(number):
 
 def seven(row):
     return row["seven"]
+
+
+def test_scenarios_with_any_kind_of_action_are_played():
+    kinds = set()
+    for number in range(40):
+        drawn, draw = None, 0
+        while drawn is None:
+            drawn, draw = determinism._allowed(number, draw), draw + 1
+        if drawn.scenario.action.kind not in kinds:
+            kinds.add(drawn.scenario.action.kind)
+            assert len(determinism.digest_of(number, 1, 1)) > 8
+    assert kinds == {"continuous", "discrete", "candidates"}
 
 
 def test_a_digest_does_not_depend_on_threads_or_company():
