@@ -144,16 +144,15 @@ def seven(row):
     return row["seven"]
 
 
-def test_scenarios_with_any_kind_of_action_are_played():
-    kinds = set()
+def test_scenarios_whose_actions_are_candidates_are_played():
+    """Their numbers go as far as there are candidates."""
     for number in range(40):
         drawn, draw = None, 0
         while drawn is None:
             drawn, draw = determinism._allowed(number, draw), draw + 1
-        if drawn.scenario.action.kind not in kinds:
-            kinds.add(drawn.scenario.action.kind)
-            assert len(determinism.digest_of(number, 1, 1)) > 8
-    assert kinds == {"continuous", "discrete", "candidates"}
+        if drawn.scenario.action.kind == "candidates":
+            break
+    assert len({determinism.digest_of(number, 1, missions) for missions in (1, 2)}) == 1
 
 
 def test_a_digest_does_not_depend_on_threads_or_company():
