@@ -9,6 +9,8 @@ from entropy_explore_env.errors import SettingError
 from entropy_explore_env.validation import check_count, check_within, is_number
 
 MAX_FIDUCIALS = 1000
+MAX_OWN = 64
+"""Landmarks that a robot keeps."""
 
 
 @dataclass(frozen=True)
@@ -70,6 +72,11 @@ class Fiducials:
         range_m: How far away they are sighted, 1e-6 to 1e6; inf = as far as the sensor sees.
         range_sigma_m: Standard deviation of a sighting along the line of sight, 1e-6 to 1e6.
         bearing_sigma_rad: Of its direction, sideways and up, 1e-6 to 10.
+        own_number: How many landmarks each robot keeps besides, 0 to 64: corners in its own map, which it
+            chooses in its scans and sights again as it does those of the world. They take back what was
+            added to its error since it chose them, and no more.
+        own_score: Least worth of such a landmark (Sujan, eq. 17), 0 to 2: see `belief.landmark_score`.
+        own_apart_m: Least distance between two of them, 0 to 1e6.
     """
 
     number: int = 0
@@ -77,6 +84,9 @@ class Fiducials:
     range_m: float = math.inf
     range_sigma_m: float = 0.05
     bearing_sigma_rad: float = 0.01
+    own_number: int = 0
+    own_score: float = 0.7
+    own_apart_m: float = 1.0
 
     def __post_init__(self) -> None:
         """Check every field."""
@@ -95,6 +105,9 @@ class Fiducials:
         check_within(self, "range_m", least=1e-6, most=1e6, inf=True)
         check_within(self, "range_sigma_m", least=1e-6, most=1e6)
         check_within(self, "bearing_sigma_rad", least=1e-6, most=10)
+        check_count(self, "own_number", 0, MAX_OWN)
+        check_within(self, "own_score", least=0, most=2)
+        check_within(self, "own_apart_m", least=0, most=1e6)
 
     @property
     def count(self) -> int:

@@ -50,6 +50,8 @@ class TeamLocalization(NamedTuple):
     """(A,) ESTIMATE, a slice of MissionState."""
     fiducials: np.ndarray
     """(F, 3) float64, places in the world, likewise."""
+    landmarks: np.ndarray
+    """(A, L) LANDMARK, of robots' own maps, likewise."""
 
 
 def begin_estimates(seed: int, episode: int, poses: np.ndarray, estimates: np.ndarray) -> None:
@@ -104,18 +106,19 @@ def localization_figures(estimates: np.ndarray, scans: int) -> dict[str, float |
 
 
 @lean_kernel
-def localization_of(params, estimates, fiducials, mission):
+def localization_of(params, estimates, fiducials, landmarks, mission):
     """TeamLocalization of a mission; None where nobody drifts.
 
     Args:
         params: (A,) LOCALIZATION_PARAMS, or None.
         estimates: (E, A) ESTIMATE.
         fiducials: (E, F, 3) float64.
+        landmarks: (E, A, L) LANDMARK.
         mission: Its number.
     """
     if params is None:  # known while compiling: nothing of the rest is compiled
         return None
-    return TeamLocalization(params, estimates[mission], fiducials[mission])
+    return TeamLocalization(params, estimates[mission], fiducials[mission], landmarks[mission])
 
 
 @lean_kernel

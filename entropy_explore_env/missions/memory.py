@@ -86,7 +86,7 @@ def memory_needs(scenario: Scenario, batch: Batch) -> list[Need]:
     phases = sum(size for name, size in sizes.items() if name.startswith("phase"))
     scans = sum(sizes[name] for name in ("scan_range_m", "scan_returned", "scan_utility_bits"))
     robots = sum(sizes[name] for name in ("missions", "robots", "heard", "faults", "estimates"))
-    robots += sizes["fiducials"] + sizes["summaries"]
+    robots += sizes["fiducials"] + sizes["landmarks"] + sizes["summaries"]
     proposed = sizes["candidates"] + sizes["experience"]
     maps = sum(sizes[name] for name in _MAPS) + _world_bytes(scenario, batch)
     burst = "Channel.burst" if scenario.channel.burst > 1 else "robots"

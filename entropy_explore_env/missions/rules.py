@@ -216,6 +216,7 @@ def localization_params(scenario: Scenario) -> np.ndarray | None:
             own[f"yaw_per_{part}"] = getattr(drift, f"yaw_rad_per_sqrt_{part}") ** 2
         own["range_m"] = min(fiducials.range_m, sensor.max_range_m)
         own["range_sigma_m"], own["bearing_sigma_rad"] = fiducials.range_sigma_m, fiducials.bearing_sigma_rad
+        own["landmark_score"], own["landmarks_apart_m"] = fiducials.own_score, fiducials.own_apart_m
         own["half_yaw_rad"] = 0.5 * sensor.columns * sensor.angular_step_rad
         own["half_pitch_rad"] = math.pi if scenario.grid.flat else 0.5 * sensor.rows * sensor.angular_step_rad
     return params

@@ -5,6 +5,7 @@ from __future__ import annotations
 from entropy_explore_env.compilation.kernels import lean_kernel
 from entropy_explore_env.missions.faults import blinded, spoil
 from entropy_explore_env.missions.fiducials import sight_fiducials
+from entropy_explore_env.missions.landmarks import choose_landmark, sight_landmarks
 from entropy_explore_env.missions.localization import (
     believe_scan,
     believed_pose,
@@ -50,6 +51,7 @@ def scan_and_share(mission, sensor, index, work):
     scene = Scene(mission.truth, grid_size(params), params.voxel_size_m, bodies)
     if not blinded(team.faults, index, clock.time_s):
         sight_fiducials(team.localization, params, index, sensor, scene, pose)
+        sight_landmarks(team.localization, params, index, sensor, scene, pose, work.covariances)
     measure(team.localization, scan, sensor, scene, pose, robot.sensor_rng)
     spoil(team.faults, index, scan, sensor, scene, pose, clock.time_s)
     here = believed_pose(estimate_of(team.localization, index), params, (x, y, z, yaw, pitch))
@@ -66,6 +68,8 @@ def scan_and_share(mission, sensor, index, work):
     robot.i_min_bits = robot.next_i_min_bits
     copy_numbers((x, y, z, yaw, pitch), robot.scan_pose, 5)
     note_scan_pose(team.localization, index, here)
+    own_map = mission.maps.beliefs.mean[index], mission.maps.beliefs.precision[index]
+    choose_landmark(team.localization, params, index, scene, scan, own_map, work.covariances)
     note_scan(robot, mission.latest, scan, index)
     if params.track_truth:
         score_scan(clock, mission.joint, mission.truth, scan, params.prior_precision)

@@ -16,6 +16,7 @@ import numpy as np
 from entropy_explore_env.belief.pooling import Cells
 from entropy_explore_env.compilation.kernels import record_type
 from entropy_explore_env.missions.rules import POINT, collision_bodies
+from entropy_explore_env.robots.landmarks import LANDMARK
 from entropy_explore_env.robots.localization import COVARIANCE_NUMBERS, ESTIMATE
 from entropy_explore_env.robots.map_summary import PARCEL, SUMMARY, summary_bytes
 from entropy_explore_env.scenario import Scenario
@@ -253,9 +254,11 @@ class MissionState(NamedTuple):
     experience: np.ndarray
     """(E, A) EXPERIENCE, what a robot remembers for its candidates."""
     estimates: np.ndarray
-    """(E, A) ESTIMATE; (E, 0), and the next three empty, where all robots know where they are."""
+    """(E, A) ESTIMATE; (E, 0), and the next four empty, where all robots know where they are."""
     fiducials: np.ndarray
     """(E, F, 3) float64, their places in the world."""
+    landmarks: np.ndarray
+    """(E, A, L) LANDMARK, those of robots' own maps."""
     in_flight_covariances: np.ndarray
     """(E, Q, 10) float64, of their senders' poses: see `robots.localization.pack_covariance`."""
     phase_covariances: np.ndarray
@@ -379,6 +382,7 @@ def state_arrays(
         "experience": ((e, proposed), EXPERIENCE),
         "estimates": ((e, a if drifting else 0), ESTIMATE),
         "fiducials": ((e, scenario.fiducials.count if drifting else 0, 3), np.float64),
+        "landmarks": ((e, a if drifting else 0, scenario.fiducials.own_number), LANDMARK),
         "in_flight_covariances": ((e, q if drifting else 0, numbers), np.float64),
         "phase_covariances": ((e, in_phases if drifting else 0, 2, s, numbers), np.float64),
         "own_mean": ((e, sharing, v), np.float32),

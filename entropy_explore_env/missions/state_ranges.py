@@ -337,11 +337,27 @@ def _localization(scenario: Scenario, arrays: Mapping[str, np.ndarray]) -> Itera
         yield Values(f"estimates.{name}", estimates[name], 0.0, _HUGE)
     yield Values("estimates.sightings", estimates["sightings"], 0, _MOST)
     yield Values("fiducials", arrays["fiducials"], low, high)
+    yield from _landmarks(arrays["landmarks"], (low, high), far_m)
     packed = {"estimates.packed": estimates["packed"]}
     for name in ("in_flight_covariances", "phase_covariances"):
         packed[name] = arrays[name]
     for name, numbers in packed.items():
         yield Values(name, numbers, -_LARGEST_COVARIANCE, _LARGEST_COVARIANCE)
+
+
+def _landmarks(
+    landmarks: np.ndarray, corners: tuple[np.ndarray, np.ndarray], far_m: float
+) -> Iterator[Values]:
+    """LANDMARK. Noise and its own error may let a robot believe one to be beyond the workspace."""
+    low, high = corners
+    yield Values("landmarks.place", landmarks["place"], low, high)
+    yield Values("landmarks.seen_from", landmarks["seen_from"], low, high)
+    yield Values("landmarks.believed", landmarks["believed"], low - _MOST * far_m, high + _MOST * far_m)
+    spread = np.where(np.eye(4, dtype=bool), 0.0, -_LARGEST_COVARIANCE)
+    yield Values("landmarks.covariance", landmarks["covariance"], spread, _LARGEST_COVARIANCE)
+    yield Values("landmarks.score", landmarks["score"], 0.0, 2.0)
+    yield Values("landmarks.sightings", landmarks["sightings"], 0, _MOST)
+    yield Values("landmarks.used", landmarks["used"], 0, 1)
 
 
 def _poses(name: str, poses: np.ndarray, low: np.ndarray, high: np.ndarray) -> Iterator[Values]:

@@ -95,7 +95,7 @@ def step_missions(rules, state, choices, work, continuous, discrete, first, last
                 state.heard[m],
                 faults_of(rules.faults, state.faults, m),
                 air_of(work.air, state.truth[m]),
-                localization_of(rules.localization, state.estimates, state.fiducials, m),
+                localization_of(rules.localization, state.estimates, state.fiducials, state.landmarks, m),
                 summaries_of(work.tree, state, m),
             ),
             Maps(Beliefs(state.mean[m], state.precision[m], state.pooled[m]), rules.cells),

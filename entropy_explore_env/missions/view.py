@@ -124,6 +124,7 @@ class RobotView:
         covariance: (4, 4) float64 of the pose's x, y, z and yaw, m and rad; 0 where it is exact. Of the
             latest event at which the estimate changed: while the robot drives on it is uncertain by more.
         fiducials_m: (F, 3) places of the fiducials by which it corrects its estimate (`Fiducials`).
+        landmarks_m: (N, 3) where it believes the landmarks of its own map to be (`Fiducials.own_number`).
     """
 
     robot: int
@@ -152,6 +153,7 @@ class RobotView:
     rules: Rules
     covariance: np.ndarray = field(default_factory=lambda: np.zeros((4, 4)))
     fiducials_m: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
+    landmarks_m: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
 
     def __repr__(self) -> str:
         """Who it is, when and where, not what it holds to be true."""
@@ -261,7 +263,16 @@ def view_of(missions: Missions, mission: int, robot: int) -> RobotView:
         rules=rules,
         covariance=read_only(exact if estimate is None else estimate["covariance"].copy()),
         fiducials_m=read_only(state.fiducials[mission].copy()),
+        landmarks_m=read_only(_landmarks(missions, mission, robot)),
     )
+
+
+def _landmarks(missions: Missions, mission: int, robot: int) -> np.ndarray:
+    """(N, 3) where a robot believes the landmarks of its own map to be; none where it knows where it is."""
+    if not missions.state.landmarks.size:
+        return np.zeros((0, 3))
+    landmarks = missions.state.landmarks[mission, robot]
+    return np.asarray(landmarks["believed"][landmarks["used"]])
 
 
 def _candidates(missions: Missions, mission: int, robot: int) -> np.ndarray:

@@ -37,6 +37,8 @@ class Workspace(NamedTuple):
     """For summaries of maps; None = robots send none: nothing of that is compiled."""
     footprints: np.ndarray
     """(K, B, 3) int64, offsets of the voxels that bodies of each kind of robot touch; B = 0 if none plans."""
+    covariances: np.ndarray | None
+    """(2, 4, 4) float64; None = no robot chooses landmarks in its own map: nothing of that is compiled."""
 
 
 def new_workspace(scenario: Scenario, navigators: Mapping[int, Navigator]) -> Workspace:
@@ -56,6 +58,7 @@ def new_workspace(scenario: Scenario, navigators: Mapping[int, Navigator]) -> Wo
         footprints=footprints(navigators, len(kinds))
         if navigators
         else np.zeros((len(kinds), 0, 3), np.int64),
+        covariances=np.zeros((2, 4, 4)) if scenario.drifts and scenario.fiducials.own_number else None,
     )
 
 

@@ -83,6 +83,9 @@ FIELDS_LOCALIZATION = (
 )
 """Fields of `estimates`, where some robot drifts."""
 
+FIELDS_LANDMARKS = "place believed seen_from covariance score sightings used".split()
+"""Fields of `landmarks`, where robots choose some in their own maps."""
+
 ARRAYS_LOCALIZATION = ("fiducials", "in_flight_covariances", "phase_covariances")
 """Further arrays there."""
 
@@ -163,6 +166,9 @@ def state_values(missions: Missions, mission: int) -> dict[str, np.ndarray]:
         estimates = missions.state.estimates
         values.update({f"estimates.{field}": estimates[field][mission, ...] for field in FIELDS_LOCALIZATION})
         values.update({name: getattr(missions.state, name)[mission] for name in ARRAYS_LOCALIZATION})
+        if missions.scenario.fiducials.own_number:
+            chosen = missions.state.landmarks
+            values.update({f"landmarks.{field}": chosen[field][mission, ...] for field in FIELDS_LANDMARKS})
     if missions.scenario.shares_summaries:
         kept, parcels = missions.state.summaries, missions.state.in_flight_parcels
         values.update({f"summaries.{field}": kept[field][mission, ...] for field in FIELDS_SUMMARIES})

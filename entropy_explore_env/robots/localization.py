@@ -37,6 +37,9 @@ LOCALIZATION_PARAMS = record_type(
         ("bearing_sigma_rad", "f8"),
         ("half_yaw_rad", "f8"),  # half of the sensor's field of view
         ("half_pitch_rad", "f8"),
+        # of landmarks in its own map
+        ("landmark_score", "f8"),
+        ("landmarks_apart_m", "f8"),
     ],
 )
 """How a robot localises itself, in the units of `localization_settings`, standard deviations squared."""

@@ -119,3 +119,75 @@ def foreseen(covariance, pose, path, viewpoint, every_m, since_m, variances, lan
                 _, covariance = corrected(state, covariance, landmark, measured(state, landmark), seen_noise)
         at, done = place, metres
     return covariance
+
+
+def clone_corrected(covariance, before, moved, believed, seen_from, seen, expected, noise):
+    """Σ and the estimate's step by a landmark of the own map: eq. 16 with the pose of then as more state.
+
+    The state is (e, e₀), the errors of the pose now and when the landmark was chosen. Without corrections in
+    between e = F e₀ + w. The landmark lies where e₀ put it, so that the sighting says H e - G e₀ + noise.
+
+    Args:
+        covariance: (4, 4), Σ now.
+        before: (4, 4), Σ₀.
+        moved: (2,), from where it believed to be then to where it does now.
+        believed: (3,), where it believes the landmark to be.
+        seen_from: (3,), where it believed to be then.
+        seen: (3,), measured.
+        expected: (3,), from where it believes to be to where it believes the landmark to be.
+        noise: (3, 3).
+
+    Returns:
+        (Σ', step): what the filter takes from the estimate.
+    """
+    carry = np.eye(4)
+    carry[0, 3], carry[1, 3] = -moved[1], moved[0]
+    joint = np.block([[covariance, carry @ before], [before @ carry.T, before]])
+
+    def lever(away):
+        h = np.zeros((3, 4))
+        h[:, :3] = np.eye(3)
+        h[:, 3] = [-away[1], away[0], 0.0]
+        return h
+
+    h = np.hstack([lever(expected), -lever(np.asarray(believed) - seen_from)])
+    gain = joint @ h.T @ np.linalg.inv(h @ joint @ h.T + noise)
+    after = (np.eye(8) - gain @ h) @ joint
+    return after[:4, :4], (gain @ (np.asarray(seen) - expected))[:4]
+
+
+def sight_frame(seen):
+    """(3, 3): unit vectors along a line of sight, sideways and up, as rows."""
+    ahead = np.asarray(seen) / np.linalg.norm(seen)
+    side = np.cross([0.0, 0.0, 1.0], ahead)
+    side /= np.linalg.norm(side)
+    return np.stack([ahead, side, np.cross(ahead, side)])
+
+
+def landmark_score(mean, precision, prior, voxel, occupancy):
+    """Eq. 17 without visual contrast, voxel by voxel; `occupancy` is P(c > ½) of a mean and a precision."""
+    known = precision > prior
+    p = np.array([occupancy(m, q) for m, q in zip(mean.ravel(), precision.ravel(), strict=True)]).reshape(
+        mean.shape
+    )
+    if not known[voxel] or p[voxel] <= 0.5:
+        return 0.0
+    apart = np.max([abs(axis - at) for axis, at in zip(np.indices(mean.shape), voxel, strict=True)], axis=0)
+    certain = np.where(known, abs(2.0 * p - 1.0), 0.0)
+    free = known & (p < 0.5)
+    shells = [certain[apart == shell].mean() for shell in range(4) if (apart == shell).any()]
+    radius = 1
+    for shell in range(1, len(shells)):
+        if shells[shell] >= shells[shell - 1]:
+            break
+        radius = shell
+    contrasts = [
+        abs(2.0 * free[apart <= shell].mean() - 1.0) if free[apart <= shell].any() else 0.0
+        for shell in (1, 2, 3)
+    ]
+    window, contrast = 0, 0.0
+    for shell, here in enumerate(contrasts, 1):
+        if here < contrast:
+            break
+        window, contrast = shell, here
+    return p[voxel] / radius + contrast * window / 3

@@ -37,7 +37,7 @@ class Args(PaperArgs):
     worlds: int | None = None
     """Worlds, one mission of every cell in each; default: 30, with --quick 3."""
     scans: int | None = None
-    """Of each mission; default: 150, with --quick 40."""
+    """Of each mission; default: 60, with --quick 40."""
 
 
 def main(words: Sequence[str]) -> int:

@@ -18,11 +18,11 @@ COUNTS = (0, 1, 3, 10)
 REACH_M = {"near": 7.5, "far": 15.0}
 """How far away fiducials are sighted."""
 AREA_M2 = 100.0 * 100.0
-ERROR_WEIGHTS = (0.1, 0.3, 1.0)
+ERROR_WEIGHTS = (0.3, 1.0)
 """w_LE, bits a metre, beside 0."""
 SPARSE = (1, 3)
 """Fiducials within reach, far, where w_LE is weighed: with more, any way leads past some."""
-SCANS = 150
+SCANS = 60
 
 
 def cell_id(count: int, reach: str, weight: float = 0.0) -> str:

@@ -1,0 +1,169 @@
+"""Landmarks that a robot chooses in its own map, and what sighting them again says of its pose.
+
+A landmark is a point of the world that a scan hit. The robot knows it as it saw it first, from where it
+believed to be: so its place is off by the error of the pose at that scan, and sighting it again says nothing
+of that error, only of what was added since:
+
+    e = F e₀ + w,   Q = cov w = Σ - F Σ₀ Fᵀ,   z - h(x̂) = H w + v - v₀
+
+with Σ₀ and e₀ of the scan that chose it, F the motion since then and H of `correct_estimate`. The gain is
+Q Hᵀ S⁻¹ with S = H Q Hᵀ + R: eqs. 14-16 of Sujan, where the uncertainty of the landmark's own place would
+otherwise count as independent of the pose's, and make a robot surer the longer it stands. R is the noise of
+this sighting, and that of the first one once more for each sighting since, as it is the same in all.
+"""
+
+from __future__ import annotations
+
+import math
+
+from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel, record_type
+from entropy_explore_env.robots.pose_covariance import dot4, length, sight_axes, spread_yaw_error
+
+LANDMARK = record_type(
+    [
+        ("place", "f8", (3,)),  # in the world
+        ("believed", "f8", (3,)),  # where the robot saw it first
+        ("seen_from", "f8", (3,)),  # where it believed to be then
+        ("covariance", "f8", (4, 4)),  # of the pose then
+        ("score", "f8"),  # eq. 17
+        ("sightings", "i8"),  # after the first one
+        ("used", "?"),
+    ],
+)
+"""A landmark of a robot's own map, or a free place for one."""
+_ROUNDING = 1e-9
+"""Share of a variance that counts as nothing."""
+
+
+@lean_kernel
+def added_since(landmark, estimate, matrices):
+    """Fill in Q, the covariance of what was added to a pose's error since a landmark was chosen.
+
+    Args:
+        landmark: LANDMARK.
+        estimate: ESTIMATE.
+        matrices: (2, 4, 4) float64; the first is filled in, the second is scratch space.
+
+    Returns:
+        Whether Q is a covariance; it is none where other landmarks have taken back more since.
+    """
+    added = matrices[0]
+    for row in range(4):
+        for column in range(4):
+            added[row, column] = -landmark.covariance[row, column]
+    x = estimate.place[0] + estimate.error[0] - landmark.seen_from[0]
+    y = estimate.place[1] + estimate.error[1] - landmark.seen_from[1]
+    spread_yaw_error(added, -y, x)
+    for row in range(4):
+        for column in range(4):
+            added[row, column] += estimate.covariance[row, column]
+    return is_covariance(added, estimate.covariance, matrices[1])
+
+
+@lean_kernel
+def is_covariance(matrix, scale, factors):
+    """Whether a symmetric (4, 4) has no negative eigenvalue, but for rounding: by its Cholesky factors.
+
+    Args:
+        matrix: (4, 4) float64.
+        scale: (4, 4) float64, whose diagonal says how large rounding errors may be.
+        factors: (4, 4) float64, scratch space.
+    """
+    for row in range(4):
+        for column in range(4):
+            factors[row, column] = matrix[row, column]
+    for column in range(4):
+        least = _ROUNDING * scale[column, column]
+        pivot = factors[column, column]
+        if pivot < -least:
+            return False
+        for row in range(column + 1, 4):
+            if pivot <= least:
+                if abs(factors[row, column]) > math.sqrt(_ROUNDING * scale[column, column] * scale[row, row]):
+                    return False
+                continue
+            share = factors[row, column] / pivot
+            for other in range(column + 1, 4):
+                factors[row, other] -= share * factors[column, other]
+    return True
+
+
+@lean_kernel
+def correct_by_landmark(estimate, landmark, seen, sigmas, matrices):
+    """Correct an estimate by sighting a landmark of the robot's own map again.
+
+    Args:
+        estimate: ESTIMATE, changed in place.
+        landmark: LANDMARK; its sighting is counted.
+        seen: (x, y, z), from the robot to the landmark as measured, turned by the yaw that it believes.
+        sigmas: (along, direction), standard deviations of a sighting: metres, radians.
+        matrices: (2, 4, 4) float64, scratch space.
+
+    Returns:
+        Whether it said anything.
+    """
+    if not added_since(landmark, estimate, matrices):
+        return False
+    added = matrices[0]
+    believed, first = landmark.believed, landmark.seen_from
+    expected = (
+        believed[0] - estimate.place[0] - estimate.error[0],
+        believed[1] - estimate.place[1] - estimate.error[1],
+        believed[2] - estimate.place[2] - estimate.error[2],
+    )
+    far_m = length((believed[0] - first[0], believed[1] - first[1], believed[2] - first[2]))
+    ahead, side, up, distance = sight_axes(seen)
+    often = 1.0 + landmark.sightings
+    across = max(distance, length(expected)) * sigmas[1]
+    # the noise of the first sighting lay along other axes: the larger of its parts counts along all
+    first_most = often * max(sigmas[0], far_m * sigmas[1]) ** 2
+    along = sigmas[0] * sigmas[0] + first_most
+    aside = across * across + first_most
+    off = seen[0] - expected[0], seen[1] - expected[1], seen[2] - expected[2]
+    taken = (0.0, 0.0, 0.0, 0.0)
+    taken = take_relative(estimate.covariance, added, ahead, expected, off, along, taken)
+    taken = take_relative(estimate.covariance, added, side, expected, off, aside, taken)
+    taken = take_relative(estimate.covariance, added, up, expected, off, aside, taken)
+    for number in range(4):
+        estimate.error[number] -= taken[number]
+    landmark.sightings += 1
+    return True
+
+
+@inlined_kernel
+def take_relative(covariance, added, axis, expected, off, variance, taken):
+    """Take in what a sighting says along one axis of what was added: as `take_in`, from Q.
+
+    Args:
+        covariance: (4, 4) float64, Σ; changed in place.
+        added: (4, 4) float64, Q; likewise.
+        axis: Unit vector.
+        expected: (x, y, z), from where the robot believes to be to where it believes the landmark to be.
+        off: What was seen less what was expected.
+        variance: Along the axis.
+        taken: (x, y, z, yaw), what the axes before have taken from the estimate.
+
+    Returns:
+        The same, with what this axis takes.
+    """
+    h = axis[0], axis[1], axis[2], axis[1] * expected[0] - axis[0] * expected[1]
+    gain_0, gain_1 = dot4(added[0], h), dot4(added[1], h)
+    gain_2, gain_3 = dot4(added[2], h), dot4(added[3], h)
+    gains = gain_0, gain_1, gain_2, gain_3
+    spread = max(dot4(gains, h), 0.0) + variance
+    if not math.isfinite(spread):
+        return taken
+    surprise = axis[0] * off[0] + axis[1] * off[1] + axis[2] * off[2] - dot4(taken, h)
+    for row in range(4):
+        for column in range(4):
+            less = gains[row] * gains[column] / spread
+            covariance[row, column] -= less
+            added[row, column] -= less
+        covariance[row, row] = max(covariance[row, row], 0.0)
+    step = surprise / spread
+    return (
+        taken[0] + gain_0 * step,
+        taken[1] + gain_1 * step,
+        taken[2] + gain_2 * step,
+        taken[3] + gain_3 * step,
+    )
