@@ -1,7 +1,9 @@
 """Strategies that drive robots to poses in known free space, a scan after each drive; which, a subclass says.
 
 Where nothing known can be reached, or a teammate is in the way, a robot goes to a random viewpoint; where a
-drive was stopped otherwise a pose is chosen anew.
+drive was stopped otherwise a pose is chosen anew. Where teammates stop it again before it has reached a goal,
+it parts from them, for longer the more often that happens: it goes to a place in known free space to which
+its own way is shorter than theirs.
 """
 
 from __future__ import annotations
@@ -28,6 +30,10 @@ _GOES_ON = (MoveEnd.ARRIVED, MoveEnd.CORNERS, MoveEnd.UNDER_WAY)
 """Ends of a drive after which a robot keeps its goal."""
 _SAME_PLACE = 0.75
 """Voxel edges: a robot this near has arrived."""
+_MOST_PARTING = 4
+"""Most decisions for which a robot parts from its teammates after a block: they need time to part, too."""
+_PARTING_DRAWS = 8
+"""Places of which a robot that parts from its teammates takes the farthest from them."""
 
 
 @dataclass
@@ -46,6 +52,10 @@ class Memory:
     """Voxels that were measured at the latest decision."""
     scanned: bool = False
     """Whether the first scan was taken."""
+    blocked: int = 0
+    """Drives that a teammate's body stopped since a goal was reached."""
+    parting: int = 0
+    """Decisions for which it still parts from its teammates."""
     expected: np.ndarray = field(default_factory=lambda: np.zeros(0, np.int32))
     """Unknown voxels that should be visible from the goal."""
 
@@ -60,6 +70,7 @@ class KnownSpace(ABC):
         """A new mission begins."""
         self._scenario, self._rng = scenario, rng
         self._search = new_search(scenario.grid.voxels)
+        self._voxels = np.arange(scenario.grid.voxels, dtype=np.int32)
         self._memories: dict[int, Memory] = {}
 
     def choose(self, views: Sequence[RobotView]) -> list[np.ndarray]:
@@ -87,6 +98,14 @@ class KnownSpace(ABC):
             return view.pose.copy()
         memory.cells.update(view, KNOWN_SIGMA)
         here, arrived_m = voxel_of(view, view.pose), _SAME_PLACE * self._scenario.grid.voxel_size_m
+        if view.move_end is MoveEnd.TEAMMATE:
+            memory.blocked += 1
+            memory.parting = min(memory.blocked - 1, _MOST_PARTING)
+        if memory.parting > 0:
+            memory.parting -= 1
+            if (away := self._away_from_teammates(view, memory, here)) is not None:
+                memory.goal = None
+                return away
         if memory.goal is not None:
             if view.move_end not in _GOES_ON:
                 memory.goal = None
@@ -94,7 +113,7 @@ class KnownSpace(ABC):
                     return random_viewpoint(view, self._rng)
             elif not view.under_way and apart_m(view, memory.goal) < arrived_m:
                 self._lose_interest(view, memory)
-                memory.goal = None
+                memory.goal, memory.blocked = None, 0
         if memory.goal is None:
             memory.expected = memory.expected[:0]
             memory.paths.start(here)
@@ -103,6 +122,29 @@ class KnownSpace(ABC):
         if memory.goal is None:
             return random_viewpoint(view, self._rng)
         return self._stop(view, memory, here, memory.goal)
+
+    def _away_from_teammates(self, view: RobotView, memory: Memory, here: int) -> np.ndarray | None:
+        """(5,) a pose to which the robot has a shorter known free way than any teammate has; None = none.
+
+        Of some that are drawn the one that is farthest from teammates, or a stop on the way there.
+        """
+        mates_m = []
+        for seen in view.teammates.values():
+            if seen.heard_s >= 0.0:
+                memory.paths.start(voxel_of(view, seen.pose))
+                memory.paths.extend(math.inf)
+                mates_m.append(memory.paths.lengths_to(self._voxels))
+        memory.paths.start(here)
+        memory.paths.extend(math.inf)
+        voxels = self._reachable(memory)
+        nearest_m = np.min([each[voxels] for each in mates_m], axis=0, initial=np.inf)
+        ours = np.flatnonzero((memory.paths.lengths_to(voxels) < nearest_m) & (voxels != here))
+        if len(ours) == 0:
+            return None
+        drawn = self._rng.choice(ours, _PARTING_DRAWS)
+        goal = int(voxels[drawn[np.argmax(nearest_m[drawn])]])
+        pose = self.pose_in(view, goal, float(view.pose[3]), float(view.pose[4]))
+        return self._stop(view, memory, here, pose)
 
     def _memory(self, view: RobotView) -> Memory:
         if view.ceiling is not None:

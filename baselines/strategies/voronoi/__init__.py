@@ -50,6 +50,8 @@ Known = Literal["occupancy", "deviation"]
 
 _GAZES = 16
 _PITCHES = (-0.6, 0.0, 0.6)
+_NOTHING = 0.01
+"""A scan that brings less than this share of the most that one brought has brought nothing."""
 _WITHIN_REACH = 0.999
 """Share of the reach that is used, so that rounding never moves a place towards the robot."""
 
@@ -60,6 +62,8 @@ class VoronoiConfig:
 
     Once all is explored the projected centroid may lead robots in circles, as on a known map in the paper's
     reproduction. Its guard (`Rules.guarded`) is not part of this strategy, since missions end by then.
+    Where a mission asks for more than the paper does, robots that have covered all would scan from one spot
+    for ever: a robot whose scan brought nothing, and which would repeat it, goes anywhere (ours).
 
     Attributes:
         control: `projected-centroid` (eqs. 6-8); `gradient-search` (eq. 3), which takes `steps` steps a
@@ -103,6 +107,10 @@ class _TravelPlan:
     """Whether the target was uncertain when it was chosen."""
     failures: int = 0
     """Consecutive drives that ended early."""
+    viewpoint: np.ndarray = field(default_factory=lambda: np.full(5, np.nan))
+    """(5,) as chosen at the latest decision."""
+    most_bits: float = 0.0
+    """Of a scan so far."""
 
 
 class VoronoiCoverage:
@@ -139,7 +147,13 @@ class VoronoiCoverage:
         plan.path = plan.path[ahead[-1] + 1 :] if len(ahead) else plan.path[:0]
         if ended_early or not self._is_valid(plan, entropy, traversal_cost):
             self._choose_target(view, entropy, traversal_cost, here)
-        return self._towards(view, plan)
+        viewpoint = self._towards(view, plan)
+        came_bits = float(view.scan.utility_bits.sum())
+        plan.most_bits = max(plan.most_bits, came_bits)
+        if np.allclose(viewpoint, plan.viewpoint) and came_bits < _NOTHING * plan.most_bits:
+            viewpoint = random_viewpoint(view, self._rng)
+        plan.viewpoint = viewpoint.copy()
+        return viewpoint
 
     def _uncertainty(self, view: RobotView) -> np.ndarray:
         """(X, Y, Z) float32 nats, filtered."""

@@ -1,9 +1,11 @@
-"""Robots that start close to each other in narrow corridors map or keep moving, whatever the strategy.
+"""Robots that start close to each other where they cannot pass map or keep moving, whatever the strategy.
 
 Once two robots 0.7 m apart stood for a whole mission, 810 of 811 moves blocked by each other's bodies.
 """
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 import numpy as np
 import pytest
@@ -12,82 +14,118 @@ from baselines.experiments.mission import run_mission, scripted
 from baselines.strategies import STRATEGIES, make_strategy
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.robots.motion import MoveEnd
-from entropy_explore_env.scenario import with_settings
-from entropy_explore_env.scenarios import OFFICE
+from entropy_explore_env.scenario import Scenario, with_settings
+from entropy_explore_env.scenarios import CAVE, OFFICE
 from entropy_explore_env.settings import Grid
 from entropy_explore_env.worlds.world import World
 
-CELLS, PITCH, OPEN = (5, 4), 12, 9
-"""Cells of a maze along x and y, voxels of 0.1 m from one to the next, and how wide corridors are: two robots
-of 0.3 m radius cannot pass each other."""
-GRID = Grid((CELLS[0] * PITCH + 3, CELLS[1] * PITCH + 3, 1), 0.1)
+
+class Maze(NamedTuple):
+    """Cells in which one path leads from each to each other; two robots cannot pass each other in it."""
+
+    scenario: Scenario
+    """Whose robots and sensors are in it, their bodies 0.3 m in radius."""
+    cells: tuple[int, int]
+    """Along x and y."""
+    voxel_size_m: float
+    pitch: int
+    """Voxels from one cell to the next."""
+    free: int
+    """Width of corridors, voxels; in volumes also their height."""
+    layers: int
+    reach_m: float
+
+    @property
+    def grid(self) -> Grid:
+        """A wall all around, a voxel wider than that between two cells."""
+        x, y = (cells * self.pitch + self.wall for cells in self.cells)
+        return Grid((x, y, self.layers), self.voxel_size_m)
+
+    @property
+    def wall(self) -> int:
+        """Voxels between two corridors."""
+        return self.pitch - self.free
+
+
+MAZES = {
+    "corridors": Maze(OFFICE, (5, 4), 0.1, 12, 9, 1, 3.0),
+    "tunnels": Maze(CAVE, (3, 3), 0.3, 5, 3, 5, 2.0),
+}
+"""Of ground robots with a lidar, and of flying ones with cameras."""
 LIMIT_S, STILL_S = 150.0, 60.0
 MOVED_M, GAINED_BITS = 0.2, 100.0
 """A robot that does neither for STILL_S stands still."""
 
 
-def maze(rng: np.random.Generator) -> World:
-    """A maze in which one path leads from each cell to each other (depth first)."""
-    occupied = np.ones(GRID.shape, bool)
+def world_of(maze: Maze, rng: np.random.Generator) -> World:
+    """A world of a maze (depth first)."""
+    occupied = np.ones(maze.grid.shape, bool)
     stack, seen = [(0, 0)], {(0, 0)}
-    _open(occupied, (0, 0), (0, 0))
+    _open(maze, occupied, (0, 0), (0, 0))
     while stack:
         x, y = stack[-1]
         around = [(x + 1, y), (x - 1, y), (x, y + 1), (x, y - 1)]
-        free = [c for c in around if c not in seen and 0 <= c[0] < CELLS[0] and 0 <= c[1] < CELLS[1]]
+        free = [
+            c for c in around if c not in seen and 0 <= c[0] < maze.cells[0] and 0 <= c[1] < maze.cells[1]
+        ]
         if not free:
             stack.pop()
             continue
         following = free[int(rng.integers(len(free)))]
-        _open(occupied, (x, y), following)
+        _open(maze, occupied, (x, y), following)
         seen.add(following)
         stack.append(following)
-    return World(GRID, occupied, name="maze")
+    return World(maze.grid, occupied, name="maze")
 
 
-def _open(occupied: np.ndarray, cell: tuple[int, int], other: tuple[int, int]) -> None:
-    low, high = np.minimum(cell, other) * PITCH + 3, np.maximum(cell, other) * PITCH + 3 + OPEN
-    occupied[low[0] : high[0], low[1] : high[1]] = False
+def _open(maze: Maze, occupied: np.ndarray, cell: tuple[int, int], other: tuple[int, int]) -> None:
+    low = np.minimum(cell, other) * maze.pitch + maze.wall
+    high = np.maximum(cell, other) * maze.pitch + maze.wall + maze.free
+    floor = 0 if maze.grid.flat else 1
+    occupied[low[0] : high[0], low[1] : high[1], floor : floor + maze.free] = False
 
 
 def close_starts(world: World, robots: int, rng: np.random.Generator) -> np.ndarray:
     """(A, 5) poses in a row along corridors, 0.7 m apart or as near to that as they fit."""
-    free = np.argwhere(~world.occupied[:, :, 0])
-    roomy = [c for c in free if not world.occupied[c[0] - 3 : c[0] + 4, c[1] - 3 : c[1] + 4].any()]
-    places = np.array(roomy) * 0.1 + 0.05
+    edge_m, reach = world.grid.voxel_size_m, 3 if world.grid.flat else 1
+    free = np.argwhere(~world.occupied)
+    beside = [tuple(slice(max(at - reach, 0), at + reach + 1) for at in voxel) for voxel in free]
+    roomy = [voxel for voxel, around in zip(free, beside, strict=True) if not world.occupied[around].any()]
+    places = (np.array(roomy) + 0.5) * edge_m
     chosen = [places[int(rng.integers(len(places)))]]
     while len(chosen) < robots:
         gaps = np.linalg.norm(places[:, None] - np.array(chosen)[None], axis=-1).min(axis=1)
         chosen.append(places[int(np.argmin(np.where(gaps >= 0.7, gaps, np.inf)))])
     starts = np.zeros((robots, 5))
-    starts[:, :2], starts[:, 2] = chosen, 0.05
+    starts[:, :3] = chosen
     starts[:, 3] = rng.uniform(-np.pi, np.pi, robots)
     return starts
 
 
-def longest_stand_s(strategy: str, robots: int, seed: int, **changes: object) -> float:
+def longest_stand_s(kind: str, strategy: str, robots: int, seed: int) -> float:
     """The longest time that a robot neither moves nor gains anything, in a maze with close starts."""
-    return stand_of(strategy, robots, seed, **changes)[0]
+    return stand_of(kind, strategy, robots, seed)[0]
 
 
-def stand_of(strategy: str, robots: int, seed: int, **changes: object) -> tuple[float, int]:
+def stand_of(kind: str, strategy: str, robots: int, seed: int, **changes: object) -> tuple[float, int]:
     """As `longest_stand_s`; and how many drives a teammate's body stopped.
 
     Args:
+        kind: Name of a maze.
         strategy: Name.
         robots: Team size.
         seed: Of maze, starts and mission.
         changes: Other settings of the scenario.
     """
-    rng = np.random.default_rng(seed)
-    world = maze(rng)
+    rng, maze = np.random.default_rng(seed), MAZES[kind]
+    world = world_of(maze, rng)
     settings = {
-        "grid": GRID,
+        "grid": maze.grid,
         "robots": robots,
         "ending": {"time_limit_s": LIMIT_S},
-        "robot": {"reach_m": 3.0},
+        "robot": {"reach_m": maze.reach_m},
     }
-    env = EntropyExploreEnv(with_settings(with_settings(scripted(OFFICE), settings), changes))
+    env = EntropyExploreEnv(with_settings(with_settings(scripted(maze.scenario), settings), changes))
     since = np.zeros(robots)
     places, gained, longest = np.full((robots, 3), np.inf), np.zeros(robots), 0.0
     stopped = 0
@@ -108,23 +146,30 @@ def stand_of(strategy: str, robots: int, seed: int, **changes: object) -> tuple[
     return longest, stopped
 
 
+@pytest.mark.parametrize("kind", MAZES)
 @pytest.mark.parametrize("strategy", STRATEGIES)
-def test_robots_that_start_close_to_each_other_keep_moving(strategy):
-    for robots in (2, 3):
-        assert longest_stand_s(strategy, robots, seed=robots) < STILL_S
+def test_robots_that_start_close_to_each_other_keep_moving(strategy, kind):
+    for robots in (2, 3) if kind == "corridors" else (4,):
+        assert longest_stand_s(kind, strategy, robots, seed=robots) < STILL_S
+
+
+def test_robots_that_have_covered_all_go_on_where_the_mission_asks_for_more():
+    """Two robots stood for 87 s, each scanning for ever from the centre of its Voronoi cell."""
+    assert longest_stand_s("tunnels", "voronoi", 2, seed=3) < 20.0
 
 
 @pytest.mark.parametrize("strategy", ["nearest-frontier", "distance-advantage", "tour"])
 def test_explorers_whose_bodies_block_each_other_part_when_they_replan_under_way(strategy):
     """Two in corridors that are too narrow to pass: bodies stop them, and both map on."""
     under_way = {"robot": {"redecide": "on_scan"}, "sensor": {"scan_every_m": 0.3}}
-    stood_s, stopped = stand_of(strategy, 2, 2, **under_way)
+    stood_s, stopped = stand_of("corridors", strategy, 2, 2, **under_way)
     assert stopped > 0 and stood_s < STILL_S
 
 
 @pytest.mark.long
+@pytest.mark.parametrize("kind", MAZES)
 @pytest.mark.parametrize("robots", [2, 4])
 @pytest.mark.parametrize("strategy", STRATEGIES)
-def test_robots_of_200_close_starts_keep_moving(strategy, robots):
-    stood = [seed for seed in range(200) if longest_stand_s(strategy, robots, seed) >= STILL_S]
+def test_robots_of_200_close_starts_keep_moving(strategy, robots, kind):
+    stood = [seed for seed in range(200) if longest_stand_s(kind, strategy, robots, seed) >= STILL_S]
     assert stood == []
