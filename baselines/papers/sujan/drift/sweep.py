@@ -17,7 +17,6 @@ STRATEGIES = {
     "information-rate-v0": "ours",
     "planned-rate": "ours",
     "nearest-frontier": "Yamauchi",
-    "random": "",
 }
 """Strategy → whose it is."""
 LEVELS = {"none": 0.0, "low": 0.3, "high": 1.0}
@@ -27,8 +26,8 @@ HIGH = Localization(xy_m_per_sqrt_m=0.02, yaw_rad_per_sqrt_m=0.01, yaw_rad_per_s
 MARGIN_M = 0.1
 """A voxel's edge: what plans keep clear of walls beyond the body."""
 FIDUCIALS = 10
-SEEN_SHARE = 0.9
-LIMIT_S = 400.0
+SEEN_SHARE = 0.8
+LIMIT_S = 250.0
 PLAIN = ("nearest-frontier", "information-rate-v0")
 """Strategies that are run without margin and guard, too."""
 

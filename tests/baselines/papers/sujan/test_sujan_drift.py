@@ -24,7 +24,7 @@ def test_levels_are_factors_of_the_same_drift():
     assert high.yaw_rad_per_sqrt_m == 0.01 and high.margin_m == low.margin_m == 0.1
     exact = task("none", 0.1, 50.0)
     assert not exact.drifts and exact.robot.localization.margin_m == 0.0
-    assert exact.ending.seen_share == 0.9 and exact.ending.time_limit_s == 50.0
+    assert exact.ending.seen_share == 0.8 and exact.ending.time_limit_s == 50.0
 
 
 def test_claims_by_hand():
