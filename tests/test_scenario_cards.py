@@ -113,6 +113,11 @@ def test_numbers_of_actions_that_robots_ignore_are_named():
         assert [n.first for n in told if "means nothing" in n.meaning] == ignored
 
 
+def test_a_card_says_why_a_second_costs_nothing(tmp_path):
+    for name, nothing in (("cliff", True), ("room", False)):
+        assert ("costs nothing by default" in card(SCENARIOS[name], tmp_path)) == nothing
+
+
 def test_times_come_from_the_tables_of_results(tmp_path):
     folder = tmp_path / "head-to-head"
     folder.mkdir()
