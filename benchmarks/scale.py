@@ -160,7 +160,13 @@ def cluster_rows(missions: int) -> list[tuple[str, str, str]]:
     one_s, two_s = (wall_s(play, played, workers) for workers in (1, 2))
     slept = f"{_SLEEPERS} workers, {8 * _SLEEPERS} tasks that sleep {_SLEEP_S:g} s"
     two = f"{len(played)} missions of the room, 2 workers instead of 1"
-    return [(slept, "busy", f"{share:.1%}"), (two, "faster", f"{one_s / two_s:.2f} ×")]
+    # Two workers can only be twice as fast as one where nothing else wants the processors.
+    running = f"{os.getloadavg()[0]:.1f}" if hasattr(os, "getloadavg") else "not known"
+    return [
+        (slept, "busy", f"{share:.1%}"),
+        (two, "faster", f"{one_s / two_s:.2f} ×"),
+        ("all that ran on the machine in the last minute, these among it", "processes at a time", running),
+    ]
 
 
 def page(costs: Sequence[Cost], cluster: Sequence[tuple[str, str, str]], command: str) -> str:
