@@ -44,6 +44,16 @@ def test_a_sensor_without_faults_measures_what_it_measures():
     assert (scan.rays["returned"] == int(Return.HIT)).any()
 
 
+def test_rays_that_measured_nothing_are_neither_lost_nor_scaled():
+    scan, params, scene = scanned()
+    fault = np.zeros(1, FAULT_PARAMS)
+    fault["range_factor"], fault["lost_rays"] = 2.0, 1.0
+    scan.rays["returned"][::2], scan.rays["range_m"][::2] = int(Return.NOTHING), 0.0
+    lost = spoil_scan(scan, fault[0], params, scene, HERE.start, np.array([3], np.uint64))
+    assert lost == len(scan.rays) // 2
+    assert (scan.rays["range_m"] == 0.0).all() and (scan.rays["returned"] == int(Return.NOTHING)).all()
+
+
 @pytest.mark.parametrize(
     ("factor", "bias_m"), [(1.1, 0.0), (1.0, -0.3), (0.9, 0.25), (0.1, -1e6), (10.0, 0.0)]
 )

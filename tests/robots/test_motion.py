@@ -154,6 +154,16 @@ def test_drives_by_hand():
     assert drive(blocked, (5.5, 5.5, 2.5), east, 1.0) == (1.0, MoveEnd.ARRIVED)  # out of a solid voxel
 
 
+def test_a_voxel_that_a_drive_meets_at_an_edge_only_is_none_to_stop_in():
+    """The line through the edge x = 2, y = 1 meets voxel (2, 0) there, before the solid one at (2, 1)."""
+    blocked = np.zeros(SIZE, np.float32)
+    blocked[2, 1, 2] = 1.0
+    length = math.hypot(1.75, 0.75)
+    driven, end = drive(blocked, (0.25, 0.25, 2.5), (1.75 / length, 0.75 / length, 0.0), 2.0 * length)
+    entered = length * 0.75 / 1.75  # x = 1
+    assert (driven, end) == (pytest.approx(0.5 * (entered + length)), MoveEnd.OBSTACLE)
+
+
 def test_a_drive_that_would_end_on_the_face_of_a_solid_voxel_stops_before_it():
     """The face x = 5 belongs to voxel 5: whoever stands there stands in it."""
     blocked = np.zeros(SIZE, np.float32)
