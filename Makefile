@@ -77,6 +77,7 @@ bench: $(STAMP)training $(STAMP)bench
 
 # What was played is kept in results; what is missing is played.
 reliability: $(STAMP)dev
+	$(RUN) benchmarks.reliability.coverage
 	-for folder in missions belief robots; do \
 		$(RUN) benchmarks.reliability.mutants entropy_explore_env/$$folder --sample 100; done
 	$(RUN) benchmarks.reliability --page docs/results/reliability.md
