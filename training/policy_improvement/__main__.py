@@ -25,14 +25,14 @@ from typing import Any, Literal
 import torch
 
 from baselines.cli.arguments import make_folder, parse, print_json, run_command
-from entropy_explore_env.command import INTERRUPTED, UsageError
+from entropy_explore_env.command import INTERRUPTED
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.missions.observation.layout import ObservationLayout
 from entropy_explore_env.missions.privileged import PRIVILEGED
 from entropy_explore_env.scenario import Scenario
 from entropy_explore_env.validation import check_whole, is_whole
 from entropy_explore_env.writing import write_atomically
-from training import extra, ppo, ppo_options  # noqa: F401 - extra: before what is not there without it
+from training import extra, ppo  # noqa: F401 - extra: before what is not there without it
 from training.candidate_network import WIDTH, CandidatePolicy, check_width
 from training.checkpoints import (
     Checkpoint,
@@ -62,6 +62,7 @@ from training.policy_improvement.labelling import (
     weights_digest,
     write_labels,
 )
+from training.policy_improvement.ppo_stage import PpoStage, check_ppo, ppo_words
 from training.policy_improvement.regression import RegressionSettings, as_json, regress
 from training.policy_improvement.rollouts import RollOutEffort
 from training.policy_improvement.tasks import task_of
@@ -69,8 +70,6 @@ from training.run_folder import FILE
 
 STAGES = ("labels", "regression", "ppo")
 _RESULT, _BEGINNING = "result.json", "begins-with.txt"
-_OF_THE_STAGES = ("scenario", "robots", "actions", "candidates", "width", "critic", "start", "out", "resume")
-"""Options of training.ppo that this command says."""
 _STOPPED = "the shard that is under way is written first"
 
 
@@ -138,7 +137,7 @@ def main(words: Sequence[str]) -> int:
     torch.set_num_threads(args.threads)
     wanted = STAGES if args.stage == "all" else (args.stage,)
     if "ppo" in wanted:
-        check_ppo(args, tasks[0])  # before the stages that it comes after
+        check_ppo(ppo_stage(args), tasks[0])  # before the stages that it comes after
     if wanted != ("ppo",):
         label_settings(args, tasks)  # refuses --policy before anything is written
     results: dict[str, Any] = {}
@@ -261,12 +260,12 @@ def learn_by_ppo(args: Args, tasks: list[Scenario], interruption: Interruption) 
     folder = args.out / "ppo"
     started = latest_checkpoint(args.out / "regression", *POLICIES)
     weights = weights_digest(_policy_in(started))
-    digest = _digest(weights, ppo_words(args, tasks[0]), args.compared)
+    digest = _digest(weights, ppo_words(ppo_stage(args), tasks[0]), args.compared)
     if (known := _known(folder, digest)) is not None:
         return known
     begun = (folder / FILE).is_file()
     _check_beginning(folder, weights, begun)
-    words = [*ppo_words(args, tasks[0]), "--start", str(started.absolute())]
+    words = [*ppo_words(ppo_stage(args), tasks[0]), "--start", str(started.absolute())]
     words += ["--resume" if begun else "--out", str(folder)]
     shown = contextlib.redirect_stdout(io.StringIO()) if args.json else contextlib.nullcontext()
     with shown:
@@ -277,6 +276,11 @@ def learn_by_ppo(args: Args, tasks: list[Scenario], interruption: Interruption) 
     curve = (folder / "curve.csv").read_text("utf-8").strip().splitlines()
     found = {"line": f"{args.ppo_steps:,} steps, {len(curve) - 1} validations"}
     return _finished(args, tasks[:1], "ppo", policy, found, digest)
+
+
+def ppo_stage(args: Args) -> PpoStage:
+    """What the options say of the third stage."""
+    return PpoStage(args.candidates, args.width, args.seed, args.ppo_steps, args.ppo_options)
 
 
 def _check_beginning(folder: Path, weights: str, begun: bool) -> None:
@@ -292,60 +296,6 @@ def _check_beginning(folder: Path, weights: str, begun: bool) -> None:
         )
         raise CheckpointError(f"{folder}: weights to begin with", f"{weights[:12]}…", allowed)
     write_atomically(noted, weights + "\n")
-
-
-def ppo_words(args: Args, task: Scenario) -> list[str]:
-    """Options of training.ppo for the third stage: small steps from where the regression ended."""
-    robots = str(task.robots)
-    chosen = {
-        "scenario": task.name,
-        "robots": robots,
-        "actions": "candidates",
-        "candidates": str(args.candidates),
-        "width": str(args.width),
-        "critic": "privileged",
-        "reward": "seconds",
-        "discount": "seconds",
-        "gamma": "1.0",
-        "learning-rate": "1e-4",
-        "entropy": "0.0",
-        "target-kl": "0.01",
-        "critic-first": "3",
-        "missions": "8",
-        "rollout-steps": "256",
-        "batch": "512",
-        "total-steps": str(args.ppo_steps),
-        "validate-every": str(max(args.ppo_steps // 8, 1)),
-        "checkpoint-every": str(max(args.ppo_steps // 8, 1)),
-        "seed": str(args.seed),
-    }
-    words = [word for name, value in chosen.items() for word in (f"--{name}", value)]
-    return [*words, "--no-video", *_split(args.ppo_options)]
-
-
-def _split(options: str) -> list[str]:
-    """The words of a text as a command line has them."""
-    try:
-        return shlex.split(options)
-    except ValueError as error:
-        allowed = f"options as on a command line ({error})"
-        raise SettingError("ppo_options", options, allowed) from None
-
-
-def check_ppo(args: Args, task: Scenario) -> None:
-    """Raise a SettingError where the third stage would refuse its options, or they would undo the others."""
-    words = _split(args.ppo_options)
-    for name in _OF_THE_STAGES:
-        option = f"--{name}"
-        if any(word == option or word.startswith(f"{option}=") for word in words):
-            raise SettingError("ppo_options", args.ppo_options, f"no {option}, which the stages say")
-    try:
-        options = ppo_options.parsed(ppo_words(args, task))
-        ppo_options.check(options)
-        ppo_options.training_task(options)
-    except (SettingError, UsageError) as error:
-        allowed = f"options of training.ppo: {error}"
-        raise SettingError("ppo_options", args.ppo_options, allowed) from None
 
 
 def _finished(
