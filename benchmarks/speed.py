@@ -28,6 +28,7 @@ from benchmarks.planning import planning_rows
 from benchmarks.rows import FULL, QUICK, Effort, Row
 from benchmarks.startup import startup_rows
 from benchmarks.stepping import profile_rows, spread_rows, vector_rows
+from benchmarks.summaries import summary_rows
 from benchmarks.world_size import size_rows
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.worlds.load import load_world
@@ -40,6 +41,7 @@ JOBS: tuple[tuple[str, Callable[[Effort], list[Row]]], ...] = (
     ("VectorEnv beside the ParallelEnv, on one and two threads", vector_rows),
     ("where a step's time goes", profile_rows),
     ("robots that drift", drifting_rows),
+    ("summaries of maps", summary_rows),
     ("shortest paths beside SciPy", planning_rows),
     ("decisions of strategies", deciding_rows),
     ("learning", learning_rows),

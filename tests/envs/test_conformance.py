@@ -84,6 +84,18 @@ def test_a_team_that_drifts_conforms(in_this_process: int, period_s: float | Non
     assert len(said) == in_this_process
 
 
+@pytest.mark.parametrize("period_s", [None, 1.0])
+def test_a_team_that_sends_summaries_conforms(in_this_process: int, period_s: float | None) -> None:
+    settings = {
+        "channel": {"content": "summaries", "summary_every_s": 1.0, "delay_s": 0.3, "loss_probability": 0.2},
+        "observation": {"overview": True},
+        "decision_period_s": period_s,
+    }
+    said: list[str] = []
+    check_conformance(BOX, robots=3, steps=25, report=said.append, **settings)
+    assert len(said) == in_this_process
+
+
 @pytest.mark.long
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("robots", range(1, 6))

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from entropy_explore_env.belief.entropy import map_entropy_bits
+from entropy_explore_env.belief.pooling import Pool, fresh_sums, pool_belief
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.missions.summaries import precision_of_place
@@ -148,6 +149,16 @@ def test_a_coarser_summary_and_a_rarer_one_cost_less():
         )
     ]
     assert bits[0] > 1.1 * bits[1] and bits[1] > bits[2] > 0
+
+
+def test_the_pooled_belief_follows_what_summaries_say():
+    missions = played(observation={"overview": True, "overview_shape": (3, 4, 2)})
+    params, cells = missions.rules.params[0], missions.rules.cells
+    for robot in range(3):
+        sums = fresh_sums(cells)
+        pool = Pool(cells, sums, float(params["prior_precision"]), float(params["end_precision"]))
+        pool_belief(pool, missions.state.mean[0, robot], missions.state.precision[0, robot])
+        np.testing.assert_allclose(missions.state.pooled[0, robot], sums, atol=1e-6)
 
 
 def test_summaries_wait_for_their_time_and_for_a_scan():

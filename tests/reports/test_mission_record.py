@@ -62,7 +62,13 @@ def saved(record: MissionRecord, folder: Path) -> Path:
 
 @pytest.mark.parametrize(
     "changes",
-    [{}, {"robots": 1}, {"action": {"kind": "discrete"}}, {"track_truth": True, "channel": {"delay_s": 2.0}}],
+    [
+        {},
+        {"robots": 1},
+        {"action": {"kind": "discrete"}},
+        {"track_truth": True, "channel": {"delay_s": 2.0}},
+        {"channel": {"content": "summaries", "summary_every_s": 1.0, "delay_s": 2.0}},
+    ],
 )
 def test_a_record_comes_back_exactly_and_its_commands_lead_to_the_same_state(changes, tmp_path):
     record, missions = recorded(**changes)
@@ -153,6 +159,7 @@ DELAYED = {"robots": 2, "track_truth": True, "channel": {"delay_s": 1.0}}
 PHASED = {"robots": 2, "channel": {"phase_s": 3.0, "repeats": 2}}
 BY_SEEN = {"robots": 2, "ending": {"seen_share": 0.9}}
 UNDER_WAY = {"robots": 2, "robot": {"redecide": 1.0}}
+SUMMARIES = {"robots": 2, "channel": {"content": "summaries", "delay_s": 2.0}}
 
 
 def leaf_arrays(state: object) -> Iterator[np.ndarray]:
@@ -163,7 +170,7 @@ def leaf_arrays(state: object) -> Iterator[np.ndarray]:
         yield from [state[name] for name in state.dtype.names] if state.dtype.names else [state]
 
 
-@pytest.mark.parametrize("changes", [DELAYED, PHASED, UNDER_WAY, BY_SEEN])
+@pytest.mark.parametrize("changes", [DELAYED, PHASED, UNDER_WAY, BY_SEEN, SUMMARIES])
 def test_a_digest_sees_every_array_and_field(changes):
     missions = started(free_box(**changes), seed=3, missions=2)
     before, other = state_digest(missions, 0), state_digest(missions, 1)

@@ -1,0 +1,1 @@
+"""Missions that share summaries of maps, beside Rocha04's batches of measurements, at equal bits (ours)."""
