@@ -37,12 +37,17 @@ class Numbers(NamedTuple):
     def indices(self) -> str:
         """`3`, or `3 … 5`."""
         last = self.first + self.count - 1
-        return str(self.first) if self.count == 1 else f"{self.first} … {last}"
+        return str(self.first) if self.count == 1 else _span(str(self.first), str(last))
 
     @property
     def range(self) -> str:
         """`-1 … 1`."""
-        return f"{self.low:.4g} … {self.high:.4g}"
+        return _span(f"{self.low:.4g}", f"{self.high:.4g}")
+
+
+def _span(low: str, high: str) -> str:
+    """`low … high`, in one line of a narrow column."""
+    return f"{low}\N{NO-BREAK SPACE}…\N{NO-BREAK SPACE}{high}"
 
 
 class _Told(NamedTuple):
@@ -132,7 +137,7 @@ def _told(name: str, part: Part, scenario: Scenario) -> list[_Told]:
         ]
     if name in ("candidates", "context"):
         features = FEATURES if name == "candidates" else CONTEXT
-        return [_Told(1, feature.meaning, feature.unit, feature.least) for feature in features]
+        return [_Told(1, f"`{each.name}`: {each.meaning}", each.unit, each.least) for each in features]
     if name == "overlaps":
         shared = "share of the voxels of each two candidates, of those of the one that sees fewer"
         return [_Told(math.prod(part.shape), shared, "share")]
