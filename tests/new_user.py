@@ -114,6 +114,11 @@ class User:
         """Import and step, outside the clone; where the package lies."""
         return Path(self.call([self.python, "-c", _FIRST_STEP]).splitlines()[-1]).parent
 
+    def has(self, package: str) -> bool:
+        """Whether a package can be imported in the environment."""
+        said = self.call([self.python, "-c", f"import importlib.util as u; print(u.find_spec({package!r}))"])
+        return said.strip() != "None"
+
     def check_gone(self) -> None:
         """Raise a StepError if the package can still be imported."""
         names = self.call([self.python, "-c", "import site; print(site.getsitepackages()[0])"])
@@ -173,17 +178,20 @@ def install(user: User) -> None:
 def examples(user: User) -> None:
     """Every code block of README and site."""
     for block in blocks():
-        needed = [
-            name for name in _ONLY_IN_SOME if re.search(rf"^\s*(import|from) {name}\b", block.text, re.M)
-        ]
-        if not user.borrow and needed:
-            print(f"    {block.name}: skipped, {needed[0]} is in no extra", file=sys.stderr)
+        missing = [name for name in _ONLY_IN_SOME if _imports(block.text, name) and not user.has(name)]
+        if missing:
+            print(f"    {block.name}: skipped, {missing[0]} is in no extra", file=sys.stderr)
             continue
         folder = user.home / "examples" / re.sub(r"\W", "-", block.name)
         folder.mkdir(parents=True)
         (folder / "example.py").write_text(block.text, encoding="utf-8")
         words = [user.python, "-c", f"import sys; sys.path.insert(0, {str(user.clone)!r}); {_RUN_FILE}"]
         user.call(words, folder)
+
+
+def _imports(text: str, package: str) -> bool:
+    """Whether an example imports a package."""
+    return re.search(rf"^\s*(import|from) {package}\b", text, re.MULTILINE) is not None
 
 
 _RUN_FILE = "import runpy; runpy.run_path('example.py', run_name='__main__')"

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from tests import new_user
+from tests.code_blocks import Block
 from tests.new_user import StepError, User, main
 
 
@@ -37,6 +38,17 @@ def test_a_step_that_fails_ends_it_and_leaves_the_folder(tmp_path, monkeypatch, 
     assert main([]) == 0 and not tmp_path.exists()
     with pytest.raises(SystemExit, match="2"):
         main(["--skip", "dinner"])
+
+
+def test_examples_of_packages_that_are_not_there_are_skipped(tmp_path, monkeypatch, capsys):
+    user = User(tmp_path, borrow=True, training_s=1.0)
+    subprocess.run([sys.executable, "-m", "venv", "--without-pip", str(user.environment)], check=True)
+    assert user.has("json") and not user.has("benchmarl")
+    written = (("here", "import json\nopen('ran', 'w').close()"), ("there", "from benchmarl import x"))
+    monkeypatch.setattr(new_user, "blocks", lambda: [Block(*each) for each in written])
+    new_user.examples(user)
+    assert "there: skipped, benchmarl is in no extra" in capsys.readouterr().err
+    assert [path.parent.name for path in tmp_path.glob("examples/*/ran")] == ["here"]
 
 
 def test_a_husk_of_the_package_is_named(tmp_path):
