@@ -27,8 +27,8 @@ from entropy_explore_env.writing import write_atomically
 YARDSTICK = "nearest-frontier"
 GRID: Mapping[str, Mapping[str, tuple[float, ...]]] = {
     "distance-advantage": {
-        "radius": (30, 60, 120),
-        "horizon": (30, 61, 120),
+        "radius": (30, 60, 120, 270),
+        "horizon": (30, 61, 120, 270),
         "opening": (0, 0.05, 0.1, 0.2, 0.3),
         "passing": (0, 0.06, 0.125),
         "meanwhile": (0, 0.25, 0.5, 1),

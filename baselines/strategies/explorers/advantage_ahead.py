@@ -4,10 +4,10 @@
          mean over u of d(u, v) - d(robot, v) + g ln V(v) - b |turn(v)| / π - t(v)
 
 Ours. The mean is that of distance advantage (Ericson, Pedro & Jensfelt 2025): what would be far to come back
-to is taken now. An opening is a frontier cell around which many known free voxels lie beside unknown ones,
-and from which many unknown voxels are in sight; one stands for all that are around it. V is how many these
-are, at most as many as would lie behind an opening of this width in a strip of a given depth: through a
-wall's single unseen voxel a wide cone is in sight. turn(v) is the angle between the way that the robot has
+to is taken now. An opening is a frontier cell around which many known free voxels lie beside unknown ones;
+one stands for all that are around it. V is how many unknown voxels are in sight of it, at most as many as
+would lie behind an opening of this width in a strip of a given depth: through a wall's single unseen voxel a
+wide cone is in sight. turn(v) is the angle between the way that the robot has
 come and the way to v: who turns round brakes, and drives what it has driven already. t(v) is how near v is
 to where teammates go.
 
@@ -47,8 +47,6 @@ _EXTENSION = 1.5
 """Where too little is found, the search goes this many times as far."""
 _TOUR = TourConfig(most_near=40, most_far=20)
 """Of slivers."""
-_ALONE = 1.0
-"""Longest distance from a sliver to other frontier cells that counts, in sensor ranges."""
 _TRIED, _FIRST = 3, 1e6
 """Slivers that are looked at, the nearest ones; a length that puts the one that it is under way to first."""
 _STAY = 1.5
@@ -65,7 +63,6 @@ class AheadConfig:
         around: How far, along either axis, an opening reaches around a frontier cell, in sensor ranges; as
             wide are the cells of a grid of which one opening each counts.
         opening: Least number of known free voxels beside unknown ones there, in sensor ranges.
-        area: Least unknown area in sight of an opening, in squared sensor ranges.
         depth: V is at most as many voxels as the opening has, times this many sensor ranges.
         gain: g, in sensor ranges.
         turn: b, what it costs to turn round, in sensor ranges.
@@ -78,21 +75,20 @@ class AheadConfig:
         SettingError: One of them is not allowed.
     """
 
-    radius: float = 0.75
+    radius: float = 3.4
     around: float = 0.125
     opening: float = 0.125
-    area: float = 0.03
     depth: float = 0.25
     gain: float = 0.25
     turn: float = 0.375
-    passing: float = 0.5
+    passing: float = 1.0
     elsewhere: float = 0.125
     ahead: float = 0.1
 
     def __post_init__(self) -> None:
         """Check every field."""
         check_positive(self, "radius", "around", "depth", "elsewhere", "ahead")
-        check_not_negative(self, "opening", "area", "gain", "turn", "passing")
+        check_not_negative(self, "opening", "gain", "turn", "passing")
 
 
 class _Openings(NamedTuple):
@@ -161,7 +157,7 @@ class AdvantageAhead(Explorer):
         """The goal, or a sliver that the way to it leaves behind, and that would be far to come back to."""
         paths, reach, config = scene.paths, scene.cells.reach, self.config
         paths.start(scene.here)
-        farthest = config.passing * _ALONE * reach
+        farthest = config.passing * self._alone(scene)
         voxels, lengths = paths.frontiers_within(farthest)
         if config.passing == 0.0 or len(voxels) == 0:
             return goal
@@ -188,12 +184,15 @@ class AdvantageAhead(Explorer):
 
     def _apart(self, scene: Scene, voxel: int) -> float:
         """How far it is from a frontier cell to the nearest one elsewhere, in voxel edges."""
-        reach = scene.cells.reach
-        elsewhere = self.config.elsewhere * reach
+        alone, elsewhere = self._alone(scene), self.config.elsewhere * scene.cells.reach
         scene.paths.start(voxel)
-        voxels, lengths = scene.paths.frontiers_within(_ALONE * reach)
+        voxels, lengths = scene.paths.frontiers_within(alone)
         off = np.abs(centres_of(scene, voxels) - centres_of(scene, np.array([voxel], np.int32)))
-        return float(lengths[off.max(axis=1) > elsewhere].min(initial=_ALONE * reach))
+        return float(lengths[off.max(axis=1) > elsewhere].min(initial=alone))
+
+    def _alone(self, scene: Scene) -> float:
+        """Longest distance from a sliver to other frontier cells that counts, in voxel edges."""
+        return min(scene.cells.reach, float(_WIDEST))
 
     def _farther(self, scene: Scene, reach: float) -> _Openings:
         """The openings that the search finds first beyond a reach; none where there is none at all."""
@@ -217,8 +216,7 @@ class AdvantageAhead(Explorer):
         wide |= (voxels == scene.target) & (counts >= least)
         voxels, lengths, counts = voxels[wide], lengths[wide], counts[wide]
         seen = np.minimum(cells.gains(voxels), config.depth * cells.reach * counts)
-        ample = seen >= config.area * cells.reach**2
-        return _Openings(voxels[ample], lengths[ample], np.maximum(seen[ample], 1.0))
+        return _Openings(voxels, lengths, np.maximum(seen, 1.0))
 
     def _costs(self, scene: Scene, openings: _Openings, heading: np.ndarray) -> np.ndarray:
         """(K,) what it costs to go to openings now, less what they show; in voxel edges."""

@@ -48,7 +48,7 @@ def straight(length=30):
     return plan
 
 
-BARE = {"opening": 0.0, "area": 0.0, "gain": 0.0, "turn": 0.0, "passing": 0.0, "around": 0.0125}
+BARE = {"radius": 0.75, "opening": 0.0, "gain": 0.0, "turn": 0.0, "passing": 0.0, "around": 0.0125}
 """With these every frontier cell is an opening, and only lengths count."""
 
 
@@ -72,7 +72,7 @@ def test_it_goes_on_where_it_came_for_unless_turning_costs_nothing_by_hand(came_
     assert picked(straight(), (11, 1), config, came_from) == (wanted, 1)
 
 
-OPENINGS = {"around": 0.05, "opening": 0.05, "area": 1e-4, "turn": 0.0, "passing": 0.0}
+OPENINGS = {"around": 0.05, "opening": 0.05, "turn": 0.0, "passing": 0.0}
 """An opening has four known free voxels beside unknown ones, none more than four voxels off."""
 
 
@@ -89,13 +89,6 @@ def test_slivers_count_where_there_is_nothing_else(ending):
     plan, robot = room_with_a_sliver(9)
     plan[25, 2:6] = reference.WALL
     assert picked(plan, robot, ending=ending) == (2, 4)
-
-
-@pytest.mark.parametrize(("area", "wanted"), [(1e-4, 24), (1e-2, 2)])
-def test_openings_that_show_little_are_slivers_by_hand(area, wanted):
-    """Four voxels are unknown beyond the opening: 0.0006 squared ranges of 80 voxels."""
-    plan, robot = room_with_a_sliver(4)
-    assert picked(plan, robot, AheadConfig(**OPENINGS | {"area": area}))[0] == wanted
 
 
 def room_with_two_ends():
@@ -136,6 +129,19 @@ def test_a_sliver_that_would_be_left_behind_is_visited_before_by_hand(robot, pas
     """From place 11 the way round by it is 19 steps, from place 20 37; other frontier cells are 47 off."""
     config = AheadConfig(**ROUND_ABOUT | {"passing": passing})
     assert picked(corridor_with_a_sliver(), (robot, 3), config)[0] == wanted
+
+
+@pytest.mark.parametrize(("robot", "wanted"), [(20, 2), (30, 179)])
+def test_a_sensor_that_sees_far_makes_no_long_way_round_by_hand(robot, wanted):
+    """Nothing else is unknown for 150 steps, which count as 90: the way round may be 45, and is 37 or 57."""
+    plan = np.full((190, 7), reference.WALL, np.int8)
+    plan[2:180, 2:5] = reference.FREE
+    plan[180:188, 2:5] = plan[2, 1] = reference.UNKNOWN
+    rule = AdvantageAhead(AheadConfig(**ROUND_ABOUT | {"around": 0.015, "opening": 0.015}))
+    rule.reset(scenario_of(plan.shape), np.random.default_rng(0))
+    scene = scene_of(plan, (robot, 3))
+    scene.cells.reach, scene.view.pose = 200.0, pose_in((robot, 3))  # type: ignore[misc]
+    assert cell(plan, rule.pick(scene))[0] == wanted
 
 
 def test_slivers_on_the_way_are_left_to_be_seen_in_passing():
