@@ -68,11 +68,35 @@ def _text(experiment: Experiment, records: Records, claims: Sequence[Claim], com
         *(_times_table(experiment, records, *team) for team in experiment.teams()),
         f"## Claims: {held} of {len(claims)} hold",
         _HOLDS,
+        "\n".join(f"- {line}" for line in findings(experiment, claims)),
         claims_table(claims, 3, given="allowed"),
         "Files: [`loss.csv`](resilience/loss.csv), [`faults.csv`](resilience/faults.csv).",
     ]
     return "\n\n".join(part.strip() for part in parts) + "\n"
 
+
+def findings(experiment: Experiment, claims: Sequence[Claim]) -> list[str]:
+    """A line for each kind of claim: teams that it holds for, does not hold for, and is not shown for."""
+    lines = []
+    for kind, text in _KINDS.items():
+        teams: dict[str, list[str]] = {"holds for": [], "does not hold for": [], "not shown for": []}
+        for scenario, robots in experiment.teams():
+            for strategy in experiment.strategies:
+                claim = next(c for c in claims if c.id == f"{kind}-{scenario}-{robots}-{strategy}")
+                most = float(str(claim.paper).removeprefix("≤ ")) * MARGIN
+                broken = claim.low is not None and claim.low > most
+                said = "holds for" if claim.holds else "does not hold for" if broken else "not shown for"
+                teams[said].append(f"`{strategy}` ({scenario}, {robots})")
+        found = "; ".join(f"{said} {', '.join(names)}" for said, names in teams.items() if names)
+        lines.append(f"{text} {found}.")
+    return lines
+
+
+_KINDS = {
+    "isolated": "Under every fault never slower than in isolation:",
+    "lost": "Losing one robot costs at most its share:",
+}
+"""Beginning of the ids of claims of one kind, and what they are."""
 
 _READING = """A mission ends, as its scenario says, when one map is known; a mission time is therefore that of
 the best-informed robot. A strategy gains from its teammates what lies between "nothing fails" and "isolated":

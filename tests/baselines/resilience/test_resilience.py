@@ -11,6 +11,7 @@ import pytest
 from baselines.experiments import cells
 from baselines.resilience import __main__ as command
 from baselines.resilience.claims import all_claims, nothing_breaks, share_of_one, slowdown
+from baselines.resilience.report import findings
 from baselines.resilience.sweep import (
     CHANNELS,
     ISOLATED,
@@ -84,6 +85,19 @@ def test_claims_by_hand():
     noisy = records_of({NOTHING_FAILS: base, LOST: [30.0, 80.0, 40.0, 55.0, 40.0], LOST_ISOLATED: base})
     _, isolated, _ = all_claims(ONE, noisy)  # 0.98 on average, but too few seeds to show it
     assert not isolated.holds and isolated.ours < 1.0 < 1.05 < isolated.high
+
+
+def test_findings_tell_what_does_not_hold_from_what_is_not_shown():
+    base = [50.0, 40.0, 60.0, 50.0, 50.0]
+    for seconds, isolated, lost in (
+        ({LOST: [1.1 * t for t in base], LOST_ISOLATED: [80.0] * 5}, "holds for", "holds for"),
+        ({LOST: [1.3 * t for t in base]}, "does not hold for", "does not hold for"),
+        ({LOST: [30.0, 80.0, 40.0, 55.0, 40.0], LOST_ISOLATED: base}, "not shown for", "not shown for"),
+    ):
+        claims = all_claims(ONE, records_of({NOTHING_FAILS: base, **seconds}))
+        first, second = findings(ONE, claims)
+        assert f"isolation: {isolated} `voronoi` (box-7x11x5, 4)." in first
+        assert f"share: {lost} `voronoi` (box-7x11x5, 4)." in second
 
 
 def test_missions_that_were_cut_off_show_nothing():
