@@ -14,7 +14,7 @@ directions there, or (`raster-fixed-yaw`) in one. Teams share their maps, and ea
 Unknown cells of a plan take the mean occupancy of their neighbours, for `next-best-view` alone, as in the
 paper. A voxel that should have been visible and did not answer loses interest (eq. 9). LE, which the paper
 leaves open, is how much less exact points will be that the robot measures there: what the way adds to the
-covariance of its pose, less what landmarks take back that it should sight on it; 0 where it does not drift.
+covariance of its pose, less what fiducials take back that it should sight on it; 0 where it does not drift.
 
 Ours, where the paper says nothing: poses are drawn uniformly, a new set at each decision; the spacing of
 raster's places; where its latest scan showed no new voxel, methods (iii) and (iv) take a random pose, since
