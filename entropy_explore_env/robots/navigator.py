@@ -32,6 +32,8 @@ from entropy_explore_env.settings import Robot
 
 _ARRIVED, _NO_PATH, _CORNERS = MoveEnd.ARRIVED.code, MoveEnd.NO_PATH.code, MoveEnd.CORNERS.code
 _SLACK = 1e-9
+_NEAR = 6.0
+"""Voxel edges: see `new_navigator`."""
 _PASSABLE, _REACHED = np.int64(0), np.int64(1)
 """Which voxels `_nearest` may choose. NumPy integers, so that it compiles for one type."""
 
@@ -50,7 +52,7 @@ class Navigator(NamedTuple):
     ends: np.ndarray
     """(2, 3) float64, start and finish of the path."""
     breaks_out: bool
-    """Whether it drives straight to its goal where it believes to be walled in: see `new_navigator`."""
+    """Whether it drives straight to a near goal to which it knows no path: see `new_navigator`."""
 
 
 def lattice_of(scenario: Scenario, robot: Robot) -> Lattice:
@@ -89,8 +91,8 @@ def footprints(navigators: Mapping[int, Navigator], kinds: int) -> np.ndarray:
 def new_navigator(scenario: Scenario, robot: Robot) -> Navigator:
     """Memory for the plans of one kind of robot.
 
-    A robot that keeps a margin may believe to stand nearer to a wall than that, where no path leads out,
-    though it can drive: then it drives straight, and what is truly in the way stops it.
+    A robot that keeps a margin may believe to stand nearer to a wall than that, or in a pocket, where no path
+    leads out though it can drive. To a near goal it then drives straight; what is truly in the way stops it.
     """
     prior_precision = float(np.float32(scenario.sigma_prior**-2))
     return Navigator(
@@ -217,12 +219,10 @@ def plan_path(navigator, mean, precision, no_fly, start, goal, waypoints):
             return 1, _ARRIVED
     code = _ARRIVED
     found = _search_path(navigator, costs, source, wanted)
-    if found == source and found != wanted and inside and navigator.breaks_out:
-        x, y, z = grid_index(lattice.size, source)
-        if not is_passable(mark_of(search, lattice, costs, source, x, y, z)):
-            for axis in range(3):
-                waypoints[0, axis] = finish[axis]
-            return 1, _ARRIVED
+    if found != wanted and inside and navigator.breaks_out and length <= _NEAR * _NEAR:
+        for axis in range(3):
+            waypoints[0, axis] = finish[axis]
+        return 1, _ARRIVED
     if found != wanted or not inside:
         code = _NO_PATH
         x, y, z = grid_index(lattice.size, found)

@@ -121,18 +121,21 @@ def test_a_margin_keeps_paths_of_robots_that_drift_clear_of_what_is_covered():
     assert plan(exact, solid, *ends)[0].tolist() == plan(planner(), solid, *ends)[0].tolist()
 
 
-def test_who_believes_to_stand_within_its_margin_drives_straight_where_no_path_leads_out():
+def test_who_keeps_a_margin_drives_straight_to_a_near_goal_to_which_it_knows_no_path():
+    """In a channel too narrow for its margin; a goal 6 voxels away is near, one at 7 is not."""
     solid = np.zeros(FLAT.shape, bool)
     solid[:, [0, 2]] = True
-    for margin_m, ends in ((0.0, MoveEnd.NO_PATH), (0.5, MoveEnd.ARRIVED)):
+    for margin_m, y, ends in (
+        (0.0, 7.5, MoveEnd.NO_PATH),
+        (0.5, 7.5, MoveEnd.ARRIVED),
+        (0.5, 8.5, MoveEnd.NO_PATH),
+    ):
         scenario = planner(localization={**DRIFT, "margin_m": margin_m})
-        points, end = plan(scenario, solid, (3.5, 1.5, 0.5), (3.5, 8.5, 0.5))
+        points, end = plan(scenario, solid, (3.5, 1.5, 0.5), (3.5, y, 0.5))
         assert end is ends
-    assert points.tolist() == [[3.5, 8.5, 0.5]]
-    points, end = plan(
-        planner(localization={**DRIFT, "margin_m": 0.5}), wall(11), (1.5, 4.5, 0.5), (5.5, 4.5, 0.5)
-    )
-    assert end is MoveEnd.NO_PATH  # it stands clear, and no way leads through the wall
+        assert (points.tolist() == [[3.5, y, 0.5]]) == (ends is MoveEnd.ARRIVED)
+    outside, end = plan(scenario, solid, (3.5, 1.5, 0.5), (3.5, -1.5, 0.5))
+    assert end is MoveEnd.NO_PATH and (outside >= 0.0).all()
 
 
 def test_planar_robots_keep_their_height_and_may_pass_under_what_is_above_them():
