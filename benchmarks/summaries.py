@@ -1,17 +1,23 @@
-"""What it takes to write a map as a summary, and to read it: 1000 × 1000 cells, as a robot may know them."""
+"""What it takes to write a map as a summary and to read it, and what steps with summaries cost.
+
+The map has 1000 × 1000 cells, known as a robot may know them; robots are those of `stepping`.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 
-from benchmarks.rows import Effort, Goal, Row, alone, interleave, timed
+from benchmarks.rows import Effort, Goal, Job, Row, alone, compared, interleave, timed
+from benchmarks.stepping import ROBOTS, TURNING, SingleTeam, turns
 from entropy_explore_env.robots.map_summary import decode_map, encode_map
+from entropy_explore_env.scenario import with_settings
 
 CELLS = 1000
 _WALLS_APART, _WALL, _THINGS = 50, 3, 400
 _SCANS, _RANGE_M = 150, 8.0
 _THRESHOLD_BITS = 0.5
 _MOST_MS = 30.0
+_EVERY_S = 5.0
 
 
 def known_plan(seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
@@ -47,4 +53,22 @@ def summary_rows(effort: Effort) -> list[Row]:
     milliseconds = {name: [1e3 * t.cpu_s for t in taken[name]] for name in taken}
     what = f"a map of {CELLS} × {CELLS} cells as a summary of {8 * len(data):,} bits"
     goals = {"encode": Goal("≤", _MOST_MS, "ms"), "decode": None}
-    return [alone(f"{name} {what}", milliseconds[name], "ms", goal) for name, goal in goals.items()]
+    rows = [alone(f"{name} {what}", milliseconds[name], "ms", goal) for name, goal in goals.items()]
+    return [*rows, step_row(effort)]
+
+
+def step_row(effort: Effort) -> Row:
+    """Steps a second of robots that send summaries beside robots that send batches."""
+    channel = {"content": "summaries", "summary_every_s": _EVERY_S}
+    scenarios = {"batches": TURNING, "summaries": with_settings(TURNING, {"channel": channel})}
+    teams, steps = {name: SingleTeam(scenario) for name, scenario in scenarios.items()}, effort.steps
+    for team in teams.values():
+        team.run(0, turns(1, 1, 0)[:, 0])
+
+    def job(team: SingleTeam) -> Job:
+        return lambda number: team.run(number, turns(steps, 1, number)[:, 0])
+
+    taken = interleave({name: job(team) for name, team in teams.items()}, effort.rounds)
+    rates = {name: [steps / t.cpu_s for t in taken[name]] for name in taken}
+    what = f"ParallelEnv.step, {ROBOTS} robots × {TURNING.sensor.rays} rays, a summary each {_EVERY_S:g} s"
+    return compared(what, "batches", rates["summaries"], rates["batches"], "steps/s")

@@ -24,6 +24,8 @@ _FOLD_BELOW = 1e-250
 
 Settings keep a ratio above 1e-16, so that a product that is not yet below stays above 1e-266.
 """
+ROW_FOLD_BELOW = 1e-100
+"""The same for rows, of which two are multiplied."""
 
 
 RAY = record_type(
@@ -121,7 +123,7 @@ def gather_ray(mean, precision, crossed, coverage, free, n, measured):
         mean[voxel] = said + (mean[voxel] - said) * (before / (before + gain))
 
 
-@lean_kernel
+@inlined_kernel
 def fuse_row(mean, precision, first, last, coverage, measured):
     """Fuse one Gaussian of coverage into each of the voxels `first` … `last` - 1 (Rocha04, eqs. 17-18).
 
@@ -134,7 +136,8 @@ def fuse_row(mean, precision, first, last, coverage, measured):
         measured: float32, its 1/σ².
 
     Returns:
-        Utility in bits, ≥ 0, as of `fuse_ray`.
+        (bits, shrink): the utility in bits (eq. 27) is bits - ½ log2 shrink, so that a logarithm is needed
+        but once for some rows: their bits add up, and their shrinks multiply.
     """
     bits, shrink = 0.0, np.float64(1.0)
     for voxel in range(first, last):
@@ -144,10 +147,10 @@ def fuse_row(mean, precision, first, last, coverage, measured):
         precision[voxel] = after
         mean[voxel] = coverage + (mean[voxel] - coverage) * share
         shrink *= share
-        if shrink < _FOLD_BELOW:
-            bits -= math.log2(shrink)
+        if shrink < ROW_FOLD_BELOW:
+            bits -= 0.5 * math.log2(shrink)
             shrink = np.float64(1.0)
-    return 0.5 * (bits - math.log2(shrink))
+    return bits, shrink
 
 
 @inlined_kernel

@@ -14,10 +14,10 @@ import math
 
 import numpy as np
 
-from entropy_explore_env.belief.map_update import fuse_row
+from entropy_explore_env.belief.map_update import ROW_FOLD_BELOW, fuse_row
 from entropy_explore_env.belief.pooling import Pool, pool_row
 from entropy_explore_env.belief.raycast import point
-from entropy_explore_env.compilation.kernels import lean_kernel
+from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel
 from entropy_explore_env.missions.faults import draw_lateness, takes_in
 from entropy_explore_env.missions.localization import believed_scan_pose, covariance_bits
 from entropy_explore_env.missions.messages import count_sent, enqueue, note_message, transmit
@@ -100,9 +100,11 @@ def send_summary(summaries, team, maps, clock, in_flight, index, length, recipie
     here = believed_scan_pose(team.localization, robot, index)
     most = latest_precision(team.localization, index, team.params[0].voxel_size_m)
     for mate in range(len(team.robots)):
-        if recipients[mate] and takes_in(team.faults, team.robots[mate], mate, time_s, bits):
+        if recipients[mate]:
+            recipients[mate] = takes_in(team.faults, team.robots[mate], mate, time_s, bits)
+        if recipients[mate]:
             note_message(team.robots[mate], team.heard[mate, index], here, time_s, _NO_MEASUREMENTS, bits)
-            hear_summary(summaries.tree, team, maps, mate, length, most)
+    hear_summary(summaries.tree, team, maps, recipients, length, most)
 
 
 @lean_kernel
@@ -148,11 +150,14 @@ def receive_summary(summaries, team, maps, in_flight, slot):
     message.due_s, parcel.bytes = math.inf, 0
     copy_numbers(summaries.contents[parcel.place], summaries.tree.coder.data, length)
     most = sent_precision(team.localization, in_flight.covariances, slot, team.params[0].voxel_size_m)
+    recipients = in_flight.recipients[slot]
     for mate in range(len(team.robots)):
-        if in_flight.recipients[slot, mate] and takes_in(team.faults, team.robots[mate], mate, time_s, bits):
-            heard = team.heard[mate, sender]
-            note_message(team.robots[mate], heard, message.pose, message.sent_s, _NO_MEASUREMENTS, bits)
-            hear_summary(summaries.tree, team, maps, mate, length, most)
+        if recipients[mate]:
+            recipients[mate] = takes_in(team.faults, team.robots[mate], mate, time_s, bits)
+        if recipients[mate]:
+            robot, heard = team.robots[mate], team.heard[mate, sender]
+            note_message(robot, heard, message.pose, message.sent_s, _NO_MEASUREMENTS, bits)
+    hear_summary(summaries.tree, team, maps, recipients, length, most)
     return True
 
 
@@ -185,36 +190,56 @@ def precision_of_place(packed, voxel_size_m):
 
 
 @lean_kernel
-def hear_summary(tree, team, maps, index, length, most):
-    """Fuse a summary into a robot's belief, as a teammate's measurements.
+def hear_summary(tree, team, maps, recipients, length, most):
+    """Fuse a summary into the beliefs of those who hear it, leaf by leaf, as a teammate's measurements.
 
     Args:
         tree: Tree, the summary in its data.
         team: Team.
         maps: Maps.
-        index: The robot that hears it.
+        recipients: (A,) bool, who hears it.
         length: Bytes of the summary.
         most: Most precision that a leaf has.
     """
-    size, shared = grid_size(team.params[0]), team.params[0]
-    if not open_summary(tree, length, size):
+    if not open_summary(tree, length, grid_size(team.params[0])):
         return
-    mean, precision = maps.beliefs.mean[index], maps.beliefs.precision[index]
-    pool = Pool(maps.cells, maps.beliefs.pooled[index], shared.prior_precision, shared.end_precision)
-    walk, leaf, bits = tree.walk[0], tree.leaf[0], 0.0
-    pooling = len(maps.cells.voxels) > 0
+    leaf = tree.leaf[0]
     while read_leaf(tree):
         known = np.float32(min(np.float64(leaf.precision), most))
-        for i in range(leaf.low[0], leaf.high[0]):
-            for j in range(leaf.low[1], leaf.high[1]):
-                row = (i * walk.size[1] + j) * walk.size[2]
-                first, last = row + leaf.low[2], row + leaf.high[2]
-                if pooling:
-                    pool_row(pool, mean, precision, first, last, -1.0)
-                bits += fuse_row(mean, precision, first, last, leaf.mean, known)
-                if pooling:
-                    pool_row(pool, mean, precision, first, last, 1.0)
-    robot = team.robots[index]
-    robot.entropy_bits -= bits
-    robot.received_bits += bits
-    robot.heard_bits += bits
+        for index in range(len(team.robots)):
+            if recipients[index]:
+                bits = fuse_leaf(tree, team.params[0], maps, index, known)
+                robot = team.robots[index]
+                robot.entropy_bits -= bits
+                robot.received_bits += bits
+                robot.heard_bits += bits
+
+
+@inlined_kernel
+def fuse_leaf(tree, shared, maps, index, known):
+    """Fuse the leaf that was read last into a robot's belief; returns the bits that it brings.
+
+    Args:
+        tree: Tree.
+        shared: PARAMS of any robot.
+        maps: Maps.
+        index: The robot.
+        known: float32, precision that the leaf counts with.
+    """
+    walk, leaf, bits, shrink = tree.walk[0], tree.leaf[0], 0.0, 1.0
+    mean, precision = maps.beliefs.mean[index], maps.beliefs.precision[index]
+    pool = Pool(maps.cells, maps.beliefs.pooled[index], shared.prior_precision, shared.end_precision)
+    pooling, coverage = len(maps.cells.voxels) > 0, leaf.mean
+    for i in range(leaf.low[0], leaf.high[0]):
+        for j in range(leaf.low[1], leaf.high[1]):
+            row = (i * walk.size[1] + j) * walk.size[2]
+            first, last = row + leaf.low[2], row + leaf.high[2]
+            if pooling:
+                pool_row(pool, mean, precision, first, last, -1.0)
+            more, share = fuse_row(mean, precision, first, last, coverage, known)
+            if pooling:
+                pool_row(pool, mean, precision, first, last, 1.0)
+            bits, shrink = bits + more, shrink * share
+            if shrink < ROW_FOLD_BELOW:
+                bits, shrink = bits - 0.5 * math.log2(shrink), 1.0
+    return bits - 0.5 * math.log2(shrink)
