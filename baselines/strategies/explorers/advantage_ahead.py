@@ -35,10 +35,10 @@ from baselines.strategies.explorers.nearest_frontier import best_of
 from baselines.strategies.explorers.teammates import centres_of, team_of
 from baselines.strategies.explorers.tour import Tour, TourConfig
 from entropy_explore_env.scenario import Scenario
-from entropy_explore_env.validation import check_not_negative, check_positive
+from entropy_explore_env.validation import check_count, check_not_negative, check_positive
 
-_WIDEST = 90
-"""Voxels: means over more, or of paths that are longer, take too long."""
+_ALONE = 90.0
+"""Longest distance from a sliver to other frontier cells that counts, in voxel edges; more takes too long."""
 _DETOUR = 4.0
 """Free cells count in means if the path to them is no longer than this many radii."""
 _STOOD = 1e-3
@@ -58,8 +58,7 @@ class AheadConfig:
     """Around which place means are taken, what an opening is, and what counts how much.
 
     Attributes:
-        radius: How far, along either axis, u may be off the robot, in sensor ranges, at most 90 voxels;
-            openings whose path is longer wait.
+        radius: Voxels, along either axis, that u may be off the robot; openings whose path is longer wait.
         around: How far, along either axis, an opening reaches around a frontier cell, in sensor ranges; as
             wide are the cells of a grid of which one opening each counts.
         opening: Least number of known free voxels beside unknown ones there, in sensor ranges.
@@ -75,7 +74,7 @@ class AheadConfig:
         SettingError: One of them is not allowed.
     """
 
-    radius: float = 3.4
+    radius: int = 60
     around: float = 0.125
     opening: float = 0.125
     depth: float = 0.25
@@ -87,7 +86,8 @@ class AheadConfig:
 
     def __post_init__(self) -> None:
         """Check every field."""
-        check_positive(self, "radius", "around", "depth", "elsewhere", "ahead")
+        check_count(self, "radius", 1, 1_000_000)
+        check_positive(self, "around", "depth", "elsewhere", "ahead")
         check_not_negative(self, "opening", "gain", "turn", "passing")
 
 
@@ -120,7 +120,7 @@ class AdvantageAhead(Explorer):
     def pick(self, scene: Scene) -> int:
         """See `Explorer`."""
         heading = self._heading(scene)
-        horizon = self._radius(scene) + 1.0
+        horizon = self.config.radius + 1.0
         openings = self._openings(scene, *scene.paths.frontiers_within(horizon))
         if len(openings.voxels) > 1:
             worth = self._advantages(scene, openings, self._costs(scene, openings, heading))
@@ -131,10 +131,6 @@ class AdvantageAhead(Explorer):
             return self._tour(scene)
         costs = self._costs(scene, openings, heading)
         return self._by_way_of(scene, best_of(openings.voxels, -costs, scene.target))
-
-    def _radius(self, scene: Scene) -> int:
-        """Voxels that u may be off the robot."""
-        return min(round(self.config.radius * scene.cells.reach), _WIDEST)
 
     def _tour(self, scene: Scene) -> int:
         """The sliver to visit next where there is no opening."""
@@ -192,7 +188,7 @@ class AdvantageAhead(Explorer):
 
     def _alone(self, scene: Scene) -> float:
         """Longest distance from a sliver to other frontier cells that counts, in voxel edges."""
-        return min(scene.cells.reach, float(_WIDEST))
+        return min(scene.cells.reach, _ALONE)
 
     def _farther(self, scene: Scene, reach: float) -> _Openings:
         """The openings that the search finds first beyond a reach; none where there is none at all."""
@@ -249,7 +245,7 @@ class AdvantageAhead(Explorer):
 
         Bounds are those of `distance-advantage`: d(u, v) ≤ d(u, w) + d(w, v).
         """
-        paths, radius = scene.paths, self._radius(scene)
+        paths, radius = scene.paths, self.config.radius
         voxels, lengths = openings.voxels, openings.lengths
         paths.extend(_DETOUR * radius)
         around = paths.around(scene.here, radius)

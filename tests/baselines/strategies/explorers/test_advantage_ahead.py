@@ -48,7 +48,7 @@ def straight(length=30):
     return plan
 
 
-BARE = {"radius": 0.75, "opening": 0.0, "gain": 0.0, "turn": 0.0, "passing": 0.0, "around": 0.0125}
+BARE = {"opening": 0.0, "gain": 0.0, "turn": 0.0, "passing": 0.0, "around": 0.0125}
 """With these every frontier cell is an opening, and only lengths count."""
 
 
