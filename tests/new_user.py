@@ -114,10 +114,13 @@ class User:
         """Import and step, outside the clone; where the package lies."""
         return Path(self.call([self.python, "-c", _FIRST_STEP]).splitlines()[-1]).parent
 
-    def has(self, package: str) -> bool:
-        """Whether a package can be imported in the environment."""
-        said = self.call([self.python, "-c", f"import importlib.util as u; print(u.find_spec({package!r}))"])
-        return said.strip() != "None"
+    def can_import(self, module: str) -> bool:
+        """Whether a module can be imported in the environment, whatever it needs in its turn."""
+        try:
+            self.call([self.python, "-c", f"import {module}"])
+        except StepError:
+            return False
+        return True
 
     def check_gone(self) -> None:
         """Raise a StepError if the package can still be imported."""
@@ -178,7 +181,7 @@ def install(user: User) -> None:
 def examples(user: User) -> None:
     """Every code block of README and site."""
     for block in blocks():
-        missing = [name for name in _ONLY_IN_SOME if _imports(block.text, name) and not user.has(name)]
+        missing = [name for name in _imported_of_some(block.text) if not user.can_import(name)]
         if missing:
             print(f"    {block.name}: skipped, {missing[0]} is in no extra", file=sys.stderr)
             continue
@@ -189,9 +192,10 @@ def examples(user: User) -> None:
         user.call(words, folder)
 
 
-def _imports(text: str, package: str) -> bool:
-    """Whether an example imports a package."""
-    return re.search(rf"^\s*(import|from) {package}\b", text, re.MULTILINE) is not None
+def _imported_of_some(text: str) -> list[str]:
+    """The modules that an example imports from packages that no extra here brings."""
+    names = "|".join(_ONLY_IN_SOME)
+    return re.findall(rf"^\s*(?:import|from) ((?:{names})\b[\w.]*)", text, re.MULTILINE)
 
 
 _RUN_FILE = "import runpy; runpy.run_path('example.py', run_name='__main__')"

@@ -43,11 +43,11 @@ def test_a_step_that_fails_ends_it_and_leaves_the_folder(tmp_path, monkeypatch, 
 def test_examples_of_packages_that_are_not_there_are_skipped(tmp_path, monkeypatch, capsys):
     user = User(tmp_path, borrow=True, training_s=1.0)
     subprocess.run([sys.executable, "-m", "venv", "--without-pip", str(user.environment)], check=True)
-    assert user.has("json") and not user.has("benchmarl")
-    written = (("here", "import json\nopen('ran', 'w').close()"), ("there", "from benchmarl import x"))
+    assert user.can_import("json.decoder") and not user.can_import("json.moon")
+    written = (("here", "import json\nopen('ran', 'w').close()"), ("there", "from benchmarl.run import x"))
     monkeypatch.setattr(new_user, "blocks", lambda: [Block(*each) for each in written])
     new_user.examples(user)
-    assert "there: skipped, benchmarl is in no extra" in capsys.readouterr().err
+    assert "there: skipped, benchmarl.run is in no extra" in capsys.readouterr().err
     assert [path.parent.name for path in tmp_path.glob("examples/*/ran")] == ["here"]
 
 
