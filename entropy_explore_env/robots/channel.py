@@ -2,9 +2,10 @@
 
 One measurement is a 3-D vector from the sensor to what it saw, three 32-bit numbers: 96 bits. Every
 message opens with its sender's pose, five numbers: 160 bits. An announcement adds a viewpoint
-(position, yaw, pitch) with r̂ and α̂ (RochaMI), seven numbers: 384 bits in all. Where robots drift, each
-batch carries the covariance of its sender's pose, ten numbers: 320 bits more. A broadcast is charged
-once to its sender and once to each teammate that hears it. What reaches whom is a matter of distance, of
+(position, yaw, pitch) with r̂ and α̂ (RochaMI), seven numbers: 384 bits in all. A summary of a map costs
+the bits of its bytes (`map_summary`). Where robots drift, each batch and each summary carries the covariance
+of its sender's pose, ten numbers: 320 bits more. A broadcast is charged once to its sender and once to each
+teammate that hears it. What reaches whom is a matter of distance, of
 free sight through the true world, or of a signal that walls weaken.
 """
 

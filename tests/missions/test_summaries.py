@@ -14,7 +14,7 @@ from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.missions.summaries import precision_of_place
 from entropy_explore_env.reports.state_values import state_digest
 from entropy_explore_env.robots.localization import pack_covariance
-from entropy_explore_env.robots.map_summary import decode_map, encode_map
+from entropy_explore_env.robots.map_summary import decode_map, encode_map, is_summary
 from entropy_explore_env.scenario import with_settings
 from tests.reference.scenes import free_box, random_actions, started, wander
 
@@ -190,6 +190,27 @@ def test_a_delayed_summary_holds_what_was_measured_before_it_was_sent():
         8 * late.state.in_flight_parcels[0]["bytes"].sum() + 160 * under_way.sum()
     )
     assert received == 2 * robots_of(late, "bits_sent").sum()
+
+
+def test_no_two_summaries_under_way_have_one_place():
+    late = {"radio": {"late": 0.5, "late_s": 4.0}}
+    channel = {**SUMMARIES, **QUIET, "summary_every_s": 0.0, "delay_s": 3.0}
+    missions = started(free_box(**WORLD, channel=channel, faults=late), 6)
+    most = []
+
+    def note(_):
+        parcels = missions.state.in_flight_parcels[0]
+        live = parcels["place"][parcels["bytes"] > 0].tolist()
+        assert len(set(live)) == len(live)
+        most.append(len(live))
+        for place in live:
+            length = int(parcels["bytes"][parcels["place"] == place].max())
+            assert is_summary(
+                missions.state.in_flight_summaries[0, place, :length].tobytes(), missions.grid.shape
+            )
+
+    wander(missions, 80, 6, note)
+    assert max(most) > 8
 
 
 def test_a_place_is_known_as_well_as_its_covariance_says():
