@@ -29,6 +29,8 @@ from entropy_explore_env.writing import write_atomically
 
 ROOT = Path(__file__).parents[2]
 FOLDERS = ("belief", "robots", "missions")
+_ALSO = {"missions": ("reset_options", "refusals", "given_worlds", "parallel_env", "vector_env")}
+"""Folder → files of tests/envs that test what is in it."""
 KEPT = Path("results/reliability/branches")
 _LEFT_OUT = ("raise AssertionError", "if ASSERTING", "if TYPE_CHECKING")
 """Lines whose branches no sound mission takes, or that are there for type checkers."""
@@ -91,9 +93,10 @@ def sources_digest(root: Path) -> str:
 
 
 def test_files(root: Path, folders: Sequence[str]) -> list[str]:
-    """The files of tests of some folders, as paths from the root."""
+    """The files of tests of some folders of the library, as paths from the root."""
     found = [path for name in folders for path in sorted((root / "tests" / name).rglob("test_*.py"))]
-    return [str(path.relative_to(root)) for path in found]
+    also = [f"tests/envs/test_{name}.py" for folder in folders for name in _ALSO.get(folder, ())]
+    return [str(path.relative_to(root)) for path in found] + also
 
 
 def data_of(file: str, kept: Path) -> Path:

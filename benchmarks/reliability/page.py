@@ -293,7 +293,7 @@ def _coverage(rows: Sequence[Row]) -> str:
         return "Not measured yet: `python -m benchmarks.reliability.coverage`."
     lines = [
         f"With kernels interpreted, {_share_covered(rows):.1%} of branches were taken by the tests of these "
-        "folders, each ended after at most 10 s of the processor (`python -m "
+        "folders and some of the environments, each ended after at most 10 s of the processor (`python -m "
         "benchmarks.reliability.coverage`); "
         f"{rows[-1]['files']} of {rows[-1]['of_files']} files of tests were run. What only assertions of "
         "debug builds and type checkers reach is left out.",

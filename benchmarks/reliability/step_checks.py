@@ -34,6 +34,8 @@ _LARGE = (
     "scan_range_m",
     "scan_returned",
     "scan_utility_bits",
+    "own_mean",
+    "own_precision",
     "in_flight_rays",
     "phase_rays",
 )
