@@ -76,6 +76,30 @@ def test_repeats_make_up_for_lost_messages():
     assert shares[0] < 0.65 and shares[1] > 0.8
 
 
+def test_what_a_broadcast_does_not_reach_is_counted_and_waits_no_longer():
+    for channel in ({"range_m": 0.1}, {"reach": "signal", "signal": {"threshold_dbm": 90.0}}):
+        missions = played(phase_s=4.0, **channel)
+        sent = robots_of(missions, "messages_sent")
+        assert sent.min() > 3 and robots_of(missions, "messages_received").sum() == 0
+        assert (robots_of(missions, "messages_out_of_range") == 2 * sent).all()
+        assert robots_of(missions, "messages_lost").sum() == 0
+
+
+def test_what_a_silent_radio_broadcasts_is_counted_and_heard_by_nobody():
+    scenario = free_box(
+        robots=3,
+        channel={**NO_ANNOUNCEMENTS, "phase_s": 4.0},
+        faults={"silent": {"at_s": 0.001, "robots": (1,)}},
+        ending={"sigma_end": 1e-4},
+    )
+    missions = started(scenario)
+    wander(missions, 60, 3)
+    silenced = missions.state.faults[0]["messages_silenced"]
+    sent, heard = robots_of(missions, "messages_sent"), robots_of(missions, "messages_received")
+    assert silenced[1] > 0 and heard[1] == 0
+    assert heard[0] == sent[2] and heard[2] == sent[0]
+
+
 def test_a_lossless_broadcast_brings_what_sending_at_once_brings():
     """After the last phase all three hold the same measurements, in another order."""
     at_once, phased = played(80), played(80, phase_s=0.25)

@@ -199,8 +199,10 @@ def test_where_no_source_comes_and_for_other_costs_there_is_no_path():
 
 
 @pytest.mark.parametrize("sources", [[0, 4], [4, 0]])
-def test_what_is_as_near_to_two_sources_belongs_to_the_earlier(sources):
+@pytest.mark.parametrize("rates", [[1, 1, 1, 1, 1], [5, 1, 1, 3, 1], [1, 3, 1, 1, 5]])
+def test_what_is_as_near_to_two_sources_belongs_to_the_earlier(sources, rates):
+    """Whichever of the two comes to the middle first."""
     space = new_tessellation((5, 1, 1))
-    tessellate(space, np.ones((5, 1, 1), np.float32), np.array(sources), 0.0, True)
+    tessellate(space, np.array(rates, np.float32).reshape(5, 1, 1), np.array(sources), 0.0, True)
     near, far = (0, 1) if sources[0] == 0 else (1, 0)
     assert space.cells.reshape(-1).tolist() == [near, near, 0, far, far]
