@@ -65,8 +65,9 @@ in a world). A quarter of them is in view, less what obstacles hide. Errors are 
 
 _NEARNESS = """\
 How near fiducials are sighted matters less than how often. With known places a sighting is off by 0.05 m, and
-aside by 0.15 m at 15 m and half of that at 7.5 m; where few are in sight, what is added between two sightings is
-several times as much. The paper tracks features whose own places are uncertain, the more so the farther away."""
+aside by 0.15 m at 15 m and half of that at 7.5 m; where few are in sight, what is added between two sightings
+is several times as much. The paper tracks features whose own places are uncertain, the more so the farther
+away."""
 
 
 def _text(records: Records, claims: Sequence[Claim], command: str) -> str:
