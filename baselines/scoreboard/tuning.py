@@ -15,6 +15,7 @@ from pathlib import Path
 
 from baselines.cli.arguments import make_folder, parse, run_command
 from baselines.experiments.cells import run_cells
+from baselines.experiments.statistics import Interval
 from baselines.experiments.tables import markdown_table
 from baselines.scoreboard.mission import SETTINGS
 from baselines.scoreboard.results import PATH, Results
@@ -96,14 +97,18 @@ def tuning_table(results: Results, strategies: Sequence[str]) -> str:
                     f"`{strategy}`",
                     variant.partition(SETTINGS)[2] or "default",
                     sum(len(results.of(task, variant)) for task in tasks),
-                    "1"
-                    if variant == strategy
-                    else f"{to_default.value:.2f} ({to_default.low:.2f} … {to_default.high:.2f})",
-                    f"{to_yardstick.value:.2f} ({to_yardstick.low:.2f} … {to_yardstick.high:.2f})",
+                    "1" if variant == strategy else ranged(to_default),
+                    ranged(to_yardstick),
                     ", ".join(f"{name} {ratio.value:.2f}" for name, ratio in by_task if ratio is not None),
                 ]
             )
     return markdown_table(head, rows)
+
+
+def ranged(ratio: Interval) -> str:
+    """A ratio and its interval; without one that has no width, as of one mission in each plan."""
+    ends = f" ({ratio.low:.2f} … {ratio.high:.2f})" if ratio.low < ratio.high else ""
+    return f"{ratio.value:.2f}{ends}"
 
 
 def with_table(page: str, table: str) -> str:

@@ -7,10 +7,11 @@ import math
 import pytest
 
 from baselines.cli.arguments import run_command
+from baselines.experiments.statistics import Interval
 from baselines.scoreboard import tuning
 from baselines.scoreboard.mission import SETTINGS, configured
 from baselines.scoreboard.suites import Place, Task, find_suite, training_plans
-from baselines.scoreboard.tuning import BEGIN, END, GRID, variants, with_table
+from baselines.scoreboard.tuning import BEGIN, END, GRID, ranged, variants, with_table
 from baselines.strategies import make_strategy
 from entropy_explore_env.errors import SettingError
 from tests.baselines.strategies.explorers.test_missions import small_plan
@@ -40,6 +41,11 @@ def test_nothing_of_the_suite_is_tuned_on_but_dungeons_of_odd_number():
         else:
             assert task.scenario.split == "train" and same.scenario.split == "test"
             assert task.missions == 3
+
+
+def test_a_ratio_of_one_mission_in_each_plan_has_no_interval():
+    assert ranged(Interval(0.956, 0.9, 1.014)) == "0.96 (0.90 … 1.01)"
+    assert ranged(Interval(0.956, 0.956, 0.956)) == "0.96"
 
 
 def test_a_new_table_takes_the_place_of_the_old_one():
