@@ -43,7 +43,7 @@ STRATEGIES: MappingProxyType[str, Callable[[], Strategy]] = MappingProxyType(
         "planner-choice": PlannerChoice,
         "information-rate-v0": InformationRate,
         "information-per-scan": partial(
-            InformationRate, InformationRateConfig(per_scan=True, candidates=120)
+            InformationRate, InformationRateConfig(per_scan=True, candidates=120, gives_way=True)
         ),
         "per-time-visibility": FrontierStrategy,
         "nearest-frontier": NearestFrontier,

@@ -16,13 +16,14 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from baselines.strategies.knowledge import announced_cones, belief_of
+from baselines.strategies.protocol import random_viewpoint
 from entropy_explore_env.belief.paths.lattice import belief_costs
 from entropy_explore_env.belief.paths.planning import ANY_GOAL, search_paths
 from entropy_explore_env.belief.paths.search import cost_to, extract_path, new_search
 from entropy_explore_env.belief.paths.string_pulling import string_pulled
 from entropy_explore_env.belief.raycast import STOP_AT_COVERED
 from entropy_explore_env.missions.view import RobotView
-from entropy_explore_env.robots.motion import driving_time
+from entropy_explore_env.robots.motion import MoveEnd, driving_time
 from entropy_explore_env.scenario import Scenario
 from entropy_explore_env.viewpoints.drawing import (
     draw_gazes,
@@ -62,6 +63,7 @@ class InformationRateConfig:
             a place farther away.
         places: Uncertain places farther away that are evaluated then.
         unknown_cost: Traversal cost of unknown space, relative to known free space.
+        gives_way: Whether a robot that teammates stopped twice in a row goes to a random viewpoint.
     """
 
     per_scan: bool = False
@@ -72,6 +74,7 @@ class InformationRateConfig:
     poor: float = 0.1
     places: int = 12
     unknown_cost: float = 2.0
+    gives_way: bool = False
 
 
 @dataclass
@@ -84,6 +87,8 @@ class _TravelPlan:
     """Decisions until it looks for a place farther away again."""
     stops: list[np.ndarray] = field(default_factory=list)
     """Places (3,) in grid units that are still ahead."""
+    blocked: int = 0
+    """Drives in a row that a teammate's body stopped."""
 
 
 class InformationRate:
@@ -112,6 +117,10 @@ class InformationRate:
 
     def _choose(self, view: RobotView) -> np.ndarray:
         plan, config = self._plans[view.robot], self.config
+        plan.blocked = plan.blocked + 1 if view.move_end is MoveEnd.TEAMMATE else 0
+        if config.gives_way and plan.blocked > 1:
+            plan.stops = []
+            return random_viewpoint(view, self._rng)
         here = view.scenario.grid.in_grid_units(view.pose)
         cones = announced_cones(view)
         if plan.stops and not self._can_drive_straight(view, here[:3], plan.stops[0]):

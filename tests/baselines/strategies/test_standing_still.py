@@ -153,6 +153,11 @@ def test_robots_that_start_close_to_each_other_keep_moving(strategy, kind):
         assert longest_stand_s(kind, strategy, robots, seed=robots) < STILL_S
 
 
+def test_robots_in_a_row_let_each_other_out():
+    """Four robots stood for 96 s, each in the way of the next."""
+    assert longest_stand_s("corridors", "information-per-scan", 4, seed=6) < 20.0
+
+
 def test_robots_that_have_covered_all_go_on_where_the_mission_asks_for_more():
     """Two robots stood for 87 s, each scanning for ever from the centre of its Voronoi cell."""
     assert longest_stand_s("tunnels", "voronoi", 2, seed=3) < 20.0
