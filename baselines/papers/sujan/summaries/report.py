@@ -31,18 +31,20 @@ def write_report(folder: Path, records: Records, claims: Sequence[Claim], comman
 
 
 _ABOUT = """\
-Written by `{command}`: teams of three share Rocha04's batches, at most
-{bursts} measurements of a scan, or summaries, one every {every} s (threshold {threshold:g} bits), in {worlds}
-worlds of each scenario; the same worlds and starts in every cell. Channels lose nothing and reach everybody;
-robots announce where they go in all of them. A mission ends when one robot's map is known well enough (over
-terrain where σ is {sigma:g} on average, elsewhere as the scenarios have it), or at the scenario's time limit.
+Written by `{command}`.
+
+Teams of three share Rocha04's batches, at most {bursts} measurements of a scan, or
+summaries, one every {every} s (threshold {threshold:g} bits), in {worlds} worlds of each scenario; the same
+worlds and starts in every cell. Channels lose nothing and reach everybody; robots announce where they go
+in all of them. A mission ends when one robot's map is known well enough (over terrain where σ is {sigma:g} on
+average, elsewhere as the scenarios have it), or at the scenario's time limit.
 
 Summaries are compared with batches at equal bits a second: the batches' means over their mean bits a second
 are a curve, which is read at the bits of the summaries; beyond its ends its nearest point is taken. Ratios
 are batches over summaries, with 95 % paired bootstrap intervals over worlds; a claim holds if the whole
 interval is above 1. Errors are of coverage, over all voxels that can be seen, an unknown one being ½; robots'
-maps are those that they act on, the joint map fuses all that the team measured. They are taken at {moments}
-into the mission."""
+maps are those that they act on, the joint map fuses all that the team measured. They are taken at a moment
+of the mission: {moments}."""
 
 
 def _text(records: Records, claims: Sequence[Claim], command: str) -> str:
@@ -79,15 +81,23 @@ def _reading(records: Records) -> str:
         shares = ", ".join(f"{gain:.2f}" for gain in summaries)
         lines.append(
             f"- {task}: a bit of batches of {BURSTS[-1]} takes {batches:.2f} bits of entropy from teammates' "
-            f"maps, one of summaries {shares} (every {', '.join(f'{s:g}' for s in EVERY_S)} s)."
+            f"maps, one of summaries {shares} (every {', '.join(f'{s:g}' for s in EVERY_S)} s). Times of "
+            f"missions of one channel differ up to {spread(records, task):.1f}-fold between worlds."
         )
     why = (
         "Why: a measurement costs 96 bits whatever it says, and is traced anew by whoever hears it; a leaf "
         "costs some bits, stands for all voxels that are much the same, and for all scans since the last "
         "summary. The longer a robot waits, the more scans one leaf stands for, but teammates learn of it "
-        "later."
+        "later. The joint map depends on what is shared only through where robots go. Where missions of one "
+        "channel differ much between worlds, intervals are wide."
     )
     return "\n".join([why, "", *lines])
+
+
+def spread(records: Records, task: str) -> float:
+    """The longest over the shortest mission of one channel, in that channel in which they differ most."""
+    times = [figure_of(records[cell], "time") for _, cell in _cells(task)]
+    return max(float(time.max() / time.min()) for time in times)
 
 
 def _cells(task: str) -> list[tuple[str, str]]:
@@ -131,6 +141,8 @@ def figure_bits(records: Records) -> Figure:
                 values = [figure_of(records[cell], row).mean() for cell in cells]
                 axes.plot(bits, values, color=COLOURS[colour], marker="o", label=kind)
             axes.set(xscale="log", xlabel="bits/s", title=task if row == "time" else "")
+            axes.set_xticks([500, 1000, 2000, 4000], ["500", "1000", "2000", "4000"], minor=False)
+            axes.set_xticks([], minor=True)
         axes_of[0].set_ylabel(labels[row])
     figure.axes[0].legend(frameon=False)
     return figure
