@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -98,8 +99,9 @@ def _of_a_team(records: Records, scenario: str, robots: int, strategy: str) -> l
         if name not in alone.values() and _tells(records, *_pair(*who, name, alone[name]))
     }
     text = f"{team}: never slower than in isolation"
+    cut = [name for name in conditions() if _cut_off(records, cell_id(*who[:2], strategy, name))]
     return [
-        _claim(f"isolated-{prefix}", text, 1.0, found),
+        _claim(f"isolated-{prefix}", text, 1.0, found, cut),
         _claim(
             f"lost-{prefix}",
             f"{team}: losing one at half time costs at most its share",
@@ -107,16 +109,28 @@ def _of_a_team(records: Records, scenario: str, robots: int, strategy: str) -> l
             {LOST: slowdown(records, *who, LOST)}
             if _tells(records, *_pair(*who, LOST, NOTHING_FAILS))
             else {},
+            cut,
         ),
     ]
 
 
-def _claim(name: str, text: str, most: float, found: dict[str, Interval]) -> Claim:
-    """That every ratio lies below a number and MARGIN with its whole interval; beside it stands the worst."""
+def _cut_off(records: Records, cell: str) -> bool:
+    """Whether a mission of a cell did not come to its end: its time is longer than what is known of it."""
+    return any(not record.get("finished", False) for record in records[cell])
+
+
+def _claim(name: str, text: str, most: float, found: dict[str, Interval], cut: Sequence[str] = ()) -> Claim:
+    """That every ratio lies below a number and MARGIN with its whole interval; beside it stands the worst.
+
+    Under conditions in which missions were `cut` off ratios are at least so large: nothing is shown of them.
+    """
     allowed = f"≤ {most:.3g}"
     if not found:
         return Claim(name, f"{text}: all missions were cut off", allowed, None, None, None, False)
     worst = max(found, key=lambda condition: (found[condition].high, found[condition].value))
     value, low, high = found[worst]
-    holds = all(each.high <= most * MARGIN for each in found.values())
-    return Claim(name, f"{text}; at worst: {TEXTS[worst]}", allowed, value, low, high, holds)
+    unknown = [TEXTS[condition] for condition in found if condition in cut]
+    holds = not unknown and all(each.high <= most * MARGIN for each in found.values())
+    text = f"{text}; at worst: {TEXTS[worst]}"
+    text += f"; missions were cut off with {', '.join(unknown)}" if unknown else ""
+    return Claim(name, text, allowed, value, low, high, holds)

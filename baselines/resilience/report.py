@@ -106,8 +106,8 @@ how much of that a fault takes away is what the figures show. Silent teammates c
 _HOLDS = f""""Never slower than in isolation" compares each condition with the same robots that tell each
 other nothing (where a robot is lost, with isolated robots of which the same one is lost). "At most its
 share": the team that lost one of A robots at half time needs at most ½ + ½ · A/(A - 1) of the time. Both hold
-only where the whole interval of every ratio lies below {MARGIN:g} times what is allowed: few seeds, or
-missions that were cut off, show nothing."""
+only where the whole interval of every ratio lies below {MARGIN:g} times what is allowed, and no mission of
+the faulty team was cut off: few seeds, or missions that were cut off, show nothing."""
 
 _SAID = {
     **{

@@ -29,7 +29,7 @@ from entropy_explore_env.writing import write_atomically
 
 ROOT = Path(__file__).parents[2]
 FOLDERS = ("belief", "robots", "missions")
-_ALSO = {"missions": ("reset_options", "refusals", "given_worlds", "parallel_env", "vector_env")}
+_ALSO = {"missions": ("reset_options", "refusals", "given_worlds", "parallel_env")}
 """Folder → files of tests/envs that test what is in it."""
 KEPT = Path("results/reliability/branches")
 _LEFT_OUT = ("raise AssertionError", "if ASSERTING", "if TYPE_CHECKING")
