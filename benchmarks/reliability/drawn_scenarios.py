@@ -87,12 +87,16 @@ FIELDS: Mapping[type, Mapping[str, Numbers | Sequence[Any]]] = MappingProxyType(
             "xy_m_per_sqrt_rad": _length(1e-6, 100.0, 0.01, 0.5, 0.0),
             "z_m_per_sqrt_rad": _length(1e-6, 100.0, 0.01, 0.5, 0.0),
             "yaw_rad_per_sqrt_rad": Numbers(1e-6, 10.0, 1e-3, 0.3, also=(0.0,)),
+            "margin_m": _length(1e-6, 100.0, 0.05, 1.0, 0.0),
         },
         Fiducials: {
             "number": _count(0, 1000, 0, 8),
             "range_m": _length(1e-6, 1e6, 1.0, 20.0, math.inf),
             "range_sigma_m": _length(1e-6, 1e6, 0.01, 1.0),
             "bearing_sigma_rad": Numbers(1e-6, 10.0, 1e-3, 0.3),
+            "own_number": _count(0, 64, 0, 8),
+            "own_score": Numbers(1e-6, 2.0, 0.1, 1.0, also=(0.0,)),
+            "own_apart_m": _length(1e-6, 1e6, 0.5, 5.0, 0.0),
         },
         Channel: {
             "burst": _count(0, 1_000_000, 0, 200),
