@@ -25,7 +25,7 @@ from entropy_explore_env import (
     parallel_env,
 )
 from entropy_explore_env.envs.conformance import leaves, require_apart, require_same, snapshot
-from entropy_explore_env.missions import simulation as missions
+from entropy_explore_env.missions import episode as missions
 from tests.reference.scenes import SMALL
 
 BOX = "box-7x11x5"
