@@ -348,8 +348,13 @@ def _localization(scenario: Scenario, arrays: Mapping[str, np.ndarray]) -> Itera
 def _landmarks(
     landmarks: np.ndarray, corners: tuple[np.ndarray, np.ndarray], far_m: float
 ) -> Iterator[Values]:
-    """LANDMARK. Noise and its own error may let a robot believe one to be beyond the workspace."""
+    """LANDMARK. Noise and its own error may let a robot believe one to be beyond the workspace.
+
+    Free places hold zeros, or what was there before.
+    """
+    used = landmarks["used"][..., None]
     low, high = corners
+    low, high = np.where(used, low, np.minimum(low, 0.0)), np.where(used, high, np.maximum(high, 0.0))
     yield Values("landmarks.place", landmarks["place"], low, high)
     yield Values("landmarks.seen_from", landmarks["seen_from"], low, high)
     yield Values("landmarks.believed", landmarks["believed"], low - _MOST * far_m, high + _MOST * far_m)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import dataclasses
 import math
 import pickle
 
@@ -174,3 +175,18 @@ def test_what_follows_from_the_world_is_in_no_saved_state():
     missions = walked(DELAYED)
     state = set(missions.state._fields)
     assert set(snapshot(missions)) & state == state - set(FROM_WORLD)
+
+
+def test_free_places_of_landmarks_hold_zeros_wherever_the_workspace_is():
+    changes = {"localization": {"xy_m_per_sqrt_m": 0.1}, "fiducials": {"own_number": 3}}
+    scenario = free_box(**changes)
+    grid = dataclasses.replace(scenario.grid, origin_m=(-40.0, 30.0, 5.0))
+    scenario = dataclasses.replace(scenario, grid=grid)
+    missions = started(scenario)
+    arrays = missions.state._asdict()
+    check_ranges(missions.scenario, arrays)
+    landmarks = arrays["landmarks"].copy()
+    assert not landmarks["used"].any() and (landmarks["place"] == 0.0).all()
+    landmarks["used"][0, 0, 1] = True
+    with pytest.raises(RecordError, match=r"landmarks\.place.*0, 0, 1"):
+        check_ranges(missions.scenario, {**arrays, "landmarks": landmarks})
