@@ -178,7 +178,7 @@ def test_what_follows_from_the_world_is_in_no_saved_state():
 
 
 def test_free_places_of_landmarks_hold_zeros_wherever_the_workspace_is():
-    changes = {"localization": {"xy_m_per_sqrt_m": 0.1}, "fiducials": {"own_number": 3}}
+    changes = {"robot": {"localization": {"xy_m_per_sqrt_m": 0.1}}, "fiducials": {"own_number": 3}}
     scenario = free_box(**changes)
     grid = dataclasses.replace(scenario.grid, origin_m=(-40.0, 30.0, 5.0))
     scenario = dataclasses.replace(scenario, grid=grid)
