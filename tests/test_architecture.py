@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
@@ -46,6 +47,13 @@ def test_the_page_names_every_module_once_and_nothing_else():
     missing, gone = sorted(there - set(named)), sorted(set(named) - there)
     assert not missing, f"docs/architecture.md lacks a line for {missing}"
     assert not gone, f"docs/architecture.md names what is not there: {gone}"
+
+
+def test_no_two_files_of_tests_share_a_name():
+    """pytest imports files of folders that are no packages by their names alone, and refuses the second."""
+    files = (ROOT / "tests").rglob("test_*.py")
+    names = Counter(path.name for path in files if not (path.parent / "__init__.py").exists())
+    assert [name for name, count in names.items() if count > 1] == []
 
 
 def folders_above(path: str) -> list[str]:

@@ -17,7 +17,13 @@ from __future__ import annotations
 import math
 
 from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel, record_type
-from entropy_explore_env.robots.pose_covariance import dot4, length, sight_axes, spread_yaw_error
+from entropy_explore_env.robots.pose_covariance import (
+    dot4,
+    length,
+    sight_axes,
+    spread_yaw_error,
+    within_half_turn,
+)
 
 LANDMARK = record_type(
     [
@@ -126,6 +132,7 @@ def correct_by_landmark(estimate, landmark, seen, sigmas, matrices):
     taken = take_relative(estimate.covariance, added, up, expected, off, aside, taken)
     for number in range(4):
         estimate.error[number] -= taken[number]
+    estimate.error[3] = within_half_turn(estimate.error[3])
     landmark.sightings += 1
     return True
 

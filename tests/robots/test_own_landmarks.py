@@ -146,3 +146,13 @@ def test_a_planar_robot_s_height_is_no_obstacle():
     assert is_covariance(np.diag([1.0, 2.0, 0.0, 0.1]), np.diag([1.0, 2.0, 0.0, 0.1]), np.empty((4, 4)))
     assert not is_covariance(np.diag([1.0, -0.1, 0.0, 0.1]), np.eye(4), np.empty((4, 4)))
     assert math.isfinite(reference.landmark_score(*(np.ones((3, 4, 1)),) * 2, 0.5, (1, 1, 0), lambda m, q: m))
+
+
+def test_an_error_of_the_yaw_stays_within_half_a_turn():
+    """It is 3.1 rad off, and sees the landmark 0.3 rad to the right of where it expects it: 3.4 rad off."""
+    estimate, landmark = np.zeros(1, ESTIMATE)[0], np.zeros(1, LANDMARK)[0]
+    estimate["error"][3], estimate["covariance"][3, 3] = 3.1, 1.0
+    landmark["believed"][0], landmark["used"] = 2.0, True
+    seen = (2.0 * math.cos(0.3), -2.0 * math.sin(0.3), 0.0)
+    assert correct_by_landmark(estimate, landmark, seen, SIGMAS, np.zeros((2, 4, 4)))
+    assert estimate["error"][3] == pytest.approx(3.4 - 2.0 * math.pi, abs=0.02)
