@@ -126,7 +126,6 @@ def fill_start(scenario: Scenario, rules: Rules, state: MissionState, start: Sta
     remembering["candidates_rng"][:, 0] = splitmix_states(seed, episode, Stream.CANDIDATES, len(remembering))
     begin_estimates(seed, episode, start.poses, state.estimates[mission])
     state.fiducials[mission] = start.fiducials
-    state.landmarks[mission] = np.zeros((), state.landmarks.dtype)
 
 
 def _set_seen_goal(scenario: Scenario, state: MissionState, mission: int, world: World) -> None:

@@ -356,7 +356,7 @@ def _landmarks(
     low, high = corners
     low, high = np.where(used, low, np.minimum(low, 0.0)), np.where(used, high, np.maximum(high, 0.0))
     yield Values("landmarks.place", landmarks["place"], low, high)
-    yield Values("landmarks.seen_from", landmarks["seen_from"], low, high)
+    yield Values("landmarks.seen_from", landmarks["seen_from"], low - _ROUNDING, high + _ROUNDING)
     yield Values("landmarks.believed", landmarks["believed"], low - _MOST * far_m, high + _MOST * far_m)
     spread = np.where(np.eye(4, dtype=bool), 0.0, -_LARGEST_COVARIANCE)
     yield Values("landmarks.covariance", landmarks["covariance"], spread, _LARGEST_COVARIANCE)

@@ -91,8 +91,9 @@ def send_summary(summaries, team, maps, clock, in_flight, index, length, recipie
     delay_s = team.params[0].delay_s + draw_lateness(team.faults, index)
     bits = summary_bits(team.localization, length)
     count_sent(robot, _NO_MEASUREMENTS, bits)
-    reached = transmit(team, index, point(robot.scan_pose), time_s, recipients)
-    if reached and delay_s > 0.0:
+    if not transmit(team, index, point(robot.scan_pose), time_s, recipients):
+        return
+    if delay_s > 0.0:
         slot = enqueue(clock, team, in_flight, index, _NO_MEASUREMENTS, recipients, delay_s)
         if slot >= 0:
             pack_summary(summaries, slot, index, len(team.robots), length)

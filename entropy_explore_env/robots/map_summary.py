@@ -106,8 +106,8 @@ def encode_map(mean: np.ndarray, precision: np.ndarray, threshold_bits: float) -
         raise SettingError("threshold_bits", threshold_bits, "a finite number ≥ 0")
     if not (np.min(mean) >= 0.0 and np.max(mean) <= 1.0):
         raise SettingError("mean", "values outside", "coverages from 0 to 1")
-    if not (np.min(precision) >= 0.0 and np.max(precision) < math.inf):
-        raise SettingError("precision", "values outside", "finite numbers ≥ 0")
+    if not (np.min(precision) >= 0.0 and np.max(precision) <= np.finfo(np.float32).max):
+        raise SettingError("precision", "values outside", "finite float32 numbers ≥ 0")
     held = [np.ascontiguousarray(array, np.float32).ravel() for array in (mean, precision)]
     x, y, z = mean.shape
     shape, corner, tree = (x, y, z), (0, 0, 0), new_summary_tree(mean.size)

@@ -107,7 +107,7 @@ def foresee_covariance(covariance, surveyor, drive):
         end = point(drive.path_m[number])
         leg_m = math.sqrt((end[0] - begin[0]) ** 2 + (end[1] - begin[1]) ** 2 + (end[2] - begin[2]) ** 2)
         done_m = 0.0
-        while leg_m - done_m > left_m:
+        while leg_m - done_m > max(left_m, 0.0):
             done_m += max(left_m, 0.0)
             metres += max(left_m, 0.0)
             share = done_m / leg_m

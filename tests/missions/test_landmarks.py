@@ -161,6 +161,14 @@ def test_a_saved_state_with_impossible_landmarks_is_refused(field, value):
         restore(missions, arrays)
 
 
+def test_a_landmark_that_was_chosen_at_the_edge_of_the_workspace_may_be_beyond_it_by_rounding():
+    missions = started(three_robots())
+    arrays = snapshot(missions)
+    arrays["landmarks"]["seen_from"][0, 1, 2, 0] = missions.grid.origin_m[0] - 1e-12
+    restore(missions, arrays)
+    assert missions.state.landmarks["seen_from"][0, 1, 2, 0] < missions.grid.origin_m[0]
+
+
 @pytest.mark.parametrize(
     ("field", "value"),
     [

@@ -146,6 +146,8 @@ def test_a_summary_of_another_map_and_bad_input_are_named():
         encode_map(mean, precision, math.nan)
     with pytest.raises(SettingError, match="precision"):
         encode_map(mean, -precision - 1.0, 0.5)
+    with pytest.raises(SettingError, match=r"precision.*float32"):
+        encode_map(mean, precision.astype(float) + 1e300, 0.5)
     with pytest.raises(SettingError, match="coverages from 0 to 1"):
         encode_map(mean + 2.0, precision, 0.5)
     with pytest.raises(SettingError, match=r"precision.*\(7, 11, 5\)"):

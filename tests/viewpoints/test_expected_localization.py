@@ -182,3 +182,10 @@ def test_a_mission_then_does_what_was_foreseen(landmarks):
         found.covariance / np.outer(scale, scale), foreseen / np.outer(scale, scale), atol=0.01
     )
     assert (error_of_points(found.covariance, 1.0) < 1e-3) == bool(landmarks)
+
+
+def test_a_scan_that_is_overdue_on_a_way_of_no_length_is_taken_at_its_end():
+    due = drive((1.75, -1.75, 0.75), since_m=1.5)
+    before = np.diag([1.0, 1.0, 0.0, 0.0])
+    le, after = growth(before, surveyor([(3.75, -1.75, 0.75)], every_m=1.0), due, 0.0)
+    assert le < 0.0 and after[0, 0] == pytest.approx(1.0 / (1.0 + 1.0 / 0.05**2))
