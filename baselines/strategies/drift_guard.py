@@ -72,8 +72,8 @@ class DriftGuard:
         """A new mission begins; the strategy draws as it does alone."""
         self._edge_m = scenario.grid.voxel_size_m
         self._trails = [_Trail() for _ in range(scenario.robots)]
-        (self._rng,) = rng.spawn(1)
         self._strategy.reset(scenario, rng)
+        (self._rng,) = rng.spawn(1)
 
     def choose(self, views: Sequence[RobotView]) -> list[np.ndarray]:
         """What the strategy chooses, but for robots that it does not get on with."""

@@ -126,7 +126,8 @@ class KnownSpace(ABC):
     def _away_from_teammates(self, view: RobotView, memory: Memory, here: int) -> np.ndarray | None:
         """(5,) a pose to which the robot has a shorter known free way than any teammate has; None = none.
 
-        Of some that are drawn the one that is farthest from teammates, or a stop on the way there.
+        Teammates of whom it never heard do not count: where it heard of none there is no such pose. Of some
+        that are drawn the one that is farthest from teammates, or a stop on the way there.
         """
         mates_m = []
         for seen in view.teammates.values():
@@ -134,10 +135,12 @@ class KnownSpace(ABC):
                 memory.paths.start(voxel_of(view, seen.pose))
                 memory.paths.extend(math.inf)
                 mates_m.append(memory.paths.lengths_to(self._voxels))
+        if not mates_m:
+            return None
         memory.paths.start(here)
         memory.paths.extend(math.inf)
         voxels = self._reachable(memory)
-        nearest_m = np.min([each[voxels] for each in mates_m], axis=0, initial=np.inf)
+        nearest_m = np.min([each[voxels] for each in mates_m], axis=0)
         ours = np.flatnonzero((memory.paths.lengths_to(voxels) < nearest_m) & (voxels != here))
         if len(ours) == 0:
             return None

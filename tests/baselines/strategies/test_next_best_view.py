@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 
 import numpy as np
@@ -25,6 +26,7 @@ from entropy_explore_env.belief.fields import Belief, occupancy_probability
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.missions.view import view_of
+from entropy_explore_env.robots.motion import MoveEnd
 from entropy_explore_env.scenario import with_settings
 from entropy_explore_env.scenarios import find_scenario
 from entropy_explore_env.settings import Grid
@@ -284,3 +286,18 @@ def test_exact_robots_have_no_localization_error():
 def test_a_weight_of_the_localization_error_below_0_is_refused():
     with pytest.raises(SettingError, match=r"error_weight.*-0\.1"):
         NextBestViewConfig(error_weight=-0.1)
+
+
+def test_who_is_stopped_by_a_teammate_of_whom_it_never_heard_goes_on():
+    task = with_settings(
+        scenario_of((25, 21, 1)), {"robots": 2, "channel": {"burst": 0, "announcements": False}}
+    )
+    missions, strategy = started(task, 3), NextBestView(NextBestViewConfig())
+    strategy.reset(task, np.random.default_rng(4))
+    toward(missions, *strategy.choose([view_of(missions, 0, robot) for robot in range(2)]))
+    view = view_of(missions, 0, 0)
+    assert all(seen.heard_s < 0.0 for seen in view.teammates.values())
+    stopped = dataclasses.replace(view, move_end=MoveEnd.TEAMMATE)
+    for _ in range(4):
+        (chosen,) = strategy.choose([stopped])
+        assert np.isfinite(chosen).all() and np.linalg.norm(chosen[:3] - view.pose[:3]) > 0.0
