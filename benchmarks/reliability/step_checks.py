@@ -38,8 +38,9 @@ _LARGE = (
     "own_precision",
     "in_flight_rays",
     "phase_rays",
+    "in_flight_summaries",
 )
-"""Arrays of voxels and rays, which are not copied."""
+"""Arrays of voxels and rays, and summaries of maps, which are not copied."""
 _MOST_BYTES, _MOST_STEPS = 16 << 20, 200
 _BITS = 1e-6
 """Rounding of sums of bits, as a share of a map's."""
@@ -126,7 +127,7 @@ class CheckedSteps:
             self._check_promises()
             state, many = self._env.missions.state, self._count * self._env.num_envs
             steps = {name: self._flat(kept) for name, kept in self._kept.items()}
-            for name in ("in_flight_rays", "phase_rays"):  # only their shapes are asked for
+            for name in ("in_flight_rays", "phase_rays", "in_flight_summaries"):  # for their shapes alone
                 steps[name] = np.broadcast_to(0.0, (many, *getattr(state, name).shape[1:]))
             check_ranges(self._env.scenario, steps, voxels_and_rays=False)
         if maps:

@@ -44,6 +44,20 @@ def test_sound_steps_pass_and_are_forgotten():
         assert np.array_equal(played.checked._kept["robots"][0]["entropy_bits"], last["entropy_bits"])
 
 
+def test_summaries_under_way_are_looked_at_in_place():
+    """They are as long as maps: copied after each step they would leave room for a step or two."""
+    played = Played({"content": "summaries", "summary_every_s": 1.0, "delay_s": 2.0}, 60)
+    assert "in_flight_summaries" not in played.checked._kept
+    state = played.env.missions.state
+    carrying = np.argwhere(state.in_flight_parcels["bytes"] > 0)
+    assert len(carrying)
+    played.checked.check(maps=True)
+    mission, slot = carrying[0]
+    state.in_flight_summaries[mission, state.in_flight_parcels["place"][mission, slot], 0] ^= 1
+    with pytest.raises(RecordError, match="in_flight_summaries"):
+        played.checked.check(maps=True)
+
+
 @pytest.mark.parametrize(
     ("spoil", "said"),
     [
