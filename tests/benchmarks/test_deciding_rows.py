@@ -26,7 +26,7 @@ def test_rows_are_measured():
 def test_decisions_are_measured_in_a_plans_file():
     world = WORLDS / "depot.npz"
     row = plan_row("depot", str(world), load_world(world).grid, TINY.steps)
-    assert row.job == "a decision of planned-rate, depot, 1 robots" and row.goal == "< 50 ms"
+    assert row.job == "a decision of planned-rate, depot, 1 robot" and row.goal == "< 50 ms"
     assert row.unit == "ms" and row.ours > 0
 
 
