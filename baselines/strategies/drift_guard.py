@@ -4,9 +4,10 @@ Where a robot is wrong about its place its map is, too: a way that it takes for 
 and what it measures there again weighs less than what it measured before, as its pose is less certain now. So
 it may believe in a free way for ever, or for ever expect a scan to bring what it does not bring. Ours:
 
-- A drive that something solid ended is not tried again. Where the strategy wants to go there once more, or
-  the robot was blocked twice in a row, it backs off: a few voxels in a random direction that leads away from
-  where it meant to go. With each further block in a row it backs off once more before it goes on.
+- A drive that something solid ended, or for which no path was known, is not tried again. Where the strategy
+  wants to go there once more, or the robot was blocked twice in a row, it backs off: a few voxels in a random
+  direction that leads away from where it meant to go. With each further block in a row it backs off once more
+  before it goes on.
 - A robot that stayed within a voxel's edge or two of the same place for so many decisions in a row goes to a
   random viewpoint within its reach.
 

@@ -139,7 +139,7 @@ def correct_by_landmark(estimate, landmark, seen, sigmas, matrices):
 
 @inlined_kernel
 def take_relative(covariance, added, axis, expected, off, variance, taken):
-    """Take in what a sighting says along one axis of what was added: as `take_in`, from Q.
+    """Take in what a sighting says along one axis of what was added: as `correct_along`, from Q.
 
     Args:
         covariance: (4, 4) float64, Σ; changed in place.
