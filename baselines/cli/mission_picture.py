@@ -73,13 +73,9 @@ def mission_picture(recorder: Recorder, title: str, strategy: str, truth: bool =
         else:
             curves, shared, above, covered = figure.subplots(2, 2).ravel()
         _draw_entropies(curves, recorder)
-        alone = robots == 1  # it shares with nobody
-        shared.step(recorder.time_s, recorder.scans if alone else recorder.shared, where="post", color="0.2")
-        shared.set(
-            xlabel="simulated time (s)",
-            ylabel="scans" if alone else "measurements sent by the team",
-            title="Scans, cumulative" if alone else "Shared measurements, cumulative",
-        )
+        sent, label, of_what = _sent(recorder)
+        shared.step(recorder.time_s, sent, where="post", color="0.2")
+        shared.set(xlabel="simulated time (s)", ylabel=label, title=f"{of_what}, cumulative")
         _draw_map(figure, above, known, recorder, believed=True)
         _draw_map(figure, covered, coverage, recorder, believed=True)
         marks = _legend(recorder)
@@ -87,6 +83,16 @@ def mission_picture(recorder: Recorder, title: str, strategy: str, truth: bool =
         what = f"{title}, {strategy}, {counted(robots, 'robot')}, seed {missions.seeds[0]}"
         figure.suptitle(what, x=0.01, ha="left", fontsize=11)
         return png(figure)
+
+
+def _sent(recorder: Recorder) -> tuple[np.ndarray, str, str]:
+    """(T,) what the team has sent, the axis' label and what it is; scans of a robot that is alone."""
+    scenario = recorder.missions.scenario
+    if scenario.robots == 1:
+        return recorder.scans, "scans", "Scans"
+    if scenario.channel.content == "summaries":
+        return recorder.bits_sent / 1000, "sent by the team (kbit)", "Summaries"
+    return recorder.shared, "measurements sent by the team", "Shared measurements"
 
 
 def _draw_entropies(axes: Axes, recorder: Recorder) -> None:
@@ -181,11 +187,12 @@ def _draw_map(figure: Figure, axes: Axes, shown: _Map, recorder: Recorder, belie
         figure.colorbar(image, ax=axes, shrink=0.7, label=shown.label)
     fiducials_m = recorder.missions.state.fiducials[0]
     axes.plot(*fiducials_m[:, :2].T, **_mark("^", "white", "black"))
+    drifts = recorder.missions.estimates is not None
     for robot, path_m in enumerate(recorder.paths_m):
         colour = COLOURS[robot % len(COLOURS)]
         axes.plot(path_m[:, 0], path_m[:, 1], color=colour, linewidth=0.9)
         axes.plot(*path_m[0, :2], **_mark("o", colour, shown.edge))
-        axes.plot(*path_m[-1, :2], **_mark("s", colour, shown.edge))
+        axes.plot(*path_m[-1, :2], **_mark("D" if drifts else "s", colour, shown.edge))
     if believed:
         _draw_estimates(axes, recorder, shown.edge)
 
@@ -202,15 +209,15 @@ def _draw_estimates(axes: Axes, recorder: Recorder, edge: str) -> None:
         to_truth = np.stack([pose[:3], recorder.paths_m[robot][-1]])
         for line in (outline, to_truth):
             axes.plot(*line[:, :2].T, color=colour, linewidth=1.5, path_effects=stroke)
-        axes.plot(*pose[:2], **_mark("D", colour, edge))
+        axes.plot(*pose[:2], **_mark("s", colour, edge))
 
 
 def _legend(recorder: Recorder) -> list[Line2D]:
     """What the marks on the maps mean."""
     drifts = recorder.missions.estimates is not None
-    meanings = {"o": "start", "s": "end: where it truly is" if drifts else "end"}
+    meanings = {"o": "start", "s": "end"}
     if drifts:
-        meanings["D"] = "end: where it believes to be, with an ellipse of 2 σ"
+        meanings |= {"s": "end: where it believes to be, with an ellipse of 2 σ", "D": "where it truly is"}
     if recorder.missions.state.fiducials.shape[1]:
         meanings["^"] = "fiducial"
     return [Line2D([], [], label=text, **_mark(mark, "white", "black")) for mark, text in meanings.items()]

@@ -125,11 +125,13 @@ class Painter:
         stopped = np.zeros(len(robots), bool)
         if missions.scenario.faults.happen:
             stopped = failing(missions.state.faults[self._number], time_s)["stopped"]
+        summaries = missions.scenario.channel.content == "summaries"
+        sent = ("bits", "bits_sent") if summaries else ("rays", "measurements_sent")
         status = (
             f"time {time_s:,.0f} s",
             f"entropy left {max(remaining_share(missions, self._number).min(), 0.0):.1%}",
             f"scans {robots['scans'].sum():,}",
-            f"rays sent {robots['measurements_sent'].sum():,}",
+            f"{sent[0]} sent {robots[sent[1]].sum():,}",
             f"driven {robots['distance_m'].sum():,.1f} m",
             *((f"pose error {max(pose_errors(estimates))[0]:.2f} m at most",) if drifts else ()),
             *((f"stopped {stopped.sum()} of {len(robots)}",) if missions.scenario.faults.happen else ()),

@@ -79,6 +79,8 @@ class Moment(NamedTuple):
     """(A,) int64 scans of each robot since the reset."""
     shared: int
     """Measurements that the team has sent since the reset."""
+    bits_sent: int
+    """Bits that the team has sent since the reset."""
     scan_positions_m: np.ndarray
     """(A, 3) float64 where each robot took its latest scan."""
     poses: np.ndarray
@@ -108,6 +110,7 @@ class Recorder:
             entropy_bits=robots["entropy_bits"].copy(),
             scans=robots["scans"].copy(),
             shared=int(robots["measurements_sent"].sum()),
+            bits_sent=int(robots["bits_sent"].sum()),
             scan_positions_m=robots["scan_pose"][:, :3].copy(),
             poses=poses_now(self.missions, 0),
             depth_m=robots["depth_m"].copy(),
@@ -148,6 +151,11 @@ class Recorder:
     def shared(self) -> np.ndarray:
         """(T,) int64 measurements that the team has sent since the reset."""
         return np.array([moment.shared for moment in self._moments])
+
+    @property
+    def bits_sent(self) -> np.ndarray:
+        """(T,) int64 bits that the team has sent since the reset."""
+        return np.array([moment.bits_sent for moment in self._moments])
 
     @property
     def depths_m(self) -> np.ndarray:

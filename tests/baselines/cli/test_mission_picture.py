@@ -61,9 +61,9 @@ def test_robots_that_drift_stand_where_they_believe_to_be_beside_where_they_are(
     assert len(panels) == 3
     for axes in panels:
         np.testing.assert_allclose(marks(axes, "^"), np.array(LANDMARKS)[:, :2])
-        np.testing.assert_allclose(marks(axes, "s"), true)
+        np.testing.assert_allclose(marks(axes, "D"), true)
         knows = axes.get_title().startswith("What")
-        np.testing.assert_allclose(marks(axes, "D"), believed if knows else np.zeros((0, 2)))
+        np.testing.assert_allclose(marks(axes, "s"), believed if knows else np.zeros((0, 2)))
         for robot in range(2 if knows else 0):
             lines = [np.stack(line.get_data(), axis=1) for line in axes.lines]
             assert any(np.array_equal(line, np.stack([believed[robot], true[robot]])) for line in lines)
@@ -74,10 +74,23 @@ def test_robots_that_drift_stand_where_they_believe_to_be_beside_where_they_are(
     (legend,) = figure.legends
     assert [text.get_text() for text in legend.texts] == [
         "start",
-        "end: where it truly is",
         "end: where it believes to be, with an ellipse of 2 σ",
+        "where it truly is",
         "fiducial",
     ]
+
+
+@pytest.mark.parametrize(("content", "label"), [("measurements", "measurements"), ("summaries", "kbit")])
+def test_what_a_team_sends_is_drawn_by_what_it_is(drawn, content, label):
+    channel = {"content": content, "summary_every_s": 0.5} if content == "summaries" else {}
+    recorder = recorded(started(free_box(robots=2, grid=GRID, channel=channel)))
+    mission_picture(recorder, "box", "random")
+    (axes,) = (axes for axes in drawn[0].axes if axes.get_title().endswith("cumulative"))
+    sent = axes.lines[0].get_ydata()
+    assert label in axes.get_ylabel() and sent[-1] > 0.0
+    robots = recorder.missions.state.robots[0]
+    whole = robots["bits_sent"].sum() / 1000 if content == "summaries" else robots["measurements_sent"].sum()
+    assert sent[-1] == pytest.approx(whole)
 
 
 def test_robots_that_know_where_they_are_have_no_estimates(drawn):
