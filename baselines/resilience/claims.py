@@ -99,7 +99,11 @@ def _of_a_team(records: Records, scenario: str, robots: int, strategy: str) -> l
         if name not in alone.values() and _tells(records, *_pair(*who, name, alone[name]))
     }
     text = f"{team}: never slower than in isolation"
-    cut = [name for name in conditions() if _cut_off(records, cell_id(*who[:2], strategy, name))]
+    cut = [
+        name
+        for name in conditions()
+        if name not in alone.values() and _cut_off(records, cell_id(*who[:2], strategy, name))
+    ]
     return [
         _claim(f"isolated-{prefix}", text, 1.0, found, cut),
         _claim(
@@ -109,7 +113,7 @@ def _of_a_team(records: Records, scenario: str, robots: int, strategy: str) -> l
             {LOST: slowdown(records, *who, LOST)}
             if _tells(records, *_pair(*who, LOST, NOTHING_FAILS))
             else {},
-            cut,
+            [name for name in cut if name == LOST],
         ),
     ]
 
@@ -129,7 +133,7 @@ def _claim(name: str, text: str, most: float, found: dict[str, Interval], cut: S
         return Claim(name, f"{text}: all missions were cut off", allowed, None, None, None, False)
     worst = max(found, key=lambda condition: (found[condition].high, found[condition].value))
     value, low, high = found[worst]
-    unknown = [TEXTS[condition] for condition in found if condition in cut]
+    unknown = [TEXTS[condition] for condition in cut]
     holds = not unknown and all(each.high <= most * MARGIN for each in found.values())
     text = f"{text}; at worst: {TEXTS[worst]}"
     text += f"; missions were cut off with {', '.join(unknown)}" if unknown else ""
