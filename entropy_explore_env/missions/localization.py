@@ -143,14 +143,16 @@ def estimate_in(estimates, mission, index):
 
 
 @lean_kernel
-def is_uncertain(estimate):
-    """Whether a robot's pose is an estimate of a covariance that is not 0; `estimate` None = it is exact."""
+def pose_variance(estimate):
+    """(place, yaw): variance of a robot's place, summed over its axes in m², and of its yaw in rad².
+
+    Args:
+        estimate: ESTIMATE, or None = its pose is exact.
+    """
     if estimate is None:  # known while compiling: nothing of the rest is compiled
-        return False
-    for number in range(4):
-        if estimate.covariance[number, number] > 0.0:
-            return True
-    return False
+        return 0.0, 0.0
+    covariance = estimate.covariance
+    return covariance[0, 0] + covariance[1, 1] + covariance[2, 2], covariance[3, 3]
 
 
 @lean_kernel

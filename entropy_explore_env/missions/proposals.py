@@ -13,7 +13,7 @@ import numpy as np
 from entropy_explore_env.belief.fields import Belief
 from entropy_explore_env.belief.paths.lattice import Costs
 from entropy_explore_env.compilation.kernels import lean_kernel
-from entropy_explore_env.missions.localization import believed_pose, estimate_in, is_uncertain
+from entropy_explore_env.missions.localization import believed_pose, estimate_in, pose_variance
 from entropy_explore_env.missions.observation.own_state import entropy_left
 from entropy_explore_env.missions.poses import copy_numbers, grid_size, pose_at, to_grid_units, within_grid
 from entropy_explore_env.missions.silence import silent_since
@@ -50,8 +50,9 @@ class PlannerInput(NamedTuple):
     """Taken from its map by its latest scan."""
     move_end: int
     under_way: bool
-    uncertain: bool
-    """Whether its pose is an estimate, of a covariance that is not 0."""
+    place_variance_m2: float
+    """Of its pose estimate, the sum over x, y and z; 0 = it knows its pose."""
+    yaw_variance_rad2: float
     heard: np.ndarray
     """(A,) HEARD."""
     mean: np.ndarray
@@ -133,6 +134,9 @@ def propose_to(params, robot, given, proposer, candidates, experience, parts):
     scratch.here[3], scratch.here[4] = given.pose[3], given.pose[4]
     copy_numbers(to_grid_units(own, given.target), scratch.target, 3)
     scratch.target[3], scratch.target[4] = given.target[3], given.target[4]
+    for scan in (proposer.drawn, proposer.exact):
+        scan.pose_variance[0] = given.place_variance_m2 / (own.voxel_size_m * own.voxel_size_m)
+        scan.pose_variance[1] = given.yaw_variance_rad2
     mates, cones = _hear(params, robot, given, scratch)
     mean, precision, none = given.mean, given.precision, given.mean[:0]
     known, cost = proposer.exact.known_precision, proposer.unknown_cost
@@ -152,7 +156,7 @@ def propose_to(params, robot, given, proposer, candidates, experience, parts):
         given.came_bits,
         given.move_end,
         given.under_way,
-        given.uncertain,
+        given.place_variance_m2 > 0.0 or given.yaw_variance_rad2 > 0.0,
     )
     features, context, overlaps = parts
     described = len(features) > 0 or len(context) > 0
@@ -216,6 +220,7 @@ def propose_missions(proposing, proposer, kind, offsets, first, last, out):
                 for ray in range(params.rays):
                     came += proposing.utility_bits[mission, index, ray]
                 estimate = estimate_in(proposing.estimates, mission, index)
+                place_variance, yaw_variance = pose_variance(estimate)
                 given = PlannerInput(
                     believed_pose(estimate, params, pose_at(params, own, clock.time_s)),
                     clock.time_s,
@@ -226,7 +231,8 @@ def propose_missions(proposing, proposer, kind, offsets, first, last, out):
                     came,
                     own.move_end,
                     own.under_way,
-                    is_uncertain(estimate),
+                    place_variance,
+                    yaw_variance,
                     proposing.heard[mission, index],
                     proposing.mean[mission, index],
                     proposing.precision[mission, index],

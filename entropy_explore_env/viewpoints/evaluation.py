@@ -97,6 +97,7 @@ def robot_model(
         voxels_behind=int(sensor.voxels_behind),
         known_precision=float(KNOWN_RATIO / scenario.sigma_prior**2),
         stop_probability=float(stop_probability),
+        pose_variance=np.zeros(2),
     )
     drive = DriveModel(
         max_speed_m_s=float(robot.max_speed_m_s),

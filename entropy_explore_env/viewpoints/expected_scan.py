@@ -9,7 +9,7 @@ import numpy as np
 
 from entropy_explore_env.belief.measurement_model import measurement_precision
 from entropy_explore_env.belief.raycast import OPEN, OPEN_END, STOP_AT_COVERED, Crossing, Line, cast_ray
-from entropy_explore_env.compilation.kernels import lean_kernel
+from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel
 from entropy_explore_env.viewpoints.gathered_bits import gathered_bits
 
 
@@ -33,6 +33,9 @@ class ScanModel(NamedTuple):
     """Voxels with less precision are unknown."""
     stop_probability: float
     """Probability that an unknown voxel stops a ray."""
+    pose_variance: np.ndarray
+    """(2,) float64: of the robot's place, summed over its axes, in squared voxel edges, and of its yaw, rad²;
+    zeros = it knows its pose."""
 
 
 class ScanScratch(NamedTuple):
@@ -56,6 +59,27 @@ def new_scan_scratch(voxels: int, longest_ray: int) -> ScanScratch:
         np.zeros(longest_ray, np.int32),
         np.zeros(longest_ray, np.int64),
     )
+
+
+@inlined_kernel
+def expected_precision(scan, length, direction):
+    """Precision of the coverage that a ray of the sensor should measure, less what the pose makes uncertain.
+
+    1/σ² with σ² = σ(d)² + off, and off the mean square of how far the measured point is off in voxel edges,
+    as `localization.weigh_by_covariance` fuses it, but for what place and yaw have in common.
+
+    Args:
+        scan: A ScanModel.
+        length: Of the ray, voxel edges.
+        direction: (x, y, z), unit vector.
+    """
+    range_m = length * scan.voxel_size_m
+    precision = measurement_precision(range_m, scan.sigma_min, scan.sigma_slope_per_m, scan.sigma_exponent)
+    place, yaw = scan.pose_variance[0], scan.pose_variance[1]
+    if place > 0.0 or yaw > 0.0:
+        lever = length * length * (direction[0] * direction[0] + direction[1] * direction[1])
+        precision = precision / (1.0 + precision * (place + lever * yaw))
+    return precision
 
 
 @lean_kernel
@@ -102,9 +126,7 @@ def expected_scan_bits(belief, scan, viewpoint, cones, scratch):
             range_m = length * scan.voxel_size_m
             if end != OPEN and range_m < scan.min_range_m:
                 continue
-            gain = scan.sensor_rays * measurement_precision(
-                range_m, scan.sigma_min, scan.sigma_slope_per_m, scan.sigma_exponent
-            )
+            gain = scan.sensor_rays * expected_precision(scan, length, direction)
             for i in range(n):
                 voxel = np.uint32(scratch.crossed[i])
                 if scratch.added[voxel] == 0.0:

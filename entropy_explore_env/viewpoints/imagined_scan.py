@@ -10,10 +10,10 @@ from __future__ import annotations
 
 import math
 
-from entropy_explore_env.belief.measurement_model import measurement_precision
 from entropy_explore_env.belief.raycast import OPEN, OPEN_END, STOP_AT_COVERED, Crossing, Line, cast_ray
 from entropy_explore_env.belief.voxel_index import grid_index
 from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel
+from entropy_explore_env.viewpoints.expected_scan import expected_precision
 from entropy_explore_env.viewpoints.gathered_bits import gathered_bits
 
 _LEAST_SHARE = 1e-3
@@ -52,9 +52,7 @@ def _imagine_ray(belief, scan, gap_probability, start, direction, count, scratch
     if end != OPEN and range_m < scan.min_range_m:
         return count
     share = 1.0
-    gain = scan.sensor_rays * measurement_precision(
-        range_m, scan.sigma_min, scan.sigma_slope_per_m, scan.sigma_exponent
-    )
+    gain = scan.sensor_rays * expected_precision(scan, length, direction)
     for i in range(n):
         voxel = scratch.crossed[i]
         if scratch.added[voxel] == 0.0:

@@ -133,9 +133,11 @@ def test_views_hold_the_candidates_and_write_them_as_actions():
             view.candidates[0] = 0.0
 
 
-def test_a_view_is_proposed_what_a_mission_is():
+@pytest.mark.parametrize("drift", [0.0, 0.1])
+def test_a_view_is_proposed_what_a_mission_is(drift):
     """From the same random state the same candidates and features, bitwise."""
-    fresh = started(free_box(action=ACTION, observation=SEEN), 5)
+    robot = {"localization": {"xy_m_per_sqrt_rad": drift, "yaw_rad_per_sqrt_rad": drift}}
+    fresh = started(free_box(action=ACTION, observation=SEEN, robot=robot), 5)
     proposer = ViewProposer(fresh.scenario, np.random.default_rng(0), overlaps=True)
     proposer._experience["candidates_rng"][:, 0] = splitmix_states(5, 0, Stream.CANDIDATES, 2)
     for _ in range(12):
@@ -149,7 +151,11 @@ def test_a_view_is_proposed_what_a_mission_is():
                 np.testing.assert_array_equal(proposer.features(robot), parts["candidates"])
                 np.testing.assert_array_equal(proposer.context(robot), parts["context"])
                 np.testing.assert_array_equal(proposer.overlaps(robot), parts["overlaps"])
+                variance, covariance = proposer._proposers[0].exact.pose_variance, view.covariance
+                assert variance[0] == pytest.approx(np.trace(covariance[:3, :3]) / 0.5**2)
+                assert variance[1] == covariance[3, 3]
         wander(fresh, 1, 7)
+    assert bool(np.all(variance > 0.0)) == (drift > 0.0)
 
 
 def test_a_policy_observes_and_acts_through_views_of_other_actions():

@@ -27,7 +27,7 @@ NO_CONES = np.zeros(0, CONE)
 SENSOR = RangeSensor((math.pi / 3, math.pi / 4), math.pi / 24, sigma_min=0.1, sigma_slope_per_m=0.05)
 
 
-def model(stop_probability=0.0, known_precision=0.0, rays=1.0, sensor=SENSOR):
+def model(stop_probability=0.0, known_precision=0.0, rays=1.0, sensor=SENSOR, pose_variance=(0.0, 0.0)):
     offsets = sensor_model(sensor)
     return ScanModel(
         offsets.yaw_offsets,
@@ -42,6 +42,7 @@ def model(stop_probability=0.0, known_precision=0.0, rays=1.0, sensor=SENSOR):
         sensor.voxels_behind,
         known_precision,
         stop_probability,
+        np.array(pose_variance, float),
     )
 
 
@@ -111,3 +112,15 @@ def test_voxels_left_to_teammates_count_nothing():
     assert expected(mean, precision, viewpoint, model(), beside) == pytest.approx(all_of_it, rel=0.05)
     short = np.array([cone_of(np.array([1.5, 5.5, 2.5, 0.0, 0.0]), 2.0, math.pi / 2)])
     assert 0.0 < expected(mean, precision, viewpoint, model(), short) < all_of_it
+
+
+def test_what_an_uncertain_pose_adds_to_the_variance_of_a_ray():
+    """One ray along x, 3.5 edges to the wall: σ² + 0.2 + 3.5² · 0.01; straight up its yaw does not matter."""
+    one = RangeSensor((0.0, 0.0), math.pi / 24, sigma_min=0.1, sigma_slope_per_m=0.0, voxels_behind=0)
+    mean, precision = np.zeros(SIZE), np.ones(SIZE)
+    level, upwards = (3.5, 5.5, 2.5, 0.0, 0.0), (3.5, 5.5, 2.5, 0.0, -math.pi / 2)
+    for at, voxels, off in ((level, 4, 0.2 + 3.5**2 * 0.01), (upwards, 3, 0.2)):
+        scan = model(sensor=one, pose_variance=(0.2, 0.01))
+        added = 1.0 / (0.1**2 + off)
+        found = expected(mean.astype(np.float32), precision.astype(np.float32), at, scan)
+        assert found == pytest.approx(voxels * 0.5 * math.log2(1.0 + added), rel=1e-5)
