@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from entropy_explore_env.belief.raycast import OPEN, STOP_AT_COVERED, Line, cast_range
-from entropy_explore_env.compilation.kernels import lean_kernel
+from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel
 from entropy_explore_env.errors import WorldError
 from entropy_explore_env.missions.localization import keep_in_workspace
 from entropy_explore_env.randomness import Stream, generator
@@ -96,17 +96,10 @@ def sight_fiducials(localization, params, index, sensor, scene, pose):
     estimate, own = localization.estimates[index], localization.params[index]
     for number in range(len(localization.fiducials)):
         fiducial = localization.fiducials[number]
-        away = (
-            fiducial[0] - estimate.place[0],
-            fiducial[1] - estimate.place[1],
-            fiducial[2] - estimate.place[2],
-        )
+        away = way_to(estimate.place, fiducial)
         if not in_sight(own, sensor.params[0], scene, pose, away):
             continue
-        error = sighting_error(away, own.range_sigma_m, own.bearing_sigma_rad, estimate.sighting_rng)
-        x, y, z = away[0] + error[0], away[1] + error[1], away[2] + error[2]
-        along, across = math.cos(estimate.error[3]), math.sin(estimate.error[3])
-        seen = along * x - across * y, across * x + along * y, z
+        seen = measured_way(own, estimate, away)
         expected = (
             away[0] - estimate.error[0],
             away[1] - estimate.error[1],
@@ -114,6 +107,27 @@ def sight_fiducials(localization, params, index, sensor, scene, pose):
         )
         correct_estimate(estimate, seen, expected, own.range_sigma_m, own.bearing_sigma_rad)
     keep_in_workspace(estimate, params)
+
+
+@inlined_kernel
+def way_to(place, other):
+    """(x, y, z) from one place to another."""
+    return other[0] - place[0], other[1] - place[1], other[2] - place[2]
+
+
+@lean_kernel
+def measured_way(own, estimate, away):
+    """(x, y, z) of a landmark as a robot measures it, turned by the yaw that it believes.
+
+    Args:
+        own: LOCALIZATION_PARAMS of the robot.
+        estimate: ESTIMATE; its random state of sightings is drawn from.
+        away: (x, y, z), where it truly is from the robot.
+    """
+    error = sighting_error(away, own.range_sigma_m, own.bearing_sigma_rad, estimate.sighting_rng)
+    x, y, z = away[0] + error[0], away[1] + error[1], away[2] + error[2]
+    along, across = math.cos(estimate.error[3]), math.sin(estimate.error[3])
+    return along * x - across * y, across * x + along * y, z
 
 
 @lean_kernel

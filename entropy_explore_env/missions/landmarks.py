@@ -12,11 +12,10 @@ from entropy_explore_env.belief.measurement_model import Return
 from entropy_explore_env.belief.raycast import OBSTACLE, STOP_AT_COVERED, Line, cast_range
 from entropy_explore_env.belief.voxel_index import flat_index
 from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel
-from entropy_explore_env.missions.fiducials import in_sight
+from entropy_explore_env.missions.fiducials import in_sight, measured_way, way_to
 from entropy_explore_env.missions.localization import keep_in_workspace
 from entropy_explore_env.missions.poses import copy_numbers
 from entropy_explore_env.robots.landmarks import correct_by_landmark
-from entropy_explore_env.robots.localization import sighting_error
 from entropy_explore_env.robots.pose_covariance import length
 
 _HIT = int(Return.HIT)
@@ -52,27 +51,6 @@ def sight_landmarks(localization, params, index, sensor, scene, pose, matrices):
             sigmas = own.range_sigma_m, own.bearing_sigma_rad
             correct_by_landmark(estimate, landmark, measured_way(own, estimate, away), sigmas, matrices)
     keep_in_workspace(estimate, params)
-
-
-@inlined_kernel
-def way_to(place, other):
-    """(x, y, z) from one place to another."""
-    return other[0] - place[0], other[1] - place[1], other[2] - place[2]
-
-
-@lean_kernel
-def measured_way(own, estimate, away):
-    """(x, y, z) of a landmark as a robot measures it, turned by the yaw that it believes.
-
-    Args:
-        own: LOCALIZATION_PARAMS of the robot.
-        estimate: ESTIMATE; its random state of sightings is drawn from.
-        away: (x, y, z), where it truly is from the robot.
-    """
-    error = sighting_error(away, own.range_sigma_m, own.bearing_sigma_rad, estimate.sighting_rng)
-    x, y, z = away[0] + error[0], away[1] + error[1], away[2] + error[2]
-    along, across = math.cos(estimate.error[3]), math.sin(estimate.error[3])
-    return along * x - across * y, across * x + along * y, z
 
 
 @lean_kernel

@@ -12,6 +12,7 @@ import numpy as np
 
 from entropy_explore_env.belief.map_update import gather_ray
 from entropy_explore_env.belief.measurement_model import Return
+from entropy_explore_env.belief.voxel_index import grid_index
 from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel
 from entropy_explore_env.robots.map_tree import Tree
 
@@ -81,8 +82,7 @@ def note_measured(summaries, index, scan, size):
 @inlined_kernel
 def widen(state, voxel, size):
     """Widen the box of a SUMMARY by a voxel. A ray is straight: its ends are enough."""
-    column = voxel // size[2]
-    place = column // size[1], column % size[1], voxel % size[2]
+    place = grid_index(size, voxel)
     empty = state.high[0] == 0
     for axis in range(3):
         if empty or place[axis] < state.low[axis]:

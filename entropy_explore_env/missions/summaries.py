@@ -100,12 +100,28 @@ def send_summary(summaries, team, maps, clock, in_flight, index, length, recipie
         return
     here = believed_scan_pose(team.localization, robot, index)
     most = latest_precision(team.localization, index, team.params[0].voxel_size_m)
+    note_summary(team, recipients, index, here, time_s, time_s, bits)
+    hear_summary(summaries.tree, team, maps, recipients, length, most)
+
+
+@lean_kernel
+def note_summary(team, recipients, sender, pose, sent_s, time_s, bits):
+    """Count a summary with those who take it in, and note where its sender was.
+
+    Args:
+        team: Team.
+        recipients: (A,) bool, whom it reaches; in place, who takes it in.
+        sender: Its number.
+        pose: (x, y, z, yaw, pitch), where the sender believed to be.
+        sent_s: When.
+        time_s: Now.
+        bits: What it costs.
+    """
     for mate in range(len(team.robots)):
         if recipients[mate]:
             recipients[mate] = takes_in(team.faults, team.robots[mate], mate, time_s, bits)
         if recipients[mate]:
-            note_message(team.robots[mate], team.heard[mate, index], here, time_s, _NO_MEASUREMENTS, bits)
-    hear_summary(summaries.tree, team, maps, recipients, length, most)
+            note_message(team.robots[mate], team.heard[mate, sender], pose, sent_s, _NO_MEASUREMENTS, bits)
 
 
 @lean_kernel
@@ -152,12 +168,7 @@ def receive_summary(summaries, team, maps, in_flight, slot):
     copy_numbers(summaries.contents[parcel.place], summaries.tree.coder.data, length)
     most = sent_precision(team.localization, in_flight.covariances, slot, team.params[0].voxel_size_m)
     recipients = in_flight.recipients[slot]
-    for mate in range(len(team.robots)):
-        if recipients[mate]:
-            recipients[mate] = takes_in(team.faults, team.robots[mate], mate, time_s, bits)
-        if recipients[mate]:
-            robot, heard = team.robots[mate], team.heard[mate, sender]
-            note_message(robot, heard, message.pose, message.sent_s, _NO_MEASUREMENTS, bits)
+    note_summary(team, recipients, sender, message.pose, message.sent_s, time_s, bits)
     hear_summary(summaries.tree, team, maps, recipients, length, most)
     return True
 

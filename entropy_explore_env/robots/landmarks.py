@@ -18,8 +18,10 @@ import math
 
 from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel, record_type
 from entropy_explore_env.robots.pose_covariance import (
-    dot4,
+    gain_along,
+    keep_positive,
     length,
+    lessen,
     sight_axes,
     spread_yaw_error,
     within_half_turn,
@@ -153,24 +155,8 @@ def take_relative(covariance, added, axis, expected, off, variance, taken):
     Returns:
         The same, with what this axis takes.
     """
-    h = axis[0], axis[1], axis[2], axis[1] * expected[0] - axis[0] * expected[1]
-    gain_0, gain_1 = dot4(added[0], h), dot4(added[1], h)
-    gain_2, gain_3 = dot4(added[2], h), dot4(added[3], h)
-    gains = gain_0, gain_1, gain_2, gain_3
-    spread = max(dot4(gains, h), 0.0) + variance
-    if not math.isfinite(spread):
-        return taken
-    surprise = axis[0] * off[0] + axis[1] * off[1] + axis[2] * off[2] - dot4(taken, h)
-    for row in range(4):
-        for column in range(4):
-            less = gains[row] * gains[column] / spread
-            covariance[row, column] -= less
-            added[row, column] -= less
-        covariance[row, row] = max(covariance[row, row], 0.0)
-    step = surprise / spread
-    return (
-        taken[0] + gain_0 * step,
-        taken[1] + gain_1 * step,
-        taken[2] + gain_2 * step,
-        taken[3] + gain_3 * step,
-    )
+    gains, spread, taken = gain_along(added, axis, expected, off, variance, taken)
+    lessen(covariance, gains, spread)
+    keep_positive(covariance)
+    lessen(added, gains, spread)
+    return taken

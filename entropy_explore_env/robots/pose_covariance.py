@@ -133,25 +133,59 @@ def correct_along(covariance, axis, expected, off, variance, taken):
     Returns:
         The same, with what this axis takes.
     """
+    gains, spread, taken = gain_along(covariance, axis, expected, off, variance, taken)
+    lessen(covariance, gains, spread)
+    keep_positive(covariance)
+    return taken
+
+
+@inlined_kernel
+def gain_along(prior, axis, expected, off, variance, taken):
+    """(gains, spread, taken): what a sighting says along one axis, by a Kalman filter.
+
+    Args:
+        prior: (4, 4) float64, covariance of the errors of which the sighting tells.
+        axis: Unit vector.
+        expected: As of `correct_by_sighting`.
+        off: What was seen less what was expected.
+        variance: Of what was seen, along the axis.
+        taken: (x, y, z, yaw), what the axes before have taken from the estimate.
+
+    Returns:
+        Gains (4,) times the spread, which is the variance of `off` along the axis, and `taken` with what this
+        axis takes. Gains are 0 where the prior is so uncertain that numbers do not hold it.
+    """
     h = axis[0], axis[1], axis[2], axis[1] * expected[0] - axis[0] * expected[1]
-    gain_0, gain_1 = dot4(covariance[0], h), dot4(covariance[1], h)
-    gain_2, gain_3 = dot4(covariance[2], h), dot4(covariance[3], h)
+    gain_0, gain_1 = dot4(prior[0], h), dot4(prior[1], h)
+    gain_2, gain_3 = dot4(prior[2], h), dot4(prior[3], h)
     gains = gain_0, gain_1, gain_2, gain_3
     spread = max(dot4(gains, h), 0.0) + variance  # below 0: rounding, or a state from outside
-    if not math.isfinite(spread):  # so uncertain that numbers do not hold it
-        return taken
+    if not math.isfinite(spread):
+        return (0.0, 0.0, 0.0, 0.0), 1.0, taken
     surprise = axis[0] * off[0] + axis[1] * off[1] + axis[2] * off[2] - dot4(taken, h)
-    for row in range(4):
-        for column in range(4):
-            covariance[row, column] -= gains[row] * gains[column] / spread
-        covariance[row, row] = max(covariance[row, row], 0.0)
     step = surprise / spread
-    return (
+    more = (
         taken[0] + gain_0 * step,
         taken[1] + gain_1 * step,
         taken[2] + gain_2 * step,
         taken[3] + gain_3 * step,
     )
+    return gains, spread, more
+
+
+@inlined_kernel
+def lessen(covariance, gains, spread):
+    """Take off a covariance (4, 4), in place, what a sighting with these gains has made known."""
+    for row in range(4):
+        for column in range(4):
+            covariance[row, column] -= gains[row] * gains[column] / spread
+
+
+@inlined_kernel
+def keep_positive(covariance):
+    """Raise variances that rounding has brought below 0, in place."""
+    for number in range(4):
+        covariance[number, number] = max(covariance[number, number], 0.0)
 
 
 @inlined_kernel
