@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from benchmarks.rows import Effort, Goal, Job, Row, compared, interleave
-from benchmarks.stepping import ROBOTS, TURNING, SingleTeam, turns
+from benchmarks.rows import Effort, Goal, Row, compared
+from benchmarks.stepping import ROBOTS, TURNING, step_rates
 from entropy_explore_env.scenario import with_settings
 
 _DRIFT = {
@@ -20,20 +20,12 @@ _MOST_ADDED = 1.15
 def drifting_rows(effort: Effort) -> list[Row]:
     """Steps a second of robots that drift beside exact ones, and with fiducials to sight beside without."""
     robot = {"localization": _DRIFT}
-    teams = {
-        "exact": SingleTeam(TURNING),
-        "drifting": SingleTeam(with_settings(TURNING, {"robot": robot})),
-        "sighting": SingleTeam(with_settings(TURNING, {"robot": robot, "fiducials": {"number": _FIDUCIALS}})),
+    scenarios = {
+        "exact": TURNING,
+        "drifting": with_settings(TURNING, {"robot": robot}),
+        "sighting": with_settings(TURNING, {"robot": robot, "fiducials": {"number": _FIDUCIALS}}),
     }
-    steps = effort.steps
-    for team in teams.values():
-        team.run(0, turns(1, 1, 0)[:, 0])
-
-    def job(team: SingleTeam) -> Job:
-        return lambda number: team.run(number, turns(steps, 1, number)[:, 0])
-
-    taken = interleave({name: job(team) for name, team in teams.items()}, effort.rounds)
-    rates = {name: [steps / t.cpu_s for t in taken[name]] for name in taken}
+    rates = step_rates(scenarios, effort)
     what = f"ParallelEnv.step, {ROBOTS} robots × {TURNING.sensor.rays} rays"
     return [
         compared(

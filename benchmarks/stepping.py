@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from types import FrameType
 from typing import Any
 
@@ -106,6 +106,24 @@ class SingleTeam:
         """
         taken = [self.run(seed, actions[:, seed]) for seed in seeds]
         return Taken(sum(t.cpu_s for t in taken), sum(t.wall_s for t in taken))
+
+
+def step_rates(scenarios: Mapping[str, Scenario], effort: Effort) -> dict[str, list[float]]:
+    """Steps a second of processor time of one ParallelEnv of each scenario, round by round in turns.
+
+    Args:
+        scenarios: Name → scenario with the actions of `TURNING`.
+        effort: Steps and rounds.
+    """
+    teams, steps = {name: SingleTeam(scenario) for name, scenario in scenarios.items()}, effort.steps
+    for team in teams.values():
+        team.run(0, turns(1, 1, 0)[:, 0])
+
+    def job(team: SingleTeam) -> Job:
+        return lambda number: team.run(number, turns(steps, 1, number)[:, 0])
+
+    taken = interleave({name: job(team) for name, team in teams.items()}, effort.rounds)
+    return {name: [steps / t.cpu_s for t in taken[name]] for name in taken}
 
 
 def by_agent(actions: np.ndarray) -> list[dict[str, np.ndarray]]:

@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from benchmarks.rows import Effort, Goal, Job, Row, alone, compared, interleave, timed
-from benchmarks.stepping import ROBOTS, TURNING, SingleTeam, turns
+from benchmarks.rows import Effort, Goal, Row, alone, compared, interleave, timed
+from benchmarks.stepping import ROBOTS, TURNING, step_rates
 from entropy_explore_env.robots.map_summary import decode_map, encode_map
 from entropy_explore_env.scenario import with_settings
 
@@ -61,14 +61,6 @@ def step_row(effort: Effort) -> Row:
     """Steps a second of robots that send summaries beside robots that send batches."""
     channel = {"content": "summaries", "summary_every_s": _EVERY_S}
     scenarios = {"batches": TURNING, "summaries": with_settings(TURNING, {"channel": channel})}
-    teams, steps = {name: SingleTeam(scenario) for name, scenario in scenarios.items()}, effort.steps
-    for team in teams.values():
-        team.run(0, turns(1, 1, 0)[:, 0])
-
-    def job(team: SingleTeam) -> Job:
-        return lambda number: team.run(number, turns(steps, 1, number)[:, 0])
-
-    taken = interleave({name: job(team) for name, team in teams.items()}, effort.rounds)
-    rates = {name: [steps / t.cpu_s for t in taken[name]] for name in taken}
+    rates = step_rates(scenarios, effort)
     what = f"ParallelEnv.step, {ROBOTS} robots × {TURNING.sensor.rays} rays, a summary each {_EVERY_S:g} s"
     return compared(what, "batches", rates["summaries"], rates["batches"], "steps/s")
