@@ -60,12 +60,6 @@ def slowdown(records: Records, scenario: str, robots: int, strategy: str, condit
     return _ratio(records, scenario, robots, strategy, condition, NOTHING_FAILS)
 
 
-def over_isolated(records: Records, scenario: str, robots: int, strategy: str, condition: str) -> Interval:
-    """Mean time under a condition over that of the same robots in isolation, by the same seeds."""
-    alone = LOST_ISOLATED if condition == LOST else ISOLATED
-    return _ratio(records, scenario, robots, strategy, condition, alone)
-
-
 def share_of_one(robots: int) -> float:
     """What losing one of A robots at half time costs if the rest do its share: ½ + ½ · A/(A - 1)."""
     return 0.5 + 0.5 * robots / (robots - 1)

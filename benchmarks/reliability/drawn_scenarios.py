@@ -185,8 +185,6 @@ FIELDS: Mapping[type, Mapping[str, Numbers | Sequence[Any]]] = MappingProxyType(
 )
 """Class → field → its numbers, or its choices. Other fields are drawn by `draw_scenario` itself."""
 
-_Draw = Callable[[type, str], Any]
-
 
 class Drawn(NamedTuple):
     """A scenario, and the worlds that its missions are to be in; none where it has a recipe."""

@@ -237,21 +237,6 @@ def count_connected(frontiers: FrontierMap, edges: np.ndarray, found: np.ndarray
 
 
 @lean_kernel
-def count_edges_around(frontiers: FrontierMap, voxel: int, radius: int, most: int) -> int:
-    """How many EDGE voxels lie within a radius, along every axis; no more than `most` are counted."""
-    size, count = frontiers.size, 0
-    x, y, z = grid_index(size, voxel)
-    for i in range(max(x - radius, 0), min(x + radius, size[0] - 1) + 1):
-        for j in range(max(y - radius, 0), min(y + radius, size[1] - 1) + 1):
-            for k in range(max(z - radius, 0), min(z + radius, size[2] - 1) + 1):
-                if frontiers.flags[flat_index(size, i, j, k)] & EDGE:
-                    count += 1
-                    if count >= most:
-                        return count
-    return count
-
-
-@lean_kernel
 def fill_crowds(
     frontiers: FrontierMap, voxels: np.ndarray, radius: int, most: int, counts: np.ndarray
 ) -> None:
