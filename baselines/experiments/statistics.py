@@ -36,6 +36,11 @@ class Interval(NamedTuple):
     low: float
     high: float
 
+    def text(self, form: str = ".2f") -> str:
+        """The figure and its ends in a format, as `0.98 (0.95 … 1.02)`."""
+        value, low, high = (format(number, form) for number in self)
+        return f"{value} ({low} … {high})"
+
 
 def mean_interval(values: Sample) -> Interval:
     """Mean and its interval."""

@@ -107,8 +107,7 @@ def tuning_table(results: Results, strategies: Sequence[str]) -> str:
 
 def ranged(ratio: Interval) -> str:
     """A ratio and its interval; without one that has no width, as of one mission in each plan."""
-    ends = f" ({ratio.low:.2f} … {ratio.high:.2f})" if ratio.low < ratio.high else ""
-    return f"{ratio.value:.2f}{ends}"
+    return ratio.text() if ratio.low < ratio.high else f"{ratio.value:.2f}"
 
 
 def with_table(page: str, table: str) -> str:

@@ -35,8 +35,7 @@ def reading(records: Records) -> str:
 
 def _ratio(records: Records, one: str, other: str) -> str:
     starts = min(len(records[one]), len(records[other]))
-    ratio, low, high = ratio_interval(times(records, one)[:starts], times(records, other)[:starts])
-    return f"{ratio:.2f} ({low:.2f} … {high:.2f})"
+    return ratio_interval(times(records, one)[:starts], times(records, other)[:starts]).text()
 
 
 def _by_size(records: Records, name: str | None) -> str:

@@ -127,4 +127,4 @@ def _reading(records: Records) -> str:
 
 def _ratio(numerator: np.ndarray, denominator: np.ndarray) -> str:
     """A ratio of means with its interval."""
-    return "{:.2f} ({:.2f} … {:.2f})".format(*ratio_interval(numerator, denominator))
+    return ratio_interval(numerator, denominator).text()

@@ -98,10 +98,10 @@ def _table(records: Records, cells: Sequence[tuple[str, str, bool]]) -> str:
             [
                 f"{strategy}{paper}{', plain' if plain else ''}",
                 level,
-                _mean(times_s(records, cell), 0),
+                mean_interval(times_s(records, cell)).text(".0f"),
                 f"{np.mean([record['finished'] for record in records[cell]]):.0%}",
                 f"{joint(records, cell, 'explored').mean():.3f}",
-                _mean(100.0 * joint(records, cell, "wrong"), 2),
+                mean_interval(100.0 * joint(records, cell, "wrong")).text(),
                 f"{error_m(records, cell).mean():.3f}",
                 f"{_sightings(records, cell):.2f}",
                 f"{blocked(records, cell).mean():.1f}",
@@ -129,7 +129,7 @@ def _reading(records: Records) -> str:
         scans, scans_before = (np.mean([record["scans"] for record in records[c]]) for c in (cell, exact))
         way, way_before = (np.mean([record["distance_m"] for record in records[c]]) for c in (cell, exact))
         lines.append(
-            f"- `{name}`: {slower[name].value:.2f} ({slower[name].low:.2f} … {slower[name].high:.2f}) of its "
+            f"- `{name}`: {slower[name].text()} of its "
             f"time without drift, {scans:.0f} scans instead of {scans_before:.0f}, {way:.0f} m instead of "
             f"{way_before:.0f} m, {blocked(records, cell).mean():.1f} drives blocked instead of "
             f"{blocked(records, exact).mean():.1f}, {100 * joint(records, cell, 'wrong').mean():.1f} % wrong "
@@ -147,11 +147,6 @@ scan the same place again and again. A margin and the guard are against the firs
 second; the table above says what they save. With high drift, from the strategy that suffers most:
 
 """
-
-
-def _mean(values: np.ndarray, digits: int) -> str:
-    mean, low, high = mean_interval(values)
-    return f"{mean:.{digits}f} ({low:.{digits}f} … {high:.{digits}f})"
 
 
 def figure_drift(records: Records) -> Figure:

@@ -111,10 +111,10 @@ def _fiducials_table(records: Records) -> str:
                     str(count),
                     reach if count else "",
                     f"{sighted / scans:.2f}",
-                    _mean(rms_error_m(records, cell)),
+                    mean_interval(rms_error_m(records, cell)).text(".3f"),
                     f"{errors_by_way(records, cell)[:, -1].mean():.2f}",
                     f"{at_end(records, cell, 'mapped').mean():.3f}",
-                    _mean(at_end(records, cell, "wrong"), 4),
+                    mean_interval(at_end(records, cell, "wrong")).text(".4f"),
                 ]
             )
     head = ["within reach", "", "sighted a scan", f"rms error over {WAY_M:.0f} m (m)"]
@@ -133,8 +133,8 @@ def _weights_table(records: Records) -> str:
                 [
                     str(count),
                     f"{weight:g}",
-                    _mean(rms_error_m(records, cell)),
-                    _mean(at_end(records, cell, "wrong"), 4),
+                    mean_interval(rms_error_m(records, cell)).text(".3f"),
+                    mean_interval(at_end(records, cell, "wrong")).text(".4f"),
                     f"{at_end(records, cell, 'mapped').mean():.3f}",
                     f"{at_end(records, cell, 'driven_m_by_scan').mean():,.0f}",
                     f"{times.mean():,.0f} ({mapped:.0%})",
@@ -161,20 +161,10 @@ def _reading(records: Records) -> str:
             wrong = ratio_interval(at_end(records, cell, "wrong"), at_end(records, base, "wrong"))
             mapped = ratio_interval(at_end(records, cell, "mapped"), at_end(records, base, "mapped"))
             lines.append(
-                f"- {count} within reach, w_LE {weight:g}: {_ratio(error)} of the error of the place and "
-                f"{_ratio(wrong)} of the wrong share, with {_ratio(mapped)} mapped for the same scans."
+                f"- {count} within reach, w_LE {weight:g}: {error.text()} of the error of the place and "
+                f"{wrong.text()} of the wrong share, with {mapped.text()} mapped for the same scans."
             )
     return "\n".join(lines)
-
-
-def _ratio(interval: tuple[float, float, float]) -> str:
-    return "{:.2f} ({:.2f} … {:.2f})".format(*interval)
-
-
-def _mean(values: np.ndarray, digits: int = 3) -> str:
-    return (
-        " … ".join(f"{number:.{digits}f}" for number in mean_interval(values)).replace(" … ", " (", 1) + ")"
-    )
 
 
 def figure_19(records: Records) -> tuple[Figure, dict[str, list[object]]]:

@@ -59,5 +59,4 @@ def figure_of(records: list[Record], figure: str) -> np.ndarray:
 
 def shown(records: list[Record], figure: str, form: str) -> str:
     """The mean of a figure, with its interval."""
-    mean, low, high = (format(value, form) for value in mean_interval(figure_of(records, figure)))
-    return f"{mean} ({low} … {high})"
+    return mean_interval(figure_of(records, figure)).text(form)
