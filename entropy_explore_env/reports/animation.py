@@ -19,6 +19,13 @@ from entropy_explore_env.writing import write_atomically
 COLOUR_CODES = 1 << 15
 """Colours are reduced to 5 bits a channel: not a visible difference, and pictures fit into one palette."""
 
+VIDEO_OPTIONS = {
+    "libx264": {"crf": "18", "preset": "medium", "x264-params": "mbtree=0"},
+    "mpeg4": {"qscale": "3"},
+}
+"""What each codec is given. Without `mbtree=0`, x264 reads memory that it never wrote where a processor has
+AVX-512, and the same pictures give files that differ."""
+
 
 def colour_codes(picture: np.ndarray) -> np.ndarray:
     """(H, W) uint16: the upper 5 bits of red, green and blue of a picture (H, W, 3) uint8."""
@@ -215,10 +222,8 @@ def write_video(frames: Iterable[np.ndarray], path: Path, frames_per_s: int) -> 
                 stream = video.add_stream(codec, rate=frames_per_s)
                 stream.height, stream.width = shape[0] - shape[0] % 2, shape[1] - shape[1] % 2
                 stream.pix_fmt = "yuv420p"
-                stream.thread_count = (
-                    1  # with more threads, slices and so the file would depend on their number
-                )
-                stream.options = {"crf": "18", "preset": "medium"} if codec == "libx264" else {"qscale": "3"}
+                stream.thread_count = 1  # more of them: slices, and so the file, depend on their number
+                stream.options = VIDEO_OPTIONS[codec]
             if picture.shape != shape:
                 raise SettingError("frames", picture.shape, f"pictures of one shape, {shape}")
             even = np.ascontiguousarray(picture[: stream.height, : stream.width])
