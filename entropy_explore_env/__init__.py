@@ -12,6 +12,7 @@ from __future__ import annotations
 import gymnasium
 import pettingzoo
 
+from entropy_explore_env.channel_settings import Channel, Signal
 from entropy_explore_env.decision_settings import Action, Observation
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv, env, parallel_env
 from entropy_explore_env.envs.rewards import StepFigures
@@ -31,12 +32,11 @@ from entropy_explore_env.localization_settings import Fiducials, Localization
 from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.missions.state import MissionEnd
 from entropy_explore_env.missions.view import RobotView
-from entropy_explore_env.radio_settings import Signal
 from entropy_explore_env.robots.channel import Delivery
 from entropy_explore_env.robots.motion import MoveEnd
 from entropy_explore_env.scenario import Scenario, with_settings
 from entropy_explore_env.scenarios import SCENARIOS, find_scenario
-from entropy_explore_env.settings import Channel, Ending, Grid, RangeSensor, Reward, Robot, RobotKind
+from entropy_explore_env.settings import Ending, Grid, RangeSensor, Reward, Robot, RobotKind
 from entropy_explore_env.version import VERSION
 from entropy_explore_env.worlds.load import load_octomap, load_world, make_world, save_world
 from entropy_explore_env.worlds.world import World

@@ -11,11 +11,12 @@ from typing import Any, Literal, TypeVar
 
 import numpy as np
 
+from entropy_explore_env.channel_settings import Channel
 from entropy_explore_env.decision_settings import Action, Observation
 from entropy_explore_env.errors import SettingError, did_you_mean
 from entropy_explore_env.fault_settings import Faults
 from entropy_explore_env.localization_settings import Fiducials
-from entropy_explore_env.settings import Channel, Ending, Grid, RangeSensor, Reward, Robot, RobotKind
+from entropy_explore_env.settings import Ending, Grid, RangeSensor, Reward, Robot, RobotKind
 from entropy_explore_env.validation import (
     check,
     check_choice,

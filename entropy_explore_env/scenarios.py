@@ -7,9 +7,10 @@ import math
 from types import MappingProxyType
 from typing import NamedTuple
 
+from entropy_explore_env.channel_settings import Channel
 from entropy_explore_env.errors import SettingError, did_you_mean
 from entropy_explore_env.scenario import Scenario
-from entropy_explore_env.settings import Channel, Ending, Grid, RangeSensor, Reward, Robot, RobotKind
+from entropy_explore_env.settings import Ending, Grid, RangeSensor, Reward, Robot, RobotKind
 
 
 class MissionTimes(NamedTuple):

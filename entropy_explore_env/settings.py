@@ -10,7 +10,6 @@ import numpy as np
 
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.localization_settings import Localization
-from entropy_explore_env.radio_settings import Signal
 from entropy_explore_env.validation import (
     check,
     check_choice,
@@ -275,95 +274,6 @@ class RobotKind:
 def centred_angles(samples: int, step_rad: float) -> np.ndarray:
     """(samples,) float64 angles around a gaze, in its middle, `step_rad` apart."""
     return (np.arange(samples) - (samples - 1) / 2.0) * step_rad
-
-
-@dataclass(frozen=True)
-class Channel:
-    """What robots tell each other: the most useful measurements of a scan (Rocha04, eqs. 42-43), or maps.
-
-    A batch is sent at once (Rocha04) or, with `phase_s`, broadcast in phases (Bhattacharya 2010, sect. 5.3):
-    a phase's batches wait for its end, are repeated all through the next phase, and who has them already
-    ignores them. Either way `burst` and `i_min_bits` select what is in a batch: as many as there are rays,
-    and 0, send everything that was newly measured.
-
-    With `content = "summaries"` robots send no batches. At the end of a scan, if `summary_every_s` have
-    passed since it last did so, a robot sends a quadtree of all that it measured itself since then (Sujan,
-    sect. 2.4; robots/map_summary.py). Nothing is selected, so I_min cannot be steered, and summaries are not
-    sent in phases. Range, reach, loss, delay and faults do to a summary what they do to a batch.
-
-    Attributes:
-        content: `measurements` or `summaries`.
-        summary_every_s: Least time from one summary of a robot to its next one, 1e-3 to 3600; 0 = at every
-            scan.
-        summary_threshold_bits: Most information content of a region of a summary that is told by one mean
-            and one σ, 0 to 5: 0 = only what is alike, 5 = all that was measured throughout.
-        burst: Most measurements of one batch; 0 shares none, and no summaries either.
-        i_min_bits: I_min, the least utility of a measurement that is worth sending, 0 to 1e6.
-        i_min_fill: None keeps I_min. A number lets each robot steer its own, from i_min_bits on, so that
-            on average over its scans so many bursts of measurements reach it (Rocha04, sect. 5.1.1).
-        i_min_gain: How much a scan with no such measurement, or with twice as many, changes ln I_min.
-        range_m: Farthest teammate that hears, 1e-9 to 1e6; inf = all.
-        reach: What else a message must come through: `distance` nothing; `line_of_sight` reaches a teammate
-            where no solid voxel of the true world is on the straight line between the two; `signal` where
-            the signal is strong enough. Bodies of robots are in no message's way.
-        signal: How strong it is.
-        loss_probability: Of a message on its way to one teammate.
-        delay_s: From sending to hearing, 0 to 3600.
-        announcements: Whether robots announce the viewpoints that they choose.
-        silent_after_s: A teammate counts as silent when no message has come from it for longer than this,
-            1e-3 to 1e9, beyond what one decision of it may take (`missions.silence.is_silent`). What it
-            announced is free for others then: `TeammateView.silent`. inf = never.
-        phase_s: Length of a phase of the broadcast, 1e-3 to 3600; 0 = batches are sent at once.
-        repeats: How often a phase's batches are sent in the next phase, evenly spread over it; 1e-3 s apart
-            or more.
-    """
-
-    content: Literal["measurements", "summaries"] = "measurements"
-    summary_every_s: float = 10.0
-    summary_threshold_bits: float = 0.5
-    burst: int = 64
-    i_min_bits: float = 0.3219
-    i_min_fill: float | None = None
-    i_min_gain: float = 0.1
-    range_m: float = math.inf
-    reach: Literal["distance", "line_of_sight", "signal"] = "distance"
-    signal: Signal = field(default_factory=Signal)
-    loss_probability: float = 0.0
-    delay_s: float = 0.0
-    announcements: bool = True
-    silent_after_s: float = 10.0
-    phase_s: float = 0.0
-    repeats: int = 1
-
-    def __post_init__(self) -> None:
-        """Check every field."""
-        check_choice(self, "content", Literal["measurements", "summaries"])
-        check_within(self, "summary_every_s", least=1e-3, most=3600, zero=True)
-        check_within(self, "summary_threshold_bits", least=0, most=5)
-        check_count(self, "burst", 0, 1_000_000)
-        check_within(self, "i_min_bits", least=0, most=1e6)
-        if self.i_min_fill is not None:
-            check(self, "i_min_fill", "None, or a number above 0 up to 10", lambda v: 0 < v <= 10)
-            check(self, "i_min_bits", "above 0 where I_min is steered", lambda v: v > 0)
-        check(self, "i_min_gain", "a number above 0 up to 1", lambda v: 0 < v <= 1)
-        check_within(self, "range_m", least=1e-9, most=1e6, inf=True)
-        check_choice(self, "reach", Literal["distance", "line_of_sight", "signal"])
-        check_kind(self, "signal", Signal)
-        check(self, "loss_probability", "a number from 0 to 1", lambda v: 0 <= v <= 1)
-        check(self, "delay_s", "a number from 0 to 3600", lambda v: 0 <= v <= 3600)
-        check_kind(self, "announcements", bool)
-        check_within(self, "silent_after_s", least=1e-3, most=1e9, inf=True)
-        check_within(self, "phase_s", least=1e-3, most=3600, zero=True)
-        check_count(self, "repeats", 1, 1000)
-        if self.phase_s / self.repeats < 1e-3 and self.phase_s > 0.0:
-            raise SettingError("Channel.repeats", self.repeats, "so few that they are 1e-3 s apart or more")
-        if self.phase_s > 0.0 and self.delay_s > 0.0:
-            raise SettingError("Channel.delay_s", self.delay_s, "0 where batches are broadcast in phases")
-        if self.content == "summaries":
-            if self.phase_s > 0.0:
-                raise SettingError("Channel.phase_s", self.phase_s, "0 where robots send summaries")
-            if self.i_min_fill is not None:
-                raise SettingError("Channel.i_min_fill", self.i_min_fill, "None where robots send summaries")
 
 
 @dataclass(frozen=True)

@@ -7,9 +7,9 @@ import math
 
 import pytest
 
+from entropy_explore_env.channel_settings import Signal
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.fault_settings import Faults, Outage, RadioFault, SensorFault
-from entropy_explore_env.radio_settings import Signal
 from entropy_explore_env.scenario import with_settings
 from entropy_explore_env.scenarios import BOX
 from entropy_explore_env.settings_json import scenario_from_json, settings_json

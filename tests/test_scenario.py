@@ -10,11 +10,12 @@ import pickle
 import numpy as np
 import pytest
 
+from entropy_explore_env.channel_settings import Channel
 from entropy_explore_env.decision_settings import Action, Observation
 from entropy_explore_env.errors import EntropyExploreError, SettingError
 from entropy_explore_env.scenario import Scenario, with_settings
 from entropy_explore_env.scenarios import BOX, ROOM, SCENARIOS, find_scenario
-from entropy_explore_env.settings import Channel, Ending, Grid, RangeSensor, Reward, Robot, RobotKind
+from entropy_explore_env.settings import Ending, Grid, RangeSensor, Reward, Robot, RobotKind
 
 NAN, INF = math.nan, math.inf
 NO_NUMBERS = ("1", None, True, [1.0], NAN)

@@ -14,7 +14,7 @@ from docs.extensions import scenario_times
 from docs.extensions.attribute_docs import attribute_docs, constant_docs
 from docs.extensions.scenario_cards import card, gallery
 from docs.extensions.space_numbers import action_numbers, discrete_actions, observation_numbers
-from entropy_explore_env import environment_id, scenarios, settings
+from entropy_explore_env import Channel, Ending, RangeSensor, Robot, environment_id, scenarios
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.missions.action import action_space
 from entropy_explore_env.missions.observation.layout import ObservationLayout
@@ -65,9 +65,7 @@ def test_a_mission_s_numbers_are_in_the_ranges_told():
             break
 
 
-@pytest.mark.parametrize(
-    "kind", [Scenario, *(getattr(settings, name) for name in ("Robot", "RangeSensor", "Channel", "Ending"))]
-)
+@pytest.mark.parametrize("kind", [Scenario, Channel, Ending, RangeSensor, Robot])
 def test_every_setting_has_its_text(kind):
     parts = {"channel", "ending", "reward", "action", "observation"}  # classes with texts of their own
     assert set(attribute_docs(kind)) >= {field.name for field in dataclasses.fields(kind)} - parts

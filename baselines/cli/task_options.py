@@ -19,13 +19,14 @@ from baselines.cli.arguments import OmitArgPrefixes, parse
 from baselines.cli.start_options import given_json, reset_options
 from baselines.cli.world_options import Reading, world_settings
 from baselines.experiments.mission import Surroundings
+from entropy_explore_env.channel_settings import Channel
 from entropy_explore_env.command import allow_read_memory
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.localization_settings import Fiducials
 from entropy_explore_env.scenario import Scenario, with_settings
 from entropy_explore_env.scenarios import ROOM, find_scenario
-from entropy_explore_env.settings import Channel, Ending, RangeSensor, Robot, RobotKind
+from entropy_explore_env.settings import Ending, RangeSensor, Robot, RobotKind
 from entropy_explore_env.settings_json import dataclass_of, json_of, scenario_of, settings_of
 
 _WHOLE = ("name", "grid")

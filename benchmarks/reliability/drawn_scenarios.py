@@ -15,12 +15,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from entropy_explore_env.channel_settings import Channel, Signal
 from entropy_explore_env.decision_settings import Action, Observation
 from entropy_explore_env.fault_settings import Faults, Outage, RadioFault, SensorFault
 from entropy_explore_env.localization_settings import Fiducials, Localization
-from entropy_explore_env.radio_settings import Signal
 from entropy_explore_env.scenario import Scenario
-from entropy_explore_env.settings import Channel, Ending, Grid, RangeSensor, Reward, Robot, RobotKind
+from entropy_explore_env.settings import Ending, Grid, RangeSensor, Reward, Robot, RobotKind
 from entropy_explore_env.worlds.recipes.catalogue import RECIPES
 from entropy_explore_env.worlds.world import World
 

@@ -9,10 +9,11 @@ import os
 from collections.abc import Mapping, Sequence
 from typing import Any, Literal, TypedDict
 
+from entropy_explore_env.channel_settings import Channel
 from entropy_explore_env.decision_settings import Action, Observation
 from entropy_explore_env.fault_settings import Faults
 from entropy_explore_env.localization_settings import Fiducials
-from entropy_explore_env.settings import Channel, Ending, Grid, RangeSensor, Reward, Robot, RobotKind
+from entropy_explore_env.settings import Ending, Grid, RangeSensor, Reward, Robot, RobotKind
 from entropy_explore_env.worlds.world import World
 
 

@@ -13,13 +13,14 @@ from benchmarks.reliability.drawn_scenarios import FIELDS, Numbers, draw_scenari
 from benchmarks.reliability.settings_fuzz import WATCHDOG_S, BrokenPromiseError, Played, Task, play
 from benchmarks.reliability.settings_fuzz import _check as check
 from entropy_explore_env import EntropyExploreEnv
+from entropy_explore_env.channel_settings import Channel
 from entropy_explore_env.decision_settings import Observation
 from entropy_explore_env.errors import EntropyExploreError
 from entropy_explore_env.fault_settings import Outage, RadioFault, SensorFault
 from entropy_explore_env.localization_settings import Fiducials
 from entropy_explore_env.scenario import Scenario
 from entropy_explore_env.scenarios import BOX
-from entropy_explore_env.settings import Channel, RangeSensor, Robot
+from entropy_explore_env.settings import RangeSensor, Robot
 from entropy_explore_env.settings_json import settings_of
 
 DRAWN_OTHERWISE = {
