@@ -35,6 +35,7 @@ from benchmarks.reliability import (
     state_fuzz,
     training_runs,
 )
+from benchmarks.reliability.mutants import of_these_sources
 from benchmarks.reliability.page import Kept, page, read_rows
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.writing import write_atomically
@@ -128,7 +129,7 @@ def main(words: Sequence[str]) -> int:
         wanted = proof.quick if args.quick else proof.full
         carry_on(proof, args.results / f"{name}.jsonl", wanted, args.limit_s)
     kept = {name: _kept(proof, args.results / f"{name}.jsonl") for name, proof in PROOFS.items()}
-    folders = {file.stem: read_rows(file) for file in sorted(args.mutants.glob("*.jsonl"))}
+    folders = {file.stem: of_these_sources(read_rows(file)) for file in sorted(args.mutants.glob("*.jsonl"))}
     text = page(kept, folders, read_rows(args.results / "coverage.jsonl"), versions())
     print(text)
     if args.page is not None:

@@ -26,11 +26,13 @@ class Mutant:
 
     Attributes:
         tree: The file as it is.
+        function: The function that the statement is in; the outermost, where it stands inside another.
         sound: The statement as it is.
         changed: What stands in its place.
     """
 
     tree: ast.Module
+    function: ast.FunctionDef
     sound: ast.stmt
     changed: ast.stmt
 
@@ -51,9 +53,14 @@ class Mutant:
         """The text of the file with the fault."""
         return _replaced(self.tree, self.sound, self.changed)
 
+    @property
+    def function_source(self) -> str:
+        """The text of the function with the fault: what else is in the file may change."""
+        return _replaced(self.function, self.sound, self.changed)
+
 
 def mutants_of(source: str, kernels: bool = False) -> list[Mutant]:
-    """All faults of a file, in the order of its text; assertions of debug builds are left alone.
+    """All faults of a file, each once, in the order of its text; assertions of debug builds are left alone.
 
     Args:
         source: Text of the file.
@@ -61,13 +68,20 @@ def mutants_of(source: str, kernels: bool = False) -> list[Mutant]:
     """
     tree = ast.parse(source)
     found = []
-    for function in ast.walk(tree):
-        if not isinstance(function, ast.FunctionDef) or (kernels and not _is_kernel(function)):
-            continue
+    for function in _outermost(tree, kernels):
         for node in ast.walk(function):
             if isinstance(node, ast.stmt) and node is not function and not _is_debugging(node):
-                found += [Mutant(tree, node, changed) for changed in _changes(node)]
+                found += [Mutant(tree, function, node, changed) for changed in _changes(node)]
     return sorted(found, key=lambda mutant: (mutant.sound.lineno, mutant.what))
+
+
+def _outermost(node: ast.AST, kernels: bool) -> Iterator[ast.FunctionDef]:
+    """Functions that stand in no other of them; with `kernels`, compiled ones."""
+    for child in ast.iter_child_nodes(node):
+        if isinstance(child, ast.FunctionDef) and (not kernels or _is_kernel(child)):
+            yield child
+        else:
+            yield from _outermost(child, kernels)
 
 
 def _is_kernel(function: ast.FunctionDef) -> bool:
@@ -145,7 +159,7 @@ def _turn(node: ast.AST) -> bool:
     return True
 
 
-def _replaced(tree: ast.Module, old: ast.stmt, new: ast.stmt) -> str:
+def _replaced(tree: ast.AST, old: ast.stmt, new: ast.stmt) -> str:
     """The text of a tree in which one statement is another."""
     for node in ast.walk(tree):
         for name in ("body", "orelse", "finalbody"):

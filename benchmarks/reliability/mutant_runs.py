@@ -17,9 +17,9 @@ import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from types import TracebackType
-from typing import Any
+from typing import Any, NamedTuple
 
-from benchmarks.reliability.quick_tests import LIMIT
+from benchmarks.reliability.quick_tests import LIMIT, TooSlowError
 
 _OWN = ("entropy_explore_env", "baselines", "training", "benchmarks", "tests", "conftest", "docs", "__main__")
 """Packages of the checkout, which a fork imports anew."""
@@ -28,6 +28,15 @@ _OLD_S = 1e9
 _TEST_S = 20.0
 """Of the processor, that a test may take with a fault."""
 LATE = "late"
+
+
+class First(NamedTuple):
+    """The test that failed first."""
+
+    test: str
+    """Its name; where all tests together took too long or ended the process, what became of them."""
+    late: bool = False
+    """Whether it took too long."""
 
 
 class Host:
@@ -73,7 +82,7 @@ class Host:
             assert pipe is not None
             pipe.close()
 
-    def first_failure(self, path: Path, source: str, tests: Sequence[str], limit_s: float) -> str | None:
+    def first_failure(self, path: Path, source: str, tests: Sequence[str], limit_s: float) -> First | None:
         """Run tests with another text of a source.
 
         Args:
@@ -83,7 +92,7 @@ class Host:
             limit_s: On the clock, of all of them.
 
         Returns:
-            The test that failed first, `LATE`, or how the tests ended; None where all passed.
+            The test that failed first; None where all passed.
         """
         file = self.folder / path
         sound = file.read_bytes()
@@ -100,7 +109,7 @@ class Host:
             self._sound[test] = self._ask([test], limit_s) is None
         return self._sound[test]
 
-    def _ask(self, tests: Sequence[str], limit_s: float) -> str | None:
+    def _ask(self, tests: Sequence[str], limit_s: float) -> First | None:
         stdin, stdout = self._process.stdin, self._process.stdout
         assert stdin is not None and stdout is not None
         stdin.write(json.dumps({"tests": list(tests), "limit_s": limit_s}) + "\n")
@@ -108,7 +117,8 @@ class Host:
         answer = stdout.readline()
         if not answer:
             raise RuntimeError(f"the process of tests ended with exit code {self._process.wait()}")
-        return json.loads(answer)["failed"]
+        told = json.loads(answer)
+        return First(told["failed"], told.get("late", False)) if told["failed"] else None
 
 
 class _FirstFailure:
@@ -117,11 +127,13 @@ class _FirstFailure:
     def __init__(self) -> None:
         """Nothing failed yet."""
         self.name: str | None = None
+        self.late = False
 
     def pytest_runtest_logreport(self, report: Any) -> None:  # noqa: ANN401 - a report of pytest
         """Note the first failure."""
         if report.failed and self.name is None:
             self.name = report.nodeid
+            self.late = TooSlowError.__name__ in str(report.longrepr)
 
 
 def _tested(tests: Sequence[str]) -> dict[str, Any]:
@@ -131,7 +143,8 @@ def _tested(tests: Sequence[str]) -> dict[str, Any]:
     plugin = _FirstFailure()
     words = ["-q", "-x", "-W", "ignore", "-p", "no:cacheprovider", "-p", "benchmarks.reliability.quick_tests"]
     code = int(pytest.main([*words, *tests], plugins=[plugin]))
-    return {"failed": plugin.name or (None if code == 0 else f"exit code {code}")}
+    failed = plugin.name or (None if code == 0 else f"exit code {code}")
+    return {"failed": failed, "late": plugin.late}
 
 
 def _modules(tests: Sequence[str]) -> dict[str, Any]:
@@ -175,7 +188,7 @@ def _in_fork(work: Callable[[Sequence[str]], dict[str, Any]], tests: Sequence[st
             pass
     status = os.waitpid(child, 0)[1]
     if late:
-        return {"failed": LATE}
+        return {"failed": LATE, "late": True}
     return json.loads(answer) if answer else {"failed": f"exit code {os.waitstatus_to_exitcode(status)}"}
 
 

@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from benchmarks.reliability.fault_table import fault_table, share_found
 from benchmarks.reliability.file_fuzz import FILES
 from benchmarks.reliability.settings_fuzz import STEPS, WATCHDOG_S
 from benchmarks.reliability.soak import CHANNELS, FLOOR, MAPS_EVERY, QUICK
@@ -67,7 +68,7 @@ def page(
         lines += [summary(played)] if played else []
         lines += [_played_by(rows)] if rows else []
         lines += ["", *(f"- case {row['number']}: {row['failure'][:300]}" for row in failed[:20]), ""]
-    lines += ["## Faults in formulas", "", _mutants(mutants), ""]
+    lines += ["## Faults in formulas", "", fault_table(mutants), ""]
     lines += ["## Branches", "", _coverage(coverage), ""]
     return "\n".join(_without_double(lines)).rstrip() + "\n"
 
@@ -88,13 +89,11 @@ def _overview(kept: Mapping[str, Kept], mutants: Mapping[str, Sequence[Row]], co
         for name, each in kept.items()
         if each.reached < each.asked
     ]
-    faults = {row["digest"]: row for rows in mutants.values() for row in rows}
+    faults = {row["digest"]: row for rows in mutants.values() for row in rows}.values()
     if len(faults) < _MUTANTS:
         missing.append(f"Faults in formulas: {len(faults)} of {_MUTANTS} drawn")
-    if faults and _share_found(faults.values()) < _SHARE_FOUND:
-        missing.append(
-            f"Faults in formulas: {_share_found(faults.values()):.0%} found, {_SHARE_FOUND:.0%} asked for"
-        )
+    if faults and share_found(faults) < _SHARE_FOUND:
+        missing.append(f"Faults in formulas: {share_found(faults):.1%} found, {_SHARE_FOUND:.0%} asked for")
     if not coverage:
         missing.append("Branches: not measured")
     elif _share_covered(coverage) < _SHARE_COVERED:
@@ -256,36 +255,6 @@ def _memory(rows: Sequence[Row]) -> Iterable[str]:
                 f"A process of {steps:,} robot-steps held {settled:.0f} MiB after the first 10⁶, then "
                 f"{max(later):.0f} MiB at most and {later[-1]:.0f} MiB at its end; scenarios take turns."
             )
-
-
-def _share_found(rows: Iterable[Row]) -> float:
-    found = [bool(row["found"]) for row in rows]
-    return sum(found) / len(found)
-
-
-def _mutants(mutants: Mapping[str, Sequence[Row]]) -> str:
-    faults = {row["digest"]: row for rows in mutants.values() for row in rows}
-    if not faults:
-        return "None drawn yet: `python -m benchmarks.reliability.mutants entropy_explore_env/missions`."
-    lines = [
-        f"{len(faults)} faults put into formulas, one at a time (`python -m "
-        "benchmarks.reliability.mutants`); "
-        f"{_share_found(faults.values()):.1%} were found by a test. Each is run with interpreted kernels "
-        "against the tests that take its line, none that takes longer than 3 s that way and 30 s of them in "
-        "all, until one fails: a fault not found here may be found by others.",
-        "",
-        "| file | faults | found |",
-        "| --- | ---: | ---: |",
-    ]
-    for path in sorted({row["path"] for row in faults.values()}):
-        own = [row for row in faults.values() if row["path"] == path]
-        lines.append(f"| {path} | {len(own)} | {sum(bool(row['found']) for row in own)} |")
-    survivors = [row for row in faults.values() if not row["found"]]
-    lines.append("")
-    for row in survivors:
-        tests = "no test takes its line" if row.get("tests") == 0 else "not found"
-        lines.append(f"- {tests}: {row['path']}:{row['line']}: `{row['what']}`")
-    return "\n".join(lines)
 
 
 def _share_covered(rows: Sequence[Row]) -> float:

@@ -2,7 +2,8 @@
 
 A test that takes longer than QUICK_TEST_S of the processor fails, whatever it waits for. The outcome of each
 test, its seconds and its name are appended to the file QUICK_TESTS_TOLD, where that is set: the quickest can
-be run again. Where coverage is measured, it is told which test runs.
+be run again. Where coverage is measured, it is told which test runs, and which is being set up: what others
+of its file share may be made then.
 """
 
 from __future__ import annotations
@@ -10,7 +11,8 @@ from __future__ import annotations
 import os
 import signal
 import time
-from collections.abc import Generator, Sequence
+from collections.abc import Generator, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from types import FrameType
 from typing import NamedTuple
@@ -18,6 +20,8 @@ from typing import NamedTuple
 import pytest
 
 LIMIT, TOLD = "QUICK_TEST_S", "QUICK_TESTS_TOLD"
+SET_UP = " is set up"
+"""Behind the name of a test, as coverage is told."""
 
 
 class Told(NamedTuple):
@@ -39,13 +43,20 @@ def _ring(number: int, frame: FrameType | None) -> None:
 
 
 @pytest.hookimpl(wrapper=True)
-def pytest_runtest_protocol(item: pytest.Item) -> Generator[None, object, object]:
-    """Tell coverage which test begins, where it is measured."""
+def pytest_runtest_setup(item: pytest.Item) -> Generator[None, object, object]:
+    """Tell coverage which test is set up."""
+    with _context(item.nodeid + SET_UP):
+        return (yield)
+
+
+@contextmanager
+def _context(name: str) -> Iterator[None]:
+    """While what runs is told coverage by a name, where it is measured."""
     measuring = _measuring()
     if measuring is not None:
-        measuring.switch_context(item.nodeid)  # type: ignore[attr-defined]
+        measuring.switch_context(name)  # type: ignore[attr-defined]
     try:
-        return (yield)
+        yield
     finally:
         if measuring is not None:
             measuring.switch_context("")  # type: ignore[attr-defined]
@@ -67,7 +78,8 @@ def pytest_runtest_call(item: pytest.Item) -> Generator[None, object, object]:
     signal.setitimer(signal.ITIMER_PROF, float(os.environ.get(LIMIT, "60")))
     begun_s = time.process_time()
     try:
-        return (yield)
+        with _context(item.nodeid):
+            return (yield)
     finally:
         signal.setitimer(signal.ITIMER_PROF, 0.0)
         signal.signal(signal.SIGPROF, before)

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from benchmarks.reliability.quick_tests import Told, told_in
+from benchmarks.reliability.quick_tests import SET_UP, Told, told_in
 
 
 @dataclass(frozen=True)
@@ -34,10 +34,11 @@ class Reached:
         taken = self.lines.get(path, {})
         names = set().union(*(taken.get(line, set()) for line in lines))
         tests = [self.told[name] for name in names if name in self.told]
-        own = f"test_{Path(path).stem}.py"
+        stem, folder = Path(path).stem, Path(path).parent.name
+        own = (f"test_{stem}.py", f"test_{folder}.py", f"test_{folder}_{stem}.py")
         tests = sorted(
             (test for test in tests if test.passed and test.seconds <= test_s),
-            key=lambda test: (own not in test.name, test.seconds, test.name),
+            key=lambda test: (not _file_of(test.name).endswith(own), test.seconds, test.name),
         )
         chosen: list[str] = []
         for test in tests:
@@ -48,18 +49,29 @@ class Reached:
 
 
 def reached_lines(folder: Path) -> Reached:
-    """What the tests took of which data are kept in a folder."""
+    """What the tests took of which data are kept in a folder.
+
+    What was taken while a test was set up may have been made for others of its file: they all count for it.
+    """
     from coverage import CoverageData
 
     lines: dict[str, dict[int, set[str]]] = defaultdict(lambda: defaultdict(set))
     told: dict[str, Told] = {}
     for file in sorted(folder.glob("*.coverage")):
-        told |= {test.name: test for test in told_in(file.with_suffix(".tests"))}
+        own = {test.name: test for test in told_in(file.with_suffix(".tests"))}
+        told |= own
         data = CoverageData(str(file))
         data.read()
         for measured in data.measured_files():
             path = measured[measured.rindex("entropy_explore_env/") :]
             for line, contexts in data.contexts_by_lineno(measured).items():
-                lines[path][line] |= {context for context in contexts if context}
+                lines[path][line] |= {context for context in contexts if context and SET_UP not in context}
+                if any(SET_UP in context for context in contexts):
+                    lines[path][line] |= set(own)
         data.close()
     return Reached(lines, told)
+
+
+def _file_of(test: str) -> str:
+    """The file of a test, from its name."""
+    return test.partition("::")[0]

@@ -8,7 +8,7 @@ import random
 import pytest
 
 from benchmarks.reliability import __main__ as command
-from benchmarks.reliability import determinism, kills, page, soak
+from benchmarks.reliability import determinism, fault_table, kills, page, soak
 from benchmarks.reliability.__main__ import PROOFS, Proof, carry_on, main
 from benchmarks.reliability.page import Kept, read_rows
 from entropy_explore_env.errors import SettingError
@@ -99,20 +99,26 @@ def test_digests_that_differ_and_memory_that_grows_are_shown():
     assert "3,000,000 robot-steps held 102 MiB after the first 10⁶, then 105 MiB at most" in text
 
 
-def test_the_page_says_what_is_asked_for_and_not_reached():
+def test_the_page_says_what_is_asked_for_and_not_reached(monkeypatch):
     faults = [
-        {"digest": "a", "path": "x/y.py", "line": 3, "what": "1  ->  2", "found": "late"},
+        {"digest": "a", "path": "x/y.py", "line": 3, "what": "1  ->  2", "found": "test_it"},
         {"digest": "b", "path": "x/y.py", "line": 4, "what": "2  ->  3", "found": ""},
         {"digest": "c", "path": "x/y.py", "line": 5, "what": "3  ->  4", "found": "", "tests": 0},
+        {"digest": "d", "path": "x/y.py", "line": 6, "what": "4  ->  5", "found": "", "late": True},
+        {"digest": "e", "path": "x/y.py", "line": 7, "what": "5  ->  6", "found": "", "function": "f"},
     ]
+    monkeypatch.setitem(fault_table._REASONS, ("x/y.py", "f", "5  ->  6"), "Both are odd.")
     branches = [
         {"path": "x/y.py", "branches": 8, "covered": 6, "files": 3, "of_files": 4},
         {"path": "x/z.py", "branches": 2, "covered": 2, "files": 3, "of_files": 4},
     ]
     text = page.page(EMPTY, {"x": faults}, branches, {"numpy": "2"})
-    assert "- Kills: 0 of 10 kills" in text and "- Faults in formulas: 3 of 300 drawn" in text
-    assert "- Faults in formulas: 33% found, 90% asked for" in text and "80.0% covered" in text
-    assert "| x/y.py | 3 | 1 |" in text and "- not found: x/y.py:4: `2  ->  3`" in text
+    assert "- Kills: 0 of 10 kills" in text and "- Faults in formulas: 5 of 300 drawn" in text
+    assert "- Faults in formulas: 25.0% found, 90% asked for" in text and "80.0% covered" in text
+    assert "; 2 were not found. Of those that change something 25.0% were found." in text
+    assert "- late: x/y.py:6: `4  ->  5`" in text
+    assert "- without effect: x/y.py:7: `5  ->  6`: Both are odd." in text
+    assert "| x/y.py | 5 | 1 | 1 | 1 |" in text and "- not found: x/y.py:4: `2  ->  3`" in text
     assert "- no test takes its line: x/y.py:5: `3  ->  4`" in text
     assert "; 3 of 4 files of tests were run" in text
     assert "| x | 10 | 80.0% |" in text and "with numpy 2." in text
