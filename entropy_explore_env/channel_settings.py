@@ -66,11 +66,14 @@ class Channel:
     Attributes:
         content: `measurements` or `summaries`.
         summary_every_s: Least time from one summary of a robot to its next one, 1e-3 to 3600; 0 = at every
-            scan.
+            scan. Where robots send no summaries it stays at its default.
         summary_threshold_bits: Most information content of a region of a summary that is told by one mean
-            and one σ, 0 to 5: 0 = only what is alike, 5 = all that was measured throughout.
-        burst: Most measurements of one batch; 0 shares none, and no summaries either.
-        i_min_bits: I_min, the least utility of a measurement that is worth sending, 0 to 1e6.
+            and one σ, 0 to 5: 0 = only what is alike, 5 = all that was measured throughout. It stays at its
+            default, likewise.
+        burst: Most measurements of one batch; 0 shares none. Above 0 where robots send summaries, whose size
+            it does not limit.
+        i_min_bits: I_min, the least utility of a measurement that is worth sending, 0 to 1e6. Measurements
+            that bring less count as redundant, also where robots send summaries.
         i_min_fill: None keeps I_min. A number lets each robot steer its own, from i_min_bits on, so that
             on average over its scans so many bursts of measurements reach it (Rocha04, sect. 5.1.1).
         i_min_gain: How much a scan with no such measurement, or with twice as many, changes ln I_min.
@@ -87,7 +90,7 @@ class Channel:
             announced is free for others then: `TeammateView.silent`. inf = never.
         phase_s: Length of a phase of the broadcast, 1e-3 to 3600; 0 = batches are sent at once.
         repeats: How often a phase's batches are sent in the next phase, evenly spread over it; 1e-3 s apart
-            or more.
+            or more. 1 where batches are sent at once.
     """
 
     content: Literal["measurements", "summaries"] = "measurements"
@@ -127,12 +130,33 @@ class Channel:
         check_within(self, "silent_after_s", least=1e-3, most=1e9, inf=True)
         check_within(self, "phase_s", least=1e-3, most=3600, zero=True)
         check_count(self, "repeats", 1, 1000)
-        if self.phase_s / self.repeats < 1e-3 and self.phase_s > 0.0:
-            raise SettingError("Channel.repeats", self.repeats, "so few that they are 1e-3 s apart or more")
-        if self.phase_s > 0.0 and self.delay_s > 0.0:
-            raise SettingError("Channel.delay_s", self.delay_s, "0 where batches are broadcast in phases")
+        self._check_contents()
+        self._check_phases()
+
+    def _check_contents(self) -> None:
+        """Settings of summaries where there are any, and only there."""
         if self.content == "summaries":
+            if self.burst == 0:
+                raise SettingError("Channel.burst", 0, "above 0 where robots send summaries")
             if self.phase_s > 0.0:
                 raise SettingError("Channel.phase_s", self.phase_s, "0 where robots send summaries")
             if self.i_min_fill is not None:
                 raise SettingError("Channel.i_min_fill", self.i_min_fill, "None where robots send summaries")
+            return
+        for name in ("summary_every_s", "summary_threshold_bits"):
+            default = type(self).__dataclass_fields__[name].default
+            if getattr(self, name) != default:
+                allowed = f'{default:g}, its default, without content="summaries": no summaries are sent'
+                raise SettingError(f"Channel.{name}", getattr(self, name), allowed)
+
+    def _check_phases(self) -> None:
+        """Repeats fit into phases, and a batch waits for one reason only."""
+        if self.phase_s == 0.0:
+            if self.repeats > 1:
+                allowed = "1 without phase_s: batches are sent at once, and once"
+                raise SettingError("Channel.repeats", self.repeats, allowed)
+            return
+        if self.phase_s / self.repeats < 1e-3:
+            raise SettingError("Channel.repeats", self.repeats, "so few that they are 1e-3 s apart or more")
+        if self.delay_s > 0.0:
+            raise SettingError("Channel.delay_s", self.delay_s, "0 where batches are broadcast in phases")

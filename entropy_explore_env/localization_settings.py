@@ -68,7 +68,7 @@ class Fiducials:
         number: How many are drawn in each mission, 0 to 1000, on surfaces that robots can see: beside a face
             that separates a free voxel from a solid one, or from the workspace's end.
         positions_m: Their places instead, (x, y, z) each, in the map frame: in free space. In a 2-D world z
-            does not matter.
+            does not matter. Lists become tuples.
         range_m: How far away they are sighted, 1e-6 to 1e6; inf = as far as the sensor sees.
         range_sigma_m: Standard deviation of a sighting along the line of sight, 1e-6 to 1e6.
         bearing_sigma_rad: Of its direction, sideways and up, 1e-6 to 10.
@@ -91,6 +91,9 @@ class Fiducials:
     def __post_init__(self) -> None:
         """Check every field."""
         check_count(self, "number", 0, MAX_FIDUCIALS)
+        if isinstance(self.positions_m, list | tuple):  # lists as JSON and users write them
+            inner = [tuple(place) if isinstance(place, list) else place for place in self.positions_m]
+            object.__setattr__(self, "positions_m", tuple(inner))
         places = self.positions_m
         if (
             not isinstance(places, tuple)
@@ -98,7 +101,9 @@ class Fiducials:
             or not all(isinstance(place, tuple) and len(place) == 3 for place in places)
             or not all(is_number(number) and abs(number) <= 2e9 for place in places for number in place)
         ):
-            allowed = f"a tuple of at most {MAX_FIDUCIALS} places (x, y, z), each number from -2e9 to 2e9"
+            allowed = (
+                f"a tuple or list of at most {MAX_FIDUCIALS} places (x, y, z), each number from -2e9 to 2e9"
+            )
             raise SettingError("Fiducials.positions_m", places, allowed)
         if self.number > 0 and places:
             raise SettingError("Fiducials.number", self.number, "0 where positions_m are given")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 import os
 from collections.abc import Callable
@@ -120,4 +121,21 @@ def check_kind(settings: object, name: str, kind: type) -> None:
     """The field is an instance of a class."""
     value = getattr(settings, name)
     if not isinstance(value, kind):
-        raise SettingError(f"{type(settings).__name__}.{name}", value, f"a {kind.__name__}")
+        raise SettingError(
+            f"{type(settings).__name__}.{name}", value, f"a {kind.__name__}{_as_part(kind, value)}"
+        )
+
+
+def _as_part(kind: type, value: object) -> str:
+    """How a part of the settings is written where a value was given that belongs into one of its fields."""
+    if not dataclasses.is_dataclass(kind):
+        return ""
+    names = [each.name for each in dataclasses.fields(kind)]
+    for name in names if isinstance(value, str) else ():
+        try:
+            kind(**{name: value})
+        except (SettingError, TypeError):
+            continue
+        return f", or a mapping of its fields: {{{name!r}: {value!r}}}"
+    shortened = ", ".join(names[:3]) + (", …" if len(names) > 3 else "")
+    return f", or a mapping of its fields {shortened}"

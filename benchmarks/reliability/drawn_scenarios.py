@@ -213,8 +213,8 @@ def draw_scenario(rng: np.random.Generator, few_kernels: bool = False) -> Drawn:
             return _default(kind, field)
         return _value(rng, FIELDS[kind][field], chance < _USUAL, grid.voxel_size_m)
 
-    def part(kind: type, **own: Any) -> Any:  # noqa: ANN401 - an object of the kind
-        return kind(**{field: draw(kind, field) for field in FIELDS[kind]}, **own)
+    def part(kind: type, made: Callable[..., Any] | None = None, **own: Any) -> Any:  # noqa: ANN401 - an object of the kind
+        return (made or kind)(**{field: draw(kind, field) for field in FIELDS[kind]}, **own)
 
     own = {field: draw(Scenario, field) for field in FIELDS[Scenario]}
     given = rng.random() < 0.3
@@ -327,11 +327,18 @@ def _fiducials(rng: np.random.Generator, part: Callable[..., Any], grid: Grid) -
 
 def _channel(part: Callable[..., Any], faulty: bool, few_kernels: bool) -> Channel:
     """A channel; with few kernels it reaches by more than distance where there are faults, and only there."""
-    channel = part(Channel, signal=part(Signal))
+
+    def fitting(**drawn: Any) -> Channel:  # noqa: ANN401 - whatever a setting is
+        if drawn["burst"] == 0 or (few_kernels and not faulty):
+            drawn["content"] = "measurements"
+        unused = [] if drawn["phase_s"] > 0.0 else ["repeats"]
+        if drawn["content"] == "measurements":
+            unused += ["summary_every_s", "summary_threshold_bits"]
+        return Channel(**drawn | {name: _default(Channel, name) for name in unused})
+
+    channel = part(Channel, fitting, signal=part(Signal))
     if few_kernels and faulty == (channel.reach == "distance"):
         channel = dataclasses.replace(channel, reach="signal" if faulty else "distance")
-    if few_kernels and not faulty:
-        channel = dataclasses.replace(channel, content="measurements")
     return channel
 
 

@@ -214,7 +214,7 @@ class Missions:
             row = mission * params["bodies"] + params["body_number"]
             self.state.collision[row] = world.layout(self.scenario, kind).collision_mask.ravel()
             if self._no_fly.size:
-                self._no_fly[row] = world.no_fly_mask(kind.robot.body_radius_m).ravel()
+                self._no_fly[row] = world.no_fly_mask(kind.robot.planning_radius_m).ravel()
 
     def thin_candidates(self, divisor: int) -> None:
         """Draw and refine so many times fewer viewpoints as candidates from now on."""

@@ -5,7 +5,9 @@ measured itself since then (`own_maps`). Teammates fuse each leaf at the precisi
 never above what the sender had. Where robots drift, what they measure is less precise by the covariance of
 their poses already. A summary carries the covariance at its sender's latest scan, too: errors of a pose are
 common to many measurements and do not average out in a leaf, so no leaf is taken as more precise than the
-place of the sender was known. Like batches, summaries lie where their senders believed to be.
+place of the sender was known. That holds for each summary: what several of them add up to is what their
+sender's own map has from the same measurements, or less. Like batches, summaries lie where their senders
+believed to be.
 """
 
 from __future__ import annotations

@@ -205,11 +205,12 @@ class RobotView:
         return np.stack([np.interp(scans_m, ends_m, points[:, axis]) for axis in range(3)], axis=1)
 
     def no_fly_mask(self) -> np.ndarray | None:
-        """(X, Y, Z) bool, where its body would reach above the ceiling; None = there is no ceiling."""
+        """(X, Y, Z) bool, where the body that it plans for reaches above the ceiling; None = no ceiling."""
         if self.ceiling is None:
             return None
         grid = self.scenario.grid
-        return no_fly_mask(self.ceiling, grid.shape[2], self.kind.robot.body_radius_m / grid.voxel_size_m)
+        radius = self.kind.robot.planning_radius_m / grid.voxel_size_m
+        return no_fly_mask(self.ceiling, grid.shape[2], radius)
 
 
 def _place(pose: np.ndarray) -> str:

@@ -6,17 +6,22 @@ import dataclasses
 
 import numpy as np
 import pytest
+from scipy.ndimage import distance_transform_edt
 
 from baselines.experiments.mission import run_mission, scripted_env
 from baselines.strategies import make_strategy
 from baselines.strategies.drift_guard import DriftGuard
+from baselines.strategies.frontier import FrontierConfig
+from baselines.strategies.frontier.terrain.candidates import TerrainCandidates
+from baselines.strategies.next_best_view.cliff import CliffMapping
+from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.localization_settings import Localization
 from entropy_explore_env.missions.view import view_of
 from entropy_explore_env.robots.motion import MoveEnd
 from entropy_explore_env.scenario import with_settings
-from entropy_explore_env.scenarios import find_scenario
-from entropy_explore_env.settings import Robot
+from entropy_explore_env.scenarios import CLIFF, find_scenario
+from entropy_explore_env.settings import Grid, Robot
 from tests.reference.scenes import free_box, put, started
 
 DRIFT = {"xy_m_per_sqrt_m": 0.02, "yaw_rad_per_sqrt_m": 0.01, "yaw_rad_per_sqrt_rad": 0.01}
@@ -134,3 +139,41 @@ def test_a_margin_counts_where_robots_drift_alone():
     for wrong in (-0.1, float("nan"), 101.0):
         with pytest.raises(SettingError, match=r"Localization\.margin_m"):
             Localization(margin_m=wrong)
+
+
+def test_a_margin_keeps_from_ceilings_and_from_steep_ground():
+    """Where robots drift, plans, views and frontiers over terrain keep clear of ceilings by the margin."""
+    settings = {
+        "grid": Grid((30, 24, 16), 1.0),
+        "robots": 1,
+        "robot": {"body_radius_m": 0.8, "navigator": "planned", "localization": {**DRIFT, "margin_m": 1.5}},
+    }
+    env = EntropyExploreEnv(with_settings(find_scenario("terrain"), settings))
+    env.reset(seed=0)
+    view, world = env.view("robot_0"), env.missions.worlds[0]
+    wider = world.no_fly_mask(2.3)
+    assert wider.sum() > world.no_fly_mask(0.8).sum()
+    np.testing.assert_array_equal(view.no_fly_mask(), wider)
+    np.testing.assert_array_equal(env.missions._no_fly[0], wider.ravel())
+    kind, frontiers = env.scenario.kinds[0], FrontierConfig()
+    exact = dataclasses.replace(kind, robot=dataclasses.replace(kind.robot, localization=Localization()))
+    reach = [
+        TerrainCandidates(env.scenario, each, frontiers, view.ceiling)._map.reach for each in (exact, kind)
+    ]
+    assert reach == [1, 2]
+
+
+def test_a_margin_keeps_rovers_from_the_edge():
+    """The columns in which a rover may stand shrink by the margin, from the same map."""
+    env = scripted_env(with_settings(CLIFF, {"max_cycles": 6}))
+    strategy = make_strategy("cliff-next-best-view")
+    run_mission(env, strategy, 0)
+    assert isinstance(strategy, CliffMapping)
+    view, memory = env.view("robot_0"), strategy._memories[0]
+    here = strategy._column(view.pose)
+    drifting = {"robot": {"localization": {**DRIFT, "margin_m": 0.25}}}
+    wider = dataclasses.replace(view, scenario=with_settings(view.scenario, drifting))
+    safe, safer = strategy._safe(view, memory, here), strategy._safe(wider, memory, here)
+    assert 0 < safer.sum() < safe.sum() and safe[safer].all()
+    away = np.asarray(distance_transform_edt(safe))
+    assert away[safer].min() >= 1.5  # 0.25 m are two columns, between middles of voxels

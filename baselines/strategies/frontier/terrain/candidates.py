@@ -47,7 +47,7 @@ class TerrainCandidates(Candidates[TerrainMap]):
         super().__init__(scenario, kind, frontiers)
         (x, y, _), edge = self._size, scenario.grid.voxel_size_m
         apart = self._spacing(frontiers.spacing_m, edge), self._spacing(frontiers.rise_m, edge)
-        self._map = new_terrain_map(self._size, kind.robot.body_radius_m / edge, *apart, ceiling)
+        self._map = new_terrain_map(self._size, kind.robot.planning_radius_m / edge, *apart, ceiling)
         self._excluded = self._map.excluded
         self._counter = new_counter(x * y, self._size)
         turns = min(math.ceil(2.0 * math.pi * self.reach), 720)

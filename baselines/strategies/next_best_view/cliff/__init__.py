@@ -283,7 +283,7 @@ class CliffMapping:
             within = behind_line(edge, here) if line else inside_polygon(edge.polygon, carrying.shape)
             carrying &= within | memory.stood[window]
         safe = np.zeros(memory.stood.shape, bool)
-        safe[window] = safe_columns(carrying, view.kind.robot.body_radius_m / edge_m + _MARGIN)
+        safe[window] = safe_columns(carrying, view.kind.robot.planning_radius_m / edge_m + _MARGIN)
         return safe
 
     def _raster(self, view: RobotView, memory: Memory, reachable: np.ndarray) -> np.ndarray:
