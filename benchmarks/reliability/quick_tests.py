@@ -1,6 +1,7 @@
 """A plugin of pytest for interpreted kernels: a clock for each test, and a list of what became of them.
 
-A test that takes longer than QUICK_TEST_S of the processor fails, whatever it waits for. The outcome of each
+Hypothesis draws a tenth of its examples, and takes the first that fails as it is. A test that takes longer
+than QUICK_TEST_S of the processor fails, whatever it waits for. The outcome of each
 test, its seconds and its name are appended to the file QUICK_TESTS_TOLD, where that is set: the quickest can
 be run again. Where coverage is measured, it is told which test runs, and which is being set up: what others
 of its file share may be made then.
@@ -18,10 +19,15 @@ from types import FrameType
 from typing import NamedTuple
 
 import pytest
+from hypothesis import Phase, settings
 
 LIMIT, TOLD = "QUICK_TEST_S", "QUICK_TESTS_TOLD"
 SET_UP = " is set up"
 """Behind the name of a test, as coverage is told."""
+
+
+_EXAMPLES = 10
+"""Of Hypothesis, where the suite draws a hundred."""
 
 
 class Told(NamedTuple):
@@ -40,6 +46,14 @@ class TooSlowError(BaseException):
 def _ring(number: int, frame: FrameType | None) -> None:
     del number, frame
     raise TooSlowError("the test took too long")
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_configure() -> None:
+    """Let Hypothesis draw few examples, and keep what the suite has settled of it."""
+    phases = [Phase.explicit, Phase.generate]
+    settings.register_profile("few", settings.default, max_examples=_EXAMPLES, phases=phases)
+    settings.load_profile("few")
 
 
 @pytest.hookimpl(wrapper=True)

@@ -28,7 +28,7 @@ SHAPES = ((7, 11, 5), (3, 8, 6), (9, 6, 1), (13, 2, 4), (1, 10, 3))
 
 def drawn(examples: int = 60) -> settings:
     """So many examples for Hypothesis, and ten times as many in its profile `long` (tests/conftest.py)."""
-    return settings(max_examples=examples * settings.default.max_examples // 100)
+    return settings(max_examples=max(examples * settings.default.max_examples // 100, 1))
 
 
 seeds = st.integers(0, 2**32 - 1)

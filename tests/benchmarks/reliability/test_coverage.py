@@ -3,10 +3,15 @@
 from __future__ import annotations
 
 import json
+import os
+import shutil
+import subprocess
+import sys
 
 import pytest
 
 from benchmarks.reliability import coverage
+from benchmarks.reliability.coverage import ROOT
 from benchmarks.reliability.quick_tests import Told, told_in
 from entropy_explore_env.errors import SettingError
 
@@ -63,6 +68,18 @@ def test_a_file_of_tests_is_measured_once_with_the_names_of_its_tests(tmp_path):
     before = data.stat()
     coverage.measure(file, tmp_path, 10.0)
     assert data.stat() == before
+
+
+def test_few_examples_are_drawn_where_kernels_are_interpreted(tmp_path):
+    shutil.copy(ROOT / "tests" / "conftest.py", tmp_path)
+    (tmp_path / "test_it.py").write_text(
+        "from hypothesis import given, settings, strategies as st\nseen = []\n"
+        "@given(st.integers())\ndef test_drawn(number):\n    seen.append(number)\n"
+        "def test_few():\n    assert 1 < len(seen) <= 10 and settings.default.deadline is None\n"
+    )
+    words = ["-q", "-p", "no:cacheprovider", "-p", "benchmarks.reliability.quick_tests", "test_it.py"]
+    variables = {**os.environ, "PYTHONPATH": str(ROOT)}
+    subprocess.run([sys.executable, "-m", "pytest", *words], cwd=tmp_path, env=variables, check=True)
 
 
 def test_what_is_told_of_tests_is_read_back(tmp_path):
