@@ -4,7 +4,8 @@ A suite is a set of worlds, starts and seeds that is pinned (scoreboard/suites.p
 same missions; written are a page with tables and figures. Missions are kept, a file each: an interrupted run
 resumes and ends with the same page, byte for byte. Mission k of all tasks and strategies is run before any
 mission k + 1, so that a page of a part is fair. A mission that raises an error or runs past its limit is a
-row with the reason.
+row with the reason. In suites, a strategy that finishes none of its first three missions of a task is not run
+further there.
 """
 
 from __future__ import annotations
@@ -45,6 +46,8 @@ from entropy_explore_env.validation import check_whole
 
 _SCENARIOS = "room,room-furnished,lab,office,cave"
 _MOST_ROBOTS = 1000
+_TRIES = 3
+"""Missions of a suite's task after which a strategy that finished none is not run further there."""
 
 
 @dataclass
@@ -56,8 +59,9 @@ class Args(WorkerOptions):
     scenarios: str | None = None
     """In place of a suite: names and world files, commas between, each changed by the options of the task;
     default: room,room-furnished,lab,office,cave, or the scenario that --settings holds as a whole."""
-    strategies: str = "all"
-    """Names as in baselines.run, commas between; nearest-frontier is added in suites, random else."""
+    strategies: str | None = None
+    """Names as in baselines.run, commas between, or all; nearest-frontier is added in suites, random else.
+    Default: those that the suite's table compares; without a suite all."""
     robots: str | None = None
     """Team sizes of scenarios, commas between; default: 1,2,4, or that of the scenario in --settings."""
     seeds: int | None = None
@@ -106,6 +110,7 @@ def main(words: Sequence[str]) -> int:
         keep_failures=True,
         stop_after_s=math.inf if args.stop_after_s is None else args.stop_after_s,
         confirm=args.confirm,
+        tries=None if args.suite is None else _TRIES,
     )
     results = Results(suite, records)
     if not any(results.of(task, strategy) for task in suite.tasks for strategy in suite.strategies):
@@ -139,11 +144,11 @@ def _suite(args: Args, words: Sequence[str]) -> tuple[Suite, list[str]]:
         for name, value in [*pinned, *([] if changed is None else [changed])]:
             if value is not None:
                 raise SettingError(name, value, "left out together with --suite, which pins it")
-        strategies = chosen_strategies(args.strategies, suite=True)
+        strategies = chosen_strategies(args.strategies, args.suite)
         return find_suite(args.suite, args.quick, strategies), []
     if args.world_scenario is not None and args.world_scenario not in SCENARIOS:
         raise SettingError("world_scenario", args.world_scenario, "one of " + ", ".join(SCENARIOS))
-    strategies = chosen_strategies(args.strategies, suite=False)
+    strategies = chosen_strategies(args.strategies)
     missions: dict[str, list[Mission]] = {}
     changes: dict[str, list[str]] = {}
     for name, entry in _entries(args).items():

@@ -17,7 +17,7 @@ from baselines.experiments.mission import Surroundings, mission_record, scripted
 from baselines.experiments.outcome import Outcome, Record
 from baselines.experiments.provenance import code_digest, modules_of
 from baselines.experiments.ray_cluster import RayCluster
-from baselines.experiments.runner import Conditions, run_all
+from baselines.experiments.runner import NOT_RUN, Conditions, run_all
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.scenario import Scenario
 
@@ -100,6 +100,16 @@ class CellMission:
     seed: int
 
     @property
+    def round(self) -> int:
+        """When its turn is; see `Cell.round`."""
+        return self.cell.round + self.seed
+
+    @property
+    def group(self) -> str:
+        """The name of its group of cells; that of its cell, if this is in none."""
+        return self.cell.group or self.cell.id
+
+    @property
     def file(self) -> str:
         """Its file in the folder of results, without suffix."""
         return f"{self.cell.id.replace('..', '__')}/seed-{self.seed}"  # a strategy may be named by a path
@@ -139,6 +149,7 @@ def run_cells(
     keep_failures: bool = False,
     stop_after_s: float = math.inf,
     confirm: bool = False,
+    tries: int | None = None,
 ) -> dict[str, list[Record]]:
     """Run what is missing of an experiment, under a progress bar.
 
@@ -155,21 +166,40 @@ def run_cells(
         keep_failures: See `runner.Conditions`.
         stop_after_s: Likewise.
         confirm: Keep what other code ran where samples come out the same; see `confirmation`.
+        tries: A group of cells of whose first so many missions none was finished is not run any further; None
+            = all are run.
 
     Returns:
-        Cell id → records by seed; see `mission.record_mission` for what one holds. Where the time was up,
-        `runner.NOT_RUN`.
+        Cell id → records by seed; see `mission.record_mission` for what one holds. Where the time was up, or
+        a group is not run further, `runner.NOT_RUN`.
     """
     missions = [CellMission(cell, seed) for cell in cells for seed in range(cell.seeds)]
-    missions.sort(key=lambda mission: mission.cell.round + mission.seed)
-    conditions = Conditions(folder, workers, title, quiet, limit_s, keep_failures, stop_after_s)
+    missions.sort(key=lambda one: one.round)
+    conditions = Conditions(folder, workers, title, quiet, limit_s, keep_failures)
+    ends_s = time.monotonic() + stop_after_s
     if confirm:
-        started_s = time.monotonic()
-        keep_confirmed(missions, [mission.cell.group or mission.cell.id for mission in missions], conditions)
-        left_s = stop_after_s - (time.monotonic() - started_s)
-        conditions = dataclasses.replace(conditions, stop_after_s=left_s)
-    found = run_all(missions, conditions)
+        left = dataclasses.replace(conditions, stop_after_s=stop_after_s)
+        keep_confirmed(missions, [one.group for one in missions], left)
+    parts = {title: missions}
+    if tries is not None:
+        parts = {
+            f"{title}, first {tries} missions": [one for one in missions if one.round < tries],
+            title: [one for one in missions if one.round >= tries],
+        }
+    found: dict[str, Record] = {}
+    going_on = {one.group for one in missions}
+    for shown, part in parts.items():
+        chosen = [one for one in part if one.group in going_on]
+        left = dataclasses.replace(conditions, title=shown, stop_after_s=ends_s - time.monotonic())
+        ran = list(zip(chosen, run_all(chosen, left), strict=True))
+        found |= {one.file: record for one, record in ran}
+        going_on = {one.group for one, record in ran if _came_to_end(record)}
     records: dict[str, list[Record]] = {cell.id: [] for cell in cells}
-    for one, record in zip(missions, found, strict=True):
-        records[one.cell.id].append(record)
+    for one in missions:
+        records[one.cell.id].append(found.get(one.file, NOT_RUN))
     return records
+
+
+def _came_to_end(record: Record) -> bool:
+    """Whether a mission was finished, or was not run yet."""
+    return "failed" not in record and record.get("finished", True)

@@ -10,7 +10,7 @@ from typing import NamedTuple
 from baselines.cli.task_options import BaseTask, TaskOptions, tasked
 from baselines.experiments.mission import Surroundings, scripted_env
 from baselines.scoreboard.results import BASELINE, REFERENCES
-from baselines.scoreboard.suites import Place, Task, team_name
+from baselines.scoreboard.suites import Place, Task, suite_strategies, team_name
 from baselines.strategies import STRATEGIES, make_strategy, resolved
 from baselines.world_sweep import is_plan
 from entropy_explore_env.errors import SettingError
@@ -19,20 +19,22 @@ from entropy_explore_env.scenarios import SCENARIOS, find_scenario
 from entropy_explore_env.worlds.given import GIVEN, distinct_names
 
 
-def chosen_strategies(words: str, suite: bool) -> tuple[str, ...]:
-    """Strategies from names with commas between them; `all` = every one.
+def chosen_strategies(words: str | None, suite: str | None = None) -> tuple[str, ...]:
+    """Strategies from names with commas between them.
 
     Args:
-        words: Names.
-        suite: Of a suite, whose first reference is added; else the random walk is.
+        words: Names; `all` = every one; None = those of the suite's table, without a suite every one.
+        suite: Its name; its first reference is added, without a suite the random walk is.
 
     Raises:
-        SettingError: None has such a name.
+        SettingError: No strategy, or no suite, has such a name.
     """
-    names = list(STRATEGIES) if words == "all" else words.split(",")
+    if words is None and suite is not None:
+        words = ",".join(suite_strategies(suite))
+    names = list(STRATEGIES) if words in (None, "all") else words.split(",")
     for name in names:
         make_strategy(name)
-    added = [name for name in REFERENCES[:1] if name in STRATEGIES] if suite else [BASELINE]
+    added = [BASELINE] if suite is None else [name for name in REFERENCES[:1] if name in STRATEGIES]
     return tuple(dict.fromkeys([*added, *map(resolved, names)]))
 
 

@@ -94,6 +94,7 @@ Strategies on the same worlds, starts and seeds, in suites that are pinned (`bas
   about ten missions they are too narrow, and of a single one there is none.
 - A mission that was cut off, or failed, counts with the time limit, and with the path that the team
   could have driven in it. Where both of a pair were cut off their ratio is 1.
+- In suites, a strategy that finishes none of its first three missions of a task is not run further there.
 - Seen: measured by any robot of the team, of the voxels that can be seen at all. Bits: what the best map
   lost, of the bits that the mission asks for.
 - Where not every mission has been run yet, mission k of all strategies and tasks came before any mission

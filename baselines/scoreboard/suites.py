@@ -204,6 +204,41 @@ def training_plans(starts: int) -> tuple[Task, ...]:
 SUITES = {"plans": plans, "volumes": volumes, "teams": teams}
 """Name → a function of `quick` that makes the tasks."""
 
+_OF_ONE_ROBOT = (
+    "random",
+    "gradient",
+    "mutual-information",
+    "per-time-visibility",
+    "next-best-view",
+    "nearest-frontier",
+    "information-gain",
+    "distance-advantage",
+    "receding-horizon",
+    "tour",
+    "information-rate-v0",
+    "planned-rate",
+)
+_OF_TEAMS = ("voronoi", "coordinated-frontier", "assigned-frontier")
+
+
+def suite_strategies(name: str) -> tuple[str, ...]:
+    """Who stands in a suite's table: the rules of the five papers, the frontier rules, and ours.
+
+    Variants of a rule do not, as `raster-fixed-yaw`; nor, where one robot explores, do rules that coordinate
+    teams.
+
+    Raises:
+        SettingError: No suite has this name.
+    """
+    _check_suite(name)
+    return _OF_ONE_ROBOT if name == "plans" else (*_OF_ONE_ROBOT, *_OF_TEAMS)
+
+
+def _check_suite(name: str) -> None:
+    """Raise an error if no suite has this name."""
+    if name not in SUITES:
+        raise SettingError("suite", name, "one of " + ", ".join(SUITES))
+
 
 def find_suite(name: str, quick: bool, strategies: tuple[str, ...]) -> Suite:
     """The suite with a name.
@@ -216,8 +251,7 @@ def find_suite(name: str, quick: bool, strategies: tuple[str, ...]) -> Suite:
     Raises:
         SettingError: No suite has this name, or its worlds are not where they should be.
     """
-    if name not in SUITES:
-        raise SettingError("suite", name, "one of " + ", ".join(SUITES))
+    _check_suite(name)
     return Suite(name, SUITES[name](quick), strategies)
 
 

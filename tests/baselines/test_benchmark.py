@@ -414,13 +414,19 @@ def test_a_page_where_all_failed_is_a_page(tmp_path):
 
 
 def test_random_is_always_there_and_first():
-    assert chosen_strategies("gradient,random", suite=False) == ("random", "gradient")
-    assert set(chosen_strategies("all", suite=False)) == set(strategies.STRATEGIES)
-    assert chosen_strategies("gradient", suite=True)[-1] == "gradient"
-    assert "nearest-frontier" in chosen_strategies("gradient", suite=True)
+    assert chosen_strategies("gradient,random") == ("random", "gradient")
+    assert set(chosen_strategies("all")) == set(chosen_strategies(None)) == set(strategies.STRATEGIES)
+    assert chosen_strategies("gradient", "plans") == ("nearest-frontier", "gradient")
     former = ("random", "information-rate-v0")
-    assert chosen_strategies("information-rate,information-rate-v0", suite=False) == former
-    assert chosen_strategies("best", suite=False) == ("random", strategies.ALIASES["best"])
+    assert chosen_strategies("information-rate,information-rate-v0") == former
+    assert chosen_strategies("best") == ("random", strategies.ALIASES["best"])
+
+
+def test_a_suite_says_who_stands_in_its_table():
+    plans, volumes = chosen_strategies(None, "plans"), chosen_strategies(None, "volumes")
+    assert plans[0] == "nearest-frontier" and strategies.ALIASES["best"] in plans
+    assert set(volumes) - set(plans) == {"voronoi", "coordinated-frontier", "assigned-frontier"}
+    assert set(chosen_strategies("all", "plans")) == set(strategies.STRATEGIES)
 
 
 def test_scenarios_are_names_and_files(tmp_path):

@@ -156,6 +156,27 @@ def test_missions_of_all_cells_take_turns(tmp_path):
     assert len(order) == 9
 
 
+def test_who_finishes_none_of_the_first_missions_is_not_run_further(tmp_path):
+    """Neither in this cell nor in others of its group, also where a stopped experiment goes on."""
+
+    def record(env, strategy, seed):
+        if strategy == "raster":
+            raise RuntimeError("cannot act here")
+        return {"finished": strategy == "gradient" and seed == 1}
+
+    names = ("random", "gradient", "raster")
+    cells = [Cell(name, SHORT, name, 4, record) for name in names]
+    cells.append(Cell("random-later", SHORT, "random", 2, record, round=4, group="random"))
+    kept = {"quiet": True, "keep_failures": True}
+    first = run_cells(cells, tmp_path, 1, "test", tries=2, **kept)
+    not_run = {name: [record == runner.NOT_RUN for record in records] for name, records in first.items()}
+    assert not_run["random"] == not_run["raster"] == [False, False, True, True]
+    assert not_run["gradient"] == [False] * 4 and not_run["random-later"] == [True, True]
+    assert run_cells(cells, tmp_path, 1, "test", tries=2, **kept) == first
+    everything = run_cells(cells, tmp_path, 1, "test", **kept)
+    assert all(record != runner.NOT_RUN for records in everything.values() for record in records)
+
+
 def test_a_record_changed_by_hand_is_run_again(finished, tmp_path):
     folder, records = finished
     path = record_file(tmp_path, "walk", 0)
