@@ -142,6 +142,16 @@ def test_a_silent_radio_neither_sends_nor_hears(who):
     assert (missions.state.heard["heard_s"][0][[0, 1], [1, 0]] == 0.0).all()
 
 
+def test_a_sound_radio_draws_nothing():
+    """So that one fault more does not change when others happen."""
+    missions = team({"blind": {"at_s": 1e6}}, channel={"i_min_bits": 0.0})
+    before = missions.state.faults["radio_rng"].copy()
+    for _ in range(3):
+        robots = toward(missions, HERE, STAY)
+    assert (robots["messages_received"] > 0).all()
+    assert (missions.state.faults["radio_rng"] == before).all()
+
+
 @pytest.mark.parametrize("channel", [{}, {"delay_s": 0.2}, {"phase_s": 2.0, "repeats": 2}])
 def test_garbled_messages_are_dropped_and_counted(channel):
     channel = {"i_min_bits": 0.0, **channel}

@@ -129,6 +129,18 @@ def test_a_robot_that_is_wrong_about_its_yaw_drives_and_looks_elsewhere():
     assert missions.mean[0, 0, 6, 5, 2] == pytest.approx(0.0, abs=1e-3)  # which it takes for one beyond x
 
 
+def test_a_robot_that_a_fault_stops_is_as_uncertain_as_what_it_has_driven_makes_it():
+    """½ m in 1.5 s, then it stops for good; 5 cm per √m."""
+    only_xy = {"localization": {"xy_m_per_sqrt_m": 0.05}, "turn_rate_rad_s": math.inf}
+    missions = started(free_box(robots=2, robot=only_xy, faults={"stop": {"at_s": 1.5, "robots": (0,)}}))
+    put(missions, 0, (1.75, 1.75, 1.25, 0.0, 0.0))
+    put(missions, 1, STAY)
+    for _ in range(5):
+        toward(missions, (1.75, 2.75, 1.25, 0.0, 0.0), STAY)
+    variance = np.diag(missions.state.estimates[0, 0]["covariance"])
+    assert variance[:2] == pytest.approx(0.05**2 * 0.5) and variance[2:] == pytest.approx(0.0)
+
+
 def test_true_walls_stop_a_robot_that_believes_to_be_elsewhere():
     solid = np.zeros((7, 11, 5), bool)
     solid[:, 5] = True

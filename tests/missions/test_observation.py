@@ -305,6 +305,19 @@ def test_parts_left_out_leave_no_numbers():
     assert list(alone.layout.split(alone.observations[0, 0])) == ["panorama", "self"]
 
 
+def test_who_does_not_decide_observes_nothing_where_that_is_asked_for():
+    missions = started(free_box(robots=2, decision_period_s=0.25, observation={"while_busy": False}))
+    put(missions, 0, (1.75, 2.75, 1.25, 0, 0))
+    put(missions, 1, (1.25, 3.75, 1.75, 0, 0))
+    stay, go = np.zeros(5), np.array([1.0, 0.0, 0.0, 0.0, 0.0])
+    seen = []
+    for _ in range(2):  # a scan takes ½ s
+        missions.step(np.array([[stay, go]]), np.zeros((1, 2), np.int64))
+        seen.append(missions.observations[0].any(axis=1).tolist())
+    assert seen == [[False, False], [True, False]]
+    assert missions.state.robots[0]["deciding"].tolist() == [True, False]
+
+
 def test_a_place_on_a_face_that_rounding_takes_past_it_is_still_inside():
     """1e9 m from the map's origin, where a metre has eight digits left: no ray begins outside."""
     grid = Grid((7, 11, 5), 0.08945617475586909, (966007922.5094144, 268677512.72424054, 239985185.11960912))

@@ -11,12 +11,22 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from entropy_explore_env.missions.poses import driven_metres, pose_at, speed_at
+from entropy_explore_env.missions.redecision import CHOICE, keeps_speed
 from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.missions.snapshot import restore, snapshot
 from entropy_explore_env.missions.view import view_of
 from entropy_explore_env.reports.state_values import state_digest
 from entropy_explore_env.robots.motion import MoveEnd
-from tests.missions.test_driving import ALL_ROUND, BEHIND, LEG, end_of, planner, toward, wall_with_a_gap
+from tests.missions.test_driving import (
+    ALL_ROUND,
+    BEHIND,
+    LEG,
+    at_the_wall,
+    end_of,
+    planner,
+    toward,
+    wall_with_a_gap,
+)
 from tests.reference.scenes import build, drawn, free_box, put, random_actions, seeds, started, wander
 
 START = (0.75, 0.75, 0.25, 0.0, 0.0)
@@ -105,6 +115,58 @@ def test_a_new_drive_that_something_cuts_short_ends_where_the_robot_can_rest():
     assert robot["ready_s"] == pytest.approx(3.5)
     robots = toward(missions, (0.75, 2.75, 0.25, 0.0, 0.0))
     assert (robot["blocked_moves"], robots["distance_m"][0]) == (1, pytest.approx(0.75 + 0.25 + 1.0))
+
+
+def test_a_new_drive_that_ends_at_once_leads_around_the_corner_where_the_robot_brakes():
+    """At ½ m/s, 0.1 m before a corner, it comes to rest 0.15 m behind it; the gate ahead has shut."""
+    missions = at_the_wall(robot={"redecide": 2.0 * LEG + 0.3})
+    robot, params = toward(missions, BEHIND)[0], missions.rules.params[0]
+    assert (robot["under_way"], robot["corners"]) == (True, 2)
+    solid = wall_with_a_gap()
+    solid[3] = True
+    build(missions, solid)
+    now_s = float(missions.state.missions[0]["time_s"])
+    robot = toward(missions, (2.25, 5.25, 0.25, 0.0, 0.0))[0]
+    assert (end_of(robot), robot["corners"]) == (MoveEnd.OBSTACLE, 1)
+    assert robot["path_m"] == pytest.approx(0.25, abs=1e-6)
+    assert robot["path"][0, :2] == pytest.approx((1.25, 4.75), abs=1e-6)
+    corner_s = now_s + (0.5 - math.sqrt(0.15)) / 0.5  # ½ t - ¼ t² = 0.1
+    assert pose_at(params, robot, corner_s)[:2] == pytest.approx((1.25, 4.75), abs=1e-6)
+    assert pose_at(params, robot, now_s + 1.0)[:2] == pytest.approx((1.40, 4.75), abs=1e-6)
+
+
+def test_who_keeps_its_viewpoint_does_not_decide_again_before_its_time():
+    """Steps of ½ s: it decides after 2 s, and then after 4."""
+    missions, decided = on_the_way(decision_period_s=0.5), []
+    for _ in range(4):
+        robots = toward(missions, FAR)
+        decided.append((bool(robots["deciding"][0]), bool(robots["under_way"][0])))
+    assert decided == [(False, False)] * 3 + [(True, True)]
+
+
+@pytest.mark.parametrize(("moved_m", "departs_s"), [(3e-4, 0.0), (1e-3, 2.0)])
+def test_a_viewpoint_is_the_same_within_a_thousandth_of_a_voxel(moved_m, departs_s):
+    """Voxels are ½ m: ½ mm counts."""
+    missions = on_the_way()
+    robots = toward(missions, (FAR[0] + moved_m, *FAR[1:]))
+    assert robots["depart_s"][0] == departs_s
+
+
+def test_a_path_as_long_as_the_braking_distance_is_too_short_to_keep_the_speed():
+    choice = np.zeros(1, CHOICE)[0]
+    for length_m, keeps in ((0.25, False), (0.25 * (1.0 + 1e-6), True)):
+        choice["path"][0] = length_m, 0.0, 0.0
+        assert keeps_speed(choice, (0.25, 0.0, 0.0), 0.25) == keeps
+
+
+def test_who_sees_its_path_blocked_decides_at_once_however_seldom_it_decides_else():
+    sensor = {**ALL_ROUND, "scan_every_m": 0.3}
+    missions = started(planner(sensor=sensor, robot={"redecide": 100.0, "unknown_cost": 1.0}))
+    build(missions, wall_with_a_gap())
+    put(missions, 0, START)
+    robot = toward(missions, BEHIND)[0]
+    assert (robot["scans"], robot["path_blocked"], robot["under_way"]) == (1, True, True)
+    assert robot["redecide_s"] == missions.state.missions[0]["time_s"]
 
 
 TOURS = (
