@@ -10,9 +10,14 @@ Ours, where the paper says nothing:
 - There is one candidate per block of the map.
 - A place from which a robot has scanned is no longer its candidate, so that slivers which its rays miss do
   not stop it.
-- A robot without candidates waits and scans while teammates are under way. Then a finer σ counts as explored,
-  half the one before, down to the mission's σ_end, since a mission may require more than having seen
-  everything once. If nothing is left at that level either, the robot goes to random viewpoints.
+- A robot without candidates waits and scans while teammates are under way, and makes room for one whose
+  body touches its own. Then a finer σ counts as explored, half the one before, down to the mission's σ_end,
+  since a mission may require more than having seen everything once. If nothing is left at that level either,
+  the robot goes to random viewpoints.
+- A robot that cannot get to its candidate twice in a row goes to a random viewpoint. If teammates' bodies
+  stop it again after that, it makes room, for longer the more often that happens.
+- A robot makes room by going to a place to which its path is shorter than its teammates' paths: so in a row
+  in which none can pass the last one moves first. If there is no such place it goes to a random viewpoint.
 - Robots that drive straight, or no farther than a reach, stop and scan at corners. t does not include these
   stops, and they first promise to see what is visible from there.
 - V is counted all around; a sensor that looks one way is turned to where most of it lies.
@@ -29,6 +34,7 @@ import numpy as np
 
 from baselines.strategies.frontier.allocation import Allocator, Choice, Value, stays, under_way
 from baselines.strategies.frontier.candidates import FrontierConfig
+from baselines.strategies.frontier.voxel.map import NONE
 from baselines.strategies.protocol import random_viewpoint
 from entropy_explore_env.belief.paths.search import extract_path, new_search
 from entropy_explore_env.belief.paths.string_pulling import string_pulled
@@ -41,6 +47,10 @@ from entropy_explore_env.validation import check, check_choice, check_kind, chec
 Allocation = Literal["asynchronous", "synchronous"]
 _WITHIN_REACH = 0.999
 """Share of the reach that is used, so that rounding never moves a place towards the robot."""
+_MOST_PARTING = 4
+"""Most decisions for which a robot makes room after a block."""
+_TOUCHING = 1.0
+"""Voxel edges: bodies that are no farther apart touch."""
 _DELAY = 1.5
 """Others may be under way this many times the estimated time, which does not include stops at corners."""
 _EARLY = (
@@ -138,6 +148,10 @@ class _Assignment:
     """Number of targets for which it left."""
     failures: int = 0
     """Consecutive drives that ended early."""
+    detours: int = 0
+    """How often it went elsewhere after such drives since it last got to where it wanted."""
+    parting: int = 0
+    """Decisions for which it still makes room for teammates."""
     scanned: bool = False
     """Whether it has taken its first scan."""
     level: float = 0.0
@@ -213,20 +227,29 @@ class FrontierStrategy:
         self._finish_drive(view, assignment, allocator)
         if assignment.failures > 1:  # the same belief would lead to the same choice
             assignment.failures, assignment.stops, assignment.target = 0, [], -1
-            return random_viewpoint(view, self._rng)
+            assignment.detours += 1
+            stopped = view.move_end is MoveEnd.TEAMMATE
+            assignment.parting = min(assignment.detours - 1, _MOST_PARTING) if stopped else 0
+            if assignment.parting == 0:
+                return random_viewpoint(view, self._rng)
+        if assignment.parting > 0:
+            assignment.parting -= 1
+            return self._making_room(view, allocator)
         if assignment.stops:
             return self._onward(view, assignment, allocator)
         if self.config.allocation == "synchronous" and self._others_are_busy(view, assignment):
             return self._gazing(view, allocator, view.pose[:3])
         choice = self._choice_of(view, assignment, allocator)
         if choice is None:
-            busy = any(self._under_way(view, mate) for mate in view.teammates)
+            busy = [mate for mate in view.teammates if self._under_way(view, mate)]
+            if any(self._touches(view, mate) for mate in busy):
+                return self._making_room(view, allocator)
             if busy or self._finest >= self.config.frontiers.sigma:
                 return self._gazing(view, allocator, view.pose[:3])
             return random_viewpoint(view, self._rng)
         assignment.target, assignment.departed_s = choice.voxel, view.time_s
         assignment.trips += 1
-        assignment.stops = self._stops_to(view, allocator, choice)
+        assignment.stops = self._stops_to(view, allocator, choice.voxel)
         return self._onward(view, assignment, allocator)
 
     def _allocator(self, view: RobotView) -> Allocator:
@@ -249,6 +272,8 @@ class FrontierStrategy:
         allocator.candidates.update(view, assignment.level)
         early = view.move_end in _EARLY and assignment.target >= 0
         assignment.failures = assignment.failures + 1 if early else 0
+        if assignment.target >= 0 and not early:
+            assignment.detours = 0
         away = bool(assignment.stops) and _apart_m(view, assignment.stops[0]) > view.kind.robot.reach_m
         if early or away:
             assignment.stops = []
@@ -261,6 +286,20 @@ class FrontierStrategy:
             )
             allocator.candidates.exclude(allocator.start_of(view.pose))
             assignment.target = -1
+
+    def _touches(self, view: RobotView, mate: int) -> bool:
+        """Whether a teammate's body touched the robot's where it was heard last."""
+        seen, grid = view.teammates[mate], self._scenario.grid
+        bodies_m = view.kind.robot.body_radius_m + self._scenario.kind_of(mate).robot.body_radius_m
+        apart_m = _apart_m(view, seen.pose[:3])
+        return seen.heard_s >= 0.0 and apart_m <= bodies_m + _TOUCHING * grid.voxel_size_m
+
+    def _making_room(self, view: RobotView, allocator: Allocator) -> np.ndarray:
+        """The viewpoint at a place away from teammates, or at a stop on the path there."""
+        away = allocator.away_from(view, self._rng)
+        if away == NONE:
+            return random_viewpoint(view, self._rng)
+        return self._gazing(view, allocator, self._stops_to(view, allocator, away)[0])
 
     def _under_way(self, view: RobotView, mate: int) -> bool:
         seen = view.teammates[mate]
@@ -329,19 +368,19 @@ class FrontierStrategy:
             place[2] = view.pose[2]
         return place
 
-    def _stops_to(self, view: RobotView, allocator: Allocator, choice: Choice) -> list[np.ndarray]:
-        """Stops on the path to a candidate, none farther from the one before than the robot reaches."""
+    def _stops_to(self, view: RobotView, allocator: Allocator, voxel: int) -> list[np.ndarray]:
+        """Stops on the path to a voxel, none farther from the one before than the robot reaches."""
         grid, robot = self._scenario.grid, view.kind.robot
-        goal = self._place(view, choice.voxel)
+        goal = self._place(view, voxel)
         if robot.navigator == "planned" and math.isinf(robot.reach_m):
             return [goal]
-        allocator.search_path(view.pose, choice.voxel)
+        allocator.search_path(view.pose, voxel)
         search, lattice = allocator.search, allocator.lattice
-        path = np.empty(extract_path(search, lattice, choice.voxel, np.empty(0, np.int32)), np.int32)
-        if extract_path(search, lattice, choice.voxel, path) == 0:
+        path = np.empty(extract_path(search, lattice, voxel, np.empty(0, np.int32)), np.int32)
+        if extract_path(search, lattice, voxel, path) == 0:
             return [goal]
         start = grid.in_grid_units(view.pose)[:3]
-        end = np.stack(np.unravel_index(choice.voxel, grid.shape)) + 0.5
+        end = np.stack(np.unravel_index(voxel, grid.shape)) + 0.5
         if lattice.layer >= 0:
             end[2] = start[2]
         points = string_pulled(search, lattice, allocator.costs, path, start, end)

@@ -23,6 +23,7 @@ import numpy as np
 from baselines.strategies.frontier.candidates import Candidates, FrontierConfig
 from baselines.strategies.frontier.terrain.candidates import TerrainCandidates
 from baselines.strategies.frontier.voxel.candidates import VoxelCandidates
+from baselines.strategies.frontier.voxel.map import NONE
 from entropy_explore_env.belief.paths.lattice import Lattice, costs_of, new_lattice
 from entropy_explore_env.belief.paths.planning import resume_search, search_paths, start_search
 from entropy_explore_env.belief.paths.search import Search, cost_to, costs_to_all
@@ -39,6 +40,8 @@ _FIRST_REACH = 0.25
 range costs more than counting the few candidates beyond that could be better."""
 _EXTENSION = 1.4
 """Then they are searched this many times as far until that is enough."""
+_PARTING_DRAWS = 8
+"""So many places away from teammates are drawn, of which the farthest from them is taken."""
 
 
 class Value(Protocol):
@@ -175,6 +178,32 @@ class Allocator:
         slots, voxels = slots[reached], voxels[reached]
         seen = self.candidates.count(slots, voxels) * self.candidates.point
         return self.seconds(view.robot, path_costs.edges[slots]), seen
+
+    def away_from(self, view: RobotView, rng: np.random.Generator) -> int:
+        """A voxel to which the robot has a shorter path than any teammate of which it heard; NONE = none.
+
+        Of some that are drawn the one that is farthest from teammates.
+        """
+        heard = [mate.pose for mate in view.teammates.values() if mate.heard_s >= 0.0]
+        if not heard:
+            return NONE
+        apart = np.min([self._costs_everywhere(pose) for pose in heard], axis=0)
+        own = self._costs_everywhere(view.pose)
+        own[self.start_of(view.pose)] = math.inf
+        nearer = np.flatnonzero(own < apart)
+        if len(nearer) == 0:
+            return NONE
+        drawn = rng.choice(nearer, _PARTING_DRAWS)
+        return int(drawn[np.argmax(apart[drawn])])
+
+    def _costs_everywhere(self, pose: np.ndarray) -> np.ndarray:
+        """(V,) float64 lengths of the paths from a pose to all voxels; inf = no path through mapped space."""
+        costs = np.empty(self._scenario.grid.voxels)
+        with self._passable_start(pose) as source:
+            start_search(self.search, self.lattice, self.costs, source)
+            resume_search(self.search, self.lattice, self.costs, math.inf)
+        costs_to_all(self.search, costs)
+        return costs
 
     def place_of(self, voxel: int) -> np.ndarray:
         """(3,) centre of a voxel, grid units."""

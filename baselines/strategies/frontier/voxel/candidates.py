@@ -144,7 +144,10 @@ class VoxelCandidates(Candidates[FrontierMap]):
 
     def open_start(self, voxel: int) -> list[int]:
         """See `Candidates`."""
-        opened, (x, y, z) = [], self._axes_of(voxel)
+        opened: list[int] = []
+        if math.isfinite(self._map.traversal_cost[voxel]):
+            return opened
+        x, y, z = self._axes_of(voxel)
         for offset in self._map.footprint:
             place = x + offset[0], y + offset[1], z + offset[2]
             if all(0 <= i < n for i, n in zip(place, self._size, strict=True)):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import itertools
 import math
 
@@ -13,7 +12,6 @@ from baselines.experiments.mission import run_mission, scripted
 from baselines.papers.sawhney.mission import explore_until_done
 from baselines.strategies import make_strategy
 from baselines.strategies.frontier import ExplorationConfig, FrontierStrategy, Metric
-from baselines.strategies.frontier.allocation import under_way
 from baselines.strategies.frontier.candidates import FrontierConfig
 from baselines.strategies.frontier.metrics import Coordinated, Nearest
 from baselines.strategies.frontier.voxel.candidates import VoxelCandidates
@@ -23,12 +21,9 @@ from entropy_explore_env.errors import SettingError
 from entropy_explore_env.missions.state import MissionEnd
 from entropy_explore_env.missions.view import view_of
 from entropy_explore_env.reports.metrics import joint_figures, mission_figures
-from entropy_explore_env.robots.motion import driving_time
 from entropy_explore_env.scenario import with_settings
 from entropy_explore_env.scenarios import BOX, find_scenario
 from entropy_explore_env.settings import Grid
-from tests.reference import sawhney as reference
-from tests.reference.scenes import build, free_box, put, started
 
 NAMES = ("per-time-visibility", "nearest-candidate", "coordinated-candidate")
 PERFECT = {"burst": 10_000, "i_min_bits": 0.0}
@@ -191,129 +186,6 @@ def test_synchronous_robots_leave_together():
         if len(before) == 3:
             ended_s = max(end for _, end in before)
             assert all(left_s >= ended_s - 1e-6 for left_s, _ in after)
-
-
-def corridor(places, heard=True):
-    """Robots in a corridor along y of which the middle is known: unexplored at both ends."""
-    missions = started(
-        free_box(robots=len(places), robot={"reach_m": 50.0, "body_radius_m": 0.0}, sigma_prior=30.0)
-    )
-    solid = np.ones(missions.grid.shape, bool)
-    solid[3, :, 2] = False
-    build(missions, solid)
-    for robot, y in enumerate(places):
-        pose = np.zeros(5)
-        pose[:3] = missions.grid.centre_of(np.array([3, y, 2]))
-        put(missions, robot, pose)
-        missions.mean[0, robot][solid], missions.mean[0, robot][~solid] = 1.0, 0.0
-        missions.precision[0, robot] = 1e4
-        for y_unknown in (0, 1, 9, 10):
-            missions.mean[0, robot][3, y_unknown, 2] = 0.5
-            missions.precision[0, robot][3, y_unknown, 2] = 1e-3
-    for robot in range(len(places)) if heard else ():
-        for mate in range(len(places)):
-            seen = missions.state.heard[0, robot, mate]
-            seen["heard_s"], seen["announced_s"] = 0.0, -1.0
-            seen["pose"][:] = missions.state.robots[0, mate]["origin"]
-    return missions
-
-
-def sent(missions, **config):
-    """Layers along y to which robots go that have scanned once."""
-    strategy = FrontierStrategy(
-        ExplorationConfig(**{"finest_sigma": ONCE, "frontiers": FrontierConfig(spacing_m=0.5), **config})
-    )
-    strategy.reset(missions.scenario, np.random.default_rng(0))
-    for assignment in strategy._assignments:
-        assignment.scanned = True
-    views = [view_of(missions, 0, robot) for robot in range(missions.scenario.robots)]
-    return [int(missions.grid.voxel_of(v[:3])[1]) for v in strategy.choose(views)]
-
-
-def test_who_stops_at_the_same_time_shares_the_frontiers():
-    assert sent(corridor((4, 6))) == [2, 8]
-    assert sent(corridor((3, 4))) == [2, 8]  # the second would be nearer to the first one's, too
-    assert sent(corridor((4, 3))) == [8, 2]
-    assert sent(corridor((3, 4)), promises=False) == [2, 2]
-    assert sent(corridor((3, 4)), metric=Nearest(), promises=False) == [2, 2]
-    assert sent(corridor((3, 4), heard=False)) == [2, 2]  # nothing was heard: each for itself
-
-
-def test_promises_stand_until_the_scan_is_heard():
-    missions = corridor((3, 4))  # V/t: 2/3.5 s at the near end, halved once promised; 2/5.5 s
-    seen = missions.state.heard[0, 1, 0]
-    seen["announced_s"] = 5.0
-    seen["announced"][:3] = missions.grid.centre_of(np.array([3, 2, 2]))
-    seen["heard_s"] = 5.0
-    assert sent(missions)[1] == 8
-    view = view_of(missions, 0, 1)
-    assert under_way(view, view.teammates[0], 0)
-    seen["heard_s"] = 6.0
-    view = view_of(missions, 0, 1)
-    assert not under_way(view, view.teammates[0], 0)
-    seen["announced_s"] = seen["heard_s"] = 6.0
-    kind, longest_m = missions.scenario.kind_of(0), sum(missions.grid.size_m)
-    drive_s = driving_time(longest_m, kind.robot.max_speed_m_s, kind.robot.acceleration_m_s2)
-    for late_s, lost in ((1.9 * drive_s, False), (2.1 * drive_s + kind.sensor.scan_time_s, True)):
-        view = dataclasses.replace(view_of(missions, 0, 1), time_s=6.0 + late_s)
-        assert under_way(view, view.teammates[0], 0) is not lost
-    seen["announced_s"] = seen["heard_s"] = -1.0
-    assert sent(missions)[1] == 2
-
-
-def test_allotment_is_the_paper_s_loop():
-    """Beside the slow reference, in a plan of which little is known: three robots that have all stopped."""
-    shape = (14, 12, 1)
-    rng = np.random.default_rng(3)
-    scenario = small_plan(grid=Grid(shape, 0.5), sensor={"max_range_m": 2.6})
-    for _ in range(6):
-        missions = started(scenario)
-        solid = np.zeros(shape, bool)
-        build(missions, solid)
-        known = np.zeros(shape, bool)
-        known[2 : int(rng.integers(6, 11)), 1 : int(rng.integers(5, 10))] = True
-        for robot in range(3):
-            pose = np.zeros(5)
-            pose[:3] = missions.grid.centre_of(np.array([3 + robot, 2 + int(rng.integers(0, 2)), 0]))
-            put(missions, robot, pose)
-            missions.mean[0, robot] = np.where(known, 0.0, 0.5)
-            missions.precision[0, robot] = np.where(known, 1e4, 1e-3)
-        for robot in range(3):
-            for mate in range(3):
-                seen = missions.state.heard[0, robot, mate]
-                seen["heard_s"], seen["announced_s"] = 0.0, -1.0
-                seen["pose"][:] = missions.state.robots[0, mate]["origin"]
-        check_against_reference(missions, known)
-
-
-def check_against_reference(missions, known):
-    strategy = FrontierStrategy(ExplorationConfig(finest_sigma=ONCE, frontiers=FrontierConfig(spacing_m=1.0)))
-    strategy.reset(missions.scenario, np.random.default_rng(0))
-    views = [view_of(missions, 0, robot) for robot in range(3)]
-    for assignment in strategy._assignments:
-        assignment.scanned = True
-    places = [tuple(missions.grid.voxel_of(v[:3]).tolist()) for v in strategy.choose(views)]
-    allocator = strategy._allocators[0]
-    assert isinstance(allocator.candidates, VoxelCandidates)
-    _, voxels = allocator.candidates.listed()
-    state = np.where(known, 0, 3)
-    directions, reach = allocator.candidates._directions, allocator.candidates.reach
-    shape, edge = known.shape, missions.grid.voxel_size_m
-    where = {int(v): np.stack(np.unravel_index(int(v), shape)) for v in voxels}
-    sees = {v: reference.seen_voxels(state, place + 0.5, directions, reach) for v, place in where.items()}
-    kind = missions.scenario.kind_of(0)
-
-    def value(robot, place, promised):
-        here = missions.grid.voxel_of(views[robot].pose[:3])
-        dx, dy = sorted(np.abs(where[place] - here)[:2])
-        length_m = (dy - dx + math.sqrt(2) * dx) * edge  # nothing is in the way in a known rectangle
-        v, a = kind.robot.max_speed_m_s, kind.robot.acceleration_m_s2
-        drive_s = 2 * math.sqrt(length_m / a) if length_m < v * v / a else length_m / v + v / a
-        seen = reference.weighed(sees[place], promised)
-        return seen / (drive_s + kind.sensor.scan_time_s) if seen else -math.inf
-
-    wanted = reference.allocated(range(3), list(where), value, sees.__getitem__, {})
-    assert places == [tuple(where[wanted[robot]].tolist()) for robot in range(3)]
 
 
 @pytest.mark.parametrize("name", NAMES)
