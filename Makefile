@@ -11,7 +11,8 @@ VENV_BENCHMARL := .venv-benchmarl
 STYLE := $(RUN) ruff check . && $(RUN) ruff format --check . && $(VENV)/bin/lint-imports --no-cache
 WARM := $(RUN) entropy_explore_env.warm --processes 1
 
-.PHONY: help demo new-user docs docs-links test test-long boundscheck test-rllib test-benchmarl lint bench reliability reproduce clean
+.PHONY: help demo new-user docs docs-links test test-long boundscheck test-rllib test-benchmarl lint bench reliability \
+	night reproduce clean
 .NOTPARALLEL:
 
 help:
@@ -28,6 +29,7 @@ help:
 	@echo "make lint         ruff, pyright and the contracts of imports"
 	@echo "make bench        speed against peers"
 	@echo "make reliability  goes on with the proofs of docs/results/reliability.md: many hours"
+	@echo "make night        a thousand drawn scenarios, others every night, and a little of the other proofs"
 	@echo "make reproduce    the experiments of the five papers, into docs/results: many hours"
 	@echo "make clean        remove the environments, builds and caches; results stay"
 
@@ -81,6 +83,14 @@ reliability: $(STAMP)dev
 	-for folder in missions belief robots; do \
 		$(RUN) benchmarks.reliability.mutants entropy_explore_env/$$folder --sample 100; done
 	$(RUN) benchmarks.reliability --page docs/results/reliability.md
+
+# What a night finds is in results/night, and its exit code is 1 where a case failed.
+NIGHT := $(RUN) benchmarks.reliability --results results/night
+TONIGHT := --first $$(date -u +%Y%m%d)000
+night: $(STAMP)dev
+	$(NIGHT) $(TONIGHT) --proofs settings --cases 1000
+	$(NIGHT) $(TONIGHT) --proofs states kills files soak --quick
+	$(NIGHT) --proofs determinism --quick
 
 reproduce: $(STAMP)baselines
 	$(RUN) baselines.papers.rocha04 --out docs/results

@@ -8,7 +8,6 @@ where it was. The page is made of all that is kept, and of what `benchmarks.reli
 
 from __future__ import annotations
 
-import hashlib
 import json
 import math
 import os
@@ -18,12 +17,10 @@ import time
 from collections.abc import Callable, Sequence
 from contextlib import closing
 from dataclasses import dataclass
-from functools import cache
 from importlib import metadata
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import entropy_explore_env
 from baselines.cli.arguments import parse, run_command
 from baselines.experiments.worker_pool import Failure, run_each
 from benchmarks.reliability import (
@@ -35,8 +32,10 @@ from benchmarks.reliability import (
     state_fuzz,
     training_runs,
 )
+from benchmarks.reliability.coverage import ROOT
 from benchmarks.reliability.mutants import of_these_sources
 from benchmarks.reliability.page import Kept, page, read_rows
+from benchmarks.reliability.sources import commits_of, library_digest
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.writing import write_atomically
 
@@ -102,6 +101,8 @@ class Args:
     Attributes:
         proofs: Which; nothing = all of them.
         quick: A few minutes.
+        cases: How much of each proof, in the unit in which the page counts it; nothing = all of it.
+        first: Number of the first case. Others draw other cases: a night may play those of its date.
         limit_s: Seconds of a proof after which no other case is begun; what is missing can be played later.
             0 = nothing is played, the page is made of what is kept.
         results: Folder of what is kept.
@@ -111,6 +112,8 @@ class Args:
 
     proofs: tuple[str, ...] = ()
     quick: bool = False
+    cases: int | None = None
+    first: int = 0
     limit_s: float = math.inf
     results: Path = Path("results/reliability")
     mutants: Path = Path("results/mutants")
@@ -123,14 +126,21 @@ def main(words: Sequence[str]) -> int:
     for name in args.proofs:
         if name not in PROOFS:
             raise SettingError("proofs", name, "one of " + ", ".join(PROOFS))
+    if args.first < 0:
+        raise SettingError("first", args.first, "a whole number ≥ 0")
+    if args.cases is not None and args.cases < 1:
+        raise SettingError("cases", args.cases, "a whole number ≥ 1")
     os.environ["ENTROPY_EXPLORE_ASSERT"] = "1"
     for name in args.proofs or PROOFS:
         proof = PROOFS[name]
-        wanted = proof.quick if args.quick else proof.full
-        carry_on(proof, args.results / f"{name}.jsonl", wanted, args.limit_s)
+        wanted = args.cases or (proof.quick if args.quick else proof.full)
+        carry_on(proof, args.results / f"{name}.jsonl", wanted, args.limit_s, args.first)
     kept = {name: _kept(proof, args.results / f"{name}.jsonl") for name, proof in PROOFS.items()}
     folders = {file.stem: of_these_sources(read_rows(file)) for file in sorted(args.mutants.glob("*.jsonl"))}
-    text = page(kept, folders, read_rows(args.results / "coverage.jsonl"), versions())
+    digests = {row["library"] for each in kept.values() for row in each.rows if "library" in row}
+    text = page(
+        kept, folders, read_rows(args.results / "coverage.jsonl"), versions(), commits_of(ROOT, digests)
+    )
     print(text)
     if args.page is not None:
         write_atomically(args.page, text.encode())
@@ -148,14 +158,14 @@ def versions() -> dict[str, str]:
     return {"Python": platform.python_version(), **{name: metadata.version(name) for name in names}}
 
 
-def carry_on(proof: Proof, file: Path, wanted: int, limit_s: float = math.inf) -> None:
-    """Play the cases from 0 that are not kept yet, until all that are kept come to what is wanted."""
+def carry_on(proof: Proof, file: Path, wanted: int, limit_s: float = math.inf, first: int = 0) -> None:
+    """Play the cases from a first one that are not kept yet, until those that are come to what is wanted."""
     begun_s = time.monotonic()
     file.parent.mkdir(parents=True, exist_ok=True)
     rows = read_rows(file)
     known, reached = {row["number"] for row in rows}, sum(map(proof.counts, rows))
     cases = wanted if proof.counts is _one else _MOST_CASES
-    missing = [number for number in range(cases) if number not in known]
+    missing = [number for number in range(first, first + cases) if number not in known]
     if reached >= wanted or limit_s <= 0.0:
         missing = []
     with (
@@ -173,14 +183,6 @@ def carry_on(proof: Proof, file: Path, wanted: int, limit_s: float = math.inf) -
                 break
     if missing:
         print(file=sys.stderr)
-
-
-@cache
-def library_digest() -> str:
-    """What the library's sources are, in a few letters: rows of other sources were played by other code."""
-    folder = Path(entropy_explore_env.__file__).parent
-    sources = b"".join(path.read_bytes() for path in sorted(folder.rglob("*.py")))
-    return hashlib.sha256(sources).hexdigest()[:12]
 
 
 if __name__ == "__main__":

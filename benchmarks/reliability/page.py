@@ -6,12 +6,14 @@ import json
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 from benchmarks.reliability.fault_table import fault_table, share_found
 from benchmarks.reliability.file_fuzz import FILES
 from benchmarks.reliability.settings_fuzz import STEPS, WATCHDOG_S
 from benchmarks.reliability.soak import CHANNELS, FLOOR, MAPS_EVERY, QUICK
+from benchmarks.reliability.sources import HOW
 
 Row = Mapping[str, Any]
 _SETTLED_STEPS = 1_000_000
@@ -41,6 +43,7 @@ def page(
     mutants: Mapping[str, Sequence[Row]],
     coverage: Sequence[Row],
     versions: Mapping[str, str],
+    commits: Mapping[str, str] = MappingProxyType({}),
 ) -> str:
     """The page as Markdown.
 
@@ -49,6 +52,7 @@ def page(
         mutants: Of each file or folder whose faults were drawn.
         coverage: A row a source file.
         versions: Of what results depend on.
+        commits: Digest of the library's sources → a commit that has it.
     """
     lines = [
         "# Reliability",
@@ -70,6 +74,7 @@ def page(
         lines += ["", *(f"- case {row['number']}: {row['failure'][:300]}" for row in failed[:20]), ""]
     lines += ["## Faults in formulas", "", fault_table(mutants), ""]
     lines += ["## Branches", "", _coverage(coverage), ""]
+    lines += ["## Sources", "", _sources(kept, commits), ""]
     return "\n".join(_without_double(lines)).rstrip() + "\n"
 
 
@@ -114,6 +119,25 @@ def _played_by(rows: Sequence[Row]) -> str:
         return f"All of them by the library whose sources have the digest {next(iter(states))}."
     latest = [row["library"] for row in rows if "library" in row][-1]
     return f"They were played by {len(states)} states of the library's sources, the latest {latest}."
+
+
+def _sources(kept: Mapping[str, Kept], commits: Mapping[str, str]) -> str:
+    """Which sources played how many cases, and which commits have them."""
+    cases: dict[str, Counter[str]] = defaultdict(Counter)
+    for name, each in kept.items():
+        for row in each.rows:
+            cases[row.get("library", "")][_SUMMARIES[name][0].lower()] += 1
+    lines = [
+        f"The digest of the library's sources is {HOW}. Where no commit is named, the sources were "
+        "those of a checkout in between.",
+        "",
+        "| digest | commit | cases |",
+        "| --- | --- | --- |",
+    ]
+    for digest, counts in sorted(cases.items(), key=lambda item: (item[0] not in commits, item[0])):
+        told = ", ".join(f"{number:,} of {name}" for name, number in counts.items())
+        lines.append(f"| {digest or 'not noted'} | {commits.get(digest, '-')} | {told} |")
+    return "\n".join(lines)
 
 
 def _settings(rows: Sequence[Row]) -> str:

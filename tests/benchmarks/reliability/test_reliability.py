@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import random
+import subprocess
 
 import pytest
 
 from benchmarks.reliability import __main__ as command
-from benchmarks.reliability import determinism, fault_table, kills, page, soak
+from benchmarks.reliability import determinism, fault_table, kills, page, soak, sources
 from benchmarks.reliability.__main__ import PROOFS, Proof, carry_on, main
 from benchmarks.reliability.page import Kept, read_rows
 from entropy_explore_env.errors import SettingError
@@ -128,6 +130,59 @@ def test_rows_of_other_sources_are_told_apart():
     rows = [{"number": n, "refused": [], "seconds": 0.5, "episodes": 1, "library": "ab"} for n in range(2)]
     assert "whose sources have the digest ab." in kept("settings", rows)
     assert "2 states of the library's sources" in kept("settings", [*rows, {**rows[0], "library": "cd"}])
+
+
+def test_the_page_names_the_commits_whose_sources_played():
+    rows = [{"number": n, "refused": "x", "library": "ab" if n else "cd"} for n in range(3)]
+    told = {**EMPTY, "states": Kept([*rows, {"number": 3, "refused": "x"}], 4, 10)}
+    lines = page.page(told, *NO_MORE, {"ab": "1234abc"}).splitlines()
+    assert lines[lines.index("| --- | --- | --- |") + 1 :] == [
+        "| ab | 1234abc | 2 of changed states |",
+        "| not noted | - | 1 of changed states |",
+        "| cd | - | 1 of changed states |",
+    ]
+
+
+def test_a_digest_is_that_of_a_commit_and_of_the_checkout_that_has_it(tmp_path, monkeypatch, capsys):
+    def git(*words):
+        who = ["-c", "user.name=a", "-c", "user.email=a@b"]
+        subprocess.run(["git", *who, *words], cwd=tmp_path, check=True, capture_output=True)
+
+    git("init", "-q")
+    digests = []
+    for content in ("1", "2"):
+        for place in ("b/c.py", "b.py", "a.py", "b/c.txt"):  # "b/c.py" stands before "b.py"
+            file = tmp_path / "entropy_explore_env" / place
+            file.parent.mkdir(parents=True, exist_ok=True)
+            file.write_text(f"{place} {content}")
+        git("add", "-A")
+        git("commit", "-q", "-m", content)
+        digests.append(sources.digest_of_commit(tmp_path, "HEAD"))
+    text = "".join(f"{place} 2" for place in ("a.py", "b/c.py", "b.py"))
+    assert digests[1] == hashlib.sha256(text.encode()).hexdigest()[:12] != digests[0]
+    monkeypatch.setattr(sources.entropy_explore_env, "__file__", str(file.parents[1] / "__init__.py"))
+    sources.library_digest.cache_clear()
+    assert sources.library_digest() == digests[1]
+    assert sources.main([]) == sources.main(["HEAD"]) == 0
+    assert capsys.readouterr().out.split() == [digests[1]] * 2
+    sources.library_digest.cache_clear()
+    found = sources.commits_of(tmp_path, [digests[0], "other"])
+    assert list(found) == digests[:1] and sources.digest_of_commit(tmp_path, found[digests[0]]) == digests[0]
+    assert sources.commits_of(tmp_path / "entropy_explore_env", []) == {}
+    with pytest.raises(SettingError, match="a commit of this checkout"):
+        sources.digest_of_commit(tmp_path, "gone")
+
+
+def test_a_night_plays_cases_of_its_own(tmp_path, monkeypatch, capsys):
+    counted = Proof(counts_for_seven, 10, 20, 60.0, seven)
+    monkeypatch.setattr(command, "PROOFS", {"settings": counted})
+    monkeypatch.setattr(command, "page", lambda *_: "")
+    assert main(["--cases", "14", "--first", "300", "--results", str(tmp_path)]) == 0
+    assert [row["number"] for row in read_rows(tmp_path / "settings.jsonl")] == [300, 301]
+    capsys.readouterr()
+    for words in (["--first", "-1"], ["--cases", "0"]):
+        with pytest.raises(SettingError, match=words[0][2:]):
+            main([*words, "--results", str(tmp_path)])
 
 
 def test_a_proof_stops_at_what_is_asked_for_and_at_its_time(tmp_path, capsys):
