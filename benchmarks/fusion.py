@@ -16,13 +16,13 @@ from benchmarks.rows import Effort, Goal, Row, compared, interleave, timed
 from entropy_explore_env.belief.map_update import PRIOR_MEAN, Scan, fuse_scan
 from entropy_explore_env.belief.measurement_model import Return, measurement_precision
 from entropy_explore_env.compilation.kernels import lean_kernel
+from entropy_explore_env.robots.measured_rays import trace_measurement
 from entropy_explore_env.robots.range_sensor import (
     Scene,
     SensorPose,
     new_scan,
     sensor_model,
     take_scan,
-    trace_measurement,
 )
 from entropy_explore_env.scenarios import ROOM
 from entropy_explore_env.settings import Grid, RangeSensor

@@ -257,3 +257,134 @@ def cast_range(coverage, size, line, stop_above):
     if at >= stops:
         return line.length, np.float32(0.0), OPEN
     return at * _EDGES, np.float32(0.0), WALL
+
+
+class _Walk(NamedTuple):
+    """A walk along a line, between two voxels."""
+
+    voxel: int
+    steps: _Axes
+    faces: _Axes
+    gaps: _Axes
+    leaves: int
+    """Ticks at which the line leaves the workspace."""
+    stops: int
+    """Ticks at its length."""
+
+
+@inlined_kernel
+def _begin_walk(size, line):
+    """The _Walk along a line, in the voxel in which it starts."""
+    x = _axis(line.start[0], line.direction[0], size[0])
+    y = _axis(line.start[1], line.direction[1], size[1])
+    z = _axis(line.start[2], line.direction[2], size[2])
+    return _Walk(
+        flat_index(size, x.index, y.index, z.index),
+        _Axes(x.step * (size[1] * size[2]), y.step * size[2], z.step),
+        _Axes(x.face, y.face, z.face),
+        _Axes(x.gap, y.gap, z.gap),
+        min(x.last, y.last, z.last),
+        _ticks(line.length),
+    )
+
+
+@inlined_kernel
+def _walk_open(walk, voxel, at, faces, until, n, crossing):
+    """Note voxels until `until`; returns (voxel, ticks, faces, number of voxels noted)."""
+    while at < until:
+        crossing.voxels[np.uint32(n)] = voxel
+        crossing.entered[np.uint32(n)] = at
+        n += 1
+        voxel, at, faces = _next_voxel(voxel, walk.steps, faces, walk.gaps)
+    return voxel, at, faces, n
+
+
+@inlined_kernel
+def _walk_behind(walk, voxel, at, faces, n, behind, crossing):
+    """Note the voxels behind a measured hit; returns the number of voxels noted in all."""
+    ends = min(at, walk.stops)
+    if at >= walk.stops:
+        for _ in range(behind):
+            if at >= walk.leaves:
+                break
+            crossing.voxels[np.uint32(n)] = voxel
+            crossing.entered[np.uint32(n)] = ends
+            n += 1
+            voxel, at, faces = _next_voxel(voxel, walk.steps, faces, walk.gaps)
+    return n
+
+
+@inlined_kernel
+def trace_two(size, first, second, behind, noted_first, noted_second):
+    """Note the voxels on two lines of known length, as `cast_ray` does with NEVER_STOP.
+
+    Each step of a walk needs the one before, so that a processor waits for most of it: two walks in turns
+    take less than one after the other.
+
+    Args:
+        size: (X, Y, Z) voxels.
+        first: Line; it starts inside the workspace.
+        second: Likewise.
+        behind: (for first, for second), voxels to note behind the length, where that is a measured hit.
+        noted_first: Crossing, filled with the voxels on the first line.
+        noted_second: Of the second; none of its arrays is one of `noted_first`.
+
+    Returns:
+        How many voxels were noted on each.
+    """
+    one, other = _begin_walk(size, first), _begin_walk(size, second)
+    noted_first.voxels[0], noted_first.entered[0] = one.voxel, 0
+    noted_second.voxels[0], noted_second.entered[0] = other.voxel, 0
+    until, other_until = min(one.leaves, one.stops), min(other.leaves, other.stops)
+    voxel, at, faces = _next_voxel(one.voxel, one.steps, one.faces, one.gaps)
+    other_voxel, other_at, other_faces = _next_voxel(other.voxel, other.steps, other.faces, other.gaps)
+    n = 1
+    while (at < until) & (other_at < other_until):
+        noted_first.voxels[np.uint32(n)] = voxel
+        noted_first.entered[np.uint32(n)] = at
+        noted_second.voxels[np.uint32(n)] = other_voxel
+        noted_second.entered[np.uint32(n)] = other_at
+        n += 1
+        voxel, at, faces = _next_voxel(voxel, one.steps, faces, one.gaps)
+        other_voxel, other_at, other_faces = _next_voxel(other_voxel, other.steps, other_faces, other.gaps)
+    voxel, at, faces, count = _walk_open(one, voxel, at, faces, until, n, noted_first)
+    other_voxel, other_at, other_faces, other_count = _walk_open(
+        other, other_voxel, other_at, other_faces, other_until, n, noted_second
+    )
+    return (
+        _walk_behind(one, voxel, at, faces, count, behind[0], noted_first),
+        _walk_behind(other, other_voxel, other_at, other_faces, other_count, behind[1], noted_second),
+    )
+
+
+@inlined_kernel
+def cast_two_ranges(coverage, size, first, second, stop_above):
+    """What `cast_range` returns for each of two lines, walked in turns as by `trace_two`."""
+    one, other = _begin_walk(size, first), _begin_walk(size, second)
+    until, other_until = min(one.leaves, one.stops), min(other.leaves, other.stops)
+    voxel, at, faces = _next_voxel(one.voxel, one.steps, one.faces, one.gaps)
+    other_voxel, other_at, other_faces = _next_voxel(other.voxel, other.steps, other.faces, other.gaps)
+    while (at < until) & (other_at < other_until):
+        if (coverage[np.uint64(voxel)] > stop_above) | (coverage[np.uint64(other_voxel)] > stop_above):
+            break
+        voxel, at, faces = _next_voxel(voxel, one.steps, faces, one.gaps)
+        other_voxel, other_at, other_faces = _next_voxel(other_voxel, other.steps, other_faces, other.gaps)
+    here, other_here = (voxel, at, faces), (other_voxel, other_at, other_faces)
+    return (
+        _range_on(coverage, one, here, until, first.length, stop_above),
+        _range_on(coverage, other, other_here, other_until, second.length, stop_above),
+    )
+
+
+@inlined_kernel
+def _range_on(coverage, walk, place, until, length, stop_above):
+    """Go on with a walk from (voxel, ticks, faces), and return what `cast_range` does."""
+    voxel, at, faces = place
+    while at < until:
+        covered = coverage[np.uint64(voxel)]
+        if covered > stop_above:
+            return at * _EDGES, covered, OBSTACLE
+        voxel, at, faces = _next_voxel(voxel, walk.steps, faces, walk.gaps)
+    if at >= walk.stops:
+        return length, np.float32(0.0), OPEN
+    return at * _EDGES, np.float32(0.0), WALL

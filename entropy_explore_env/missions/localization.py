@@ -15,7 +15,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from entropy_explore_env.belief.measurement_model import Return
 from entropy_explore_env.belief.raycast import point
 from entropy_explore_env.compilation.kernels import lean_kernel
 from entropy_explore_env.missions.poses import copy_numbers, pose_at, share_left
@@ -29,14 +28,10 @@ from entropy_explore_env.robots.localization import (
     point_in_world,
     weigh_by_covariance,
 )
+from entropy_explore_env.robots.measured_rays import trace_measurements
 from entropy_explore_env.robots.pose_covariance import within_half_turn
-from entropy_explore_env.robots.range_sensor import (
-    measure_ranges,
-    take_scan,
-    trace_measurement,
-)
+from entropy_explore_env.robots.range_sensor import measure_ranges, take_scan
 
-_NOTHING = int(Return.NOTHING)
 _INSIDE = 1e-6
 """How far within the workspace's upper faces an estimate is taken, in edges: these belong to no voxel."""
 
@@ -280,8 +275,7 @@ def believe_scan(localization, index, scan, sensor, scene, pose):
         x, y = ray.direction[0], ray.direction[1]
         ray.direction[0] += along * x - across * y
         ray.direction[1] += across * x + along * y
-        if ray.returned != _NOTHING:
-            trace_measurement(scan, number, sensor, scene.size, scene.voxel_size_m, pose, scene.occupied)
+    trace_measurements(scan, sensor, scene.size, scene.voxel_size_m, pose)
     pack_covariance(estimate.covariance, estimate.packed)
     weigh_by_covariance(scan.rays, len(scan.rays), estimate.packed, scene.voxel_size_m)
 

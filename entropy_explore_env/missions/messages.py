@@ -46,7 +46,7 @@ from entropy_explore_env.robots.channel import (
     edges_in_walls,
     path_loss_db,
 )
-from entropy_explore_env.robots.range_sensor import trace_measurement
+from entropy_explore_env.robots.measured_rays import trace_measurement
 
 _OUT_OF_RANGE, _LOST = Delivery.OUT_OF_RANGE.code, Delivery.LOST.code
 _ANNOUNCEMENT = np.int64(-1)

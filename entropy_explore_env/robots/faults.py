@@ -5,7 +5,8 @@ from __future__ import annotations
 from entropy_explore_env.belief.measurement_model import Return
 from entropy_explore_env.compilation.kernels import lean_kernel, record_type
 from entropy_explore_env.randomness import draw_uniform
-from entropy_explore_env.robots.range_sensor import NEAREST, trace_measurement
+from entropy_explore_env.robots.measured_rays import trace_measurement
+from entropy_explore_env.robots.range_sensor import NEAREST
 
 _NOTHING, _HIT = int(Return.NOTHING), int(Return.HIT)
 

@@ -13,9 +13,8 @@ from typing import NamedTuple
 import numpy as np
 
 from entropy_explore_env.belief.map_update import RAY, Scan
-from entropy_explore_env.belief.measurement_model import Return, measured_coverage, measurement_precision
+from entropy_explore_env.belief.measurement_model import Return
 from entropy_explore_env.belief.raycast import (
-    NEVER_STOP,
     OBSTACLE,
     OPEN,
     OPEN_END,
@@ -23,13 +22,14 @@ from entropy_explore_env.belief.raycast import (
     Crossing,
     Line,
     RayEnd,
-    cast_range,
     cast_ray,
+    cast_two_ranges,
     longest_crossing,
     point,
 )
 from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel, record_type
 from entropy_explore_env.randomness import draw_gaussian
+from entropy_explore_env.robots.measured_rays import trace_measurement, weigh_measurement
 from entropy_explore_env.settings import Grid, RangeSensor, centred_angles
 
 _NOTHING, _FREE, _HIT = int(Return.NOTHING), int(Return.FREE), int(Return.HIT)
@@ -155,6 +155,7 @@ def first_rays(scan, count):
         scan.utility[:count],
         scan.crossed,
         scan.entered,
+        scan.entered_beside,
         scan.coverage,
         scan.order[:count],
     )
@@ -171,6 +172,7 @@ def new_scan(grid: Grid, sensors: Sequence[RangeSensor], rays: int) -> Scan:
         utility=np.zeros(rays),
         crossed=np.zeros((rays, longest), np.int32),
         entered=np.zeros(longest, np.int64),
+        entered_beside=np.zeros(longest, np.int64),
         coverage=np.zeros((rays, longest), np.float32),
         order=np.zeros(rays, np.int64),
     )
@@ -182,7 +184,7 @@ def scan_bytes(grid: Grid, sensors: Sequence[RangeSensor], rays: int) -> int:
         longest_crossing(*grid.shape, sensor.max_range_m / grid.voxel_size_m, sensor.voxels_behind)
         for sensor in sensors
     )
-    return rays * (RAY.itemsize + 16 + 8 * longest) + 8 * longest
+    return rays * (RAY.itemsize + 16 + 8 * longest) + 16 * longest
 
 
 @inlined_kernel
@@ -243,46 +245,6 @@ def body_distance(start, direction, bodies):
     return nearest
 
 
-@inlined_kernel
-def weigh_measurement(scan, index, params, size, start):
-    """Measured coverage (eq. 4) and its precision (eq. 5) for a ray with its crossing filled in."""
-    ray = scan.rays[index]
-    ray.precision = measurement_precision(
-        ray.range_m, params.sigma_min, params.sigma_slope_per_m, params.sigma_exponent
-    )
-    ray.free = ray.voxels
-    if ray.returned == _HIT:
-        crossing = Crossing(scan.crossed[index], scan.entered)
-        ray.free = measured_coverage(start, ray.length, size, crossing, ray.voxels, scan.coverage[index])
-
-
-@lean_kernel
-def trace_measurement(scan, index, params, size, voxel_size_m, start, coverage):
-    """Voxels and measured coverage of a measurement with a known distance.
-
-    Args:
-        scan: Holds direction, length and Return of the ray; the rest is filled in.
-        index: Which ray.
-        params: SENSOR_PARAMS.
-        size: (X, Y, Z) voxels.
-        voxel_size_m: Edge of a voxel.
-        start: (x, y, z), the sensor in grid units.
-        coverage: (V,) float32, any map of the workspace; what it holds does not matter.
-    """
-    ray = scan.rays[index]
-    ray.range_m = ray.length * voxel_size_m
-    ray.voxels = cast_ray(
-        coverage,
-        size,
-        Line(start, point(ray.direction), ray.length),
-        NEVER_STOP,
-        ray.returned == _HIT,
-        params.voxels_behind,
-        Crossing(scan.crossed[index], scan.entered),
-    ).voxels
-    weigh_measurement(scan, index, params, size, start)
-
-
 @lean_kernel
 def take_scan(scan, model, scene, pose, rng):
     """Cast the bundle through the true world: what the sensor measures.
@@ -317,7 +279,7 @@ def take_scan(scan, model, scene, pose, rng):
         if moved:
             trace_measurement(scan, index, params, scene.size, scene.voxel_size_m, start, scene.occupied)
         else:
-            weigh_measurement(scan, index, params, scene.size, start)
+            weigh_measurement(scan, index, params, scene.size, start, scan.entered)
 
 
 @lean_kernel
@@ -329,11 +291,21 @@ def measure_ranges(scan, model, scene, pose, rng):
     params, start = model.params[0], pose.start
     point_rays(model, pose.yaw, pose.pitch, scan.rays)
     reach = params.max_range_m / scene.voxel_size_m
-    for index in range(len(scan.rays)):
-        ray = scan.rays[index]
-        line = Line(start, point(ray.direction), reach)
-        length, covered, end = cast_range(scene.occupied, scene.size, line, STOP_AT_COVERED)
+    rays = scan.rays
+    for index in range(0, len(rays), 2):
+        beside = min(index + 1, len(rays) - 1)
+        ray, other = rays[index], rays[beside]
+        (length, covered, end), (other_length, other_covered, other_end) = cast_two_ranges(
+            scene.occupied,
+            scene.size,
+            Line(start, point(ray.direction), reach),
+            Line(start, point(other.direction), reach),
+            STOP_AT_COVERED,
+        )
         measure_ray(ray, params, scene, start, RayEnd(length, 0, end), covered >= _UNREADABLE, rng)
+        if beside > index:
+            ended = RayEnd(other_length, 0, other_end)
+            measure_ray(other, params, scene, start, ended, other_covered >= _UNREADABLE, rng)
 
 
 @inlined_kernel

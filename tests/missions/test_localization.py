@@ -368,7 +368,7 @@ def test_fiducials_where_none_can_be_are_refused_before_anything_changes():
         (Fiducials, "number", -1),
         (Fiducials, "number", 1001),
         (Fiducials, "number", 2.0),
-        (Fiducials, "positions_m", [(0.0, 0.0, 0.0)]),
+        (Fiducials, "positions_m", [(0.0, 0.0)]),
         (Fiducials, "positions_m", ((0.0, 0.0),)),
         (Fiducials, "positions_m", ((0.0, 0.0, math.nan),)),
         (Fiducials, "range_m", 0.0),

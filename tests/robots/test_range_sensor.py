@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from entropy_explore_env.belief.map_update import fuse_scan
 from entropy_explore_env.belief.measurement_model import Return
+from entropy_explore_env.robots.measured_rays import trace_measurement
 from entropy_explore_env.robots.range_sensor import (
     Scene,
     SensorPose,
@@ -19,7 +20,6 @@ from entropy_explore_env.robots.range_sensor import (
     new_scan,
     sensor_model,
     take_scan,
-    trace_measurement,
     true_coverage,
     visibility_parameters,
 )

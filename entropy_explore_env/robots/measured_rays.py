@@ -1,0 +1,97 @@
+"""What measurements of known distance say of the voxels on their rays (Rocha04, eqs. 4-5).
+
+Positions and lengths in grid units, ranges in metres.
+"""
+
+from __future__ import annotations
+
+from entropy_explore_env.belief.measurement_model import Return, measured_coverage, measurement_precision
+from entropy_explore_env.belief.raycast import NEVER_STOP, Crossing, Line, cast_ray, point, trace_two
+from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel
+
+_NOTHING, _HIT = int(Return.NOTHING), int(Return.HIT)
+
+
+@inlined_kernel
+def weigh_measurement(scan, index, params, size, start, entered):
+    """Measured coverage (eq. 4) and its precision (eq. 5) for a ray with its crossing filled in.
+
+    Args:
+        scan: Scan.
+        index: Which ray.
+        params: SENSOR_PARAMS.
+        size: (X, Y, Z) voxels.
+        start: (x, y, z), the sensor in grid units.
+        entered: (L,) int64, when the ray entered its voxels.
+    """
+    ray = scan.rays[index]
+    ray.precision = measurement_precision(
+        ray.range_m, params.sigma_min, params.sigma_slope_per_m, params.sigma_exponent
+    )
+    ray.free = ray.voxels
+    if ray.returned == _HIT:
+        crossing = Crossing(scan.crossed[index], entered)
+        ray.free = measured_coverage(start, ray.length, size, crossing, ray.voxels, scan.coverage[index])
+
+
+@lean_kernel
+def trace_measurement(scan, index, params, size, voxel_size_m, start, coverage):
+    """Voxels and measured coverage of a measurement with a known distance.
+
+    Args:
+        scan: Holds direction, length and Return of the ray; the rest is filled in.
+        index: Which ray.
+        params: SENSOR_PARAMS.
+        size: (X, Y, Z) voxels.
+        voxel_size_m: Edge of a voxel.
+        start: (x, y, z), the sensor in grid units.
+        coverage: (V,) float32, any map of the workspace; what it holds does not matter.
+    """
+    ray = scan.rays[index]
+    ray.range_m = ray.length * voxel_size_m
+    ray.voxels = cast_ray(
+        coverage,
+        size,
+        Line(start, point(ray.direction), ray.length),
+        NEVER_STOP,
+        ray.returned == _HIT,
+        params.voxels_behind,
+        Crossing(scan.crossed[index], scan.entered),
+    ).voxels
+    weigh_measurement(scan, index, params, size, start, scan.entered)
+
+
+@lean_kernel
+def trace_measurements(scan, params, size, voxel_size_m, start):
+    """What `trace_measurement` fills in, for all rays of a scan that measured something, two at a time."""
+    rays, waiting = scan.rays, -1
+    for index in range(len(rays)):
+        if rays[index].returned == _NOTHING:
+            continue
+        if waiting < 0:
+            waiting = index
+            continue
+        _trace_pair(scan, waiting, index, params, size, voxel_size_m, start)
+        waiting = -1
+    if waiting >= 0:  # beside itself: its voxels are noted where those of the second are
+        _trace_pair(scan, waiting, waiting, params, size, voxel_size_m, start)
+
+
+@inlined_kernel
+def _trace_pair(scan, index, other_index, params, size, voxel_size_m, start):
+    """What `trace_measurement` fills in, for two rays."""
+    ray, other = scan.rays[index], scan.rays[other_index]
+    ray.range_m, other.range_m = ray.length * voxel_size_m, other.length * voxel_size_m
+    ray.voxels, other.voxels = trace_two(
+        size,
+        Line(start, point(ray.direction), ray.length),
+        Line(start, point(other.direction), other.length),
+        (
+            params.voxels_behind if ray.returned == _HIT else 0,
+            params.voxels_behind if other.returned == _HIT else 0,
+        ),
+        Crossing(scan.crossed[index], scan.entered),
+        Crossing(scan.crossed[other_index], scan.entered_beside),
+    )
+    weigh_measurement(scan, index, params, size, start, scan.entered)
+    weigh_measurement(scan, other_index, params, size, start, scan.entered_beside)
