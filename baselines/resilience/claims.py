@@ -96,7 +96,7 @@ def _of_a_team(records: Records, scenario: str, robots: int, strategy: str) -> l
     cut = [
         name
         for name in conditions()
-        if name not in alone.values() and _cut_off(records, cell_id(*who[:2], strategy, name))
+        if name not in alone.values() and missions_cut_off(records, cell_id(*who[:2], strategy, name))
     ]
     return [
         _claim(f"isolated-{prefix}", text, 1.0, found, cut),
@@ -112,9 +112,9 @@ def _of_a_team(records: Records, scenario: str, robots: int, strategy: str) -> l
     ]
 
 
-def _cut_off(records: Records, cell: str) -> bool:
-    """Whether a mission of a cell did not come to its end: its time is longer than what is known of it."""
-    return any(not record.get("finished", False) for record in records[cell])
+def missions_cut_off(records: Records, cell: str) -> int:
+    """How many missions of a cell did not come to their end: they take longer than what is known of them."""
+    return sum(not record.get("finished", False) for record in records[cell])
 
 
 def _claim(name: str, text: str, most: float, found: dict[str, Interval], cut: Sequence[str] = ()) -> Claim:

@@ -1,4 +1,7 @@
-"""The figures of the page: degradation by lost messages, and by all else that fails."""
+"""The figures of the page: degradation by lost messages, and by all else that fails.
+
+A point is hollow where missions were cut off: the ratio is at least so large.
+"""
 
 from __future__ import annotations
 
@@ -7,10 +10,11 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
 from baselines.cli.figures import COLOURS
 from baselines.experiments.statistics import Interval
-from baselines.resilience.claims import slowdown
+from baselines.resilience.claims import missions_cut_off, slowdown
 from baselines.resilience.sweep import (
     ISOLATED,
     LOSSES,
@@ -18,10 +22,12 @@ from baselines.resilience.sweep import (
     TEXTS,
     Experiment,
     Records,
+    cell_id,
     loss_name,
 )
 
 Table = dict[str, list[object]]
+Colour = tuple[float, ...]
 OTHERS = ("burst-0", "range", "sight", LOST, ISOLATED)
 """Conditions of the second figure."""
 
@@ -42,14 +48,16 @@ def loss_figure(experiment: Experiment, records: Records) -> tuple[Figure, Table
             colour = COLOURS[number % len(COLOURS)]
             values = np.array([each.value for each in found])
             axes.plot(places[:-1] + shift, values[:-1], style, color=colour, linewidth=1.3, label=strategy)
-            axes.errorbar(
-                places + shift, values, _arms(found), fmt="o", color=colour, markersize=3, linewidth=0.8
-            )
-            for name, each in zip(points, found, strict=True):
-                _note(table, scenario, robots, strategy, name, each)
+            cut = [missions_cut_off(records, cell_id(scenario, robots, strategy, name)) for name in points]
+            axes.errorbar(places + shift, values, _arms(found), fmt="none", ecolor=colour, linewidth=0.8)
+            _dots(axes, places + shift, values, cut, colour)
+            for name, each, number_cut in zip(points, found, cut, strict=True):
+                _note(table, scenario, robots, strategy, name, each, number_cut)
         _by_loss(axes, f"{scenario}, {robots} robots")
     panels[0].set_ylabel("mission time over that without faults")
     handles, labels = panels[0].get_legend_handles_labels()
+    handles.append(_hollow(axes=panels[0]))
+    labels.append("hollow: missions were cut off")
     figure.legend(handles, labels, loc="outside lower center", ncols=4, frameon=False, fontsize=8)
     return figure, table
 
@@ -68,37 +76,51 @@ def fault_figure(experiment: Experiment, records: Records) -> tuple[Figure, Tabl
     strategies, teams = experiment.strategies, experiment.teams()
     height = 1.4 + 0.2 * len(strategies) * len(teams)
     figure = Figure(figsize=(11.0, height), layout="constrained")
-    panels = figure.subplots(1, len(OTHERS), sharey=True)
+    panels = figure.subplots(1, len(OTHERS), sharex=True, sharey=True)
     table: Table = {name: [] for name in _COLUMNS}
     rows = np.arange(len(strategies))[::-1].astype(float)
     for axes, name in zip(panels, OTHERS, strict=True):
         for place, (scenario, robots) in enumerate(teams):
             found = [slowdown(records, scenario, robots, strategy, name) for strategy in strategies]
             shift = 0.7 * ((place + 0.5) / len(teams) - 0.5)
-            values = [each.value for each in found]
-            axes.errorbar(
-                values,
-                rows - shift,
-                xerr=_arms(found),
-                fmt="o",
-                color=COLOURS[place % len(COLOURS)],
-                markersize=3.5,
-                linewidth=1.0,
-                label=f"{scenario}, {robots} robots",
-            )
-            for strategy, each in zip(strategies, found, strict=True):
-                _note(table, scenario, robots, strategy, name, each)
+            values, colour = np.array([each.value for each in found]), COLOURS[place % len(COLOURS)]
+            cut = [missions_cut_off(records, cell_id(scenario, robots, who, name)) for who in strategies]
+            label = f"{scenario}, {robots} robots"
+            arms = {"xerr": _arms(found), "fmt": "none", "ecolor": colour, "linewidth": 1.0}
+            axes.errorbar(values, rows - shift, **arms)
+            _dots(axes, values, rows - shift, cut, colour, label)
+            for strategy, each, number_cut in zip(strategies, found, cut, strict=True):
+                _note(table, scenario, robots, strategy, name, each, number_cut)
         axes.axvline(1.0, color="0.6", linewidth=0.8)
         axes.set_title(TEXTS[name], fontsize=9)
         axes.set_yticks(rows, strategies)
         axes.set_ylim(-0.6, len(strategies) - 0.4)
     panels[len(OTHERS) // 2].set_xlabel("mission time over that without faults")
     handles, labels = panels[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=len(teams), frameon=False, fontsize=8)
+    handles.append(_hollow(axes=panels[0]))
+    labels.append("hollow: missions were cut off")
+    columns = len(teams) + 1
+    figure.legend(handles, labels, loc="outside lower center", ncols=columns, frameon=False, fontsize=8)
     return figure, table
 
 
-_COLUMNS = ("scenario", "robots", "strategy", "condition", "ratio", "low", "high")
+_COLUMNS = ("scenario", "robots", "strategy", "condition", "ratio", "low", "high", "cut_off")
+
+
+def _dots(
+    axes: Axes, x: np.ndarray, y: np.ndarray, cut: Sequence[int], colour: Colour, label: str = ""
+) -> None:
+    """Points, hollow where missions were cut off."""
+    for number, hollow in enumerate(cut):
+        face = "white" if hollow else colour
+        axes.plot(x[number], y[number], "o", markersize=3.5, color=colour, markerfacecolor=face)
+    if label:
+        axes.plot([], [], "o", markersize=3.5, color=colour, label=label)
+
+
+def _hollow(axes: Axes) -> Line2D:
+    """What stands for a hollow point in a legend."""
+    return axes.plot([], [], "o", markersize=3.5, color="0.3", markerfacecolor="white")[0]
 
 
 def _arms(found: Sequence[Interval]) -> np.ndarray:
@@ -108,7 +130,9 @@ def _arms(found: Sequence[Interval]) -> np.ndarray:
     return np.array([down, up])
 
 
-def _note(table: Table, scenario: str, robots: int, strategy: str, name: str, found: Interval) -> None:
-    row = (scenario, robots, strategy, name, *(f"{value:.4g}" for value in found))
+def _note(
+    table: Table, scenario: str, robots: int, strategy: str, name: str, found: Interval, cut: int
+) -> None:
+    row = (scenario, robots, strategy, name, *(f"{value:.4g}" for value in found), cut)
     for column, value in zip(_COLUMNS, row, strict=True):
         table[column].append(value)

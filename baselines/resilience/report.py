@@ -11,7 +11,7 @@ import numpy as np
 from baselines.cli.figures import STYLE, png
 from baselines.experiments.claims import Claim, claims_table
 from baselines.experiments.tables import csv_table, markdown_table
-from baselines.resilience.claims import MARGIN
+from baselines.resilience.claims import MARGIN, missions_cut_off
 from baselines.resilience.figures import fault_figure, loss_figure
 from baselines.resilience.sweep import (
     CHANNELS,
@@ -48,7 +48,7 @@ def write_report(
 
 def _text(experiment: Experiment, records: Records, claims: Sequence[Claim], command: str) -> str:
     missions = sum(len(cell) for cell in records.values())
-    cut = sum(not record.get("finished", False) for cell in records.values() for record in cell)
+    cut = sum(missions_cut_off(records, cell) for cell in records)
     held = sum(claim.holds for claim in claims)
     parts = [
         "# Teams whose robots and messages fail",
@@ -117,7 +117,8 @@ _SAID = {
     },
     "burst-0": "`Channel.burst=0`: viewpoints are announced, measurements are not sent",
     "range": f"`Channel.range_m={RANGE_M:g}`",
-    "sight": "`Channel.reach='line_of_sight'`: no solid voxel of the true world in between",
+    "sight": "`Channel.reach='line_of_sight'`: no solid voxel of the true world in between; "
+    "where nothing stands in the way, as in an empty room, it changes nothing",
     "isolated": "`Channel.burst=0, announcements=False`",
     "lost": "the last robot stops for good (`Faults.stop`) at half the median time without faults",
     "lost-isolated": "the same, in isolation",
@@ -132,7 +133,7 @@ def _times_table(experiment: Experiment, records: Records, scenario: str, robots
         for name in conditions():
             cell = cell_id(scenario, robots, strategy, name)
             found = times(records, cell)
-            cut = sum(not record.get("finished", False) for record in records[cell])
+            cut = missions_cut_off(records, cell)
             known = found[np.isfinite(found)]
             median = f"{np.median(known):,.0f}" if len(known) else "-"
             row.append(median + (f" ({cut})" if cut else ""))

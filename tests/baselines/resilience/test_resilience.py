@@ -11,6 +11,7 @@ import pytest
 from baselines.experiments import cells
 from baselines.resilience import __main__ as command
 from baselines.resilience.claims import all_claims, nothing_breaks, share_of_one, slowdown
+from baselines.resilience.figures import fault_figure, loss_figure
 from baselines.resilience.report import findings
 from baselines.resilience.sweep import (
     CHANNELS,
@@ -117,6 +118,20 @@ def test_a_ratio_of_missions_that_were_cut_off_is_at_least_so_large_and_shows_no
     assert not isolated.holds and "cut off with range 3 m" in isolated.claim
     _, isolated, _ = all_claims(ONE, records_of({NOTHING_FAILS: base, ISOLATED: [90.0] * 5}))
     assert isolated.holds  # who is isolated takes longer still
+
+
+def test_points_of_missions_that_were_cut_off_are_hollow():
+    records = records_of({"loss-90": [90.0, 80.0, 90.0, 70.0, 60.0], LOST: [90.0] * 5})
+    for draw, cut_off in ((loss_figure, {"loss-90": 2}), (fault_figure, {LOST: 5})):
+        figure, table = draw(ONE, records)
+        counted = dict(zip(table["condition"], table["cut_off"], strict=True))
+        assert counted == {**dict.fromkeys(table["condition"], 0), **cut_off}
+        dots = [line for axes in figure.axes for line in axes.lines if line.get_marker() == "o"]
+        faces = [line.get_markerfacecolor() for line in dots if len(line.get_xdata())]
+        assert len(faces) == 5 and faces.count("white") == 1
+        assert "hollow: missions were cut off" in [text.get_text() for text in figure.legends[0].get_texts()]
+    shared = {axes.get_xlim() for axes in figure.axes}
+    assert len(shared) == 1
 
 
 def test_a_mission_that_breaks_is_counted_and_left_out_of_times():
