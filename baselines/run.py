@@ -1,4 +1,4 @@
-"""Run a mission and show it: `python -m baselines.run room --strategy gradient --robots 3 --seed 0`.
+"""Run a mission and show it: `python -m baselines.run office --strategy best --robots 3 --seed 0`.
 
 Shows a progress bar and a table; with `--out DIR` writes `mission.json` (the figures and time
 series), `mission.png` (curves and maps), `mission.gif` (the mission as it went) and `mission.npz`
@@ -31,15 +31,20 @@ class Args:
     scenario: Positional[str] = "room"
     """A named scenario: room, office, cave, … (docs/environments.md lists them)."""
     strategy: str = "gradient"
-    """Chooses viewpoints: best (planned-rate, which we recommend), planner-choice, random, gradient,
-    gradient-plane, mutual-information, ground-gradient, information-rate-v0, information-per-scan,
-    voronoi, voronoi-gradient, voronoi-nearest, per-time-visibility, nearest-candidate,
-    coordinated-candidate, nearest-frontier, coordinated-frontier, assigned-frontier, information-gain,
-    distance-advantage, receding-horizon, tour, next-best-view, most-unmapped, least-mapped,
-    random-known, raster, raster-fixed-yaw; above a cliff: cliff-next-best-view, cliff-polygon-edge,
-    cliff-straight-edge, cliff-raster, cliff-raster-fixed-yaw; a learned policy: pretrained:room, or
-    the folder of a run of training.ppo; or a class of your own: my_package.my_module:MyStrategy, or
-    path/to/file.py:MyStrategy."""
+    """Chooses viewpoints. We recommend best, which is planned-rate.
+    Of papers: random, gradient, gradient-plane, mutual-information,
+    ground-gradient, voronoi, voronoi-gradient, next-best-view,
+    most-unmapped, least-mapped, random-known, raster, raster-fixed-yaw,
+    per-time-visibility, nearest-candidate, coordinated-candidate.
+    Of papers, as their authors run them: nearest-frontier,
+    coordinated-frontier, assigned-frontier, information-gain,
+    distance-advantage, receding-horizon, tour.
+    Ours: planned-rate, planner-choice, information-rate-v0,
+    information-per-scan, voronoi-nearest.
+    Above a cliff: cliff-next-best-view, cliff-polygon-edge,
+    cliff-straight-edge, cliff-raster, cliff-raster-fixed-yaw.
+    A learned policy: pretrained:room, or the folder of a run of training.
+    Your own: my_package.my_module:MyStrategy, path/to/file.py:MyStrategy."""
     robots: int = 3
     """Team size."""
     seed: int = 0

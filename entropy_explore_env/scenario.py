@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, Literal, TypeVar
@@ -392,6 +392,14 @@ def with_settings(scenario: Scenario, settings: Mapping[str, Any]) -> Scenario:
     return _replaced(scenario, changes)
 
 
+def _meant(settings: object, name: str, known: Sequence[str]) -> str:
+    """End of the message about an unknown field: the part that has such a field, or a field that is alike."""
+    for part in known:
+        if name in getattr(getattr(settings, part, None), "__dataclass_fields__", ()):
+            return f"; did you mean {part}={{{name!r}: …}}?"
+    return did_you_mean(name, known)
+
+
 def _replaced(settings: Settings, changes: Mapping[str, Any]) -> Settings:
     """Like dataclasses.replace, into nested parts, with a named error for an unknown field."""
     fields = [f.name for f in dataclasses.fields(settings)]  # type: ignore[arg-type]
@@ -402,7 +410,7 @@ def _replaced(settings: Settings, changes: Mapping[str, Any]) -> Settings:
             raise SettingError(
                 f"{type(settings).__name__}.{name}",
                 value,
-                "one of the fields " + ", ".join(fields) + did_you_mean(name, known),
+                "one of the fields " + ", ".join(fields) + _meant(settings, name, known),
             )
         current = getattr(settings, name)
         nested = isinstance(value, Mapping) and dataclasses.is_dataclass(current)

@@ -13,7 +13,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from entropy_explore_env.errors import SettingError
+from entropy_explore_env.errors import SettingError, did_you_mean
 from entropy_explore_env.scenario import Scenario
 
 Settings = TypeVar("Settings")
@@ -134,7 +134,11 @@ def _part(kind: type, value: Any, name: str) -> Any:  # noqa: ANN401 - an object
     }
     for field, given in value.items():
         if field not in hints:
-            raise SettingError(f"{kind.__name__}.{field}", given, "one of the fields " + ", ".join(hints))
+            raise SettingError(
+                f"{kind.__name__}.{field}",
+                given,
+                "one of the fields " + ", ".join(hints) + did_you_mean(field, hints),
+            )
     for field in dataclasses.fields(kind):
         needed = field.default is dataclasses.MISSING and field.default_factory is dataclasses.MISSING
         if needed and field.name not in value:

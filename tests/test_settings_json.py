@@ -166,3 +166,5 @@ def test_any_dataclass_of_settings_comes_back():
     assert dataclass_of(RobotKind, json.loads(json.dumps(json_of(kind), allow_nan=False))) == kind
     with pytest.raises(SettingError, match=r"RobotKind\.wings"):
         dataclass_of(RobotKind, {"wings": 2})
+    with pytest.raises(SettingError, match=r"RobotKind\.robt.*; did you mean robot\?"):
+        dataclass_of(RobotKind, {"robt": {}})

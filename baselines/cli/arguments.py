@@ -63,9 +63,12 @@ else:
 
 Arguments = TypeVar("Arguments")
 
-_FRAME = re.compile(r"[─-╿]+")
+_FRAME = re.compile(r"[─-╿]+|-{4,}")
+"""The lines around the parser's message, also where a terminal has no characters for them."""
 _TITLE = re.compile(r"^(Unrecognized options|Invalid choice|Value error|Parsing error|Required options) ")
 """What stands on the parser's frame; the message says it again."""
+_HELP = re.compile(r" Argument helptext: .*?(?= For full helptext|$)")
+"""The text of the option that was wrong: `--help` has it."""
 
 
 def parse(
@@ -128,6 +131,7 @@ def _one_line(complaint: str) -> str:
     """The parser's framed message as one line; tyro 1.0 has errors as values in a private module only."""
     words = " ".join(_FRAME.sub(" ", complaint).split())
     words = _TITLE.sub("", words)
+    words = _HELP.sub("", words).replace(" Perhaps you meant:", "; perhaps you meant")
     return words.split(" For full helptext")[0] or "the arguments do not fit; see --help"
 
 

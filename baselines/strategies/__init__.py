@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import importlib
 from collections.abc import Callable
 from functools import partial
@@ -30,7 +29,7 @@ from baselines.strategies.protocol import Strategy
 from baselines.strategies.random_walk import RandomWalk
 from baselines.strategies.voronoi import VoronoiConfig, VoronoiCoverage
 from entropy_explore_env.command import home_path
-from entropy_explore_env.errors import MissingExtraError, SettingError
+from entropy_explore_env.errors import MissingExtraError, SettingError, did_you_mean
 
 STRATEGIES: MappingProxyType[str, Callable[[], Strategy]] = MappingProxyType(
     {
@@ -158,12 +157,10 @@ def _reference(name: str) -> str:
     if name in declared:
         return declared[name]
     known = [*STRATEGIES, *CLIFF_STRATEGIES, *ALIASES, *declared]
-    alike = difflib.get_close_matches(name, known, n=1)
-    meant = f" (did you mean {alike[0]}?)" if alike else ""
-    allowed = (
-        f"one of {', '.join(known)}, {_PRETRAINED}NAME, a policy's folder, module:Class or file.py:Class"
-    )
-    raise SettingError("strategy", name, allowed + meant)
+    others = f"{_PRETRAINED}NAME, a policy's folder, module:Class or file.py:Class"
+    if len(Path(name).parts) > 1:
+        raise SettingError("strategy", name, f"a strategy's name, {others}; there is no such folder")
+    raise SettingError("strategy", name, f"one of {', '.join(known)}, {others}" + did_you_mean(name, known))
 
 
 def is_learned(name: str) -> bool:

@@ -285,9 +285,8 @@ class EntropyExploreVectorEnv(VectorEnv[Any, Any, Any]):
 
         Paths and curves begin at the missions' reset.
         """
-        if self.render_mode != "rgb_array":
-            return None
-        return tuple(painter.picture(self.missions) for painter in self._painters)
+        pictures = tuple(painter.picture(self.missions) for painter in self._painters)
+        return pictures if self.render_mode == "rgb_array" else None
 
     def close_extras(self, **kwargs: object) -> None:
         """End the threads and close the window."""

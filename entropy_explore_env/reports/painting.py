@@ -6,6 +6,7 @@ import importlib.util
 from pathlib import Path
 
 import numpy as np
+from gymnasium import logger
 
 from entropy_explore_env.errors import CallOrderError, SettingError
 from entropy_explore_env.missions.faults import failing
@@ -92,9 +93,13 @@ class Painter:
     def picture(self, missions: Missions) -> np.ndarray | None:
         """The picture of this moment, (480, 640, 3) uint8, in mode `rgb_array`; otherwise None.
 
+        Without a mode a warning says how to get one.
+
         Raises:
             CallOrderError: The mission was not reset yet.
         """
+        if self._mode is None:
+            logger.warn("render() shows nothing: give the environment render_mode='rgb_array' or 'human'")
         if self._mode != "rgb_array":
             return None
         if missions.episodes[self._number] < 0:

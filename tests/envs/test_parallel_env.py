@@ -348,7 +348,8 @@ def test_turns_out_of_order_are_refused() -> None:
 def test_pictures(scenario: str) -> None:
     team = parallel_env(scenario, robots=2, render_mode="rgb_array", max_cycles=5)
     silent = parallel_env(scenario, robots=2, max_cycles=5)
-    assert silent.render() is None
+    with pytest.warns(UserWarning, match="render_mode='rgb_array'"):
+        assert silent.render() is None
     team.reset(seed=0)
     first = team.render()
     assert first is not None and first.shape == (480, 640, 3) and first.dtype == np.uint8

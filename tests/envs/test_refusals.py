@@ -125,6 +125,8 @@ def test_values_that_cannot_be_shown_are_refused_all_the_same() -> None:
         ({"scenario": "room-furnishd"}, "room-furnished"),
         ({"robts": 3}, "robots"),
         ({"max_cyles": 3}, "max_cycles"),
+        ({"reach_m": 3.0}, "robot={'reach_m': …}"),
+        ({"max_range_m": 3.0}, "sensor={'max_range_m': …}"),
         ({"channel": {"brust": 3}}, "burst"),
         ({"world": "furnishd"}, "furnished"),
         ({"world": {"path": "x.npz", "hight_m": 3.0}}, "height_m"),

@@ -36,7 +36,7 @@ def test_words_become_arguments():
     [
         (["--number", "many"], "--number"),
         (["--number"], "--number"),
-        (["--nmber", "3"], "--nmber"),
+        (["--nmber", "3"], "--nmber, 3; perhaps you meant --number"),
         (["stray"], "stray"),
         (["--loud", "yes"], "yes"),
     ],
@@ -46,6 +46,7 @@ def test_words_that_do_not_fit_are_named_in_one_line_and_print_nothing(words, sa
         parse(Args, words)
     assert said in str(error.value) and "\n" not in str(error.value)
     assert not set(str(error.value)) & set("│╭╮╰╯─")
+    assert "helptext" not in str(error.value) and "---" not in str(error.value)
     assert capsys.readouterr() == ("", "")
 
 

@@ -108,6 +108,7 @@ def test_an_entry_point_is_a_name(monkeypatch):
     [
         ("gradeint", "did you mean gradient?"),
         ("nonsense", "one of random, gradient"),
+        ("runs/nothing", "there is no such folder"),
         ("no_such_module:Own", "there is no module no_such_module"),
         ("baselines.strategies.nothing:Own", "there is no module baselines.strategies.nothing"),
         ("baselines:", "module:Class or path/to/file.py:Class"),
