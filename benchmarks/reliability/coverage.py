@@ -72,7 +72,7 @@ def main(words: Sequence[str]) -> int:
     report = report_of([data_of(file, kept) for file in files if file not in missing])
     rows = [row for row in read_rows(args.out) if row["path"].split("/")[1] not in args.folders]
     rows += [
-        {**row, "files": len(files) - len(missing), "of_files": len(files)}
+        {**row, "files": len(files) - len(missing), "of_files": len(files), "test_s": args.test_s}
         for row in rows_of(report)
         if row["path"].split("/")[1] in args.folders
     ]

@@ -290,7 +290,8 @@ def _coverage(rows: Sequence[Row]) -> str:
         return "Not measured yet: `python -m benchmarks.reliability.coverage`."
     lines = [
         f"With kernels interpreted, {_share_covered(rows):.1%} of branches were taken by the tests of these "
-        "folders and some of the environments, each ended after at most 10 s of the processor (`python -m "
+        f"folders and some of the environments, each ended after {rows[-1]['test_s']:g} s of the processor "
+        "and with a tenth of the drawn examples (`python -m "
         "benchmarks.reliability.coverage`); "
         f"{rows[-1]['files']} of {rows[-1]['of_files']} files of tests were run. What only assertions of "
         "debug builds and type checkers reach is left out.",

@@ -23,7 +23,7 @@ def summary(branches, covered):
 
 def row(name, covered, files=2):
     path = f"entropy_explore_env/{name}.py"
-    return {"path": path, "branches": 4, "covered": covered, "files": files, "of_files": 2}
+    return {"path": path, "branches": 4, "covered": covered, "files": files, "of_files": 2, "test_s": 2.5}
 
 
 def test_rows_of_other_folders_stay_and_files_without_branches_are_left_out(tmp_path, monkeypatch, capsys):
@@ -40,7 +40,7 @@ def test_rows_of_other_folders_stay_and_files_without_branches_are_left_out(tmp_
     out, where = tmp_path / "coverage.jsonl", ["--kept", str(tmp_path / "kept")]
     rows = [row("belief/x", 1), row("robots/x", 1)]
     out.write_text("".join(json.dumps(each) + "\n" for each in rows))
-    words = ["--folders", "belief", "--out", str(out), *where]
+    words = ["--folders", "belief", "--test-s", "2.5", "--out", str(out), *where]
     assert coverage.main([*words, "--missing"]) == 0
     assert [json.loads(line) for line in out.read_text().splitlines()] == [rows[1], row("belief/b", 3)]
     said = capsys.readouterr().out

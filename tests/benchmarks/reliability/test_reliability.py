@@ -111,8 +111,8 @@ def test_the_page_says_what_is_asked_for_and_not_reached(monkeypatch):
     ]
     monkeypatch.setitem(fault_table._REASONS, ("x/y.py", "f", "5  ->  6"), "Both are odd.")
     branches = [
-        {"path": "x/y.py", "branches": 8, "covered": 6, "files": 3, "of_files": 4},
-        {"path": "x/z.py", "branches": 2, "covered": 2, "files": 3, "of_files": 4},
+        {"path": "x/y.py", "branches": 8, "covered": 6, "files": 3, "of_files": 4, "test_s": 3.0},
+        {"path": "x/z.py", "branches": 2, "covered": 2, "files": 3, "of_files": 4, "test_s": 3.0},
     ]
     text = page.page(EMPTY, {"x": faults}, branches, {"numpy": "2"})
     assert "- Kills: 0 of 10 kills" in text and "- Faults in formulas: 5 of 300 drawn" in text
@@ -122,7 +122,7 @@ def test_the_page_says_what_is_asked_for_and_not_reached(monkeypatch):
     assert "- without effect: x/y.py:7: `5  ->  6`: Both are odd." in text
     assert "| x/y.py | 5 | 1 | 1 | 1 |" in text and "- not found: x/y.py:4: `2  ->  3`" in text
     assert "- no test takes its line: x/y.py:5: `3  ->  4`" in text
-    assert "; 3 of 4 files of tests were run" in text
+    assert "; 3 of 4 files of tests were run" in text and "ended after 3 s of the processor" in text
     assert "| x | 10 | 80.0% |" in text and "with numpy 2." in text
 
 
