@@ -23,7 +23,8 @@ _OTHERS = """other commands of the library:
 def main(words: Sequence[str]) -> int:
     """Run the command; the exit code."""
     kind = argparse.RawDescriptionHelpFormatter
-    parser = LineParser("python -m entropy_explore_env", epilog=_OTHERS, formatter_class=kind)
+    about = "The library's version, and what is installed and compiled, for reports of problems."
+    parser = LineParser("python -m entropy_explore_env", None, about, _OTHERS, formatter_class=kind)
     parser.add_argument("--version", action="version", version=f"entropy_explore_env {VERSION}")
     commands = parser.add_subparsers(dest="command", required=True)
     doctor = commands.add_parser("doctor", help="versions, cache folder, what is compiled")

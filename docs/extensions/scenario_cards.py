@@ -68,7 +68,7 @@ def gallery() -> str:
         for name in SCENARIOS
     ]
     pages = "\n".join(SCENARIOS)
-    return f"""# Scenarios
+    return f"""# Scenario cards
 
 A scenario is a task: a kind of world, a team, what it may do, and when it is over. Each has an id for
 `gymnasium.make`, `gymnasium.make_vec` and `pettingzoo.make`; `entropy_explore_env.parallel_env` takes its
