@@ -8,8 +8,17 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.ndimage import distance_transform_cdt
 
-from entropy_explore_env.belief.elevation import _relax, completed, elevation_map
+from entropy_explore_env.belief.elevation import (
+    _new_board,
+    _relax,
+    _set_out,
+    _share_out,
+    _take_in,
+    completed,
+    elevation_map,
+)
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.settings import Grid
 from tests.reference.scenes import drawn, seeds
@@ -109,10 +118,13 @@ def test_a_relaxation_ends_after_its_sweeps_or_at_its_tolerance():
         (2, 0.0, [2.25, 3.625]),
         (9, 9.0, [2.0, 3.5]),
     ):
-        heights = np.pad(np.array([[1.0], [0.0], [3.0], [5.0]]), 1)
-        shares = np.pad(np.array([[0.0], [0.5], [0.5], [0.0]]), 1)
-        _relax(heights, shares, 1.0, sweeps, tolerance)
-        assert heights[1:5, 1].tolist() == [1.0, *expected, 5.0]
+        heights, fixed = np.array([[1.0], [0.0], [3.0], [5.0]]), np.array([[True], [False], [False], [True]])
+        board, before = _new_board(4, 1), _new_board(4, 1)
+        assert _set_out(board, heights, fixed, np.empty((4, 1), np.int32)) == 1
+        _share_out(board, fixed, 1.0)
+        _relax(board, before, 1.0, sweeps, tolerance, np.zeros(4, np.int64))
+        _take_in(board, heights)
+        assert heights[:, 0].tolist() == [1.0, *expected, 5.0]
 
 
 def test_nothing_known_is_level_and_all_known_stays():
@@ -137,3 +149,40 @@ def test_bad_input_is_named():
         completed(np.zeros((3, 4)), np.ones((3, 4), bool), -1.0)
     with pytest.raises(SettingError, match="begin_m"):
         completed(np.zeros((3, 4)), np.eye(3, 4, dtype=bool), 1.0, np.full((3, 4), np.nan))
+
+
+def chessboard(heights, fixed, tolerance):
+    """Over-relaxation in its plainest form: white squares, then black ones, until a sweep changes little."""
+    gap = int(np.max(np.asarray(distance_transform_cdt(~fixed, "taxicab"))))
+    slowest = 0.5 * (1.0 + math.cos(math.pi / (2 * gap + 1)))
+    factor = 2.0 / (1.0 + math.sqrt(1.0 - slowest * slowest))
+    padded, free = np.pad(heights, 1), np.pad(~fixed, 1)
+    inside = np.pad(np.ones(heights.shape), 1)
+    i, j = np.indices(padded.shape)
+    sweeps, most = 0, math.inf
+    while sweeps < 40 * (gap + 10) and most > (2.0 - factor) * tolerance:
+        sweeps, most = sweeps + 1, 0.0
+        for colour in (1, 0):
+            squares = np.argwhere(free & ((i + j) % 2 == colour))
+            x, y = squares.T
+            beside = padded[x - 1, y] + padded[x + 1, y] + padded[x, y - 1] + padded[x, y + 1]
+            number = inside[x - 1, y] + inside[x + 1, y] + inside[x, y - 1] + inside[x, y + 1]
+            change = (factor / np.maximum(number, 1.0)) * beside - factor * padded[x, y]
+            padded[x, y] += change
+            most = max(most, np.abs(change).max(initial=0.0))
+    return padded[1:-1, 1:-1], sweeps
+
+
+@pytest.mark.parametrize("shape", [(1, 1), (1, 9), (7, 11), (12, 5), (69, 41), (96, 8)])
+def test_sweeps_that_go_over_the_rows_together_are_those_done_one_after_the_other(shape):
+    """Bit for bit, whatever the number of sweeps that it takes."""
+    rng, counts = np.random.default_rng(shape[0]), set()
+    for tolerance in (0.3, 1e-2, 1e-4):
+        for share in (0.03, 0.4, 1.0):
+            heights, fixed = rng.random(shape), rng.random(shape) < share
+            fixed.flat[rng.integers(fixed.size)] = True
+            begin = rng.random(shape)
+            expected, sweeps = chessboard(np.where(fixed, heights, begin), fixed, tolerance)
+            np.testing.assert_array_equal(completed(heights, fixed, tolerance, begin), expected)
+            counts.add(sweeps % 6)
+    assert len(counts) > 1 or shape == (1, 1)
