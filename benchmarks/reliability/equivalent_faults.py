@@ -17,8 +17,66 @@ class Equivalent(NamedTuple):
     """Why both do the same."""
 
 
-_MISSIONS, _ROBOTS = "entropy_explore_env/missions", "entropy_explore_env/robots"
+_BELIEF, _MISSIONS = "entropy_explore_env/belief", "entropy_explore_env/missions"
+_ROBOTS = "entropy_explore_env/robots"
 EQUIVALENT = (
+    Equivalent(
+        f"{_BELIEF}/elevation.py",
+        "_relax",
+        "most = 0.0  ->  most = 1.0",
+        "More sweeps are made than are needed: the heights stay within the tolerance.",
+    ),
+    Equivalent(
+        f"{_BELIEF}/landmark_score.py",
+        "landmark_score",
+        "mean = total / count if count > 0 else 0.0  ->  mean = total / count if count > 0 else 1.0",
+        "The mean of no voxels is not read.",
+    ),
+    Equivalent(
+        f"{_BELIEF}/paths/planning.py",
+        "_open_exits",
+        "i, j, k = (x + offset[0], y + offset[1], z + offset[2])  ->  "
+        "i, j, k = (x + offset[0], y + offset[1], z - offset[2])",
+        "What a body touches lies as far below it as above.",
+    ),
+    Equivalent(
+        f"{_BELIEF}/paths/planning.py",
+        "search_paths",
+        "per_cost = _BUCKET_WIDTH ** (-1) / costs.min_per_edge  ->  "
+        "per_cost = _BUCKET_WIDTH ** (-2) / costs.min_per_edge",
+        "Buckets that are a millionth narrower hold the same costs in the same order.",
+    ),
+    Equivalent(
+        f"{_BELIEF}/paths/string_pulling.py",
+        "string_pull",
+        "while here < last and filled < len(waypoints):  ->  while here <= last and filled < len(waypoints):",
+        "What is behind the last stop is that stop again, and no waypoint is as near.",
+    ),
+    Equivalent(
+        f"{_BELIEF}/map_update.py",
+        "fuse_ray",
+        "if shrink < _FOLD_BELOW:  ->  if shrink <= _FOLD_BELOW:",
+        "Whether a product is folded one voxel earlier does not change the sum of the logarithms.",
+    ),
+    Equivalent(
+        f"{_BELIEF}/map_update.py",
+        "expected_utility",
+        "if growth > 1.0 / _FOLD_BELOW:  ->  if growth > 1.0 * _FOLD_BELOW:",
+        "The product is folded at every voxel, and the sum of the logarithms stays the same.",
+    ),
+    Equivalent(
+        f"{_BELIEF}/paths/planning.py",
+        "resume_search",
+        "query = _Query(ANY_GOAL, (0, 0, 0), _BUCKET_WIDTH ** (-1) / costs.min_per_edge)  ->  "
+        "query = _Query(ANY_GOAL, (1, 0, 0), _BUCKET_WIDTH ** (-1) / costs.min_per_edge)",
+        "A search without a goal does not read where the goal is.",
+    ),
+    Equivalent(
+        f"{_BELIEF}/visibility.py",
+        "_column_span",
+        "if a > _SLACK and root >= 0.0:  ->  if a > _SLACK and root > 0.0:",
+        "Bounds that are not narrowed here are narrowed by the loops that follow.",
+    ),
     Equivalent(
         f"{_MISSIONS}/faults.py",
         "next_stop",

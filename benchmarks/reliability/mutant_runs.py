@@ -25,7 +25,7 @@ _OWN = ("entropy_explore_env", "baselines", "training", "benchmarks", "tests", "
 """Packages of the checkout, which a fork imports anew."""
 _OLD_S = 1e9
 """Time of sources that are sound, long ago, so that one that was changed is never taken for them."""
-_TEST_S = 20.0
+_TEST_S = 10.0
 """Of the processor, that a test may take with a fault."""
 LATE = "late"
 

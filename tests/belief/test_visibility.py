@@ -166,3 +166,14 @@ def test_what_stands_in_front_hides_what_is_behind_but_not_itself():
     assert covered([cone], belief)[0] == pytest.approx(6.0)  # the paper's cone does not care
     own, *_, marks = covered([cone], belief, occluded=True)
     assert own == pytest.approx(4.0) and np.flatnonzero(marks).tolist() == ahead[:4]
+
+
+def test_bits_of_many_voxels_of_which_little_is_known_are_summed_without_overflow():
+    """Each voxel brings ½ log2 10³⁰ bits; the product of all 385 ratios is no float64."""
+    everywhere = cone_of(np.array([3.5, 5.5, 2.5, 0.0, 0.0]), 20.0, math.pi)
+    precision, marks = np.full(SIZE, 1e-30, np.float32).ravel(), np.zeros(385, np.uint8)
+    marks[::7] = 1
+    bits = 0.5 * math.log2(1e30)
+    told = visible_bits(np.array([everywhere])[0], SIZE, precision, 1.0, None, marks)
+    assert told == pytest.approx((385 * bits, 55 * bits), rel=1e-6)
+    assert marked_bits(precision, 1.0, marks) == pytest.approx(55 * bits, rel=1e-6)

@@ -206,3 +206,9 @@ def test_what_is_as_near_to_two_sources_belongs_to_the_earlier(sources, rates):
     tessellate(space, np.array(rates, np.float32).reshape(5, 1, 1), np.array(sources), 0.0, True)
     near, far = (0, 1) if sources[0] == 0 else (1, 0)
     assert space.cells.reshape(-1).tolist() == [near, near, 0, far, far]
+
+
+def test_a_path_to_what_is_as_near_to_two_sources_does_not_leave_its_cell():
+    space, rates = new_tessellation((5, 1, 1)), np.ones((5, 1, 1), np.float32)
+    tessellate(space, rates, np.array([4, 0]), 0.0, True)
+    assert extract_path(space, rates, 2, 0.0, True).tolist() == [4, 3, 2]
