@@ -116,4 +116,11 @@ EQUIVALENT = (
         "within_half_view(params, turn - math.pi, math.pi - down - pitch)",
         "Both differ by a whole turn, which `within_half_view` takes away.",
     ),
+    Equivalent(
+        f"{_ROBOTS}/range_sensor.py",
+        "measure_ranges",
+        "measure_ray(ray, params, scene, start, RayEnd(length, 0, end), covered >= _UNREADABLE, rng)  ->  "
+        "measure_ray(ray, params, scene, start, RayEnd(length, 1, end), covered >= _UNREADABLE, rng)",
+        "What is measured does not depend on how many voxels were crossed.",
+    ),
 )

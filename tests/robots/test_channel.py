@@ -170,6 +170,7 @@ def test_walls_by_hand():
     assert walls(occupied, (1.0, 2.5, 2.5), (5.0, 6.5, 2.5)) == pytest.approx(math.sqrt(2.0))
     assert walls(occupied, (2.5, 1.5, 2.5), (2.5, 4.0, 2.5)) == 0.0
     assert walls(occupied, (2.5, 1.5, 2.5), (2.5, 4.25, 2.5)) == pytest.approx(0.25)
+    assert walls(occupied, (2.5, 3.9, 2.5), (2.5, 4.5, 2.5)) == pytest.approx(0.5)
     assert walls(occupied, (2.5, 1.5, 2.5), (2.5, 1.5, 2.5)) == 0.0
 
 
