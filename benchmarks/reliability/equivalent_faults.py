@@ -21,12 +21,6 @@ _BELIEF, _MISSIONS = "entropy_explore_env/belief", "entropy_explore_env/missions
 _ROBOTS = "entropy_explore_env/robots"
 EQUIVALENT = (
     Equivalent(
-        f"{_BELIEF}/elevation.py",
-        "_relax",
-        "most = 0.0  ->  most = 1.0",
-        "More sweeps are made than are needed: the heights stay within the tolerance.",
-    ),
-    Equivalent(
         f"{_BELIEF}/landmark_score.py",
         "landmark_score",
         "mean = total / count if count > 0 else 0.0  ->  mean = total / count if count > 0 else 1.0",

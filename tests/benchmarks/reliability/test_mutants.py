@@ -117,7 +117,9 @@ def test_a_fault_is_known_by_its_function_whatever_else_changes(tmp_path):
     assert mutants.of_these_sources([{"digest": "a", "path": "gone.py"}], tmp_path) == []
 
 
+@pytest.mark.long
 def test_faults_without_effect_are_faults_of_the_sources():
+    """Whoever changes such a line takes its fault out of the list, or names the new one."""
     assert len(set(EQUIVALENT)) == len(EQUIVALENT)
     for path in {each.path for each in EQUIVALENT}:
         found = mutants_of((ROOT / path).read_text("utf-8"))
