@@ -63,7 +63,7 @@ WALK = record_type(
         ("sigma", "i8"),
         ("same_mean", "i8"),  # whether that leaf had the mean of the one before it
         ("same_sigma", "i8"),
-        ("nodes", "i8"),  # so far
+        ("nodes", "i8"),  # read so far
         ("leaves", "i8"),
     ]
 )
@@ -235,7 +235,6 @@ def write_tree(tree, mean, precision, threshold_bits):
             write_bit(coder, _ASKS_LEAF + known * _SIZES + context, int(kind != _LEAF))
             if kind != _LEAF and known == 0:
                 write_bit(coder, _ASKS_KNOWN + context, int(kind == _SPLIT_KNOWN))
-        walk.nodes += 1
         walk.kind = kind
         if kind == _LEAF:
             write_leaf(tree, mean, precision, region)
