@@ -99,6 +99,22 @@ def test_where_no_path_is_known_it_leads_to_the_nearest_place(goal, nearest):
     assert points[-1].tolist() == list(nearest)
 
 
+@pytest.mark.parametrize(
+    ("free", "start", "goal", "nearest"),
+    [
+        (np.s_[6:], (6.5, 1.5, 0.5), (5.5, 8.5, 0.5), (6.5, 8.5, 0.5)),
+        (np.s_[:1], (0.5, 1.5, 0.5), (1.5, 8.5, 0.5), (0.5, 8.5, 0.5)),
+        (np.s_[:, 10:], (1.5, 10.5, 0.5), (5.5, 9.5, 0.5), (5.5, 10.5, 0.5)),
+        (np.s_[:, :1], (1.5, 0.5, 0.5), (5.5, 1.5, 0.5), (5.5, 0.5, 0.5)),
+    ],
+)
+def test_the_nearest_place_may_be_at_the_edge_of_the_workspace(free, start, goal, nearest):
+    solid = np.ones(FLAT.shape, bool)
+    solid[free] = False
+    points, end = plan(planner(), solid, start, goal)
+    assert (points.tolist(), end) == ([list(nearest)], MoveEnd.NO_PATH)
+
+
 def test_who_cannot_get_nearer_stays_where_it_is():
     points, end = plan(planner(), wall(open_from=11), (2.7, 4.6, 0.5), (5.5, 4.5, 0.5))
     assert (points.tolist(), end) == ([[2.7, 4.6, 0.5]], MoveEnd.NO_PATH)
