@@ -57,6 +57,15 @@ def test_what_is_written_is_read_again(numbers, changes, flat):
     assert [read_change(coder, 256) for _ in changes] == changes
 
 
+def test_every_number_comes_back_once_the_odds_have_learned():
+    numbers, changes = [*range(256)] * 2, [*range(-255, 0), *range(1, 256)] * 2
+    data, end = written(numbers, changes)
+    coder = new_coder(0)._replace(data=data)
+    begin_reading(coder, FIRST, end, False)
+    assert [read_byte(coder, 0) for _ in numbers] == numbers
+    assert [read_change(coder, 256) for _ in changes] == changes
+
+
 @drawn(40)
 @given(seeds)
 def test_carries_reach_back_through_bytes_of_255(seed):
