@@ -35,6 +35,13 @@ EQUIVALENT = (
     ),
     Equivalent(
         f"{_BELIEF}/paths/planning.py",
+        "_passable_moves",
+        "inner = 0 < x < size[0] - 1 and 0 < y < size[1] - 1 and (lattice.layer >= 0)  ->  "
+        "inner = 1 < x < size[0] - 1 and 0 < y < size[1] - 1 and (lattice.layer >= 0)",
+        "One row more takes the slower way, which finds the same.",
+    ),
+    Equivalent(
+        f"{_BELIEF}/paths/planning.py",
         "search_paths",
         "per_cost = _BUCKET_WIDTH ** (-1) / costs.min_per_edge  ->  "
         "per_cost = _BUCKET_WIDTH ** (-2) / costs.min_per_edge",
@@ -109,6 +116,13 @@ EQUIVALENT = (
         "math.pi - down - pitch)  ->  return within_half_view(params, turn, down - pitch) or "
         "within_half_view(params, turn - math.pi, math.pi - down - pitch)",
         "Both differ by a whole turn, which `within_half_view` takes away.",
+    ),
+    Equivalent(
+        f"{_ROBOTS}/range_coder.py",
+        "read_change",
+        "size = size << 1 | read_bit(coder, contexts + 9 + 8 * bits + place)  ->  "
+        "size = size << 1 | read_bit(coder, contexts + 9 + 8 * bits - place)",
+        "The reader numbers its contexts in another order: each is still that of one kind of decision.",
     ),
     Equivalent(
         f"{_ROBOTS}/range_sensor.py",

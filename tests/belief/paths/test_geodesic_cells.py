@@ -106,6 +106,18 @@ def test_cost_of_a_diagonal_step_by_hand():
     assert space.costs[1, 1, 0] == pytest.approx(3.0 + 5.0 + 0.5)
 
 
+@pytest.mark.parametrize("closed", [(1, 0), (-1, 0), (0, 1), (0, -1)])
+def test_no_corner_of_a_closed_voxel_is_cut_and_all_others_are(closed):
+    """From the middle of a plane of 5 × 7, beside which one voxel is closed: √2 askew, 2 around."""
+    rates = np.ones((5, 7, 1), np.float32)
+    rates[2 + closed[0], 3 + closed[1], 0] = np.inf
+    space = new_tessellation(rates.shape)
+    tessellate(space, rates, np.array([2 * 7 + 3]), 0.0, True)
+    for x, y in itertools.product((-1, 1), repeat=2):
+        around = closed in ((x, 0), (0, y))
+        assert space.costs[2 + x, 3 + y, 0] == pytest.approx(2.0 if around else math.sqrt(2.0))
+
+
 def test_sources_that_are_impassable_or_share_a_voxel_get_no_cell():
     rates = np.ones((3, 4, 2), np.float32)
     rates[1, 2, 0] = np.inf
