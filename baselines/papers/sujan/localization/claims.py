@@ -9,7 +9,7 @@ import numpy as np
 from baselines.experiments.claims import Claim
 from baselines.experiments.outcome import Record
 from baselines.experiments.statistics import ratio_interval
-from baselines.papers.sujan.localization.sweep import COUNTS, ERROR_WEIGHTS, REACH_M, SPARSE, cell_id
+from baselines.papers.sujan.localization.sweep import COUNTS, ERROR_WEIGHTS, OWN_ID, REACH_M, SPARSE, cell_id
 
 Records = dict[str, list[Record]]
 WAY_M = 300.0
@@ -28,6 +28,8 @@ def all_claims(records: Records) -> list[Claim]:
     for count in COUNTS[1:]:
         text = f"{count} within reach: the error is less with near fiducials than with far ones; ratio"
         claims.append(_less(records, f"near-{count}", text, cell_id(count, "near"), cell_id(count, "far")))
+    text = "ours: the error is less with landmarks of its own map than with none; ratio"
+    claims.append(_less(records, "own", text, OWN_ID, cell_id(0, "far")))
     for count in SPARSE:
         for weight in ERROR_WEIGHTS:
             text = (

@@ -25,6 +25,8 @@ from baselines.papers.sujan.localization.claims import (
 from baselines.papers.sujan.localization.sweep import (
     COUNTS,
     ERROR_WEIGHTS,
+    OWN,
+    OWN_ID,
     REACH_M,
     SPARSE,
     cell_id,
@@ -52,15 +54,17 @@ def write_report(folder: Path, records: Records, claims: Sequence[Claim], comman
 
 
 _ABOUT = """\
-Written by `{command}`: {worlds} worlds of `occlusions` (100 × 100 m), one mission of one
-robot (90°, 15 m) by method (v) in each cell, all from the middle, {scans} scans. The robot drifts: the
-standard deviation of x, and that of y, grows by 0.02 m a √m, that of the yaw by 0.002 rad a √m and a √rad.
-Its map is made of what it believes; errors are against the truth. The paper gives no numbers for fig. 19, and
-tracks features of the scene. Here fiducials are drawn on obstacles, their places are known, and a sighting
-has a standard deviation of 0.05 m along and 0.01 rad aside. Near ones are sighted up to 7.5 m away, far ones
-up to 15 m; so many are drawn that 1, 3 or 10 are in a circle of that radius on average ({numbers}
-in a world). A quarter of them is in view, less what obstacles hide. Errors are compared over the first
-{way:.0f} m of the way. Intervals are 95 % paired bootstrap intervals over worlds."""
+Written by `{command}`: {worlds} worlds of `occlusions` (100 × 100 m), one mission of one robot (90°, 15 m)
+by method (v) in each cell, all from the middle, {scans} scans. The robot drifts: the standard deviation of
+x, and that of y, grows by 0.02 m a √m, that of the yaw by 0.002 rad a √m and a √rad. Its map is made of
+what it believes; errors are against the truth. The paper gives no numbers for fig. 19, and tracks features
+of the scene. Here fiducials are drawn on obstacles, their places are known, and a sighting has a standard
+deviation of 0.05 m along and 0.01 rad aside. Near ones are sighted up to 7.5 m away, far ones up to 15 m;
+so many are drawn that 1, 3 or 10 are in a circle of that radius on average ({numbers} in a world). A
+quarter of them is in view, less what obstacles hide. "Own" are up to {own} landmarks that the robot chooses
+in its own map, without any fiducials. Errors are compared over the first {way:.0f} m of the way: rms in the
+tables is over the way of a mission, of which the mean over worlds is shown; in the figure it is over
+worlds, at every place of the way. Intervals are 95 % paired bootstrap intervals over worlds."""
 
 
 _NEARNESS = """\
@@ -80,6 +84,7 @@ def _text(records: Records, claims: Sequence[Claim], command: str) -> str:
         worlds=len(cell),
         scans=len(cell[0]["mapped"]),
         numbers=numbers,
+        own=OWN,
         way=WAY_M,
     )
     parts = [
@@ -100,25 +105,26 @@ def _text(records: Records, claims: Sequence[Claim], command: str) -> str:
 
 
 def _fiducials_table(records: Records) -> str:
+    cells = [("0", "", cell_id(0, "far")), ("own", "", OWN_ID)]
+    cells += [(str(count), reach, cell_id(count, reach)) for reach in REACH_M for count in COUNTS if count]
     rows = []
-    for reach in REACH_M:
-        for count in COUNTS[0 if reach == "near" else 1 :]:
-            cell = cell_id(count, reach)
-            sighted = np.mean([record["localization"]["sightings"] for record in records[cell]])
-            scans = np.mean([record["scans"] for record in records[cell]])
-            rows.append(
-                [
-                    str(count),
-                    reach if count else "",
-                    f"{sighted / scans:.2f}",
-                    mean_interval(rms_error_m(records, cell)).text(".3f"),
-                    f"{errors_by_way(records, cell)[:, -1].mean():.2f}",
-                    f"{at_end(records, cell, 'mapped').mean():.3f}",
-                    mean_interval(at_end(records, cell, "wrong")).text(".4f"),
-                ]
-            )
-    head = ["within reach", "", "sighted a scan", f"rms error over {WAY_M:.0f} m (m)"]
-    return markdown_table([*head, f"error after {WAY_M:.0f} m (m)", "share mapped", "wrong"], rows)
+    for count, reach, cell in cells:
+        sighted = np.mean([record["localization"]["sightings"] for record in records[cell]])
+        scans = np.mean([record["scans"] for record in records[cell]])
+        rows.append(
+            [
+                count,
+                reach,
+                f"{sighted / scans:.2f}",
+                mean_interval(rms_error_m(records, cell)).text(".3f"),
+                mean_interval(errors_by_way(records, cell)[:, -1]).text(".2f"),
+                f"{at_end(records, cell, 'mapped').mean():.3f}",
+                mean_interval(at_end(records, cell, "wrong")).text(".4f"),
+            ]
+        )
+    head = ["within reach", "", "sighted a scan", f"rms over {WAY_M:.0f} m, mean of worlds (m)"]
+    head.append(f"error after {WAY_M:.0f} m, mean of worlds (m)")
+    return markdown_table([*head, "share mapped, mean", "wrong, mean"], rows)
 
 
 def _weights_table(records: Records) -> str:
@@ -143,7 +149,8 @@ def _weights_table(records: Records) -> str:
                     ),
                 ]
             )
-    head = ["within reach", "w_LE", f"rms error over {WAY_M:.0f} m (m)", "wrong", "share mapped", "way (m)"]
+    head = ["within reach", "w_LE", f"rms over {WAY_M:.0f} m, mean of worlds (m)", "wrong, mean"]
+    head += ["share mapped, mean", "way, mean (m)"]
     return markdown_table(
         [*head, f"seconds to {_SHARE:.0%} mapped (who did)", "over w_LE 0"],
         rows,
@@ -181,6 +188,6 @@ def figure_19(records: Records) -> tuple[Figure, dict[str, list[object]]]:
             table["driven_m"] += at.tolist()
             table["rms_error_m"] += curve.round(4).tolist()
         axes.set(title=f"{reach}: up to {REACH_M[reach]:g} m", xlabel="way (m)", ylim=(0, None))
-    figure.axes[0].set_ylabel("rms error of the place (m)")
+    figure.axes[0].set_ylabel("error of the place, rms over worlds (m)")
     figure.axes[0].legend(frameon=False, title="fiducials within reach")
     return figure, table

@@ -22,6 +22,9 @@ ERROR_WEIGHTS = (0.3, 1.0)
 """w_LE, bits a metre, beside 0."""
 SPARSE = (1, 3)
 """Fiducials within reach, far, where w_LE is weighed: with more, any way leads past some."""
+OWN = 16
+"""Landmarks of the robot's own map, where there are no fiducials: ours."""
+OWN_ID = "own-landmarks"
 SCANS = 60
 
 
@@ -41,6 +44,8 @@ def experiment(worlds: int, scans: int = SCANS) -> list[Cell]:
     cells = [_cell(0, "far", 0.0, worlds, scans)]
     for reach in REACH_M:
         cells += [_cell(count, reach, 0.0, worlds, scans) for count in COUNTS if count]
+    own = with_settings(drifting(0, "far", scans), {"fiducials": {"own_number": OWN}})
+    cells.append(Cell(OWN_ID, own, METHODS["v"], worlds, Run(NextBestViewConfig()), in_the_middle(1)))
     for count in SPARSE:
         cells += [_cell(count, "far", weight, worlds, scans) for weight in ERROR_WEIGHTS]
     return cells

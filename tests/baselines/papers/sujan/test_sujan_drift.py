@@ -14,8 +14,10 @@ from baselines.papers.sujan.drift.claims import all_claims
 from baselines.papers.sujan.drift.sweep import STRATEGIES, experiment, task
 
 
-def record_of(time_s, blocked):
-    return {"t_mission_s": time_s, "blocked_moves": blocked}
+def record_of(half_s, blocked, seen=0.8):
+    """Of a mission of 250 s; half_s None = it did not see half."""
+    joint = {"t50_seen_s": half_s, "explored": seen}
+    return {"t_mission_s": 250.0, "blocked_moves": blocked, "joint": joint}
 
 
 def test_levels_are_factors_of_the_same_drift():
@@ -34,12 +36,18 @@ def test_claims_by_hand():
     records = {name: [record_of(100.0, 2), record_of(120.0, 2)] for name in cells}
     records["voronoi-high"] = [record_of(130.0, 2), record_of(156.0, 2)]
     records["nearest-frontier-low-plain"] = [record_of(200.0, 90), record_of(240.0, 70)]
+    records["gradient-low"] = [record_of(100.0, 2), record_of(None, 2, 0.4)]
+    records["gradient-none"] = [record_of(240.0, 2), record_of(240.0, 2)]
     claims = {claim.id: claim for claim in all_claims(records)}
-    assert len(claims) == 2 * len(STRATEGIES) + 8
-    assert claims["time-voronoi-high"].ours == pytest.approx(1.3)
+    assert len(claims) == 4 * len(STRATEGIES) + 8
+    assert claims["half-voronoi-high"].ours == pytest.approx(1.3)
+    assert claims["half-gradient-low"].ours == pytest.approx(350.0 / 480.0)
+    assert claims["half-gradient-low"].claim.endswith("ratio (only 50% of the missions did)")
+    assert claims["seen-gradient-low"].ours == pytest.approx(0.75)
+    assert claims["seen-gradient-high"].ours == 1.0
     failed = {name for name, claim in claims.items() if not claim.holds}
     unchanged = {"nearest-frontier-high", "information-rate-v0-low", "information-rate-v0-high"}
-    assert failed == {"time-voronoi-high"} | {
+    assert failed == {"half-voronoi-high", "half-gradient-low", "seen-gradient-low"} | {
         f"{what}-{n}" for what in ("blocked", "guard") for n in unchanged
     }
     assert claims["blocked-nearest-frontier-low"].ours == -78.0
@@ -58,7 +66,7 @@ def test_the_command_writes_its_page(tmp_path, capsys, monkeypatch):
     folders = ["--out", str(tmp_path), "--runs", str(tmp_path / "r")]
     monkeypatch.setattr("sys.argv", ["sujan.drift", *words, *folders])
     assert run_command(drift.main) == 0
-    assert len(json.loads(capsys.readouterr().out)["claims"]) == 6
+    assert len(json.loads(capsys.readouterr().out)["claims"]) == 8
     page = (tmp_path / "sujan-drift.md").read_text()
     assert "python -m baselines.papers.sujan.drift --quick --worlds 1" in page and "random, plain" in page
     with Image.open(tmp_path / "sujan-drift" / "drift.png") as picture:

@@ -43,20 +43,24 @@ def test_as_many_fiducials_are_drawn_as_are_to_be_within_reach():
     )  # 10⁴ m² over π 7.5², ten times over π 15²
     task = drifting(3, "near", 20)
     assert task.fiducials.number == 170 and task.fiducials.range_m == 7.5 and task.ending.max_cycles == 20
+    own = next(cell.scenario for cell in experiment(2) if cell.id == "own-landmarks")
+    assert (own.fiducials.own_number, own.fiducials.number) == (16, 0) and own.drifts
     assert task.drifts and drifting(0, "far", 20).fiducials.number == 0
 
 
 def test_claims_by_hand():
     cells = {cell.id: cell for cell in experiment(2)}
-    assert len(cells) == 11
+    assert len(cells) == 12
     records = {name: [record_of(1.0), record_of(1.1)] for name in cells}
     records["fiducials-10-near"] = [record_of(0.5), record_of(0.5)]
+    records["own-landmarks"] = [record_of(0.9), record_of(0.9)]
     records["fiducials-3-far-weight-0.3"] = [record_of(1.0, 0.01), record_of(1.0, 0.01)]
     claims = {claim.id: claim for claim in all_claims(records)}
-    assert len(claims) == 13
+    assert len(claims) == 14
     assert {name for name, claim in claims.items() if claim.holds} == {
         "number-near-10",
         "near-10",
+        "own",
         "weight-3-0.3",
     }
     assert claims["near-10"].ours == pytest.approx(1.0 / 2.1)
@@ -68,11 +72,12 @@ def test_the_command_writes_its_page(tmp_path, capsys, monkeypatch):
     folders = ["--out", str(tmp_path), "--runs", str(tmp_path / "r")]
     monkeypatch.setattr("sys.argv", ["sujan.localization", *words, *folders])
     assert run_command(localization.main) == 0
-    assert len(json.loads(capsys.readouterr().out)["claims"]) == 13
+    assert len(json.loads(capsys.readouterr().out)["claims"]) == 14
     page = (tmp_path / "sujan-localization.md").read_text()
     assert "python -m baselines.papers.sujan.localization --worlds 1 --scans 3" in page
     with Image.open(tmp_path / "sujan-localization" / "figure-19.png") as picture:
         assert picture.width > 800
+    assert "| own |" in page and "rms over 300 m, mean of worlds (m)" in page
     (file,) = (tmp_path / "r" / "fiducials-10-near").glob("*.json")
     record = json.loads(file.read_text())["record"]
     assert len(record["error_m"]) == record["scans"] == 3
