@@ -204,5 +204,7 @@ def show_results(env: EntropyExploreEnv, figures: dict[str, Any], written: list[
     """Print what a mission came to: one JSON object, or a table and the files that were written."""
     if as_json:
         print_json(figures)
-    else:
-        print_table(figures, written, env.scenario)
+        return
+    if env.scenario.shares_summaries:
+        figures = {**figures, "summaries_sent": int(env.missions.state.summaries["sent"][0].sum())}
+    print_table(figures, written, env.scenario)

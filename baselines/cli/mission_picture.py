@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any, NamedTuple
 
 import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.colors import Normalize, PowerNorm
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patheffects import withStroke
@@ -22,8 +24,10 @@ from entropy_explore_env.settings import Grid
 _UNKNOWN = "#c9d6e8"
 _UNKNOWN_ABOVE = 0.9
 """A voxel counts as unknown while more than this share of its entropy is left."""
-_HEIGHTS = "YlGn_r"
-"""Colours of heights: dark is low."""
+_HEIGHTS = "viridis"
+"""Colours of heights: dark is low. None of them is like that of unknown columns."""
+_LEAST_EXPONENT = 0.3
+"""Of the scale of heights; see `_scale_of`."""
 _MARK_SIZE = 5
 
 
@@ -37,8 +41,8 @@ class _Map(NamedTuple):
     """Of its colour bar; None = it has none."""
     colours: str
     """Name of matplotlib's."""
-    limits: tuple[float, float]
-    """Values of the first and the last colour."""
+    scale: Normalize
+    """From values to shares of the way from the first colour to the last."""
     edge: str
     """Colour of the edges of marks, which stand out on it."""
 
@@ -125,7 +129,7 @@ def _maps(recorder: Recorder) -> tuple[_Map, _Map, _Map]:
     where = "" if grid.flat else f"\nlayer at z = {height_m:.2f} m, paths at all heights"
     share = entropy_share(missions, 0, 0)[:, :, layer]
     cover = np.ma.masked_where(share > _UNKNOWN_ABOVE, missions.mean[0, 0][:, :, layer])
-    knows, unit = f"What robot_0 knows{where}", (0.0, 1.0)
+    knows, unit = f"What robot_0 knows{where}", Normalize(0.0, 1.0)
     return (
         _Map(np.ma.masked_array(share), knows, "share of the entropy left", "magma", unit, "white"),
         _Map(cover, knows, "coverage; blue: unknown", "Greys", unit, "black"),
@@ -148,14 +152,25 @@ def _maps_from_above(recorder: Recorder, true_m: np.ndarray) -> tuple[_Map, _Map
     mean, precision = missions.mean[0, 0], missions.precision[0, 0]
     ground = elevation_map(mean, precision, grid, scenario.sigma_prior, scenario.sensor.sigma_min)
     believed_m = np.ma.masked_where(~ground.known, ground.height_m)
-    limits = float(true_m.min()), float(true_m.max())
+    scale = _scale_of(true_m)
     knows, label = "What robot_0 knows, from above", "height of the ground (m)"
     left = f"{knows}\nmean over each column"
     return (
-        _Map(share, left, "share of the entropy left", "magma", (0.0, 1.0), "white"),
-        _Map(believed_m, f"{knows}\nblue: unknown", label, _HEIGHTS, limits, "black"),
-        _Map(np.ma.masked_array(true_m), "The true world, from above", label, _HEIGHTS, limits, "black"),
+        _Map(share, left, "share of the entropy left", "magma", Normalize(0.0, 1.0), "white"),
+        _Map(believed_m, f"{knows}\nblue: unknown", label, _HEIGHTS, scale, "black"),
+        _Map(np.ma.masked_array(true_m), "The true world, from above", label, _HEIGHTS, scale, "black"),
     )
+
+
+def _scale_of(heights_m: np.ndarray) -> Normalize:
+    """Half of the columns get the darker half of the colours: low ground below a cliff shows its rocks.
+
+    Shares of the range are raised to a power; 1 at most, so that heights that are spread evenly stay so.
+    """
+    low, high = float(heights_m.min()), float(heights_m.max())
+    middle = (float(np.median(heights_m)) - low) / max(high - low, 1e-9)
+    exponent = math.log(0.5) / math.log(min(max(middle, 1e-9), 0.5))
+    return PowerNorm(max(exponent, _LEAST_EXPONENT), low, high)
 
 
 def _open_ground(solid: np.ndarray) -> np.ndarray | None:
@@ -177,8 +192,7 @@ def _draw_map(figure: Figure, axes: Axes, shown: _Map, recorder: Recorder, belie
         origin="lower",
         extent=extent_of(recorder.missions.grid),
         cmap=mpl.colormaps[shown.colours].with_extremes(bad=_UNKNOWN),
-        vmin=shown.limits[0],
-        vmax=shown.limits[1],
+        norm=shown.scale,
         aspect="equal",
     )
     axes.set(xlabel="x (m)", ylabel="y (m)")
@@ -188,11 +202,13 @@ def _draw_map(figure: Figure, axes: Axes, shown: _Map, recorder: Recorder, belie
     fiducials_m = recorder.missions.state.fiducials[0]
     axes.plot(*fiducials_m[:, :2].T, **_mark("^", "white", "black"))
     drifts = recorder.missions.estimates is not None
+    end = _mark("D", "none", shown.edge) if drifts else None
     for robot, path_m in enumerate(recorder.paths_m):
         colour = COLOURS[robot % len(COLOURS)]
-        axes.plot(path_m[:, 0], path_m[:, 1], color=colour, linewidth=0.9)
+        thin = [withStroke(linewidth=1.7, foreground=shown.edge)]
+        axes.plot(path_m[:, 0], path_m[:, 1], color=colour, linewidth=0.9, path_effects=thin)
         axes.plot(*path_m[0, :2], **_mark("o", colour, shown.edge))
-        axes.plot(*path_m[-1, :2], **_mark("D" if drifts else "s", colour, shown.edge))
+        axes.plot(*path_m[-1, :2], **(end or _mark("s", colour, shown.edge)))
     if believed:
         _draw_estimates(axes, recorder, shown.edge)
 
@@ -207,9 +223,9 @@ def _draw_estimates(axes: Axes, recorder: Recorder, edge: str) -> None:
         colour = COLOURS[robot % len(COLOURS)]
         outline = estimate_outline(pose[:3], missions.estimates[0][robot]["covariance"][:3, :3], up=1)
         to_truth = np.stack([pose[:3], recorder.paths_m[robot][-1]])
-        for line in (outline, to_truth):
+        axes.plot(*pose[:2], **_mark("s", "none", edge))
+        for line in (outline, to_truth):  # over the marks, which are hollow: an ellipse may be smaller
             axes.plot(*line[:, :2].T, color=colour, linewidth=1.5, path_effects=stroke)
-        axes.plot(*pose[:2], **_mark("s", colour, edge))
 
 
 def _legend(recorder: Recorder) -> list[Line2D]:
@@ -220,14 +236,15 @@ def _legend(recorder: Recorder) -> list[Line2D]:
         meanings |= {"s": "end: where it believes to be, with an ellipse of 2 σ", "D": "where it truly is"}
     if recorder.missions.state.fiducials.shape[1]:
         meanings["^"] = "fiducial"
-    return [Line2D([], [], label=text, **_mark(mark, "white", "black")) for mark, text in meanings.items()]
+    inside = "none" if drifts else "white"
+    return [Line2D([], [], label=text, **_mark(mark, inside, "black")) for mark, text in meanings.items()]
 
 
 def _mark(marker: str, colour: Any, edge: str) -> dict[str, Any]:  # noqa: ANN401 - any of matplotlib's colours
     """How a mark is drawn."""
     return {
         "marker": marker,
-        "color": colour,
+        "markerfacecolor": colour,
         "markeredgecolor": edge,
         "markersize": _MARK_SIZE,
         "linestyle": "",

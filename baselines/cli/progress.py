@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import sys
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -14,10 +15,16 @@ from entropy_explore_env.reports.painting import remaining_share
 from entropy_explore_env.scenario import Scenario, with_settings
 from entropy_explore_env.scenarios import SCENARIOS
 
+LINE_EVERY_S = 15.0
+"""On the clock, between two lines in place of a bar."""
+
 
 @contextmanager
 def progress_bar(title: str, hidden: bool) -> Iterator[Callable[[EntropyExploreEnv], None]]:
-    """A bar that is there from the first call of the function given, to be called after every step."""
+    """A bar that is there from the first call of the function given, to be called after every step.
+
+    Where standard error is no terminal, a line now and then stands in its place.
+    """
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
@@ -31,14 +38,15 @@ def progress_bar(title: str, hidden: bool) -> Iterator[Callable[[EntropyExploreE
         TimeElapsedColumn(),
     )
     console = Console(file=sys.stderr)
-    hidden = hidden or not console.is_terminal
+    lines = not hidden and not console.is_terminal
+    hidden = hidden or lines
     progress = Progress(*columns, console=console, transient=True, disable=hidden)
     task = progress.add_task(title, total=1.0, left=1.0, time_s=0.0, shared=0)
 
-    started = False
+    started, told_s = False, time.monotonic()
 
     def show(env: EntropyExploreEnv) -> None:
-        nonlocal started
+        nonlocal started, told_s
         if not started:
             progress.start()
             started = True
@@ -47,6 +55,9 @@ def progress_bar(title: str, hidden: bool) -> Iterator[Callable[[EntropyExploreE
         shared = int(state.robots[0]["measurements_sent"].sum())
         time_s = float(state.missions[0]["time_s"])
         progress.update(task, completed=1.0 - left, left=left, time_s=time_s, shared=shared)
+        if lines and time.monotonic() - told_s > LINE_EVERY_S:
+            told_s = time.monotonic()
+            print(f"{title}: entropy left {left:.1%}, simulated {time_s:,.0f} s", file=sys.stderr, flush=True)
 
     try:
         yield show
@@ -65,6 +76,7 @@ _ROWS: tuple[tuple[str, str, Callable[[Any], str]], ...] = (
     ("scans over the floor", "scans_over_floor", lambda v: f"{v:.2f}"),
     ("measurements", "measurements", lambda v: f"{v:,}"),
     ("shared measurements", "shared_measurements", lambda v: f"{v:,}"),
+    ("summaries sent", "summaries_sent", lambda v: f"{v:,}"),
     ("bits sent", "bits_sent", lambda v: f"{v:,}"),
     ("bits gained per bit sent", "bits_gained_per_bit_sent", lambda v: f"{v:.3f}"),
     ("measurements below I_min", "overlap", lambda v: f"{v:.0%}"),
@@ -81,6 +93,7 @@ _ROWS: tuple[tuple[str, str, Callable[[Any], str]], ...] = (
     ("error of what robots believe of their place, rms", "rms_error_m", lambda v: f"{v:.3f} m"),
     ("the same of their yaw", "rms_error_rad", lambda v: f"{v:.4f} rad"),
     ("sightings of fiducials", "sightings", lambda v: f"{v:,}"),
+    ("sightings of landmarks in own maps", "own_sightings", lambda v: f"{v:,}"),
     ("faults", "faults_told", str),
     ("computed, compiled and drawn in", "wall_s", lambda v: f"{v:,.2f} s"),
 )

@@ -15,6 +15,7 @@ from entropy_explore_env.missions.poses import place_at, pose_at, share_left, sp
 from entropy_explore_env.missions.rules import Rules
 from entropy_explore_env.missions.silence import is_silent
 from entropy_explore_env.missions.simulation import Missions
+from entropy_explore_env.robots.landmarks import LANDMARK
 from entropy_explore_env.robots.localization import believed_point
 from entropy_explore_env.robots.motion import MoveEnd
 from entropy_explore_env.scenario import Scenario
@@ -125,6 +126,7 @@ class RobotView:
             latest event at which the estimate changed: while the robot drives on it is uncertain by more.
         fiducials_m: (F, 3) places of the fiducials by which it corrects its estimate (`Fiducials`).
         landmarks_m: (N, 3) where it believes the landmarks of its own map to be (`Fiducials.own_number`).
+        landmarks: (N,) LANDMARK, the same with all that it knows of them; their true places are not told.
     """
 
     robot: int
@@ -154,6 +156,7 @@ class RobotView:
     covariance: np.ndarray = field(default_factory=lambda: np.zeros((4, 4)))
     fiducials_m: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
     landmarks_m: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
+    landmarks: np.ndarray = field(default_factory=lambda: np.zeros(0, LANDMARK))
 
     def __repr__(self) -> str:
         """Who it is, when and where, not what it holds to be true."""
@@ -228,6 +231,7 @@ def view_of(missions: Missions, mission: int, robot: int) -> RobotView:
     estimate = None if missions.estimates is None else missions.estimates[here]
     scan_pose = own["scan_pose"] if estimate is None else estimate["scan_pose"]
     exact, params = np.zeros((4, 4)), rules.params[robot]
+    landmarks = _landmarks(missions, mission, robot)
     return RobotView(
         robot=robot,
         scenario=missions.scenario,
@@ -264,16 +268,19 @@ def view_of(missions: Missions, mission: int, robot: int) -> RobotView:
         rules=rules,
         covariance=read_only(exact if estimate is None else estimate["covariance"].copy()),
         fiducials_m=read_only(state.fiducials[mission].copy()),
-        landmarks_m=read_only(_landmarks(missions, mission, robot)),
+        landmarks_m=read_only(np.ascontiguousarray(landmarks["believed"])),
+        landmarks=read_only(landmarks),
     )
 
 
 def _landmarks(missions: Missions, mission: int, robot: int) -> np.ndarray:
-    """(N, 3) where a robot believes the landmarks of its own map to be; none where it knows where it is."""
+    """(N,) LANDMARK of a robot's own map, as it knows them; none where it knows where it is."""
     if not missions.state.landmarks.size:
-        return np.zeros((0, 3))
+        return np.zeros(0, LANDMARK)
     landmarks = missions.state.landmarks[mission, robot]
-    return np.asarray(landmarks["believed"][landmarks["used"]])
+    known = landmarks[landmarks["used"]]
+    known["place"] = known["believed"]
+    return np.asarray(known)
 
 
 def _candidates(missions: Missions, mission: int, robot: int) -> np.ndarray:

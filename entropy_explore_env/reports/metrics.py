@@ -52,7 +52,7 @@ def mission_figures(missions: Missions, mission: int, floor: bool | None = None)
         `entropy_mean_bits` over the team; `balance`: the coefficient of variation of the bits that the
         robots gained themselves; `distance_m`, `blocked_moves`; `per_robot`: a list of the counts of
         each robot. If the scenario has faults, also `faults`: see `fault_counts`. If robots drift, also
-        `localization`: see `localization_figures`. If it tracks the truth, also `joint`: see `joint_figures`.
+        `localization`: see `localization_told`. If it tracks the truth, also `joint`: see `joint_figures`.
     """
     clock, robots = missions.state.missions[mission], missions.state.robots[mission]
     faults = missions.state.faults[mission]
@@ -94,9 +94,17 @@ def mission_figures(missions: Missions, mission: int, floor: bool | None = None)
 
 
 def localization_told(missions: Missions, mission: int) -> dict[str, float | int | None]:
-    """How wrong a mission's robots were about their poses: see `localization_figures`."""
+    """How wrong a mission's robots were about their poses: see `localization_figures`.
+
+    Where they keep landmarks of their own maps, also `own_sightings` of those that they still keep, after the
+    scans that chose them.
+    """
     robots, estimates = missions.state.robots[mission], missions.state.estimates[mission]
-    return localization_figures(estimates, int(robots["scans"].sum()))
+    told = localization_figures(estimates, int(robots["scans"].sum()))
+    landmarks = missions.state.landmarks[mission]
+    if landmarks.size:
+        told["own_sightings"] = int(landmarks["sightings"][landmarks["used"]].sum())
+    return told
 
 
 def _reached(clock: np.void, place: int) -> float | None:

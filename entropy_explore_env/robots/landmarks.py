@@ -44,12 +44,13 @@ _ROUNDING = 1e-9
 
 
 @lean_kernel
-def added_since(landmark, estimate, matrices):
+def added_since(landmark, here, covariance, matrices):
     """Fill in Q, the covariance of what was added to a pose's error since a landmark was chosen.
 
     Args:
         landmark: LANDMARK.
-        estimate: ESTIMATE.
+        here: (x, y, z), where the robot believes to be.
+        covariance: (4, 4) float64, Σ, of that pose.
         matrices: (2, 4, 4) float64; the first is filled in, the second is scratch space.
 
     Returns:
@@ -59,13 +60,12 @@ def added_since(landmark, estimate, matrices):
     for row in range(4):
         for column in range(4):
             added[row, column] = -landmark.covariance[row, column]
-    x = estimate.place[0] + estimate.error[0] - landmark.seen_from[0]
-    y = estimate.place[1] + estimate.error[1] - landmark.seen_from[1]
+    x, y = here[0] - landmark.seen_from[0], here[1] - landmark.seen_from[1]
     spread_yaw_error(added, -y, x)
     for row in range(4):
         for column in range(4):
-            added[row, column] += estimate.covariance[row, column]
-    return is_covariance(added, estimate.covariance, matrices[1])
+            added[row, column] += covariance[row, column]
+    return is_covariance(added, covariance, matrices[1])
 
 
 @lean_kernel
@@ -110,15 +110,59 @@ def correct_by_landmark(estimate, landmark, seen, sigmas, matrices):
     Returns:
         Whether it said anything.
     """
-    if not added_since(landmark, estimate, matrices):
+    here = (
+        estimate.place[0] + estimate.error[0],
+        estimate.place[1] + estimate.error[1],
+        estimate.place[2] + estimate.error[2],
+    )
+    if not added_since(landmark, here, estimate.covariance, matrices):
         return False
-    added = matrices[0]
-    believed, first = landmark.believed, landmark.seen_from
+    believed = landmark.believed
     expected = (
         believed[0] - estimate.place[0] - estimate.error[0],
         believed[1] - estimate.place[1] - estimate.error[1],
         believed[2] - estimate.place[2] - estimate.error[2],
     )
+    taken = take_landmark(estimate.covariance, landmark, seen, expected, sigmas, matrices)
+    for number in range(4):
+        estimate.error[number] -= taken[number]
+    estimate.error[3] = within_half_turn(estimate.error[3])
+    landmark.sightings += 1
+    return True
+
+
+@lean_kernel
+def foresee_landmark(covariance, landmark, here, away, sigmas, matrices):
+    """Take in what sighting a landmark of the robot's own map again should say, where it is as believed.
+
+    Args:
+        covariance: (4, 4) float64, Σ; changed in place.
+        landmark: LANDMARK, which stays as it is.
+        here: (x, y, z), where the robot believes to be.
+        away: (x, y, z), from there to where it believes the landmark to be.
+        sigmas: As of `correct_by_landmark`.
+        matrices: (2, 4, 4) float64, scratch space.
+    """
+    if added_since(landmark, here, covariance, matrices):
+        take_landmark(covariance, landmark, away, away, sigmas, matrices)
+
+
+@lean_kernel
+def take_landmark(covariance, landmark, seen, expected, sigmas, matrices):
+    """Take in what a sighting says of what was added since its landmark was chosen.
+
+    Args:
+        covariance: (4, 4) float64, Σ; changed in place.
+        landmark: LANDMARK.
+        seen: (x, y, z), as of `correct_by_landmark`.
+        expected: (x, y, z), from where the robot believes to be to where it believes the landmark to be.
+        sigmas: As of `correct_by_landmark`.
+        matrices: (2, 4, 4) float64, as `added_since` has filled them; the first is changed.
+
+    Returns:
+        (x, y, z, yaw) that is to be taken from the estimate.
+    """
+    added, believed, first = matrices[0], landmark.believed, landmark.seen_from
     far_m = length((believed[0] - first[0], believed[1] - first[1], believed[2] - first[2]))
     ahead, side, up, distance = sight_axes(seen)
     often = 1.0 + landmark.sightings
@@ -129,14 +173,9 @@ def correct_by_landmark(estimate, landmark, seen, sigmas, matrices):
     aside = across * across + first_most
     off = seen[0] - expected[0], seen[1] - expected[1], seen[2] - expected[2]
     taken = (0.0, 0.0, 0.0, 0.0)
-    taken = take_relative(estimate.covariance, added, ahead, expected, off, along, taken)
-    taken = take_relative(estimate.covariance, added, side, expected, off, aside, taken)
-    taken = take_relative(estimate.covariance, added, up, expected, off, aside, taken)
-    for number in range(4):
-        estimate.error[number] -= taken[number]
-    estimate.error[3] = within_half_turn(estimate.error[3])
-    landmark.sightings += 1
-    return True
+    taken = take_relative(covariance, added, ahead, expected, off, along, taken)
+    taken = take_relative(covariance, added, side, expected, off, aside, taken)
+    return take_relative(covariance, added, up, expected, off, aside, taken)
 
 
 @inlined_kernel

@@ -2,6 +2,8 @@
 
 The localization error LE of Sujan's rating function (sect. 2.3.5, eq. 23), which the paper leaves open: "the
 localization error of the agent along the path to the target", less where the path has promising fiducials.
+Landmarks are those of the world, and of the robot's own map, which take back what was added since it chose
+them, and no more.
 """
 
 from __future__ import annotations
@@ -13,6 +15,7 @@ import numpy as np
 
 from entropy_explore_env.belief.raycast import STOP_AT_COVERED, Line, cast_range, point
 from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel
+from entropy_explore_env.robots.landmarks import foresee_landmark
 from entropy_explore_env.robots.pose_covariance import (
     correct_by_sighting,
     drift_variances,
@@ -42,6 +45,10 @@ class Surveyor(NamedTuple):
     """It sights nothing nearer."""
     scan_every_m: float
     """It scans under way after every so many metres; inf = at the end alone."""
+    own: np.ndarray
+    """(N,) LANDMARK, of its own map; where they truly are does not matter."""
+    matrices: np.ndarray
+    """(2, 4, 4) float64, scratch space."""
 
 
 class Drive(NamedTuple):
@@ -149,6 +156,12 @@ def move_and_sight(covariance, surveyor, drive, event, here, metres, turned):
         away = landmark[0] - here[0], landmark[1] - here[1], landmark[2] - here[2]
         if should_be_in_sight(surveyor, drive.viewpoint, here, away):
             correct_by_sighting(covariance, away, away, params.range_sigma_m, params.bearing_sigma_rad)
+    sigmas = params.range_sigma_m, params.bearing_sigma_rad
+    for number in range(len(surveyor.own)):
+        own = surveyor.own[number]
+        away = own.believed[0] - here[0], own.believed[1] - here[1], own.believed[2] - here[2]
+        if should_be_in_sight(surveyor, drive.viewpoint, here, away):
+            foresee_landmark(covariance, own, here, away, sigmas, surveyor.matrices)
 
 
 @lean_kernel

@@ -10,7 +10,13 @@ from hypothesis import given
 
 from entropy_explore_env.belief.fields import Belief, occupancy_probability
 from entropy_explore_env.belief.landmark_score import landmark_score
-from entropy_explore_env.robots.landmarks import LANDMARK, added_since, correct_by_landmark, is_covariance
+from entropy_explore_env.robots.landmarks import (
+    LANDMARK,
+    added_since,
+    correct_by_landmark,
+    foresee_landmark,
+    is_covariance,
+)
 from entropy_explore_env.robots.localization import ESTIMATE
 from tests.reference import localization as reference
 from tests.reference.scenes import drawn, seeds
@@ -120,6 +126,20 @@ def test_sighting_a_landmark_again_is_a_filter_with_the_pose_of_then_as_more_sta
     assert landmark["sightings"] == sightings + 1
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_what_is_foreseen_is_what_a_sighting_as_expected_takes_back(seed):
+    estimate, landmark, _ = situation(np.random.default_rng(seed), 0.3 * np.eye(4))
+    here = estimate["place"] + estimate["error"][:3]
+    away = tuple(landmark["believed"] - here)
+    foreseen, error = estimate["covariance"].copy(), estimate["error"].copy()
+    before, sightings = foreseen.copy(), int(landmark["sightings"])
+    foresee_landmark(foreseen, landmark, tuple(here), away, SIGMAS, np.empty((2, 4, 4)))
+    assert landmark["sightings"] == sightings and np.trace(foreseen) < np.trace(before)
+    assert correct_by_landmark(estimate, landmark, away, SIGMAS, np.empty((2, 4, 4)))
+    np.testing.assert_allclose(foreseen, estimate["covariance"], rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(estimate["error"], error, atol=1e-9)
+
+
 def test_who_has_not_moved_since_learns_nothing_from_its_own_landmark():
     estimate, landmark, _ = situation(np.random.default_rng(1), np.zeros((4, 4)))
     estimate["covariance"] = landmark["covariance"]
@@ -135,7 +155,8 @@ def test_a_landmark_that_is_known_less_well_than_the_pose_now_is_left_out():
     estimate, landmark, _ = situation(np.random.default_rng(2), np.zeros((4, 4)))
     estimate["covariance"] = 0.25 * estimate["covariance"]
     before = estimate.copy()
-    assert not added_since(landmark, estimate, np.empty((2, 4, 4)))
+    here = tuple(estimate["place"] + estimate["error"][:3])
+    assert not added_since(landmark, here, estimate["covariance"], np.empty((2, 4, 4)))
     assert not correct_by_landmark(estimate, landmark, (1.0, 0.5, 0.2), SIGMAS, np.empty((2, 4, 4)))
     assert (estimate["covariance"] == before["covariance"]).all() and landmark["sightings"] == 0
 

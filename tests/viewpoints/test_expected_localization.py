@@ -9,6 +9,8 @@ import pytest
 from hypothesis import given
 
 from entropy_explore_env.missions.view import view_of
+from entropy_explore_env.reports.metrics import localization_told
+from entropy_explore_env.robots.landmarks import LANDMARK
 from entropy_explore_env.robots.localization import LOCALIZATION_PARAMS
 from entropy_explore_env.viewpoints.expected_localization import (
     Drive,
@@ -17,6 +19,7 @@ from entropy_explore_env.viewpoints.expected_localization import (
     foresee_covariance,
     growth_of_error,
 )
+from tests.missions.test_landmarks import there_and_back
 from tests.missions.test_tick import toward
 from tests.reference import localization as reference
 from tests.reference.scenes import drawn, free_box, put, seeds, started
@@ -47,7 +50,8 @@ def surveyor(landmarks=(), mean=None, every_m=math.inf, **params):
         own[name] = number
     places = np.array(landmarks, np.float64).reshape(-1, 3)
     free = np.zeros(math.prod(SIZE), np.float32) if mean is None else mean
-    return Surveyor(own, places, free, SIZE, ORIGIN, EDGE, 0.0, every_m)
+    mine = np.zeros(0, LANDMARK)
+    return Surveyor(own, places, free, SIZE, ORIGIN, EDGE, 0.0, every_m, mine, np.empty((2, 4, 4)))
 
 
 def drive(*path, pose=(1.75, -1.75, 0.75, 0.2, 0.0), gaze=0.2, since_m=0.0):
@@ -171,6 +175,8 @@ def test_a_mission_then_does_what_was_foreseen(landmarks):
         0.5,
         0.0,
         0.6,
+        view.landmarks,
+        np.empty((2, 4, 4)),
     )
     foreseen = view.covariance.copy()
     foresee_covariance(foreseen, who, Drive(view.pose, goal[None, :3], goal, float(view.since_scan_m)))
@@ -189,3 +195,36 @@ def test_a_scan_that_is_overdue_on_a_way_of_no_length_is_taken_at_its_end():
     before = np.diag([1.0, 1.0, 0.0, 0.0])
     le, after = growth(before, surveyor([(3.75, -1.75, 0.75)], every_m=1.0), due, 0.0)
     assert le < 0.0 and after[0, 0] == pytest.approx(1.0 / (1.0 + 1.0 / 0.05**2))
+
+
+def test_landmarks_of_its_own_map_take_back_what_the_way_adds_and_no_more():
+    """One that it chose where it stands: staying brings nothing, and a drive costs less than without it."""
+    before = np.diag([0.04, 0.04, 0.01, 0.01])
+    own = np.zeros(1, LANDMARK)
+    own["believed"], own["seen_from"], own["used"] = (2.75, -1.75, 0.75), (1.75, -1.75, 0.75), True
+    own["covariance"] = before
+    for way, least in ((drive(), 0.0), (drive((1.75, 1.0, 0.75)), 1e-3)):
+        without, _ = growth(before, surveyor(), way, 2.0)
+        having, after = growth(before, surveyor()._replace(own=own), way, 2.0)
+        exact, _ = growth(before, surveyor([(2.75, -1.75, 0.75)]), way, 2.0)
+        assert having == pytest.approx(0.0, abs=1e-9) if least == 0.0 else least < having < without - least
+        assert exact < having and (np.linalg.eigvalsh(after) > -1e-12).all()
+    hidden = np.zeros(SIZE, np.float32)
+    hidden[2, :, :] = 1.0  # a wall between
+    behind = own.copy()
+    behind["believed"] = (3.75, -1.75, 0.75)
+    who = surveyor(mean=hidden.ravel())
+    way = drive((1.75, 1.0, 0.75))
+    assert growth(before, who._replace(own=behind), way, 2.0)[0] == growth(before, who, way, 2.0)[0]
+
+
+def test_a_view_tells_of_own_landmarks_what_the_robot_knows_and_not_where_they_are():
+    missions = there_and_back(6)
+    view, kept = view_of(missions, 0, 0), missions.state.landmarks[0, 0]
+    kept = kept[kept["used"]]
+    assert len(view.landmarks) == len(kept) > 3 and (view.landmarks["place"] == kept["believed"]).all()
+    assert (kept["place"] != kept["believed"]).any() and not view.landmarks.flags.writeable
+    for name in ("believed", "seen_from", "covariance", "sightings"):
+        np.testing.assert_array_equal(view.landmarks[name], kept[name])
+    assert localization_told(missions, 0)["own_sightings"] == kept["sightings"].sum() > 0
+    assert "own_sightings" not in localization_told(there_and_back(0), 0)

@@ -35,6 +35,8 @@ class LocalizationError:
                 voxel_size_m=float(grid.voxel_size_m),
                 min_range_m=float(sensor.min_range_m),
                 scan_every_m=float(min(sensor.scan_every_m, robot.reach_m)),
+                own=view.landmarks,
+                matrices=np.empty((2, 4, 4)),
             )
 
     def at(self, pose: np.ndarray) -> float:

@@ -138,3 +138,23 @@ def test_what_is_no_open_ground_is_cut_at_a_layer(change):
 
 def test_a_plan_is_no_open_ground():
     assert pictures._open_ground(np.random.default_rng(3).random((13, 9, 1)) < 0.9) is None
+
+
+def test_heights_far_below_others_have_colours_of_their_own():
+    """Of a cliff most ground is low and the plateau high: half of the columns get half of the colours."""
+    low = np.linspace(0.4, 0.9, 60)
+    scale = pictures._scale_of(np.concatenate([low, np.full(40, 3.0)]))
+    assert scale(0.4) == 0.0 and scale(3.0) == 1.0 and 0.4 < scale(np.float64(low[50])) < 0.6
+    even = pictures._scale_of(np.linspace(2.0, 4.0, 101))
+    assert even(2.5) == pytest.approx(0.25) and even(3.0) == pytest.approx(0.5)
+    assert pictures._scale_of(np.full((3, 4), 2.0))(2.0) == 0.0
+
+
+def test_the_ellipse_lies_over_the_marks_which_are_hollow(drawn):
+    mission_picture(recorded(started(free_box(robots=1, robot=DRIFT, grid=GRID))), "box", "random")
+    axes = panels_of(drawn[0])[0]
+    kinds = [line.get_marker() for line in axes.lines]
+    assert kinds[-2:] == ["None", "None"] and len(axes.lines[-2].get_xdata()) > 8
+    for line in axes.lines:
+        if line.get_marker() in "sD":
+            assert line.get_markerfacecolor() == "none"
