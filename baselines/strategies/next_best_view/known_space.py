@@ -127,7 +127,8 @@ class KnownSpace(ABC):
         """(5,) a pose to which the robot has a shorter known free way than any teammate has; None = none.
 
         Teammates of whom it never heard do not count: where it heard of none there is no such pose. Of some
-        that are drawn the one that is farthest from teammates, or a stop on the way there.
+        that are drawn the one that is farthest from teammates, or a stop on the way there. It looks anywhere,
+        since who has seen nothing behind itself knows no way out there.
         """
         mates_m = []
         for seen in view.teammates.values():
@@ -146,8 +147,8 @@ class KnownSpace(ABC):
             return None
         drawn = self._rng.choice(ours, _PARTING_DRAWS)
         goal = int(voxels[drawn[np.argmax(nearest_m[drawn])]])
-        pose = self.pose_in(view, goal, float(view.pose[3]), float(view.pose[4]))
-        return self._stop(view, memory, here, pose)
+        yaw = float(self._rng.uniform(-math.pi, math.pi))
+        return self._stop(view, memory, here, self.pose_in(view, goal, yaw, float(view.pose[4])))
 
     def _memory(self, view: RobotView) -> Memory:
         if view.ceiling is not None:
