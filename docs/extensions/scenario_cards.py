@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from baselines.films import QUICKER
 from baselines.strategies import recommended, resolved
 from docs.extensions.attribute_docs import attribute_docs, constant_docs
 from docs.extensions.scenario_times import times_table
@@ -93,14 +94,11 @@ def card(scenario: Scenario, docs: Path) -> str:
         docs: The folder of the site's sources: results and films are looked for in it.
     """
     name = scenario.name
-    film = (
-        f"![A mission in {name}](../{FILMS}/{name}.gif)\n" if (docs / FILMS / f"{name}.gif").exists() else ""
-    )
     parts = [
         f"# {name}",
         _about(name),
         f"![A world of {name}]({name}.png)",
-        film,
+        _film(name, docs),
         "```python\nimport entropy_explore_env as eee\n\n"
         f'env = eee.parallel_env("{name}")\nobservations, infos = env.reset(seed=0)\n```',
         f"Ids: `{environment_id(name)}` for `gymnasium.make` (one robot, a step is a decision),\n"
@@ -342,6 +340,18 @@ def _changes(part: Any) -> str:  # noqa: ANN401 - any settings
     fields = [f for f in dataclasses.fields(part) if getattr(part, f.name) != _default(f)]
     words = ", ".join(f"{f.name}={getattr(part, f.name)!r}" for f in fields)
     return f"{type(part).__name__}({words})"
+
+
+def _film(name: str, docs: Path) -> str:
+    """The film of a mission, if there is one, and who acts in it if that is not whom we recommend."""
+    if not (docs / FILMS / f"{name}.gif").exists():
+        return ""
+    film = f"![A mission in {name}](../{FILMS}/{name}.gif)\n"
+    if name not in QUICKER:
+        return film
+    return (
+        f"{film}\nFilmed with `{QUICKER[name]}`: what we recommend computes for more than ten minutes here.\n"
+    )
 
 
 def _versions(name: str) -> str:

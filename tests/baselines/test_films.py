@@ -2,12 +2,20 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 from PIL import Image
 
 from baselines import films
 from baselines.cli.arguments import run_command
-from entropy_explore_env.scenarios import BOX
+from entropy_explore_env.scenarios import BOX, SCENARIOS
+
+ROOT = Path(__file__).parents[2]
+
+
+def test_every_named_scenario_has_its_film():
+    assert {path.stem for path in (ROOT / "docs" / "films").glob("*.gif")} == set(SCENARIOS)
 
 
 def test_a_film_shows_the_mission_from_beginning_to_end(tmp_path, capsys):
