@@ -1,10 +1,10 @@
 """A plugin of pytest for interpreted kernels: a clock for each test, and a list of what became of them.
 
 Hypothesis draws a tenth of its examples, and takes the first that fails as it is. A test that takes longer
-than QUICK_TEST_S of the processor fails, whatever it waits for. The outcome of each
-test, its seconds and its name are appended to the file QUICK_TESTS_TOLD, where that is set: the quickest can
-be run again. Where coverage is measured, it is told which test runs, and which is being set up: what others
-of its file share may be made then.
+than QUICK_TEST_S of the processor, or forty times as long on the clock, fails, whatever it waits for. The
+outcome of each test, its seconds and its name are appended to the file QUICK_TESTS_TOLD, where that is set:
+the quickest can be run again. Where coverage is measured, it is told which test runs, and which is being set
+up: what others of its file share may be made then.
 """
 
 from __future__ import annotations
@@ -26,6 +26,8 @@ SET_UP = " is set up"
 """Behind the name of a test, as coverage is told."""
 
 
+_CLOCK = 40.0
+"""Times the limit on the processor: who was ended may leave a lock behind, for which the next waits."""
 _EXAMPLES = 10
 """Of Hypothesis, where the suite draws a hundred."""
 
@@ -87,16 +89,20 @@ def _measuring() -> object | None:
 
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_call(item: pytest.Item) -> Generator[None, object, object]:
-    """Run a test under the clock."""
-    before = signal.signal(signal.SIGPROF, _ring)
-    signal.setitimer(signal.ITIMER_PROF, float(os.environ.get(LIMIT, "60")))
+    """Run a test under the clocks."""
+    limit_s = float(os.environ.get(LIMIT, "60"))
+    before = [signal.signal(number, _ring) for number in (signal.SIGPROF, signal.SIGALRM)]
+    signal.setitimer(signal.ITIMER_PROF, limit_s)
+    signal.setitimer(signal.ITIMER_REAL, _CLOCK * limit_s)
     begun_s = time.process_time()
     try:
         with _context(item.nodeid):
             return (yield)
     finally:
-        signal.setitimer(signal.ITIMER_PROF, 0.0)
-        signal.signal(signal.SIGPROF, before)
+        for timer in (signal.ITIMER_PROF, signal.ITIMER_REAL):
+            signal.setitimer(timer, 0.0)
+        for number, handler in zip((signal.SIGPROF, signal.SIGALRM), before, strict=True):
+            signal.signal(number, handler)
         item.user_properties.append(("seconds", time.process_time() - begun_s))
 
 

@@ -12,7 +12,7 @@ import pytest
 
 from benchmarks.reliability import coverage
 from benchmarks.reliability.coverage import ROOT
-from benchmarks.reliability.quick_tests import Told, told_in
+from benchmarks.reliability.quick_tests import LIMIT, TOLD, Told, told_in
 from entropy_explore_env.errors import SettingError
 
 
@@ -80,6 +80,17 @@ def test_few_examples_are_drawn_where_kernels_are_interpreted(tmp_path):
     words = ["-q", "-p", "no:cacheprovider", "-p", "benchmarks.reliability.quick_tests", "test_it.py"]
     variables = {**os.environ, "PYTHONPATH": str(ROOT)}
     subprocess.run([sys.executable, "-m", "pytest", *words], cwd=tmp_path, env=variables, check=True)
+
+
+def test_a_test_that_waits_for_ever_is_ended(tmp_path):
+    (tmp_path / "test_it.py").write_text(
+        "import threading\ndef test_waits():\n    threading.Semaphore(0).acquire()\n"
+        "def test_next():\n    pass\n"
+    )
+    words = ["-q", "-p", "no:cacheprovider", "-p", "benchmarks.reliability.quick_tests", "test_it.py"]
+    variables = {**os.environ, "PYTHONPATH": str(ROOT), LIMIT: "0.03", TOLD: "told"}
+    subprocess.run([sys.executable, "-m", "pytest", *words], cwd=tmp_path, env=variables, timeout=60)
+    assert [told.passed for told in told_in(tmp_path / "told")] == [False, True]
 
 
 def test_what_is_told_of_tests_is_read_back(tmp_path):
