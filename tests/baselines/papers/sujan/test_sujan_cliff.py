@@ -115,6 +115,10 @@ def test_the_command_writes_its_page_and_goes_on_where_it_was(tmp_path, capsys, 
     assert printed["paper"] == "Sujan's cliff" and len(printed["claims"]) == 13
     page = (tmp_path / "sujan-cliff.md").read_text()
     assert "python -m baselines.papers.sujan.cliff --worlds 1" in page and "cliff-next-best-view" in page
+    rows = [
+        line for line in page.splitlines() if line.startswith("| method | fig. 29: new columns after 1 step")
+    ]
+    assert len(rows) == 1 and "fig. 31" in rows[0] and "fig. 32" in rows[0] and "fig. 30" in page
     for name in ("figure-7", "figure-9", "figure-24", "figure-25", "figure-26"):
         with Image.open(tmp_path / "sujan-cliff" / f"{name}.png") as picture:
             assert picture.width > 600
