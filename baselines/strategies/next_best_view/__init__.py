@@ -12,9 +12,10 @@ poses drawn in known free space (P_occ < 0.05) that a known free path reaches, a
 directions there, or (`raster-fixed-yaw`) in one. Teams share their maps, and each robot chooses by itself.
 
 Unknown cells of a plan take the mean occupancy of their neighbours, for `next-best-view` alone, as in the
-paper. A voxel that should have been visible and did not answer loses interest (eq. 9). LE, which the paper
-leaves open, is how much less exact points will be that the robot measures there: what the way adds to the
-covariance of its pose, less what fiducials take back that it should sight on it; 0 where it does not drift.
+paper; of plans of more than 200 × 200 cells, ours, those that can be seen from known ones. A voxel that
+should have been visible and did not answer loses interest (eq. 9). LE, which the paper leaves open, is how
+much less exact points will be that the robot measures there: what the way adds to the covariance of its
+pose, less what fiducials take back that it should sight on it; 0 where it does not drift.
 
 Ours, where the paper says nothing: poses are drawn uniformly, a new set at each decision; the spacing of
 raster's places; where its latest scan showed no new voxel, methods (iii) and (iv) take a random pose, since
@@ -124,7 +125,8 @@ class NextBestView(KnownSpace):
         if self.config.choice == "random" or (nothing_new and self.config.choice in _BY_COUNT):
             return poses[0]
         if self.config.choice == "information" and self.config.extrapolated:
-            known = extrapolated(known, memory.occupancy)
+            scan = self._models[view.kind].scan
+            known = extrapolated(known, memory.occupancy, scan.max_range_m / scan.voxel_size_m)
             memory.occupancy = known.occupancy
         self._error = LocalizationError(view, memory.paths) if self.config.error_weight > 0.0 else None
         best, expected = poses[0], memory.expected

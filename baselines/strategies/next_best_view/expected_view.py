@@ -21,6 +21,9 @@ LEVELS = 20
 """Intervals of occupancy, and of stretched occupancy, whose histograms are taken."""
 _TOLERANCE = 0.01
 """Of the occupancy of unknown cells, as neighbours say it."""
+_WHOLE_CELLS = 40_000
+"""Plans with more cells than this, 200 × 200, are extrapolated no farther than can be seen: what the means of
+neighbours take to settle grows with the third power of the width of a gap."""
 
 
 class OccupancyMap(NamedTuple):
@@ -84,22 +87,36 @@ def occupancy_map(belief: Belief, prior_precision: float, interest: np.ndarray) 
     return OccupancyMap(belief, occupancy, unknown, interest)
 
 
-def extrapolated(known: OccupancyMap, before: np.ndarray | None) -> OccupancyMap:
+def extrapolated(known: OccupancyMap, before: np.ndarray | None, reach: float) -> OccupancyMap:
     """A plan's map in which unknown cells have the mean occupancy of their neighbours (Sujan, sect. 2.3.2).
 
-    In 3-D they keep ½.
+    In 3-D they keep ½, and so do those of large plans that cannot be seen yet: in their rows or columns no
+    known cell is within the sensor's reach.
 
     Args:
         known: Of `occupancy_map`.
+        reach: Of the sensor, in voxel edges; inf allowed.
         before: (V,) float32 occupancies extrapolated for an earlier map, near which these are; None = none.
     """
     plan = known.belief.size[:2]
     if known.belief.size[2] > 1 or known.unknown.all():
         return known
     measured = (known.unknown == 0).reshape(plan)
-    begin = None if before is None else before.reshape(plan)
-    filled = completed(known.occupancy.reshape(plan), measured, _TOLERANCE, begin)
-    return known._replace(occupancy=filled.astype(np.float32).reshape(-1))
+    window = _window(measured, reach) if measured.size > _WHOLE_CELLS else (slice(None), slice(None))
+    begin = None if before is None else before.reshape(plan)[window]
+    filled = known.occupancy.reshape(plan).copy()
+    filled[window] = completed(filled[window], measured[window], _TOLERANCE, begin)
+    return known._replace(occupancy=filled.reshape(-1))
+
+
+def _window(measured: np.ndarray, reach: float) -> tuple[slice, slice]:
+    """The rows and columns that can be seen from where something is measured, and one more."""
+    beyond = math.ceil(min(reach, sum(measured.shape))) + 1
+    rows, columns = (np.flatnonzero(measured.any(axis=axis)) for axis in (1, 0))
+    return (
+        slice(max(int(rows[0]) - beyond, 0), int(rows[-1]) + beyond + 1),
+        slice(max(int(columns[0]) - beyond, 0), int(columns[-1]) + beyond + 1),
+    )
 
 
 @lean_kernel

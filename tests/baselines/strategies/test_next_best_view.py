@@ -11,7 +11,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from baselines.strategies import make_strategy
-from baselines.strategies.next_best_view import NextBestView, NextBestViewConfig
+from baselines.strategies.next_best_view import NextBestView, NextBestViewConfig, expected_view
 from baselines.strategies.next_best_view.expected_view import (
     extrapolated,
     look,
@@ -22,6 +22,7 @@ from baselines.strategies.next_best_view.expected_view import (
 )
 from baselines.strategies.next_best_view.raster import RasterConfig
 from baselines.strategies.next_best_view.rating import UNCERTAINTY, new_information, pose_distance, rating
+from entropy_explore_env.belief.elevation import completed
 from entropy_explore_env.belief.fields import Belief, occupancy_probability
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.missions.simulation import Missions
@@ -107,7 +108,7 @@ def test_unknown_cells_of_a_plan_have_the_mean_occupancy_of_their_neighbours(see
     known = occupancy_map(belief, PRIOR, np.ones(mean.size, np.float32))
     assume(not known.unknown.all())
     before = rng.random(mean.size).astype(np.float32) if warm else None
-    found = extrapolated(known, before).occupancy.reshape(13, 9)
+    found = extrapolated(known, before, math.inf).occupancy.reshape(13, 9)
     theirs = sujan.neighbours_mean(
         known.occupancy.reshape(13, 9).astype(float), known.unknown.reshape(13, 9) == 0
     )
@@ -115,12 +116,33 @@ def test_unknown_cells_of_a_plan_have_the_mean_occupancy_of_their_neighbours(see
     np.testing.assert_array_equal(found.ravel()[known.unknown == 0], known.occupancy[known.unknown == 0])
 
 
+@pytest.mark.parametrize(("reach", "low", "high"), [(3.0, (5, 0), (16, 9)), (math.inf, (0, 0), (21, 9))])
+def test_large_plans_are_extrapolated_no_farther_than_can_be_seen(monkeypatch, reach, low, high):
+    """A patch of known cells at x = 9 … 11, y = 2 … 4: the window is 3 + 1 cells wider, within the plan."""
+    shape = (21, 9, 1)
+    mean, precision = np.full(shape, 0.5, np.float32), np.full(shape, PRIOR, np.float32)
+    mean[9:12, 2:5], precision[9:12, 2:5] = np.linspace(0.1, 0.4, 9).reshape(3, 3, 1), 4.0
+    known = occupancy_map(Belief(mean.ravel(), precision.ravel(), shape), PRIOR, np.ones(189, np.float32))
+    assert known.unknown.sum() == 180
+    whole = extrapolated(known, None, reach).occupancy.reshape(21, 9)
+    monkeypatch.setattr(expected_view, "_WHOLE_CELLS", 188)
+    found = extrapolated(known, None, reach).occupancy.reshape(21, 9)
+    window = slice(low[0], high[0]), slice(low[1], high[1])
+    measured = known.unknown.reshape(21, 9) == 0
+    inside = completed(known.occupancy.reshape(21, 9)[window], measured[window], 0.01)
+    np.testing.assert_array_equal(found[window], inside.astype(np.float32))
+    outside = np.ones((21, 9), bool)
+    outside[window] = False
+    assert (found[outside] == 0.5).all() and outside.any() == (reach == 3.0)
+    assert (whole != 0.5).all() and (whole == found).all() == (reach == math.inf)
+
+
 def test_in_3_d_unknown_voxels_keep_one_half():
     mean, precision = patchy_belief((7, 11, 5), np.random.default_rng(2))
     known = occupancy_map(
         Belief(mean.ravel(), precision.ravel(), (7, 11, 5)), PRIOR, np.ones(385, np.float32)
     )
-    assert (extrapolated(known, None).occupancy[known.unknown == 1] == 0.5).all()
+    assert (extrapolated(known, None, 3.0).occupancy[known.unknown == 1] == 0.5).all()
 
 
 def test_ratings_by_hand():
