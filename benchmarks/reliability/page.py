@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 from benchmarks.reliability.fault_table import fault_table, share_found
 from benchmarks.reliability.file_fuzz import FILES
 from benchmarks.reliability.settings_fuzz import STEPS, WATCHDOG_S
-from benchmarks.reliability.soak import CHANNELS, FLOOR, MAPS_EVERY, QUICK
+from benchmarks.reliability.soak import CHANNELS, FLOOR, MAPS_EVERY, QUICK, ROUND, round_of
 from benchmarks.reliability.sources import HOW
 
 Row = Mapping[str, Any]
@@ -164,15 +164,17 @@ def _determinism(rows: Sequence[Row]) -> str:
     digests, variants = defaultdict(set), defaultdict(set)
     for row in rows:
         for number, digest in enumerate(row["digests"], row["first"]):
-            digests[number].add(digest)
-            variants[number].add(row["variant"])
-    differing = sorted(number for number, found in digests.items() if len(found) > 1)
+            played = number, row.get("library")  # another state of the sources may have other states
+            digests[played].add(digest)
+            variants[played].add(row["variant"])
+    differing = sorted({number for (number, _), found in digests.items() if len(found) > 1})
     several = sum(len(found) > 1 for found in variants.values())
     said = f"differences in drawn scenarios {differing}" if differing else "no difference"
     return (
         f"{len(digests):,} drawn scenarios, {several:,} of them in several and up to "
         f"{max(map(len, variants.values()))} processes that differ in processor level, threads, missions "
-        f"beside it, hash seed and start method: {said}."
+        f"beside it, hash seed and start method: {said}. A scenario that several states of the sources "
+        "played counts for each, and is compared within each."
     )
 
 
@@ -264,21 +266,49 @@ def _soaked(name: str, rows: Sequence[Row]) -> str:
 
 
 def _memory(rows: Sequence[Row]) -> Iterable[str]:
-    """How far the memory of each process grew after its first 10⁶ robot-steps, at its end and at most."""
+    """What each process held, round by round of all pairs; of those of one round, from its first 10⁶ on."""
     for process in dict.fromkeys(row["process"] for row in rows):
-        steps, settled = 0, 0.0
         own = [row for row in rows if row["process"] == process]
-        later: list[float] = []
-        for row in own:
-            if steps >= _SETTLED_STEPS:
-                settled = settled or row["settled_mib"]
-                later.append(row["resident_mib"])
-            steps += row["robot_steps"]
-        if later:
+        steps = sum(row["robot_steps"] for row in own)
+        rounds = _whole_rounds(own)
+        if len(rounds) > 1:
+            most, means = (", ".join(f"{kind(held):.0f}" for held in rounds) for kind in (max, _mean))
+            growth = _mean(rounds[-1]) / _mean(rounds[1]) - 1.0
+            yield (
+                f"A process of {steps:,} robot-steps held at most {most} MiB in its rounds of all "
+                f"{len(ROUND)} pairs, and {means} MiB on average. The first round compiles kernels for every "
+                f"channel; from the second to the last the average grew by {growth:.1%}."
+            )
+        elif later := _later(own):
+            settled, held = later
             yield (
                 f"A process of {steps:,} robot-steps held {settled:.0f} MiB after the first 10⁶, then "
-                f"{max(later):.0f} MiB at most and {later[-1]:.0f} MiB at its end; scenarios take turns."
+                f"{max(held):.0f} MiB at most and {held[-1]:.0f} MiB at its end; scenarios take turns."
             )
+
+
+def _whole_rounds(rows: Sequence[Row]) -> list[list[float]]:
+    """MiB held after each pair, of the rounds that a process played as a whole."""
+    rounds: dict[int, list[float]] = defaultdict(list)
+    for row in rows:
+        rounds[round_of(row["number"])].append(row["resident_mib"])
+    return [held for number, held in sorted(rounds.items()) if number >= 0 and len(held) == len(ROUND)]
+
+
+def _mean(held: Sequence[float]) -> float:
+    return sum(held) / len(held)
+
+
+def _later(rows: Sequence[Row]) -> tuple[float, list[float]] | None:
+    """MiB that a process held after its first 10⁶ robot-steps, and after every case from there on."""
+    steps, settled = 0, 0.0
+    held: list[float] = []
+    for row in rows:
+        if steps >= _SETTLED_STEPS:
+            settled = settled or row["settled_mib"]
+            held.append(row["resident_mib"])
+        steps += row["robot_steps"]
+    return (settled, held) if held else None
 
 
 def _share_covered(rows: Sequence[Row]) -> float:

@@ -46,8 +46,9 @@ CHANNELS: tuple[dict[str, Any], ...] = (
     {"content": "summaries"},
     {"content": "summaries", "summary_every_s": 1.0, "delay_s": 2.0},
 )
-_FLOOR_CASES = tuple(itertools.product(CHANNELS, SCENARIOS))
-_MORE_CASES = tuple(itertools.product(CHANNELS, QUICK))
+FLOOR_CASES = tuple(itertools.product(CHANNELS, SCENARIOS))
+ROUND = tuple(itertools.product(CHANNELS, QUICK))
+"""Cases beyond the floor, again and again."""
 
 
 def play_number(number: int) -> dict[str, Any]:
@@ -57,8 +58,8 @@ def play_number(number: int) -> dict[str, Any]:
         BrokenPromiseError: Something is not as environments promise.
         RecordError: A number of the state is in no mission of the scenario.
     """
-    beyond = number >= len(_FLOOR_CASES)
-    cases = _MORE_CASES if beyond else _FLOOR_CASES
+    beyond = number >= len(FLOOR_CASES)
+    cases = ROUND if beyond else FLOOR_CASES
     channel, name = cases[number % len(cases)]
     scenario = SCENARIOS[name]
     env = EntropyExploreVectorEnv(
@@ -93,6 +94,11 @@ def play_number(number: int) -> dict[str, Any]:
     }
     env.close()
     return row
+
+
+def round_of(number: int) -> int:
+    """How many rounds of all pairs were begun before a case beyond the floor; -1 of one of the floor."""
+    return (number - len(FLOOR_CASES)) // len(ROUND) if number >= len(FLOOR_CASES) else -1
 
 
 def robot_steps(row: dict[str, Any]) -> int:

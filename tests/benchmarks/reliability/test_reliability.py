@@ -101,6 +101,26 @@ def test_digests_that_differ_and_memory_that_grows_are_shown():
     assert "3,000,000 robot-steps held 102 MiB after the first 10⁶, then 105 MiB at most" in text
 
 
+def test_memory_is_compared_from_round_to_round():
+    first, pairs = len(soak.FLOOR_CASES), len(soak.ROUND)
+    case = {"scenario": "room", "channel": 1, "robot_steps": 200_000, "missions": 2, "cpu_s": 6.0}
+    held = [200.0] * pairs + [300.0] * (pairs - 1) + [330.0] + [303.0] * (pairs - 1) + [333.3] + [900.0]
+    numbers = [first - 1, *range(first, first + len(held))]
+    rows = [
+        {**case, "process": 7, "number": number, "settled_mib": mib, "resident_mib": mib}
+        for number, mib in zip(numbers, [10.0, *held], strict=True)
+    ]
+    text = kept("soak", rows)
+    assert "held at most 200, 330, 333 MiB in its rounds of all 30 pairs, and 200, 301, 304 MiB" in text
+    assert "from the second to the last the average grew by 1.0%" in text and "18,400,000 robot-steps" in text
+
+
+def test_plays_by_other_sources_are_not_compared():
+    told = {"variant": 0, "first": 3, "digests": ["a"], "number": 0, "library": "x"}
+    text = kept("determinism", [told, {**told, "digests": ["b"], "library": "y"}])
+    assert "2 drawn scenarios" in text and "no difference" in text
+
+
 def test_the_page_says_what_is_asked_for_and_not_reached(monkeypatch):
     faults = [
         {"digest": "a", "path": "x/y.py", "line": 3, "what": "1  ->  2", "found": "test_it"},
