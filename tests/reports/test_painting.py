@@ -187,7 +187,7 @@ def test_it_can_paint_what_it_has_not_watched():
 # --- modes
 
 
-def test_without_a_mode_nothing_is_done(monkeypatch):
+def test_without_a_mode_nothing_is_painted_and_a_warning_says_why(monkeypatch):
     def must_not(*_: object, **__: object) -> None:
         raise AssertionError("something was painted")
 
@@ -196,7 +196,8 @@ def test_without_a_mode_nothing_is_done(monkeypatch):
     missions = started(free_box(robots=2), seed=3)
     painter = Painter(None)
     watch(missions, painter, 3)
-    assert painter.picture(missions) is None
+    with pytest.warns(UserWarning, match="give the environment render_mode"):
+        assert painter.picture(missions) is None
     painter.close()
 
 
