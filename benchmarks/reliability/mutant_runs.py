@@ -66,6 +66,7 @@ class Host:
             text=True,
         )
         self._sound: dict[str, bool] = {}
+        self._changes = 0
 
     def __enter__(self) -> Host:
         """The process itself."""
@@ -97,6 +98,8 @@ class Host:
         file = self.folder / path
         sound = file.read_bytes()
         file.write_text(source, "utf-8")
+        self._changes += 1  # Python takes what it compiled within a second for a file of equal size
+        os.utime(file, (_OLD_S + self._changes, _OLD_S + self._changes))
         try:
             return self._ask(tests, limit_s)
         finally:
