@@ -93,6 +93,25 @@ def test_a_test_that_waits_for_ever_is_ended(tmp_path):
     assert [told.passed for told in told_in(tmp_path / "told")] == [False, True]
 
 
+def test_what_coverage_notes_is_noted_before_a_test_is_ended(tmp_path):
+    """Its clock rings while coverage holds its lock: the lock is given back, and then the test ends."""
+    (tmp_path / "test_it.py").write_text(
+        "import threading, time, types\nlock = threading.Lock()\n"
+        "noting = types.ModuleType('coverage.collector')\n"
+        "exec('def note(lock, wait):\\n with lock:\\n  wait()', vars(noting))\n"
+        "def busy():\n    until = time.process_time() + 0.2\n"
+        "    while time.process_time() < until:\n        pass\n"
+        "def test_noting():\n    noting.note(lock, busy)\n    busy()\n"
+        "def test_next():\n    assert lock.acquire(blocking=False)\n"
+    )
+    words = ["-q", "-p", "no:cacheprovider", "-p", "benchmarks.reliability.quick_tests", "test_it.py"]
+    variables = {**os.environ, "PYTHONPATH": str(ROOT), LIMIT: "0.05", TOLD: "told"}
+    subprocess.run([sys.executable, "-m", "pytest", *words], cwd=tmp_path, env=variables, timeout=60)
+    noting, then = told_in(tmp_path / "told")
+    assert (noting.passed, then.passed) == (False, True)
+    assert 0.2 <= noting.seconds < 0.35
+
+
 def test_what_is_told_of_tests_is_read_back(tmp_path):
     (tmp_path / "told").write_text("passed\t0.25\ta::b[c\td]\nfailed\t1.5\ta::e\n")
     assert told_in(tmp_path / "told") == [Told("a::b[c\td]", True, 0.25), Told("a::e", False, 1.5)]
