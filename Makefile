@@ -89,7 +89,7 @@ NIGHT := $(RUN) benchmarks.reliability --results results/night
 TONIGHT := --first $$(date -u +%Y%m%d)000
 night: $(STAMP)dev
 	$(NIGHT) $(TONIGHT) --proofs settings --cases 1000
-	$(NIGHT) $(TONIGHT) --proofs states kills files soak --quick
+	$(NIGHT) $(TONIGHT) --proofs states kills files soak memory --quick
 	$(NIGHT) --proofs determinism --quick
 
 reproduce: $(STAMP)baselines

@@ -11,15 +11,12 @@ from typing import Any, NamedTuple
 
 from benchmarks.reliability.fault_table import fault_table, share_found
 from benchmarks.reliability.file_fuzz import FILES
+from benchmarks.reliability.memory import MOST_GROWTH
 from benchmarks.reliability.settings_fuzz import STEPS, WATCHDOG_S
-from benchmarks.reliability.soak import CHANNELS, FLOOR, MAPS_EVERY, QUICK, ROUND, round_of
+from benchmarks.reliability.soak_table import grew, memory_table, soak_table
 from benchmarks.reliability.sources import HOW
 
 Row = Mapping[str, Any]
-_SETTLED_STEPS = 1_000_000
-"""Robot-steps of a process after which its memory is taken for settled."""
-_LONG_STEPS = 100_000
-"""Of a case, in which memory has time to settle."""
 _MUTANTS, _SHARE_FOUND, _SHARE_COVERED = 300, 0.9, 0.95
 
 
@@ -103,6 +100,8 @@ def _overview(kept: Mapping[str, Kept], mutants: Mapping[str, Sequence[Row]], co
         missing.append("Branches: not measured")
     elif _share_covered(coverage) < _SHARE_COVERED:
         missing.append(f"Branches: {_share_covered(coverage):.1%} covered, {_SHARE_COVERED:.0%} asked for")
+    if (most := max(map(max, grew(kept["memory"].rows)), default=0.0)) >= MOST_GROWTH:
+        missing.append(f"Memory: grew by {most:.1%}, less than {MOST_GROWTH:.0%} asked for")
     failed = sum("failure" in row for each in kept.values() for row in each.rows)
     said = f"Cases that failed: {failed}."
     return (
@@ -225,92 +224,6 @@ def _training(rows: Sequence[Row]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _soak(rows: Sequence[Row]) -> str:
-    ordered = sorted(rows, key=lambda row: row["number"])
-    long = [row for row in ordered if row["robot_steps"] >= _LONG_STEPS] or ordered
-    within = max(row["resident_mib"] / row["settled_mib"] - 1.0 for row in long)
-    lines = [
-        "At each step: observations in their spaces, rewards finite, time never backwards, ends said, bits "
-        "gained equal to the entropy lost, every number of the state in its range, the rays of messages on "
-        f"their way among them; every voxel, and all other rays, each {MAPS_EVERY} steps.",
-        f"First every scenario is played over each of {len(CHANNELS)} channels for {FLOOR:,} robot-steps; "
-        f"what is then left is shared, by time, among those that step quickest: {', '.join(QUICK)}. "
-        f"{_pairs(ordered)}",
-        f"Within a case of {_LONG_STEPS:,} robot-steps or more resident memory grew by "
-        f"{max(within, 0.0):.1%} at most after its first fifth.",
-        *_memory(ordered),
-        "",
-        "Robot-steps a second are of one core's own time, with everything that is checked.",
-        "",
-        "| scenario | robot-steps | missions | robot-steps/s |",
-        "| --- | ---: | ---: | ---: |",
-    ]
-    for name in dict.fromkeys(row["scenario"] for row in ordered):
-        lines.append(_soaked(name, [row for row in ordered if row["scenario"] == name]))
-    lines.append(_soaked("all", ordered))
-    return "\n".join(lines) + "\n"
-
-
-def _pairs(rows: Sequence[Row]) -> str:
-    """How many pairs of a scenario and a channel were played, and for how long at least."""
-    steps: Counter[tuple[str, int]] = Counter()
-    for row in rows:
-        steps[row["scenario"], row["channel"]] += row["robot_steps"]
-    return f"So far {len(steps)} of these pairs were played, each for {min(steps.values()):,} or more."
-
-
-def _soaked(name: str, rows: Sequence[Row]) -> str:
-    """A line of the table of the soak."""
-    steps, missions, cpu_s = (sum(row[k] for row in rows) for k in ("robot_steps", "missions", "cpu_s"))
-    return f"| {name} | {steps:,} | {missions:,} | {steps / cpu_s:,.0f} |"
-
-
-def _memory(rows: Sequence[Row]) -> Iterable[str]:
-    """What each process held, round by round of all pairs; of those of one round, from its first 10⁶ on."""
-    for process in dict.fromkeys(row["process"] for row in rows):
-        own = [row for row in rows if row["process"] == process]
-        steps = sum(row["robot_steps"] for row in own)
-        rounds = _whole_rounds(own)
-        if len(rounds) > 1:
-            most, means = (", ".join(f"{kind(held):.0f}" for held in rounds) for kind in (max, _mean))
-            growth = _mean(rounds[-1]) / _mean(rounds[1]) - 1.0
-            yield (
-                f"A process of {steps:,} robot-steps held at most {most} MiB in its rounds of all "
-                f"{len(ROUND)} pairs, and {means} MiB on average. The first round compiles kernels for every "
-                f"channel; from the second to the last the average grew by {growth:.1%}."
-            )
-        elif later := _later(own):
-            settled, held = later
-            yield (
-                f"A process of {steps:,} robot-steps held {settled:.0f} MiB after the first 10⁶, then "
-                f"{max(held):.0f} MiB at most and {held[-1]:.0f} MiB at its end; scenarios take turns."
-            )
-
-
-def _whole_rounds(rows: Sequence[Row]) -> list[list[float]]:
-    """MiB held after each pair, of the rounds that a process played as a whole."""
-    rounds: dict[int, list[float]] = defaultdict(list)
-    for row in rows:
-        rounds[round_of(row["number"])].append(row["resident_mib"])
-    return [held for number, held in sorted(rounds.items()) if number >= 0 and len(held) == len(ROUND)]
-
-
-def _mean(held: Sequence[float]) -> float:
-    return sum(held) / len(held)
-
-
-def _later(rows: Sequence[Row]) -> tuple[float, list[float]] | None:
-    """MiB that a process held after its first 10⁶ robot-steps, and after every case from there on."""
-    steps, settled = 0, 0.0
-    held: list[float] = []
-    for row in rows:
-        if steps >= _SETTLED_STEPS:
-            settled = settled or row["settled_mib"]
-            held.append(row["resident_mib"])
-        steps += row["robot_steps"]
-    return (settled, held) if held else None
-
-
 def _share_covered(rows: Sequence[Row]) -> float:
     return sum(row["covered"] for row in rows) / max(sum(row["branches"] for row in rows), 1)
 
@@ -342,5 +255,6 @@ _SUMMARIES: Mapping[str, tuple[str, str, Callable[[Sequence[Row]], str]]] = {
     "kills": ("Kills", "kills", _kills),
     "files": ("Changed files", "files", _files),
     "training": ("Training", "robot-steps", _training),
-    "soak": ("Soak", "robot-steps", _soak),
+    "soak": ("Soak", "robot-steps", soak_table),
+    "memory": ("Memory", "robot-steps", memory_table),
 }

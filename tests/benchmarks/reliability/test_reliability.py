@@ -10,7 +10,7 @@ import subprocess
 import pytest
 
 from benchmarks.reliability import __main__ as command
-from benchmarks.reliability import determinism, fault_table, kills, page, soak, sources
+from benchmarks.reliability import determinism, fault_table, kills, memory, page, soak, sources
 from benchmarks.reliability.__main__ import PROOFS, Proof, carry_on, main
 from benchmarks.reliability.page import Kept, read_rows
 from entropy_explore_env.errors import SettingError
@@ -113,6 +113,33 @@ def test_memory_is_compared_from_round_to_round():
     text = kept("soak", rows)
     assert "held at most 200, 330, 333 MiB in its rounds of all 30 pairs, and 200, 301, 304 MiB" in text
     assert "from the second to the last the average grew by 1.0%" in text and "18,400,000 robot-steps" in text
+
+
+def test_memory_is_compared_million_by_million():
+    """200 MiB after the first; then 199, 201, 203: 1 more on average, on a line that rises by 4."""
+    rows = [
+        {"number": number, "robot_steps": 1_000_320, "process": process, "resident_mib": mib}
+        for number, (process, mib) in enumerate([(7, 200.0), (7, 199.0), (7, 201.0), (7, 203.0), (8, 100.0)])
+    ]
+    text = kept("memory", [*rows[::-1], {"number": 5, "failure": "x"}])
+    assert (
+        "A process of 4 million robot-steps held 200.0 MiB after the first, and then 199.0 to 203.0" in text
+    )
+    assert "fits best rises by 2.00%; after the last it held 1.50% more" in text
+    assert text.count("A process of") == 1  # one of a single million has nothing to be compared with
+    assert "- Memory: grew by 2.0%, less than 1% asked for" in text
+    falls = kept("memory", [{**row, "resident_mib": 300.0 - row["resident_mib"]} for row in rows[:2]])
+    assert "fits best rises by 0.00%; after the last it held 1.00% more" in falls
+    assert "Memory: grew by 1.0%" in falls and "Memory: grew" not in kept("memory", rows[:2])
+    assert "0.50% less than after the first" in kept("memory", rows[:2])
+    assert memory.robot_steps(rows[0]) == 1_000_320 and memory.robot_steps({"failure": "x"}) == 0
+
+
+def test_a_piece_of_memory(monkeypatch):
+    monkeypatch.setattr(memory, "CASE_STEPS", 5_000)
+    monkeypatch.setattr(memory, "ROUND", soak.ROUND[:1])
+    row = memory.play_number(2)
+    assert 5_000 <= row["robot_steps"] < 5_000 + 64 * 2 and row["resident_mib"] > 10.0
 
 
 def test_plays_by_other_sources_are_not_compared():

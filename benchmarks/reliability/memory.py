@@ -1,0 +1,84 @@
+"""Resident memory of one process, million by million of robot-steps: it settles in the first, and stays.
+
+Every million is shared evenly by all pairs of a scenario and a channel of the soak, those that step quickest.
+So the first million of a process compiles all that the later ones run, each ends with the same pair as the
+one before, and what it holds then can be compared with what the first left.
+"""
+
+from __future__ import annotations
+
+import gc
+import os
+import time
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from benchmarks.reliability.soak import ROUND, resident_mib
+from benchmarks.reliability.step_checks import CheckedSteps
+from entropy_explore_env.envs.vector_env import EntropyExploreVectorEnv
+from entropy_explore_env.scenarios import SCENARIOS
+
+ROBOT_STEPS = 20_000_000
+"""Asked for in all."""
+MOST_GROWTH = 0.01
+"""After the first million, as a share of what the process held then."""
+_MISSIONS, _CYCLES = 64, 40
+"""At once, and steps of each: missions end and begin anew in every pair."""
+CASE_STEPS = 1_000_000
+"""Robot-steps of a case."""
+
+
+def play_number(number: int) -> dict[str, Any]:
+    """Play all pairs, a million robot-steps together.
+
+    Raises:
+        BrokenPromiseError: Something is not as environments promise.
+        RecordError: A number of the state is in no mission of the scenario.
+    """
+    begun_s, begun_cpu_s, steps = time.perf_counter(), time.process_time(), 0
+    for place in range(len(ROUND)):
+        steps += _play(place, number, CASE_STEPS / len(ROUND))
+    gc.collect()
+    return {
+        "robot_steps": steps,
+        "seconds": round(time.perf_counter() - begun_s, 2),
+        "cpu_s": round(time.process_time() - begun_cpu_s, 2),
+        "resident_mib": resident_mib(),
+        "process": os.getpid(),
+    }
+
+
+def _play(place: int, number: int, least: float) -> int:
+    """Play one pair for at least so many robot-steps; how many they were."""
+    channel, name = ROUND[place]
+    env = EntropyExploreVectorEnv(SCENARIOS[name], _MISSIONS, channel=channel, ending={"max_cycles": _CYCLES})
+    env.action_space.seed(number)
+    env.reset(seed=(number * len(ROUND) + place) * _MISSIONS)
+    checked, steps, team = CheckedSteps(env), 0, env.num_envs * SCENARIOS[name].robots
+    while steps < least:
+        checked.note(env.step(env.action_space.sample()))
+        steps += team
+    checked.check(maps=True)
+    env.close()
+    return steps
+
+
+def robot_steps(row: dict[str, Any]) -> int:
+    """What a case counts for; one that failed for nothing."""
+    return row.get("robot_steps", 0)
+
+
+def growth(held: Sequence[float]) -> tuple[float, float]:
+    """How much more than after its first million a process holds later, as shares of what it held then.
+
+    Args:
+        held: MiB after each million, two or more.
+
+    Returns:
+        On average over the later ones; and by how much the straight line that fits these best rises.
+    """
+    first, later = held[0], np.asarray(held[1:])
+    slope = np.polyfit(np.arange(len(later)), later, 1)[0] if len(later) > 1 else 0.0
+    return float(later.mean() / first - 1.0), float(slope * (len(later) - 1) / first)
