@@ -29,12 +29,15 @@ from entropy_explore_env.worlds.files.voxels import (
 NEEDS = (("trimesh", "trimesh"), ("scipy.ndimage", "scipy"))
 _INWARDS = 1e-6
 """Surfaces are moved inwards by this many voxels: one between two voxels belongs to the solid's side."""
-_TRIANGLES_AT_ONCE = 200_000
-"""Small triangles that a surface is divided into at once: memory follows the result, not the area."""
 _SHARE = 2.0
-"""Triangles are divided until no edge is longer than a voxel divided by this, as by trimesh's `voxelized`."""
-_MOST_HALVINGS = 64
-"""Limit of the subdivisions of an edge, never reached: trimesh's own is too low for long thin triangles."""
+"""Triangles are cut into four until no edge is longer than a voxel divided by this; the surface's voxels are
+those that a corner of these small triangles lies in."""
+_LONG_HALVINGS, _THIN = 7, 4.0
+"""A triangle is long and thin if it would be cut into four more often than this, and that would make so many
+times as many small ones as would cover it: it is covered by lines instead, no further from each other."""
+_HALVINGS_AT_ONCE = 8
+_POINTS_AT_ONCE = 1 << 18
+"""Corners of small triangles that are made at once: memory follows the result, not the area."""
 
 
 def read(path: Path, options: Options) -> Voxels:
@@ -63,7 +66,7 @@ def _voxels(mesh: Any, y_is_up: bool, options: Options) -> Voxels:  # noqa: ANN4
         raise RefusedError("a mesh whose vertices are finite")
     margin = math.ceil(clearance_m / voxel_m - 1e-9)
     checked_shape(np.ptp(vertices, axis=0) / voxel_m + 2.0 + 2.0 * margin)
-    faces = np.asarray(mesh.faces)
+    faces = np.asarray(mesh.faces)[mesh.unique_faces()]
     vertices = vertices - _INWARDS * voxel_m * np.asarray(mesh.vertex_normals)
     if y_is_up:
         vertices = np.column_stack((vertices[:, 0], -vertices[:, 2], vertices[:, 1]))
@@ -88,27 +91,78 @@ def _surface(vertices: np.ndarray, faces: np.ndarray, voxel_m: float) -> tuple[n
     Returns:
         (X, Y, Z) bool, the voxels of the surface's box, and (3,) float64, its lowest voxel.
     """
-    from trimesh.remesh import subdivide_to_size
-
-    low, high = np.round(vertices.min(axis=0) / voxel_m), np.round(vertices.max(axis=0) / voxel_m)
+    places = vertices / voxel_m
+    low, high = np.round(places.min(axis=0)), np.round(places.max(axis=0))
     solid = np.zeros((high - low + 1.0).astype(np.int64), np.bool_)
-    corners = _divided(vertices[faces], voxel_m / _SHARE)
-    begin = np.cumsum(_small_triangles(corners, voxel_m / _SHARE)) // _TRIANGLES_AT_ONCE
-    groups = np.split(corners, np.flatnonzero(np.diff(begin)) + 1)
-    for points in (vertices, *groups):
-        if points.ndim == 3:
-            own = np.arange(3 * len(points)).reshape(-1, 3)
-            points = subdivide_to_size(points.reshape(-1, 3), own, voxel_m / _SHARE, _MOST_HALVINGS)[0]
-        at = (np.round(points / voxel_m) - low).astype(np.int64)
-        solid[tuple(at.T)] = True
+    _mark(solid, low, places)
+    corners = places[faces]
+    thin = _are_thin(corners)
+    for ends, of_parts in (
+        (_divided(corners[~thin]), _corners_of_parts),
+        (_lines(corners[thin]), _places_on),
+    ):
+        halvings = _halvings(ends)
+        for count in np.unique(halvings).tolist():
+            shares, alike = of_parts(count), ends[halvings == count]
+            at_once = max(1, _POINTS_AT_ONCE // len(shares))
+            for first in range(0, len(alike), at_once):
+                some = alike[first : first + at_once]
+                _mark(solid, low, np.einsum("ps,tsx->tpx", shares, some).reshape(-1, 3))  # no BLAS
     return solid, low
 
 
-def _divided(corners: np.ndarray, longest_m: float) -> np.ndarray:
-    """Triangles (M, 3, 3), those of too many small ones cut into four at the middles of their edges."""
-    done = []
+def _mark(solid: np.ndarray, low: np.ndarray, places: np.ndarray) -> None:
+    """Make the voxels solid that places (N, 3) lie in, in voxels; the first one's centre is `low`."""
+    at = np.clip(np.round(places) - low, 0.0, np.array(solid.shape) - 1.0)  # sums of shares are rounded
+    solid[tuple(at.astype(np.int64).T)] = True
+
+
+def _corners_of_parts(halvings: int) -> np.ndarray:
+    """(P, 3) shares of its corners in those of the triangles that one is cut into, four each time."""
+    parts = 1 << halvings
+    b, c = np.nonzero(np.add.outer(np.arange(parts + 1), np.arange(parts + 1)) <= parts)
+    return np.stack((parts - b - c, b, c), axis=1) / parts
+
+
+def _places_on(halvings: int) -> np.ndarray:
+    """(P, 2) shares of its ends in the places on a line that are as far apart as halvings make them."""
+    parts = np.arange((1 << halvings) + 1) / (1 << halvings)
+    return np.stack((1.0 - parts, parts), axis=1)
+
+
+def _are_thin(corners: np.ndarray) -> np.ndarray:
+    """(M,) which of the triangles (M, 3, 3) are long and thin.
+
+    Cut into four at the middles of its edges, a triangle keeps its form: a needle of a thousand small
+    triangles in a row would become a million.
+    """
+    halvings = _halvings(corners)
+    return (halvings > _LONG_HALVINGS) & (4.0**halvings > _THIN * _by_area(corners))
+
+
+def _lines(corners: np.ndarray) -> np.ndarray:
+    """Lines (N, 2, 3) side by side that cover long thin triangles (M, 3, 3), in voxels.
+
+    They go from both ends of a triangle's longest side to places on its height above that side.
+    """
+    sides = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2)
+    order = (np.argmax(sides, axis=1)[:, None] + np.arange(3)) % 3  # the longest side is from a to b
+    a, b, c = np.moveaxis(np.take_along_axis(corners, order[..., None], axis=1), 1, 0)
+    along = b - a
+    foot = a + along * (((c - a) * along).sum(axis=1) / (along**2).sum(axis=1))[:, None]
+    steps = np.ceil(_SHARE * np.linalg.norm(c - foot, axis=1)).astype(np.int64)
+    which = np.repeat(np.arange(len(corners)), steps + 1)
+    step = np.arange(len(which)) - np.repeat(np.cumsum(steps + 1) - steps - 1, steps + 1)
+    up = (step / np.maximum(steps, 1)[which])[:, None]
+    to = foot[which] + up * (c - foot)[which]
+    return np.concatenate([np.stack((a[which], to), axis=1), np.stack((b[which], to), axis=1)])
+
+
+def _divided(corners: np.ndarray) -> np.ndarray:
+    """Triangles (M, 3, 3), the largest ones cut into four at the middles of their edges."""
+    done = [corners[:0]]
     while len(corners):
-        large = _small_triangles(corners, longest_m) > _TRIANGLES_AT_ONCE
+        large = _halvings(corners) > _HALVINGS_AT_ONCE
         done.append(corners[~large])
         a, b, c = np.moveaxis(corners[large], 1, 0)
         ab, bc, ca = 0.5 * (a + b), 0.5 * (b + c), 0.5 * (c + a)
@@ -117,9 +171,19 @@ def _divided(corners: np.ndarray, longest_m: float) -> np.ndarray:
     return np.concatenate(done)
 
 
-def _small_triangles(corners: np.ndarray, longest_m: float) -> np.ndarray:
-    """(M,) about how many triangles with edges up to a length triangles (M, 3, 3) are divided into."""
-    sides = np.linalg.norm(corners - np.roll(corners, -1, axis=1), axis=2).max(axis=1)
+def _longest_sides(corners: np.ndarray) -> np.ndarray:
+    """(M,) the longest side of each of the triangles (M, 3, 3), or the length of lines (M, 2, 3)."""
+    return np.linalg.norm(corners - np.roll(corners, -1, axis=1), axis=2).max(axis=1, initial=0.0)
+
+
+def _halvings(corners: np.ndarray) -> np.ndarray:
+    """(M,) how often triangles (M, 3, 3) or lines, in voxels, are cut until no edge is too long."""
+    return np.ceil(np.log2(np.maximum(_SHARE * _longest_sides(corners), 1.0))).astype(np.int64)
+
+
+def _by_area(corners: np.ndarray) -> np.ndarray:
+    """(M,) about how many triangles with no edge too long would cover triangles (M, 3, 3), in voxels."""
+    sides = _longest_sides(corners)
     areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
-    heights = areas / np.maximum(sides, 1e-300)
-    return np.maximum(2.0 * sides / longest_m, 1.0) * np.maximum(2.0 * heights / longest_m, 1.0)
+    along, across = 2.0 * _SHARE * sides, 2.0 * _SHARE * areas / np.maximum(sides, 1e-300)
+    return np.maximum(along, 1.0) * np.maximum(across, 1.0)

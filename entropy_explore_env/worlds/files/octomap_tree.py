@@ -8,6 +8,7 @@ the grid of the tree's own resolution is never made.
 from __future__ import annotations
 
 import itertools
+import math
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -28,7 +29,10 @@ from entropy_explore_env.worlds.files.voxels import (
 )
 
 NEEDS = (("octomap", "octomap-python"),)
+_BINARY_FILE, _FULL_FILE = b"# Octomap OcTree binary file", b"# Octomap OcTree file"
+_SIZED = "an OctoMap with a resolution > 0 and finite bounds"
 _DEPTH = 16
+"""Levels below the root."""
 _VOXELS_PER_BYTE = 4096
 """Limit of the voxels for each byte of the file: a leaf, at least two bits, may cover many."""
 _LEAVES_AT_ONCE = 1 << 16
@@ -54,10 +58,10 @@ def read(path: Path, options: Options) -> Voxels:
     edge = float(tree.getResolution())
     low, high = np.array(tree.getMetricMin()), np.array(tree.getMetricMax())
     if not (edge > 0 and np.isfinite(low).all() and np.isfinite(high).all()):
-        raise RefusedError("an OctoMap with a resolution > 0 and finite bounds")
+        raise RefusedError(_SIZED)
     extent = np.rint((high - low) / edge)
     if (extent < 1).any():
-        raise RefusedError("an OctoMap with a resolution > 0 and finite bounds")
+        raise RefusedError(_SIZED)
     voxel_m = options.get("voxel_size_m")
     wanted_m = edge if voxel_m is None else float(voxel_m)
     own = abs(wanted_m - edge) < 1e-9 * edge
@@ -72,26 +76,83 @@ def read(path: Path, options: Options) -> Voxels:
 
 
 def _tree(data: bytes) -> Any:  # noqa: ANN401 - octomap has no types
-    """The tree in the bytes; truncated ones are refused, since the C++ reader fills in zeros."""
+    """The tree in the bytes, whose nodes are counted before octomap reads them.
+
+    Where a file ends too early, octomap makes nodes of what it finds in its memory, at any depth, until there
+    is no more of it. So it is given the nodes that are there, under a head of our own.
+    """
     import octomap
 
-    binary = data.startswith(b"# Octomap OcTree binary file")
-    if not binary and not data.startswith(b"# Octomap OcTree file"):
+    binary = data.startswith(_BINARY_FILE)
+    if not binary and not data.startswith(_FULL_FILE):
         raise RefusedError("a whole OctoMap tree")
-    tree = octomap.OcTree.read(data) if not binary else _binary_tree(octomap, data)
-    _, _, body = data.partition(b"\ndata\n")
-    inner = tree.size() - tree.getNumLeafNodes()
-    stored = 2 * inner if binary else 5 * tree.size()  # a float and a byte of children for every node
-    if tree.size() == 0 or stored > len(body):
-        raise RefusedError("a whole OctoMap tree")
-    return tree
-
-
-def _binary_tree(octomap: Any, data: bytes) -> Any:  # noqa: ANN401 - octomap has no types
+    size, edge, body = _head_and_body(data)
+    nodes, used = _counted_nodes(body, binary)
+    if nodes != size:
+        raise RefusedError(f"an OctoMap tree of as many nodes as its head says; there are {nodes}")
+    first = _BINARY_FILE if binary else _FULL_FILE
+    whole = b"%s\nid OcTree\nsize %d\nres %s\ndata\n%s" % (first, size, repr(edge).encode(), body[:used])
+    if not binary:
+        return octomap.OcTree.read(whole)
     tree = octomap.OcTree(1.0)
-    if not tree.readBinary(data):
+    if not tree.readBinary(whole):
         raise RefusedError("a whole OctoMap tree")
     return tree
+
+
+def _head_and_body(data: bytes) -> tuple[int, float, bytes]:
+    """The number of nodes and the resolution that a file states, and the bytes of its nodes."""
+    head, _, body = data.partition(b"\ndata\n")
+    rows = (line.split() for line in head.splitlines() if not line.startswith(b"#"))
+    about = {row[0]: row[1] for row in rows if len(row) > 1}
+    if about.get(b"id") != b"OcTree":
+        raise RefusedError("an OctoMap whose id is OcTree")
+    try:
+        size, edge = int(about.get(b"size", b"0")), float(about.get(b"res", b"0"))
+    except ValueError:
+        raise RefusedError("an OctoMap whose size and res are numbers") from None
+    if not 0.0 < edge < math.inf:
+        raise RefusedError(_SIZED)
+    return size, edge, body
+
+
+def _counted_nodes(body: bytes, binary: bool) -> tuple[int, int]:
+    """How many nodes a tree has, and how many bytes hold them.
+
+    Nodes follow each other depth first. A binary file has two bytes for every inner node, two bits of them
+    for each child: none, free, solid or inner. The other kind has a float and a byte for every node, a bit of
+    it for each child. A tree ends where no child is left to come.
+    """
+    if binary:
+        words = np.frombuffer(body, "<u2", len(body) // 2)
+        pairs = (words[:, None] >> np.arange(0, 16, 2)) & 3
+        stored_children, children = (pairs == 3).sum(axis=1), (pairs > 0).sum(axis=1)
+        record = 2
+    else:
+        masks = np.frombuffer(body, np.uint8, len(body) // 5 * 5)[4::5]
+        stored_children = children = np.unpackbits(masks[:, None], axis=1).sum(axis=1)
+        record = 5
+    to_come = 1 + np.cumsum(stored_children.astype(np.int64) - 1)
+    ends = np.flatnonzero(to_come == 0)
+    if len(ends) == 0:
+        raise RefusedError("a whole OctoMap tree")
+    count = int(ends[0]) + 1
+    if _levels(stored_children[:count].tolist()) > (_DEPTH if binary else _DEPTH + 1):
+        raise RefusedError(f"an OctoMap tree of at most {_DEPTH} levels below its root")
+    return 1 + int(children[:count].sum()), count * record
+
+
+def _levels(children: list[int]) -> int:
+    """How many levels nodes have that follow each other depth first, from each one's number of children."""
+    to_come, most = [1], 1
+    for count in children:
+        to_come[-1] -= 1
+        if count:
+            to_come.append(count)
+            most = max(most, len(to_come))
+        while to_come and to_come[-1] == 0:
+            to_come.pop()
+    return most
 
 
 def _leaves(tree: Any, low: np.ndarray, edge: float, extent: np.ndarray) -> _Leaves:  # noqa: ANN401

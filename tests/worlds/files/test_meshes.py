@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from entropy_explore_env.errors import SettingError, WorldError
-from entropy_explore_env.worlds.files import meshes
+from entropy_explore_env.worlds.files import meshes, process
 from entropy_explore_env.worlds.files.voxels import Options
 from entropy_explore_env.worlds.load import load_world
 
@@ -108,7 +108,54 @@ def test_a_surface_in_parts_has_the_same_voxels(monkeypatch):
     turned = trimesh.transformations.euler_matrix(0.3, 0.2, 0.5)
     parts = [trimesh.creation.box((3.0, 2.0, 1.0), turned), trimesh.creation.icosphere(2, 0.8)]
     whole = meshes._voxels(trimesh.util.concatenate(parts), False, Options({"voxel_size_m": 0.05}))
-    monkeypatch.setattr(meshes, "_TRIANGLES_AT_ONCE", 2000)
+    monkeypatch.setattr(meshes, "_POINTS_AT_ONCE", 2000)
+    monkeypatch.setattr(meshes, "_HALVINGS_AT_ONCE", 3)
     again = meshes._voxels(trimesh.util.concatenate(parts), False, Options({"voxel_size_m": 0.05}))
     np.testing.assert_array_equal(again.labels, whole.labels)
     assert again.origin_m == whole.origin_m and 0 < (whole.labels == 1).mean() < 1
+
+
+def one_triangle(corners, voxel_m=1.0):
+    """Its voxels, and the lower corner of the first one."""
+    mesh = trimesh.Trimesh(corners, [[0, 1, 2]])
+    voxels = meshes._voxels(mesh, False, Options({"voxel_size_m": voxel_m, "fill": False}))
+    return voxels.labels == 1, np.round(np.array(voxels.origin_m) / voxel_m).astype(int)
+
+
+@pytest.mark.parametrize("foot", [0.0, 0.3, 1.0])
+@pytest.mark.parametrize("across", [0.0, 2.7])
+def test_the_voxels_of_a_needle_are_those_that_its_places_lie_in(foot, across):
+    """200 m long, and up to 2.7 m wide: places drawn on it are in solid voxels, and no others are solid."""
+    a, b = np.array([0.31, 0.4, 0.2]), np.array([190.3, 57.4, 21.7])
+    c = a + foot * (b - a) + across * np.array([-0.28, 0.96, 0.0])
+    assert meshes._are_thin(np.array([[a, b, c]])).all()
+    solid, low = one_triangle(np.array([a, b, c]))
+    shares = np.random.default_rng(0).dirichlet(np.ones(3), 4000)
+    at = np.floor(shares @ np.array([a, b, c]) + 1e-6).astype(int) - low
+    assert solid[tuple(at.T)].mean() > 0.97  # a place in a voxel's corner may be missed
+    there = np.argwhere(solid) + low + 0.5
+    along = (b - a) / np.linalg.norm(b - a)
+    off = there - a - ((there - a) @ along)[:, None] * along
+    assert np.linalg.norm(off, axis=1).max() < across + 0.5 * np.sqrt(3.0) + 1e-4
+
+
+def test_a_needle_of_a_hundred_thousand_voxels_is_read_soon(tmp_path):
+    """In a box of 100,000 × 3 × 2 voxels; cut into four each time, it would be 10¹⁰ small triangles."""
+    path = tmp_path / "needle.obj"
+    path.write_bytes(b"v 0.5 0.5 0.5\nv 99999.5 2.5 1.5\nv 60000 0.5 0.5\nf 1 2 3\n")
+    with process.kept_reader() as reader:
+        world = load_world(path, 1.0, fill=False)
+        assert reader.cost is not None and reader.cost["peak_kib"] < 300 * 1024
+    assert world.grid.shape == (100_000, 3, 2)
+    assert world.occupied.any(axis=(1, 2)).all()
+
+
+def test_faces_that_are_there_twice_are_drawn_once(monkeypatch):
+    drawn = []
+    kept = meshes._divided
+    monkeypatch.setattr(meshes, "_divided", lambda corners: drawn.append(len(corners)) or kept(corners))
+    box = trimesh.creation.box((3.0, 2.0, 1.0))
+    for faces in (box.faces, np.concatenate([box.faces, box.faces[::-1], np.roll(box.faces, 1, axis=1)])):
+        mesh = trimesh.Trimesh(box.vertices, faces, process=False)
+        meshes._voxels(mesh, False, Options({"voxel_size_m": 0.25}))
+    assert drawn == [12, 12]

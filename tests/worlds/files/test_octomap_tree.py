@@ -12,7 +12,7 @@ from entropy_explore_env.command import READ_MEMORY_VARIABLE, allow_read_memory
 from entropy_explore_env.errors import SettingError, WorldError
 from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.scenarios import BOX
-from entropy_explore_env.worlds.files import process
+from entropy_explore_env.worlds.files import octomap_tree, process
 from entropy_explore_env.worlds.files.process import kept_reader
 from entropy_explore_env.worlds.files.resampling import resampled
 from entropy_explore_env.worlds.files.voxels import Voxels
@@ -164,6 +164,7 @@ BROKEN = {
     "noise after the header": b"# Octomap OcTree binary file\nid OcTree\nsize 900\nres 0.1\ndata\n"
     + np.random.default_rng(1).bytes(900),
     "another tree": b"# Octomap OcTree binary file\nid ColorOcTree\nsize 1\nres 0.1\ndata\n\x00\x00",
+    "a tree of colours": b"# Octomap OcTree file\nid ColorOcTree\nsize 1\nres 0.1\ndata\n" + bytes(8),
     "no resolution": b"# Octomap OcTree binary file\nid OcTree\nsize 1\nres 0\ndata\n\x01\x00",
     "resolution below 0": b"# Octomap OcTree binary file\nid OcTree\nsize 1\nres -1\ndata\n\x01\x00",
     "resolution nan": b"# Octomap OcTree binary file\nid OcTree\nsize 1\nres nan\ndata\n\x01\x00",
@@ -187,6 +188,55 @@ def test_broken_files_are_refused(tmp_path, kind):
     path = tmp_path / "broken.bt"
     path.write_bytes(BROKEN[kind])
     assert refused(path).value == str(path)
+
+
+def full_tree(masks, size=None, res=b"0.1"):
+    """An `.ot` of free nodes, depth first, from the children of each."""
+    nodes = b"".join(np.float32(-1.0).tobytes() + bytes([mask]) for mask in masks)
+    size = len(masks) if size is None else size
+    return b"# Octomap OcTree file\nid OcTree\nsize %d\nres %s\ndata\n" % (size, res) + nodes
+
+
+HOSTILE = {
+    "children that never come": (full_tree([255] * 60), "a whole OctoMap tree"),
+    "a node too few": (full_tree([3, 0]), "a whole OctoMap tree"),
+    "bytes moved by one": (
+        full_tree([1] * 16 + [0]).replace(b"data\n", b"data\n\x01"),
+        "a whole OctoMap tree",
+    ),
+    "a level too many": (full_tree([1] * 17 + [0]), "an OctoMap tree of at most 16 levels below its root"),
+    "a size that is not its": (full_tree([3, 0, 0], 4), "as many nodes as its head says; there are 3"),
+    "another tree": (full_tree([0]).replace(b"OcTree\nsize", b"ColorOcTree\nsize"), "whose id is OcTree"),
+    "a size that is no number": (full_tree([0]).replace(b"size 1", b"size 1x"), "size and res are numbers"),
+    "no resolution": (full_tree([0], res=b"0"), "a resolution > 0"),
+    "binary, a level too many": (
+        b"# Octomap OcTree binary file\nid OcTree\nsize 18\nres 0.1\ndata\n" + b"\x03\0" * 16 + b"\x01\0",
+        "an OctoMap tree of at most 16 levels below its root",
+    ),
+}
+
+
+@pytest.mark.parametrize("kind", HOSTILE)
+def test_hostile_trees_are_refused_at_once(tmp_path, kind):
+    """octomap itself would make nodes of them until there is no memory left."""
+    data, allowed = HOSTILE[kind]
+    path = tmp_path / ("map.bt" if b"binary" in data else "map.ot")
+    path.write_bytes(data)
+    with kept_reader() as reader:
+        assert allowed in refused(path).allowed
+        assert reader.cost is not None and reader.cost["peak_kib"] < 200 * 1024
+
+
+@pytest.mark.parametrize("binary", [True, False])
+def test_a_tree_of_all_levels_is_read(tmp_path, binary):
+    """One voxel at the deepest level, below sixteen nodes."""
+    tree = octomap.OcTree(0.25)
+    tree.updateNode(np.array([0.1, 0.1, 0.1]), False)
+    path = tmp_path / ("map.bt" if binary else "map.ot")
+    assert (tree.writeBinary if binary else tree.write)(str(path).encode())
+    assert load_octomap(path).grid.shape == (1, 1, 1)
+    body = path.read_bytes().partition(b"\ndata\n")[2]
+    assert octomap_tree._counted_nodes(body + b"more", binary) == (17, 16 * 2 if binary else 17 * 5)
 
 
 @pytest.mark.parametrize("missing", [1, 2, 3, 40, 300])
