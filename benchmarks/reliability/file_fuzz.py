@@ -6,14 +6,17 @@ records and checkpoints by `saved_files`.
 
 from __future__ import annotations
 
+import atexit
 import tempfile
 from dataclasses import asdict
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 from benchmarks.reliability.saved_files import KINDS, play_files
 from benchmarks.reliability.world_files import fuzz
 from benchmarks.reliability.world_samples import samples
+from entropy_explore_env.worlds.files.process import ReaderProcess
 
 BATCH = 500
 """Files of a case."""
@@ -56,9 +59,20 @@ def play_number(number: int) -> dict[str, Any]:
 
 
 def _play_worlds(loader: str, folder: Path, seed: int) -> dict[str, Any]:
-    found = asdict(fuzz(samples()[loader], BATCH, seed, folder))
+    found = asdict(fuzz(_samples()[loader], BATCH, seed, folder, _reader_of(loader)))
     del found["causes"]
-    return found
+    return {**found, "held_mib": found.pop("most_mib")}
+
+
+_samples = cache(samples)
+
+
+@cache
+def _reader_of(loader: str) -> ReaderProcess:
+    """The process that reads a loader's files, the same for all cases that are played in this one."""
+    reader = ReaderProcess()
+    atexit.register(reader.close)
+    return reader
 
 
 def files_of(row: dict[str, Any]) -> int:

@@ -191,10 +191,10 @@ def _kills(rows: Sequence[Row]) -> str:
 def _files(rows: Sequence[Row]) -> str:
     table = [
         f"{FILES:,} of each loader are asked for. Each must be read or refused by a named error, in little "
-        "time and memory, run nothing and read nothing outside its folder. Ended: the reading "
-        "process died and "
-        "was started anew, and an error was raised. Most MiB: the most that the process which reads "
-        "had held.",
+        "time and memory, run nothing and read nothing outside its folder. Ended: the reading process died "
+        "and was started anew, and an error was raised. Most s: of the processor, for one file. Most MiB: "
+        "the most that the reading process held; of records and checkpoints, which the command reads itself, "
+        "by how much it grew.",
         "",
         "| loader | files | read | refused | of these ended | most s | most MiB |",
         "| --- | ---: | ---: | ---: | ---: | ---: | ---: |",
@@ -203,9 +203,10 @@ def _files(rows: Sequence[Row]) -> str:
     for loader in loaders:
         own = [row for row in rows if row["loader"] == loader]
         files, loaded, killed = (sum(row[name] for row in own) for name in ("files", "loaded", "killed"))
-        most_s, most_mib = max(row["most_s"] for row in own), max(row["most_mib"] for row in own)
-        cells = (loader, f"{files:,}", f"{loaded:,}", f"{files - loaded:,}", f"{killed:,}")
-        table.append("| " + " | ".join((*cells, f"{most_s:.2f}", f"{most_mib:.0f}")) + " |")
+        most_s = max(row["most_s"] for row in own)
+        mib = [row[name] for row in own for name in ("held_mib", "grew_mib") if name in row]
+        cells = (loader, f"{files:,}", f"{loaded:,}", f"{files - loaded:,}", f"{killed:,}", f"{most_s:.2f}")
+        table.append("| " + " | ".join((*cells, f"{max(mib):.0f}" if mib else "-")) + " |")
     return "\n".join(table) + "\n"
 
 

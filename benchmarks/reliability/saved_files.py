@@ -166,6 +166,7 @@ def checkpoint_files(folder: Path) -> Kind:
     from training.normalisation import Normaliser
     from training.policy import make_policy, weights_of
 
+    torch.set_num_threads(1)  # of small matrices: more threads wait for each other
     form = {"action": {"kind": "discrete", "moves": "axes"}, "observation": {"flat": True}}
     settings = PolicySettings(with_settings(BOX, form), "vector", (6, 5))
     stats = Normaliser(Missions(settings.scenario).layout.size)
@@ -238,9 +239,9 @@ def play_files(kind: Kind, folder: Path, count: int, seed: int) -> dict[str, Any
                 complaint = complaint or f"{spent_s:.1f} s"
             if complaint:
                 found["wrong"].append(f"[{seed}, {number}] {change.__name__} of {name}: {complaint[:150]}")
-    found["most_mib"] = _peak_mib()
-    if found["most_mib"] - before_mib > MOST_GROWTH_MIB:
-        found["wrong"].append(f"grew to {found['most_mib']:.0f} MiB")
+    found["grew_mib"] = _peak_mib() - before_mib
+    if found["grew_mib"] > MOST_GROWTH_MIB:
+        found["wrong"].append(f"grew by {found['grew_mib']:.0f} MiB")
     return found
 
 

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-from benchmarks.reliability.world_files import MUTATORS, Outcome, fuzz, mutants, table
+from benchmarks.reliability.world_files import MUTATORS, Outcome, drawn_octree, fuzz, mutants, table
 from benchmarks.reliability.world_samples import samples
+from entropy_explore_env.errors import WorldError
+from entropy_explore_env.worlds.files.process import ReaderProcess, kept_reader
+from entropy_explore_env.worlds.load import load_world
 
 FEW, MANY = 40, 500
 """Files a loader. Most of their time goes into starting the reader again after it crashed."""
@@ -46,9 +51,36 @@ def test_mutants_are_the_same_for_the_same_seed():
 
 
 def test_every_mutator_changes_something():
-    for loader in ("map_server", "height npz", "height png", "glb"):
-        named = {name for name, _ in mutants(samples()[loader], 80, 0)}
+    for loader in ("map_server", "height npz", "height png", "glb", "octomap"):
+        named = {name for name, _ in mutants(samples()[loader], 120, 0)}
         assert named == {mutate.__name__ for mutate in MUTATORS}
+
+
+def test_drawn_octrees_are_read_and_refused(folder):
+    """Some are sound, some have a wrong size, some are too deep: all changes are one after the other."""
+    causes, loaded = Counter(), 0
+    with kept_reader():
+        for source in samples()["octomap"]:
+            name, data = next(iter(source.files.items()))
+            for seed in range(60):
+                (folder / name).write_bytes(drawn_octree(data, np.random.default_rng(seed)))
+                try:
+                    load_world(folder / name)
+                    loaded += 1
+                except WorldError as error:
+                    causes[error.allowed.split(";")[0]] += 1
+    assert loaded > 20
+    assert causes["an OctoMap tree of at most 16 levels below its root"] > 2
+    assert causes["an OctoMap tree of as many nodes as its head says"] > 5
+
+
+def test_a_reader_that_is_given_goes_on_after_the_files(folder):
+    reader = ReaderProcess()
+    for part in ("first", "second"):
+        fuzz(samples()["image"], 5, 7, folder / part, reader)
+        running = reader._process
+        assert running is not None and running.poll() is None
+    reader.close()
 
 
 def test_the_table_counts():

@@ -245,15 +245,20 @@ _KEPT: ContextVar[ReaderProcess | None] = ContextVar("_KEPT", default=None)
 
 
 @contextlib.contextmanager
-def kept_reader() -> Iterator[ReaderProcess]:
-    """Read all files inside this block in one process, which saves its starts; yields that process."""
-    reader = ReaderProcess()
-    token = _KEPT.set(reader)
+def kept_reader(reader: ReaderProcess | None = None) -> Iterator[ReaderProcess]:
+    """Read all files inside this block in one process, which saves its starts; yields that process.
+
+    Args:
+        reader: One that goes on after the block; None = a new one, which ends with it.
+    """
+    one = reader or ReaderProcess()
+    token = _KEPT.set(one)
     try:
-        yield reader
+        yield one
     finally:
         _KEPT.reset(token)
-        reader.close()
+        if reader is None:
+            one.close()
 
 
 def read_apart(form: Format, path: Path | str, options: Mapping[str, Any], limits: Limits = USUAL) -> Voxels:
