@@ -95,7 +95,7 @@ def overlap_bits(
     """I of the last cone and all others, in bits; `marks` (V,) uint8 is cleared first."""
     marks[:] = 0
     for place in range(len(cones) - 1):
-        mark_cone(cones[place], size, None, marks)
+        mark_cone(cones[place], size, None, marks, 1)
     return visible_bits(cones[len(cones) - 1], size, precision, known_precision, None, marks)[1]
 
 

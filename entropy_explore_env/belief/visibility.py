@@ -45,6 +45,8 @@ class Occlusion(NamedTuple):
 
 
 _FOLD_ABOVE = 1e250
+_FARTHEST = 2.0**21
+"""Longer than any workspace, in voxel edges: radii may be infinite."""
 _SLACK = 1e-9
 """Tolerance of a cone's angle, as a share of the distance."""
 
@@ -68,15 +70,6 @@ def in_cone(cone, dx, dy, dz):
 
 
 @inlined_kernel
-def in_cones(cones, x, y, z):
-    """Whether a point in grid units lies in any of (M,) CONE."""
-    for cone in cones:
-        if in_cone(cone, x - cone.apex[0], y - cone.apex[1], z - cone.apex[2]):
-            return True
-    return False
-
-
-@inlined_kernel
 def _column_span(cone, dx, dy, layers):
     """First and one past the last layer of a column of voxels in which centres may lie in a cone.
 
@@ -85,7 +78,8 @@ def _column_span(cone, dx, dy, layers):
     of the ball, and whether a centre is inside is for `in_cone` to say.
     """
     flat = dx * dx + dy * dy
-    high = cone.radius * cone.radius - flat
+    radius = min(cone.radius, _FARTHEST)
+    high = radius * radius - flat
     if high < 0.0:
         return 0, 0
     high = math.sqrt(high)
@@ -154,21 +148,23 @@ def _span(cone, axis, size):
     """
     half = math.acos(min(max(cone.cosine, -1.0), 1.0))
     angle = math.acos(min(max(cone.gaze[axis], -1.0), 1.0))
-    ahead = cone.radius * max(math.cos(max(angle - half, 0.0)), 0.0)
-    behind = cone.radius * max(math.cos(max(math.pi - angle - half, 0.0)), 0.0)
+    radius = min(cone.radius, _FARTHEST)
+    ahead = radius * max(math.cos(max(angle - half, 0.0)), 0.0)
+    behind = radius * max(math.cos(max(math.pi - angle - half, 0.0)), 0.0)
     first, last = math.floor(cone.apex[axis] - behind - 0.5), math.floor(cone.apex[axis] + ahead + 0.5)
     return max(first, 0), min(last + 1, size)
 
 
 @lean_kernel
-def mark_cone(cone, size, occlusion, marks):
-    """Add the voxels that are visible in a cone to those marked (RochaMI, eqs. 5 and 8).
+def mark_cone(cone, size, occlusion, marks, mark):
+    """Give the voxels that are visible in a cone a mark (RochaMI, eqs. 5 and 8).
 
     Args:
         cone: A CONE.
         size: (X, Y, Z) voxels.
         occlusion: An Occlusion, or None.
-        marks: (V,) uint8, set to 1 where a voxel is visible.
+        marks: (V,) uint8.
+        mark: What the visible ones become, 0 … 255.
     """
     first_x, last_x = _span(cone, 0, size[0])
     first_y, last_y = _span(cone, 1, size[1])
@@ -177,7 +173,14 @@ def mark_cone(cone, size, occlusion, marks):
             first, last = _column_span(cone, i + 0.5 - cone.apex[0], j + 0.5 - cone.apex[1], size[2])
             for k in range(first, last):
                 if _visible(cone, size, i, j, k, occlusion):
-                    marks[np.uint32(flat_index(size, i, j, k))] = 1
+                    marks[np.uint32(flat_index(size, i, j, k))] = mark
+
+
+@lean_kernel
+def mark_cones(cones, size, marks, mark):
+    """Give the voxels whose centres lie in any of (M,) CONE a mark, whatever hides them; see `mark_cone`."""
+    for cone in cones:
+        mark_cone(cone, size, None, marks, mark)
 
 
 @lean_kernel

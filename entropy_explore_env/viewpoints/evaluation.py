@@ -20,6 +20,7 @@ from entropy_explore_env.belief.raycast import (
     cast_ray,
     longest_crossing,
 )
+from entropy_explore_env.belief.visibility import mark_cones
 from entropy_explore_env.compilation.kernels import lean_kernel
 from entropy_explore_env.robots.motion import driving_time, turning_time
 from entropy_explore_env.scenario import Scenario
@@ -192,6 +193,7 @@ def evaluate_viewpoints(belief, scan, drive, here, viewpoints, cones, scratch, o
         scratch: A ScanScratch.
         outlook: An Outlook, filled in.
     """
+    mark_cones(cones, belief.size, scratch.left, 1)
     for k in range(len(viewpoints)):
         viewpoint = viewpoints[k]
         x, y, z = viewpoint[0] - here[0], viewpoint[1] - here[1], viewpoint[2] - here[2]
@@ -204,7 +206,8 @@ def evaluate_viewpoints(belief, scan, drive, here, viewpoints, cones, scratch, o
             direction = (x / length, y / length, z / length)
             if not line_is_free(belief, here, direction, length, drive.body_radius, scratch):
                 continue
-        outlook.bits[k] = expected_scan_bits(belief, scan, viewpoint, cones, scratch)
+        outlook.bits[k] = expected_scan_bits(belief, scan, viewpoint, scratch)
+    mark_cones(cones, belief.size, scratch.left, 0)
 
 
 @lean_kernel

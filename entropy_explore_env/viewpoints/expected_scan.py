@@ -44,7 +44,9 @@ class ScanScratch(NamedTuple):
     added: np.ndarray
     """(V,) float32, zeros, which it is again afterwards."""
     touched: np.ndarray
-    """(V,) int32."""
+    """(V + 1,) int32; the last is written, never read."""
+    left: np.ndarray
+    """(V,) uint8, zeros but while viewpoints are evaluated: not 0 = the voxel is left to teammates."""
     crossed: np.ndarray
     """(L,) int32, see `cast_ray`."""
     entered: np.ndarray
@@ -55,7 +57,8 @@ def new_scan_scratch(voxels: int, longest_ray: int) -> ScanScratch:
     """Scratch space for a grid, and rays that cross at most so many of its voxels."""
     return ScanScratch(
         np.zeros(voxels, np.float32),
-        np.zeros(voxels, np.int32),
+        np.zeros(voxels + 1, np.int32),
+        np.zeros(voxels, np.uint8),
         np.zeros(longest_ray, np.int32),
         np.zeros(longest_ray, np.int64),
     )
@@ -83,7 +86,7 @@ def expected_precision(scan, length, direction):
 
 
 @lean_kernel
-def expected_scan_bits(belief, scan, viewpoint, cones, scratch):
+def expected_scan_bits(belief, scan, viewpoint, scratch):
     """Bits that a scan from a viewpoint is expected to take from the robot's map.
 
     Rays go through the belief like those of a scan, until something believed covered; where that is too near
@@ -93,13 +96,12 @@ def expected_scan_bits(belief, scan, viewpoint, cones, scratch):
         I = Σ ½ log2(1 + Σ_rays w/σ(d)² / p),
 
     with p the voxel's precision, d the ray's length and w the probability that it gets there (Rocha04, eqs.
-    5, 17 and 27). Voxels whose centres lie in one of the cones are left to teammates, and count nothing.
+    5, 17 and 27). Voxels that `scratch.left` marks are left to teammates, and count nothing.
 
     Args:
         belief: A Belief.
         scan: A ScanModel.
         viewpoint: (5,) x, y, z in grid units, yaw, pitch.
-        cones: (M,) CONE.
         scratch: A ScanScratch.
 
     Returns:
@@ -128,11 +130,11 @@ def expected_scan_bits(belief, scan, viewpoint, cones, scratch):
                 continue
             gain = scan.sensor_rays * expected_precision(scan, length, direction)
             for i in range(n):
-                voxel = np.uint32(scratch.crossed[i])
-                if scratch.added[voxel] == 0.0:
-                    scratch.touched[count] = scratch.crossed[i]
-                    count += 1
-                scratch.added[voxel] += np.float32(gain)
+                voxel = np.uint32(scratch.crossed[np.uint32(i)])
+                before = scratch.added[voxel]
+                scratch.touched[np.uint32(count)] = voxel  # kept where it is the first: a branch costs more
+                count += int(before == 0.0)
+                scratch.added[voxel] = before + np.float32(gain)
                 if belief.precision[voxel] < scan.known_precision:
                     gain *= 1.0 - scan.stop_probability
-    return gathered_bits(belief, cones, scratch, count)
+    return gathered_bits(belief, scratch, count)

@@ -6,8 +6,6 @@ import math
 
 import numpy as np
 
-from entropy_explore_env.belief.visibility import in_cones
-from entropy_explore_env.belief.voxel_index import grid_index
 from entropy_explore_env.compilation.kernels import inlined_kernel
 
 _FOLD_ABOVE = 1e250
@@ -15,18 +13,14 @@ _FOLD_ABOVE = 1e250
 
 
 @inlined_kernel
-def gathered_bits(belief, cones, scratch, count):
-    """Σ ½ log2(1 + added/p) over the touched voxels outside the cones; what was added is cleared."""
+def gathered_bits(belief, scratch, count):
+    """Σ ½ log2(1 + added/p) over the touched voxels that are not left to teammates; clears what was added."""
     bits, growth = 0.0, 1.0
     for i in range(count):
-        voxel = np.uint32(scratch.touched[i])
+        voxel = np.uint32(scratch.touched[np.uint32(i)])
         share = np.float64(scratch.added[voxel]) / np.float64(belief.precision[voxel])
         scratch.added[voxel] = 0.0
-        if len(cones) > 0:
-            x, y, z = grid_index(belief.size, scratch.touched[i])
-            if in_cones(cones, x + 0.5, y + 0.5, z + 0.5):
-                continue
-        growth *= 1.0 + share
+        growth *= 1.0 + (0.0 if scratch.left[voxel] else share)
         if growth > _FOLD_ABOVE:
             bits += math.log2(growth)
             growth = 1.0

@@ -10,7 +10,10 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from entropy_explore_env.belief.raycast import OPEN, OPEN_END, STOP_AT_COVERED, Crossing, Line, cast_ray
+from entropy_explore_env.belief.visibility import mark_cones
 from entropy_explore_env.belief.voxel_index import grid_index
 from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel
 from entropy_explore_env.viewpoints.expected_scan import expected_precision
@@ -54,11 +57,11 @@ def _imagine_ray(belief, scan, gap_probability, start, direction, count, scratch
     share = 1.0
     gain = scan.sensor_rays * expected_precision(scan, length, direction)
     for i in range(n):
-        voxel = scratch.crossed[i]
-        if scratch.added[voxel] == 0.0:
-            scratch.touched[count] = voxel
-            count += 1
-        scratch.added[voxel] += gain * share
+        voxel = np.uint32(scratch.crossed[np.uint32(i)])
+        before = scratch.added[voxel]
+        scratch.touched[np.uint32(count)] = voxel  # kept where it is the first: a branch costs more
+        count += int(before == 0.0)
+        scratch.added[voxel] = before + gain * share
         if belief.precision[voxel] < scan.known_precision:
             gap = gap_probability != scan.stop_probability and beside_covered(belief, voxel)
             share *= 1.0 - (gap_probability if gap else scan.stop_probability)
@@ -109,6 +112,8 @@ def imagined_bits(belief, scan, gap_probability, viewpoints, cones, scratch, bit
         scratch: A ScanScratch.
         bits: (K,) float64, filled in.
     """
+    mark_cones(cones, belief.size, scratch.left, 1)
     for k in range(len(viewpoints)):
         count = imagine_scan(belief, scan, gap_probability, viewpoints[k], scratch)
-        bits[k] = gathered_bits(belief, cones, scratch, count)
+        bits[k] = gathered_bits(belief, scratch, count)
+    mark_cones(cones, belief.size, scratch.left, 0)

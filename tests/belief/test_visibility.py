@@ -13,8 +13,9 @@ from entropy_explore_env.belief.visibility import (
     CONE,
     Occlusion,
     cone_of,
-    in_cones,
+    in_cone,
     mark_cone,
+    mark_cones,
     marked_bits,
     visible_bits,
 )
@@ -36,7 +37,10 @@ NO_CONES = np.zeros(0, CONE)
 
 @lean_kernel
 def inside(cones, x, y, z):
-    return in_cones(cones, x, y, z)
+    for cone in cones:
+        if in_cone(cone, x - cone.apex[0], y - cone.apex[1], z - cone.apex[2]):
+            return True
+    return False
 
 
 def test_cones_by_hand():
@@ -70,6 +74,24 @@ def test_a_cone_is_a_ball_cut_by_an_angle(seed, half_angle):
         assert inside(cones, *point) == (distance < radius and angle < half_angle)
 
 
+@drawn(100)
+@given(seeds, st.floats(0.05, math.pi), st.sampled_from([math.inf, 3.0, 0.4]))
+def test_marks_are_the_voxels_whose_centres_lie_in_a_cone(seed, half_angle, radius):
+    rng = np.random.default_rng(seed)
+    cones = np.zeros(2, CONE)
+    for number in range(2):
+        gaze = (rng.uniform(-math.pi, math.pi), rng.uniform(-1.5, 1.5))
+        cones[number] = cone_of(
+            np.array([*rng.uniform(-1.0, np.array(SIZE) + 1.0), *gaze]), radius, half_angle
+        )
+    marks = np.full(math.prod(SIZE), 7, np.uint8)
+    mark_cones(cones, SIZE, marks, 1)
+    found = [inside(cones, x + 0.5, y + 0.5, z + 0.5) for x, y, z in np.ndindex(SIZE)]
+    np.testing.assert_array_equal(marks, np.where(found, 1, 7))
+    mark_cones(cones, SIZE, marks, 7)
+    assert (marks == 7).all()
+
+
 # --- What cones cover (RochaMI, eqs. 5 and 7-10)
 
 KNOWN = 0.05**-2
@@ -83,10 +105,10 @@ def covered(cones, belief, occluded=False, size=SIZE):
     mine = np.array([cone_of(np.array([*c.apex, c.yaw, c.pitch]), c.radius, c.half_angle) for c in cones])
     marks = np.zeros(mean.size, np.uint8)
     for cone in mine[1:]:
-        mark_cone(cone, size, occlusion, marks)
+        mark_cone(cone, size, occlusion, marks, 1)
     team = marked_bits(precision, KNOWN, marks)
     own, shared = visible_bits(mine[0], size, precision, KNOWN, occlusion, marks)
-    mark_cone(mine[0], size, occlusion, marks)
+    mark_cone(mine[0], size, occlusion, marks, 1)
     return own, shared, team, marked_bits(precision, KNOWN, marks), marks
 
 

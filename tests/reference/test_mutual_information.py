@@ -37,7 +37,7 @@ def ours(belief, position, radius, cone, mates, weights, planar, ranked=None):
         heard[place]["touching"] = weights.touching
         if mate.cone is not None:
             c = mate.cone
-            mark_cone(_cone(c.apex, c.yaw, c.pitch, c.radius, c.half_angle), SIZE, None, marks)
+            mark_cone(_cone(c.apex, c.yaw, c.pitch, c.radius, c.half_angle), SIZE, None, marks, 1)
     if count == 0:
         return candidates, -1
     factors = np.zeros(1, FACTORS)

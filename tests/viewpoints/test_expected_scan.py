@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from entropy_explore_env.belief.fields import Belief
 from entropy_explore_env.belief.map_update import fuse_scan
 from entropy_explore_env.belief.raycast import longest_crossing
-from entropy_explore_env.belief.visibility import CONE, cone_of
+from entropy_explore_env.belief.visibility import CONE, cone_of, mark_cones
 from entropy_explore_env.robots.range_sensor import Scene, SensorPose, new_scan, sensor_model, take_scan
 from entropy_explore_env.settings import Grid, RangeSensor
 from entropy_explore_env.viewpoints.expected_scan import ScanModel, expected_scan_bits, new_scan_scratch
@@ -49,7 +49,8 @@ def model(stop_probability=0.0, known_precision=0.0, rays=1.0, sensor=SENSOR, po
 def expected(mean, precision, viewpoint, scan, cones=NO_CONES):
     scratch = new_scan_scratch(mean.size, longest_crossing(*SIZE, math.inf, scan.voxels_behind))
     belief = Belief(mean.ravel(), precision.ravel(), SIZE)
-    bits = expected_scan_bits(belief, scan, np.asarray(viewpoint, float), cones, scratch)
+    mark_cones(cones, SIZE, scratch.left, 1)
+    bits = expected_scan_bits(belief, scan, np.asarray(viewpoint, float), scratch)
     assert not scratch.added.any()
     return bits
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from entropy_explore_env.belief.fields import Belief
-from entropy_explore_env.belief.visibility import CONE, cone_of
+from entropy_explore_env.belief.visibility import CONE, cone_of, mark_cones
 from entropy_explore_env.scenarios import BOX
 from entropy_explore_env.settings import Grid
 from entropy_explore_env.viewpoints.evaluation import new_scratch, robot_model
@@ -43,7 +43,8 @@ def test_without_partly_covered_voxels_and_gaps_it_is_the_expected_scan(seed):
     viewpoints, cones = drawn_viewpoints(9, seed=seed), np.zeros(1, CONE)
     cones[0] = cone_of(viewpoints[0], 3.0, 0.6)
     scratch = new_scratch(BOX.grid, [MODEL])
-    expected = [expected_scan_bits(belief, MODEL.scan, each, cones, scratch) for each in viewpoints]
+    mark_cones(cones, SIZE, scratch.left, 1)
+    expected = [expected_scan_bits(belief, MODEL.scan, each, scratch) for each in viewpoints]
     np.testing.assert_allclose(imagined(belief, viewpoints, 0.1, cones), expected, rtol=1e-5)
 
 

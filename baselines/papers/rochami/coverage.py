@@ -42,7 +42,7 @@ class TeamCoverage:
         for cone in cones:  # I of each with those before it: what is covered more than once
             _, twice = visible_bits(cone, grid.shape, precision, known, None, marks)
             shared += twice
-            mark_cone(cone, grid.shape, None, marks)
+            mark_cone(cone, grid.shape, None, marks, 1)
         self._times.append(float(missions.state.missions[0]["time_s"]))
         self._team.append(float(marked_bits(precision, known, marks)))
         self._shared.append(shared)

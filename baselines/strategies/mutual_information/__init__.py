@@ -252,7 +252,7 @@ class MutualInformation:
             heard[place]["end"] = grid.in_grid_units(mate.viewpoint if under_way else mate.pose)[:3]
             heard[place]["touching"] = touching_m / grid.voxel_size_m if settings.teammates_block else -1.0
             if settings.overlap and mate.announced_s >= 0.0 and mate.depth_m > 0.0:
-                mark_cone(announced_cone(grid, mate), grid.shape, occlusion, self._marks)
+                mark_cone(announced_cone(grid, mate), grid.shape, occlusion, self._marks, 1)
         return heard
 
 
