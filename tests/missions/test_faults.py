@@ -17,7 +17,7 @@ from entropy_explore_env.missions.poses import pose_at
 from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.missions.snapshot import restore, snapshot
 from entropy_explore_env.missions.state import FAULT, MissionEnd
-from entropy_explore_env.randomness import Stream
+from entropy_explore_env.randomness import Stream, draw_uniform
 from entropy_explore_env.reports.metrics import mission_figures
 from entropy_explore_env.reports.state_values import state_digest
 from entropy_explore_env.robots.motion import MoveEnd
@@ -45,10 +45,10 @@ def team(faults, **changes):
 
 
 def test_a_robot_that_stops_stands_where_it_was_and_stays_there():
-    """1 m at 0.5 m/s and 0.5 m/s²: half a metre after 1.5 s, where it is at its speed."""
-    missions = team({"stop": {"at_s": 1.5, "robots": (0,)}})
+    """2 m at 0.5 m/s and 0.5 m/s²: half a metre after 1.5 s, where it is at its speed."""
+    missions = team({"stop": {"at_s": 1.5, "robots": (0,)}}, robot={"reach_m": 2.0})
     for _ in range(9):
-        robots = toward(missions, FAR, STAY)
+        robots = toward(missions, (1.75, 3.75, 1.25, 0.0, 0.0), STAY)
     place = (1.75, 2.25, 1.25, 0.0, 0.0)
     state, params = missions.state, missions.rules.params[0]
     assert state.missions[0]["time_s"] == pytest.approx(4.5)
@@ -150,6 +150,27 @@ def test_a_sound_radio_draws_nothing():
         robots = toward(missions, HERE, STAY)
     assert (robots["messages_received"] > 0).all()
     assert (missions.state.faults["radio_rng"] == before).all()
+
+
+@pytest.mark.parametrize("kind", ["late", "garbled", "repeated"])
+def test_a_radio_fails_where_less_than_its_share_is_drawn(kind):
+    """The least number that a mission draws is no fault; it is one where the share is the next number."""
+
+    def played(share):
+        missions = team({"radio": {kind: share, "robots": (0,)}}, channel={"i_min_bits": 0.0})
+        state = missions.state.faults[0, 0]
+        before = state["radio_rng"].copy()
+        for _ in range(3):
+            toward(missions, HERE, STAY)
+        return before, state["radio_rng"].copy(), int(state[f"messages_{kind}"])
+
+    rng, after, _ = played(5e-324)
+    drawn = []
+    while rng != after:
+        drawn.append(draw_uniform(rng))
+    assert len(drawn) >= 3
+    assert played(min(drawn))[2] == 0
+    assert played(np.nextafter(min(drawn), 1.0))[2] == 1
 
 
 @pytest.mark.parametrize("channel", [{}, {"delay_s": 0.2}, {"phase_s": 2.0, "repeats": 2}])

@@ -104,6 +104,28 @@ def test_a_score_is_that_of_the_robot_s_own_map_and_posts_come_first():
     assert np.floor(kept["place"][:2] / 0.5 + 0.0).tolist() in ([6, 7], [7, 7], [7, 6])  # beside the post
 
 
+def test_a_landmark_is_found_in_a_hall_that_is_higher_than_it_is_long_and_wide():
+    """5 × 7 voxels, and 13 high: a post from floor to ceiling, 2 m ahead."""
+    sensor = {"field_of_view_rad": (1.0, 0.0), "angular_step_rad": 0.1, "max_range_m": 9.0}
+    missions = started(
+        free_box(
+            grid=Grid((5, 7, 13), 0.5),
+            robots=1,
+            robot={"motion": "planar", "sensor_height_m": 2.25, "localization": SOME},
+            sensor=sensor,
+            fiducials={"own_number": 1, "own_score": 0.0},
+        )
+    )
+    solid = np.zeros((5, 7, 13), bool)
+    solid[2, 5] = True
+    build(missions, solid)
+    here = (1.25, 0.75, 2.25, np.pi / 2, 0.0)
+    put(missions, 0, here)
+    toward(missions, here)
+    (kept,) = missions.state.landmarks[0, 0]
+    assert kept["used"] and kept["place"][1] == pytest.approx(2.5, abs=0.02)  # the face of the post
+
+
 def test_where_none_are_asked_for_there_are_none():
     exact = started(free_box(robots=2, fiducials={"own_number": 5}))
     assert exact.state.landmarks.shape[1] == 0

@@ -166,6 +166,20 @@ def test_an_estimate_beyond_the_workspace_is_taken_into_it():
     assert robots["scans"][0] == 12 and np.isfinite(missions.mean).all()
 
 
+def test_an_estimate_that_leaves_the_workspace_between_two_scans_is_taken_into_it():
+    robot = {"localization": SOME, "redecide": 0.3, "turn_rate_rad_s": math.inf, "reach_m": 9.0}
+    missions = frozen(free_box(robots=1, robot=robot))
+    put(missions, 0, (1.75, 1.75, 1.25, 0.0, 0.0))
+    missions.state.estimates["error"][0, 0] = 0.0, 0.0, 0.0, 0.1  # so that it believes to drive to x = 3.4
+    robots = toward(missions, (3.4, 1.75, 1.25, 0.0, 0.0))
+    assert (robots["scans"][0], robots["under_way"][0]) == (0, True)
+    missions.state.estimates["error"][0, 0, :3] = 2.0, -3.0, 1.5
+    robots = toward(missions, view_of(missions, 0, 0).target)
+    estimate = missions.state.estimates[0, 0]
+    assert (robots["scans"][0], robots["under_way"][0]) == (0, True)
+    assert estimate["place"] + estimate["error"][:3] == pytest.approx([3.5, 0.0, 2.5], abs=1e-6)
+
+
 @pytest.mark.parametrize("channel", CHANNELS)
 def test_teammates_fuse_in_the_sender_s_frame_with_the_sender_s_covariance(channel):
     """Robot 0, an edge off and uncertain, scans; robot 1 sees nothing itself and holds the same map."""

@@ -199,9 +199,12 @@ def test_patch(mission):
 
 
 def test_a_teammate_in_the_patch():
-    missions = started(free_box(robots=2, observation=EVERYTHING, robot={"body_radius_m": 0.0}), seed=3)
-    put(missions, 0, (1.75, 2.75, 1.25, 0, 0))  # voxel (3, 5, 2)
-    put(missions, 1, (1.25, 3.75, 1.75, 0, 0))  # voxel (2, 7, 3)
+    grid = Grid((7, 11, 5), 0.5, (-1.0, 2.0, 0.5))
+    missions = started(
+        free_box(grid=grid, robots=2, observation=EVERYTHING, robot={"body_radius_m": 0.0}), seed=3
+    )
+    put(missions, 0, (0.75, 4.75, 1.75, 0, 0))  # voxel (3, 5, 2)
+    put(missions, 1, (0.25, 5.75, 2.25, 0, 0))  # voxel (2, 7, 3)
     missions.step(np.zeros((1, 2, 5)), np.zeros((1, 2), np.int64))
     first, second = (missions.layout.split(row)["patch"] for row in missions.observations[0])
     assert np.argwhere(first[3]).tolist() == [[1, 5, 2]]  # patch (5, 7, 3), middle (2, 3, 1)
