@@ -63,6 +63,25 @@ def test_repeats_cost_bits_and_are_fused_once():
         np.testing.assert_allclose(carried, map_entropy_bits(missions.precision[0]), rtol=1e-6)
 
 
+def test_a_teammate_is_heard_again_when_it_repeats_what_is_known():
+    """Two broadcasts of each buffer, 2 s apart: the first of all at 4 s, when the first phase has ended."""
+    settings = {"phase_s": 4.0, "repeats": 2}
+    missions = started(
+        free_box(robots=2, channel={**NO_ANNOUNCEMENTS, **settings}, ending={"sigma_end": 1e-4})
+    )
+    seen = []
+
+    def note(_):
+        heard = missions.state.heard[0]["heard_s"]
+        seen.append((float(missions.state.missions[0]["time_s"]), heard[0, 1], heard[1, 0]))
+
+    wander(missions, 20, 1, note)
+    later = [(heard, 2.0 * (time_s // 2.0)) for time_s, *heard in seen if time_s > 4.0 and time_s % 2.0]
+    assert {latest % 4.0 for _, latest in later} == {0.0, 2.0}
+    for heard, latest in later:
+        assert heard == [latest, latest]
+
+
 def test_repeats_make_up_for_lost_messages():
     shares = []
     for repeats in (1, 4):

@@ -17,6 +17,7 @@ from entropy_explore_env.missions.view_observation import ViewObserver
 from entropy_explore_env.randomness import Stream, splitmix_states
 from entropy_explore_env.reports.state_values import state_digest
 from entropy_explore_env.scenario import with_settings
+from entropy_explore_env.settings import Grid
 from entropy_explore_env.viewpoints.candidate_features import CONTEXT, FEATURES
 from entropy_explore_env.viewpoints.proposals.records import Kind
 from tests.missions.replays import check_replay
@@ -187,6 +188,24 @@ def test_who_drives_on_has_the_viewpoint_to_which_it_drives_among_its_candidates
             under_way += 1
         missions.step(np.zeros((1, 2, 1)), rng.integers(0, MOST, (1, 2)))
     assert under_way > 3
+
+
+def test_candidates_are_described_where_their_parts_lie_and_what_a_scan_brought_is_remembered():
+    """A plan of 5 × 7 voxels: a viewpoint of which a million bits were expected brings a few."""
+    sensor = {"field_of_view_rad": (1.0, 0.0), "angular_step_rad": 0.5}
+    settings = {"grid": Grid((5, 7, 1), 0.5), "robots": 1, "sensor": sensor}
+    missions = walked(0, 0, 1, **{**settings, "action": Action("candidates", candidates=2)})
+    parts = missions.layout.split(missions.observations[0, 0])
+    own, candidates = missions.state.experience[0, 0], missions.state.candidates[0, 0]
+    there = candidates["kind"] != Kind.NONE
+    assert there[0] and (parts["action_mask"] == there).all() and parts["context"].any()
+    assert ((parts["candidates"][:, 0] > 0.0) == there).all()
+    assert (np.diag(parts["overlaps"]) == there).all()
+    candidates["bits"] = 1e6
+    missions.step(np.zeros((1, 1, 1)), np.zeros((1, 1), np.int64))
+    came = missions.state.scan_utility_bits[0, 0].sum()
+    assert came > 1.0 and own["failures"] == 1
+    assert own["share"][0] == pytest.approx(came / 1e6, rel=1e-6)
 
 
 def test_where_actions_are_others_nothing_of_it_is_called(monkeypatch):

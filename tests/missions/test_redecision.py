@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from entropy_explore_env.missions.poses import driven_metres, pose_at, speed_at
-from entropy_explore_env.missions.redecision import CHOICE, keeps_speed
+from entropy_explore_env.missions.redecision import CHOICE, braking_metres, keeps_speed
 from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.missions.snapshot import restore, snapshot
 from entropy_explore_env.missions.view import view_of
@@ -157,6 +157,17 @@ def test_a_path_as_long_as_the_braking_distance_is_too_short_to_keep_the_speed()
     for length_m, keeps in ((0.25, False), (0.25 * (1.0 + 1e-6), True)):
         choice["path"][0] = length_m, 0.0, 0.0
         assert keeps_speed(choice, (0.25, 0.0, 0.0), 0.25) == keeps
+
+
+def test_a_robot_that_comes_to_rest_within_a_billionth_of_a_metre_stands():
+    """v²/2a at 1 m/s, of one that brakes with 5·10⁸ m/s², and with four fifths of that."""
+    missions = on_the_way()
+    params, robot = missions.rules.params[:1].copy(), missions.state.robots[0, 0]
+    params["max_speed_m_s"] = 1.0
+    for acceleration_m_s2, braking_m in ((5e8, 0.0), (4e8, 1.25e-9)):
+        params["acceleration_m_s2"] = acceleration_m_s2
+        assert speed_at(params[0], robot, 2.0) == 1.0
+        assert braking_metres(params[0], robot, 2.0) == braking_m
 
 
 def test_who_sees_its_path_blocked_decides_at_once_however_seldom_it_decides_else():
