@@ -44,6 +44,12 @@ FAILED = 1
 Row = dict[str, Any]
 
 
+def _any(number: int) -> bool:
+    """All cases are played."""
+    del number
+    return True
+
+
 def _one(row: Row) -> int:
     """What a case counts for: itself."""
     del row
@@ -62,6 +68,8 @@ class Proof(NamedTuple):
     """Of a case, on the clock."""
     counts: Callable[[Row], int] = _one
     """What a case comes to, in the unit of `quick` and `full`."""
+    cases: int | None = None
+    """How many there are; None = as many as it takes."""
 
 
 PROOFS = {
@@ -81,6 +89,7 @@ PROOFS = {
         len(file_fuzz.LOADERS) * file_fuzz.FILES,
         600.0,
         file_fuzz.files_of,
+        file_fuzz.CASES,
     ),
     "training": Proof(
         training_runs.play_number,
@@ -109,6 +118,7 @@ class Args:
         first: Number of the first case. Others draw other cases: a night may play those of its date.
         limit_s: Seconds of a proof after which no other case is begun; what is missing can be played later.
             0 = nothing is played, the page is made of what is kept.
+        loaders: Of the changed files, which loaders' are played; nothing = all, which take turns.
         results: Folder of what is kept.
         mutants: Folder of what `benchmarks.reliability.mutants` kept.
         page: The page to write; nothing = none.
@@ -119,6 +129,7 @@ class Args:
     cases: int | None = None
     first: int = 0
     limit_s: float = math.inf
+    loaders: tuple[str, ...] = ()
     results: Path = Path("results/reliability")
     mutants: Path = Path("results/mutants")
     page: Path | None = None
@@ -134,11 +145,15 @@ def main(words: Sequence[str]) -> int:
         raise SettingError("first", args.first, "a whole number ≥ 0")
     if args.cases is not None and args.cases < 1:
         raise SettingError("cases", args.cases, "a whole number ≥ 1")
+    for name in args.loaders:
+        if name not in file_fuzz.LOADERS:
+            raise SettingError("loaders", name, "one of " + ", ".join(file_fuzz.LOADERS))
     os.environ["ENTROPY_EXPLORE_ASSERT"] = "1"
     for name in args.proofs or PROOFS:
         proof = PROOFS[name]
         wanted = args.cases or (proof.quick if args.quick else proof.full)
-        carry_on(proof, args.results / f"{name}.jsonl", wanted, args.limit_s, args.first)
+        plays = file_fuzz.plays_one_of(args.loaders) if name == "files" and args.loaders else _any
+        carry_on(proof, args.results / f"{name}.jsonl", wanted, args.limit_s, args.first, plays)
     kept = {name: _kept(proof, args.results / f"{name}.jsonl") for name, proof in PROOFS.items()}
     folders = {file.stem: of_these_sources(read_rows(file)) for file in sorted(args.mutants.glob("*.jsonl"))}
     digests = {row["library"] for each in kept.values() for row in each.rows if "library" in row}
@@ -162,14 +177,30 @@ def versions() -> dict[str, str]:
     return {"Python": platform.python_version(), **{name: metadata.version(name) for name in names}}
 
 
-def carry_on(proof: Proof, file: Path, wanted: int, limit_s: float = math.inf, first: int = 0) -> None:
-    """Play the cases from a first one that are not kept yet, until those that are come to what is wanted."""
+def carry_on(
+    proof: Proof,
+    file: Path,
+    wanted: int,
+    limit_s: float = math.inf,
+    first: int = 0,
+    plays: Callable[[int], bool] = _any,
+) -> None:
+    """Play the cases from a first one that are not kept yet, until those that are come to what is wanted.
+
+    Args:
+        proof: Whose cases.
+        file: Of what is kept, a line each.
+        wanted: How much, in the proof's unit.
+        limit_s: After which no other case is begun.
+        first: Number of the first one.
+        plays: Whether a case is played, by its number.
+    """
     begun_s = time.monotonic()
     file.parent.mkdir(parents=True, exist_ok=True)
     rows = read_rows(file)
     known, reached = {row["number"] for row in rows}, sum(map(proof.counts, rows))
-    cases = wanted if proof.counts is _one else _MOST_CASES
-    missing = [number for number in range(first, first + cases) if number not in known]
+    cases = proof.cases or (wanted if proof.counts is _one else _MOST_CASES)
+    missing = [each for each in range(first, first + cases) if each not in known and plays(each)]
     if reached >= wanted or limit_s <= 0.0:
         missing = []
     with (

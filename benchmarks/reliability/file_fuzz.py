@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import atexit
 import tempfile
+from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from functools import cache
 from pathlib import Path
@@ -38,6 +39,7 @@ WORLDS = (
 )
 """Loaders of worlds, as `world_samples` names them."""
 LOADERS = (*KINDS, *WORLDS)
+CASES = len(LOADERS) * FILES // BATCH
 _IN_MEMORY = "/dev/shm"
 """A folder in memory, on systems that have it there: to write a file takes longer than to refuse it."""
 
@@ -73,6 +75,11 @@ def _reader_of(loader: str) -> ReaderProcess:
     reader = ReaderProcess()
     atexit.register(reader.close)
     return reader
+
+
+def plays_one_of(loaders: Sequence[str]) -> Callable[[int], bool]:
+    """Whether a case is one of these loaders', by its number."""
+    return lambda number: LOADERS[number % len(LOADERS)] in loaders
 
 
 def files_of(row: dict[str, Any]) -> int:

@@ -10,7 +10,7 @@ import subprocess
 import pytest
 
 from benchmarks.reliability import __main__ as command
-from benchmarks.reliability import determinism, fault_table, kills, memory, page, soak, sources
+from benchmarks.reliability import determinism, fault_table, file_fuzz, kills, memory, page, soak, sources
 from benchmarks.reliability.__main__ import PROOFS, Proof, carry_on, main
 from benchmarks.reliability.page import Kept, read_rows
 from entropy_explore_env.errors import SettingError
@@ -242,6 +242,38 @@ def test_a_proof_stops_at_what_is_asked_for_and_at_its_time(tmp_path, capsys):
     assert len(read_rows(tmp_path / "sevens.jsonl")) == 4
     assert len({row["library"] for row in read_rows(tmp_path / "sevens.jsonl")}) == 1
     assert "sevens: 28 of 70" in capsys.readouterr().err
+
+
+def test_only_the_cases_of_some_loaders_are_played(tmp_path, monkeypatch, capsys):
+    few = Proof(counts_for_seven, 10, 1_000, 60.0, seven, 3 * len(file_fuzz.LOADERS))
+    monkeypatch.setattr(command, "PROOFS", {"files": few})
+    monkeypatch.setattr(command, "page", lambda *_: "")
+    words = ["--proofs", "files", "--results", str(tmp_path), "--loaders"]
+    assert main([*words, "height png", "record"]) == 0
+    numbers = [row["number"] for row in read_rows(tmp_path / "files.jsonl")]
+    assert [file_fuzz.LOADERS[number % len(file_fuzz.LOADERS)] for number in numbers] == [
+        "record",
+        "height png",
+    ] * 3
+    capsys.readouterr()
+    with pytest.raises(SettingError, match="loaders = 'records': allowed is one of record, checkpoint"):
+        main([*words, "records"])
+
+
+def test_a_case_of_changed_files(monkeypatch):
+    """Of worlds, by a process that stays for the next case, and of what the library saves itself."""
+    monkeypatch.setattr(file_fuzz, "BATCH", 8)
+    image, loaders = file_fuzz.LOADERS.index("image"), len(file_fuzz.LOADERS)
+    rows = [file_fuzz.play_number(number) for number in (image, image + loaders, 0)]
+    assert [row["loader"] for row in rows] == ["image", "image", "record"]
+    assert all(file_fuzz.files_of(row) == 8 and "failure" not in row for row in rows)
+    assert 10.0 < rows[0]["held_mib"] < 512.0 and rows[2]["grew_mib"] >= 0.0
+    text = kept("files", rows)
+    assert f"| image | 16 | {rows[0]['loaded'] + rows[1]['loaded']} |" in text and "| record | 8 |" in text
+    reader = file_fuzz._reader_of("image")
+    assert reader._process is not None and reader._process.poll() is None
+    reader.close()
+    file_fuzz._reader_of.cache_clear()
 
 
 def counts_for_seven(number):
