@@ -117,7 +117,8 @@ def robot_model(
 
 def new_scratch(grid: Grid, models: Sequence[RobotModel]) -> ScanScratch:
     """Scratch space to evaluate viewpoints of robots of these kinds."""
-    return new_scan_scratch(grid.voxels, max(model.longest_ray for model in models) + sum(grid.shape))
+    longest = max(model.longest_ray for model in models) + sum(grid.shape)
+    return new_scan_scratch(grid.voxels, longest, max(len(model.scan.pitches) for model in models))
 
 
 @lean_kernel

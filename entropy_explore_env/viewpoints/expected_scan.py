@@ -39,7 +39,7 @@ class ScanModel(NamedTuple):
 
 
 class ScanScratch(NamedTuple):
-    """Scratch space of `expected_scan_bits` for V voxels and rays across L of them."""
+    """Scratch space of `expected_scan_bits` for V voxels, rays across L of them, and R rows of rays."""
 
     added: np.ndarray
     """(V,) float32, zeros, which it is again afterwards."""
@@ -51,17 +51,27 @@ class ScanScratch(NamedTuple):
     """(L,) int32, see `cast_ray`."""
     entered: np.ndarray
     """(L,) int64."""
+    rows: np.ndarray
+    """(R, 2) float64, cosine and sine of each row's pitch."""
 
 
-def new_scan_scratch(voxels: int, longest_ray: int) -> ScanScratch:
-    """Scratch space for a grid, and rays that cross at most so many of its voxels."""
+def new_scan_scratch(voxels: int, longest_ray: int, rows: int) -> ScanScratch:
+    """Scratch space for a grid, rays that cross at most so many of its voxels, and at most so many rows."""
     return ScanScratch(
         np.zeros(voxels, np.float32),
         np.zeros(voxels + 1, np.int32),
         np.zeros(voxels, np.uint8),
         np.zeros(longest_ray, np.int32),
         np.zeros(longest_ray, np.int64),
+        np.zeros((rows, 2)),
     )
+
+
+@inlined_kernel
+def fill_rows(scan, pitch, rows):
+    """Fill in cosine and sine of the pitch of each row of rays, by the pitch of the gaze."""
+    for row in range(len(scan.pitches)):
+        rows[row, 0], rows[row, 1] = math.cos(pitch + scan.pitches[row]), math.sin(pitch + scan.pitches[row])
 
 
 @inlined_kernel
@@ -109,13 +119,13 @@ def expected_scan_bits(belief, scan, viewpoint, scratch):
     """
     start, count = (viewpoint[0], viewpoint[1], viewpoint[2]), 0
     reach = scan.max_range_m / scan.voxel_size_m
+    fill_rows(scan, viewpoint[4], scratch.rows)
     for column in range(len(scan.yaws)):
         yaw = viewpoint[3] + scan.yaws[column]
         along, across = math.cos(yaw), math.sin(yaw)
         for row in range(len(scan.pitches)):
-            pitch = viewpoint[4] + scan.pitches[row]
-            level = math.cos(pitch)
-            direction = (along * level, across * level, -math.sin(pitch))
+            level = scratch.rows[row, 0]
+            direction = (along * level, across * level, -scratch.rows[row, 1])
             length, n, end = cast_ray(
                 belief.mean,
                 belief.size,

@@ -16,7 +16,7 @@ from entropy_explore_env.belief.raycast import OPEN, OPEN_END, STOP_AT_COVERED, 
 from entropy_explore_env.belief.visibility import mark_cones
 from entropy_explore_env.belief.voxel_index import grid_index
 from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel
-from entropy_explore_env.viewpoints.expected_scan import expected_precision
+from entropy_explore_env.viewpoints.expected_scan import expected_precision, fill_rows
 from entropy_explore_env.viewpoints.gathered_bits import gathered_bits
 
 _LEAST_SHARE = 1e-3
@@ -87,13 +87,13 @@ def imagine_scan(belief, scan, gap_probability, at, scratch):
         How many voxels are in `scratch.touched`.
     """
     count = 0
+    fill_rows(scan, at[4], scratch.rows)
     for column in range(len(scan.yaws)):
         yaw = at[3] + scan.yaws[column]
         along, across = math.cos(yaw), math.sin(yaw)
         for row in range(len(scan.pitches)):
-            pitch = at[4] + scan.pitches[row]
-            level = math.cos(pitch)
-            direction = (along * level, across * level, -math.sin(pitch))
+            level = scratch.rows[row, 0]
+            direction = (along * level, across * level, -scratch.rows[row, 1])
             start = (at[0], at[1], at[2])
             count = _imagine_ray(belief, scan, gap_probability, start, direction, count, scratch)
     return count

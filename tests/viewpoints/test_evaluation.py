@@ -26,7 +26,7 @@ SIZE = (7, 11, 5)
 def line_free(mean, start, finish, radius):
     belief = Belief(mean.ravel(), mean.ravel(), SIZE)
     extent = np.asarray(finish, float) - start
-    return is_line_free(belief, np.asarray(start, float), extent, radius, new_scan_scratch(1, 60))
+    return is_line_free(belief, np.asarray(start, float), extent, radius, new_scan_scratch(1, 60, 1))
 
 
 def test_lines_leave_room_for_the_body():

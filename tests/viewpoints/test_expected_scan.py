@@ -47,7 +47,9 @@ def model(stop_probability=0.0, known_precision=0.0, rays=1.0, sensor=SENSOR, po
 
 
 def expected(mean, precision, viewpoint, scan, cones=NO_CONES):
-    scratch = new_scan_scratch(mean.size, longest_crossing(*SIZE, math.inf, scan.voxels_behind))
+    scratch = new_scan_scratch(
+        mean.size, longest_crossing(*SIZE, math.inf, scan.voxels_behind), len(scan.pitches)
+    )
     belief = Belief(mean.ravel(), precision.ravel(), SIZE)
     mark_cones(cones, SIZE, scratch.left, 1)
     bits = expected_scan_bits(belief, scan, np.asarray(viewpoint, float), scratch)

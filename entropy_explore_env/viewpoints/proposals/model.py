@@ -234,7 +234,7 @@ def _new_scratch(scenario: Scenario, recipes: Sequence[Recipe]) -> ProposalScrat
     pool, far, gazes, longest = _sizes(scenario, recipes)
     mates = max(scenario.robots - 1, 0)
     return ProposalScratch(
-        scan=new_scan_scratch(voxels, longest),
+        scan=new_scan_scratch(voxels, longest, max(kind.sensor.rows for kind in scenario.kinds)),
         search=new_search(voxels),
         source=np.zeros(1, np.int32),
         path=np.empty(voxels, np.int32),
@@ -266,7 +266,7 @@ def proposal_bytes(scenario: Scenario) -> int:
     recipes = _recipes_of(scenario)
     pool, far, _, longest = _sizes(scenario, recipes)
     blocks = sum(_block_count(scenario, recipe) for recipe in recipes)
-    per_voxel = 8 + 4 + 8 + 4  # added and touched, path, marks, seen
+    per_voxel = 9 + 4 + 8 + 4  # added, touched and left, path, marks, seen
     kept = 14 * 8 * (pool + far) + candidates * (8 * candidates + VIEW.itemsize)
     return search_bytes(voxels) + per_voxel * voxels + 12 * longest + kept + 16 * blocks
 
