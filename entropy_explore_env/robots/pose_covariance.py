@@ -12,6 +12,8 @@ from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel
 
 _NO_DISTANCE_M = 1e-9
 """What is nearer has no direction, and is taken for this far away."""
+_ROUNDING = 1e-9
+"""Share of a variance that sums of products may be off by."""
 _LEVEL = 1e-9
 """A direction with a shorter horizontal part is vertical: any horizontal one is sideways to it."""
 
@@ -181,11 +183,45 @@ def lessen(covariance, gains, spread):
             covariance[row, column] -= gains[row] * gains[column] / spread
 
 
-@inlined_kernel
+@lean_kernel
 def keep_positive(covariance):
-    """Raise variances that rounding has brought below 0, in place."""
+    """Let no combination of errors have a variance below 0, but for rounding, in place.
+
+    What a sighting takes off may be all that was there, to the last digit that numbers hold; what is left
+    then is rounding, and no covariance. By Cholesky's factors, column by column: two errors have no more in
+    common than the geometric mean of what the errors before leave of their variances. A matrix that is a
+    covariance stays as it is.
+
+    Args:
+        covariance: (4, 4) float64, symmetric. Below the diagonal it holds the factors meanwhile.
+    """
     for number in range(4):
         covariance[number, number] = max(covariance[number, number], 0.0)
+    for column in range(4):
+        least = _ROUNDING * covariance[column, column]
+        left = left_by_those_before(covariance, column, column)
+        for row in range(column + 1, 4):
+            joint = covariance[column, row]
+            for before in range(column):
+                joint -= covariance[row, before] * covariance[column, before]
+            others = left_by_those_before(covariance, row, column)
+            if joint * joint > (left + least) * (others + _ROUNDING * covariance[row, row]):
+                bounded = math.copysign(math.sqrt(left * others), joint)
+                covariance[column, row] += bounded - joint
+                joint = bounded
+            covariance[row, column] = joint / math.sqrt(left) if left > least else 0.0
+    for row in range(1, 4):
+        for column in range(row):
+            covariance[row, column] = covariance[column, row]
+
+
+@lean_kernel
+def left_by_those_before(covariance, row, column):
+    """What the errors before a column leave of a variance, ≥ 0; their factors are below the diagonal."""
+    left = covariance[row, row]
+    for before in range(column):
+        left -= covariance[row, before] * covariance[row, before]
+    return max(left, 0.0)
 
 
 @inlined_kernel

@@ -21,7 +21,7 @@ from entropy_explore_env.robots.localization import (
     sighting_error,
     weigh_by_covariance,
 )
-from entropy_explore_env.robots.pose_covariance import within_half_turn
+from entropy_explore_env.robots.pose_covariance import keep_positive, within_half_turn
 from tests.reference import localization as reference
 from tests.reference.scenes import drawn, seeds
 
@@ -188,6 +188,62 @@ def test_covariances_stay_symmetric_and_positive(seed):
         covariance = estimate["covariance"]
         assert np.isfinite(covariance).all() and (covariance == covariance.T).all()
         assert np.linalg.eigvalsh(covariance).min() >= -1e-9 * max(np.trace(covariance), 1e-12)
+
+
+def least_share(covariance):
+    """The least eigenvalue, as a share of the trace; ≥ 0 where there is no uncertainty."""
+    return np.linalg.eigvalsh(covariance).min() / max(np.trace(covariance), 1e-300)
+
+
+def drawn_covariance(rng):
+    """One of 1 to 4 independent errors, of any sizes."""
+    root = rng.normal(size=(4, rng.integers(1, 5))) * 10.0 ** rng.uniform(-6, 6, (4, 1))
+    covariance = root @ root.T
+    return np.triu(covariance) + np.triu(covariance, 1).T
+
+
+@drawn(100)
+@given(seeds)
+def test_a_covariance_stays_as_it_is(seed):
+    """Also a singular one, whose eigenvalues are below 0 by rounding, and one with errors that are none."""
+    rng = np.random.default_rng(seed)
+    covariance = drawn_covariance(rng)
+    known = rng.random(4) < 0.2
+    covariance[known] = covariance[:, known] = 0.0
+    kept = covariance.copy()
+    keep_positive(kept)
+    np.testing.assert_array_equal(kept, covariance)
+
+
+@drawn(100)
+@given(seeds)
+def test_what_is_no_covariance_becomes_one(seed):
+    """Rounding of what was there before, larger than what is left; variances stay, or become 0."""
+    rng = np.random.default_rng(seed)
+    noise = rng.normal(size=(4, 4)) * 10.0 ** rng.uniform(-3, 3)
+    matrix = drawn_covariance(rng) + noise + noise.T
+    kept = matrix.copy()
+    keep_positive(kept)
+    assert (kept == kept.T).all() and least_share(kept) >= -1e-7
+    np.testing.assert_array_equal(np.diag(kept), np.maximum(np.diag(matrix), 0.0))
+
+
+def test_the_last_of_an_uncertainty_is_no_negative_one():
+    """Of 200 m to 10 nm and better: nothing of it is left in the last digits, but what rounding leaves.
+
+    A robot that turns on the spot does not know where it is any more, and sees landmarks on two sides.
+    """
+    rng = np.random.default_rng(0)
+    estimate = estimate_at()
+    rates = drift(xy_per_rad=1e4)
+    for step in range(200):
+        advance_estimate(estimate, rates, PLACE, 2.0 * (step % 2), 0.0)
+        for _ in range(3):
+            away = rng.normal(size=3) * np.array([1.0, 1.0, step % 2])
+            expected = tuple(away - estimate["error"][:3])
+            correct_estimate(estimate, tuple(away), expected, 10.0 ** rng.uniform(-9, 0), 1e-9)
+            assert least_share(estimate["covariance"]) >= -1e-7
+            assert np.abs(estimate["covariance"]).max() < 1e6
 
 
 def test_errors_of_sightings_lie_along_and_across_the_line_of_sight():
