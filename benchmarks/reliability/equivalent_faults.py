@@ -104,6 +104,13 @@ EQUIVALENT = (
         "No voxel of the truth is half solid.",
     ),
     Equivalent(
+        f"{_ROBOTS}/map_tree.py",
+        "write_tree",
+        "kind = kind_of(tree, region, known == 1, threshold_bits)  ->  "
+        "kind = kind_of(tree, region, known == 2, threshold_bits)",
+        "A part of what is known is looked through once more, and is found to be known.",
+    ),
+    Equivalent(
         f"{_ROBOTS}/motion.py",
         "time_after",
         "if since_rest_m < 0.0:  ->  if since_rest_m <= 0.0:",

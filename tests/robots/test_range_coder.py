@@ -15,8 +15,10 @@ from entropy_explore_env.robots.range_coder import (
     begin_reading,
     begin_writing,
     end_writing,
+    read_bit,
     read_byte,
     read_change,
+    write_bit,
     write_byte,
     write_change,
 )
@@ -64,6 +66,27 @@ def test_every_number_comes_back_once_the_odds_have_learned():
     begin_reading(coder, FIRST, end, False)
     assert [read_byte(coder, 0) for _ in numbers] == numbers
     assert [read_change(coder, 256) for _ in changes] == changes
+
+
+@pytest.mark.parametrize("reads", [False, True])
+@pytest.mark.parametrize(
+    ("before", "after"), [(1 << 25, 1 << 24), ((1 << 25) - (1 << 12), (1 << 32) - (1 << 19))]
+)
+def test_a_byte_is_done_as_soon_as_an_interval_is_shorter_than_its_place(before, after, reads):
+    """Half of 2²⁵ is not shorter than 2²⁴; half of 2²⁵ - 2¹² is, and becomes 256 times as long."""
+    coder = new_coder(20)
+    if reads:
+        begin_reading(coder, FIRST, FIRST, True)
+    else:
+        begin_writing(coder, FIRST, True)
+    record = coder.record[0]
+    record["range"], done = before, record["place"] + record["waiting"]
+    if reads:
+        read_bit(coder, 0)
+    else:
+        write_bit(coder, 0, 0)
+    assert record["range"] == after
+    assert record["place"] + record["waiting"] - done == int(after > 1 << 24)
 
 
 @drawn(40)
