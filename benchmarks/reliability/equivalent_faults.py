@@ -21,6 +21,12 @@ _BELIEF, _MISSIONS = "entropy_explore_env/belief", "entropy_explore_env/missions
 _ROBOTS = "entropy_explore_env/robots"
 EQUIVALENT = (
     Equivalent(
+        f"{_BELIEF}/elevation.py",
+        "_relax",
+        "if needed + 1 < together:  ->  if needed - 1 < together:",
+        "Sweeps of which the last was the last that is needed are done once more, from the same start.",
+    ),
+    Equivalent(
         f"{_BELIEF}/landmark_score.py",
         "landmark_score",
         "mean = total / count if count > 0 else 0.0  ->  mean = total / count if count > 0 else 1.0",
@@ -39,6 +45,13 @@ EQUIVALENT = (
         "inner = 0 < x < size[0] - 1 and 0 < y < size[1] - 1 and (lattice.layer >= 0)  ->  "
         "inner = 1 < x < size[0] - 1 and 0 < y < size[1] - 1 and (lattice.layer >= 0)",
         "One row more takes the slower way, which finds the same.",
+    ),
+    Equivalent(
+        f"{_BELIEF}/paths/planning.py",
+        "_passable_moves",
+        "inner = 0 < x < size[0] - 1 and 0 < y < size[1] - 1 and (lattice.layer >= 0)  ->  "
+        "inner = 0 < x < size[0] - 1 and 1 < y < size[1] - 1 and (lattice.layer >= 0)",
+        "One column more takes the slower way, which finds the same.",
     ),
     Equivalent(
         f"{_BELIEF}/paths/planning.py",
@@ -63,6 +76,18 @@ EQUIVALENT = (
         f"{_BELIEF}/map_update.py",
         "expected_utility",
         "if growth > 1.0 / _FOLD_BELOW:  ->  if growth > 1.0 * _FOLD_BELOW:",
+        "The product is folded at every voxel, and the sum of the logarithms stays the same.",
+    ),
+    Equivalent(
+        f"{_BELIEF}/map_update.py",
+        "expected_utility",
+        "if growth > 1.0 / _FOLD_BELOW:  ->  if growth > 2.0 / _FOLD_BELOW:",
+        "Whether a product is folded one voxel later does not change the sum of the logarithms.",
+    ),
+    Equivalent(
+        f"{_BELIEF}/map_update.py",
+        "fuse_row",
+        "if shrink < ROW_FOLD_BELOW:  ->  if not shrink < ROW_FOLD_BELOW:",
         "The product is folded at every voxel, and the sum of the logarithms stays the same.",
     ),
     Equivalent(

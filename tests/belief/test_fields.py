@@ -1,4 +1,4 @@
-"""The entropy gradient (Rocha04, eq. 30) against the slow reference."""
+"""The entropy gradient (Rocha04, eq. 30) against the slow reference, and what known voxels leave of it."""
 
 from __future__ import annotations
 
@@ -7,7 +7,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from entropy_explore_env.belief.fields import entropy_gradient
+from entropy_explore_env.belief.fields import (
+    entropy_gradient,
+    remaining_bits,
+    remaining_entropy_gradient,
+)
 from tests.reference import rocha04
 from tests.reference.scenes import SHAPES, as_reference, drawn, random_belief, seeds
 
@@ -32,3 +36,21 @@ def test_the_gradient_of_stripes():
     assert entropy_gradient(precision, 2, 3, 4, 0.5) == pytest.approx((2.0, -4.0, 6.0))
     assert entropy_gradient(precision, 0, 3, 4, 0.5) == pytest.approx((0.0, -4.0, 6.0))
     assert entropy_gradient(precision, 2, 0, 0, 0.5) == pytest.approx((2.0, 0.0, 0.0))
+
+
+def test_what_is_left_of_stripes_above_known_voxels():
+    """Of σ = 2^(x - 2y + 3z), where σ = 1 is known: the exponent where it is > 0, and its gradient."""
+    x, y, z = np.ogrid[0:7, 0:11, 0:5]
+    precision = (4.0 ** -(x - 2 * y + 3 * z)).astype(np.float32)
+    known = np.float32(1.0)
+    assert remaining_bits(precision[2, 3, 4], known) == 8.0
+    assert remaining_bits(precision[0, 3, 0], known) == 0.0
+    for voxel, expected in (
+        ((2, 3, 4), (1.0, -2.0, 3.0)),
+        ((1, 0, 0), (1.0, 0.0, 0.0)),
+        ((2, 1, 0), (0.0, -2.0, 0.0)),  # known, beside one of 2 bits
+        ((0, 2, 1), (0.0, -1.0, 0.0)),  # known, beside one of 1 bit
+        ((0, 1, 1), (0.0, -2.0, 1.0)),  # above a known one
+        ((0, 3, 0), (0.0, 0.0, 0.0)),
+    ):
+        assert remaining_entropy_gradient(precision, *voxel, known) == expected

@@ -10,7 +10,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from entropy_explore_env.belief.entropy import map_entropy_bits
-from entropy_explore_env.belief.map_update import expected_utility, fuse_ray
+from entropy_explore_env.belief.map_update import expected_utility, fuse_ray, fuse_row
 from entropy_explore_env.belief.measurement_model import measured_coverage, measurement_precision
 from entropy_explore_env.belief.raycast import NEVER_STOP, Line, cast_ray
 from entropy_explore_env.settings import gaussian_entropy_bits
@@ -145,6 +145,25 @@ def test_utility_of_long_rays_is_folded_without_loss(n):
     mean, precision = np.full(n, 0.5, np.float32), np.full(n, 1e-8, np.float32)
     bits = fuse_ray(mean, precision, crossed, coverage + np.float32(0.75), 0, n, 1e8)  # all of it covered
     assert bits == pytest.approx(n * math.log2(1e8), rel=1e-6)
+    assert mean == pytest.approx(0.75) and precision == pytest.approx(1e8)
+
+
+def test_a_row_of_voxels_is_fused_with_one_gaussian_by_hand():
+    """Voxels of precisions 2 and 6, with coverage 1 of precision 2: twice as precise, and 4/3 times."""
+    mean, precision = np.array([0.5, 0.0, 0.2, 0.7], np.float32), np.array([9, 2, 6, 9], np.float32)
+    bits, shrink = fuse_row(mean, precision, 1, 3, np.float32(1.0), np.float32(2.0))
+    assert (bits, shrink) == (0.0, pytest.approx(0.5 * 0.75))
+    assert precision.tolist() == [9, 4, 8, 9]
+    assert mean == pytest.approx([0.5, 0.5, 0.4, 0.7])
+
+
+@pytest.mark.parametrize("n", [1, 6, 7, 8, 100])
+def test_the_bits_of_long_rows_are_folded_without_loss(n):
+    """σ falls from 1e4 to 1e-4 in every voxel."""
+    mean, precision = np.full(n, 0.5, np.float32), np.full(n, 1e-8, np.float32)
+    bits, shrink = fuse_row(mean, precision, 0, n, np.float32(0.75), np.float32(1e8))
+    assert bits - 0.5 * math.log2(shrink) == pytest.approx(n * math.log2(1e8), rel=1e-6)
+    assert (bits > 0.0) == (n > 6)  # seven ratios of 1e-16 are below what is folded
     assert mean == pytest.approx(0.75) and precision == pytest.approx(1e8)
 
 
