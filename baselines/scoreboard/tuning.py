@@ -34,9 +34,9 @@ GRID: Mapping[str, Mapping[str, tuple[float, ...]]] = {
         "passing": (0, 0.06, 0.125),
         "meanwhile": (0, 0.25, 0.5, 1),
     },
-    "information-gain": {"weight": (0.05, 0.15, 0.4, 1, 2), "horizon": (1, 3)},
-    "receding-horizon": {"decay": (0.5, 1, 2, 4), "edge": (0.2, 0.4, 0.8), "places": (15, 30, 60)},
-    "tour": {"near": (0.75, 1.5, 3), "cover": (0.25, 0.5, 1), "stay": (0.02, 0.1, 0.3)},
+    "information-gain": {"weight": (0.02, 0.05, 0.15, 0.4, 1, 2), "horizon": (1, 3)},
+    "receding-horizon": {"decay": (0.5, 1, 2, 4, 8, 16), "edge": (0.2, 0.4, 0.8), "places": (15, 30, 60)},
+    "tour": {"near": (0.4, 0.75, 1.5, 3), "cover": (0.25, 0.5, 1, 2), "stay": (0.02, 0.1, 0.3)},
 }
 """Strategy → setting → values, the default among them. With one robot the coordinated rules have none."""
 BEGIN, END = "<!-- tuning: begin -->", "<!-- tuning: end -->"
