@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from entropy_explore_env.belief.fields import Belief
@@ -20,6 +22,14 @@ def voxel_of(view: RobotView, pose: np.ndarray) -> int:
     grid = view.scenario.grid
     indices = np.clip(grid.voxel_of(pose[:3]), 0, np.array(grid.shape) - 1)
     return int(np.ravel_multi_index(tuple(indices), grid.shape))
+
+
+def teammates_that_share(view: RobotView) -> Mapping[int, TeammateView]:
+    """Teammates whose scans the channel carries to the robot.
+
+    What the others go to see it has to see itself: to leave it to them, it would wait for nothing.
+    """
+    return view.teammates if view.scenario.channel.burst > 0 else {}
 
 
 def announced_cone(grid: Grid, mate: TeammateView) -> np.void:

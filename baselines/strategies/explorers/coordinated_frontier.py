@@ -31,7 +31,7 @@ from baselines.strategies.explorers.explorer import Explorer, Scene
 from baselines.strategies.explorers.nearest_frontier import best_of
 from baselines.strategies.explorers.teammates import centres_of, lengths_of_all, team_of
 from baselines.strategies.frontier.voxel.map import NONE
-from baselines.strategies.knowledge import voxel_of
+from baselines.strategies.knowledge import teammates_that_share, voxel_of
 from entropy_explore_env.validation import check_positive
 
 _UNREACHED = 1e9
@@ -129,7 +129,7 @@ class AssignedFrontier(_Coordinated):
 
     def pick_among(self, scene: Scene, voxels: np.ndarray, lengths: np.ndarray) -> int:
         """See `_Coordinated`."""
-        teammates = scene.view.teammates.values()
+        teammates = teammates_that_share(scene.view).values()
         mates = [mate for mate in teammates if mate.heard_s >= 0.0 and not mate.silent]
         known = np.array([voxel_of(scene.view, mate.pose) for mate in mates], np.int32)
         group = groups(centres_of(scene, voxels), self.config.group * scene.cells.reach)

@@ -8,11 +8,11 @@ import numpy as np
 
 from baselines.strategies.explorers.explorer import Scene
 from baselines.strategies.frontier.allocation import stays, under_way
-from baselines.strategies.knowledge import voxel_of
+from baselines.strategies.knowledge import teammates_that_share, voxel_of
 
 
 class Team(NamedTuple):
-    """Teammates of which a robot has heard, those that are silent left out, in two groups."""
+    """Teammates of which a robot has heard, in two groups; not those that are silent or share no scans."""
 
     places: np.ndarray
     """(M,) int32 voxels where those were who choose anew now, as far as the robot knows."""
@@ -23,7 +23,7 @@ class Team(NamedTuple):
 def team_of(scene: Scene) -> Team:
     """The teammates of a scene's robot."""
     view, places, targets = scene.view, [], []
-    for mate, seen in view.teammates.items():
+    for mate, seen in teammates_that_share(view).items():
         if seen.silent or (seen.heard_s < 0.0 and seen.announced_s < 0.0):
             continue
         if under_way(view, seen, mate) and not stays(view, seen):

@@ -35,6 +35,7 @@ import numpy as np
 from baselines.strategies.frontier.allocation import Allocator, Choice, Value, stays, under_way
 from baselines.strategies.frontier.candidates import FrontierConfig
 from baselines.strategies.frontier.voxel.map import NONE
+from baselines.strategies.knowledge import teammates_that_share
 from baselines.strategies.protocol import random_viewpoint
 from entropy_explore_env.belief.paths.search import extract_path, new_search
 from entropy_explore_env.belief.paths.string_pulling import string_pulled
@@ -333,7 +334,7 @@ class FrontierStrategy:
         """The robot's candidate; if there is none, a finer σ counts as explored."""
         known = {
             mate: seen
-            for mate, seen in view.teammates.items()
+            for mate, seen in teammates_that_share(view).items()
             if seen.heard_s >= 0.0 and not seen.silent  # a silent one takes no candidate
         }
         together = self.config.allocation == "synchronous"

@@ -14,7 +14,7 @@ from typing import Literal
 
 import numpy as np
 
-from baselines.strategies.knowledge import belief_of, voxel_of
+from baselines.strategies.knowledge import belief_of, teammates_that_share, voxel_of
 from baselines.strategies.protocol import random_viewpoint
 from baselines.strategies.voronoi.controls import (
     CellFunctional,
@@ -231,10 +231,10 @@ class VoronoiCoverage:
         return np.array(path, np.int64)
 
     def _sources(self, view: RobotView, here: int) -> tuple[np.ndarray, int]:
-        """Voxels of the robots that are heard and of this one, by number, and the index of this one."""
+        """Voxels of the robots that are heard and share, and of this one, by number; and this one's index."""
         heard = {
             mate: voxel_of(view, seen.pose)
-            for mate, seen in view.teammates.items()
+            for mate, seen in teammates_that_share(view).items()
             if seen.heard_s >= 0.0 and not seen.silent
         }
         heard[view.robot] = here

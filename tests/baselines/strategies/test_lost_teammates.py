@@ -82,3 +82,30 @@ def test_the_team_sees_all_whatever_fails(strategy, fault):
     end, longest_s = ended(strategy, fault)
     assert end is MissionEnd.SEEN
     assert longest_s < STILL_S or strategy == EXPECTS_TOO_LONG
+
+
+@pytest.mark.parametrize(
+    "strategy", ["coordinated-frontier", "assigned-frontier", "voronoi", "per-time-visibility"]
+)
+def test_nothing_is_left_to_teammates_whose_scans_do_not_come(strategy):
+    """Only announced, teammates' viewpoints take no frontier: all go where they would go if nobody spoke."""
+    went = []
+    for channel in ({"burst": 0}, {"burst": 0, "announcements": False}, {}):
+        settings = {
+            "grid": GRID,
+            "robots": 3,
+            "channel": channel,
+            "ending": {"time_limit_s": 60.0},
+            "robot": {"reach_m": 3.0},
+            "sensor": {"max_range_m": 3.0},
+        }
+        env, places = EntropyExploreEnv(with_settings(scripted(OFFICE), settings)), []
+        starts = [[1.0, 1.0, 0.05, 0.0, 0.0], [3.0, 2.0, 0.05, 1.5, 0.0], [5.0, 1.0, 0.05, 2.0, 0.0]]
+
+        def note(env: EntropyExploreEnv, places: list = places) -> None:
+            places.append(env.missions.state.robots[0]["origin"].copy())
+
+        run_mission(env, make_strategy(strategy), 1, note, options={"world": two_rooms(), "starts": starts})
+        went.append(np.array(places[:15]))  # later bodies stop each other, and who knows whose gives way
+    np.testing.assert_array_equal(went[0], went[1])
+    assert not np.array_equal(went[0], went[2])
