@@ -94,7 +94,7 @@ def test_a_card_says_what_the_scenario_sets(name, tmp_path):
     text = card(scenario, tmp_path)
     assert text.startswith(f"# {name}\n") and f'eee.parallel_env("{name}")' in text
     assert f"`{environment_id(name)}`" in text and f"{scenario.grid.voxels:,}" in text
-    for part in ("robot", "sensor", "channel", "ending", "reward", "action", "observation"):
+    for part in ("robot", "sensor", "channel", "faults", "ending", "reward", "action", "observation"):
         for field in dataclasses.fields(getattr(scenario, part)):
             assert f"| `{field.name}` | " in text, (part, field.name)
     assert f"| `robots` | {scenario.robots} | " in text
@@ -102,6 +102,14 @@ def test_a_card_says_what_the_scenario_sets(name, tmp_path):
     (words,) = re.findall(r"^    python -m (baselines.run .*)$", text, re.MULTILINE)
     strategy = "cliff-next-best-view" if name == "cliff" else "best"
     assert f"{name} --robots {scenario.robots} --strategy {strategy} " in words
+
+
+def test_a_card_shows_what_fails_and_whose_map_counts_then(tmp_path):
+    settings = {"faults": {"stop": {"at_s": 30.0, "robots": (1,)}}, "ending": {"termination": "shared"}}
+    text = card(with_settings(scenarios.ROOM, settings), tmp_path)
+    assert "| `stop` | `Outage(at_s=30.0, robots=(1,))` | `Outage()` | " in text
+    assert "the entropy of the map of the last robot that still works falls to H_th" in text
+    assert "the entropy of any robot's map falls to H_th" in card(scenarios.ROOM, tmp_path)
 
 
 def test_numbers_of_actions_that_robots_ignore_are_named():

@@ -59,6 +59,14 @@ def _write(path: Path, content: bytes) -> Path:
     return path
 
 
+_WHOSE = {
+    "any": "any robot's map",
+    "all": "the last robot's map",
+    "shared": "the map of the last robot that still works",
+}
+"""Ending.termination → by whose map a mission ends."""
+
+
 def gallery() -> str:
     """The page that shows all scenarios."""
     rows = [
@@ -263,7 +271,7 @@ def _ending(scenario: Scenario) -> str:
     rows = [
         [
             "terminates",
-            f"when the entropy of {ending.termination} robot's map falls to H_th (`ending.termination`)",
+            f"when the entropy of {_WHOSE[ending.termination]} falls to H_th (`ending.termination`)",
         ],
         ["H(0)", f"{begin:,.0f} bits: every voxel at σ = {scenario.sigma_prior:g}"],
         [
