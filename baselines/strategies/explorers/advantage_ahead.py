@@ -45,7 +45,7 @@ _STOOD = 1e-3
 """A robot that is nearer to where it was, in voxel edges, has not moved."""
 _EXTENSION = 1.5
 """Where too little is found, the search goes this many times as far."""
-_TOUR = TourConfig(most_near=40, most_far=20)
+_TOUR = TourConfig(near=1.5, cover=0.5, most_near=40, most_far=20)
 """Of slivers."""
 _TRIED, _FIRST = 3, 1e6
 """Slivers that are looked at, the nearest ones; a length that puts the one that it is under way to first."""

@@ -37,7 +37,7 @@ class InformationGainConfig:
         SettingError: One of them is not allowed.
     """
 
-    weight: float = 0.15
+    weight: float = 0.05
     horizon: float = 3.0
 
     def __post_init__(self) -> None:

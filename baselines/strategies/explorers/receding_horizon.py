@@ -46,7 +46,7 @@ class RecedingHorizonConfig:
         SettingError: One of them is not allowed.
     """
 
-    decay: float = 2.0
+    decay: float = 8.0
     edge: float = 0.4
     around: float = 1.5
     places: int = 30

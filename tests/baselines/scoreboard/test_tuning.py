@@ -60,7 +60,7 @@ def test_a_new_table_takes_the_place_of_the_old_one():
 def test_the_command_writes_the_paths_over_the_defaults(tmp_path, monkeypatch, capsys):
     plan = small_plan(ending={"seen_share": 0.8, "time_limit_s": 500.0})
     monkeypatch.setattr(tuning, "training_plans", lambda n: (Task("hall", (Place("hall", plan, n),)),))
-    monkeypatch.setattr(tuning, "GRID", {"tour": {"near": (1.5, 0.05)}})
+    monkeypatch.setattr(tuning, "GRID", {"tour": {"near": (0.75, 0.05)}})
     page = tmp_path / "page.md"
     page.write_text(f"{BEGIN}\n{END}\n")
     words = ["--strategies", "tour", "--starts", "2", "--runs", str(tmp_path / "runs"), "--page", str(page)]

@@ -15,12 +15,12 @@ from tests.reference.scenes import drawn, seeds
 
 def test_a_tour_of_both_ends_begins_with_the_nearer_and_keeps_its_target_when_that_is_as_good():
     plan = corridor()
-    assert cell(plan, Tour().pick(scene_of(plan, (8, 1)))) == (1, 1)
-    assert cell(plan, Tour().pick(scene_of(plan, (20, 1)))) == (27, 1)
+    assert cell(plan, Tour(TourConfig(near=1.5, cover=0.5)).pick(scene_of(plan, (8, 1)))) == (1, 1)
+    assert cell(plan, Tour(TourConfig(near=1.5, cover=0.5)).pick(scene_of(plan, (20, 1)))) == (27, 1)
     right = int(np.ravel_multi_index((27, 1), plan.shape))
     near_middle = scene_of(plan, (13, 1), target=right)
-    assert cell(plan, Tour(TourConfig(stay=0.2)).pick(near_middle)) == (27, 1)
-    assert cell(plan, Tour(TourConfig(stay=0.0)).pick(scene_of(plan, (13, 1), target=right))) == (1, 1)
+    assert cell(plan, Tour(TourConfig(near=1.5, cover=0.5, stay=0.2)).pick(near_middle)) == (27, 1)
+    assert cell(plan, Tour(TourConfig(near=1.5, cover=0.5, stay=0.0)).pick(scene_of(plan, (13, 1), target=right))) == (1, 1)
 
 
 def test_lengths_between_places_are_those_of_paths_by_hand():
