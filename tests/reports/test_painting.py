@@ -261,3 +261,15 @@ def test_robots_that_drift_are_drawn_where_they_believe_to_be(frames):
     assert (frame.true_m[:, :2] != frame.positions_m[:, :2]).all()
     largest = np.linalg.norm(estimates["error"][:, :3], axis=1).max()
     assert frame.status[-1] == f"pose error {largest:.2f} m at most"
+
+
+def test_a_picture_says_how_many_robots_have_stopped(frames):
+    """Only where faults happen; whose body stands there is crossed out."""
+    for faults in ({}, {"stop": {"at_s": 0.001, "robots": (1,)}}):
+        missions = started(free_box(robots=3, faults=faults))
+        painter = Painter("rgb_array")
+        watch(missions, painter, 2)
+        painter.paint(missions)
+    sound, failing = frames[-2], frames[-1]
+    assert not any(line.startswith("stopped") for line in sound.status) and list(sound.stopped) == []
+    assert "stopped 1 of 3" in failing.status and list(failing.stopped) == [1]
