@@ -104,6 +104,19 @@ EQUIVALENT = (
         "Bounds that are not narrowed here are narrowed by the loops that follow.",
     ),
     Equivalent(
+        f"{_BELIEF}/visibility.py",
+        "_column_span",
+        "return (0, 0)  ->  return (1, 0)",
+        "Both are spans without a layer.",
+    ),
+    Equivalent(
+        f"{_BELIEF}/visibility.py",
+        "_column_span",
+        "low, high = (max(low, (root - half_b) / a), min(high, -(root + half_b) / a))  ->  "
+        "low, high = (max(low, (root - half_b) / a), max(high, -(root + half_b) / a))",
+        "Bounds that are not narrowed here are narrowed by the loops that follow.",
+    ),
+    Equivalent(
         f"{_MISSIONS}/faults.py",
         "next_stop",
         "soonest, soonest_s = (0, math.inf)  ->  soonest, soonest_s = (1, math.inf)",

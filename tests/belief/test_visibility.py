@@ -92,6 +92,19 @@ def test_marks_are_the_voxels_whose_centres_lie_in_a_cone(seed, half_angle, radi
     assert (marks == 7).all()
 
 
+@pytest.mark.parametrize("side", [1, -1])
+def test_a_cone_that_is_wide_around_the_vertical_by_hand(side):
+    """50° up or down from the middle of layer 2, ±80°: 30° beyond the level ahead, above 50° behind."""
+    apex = (1.5, 5.5, 2.5, 0.0, -side * math.radians(50.0))
+    cones = np.array([cone_of(np.array(apex), math.inf, math.radians(80.0))])
+    marks = np.zeros(math.prod(SIZE), np.uint8)
+    mark_cones(cones, SIZE, marks, 1)
+    columns = marks.reshape(SIZE)[:, 5]
+    lowest = (2, 0, 0, -1, -1, -2, -2)  # above 1.2; the apex; above -0.6, -1.2, -1.7, -2.3 and -2.9
+    for x, low in enumerate(lowest):
+        assert columns[x].astype(bool).tolist() == [low <= side * layer for layer in range(-2, 3)], x
+
+
 # --- What cones cover (RochaMI, eqs. 5 and 7-10)
 
 KNOWN = 0.05**-2
