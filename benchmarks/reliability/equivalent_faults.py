@@ -85,12 +85,6 @@ EQUIVALENT = (
         "Whether a product is folded one voxel later does not change the sum of the logarithms.",
     ),
     Equivalent(
-        f"{_BELIEF}/map_update.py",
-        "fuse_row",
-        "if shrink < ROW_FOLD_BELOW:  ->  if not shrink < ROW_FOLD_BELOW:",
-        "The product is folded at every voxel, and the sum of the logarithms stays the same.",
-    ),
-    Equivalent(
         f"{_BELIEF}/paths/planning.py",
         "resume_search",
         "query = _Query(ANY_GOAL, (0, 0, 0), _BUCKET_WIDTH ** (-1) / costs.min_per_edge)  ->  "
