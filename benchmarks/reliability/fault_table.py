@@ -13,7 +13,7 @@ _REASONS = {(each.path, each.function, each.what): each.reason for each in EQUIV
 
 def share_found(faults: Collection[Row]) -> float:
     """The share of faults that a test finds, of those that can change what the code does."""
-    able = [row for row in faults if not _reason(row)]
+    able = [row for row in faults if not reason_of(row)]
     return sum(bool(row["found"]) for row in able) / max(len(able), 1)
 
 
@@ -54,7 +54,7 @@ def fault_table(mutants: Mapping[str, Sequence[Row]]) -> str:
 def _said(row: Row) -> str:
     """What became of a fault that no test found."""
     place = f"{row['path']}:{row['line']}: `{row['what']}`"
-    if reason := _reason(row):
+    if reason := reason_of(row):
         return f"without effect: {place}: {reason}"
     if row.get("late"):
         return f"late: {place}"
@@ -70,9 +70,9 @@ def _late(row: Row) -> bool:
 
 
 def _equivalent(row: Row) -> bool:
-    return not row["found"] and bool(_reason(row))
+    return not row["found"] and bool(reason_of(row))
 
 
-def _reason(row: Row) -> str:
+def reason_of(row: Row) -> str:
     """Why a fault cannot change anything; "" = it can."""
     return "" if row["found"] else _REASONS.get((row["path"], row.get("function", ""), row["what"]), "")

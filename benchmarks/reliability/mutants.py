@@ -7,7 +7,8 @@ Each runs in a copy of the checkout, with interpreted kernels, because compiling
 for each fault. Only the tests that take its line, as `benchmarks.reliability.coverage` keeps them, are run:
 those of the file itself first, then the quickest, until one fails. A test that takes too long with a fault
 finds nothing: the others are run, and the fault is late if they find nothing either. Results are kept in
-`results/mutants`, a line each; what has one is not run again.
+`results/mutants`, a line each; what has one is not run again. Faults that are named as without effect in
+`benchmarks.reliability.equivalent_faults` are not counted.
 """
 
 from __future__ import annotations
@@ -26,6 +27,7 @@ from typing import Any, NamedTuple
 
 from baselines.cli.arguments import Positional, parse, run_command
 from benchmarks.reliability.coverage import FOLDERS, KEPT, ROOT, measure, sources_digest, test_files
+from benchmarks.reliability.fault_table import reason_of
 from benchmarks.reliability.faults_in_source import Mutant, mutants_of
 from benchmarks.reliability.mutant_runs import LATE, Host
 from benchmarks.reliability.page import read_rows
@@ -47,7 +49,8 @@ class Args:
         test_s: Seconds of the processor that a test may take without a fault, to be run at all.
         tests_s: Of all tests that are run for a fault, as they take without it.
         limit_s: On the clock, of all tests for one fault.
-        retry: Run those again that no test found, also those that were drawn before.
+        retry: Run those again that no test found, also those that were drawn before; but not those that are
+            named as without effect.
         stop_s: Seconds on the clock after which no other fault is begun.
         kept: Folder of what files of tests took, as of `benchmarks.reliability.coverage`.
         out: Folder of the results.
@@ -118,9 +121,9 @@ def main(words: Sequence[str]) -> int:
     kept = args.out / f"{'.'.join(path.with_suffix('').parts)}.jsonl"
     known = {row["digest"]: row for row in read_rows(kept)}
     if args.retry:
-        again = {digest for digest, row in known.items() if not row["found"]}
+        again = {digest for digest, row in known.items() if not row["found"] and not reason_of(row)}
         faults = [fault for fault in every if fault.digest in again | {each.digest for each in faults}]
-        known = {digest: row for digest, row in known.items() if row["found"]}
+        known = {digest: row for digest, row in known.items() if digest not in again}
     missing = [fault for fault in faults if fault.digest not in known]
     begun_s = time.monotonic()
     if missing:
@@ -138,6 +141,7 @@ def main(words: Sequence[str]) -> int:
                     told = row["found"] or (LATE if row["late"] else f"SURVIVED {row['tests']} tests")
                     print(f"{row['path']}:{row['line']}: {told}: {row['what']}", flush=True)
     tried = [known[fault.digest] for fault in faults if fault.digest in known]
+    tried = [row for row in tried if not reason_of(row)]
     found = sum(bool(row["found"]) for row in tried)
     print(f"{found} of {len(tried)} faults were found, {len(faults)} drawn of {len(every)} that there are")
     return SURVIVED if found < len(tried) else 0

@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 from coverage import CoverageData
 
-from benchmarks.reliability import mutant_runs, mutants
+from benchmarks.reliability import fault_table, mutant_runs, mutants
 from benchmarks.reliability.coverage import ROOT
 from benchmarks.reliability.equivalent_faults import EQUIVALENT
 from benchmarks.reliability.faults_in_source import mutants_of
@@ -285,3 +285,8 @@ def test_what_is_known_is_not_run_again_unless_no_test_found_it(tmp_path, capsys
     monkeypatch.setattr(mutants, "_reached", lambda kept, package: Reached({}, {}))
     assert main([str(path), "--sample", "2", "--no-kernels", "--out", str(tmp_path), *again]) == 0
     assert "1 of 1 faults were found, 2 drawn of" in capsys.readouterr().out
+    monkeypatch.setitem(fault_table._REASONS, (str(path), "", "x"), "Both are odd.")
+    monkeypatch.delattr(mutants, "_reached")  # nothing is run: the other one is named as without effect
+    for words in ([], again):
+        assert main([str(path), "--sample", "2", "--no-kernels", "--out", str(tmp_path), *words]) == 0
+        assert "1 of 1 faults were found, 2 drawn of" in capsys.readouterr().out
