@@ -11,6 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from entropy_explore_env.errors import ActionError
+from entropy_explore_env.missions.action import ROUNDING as PULLED_IN_BEYOND
 from entropy_explore_env.missions.action import action_space, decode_action, encode_viewpoint
 from entropy_explore_env.missions.observation.mask import write_mask
 from entropy_explore_env.missions.rules import discrete_moves, rules_of
@@ -221,6 +222,13 @@ def test_a_discrete_move_from_anywhere_in_a_voxel_goes_to_a_centre_but_not_beyon
     centre = np.array([*grid.centre_of(np.array([5, 5, 2])), 0.0, 0.0])  # 1.2 m ahead
     got = decode(rules, pose, encode_viewpoint(rules, pose, centre))
     assert got[:3] == pytest.approx([2.55, 2.75, 1.25])
+
+
+def test_a_viewpoint_beyond_reach_by_more_than_rounding_is_pulled_in():
+    rules, farthest = rules_of(free_box(robot={"reach_m": 1.0})), 1.0 + PULLED_IN_BEYOND
+    assert decode(rules, np.zeros(5), [farthest, 0.0, 0.0, 0.0, 0.0])[0] == farthest
+    beyond = np.nextafter(farthest, 2.0)
+    assert decode(rules, np.zeros(5), [0.0, beyond, 0.0, 0.0, 0.0])[1] == pytest.approx(1.0, abs=1e-12)
 
 
 @pytest.mark.parametrize(

@@ -173,6 +173,23 @@ def test_a_wall_seen_under_way_ends_the_drive_there_and_the_robot_decides_anew()
     assert end_of(robot) is MoveEnd.ARRIVED
 
 
+def test_a_drive_counts_as_blocked_that_ends_before_what_is_not_there():
+    """It comes to believe in a wall that is none, a metre before it scans."""
+    sensor = {**ALL_ROUND, "scan_every_m": 1.0}
+    missions = started(planner(decision_period_s=0.25, sensor=sensor))
+    know(missions, np.zeros(FLAT.shape, bool))
+    put(missions, 0, START)
+    robot = toward(missions, (0.75, 4.75, 0.25, 0.0, 0.0))[0]
+    assert (end_of(robot), robot["blocked_moves"]) == (MoveEnd.ARRIVED, 0)
+    wall = np.zeros(FLAT.shape, bool)
+    wall[:, 6] = True
+    know(missions, wall)
+    while not robot["scans"]:
+        toward(missions, (0.75, 4.75, 0.25, 0.0, 0.0))
+    assert (end_of(robot), robot["blocked_moves"], robot["deciding"]) == (MoveEnd.SEEN, 1, True)
+    assert robot["path_m"] == pytest.approx(1.0) == pytest.approx(robot["distance_m"])
+
+
 def test_the_end_of_a_path_counts_though_an_unseen_wall_ends_the_drive_before():
     """The wall is where the plan leads, not where the drive would stop."""
     missions = started(planner(sensor={**ALL_ROUND, "scan_every_m": 1.0}))
