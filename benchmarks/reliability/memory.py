@@ -20,7 +20,7 @@ from benchmarks.reliability.step_checks import CheckedSteps
 from entropy_explore_env.envs.vector_env import EntropyExploreVectorEnv
 from entropy_explore_env.scenarios import SCENARIOS
 
-ROBOT_STEPS = 20_000_000
+ROBOT_STEPS = 10_000_000
 """Asked for in all."""
 MOST_GROWTH = 0.01
 """After the first million, as a share of what the process held then."""

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from entropy_explore_env.missions.poses import driven_metres, pose_at, speed_at
-from entropy_explore_env.missions.redecision import CHOICE, braking_metres, keeps_speed
+from entropy_explore_env.missions.redecision import CHOICE, braking_metres, keeps_speed, keeps_target
 from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.missions.snapshot import restore, snapshot
 from entropy_explore_env.missions.view import view_of
@@ -150,6 +150,23 @@ def test_a_viewpoint_is_the_same_within_a_thousandth_of_a_voxel(moved_m, departs
     missions = on_the_way()
     robots = toward(missions, (FAR[0] + moved_m, *FAR[1:]))
     assert robots["depart_s"][0] == departs_s
+
+
+@pytest.mark.parametrize(
+    ("viewpoint", "same"),
+    [
+        ((1.0, 2.0, 1.0, 0.5, -0.3), True),
+        ((1.0, 2.0, 1.0, 0.5 - 2.0 * math.pi, -0.3), True),
+        ((1.0, 2.0, 1.0, 0.5, 0.3), False),
+        ((1.0, 2.0, 1.0, -0.5, -0.3), False),
+        ((1.0, 2.0, 1.001, 0.5, -0.3), False),
+        ((1.0, 2.0, 1.0, 0.502, -0.3), False),
+    ],
+)
+def test_a_viewpoint_is_the_same_with_the_same_gaze(viewpoint, same):
+    params, choice = started(free_box(robot={"reach_m": math.inf})).rules.params[0], np.zeros(1, CHOICE)[0]
+    choice["viewpoint"] = viewpoint
+    assert keeps_target(params, choice, np.array((1.0, 2.0, 1.0, 0.5, -0.3))) is same
 
 
 def test_a_path_as_long_as_the_braking_distance_is_too_short_to_keep_the_speed():
