@@ -1,8 +1,8 @@
 """Broken and hostile files of every kind, made from seeds, and what the loaders make of them.
 
 A mutated file must give a World or a named error within 2 s of computing and 512 MiB, run nothing and read
-nothing outside its folder. `python -m benchmarks.reliability.world_files --files 10000 --out FILE` runs so
-many files a loader and writes the table docs/results/fuzz.md.
+nothing outside its folder. `python -m benchmarks.reliability.world_files --files 10000 --loader pcd` reads so
+many files and prints a table; the proof of changed files (`file_fuzz`) reads and keeps far more.
 """
 
 from __future__ import annotations
