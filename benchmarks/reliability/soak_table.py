@@ -113,34 +113,41 @@ def memory_table(rows: Sequence[Row]) -> str:
     Args:
         rows: What is kept of the cases that did not fail.
     """
-    lines = [
+    said = (
         f"Each {CASE_STEPS:,} robot-steps are shared evenly by all {len(ROUND)} pairs of {', '.join(QUICK)} "
         f"and the {len(CHANNELS)} channels of the soak, with its checks. A process compiles in its first "
-        "million what it runs in all later ones. Resident memory is read after each."
-    ]
-    for held in _held_by_process(rows):
-        later, (average, line) = held[1:], growth(held)
-        lines.append(
-            f"A process of {len(held)} million robot-steps held {held[0]:.1f} MiB after the first, and then "
-            f"{min(later):.1f} to {max(later):.1f} MiB, {sum(later) / len(later):.1f} MiB on average: "
-            f"{_more(average)} than after the first. Over the later ones the straight line that fits best "
-            f"{'rises' if line >= 0.0 else 'falls'} by {abs(line):.2%}; after the last it held "
-            f"{_more(held[-1] / held[0] - 1.0)} than after the first."
-        )
-    return "\n".join(lines)
+        "million what it runs in all later ones. Resident memory is read after each million, when the "
+        "allocator has given back what is free; and after each pair, as it is."
+    )
+    return "\n".join([said, *map(_process, _by_process(rows))])
+
+
+def _process(rows: Sequence[Row]) -> str:
+    """What one process held."""
+    held, most = ([row[name] for row in rows] for name in ("resident_mib", "most_mib"))
+    later, (average, line) = held[1:], growth(held)
+    steps, mean = sum(row["robot_steps"] for row in rows), sum(later) / len(later)
+    return (
+        f"A process of {steps:,} robot-steps held {held[0]:.1f} MiB after the first million, and then "
+        f"{min(later):.1f} to {max(later):.1f} MiB, {mean:.1f} MiB on average: {_more(average)} than after "
+        "the first. Over the later ones the straight line that fits best "
+        f"{'rises' if line >= 0.0 else 'falls'} by {abs(line):.2%}; after the last it held "
+        f"{_more(held[-1] / held[0] - 1.0)} than after the first. Between pairs it held {most[0]:.1f} MiB "
+        f"at most in the first million, and {max(most[1:]):.1f} MiB in later ones."
+    )
 
 
 def grew(rows: Sequence[Row]) -> list[tuple[float, float]]:
     """By how much each process of more than a million robot-steps grew, as `memory.growth` says."""
-    return [growth(held) for held in _held_by_process(rows)]
+    return [growth([row["resident_mib"] for row in own]) for own in _by_process(rows)]
 
 
-def _held_by_process(rows: Sequence[Row]) -> list[list[float]]:
-    """MiB after each million, of the processes of more than one."""
-    held: dict[int, list[float]] = defaultdict(list)
+def _by_process(rows: Sequence[Row]) -> list[list[Row]]:
+    """The millions of each process that played more than one, in their order."""
+    found: dict[int, list[Row]] = defaultdict(list)
     for row in sorted((row for row in rows if "failure" not in row), key=lambda row: row["number"]):
-        held[row["process"]].append(row["resident_mib"])
-    return [each for each in held.values() if len(each) > 1]
+        found[row["process"]].append(row)
+    return [own for own in found.values() if len(own) > 1]
 
 
 def _more(share: float) -> str:

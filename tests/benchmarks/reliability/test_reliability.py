@@ -118,13 +118,19 @@ def test_memory_is_compared_from_round_to_round():
 def test_memory_is_compared_million_by_million():
     """200 MiB after the first; then 199, 201, 203: 1 more on average, on a line that rises by 4."""
     rows = [
-        {"number": number, "robot_steps": 1_000_320, "process": process, "resident_mib": mib}
+        {
+            "number": number,
+            "robot_steps": 1_000_320,
+            "process": process,
+            "resident_mib": mib,
+            "most_mib": mib + 50.0,
+        }
         for number, (process, mib) in enumerate([(7, 200.0), (7, 199.0), (7, 201.0), (7, 203.0), (8, 100.0)])
     ]
     text = kept("memory", [*rows[::-1], {"number": 5, "failure": "x"}])
-    assert (
-        "A process of 4 million robot-steps held 200.0 MiB after the first, and then 199.0 to 203.0" in text
-    )
+    assert "A process of 4,001,280 robot-steps held 200.0 MiB after the first million" in text
+    assert "and then 199.0 to 203.0 MiB, 201.0 MiB on average: 0.50% more than after the first" in text
+    assert "held 250.0 MiB at most in the first million, and 253.0 MiB in later ones" in text
     assert "fits best rises by 2.00%; after the last it held 1.50% more" in text
     assert text.count("A process of") == 1  # one of a single million has nothing to be compared with
     assert "- Memory: grew by 2.0%, less than 1% asked for" in text
@@ -139,7 +145,8 @@ def test_a_piece_of_memory(monkeypatch):
     monkeypatch.setattr(memory, "CASE_STEPS", 5_000)
     monkeypatch.setattr(memory, "ROUND", soak.ROUND[:1])
     row = memory.play_number(2)
-    assert 5_000 <= row["robot_steps"] < 5_000 + 64 * 2 and row["resident_mib"] > 10.0
+    assert 5_000 <= row["robot_steps"] < 5_000 + 64 * 2
+    assert 10.0 < row["resident_mib"] and 10.0 < row["most_mib"]
 
 
 def test_plays_by_other_sources_are_not_compared():
