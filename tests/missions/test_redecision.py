@@ -166,7 +166,7 @@ def test_a_viewpoint_is_the_same_within_a_thousandth_of_a_voxel(moved_m, departs
 def test_a_viewpoint_is_the_same_with_the_same_gaze(viewpoint, same):
     params, choice = started(free_box(robot={"reach_m": math.inf})).rules.params[0], np.zeros(1, CHOICE)[0]
     choice["viewpoint"] = viewpoint
-    assert keeps_target(params, choice, np.array((1.0, 2.0, 1.0, 0.5, -0.3))) is same
+    assert keeps_target(params, choice, np.array((1.0, 2.0, 1.0, 0.5, -0.3))) == same
 
 
 def test_a_path_as_long_as_the_braking_distance_is_too_short_to_keep_the_speed():
