@@ -6,6 +6,8 @@ import math
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from entropy_explore_env.belief.entropy import map_entropy_bits
 from entropy_explore_env.belief.pooling import Pool, fresh_sums, pool_belief
@@ -16,7 +18,7 @@ from entropy_explore_env.reports.state_values import state_digest
 from entropy_explore_env.robots.localization import pack_covariance
 from entropy_explore_env.robots.map_summary import decode_map, encode_map, is_summary
 from entropy_explore_env.scenario import with_settings
-from tests.reference.scenes import free_box, random_actions, started, wander
+from tests.reference.scenes import drawn, free_box, random_actions, seeds, started, wander
 
 QUIET = {"announcements": False}
 SUMMARIES = {"content": "summaries", "summary_every_s": 2.0}
@@ -127,6 +129,48 @@ def test_no_measurement_comes_twice_and_none_more_precise_than_it_was(changes):
     carried, start = robots_of(missions, "entropy_bits"), state.missions[0]["entropy_start_bits"]
     np.testing.assert_allclose(carried, map_entropy_bits(missions.precision[0]), rtol=1e-5)
     np.testing.assert_allclose(start - carried, own, rtol=1e-5)
+
+
+@drawn(25)
+@given(
+    seeds,
+    st.sampled_from([0.0, 1.0, 4.0]),
+    st.sampled_from([0.0, 0.5, 5.0]),
+    st.sampled_from([0.0, 0.4]),
+    st.sampled_from([{}, {"radio": {"repeated": 0.6}}, {"radio": {"repeated": 0.6, "late": 0.5, "late_s": 3.0}}]),
+    st.sampled_from([None, DRIFT]),
+)
+def test_what_a_robot_has_from_another_is_never_more_than_that_one_measured(
+    seed, every_s, threshold, loss, faults, drift
+):
+    """Of two robots: the sum of all summaries that came, against the sum of all that their sender measured.
+
+    The joint map holds each measurement of both at the precision that its own robot gave it. So what is more
+    in it than in a robot's own measurements is what the other measured, all its summaries together.
+    """
+    missions = played(
+        50,
+        seed % 1000,
+        robots=2,
+        robot={"localization": drift} if drift else {},
+        fiducials={"number": 3} if drift else {},
+        faults=faults,
+        channel={
+            **QUIET,
+            "summary_every_s": every_s,
+            "summary_threshold_bits": threshold,
+            "loss_probability": loss,
+            "delay_s": 0.5,
+        },
+    )
+    state, prior = missions.state, np.float64(missions.rules.params["prior_precision"][0])
+    known, joint = state.precision[0].astype(float), state.joint_precision[0].astype(float)
+    for robot in range(2):
+        heard = int(robots_of(missions, "messages_received")[robot])
+        assert heard > 1 or loss or faults
+        assert (known[robot] <= joint * (1.0 + 1e-4)).all()
+        measured = joint > prior * (1.0 + 1e-6)
+        assert (known[robot][~measured] <= prior * (1.0 + 1e-6)).all()
 
 
 def test_summaries_bring_nearly_all_that_teammates_measured():
