@@ -137,7 +137,9 @@ def test_no_measurement_comes_twice_and_none_more_precise_than_it_was(changes):
     st.sampled_from([0.0, 1.0, 4.0]),
     st.sampled_from([0.0, 0.5, 5.0]),
     st.sampled_from([0.0, 0.4]),
-    st.sampled_from([{}, {"radio": {"repeated": 0.6}}, {"radio": {"repeated": 0.6, "late": 0.5, "late_s": 3.0}}]),
+    st.sampled_from(
+        [{}, {"radio": {"repeated": 0.6}}, {"radio": {"repeated": 0.6, "late": 0.5, "late_s": 3.0}}]
+    ),
     st.sampled_from([None, DRIFT]),
 )
 def test_what_a_robot_has_from_another_is_never_more_than_that_one_measured(

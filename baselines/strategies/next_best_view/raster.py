@@ -8,10 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from baselines.strategies.next_best_view.known_space import KnownSpace, Memory
+from entropy_explore_env.errors import SettingError
 from entropy_explore_env.missions.view import RobotView
 from entropy_explore_env.scenario import Scenario
 from entropy_explore_env.settings import RobotKind
-from entropy_explore_env.validation import check_positive
+from entropy_explore_env.validation import check_count, check_positive
+
+_MOST_STEPS = 100_000
 
 
 @dataclass(frozen=True)
@@ -22,17 +25,22 @@ class RasterConfig:
         spacing: Between its places, in sensor ranges; of a sensor without range limit, in tenths of the
             workspace's longest side.
         turning: Whether it looks in all directions from each place, or always along x.
+        yaw_steps: In how many directions, evenly around; None = as few as show all around. More than one for
+            each ray that would fit around are refused: a scan between two rays shows what these do.
 
     Raises:
-        SettingError: The spacing is not > 0.
+        SettingError: The spacing is not > 0, or the steps are not a whole number ≥ 1.
     """
 
     spacing: float = 0.5
     turning: bool = True
+    yaw_steps: int | None = None
 
     def __post_init__(self) -> None:
         """Check every field."""
         check_positive(self, "spacing")
+        if self.yaw_steps is not None:
+            check_count(self, "yaw_steps", 1, _MOST_STEPS)
 
 
 class Raster(KnownSpace):
@@ -43,7 +51,17 @@ class Raster(KnownSpace):
         self.config = config or RasterConfig()
 
     def reset(self, scenario: Scenario, rng: np.random.Generator) -> None:
-        """A new mission begins."""
+        """A new mission begins.
+
+        Raises:
+            SettingError: There are more yaw steps than rays around.
+        """
+        steps = self.config.yaw_steps
+        for kind in scenario.kinds:
+            around = max(round(2.0 * math.pi / kind.sensor.angular_step_rad), 1)
+            if self.config.turning and steps is not None and steps > around:
+                allowed = f"at most {around}, the rays around at RangeSensor.angular_step_rad apart"
+                raise SettingError("RasterConfig.yaw_steps", steps, allowed)
         super().reset(scenario, rng)
         self._scans: dict[int, dict[int, int]] = {}
         """Robot → voxel → how many scans it has taken there."""
@@ -62,9 +80,11 @@ class Raster(KnownSpace):
     def _gazes(self, kind: RobotKind) -> list[float]:
         """Yaw of each scan from a place, radians."""
         wide = kind.sensor.field_of_view_rad[0]
-        if not self.config.turning or wide <= 0.0:
+        if not self.config.turning:
             return [0.0]
-        turns = math.ceil(2.0 * math.pi / wide - 1e-9)
+        turns = self.config.yaw_steps
+        if turns is None:
+            turns = math.ceil(2.0 * math.pi / wide - 1e-9) if wide > 0.0 else 1
         return [2.0 * math.pi * turn / turns for turn in range(turns)]
 
     def _places(self, kind: RobotKind, reachable: np.ndarray) -> np.ndarray:

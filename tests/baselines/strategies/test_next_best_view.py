@@ -20,7 +20,7 @@ from baselines.strategies.next_best_view.expected_view import (
     occupancy_map,
     voxels_in_view,
 )
-from baselines.strategies.next_best_view.raster import RasterConfig
+from baselines.strategies.next_best_view.raster import Raster, RasterConfig
 from baselines.strategies.next_best_view.rating import UNCERTAINTY, new_information, pose_distance, rating
 from entropy_explore_env.belief.elevation import completed
 from entropy_explore_env.belief.fields import Belief, occupancy_probability
@@ -242,6 +242,20 @@ def test_raster_scans_a_lattice_row_by_row_in_all_directions():
     assert [places[4 * n : 4 * n + 4] == [places[4 * n]] * 4 for n in range(3)] == [True] * 3
     yaws = [float(viewpoint[3]) for _, viewpoint in chosen[:4]]
     assert yaws == pytest.approx([0.0, 0.5 * math.pi, math.pi, 1.5 * math.pi])
+    three = play(missions_of(robot={"reach_m": math.inf}), Raster(RasterConfig(yaw_steps=3)), 4)[1:]
+    turns = [float(viewpoint[3]) for _, viewpoint in three]
+    assert turns == pytest.approx([0.0, 2.0 * math.pi / 3.0, 4.0 * math.pi / 3.0])
+
+
+def test_more_yaw_steps_than_rays_around_are_refused_before_a_mission_begins():
+    missions = missions_of(sensor={"angular_step_rad": math.pi / 6.0})
+    Raster(RasterConfig(yaw_steps=12)).reset(missions.scenario, np.random.default_rng(0))
+    Raster(RasterConfig(yaw_steps=13, turning=False)).reset(missions.scenario, np.random.default_rng(0))
+    with pytest.raises(SettingError, match=r"RasterConfig.yaw_steps = 13: allowed is at most 12, the rays"):
+        Raster(RasterConfig(yaw_steps=13)).reset(missions.scenario, np.random.default_rng(0))
+    for wrong in (0, 2.0, True):
+        with pytest.raises(SettingError, match=r"RasterConfig\.yaw_steps"):
+            RasterConfig(yaw_steps=wrong)  # type: ignore[arg-type]
 
 
 def test_what_should_have_been_seen_and_was_not_loses_interest():
