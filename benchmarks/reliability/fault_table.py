@@ -34,8 +34,9 @@ def fault_table(mutants: Mapping[str, Sequence[Row]]) -> str:
         f"reasons below; {len(faults) - found - late - equivalent} were not found. Of those that change "
         f"something {share_found(faults):.1%} were found. Each is run with interpreted kernels against the "
         "tests that take its line, none that takes longer than 3 s that way and 30 s of them in all, until "
-        "one fails: a fault not found here may be found by others. Faults in functions that have changed "
-        "since are not counted.",
+        "one fails: a fault not found here may be found by others. Tests were written for many that were not "
+        "found at first: of others, drawn anew, fewer are found. Faults in functions that have changed since "
+        "are not counted.",
         "",
         "| file | faults | found | late | without effect |",
         "| --- | ---: | ---: | ---: | ---: |",

@@ -132,8 +132,9 @@ def _process(rows: Sequence[Row]) -> str:
         f"{min(later):.1f} to {max(later):.1f} MiB, {mean:.1f} MiB on average: {_more(average)} than after "
         "the first. Over the later ones the straight line that fits best "
         f"{'rises' if line >= 0.0 else 'falls'} by {abs(line):.2%}; after the last it held "
-        f"{_more(held[-1] / held[0] - 1.0)} than after the first. Between pairs it held {most[0]:.1f} MiB "
-        f"at most in the first million, and {max(most[1:]):.1f} MiB in later ones."
+        f"{_more(held[-1] / held[0] - 1.0)} than after the first. Between pairs, with what the allocator "
+        f"keeps for later, it held {most[0]:.1f} MiB at most in the first million, and {max(most[1:]):.1f} "
+        "MiB in later ones."
     )
 
 

@@ -130,7 +130,7 @@ def test_memory_is_compared_million_by_million():
     text = kept("memory", [*rows[::-1], {"number": 5, "failure": "x"}])
     assert "A process of 4,001,280 robot-steps held 200.0 MiB after the first million" in text
     assert "and then 199.0 to 203.0 MiB, 201.0 MiB on average: 0.50% more than after the first" in text
-    assert "held 250.0 MiB at most in the first million, and 253.0 MiB in later ones" in text
+    assert "it held 250.0 MiB at most in the first million, and 253.0 MiB in later ones" in text
     assert "fits best rises by 2.00%; after the last it held 1.50% more" in text
     assert text.count("A process of") == 1  # one of a single million has nothing to be compared with
     assert "- Memory: grew by 2.0%, less than 1% asked for" in text
