@@ -66,8 +66,11 @@ def figure_views() -> Figure:
         env, strategy = _played(method, steps)
         world = env.missions.worlds[0]
         assert world is not None and world.unreadable is not None
-        heights = np.where(known_columns(env), world.occupied.sum(axis=2), np.nan)
-        axes.imshow(heights.T, origin="lower", cmap="viridis", vmin=0)
+        layers = np.where(known_columns(env), world.occupied.sum(axis=2), np.nan)
+        top_m = float(world.occupied.sum(axis=2).max() * world.grid.voxel_size_m)
+        heights_m = world.grid.voxel_size_m * layers
+        drawn = axes.imshow(heights_m.T, origin="lower", cmap="viridis", vmin=0.0, vmax=top_m)
+        figure.colorbar(drawn, ax=axes, shrink=0.8, label="height (m)")
         plateau, unreadable = plateau_of(world.occupied), np.asarray(world.unreadable.any(axis=2))
         _outline(axes, plateau, unreadable)
         axes.set(title=f"method {method} after {steps} steps", xticks=[], yticks=[])
@@ -75,7 +78,7 @@ def figure_views() -> Figure:
     shown = panels[-1].imshow(interest.T, origin="lower", cmap="magma", vmin=0.0, vmax=1.0)
     _outline(panels[-1], plateau, unreadable)
     panels[-1].set(title=f"interest left after {FEW} steps of method 5", xticks=[], yticks=[])
-    figure.colorbar(shown, ax=panels[-1], shrink=0.8)
+    figure.colorbar(shown, ax=panels[-1], shrink=0.8, label="interest")
     return figure
 
 
