@@ -12,6 +12,9 @@ from entropy_explore_env.belief.raycast import OPEN, OPEN_END, STOP_AT_COVERED, 
 from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel
 from entropy_explore_env.viewpoints.gathered_bits import gathered_bits
 
+LEAST_GAIN = 1e-45
+"""Precision that float32 still holds: what is added to a voxel is more than 0."""
+
 
 class ScanModel(NamedTuple):
     """How a scan is imagined: with fewer rays than the sensor's."""
@@ -139,6 +142,8 @@ def expected_scan_bits(belief, scan, viewpoint, scratch):
             if end != OPEN and range_m < scan.min_range_m:
                 continue
             gain = scan.sensor_rays * expected_precision(scan, length, direction)
+            if gain < LEAST_GAIN:
+                continue
             for i in range(n):
                 voxel = np.uint32(scratch.crossed[np.uint32(i)])
                 before = scratch.added[voxel]
@@ -147,4 +152,6 @@ def expected_scan_bits(belief, scan, viewpoint, scratch):
                 scratch.added[voxel] = before + np.float32(gain)
                 if belief.precision[voxel] < scan.known_precision:
                     gain *= 1.0 - scan.stop_probability
+                    if gain < LEAST_GAIN:  # a voxel that gets nothing would be touched anew by every ray
+                        break
     return gathered_bits(belief, scratch, count)

@@ -16,7 +16,7 @@ from entropy_explore_env.belief.raycast import OPEN, OPEN_END, STOP_AT_COVERED, 
 from entropy_explore_env.belief.visibility import mark_cones
 from entropy_explore_env.belief.voxel_index import grid_index
 from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel
-from entropy_explore_env.viewpoints.expected_scan import expected_precision, fill_rows
+from entropy_explore_env.viewpoints.expected_scan import LEAST_GAIN, expected_precision, fill_rows
 from entropy_explore_env.viewpoints.gathered_bits import gathered_bits
 
 _LEAST_SHARE = 1e-3
@@ -56,6 +56,8 @@ def _imagine_ray(belief, scan, gap_probability, start, direction, count, scratch
         return count
     share = 1.0
     gain = scan.sensor_rays * expected_precision(scan, length, direction)
+    if gain * _LEAST_SHARE < LEAST_GAIN:
+        return count
     for i in range(n):
         voxel = np.uint32(scratch.crossed[np.uint32(i)])
         before = scratch.added[voxel]

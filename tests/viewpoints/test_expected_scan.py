@@ -16,6 +16,8 @@ from entropy_explore_env.belief.visibility import CONE, cone_of, mark_cones
 from entropy_explore_env.robots.range_sensor import Scene, SensorPose, new_scan, sensor_model, take_scan
 from entropy_explore_env.settings import Grid, RangeSensor
 from entropy_explore_env.viewpoints.expected_scan import ScanModel, expected_scan_bits, new_scan_scratch
+from entropy_explore_env.viewpoints.gathered_bits import gathered_bits
+from entropy_explore_env.viewpoints.imagined_scan import imagine_scan
 from tests.reference.scenes import (
     drawn,
     random_cover,
@@ -103,6 +105,26 @@ def test_one_ray_by_hand():
     near = 1.0 / (0.1 + 0.05 * 1.25) ** 2
     stopped = expected(mean, precision, viewpoint, model(sensor=one))
     assert stopped == pytest.approx(4 * 0.5 * math.log2(1 + near / 4.0), rel=1e-5)
+
+
+@pytest.mark.parametrize(("stop_probability", "sigma_min"), [(1.0, 0.1), (0.0, 1e25)])
+def test_no_voxel_is_touched_twice_where_rays_bring_nothing(stop_probability, sigma_min):
+    """Thousands of crossings by rays of which nothing is left, or whose precision float32 does not hold."""
+    fine = RangeSensor((math.pi / 3, math.pi / 4), math.pi / 96, sigma_min=0.1)
+    scan = model(stop_probability, known_precision=5.0, sensor=fine)._replace(sigma_min=sigma_min)
+    voxels = math.prod(SIZE)
+    scratch = new_scan_scratch(voxels, longest_crossing(*SIZE, math.inf, scan.voxels_behind), fine.rows)
+    belief = Belief(np.zeros(voxels, np.float32), np.full(voxels, 4.0, np.float32), SIZE)
+    viewpoint = np.array([1.5, 5.5, 2.5, 0.3, 0.0])
+    for is_imagined in (False, True):
+        scratch = scratch._replace(touched=np.full(20 * voxels, -1, np.int32))
+        if is_imagined:
+            count = imagine_scan(belief, scan, scan.stop_probability, viewpoint, scratch)
+            gathered_bits(belief, scratch, count)
+        else:
+            expected_scan_bits(belief, scan, viewpoint, scratch)
+        assert (scratch.touched[voxels + 1 :] == -1).all()
+        assert not scratch.added.any()
 
 
 def test_voxels_left_to_teammates_count_nothing():

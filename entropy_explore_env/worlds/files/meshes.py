@@ -107,7 +107,9 @@ def _surface(vertices: np.ndarray, faces: np.ndarray, voxel_m: float) -> tuple[n
             at_once = max(1, _POINTS_AT_ONCE // len(shares))
             for first in range(0, len(alike), at_once):
                 some = alike[first : first + at_once]
-                _mark(solid, low, np.einsum("ps,tsx->tpx", shares, some).reshape(-1, 3))  # no BLAS
+                for begin in range(0, len(shares), _POINTS_AT_ONCE):
+                    of_each = shares[begin : begin + _POINTS_AT_ONCE]
+                    _mark(solid, low, np.einsum("ps,tsx->tpx", of_each, some).reshape(-1, 3))  # no BLAS
     return solid, low
 
 
