@@ -8,10 +8,12 @@ import numpy as np
 import pytest
 
 from entropy_explore_env.belief.fields import Belief
-from entropy_explore_env.belief.visibility import CONE
+from entropy_explore_env.belief.visibility import CONE, cone_of
 from entropy_explore_env.scenarios import BOX
 from entropy_explore_env.settings import RangeSensor
 from entropy_explore_env.viewpoints.evaluation import (
+    Outlook,
+    evaluate_viewpoints,
     expected_outlook,
     is_line_free,
     new_scratch,
@@ -19,6 +21,7 @@ from entropy_explore_env.viewpoints.evaluation import (
     sees_all_around,
 )
 from entropy_explore_env.viewpoints.expected_scan import new_scan_scratch
+from tests.reference.scenes import random_belief
 
 SIZE = (7, 11, 5)
 
@@ -65,3 +68,22 @@ def test_a_viewpoint_behind_an_obstacle_is_worth_nothing_unless_the_line_does_no
 def test_a_sensor_sees_all_around_if_its_rays_leave_no_gap(degrees, all_around):
     sensor = RangeSensor((math.radians(degrees), 0.0), math.radians(10.0))
     assert sees_all_around(sensor) == all_around
+
+
+def test_what_is_left_to_teammates_counts_nothing_and_is_forgotten_afterwards():
+    """On the spot, so that no line has to be free; the cone holds all that there is, or nothing."""
+    size = BOX.grid.shape
+    model = robot_model(BOX, BOX.kinds[0])
+    mean, precision = random_belief(size, 3)
+    belief = Belief(mean.reshape(-1), precision.reshape(-1), size)
+    here, scratch = np.array([3.5, 5.5, 2.5]), new_scratch(BOX.grid, [model])
+    viewpoints = np.array([[*here, yaw, 0.0] for yaw in (0.0, 2.0)])
+    everywhere = np.array([cone_of(np.array([*here, 0.0, 0.0]), math.inf, math.pi)])
+    told = []
+    for cones in (np.zeros(0, CONE), everywhere, np.zeros(0, CONE)):
+        outlook = Outlook(np.full(2, np.nan), np.full(2, np.nan))
+        at = np.array([*here, 0.0, 0.0])
+        evaluate_viewpoints(belief, model.scan, model.drive, at, viewpoints, cones, scratch, outlook)
+        told.append(outlook.bits)
+    assert (told[0] > 0.0).all() and (told[1] == 0.0).all()
+    np.testing.assert_array_equal(told[0], told[2])

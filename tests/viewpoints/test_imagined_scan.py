@@ -25,7 +25,7 @@ def imagined(belief, viewpoints, gap, cones=NO_CONES, model=MODEL, size=SIZE):
     scratch = new_scratch(Grid(size, 0.5), [model])
     bits = np.full(len(viewpoints), np.nan)
     imagined_bits(belief, model.scan, gap, viewpoints, cones, scratch, bits)
-    assert not scratch.added.any()
+    assert not scratch.added.any() and not scratch.left.any()
     return bits
 
 

@@ -148,6 +148,33 @@ def test_a_file_that_changes_under_an_environment_is_refused_by_name_and_changes
         walk(env)
 
 
+@pytest.mark.parametrize("what", ["origin", "heading", "ceiling", "unreadable"])
+def test_another_world_of_the_same_voxels_is_a_changed_file(tmp_path, what):
+    """Files of the library's own say more of a world than which of its voxels are solid."""
+    occupied = np.zeros((7, 11, 5), bool)
+    occupied[2:4, 5:7] = True
+    ceiling = np.full((7, 11), 4, np.int32)
+    parts = {"ceiling": ceiling, "yaw_rad": 0.5, "unreadable": occupied}
+    grid = Grid((7, 11, 5), 0.25)
+    save_world(World(grid, occupied, "plan", **parts), tmp_path / "world.npz")
+    env = EntropyExploreEnv(BOX, world=str(tmp_path / "world.npz"), grid=grid, robots=1)
+    env.reset(seed=1)
+    before = snapshot(env)
+    less = occupied.copy()
+    less[2, 5] = False
+    other = {
+        "origin": {},
+        "heading": {"yaw_rad": 0.25},
+        "ceiling": {"ceiling": ceiling - 1},
+        "unreadable": {"unreadable": less},
+    }[what]
+    where = Grid((7, 11, 5), 0.25, (1.0, 0.0, 0.0)) if what == "origin" else grid
+    save_world(World(where, occupied, "plan", **{**parts, **other}), tmp_path / "world.npz")
+    with pytest.raises(WorldError, match="a file that stays as it was read"):
+        env.reset(seed=2)
+    require_same("refused", before, snapshot(env))
+
+
 def walk(env):
     for _ in range(3):
         each = isinstance(env, EntropyExploreEnv)

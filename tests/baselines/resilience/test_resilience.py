@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ from baselines.experiments import cells
 from baselines.resilience import __main__ as command
 from baselines.resilience.claims import all_claims, nothing_breaks, share_of_one, slowdown
 from baselines.resilience.figures import fault_figure, loss_figure
-from baselines.resilience.report import findings
+from baselines.resilience.report import findings, is_explained
 from baselines.resilience.sweep import (
     CHANNELS,
     ISOLATED,
@@ -152,6 +153,19 @@ def test_what_cannot_be_run_is_refused(words, tmp_path):
         command.main([*words, "--out", str(tmp_path), "--runs", str(tmp_path)])
     with pytest.raises(SettingError, match="robots"):
         checked(Experiment(("room",), ("voronoi",), (2, 1), 2, 9.0))
+
+
+def test_what_is_written_by_hand_stands_on_no_page_of_other_missions():
+    explained = Experiment(("room",), STRATEGIES, (2, 4), 5, 1000.0)
+    assert is_explained(explained)
+    for name, value in (
+        ("scenarios", ("room", "office")),
+        ("strategies", STRATEGIES[:2]),
+        ("robots", (4,)),
+        ("seeds", 2),
+        ("time_limit_s", 300.0),
+    ):
+        assert not is_explained(replace(explained, **{name: value})), name
 
 
 def test_the_command_writes_a_page_resumes_and_says_it_as_json(tmp_path, capsys):
