@@ -17,7 +17,7 @@ import numpy as np
 
 from baselines.strategies.knowledge import announced_cones, belief_of
 from baselines.strategies.protocol import random_viewpoint
-from entropy_explore_env.belief.paths.lattice import belief_costs
+from entropy_explore_env.belief.paths.lattice import MAX_COST_RATIO, belief_costs
 from entropy_explore_env.belief.paths.planning import ANY_GOAL, search_paths
 from entropy_explore_env.belief.paths.search import cost_to, extract_path, new_search
 from entropy_explore_env.belief.paths.string_pulling import string_pulled
@@ -25,6 +25,7 @@ from entropy_explore_env.belief.raycast import STOP_AT_COVERED
 from entropy_explore_env.missions.view import RobotView
 from entropy_explore_env.robots.motion import MoveEnd, driving_time
 from entropy_explore_env.scenario import Scenario
+from entropy_explore_env.validation import check, check_count, check_not_negative
 from entropy_explore_env.viewpoints.drawing import (
     draw_gazes,
     draw_places,
@@ -64,6 +65,9 @@ class InformationRateConfig:
         places: Uncertain places farther away that are evaluated then.
         unknown_cost: Traversal cost of unknown space, relative to known free space.
         gives_way: Whether a robot that teammates stopped twice in a row goes to a random viewpoint.
+
+    Raises:
+        SettingError: One of them is not allowed.
     """
 
     per_scan: bool = False
@@ -75,6 +79,17 @@ class InformationRateConfig:
     places: int = 12
     unknown_cost: float = 2.0
     gives_way: bool = False
+
+    def __post_init__(self) -> None:
+        """Check every number."""
+        check_count(self, "candidates", 4, 100_000)
+        check_count(self, "refinements", 0, 1000)
+        check_count(self, "thinning", 1, 1000)
+        check_count(self, "places", 1, 10_000)
+        check(self, "stop_probability", "a number from 0 to 1", lambda v: 0.0 <= v <= 1.0)
+        check_not_negative(self, "poor")
+        ratio = f"a number from 1 to {MAX_COST_RATIO:g}"
+        check(self, "unknown_cost", ratio, lambda v: 1.0 <= v <= MAX_COST_RATIO)
 
 
 @dataclass

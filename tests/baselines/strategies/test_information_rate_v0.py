@@ -12,6 +12,7 @@ from baselines.strategies import information_rate_v0
 from baselines.strategies.information_rate_v0 import InformationRate, InformationRateConfig, _stops
 from baselines.strategies.knowledge import announced_cones
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
+from entropy_explore_env.errors import SettingError
 from entropy_explore_env.missions.view import view_of
 from entropy_explore_env.reports.metrics import mission_figures
 from entropy_explore_env.scenario import with_settings
@@ -114,3 +115,20 @@ def test_it_does_not_fly_into_the_ceiling_that_it_knows():
     strategy.reset(env.scenario, env.strategy_generator())
     drawn = strategy._drawn_voxels(view, view.pose[:3], no_fly)
     assert len(drawn) > 0 and not no_fly.reshape(-1)[drawn].any()
+
+
+@pytest.mark.parametrize(
+    ("field", "value"),
+    [
+        ("candidates", 3),
+        ("refinements", -1),
+        ("thinning", 0),
+        ("places", 0),
+        ("stop_probability", 2.0),
+        ("poor", math.nan),
+        ("unknown_cost", 0.5),
+    ],
+)
+def test_settings_that_make_no_sense_are_refused_by_name(field, value):
+    with pytest.raises(SettingError, match=rf"InformationRateConfig\.{field} = {value}"):
+        InformationRateConfig(**{field: value})
