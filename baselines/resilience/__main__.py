@@ -32,7 +32,7 @@ class Args(PaperArgs):
     out: Path = Path("results/resilience")
     runs: Path = Path("results/resilience-runs")
     scenarios: str = "room,office"
-    """Names, commas between."""
+    """Names, commas between; `office:4` or `office:2+4` for team sizes of its own."""
     strategies: str = ",".join(STRATEGIES)
     """Names as in baselines.run, commas between."""
     robots: str = "2,4"
@@ -65,17 +65,30 @@ def _experiment(args: Args) -> Experiment:
     Raises:
         SettingError: An option has a value that is not allowed.
     """
-    sizes = args.robots.split(",")
-    if not all(size.isascii() and size.isdigit() for size in sizes):
-        raise SettingError("robots", args.robots, "whole numbers from 2 to 1000, commas between")
+    usual, teams = _sizes("robots", args.robots, ","), []
+    for each in args.scenarios.split(","):
+        name, colon, own = each.partition(":")
+        teams += [(name, size) for size in (_sizes("scenarios", own, "+") if colon else usual)]
     strategies = tuple(dict.fromkeys(resolved(name) for name in args.strategies.split(",")))
     for name in strategies:
         make_strategy(name)
-    scenarios, robots = tuple(args.scenarios.split(",")), tuple(dict.fromkeys(map(int, sizes)))
+    teams = list(dict.fromkeys(teams))
     if args.quick:
-        scenarios, strategies, robots = scenarios[:1], strategies[:2], robots[-1:]
+        teams, strategies = [team for team in teams if team[0] == teams[0][0]][-1:], strategies[:2]
     seeds = args.seeds or (_QUICK_SEEDS if args.quick else _SEEDS)
-    return checked(Experiment(scenarios, strategies, robots, seeds, args.time_limit_s))
+    return checked(Experiment(tuple(teams), strategies, seeds, args.time_limit_s))
+
+
+def _sizes(option: str, text: str, between: str) -> list[int]:
+    """Team sizes.
+
+    Raises:
+        SettingError: They are no numbers.
+    """
+    sizes = text.split(between)
+    if not all(size.isascii() and size.isdigit() for size in sizes):
+        raise SettingError(option, text, f"whole numbers from 2 to 1000, with {between} between")
+    return [int(size) for size in sizes]
 
 
 def _measured(args: Args, experiment: Experiment) -> Reproduced:
@@ -108,8 +121,7 @@ def _command(args: Args, experiment: Experiment) -> str:
         words.append("--quick")
     if args.confirm:
         words.append("--confirm")
-    for name, values in (("scenarios", experiment.scenarios), ("robots", experiment.robots)):
-        words.append(f"--{name} {','.join(map(str, values))}")
+    words += [f"--scenarios {args.scenarios}", f"--robots {args.robots}"]
     if experiment.strategies != STRATEGIES:
         words.append(f"--strategies {','.join(experiment.strategies)}")
     return " ".join([*words, f"--seeds {experiment.seeds}", f"--time-limit-s {experiment.time_limit_s:g}"])

@@ -32,7 +32,7 @@ def all_claims(experiment: Experiment, records: Records) -> list[Claim]:
     for strategy in experiment.strategies:
         claims += [
             claim
-            for scenario, robots in experiment.teams()
+            for scenario, robots in experiment.teams
             for claim in _of_a_team(records, scenario, robots, strategy)
         ]
     return claims

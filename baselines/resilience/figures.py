@@ -34,7 +34,7 @@ OTHERS = ("burst-0", "range", "sight", LOST, ISOLATED)
 
 def loss_figure(experiment: Experiment, records: Records) -> tuple[Figure, Table]:
     """Mission time over that without loss, by the share of messages that are lost; isolation at the end."""
-    teams = experiment.teams()
+    teams = experiment.teams
     figure = Figure(figsize=(2.6 + 3.4 * len(teams), 4.6), layout="constrained")
     panels = figure.subplots(1, len(teams), squeeze=False, sharey=True)[0]
     table: Table = {name: [] for name in _COLUMNS}
@@ -73,7 +73,7 @@ def _by_loss(axes: Axes, title: str) -> None:
 
 def fault_figure(experiment: Experiment, records: Records) -> tuple[Figure, Table]:
     """Mission time over that without faults: a row for each strategy, a panel for each fault."""
-    strategies, teams = experiment.strategies, experiment.teams()
+    strategies, teams = experiment.strategies, experiment.teams
     height = 1.4 + 0.2 * len(strategies) * len(teams)
     figure = Figure(figsize=(11.0, height), layout="constrained")
     panels = figure.subplots(1, len(OTHERS), sharex=True, sharey=True)

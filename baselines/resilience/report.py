@@ -66,7 +66,7 @@ def _text(experiment: Experiment, records: Records, claims: Sequence[Claim], com
         "## All else that fails",
         "![Faults](resilience/faults.png)",
         "## Mission times",
-        *(_times_table(experiment, records, *team) for team in experiment.teams()),
+        *(_times_table(experiment, records, *team) for team in experiment.teams),
         f"## Claims: {held} of {len(claims)} hold",
         _HOLDS,
         "\n".join(f"- {line}" for line in findings(experiment, claims)),
@@ -79,9 +79,9 @@ def _text(experiment: Experiment, records: Records, claims: Sequence[Claim], com
 
 def is_explained(experiment: Experiment) -> bool:
     """Whether it is what `_WHY`, written by hand, speaks of: its figures are of no other missions."""
-    asked = (experiment.scenarios, experiment.strategies, experiment.robots)
+    room = {("room", 2), ("room", 4)} <= set(experiment.teams)
     limits = (experiment.seeds, experiment.time_limit_s)
-    return asked == (("room",), STRATEGIES, (2, 4)) and limits == (5, 1000.0)
+    return room and experiment.strategies == STRATEGIES and limits == (5, 1000.0)
 
 
 def findings(experiment: Experiment, claims: Sequence[Claim]) -> list[str]:
@@ -89,7 +89,7 @@ def findings(experiment: Experiment, claims: Sequence[Claim]) -> list[str]:
     lines = []
     for kind, text in _KINDS.items():
         teams: dict[str, list[str]] = {"holds for": [], "does not hold for": [], "not shown for": []}
-        for scenario, robots in experiment.teams():
+        for scenario, robots in experiment.teams:
             for strategy in experiment.strategies:
                 claim = next(c for c in claims if c.id == f"{kind}-{scenario}-{robots}-{strategy}")
                 most = float(str(claim.paper).removeprefix("≤ ")) * MARGIN

@@ -75,28 +75,22 @@ class Experiment:
     """What is compared.
 
     Attributes:
-        scenarios: Names of scenarios.
+        teams: Name of a scenario and size of the team, at least 2, in the order of the page.
         strategies: Names of strategies.
-        robots: Team sizes, at least 2 each.
         seeds: Missions of each cell.
         time_limit_s: Of every mission, simulated.
     """
 
-    scenarios: tuple[str, ...]
+    teams: tuple[tuple[str, int], ...]
     strategies: tuple[str, ...]
-    robots: tuple[int, ...]
     seeds: int
     time_limit_s: float
-
-    def teams(self) -> list[tuple[str, int]]:
-        """Scenario and team size, in the order of the page."""
-        return [(scenario, robots) for scenario in self.scenarios for robots in self.robots]
 
     def first_cells(self) -> list[Cell]:
         """All in which no robot is lost."""
         return [
             self._cell(scenario, robots, strategy, name, {"channel": channel})
-            for scenario, robots in self.teams()
+            for scenario, robots in self.teams
             for name, channel in CHANNELS.items()
             for strategy in self.strategies
         ]
@@ -104,7 +98,7 @@ class Experiment:
     def lost_cells(self, records: Records) -> list[Cell]:
         """Those in which the last robot stops for good; `records` are those of the first cells."""
         cells = []
-        for scenario, robots in self.teams():
+        for scenario, robots in self.teams:
             for strategy in self.strategies:
                 whole = times(records, cell_id(scenario, robots, strategy, NOTHING_FAILS))
                 at_s = round(0.5 * float(np.median(whole)), 1)
@@ -130,10 +124,10 @@ def checked(experiment: Experiment) -> Experiment:
     Raises:
         SettingError: A scenario is unknown, or a team has fewer than two robots.
     """
-    for name in experiment.scenarios:
+    for name, robots in experiment.teams:
         find_scenario(name)
-    if min(experiment.robots, default=0) < 2:
-        raise SettingError("robots", experiment.robots, "team sizes of at least 2")
+        if robots < 2:
+            raise SettingError("robots", robots, "team sizes of at least 2")
     return experiment
 
 

@@ -30,7 +30,7 @@ from baselines.resilience.sweep import (
 from baselines.strategies import STRATEGIES as ALL_STRATEGIES
 from entropy_explore_env.errors import SettingError
 
-ONE = Experiment(("box-7x11x5",), ("voronoi",), (4,), 5, 90.0)
+ONE = Experiment((("box-7x11x5", 4),), ("voronoi",), 5, 90.0)
 
 
 def records_of(seconds, limit_s=90.0):
@@ -147,21 +147,41 @@ def test_a_mission_that_breaks_is_counted_and_left_out_of_times():
     assert slowdown(records, "box-7x11x5", 4, "voronoi", "range").value == pytest.approx(1.0)
 
 
-@pytest.mark.parametrize("words", [["--robots", "1"], ["--robots", "x"], ["--scenarios", "nowhere"]])
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["--robots", "1"],
+        ["--robots", "x"],
+        ["--scenarios", "nowhere"],
+        ["--scenarios", "room:"],
+        ["--scenarios", "room:2+x"],
+        ["--scenarios", "room:1"],
+    ],
+)
 def test_what_cannot_be_run_is_refused(words, tmp_path):
     with pytest.raises(SettingError):
         command.main([*words, "--out", str(tmp_path), "--runs", str(tmp_path)])
     with pytest.raises(SettingError, match="robots"):
-        checked(Experiment(("room",), ("voronoi",), (2, 1), 2, 9.0))
+        checked(Experiment((("room", 2), ("room", 1)), ("voronoi",), 2, 9.0))
+
+
+def test_scenarios_may_have_team_sizes_of_their_own():
+    args = command.Args(scenarios="room:2+4,office:3,lab", robots="5,2", seeds=3)
+    experiment = command._experiment(args)
+    assert experiment.teams == (("room", 2), ("room", 4), ("office", 3), ("lab", 5), ("lab", 2))
+    said = "--scenarios room:2+4,office:3,lab --robots 5,2 --seeds 3"
+    assert said in command._command(args, experiment)
+    quick = command._experiment(replace(args, quick=True))
+    assert quick.teams == (("room", 4),) and len(quick.strategies) == 2
 
 
 def test_what_is_written_by_hand_stands_on_no_page_of_other_missions():
-    explained = Experiment(("room",), STRATEGIES, (2, 4), 5, 1000.0)
+    explained = Experiment((("room", 2), ("room", 4)), STRATEGIES, 5, 1000.0)
     assert is_explained(explained)
+    assert is_explained(replace(explained, teams=(*explained.teams, ("office", 4))))
     for name, value in (
-        ("scenarios", ("room", "office")),
+        ("teams", (("room", 4),)),
         ("strategies", STRATEGIES[:2]),
-        ("robots", (4,)),
         ("seeds", 2),
         ("time_limit_s", 300.0),
     ):
