@@ -71,17 +71,19 @@ def _text(experiment: Experiment, records: Records, claims: Sequence[Claim], com
         _HOLDS,
         "\n".join(f"- {line}" for line in findings(experiment, claims)),
         claims_table(claims, 3, given="allowed"),
-        _WHY if is_explained(experiment) else "",
+        *explanations(experiment),
         "Files: [`loss.csv`](resilience/loss.csv), [`faults.csv`](resilience/faults.csv).",
     ]
     return "\n\n".join(part.strip() for part in parts if part) + "\n"
 
 
-def is_explained(experiment: Experiment) -> bool:
-    """Whether it is what `_WHY`, written by hand, speaks of: its figures are of no other missions."""
-    room = {("room", 2), ("room", 4)} <= set(experiment.teams)
-    limits = (experiment.seeds, experiment.time_limit_s)
-    return room and experiment.strategies == STRATEGIES and limits == (5, 1000.0)
+def explanations(experiment: Experiment) -> list[str]:
+    """What was written by hand of its missions: figures there are of no others."""
+    if experiment.strategies != STRATEGIES or (experiment.seeds, experiment.time_limit_s) != (5, 1000.0):
+        return []
+    teams = set(experiment.teams)
+    said = [text for those, text in _WHY.items() if set(those) <= teams]
+    return ["## Why some are not shown", *said] if said else []
 
 
 def findings(experiment: Experiment, claims: Sequence[Claim]) -> list[str]:
@@ -118,9 +120,7 @@ share": the team that lost one of A robots at half time needs at most ½ + ½ ·
 only where the whole interval of every ratio lies below {MARGIN:g} times what is allowed, and no mission of
 the faulty team was cut off: few seeds, or missions that were cut off, show nothing."""
 
-_WHY = """## Why some are not shown
-
-In the room, with the five seeds; one thing is changed at a time.
+_WHY_ROOM = """In the room, with the five seeds; one thing is changed at a time.
 
 - `mutual-information`: isolated robots are not done in 1000 s, and missions that are cut off show nothing.
 - `coordinated-frontier` and `assigned-frontier`, one of two robots lost: 1.60 and 1.48 of the time. A
@@ -141,6 +141,23 @@ Where only viewpoints were announced, `coordinated-frontier` with four robots ha
 isolation (1.22), since it left frontiers to teammates whose scans never came. With teammates' targets left
 out 1.03 was left of it, with all that was heard left out 1.00. It leaves them nothing any more where no
 scans are shared; so do `assigned-frontier`, `voronoi`, `per-time-visibility` and `coordinated-candidate`."""
+
+_WHY_OFFICE = """In the office, with four robots:
+
+- `information-rate-v0` stands still where nobody tells it anything, its known defect: in the missions of
+isolated robots of which one is lost and that were cut off, the team drove 32 to 68 m and scanned about 5,000
+times. So it is where one is lost and the others share (1.42): in one of five missions 738 moves were
+blocked by bodies, and 162 m driven. `planned-rate`, its successor, does not stand.
+- `assigned-frontier`, one robot lost: in one of five missions the robot stopped in a corridor, and the others
+were stopped by its body 950 times. Paths are planned through what is known to be free, bodies are not in the
+map. The other four took 0.99 to 1.24 of the time.
+- `mutual-information` and `voronoi`: isolated robots are not done in 1000 s.
+- `per-time-visibility`, `voronoi` and `mutual-information`, one robot lost: 1.23, 1.19 and 1.13 where 1.17 is
+allowed, with intervals that hold both answers; likewise `per-time-visibility` where only viewpoints are
+announced, 1.01 of isolation."""
+
+_WHY = {(("room", 2), ("room", 4)): _WHY_ROOM, (("office", 4),): _WHY_OFFICE}
+"""Teams → why claims of theirs are not shown, of the missions of `explanations`."""
 
 _SAID = {
     **{

@@ -13,7 +13,7 @@ from baselines.experiments import cells
 from baselines.resilience import __main__ as command
 from baselines.resilience.claims import all_claims, nothing_breaks, share_of_one, slowdown
 from baselines.resilience.figures import fault_figure, loss_figure
-from baselines.resilience.report import findings, is_explained
+from baselines.resilience.report import explanations, findings
 from baselines.resilience.sweep import (
     CHANNELS,
     ISOLATED,
@@ -177,15 +177,17 @@ def test_scenarios_may_have_team_sizes_of_their_own():
 
 def test_what_is_written_by_hand_stands_on_no_page_of_other_missions():
     explained = Experiment((("room", 2), ("room", 4)), STRATEGIES, 5, 1000.0)
-    assert is_explained(explained)
-    assert is_explained(replace(explained, teams=(*explained.teams, ("office", 4))))
+    said = explanations(explained)
+    assert len(said) == 2 and said[1].startswith("In the room")
+    assert explanations(replace(explained, teams=(*explained.teams, ("office", 4))))[:2] == said
+    assert explanations(replace(explained, teams=(("office", 4),)))[1].startswith("In the office")
     for name, value in (
         ("teams", (("room", 4),)),
         ("strategies", STRATEGIES[:2]),
         ("seeds", 2),
         ("time_limit_s", 300.0),
     ):
-        assert not is_explained(replace(explained, **{name: value})), name
+        assert not explanations(replace(explained, **{name: value})), name
 
 
 def test_the_command_writes_a_page_resumes_and_says_it_as_json(tmp_path, capsys):
