@@ -15,7 +15,7 @@ from baselines.strategies import make_strategy
 from baselines.strategies.next_best_view import NextBestView, NextBestViewConfig
 from baselines.strategies.protocol import Stopwatch, Strategy
 from benchmarks.rows import Effort, Goal, Row, alone, timed
-from entropy_explore_env.belief.visibility import CONE, cone_of, mark_cone, visible_bits
+from entropy_explore_env.belief.visibility import CONE, cone_of, mark_cones, visible_bits
 from entropy_explore_env.compilation.kernels import kernel
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.errors import counted
@@ -94,8 +94,7 @@ def overlap_bits(
 ) -> float:
     """I of the last cone and all others, in bits; `marks` (V,) uint8 is cleared first."""
     marks[:] = 0
-    for place in range(len(cones) - 1):
-        mark_cone(cones[place], size, None, marks, 1)
+    mark_cones(cones[:-1], size, marks, 1)
     return visible_bits(cones[len(cones) - 1], size, precision, known_precision, None, marks)[1]
 
 

@@ -74,7 +74,7 @@ def _text(experiment: Experiment, records: Records, claims: Sequence[Claim], com
         *explanations(experiment),
         "Files: [`loss.csv`](resilience/loss.csv), [`faults.csv`](resilience/faults.csv).",
     ]
-    return "\n\n".join(part.strip() for part in parts if part) + "\n"
+    return "\n\n".join(part.strip() for part in parts) + "\n"
 
 
 def explanations(experiment: Experiment) -> list[str]:
@@ -144,7 +144,7 @@ scans are shared; so do `assigned-frontier`, `voronoi`, `per-time-visibility` an
 
 _WHY_OFFICE = """In the office, with four robots:
 
-- `information-rate-v0` stands still where nobody tells it anything, its known defect: in the missions of
+- `information-rate-v0` stops moving where robots do not communicate, a known defect: in the missions of
 isolated robots of which one is lost and that were cut off, the team drove 32 to 68 m and scanned about 5,000
 times. So it is where one is lost and the others share (1.42): in one of five missions 738 moves were
 blocked by bodies, and 162 m driven. `planned-rate`, its successor, does not stand.

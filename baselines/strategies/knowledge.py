@@ -25,11 +25,13 @@ def voxel_of(view: RobotView, pose: np.ndarray) -> int:
 
 
 def teammates_that_share(view: RobotView) -> Mapping[int, TeammateView]:
-    """Teammates whose scans the channel carries to the robot.
+    """Teammates whose scans reach the robot: not silent ones, and none where the channel carries no scans.
 
-    What the others go to see it has to see itself: to leave it to them, it would wait for nothing.
+    What the others go to see it has to see itself: nothing is left to them.
     """
-    return view.teammates if view.scenario.channel.burst > 0 else {}
+    if view.scenario.channel.burst == 0:
+        return {}
+    return {mate: seen for mate, seen in view.teammates.items() if not seen.silent}
 
 
 def announced_cone(grid: Grid, mate: TeammateView) -> np.void:

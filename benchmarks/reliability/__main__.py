@@ -96,12 +96,10 @@ PROOFS = {
         training_runs.ROBOT_STEPS,
         len(training_runs.TRAINERS) * training_runs.ROBOT_STEPS,
         7200.0,
-        training_runs.robot_steps,
+        soak.robot_steps,
     ),
     "soak": Proof(soak.play_number, 1_000_000, soak.ROBOT_STEPS, 600.0, soak.robot_steps),
-    "memory": Proof(
-        memory.play_number, 3 * memory.CASE_STEPS, memory.ROBOT_STEPS, 1200.0, memory.robot_steps
-    ),
+    "memory": Proof(memory.play_number, 3 * memory.CASE_STEPS, memory.ROBOT_STEPS, 1200.0, soak.robot_steps),
 }
 _MOST_CASES = 20_000
 """Of a proof whose cases count for more than themselves."""

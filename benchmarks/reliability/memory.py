@@ -18,7 +18,8 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.reliability.soak import ROUND, resident_mib
+from benchmarks.reliability.process_memory import resident_mib
+from benchmarks.reliability.soak import ROUND
 from benchmarks.reliability.step_checks import CheckedSteps
 from entropy_explore_env.envs.vector_env import EntropyExploreVectorEnv
 from entropy_explore_env.scenarios import SCENARIOS
@@ -56,7 +57,7 @@ def play_number(number: int) -> dict[str, Any]:
 
 
 def _play(place: int, number: int, least: float) -> int:
-    """Play one pair for at least so many robot-steps; how many they were."""
+    """Play one pair for at least `least` robot-steps; returns how many were played."""
     channel, name = ROUND[place]
     env = EntropyExploreVectorEnv(SCENARIOS[name], _MISSIONS, channel=channel, ending={"max_cycles": _CYCLES})
     env.action_space.seed(number)
@@ -76,11 +77,6 @@ def _give_back() -> None:
     trim = getattr(ctypes.CDLL(None), "malloc_trim", None) if sys.platform == "linux" else None
     if trim is not None:
         trim(0)
-
-
-def robot_steps(row: dict[str, Any]) -> int:
-    """What a case counts for; one that failed for nothing."""
-    return row.get("robot_steps", 0)
 
 
 def growth(held: Sequence[float]) -> tuple[float, float]:

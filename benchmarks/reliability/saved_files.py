@@ -20,6 +20,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from benchmarks.reliability.changed_bytes import doubled, flipped, overwritten, truncated
+from benchmarks.reliability.process_memory import peak_mib
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.errors import EntropyExploreError
 from entropy_explore_env.missions.simulation import Missions
@@ -214,7 +215,7 @@ def play_files(kind: Kind, folder: Path, count: int, seed: int) -> dict[str, Any
     """
     found: dict[str, Any] = {"files": count, "loaded": 0, "killed": 0, "most_s": 0.0, "wrong": []}
     folder.mkdir(exist_ok=True)
-    before_mib, there = _peak_mib(), {}
+    before_mib, there = peak_mib(), {}
     with _little_memory():
         for number in range(count):
             rng = np.random.default_rng([seed, number])
@@ -239,14 +240,10 @@ def play_files(kind: Kind, folder: Path, count: int, seed: int) -> dict[str, Any
                 complaint = complaint or f"{spent_s:.1f} s"
             if complaint:
                 found["wrong"].append(f"[{seed}, {number}] {change.__name__} of {name}: {complaint[:150]}")
-    found["grew_mib"] = _peak_mib() - before_mib
+    found["grew_mib"] = peak_mib() - before_mib
     if found["grew_mib"] > MOST_GROWTH_MIB:
         found["wrong"].append(f"grew by {found['grew_mib']:.0f} MiB")
     return found
-
-
-def _peak_mib() -> float:
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
 
 
 @contextmanager

@@ -11,9 +11,9 @@ import itertools
 import math
 import os
 import time
-from pathlib import Path
 from typing import Any
 
+from benchmarks.reliability.process_memory import resident_mib
 from benchmarks.reliability.step_checks import CheckedSteps
 from entropy_explore_env.envs.vector_env import EntropyExploreVectorEnv
 from entropy_explore_env.scenario import Scenario
@@ -109,12 +109,3 @@ def robot_steps(row: dict[str, Any]) -> int:
 def missions_of(scenario: Scenario) -> int:
     """How many missions of a scenario are played at once."""
     return min(max(_MOST_VOXELS // (scenario.grid.voxels * scenario.robots), 1), _MOST_MISSIONS)
-
-
-def resident_mib() -> float:
-    """Memory of this process, in MiB; nan where the system does not say."""
-    try:
-        pages = int(Path("/proc/self/statm").read_text("ascii").split()[1])
-    except OSError:
-        return math.nan
-    return pages * os.sysconf("SC_PAGE_SIZE") / 2**20

@@ -63,17 +63,16 @@ def _soaked(name: str, rows: Sequence[Row]) -> str:
 
 def _held(rows: Sequence[Row]) -> Iterable[str]:
     """What each process held, round by round of all pairs; of those of one round, from its first 10⁶ on."""
-    for process in dict.fromkeys(row["process"] for row in rows):
-        own = [row for row in rows if row["process"] == process]
+    for own in _by_process(rows):
         steps = sum(row["robot_steps"] for row in own)
         rounds = _whole_rounds(own)
         if len(rounds) > 1:
             most, means = (", ".join(f"{kind(held):.0f}" for held in rounds) for kind in (max, _mean))
-            growth = _mean(rounds[-1]) / _mean(rounds[1]) - 1.0
+            risen = _mean(rounds[-1]) / _mean(rounds[1]) - 1.0
             yield (
                 f"A process of {steps:,} robot-steps held at most {most} MiB in its rounds of all "
                 f"{len(ROUND)} pairs, and {means} MiB on average. The first round compiles kernels for every "
-                f"channel; from the second to the last the average grew by {growth:.1%}."
+                f"channel; from the second to the last the average grew by {risen:.1%}."
             )
         elif later := _later(own):
             settled, held = later
@@ -119,7 +118,7 @@ def memory_table(rows: Sequence[Row]) -> str:
         "million what it runs in all later ones. Resident memory is read after each million, when the "
         "allocator has given back what is free; and after each pair, as it is."
     )
-    return "\n".join([said, *map(_process, _by_process(rows))])
+    return "\n".join([said, *map(_process, _longer_ones(rows))])
 
 
 def _process(rows: Sequence[Row]) -> str:
@@ -140,15 +139,20 @@ def _process(rows: Sequence[Row]) -> str:
 
 def grew(rows: Sequence[Row]) -> list[tuple[float, float]]:
     """By how much each process of more than a million robot-steps grew, as `memory.growth` says."""
-    return [growth([row["resident_mib"] for row in own]) for own in _by_process(rows)]
+    return [growth([row["resident_mib"] for row in own]) for own in _longer_ones(rows)]
+
+
+def _longer_ones(rows: Sequence[Row]) -> list[list[Row]]:
+    """The millions of each process that played more than one."""
+    return [own for own in _by_process(rows) if len(own) > 1]
 
 
 def _by_process(rows: Sequence[Row]) -> list[list[Row]]:
-    """The millions of each process that played more than one, in their order."""
+    """The cases of each process that did not fail, in their order."""
     found: dict[int, list[Row]] = defaultdict(list)
     for row in sorted((row for row in rows if "failure" not in row), key=lambda row: row["number"]):
         found[row["process"]].append(row)
-    return [own for own in found.values() if len(own) > 1]
+    return list(found.values())
 
 
 def _more(share: float) -> str:

@@ -71,11 +71,6 @@ def play_number(number: int) -> dict[str, Any]:
         return train(name, Path(folder) / "run", (*words, "--total-steps", str(ROBOT_STEPS)), KILLS, moments)
 
 
-def robot_steps(row: dict[str, Any]) -> int:
-    """What a case counts for; one that failed for nothing."""
-    return row.get("robot_steps", 0)
-
-
 def train(name: str, run: Path, words: tuple[str, ...], kills: int, moments: random.Random) -> dict[str, Any]:
     """Train in a folder, kill the trainer and resume it so many times, and look at what it wrote.
 

@@ -10,7 +10,6 @@ from __future__ import annotations
 import argparse
 import io
 import re
-import resource
 import struct
 import sys
 import tempfile
@@ -26,6 +25,7 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.reliability.changed_bytes import doubled, flipped, overwritten, truncated
+from benchmarks.reliability.process_memory import peak_mib
 from benchmarks.reliability.world_samples import Sample, glb_of_json, samples
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.worlds.files.process import CPU_S, ReaderProcess, kept_reader
@@ -288,7 +288,7 @@ class Outcome:
 def fuzz(
     sources: list[Sample], count: int, seed: int, folder: Path, process: ReaderProcess | None = None
 ) -> Outcome:
-    """Load so many mutants in an empty folder; what is wrong is said, file by file.
+    """Load mutants in an empty folder, and note what is wrong with how each was treated.
 
     Args:
         sources: What is changed.
@@ -305,7 +305,7 @@ def fuzz(
     (inside / "linked").symlink_to(folder)
     found = Outcome()
     there: dict[str, bytes] = {}
-    before_mib = _peak_mib()
+    before_mib = peak_mib()
     with kept_reader(process) as reader:
         for number, (mutator, sample) in enumerate(mutants(sources, count, seed)):
             for name, data in sample.files.items():
@@ -317,13 +317,9 @@ def fuzz(
                 complaint = "ran code"
             if complaint:
                 found.wrong.append(f"seed [{seed}, {number}] {mutator}: {complaint}")
-    if _peak_mib() - before_mib > MOST_GROWTH_MIB:
-        found.wrong.append(f"the command itself grew to {_peak_mib():.0f} MiB")
+    if peak_mib() - before_mib > MOST_GROWTH_MIB:
+        found.wrong.append(f"the command itself grew to {peak_mib():.0f} MiB")
     return found
-
-
-def _peak_mib() -> float:
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
 
 
 def _load(path: Path, sample: Sample, reader: ReaderProcess, found: Outcome) -> str:

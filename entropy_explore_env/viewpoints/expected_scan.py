@@ -10,10 +10,7 @@ import numpy as np
 from entropy_explore_env.belief.measurement_model import measurement_precision
 from entropy_explore_env.belief.raycast import OPEN, OPEN_END, STOP_AT_COVERED, Crossing, Line, cast_ray
 from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel
-from entropy_explore_env.viewpoints.gathered_bits import gathered_bits
-
-LEAST_GAIN = 1e-45
-"""Precision that float32 still holds: what is added to a voxel is more than 0."""
+from entropy_explore_env.viewpoints.gathered_bits import LEAST_GAIN, gathered_bits, touch
 
 
 class ScanModel(NamedTuple):
@@ -146,12 +143,9 @@ def expected_scan_bits(belief, scan, viewpoint, scratch):
                 continue
             for i in range(n):
                 voxel = np.uint32(scratch.crossed[np.uint32(i)])
-                before = scratch.added[voxel]
-                scratch.touched[np.uint32(count)] = voxel  # kept where it is the first: a branch costs more
-                count += int(before == 0.0)
-                scratch.added[voxel] = before + np.float32(gain)
+                count = touch(scratch, voxel, np.float32(gain), count)
                 if belief.precision[voxel] < scan.known_precision:
                     gain *= 1.0 - scan.stop_probability
-                    if gain < LEAST_GAIN:  # a voxel that gets nothing would be touched anew by every ray
+                    if gain < LEAST_GAIN:
                         break
     return gathered_bits(belief, scratch, count)

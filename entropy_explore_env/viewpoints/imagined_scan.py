@@ -16,8 +16,8 @@ from entropy_explore_env.belief.raycast import OPEN, OPEN_END, STOP_AT_COVERED, 
 from entropy_explore_env.belief.visibility import mark_cones
 from entropy_explore_env.belief.voxel_index import grid_index
 from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel
-from entropy_explore_env.viewpoints.expected_scan import LEAST_GAIN, expected_precision, fill_rows
-from entropy_explore_env.viewpoints.gathered_bits import gathered_bits
+from entropy_explore_env.viewpoints.expected_scan import expected_precision, fill_rows
+from entropy_explore_env.viewpoints.gathered_bits import LEAST_GAIN, gathered_bits, touch
 
 _LEAST_SHARE = 1e-3
 """Rays that get on with less probability are not followed."""
@@ -60,10 +60,7 @@ def _imagine_ray(belief, scan, gap_probability, start, direction, count, scratch
         return count
     for i in range(n):
         voxel = np.uint32(scratch.crossed[np.uint32(i)])
-        before = scratch.added[voxel]
-        scratch.touched[np.uint32(count)] = voxel  # kept where it is the first: a branch costs more
-        count += int(before == 0.0)
-        scratch.added[voxel] = before + gain * share
+        count = touch(scratch, voxel, gain * share, count)
         if belief.precision[voxel] < scan.known_precision:
             gap = gap_probability != scan.stop_probability and beside_covered(belief, voxel)
             share *= 1.0 - (gap_probability if gap else scan.stop_probability)

@@ -130,7 +130,7 @@ class AssignedFrontier(_Coordinated):
     def pick_among(self, scene: Scene, voxels: np.ndarray, lengths: np.ndarray) -> int:
         """See `_Coordinated`."""
         teammates = teammates_that_share(scene.view).values()
-        mates = [mate for mate in teammates if mate.heard_s >= 0.0 and not mate.silent]
+        mates = [mate for mate in teammates if mate.heard_s >= 0.0]
         known = np.array([voxel_of(scene.view, mate.pose) for mate in mates], np.int32)
         group = groups(centres_of(scene, voxels), self.config.group * scene.cells.reach)
         apart = lengths_of_all(scene, voxels, lengths, known)

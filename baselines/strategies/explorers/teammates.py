@@ -12,7 +12,7 @@ from baselines.strategies.knowledge import teammates_that_share, voxel_of
 
 
 class Team(NamedTuple):
-    """Teammates of which a robot has heard, in two groups; not those that are silent or share no scans."""
+    """Teammates of which a robot has heard and whose scans reach it, in two groups."""
 
     places: np.ndarray
     """(M,) int32 voxels where those were who choose anew now, as far as the robot knows."""
@@ -24,7 +24,7 @@ def team_of(scene: Scene) -> Team:
     """The teammates of a scene's robot."""
     view, places, targets = scene.view, [], []
     for mate, seen in teammates_that_share(view).items():
-        if seen.silent or (seen.heard_s < 0.0 and seen.announced_s < 0.0):
+        if seen.heard_s < 0.0 and seen.announced_s < 0.0:
             continue
         if under_way(view, seen, mate) and not stays(view, seen):
             targets.append(view.scenario.grid.in_grid_units(seen.viewpoint)[:3])

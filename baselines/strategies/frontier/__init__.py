@@ -332,11 +332,7 @@ class FrontierStrategy:
 
     def _choice_of(self, view: RobotView, assignment: _Assignment, allocator: Allocator) -> Choice | None:
         """The robot's candidate; if there is none, a finer σ counts as explored."""
-        known = {
-            mate: seen
-            for mate, seen in teammates_that_share(view).items()
-            if seen.heard_s >= 0.0 and not seen.silent  # a silent one takes no candidate
-        }
+        known = {mate: seen for mate, seen in teammates_that_share(view).items() if seen.heard_s >= 0.0}
         together = self.config.allocation == "synchronous"
         moving = [] if together else [mate for mate in known if self._under_way(view, mate)]
         grid = self._scenario.grid

@@ -127,8 +127,8 @@ class KnownSpace(ABC):
         """(5,) a pose to which the robot has a shorter known free way than any teammate has; None = none.
 
         Teammates of whom it never heard do not count: where it heard of none there is no such pose. Of some
-        that are drawn the one that is farthest from teammates, or a stop on the way there. It looks anywhere,
-        since who has seen nothing behind itself knows no way out there.
+        that are drawn the one that is farthest from teammates, or a stop on the way there. It looks in
+        any direction: a robot that has seen nothing behind it knows no path there.
         """
         mates_m = []
         for seen in view.teammates.values():

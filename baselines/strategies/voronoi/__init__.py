@@ -235,7 +235,7 @@ class VoronoiCoverage:
         heard = {
             mate: voxel_of(view, seen.pose)
             for mate, seen in teammates_that_share(view).items()
-            if seen.heard_s >= 0.0 and not seen.silent
+            if seen.heard_s >= 0.0
         }
         heard[view.robot] = here
         robots = sorted(heard)

@@ -138,7 +138,7 @@ def test_memory_is_compared_million_by_million():
     assert "fits best rises by 0.00%; after the last it held 1.00% more" in falls
     assert "Memory: grew by 1.0%" in falls and "Memory: grew" not in kept("memory", rows[:2])
     assert "0.50% less than after the first" in kept("memory", rows[:2])
-    assert memory.robot_steps(rows[0]) == 1_000_320 and memory.robot_steps({"failure": "x"}) == 0
+    assert soak.robot_steps(rows[0]) == 1_000_320 and soak.robot_steps({"failure": "x"}) == 0
 
 
 def test_a_piece_of_memory(monkeypatch):
