@@ -173,6 +173,7 @@ class Explorer(ABC):
         memory.waited = False
         if view.move_end in _STOPPED:
             memory.cells.drop(memory.target, with_edges=False)
+            memory.target, memory.viewpoint = NONE, None
         elif here == memory.target and memory.cells.is_frontier(here):
             memory.gazes += 1
             gaze = memory.cells.gaze(self._scenario.grid.in_grid_units(view.pose)[:3], view)

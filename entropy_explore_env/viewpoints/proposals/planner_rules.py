@@ -8,6 +8,8 @@ DISAPPOINTING = 0.1
 """Viewpoints are remembered that brought less than this share of what was expected."""
 ALIKE_EDGES, ALIKE_RAD = 1.0, 0.1
 """Viewpoints that differ by less are the same to a robot that remembers one."""
+FAILED_GAZES = 4
+"""Failures of one place; each beyond widens by ALIKE_RAD which gazes there count as alike."""
 FORGET_EDGES, REMEMBERED = 6.0, 16
 """How far away from where it was a robot forgets what it could not do, and how much it remembers at most."""
 BLOCKED_DECISIONS = 4

@@ -18,6 +18,7 @@ from entropy_explore_env.viewpoints.proposals.planner_rules import (
     CLEAR,
     DISAPPOINTING,
     DREGS_SHARE,
+    FAILED_GAZES,
     FORGET_EDGES,
     MISSED_EDGES,
     REMEMBERED,
@@ -162,14 +163,21 @@ def _remember(experience, viewpoint, share, forget_at):
 
 @lean_kernel
 def trust_in(experience, all_around, at):
-    """Share of the expected bits that viewpoints like this one brought; 1 where none was a failure."""
-    trust = 1.0
+    """Share of the expected bits that viewpoints like this one brought; 1 where none was a failure.
+
+    Where many gazes of one place failed, wider and wider ones around each count as alike: what hides from a
+    robot what it expects to see, as a teammate's body does, hides it from every gaze that way.
+    """
+    trust, here = 1.0, 0
+    for number in range(experience.failures):
+        here += int(distance_apart(experience.failed[number], at) < ALIKE_EDGES)
+    alike_rad = ALIKE_RAD * max(here - FAILED_GAZES, 1)
     for number in range(experience.failures):
         failed, share = experience.failed[number], experience.share[number]
         if distance_apart(failed, at) >= ALIKE_EDGES:
             continue
         if share > 0.0 and not all_around:
-            if turned(failed[3], at[3]) >= ALIKE_RAD or abs(failed[4] - at[4]) >= ALIKE_RAD:
+            if turned(failed[3], at[3]) >= alike_rad or abs(failed[4] - at[4]) >= alike_rad:
                 continue
         trust *= share
     return trust

@@ -53,11 +53,22 @@ MAZES = {
 }
 """Of ground robots with a lidar, and of flying ones with cameras."""
 LIMIT_S, STILL_S = 150.0, 60.0
-STILL_OF_REFERENCE_S = 120.0
-"""Of `information-rate-v0`, which stays as it is, since tables and rewards compare with it: four of its
-robots in a row in a corridor stand for 61 s at times."""
+STILL_IN_A_ROW_S = 120.0
+"""Of one of four robots in a row where none can pass, while others map: with a random walk 77 s were seen. And
+of `information-rate-v0`, which stays as it is, since tables and rewards compare with it: up to 95 s."""
 MOVED_M, GAINED_BITS = 0.2, 100.0
 """A robot that does neither for STILL_S stands still."""
+
+
+class Stand(NamedTuple):
+    """How long robots of one mission neither moved nor gained anything."""
+
+    robot_s: float
+    """Any of them, at most."""
+    team_s: float
+    """All of them at the same time, at most."""
+    stopped: int
+    """Drives that a teammate's body stopped."""
 
 
 def world_of(maze: Maze, rng: np.random.Generator) -> World:
@@ -107,11 +118,11 @@ def close_starts(world: World, robots: int, rng: np.random.Generator) -> np.ndar
 
 def longest_stand_s(kind: str, strategy: str, robots: int, seed: int) -> float:
     """The longest time that a robot neither moves nor gains anything, in a maze with close starts."""
-    return stand_of(kind, strategy, robots, seed)[0]
+    return stand_of(kind, strategy, robots, seed).robot_s
 
 
-def stand_of(kind: str, strategy: str, robots: int, seed: int, **changes: object) -> tuple[float, int]:
-    """As `longest_stand_s`; and how many drives a teammate's body stopped.
+def stand_of(kind: str, strategy: str, robots: int, seed: int, **changes: object) -> Stand:
+    """How long robots stand in a maze with close starts.
 
     Args:
         kind: Name of a maze.
@@ -130,11 +141,11 @@ def stand_of(kind: str, strategy: str, robots: int, seed: int, **changes: object
     }
     env = EntropyExploreEnv(with_settings(with_settings(scripted(maze.scenario), settings), changes))
     since = np.zeros(robots)
-    places, gained, longest = np.full((robots, 3), np.inf), np.zeros(robots), 0.0
-    stopped = 0
+    places, gained = np.full((robots, 3), np.inf), np.zeros(robots)
+    longest, all_of_them, stopped = 0.0, 0.0, 0
 
     def note(env: EntropyExploreEnv) -> None:
-        nonlocal longest, stopped
+        nonlocal longest, all_of_them, stopped
         state = env.missions.state
         time_s, here = float(state.missions[0]["time_s"]), state.robots[0]["origin"][:, :3]
         bits = state.robots[0]["gained_bits"]
@@ -142,11 +153,12 @@ def stand_of(kind: str, strategy: str, robots: int, seed: int, **changes: object
         active |= bits - gained >= GAINED_BITS
         places[active], gained[active], since[active] = here[active], bits[active], time_s
         longest = max(longest, float((time_s - since).max()))
+        all_of_them = max(all_of_them, float((time_s - since).min()))
         stopped += int((state.robots[0]["move_end"] == MoveEnd.TEAMMATE.code).sum())
 
     options = {"world": world, "starts": close_starts(world, robots, rng)}
     run_mission(env, make_strategy(strategy), seed, note, options=options)
-    return longest, stopped
+    return Stand(longest, all_of_them, stopped)
 
 
 @pytest.mark.parametrize("kind", MAZES)
@@ -176,6 +188,15 @@ def test_robots_look_behind_themselves_for_a_way_out():
     assert longest_stand_s("tunnels", "least-mapped", 4, seed=39) < 20.0
 
 
+@pytest.mark.parametrize(
+    ("strategy", "seed"), [("planned-rate", 84), ("receding-horizon", 137), ("receding-horizon", 182)]
+)
+def test_robots_look_and_drive_elsewhere_when_a_teammate_hides_what_they_expect(strategy, seed):
+    """Two robots stood for 70, 91 and 120 s: one looked through its teammate for ever, at bits that never came,
+    others drove to a place on the far side of it that they had not dropped."""
+    assert longest_stand_s("tunnels", strategy, 2, seed) < 20.0
+
+
 def test_robots_that_have_covered_all_go_on_where_the_mission_asks_for_more():
     """Two robots stood for 87 s, each scanning for ever from the centre of its Voronoi cell."""
     assert longest_stand_s("tunnels", "voronoi", 2, seed=3) < 20.0
@@ -185,8 +206,8 @@ def test_robots_that_have_covered_all_go_on_where_the_mission_asks_for_more():
 def test_explorers_whose_bodies_block_each_other_part_when_they_replan_under_way(strategy):
     """Two in corridors that are too narrow to pass: bodies stop them, and both map on."""
     under_way = {"robot": {"redecide": "on_scan"}, "sensor": {"scan_every_m": 0.3}}
-    stood_s, stopped = stand_of("corridors", strategy, 2, 2, **under_way)
-    assert stopped > 0 and stood_s < STILL_S
+    stand = stand_of("corridors", strategy, 2, 2, **under_way)
+    assert stand.stopped > 0 and stand.robot_s < STILL_S
 
 
 @pytest.mark.long
@@ -194,6 +215,8 @@ def test_explorers_whose_bodies_block_each_other_part_when_they_replan_under_way
 @pytest.mark.parametrize("robots", [2, 4])
 @pytest.mark.parametrize("strategy", STRATEGIES)
 def test_robots_of_200_close_starts_keep_moving(strategy, robots, kind):
-    still_s = STILL_OF_REFERENCE_S if strategy == "information-rate-v0" else STILL_S
-    stood = [seed for seed in range(200) if longest_stand_s(kind, strategy, robots, seed) >= still_s]
-    assert stood == []
+    reference = strategy == "information-rate-v0"
+    robot_s = STILL_IN_A_ROW_S if reference or robots == 4 else STILL_S
+    team_s = STILL_IN_A_ROW_S if reference else STILL_S
+    stands = [stand_of(kind, strategy, robots, seed) for seed in range(200)]
+    assert [seed for seed, at in enumerate(stands) if at.robot_s >= robot_s or at.team_s >= team_s] == []

@@ -198,15 +198,32 @@ def test_nothing_is_remembered_of_free_drives_with_drift():
     assert drives >= 6 and off_edges > 0.01
 
 
+def fail_at(candidates, experience, target, came_bits=1.0):
+    candidates[0]["viewpoint"] = [*(0.5 * target[:3]), *target[3:]]
+    learn(experience, candidates, decision(target, came_bits), target)
+
+
 def test_more_failures_than_are_remembered_push_out_the_oldest(proposed):
     candidates, experience = proposed
-    for number in range(20):
-        target = ALONG_X + np.array([0, 0, 0, 0.3 * number, 0])
-        candidates[0]["viewpoint"] = [*(0.5 * target[:3]), *target[3:]]
-        learn(experience, candidates, decision(target, 1.0), target)
+    places = [ALONG_X + np.array([1.1 * (n % 5), 1.1 * (n // 5), 0, 0, 0]) for n in range(20)]
+    for target in places:
+        fail_at(candidates, experience, target)
     assert experience["failures"] == 16
-    assert trust_in(experience, False, ALONG_X + np.array([0, 0, 0, 0.3 * 3, 0])) == 1.0
-    assert trust_in(experience, False, ALONG_X + np.array([0, 0, 0, 0.3 * 4, 0])) == pytest.approx(0.02)
+    assert trust_in(experience, False, places[3]) == 1.0
+    assert trust_in(experience, False, places[4]) == pytest.approx(0.02)
+
+
+def test_a_fifth_gaze_that_fails_at_one_place_makes_wider_ones_alike(proposed):
+    """0.15 rad from the last: apart from it while four or five failed, alike from the sixth on."""
+    candidates, experience = proposed
+    beside = ALONG_X + np.array([0, 0, 0, 0, 0.15])
+    trusted = []
+    for number in range(7):
+        fail_at(candidates, experience, ALONG_X + np.array([0, 0, 0, 0.5 * number, 0]))
+        trusted.append(trust_in(experience, False, beside + np.array([0, 0, 0, 0.5 * number, 0])))
+    assert trusted == pytest.approx([1.0] * 5 + [0.02] * 2)
+    elsewhere = beside + np.array([1.5, 0, 0, 3.0, 0])
+    assert trust_in(experience, False, elsewhere) == 1.0
 
 
 @drawn(20)
