@@ -157,6 +157,8 @@ def propose_to(params, robot, given, proposer, candidates, experience, parts):
         given.move_end,
         given.under_way,
         given.place_variance_m2 > 0.0 or given.yaw_variance_rad2 > 0.0,
+        given.time_s,
+        given.gained_bits,
     )
     features, context, overlaps = parts
     described = len(features) > 0 or len(context) > 0

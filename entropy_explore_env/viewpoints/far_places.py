@@ -1,7 +1,10 @@
 """Far places that may be worth a drive: uncertain blocks of a belief, and places to look at them from.
 
-The belief is divided into blocks of voxels. Of each block that a path search reached, the place is the
-reached voxel nearest to its centre; the block's remaining bits are those of its voxels that nothing covers.
+The belief is divided into blocks of voxels. The place of a block is, of its voxels that are known to be free
+and that a path search reached, the one nearest to its centre. Its remaining bits are those of all its voxels
+that nothing covers. Most of what is unknown can never be seen, as the inside of rock: what openings promise
+is counted beside it, the bits of what was seen, and some times those of frontier voxels, which are unknown
+and lie beside one that is known to be free.
 """
 
 from __future__ import annotations
@@ -21,6 +24,17 @@ NOT_REACHED = -1
 """As a place: no voxel of the block was reached."""
 
 
+class BitCount(NamedTuple):
+    """Which bits are counted."""
+
+    target_precision: float
+    """1/σ² of a voxel at which nothing remains to be gained."""
+    known_precision: float
+    """1/σ² from which on a voxel counts as seen."""
+    behind: float
+    """How many times its own bits a frontier voxel promises."""
+
+
 class Blocks(NamedTuple):
     """Blocks of a belief, I, J, K along the axes."""
 
@@ -28,6 +42,8 @@ class Blocks(NamedTuple):
     """Voxels along a block's edge."""
     bits: np.ndarray
     """(I, J, K) float64, remaining bits; 0 outside the window that was looked at."""
+    promised: np.ndarray
+    """(I, J, K) float64, those that openings promise."""
     place: np.ndarray
     """(I, J, K) int64, the reached voxel nearest to the block's centre, or NOT_REACHED."""
 
@@ -35,22 +51,42 @@ class Blocks(NamedTuple):
 def new_blocks(shape: tuple[int, int, int], edge: int) -> Blocks:
     """Memory for the blocks of a grid, `edge` voxels along each axis that has so many."""
     count = tuple(math.ceil(n / edge) for n in shape)
-    return Blocks(edge, np.zeros(count), np.full(count, NOT_REACHED, np.int64))
+    return Blocks(edge, np.zeros(count), np.zeros(count), np.full(count, NOT_REACHED, np.int64))
+
+
+@lean_kernel
+def _is_frontier(belief, known_precision, x, y, z):
+    """Whether one of the six voxels beside an unknown one is known to be free."""
+    size = belief.size
+    for axis in range(3):
+        for step in (-1, 1):
+            i, j, k = x + step * (axis == 0), y + step * (axis == 1), z + step * (axis == 2)
+            if 0 <= i < size[0] and 0 <= j < size[1] and 0 <= k < size[2]:
+                beside = flat_index(size, i, j, k)
+                if belief.precision[beside] >= known_precision and belief.mean[beside] <= STOP_AT_COVERED:
+                    return True
+    return False
 
 
 @inlined_kernel
-def _fill_block(search, belief, target_precision, layer, low, high):
-    """(bits, place) of the block of the voxels from `low` up to, not including, `high`."""
-    bits, place, nearest = 0.0, NOT_REACHED, math.inf
+def _fill_block(search, belief, count, layer, low, high):
+    """(bits, promised, place) of the block of the voxels from `low` up to, not including, `high`."""
+    bits, promised, place, nearest = 0.0, 0.0, NOT_REACHED, math.inf
     for x in range(low[0], high[0]):
         for y in range(low[1], high[1]):
             for z in range(low[2], high[2]):
                 voxel = flat_index(belief.size, x, y, z)
                 if belief.mean[voxel] > STOP_AT_COVERED:
                     continue
-                if belief.precision[voxel] < target_precision:
-                    bits += remaining_bits(belief.precision[voxel], target_precision)
-                if (layer >= 0 and z != layer) or math.isinf(cost_to(search, voxel)):
+                known = belief.precision[voxel] >= count.known_precision
+                if belief.precision[voxel] < count.target_precision:
+                    left = remaining_bits(belief.precision[voxel], count.target_precision)
+                    bits += left
+                    if known:
+                        promised += left
+                    elif _is_frontier(belief, count.known_precision, x, y, z):
+                        promised += count.behind * left
+                if not known or (layer >= 0 and z != layer) or math.isinf(cost_to(search, voxel)):
                     continue
                 away = (
                     (2 * x + 1 - low[0] - high[0]) ** 2
@@ -59,17 +95,17 @@ def _fill_block(search, belief, target_precision, layer, low, high):
                 )
                 if away < nearest:
                     nearest, place = away, voxel
-    return bits, place
+    return bits, promised, place
 
 
 @lean_kernel
-def fill_blocks(search, belief, target_precision, layer, start, radius, blocks):
+def fill_blocks(search, belief, count, layer, start, radius, blocks):
     """Fill in the blocks of a belief around a robot after a search for paths.
 
     Args:
         search: The latest search.
         belief: A Belief.
-        target_precision: 1/σ² of a voxel at which nothing remains to be gained.
+        count: A BitCount.
         layer: The layer of a planar robot, from which alone places are taken; -1 = it flies.
         start: Voxel of the robot.
         radius: Half an edge of the window of voxels that is looked at; no path was searched beyond.
@@ -84,18 +120,25 @@ def fill_blocks(search, belief, target_precision, layer, start, radius, blocks):
                 inside = True
                 for axis in range(3):
                     inside &= low[axis] <= centre[axis] + radius and high[axis] > centre[axis] - radius
-                bits, place = 0.0, NOT_REACHED
+                bits, promised, place = 0.0, 0.0, NOT_REACHED
                 if inside:
-                    bits, place = _fill_block(search, belief, target_precision, layer, low, high)
-                blocks.bits[i, j, k], blocks.place[i, j, k] = bits, place
+                    bits, promised, place = _fill_block(search, belief, count, layer, low, high)
+                blocks.bits[i, j, k], blocks.promised[i, j, k] = bits, promised
+                blocks.place[i, j, k] = place
 
 
 @lean_kernel
-def block_bits_around(blocks, i, j, k):
-    """Remaining bits of a block and of its neighbours."""
-    total, count = 0.0, blocks.bits.shape
+def bits_around(bits, i, j, k):
+    """Sum of the (I, J, K) bits of a block and of its neighbours."""
+    total, count = 0.0, bits.shape
     for x in range(max(i - 1, 0), min(i + 2, count[0])):
         for y in range(max(j - 1, 0), min(j + 2, count[1])):
             for z in range(max(k - 1, 0), min(k + 2, count[2])):
-                total += blocks.bits[x, y, z]
+                total += bits[x, y, z]
     return total
+
+
+@lean_kernel
+def promised_around(blocks, i, j, k):
+    """What openings promise in a block and its neighbours: no more bits than remain there."""
+    return min(bits_around(blocks.bits, i, j, k), bits_around(blocks.promised, i, j, k))

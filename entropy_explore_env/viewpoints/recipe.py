@@ -41,6 +41,11 @@ class Recipe:
         block_m: Edge of the blocks that far places are taken from.
         dregs: What any scan of known ground still brings, as a share of the most bits ever expected of one:
             bits below that are worth next to nothing, and bits above it so much less.
+        leave_below: A robot whose last decision brought fewer bits a second than this share of its mission's
+            mean so far chooses by the plain rate, c = 1: what is left where it is holds it no longer (the
+            marginal value theorem of Charnov 1976, by which foragers leave a patch).
+        behind: How many times its own bits an unknown voxel beside a free one promises, where far places are
+            looked for.
     """
 
     exponent: float
@@ -62,11 +67,13 @@ class Recipe:
     keep: float = 1.15
     block_m: float = 1.0
     dregs: float = 0.0
+    leave_below: float = 0.0
+    behind: float = 4.0
 
     def __post_init__(self) -> None:
         """Check every field."""
         check_positive(self, "exponent", "keep", "block_m")
-        check_not_negative(self, "yaw_spread", "pitch_spread", "far_below", "dregs")
+        check_not_negative(self, "yaw_spread", "pitch_spread", "far_below", "dregs", "leave_below", "behind")
         for name in ("stop_probability", "gap_probability"):
             check(self, name, "a number from 0 to 1", lambda v: 0.0 <= v <= 1.0)
         check_count(self, "draw_thinning", 1, 1000)
@@ -90,6 +97,7 @@ ALL_AROUND = Recipe(
     gazes=4,
     turns=0,
     places=28,
+    behind=64.0,
 )
 """Scanners that see all around: where to, not which way to look."""
 
@@ -104,7 +112,6 @@ NARROW_PLANNED = Recipe(
     places=40,
     refinements=3,
     refined=20,
-    far_places=12,
     far_gazes=3,
     waypoint_gazes=24,
     block_m=1.6,
@@ -126,6 +133,7 @@ NARROW_STRAIGHT = Recipe(
     far_places=12,
     far_gazes=4,
     far_below=0.1,
+    leave_below=0.1,
 )
 """Narrow fields of view, straight drives of short reach: nearly all time is turning and scanning."""
 

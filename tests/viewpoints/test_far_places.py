@@ -12,48 +12,86 @@ from entropy_explore_env.belief.fields import Belief
 from entropy_explore_env.belief.paths.lattice import belief_costs, new_lattice
 from entropy_explore_env.belief.paths.planning import ANY_GOAL, search_paths
 from entropy_explore_env.belief.paths.search import cost_to, new_search
-from entropy_explore_env.viewpoints.far_places import NOT_REACHED, block_bits_around, fill_blocks, new_blocks
+from entropy_explore_env.viewpoints.far_places import (
+    NOT_REACHED,
+    BitCount,
+    bits_around,
+    fill_blocks,
+    new_blocks,
+    promised_around,
+)
 from tests.reference.scenes import random_belief
 
 SIZE, EDGE, TARGET = (7, 11, 5), 3, 400.0
+BEHIND = 0.75
+
+
+def lies_beside_free(mean, precision, seen, voxel):
+    """Whether one of six neighbours is known to be free."""
+    for axis, step in itertools.product(range(3), (-1, 1)):
+        beside = list(voxel)
+        beside[axis] += step
+        if 0 <= beside[axis] < SIZE[axis]:
+            at = tuple(beside)
+            if precision[at] >= seen and mean[at] <= 0.5:
+                return True
+    return False
 
 
 @pytest.mark.parametrize(("seed", "layer"), [(0, -1), (1, -1), (2, 3)])
 def test_blocks_are_those_of_a_slow_count(seed, layer):
     mean, precision = random_belief(SIZE, seed)
     mean[3, 5, :] = 0.0
+    seen = float(np.median(precision))
     search, lattice = new_search(mean.size), new_lattice(SIZE, 0.0, None if layer < 0 else layer)
     start = int(np.ravel_multi_index((3, 5, 3), SIZE))
     source = np.array([start], np.int32)
     search_paths(search, lattice, belief_costs(mean, precision, 1e-3), source, ANY_GOAL, math.inf)
     blocks, radius = new_blocks(SIZE, EDGE), 3
-    fill_blocks(
-        search, Belief(mean.reshape(-1), precision.reshape(-1), SIZE), TARGET, layer, start, radius, blocks
-    )
+    belief = Belief(mean.reshape(-1), precision.reshape(-1), SIZE)
+    fill_blocks(search, belief, BitCount(TARGET, seen, BEHIND), layer, start, radius, blocks)
     assert blocks.bits.shape == (3, 4, 2) and (blocks.place > NOT_REACHED).any()
+    both = 0
     for index in itertools.product(*map(range, blocks.bits.shape)):
         low = np.array(index) * EDGE
         high = np.minimum(low + EDGE, SIZE)
         outside = (low > np.array((3, 5, 3)) + radius).any() or (high <= np.array((3, 5, 3)) - radius).any()
-        bits, reached = 0.0, {}
+        bits, promised, reached = 0.0, 0.0, {}
         for voxel in itertools.product(*(range(a, b) for a, b in zip(low, high, strict=True))):
             if mean[voxel] <= 0.5:
-                bits += max(0.5 * math.log2(TARGET / float(precision[voxel])), 0.0)
+                left = max(0.5 * math.log2(TARGET / float(precision[voxel])), 0.0)
+                bits += left
+                known = precision[voxel] >= seen
+                if known:
+                    promised += left
+                elif lies_beside_free(mean, precision, seen, voxel):
+                    promised += BEHIND * left
                 number = int(np.ravel_multi_index(voxel, SIZE))
-                if (layer < 0 or voxel[2] == layer) and math.isfinite(cost_to(search, number)):
+                if known and (layer < 0 or voxel[2] == layer) and math.isfinite(cost_to(search, number)):
                     reached[number] = float(((np.array(voxel) + 0.5 - (low + high) / 2) ** 2).sum())
         if outside:
-            bits, reached = 0.0, {}
+            bits, promised, reached = 0.0, 0.0, {}
         assert blocks.bits[index] == pytest.approx(bits, rel=1e-6, abs=1e-9)
+        assert blocks.promised[index] == pytest.approx(promised, rel=1e-6, abs=1e-9)
+        both += int(0.0 < promised < bits)
         place = int(blocks.place[index])
         assert (place == NOT_REACHED) == (not reached)
         if reached:
             assert reached[place] == min(reached.values())
+    assert both >= 3
 
 
 def test_the_bits_around_a_block_are_those_of_it_and_its_neighbours():
     blocks = new_blocks((6, 8, 1), 2)
     blocks.bits[:] = np.arange(12).reshape(3, 4, 1)
-    assert block_bits_around(blocks, 0, 0, 0) == 0 + 1 + 4 + 5
-    assert block_bits_around(blocks, 1, 2, 0) == blocks.bits[0:3, 1:4].sum()
-    assert block_bits_around(blocks, 2, 3, 0) == 6 + 7 + 10 + 11
+    assert bits_around(blocks.bits, 0, 0, 0) == 0 + 1 + 4 + 5
+    assert bits_around(blocks.bits, 1, 2, 0) == blocks.bits[0:3, 1:4].sum()
+    assert bits_around(blocks.bits, 2, 3, 0) == 6 + 7 + 10 + 11
+
+
+def test_openings_promise_no_more_bits_than_remain():
+    blocks = new_blocks((6, 8, 1), 2)
+    blocks.bits[:] = 10.0
+    blocks.promised[0, 0], blocks.promised[2, 3] = 7.0, 90.0
+    assert promised_around(blocks, 1, 1, 0) == 7.0
+    assert promised_around(blocks, 2, 2, 0) == 60.0

@@ -11,7 +11,7 @@ from entropy_explore_env.belief.raycast import STOP_AT_COVERED
 from entropy_explore_env.belief.voxel_index import flat_index, grid_index
 from entropy_explore_env.compilation.kernels import lean_kernel
 from entropy_explore_env.randomness import draw_gaussian, draw_uniform
-from entropy_explore_env.viewpoints.far_places import block_bits_around, fill_blocks
+from entropy_explore_env.viewpoints.far_places import BitCount, fill_blocks, promised_around
 from entropy_explore_env.viewpoints.imagined_scan import imagined_bits
 from entropy_explore_env.viewpoints.proposals.nearby import copy_viewpoint, value_of, voxel_at
 from entropy_explore_env.viewpoints.proposals.situation import distance_apart, worth_bits
@@ -70,7 +70,8 @@ def _far_viewpoints(proposer, situation, radius):
     if recipe.far_places == 0:
         return 0
     start, window = voxel_at(belief.size, here), math.ceil(radius)
-    fill_blocks(scratch.search, belief, proposer.target_precision, proposer.layer, start, window, blocks)
+    count_of = BitCount(proposer.target_precision, proposer.exact.known_precision, recipe.behind)
+    fill_blocks(scratch.search, belief, count_of, proposer.layer, start, window, blocks)
     count, one = 0, len(far.viewpoints) - 1
     viewpoint, seconds = far.viewpoints[one : one + 1], far.seconds[one : one + 1]
     edge_m, drive = proposer.exact.voxel_size_m, proposer.drive
@@ -78,13 +79,13 @@ def _far_viewpoints(proposer, situation, radius):
         for j in range(shape[1]):
             for k in range(shape[2]):
                 place = blocks.place[i, j, k]
-                bits = block_bits_around(blocks, i, j, k) if place >= 0 else 0.0
+                bits = promised_around(blocks, i, j, k) if place >= 0 else 0.0
                 if bits > 0.0:
                     _put_place(proposer, situation, place, viewpoint[0])
                     travel_seconds(
                         scratch.search, belief.size, drive, edge_m, here, viewpoint, proposer.reach, seconds
                     )
-                    worth = value_of(proposer, bits, seconds[0])
+                    worth = value_of(situation, bits, seconds[0])
                     count = _insert_place(proposer, situation, place, worth, count)
     for place in range(count - 1, -1, -1):
         for gaze in range(recipe.far_gazes - 1, -1, -1):
@@ -128,9 +129,9 @@ def propose_far(proposer, situation):
         best = 0.0
         for k in range(count):
             far.bits[k] = worth_bits(proposer, situation, far.viewpoints[k], far.bits[k])
-            far.values[k] = value_of(proposer, far.bits[k], far.seconds[k])
+            far.values[k] = value_of(situation, far.bits[k], far.seconds[k])
             best = max(best, far.values[k])
-        beyond = value_of(proposer, experience.most_bits, max(radius * edge_m / drive.max_speed_m_s, 1e-9))
+        beyond = value_of(situation, experience.most_bits, max(radius * edge_m / drive.max_speed_m_s, 1e-9))
         if radius >= everywhere or best >= beyond:
             return count, best
         radius *= 2.0

@@ -9,7 +9,7 @@ from entropy_explore_env.belief.paths.search import cost_to
 from entropy_explore_env.compilation.kernels import lean_kernel
 from entropy_explore_env.robots.motion import driving_time
 from entropy_explore_env.viewpoints.candidate_features import COLUMNS, CONTEXT_COLUMNS, FEATURES
-from entropy_explore_env.viewpoints.far_places import block_bits_around
+from entropy_explore_env.viewpoints.far_places import bits_around
 from entropy_explore_env.viewpoints.proposals.nearby import voxel_at
 from entropy_explore_env.viewpoints.proposals.planner_rules import REMEMBERED
 from entropy_explore_env.viewpoints.proposals.records import Kind
@@ -113,7 +113,7 @@ def _share_around(proposer, size, at, remaining):
     i = min(max(int(at[0]), 0), size[0] - 1) // blocks.edge
     j = min(max(int(at[1]), 0), size[1] - 1) // blocks.edge
     k = min(max(int(at[2]), 0), size[2] - 1) // blocks.edge
-    return clip(block_bits_around(blocks, i, j, k) / remaining)
+    return clip(bits_around(blocks.bits, i, j, k) / remaining)
 
 
 @lean_kernel

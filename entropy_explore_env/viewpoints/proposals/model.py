@@ -58,6 +58,8 @@ class RecipeNumbers(NamedTuple):
     """A Recipe as compiled code takes it; spreads in radians."""
 
     exponent: float
+    leave_below: float
+    behind: float
     gap_probability: float
     gazes: int
     turns: int
@@ -179,6 +181,8 @@ def recipe_numbers(recipe: Recipe, kind: RobotKind) -> RecipeNumbers:
     width, height = kind.sensor.field_of_view_rad
     return RecipeNumbers(
         exponent=float(recipe.exponent),
+        leave_below=float(recipe.leave_below),
+        behind=float(recipe.behind),
         gap_probability=float(recipe.gap_probability),
         gazes=int(recipe.gazes),
         turns=int(recipe.turns),

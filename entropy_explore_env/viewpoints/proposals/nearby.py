@@ -137,9 +137,9 @@ def _vary(proposer, situation, spread, at):
 
 
 @lean_kernel
-def value_of(proposer, bits, seconds):
+def value_of(situation, bits, seconds):
     """Bits / s^c; 0 where there is no path."""
-    return bits / seconds**proposer.recipe.exponent if seconds < math.inf else 0.0
+    return bits / seconds**situation.experience.exponent if seconds < math.inf else 0.0
 
 
 @lean_kernel
@@ -166,7 +166,7 @@ def evaluate(proposer, situation, scan, first, last):
     for k in range(first, last):
         at = pool.viewpoints[k]
         pool.bits[k] = pool.stop_bits[k] = worth_bits(proposer, situation, at, pool.bits[k])
-        pool.values[k] = value_of(proposer, pool.bits[k], pool.seconds[k])
+        pool.values[k] = value_of(situation, pool.bits[k], pool.seconds[k])
         moved = at[0] != here[0] or at[1] != here[1] or at[2] != here[2]
         pool.kinds[k] = _NEAR if moved else _SPOT
         copy_viewpoint(at, pool.goals[k])

@@ -13,7 +13,7 @@ from entropy_explore_env.viewpoints.proposals.nearby import (
 )
 from entropy_explore_env.viewpoints.proposals.records import Kind
 from entropy_explore_env.viewpoints.proposals.selection import choose, most_far_of, select
-from entropy_explore_env.viewpoints.proposals.situation import distance_apart, learn
+from entropy_explore_env.viewpoints.proposals.situation import distance_apart, learn, weigh_time
 
 _NONE, _FAR = int(Kind.NONE), int(Kind.FAR)
 
@@ -34,6 +34,7 @@ def propose(proposer, situation, decision, candidates, described):
     """
     experience, pool = situation.experience, proposer.scratch.pool
     learn(experience, candidates, decision, situation.here)
+    weigh_time(proposer, experience, decision)
     if proposer.planned:
         start_paths(proposer, situation)
     size = propose_nearby(proposer, situation)

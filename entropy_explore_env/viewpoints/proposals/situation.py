@@ -64,6 +64,10 @@ class LastDecision(NamedTuple):
     """Whether it still drives there."""
     uncertain: bool
     """Whether its pose is an estimate: nothing cut a drive short that ended elsewhere, where it arrived."""
+    time_s: float
+    """Now."""
+    gained_bits: float
+    """Since the mission began, by its own scans."""
 
 
 @lean_kernel
@@ -125,6 +129,24 @@ def learn(experience, candidates, decision, here):
         experience.going = False
     elif came < DISAPPOINTING * expected:
         _remember(experience, decision.target, came / expected, FORGET_EDGES)
+
+
+@lean_kernel
+def weigh_time(proposer, experience, decision):
+    """Set how much time weighs in bits / s^c at this decision; see `Recipe.leave_below`.
+
+    Args:
+        proposer: A Proposer.
+        experience: EXPERIENCE, changed in place.
+        decision: LastDecision.
+    """
+    if decision.under_way:
+        return
+    seconds = max(decision.time_s - experience.decided_s, 1e-9)
+    mean_rate = decision.gained_bits / max(decision.time_s, 1e-9)
+    leaves = max(decision.came_bits, 0.0) / seconds < proposer.recipe.leave_below * mean_rate
+    experience.exponent = 1.0 if leaves else proposer.recipe.exponent
+    experience.decided_s = decision.time_s
 
 
 @lean_kernel

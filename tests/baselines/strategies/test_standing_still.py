@@ -54,8 +54,8 @@ MAZES = {
 """Of ground robots with a lidar, and of flying ones with cameras."""
 LIMIT_S, STILL_S = 150.0, 60.0
 STILL_IN_A_ROW_S = 120.0
-"""Of one of four robots in a row where none can pass, while others map: with a random walk 77 s were seen. And
-of `information-rate-v0`, which stays as it is, since tables and rewards compare with it: up to 95 s."""
+"""Of one of four robots in a row where none can pass, while others map: with a random walk 77 s were seen.
+And of `information-rate-v0`, which stays as it is, since tables and rewards compare with it: up to 95 s."""
 MOVED_M, GAINED_BITS = 0.2, 100.0
 """A robot that does neither for STILL_S stands still."""
 
@@ -192,8 +192,8 @@ def test_robots_look_behind_themselves_for_a_way_out():
     ("strategy", "seed"), [("planned-rate", 84), ("receding-horizon", 137), ("receding-horizon", 182)]
 )
 def test_robots_look_and_drive_elsewhere_when_a_teammate_hides_what_they_expect(strategy, seed):
-    """Two robots stood for 70, 91 and 120 s: one looked through its teammate for ever, at bits that never came,
-    others drove to a place on the far side of it that they had not dropped."""
+    """Two robots stood for 70, 91 and 120 s: one looked through its teammate for bits that never came, others
+    drove to a place on the far side of it that they had not dropped."""
     assert longest_stand_s("tunnels", strategy, 2, seed) < 20.0
 
 

@@ -20,7 +20,13 @@ from entropy_explore_env.viewpoints.candidate_features import COLUMNS
 from entropy_explore_env.viewpoints.evaluation import is_line_free, new_scratch, robot_model
 from entropy_explore_env.viewpoints.proposals.model import MATE, new_proposers
 from entropy_explore_env.viewpoints.proposals.records import CANDIDATE, EXPERIENCE, Kind
-from entropy_explore_env.viewpoints.proposals.situation import LastDecision, Situation, learn, trust_in
+from entropy_explore_env.viewpoints.proposals.situation import (
+    LastDecision,
+    Situation,
+    learn,
+    trust_in,
+    weigh_time,
+)
 from entropy_explore_env.viewpoints.proposals.views import clear_marks, look_from, mark_view
 from entropy_explore_env.viewpoints.recipe import NARROW_PLANNED, recipe_for
 from tests.reference.scenes import drawn, free_box, put, random_belief, seeds, started
@@ -70,10 +76,12 @@ def test_one_ray_through_seven_unknown_voxels():
     assert not proposer.scratch.marks.any() and not proposer.scratch.scan.added.any()
 
 
-def decision(target, came_bits, move_end=MoveEnd.ARRIVED, under_way=False, uncertain=False):
+def decision(target, came_bits, move_end=MoveEnd.ARRIVED, under_way=False, uncertain=False, **so_far):
     target = np.asarray(target, float)
     in_metres = np.concatenate([0.5 * target[:3], target[3:]])
-    return LastDecision(target, in_metres, 0.5, came_bits, move_end.code, under_way, uncertain)
+    time_s, gained_bits = so_far.get("time_s", 0.0), so_far.get("gained_bits", 0.0)
+    came = (came_bits, move_end.code, under_way, uncertain)
+    return LastDecision(target, in_metres, 0.5, *came, time_s, gained_bits)
 
 
 @pytest.fixture
@@ -224,6 +232,22 @@ def test_a_fifth_gaze_that_fails_at_one_place_makes_wider_ones_alike(proposed):
     assert trusted == pytest.approx([1.0] * 5 + [0.02] * 2)
     elsewhere = beside + np.array([1.5, 0, 0, 3.0, 0])
     assert trust_in(experience, False, elsewhere) == 1.0
+
+
+def test_robots_leave_where_a_decision_brings_a_tenth_of_the_mean_rate(proposed):
+    """1,000 bits in 10 s: 20 bits in 2 s are enough to stay, 19 are not, and under way nothing changes."""
+    proposer, experience = new_proposers(ONE_RAY)[0], proposed[1]
+    assert proposer.recipe.leave_below == 0.1 and proposer.recipe.exponent == 2.2
+
+    def exponent_after(bits, under_way=False):
+        experience["decided_s"] = 8.0
+        came = decision(ALONG_X, bits, under_way=under_way, time_s=10.0, gained_bits=1000.0)
+        weigh_time(proposer, experience, came)
+        return experience["exponent"], experience["decided_s"]
+
+    assert exponent_after(20.0) == (2.2, 10.0)
+    assert exponent_after(19.0) == (1.0, 10.0)
+    assert exponent_after(500.0, under_way=True) == (1.0, 8.0)
 
 
 @drawn(20)
