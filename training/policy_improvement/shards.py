@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from entropy_explore_env.worlds.files.archives import arrays as arrays_of
 from entropy_explore_env.writing import write_atomically
 from training.errors import LabelsError
 
@@ -148,8 +149,7 @@ def _check_shapes(file: Path, labels: Labels) -> None:
 
 def _arrays(file: Path) -> dict[str, np.ndarray]:
     try:
-        with np.load(io.BytesIO(file.read_bytes()), allow_pickle=False) as content:
-            return {name: content[name] for name in content.files}
+        return arrays_of(file.read_bytes())
     except Exception as error:  # of a broken archive: zipfile and NumPy raise a dozen kinds
         said = " ".join(str(error).split())[:200]
         raise LabelsError("labels", str(file), f"a shard as it was written, whole ({said})") from None

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import tracemalloc
+import zipfile
+
 import numpy as np
 import pytest
 
@@ -35,6 +38,20 @@ def test_labels_of_other_code_or_settings_are_refused(tmp_path, origin, said):
     save_shard(file, labels(1.0, states=5), HERE, [1])
     with pytest.raises(LabelsError, match=said):
         load_shard(file, origin)
+
+
+def test_a_small_file_cannot_fill_the_memory(tmp_path):
+    """300 MiB of zeros in 300 kB; no array is made of them."""
+    file = shard_file(tmp_path, 0)
+    file.parent.mkdir(parents=True, exist_ok=True)
+    with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
+        archive.writestr("observations.npy", bytes(300 << 20))
+    assert file.stat().st_size < 2 << 20
+    tracemalloc.start()
+    with pytest.raises(LabelsError, match="at most 32 arrays and 256 MiB"):
+        load_shard(file, HERE)
+    assert tracemalloc.get_traced_memory()[1] < 20 << 20
+    tracemalloc.stop()
 
 
 def test_broken_shards_are_refused(tmp_path):
