@@ -15,11 +15,9 @@ Checkpoints of the policy alone lack the last three. Nothing is ever unpickled.
 from __future__ import annotations
 
 import hashlib
-import io
 import json
 import os
 import shutil
-import zipfile
 from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
@@ -38,6 +36,7 @@ from entropy_explore_env.settings_json import scenario_of, settings_of
 from entropy_explore_env.viewpoints.candidate_features import FEATURES_VERSION
 from training.errors import CheckpointError
 from training.networks import NETWORKS
+from training.stored_arrays import stored_arrays, stored_bytes
 
 FORMAT = 1
 _MOST_WEIGHTS = 1 << 26
@@ -108,11 +107,11 @@ def save_checkpoint(folder: Path, checkpoint: Checkpoint) -> None:
     """
     files = {
         "policy.safetensors": bytes_of(checkpoint.weights),
-        "normalisation.npz": _npz(checkpoint.normalisation),
+        "normalisation.npz": stored_bytes(checkpoint.normalisation),
     }
     if checkpoint.trainer is not None:
         files["training.safetensors"] = bytes_of(checkpoint.trainer.tensors)
-        files["training.npz"] = _npz(checkpoint.trainer.arrays)
+        files["training.npz"] = stored_bytes(checkpoint.trainer.arrays)
         files["training.json"] = _json(checkpoint.trainer.counters)
     files["policy.json"] = _json(
         {
@@ -277,23 +276,12 @@ def _counters(file: Path, digests: Mapping[str, Any]) -> dict[str, Any]:
 
 def _arrays(file: Path, digests: Mapping[str, Any]) -> dict[str, np.ndarray]:
     try:
-        content = _content(file, digests)
-        with zipfile.ZipFile(io.BytesIO(content)) as members:
-            if any(each.file_size != each.compress_size for each in members.infolist()):
-                raise ValueError("its arrays are compressed: a small file could fill the memory")
-        with np.load(io.BytesIO(content), allow_pickle=False) as arrays:
-            return {name: arrays[name] for name in arrays.files}
+        return stored_arrays(_content(file, digests))
     except CheckpointError:
         raise
     except Exception as error:  # of a broken archive: zipfile and NumPy raise a dozen kinds
         said = " ".join(str(error).split())[:200]
         raise CheckpointError("checkpoint", str(file), f"NumPy's npz without objects ({said})") from None
-
-
-def _npz(arrays: Mapping[str, np.ndarray]) -> bytes:
-    file = io.BytesIO()
-    np.savez(file, **arrays)  # pyright: ignore[reportArgumentType] - names are those of arrays
-    return file.getvalue()
 
 
 def _json(content: Mapping[str, Any]) -> bytes:

@@ -67,5 +67,6 @@ def configured(strategy: Any, settings: str) -> Strategy:  # noqa: ANN401 - with
     config, changes = strategy.config, {}
     for pair in settings.split(","):
         name, _, value = pair.partition("=")
-        changes[name] = type(getattr(config, name))(float(value))
+        default = getattr(config, name)
+        changes[name] = float(value) if default is None else type(default)(float(value))
     return type(strategy)(replace(config, **changes))

@@ -201,6 +201,15 @@ def training_plans(starts: int) -> tuple[Task, ...]:
     return (_dungeons(starts, every=2), *recipes)
 
 
+def training_volumes(starts: int) -> tuple[Task, ...]:
+    """Worlds like those of the suite `volumes` on which settings may be tuned: of the training split."""
+    return tuple(
+        _one(team_name(name, robots), with_settings(SCENARIOS[name], {"robots": robots}), starts, "train")
+        for name in ("room-furnished", "office", "office-3d", "cave")
+        for robots in (1, 3)
+    )
+
+
 SUITES = {"plans": plans, "volumes": volumes, "teams": teams}
 """Name → a function of `quick` that makes the tasks."""
 

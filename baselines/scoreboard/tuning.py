@@ -1,56 +1,97 @@
-"""Tune the rivals: `python -m baselines.scoreboard.tuning`.
+"""Tune the rivals, and ours: `python -m baselines.scoreboard.tuning`.
 
-Each setting of a rule is varied alone around its default, on training worlds (`suites.training_plans`) with
-the same starts for every value. The table of paths over the default's is written into the page that tells of
-the rules; who changes a default runs this again. Missions are kept, so that more starts run what is missing.
+Each setting of a rule is varied alone around its default, on training worlds (`suites.training_plans`,
+`suites.training_volumes`) with the same starts for every value. The table of paths, or of mission times,
+over the default's is written into the page that tells of the rules; who changes a default runs this again.
+Missions are kept, so that more starts run what is missing.
 """
 
 from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 from baselines.cli.arguments import make_folder, parse, run_command
 from baselines.experiments.cells import run_cells
 from baselines.experiments.statistics import Interval
 from baselines.experiments.tables import markdown_table
 from baselines.scoreboard.mission import SETTINGS
-from baselines.scoreboard.results import PATH, Results
-from baselines.scoreboard.suites import Suite, training_plans
+from baselines.scoreboard.results import PATH, TIME, Measure, Results
+from baselines.scoreboard.suites import Suite, Task, training_plans, training_volumes
 from baselines.strategies import make_strategy
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.validation import check_whole
 from entropy_explore_env.writing import write_atomically
 
-YARDSTICK = "nearest-frontier"
-GRID: Mapping[str, Mapping[str, tuple[float, ...]]] = {
-    "distance-advantage": {
-        "radius": (30, 60, 120, 270),
-        "horizon": (30, 61, 120, 270),
-        "opening": (0, 0.05, 0.1, 0.2, 0.3),
-        "passing": (0, 0.06, 0.125),
-        "meanwhile": (0, 0.25, 0.5, 1),
-    },
-    "information-gain": {"weight": (0.02, 0.05, 0.15, 0.4, 1, 2), "horizon": (1, 3)},
-    "receding-horizon": {"decay": (0.5, 1, 2, 4, 8, 16), "edge": (0.2, 0.4, 0.8), "places": (15, 30, 60)},
-    "tour": {"near": (0.4, 0.75, 1.5, 3), "cover": (0.25, 0.5, 1, 2), "stay": (0.02, 0.1, 0.3)},
+
+class Tuning(NamedTuple):
+    """What is tuned where, and by what."""
+
+    tasks: Callable[[int], tuple[Task, ...]]
+    """Of so many starts each."""
+    grid: Mapping[str, Mapping[str, tuple[float, ...]]]
+    """Strategy → setting → values, the default among them, unless robots of different kinds have several."""
+    yardstick: str
+    """Strategy."""
+    measure: Measure
+    words: str
+    """What the measure is."""
+
+
+TUNINGS: Mapping[str, Tuning] = {
+    "plans": Tuning(
+        training_plans,
+        {
+            "distance-advantage": {
+                "radius": (30, 60, 120, 270),
+                "horizon": (30, 61, 120, 270),
+                "opening": (0, 0.05, 0.1, 0.2, 0.3),
+                "passing": (0, 0.06, 0.125),
+                "meanwhile": (0, 0.25, 0.5, 1),
+            },
+            "information-gain": {"weight": (0.02, 0.05, 0.15, 0.4, 1, 2), "horizon": (1, 3)},
+            "receding-horizon": {
+                "decay": (0.5, 1, 2, 4, 8, 16),
+                "edge": (0.2, 0.4, 0.8),
+                "places": (15, 30, 60),
+            },
+            "tour": {"near": (0.4, 0.75, 1.5, 3), "cover": (0.25, 0.5, 1, 2), "stay": (0.02, 0.1, 0.3)},
+        },
+        "nearest-frontier",
+        PATH,
+        "path",
+    ),
+    "volumes": Tuning(
+        training_volumes,
+        {
+            "planned-rate": {
+                "behind": (1, 4, 16, 64),
+                "far_places": (6, 12, 24, 48),
+                "leave_below": (0, 0.05, 0.1, 0.2),
+            }
+        },
+        "information-rate-v0",
+        TIME,
+        "mission time",
+    ),
 }
-"""Strategy → setting → values, the default among them. With one robot the coordinated rules have none."""
-BEGIN, END = "<!-- tuning: begin -->", "<!-- tuning: end -->"
-"""Between these lines of the page the table stands."""
+"""Suite → what is tuned on worlds like those of it. With one robot the coordinated rules have no setting."""
 
 
 @dataclass
 class Args:
-    """Vary the rivals' settings on training worlds."""
+    """Vary settings on training worlds."""
 
-    strategies: str = ",".join(GRID)
-    """Which, commas between."""
+    suite: str = "plans"
+    """plans: the rivals; volumes: ours."""
+    strategies: str | None = None
+    """Which, commas between; default: all that the suite tunes."""
     starts: int = 5
-    """In each of the training plans."""
+    """In each of the training worlds."""
     stop_after_s: float | None = None
     """Time on the clock after which no mission is begun any more; the same command goes on."""
     confirm: bool = False
@@ -63,35 +104,53 @@ class Args:
     """Page that holds the table."""
 
 
-def variants(strategy: str) -> list[str]:
+def marks(suite: str) -> tuple[str, str]:
+    """The lines of the page between which the table of a suite stands."""
+    return f"<!-- tuning of {suite}: begin -->", f"<!-- tuning of {suite}: end -->"
+
+
+def find_tuning(suite: str) -> Tuning:
+    """What is tuned on worlds like those of a suite.
+
+    Raises:
+        SettingError: Nothing is.
+    """
+    if suite not in TUNINGS:
+        raise SettingError("suite", suite, "one of " + ", ".join(TUNINGS))
+    return TUNINGS[suite]
+
+
+def variants(tuning: Tuning, strategy: str) -> list[str]:
     """The default, then each other value of each setting: `name::setting=value`.
+
+    Of a setting whose default depends on the kind of robot each value is another one.
 
     Raises:
         SettingError: There is no grid for the strategy.
     """
-    if strategy not in GRID:
-        raise SettingError("strategies", strategy, "one of " + ", ".join(GRID))
+    if strategy not in tuning.grid:
+        raise SettingError("strategies", strategy, "one of " + ", ".join(tuning.grid))
     config = getattr(make_strategy(strategy), "config", None)
     found = [strategy]
-    for name, values in GRID[strategy].items():
+    for name, values in tuning.grid[strategy].items():
         found += [
             f"{strategy}{SETTINGS}{name}={value:g}" for value in values if value != getattr(config, name)
         ]
     return found
 
 
-def tuning_table(results: Results, strategies: Sequence[str]) -> str:
-    """Markdown: a row of each variant, its path over the default's and over the yardstick's."""
-    tasks = results.suite.tasks
-    head = ["strategy", "setting", "missions", "path over the default's", f"over `{YARDSTICK}`'s", "by plan"]
+def tuning_table(results: Results, tuning: Tuning, strategies: Sequence[str]) -> str:
+    """Markdown: a row of each variant, its measure over the default's and over the yardstick's."""
+    tasks, yardstick, measure = results.suite.tasks, tuning.yardstick, tuning.measure
+    over = [f"{tuning.words} over the default's", f"over `{yardstick}`'s"]
     rows = []
     for strategy in strategies:
-        for variant in variants(strategy):
-            to_default = results.ratio(variant, strategy, PATH, tasks)
-            to_yardstick = results.ratio(variant, YARDSTICK, PATH, tasks)
+        for variant in variants(tuning, strategy):
+            to_default = results.ratio(variant, strategy, measure, tasks)
+            to_yardstick = results.ratio(variant, yardstick, measure, tasks)
             if to_default is None or to_yardstick is None:
                 continue
-            by_task = [(task.name, results.ratio(variant, YARDSTICK, PATH, [task])) for task in tasks]
+            by_task = [(task.name, results.ratio(variant, yardstick, measure, [task])) for task in tasks]
             rows.append(
                 [
                     f"`{strategy}`",
@@ -102,7 +161,7 @@ def tuning_table(results: Results, strategies: Sequence[str]) -> str:
                     ", ".join(f"{name} {ratio.value:.2f}" for name, ratio in by_task if ratio is not None),
                 ]
             )
-    return markdown_table(head, rows)
+    return markdown_table(["strategy", "setting", "missions", *over, "by world"], rows)
 
 
 def ranged(ratio: Interval) -> str:
@@ -110,16 +169,17 @@ def ranged(ratio: Interval) -> str:
     return ratio.text() if ratio.low < ratio.high else f"{ratio.value:.2f}"
 
 
-def with_table(page: str, table: str) -> str:
-    """A page with a new table between its marks.
+def with_table(page: str, suite: str, table: str) -> str:
+    """A page with a new table between the marks of a suite.
 
     Raises:
         SettingError: It has no marks.
     """
-    if BEGIN not in page or END not in page:
-        raise SettingError("page", BEGIN, f"a page with the lines {BEGIN} and {END}")
-    before, _, rest = page.partition(BEGIN)
-    return f"{before}{BEGIN}\n\n{table.strip()}\n\n{END}{rest.partition(END)[2]}"
+    begin, end = marks(suite)
+    if begin not in page or end not in page:
+        raise SettingError("page", begin, f"a page with the lines {begin} and {end}")
+    before, _, rest = page.partition(begin)
+    return f"{before}{begin}\n\n{table.strip()}\n\n{end}{rest.partition(end)[2]}"
 
 
 def main(words: Sequence[str]) -> int:
@@ -129,12 +189,13 @@ def main(words: Sequence[str]) -> int:
     check_whole("jobs", args.jobs, 1)
     if args.stop_after_s is not None and not 0.0 < args.stop_after_s < math.inf:
         raise SettingError("stop_after_s", args.stop_after_s, "a number > 0")
-    strategies = args.strategies.split(",")
-    entered = [YARDSTICK, *(variant for strategy in strategies for variant in variants(strategy))]
+    tuning = find_tuning(args.suite)
+    strategies = list(tuning.grid) if args.strategies is None else args.strategies.split(",")
+    entered = [variant for strategy in strategies for variant in variants(tuning, strategy)]
     page = args.page.read_text(encoding="utf-8")
-    with_table(page, "")  # refused before hours of missions
+    with_table(page, args.suite, "")  # refused before hours of missions
     make_folder("runs", args.runs)
-    suite = Suite("plans", training_plans(args.starts), tuple(entered))
+    suite = Suite(args.suite, tuning.tasks(args.starts), (tuning.yardstick, *entered))
     records = run_cells(
         suite.cells,
         args.runs,
@@ -146,8 +207,8 @@ def main(words: Sequence[str]) -> int:
         stop_after_s=math.inf if args.stop_after_s is None else args.stop_after_s,
         confirm=args.confirm,
     )
-    table = tuning_table(Results(suite, records), strategies)
-    write_atomically(args.page, with_table(page, table))
+    table = tuning_table(Results(suite, records), tuning, strategies)
+    write_atomically(args.page, with_table(page, args.suite, table))
     print(f"written: the table in {args.page}", file=sys.stderr)
     return 0
 

@@ -19,7 +19,8 @@ What a robot is, and what its mission asks for, decides how it explores:
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 
@@ -29,7 +30,7 @@ from entropy_explore_env.missions.view_candidates import ViewProposer
 from entropy_explore_env.scenario import Scenario, with_settings
 from entropy_explore_env.settings import RobotKind
 from entropy_explore_env.viewpoints.evaluation import sees_all_around
-from entropy_explore_env.viewpoints.recipe import Recipe
+from entropy_explore_env.viewpoints.recipe import Recipe, recipe_for
 
 
 def explores_frontiers(scenario: Scenario, kind: RobotKind) -> bool:
@@ -38,12 +39,41 @@ def explores_frontiers(scenario: Scenario, kind: RobotKind) -> bool:
     return plan and (kind.robot.redecide != "at_stop" or scenario.ending.by_seen)
 
 
+@dataclass(frozen=True)
+class PlannedRateConfig:
+    """What differs from the recipe of every kind of robot (`viewpoints.recipe.Recipe`); None = nothing.
+
+    Attributes:
+        exponent: c of bits / s^c.
+        behind: How many times its own bits an unknown voxel beside a free one promises.
+        far_places: That are evaluated beyond those within reach.
+        leave_below: Share of the mission's mean rate below which a robot leaves.
+        dregs: What any scan still brings.
+    """
+
+    exponent: float | None = None
+    behind: float | None = None
+    far_places: float | None = None
+    leave_below: float | None = None
+    dregs: float | None = None
+
+    def recipe(self, kind: RobotKind) -> Recipe:
+        """Of a kind of robot.
+
+        Raises:
+            SettingError: A value is not allowed.
+        """
+        recipe = recipe_for(kind)
+        given = {name: value for name, value in asdict(self).items() if value is not None}
+        return replace(recipe, **{name: type(getattr(recipe, name))(given[name]) for name in given})
+
+
 class PlannedRate:
     """Chooses among candidates nearby and far away by bits / s^c; in some plans among frontier cells."""
 
-    def __init__(self, recipes: Mapping[int, Recipe] | None = None) -> None:
-        """Take the recipe of each kind of robot by its number; None = by what the robot is."""
-        self._recipes = recipes
+    def __init__(self, config: PlannedRateConfig | None = None) -> None:
+        """Take what differs from the robots' recipes; None = nothing."""
+        self.config = config or PlannedRateConfig()
 
     def reset(self, scenario: Scenario, rng: np.random.Generator) -> None:
         """A new mission begins."""
@@ -53,7 +83,8 @@ class PlannedRate:
             self._plans.reset(scenario, rng)
         if not all(self._frontiers):
             one = with_settings(scenario, {"action": {"kind": "candidates", "candidates": 1}})
-            self._proposer = ViewProposer(one, rng, recipes=self._recipes)
+            recipes = {number: self.config.recipe(kind) for number, kind in enumerate(scenario.kinds)}
+            self._proposer = ViewProposer(one, rng, recipes=recipes)
 
     def choose(self, views: Sequence[RobotView]) -> list[np.ndarray]:
         """The viewpoint of each view, by its own belief and what it has heard."""

@@ -6,7 +6,6 @@ code and of the settings that it was made with, and the seeds of its missions. N
 
 from __future__ import annotations
 
-import io
 import json
 from collections.abc import Mapping
 from pathlib import Path
@@ -14,9 +13,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from entropy_explore_env.worlds.files.archives import arrays as arrays_of
 from entropy_explore_env.writing import write_atomically
 from training.errors import LabelsError
+from training.stored_arrays import stored_arrays, stored_bytes
 
 FORMAT = 2
 _HEAD = "head"
@@ -92,9 +91,8 @@ def shard_file(folder: Path, number: int) -> Path:
 def save_shard(file: Path, labels: Labels, origin: Origin, seeds: list[int]) -> None:
     """Write a shard, whole or not at all."""
     head = {"format": FORMAT, **origin._asdict(), "seeds": [str(seed) for seed in seeds]}
-    content, text = io.BytesIO(), np.frombuffer(json.dumps(head).encode(), np.uint8)
-    np.savez(content, **labels._asdict(), **{_HEAD: text})  # pyright: ignore[reportArgumentType]
-    write_atomically(file, content.getvalue())
+    text = np.frombuffer(json.dumps(head).encode(), np.uint8)
+    write_atomically(file, stored_bytes({**labels._asdict(), _HEAD: text}))
 
 
 def load_shard(file: Path, origin: Origin) -> Labels:
@@ -149,7 +147,7 @@ def _check_shapes(file: Path, labels: Labels) -> None:
 
 def _arrays(file: Path) -> dict[str, np.ndarray]:
     try:
-        return arrays_of(file.read_bytes())
+        return stored_arrays(file.read_bytes())
     except Exception as error:  # of a broken archive: zipfile and NumPy raise a dozen kinds
         said = " ".join(str(error).split())[:200]
         raise LabelsError("labels", str(file), f"a shard as it was written, whole ({said})") from None

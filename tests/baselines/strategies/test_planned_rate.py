@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 from baselines.experiments.mission import run_mission, scripted
 from baselines.strategies.information_rate_v0 import InformationRate
-from baselines.strategies.planned_rate import PlannedRate
+from baselines.strategies.planned_rate import PlannedRate, PlannedRateConfig
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
+from entropy_explore_env.errors import SettingError
 from entropy_explore_env.reports.metrics import mission_figures
 from entropy_explore_env.scenario import with_settings
-from entropy_explore_env.scenarios import BOX, ROOM, find_scenario
+from entropy_explore_env.scenarios import BOX, ROOM, SCENARIOS, find_scenario
+from entropy_explore_env.viewpoints.recipe import recipe_for
 
 
 def figures_of(strategy, scenario=ROOM, seed=0, **settings):
@@ -19,7 +23,10 @@ def figures_of(strategy, scenario=ROOM, seed=0, **settings):
     return mission_figures(env.missions, 0)
 
 
-@pytest.mark.parametrize(("name", "robots", "share"), [("room-furnished", 3, 0.98), ("office", 1, 0.85)])
+@pytest.mark.parametrize(
+    ("name", "robots", "share"),
+    [("room-furnished", 3, 0.98), ("office", 1, 0.85), ("cave", 1, 0.8), ("cave", 3, 0.95)],
+)
 def test_it_is_sooner_done_than_its_predecessor(name, robots, share):
     ours, before = (
         [figures_of(make(), find_scenario(name), seed, robots=robots)["t_mission_s"] for seed in (0, 1)]
@@ -37,3 +44,14 @@ def test_mixed_teams_take_the_recipe_of_each_kind():
     mixed = find_scenario("office-mixed")
     figures = figures_of(PlannedRate(), mixed, seed=1, robots=2, ending={"time_limit_s": 40.0})
     assert all(robot["scans"] > 4 for robot in figures["per_robot"])
+
+
+def test_a_configuration_changes_the_recipe_of_every_kind_of_robot():
+    for name in ("room", "office", "cave"):
+        kind = SCENARIOS[name].kinds[0]
+        assert PlannedRateConfig().recipe(kind) == recipe_for(kind)
+        changed = PlannedRateConfig(behind=7.0, far_places=5.0).recipe(kind)
+        assert changed == replace(recipe_for(kind), behind=7.0, far_places=5)
+        assert type(changed.far_places) is int
+        with pytest.raises(SettingError, match=r"Recipe\.leave_below"):
+            PlannedRateConfig(leave_below=-1.0).recipe(kind)

@@ -48,7 +48,7 @@ def test_a_small_file_cannot_fill_the_memory(tmp_path):
         archive.writestr("observations.npy", bytes(300 << 20))
     assert file.stat().st_size < 2 << 20
     tracemalloc.start()
-    with pytest.raises(LabelsError, match="at most 32 arrays and 256 MiB"):
+    with pytest.raises(LabelsError, match="its arrays are compressed"):
         load_shard(file, HERE)
     assert tracemalloc.get_traced_memory()[1] < 20 << 20
     tracemalloc.stop()
