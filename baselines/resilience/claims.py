@@ -42,7 +42,7 @@ def nothing_breaks(records: Records) -> Claim:
     """No mission raises an error, runs past the time on the clock, or has a figure that is no number."""
     broken = sum(_broken(record) for cell in records.values() for record in cell)
     missions = sum(len(cell) for cell in records.values())
-    text = f"no mission raises an error, hangs or reports NaN: how many of {missions:,} missions do"
+    text = f"missions of {missions:,} that raise an error, hang or report NaN"
     return Claim("nothing-breaks", text, 0.0, float(broken), None, None, broken == 0)
 
 

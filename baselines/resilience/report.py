@@ -153,8 +153,8 @@ were stopped by its body 950 times. Paths are planned through what is known to b
 map. The other four took 0.99 to 1.24 of the time.
 - `mutual-information` and `voronoi`: isolated robots are not done in 1000 s.
 - `planned-rate`, `per-time-visibility`, `voronoi` and `mutual-information`, one robot lost: 1.23, 1.23, 1.19
-and 1.13 where 1.17 is allowed, with intervals that hold both answers; likewise `per-time-visibility` where only
-viewpoints are announced, 1.01 of isolation."""
+and 1.13 where 1.17 is allowed, with intervals that hold both answers; likewise `per-time-visibility` where
+only viewpoints are announced, 1.01 of isolation."""
 
 _WHY = {(("room", 2), ("room", 4)): _WHY_ROOM, (("office", 4),): _WHY_OFFICE}
 """Teams → why claims of theirs are not shown, of the missions of `explanations`."""

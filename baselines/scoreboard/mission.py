@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, is_dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -13,6 +13,7 @@ from baselines.experiments.outcome import Record
 from baselines.strategies import make_strategy
 from baselines.strategies.protocol import Stopwatch, Strategy
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
+from entropy_explore_env.errors import SettingError
 from entropy_explore_env.reports.metrics import mission_figures
 
 SETTINGS = "::"
@@ -61,12 +62,19 @@ def configured(strategy: Any, settings: str) -> Strategy:  # noqa: ANN401 - with
     Args:
         strategy: With a `config`, a dataclass that its class takes.
         settings: See `SuiteMission`.
+
+    Raises:
+        SettingError: The strategy has no such setting, or a value is not allowed.
     """
     if not settings:
         return strategy
-    config, changes = strategy.config, {}
+    config, changes = getattr(strategy, "config", None), {}
+    known = [field.name for field in fields(config)] if is_dataclass(config) else []
     for pair in settings.split(","):
         name, _, value = pair.partition("=")
-        default = getattr(config, name)
-        changes[name] = float(value) if default is None else type(default)(float(value))
+        if name not in known:
+            raise SettingError(SETTINGS, pair, "name=value, of " + (", ".join(known) or "none at all"))
+        default, number = getattr(config, name), float(value)
+        whole = number.is_integer() if default is None else isinstance(default, int)
+        changes[name] = int(number) if whole else number
     return type(strategy)(replace(config, **changes))

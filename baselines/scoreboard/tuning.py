@@ -32,7 +32,7 @@ class Tuning(NamedTuple):
     """What is tuned where, and by what."""
 
     tasks: Callable[[int], tuple[Task, ...]]
-    """Of so many starts each."""
+    """Number of starts → tasks."""
     grid: Mapping[str, Mapping[str, tuple[float, ...]]]
     """Strategy → setting → values, the default among them, unless robots of different kinds have several."""
     yardstick: str

@@ -25,7 +25,7 @@ def voxel_of(view: RobotView, pose: np.ndarray) -> int:
 
 
 def teammates_that_share(view: RobotView) -> Mapping[int, TeammateView]:
-    """Teammates whose scans reach the robot: not silent ones, and none where the channel carries no scans.
+    """Teammates whose scans may reach the robot: no silent ones, and none where the channel carries no scans.
 
     What the others go to see it has to see itself: nothing is left to them.
     """

@@ -29,6 +29,7 @@ from entropy_explore_env.missions.view import RobotView
 from entropy_explore_env.missions.view_candidates import ViewProposer
 from entropy_explore_env.scenario import Scenario, with_settings
 from entropy_explore_env.settings import RobotKind
+from entropy_explore_env.validation import check_count, check_not_negative, check_positive
 from entropy_explore_env.viewpoints.evaluation import sees_all_around
 from entropy_explore_env.viewpoints.recipe import Recipe, recipe_for
 
@@ -41,31 +42,40 @@ def explores_frontiers(scenario: Scenario, kind: RobotKind) -> bool:
 
 @dataclass(frozen=True)
 class PlannedRateConfig:
-    """What differs from the recipe of every kind of robot (`viewpoints.recipe.Recipe`); None = nothing.
+    """What differs from the recipe of every kind of robot; None = nothing. Who explores frontiers needs none.
 
     Attributes:
-        exponent: c of bits / s^c.
-        behind: How many times its own bits an unknown voxel beside a free one promises.
-        far_places: That are evaluated beyond those within reach.
-        leave_below: Share of the mission's mean rate below which a robot leaves.
-        dregs: What any scan still brings.
+        exponent: As in `viewpoints.recipe.Recipe`, likewise the others.
+        behind: Likewise.
+        far_places: Likewise.
+        leave_below: Likewise.
+        dregs: Likewise.
+
+    Raises:
+        SettingError: One of them is not allowed.
     """
 
     exponent: float | None = None
     behind: float | None = None
-    far_places: float | None = None
+    far_places: int | None = None
     leave_below: float | None = None
     dregs: float | None = None
 
-    def recipe(self, kind: RobotKind) -> Recipe:
-        """Of a kind of robot.
+    def __post_init__(self) -> None:
+        """Check every field."""
+        given = [name for name, value in asdict(self).items() if value is not None]
+        for name in given:
+            if name == "far_places":
+                check_count(self, name, 0, 100_000)
+            elif name == "exponent":
+                check_positive(self, name)
+            else:
+                check_not_negative(self, name)
 
-        Raises:
-            SettingError: A value is not allowed.
-        """
-        recipe = recipe_for(kind)
+    def recipe(self, kind: RobotKind) -> Recipe:
+        """Of a kind of robot."""
         given = {name: value for name, value in asdict(self).items() if value is not None}
-        return replace(recipe, **{name: type(getattr(recipe, name))(given[name]) for name in given})
+        return replace(recipe_for(kind), **given)
 
 
 class PlannedRate:

@@ -295,6 +295,9 @@ def _experience(scenario: Scenario, arrays: Mapping[str, np.ndarray]) -> Iterato
     corners = _grid_corners(scenario)
     for name in ("most_bits", "best_rate", "far_value"):
         yield Values(f"experience.{name}", kept[name], 0.0, _HUGE)
+    yield Values("experience.exponent", kept["exponent"], 0.0, _HUGE)
+    yield Values("experience.decided_s", kept["decided_s"], 0.0, _MOST)
+    yield Values("experience.decided_bits", kept["decided_bits"], 0.0, _MOST)
     for name in ("going", "looked_far", "was_free"):
         yield Values(f"experience.{name}", kept[name], 0, 1)
     yield Values("experience.patience", kept["patience"], -_MOST, _MOST)

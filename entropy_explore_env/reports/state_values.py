@@ -118,7 +118,8 @@ FIELDS_EXPERIENCE = (
     "candidates_rng most_bits best_rate going goal far_value looked_far far_at patience blocked was_free "
     "free_at failures failed share forget_at".split()
 )
-"""Fields of `experience`, likewise."""
+"""Fields of `experience`, likewise; without those that follow from times and bits: `decided_s`,
+`decided_bits`, `exponent`."""
 
 FOLLOWS_FROM_WORLD = ("blocked", "visible")
 """Values that the true world and the scenario determine; the digest leaves them out."""

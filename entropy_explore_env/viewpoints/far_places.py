@@ -2,9 +2,9 @@
 
 The belief is divided into blocks of voxels. The place of a block is, of its voxels that are known to be free
 and that a path search reached, the one nearest to its centre. Its remaining bits are those of all its voxels
-that nothing covers. Most of what is unknown can never be seen, as the inside of rock: what openings promise
-is counted beside it, the bits of what was seen, and some times those of frontier voxels, which are unknown
-and lie beside one that is known to be free.
+that nothing covers. Most unknown voxels can never be seen: they are inside of rock. So a second sum ranks the
+places: the bits left in known voxels, plus `behind` times those of openings, which are unknown voxels beside
+one that is known to be free.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from entropy_explore_env.belief.voxel_index import flat_index, grid_index
 from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel
 
 NOT_REACHED = -1
-"""As a place: no voxel of the block was reached."""
+"""As a place: no voxel of the block that is known to be free was reached."""
 
 
 class BitCount(NamedTuple):
@@ -32,7 +32,7 @@ class BitCount(NamedTuple):
     known_precision: float
     """1/σ² from which on a voxel counts as seen."""
     behind: float
-    """How many times its own bits a frontier voxel promises."""
+    """How many times its own bits an opening promises."""
 
 
 class Blocks(NamedTuple):
@@ -45,7 +45,7 @@ class Blocks(NamedTuple):
     promised: np.ndarray
     """(I, J, K) float64, those that openings promise."""
     place: np.ndarray
-    """(I, J, K) int64, the reached voxel nearest to the block's centre, or NOT_REACHED."""
+    """(I, J, K) int64, the known free voxel reached nearest to the block's centre, or NOT_REACHED."""
 
 
 def new_blocks(shape: tuple[int, int, int], edge: int) -> Blocks:
@@ -55,7 +55,7 @@ def new_blocks(shape: tuple[int, int, int], edge: int) -> Blocks:
 
 
 @lean_kernel
-def _is_frontier(belief, known_precision, x, y, z):
+def _is_opening(belief, known_precision, x, y, z):
     """Whether one of the six voxels beside an unknown one is known to be free."""
     size = belief.size
     for axis in range(3):
@@ -84,7 +84,7 @@ def _fill_block(search, belief, count, layer, low, high):
                     bits += left
                     if known:
                         promised += left
-                    elif _is_frontier(belief, count.known_precision, x, y, z):
+                    elif _is_opening(belief, count.known_precision, x, y, z):
                         promised += count.behind * left
                 if not known or (layer >= 0 and z != layer) or math.isinf(cost_to(search, voxel)):
                     continue

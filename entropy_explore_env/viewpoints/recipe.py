@@ -32,7 +32,7 @@ class Recipe:
         pitch_spread: The same in its heights.
         refinements: How often viewpoints are drawn around the best three.
         refined: How many each time.
-        far_places: Uncertain places that are evaluated beyond those within reach.
+        far_places: Known free places that are evaluated beyond those within reach.
         far_gazes: Gazes at each.
         waypoint_gazes: Gazes that are evaluated at a stop on the way to one.
         far_below: Far places are looked for where the best viewpoint nearby brings less than this share of

@@ -112,6 +112,29 @@ def test_a_number_that_no_mission_holds_is_refused_by_name(name, field, value, c
     assert everything(others)[:4] == before
 
 
+@pytest.mark.parametrize(
+    ("field", "value"),
+    [
+        ("exponent", math.nan),
+        ("exponent", -1.0),
+        ("decided_s", -1.0),
+        ("decided_s", math.inf),
+        ("decided_bits", math.nan),
+        ("most_bits", -1.0),
+        ("failures", 17),
+        ("share", 1.5),
+    ],
+)
+def test_an_experience_that_no_robot_has_is_refused_by_name(field, value):
+    missions = started(free_box(action={"kind": "candidates", "candidates": 6}), 3)
+    missions.step(np.zeros((1, 2, 1)), np.zeros((1, 2), int))
+    arrays = snapshot(missions)
+    restore(missions, arrays)
+    arrays["experience"][field][-1, -1] = value
+    with pytest.raises(RecordError, match=rf"experience\.{field}"):
+        restore(missions, arrays)
+
+
 @pytest.mark.parametrize("channel", [DELAYED, IN_PHASES, SUMMARIES])
 def test_a_state_as_it_was_is_taken_whenever_it_was_saved(channel):
     missions, others = walked(channel, 0), walked(channel, 5, 8)

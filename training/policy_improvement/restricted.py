@@ -1,8 +1,8 @@
 """The planner restricted to the discrete actions of `training.ppo`: what that set of actions costs.
 
 At each decision every move and gaze that makes sense is scored as the planner scores its candidates, by
-expected bits / s^c, and the best is taken. An action that brought nothing at a place is not tried there
-again.
+expected bits / s^c, and the best is taken; c is the recipe's at all times (`Recipe.leave_below` has no say).
+An action that brought nothing at a place is not tried there again.
 """
 
 from __future__ import annotations

@@ -64,7 +64,7 @@ def _put_place(proposer, situation, place, at):
 
 @lean_kernel
 def _far_viewpoints(proposer, situation, radius):
-    """Fill in the places worth most by the bits of their blocks, a few gazes each; returns how many."""
+    """Fill in the places worth most by what openings promise there, a few gazes each; returns how many."""
     scratch, blocks, recipe = proposer.scratch, proposer.blocks, proposer.recipe
     belief, here, far, shape = situation.belief, situation.here, scratch.far, blocks.bits.shape
     if recipe.far_places == 0:

@@ -272,7 +272,7 @@ def proposal_bytes(scenario: Scenario) -> int:
     blocks = sum(_block_count(scenario, recipe) for recipe in recipes)
     per_voxel = 9 + 4 + 8 + 4  # added, touched and left, path, marks, seen
     kept = 14 * 8 * (pool + far) + candidates * (8 * candidates + VIEW.itemsize)
-    return search_bytes(voxels) + per_voxel * voxels + 12 * longest + kept + 16 * blocks
+    return search_bytes(voxels) + per_voxel * voxels + 12 * longest + kept + 24 * blocks
 
 
 def _edge(scenario: Scenario, recipe: Recipe) -> int:

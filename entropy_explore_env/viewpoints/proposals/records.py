@@ -35,7 +35,8 @@ EXPERIENCE = record_type(
     [
         ("candidates_rng", "u8", (1,)),  # random state of its candidates
         ("most_bits", "f8"),  # most bits ever expected of a viewpoint
-        ("decided_s", "f8"),  # when it decided last
+        ("decided_s", "f8"),  # when it last decided at a stop
+        ("decided_bits", "f8"),  # what its own scans had brought by then
         ("exponent", "f8"),  # c of bits / s^c, now
         ("best_rate", "f8"),  # most bits per second of a candidate
         ("going", "?"),  # whether it is on its way to a far place

@@ -142,11 +142,14 @@ def weigh_time(proposer, experience, decision):
     """
     if decision.under_way:
         return
-    seconds = max(decision.time_s - experience.decided_s, 1e-9)
+    exponent = proposer.recipe.exponent
+    came, seconds = decision.gained_bits - experience.decided_bits, decision.time_s - experience.decided_s
     mean_rate = decision.gained_bits / max(decision.time_s, 1e-9)
-    leaves = max(decision.came_bits, 0.0) / seconds < proposer.recipe.leave_below * mean_rate
-    experience.exponent = 1.0 if leaves else proposer.recipe.exponent
-    experience.decided_s = decision.time_s
+    if came / max(seconds, 1e-9) < proposer.recipe.leave_below * mean_rate:
+        exponent = min(exponent, 1.0)
+    experience.looked_far &= exponent == experience.exponent
+    experience.exponent = exponent
+    experience.decided_s, experience.decided_bits = decision.time_s, decision.gained_bits
 
 
 @lean_kernel
@@ -193,7 +196,7 @@ def trust_in(experience, all_around, at):
     trust, here = 1.0, 0
     for number in range(experience.failures):
         here += int(distance_apart(experience.failed[number], at) < ALIKE_EDGES)
-    alike_rad = ALIKE_RAD * max(here - FAILED_GAZES, 1)
+    alike_rad = ALIKE_RAD * (1 + max(here - FAILED_GAZES, 0))
     for number in range(experience.failures):
         failed, share = experience.failed[number], experience.share[number]
         if distance_apart(failed, at) >= ALIKE_EDGES:

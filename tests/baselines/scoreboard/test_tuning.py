@@ -36,6 +36,10 @@ def test_each_setting_is_varied_alone_and_the_default_comes_first(suite):
 
 
 def test_what_is_not_tuned_is_refused_by_name():
+    with pytest.raises(SettingError, match=r"nope=1.*behind"):
+        configured(make_strategy("planned-rate"), "nope=1")
+    with pytest.raises(SettingError, match=r"weight=1.*none at all"):
+        configured(make_strategy("random"), "weight=1")
     with pytest.raises(SettingError, match=r"suite = 'teams': allowed is one of plans, volumes"):
         find_tuning("teams")
 

@@ -50,8 +50,21 @@ def test_a_configuration_changes_the_recipe_of_every_kind_of_robot():
     for name in ("room", "office", "cave"):
         kind = SCENARIOS[name].kinds[0]
         assert PlannedRateConfig().recipe(kind) == recipe_for(kind)
-        changed = PlannedRateConfig(behind=7.0, far_places=5.0).recipe(kind)
+        changed = PlannedRateConfig(behind=7.0, far_places=5).recipe(kind)
         assert changed == replace(recipe_for(kind), behind=7.0, far_places=5)
-        assert type(changed.far_places) is int
-        with pytest.raises(SettingError, match=r"Recipe\.leave_below"):
-            PlannedRateConfig(leave_below=-1.0).recipe(kind)
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"exponent": 0.0},
+        {"behind": float("inf")},
+        {"leave_below": -0.1},
+        {"dregs": float("nan")},
+        {"far_places": 2.5},
+        {"far_places": -1},
+    ],
+)
+def test_settings_that_make_no_sense_are_refused_at_once(wrong):
+    with pytest.raises(SettingError, match=rf"PlannedRateConfig\.{next(iter(wrong))}"):
+        PlannedRateConfig(**wrong)

@@ -1,5 +1,6 @@
 """What candidates see and what a robot learns, computed by hand; candidates in beliefs drawn at random."""
 
+import dataclasses
 import math
 
 import numpy as np
@@ -28,7 +29,7 @@ from entropy_explore_env.viewpoints.proposals.situation import (
     weigh_time,
 )
 from entropy_explore_env.viewpoints.proposals.views import clear_marks, look_from, mark_view
-from entropy_explore_env.viewpoints.recipe import NARROW_PLANNED, recipe_for
+from entropy_explore_env.viewpoints.recipe import NARROW_PLANNED, NARROW_STRAIGHT, recipe_for
 from tests.reference.scenes import drawn, free_box, put, random_belief, seeds, started
 
 SIZE, MOST = (7, 11, 5), 6
@@ -222,32 +223,47 @@ def test_more_failures_than_are_remembered_push_out_the_oldest(proposed):
 
 
 def test_a_fifth_gaze_that_fails_at_one_place_makes_wider_ones_alike(proposed):
-    """0.15 rad from the last: apart from it while four or five failed, alike from the sixth on."""
+    """0.15 rad from the last: apart from it while four failed, alike from the fifth on."""
     candidates, experience = proposed
     beside = ALONG_X + np.array([0, 0, 0, 0, 0.15])
     trusted = []
     for number in range(7):
         fail_at(candidates, experience, ALONG_X + np.array([0, 0, 0, 0.5 * number, 0]))
         trusted.append(trust_in(experience, False, beside + np.array([0, 0, 0, 0.5 * number, 0])))
-    assert trusted == pytest.approx([1.0] * 5 + [0.02] * 2)
+    assert trusted == pytest.approx([1.0] * 4 + [0.02] * 3)
     elsewhere = beside + np.array([1.5, 0, 0, 3.0, 0])
     assert trust_in(experience, False, elsewhere) == 1.0
 
 
 def test_robots_leave_where_a_decision_brings_a_tenth_of_the_mean_rate(proposed):
-    """1,000 bits in 10 s: 20 bits in 2 s are enough to stay, 19 are not, and under way nothing changes."""
+    """1,000 bits in 10 s: 20 bits in 2 s are enough to stay, 19 are not. What the last of several scans
+    brought has no say, and under way nothing changes."""
     proposer, experience = new_proposers(ONE_RAY)[0], proposed[1]
     assert proposer.recipe.leave_below == 0.1 and proposer.recipe.exponent == 2.2
 
     def exponent_after(bits, under_way=False):
-        experience["decided_s"] = 8.0
-        came = decision(ALONG_X, bits, under_way=under_way, time_s=10.0, gained_bits=1000.0)
+        experience["decided_s"], experience["decided_bits"] = 8.0, 1000.0 - bits
+        came = decision(ALONG_X, 7.0, under_way=under_way, time_s=10.0, gained_bits=1000.0)
         weigh_time(proposer, experience, came)
-        return experience["exponent"], experience["decided_s"]
+        return experience["exponent"], experience["decided_s"], experience["decided_bits"]
 
-    assert exponent_after(20.0) == (2.2, 10.0)
-    assert exponent_after(19.0) == (1.0, 10.0)
-    assert exponent_after(500.0, under_way=True) == (1.0, 8.0)
+    assert exponent_after(20.0) == (2.2, 10.0, 1000.0)
+    experience["looked_far"] = True
+    assert exponent_after(19.0) == (1.0, 10.0, 1000.0)
+    assert not experience["looked_far"]  # what far places were worth then was another measure
+    experience["looked_far"] = True
+    assert exponent_after(500.0, under_way=True) == (1.0, 8.0, 500.0)
+    assert exponent_after(18.0) == (1.0, 10.0, 1000.0) and experience["looked_far"]
+
+
+def test_a_recipe_with_a_small_exponent_keeps_it_when_a_robot_leaves(proposed):
+    recipe = dataclasses.replace(NARROW_STRAIGHT, exponent=0.7)
+    proposer, experience = new_proposers(ONE_RAY, {0: recipe})[0], proposed[1]
+    weigh_time(proposer, experience, decision(ALONG_X, 0.0, time_s=10.0, gained_bits=0.0))
+    assert experience["exponent"] == 0.7
+    weigh_time(proposer, experience, decision(ALONG_X, 0.0, time_s=20.0, gained_bits=1.0))
+    weigh_time(proposer, experience, decision(ALONG_X, 0.0, time_s=30.0, gained_bits=1.0))
+    assert experience["exponent"] == 0.7
 
 
 @drawn(20)
