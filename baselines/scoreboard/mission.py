@@ -68,7 +68,8 @@ def configured(strategy: Any, settings: str) -> Strategy:  # noqa: ANN401 - with
     """
     if not settings:
         return strategy
-    config, changes = getattr(strategy, "config", None), {}
+    config: Any = getattr(strategy, "config", None)
+    changes: dict[str, float] = {}
     known = [field.name for field in fields(config)] if is_dataclass(config) else []
     for pair in settings.split(","):
         name, _, value = pair.partition("=")
