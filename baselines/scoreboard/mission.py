@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass, fields, is_dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
@@ -68,14 +68,13 @@ def configured(strategy: Any, settings: str) -> Strategy:  # noqa: ANN401 - with
     """
     if not settings:
         return strategy
-    config: Any = getattr(strategy, "config", None)
     changes: dict[str, float] = {}
-    known = [field.name for field in fields(config)] if is_dataclass(config) else []
+    known = [field.name for field in fields(strategy.config)] if hasattr(strategy, "config") else []
     for pair in settings.split(","):
         name, _, value = pair.partition("=")
         if name not in known:
             raise SettingError(SETTINGS, pair, "name=value, of " + (", ".join(known) or "none at all"))
-        default, number = getattr(config, name), float(value)
+        default, number = getattr(strategy.config, name), float(value)
         whole = number.is_integer() if default is None else isinstance(default, int)
         changes[name] = int(number) if whole else number
-    return type(strategy)(replace(config, **changes))
+    return type(strategy)(replace(strategy.config, **changes))
