@@ -97,8 +97,8 @@ Strategies on the same worlds, starts and seeds, in suites that are pinned (`bas
 - In suites, a strategy that finishes none of its first three missions of a task is not run further there.
 - Seen: measured by any robot of the team, of the voxels that can be seen at all. Bits: what the best map
   lost, of the bits that the mission asks for.
-- Where not every mission has been run yet, mission k of all strategies and tasks came before any mission
-  k + 1. Rows say how many there are of each, and ratios are of those that both have run.
+- Thirty starts a task are the whole; where fewer have been run yet rows say how many, all strategies of a
+  task have run the same ones, and tasks that none has run are left out.
 - ms a decision: of one robot, the median over missions of their medians, and the worst of all.
 - A strategy of one's own takes part by `python -m baselines.benchmark --suite NAME --strategies MODULE:CLASS`
   (docs/own_strategy.md).
@@ -119,7 +119,11 @@ def _parts(results: Results, tasks: list[Row], overall: list[Row], command: str)
     for task in suite.tasks:
         rows = [row for row in tasks if row["task"] == task.name]
         if rows:
-            parts += [f"### {task.name}", about(task), _task_table(results, rows)]
+            parts += [
+                f"### {task.name}",
+                about(task, max(int(str(row["missions"])) for row in rows)),
+                _task_table(results, rows),
+            ]
     failed = failed_rows(results)
     if failed:
         parts += ["### Missions that failed", _failed_table(failed)]
@@ -223,8 +227,8 @@ def _plain(text: str) -> str:
     return "".join(f"\\{sign}" if sign in r"\`*_{}[]<>()#!|~" else sign for sign in text)
 
 
-def about(task: Task) -> str:
-    """What kind of missions a task has."""
+def about(task: Task, missions: int) -> str:
+    """What kind of missions a task has, so many of which were run of one strategy."""
     scenario = task.scenario
     grid, around = scenario.grid, task.places[0].surroundings
     files = [Path(scenario.world)] if around is None or not around.worlds else around.files()
@@ -238,7 +242,10 @@ def about(task: Task) -> str:
     sensor = scenario.sensor
     if math.isfinite(sensor.scan_every_m):
         team += f" that scans {sensor.rays} rays of {sensor.max_range_m:g} m every {sensor.scan_every_m:g} m"
+    starts = (
+        f"{task.missions} starts" if missions >= task.missions else f"{missions} of {task.missions} starts"
+    )
     return (
-        f"{task.missions} starts, {worlds}, {shape} voxels of {grid.voxel_size_m:g} m, {team}, "
+        f"{starts}, {worlds}, {shape} voxels of {grid.voxel_size_m:g} m, {team}, "
         f"time limit {scenario.ending.time_limit_s:,.0f} s."
     )

@@ -35,7 +35,7 @@ def times_table(scenario: Scenario, results: Path) -> str:
             f"`information-rate-v0`: median {measured.median_s:g} s over {measured.missions} starts of the "
             "training split, this scenario's own team (`python -m baselines.mission_times`)."
         )
-    times = head_to_head_times(scenario.name, results) + scoreboard_times(scenario.name, results)
+    times = scoreboard_times(scenario.name, results)
     if times:
         rows = [
             f"| {t.task} | `{t.strategy}` | {t.seconds} | {t.finished} of {t.missions} "
@@ -47,19 +47,6 @@ def times_table(scenario: Scenario, results: Path) -> str:
             + "\n".join(rows)
         )
     return "## How long strategies take\n\n" + "\n\n".join(lines) if lines else ""
-
-
-def head_to_head_times(scenario: str, results: Path) -> list[Time]:
-    """Rows of `head-to-head/scenarios.csv`, in which `information-rate-v0` has the name of then."""
-    former = {"information-rate": "information-rate-v0", "nearest-frontier": "nearest-candidate"}
-    times = []
-    for row in _rows(results / "head-to-head" / "scenarios.csv"):
-        if row["scenario"] == scenario:
-            strategy = former.get(row["strategy"], row["strategy"])
-            seconds = _interval(row["time_s"], row["time_s_low"], row["time_s_high"])
-            team = f"{row['robots']} robot" + ("s" if row["robots"] != "1" else "")
-            times.append(Time(team, strategy, row["missions"], row["mapped"], seconds, "head-to-head"))
-    return times
 
 
 SUITES = {"plans": ("time_s_99_seen", " (to 99 % seen)"), "volumes": ("time_s_end", "")}

@@ -75,9 +75,11 @@ def test_plans_replan_at_every_scan_until_everything_is_seen():
 
 def test_the_page_says_with_what_plans_are_scanned():
     plan, *_ = find_suite("plans", True, TEAMS).tasks
-    assert "1 ground robot that scans 720 rays of 8 m every 0.5 m, time limit" in about(plan)
+    assert "1 ground robot that scans 720 rays of 8 m every 0.5 m, time limit" in about(plan, 4)
     team, *_ = find_suite("teams", True, TEAMS).tasks
-    assert "2 flying robots, time limit" in about(team)
+    assert "2 flying robots, time limit" in about(team, team.missions)
+    assert about(team, team.missions).startswith("2 starts, world")
+    assert about(team, 1).startswith("1 of 2 starts, world")
 
 
 def test_mission_k_of_every_task_is_run_in_round_k():
