@@ -25,7 +25,8 @@ from baselines.scoreboard.results import (
 from baselines.scoreboard.suites import Task
 from entropy_explore_env.writing import write_atomically
 
-PAGE, FILES = "scoreboard.md", "scoreboard"
+PAGE, FILES, PART = "scoreboard.md", "scoreboard", "part.txt"
+"""The page, the folder beside it, and in a suite's folder its part of the page."""
 _DIGITS = 6
 """Significant digits of the CSV tables."""
 _CLOCK = ("decision_ms", "worst_decision_ms")
@@ -63,8 +64,8 @@ def write_page(folder: Path, results: Results, command: str) -> Path:
     names = ("task", "strategy", *_CLOCK)
     write_atomically(beside / "timing.csv", csv_rows([{name: row[name] for name in names} for row in tasks]))
     part = "\n\n".join(text.strip() for text in _parts(results, tasks, overall, command)) + "\n"
-    write_atomically(beside / "part.md", part)
-    found = [folder / FILES / name / "part.md" for name in _TITLES]
+    write_atomically(beside / PART, part)
+    found = [folder / FILES / name / PART for name in _TITLES]
     text = _READING + "\n" + "\n".join(path.read_text() for path in found if path.is_file())
     write_atomically(folder / PAGE, text)
     return folder / PAGE

@@ -137,8 +137,10 @@ class Results:
     def ratio(
         self, strategy: str, reference: str, measure: Measure, tasks: Sequence[Task]
     ) -> Interval | None:
-        """The ratio to a reference over those of some tasks in which both ran a mission; None = in none."""
-        pairs = [(task, self.shared(task, (strategy, reference))) for task in tasks]
+        """The ratio to a reference over those of some tasks in which both can act; None = in none."""
+        both = (strategy, reference)
+        acting = [task for task in tasks if not any(_cannot_act(self.of(task, who)) for who in both)]
+        pairs = [(task, self.shared(task, both)) for task in acting]
         pairs = [(task, missions) for task, missions in pairs if missions]
         if not pairs:
             return None
@@ -240,7 +242,7 @@ def overall_rows(results: Results) -> list[Row]:
 
 
 def _cannot_act(records: Sequence[Record]) -> bool:
-    """Whether every mission of a task failed."""
+    """Whether every mission of a task failed, or none was run."""
     return all("failed" in record for record in records)
 
 

@@ -87,7 +87,7 @@ def test_the_command_leaves_page_tables_figures_and_a_file_a_mission(pair):
     assert "24/24" in ran.stderr and "scoreboard.md" in ran.stderr
     assert set(contents(folder)) == {"scoreboard.md"} | {
         f"scoreboard/own/{name}"
-        for name in ("part.md", "overall.csv", "tasks.csv", "missions.csv", "ratios.png", "tasks.png")
+        for name in ("part.txt", "overall.csv", "tasks.csv", "missions.csv", "ratios.png", "tasks.png")
     }
     missions = sorted(str(path.relative_to(folder / "runs")) for path in folder.rglob("seed-*.json"))
     assert missions == sorted(
@@ -395,6 +395,17 @@ def test_a_path_counts_with_what_the_team_could_have_driven():
     assert BOX.robots == 2 and BOX.robot.max_speed_m_s == 0.5
     assert results.values(task, "random", PATH).tolist() == [2 * 0.5 * 100.0, 7.0]
     assert results.values(task, "random", TIME).tolist() == [100.0, 80.0]
+
+
+def test_who_cannot_act_in_a_task_takes_no_part_in_ratios_there():
+    """`random` refuses the second world: `quick` is compared in the first alone, not with a time limit."""
+    results = results_of({"random": [[50.0, 40.0], ["no", "no"]], "quick": [[25.0, 20.0], [1.0, 2.0]]})
+    overall = {row["strategy"]: row for row in overall_rows(results)}
+    assert overall["quick"]["time_s_end_over_random"] == pytest.approx(0.5)
+    assert (overall["quick"]["tasks"], overall["random"]["tasks"]) == (2, 1)
+    rows = {(row["task"], row["strategy"]): row for row in task_rows(results)}
+    for strategy in ("quick", "random"):
+        assert rows["world-1", strategy]["time_s_end_over_random"] is None
 
 
 def test_failures_of_one_reason_share_a_row():
