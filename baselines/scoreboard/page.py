@@ -98,8 +98,8 @@ Strategies on the same worlds, starts and seeds, in suites that are pinned (`bas
 - In suites, a strategy that finishes none of its first three missions of a task is not run further there.
 - Seen: measured by any robot of the team, of the voxels that can be seen at all. Bits: what the best map
   lost, of the bits that the mission asks for.
-- Thirty starts a task are the whole; where fewer have been run yet rows say how many, all strategies of a
-  task have run the same ones, and tasks that none has run are left out.
+- Thirty starts a task are the whole; where fewer have been run yet rows say how many, and ratios are of
+  those that both have run. Tasks of which none has been run are left out.
 - ms a decision: of one robot, the median over missions of their medians, and the worst of all.
 - A strategy of one's own takes part by `python -m baselines.benchmark --suite NAME --strategies MODULE:CLASS`
   (docs/own_strategy.md).
