@@ -51,7 +51,7 @@ def task_figure(results: Results) -> Figure:
             ended = [
                 record.get("finished") for who in (strategy, reference) for record in results.of(task, who)
             ]
-            if any(ended) and any("failed" not in record for record in results.of(task, strategy)):
+            if any(ended):
                 ratio = results.ratio(strategy, reference, measure, [task])
                 ratios[row, column] = np.nan if ratio is None else ratio.value
     figure = Figure(figsize=(0.62 * len(tasks) + 2.8, 0.3 * len(strategies) + 2.0), layout="constrained")

@@ -91,8 +91,8 @@ _READING = """# Scoreboard
 Strategies on the same worlds, starts and seeds, in suites that are pinned (`baselines/scoreboard/suites.py`).
 
 - A ratio is the geometric mean of paired missions' ratios, over all tasks the geometric mean of the
-  tasks'; below 1 is better. Intervals (…) hold 95 %: a bootstrap over pairs, within each task. Of fewer than
-  about ten missions they are too narrow, and of a single one there is none.
+  tasks'; below 1 is better. Intervals (…) hold 95 %: a bootstrap over pairs, within each task. An interval
+  over fewer than about ten missions is too narrow, and a single mission has none.
 - A mission that was cut off, or failed, counts with the time limit, and with the path that the team
   could have driven in it. Where both of a pair were cut off their ratio is 1.
 - In suites, a strategy that finishes none of its first three missions of a task is not run further there.
@@ -122,7 +122,7 @@ def _parts(results: Results, tasks: list[Row], overall: list[Row], command: str)
         if rows:
             parts += [
                 f"### {task.name}",
-                about(task, max(int(str(row["missions"])) for row in rows)),
+                about(task, max(len(results.of(task, strategy)) for strategy in suite.strategies)),
                 _task_table(results, rows),
             ]
     failed = failed_rows(results)
@@ -229,7 +229,12 @@ def _plain(text: str) -> str:
 
 
 def about(task: Task, missions: int) -> str:
-    """What kind of missions a task has, so many of which were run of one strategy."""
+    """What kind of missions a task has.
+
+    Args:
+        task: Which.
+        missions: Run by the strategy that ran most of them.
+    """
     scenario = task.scenario
     grid, around = scenario.grid, task.places[0].surroundings
     files = [Path(scenario.world)] if around is None or not around.worlds else around.files()

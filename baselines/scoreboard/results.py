@@ -235,7 +235,7 @@ def overall_rows(results: Results) -> list[Row]:
         }
         for measure in results.judged_by:
             for reference in results.references:
-                ratio = results.ratio(strategy, reference, measure, tasks) if tasks else None
+                ratio = results.ratio(strategy, reference, measure, tasks)
                 row |= interval_columns(f"{measure.name}_over_{reference}", ratio)
         rows.append(row | _clock(records))
     return rows

@@ -293,11 +293,10 @@ def _experience(scenario: Scenario, arrays: Mapping[str, np.ndarray]) -> Iterato
     """EXPERIENCE."""
     kept = arrays["experience"]
     corners = _grid_corners(scenario)
-    for name in ("most_bits", "best_rate", "far_value"):
+    for name in ("most_bits", "exponent", "best_rate", "far_value"):
         yield Values(f"experience.{name}", kept[name], 0.0, _HUGE)
-    yield Values("experience.exponent", kept["exponent"], 0.0, _HUGE)
-    yield Values("experience.decided_s", kept["decided_s"], 0.0, _MOST)
-    yield Values("experience.decided_bits", kept["decided_bits"], 0.0, _MOST)
+    for name in ("decided_s", "decided_bits", "forget_at"):
+        yield Values(f"experience.{name}", kept[name], 0.0, _MOST)
     for name in ("going", "looked_far", "was_free"):
         yield Values(f"experience.{name}", kept[name], 0, 1)
     yield Values("experience.patience", kept["patience"], -_MOST, _MOST)
@@ -309,7 +308,6 @@ def _experience(scenario: Scenario, arrays: Mapping[str, np.ndarray]) -> Iterato
     far = _farthest_m(scenario) / scenario.grid.voxel_size_m
     yield from _poses("experience.failed", kept["failed"], corners[0] - far, corners[1] + far)
     yield Values("experience.share", kept["share"], 0.0, 1.0)
-    yield Values("experience.forget_at", kept["forget_at"], 0.0, _MOST)
 
 
 def _grid_corners(scenario: Scenario) -> tuple[np.ndarray, np.ndarray]:
