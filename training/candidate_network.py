@@ -1,12 +1,13 @@
 """A network that chooses among a planner's candidate viewpoints, and that begins as the planner itself.
 
-The logit of candidate k of K is what the planner says of it and a learned residual r,
+The logit of candidate k of K is what the planner says of it, a weighted sum of its features f, and a residual
+r,
 
-    l_k = β ln s_k + m [k = c] + r_k,        β, m > 0 learned,
+    l_k = β ln s_k + m [k = c] + w · f_k + r_k,        β, m > 0, w and r learned,
 
-where c is its own choice and s_k ≤ 1 what it holds k to be worth, as a share of c. The last layer of r begins
-at zero: until something is learned the likeliest candidate is the planner's choice, and others are the
-likelier the nearer their scores come to its own (residual learning: Johannink et al. 2019).
+where c is its own choice and s_k ≤ 1 what it holds k to be worth, as a share of c. The weights w and the last
+layer of r begin at zero: until something is learned the likeliest candidate is the planner's choice, and
+others are the likelier the nearer their scores come to its own (residual learning: Johannink et al. 2019).
 r comes from an MLP that all candidates share, and from layers of attention among them (Vaswani et al. 2017)
 in which the overlap of what two candidates see is an additive bias.
 
@@ -148,20 +149,22 @@ class CandidateActor(nn.Module):
         self.layers = nn.ModuleList(_Attention(width, HEADS) for _ in range(_LAYERS))
         self.after = nn.LayerNorm(width)
         self.residual = nn.Linear(width, 1)
+        self.weights = nn.Parameter(torch.zeros(parts.candidates.shape[1]))
         self.log_beta = nn.Parameter(torch.tensor(math.log(_BETA)))
         self.log_margin = nn.Parameter(torch.tensor(math.log(_MARGIN)))
         self.begin_as_planner()
 
     def begin_as_planner(self) -> None:
-        """Set the last layer of the residual to zero."""
+        """Set the weights of features, and the last layer of the residual, to zero."""
+        nn.init.zeros_(self.weights)
         nn.init.zeros_(self.residual.weight)
         nn.init.zeros_(self.residual.bias)
 
     def forward(self, observations: torch.Tensor) -> torch.Tensor:
         """Logits (N, K) of observations (N, at least `parts.size`)."""
         seen = seen_by_network(self.parts, observations)
-        residual = self.residual(self._tokens(seen))[:, :, 0]
-        return torch.where(seen.exists, self._planner(seen) + residual, _NEVER)
+        learned = seen.candidates @ self.weights + self.residual(self._tokens(seen))[:, :, 0]
+        return torch.where(seen.exists, self._planner(seen) + learned, _NEVER)
 
     def _planner(self, seen: Seen) -> torch.Tensor:
         """(N, K) what the planner says of the candidates."""

@@ -49,7 +49,7 @@ class Args(WorkerOptions):
     """Compare a learned policy with the strategies."""
 
     pretrained: str | None = None
-    """A policy that comes with the project: room."""
+    """A policy that comes with the project: room, plans or volumes."""
     strategy: str | None = None
     """The folder of a run of training.ppo, or of one of its checkpoints."""
     against: str | None = None

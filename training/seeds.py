@@ -4,7 +4,7 @@
 | --- | --- |
 | tables and tests | 0, 1, 2, … |
 | validation | 2³² + 0, 1, 2, … |
-| learning, and labels of roll-outs | ≥ 2⁶³, drawn for each run |
+| learning, labels of roll-outs, and pairs of missions | ≥ 2⁶³, drawn for each run |
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 
 _VALIDATION, _LEARNING = 2**32, 2**63
-_LABELS_KEY = 1
+_LABELS_KEY, _PAIRS_KEY = 1, 2
 
 
 def validation_seeds(missions: int, first: int = 0) -> list[int]:
@@ -24,6 +24,12 @@ def label_seeds(seed: int, shard: int, missions: int) -> list[int]:
     """Seeds of the missions of one file of roll-out labels; those of learning, and never one twice."""
     sequence = np.random.SeedSequence(entropy=seed, spawn_key=(_LABELS_KEY, shard))
     return [_LEARNING + int(drawn) for drawn in sequence.generate_state(missions, np.uint64)]
+
+
+def pair_seeds(seed: int, part: int, pairs: int) -> list[int]:
+    """Seeds of the pairs of missions of one part of a search; those of learning, and never one twice."""
+    sequence = np.random.SeedSequence(entropy=seed, spawn_key=(_PAIRS_KEY, part))
+    return [_LEARNING + int(drawn) for drawn in sequence.generate_state(pairs, np.uint64)]
 
 
 def learning_seeds(seed: int, missions: int) -> list[int]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
@@ -11,9 +12,9 @@ from baselines.cli.task_options import BaseTask, TaskOptions, tasked
 from baselines.experiments.mission import Surroundings, scripted_env
 from baselines.scoreboard.results import BASELINE, REFERENCES
 from baselines.scoreboard.suites import Place, Task, suite_strategies, team_name
-from baselines.strategies import STRATEGIES, make_strategy, resolved
+from baselines.strategies import STRATEGIES, is_learned, learned_policies, make_strategy, resolved
 from baselines.world_sweep import is_plan
-from entropy_explore_env.errors import SettingError
+from entropy_explore_env.errors import MissingExtraError, SettingError
 from entropy_explore_env.scenario import Scenario, with_settings
 from entropy_explore_env.scenarios import SCENARIOS, find_scenario
 from entropy_explore_env.worlds.given import GIVEN, distinct_names
@@ -23,19 +24,30 @@ def chosen_strategies(words: str | None, suite: str | None = None) -> tuple[str,
     """Strategies from names with commas between them.
 
     Args:
-        words: Names; `all` = every one; None = those of the suite's table, without a suite every one.
+        words: Names; `all` = every one; None = those of the suite's table, of which learned policies are left
+            out, and named, where what runs them is not installed; without a suite every one.
         suite: Its name; its first reference is added, without a suite the random walk is.
 
     Raises:
         SettingError: No strategy, or no suite, has such a name.
     """
     if words is None and suite is not None:
-        words = ",".join(suite_strategies(suite))
+        words = ",".join(_runnable(suite_strategies(suite)))
     names = list(STRATEGIES) if words in (None, "all") else words.split(",")
     for name in names:
         make_strategy(name)
     added = [BASELINE] if suite is None else [name for name in REFERENCES[:1] if name in STRATEGIES]
     return tuple(dict.fromkeys([*added, *map(resolved, names)]))
+
+
+def _runnable(names: Sequence[str]) -> list[str]:
+    """The strategies that can be run with what is installed; says which others there are."""
+    try:
+        learned_policies()
+    except MissingExtraError as error:
+        print(f"without {', '.join(name for name in names if is_learned(name))}: {error}", file=sys.stderr)
+        return [name for name in names if not is_learned(name)]
+    return list(names)
 
 
 class Entry(NamedTuple):

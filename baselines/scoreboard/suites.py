@@ -228,10 +228,11 @@ _OF_ONE_ROBOT = (
     "planned-rate",
 )
 _OF_TEAMS = ("voronoi", "coordinated-frontier", "assigned-frontier")
+_PLANS_POLICY, _VOLUMES_POLICY = "pretrained:plans", "pretrained:volumes"
 
 
 def suite_strategies(name: str) -> tuple[str, ...]:
-    """Who stands in a suite's table: the rules of the five papers, the frontier rules, and ours.
+    """Who stands in a suite's table: the rules of the five papers, the frontier rules, ours, and policies.
 
     Variants of a rule do not, as `raster-fixed-yaw`; nor, where one robot explores, do rules that coordinate
     teams.
@@ -240,7 +241,9 @@ def suite_strategies(name: str) -> tuple[str, ...]:
         SettingError: No suite has this name.
     """
     _check_suite(name)
-    return _OF_ONE_ROBOT if name == "plans" else (*_OF_ONE_ROBOT, *_OF_TEAMS)
+    if name == "plans":
+        return (*_OF_ONE_ROBOT, _PLANS_POLICY)
+    return (*_OF_ONE_ROBOT, *_OF_TEAMS, _PLANS_POLICY, _VOLUMES_POLICY)
 
 
 def _check_suite(name: str) -> None:

@@ -17,7 +17,7 @@ from entropy_explore_env.compilation.kernels import kernel
 from entropy_explore_env.errors import CallOrderError, SettingError
 from entropy_explore_env.missions.poses import pose_at
 from entropy_explore_env.missions.simulation import Missions
-from entropy_explore_env.missions.state import MissionEnd, MissionState
+from entropy_explore_env.missions.state import MissionEnd, MissionState, goals_reached
 from entropy_explore_env.scenario import with_settings
 
 _FOLD = 1e150
@@ -229,6 +229,11 @@ def mission_times(missions: Missions) -> np.ndarray:
 def running(missions: Missions) -> np.ndarray:
     """(E,) bool, which missions go on."""
     return missions.state.missions["end"] == MissionEnd.RUNNING.code
+
+
+def finished(missions: Missions) -> np.ndarray:
+    """(E,) bool, which missions came to what they ask for."""
+    return goals_reached(missions.state.missions["end"])
 
 
 def deciding(missions: Missions) -> np.ndarray:

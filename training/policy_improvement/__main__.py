@@ -1,13 +1,14 @@
-"""Learn in three stages to choose better than a planner among the viewpoints that it proposes.
+"""Learn in stages to choose better than a planner among the viewpoints that it proposes.
 
     python -m training.policy_improvement --tasks room-furnished:3 --out runs/improved
 
 1. `labels`: what choosing another candidate would have saved, by roll-outs from states of the planner's
-   missions. 2. `regression`: the residual learns that. 3. `ppo`: PPO from there, rewarded by less the
-seconds. `--stage` does one of them, by default all are done, one after the other. What is there already is
-not done again, so that the same command continues a run that was stopped; every stage ends with a comparison
-with the planner, paired by start. `python -m training.evaluate --strategy runs/improved/ppo` evaluates the
-result, `runs/improved/regression` that of the second stage.
+   missions. 2. `regression`: the residual learns that. 3. `search`: weights of features, by whole missions.
+4. `ppo`: PPO from there, rewarded by less the seconds. `--stage` does one of them, by default all are done,
+one after the other; `search` and `ppo` begin with what the last one before them wrote, else with the
+planner. What is there already is not done again, so that the same command continues a run that was stopped;
+every stage ends with a comparison with the planner, paired by start.
+`python -m training.evaluate --strategy runs/improved/search` evaluates what a stage came to.
 """
 
 from __future__ import annotations
@@ -18,22 +19,19 @@ import io
 import json
 import shlex
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import torch
 
 from baselines.cli.arguments import make_folder, parse, print_json, run_command
 from entropy_explore_env.command import INTERRUPTED
-from entropy_explore_env.errors import SettingError
 from entropy_explore_env.missions.observation.layout import ObservationLayout
 from entropy_explore_env.missions.privileged import PRIVILEGED
 from entropy_explore_env.scenario import Scenario
-from entropy_explore_env.validation import check_whole, is_whole
 from entropy_explore_env.writing import write_atomically
 from training import extra, ppo  # noqa: F401 - extra: before what is not there without it
-from training.candidate_network import WIDTH, CandidatePolicy, check_width
+from training.candidate_network import CandidatePolicy
 from training.checkpoints import (
     Checkpoint,
     PolicySettings,
@@ -65,68 +63,14 @@ from training.policy_improvement.labelling import (
 from training.policy_improvement.ppo_stage import PpoStage, check_ppo, ppo_words
 from training.policy_improvement.regression import RegressionSettings, as_json, regress
 from training.policy_improvement.rollouts import RollOutEffort
+from training.policy_improvement.search import SearchSettings, search
+from training.policy_improvement.stage_options import Args, check
 from training.policy_improvement.tasks import task_of
 from training.run_folder import FILE
 
-STAGES = ("labels", "regression", "ppo")
+STAGES = ("labels", "regression", "search", "ppo")
 _RESULT, _BEGINNING = "result.json", "begins-with.txt"
-_STOPPED = "the shard that is under way is written first"
-
-
-@dataclass
-class Args:
-    """Learn to choose better than a planner among the viewpoints that it proposes."""
-
-    tasks: tuple[str, ...] = ("room-furnished:3",)
-    """Named scenarios with their robots, NAME:ROBOTS; files of labels are dealt to them in turn, PPO learns
-    in the first."""
-    out: Path = Path("runs/improved")
-    """Folder of the run, with a folder of each stage."""
-    stage: Literal["labels", "regression", "ppo", "all"] = "all"
-    """What to do; a stage needs what those before it wrote."""
-    seed: int = 0
-    """Seed of missions, weights and all other draws."""
-    threads: int = 2
-    """Threads for missions and for learning."""
-    candidates: int = 24
-    """Viewpoints that the planner proposes at most."""
-    width: int = WIDTH
-    """Units of each candidate in the networks."""
-    compared: int = 64
-    """Starts on which each stage's policy is compared with the planner; 0 = it is not."""
-    json: bool = False
-    """Print one JSON object and nothing else."""
-
-    shards: int = 16
-    """Files of labels."""
-    missions: int = 4
-    """Missions of a file of labels."""
-    every: int = 40
-    """One decision of so many is labelled, on average."""
-    branches: int = 8
-    """Candidates that are tried at a state, the planner's choice among them."""
-    draws: int = 4
-    """Random numbers over which a label is averaged."""
-    horizon: int = 30
-    """Decisions a robot until the learned time to go stands for the rest of a roll-out; 0 = never."""
-    divisor: int = 4
-    """So many times fewer viewpoints are drawn and refined in roll-outs."""
-    states: int = 2
-    """States whose roll-outs run at once: each takes branches × draws missions' memory."""
-    policy: Path | None = None
-    """A run whose policy leads the missions that are labelled; default: the planner."""
-
-    epochs: int = 60
-    """Passes over the labels."""
-    batch: int = 128
-    """States in a minibatch of the regression."""
-    learning_rate: float = 1e-3
-    """Of the regression."""
-
-    ppo_steps: int = 200_000
-    """Steps of PPO, counted per robot."""
-    ppo_options: str = ""
-    """Further options of training.ppo in one text: `--ppo-options='--batch 256 --clip 0.1'`."""
+_STOPPED = "the shard that is under way is written first; of a search what is done is there already"
 
 
 def main(words: Sequence[str]) -> int:
@@ -144,8 +88,7 @@ def main(words: Sequence[str]) -> int:
     for stage in wanted:
         make_folder("out", args.out / stage)
         with Interruption(_STOPPED) as interruption:
-            run = {"labels": label, "regression": learn_labels, "ppo": learn_by_ppo}[stage]
-            result = run(args, tasks, interruption)
+            result = _RUN[stage](args, tasks, interruption)
         if result is None:
             return _say_stopped(args, words)
         results[stage] = result
@@ -155,35 +98,6 @@ def main(words: Sequence[str]) -> int:
     if args.json:
         print_json(results)
     return 0
-
-
-def check(args: Args) -> None:
-    """Raise a SettingError where an option is out of its range."""
-    for name in (
-        "threads",
-        "shards",
-        "missions",
-        "every",
-        "divisor",
-        "states",
-        "epochs",
-        "batch",
-        "ppo_steps",
-    ):
-        check_whole(name, getattr(args, name), 1)
-    for name in ("seed", "horizon", "compared"):
-        check_whole(name, getattr(args, name), 0)
-    check_whole("candidates", args.candidates, 2)
-    if not is_whole(args.branches, 2, args.candidates):
-        raise SettingError(
-            "branches", args.branches, f"a whole number from 2 to {args.candidates}, the candidates"
-        )
-    check_whole("draws", args.draws, 1)
-    check_width(args.width)
-    if not 0.0 < args.learning_rate < float("inf"):
-        raise SettingError("learning_rate", args.learning_rate, "a number above 0")
-    if not args.tasks:
-        raise SettingError("tasks", args.tasks, "at least one NAME:ROBOTS")
 
 
 def label(args: Args, tasks: list[Scenario], interruption: Interruption) -> dict[str, Any] | None:
@@ -246,26 +160,56 @@ def learn_labels(args: Args, tasks: list[Scenario], interruption: Interruption) 
     if led_by is not None:  # a further round goes on from the policy that led the missions
         policy.load_state_dict(led_by.state_dict())
     result, returns = regress(policy, labels, learning)
-    observed = Normaliser(ObservationLayout(tasks[0]).size + len(PRIVILEGED))
-    statistics = observed.arrays("observations") | returns.arrays("returns")
     found = {**as_json(result), "line": result.line()}
-    progress = {"steps": 0, "regression": found}
-    folder = args.out / "regression" / checkpoint_name("best", 0)
-    save_checkpoint(folder, Checkpoint(described(args, tasks), progress, weights_of(policy), statistics))
+    _save(args, tasks, "regression", policy, found, returns)
     return _finished(args, tasks, "regression", policy, found, digest)
 
 
-def learn_by_ppo(args: Args, tasks: list[Scenario], interruption: Interruption) -> dict[str, Any] | None:
+def search_weights(args: Args, tasks: list[Scenario], interruption: Interruption) -> dict[str, Any] | None:
     """Stage 3; None if Ctrl-C stopped it."""
+    folder, settings_of = args.out / "search", described(args, tasks)
+    before = _latest(args, "regression")
+    torch.manual_seed(args.seed)
+    policy = make_policy(settings_of) if before is None else _policy_in(before, settings_of)
+    assert isinstance(policy, CandidatePolicy)
+    begins = "" if before is None else weights_digest(policy)
+    settings = SearchSettings(tuple(tasks), args.rounds, args.pairs, args.sigma, args.step, args.seed, begins)
+    digest = _digest(settings.origin, args.width, args.compared)
+    if (known := _known(folder, digest)) is not None:
+        return known
+    result = search(
+        policy,
+        settings,
+        folder,
+        args.threads,
+        args.at_once,
+        lambda: interruption.asked,
+        lambda line: _say(args, line),
+    )
+    if result is None:
+        return None
+    with torch.no_grad():
+        policy.actor.weights.add_(torch.as_tensor(result.weights, dtype=torch.float32))
+    found = {**result.as_json(), "line": result.line(), "begins": begins}
+    returns = Normaliser()
+    if before is not None:  # the scale of what its critic learned
+        returns.load_arrays("returns", load_checkpoint(before).normalisation)
+    _save(args, tasks, "search", policy, found, returns)
+    return _finished(args, tasks, "search", policy, found, digest)
+
+
+def learn_by_ppo(args: Args, tasks: list[Scenario], interruption: Interruption) -> dict[str, Any] | None:
+    """Stage 4; None if Ctrl-C stopped it."""
     folder = args.out / "ppo"
-    started = latest_checkpoint(args.out / "regression", *POLICIES)
-    weights = weights_digest(_policy_in(started))
+    started = _beginning_of_ppo(args)
+    weights = "" if started is None else weights_digest(_policy_in(started))
     digest = _digest(weights, ppo_words(ppo_stage(args), tasks[0]), args.compared)
     if (known := _known(folder, digest)) is not None:
         return known
     begun = (folder / FILE).is_file()
     _check_beginning(folder, weights, begun)
-    words = [*ppo_words(ppo_stage(args), tasks[0]), "--start", str(started.absolute())]
+    words = ppo_words(ppo_stage(args), tasks[0])
+    words += [] if started is None else ["--start", str(started.absolute())]
     words += ["--resume" if begun else "--out", str(folder)]
     shown = contextlib.redirect_stdout(io.StringIO()) if args.json else contextlib.nullcontext()
     with shown:
@@ -276,6 +220,49 @@ def learn_by_ppo(args: Args, tasks: list[Scenario], interruption: Interruption) 
     curve = (folder / "curve.csv").read_text("utf-8").strip().splitlines()
     found = {"line": f"{args.ppo_steps:,} steps, {len(curve) - 1} validations"}
     return _finished(args, tasks[:1], "ppo", policy, found, digest)
+
+
+_RUN = {"labels": label, "regression": learn_labels, "search": search_weights, "ppo": learn_by_ppo}
+
+
+def _latest(args: Args, *stages: str) -> Path | None:
+    """The checkpoint of the first of some stages that wrote one."""
+    for stage in stages:
+        if any((args.out / stage).glob("best-*")):
+            return latest_checkpoint(args.out / stage, *POLICIES)
+    return None
+
+
+def _beginning_of_ppo(args: Args) -> Path | None:
+    """The checkpoint that PPO begins with: the search's, else the regression's; None = the planner.
+
+    Raises:
+        CheckpointError: The search began with another regression than the one that is there.
+    """
+    searched, before = _latest(args, "search"), _latest(args, "regression")
+    if searched is None:
+        return before
+    begins = "" if before is None else weights_digest(_policy_in(before))
+    if load_checkpoint(searched).progress["search"].get("begins") != begins:
+        allowed = "those of the regression that is there: run --stage search again, or remove its folder"
+        raise CheckpointError(f"{searched}: weights that it began with", "others", allowed)
+    return searched
+
+
+def _save(
+    args: Args,
+    tasks: list[Scenario],
+    stage: str,
+    policy: CandidatePolicy,
+    found: dict[str, Any],
+    returns: Normaliser,
+) -> None:
+    """Write what a stage came to as a checkpoint."""
+    observed = Normaliser(ObservationLayout(tasks[0]).size + len(PRIVILEGED))
+    statistics = observed.arrays("observations") | returns.arrays("returns")
+    folder = args.out / stage / checkpoint_name("best", 0)
+    progress = {"steps": 0, stage: found}
+    save_checkpoint(folder, Checkpoint(described(args, tasks), progress, weights_of(policy), statistics))
 
 
 def ppo_stage(args: Args) -> PpoStage:
@@ -292,7 +279,7 @@ def _check_beginning(folder: Path, weights: str, begun: bool) -> None:
     noted = folder / _BEGINNING
     if begun and noted.is_file() and noted.read_text("utf-8").strip() != weights:
         allowed = (
-            "those that the run in it began with: the regression is another one since; remove the folder"
+            "those that the run in it began with: the stage before is another one since; remove the folder"
         )
         raise CheckpointError(f"{folder}: weights to begin with", f"{weights[:12]}…", allowed)
     write_atomically(noted, weights + "\n")

@@ -1,4 +1,4 @@
-"""The third stage: the options of `training.ppo` that it runs with, checked before the first stage."""
+"""The last stage: the options of `training.ppo` that it runs with, checked before the first stage."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _OF_THE_STAGES = ("scenario", "robots", "actions", "candidates", "width", "criti
 
 
 class PpoStage(NamedTuple):
-    """What a command line says of the third stage."""
+    """What a command line says of the last stage."""
 
     candidates: int
     width: int
@@ -28,7 +28,7 @@ class PpoStage(NamedTuple):
 
 
 def ppo_words(stage: PpoStage, task: Scenario) -> list[str]:
-    """Options of training.ppo for the third stage: small steps from where the regression ended."""
+    """Options of training.ppo for the last stage: small steps from where the one before ended."""
     robots = str(task.robots)
     chosen = {
         "scenario": task.name,
@@ -66,7 +66,7 @@ def _split(options: str) -> list[str]:
 
 
 def check_ppo(stage: PpoStage, task: Scenario) -> None:
-    """Raise a SettingError where the third stage would refuse its options, or they would undo the others."""
+    """Raise a SettingError where the last stage would refuse its options, or they would undo the others."""
     words = _split(stage.options)
     for name in _OF_THE_STAGES:
         option = f"--{name}"

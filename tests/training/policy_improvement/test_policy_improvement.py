@@ -1,4 +1,4 @@
-"""The three stages in small: labels that repeat, a command that goes on where it was, and what it refuses."""
+"""The stages in small: labels that repeat, a command that goes on where it was, and what it refuses."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from entropy_explore_env.missions.view import view_of
 from entropy_explore_env.scenario import with_settings
 from entropy_explore_env.scenarios import find_scenario
 from training.candidate_network import CandidatePolicy
-from training.checkpoints import latest_checkpoint
+from training.checkpoints import latest_checkpoint, load_checkpoint
 from training.errors import CheckpointError, LabelsError, RollOutError
 from training.policy import make_policy, settings_of_policy
 from training.policy_improvement import __main__ as command
@@ -40,7 +40,8 @@ from training.policy_improvement.tasks import task_of
 
 TINY = (
     "--tasks box-7x11x5:2 --threads 1 --candidates 6 --width 8 --compared 3 --shards 2 --missions 2 "
-    "--every 6 --branches 3 --draws 2 --horizon 4 --epochs 3 --batch 8 --ppo-steps 192 --json"
+    "--every 6 --branches 3 --draws 2 --horizon 4 --epochs 3 --batch 8 "
+    "--rounds 2 --pairs 2 --ppo-steps 192 --json"
 ).split()
 TINY.append(
     "--ppo-options=--missions 2 --rollout-steps 16 --batch 16 --epochs 1 --validation-missions 2 "
@@ -77,8 +78,8 @@ def improved(tmp_path_factory):
 
 def test_all_stages_run_and_are_compared_with_the_planner(improved):
     out, said = improved
-    assert set(said) == {"labels", "regression", "ppo"} and said["labels"]["states"] > 5
-    for stage in ("regression", "ppo"):
+    assert set(said) == {"labels", "regression", "search", "ppo"} and said["labels"]["states"] > 5
+    for stage in ("regression", "search", "ppo"):
         (compared,) = said[stage]["compared"]
         assert compared["missions"] == 3 and compared["finished"] == compared["planner_finished"] == 3
         assert 0.0 < compared["ratio_low"] <= compared["ratio"] <= compared["ratio_high"]
@@ -94,6 +95,7 @@ def test_the_same_command_does_not_do_anything_again(improved, monkeypatch):
     for module, name in (
         (labelling, "label_missions"),
         (command, "regress"),
+        (command, "search"),
         (command, "compare_with_planner"),
     ):
         monkeypatch.setattr(module, name, None)
@@ -114,6 +116,7 @@ def test_ppo_goes_on_with_more_steps_but_not_from_other_weights_or_with_other_op
     assert printed("--out", str(folder), "--stage", "regression", "--epochs", "9")["regression"]["states"] > 0
     weights = latest_checkpoint(folder / "regression", "best") / "policy.json"
     assert weights.is_file()
+    shutil.rmtree(folder / "search")
     (folder / "ppo" / "begins-with.txt").write_text("others")
     assert improve(*on) == BAD_INPUT
     assert "weights to begin with" in capsys.readouterr().err
@@ -135,10 +138,48 @@ def test_a_policy_that_has_learned_nothing_is_the_planner_on_every_start():
 def test_stages_run_one_by_one_and_a_missing_one_is_named(improved, tmp_path, capsys):
     assert improve("--out", str(tmp_path), "--stage", "regression") == BAD_INPUT
     assert "labels-00000.npz" in capsys.readouterr().err
-    assert improve("--out", str(tmp_path), "--stage", "ppo") == BAD_INPUT
-    assert "regression" in capsys.readouterr().err
     out, said = improved
     assert printed("--out", str(out), "--stage", "regression") == {"regression": said["regression"]}
+
+
+def test_a_search_begins_with_the_regression_and_ppo_with_the_search(improved, tmp_path, capsys):
+    out, _ = improved
+    checkpoints = {
+        stage: load_checkpoint(latest_checkpoint(out / stage, "best")) for stage in ("regression", "search")
+    }
+    before, after = checkpoints["regression"], checkpoints["search"]
+    changed = [name for name in before.weights if not torch.equal(before.weights[name], after.weights[name])]
+    assert changed in ([], ["mlp_extractor.actor.weights"])
+    for name in ("returns_mean", "returns_variance", "returns_count"):
+        assert np.array_equal(before.normalisation[name], after.normalisation[name])
+    assert f"{out / 'search'}" in (out / "ppo" / "run.json").read_text()
+    folder = tmp_path / "run"
+    shutil.copytree(out, folder)
+    shutil.rmtree(folder / "search")
+    shutil.rmtree(folder / "regression")
+    said = printed("--out", str(folder), "--stage", "search")["search"]
+    assert said["begins"] == ""
+    shutil.copytree(out / "regression", folder / "regression")
+    shutil.rmtree(folder / "ppo")
+    assert improve("--out", str(folder), "--stage", "ppo") == BAD_INPUT
+    assert "weights that it began with" in capsys.readouterr().err
+
+
+def test_ppo_alone_begins_with_the_planner(tmp_path):
+    said = printed("--out", str(tmp_path), "--stage", "ppo", "--ppo-steps", "64")
+    assert (
+        "64 steps" in said["ppo"]["line"] and '"start": null' in (tmp_path / "ppo" / "run.json").read_text()
+    )
+
+
+@pytest.mark.parametrize(
+    "option",
+    ["--rounds 0", "--pairs 0", "--at-once 0", "--sigma 0", "--sigma nan", "--sigma 101", "--step inf"],
+)
+def test_options_of_the_search_are_checked_before_anything_is_written(option, tmp_path, capsys):
+    assert improve("--out", str(tmp_path / "run"), "--stage", "search", *option.split()) == BAD_INPUT
+    name, _ = option.removeprefix("--").replace("-", "_").split()
+    assert name in capsys.readouterr().err and not (tmp_path / "run").exists()
 
 
 def test_it_acts_in_candidates_of_its_own_number_only(improved):
