@@ -22,17 +22,20 @@ def validation_seeds(missions: int, first: int = 0) -> list[int]:
 
 def label_seeds(seed: int, shard: int, missions: int) -> list[int]:
     """Seeds of the missions of one file of roll-out labels; those of learning, and never one twice."""
-    sequence = np.random.SeedSequence(entropy=seed, spawn_key=(_LABELS_KEY, shard))
-    return [_LEARNING + int(drawn) for drawn in sequence.generate_state(missions, np.uint64)]
+    return _drawn(seed, (_LABELS_KEY, shard), missions)
 
 
 def pair_seeds(seed: int, part: int, pairs: int) -> list[int]:
     """Seeds of the pairs of missions of one part of a search; those of learning, and never one twice."""
-    sequence = np.random.SeedSequence(entropy=seed, spawn_key=(_PAIRS_KEY, part))
-    return [_LEARNING + int(drawn) for drawn in sequence.generate_state(pairs, np.uint64)]
+    return _drawn(seed, (_PAIRS_KEY, part), pairs)
 
 
 def learning_seeds(seed: int, missions: int) -> list[int]:
     """Seeds of the missions that a run with this seed begins with."""
-    sequence = np.random.SeedSequence(entropy=seed, spawn_key=(0,))
+    return _drawn(seed, (0,), missions)
+
+
+def _drawn(seed: int, key: tuple[int, ...], missions: int) -> list[int]:
+    """Seeds of learning that follow from a run's seed and a key; others for every key."""
+    sequence = np.random.SeedSequence(entropy=seed, spawn_key=key)
     return [_LEARNING + int(drawn) for drawn in sequence.generate_state(missions, np.uint64)]

@@ -68,7 +68,6 @@ from training.policy_improvement.stage_options import Args, check
 from training.policy_improvement.tasks import task_of
 from training.run_folder import FILE
 
-STAGES = ("labels", "regression", "search", "ppo")
 _RESULT, _BEGINNING = "result.json", "begins-with.txt"
 _STOPPED = "the shard that is under way is written first; of a search what is done is there already"
 
@@ -79,7 +78,7 @@ def main(words: Sequence[str]) -> int:
     check(args)
     tasks = [task_of(name, args.candidates) for name in args.tasks]
     torch.set_num_threads(args.threads)
-    wanted = STAGES if args.stage == "all" else (args.stage,)
+    wanted = tuple(_RUN) if args.stage == "all" else (args.stage,)
     if "ppo" in wanted:
         check_ppo(ppo_stage(args), tasks[0])  # before the stages that it comes after
     if wanted != ("ppo",):
@@ -168,7 +167,7 @@ def learn_labels(args: Args, tasks: list[Scenario], interruption: Interruption) 
 def search_weights(args: Args, tasks: list[Scenario], interruption: Interruption) -> dict[str, Any] | None:
     """Stage 3; None if Ctrl-C stopped it."""
     folder, settings_of = args.out / "search", described(args, tasks)
-    before = _latest(args, "regression")
+    before = _written(args, "regression")
     torch.manual_seed(args.seed)
     policy = make_policy(settings_of) if before is None else _policy_in(before, settings_of)
     assert isinstance(policy, CandidatePolicy)
@@ -223,14 +222,13 @@ def learn_by_ppo(args: Args, tasks: list[Scenario], interruption: Interruption) 
 
 
 _RUN = {"labels": label, "regression": learn_labels, "search": search_weights, "ppo": learn_by_ppo}
+"""The stages, one after the other."""
 
 
-def _latest(args: Args, *stages: str) -> Path | None:
-    """The checkpoint of the first of some stages that wrote one."""
-    for stage in stages:
-        if any((args.out / stage).glob("best-*")):
-            return latest_checkpoint(args.out / stage, *POLICIES)
-    return None
+def _written(args: Args, stage: str) -> Path | None:
+    """The checkpoint that a stage wrote; None = it did not."""
+    folder = args.out / stage
+    return latest_checkpoint(folder, *POLICIES) if any(folder.glob("best-*")) else None
 
 
 def _beginning_of_ppo(args: Args) -> Path | None:
@@ -239,7 +237,7 @@ def _beginning_of_ppo(args: Args) -> Path | None:
     Raises:
         CheckpointError: The search began with another regression than the one that is there.
     """
-    searched, before = _latest(args, "search"), _latest(args, "regression")
+    searched, before = _written(args, "search"), _written(args, "regression")
     if searched is None:
         return before
     begins = "" if before is None else weights_digest(_policy_in(before))
@@ -266,7 +264,7 @@ def _save(
 
 
 def ppo_stage(args: Args) -> PpoStage:
-    """What the options say of the third stage."""
+    """What the options say of the last stage."""
     return PpoStage(args.candidates, args.width, args.seed, args.ppo_steps, args.ppo_options)
 
 

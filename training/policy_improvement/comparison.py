@@ -5,12 +5,12 @@ from __future__ import annotations
 import dataclasses
 from contextlib import closing
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from baselines.experiments.mission import Surroundings
-from baselines.experiments.statistics import geometric_ratio_interval, median_ratio_interval
+from baselines.experiments.statistics import Interval, geometric_ratio_interval, median_ratio_interval
 from entropy_explore_env.errors import counted
 from entropy_explore_env.scenario import Scenario
 from training.candidate_network import CandidatePolicy
@@ -66,6 +66,29 @@ class Comparison:
         return dataclasses.asdict(self)
 
 
+class Paired(NamedTuple):
+    """Figures of a policy beside those of another strategy on the same starts; smaller is better."""
+
+    medians: tuple[float, float]
+    """Of the policy, and of the other."""
+    ratio: Interval
+    """Of the medians."""
+    mean_ratio: Interval
+    """Geometric mean of the paired ratios."""
+    worst_tenth: float
+    """Ratio of the 90th percentiles."""
+
+
+def paired(own: np.ndarray, other: np.ndarray) -> Paired:
+    """Compare figures (N,) of a policy with those of another strategy, start by start."""
+    return Paired(
+        (float(np.median(own)), float(np.median(other))),
+        median_ratio_interval(own, other),
+        geometric_ratio_interval([own], [other]),
+        float(np.percentile(own, 90) / np.percentile(other, 90)),
+    )
+
+
 def compare_with_planner(
     policy: CandidatePolicy, scenario: Scenario, missions: int, threads: int, first: int = FIRST
 ) -> Comparison:
@@ -84,20 +107,16 @@ def compare_with_planner(
         ours = validator.run(lambda observations: choose_actions(policy, observations, None))
     assert ours is not None and theirs is not None
     own_s, planner_s = (np.array([each["t_mission_s"] for each in one]) for one in (ours, theirs))
-    ratio, mean_ratio = (
-        median_ratio_interval(own_s, planner_s),
-        geometric_ratio_interval([own_s], [planner_s]),
-    )
+    found = paired(own_s, planner_s)
     return Comparison(
         scenario.name,
         scenario.robots,
         missions,
-        float(np.median(own_s)),
-        float(np.median(planner_s)),
-        *ratio,
-        *mean_ratio,
+        *found.medians,
+        *found.ratio,
+        *found.mean_ratio,
         int((own_s < planner_s).sum()),
         int(sum(each["finished"] for each in ours)),
         int(sum(each["finished"] for each in theirs)),
-        float(np.percentile(own_s, 90) / np.percentile(planner_s, 90)),
+        found.worst_tenth,
     )

@@ -16,10 +16,9 @@ import numpy as np
 import torch
 
 from baselines.experiments.provenance import code_digest
-from entropy_explore_env.missions.privileged import deciding, mission_times, running
+from entropy_explore_env.missions.privileged import deciding, mission_times
 from entropy_explore_env.scenario import Scenario
 from training.candidate_network import CandidatePolicy
-from training.errors import RollOutError
 from training.policy import choose_actions
 from training.policy_improvement.rollouts import (
     PLANNER,
@@ -34,7 +33,6 @@ from training.policy_improvement.shards import Labels, Origin, load_shard, save_
 from training.seeds import label_seeds
 
 _KEYS = 2**62
-_MOST_STEPS = 200_000
 
 
 class LabelSettings(NamedTuple):
@@ -183,15 +181,8 @@ class _Shard:
     def run(self, acts: Acting) -> tuple[Labels, list[int]]:
         """The labels of all missions, and their seeds."""
         missions = self._batch.missions
-        for _ in range(_MOST_STEPS):
-            going = running(missions)
-            if not going.any():
-                break
+        for going in self._batch.led(acts):
             self._note(going)
-            self._batch.step(acts(self._batch))
-        else:
-            name, time_s = self._batch.scenario.name, float(mission_times(missions).max())
-            raise RollOutError(name, self._seeds[0], 0, _MOST_STEPS, time_s)
         self._run_branches()
         self._rollouts.close()
         self._batch.close()

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -23,20 +23,19 @@ from baselines.cli.worker_options import WorkerOptions
 from baselines.experiments.cells import Cell, run_cells
 from baselines.experiments.outcome import Record
 from baselines.experiments.runner import NOT_RUN
-from baselines.experiments.statistics import Interval, geometric_ratio_interval, median_ratio_interval
 from baselines.experiments.tables import markdown_table
-from baselines.scoreboard.mission import SuiteMission
-from baselines.scoreboard.results import Measure, value
-from baselines.scoreboard.suites import plans
+from baselines.scoreboard.results import Measure, limit_of, value
+from baselines.scoreboard.suites import Place, Suite, Task, plans, team_name
 from baselines.strategies import resolved
-from entropy_explore_env.errors import SettingError, counted
-from entropy_explore_env.scenario import Scenario, with_settings
+from entropy_explore_env.errors import SettingError
+from entropy_explore_env.scenario import with_settings
 from entropy_explore_env.scenarios import SCENARIOS
 from entropy_explore_env.validation import check_whole
 from entropy_explore_env.writing import write_atomically
 from training import extra  # noqa: F401 - before what is not there without it
 from training.checkpoints import latest_checkpoint, load_checkpoint
 from training.policy import POLICIES, policy_folder
+from training.policy_improvement.comparison import Paired, paired
 
 _BEST, _DUNGEONS = resolved("best"), "dungeons"
 _OTHERS = ("planner-choice", "information-rate-v0")
@@ -69,12 +68,7 @@ class Test:
     @property
     def title(self) -> str:
         """As the table says it."""
-        return f"{self.name}, {counted(self.robots, 'robot')}" + (f", {self.words}" if self.words else "")
-
-    @property
-    def folder(self) -> str:
-        """Of its missions."""
-        return "-".join(self.title.replace(",", "").split())
+        return team_name(self.name, self.robots) + (f", {self.words}" if self.words else "")
 
     @property
     def measure(self) -> Measure:
@@ -83,34 +77,25 @@ class Test:
 
     def measured(self, record: Record) -> float:
         """The measure of a mission; of one that was not finished what it could have come to at most."""
-        if (reached := value(record, self.measure)) is not None:
-            return reached
-        scenario = plans()[0].scenario if self.name == _DUNGEONS else self.scenario
-        limit_s = scenario.ending.time_limit_s
-        return limit_s * scenario.robot.max_speed_m_s if self.measure.figure == "path_m" else limit_s
+        reached = value(record, self.measure)
+        return limit_of(self.task, self.measure) if reached is None else reached
 
     def cells(self, strategy: str, seeds: int) -> list[Cell]:
         """Missions of a strategy."""
+        places = self.task.places
         if self.name == _DUNGEONS:
-            places = plans()[0].places[:seeds]
-            return [
-                Cell(
-                    f"{self.folder}/{place.name}/{strategy}",
-                    place.scenario,
-                    strategy,
-                    1,
-                    SuiteMission(place.start),
-                    round=number,
-                )
-                for number, place in enumerate(places)
-            ]
-        return [Cell(f"{self.folder}/{strategy}", self.scenario, strategy, seeds, SuiteMission())]
+            some = places[:seeds]
+        else:
+            some = tuple(replace(place, missions=seeds) for place in places)
+        return Suite("own", (replace(self.task, places=some),), (strategy,)).cells
 
     @cached_property
-    def scenario(self) -> Scenario:
-        """In worlds of the test split."""
+    def task(self) -> Task:
+        """As the suites have it: the dungeons, or worlds of a scenario's test split."""
+        if self.name == _DUNGEONS:
+            return replace(plans()[0], name=self.title)
         settings = {"robots": self.robots, "split": "test", **self.changes}
-        return with_settings(SCENARIOS[self.name], settings)
+        return Task(self.title, (Place(self.name, with_settings(SCENARIOS[self.name], settings), 1),))
 
 
 TESTS: dict[str, tuple[Test, ...]] = {
@@ -166,21 +151,15 @@ class Compared(NamedTuple):
     starts: int
     finished: tuple[int, int]
     """Missions of the policy, and of the other, that came to their end."""
-    medians: tuple[float, float]
-    """Likewise."""
-    ratio: Interval
-    """Of the medians."""
-    mean_ratio: Interval
-    """Geometric mean of the paired ratios."""
-    worst_tenth: float
-    """Ratio of the 90th percentiles."""
+    measured: Paired
     decision_ms: tuple[float, float]
     """Median time on the clock that a decision of one robot took."""
 
     def holds(self, goal: float) -> bool:
         """Whether a goal is reached: see the head of the page."""
-        clear = goal >= 1.0 or self.ratio.high < 1.0
-        return self.ratio.value <= goal and clear and self.finished[0] >= self.finished[1]
+        ratio = self.measured.ratio
+        clear = goal >= 1.0 or ratio.high < 1.0
+        return ratio.value <= goal and clear and self.finished[0] >= self.finished[1]
 
 
 def main(words: Sequence[str]) -> int:
@@ -239,10 +218,7 @@ def compared(test: Test, ours: Sequence[Record], theirs: Sequence[Record]) -> Co
     return Compared(
         len(pairs),
         (own_finished, other_finished),
-        (float(np.median(own)), float(np.median(other))),
-        median_ratio_interval(own, other),
-        geometric_ratio_interval([own], [other]),
-        float(np.percentile(own, 90) / np.percentile(other, 90)),
+        paired(own, other),
         (_decision_ms([pair[0] for pair in pairs]), _decision_ms([pair[1] for pair in pairs])),
     )
 
@@ -314,16 +290,16 @@ def _table(name: str, tests: Sequence[Test], against: str, found: Found) -> str:
 
 def _row(test: Test, result: Compared, goal: float | None) -> list[str]:
     unit = "m" if test.measure.figure == "path_m" else "s"
-    own, other = (f"{value:,.0f} {unit}" for value in result.medians)
+    own, other = (f"{median:,.0f} {unit}" for median in result.measured.medians)
     return [
         test.title,
         str(result.starts),
         "{} and {}".format(*result.finished),
         own,
         other,
-        result.ratio.text(),
-        result.mean_ratio.text(),
-        f"{result.worst_tenth:.2f}",
+        result.measured.ratio.text(),
+        result.measured.mean_ratio.text(),
+        f"{result.measured.worst_tenth:.2f}",
         "{:.1f} and {:.1f}".format(*result.decision_ms),
         "" if goal is None else f"≤ {goal:.2f}",
         "" if goal is None else "yes" if result.holds(goal) else "no",

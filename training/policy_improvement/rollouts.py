@@ -10,6 +10,7 @@ Letters: N states, B branches of each, D draws, P privileged numbers.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -32,6 +33,8 @@ from training.candidate_network import CandidateParts, candidate_parts
 from training.errors import RollOutError
 
 _NOTHING = dict.fromkeys(("panorama", "self_state", "team", "candidates", "overlaps", "action_mask"), False)
+MOST_STEPS = 200_000
+"""Of a mission that is led to its end: no mission should take so many."""
 _MOST_STEPS = 50
 """Steps for each decision of a roll-out's horizon, at most; each should bring at least one decision."""
 
@@ -62,6 +65,28 @@ class BatchMissions:
     def step(self, actions: np.ndarray) -> None:
         """Take the candidates with these numbers, (E, A) int64."""
         self.missions.step(self._no_numbers, actions)
+
+    def led(self, acts: Callable[[BatchMissions], np.ndarray]) -> Iterator[np.ndarray]:
+        """Lead the missions to their ends.
+
+        Args:
+            acts: From missions to the candidates (E, A) that their robots take.
+
+        Yields:
+            Before every step, (E,) bool: which missions go on.
+
+        Raises:
+            RollOutError: A mission makes no headway.
+        """
+        missions = self.missions
+        for _ in range(MOST_STEPS):
+            going = running(missions)
+            if not going.any():
+                return
+            yield going
+            self.step(acts(self))
+        clock_s = float(mission_times(missions).max())
+        raise RollOutError(self.scenario.name, missions.seeds[0], missions.episodes[0], MOST_STEPS, clock_s)
 
     def features(self) -> np.ndarray:
         """(E, A, K, F) float32 of the candidates; a view."""

@@ -33,13 +33,14 @@ import numpy as np
 import torch
 
 from baselines.experiments.provenance import code_digest
-from entropy_explore_env.missions.privileged import finished, mission_times, running
+from entropy_explore_env.missions.privileged import deciding, finished, mission_times, running
 from entropy_explore_env.scenario import Scenario
 from entropy_explore_env.viewpoints.candidate_features import COLUMNS
 from entropy_explore_env.writing import write_atomically
 from training.candidate_network import CandidatePolicy
 from training.errors import LabelsError, RollOutError
-from training.policy_improvement.rollouts import PLANNER, BatchMissions
+from training.policy_improvement.labelling import planner_acts
+from training.policy_improvement.rollouts import MOST_STEPS, PLANNER, BatchMissions
 from training.seeds import pair_seeds
 
 SEARCHED = (
@@ -56,7 +57,6 @@ _OLDER = 0.5
 _LAST_STEP = 0.3
 """Length of the last step, as a share of the first one's."""
 _RIDGE = 1.0
-_MOST_STEPS = 200_000
 _HEAD = "head"
 
 
@@ -127,9 +127,6 @@ class Found(NamedTuple):
         return {"weights": weights, "rounds": self.rounds}
 
 
-Told = Callable[[str], None]
-
-
 def search(
     policy: CandidatePolicy,
     settings: SearchSettings,
@@ -137,7 +134,7 @@ def search(
     threads: int,
     missions: int = 16,
     stopped: Callable[[], bool] = lambda: False,
-    say: Told = lambda line: None,
+    say: Callable[[str], None] = lambda line: None,
 ) -> Found | None:
     """Search weights, from where the files in a folder end.
 
@@ -163,8 +160,8 @@ def search(
         for task, scenario in enumerate(settings.scenarios):
             part = _Part(settings, number, task, centre)
             file = folder / f"round-{number:03d}-task-{task}.jsonl"
-            with closing(_Runner(policy, scenario, spreads, missions, threads)) as runner:
-                done = part.run(file, origin, runner, stopped)
+            runner = _Runner(policy, scenario, spreads, missions, threads)
+            done = part.run(file, origin, runner, stopped)
             if done is None:
                 return None
             parts.append(done)
@@ -281,23 +278,25 @@ class End(NamedTuple):
     finished: bool
 
 
-class _Runner:
-    """Missions of one task, as many at once as there is room for."""
+class _Runner(NamedTuple):
+    """Runs missions of one task, as many at once as there is room for."""
 
-    def __init__(
-        self, policy: CandidatePolicy, scenario: Scenario, spreads: np.ndarray, missions: int, threads: int
-    ) -> None:
-        self._policy, self._spreads = policy, spreads
-        self._scenario, self._missions, self._threads = scenario, missions, threads
-        self._batch: BatchMissions | None = None
+    policy: CandidatePolicy
+    scenario: Scenario
+    spreads: np.ndarray
+    missions: int
+    threads: int
 
     def run(self, runs: Sequence[Run], stopped: Callable[[], bool]) -> Iterator[tuple[int, End]]:
         """Run missions to their ends; yields numbers of `runs` as they end."""
-        if not runs:
-            return
-        rows = min(self._missions, len(runs))
-        batch = self._batch = BatchMissions(self._scenario, rows, self._threads)
-        missions, waiting = batch.missions, iter(range(len(runs)))
+        if runs:
+            with closing(BatchMissions(self.scenario, min(self.missions, len(runs)), self.threads)) as batch:
+                yield from self._run_in(batch, runs, stopped)
+
+    def _run_in(
+        self, batch: BatchMissions, runs: Sequence[Run], stopped: Callable[[], bool]
+    ) -> Iterator[tuple[int, End]]:
+        missions, waiting, rows = batch.missions, iter(range(len(runs))), batch.missions.count
         under_way = np.full(rows, -1)
         changes = np.zeros((rows, len(SEARCHED)))
         steps = np.zeros(rows, np.int64)
@@ -308,7 +307,7 @@ class _Runner:
                 under_way[row], steps[row] = -1 if number is None else number, 0
                 if number is not None:
                     missions.reset_some([row], [runs[number].seed])
-                    changes[row] = in_weights(runs[number].change, self._spreads)
+                    changes[row] = in_weights(runs[number].change, self.spreads)
             if (under_way < 0).all():
                 return
             batch.step(self._choices(batch, changes))
@@ -316,31 +315,25 @@ class _Runner:
             over = (under_way >= 0) & ~running(missions)
             ended = np.flatnonzero(over)
             clocks_s, reached = mission_times(missions), finished(missions)
-            limit_s = self._scenario.ending.time_limit_s
+            limit_s = self.scenario.ending.time_limit_s
             for row in ended.tolist():
                 seconds = clocks_s[row] if reached[row] else limit_s
                 yield int(under_way[row]), End(float(seconds), bool(reached[row]))
-            if (late := np.flatnonzero((steps > _MOST_STEPS) & (under_way >= 0) & ~over)).size:
+            if (late := np.flatnonzero((steps > MOST_STEPS) & (under_way >= 0) & ~over)).size:
                 row = int(late[0])
-                seed, name = runs[under_way[row]].seed, self._scenario.name
+                seed, name = runs[under_way[row]].seed, self.scenario.name
                 raise RollOutError(name, seed, 0, int(steps[row]), float(clocks_s[row]))
 
     def _choices(self, batch: BatchMissions, changes: np.ndarray) -> np.ndarray:
         """(E, A) the likeliest candidates, with the weights of each mission changed."""
-        features = batch.features()
-        seen = batch.missions.observations
+        choosing = deciding(batch.missions)
+        features, seen = batch.features()[choosing], batch.missions.observations[choosing]
         with torch.inference_mode():
-            logits = self._policy.actor(torch.as_tensor(seen.reshape(-1, seen.shape[-1])))
-        logits = logits.numpy().reshape(features.shape[:3]).astype(np.float64)
-        logits += np.einsum("eakf,ef->eak", features[..., _COLUMNS], changes)
-        exists = batch.exists()
-        exists[..., PLANNER] = True
-        return np.where(exists, logits, -np.inf).argmax(axis=2)
-
-    def close(self) -> None:
-        """End the threads."""
-        if self._batch is not None:
-            self._batch.close()
+            logits = self.policy.actor(torch.as_tensor(seen)).numpy().astype(np.float64)
+        logits += np.einsum("nkf,nf->nk", features[..., _COLUMNS], changes[np.nonzero(choosing)[0]])
+        actions = np.full(choosing.shape, PLANNER, np.int64)
+        actions[choosing] = logits.argmax(axis=1)
+        return actions
 
 
 def _spreads(settings: SearchSettings, file: Path, origin: str, threads: int) -> np.ndarray:
@@ -369,18 +362,11 @@ def _spreads_in(scenario: Scenario, seed: int, threads: int) -> np.ndarray:
     count, total, decisions = _SPREAD_MISSIONS, np.zeros(len(SEARCHED)), 0
     with closing(BatchMissions(scenario, count, threads)) as batch:
         batch.missions.reset_some(range(count), pair_seeds(seed, 0, count))  # those of the first pairs
-        planner = np.full((count, scenario.robots), PLANNER)
-        for _ in range(_MOST_STEPS):
-            if not running(batch.missions).any():
-                break
+        for _ in batch.led(planner_acts):
             exists, features = batch.exists(), batch.features()[..., _COLUMNS]
             for at in zip(*np.nonzero(exists.sum(axis=2) > 1), strict=True):
                 total += features[at][exists[at]].var(axis=0)
                 decisions += 1
-            batch.step(planner)
-        else:
-            clock_s = float(mission_times(batch.missions).max())
-            raise RollOutError(scenario.name, batch.missions.seeds[0], 0, _MOST_STEPS, clock_s)
     return np.sqrt(total / max(decisions, 1))
 
 

@@ -40,7 +40,7 @@ class Args:
     missions: int = 4
     """Missions of a file of labels."""
     every: int = 40
-    """One decision of so many is labelled, on average."""
+    """Decisions for each one that is labelled, on average."""
     branches: int = 8
     """Candidates that are tried at a state, the planner's choice among them."""
     draws: int = 4

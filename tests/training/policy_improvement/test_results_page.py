@@ -26,23 +26,25 @@ def test_only_starts_that_both_ran_are_compared():
     theirs = [record(10.0), record(10.0), record(5.0), record(15.0)]
     found = compared(Test("office", 1), ours, theirs)
     assert found is not None
-    assert found.starts == 3 and found.finished == (3, 3) and found.medians == (10.0, 10.0)
-    assert found.ratio.value == 1.0 and found.ratio.low <= 1.0 <= found.ratio.high
+    assert found.starts == 3 and found.finished == (3, 3) and found.measured.medians == (10.0, 10.0)
+    assert found.measured.ratio.value == 1.0 and found.measured.ratio.low <= 1.0 <= found.measured.ratio.high
     assert found.decision_ms == (2.5, 2.5)
-    assert found.mean_ratio.value == pytest.approx((0.8 * 1.0 * 2.0) ** (1 / 3))
-    assert found.worst_tenth == pytest.approx(26.0 / 14.0)  # 90th percentiles of 8, 10, 30 and of 10, 10, 15
+    assert found.measured.mean_ratio.value == pytest.approx((0.8 * 1.0 * 2.0) ** (1 / 3))
+    assert found.measured.worst_tenth == pytest.approx(
+        26.0 / 14.0
+    )  # 90th percentiles of 8, 10, 30 and of 10, 10, 15
     assert compared(Test("office", 1), [NOT_RUN], [record(1.0)]) is None
 
 
 def test_missions_that_failed_or_were_not_finished_count_with_the_time_limit():
     office = Test("office", 1)
-    limit_s = office.scenario.ending.time_limit_s
+    limit_s = office.task.scenario.ending.time_limit_s
     failed = {"failed": "it raised", "trace": "", "limit_s": None}
     found = compared(office, [failed, record(50.0, finished=False)], [record(10.0), record(10.0)])
-    assert found is not None and found.finished == (0, 2) and found.medians == (limit_s, 10.0)
+    assert found is not None and found.finished == (0, 2) and found.measured.medians == (limit_s, 10.0)
     assert found.decision_ms == (12.5, 2.5)
     found = compared(office, [record(10.0)], [failed])
-    assert found is not None and found.finished == (1, 0) and found.medians == (10.0, limit_s)
+    assert found is not None and found.finished == (1, 0) and found.measured.medians == (10.0, limit_s)
 
 
 @pytest.mark.parametrize(
@@ -64,9 +66,9 @@ def test_a_goal_asks_for_the_ratio_its_interval_and_finished_missions(ours, goal
 def test_in_the_dungeons_the_path_counts(tmp_path):
     (dungeons,) = (test for test in TESTS["plans"] if test.name == "dungeons")
     found = compared(dungeons, [record(8.0)], [record(10.0)])
-    assert found is not None and found.medians == (4.0, 5.0)
+    assert found is not None and found.measured.medians == (4.0, 5.0)
     found = compared(dungeons, [record(8.0, finished=False)], [record(10.0)])
-    assert found is not None and found.medians == (3600.0, 5.0)  # 7,200 s at 0.5 m/s
+    assert found is not None and found.measured.medians == (3600.0, 5.0)  # 7,200 s at 0.5 m/s
     cells = dungeons.cells("planned-rate", 3)
     assert len(cells) == 3 and all(cell.seeds == 1 for cell in cells)
     assert len({cell.scenario.world for cell in cells}) == 3
@@ -79,13 +81,13 @@ def test_in_the_dungeons_the_path_counts(tmp_path):
 
 def test_tasks_are_of_the_test_split_and_differ_by_what_their_names_say():
     for tests in TESTS.values():
-        assert len({test.folder for test in tests}) == len(tests)
+        assert len({test.task.folder for test in tests}) == len(tests)
         for test in tests:
             if test.name != "dungeons":
-                assert test.scenario.split == "test" and test.scenario.robots == test.robots
+                assert test.task.scenario.split == "test" and test.task.scenario.robots == test.robots
             assert test.goal is not None or test.learned
     lost = next(test for test in TESTS["plans"] if test.words.startswith("half"))
-    assert lost.scenario.channel.loss_probability == 0.5
+    assert lost.task.scenario.channel.loss_probability == 0.5
 
 
 def test_the_page_is_written_stopped_and_gone_on_with(tmp_path, monkeypatch, capsys):

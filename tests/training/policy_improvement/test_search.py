@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import json
 from itertools import count
 
@@ -118,9 +117,8 @@ def test_a_changed_mission_is_that_of_a_policy_with_the_changed_weights():
     change = np.zeros(SIZE)
     change[SEARCHED.index("unknown")], change[SEARCHED.index("seconds")] = 3.0, -2.0
     validated = validation_seeds(3, 1_000)
-    with contextlib.closing(searching._Runner(policy(), scenario, spreads, 2, 1)) as runner:
-        runs = [Run(seed, change) for seed in validated]
-        ends = dict(runner.run(runs, lambda: False))
+    runs = [Run(seed, change) for seed in validated]
+    ends = dict(searching._Runner(policy(), scenario, spreads, 2, 1).run(runs, lambda: False))
     changed = policy()
     with torch.no_grad():
         for name, by in zip(SEARCHED, change / spreads, strict=True):
