@@ -1,11 +1,12 @@
 """Strategies compared: `python -m baselines.benchmark --suite plans`, or `--scenarios room,office`.
 
 A suite is a set of worlds, starts and seeds that is pinned (scoreboard/suites.py). Every strategy runs the
-same missions; written are a page with tables and figures. Missions are kept, a file each: an interrupted run
-resumes and ends with the same page, byte for byte. Mission k of all tasks and strategies is run before any
-mission k + 1, so that a page of a part is fair. A mission that raises an error or runs past its limit is a
-row with the reason. In suites, a strategy that finishes none of its first three missions of a task is not run
-further there.
+same missions. Written are a page with tables and figures. Missions are kept, a file each: an interrupted run
+resumes and ends with the same page, byte for byte. `missions.jsonl.xz` beside a suite's tables holds them
+all: with `--archive FILE` another run begins with them, to go on or to add a strategy. Mission k of all tasks
+and strategies is run before any mission k + 1, so that a page of a part is fair. A mission that raises an
+error or runs past its limit is a row with the reason. In suites, a strategy that finishes none of its first
+three missions of a task is not run further there.
 """
 
 from __future__ import annotations
@@ -30,7 +31,8 @@ from baselines.cli.task_options import (
     words_of,
 )
 from baselines.cli.worker_options import WorkerOptions
-from baselines.experiments.cells import run_cells
+from baselines.experiments.archive import read_archive, write_archive
+from baselines.experiments.cells import missions_of, run_cells
 from baselines.scoreboard.chosen import (
     Entry,
     Mission,
@@ -80,6 +82,9 @@ class Args(WorkerOptions):
     confirm: bool = False
     """Keep missions that other code ran, of each strategy and task whose first mission comes out the same
     when it is run again; else a change of the code runs all again."""
+    archive: Path | None = None
+    """missions.jsonl.xz of an earlier run: its missions of the same settings are not run again; what other
+    code ran counts with --confirm."""
     out: Path = Path("results/scoreboard")
     """Folder for scoreboard.md and, in scoreboard, its tables and figures."""
     runs: Path | None = None
@@ -92,13 +97,17 @@ def main(words: Sequence[str]) -> int:
     """Run the command."""
     args = parse(Args, words, description=__doc__)
     (suite, changes), workers = _suite(args, words), args.workers
-    from baselines.scoreboard.page import write_page  # matplotlib: after the help
+    from baselines.scoreboard.page import ARCHIVE, FILES, write_page  # matplotlib: after the help
     from baselines.scoreboard.results import Results
     from baselines.scoreboard.terminal import printed_results, show_results
 
     runs = args.runs or args.out / "runs"
     make_folder("out", args.out)
     make_folder("runs", runs)
+    missions = missions_of(suite.cells)
+    if args.archive is not None:
+        taken = read_archive(args.archive, runs, missions)
+        print(f"{taken:,} missions taken from {args.archive}", file=sys.stderr)
     started = time.perf_counter()
     records = run_cells(
         suite.cells,
@@ -117,6 +126,7 @@ def main(words: Sequence[str]) -> int:
         print("nothing to write: no mission was run", file=sys.stderr)
         return 0
     page = write_page(args.out, results, _command(args, suite, changes))
+    write_archive(page.parent / FILES / suite.name / ARCHIVE, runs, missions)
     if args.json:
         print_json({**printed_results(results), "wall_s": round(time.perf_counter() - started, 1)})
     else:

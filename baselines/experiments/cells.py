@@ -139,6 +139,12 @@ def _environment(scenario: Scenario, surroundings: Surroundings | None) -> Entro
     return scripted_env(scenario, surroundings)
 
 
+def missions_of(cells: Sequence[Cell]) -> list[CellMission]:
+    """All missions of some cells, in the order in which they are run."""
+    missions = [CellMission(cell, seed) for cell in cells for seed in range(cell.seeds)]
+    return sorted(missions, key=lambda one: one.round)
+
+
 def run_cells(
     cells: Sequence[Cell],
     folder: Path,
@@ -173,8 +179,7 @@ def run_cells(
         Cell id → records by seed; see `mission.record_mission` for what one holds. Where the time was up, or
         a group is not run further, `runner.NOT_RUN`.
     """
-    missions = [CellMission(cell, seed) for cell in cells for seed in range(cell.seeds)]
-    missions.sort(key=lambda one: one.round)
+    missions = missions_of(cells)
     conditions = Conditions(folder, workers, title, quiet, limit_s, keep_failures)
     ends_s = time.monotonic() + stop_after_s
     if confirm:

@@ -196,7 +196,7 @@ def _checksum(record: object) -> str:
 
 def read_record(folder: Path, work: Work, code: str, limit_s: float = math.inf) -> Record | None:
     """The record of work with these settings and this code that was not ended by a shorter limit."""
-    content = _content(folder, work)
+    content = kept_content(folder, work)
     if content.get("digest") != result_digest(work, code):
         return None
     ended_after_s = content["record"].get("limit_s")
@@ -205,7 +205,7 @@ def read_record(folder: Path, work: Work, code: str, limit_s: float = math.inf) 
 
 def read_older_record(folder: Path, work: Work) -> tuple[str, Record] | None:
     """The digest of the code and the record of work with these settings, whatever code did it."""
-    content = _content(folder, work)
+    content = kept_content(folder, work)
     if content.get("settings") != work.settings_digest or not isinstance(content.get("code"), str):
         return None
     if content.get("digest") != result_digest(work, content["code"]):
@@ -213,7 +213,7 @@ def read_older_record(folder: Path, work: Work) -> tuple[str, Record] | None:
     return content["code"], content["record"]
 
 
-def _content(folder: Path, work: Work) -> dict[str, Any]:
+def kept_content(folder: Path, work: Work) -> dict[str, Any]:
     """What the file of some work holds; nothing if there is none, or if it was changed by hand."""
     try:
         content = json.loads((folder / f"{work.file}.json").read_text())

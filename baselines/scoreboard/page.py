@@ -27,6 +27,8 @@ from entropy_explore_env.writing import write_atomically
 
 PAGE, FILES, PART = "scoreboard.md", "scoreboard", "part.txt"
 """The page, the folder beside it, and in a suite's folder its part of the page."""
+ARCHIVE = "missions.jsonl.xz"
+"""All missions of a suite, in its folder."""
 _DIGITS = 6
 """Significant digits of the CSV tables."""
 _CLOCK = ("decision_ms", "worst_decision_ms")
@@ -101,7 +103,9 @@ Strategies on the same worlds, starts and seeds, in suites that are pinned (`bas
 - Thirty starts a task are the whole; where fewer have been run yet rows say how many, and ratios are of
   those that both have run. Tasks of which none has been run are left out.
 - ms a decision: of one robot, the median over missions of their medians, and the worst of all.
-- A strategy of one's own takes part by `python -m baselines.benchmark --suite NAME --strategies MODULE:CLASS`
+- `missions.jsonl.xz` among a suite's files holds all of its missions. A strategy of one's own takes part by
+  `python -m baselines.benchmark --suite NAME --strategies MODULE:CLASS --archive FILE --confirm`: the others'
+  missions are taken from the file, and run again only where the code has changed what comes out
   (docs/own_strategy.md).
 """
 
@@ -128,8 +132,8 @@ def _parts(results: Results, tasks: list[Row], overall: list[Row], command: str)
     failed = failed_rows(results)
     if failed:
         parts += ["### Missions that failed", _failed_table(failed)]
-    files = ("overall", "tasks", "missions", "timing")
-    parts.append("Files: " + ", ".join(f"[`{name}.csv`]({beside}/{name}.csv)" for name in files) + ".")
+    files = ("overall.csv", "tasks.csv", "missions.csv", "timing.csv", ARCHIVE)
+    parts.append("Files: " + ", ".join(f"[`{name}`]({beside}/{name})" for name in files) + ".")
     return parts
 
 

@@ -58,10 +58,11 @@ _MILLISECONDS = re.compile(rb"\| [0-9.,-]+ \| [0-9.,-]+ \|$", re.MULTILINE)
 
 def contents(folder: Path) -> dict[str, bytes]:
     """All that the command wrote but missions and the clock; what a kill left of half files is nobody's."""
+    clocked = ("timing.csv", "missions.jsonl.xz")
     return {
         str(path.relative_to(folder)): _MILLISECONDS.sub(b"|", path.read_bytes())
         for path in sorted(folder.rglob("*"))
-        if path.is_file() and "runs" not in path.parts and path.name[0] != "." and path.name != "timing.csv"
+        if path.is_file() and "runs" not in path.parts and path.name[0] != "." and path.name not in clocked
     }
 
 
@@ -182,6 +183,28 @@ def test_two_processes_write_the_same_bytes(pair, tmp_path, capsys):
     words = [*PAIR[:-1], "2", "--out", str(tmp_path), "--runs", str(tmp_path / "runs")]
     assert run_command(benchmark.main, words) == 0
     assert contents(tmp_path) == contents(pair[0])
+
+
+def test_another_run_begins_with_the_archive_of_the_first(pair, tmp_path, capsys, monkeypatch):
+    """All of it: no mission is run. With a strategy more: only that one's are."""
+    archive, ran = pair[0] / "scoreboard" / "own" / "missions.jsonl.xz", []
+    real = runner.run_each
+
+    def logged(do: object, tasks: list, *others: object):
+        ran.extend(order.work.file for order in tasks)
+        return real(do, tasks, *others)
+
+    monkeypatch.setattr(runner, "run_each", logged)
+    words = ["--archive", str(archive), "--out", str(tmp_path / "same")]
+    assert run_command(benchmark.main, [*PAIR, *words]) == 0
+    assert "24 missions taken" in capsys.readouterr().err and ran == []
+    assert contents(tmp_path / "same") == contents(pair[0])
+    again = tmp_path / "same" / "scoreboard" / "own" / "missions.jsonl.xz"
+    assert again.read_bytes() == archive.read_bytes()
+    words = ["--archive", str(archive), "--out", str(tmp_path / "more"), "--seeds", "6", "--jobs", "1"]
+    words += ["--strategies", "gradient,mutual-information"]
+    assert run_command(benchmark.main, [*TINY, *words]) == 0
+    assert len(ran) == 12 and all("/mutual-information/" in name for name in ran)
 
 
 KILLER = """
