@@ -85,6 +85,7 @@ def robot_model(
     grid, sensor, robot = scenario.grid, kind.sensor, kind.robot
     step, edge = sensor.angular_step_rad, grid.voxel_size_m
     columns, rows = (max(n // thinning, 1) for n in (sensor.columns, sensor.rows))
+    known_precision = float(KNOWN_RATIO / scenario.sigma_prior**2)
     scan = ScanModel(
         yaws=centred_angles(columns, step) * sensor.columns / columns,
         pitches=centred_angles(rows, step) * sensor.rows / rows,
@@ -96,9 +97,10 @@ def robot_model(
         sigma_slope_per_m=float(sensor.sigma_slope_per_m),
         sigma_exponent=float(sensor.sigma_exponent),
         voxels_behind=int(sensor.voxels_behind),
-        known_precision=float(KNOWN_RATIO / scenario.sigma_prior**2),
+        known_precision=known_precision,
         stop_probability=float(stop_probability),
         pose_variance=np.zeros(2),
+        wanted_precision=known_precision if scenario.ending.by_seen else math.inf,
     )
     drive = DriveModel(
         max_speed_m_s=float(robot.max_speed_m_s),

@@ -36,6 +36,8 @@ class ScanModel(NamedTuple):
     pose_variance: np.ndarray
     """(2,) float64: of the robot's place, summed over its axes, in squared voxel edges, and of its yaw, rad²;
     zeros = it knows its pose."""
+    wanted_precision: float = math.inf
+    """Voxels with at least so much precision bring nothing that counts; inf = all voxels count."""
 
 
 class ScanScratch(NamedTuple):

@@ -60,7 +60,8 @@ def _imagine_ray(belief, scan, gap_probability, start, direction, count, scratch
         return count
     for i in range(n):
         voxel = np.uint32(scratch.crossed[np.uint32(i)])
-        count = touch(scratch, voxel, gain * share, count)
+        if belief.precision[voxel] < scan.wanted_precision:
+            count = touch(scratch, voxel, gain * share, count)
         if belief.precision[voxel] < scan.known_precision:
             gap = gap_probability != scan.stop_probability and beside_covered(belief, voxel)
             share *= 1.0 - (gap_probability if gap else scan.stop_probability)

@@ -335,7 +335,7 @@ def _proposer(scenario: Scenario, kind: RobotKind, recipe: Recipe, scratch: Prop
         within=float(within.reach),
         reach=float(min(kind.robot.reach_m / grid.voxel_size_m, float(sum(grid.shape)))),
         view_width_rad=float(max(*kind.sensor.field_of_view_rad, kind.sensor.angular_step_rad)),
-        target_precision=float(scenario.ending.sigma_end**-2),
+        target_precision=min(float(scenario.ending.sigma_end**-2), exact.scan.wanted_precision),
         unknown_cost=float(kind.robot.unknown_cost),
         blocks=new_blocks(grid.shape, _edge(scenario, recipe)),
         scratch=scratch,

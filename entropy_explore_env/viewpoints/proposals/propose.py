@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import math
+
 from entropy_explore_env.compilation.kernels import lean_kernel
+from entropy_explore_env.viewpoints.imagined_scan import imagined_bits
 from entropy_explore_env.viewpoints.proposals.far import remaining_bits_by_block
 from entropy_explore_env.viewpoints.proposals.features import Selection
 from entropy_explore_env.viewpoints.proposals.nearby import (
@@ -13,7 +16,12 @@ from entropy_explore_env.viewpoints.proposals.nearby import (
 )
 from entropy_explore_env.viewpoints.proposals.records import Kind
 from entropy_explore_env.viewpoints.proposals.selection import choose, most_far_of, select
-from entropy_explore_env.viewpoints.proposals.situation import distance_apart, learn, weigh_time
+from entropy_explore_env.viewpoints.proposals.situation import (
+    chosen_number,
+    distance_apart,
+    learn,
+    weigh_time,
+)
 
 _NONE, _FAR = int(Kind.NONE), int(Kind.FAR)
 
@@ -33,7 +41,9 @@ def propose(proposer, situation, decision, candidates, described):
         Selection.
     """
     experience, pool = situation.experience, proposer.scratch.pool
-    learn(experience, candidates, decision, situation.here)
+    chosen = chosen_number(candidates, decision)
+    came_bits = _came_bits(proposer, situation, candidates, decision, chosen)
+    learn(experience, candidates, decision, chosen, came_bits, situation.here)
     weigh_time(proposer, experience, decision)
     if proposer.planned:
         start_paths(proposer, situation)
@@ -55,6 +65,23 @@ def propose(proposer, situation, decision, candidates, described):
     remaining = remaining_bits_by_block(proposer, situation.belief) if described else 0.0
     _write_candidates(proposer, situation.here, candidates, count)
     return Selection(count, kept, near_value, far_value, remaining)
+
+
+@lean_kernel
+def _came_bits(proposer, situation, candidates, decision, chosen):
+    """Bits that the latest scan brought, of those that count.
+
+    Where only unknown voxels count, they are what the same view promises less than before: a scan of known
+    walls brings bits, too, however often it is taken.
+    """
+    if math.isinf(proposer.exact.wanted_precision) or chosen < 0 or decision.under_way:
+        return decision.came_bits
+    left, gap = proposer.scratch.gaze_bits[:1], proposer.recipe.gap_probability
+    viewpoint = proposer.scratch.gazes[:1]
+    copy_viewpoint(decision.target, viewpoint[0])
+    scratch = proposer.scratch.scan
+    imagined_bits(situation.belief, proposer.exact, gap, viewpoint, situation.cones, scratch, left)
+    return candidates[chosen].bits - left[0]
 
 
 @lean_kernel

@@ -98,16 +98,17 @@ def chosen_number(candidates, decision):
 
 
 @lean_kernel
-def learn(experience, candidates, decision, here):
+def learn(experience, candidates, decision, number, came_bits, here):
     """Compare what came with what was expected, and remember what is not worth another try.
 
     Args:
         experience: EXPERIENCE, changed in place.
         candidates: (K,) CANDIDATE among which it chose.
         decision: LastDecision.
+        number: Of the candidate that it chose; -1 = something else.
+        came_bits: Those of its latest scan that count.
         here: (5,) where the robot is, grid units.
     """
-    number = chosen_number(candidates, decision)
     if number >= 0 or not decision.under_way:  # who is under way to what is out of reach keeps its goal
         experience.going = False
     if number >= 0 and candidates[number].kind == _FAR:
@@ -122,7 +123,7 @@ def learn(experience, candidates, decision, here):
         experience.blocked = BLOCKED_DECISIONS
     missed = distance_apart(decision.target, here)
     expected = candidates[number].bits if number >= 0 else 0.0
-    came = max(decision.came_bits, 0.0)
+    came = max(came_bits, 0.0)
     arrived = decision.move_end == _ARRIVED or decision.move_end == _CORNERS
     if missed > MISSED_EDGES and not (arrived and decision.uncertain):
         _remember(experience, decision.target, 0.0, max(2.0 * missed, FORGET_EDGES))

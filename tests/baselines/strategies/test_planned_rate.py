@@ -9,6 +9,7 @@ import pytest
 from baselines.experiments.mission import run_mission, scripted
 from baselines.strategies.information_rate_v0 import InformationRate
 from baselines.strategies.planned_rate import PlannedRate, PlannedRateConfig
+from baselines.strategies.planner_choice import PlannerChoice
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.reports.metrics import mission_figures
@@ -68,3 +69,11 @@ def test_a_configuration_changes_the_recipe_of_every_kind_of_robot():
 def test_settings_that_make_no_sense_are_refused_at_once(wrong):
     with pytest.raises(SettingError, match=rf"PlannedRateConfig\.{next(iter(wrong))}"):
         PlannedRateConfig(**wrong)
+
+
+def test_where_everything_is_to_be_seen_no_time_goes_to_known_walls():
+    """`planner-choice` took 4,377 scans and 2,818 s here, most of them of walls that it knew."""
+    ending = {"seen_share": 1.0, "time_limit_s": 3000.0}
+    settings = {"robots": 1, "track_truth": True, "split": "train", "ending": ending}
+    figures = figures_of(PlannerChoice(), SCENARIOS["office"], **settings)
+    assert figures["finished"] and figures["scans"] < 400 and figures["t_mission_s"] < 1500.0

@@ -19,11 +19,14 @@ from entropy_explore_env.scenarios import BOX
 from entropy_explore_env.settings import Grid, RangeSensor
 from entropy_explore_env.viewpoints.candidate_features import COLUMNS
 from entropy_explore_env.viewpoints.evaluation import is_line_free, new_scratch, robot_model
+from entropy_explore_env.viewpoints.imagined_scan import imagined_bits
 from entropy_explore_env.viewpoints.proposals.model import MATE, new_proposers
+from entropy_explore_env.viewpoints.proposals.propose import propose
 from entropy_explore_env.viewpoints.proposals.records import CANDIDATE, EXPERIENCE, Kind
 from entropy_explore_env.viewpoints.proposals.situation import (
     LastDecision,
     Situation,
+    chosen_number,
     learn,
     trust_in,
     weigh_time,
@@ -77,12 +80,59 @@ def test_one_ray_through_seven_unknown_voxels():
     assert not proposer.scratch.marks.any() and not proposer.scratch.scan.added.any()
 
 
+def test_where_a_mission_ends_by_what_is_seen_known_voxels_bring_nothing():
+    """Four of the seven voxels are known: the others count, as do far places' unknown voxels alone."""
+    by_seen = with_settings(ONE_RAY, {"ending": {"seen_share": 1.0}, "track_truth": True})
+    bits = {}
+    for scenario in (ONE_RAY, by_seen):
+        recipe = dataclasses.replace(recipe_for(scenario.kinds[0]), thinning=1, stop_probability=0.0)
+        proposer = new_proposers(scenario, {0: recipe})[0]
+        precision, situation = unknown_world()
+        precision[:4, 5, 2] = 100.0
+        viewpoint, found = ALONG_X[None], np.zeros(1)
+        scan = proposer.exact
+        imagined_bits(situation.belief, scan, 0.0, viewpoint, situation.cones, proposer.scratch.scan, found)
+        sensor = scenario.sensor
+        gain = (sensor.sigma_min + sensor.sigma_slope_per_m * 3.25) ** -2
+        bits[scenario.ending.by_seen] = found[0]
+        assert math.isinf(scan.wanted_precision) != scenario.ending.by_seen
+    unknown, known = 0.5 * math.log2(1.0 + gain / PRIOR), 0.5 * math.log2(1.0 + gain / 100.0)
+    assert bits[True] == pytest.approx(3 * unknown, rel=1e-5)
+    assert bits[False] == pytest.approx(3 * unknown + 4 * known, rel=1e-5)
+
+
+@pytest.mark.parametrize(("known", "failures"), [(False, 1), (True, 0)])
+def test_there_a_scan_failed_if_what_it_was_to_show_is_still_unknown(known, failures):
+    """However many bits it brought of what was known before."""
+    by_seen = with_settings(ONE_RAY, {"ending": {"seen_share": 1.0}, "track_truth": True})
+    proposer = new_proposers(by_seen)[0]
+    precision, situation = unknown_world()
+    candidates = np.zeros(MOST, CANDIDATE)
+    for part in (False, True):
+        last = decision(ALONG_X, 1e6 if part else 0.0)
+        propose(proposer, situation, last, candidates, False)
+        assert situation.experience["failures"] == (failures if part else 0)
+        scan, found = proposer.exact, np.zeros(1)
+        imagined_bits(
+            situation.belief, scan, 0.9, ALONG_X[None], situation.cones, proposer.scratch.scan, found
+        )
+        candidates[0]["viewpoint"] = [*(0.5 * ALONG_X[:3]), *ALONG_X[3:]]
+        candidates[0]["kind"], candidates[0]["bits"] = Kind.SPOT, found[0]
+        if known:
+            precision[:] = 100.0
+
+
 def decision(target, came_bits, move_end=MoveEnd.ARRIVED, under_way=False, uncertain=False, **so_far):
     target = np.asarray(target, float)
     in_metres = np.concatenate([0.5 * target[:3], target[3:]])
     time_s, gained_bits = so_far.get("time_s", 0.0), so_far.get("gained_bits", 0.0)
     came = (came_bits, move_end.code, under_way, uncertain)
     return LastDecision(target, in_metres, 0.5, *came, time_s, gained_bits)
+
+
+def learned(experience, candidates, last, here):
+    """As where all bits count."""
+    learn(experience, candidates, last, chosen_number(candidates, last), last.came_bits, here)
 
 
 @pytest.fixture
@@ -98,52 +148,52 @@ def proposed():
 
 def test_what_brought_a_tenth_or_more_is_no_failure(proposed):
     candidates, experience = proposed
-    learn(experience, candidates, decision(ALONG_X, 5.0), ALONG_X)
+    learned(experience, candidates, decision(ALONG_X, 5.0), ALONG_X)
     assert experience["failures"] == 0 and not experience["going"]
     assert trust_in(experience, False, ALONG_X) == 1.0
 
 
 def test_what_brought_less_is_remembered_until_it_is_far_behind(proposed):
     candidates, experience = proposed
-    learn(experience, candidates, decision(ALONG_X, 4.0), ALONG_X)
+    learned(experience, candidates, decision(ALONG_X, 4.0), ALONG_X)
     assert experience["failures"] == 1
     alike, turned = ALONG_X + np.array([0.5, 0, 0, 0.05, 0]), ALONG_X + np.array([0, 0, 0, 0.2, 0])
     assert trust_in(experience, False, alike) == pytest.approx(4.0 / 50.0)
     assert trust_in(experience, False, turned) == 1.0
     assert trust_in(experience, True, turned) == pytest.approx(4.0 / 50.0)
     away = ALONG_X + np.array([6.1, 0, 0, 0, 0])
-    learn(experience, candidates, decision(away, 60.0), away)
+    learned(experience, candidates, decision(away, 60.0), away)
     assert experience["failures"] == 0
 
 
 def test_a_drive_that_was_cut_short_loses_its_goal_and_its_trust(proposed):
     candidates, experience = proposed
-    learn(experience, candidates, decision(BACK, 60.0), BACK)
+    learned(experience, candidates, decision(BACK, 60.0), BACK)
     assert experience["going"] and experience["goal"].tolist() == (BACK + np.array([0, 2, 0, 0, 0])).tolist()
     short = BACK - np.array([2.0, 0, 0, 0, 0])
-    learn(experience, candidates, decision(BACK, 60.0, MoveEnd.TEAMMATE), short)
+    learned(experience, candidates, decision(BACK, 60.0, MoveEnd.TEAMMATE), short)
     assert not experience["going"] and experience["blocked"] == 4
     assert trust_in(experience, False, BACK) == 0.0
 
 
 def test_who_drives_on_judges_nothing_and_keeps_its_goal(proposed):
     candidates, experience = proposed
-    learn(experience, candidates, decision(BACK, 0.0, under_way=True), ALONG_X)
+    learned(experience, candidates, decision(BACK, 0.0, under_way=True), ALONG_X)
     assert experience["going"] and experience["failures"] == 0
 
 
 def test_who_is_under_way_beyond_reach_keeps_its_goal_until_it_stops(proposed):
     """Its target was pulled within reach when it was proposed again, so that it is like no candidate."""
     candidates, experience = proposed
-    learn(experience, candidates, decision(BACK, 60.0), BACK)
+    learned(experience, candidates, decision(BACK, 60.0), BACK)
     goal = experience["goal"].tolist()
     beyond = BACK + np.array([0, 4.0, 0, 0, 0])
-    learn(experience, candidates, decision(beyond, 0.0, under_way=True), ALONG_X)
+    learned(experience, candidates, decision(beyond, 0.0, under_way=True), ALONG_X)
     assert experience["going"] and experience["goal"].tolist() == goal
-    learn(experience, candidates, decision(ALONG_X, 0.0, under_way=True), ALONG_X)
+    learned(experience, candidates, decision(ALONG_X, 0.0, under_way=True), ALONG_X)
     assert not experience["going"]  # it chose a gaze nearby instead
-    learn(experience, candidates, decision(BACK, 60.0), BACK)
-    learn(experience, candidates, decision(beyond, 60.0), beyond)
+    learned(experience, candidates, decision(BACK, 60.0), BACK)
+    learned(experience, candidates, decision(beyond, 60.0), beyond)
     assert not experience["going"]
 
 
@@ -151,17 +201,17 @@ def test_who_is_under_way_beyond_reach_keeps_its_goal_until_it_stops(proposed):
 def test_who_drifts_is_where_it_meant_to_be_if_nothing_cut_its_drive_short(proposed, end):
     candidates, experience = proposed
     off = BACK + np.array([-0.3, 0.2, 0, 0.01, 0])
-    learn(experience, candidates, decision(BACK, 60.0, end, uncertain=True), off)
+    learned(experience, candidates, decision(BACK, 60.0, end, uncertain=True), off)
     assert experience["going"] and experience["failures"] == 0
-    learn(experience, candidates, decision(BACK, 4.0, end, uncertain=True), off)
+    learned(experience, candidates, decision(BACK, 4.0, end, uncertain=True), off)
     assert trust_in(experience, False, BACK) == pytest.approx(4.0 / 50.0)
-    learn(experience, candidates, decision(BACK, 60.0, MoveEnd.OBSTACLE, uncertain=True), off)
+    learned(experience, candidates, decision(BACK, 60.0, MoveEnd.OBSTACLE, uncertain=True), off)
     assert not experience["going"] and trust_in(experience, False, BACK) == 0.0
 
 
 def test_who_does_not_drift_is_judged_by_where_it_stands(proposed):
     candidates, experience = proposed
-    learn(experience, candidates, decision(BACK, 60.0, MoveEnd.CORNERS), BACK - np.array([0.3, 0, 0, 0, 0]))
+    learned(experience, candidates, decision(BACK, 60.0, MoveEnd.CORNERS), BACK - np.array([0.3, 0, 0, 0, 0]))
     assert not experience["going"] and trust_in(experience, False, BACK) == 0.0
 
 
@@ -209,7 +259,7 @@ def test_nothing_is_remembered_of_free_drives_with_drift():
 
 def fail_at(candidates, experience, target, came_bits=1.0):
     candidates[0]["viewpoint"] = [*(0.5 * target[:3]), *target[3:]]
-    learn(experience, candidates, decision(target, came_bits), target)
+    learned(experience, candidates, decision(target, came_bits), target)
 
 
 def test_more_failures_than_are_remembered_push_out_the_oldest(proposed):
