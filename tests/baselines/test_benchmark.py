@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import json
 import math
-import re
 import subprocess
 import sys
 import time
@@ -37,6 +36,7 @@ from baselines.scoreboard.results import (
 from baselines.scoreboard.suites import Place, Suite, Task
 from baselines.strategies import make_strategy
 from baselines.strategies.random_walk import RandomWalk
+from benchmarks.reliability.kills import contents
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.errors import MissingExtraError
 from entropy_explore_env.reports.metrics import mission_figures
@@ -50,20 +50,6 @@ from entropy_explore_env.worlds.world import World
 ROOT = Path(__file__).parents[2]
 TINY = ("--scenarios", "box-7x11x5", "--robots", "1,2", "--time-limit-s", "150")
 PAIR = (*TINY, "--strategies", "gradient", "--seeds", "6", "--jobs", "1")
-
-
-_MILLISECONDS = re.compile(rb"\| [0-9.,-]+ \| [0-9.,-]+ \|$", re.MULTILINE)
-"""The last two columns of the page's tables."""
-
-
-def contents(folder: Path) -> dict[str, bytes]:
-    """All that the command wrote but missions and the clock; what a kill left of half files is nobody's."""
-    clocked = ("timing.csv", "missions.jsonl.xz")
-    return {
-        str(path.relative_to(folder)): _MILLISECONDS.sub(b"|", path.read_bytes())
-        for path in sorted(folder.rglob("*"))
-        if path.is_file() and "runs" not in path.parts and path.name[0] != "." and path.name not in clocked
-    }
 
 
 def rows_of(path: Path) -> list[dict[str, str]]:
@@ -89,7 +75,10 @@ def test_the_command_leaves_page_tables_figures_and_a_file_a_mission(pair):
     assert "24/24" in ran.stderr and "scoreboard.md" in ran.stderr
     assert set(contents(folder)) == {"scoreboard.md"} | {
         f"scoreboard/own/{name}"
-        for name in ("part.txt", "overall.csv", "tasks.csv", "missions.csv", "ratios.png", "tasks.png")
+        for name in (
+            *("part.txt", "overall.csv", "tasks.csv", "missions.csv", "missions.jsonl.xz"),
+            *("ratios.png", "tasks.png"),
+        )
     }
     missions = sorted(str(path.relative_to(folder / "runs")) for path in folder.rglob("seed-*.json"))
     assert missions == sorted(
