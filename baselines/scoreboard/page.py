@@ -116,7 +116,7 @@ def _parts(results: Results, tasks: list[Row], overall: list[Row], command: str)
     beside = f"{FILES}/{suite.name}"
     parts = [
         f"## {_TITLES[suite.name]}",
-        f"Written by `{command}`." + (_CONFIRMED if "--confirm" in command.split() else ""),
+        f"Written by `{command}`." + (CONFIRMED if "--confirm" in command.split() else ""),
         _overall_table(results, overall),
         f"![Ratios with intervals]({beside}/ratios.png)",
         f"![Ratios by task]({beside}/tasks.png)",
@@ -137,10 +137,11 @@ def _parts(results: Results, tasks: list[Row], overall: list[Row], command: str)
     return parts
 
 
-_CONFIRMED = (
+CONFIRMED = (
     " Some missions may have been run by an earlier version of the code: the first one of their strategy and"
     " task was run again by the last version, and came out the same."
 )
+"""What a page says that was written with --confirm."""
 _TITLES: Mapping[str, str] = {
     "plans": "Plans: until everything is seen",
     "volumes": "Volumes and offices: until the map is known",

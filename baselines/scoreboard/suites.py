@@ -49,6 +49,7 @@ SCAN_EVERY_M = 0.5
 ANGULAR_STEP_RAD = math.pi / 360
 """Plans: between two rays of the lidar."""
 DUNGEON_UNSEEN = 250
+_ALL: Mapping[str, Any] = {"seen_share": 1.0}
 _UNLIMITED, _LOSSY = 1_000_000, 0.5
 
 
@@ -147,7 +148,10 @@ def plans(quick: bool = False) -> tuple[Task, ...]:
     chosen = {**recipes, **{name: scenario for name, scenario in files.items() if name in small}}
     return (
         _dungeons(QUICK_DUNGEONS if quick else None),
-        *(_one(name, _explored(scenario, {"seen_share": 1.0}), starts) for name, scenario in chosen.items()),
+        *(
+            task_in(name, _explored(scenario, {"seen_share": 1.0}), starts)
+            for name, scenario in chosen.items()
+        ),
     )
 
 
@@ -159,7 +163,7 @@ def volumes(quick: bool = False) -> tuple[Task, ...]:
     if not quick:
         worlds["geb079"] = _in_file(SCENARIOS["office-3d"], "geb079", {"time_limit_s": 14_400.0})
     return tuple(
-        _one(team_name(name, robots), with_settings(scenario, {"robots": robots}), starts)
+        task_in(team_name(name, robots), with_settings(scenario, {"robots": robots}), starts)
         for name, scenario in worlds.items()
         for robots in (1, 3)
     )
@@ -179,7 +183,7 @@ def teams(quick: bool = False) -> tuple[Task, ...]:
         ", half of the messages lost": {**whole, "loss_probability": _LOSSY},
     }
     return tuple(
-        _one(
+        task_in(
             team_name(name, robots) + words,
             with_settings(scenario, {"robots": robots, "channel": channel}),
             starts,
@@ -197,14 +201,16 @@ def training_plans(starts: int) -> tuple[Task, ...]:
     there is one each, which nothing is tuned on.
     """
     names = ("office", "corridor", "cluttered", "hybrid")
-    recipes = [_one(name, _explored(SCENARIOS[name], {"seen_share": 1.0}), starts, "train") for name in names]
+    recipes = [
+        task_in(name, _explored(SCENARIOS[name], {"seen_share": 1.0}), starts, "train") for name in names
+    ]
     return (_dungeons(starts, every=2), *recipes)
 
 
 def training_volumes(starts: int) -> tuple[Task, ...]:
     """Worlds like those of the suite `volumes` on which settings may be tuned: of the training split."""
     return tuple(
-        _one(team_name(name, robots), with_settings(SCENARIOS[name], {"robots": robots}), starts, "train")
+        task_in(team_name(name, robots), with_settings(SCENARIOS[name], {"robots": robots}), starts, "train")
         for name in ("room-furnished", "office", "office-3d", "cave")
         for robots in (1, 3)
     )
@@ -267,8 +273,15 @@ def find_suite(name: str, quick: bool, strategies: tuple[str, ...]) -> Suite:
     return Suite(name, SUITES[name](quick), strategies)
 
 
-def _one(name: str, scenario: Scenario, missions: int, split: str = "test") -> Task:
-    """A task in one scenario, in worlds of a split."""
+def task_in(name: str, scenario: Scenario, missions: int, split: str = "test") -> Task:
+    """A task in one scenario, in worlds of a split.
+
+    Args:
+        name: Of the task.
+        scenario: Whose worlds are drawn.
+        missions: Their number.
+        split: `train` or `test`.
+    """
     tested = with_settings(scenario, {"split": split, "track_truth": True})
     return Task(name, (Place(name, tested, missions),))
 

@@ -3,13 +3,15 @@
 Each policy over candidates runs beside the strategy that is recommended, on the same starts, in worlds that
 nothing was learned in: in the tasks that it learned, there also beside the planner whose candidates it
 chooses among and `information-rate-v0`, and in others, with other teams, channels and sensors. Written is
-`policy.md`. Missions are kept, a file each: what was stopped goes on, and a page of a part says how many
-starts it holds.
+`policy.md`, and beside it all missions as one file, with which another run begins (`--archive`). Missions are
+kept, a file each: what was stopped goes on, and a page of a part says how many starts it holds. Tasks that
+stand in suites, too, are theirs: archives of the scoreboard serve as well.
 """
 
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -20,12 +22,14 @@ import numpy as np
 
 from baselines.cli.arguments import make_folder, parse, run_command
 from baselines.cli.worker_options import WorkerOptions
-from baselines.experiments.cells import Cell, run_cells
+from baselines.experiments.archive import read_archive, write_archive
+from baselines.experiments.cells import Cell, missions_of, run_cells
 from baselines.experiments.outcome import Record
 from baselines.experiments.runner import NOT_RUN
 from baselines.experiments.tables import markdown_table
+from baselines.scoreboard.page import ARCHIVE, CONFIRMED
 from baselines.scoreboard.results import Measure, limit_of, value
-from baselines.scoreboard.suites import Place, Suite, Task, plans, team_name
+from baselines.scoreboard.suites import Suite, Task, plans, task_in, team_name
 from baselines.strategies import resolved
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.scenario import with_settings
@@ -93,9 +97,9 @@ class Test:
     def task(self) -> Task:
         """As the suites have it: the dungeons, or worlds of a scenario's test split."""
         if self.name == _DUNGEONS:
-            return replace(plans()[0], name=self.title)
-        settings = {"robots": self.robots, "split": "test", **self.changes}
-        return Task(self.title, (Place(self.name, with_settings(SCENARIOS[self.name], settings), 1),))
+            return plans()[0]
+        settings = {"robots": self.robots, **self.changes}
+        return task_in(self.title, with_settings(SCENARIOS[self.name], settings), 1)
 
 
 TESTS: dict[str, tuple[Test, ...]] = {
@@ -139,8 +143,14 @@ class Args(WorkerOptions):
     """Time on the clock after which no mission is begun any more; the page then holds what was run."""
     wall_limit_s: float = 3600.0
     """Time on the clock after which a mission is ended, and counts as failed."""
+    confirm: bool = False
+    """Keep missions that other code ran, of each strategy and task whose first mission comes out the same
+    when it is run again; else a change of the code runs all again."""
+    archive: tuple[Path, ...] = ()
+    """Files missions.jsonl.xz of earlier runs, of this page or of the scoreboard: their missions of the same
+    settings are not run again; what other code ran counts with --confirm."""
     out: Path = Path("results/policy")
-    """Folder for policy.md."""
+    """Folder for policy.md and, in policy, its missions."""
     runs: Path | None = None
     """Folder that keeps the missions; default: runs in --out."""
 
@@ -185,19 +195,26 @@ def main(words: Sequence[str]) -> int:
         for name, pairs in rows.items()
         for test, strategy in pairs
     }
+    wanted, runs = [cell for group in cells.values() for cell in group], args.runs or args.out / "runs"
+    make_folder("runs", runs)
+    missions = missions_of(wanted)
+    for file in args.archive:
+        print(f"{read_archive(file, runs, missions):,} missions taken from {file}", file=sys.stderr)
     records = run_cells(
-        [cell for group in cells.values() for cell in group],
-        args.runs or args.out / "runs",
+        wanted,
+        runs,
         workers,
         "policies tested",
         quiet=False,
         limit_s=args.wall_limit_s,
         keep_failures=True,
         stop_after_s=args.stop_after_s,
+        confirm=args.confirm,
     )
     found = {key: [each for cell in group for each in records[cell.id]] for key, group in cells.items()}
     page = args.out / "policy.md"
-    write_atomically(page, "\n".join(_page(names, found)))
+    write_atomically(page, "\n".join(_page(names, found, args.confirm)))
+    write_archive(args.out / FILES / ARCHIVE, runs, missions)
     print(f"written: {page}")
     return 0
 
@@ -233,14 +250,18 @@ def _finished(record: Record) -> bool:
     return "failed" not in record and bool(record["finished"])
 
 
+FILES = "policy"
+"""Folder beside the page."""
 Found = Mapping[tuple[str, str, str], Sequence[Record]]
 
 
-def _page(names: Sequence[str], found: Found) -> list[str]:
+def _page(names: Sequence[str], found: Found, confirmed: bool) -> list[str]:
     """The page, part by part."""
+    flags, said = (" --confirm", CONFIRMED) if confirmed else ("", "")
     parts = [
         "# Policies that choose among a planner's candidates\n",
-        "Written by `python -m training.policy_improvement.results_page --out docs/results`; the policies "
+        f"Written by `python -m training.policy_improvement.results_page{flags} --out docs/results`.{said} "
+        f"All missions lie in [`{ARCHIVE}`]({FILES}/{ARCHIVE}). The policies "
         f"come from `make policy`. Each runs beside the recommended strategy, `{_BEST}`, on the same starts, "
         "in worlds of the test split; the dungeons have no splits, and none was learned in. A ratio is the "
         "policy's over that of the other: below 1 the policy is faster. Intervals are 95 %, of a bootstrap "

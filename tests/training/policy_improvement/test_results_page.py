@@ -7,8 +7,9 @@ import dataclasses
 import pytest
 
 from baselines.cli.arguments import run_command
-from baselines.experiments.cells import run_cells
+from baselines.experiments.cells import missions_of, run_cells
 from baselines.experiments.runner import NOT_RUN
+from baselines.scoreboard.suites import find_suite
 from entropy_explore_env.command import BAD_INPUT
 from entropy_explore_env.scenario import with_settings
 from training.policy_improvement import results_page
@@ -90,6 +91,24 @@ def test_tasks_are_of_the_test_split_and_differ_by_what_their_names_say():
     assert lost.task.scenario.channel.loss_probability == 0.5
 
 
+def test_missions_of_the_scoreboard_are_those_of_the_page():
+    """An archive of it holds them under the same names and settings."""
+    for name, tests in TESTS.items():
+        suite = {"plans": ("plans", "volumes"), "volumes": ("volumes",)}[name]
+        theirs = {
+            mission.file: mission.settings_digest
+            for each in suite
+            for mission in missions_of(find_suite(each, False, ("planned-rate",)).cells)
+        }
+        for test in tests:
+            ours = missions_of(test.cells("planned-rate", 30))
+            shared = [one for one in ours if one.file in theirs]
+            assert all(one.settings_digest == theirs[one.file] for one in shared)
+            known = {"office, 1 robot", "office, 3 robots", "dungeons, 1 robot"}
+            known |= {test.title for test in TESTS["volumes"] if test.robots in (1, 3) and not test.words}
+            assert len(shared) == (len(ours) if test.title in known else 0), test.title
+
+
 def test_the_page_is_written_stopped_and_gone_on_with(tmp_path, monkeypatch, capsys):
     small = Test("box-7x11x5", 2, learned=True, goal=2.0, goal_v0=0.01)
     monkeypatch.setattr(results_page, "TESTS", {"volumes": (small, Test("box-7x11x5", 1, goal=2.0))})
@@ -105,6 +124,12 @@ def test_the_page_is_written_stopped_and_gone_on_with(tmp_path, monkeypatch, cap
     assert run_command(results_page.main, options) == 0
     assert (tmp_path / "policy.md").read_text() == page
     capsys.readouterr()
+    archive, other = tmp_path / "policy" / "missions.jsonl.xz", tmp_path / "other"
+    words = [*options, "--out", str(other), "--archive", str(archive), str(archive), "--stop-after-s", "1e-6"]
+    assert run_command(results_page.main, words) == 0  # no mission is run
+    assert (other / "policy.md").read_text() == page
+    said = capsys.readouterr().err
+    assert f"18 missions taken from {archive}" in said and f"0 missions taken from {archive}" in said
 
 
 def test_unknown_policies_and_starts_are_refused(tmp_path, capsys):
