@@ -3,7 +3,7 @@
     import entropy_explore_env
     env = entropy_explore_env.parallel_env("room", robots=3)
 
-Importing registers, for every scenario (room → Room-v0), `gymnasium.make`, `gymnasium.make_vec` and
+Importing registers, for every scenario (room → Room-v1), `gymnasium.make`, `gymnasium.make_vec` and
 `pettingzoo.make("parallel" | "aec", ...)` under `entropy_explore_env/`.
 """
 
@@ -91,13 +91,13 @@ __all__ = [
 
 
 def environment_id(scenario: str) -> str:
-    """The id of a named scenario: `room-furnished` → `entropy_explore_env/RoomFurnished-v0`.
+    """The id of a named scenario: `room-furnished` → `entropy_explore_env/RoomFurnished-v1`.
 
     Raises:
         SettingError: No scenario has this name.
     """
     words = find_scenario(scenario).name.split("-")
-    return "entropy_explore_env/" + "".join(word[:1].upper() + word[1:] for word in words) + "-v0"
+    return "entropy_explore_env/" + "".join(word[:1].upper() + word[1:] for word in words) + "-v1"
 
 
 _MAPPED_IN_TIME = 0.8

@@ -20,6 +20,7 @@ from entropy_explore_env.missions.action import action_space
 from entropy_explore_env.missions.observation.layout import ObservationLayout
 from entropy_explore_env.scenario import Scenario, with_settings
 from entropy_explore_env.scenarios import SCENARIOS
+from entropy_explore_env.version import VERSION
 from tests.code_blocks import DOCS
 
 ALL_PARTS = {
@@ -119,9 +120,17 @@ def test_numbers_of_actions_that_robots_ignore_are_named():
         assert [n.first for n in told if "means nothing" in n.meaning] == ignored
 
 
-def test_a_card_says_why_a_second_costs_nothing(tmp_path):
-    for name, nothing in (("cliff", True), ("room", False)):
-        assert ("costs nothing by default" in card(SCENARIOS[name], tmp_path)) == nothing
+def test_a_card_says_what_a_second_costs_and_by_whom(tmp_path):
+    for name, strategy in (("cliff", "cliff-next-best-view"), ("room", "information-rate-v0")):
+        text, times = card(SCENARIOS[name], tmp_path), scenarios.MISSION_TIMES[name]
+        assert f"A mission of {times.median_s:g} s, the median of `{strategy}` over 20" in text
+        assert f"`{strategy}`: median {times.median_s:g} s over 20 starts" in text
+
+
+def test_a_card_says_which_version_of_the_id_is_of_which_release(tmp_path):
+    text = card(SCENARIOS["room-furnished"], tmp_path)
+    assert f"| `entropy_explore_env/RoomFurnished-v1` | {'.'.join(VERSION.split('.')[:2])}" in text
+    assert "| `entropy_explore_env/RoomFurnished-v0` | 0.1.0" in text
 
 
 def test_times_come_from_the_suites_of_the_scoreboard(tmp_path):
@@ -138,9 +147,8 @@ def test_times_come_from_the_suites_of_the_scoreboard(tmp_path):
     assert "| 1 robot (to 99 % seen) | `nearest-frontier` | 312 (300 … 330) | 29 of 30 |" in text
     assert "| 3 robots | `planned-rate` | 150 (140 … 161) | 30 of 30 |" in text
     assert "8 robots" not in text and "`random`" not in text
-    bare = SCENARIOS["bhattacharya-cluttered"]
-    if bare.name not in scenarios.MISSION_TIMES:
-        assert scenario_times.times_table(bare, tmp_path) == ""
+    bare = with_settings(SCENARIOS["office"], {"name": "mine"})
+    assert scenario_times.times_table(bare, tmp_path) == ""
 
 
 def test_the_reference_lists_all_parts_of_a_scenario():

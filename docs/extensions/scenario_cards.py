@@ -252,14 +252,9 @@ def _reward(scenario: Scenario) -> str:
     times = MISSION_TIMES.get(scenario.name)
     if times is not None and reward.cost_per_s:
         text += (
-            f"\nA mission of {times.median_s:g} s, the median of `information-rate-v0` over {times.missions} "
+            f"\nA mission of {times.median_s:g} s, the median of `{times.strategy}` over {times.missions} "
             'starts, costs 0.2. With `reward={"kind": "team"}`, or one robot, it returns about 0.8, '
             "one twice as long 0.6."
-        )
-    if times is None and scenario.name in SCENARIOS:
-        text += (
-            "\nA second costs nothing by default: no mission of `information-rate-v0`, to which costs refer, "
-            "was mapped in reasonable time here."
         )
     return text
 
@@ -364,11 +359,10 @@ def _film(name: str, docs: Path) -> str:
 
 def _versions(name: str) -> str:
     """The history of the id."""
+    now = environment_id(name)
     rows = [
-        [
-            f"`{environment_id(name)}`",
-            "first version; changes that alter results stand in the [changelog](../changelog.md)",
-        ]
+        [f"`{now}`", "0.2.0; what alters results since 0.1.0 stands in the [changelog](../changelog.md)"],
+        [f"`{now.removesuffix('1')}0`", "0.1.0, the first version; a newer id takes its place"],
     ]
     return "## Versions\n\n" + table(["id", ""], rows)
 

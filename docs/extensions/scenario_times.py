@@ -32,7 +32,7 @@ def times_table(scenario: Scenario, results: Path) -> str:
     measured = MISSION_TIMES.get(scenario.name)
     if measured is not None:
         lines.append(
-            f"`information-rate-v0`: median {measured.median_s:g} s over {measured.missions} starts of the "
+            f"`{measured.strategy}`: median {measured.median_s:g} s over {measured.missions} starts of the "
             "training split, this scenario's own team (`python -m baselines.mission_times`)."
         )
     times = scoreboard_times(scenario.name, results)

@@ -14,7 +14,7 @@ import entropy_explore_env as eee
 from entropy_explore_env.envs.conformance import check_conformance
 from entropy_explore_env.envs.episodes import require_same, snapshot
 
-ROOM = "entropy_explore_env/Room-v0"
+ROOM = "entropy_explore_env/Room-v1"
 SHAPE = (9, 12, 7)
 
 

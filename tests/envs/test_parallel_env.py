@@ -56,7 +56,7 @@ def played(team: EntropyExploreEnv, seed: int = 0) -> list[tuple[Any, ...]]:
     ("scenario", "name"), [("room", "Room"), ("room-furnished", "RoomFurnished"), (BOX, "Box7x11x5")]
 )
 def test_every_scenario_has_an_id_that_pettingzoo_makes(scenario: str, name: str) -> None:
-    assert environment_id(scenario) == f"entropy_explore_env/{name}-v0"
+    assert environment_id(scenario) == f"entropy_explore_env/{name}-v1"
     made = pettingzoo.make("parallel", environment_id(scenario), robots=4, channel={"burst": 3})
     assert isinstance(made, EntropyExploreEnv)
     assert made.possible_agents == ["robot_0", "robot_1", "robot_2", "robot_3"]

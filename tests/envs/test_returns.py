@@ -9,6 +9,7 @@ from gymnasium.wrappers import RecordEpisodeStatistics
 from stable_baselines3.common.monitor import Monitor
 from stable_baselines3.common.vec_env import VecMonitor
 
+from baselines import mission_times
 from baselines.experiments.mission import run_mission, scripted
 from baselines.strategies import make_strategy
 from entropy_explore_env.envs.infos import END_FIGURES
@@ -22,11 +23,10 @@ SHORT = {"robots": 2, "time_limit_s": 6.0, "action": {"kind": "discrete", "moves
 
 
 def test_a_second_costs_a_fifth_over_the_median_mission_time():
-    untimed = set(SCENARIOS) - set(MISSION_TIMES)
-    assert untimed == {"bhattacharya-cluttered", "cliff"}
-    for name, (median_s, _) in MISSION_TIMES.items():
-        assert SCENARIOS[name].reward.cost_per_s == pytest.approx(0.2 / median_s, rel=5e-3)
-    assert all(SCENARIOS[name].reward.cost_per_s == 0.0 for name in untimed)
+    assert set(MISSION_TIMES) == set(SCENARIOS)
+    for name, times in MISSION_TIMES.items():
+        assert SCENARIOS[name].reward.cost_per_s == pytest.approx(0.2 / times.median_s, rel=5e-3)
+        assert times.strategy == mission_times.reference(name)
 
 
 def test_a_mission_as_long_as_the_median_returns_about_four_fifths():
@@ -55,7 +55,7 @@ def test_a_mission_as_long_as_the_median_returns_about_four_fifths():
 
 
 def test_gymnasium_and_stable_baselines_show_mission_time_and_bits_per_bit():
-    made = gymnasium.make("entropy_explore_env/Box7x11x5-v0", time_limit_s=6.0)
+    made = gymnasium.make("entropy_explore_env/Box7x11x5-v1", time_limit_s=6.0)
     env, over = Monitor(RecordEpisodeStatistics(made), info_keywords=END_FIGURES), False
     env.reset(seed=0)
     env.action_space.seed(0)

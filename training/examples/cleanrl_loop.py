@@ -7,7 +7,7 @@ import torch
 import entropy_explore_env  # noqa: F401 - registers the ids
 
 settings = {"robots": 3, "observation": {"flat": True}, "action": {"kind": "discrete"}}
-envs = gymnasium.make_vec("entropy_explore_env/Room-v0", num_envs=4, decision_period_s=1.0, **settings)
+envs = gymnasium.make_vec("entropy_explore_env/Room-v1", num_envs=4, decision_period_s=1.0, **settings)
 observations, infos = envs.reset(seed=0)
 policy = torch.nn.Linear(observations.shape[-1], infos["action_mask"].shape[-1])
 rollout, over, latest = [], np.zeros(4, bool), {}
