@@ -20,6 +20,7 @@ from entropy_explore_env.missions.privileged import deciding, mission_times
 from entropy_explore_env.scenario import Scenario
 from training.candidate_network import CandidatePolicy
 from training.policy import choose_actions
+from training.policy_improvement.origin import Origin
 from training.policy_improvement.rollouts import (
     PLANNER,
     BatchMissions,
@@ -29,7 +30,7 @@ from training.policy_improvement.rollouts import (
     RollOuts,
     candidates_to_try,
 )
-from training.policy_improvement.shards import Labels, Origin, load_shard, save_shard, shard_file
+from training.policy_improvement.shards import Labels, load_shard, save_shard, shard_file
 from training.seeds import label_seeds
 
 _KEYS = 2**62

@@ -40,6 +40,7 @@ from entropy_explore_env.writing import write_atomically
 from training.candidate_network import CandidatePolicy
 from training.errors import LabelsError, RollOutError
 from training.policy_improvement.labelling import planner_acts
+from training.policy_improvement.origin import Origin
 from training.policy_improvement.rollouts import MOST_STEPS, PLANNER, BatchMissions
 from training.seeds import pair_seeds
 
@@ -57,7 +58,6 @@ _OLDER = 0.5
 _LAST_STEP = 0.3
 """Length of the last step, as a share of the first one's."""
 _RIDGE = 1.0
-_HEAD = "head"
 
 
 @dataclass(frozen=True)
@@ -84,9 +84,9 @@ class SearchSettings:
     begins: str = ""
 
     @property
-    def origin(self) -> str:
-        """What decides the results of pairs: code and settings."""
-        return f"{code_digest(__name__)} {hashlib.sha256(repr(self).encode()).hexdigest()}"
+    def origin(self) -> Origin:
+        """What decides the results of pairs."""
+        return Origin(code_digest(__name__), hashlib.sha256(repr(self).encode()).hexdigest())
 
     def step_of(self, number: int) -> float:
         """Length of the step after a round."""
@@ -234,7 +234,7 @@ class _Part:
         self._directions = rng.standard_normal((settings.pairs, len(SEARCHED)))
         self._centre, self._sigma = centre, settings.sigma
 
-    def run(self, file: Path, origin: str, runner: _Runner, stopped: Callable[[], bool]) -> Pairs | None:
+    def run(self, file: Path, origin: Origin, runner: _Runner, stopped: Callable[[], bool]) -> Pairs | None:
         """Run the pairs that are missing in a file; None if that was stopped."""
         known = _read_lines(file, origin, len(self._seeds))
         wanted = [pair for pair in range(len(self._seeds)) if pair not in known]
@@ -245,7 +245,7 @@ class _Part:
         ]
         ends: dict[int, End] = {}
         if wanted and not known:
-            write_atomically(file, json.dumps({_HEAD: origin}) + "\n")
+            write_atomically(file, json.dumps(origin._asdict()) + "\n")
         for run, end in runner.run(runs, stopped):
             ends[run] = end
             plus, minus = ends.get(run - run % 2), ends.get(run - run % 2 + 1)
@@ -336,14 +336,14 @@ class _Runner(NamedTuple):
         return actions
 
 
-def _spreads(settings: SearchSettings, file: Path, origin: str, threads: int) -> np.ndarray:
+def _spreads(settings: SearchSettings, file: Path, origin: Origin, threads: int) -> np.ndarray:
     """(S,) standard deviation of each feature among the candidates of a robot, in missions of the planner.
 
     The mean over those tasks in which it varies; 0 where it varies in none.
     """
     if file.is_file():
         known = _parsed(file, _text_of(file))
-        _check_origin(file, known, origin)
+        origin.check(file, _head(file, known))
         spreads = [known.get(name) for name in SEARCHED]
         if not all(isinstance(each, float) and 0.0 <= each < math.inf for each in spreads):
             raise LabelsError(str(file), spreads, f"{len(SEARCHED)} numbers ≥ 0: remove the file")
@@ -352,7 +352,7 @@ def _spreads(settings: SearchSettings, file: Path, origin: str, threads: int) ->
     varies = found > _NO_SPREAD
     mean = found.sum(axis=0, where=varies) / np.maximum(varies.sum(axis=0), 1)
     spreads = np.where(varies.any(axis=0), np.maximum(mean, _LEAST_SPREAD), 0.0)
-    text = json.dumps({_HEAD: origin, **dict(zip(SEARCHED, spreads.tolist(), strict=True))})
+    text = json.dumps({**origin._asdict(), **dict(zip(SEARCHED, spreads.tolist(), strict=True))})
     write_atomically(file, text + "\n")
     return spreads
 
@@ -370,7 +370,7 @@ def _spreads_in(scenario: Scenario, seed: int, threads: int) -> np.ndarray:
     return np.sqrt(total / max(decisions, 1))
 
 
-def _read_lines(file: Path, origin: str, pairs: int) -> dict[int, tuple[float, float, int]]:
+def _read_lines(file: Path, origin: Origin, pairs: int) -> dict[int, tuple[float, float, int]]:
     """Of each pair in a file both mission times, and how many missions were finished.
 
     A last line that is not whole is not there.
@@ -380,7 +380,7 @@ def _read_lines(file: Path, origin: str, pairs: int) -> dict[int, tuple[float, f
     *lines, torn = _text_of(file).split("\n")
     if not lines:
         return {}
-    _check_origin(file, _parsed(file, lines[0]), origin)
+    origin.check(file, _head(file, _parsed(file, lines[0])))
     if torn:
         write_atomically(file, "\n".join(lines) + "\n")
     return dict(_pair_in(file, line, pairs) for line in lines[1:])
@@ -409,7 +409,8 @@ def _parsed(file: Path, text: str) -> Any:  # noqa: ANN401 - as JSON has it
         raise LabelsError(str(file), text[:40], "lines of JSON: remove the file") from None
 
 
-def _check_origin(file: Path, head: Any, origin: str) -> None:  # noqa: ANN401 - as JSON has it
-    if not isinstance(head, dict) or head.get(_HEAD) != origin:
-        allowed = "those of the same options and the same code: take another --out, or remove the folder"
-        raise LabelsError(f"{file}: pairs", "others", allowed)
+def _head(file: Path, parsed: Any) -> dict[str, Any]:  # noqa: ANN401 - as JSON has it
+    """What a file says of itself."""
+    if not isinstance(parsed, dict):
+        raise LabelsError(str(file), "no head", "one that says what it comes from: remove the file")
+    return parsed

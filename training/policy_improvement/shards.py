@@ -15,6 +15,7 @@ import numpy as np
 
 from entropy_explore_env.writing import write_atomically
 from training.errors import LabelsError
+from training.policy_improvement.origin import Origin
 from training.stored_arrays import stored_arrays, stored_bytes
 
 FORMAT = 2
@@ -71,18 +72,6 @@ _KINDS = {
 }
 
 
-class Origin(NamedTuple):
-    """What labels come from; labels of another origin are not used.
-
-    Attributes:
-        code: Digest of the code.
-        settings: Digest of all options that decide the labels.
-    """
-
-    code: str
-    settings: str
-
-
 def shard_file(folder: Path, number: int) -> Path:
     """Where a shard lies."""
     return folder / f"labels-{number:05d}.npz"
@@ -105,11 +94,7 @@ def load_shard(file: Path, origin: Origin) -> Labels:
     head = _head_of(file, arrays)
     if head.get("format") != FORMAT:
         raise LabelsError(f"{file}: format", head.get("format"), f"{FORMAT}")
-    for name, expected in origin._asdict().items():
-        if head.get(name) != expected:
-            what = "this version of the code" if name == "code" else "these options"
-            allowed = f"{expected[:12]}…, labels made with {what}; remove the folder, or name a new one"
-            raise LabelsError(f"{file}: {name}", f"{str(head.get(name))[:12]}…", allowed)
+    origin.check(file, head)
     for name, kind in _KINDS.items():
         if name not in arrays or arrays[name].dtype != kind:
             found = None if name not in arrays else str(arrays[name].dtype)

@@ -131,7 +131,7 @@ def test_a_changed_mission_is_that_of_a_policy_with_the_changed_weights():
 
 def test_results_of_other_settings_or_broken_ones_are_refused(tmp_path):
     assert search(policy(), settings(rounds=1), tmp_path, 1) is not None
-    with pytest.raises(LabelsError, match=r"pairs = 'others'.*same options"):
+    with pytest.raises(LabelsError, match=r"settings = .*made with these options"):
         search(policy(), settings(rounds=1, sigma=2.0), tmp_path, 1)
     file, spreads = tmp_path / "round-000-task-0.jsonl", tmp_path / "spreads.json"
     for broken, content in [

@@ -10,7 +10,8 @@ import pytest
 
 from tests.training.policy_improvement.test_regression import labels
 from training.errors import LabelsError
-from training.policy_improvement.shards import Labels, Origin, load_shard, save_shard, shard_file
+from training.policy_improvement.origin import Origin
+from training.policy_improvement.shards import Labels, load_shard, save_shard, shard_file
 
 HERE = Origin("a" * 64, "b" * 64)
 
