@@ -42,7 +42,7 @@ MISSION_TIMES = MappingProxyType(
         "occlusions": MissionTimes(1472.0, 20),
         "lab": MissionTimes(161.6, 20),
         "bhattacharya-office": MissionTimes(86.5, 20),
-        "bhattacharya-cluttered": MissionTimes(2581.2, 1, "per-time-visibility"),
+        "bhattacharya-cluttered": MissionTimes(2631.7, 11, "per-time-visibility"),
         "cliff": MissionTimes(880.1, 20, "cliff-next-best-view"),
     }
 )

@@ -10,6 +10,7 @@ import matplotlib as mpl
 
 from baselines.cli.figures import STYLE, png
 from baselines.experiments.tables import csv_table, markdown_table
+from baselines.scoreboard.effects import effect_rows, effects_table
 from baselines.scoreboard.figures import ratio_figure, task_figure
 from baselines.scoreboard.results import (
     BITS,
@@ -61,6 +62,8 @@ def write_page(folder: Path, results: Results, command: str) -> Path:
         "tasks": _without_clock(tasks),
         "missions": mission_rows(results),
     }
+    if effects := effect_rows(results):
+        tables["effects"] = effects
     for name, rows in tables.items():
         write_atomically(beside / f"{name}.csv", csv_rows(rows))
     names = ("task", "strategy", *_CLOCK)
@@ -121,6 +124,9 @@ def _parts(results: Results, tasks: list[Row], overall: list[Row], command: str)
         f"![Ratios with intervals]({beside}/ratios.png)",
         f"![Ratios by task]({beside}/tasks.png)",
     ]
+    effects = effect_rows(results)
+    if effects:
+        parts += [_EFFECTS, effects_table(results, effects)]
     for task in suite.tasks:
         rows = [row for row in tasks if row["task"] == task.name]
         if rows:
@@ -132,11 +138,17 @@ def _parts(results: Results, tasks: list[Row], overall: list[Row], command: str)
     failed = failed_rows(results)
     if failed:
         parts += ["### Missions that failed", _failed_table(failed)]
-    files = ("overall.csv", "tasks.csv", "missions.csv", "timing.csv", ARCHIVE)
+    tables = ["overall", "tasks", *(["effects"] if effects else []), "missions", "timing"]
+    files = [*(f"{name}.csv" for name in tables), ARCHIVE]
     parts.append("Files: " + ", ".join(f"[`{name}`]({beside}/{name})" for name in files) + ".")
     return parts
 
 
+_EFFECTS = """### What more robots and worse channels change
+
+Each strategy beside itself, on the same worlds, missions paired by their number. Speed-up: the time of one
+robot over that of the team, with a channel that carries everything. Time: of four robots, over that of four
+with such a channel. Geometric means; a mission that was cut off counts with the time limit."""
 CONFIRMED = (
     " Some missions may have been run by an earlier version of the code: the first one of their strategy and"
     " task was run again by the last version, and came out the same."

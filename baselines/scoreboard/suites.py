@@ -4,8 +4,8 @@
               seen is seen: how far it drives, and how long
     volumes   3-D worlds and the office, one robot and three, as the scenarios stand, until a map passes the
               mission's entropy threshold
-    teams     2, 4 and 8 robots with a channel that carries everything; 4 also with a narrow one, and with one
-              that loses half of the messages
+    teams     1, 2, 4 and 8 robots with a channel that carries everything; 4 also with a narrow one, and with
+              one that loses half of the messages
 
 Worlds of recipes are those of the test split, which nothing was tuned on; mission k of a task has seed k for
 every strategy. The dungeons are those of ARiADNE (Cao et al., ICRA 2023): a sensor of 80 cells, a robot
@@ -79,10 +79,12 @@ class Task:
     Attributes:
         name: As the table says it.
         places: Their missions, one after the other, are those of the task.
+        beside: Name of the task from which it differs by its team or its channel alone; None = of none.
     """
 
     name: str
     places: tuple[Place, ...]
+    beside: str | None = None
 
     @property
     def scenario(self) -> Scenario:
@@ -170,7 +172,7 @@ def volumes(quick: bool = False) -> tuple[Task, ...]:
 
 
 def teams(quick: bool = False) -> tuple[Task, ...]:
-    """Teams of 2, 4 and 8 robots, with channels of different width."""
+    """Teams of 1, 2, 4 and 8 robots, with channels of different width."""
     starts = QUICK_STARTS if quick else STARTS_A_TASK
     names = ("room-furnished", "office", "office-3d", "cave", "terrain")
     worlds = {name: SCENARIOS[name] for name in (names[:2] if quick else names)}
@@ -183,14 +185,17 @@ def teams(quick: bool = False) -> tuple[Task, ...]:
         ", half of the messages lost": {**whole, "loss_probability": _LOSSY},
     }
     return tuple(
-        task_in(
-            team_name(name, robots) + words,
-            with_settings(scenario, {"robots": robots, "channel": channel}),
-            starts,
+        dataclasses.replace(
+            task_in(
+                team_name(name, robots) + words,
+                with_settings(scenario, {"robots": robots, "channel": channel}),
+                starts,
+            ),
+            beside=team_name(name, robots) if words else team_name(name, 1) if robots > 1 else None,
         )
         for name, scenario in worlds.items()
         for words, channel in channels.items()
-        for robots in ((2, 4, 8) if not words else (4,))
+        for robots in ((1, 2, 4, 8) if not words else (4,))
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import hashlib
 from pathlib import Path
 
@@ -28,6 +29,7 @@ NAMES = {
         f"{name}, {team}"
         for name in ("room-furnished", "office", "office-3d", "cave", "terrain", "warehouse")
         for team in (
+            "1 robot",
             "2 robots",
             "4 robots",
             "8 robots",
@@ -76,7 +78,7 @@ def test_plans_replan_at_every_scan_until_everything_is_seen():
 def test_the_page_says_with_what_plans_are_scanned():
     plan, *_ = find_suite("plans", True, TEAMS).tasks
     assert "1 ground robot that scans 720 rays of 8 m every 0.5 m, time limit" in about(plan, 4)
-    team, *_ = find_suite("teams", True, TEAMS).tasks
+    _, team, *_ = find_suite("teams", True, TEAMS).tasks
     assert "2 flying robots, time limit" in about(team, team.missions)
     assert about(team, team.missions).startswith("2 starts, world")
     assert about(team, 1).startswith("1 of 2 starts, world")
@@ -121,6 +123,18 @@ def test_teams_differ_in_their_channel_alone():
     assert whole.channel.burst >= whole.sensor.rays and whole.channel.i_min_bits == 0.0
     assert (narrow.channel.burst, lossy.channel.loss_probability) == (64, 0.5)
     assert lossy.channel.burst == whole.channel.burst and whole.channel.loss_probability == 0.0
+
+
+def test_teams_are_compared_with_one_robot_and_channels_with_the_whole_one():
+    tasks = {task.name: task for task in find_suite("teams", False, TEAMS).tasks}
+    for task in tasks.values():
+        if task.beside is None:
+            assert task.scenario.robots == 1
+            continue
+        beside = tasks[task.beside].scenario
+        differs = "robots" if task.scenario.channel == beside.channel else "channel"
+        assert dataclasses.replace(task.scenario, **{differs: getattr(beside, differs)}) == beside
+        assert (beside.robots, differs) in ((1, "robots"), (4, "channel"))
 
 
 def test_unknown_suites_and_missing_worlds_are_named(monkeypatch):
