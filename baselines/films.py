@@ -1,28 +1,33 @@
 """A small film of every named scenario: `python -m baselines.films` writes docs/films/NAME.gif.
 
 A mission each of the recommended strategy (but see QUICKER), with the scenario's own team, for README and the
-cards of scenarios. The same version gives the same films.
+cards of scenarios. With `--beside STRATEGY` a film shows two missions, in the same world and from the same
+start: `NAME-FIRST-SECOND.gif`. The same version gives the same films.
 """
 
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
+from typing import Literal
 
 import numpy as np
-from PIL import Image
+from PIL import Image, ImageDraw
 
 from baselines.cli.arguments import make_folder, parse, run_command
 from baselines.experiments.mission import run_mission, scripted_env
 from baselines.strategies import make_strategy, recommended
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.errors import SettingError
+from entropy_explore_env.picture_text import shortened
 from entropy_explore_env.reports.animation import Film, animate
+from entropy_explore_env.reports.annotations import write
+from entropy_explore_env.reports.colours import PAPER
 from entropy_explore_env.reports.painting import Painter
-from entropy_explore_env.scenario import Scenario
+from entropy_explore_env.scenario import Scenario, with_settings
 from entropy_explore_env.scenarios import SCENARIOS
 from entropy_explore_env.validation import check_whole
 
@@ -41,12 +46,16 @@ class Args:
     strategy: str | None = None
     """Chooses viewpoints, as in baselines.run; default: the one that is recommended in each scenario, or
     nearest-frontier where that one computes for too long."""
+    beside: str | None = None
+    """A second strategy, shown to the right of the first one on the same clock."""
+    split: Literal["train", "test"] | None = None
+    """Which worlds are drawn; default: as the scenario says."""
     seed: int = 0
     """Of every mission."""
     pictures: int = 28
     """Most pictures in a film."""
     width: int = 320
-    """Of the films, in pixels; their height is three quarters of it."""
+    """Of a mission's picture, in pixels; its height is three quarters of it."""
     out: Path = Path("docs/films")
     """Folder for the films."""
 
@@ -61,17 +70,52 @@ def main(words: Sequence[str]) -> int:
     for name in names:
         if name not in SCENARIOS:
             raise SettingError("scenarios", name, "all, or names out of " + ", ".join(SCENARIOS))
-    strategies = [args.strategy or QUICKER.get(name, recommended(name)) for name in names]
-    for strategy in strategies:
+    first = [args.strategy or QUICKER.get(name, recommended(name)) for name in names]
+    for strategy in {*first, *([args.beside] if args.beside else [])}:
         make_strategy(strategy)
     make_folder("out", args.out)
-    for number, (name, strategy) in enumerate(zip(names, strategies, strict=True), 1):
+    for number, (name, strategy) in enumerate(zip(names, first, strict=True), 1):
         print(f"{number} of {len(names)}: {name}", file=sys.stderr, flush=True)
-        film = filmed(SCENARIOS[name], strategy, args.seed, args.pictures)
-        path = args.out / f"{name}.gif"
-        animate((shrunk(picture, args.width) for picture in film.pictures(_LAST)), path, _FRAME_S)
+        scenario = SCENARIOS[name]
+        if args.split is not None:
+            scenario = with_settings(scenario, {"split": args.split})
+        shown = [each for each in (strategy, args.beside) if each is not None]
+        films = [filmed(scenario, each, args.seed, args.pictures) for each in shown]
+        pictures = (shrunk(picture, args.width) for picture in films[0].pictures(_LAST))
+        if len(films) > 1:
+            pictures = beside_each_other(films, shown, args.width)
+        path = args.out / f"{'-'.join([name, *shown] if len(films) > 1 else [name]).replace(':', '-')}.gif"
+        animate(pictures, path, _FRAME_S)
         print(f"{path}, {path.stat().st_size / 1000:,.0f} kB")
     return 0
+
+
+def beside_each_other(films: Sequence[Film], names: Sequence[str], width: int) -> Iterator[np.ndarray]:
+    """Pictures (H, W, 3) uint8 of several missions on one clock, each under its name; the last one repeated.
+
+    Args:
+        films: Of the missions; one that is over stands still.
+        names: What is written above each.
+        width: Of each mission's picture, in pixels.
+    """
+    longest = max(films, key=lambda film: film.times_s[-1])
+    for time_s in [*longest.times_s, *[longest.times_s[-1]] * (_LAST - 1)]:
+        parts = []
+        for film, name in zip(films, names, strict=True):
+            end_s = film.times_s[-1]
+            over = f", over after {end_s:.0f} s" if time_s >= end_s else ""
+            parts.append(_titled(shrunk(film.picture_at(time_s), width), f"{name}{over}"))
+        yield np.concatenate(parts, axis=1)
+
+
+def _titled(picture: np.ndarray, title: str) -> np.ndarray:
+    """A picture with a line of text above it."""
+    height, width, _ = picture.shape
+    size = max(width // 24, 8)
+    page = Image.new("RGB", (width, height + 2 * size), PAPER)
+    page.paste(Image.fromarray(picture), (0, 2 * size))
+    write(ImageDraw.Draw(page), (size // 2, size), shortened(title, width - size, size), size, "lm")
+    return np.asarray(page)
 
 
 def filmed(scenario: Scenario, strategy: str, seed: int, pictures: int) -> Film:

@@ -85,11 +85,24 @@ class Film:
     def __len__(self) -> int:
         return len(self._kept)
 
+    @property
+    def times_s(self) -> list[float]:
+        """The moments of the pictures that are kept, in order."""
+        return [time_s for time_s, _ in self._kept]
+
+    def picture_at(self, time_s: float) -> np.ndarray:
+        """The last picture (H, W, 3) uint8 up to a moment; before the first one that one."""
+        until = [packed for moment_s, packed in self._kept if moment_s <= time_s]
+        return self._unpacked(until[-1] if until else self._kept[0][1])
+
+    def _unpacked(self, packed: bytes) -> np.ndarray:
+        return np.frombuffer(zlib.decompress(packed), np.uint8).reshape(self._shape)
+
     def pictures(self, last: int) -> Iterator[np.ndarray]:
         """The pictures in order, each (H, W, 3) uint8; the last one `last` times."""
         picture = np.zeros(0, np.uint8)
         for _, packed in self._kept:
-            picture = np.frombuffer(zlib.decompress(packed), np.uint8).reshape(self._shape)
+            picture = self._unpacked(packed)
             yield picture
         for _ in range(last - 1):
             yield picture
