@@ -41,6 +41,7 @@ from training.candidate_network import CandidatePolicy
 from training.errors import LabelsError, RollOutError
 from training.policy_improvement.labelling import planner_acts
 from training.policy_improvement.origin import Origin
+from training.policy_improvement.pair_files import read_object, read_pairs
 from training.policy_improvement.rollouts import MOST_STEPS, PLANNER, BatchMissions
 from training.seeds import pair_seeds
 
@@ -236,7 +237,7 @@ class _Part:
 
     def run(self, file: Path, origin: Origin, runner: _Runner, stopped: Callable[[], bool]) -> Pairs | None:
         """Run the pairs that are missing in a file; None if that was stopped."""
-        known = _read_lines(file, origin, len(self._seeds))
+        known = read_pairs(file, origin, len(self._seeds))
         wanted = [pair for pair in range(len(self._seeds)) if pair not in known]
         runs = [
             Run(self._seeds[pair], self._centre + sign * self._sigma * self._directions[pair])
@@ -342,8 +343,7 @@ def _spreads(settings: SearchSettings, file: Path, origin: Origin, threads: int)
     The mean over those tasks in which it varies; 0 where it varies in none.
     """
     if file.is_file():
-        known = _parsed(file, _text_of(file))
-        origin.check(file, _head(file, known))
+        known = read_object(file, origin)
         spreads = [known.get(name) for name in SEARCHED]
         if not all(isinstance(each, float) and 0.0 <= each < math.inf for each in spreads):
             raise LabelsError(str(file), spreads, f"{len(SEARCHED)} numbers ≥ 0: remove the file")
@@ -368,49 +368,3 @@ def _spreads_in(scenario: Scenario, seed: int, threads: int) -> np.ndarray:
                 total += features[at][exists[at]].var(axis=0)
                 decisions += 1
     return np.sqrt(total / max(decisions, 1))
-
-
-def _read_lines(file: Path, origin: Origin, pairs: int) -> dict[int, tuple[float, float, int]]:
-    """Of each pair in a file both mission times, and how many missions were finished.
-
-    A last line that is not whole is not there.
-    """
-    if not file.is_file():
-        return {}
-    *lines, torn = _text_of(file).split("\n")
-    if not lines:
-        return {}
-    origin.check(file, _head(file, _parsed(file, lines[0])))
-    if torn:
-        write_atomically(file, "\n".join(lines) + "\n")
-    return dict(_pair_in(file, line, pairs) for line in lines[1:])
-
-
-def _pair_in(file: Path, line: str, pairs: int) -> tuple[int, tuple[float, float, int]]:
-    match _parsed(file, line):
-        case [int(pair), float(plus), float(minus), int(finished)]:
-            if 0 <= pair < pairs and 0.0 < plus < math.inf and 0.0 < minus < math.inf:
-                return pair, (plus, minus, finished)
-    allowed = f"a pair's number below {pairs}, two mission times and how many were finished: remove the file"
-    raise LabelsError(str(file), line[:40], allowed)
-
-
-def _text_of(file: Path) -> str:
-    try:
-        return file.read_text("utf-8")
-    except (OSError, UnicodeDecodeError):
-        raise LabelsError(str(file), "not text", "lines of JSON: remove the file") from None
-
-
-def _parsed(file: Path, text: str) -> Any:  # noqa: ANN401 - as JSON has it
-    try:
-        return json.loads(text)
-    except (ValueError, RecursionError):
-        raise LabelsError(str(file), text[:40], "lines of JSON: remove the file") from None
-
-
-def _head(file: Path, parsed: Any) -> dict[str, Any]:  # noqa: ANN401 - as JSON has it
-    """What a file says of itself."""
-    if not isinstance(parsed, dict):
-        raise LabelsError(str(file), "no head", "one that says what it comes from: remove the file")
-    return parsed
