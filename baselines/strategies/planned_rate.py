@@ -12,9 +12,10 @@ What a robot is, and what its mission asks for, decides how it explores:
 - Flying robots, and all in 3-D worlds: bits per time, with the recipe of narrow or of wide views.
 - Ground robots with a scanner that sees all around, in a plan, deciding at stops until the map has so little
   entropy: bits per time.
-- The same robots where they decide under way (`Robot.redecide`), or where the mission ends by what is seen:
-  frontier cells, by `explorers.advantage_ahead`. Bits per time would change its mind at every scan, and
-  would leave what is small until the end.
+- The same robots where everything is to be seen, or where they decide under way (`Robot.redecide`) until the
+  map has so little entropy: frontier cells, by `explorers.advantage_ahead`. Bits per time would leave what is
+  small until the end, and drive back for it.
+- The same robots where a part may stay unseen: bits per time, of unknown voxels alone.
 """
 
 from __future__ import annotations
@@ -33,11 +34,26 @@ from entropy_explore_env.validation import check_count, check_not_negative, chec
 from entropy_explore_env.viewpoints.evaluation import sees_all_around
 from entropy_explore_env.viewpoints.recipe import Recipe, recipe_for
 
+_EVERYTHING = 0.995
+"""Who is to see such a share of what can be seen has to look into every corner."""
+
 
 def explores_frontiers(scenario: Scenario, kind: RobotKind) -> bool:
     """Whether robots of a kind go for frontier cells, and not for bits."""
-    plan = scenario.grid.flat and kind.robot.motion == "planar" and sees_all_around(kind.sensor)
-    return plan and (kind.robot.redecide != "at_stop" or scenario.ending.by_seen)
+    if not (scenario.grid.flat and kind.robot.motion == "planar" and sees_all_around(kind.sensor)):
+        return False
+    if scenario.ending.by_seen:
+        return _wants_everything(scenario, kind)
+    return kind.robot.redecide != "at_stop"
+
+
+def _wants_everything(scenario: Scenario, kind: RobotKind) -> bool:
+    """Whether a mission that ends by what is seen leaves no more unseen than a sliver between two rays."""
+    ending = scenario.ending
+    if ending.seen_share is not None:
+        return ending.seen_share >= _EVERYTHING
+    unseen = 0 if ending.unseen_free_voxels is None else ending.unseen_free_voxels
+    return unseen < kind.sensor.max_range_m / scenario.grid.voxel_size_m
 
 
 @dataclass(frozen=True)

@@ -196,12 +196,16 @@ def test_crowds_are_counted_edge_by_edge(seed):
     [
         ("office", {}, False),
         ("office", {"robot": {"redecide": "on_scan"}, "sensor": {"scan_every_m": 0.5}}, True),
-        ("office", {"ending": {"seen_share": 0.9}, "track_truth": True}, True),
-        ("office-3d", {"ending": {"seen_share": 0.9}, "track_truth": True}, False),
+        ("office", {"ending": {"seen_share": 1.0}, "track_truth": True}, True),
+        ("office", {"ending": {"seen_share": 0.99}, "track_truth": True}, False),
+        ("office", {"ending": {"unseen_free_voxels": 79}, "track_truth": True}, True),  # its rays: 80 voxels
+        ("office", {"ending": {"unseen_free_voxels": 80}, "track_truth": True}, False),
+        ("office", {"robot": {"redecide": 2.0}, "ending": {"seen_share": 0.9}, "track_truth": True}, False),
+        ("office-3d", {"ending": {"seen_share": 1.0}, "track_truth": True}, False),
         ("room", {"robot": {"redecide": 0.5}}, False),
     ],
 )
-def test_it_goes_for_frontiers_in_plans_where_it_decides_under_way_or_all_is_to_be_seen(
+def test_it_goes_for_frontiers_in_plans_where_all_is_to_be_seen_or_it_decides_under_way(
     name, settings, wanted
 ):
     scenario = with_settings(find_scenario(name), settings)
