@@ -2,8 +2,8 @@
 
 Missions are paired by their number: the same world, and starts drawn from the same seed. A speed-up is the
 geometric mean of the times of one robot over those of the team, where the channel differs of the times over
-those with one that carries everything. Missions that were cut off count with the time limit, so a strategy
-that is cut off in both seems to be unchanged.
+those with one that carries everything. Missions that were cut off count with the time limit: where that was
+on one side alone, the figure is a bound.
 """
 
 from __future__ import annotations
@@ -34,10 +34,10 @@ def _row(results: Results, task: Task, beside: Task, strategy: str) -> Row | Non
     if not both:
         return None
     times = [results.values(each, strategy, measure, both) for each in (task, beside)]
-    finished = sum(here[n].get("finished", False) and there[n].get("finished", False) for n in both)
     row = {"task": task.name, "beside": beside.name, "strategy": strategy, "missions": len(both)}
-    ratio = geometric_ratio_interval([times[0]], [times[1]])
-    return {**row, "finished": finished, **interval_columns("time_over", ratio)}
+    for name, records in (("finished", here), ("beside_finished", there)):
+        row[name] = sum(records[number].get("finished", False) for number in both)
+    return row | interval_columns("time_over", geometric_ratio_interval([times[0]], [times[1]]))
 
 
 def effects_table(results: Results, rows: list[Row]) -> str:
@@ -49,7 +49,7 @@ def effects_table(results: Results, rows: list[Row]) -> str:
     missions: dict[tuple[str, str], list[int]] = {}
     for row in rows:
         where, head = (row["task"].partition(", ")[0], row["strategy"]), heads[row["task"]]
-        shown.setdefault(where, {})[head] = _interval(row, inverse=head.startswith(_SPEED_UP)).text()
+        shown.setdefault(where, {})[head] = _text(row, inverse=head.startswith(_SPEED_UP))
         missions.setdefault(where, []).append(row["missions"])
     table = [
         [where[0], f"`{where[1]}`", _range(missions[where]), *(cells.get(head, "-") for head in columns)]
@@ -68,9 +68,15 @@ def _head(task: Task, beside: Task) -> str:
     return "time, " + task.name.removeprefix(f"{beside.name}, ")
 
 
-def _interval(row: Row, inverse: bool) -> Interval:
+def _text(row: Row, inverse: bool) -> str:
+    """The time over that beside it, or its inverse; a bound where missions of one side were cut off."""
+    cut_off = [row[name] < row["missions"] for name in ("finished", "beside_finished")]
+    if all(cut_off):
+        return "-"
+    above, below = reversed(cut_off) if inverse else cut_off
     middle, low, high = (row[f"time_over{end}"] for end in ("", "_low", "_high"))
-    return Interval(1.0 / middle, 1.0 / high, 1.0 / low) if inverse else Interval(middle, low, high)
+    interval = Interval(1.0 / middle, 1.0 / high, 1.0 / low) if inverse else Interval(middle, low, high)
+    return ("> " if above else "< " if below else "") + interval.text()
 
 
 def _range(counts: list[int]) -> str:

@@ -43,7 +43,7 @@ def ratio_figure(results: Results, rows: list[Row]) -> Figure:
 def task_figure(results: Results) -> Figure:
     """A column a task: each strategy's ratio to the first reference, a colour a ratio, numbers within."""
     reference, measure = results.references[0], results.judged_by[0]
-    strategies = results.suite.strategies
+    strategies = results.ran
     tasks = [task for task in results.suite.tasks if any(results.of(task, who) for who in strategies)]
     ratios = np.full((len(strategies), len(tasks)), np.nan)
     for row, strategy in enumerate(strategies):

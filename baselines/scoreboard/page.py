@@ -120,7 +120,7 @@ def _parts(results: Results, tasks: list[Row], overall: list[Row], command: str)
     parts = [
         f"## {_TITLES[suite.name]}",
         f"Written by `{command}`." + (CONFIRMED if "--confirm" in command.split() else ""),
-        _overall_table(results, overall),
+        *_overall_parts(results, overall),
         f"![Ratios with intervals]({beside}/ratios.png)",
         f"![Ratios by task]({beside}/tasks.png)",
     ]
@@ -148,7 +148,8 @@ _EFFECTS = """### What more robots and worse channels change
 
 Each strategy beside itself, on the same worlds, missions paired by their number. Speed-up: the time of one
 robot over that of the team, with a channel that carries everything. Time: of four robots, over that of four
-with such a channel. Geometric means; a mission that was cut off counts with the time limit."""
+with such a channel. Geometric means; a mission that was cut off counts with the time limit, so that a figure
+is a bound (>, <) where that was on one side, and left out where on both."""
 CONFIRMED = (
     " Some missions may have been run by an earlier version of the code: the first one of their strategy and"
     " task was run again by the last version, and came out the same."
@@ -160,6 +161,12 @@ _TITLES: Mapping[str, str] = {
     "teams": "Teams and channels",
     "own": "Scenarios of one's own",
 }
+
+
+def _overall_parts(results: Results, rows: list[Row]) -> list[str]:
+    """The table of those that ran, and the names of the others."""
+    absent = [f"`{who}`" for who in results.suite.strategies if who not in results.ran]
+    return [_overall_table(results, rows), *([f"Not run yet: {', '.join(absent)}."] if absent else [])]
 
 
 def _overall_table(results: Results, rows: list[Row]) -> str:

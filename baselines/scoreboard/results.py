@@ -101,6 +101,13 @@ class Results:
         return present or tuple(name for name in (BASELINE,) if name in self.suite.strategies)
 
     @property
+    def ran(self) -> tuple[str, ...]:
+        """Strategies that ran a mission, as the suite orders them."""
+        return tuple(
+            who for who in self.suite.strategies if any(self.of(task, who) for task in self.suite.tasks)
+        )
+
+    @property
     def judged_by(self) -> tuple[Measure, ...]:
         """The suite's measures."""
         return JUDGED_BY[self.suite.name]
@@ -221,9 +228,9 @@ def _clock(records: Sequence[Record]) -> Row:
 
 
 def overall_rows(results: Results) -> list[Row]:
-    """A row of each strategy over its tasks but those in which all of its missions failed."""
+    """A row of each strategy that ran, over its tasks but those in which all of its missions failed."""
     rows = []
-    for strategy in results.suite.strategies:
+    for strategy in results.ran:
         tasks = [task for task in results.suite.tasks if not _cannot_act(results.of(task, strategy))]
         records = [record for task in tasks for record in results.of(task, strategy)]
         finished = sum(record.get("finished", False) for record in records)

@@ -35,7 +35,7 @@ SECONDS = {
 }
 
 
-def results():
+def results(times_of=SECONDS):
     def record(seconds):
         if seconds == NOT_RUN:
             return NOT_RUN
@@ -46,10 +46,10 @@ def results():
             "clock": {"decision_ms": 1.0, "worst_decision_ms": 3.0},
         }
 
-    suite = Suite("teams", TASKS, tuple(SECONDS))
+    suite = Suite("teams", TASKS, tuple(times_of))
     records = {
         suite.cell_id(each, each.places[0], strategy): [record(seconds) for seconds in times]
-        for strategy, tasks in SECONDS.items()
+        for strategy, tasks in times_of.items()
         for each, times in zip(TASKS, tasks, strict=True)
     }
     return Results(suite, records)
@@ -58,13 +58,18 @@ def results():
 def test_times_are_compared_mission_by_mission_with_the_task_beside():
     rows = {(row["task"], row["strategy"]): row for row in effect_rows(results())}
     two = rows["box, 2 robots", "random"]
-    assert (two["beside"], two["missions"], two["finished"]) == ("box, 1 robot", 3, 3)
+    assert (two["beside"], two["missions"], two["finished"], two["beside_finished"]) == (
+        "box, 1 robot",
+        3,
+        3,
+        3,
+    )
     assert two["time_over"] == pytest.approx((0.5 * 0.25 * 0.5) ** (1 / 3))
     assert two["time_over_low"] <= two["time_over"] <= two["time_over_high"]
     assert rows["box, 4 robots", "random"]["time_over"] == pytest.approx(math.sqrt(10 / 80 * 20 / 40))
     assert rows["box, 4 robots, burst 64", "random"]["time_over"] == pytest.approx(math.sqrt(2.0))
     cut = rows["box, 2 robots", "voronoi"]  # one mission of one robot was cut off at 100 s
-    assert (cut["missions"], cut["finished"]) == (3, 2)
+    assert (cut["missions"], cut["finished"], cut["beside_finished"]) == (3, 3, 2)
     assert cut["time_over"] == pytest.approx(0.5 ** (1 / 3))
     assert ("box, 4 robots", "voronoi") not in rows and len(rows) == 4
 
@@ -76,12 +81,32 @@ def test_the_page_shows_speed_ups_and_what_channels_cost(tmp_path):
         head == "| world | strategy | missions | speed-up, 2 robots | speed-up, 4 robots | time, burst 64 |"
     )
     assert rows[0].startswith("| box | `random` | 2 … 3 | 2.52 (")
-    assert rows[1].startswith("| box | `voronoi` | 3 | 1.26 (") and rows[1].endswith("| - | - |")
+    assert rows[1].startswith("| box | `voronoi` | 3 | > 1.26 (") and rows[1].endswith("| - | - |")
     page = write_page(tmp_path, found, "a command").read_text()
     assert "### What more robots and worse channels change" in page and rows[0] in page
     lines = (tmp_path / "scoreboard" / "teams" / "effects.csv").read_text().splitlines()
-    assert lines[0].startswith("task,beside,strategy,missions,finished,time_over,") and len(lines) == 5
+    assert (
+        lines[0].startswith("task,beside,strategy,missions,finished,beside_finished,time_over,")
+        and len(lines) == 5
+    )
     assert "[`effects.csv`](scoreboard/teams/effects.csv)" in page
+
+
+@pytest.mark.parametrize(
+    ("one", "two", "four", "burst", "speed_up", "channel"),
+    [
+        ([80.0, 80.0], [40.0, 40.0], [20.0, 20.0], [40.0, 40.0], "2.00", "2.00"),
+        ([None, 50.0], [50.0, 50.0], [20.0, 20.0], [40.0, None], "> 1.41", "> 3.16"),
+        ([50.0, 50.0], [50.0, None], [None, 25.0], [25.0, 25.0], "< 0.71", "< 0.50"),
+        ([None, 50.0], [50.0, None], [None, 25.0], [None, 25.0], "-", "-"),
+    ],
+)
+def test_a_figure_is_a_bound_where_missions_of_one_side_were_cut_off(
+    one, two, four, burst, speed_up, channel
+):
+    found = results({"random": [one, two, four, burst]})
+    cells = effects_table(found, effect_rows(found)).strip().splitlines()[-1].split(" | ")
+    assert [cells[3].partition(" (")[0], cells[5].partition(" (")[0].rstrip(" |")] == [speed_up, channel]
 
 
 def test_a_suite_whose_tasks_stand_alone_has_no_such_part(tmp_path):
