@@ -24,7 +24,9 @@ import numpy as np
 
 from baselines.cli.arguments import make_folder, parse, print_json, run_command
 from baselines.experiments.mission import run_mission, scripted, scripted_env
-from baselines.experiments.statistics import geometric_ratio_interval, median_ratio_interval
+from baselines.experiments.statistics import Interval, geometric_ratio_interval, median_ratio_interval
+from baselines.experiments.tables import markdown_table
+from baselines.scoreboard.suites import team_name
 from baselines.strategies import make_strategy
 from baselines.strategies.protocol import Strategy
 from entropy_explore_env.errors import SettingError
@@ -44,6 +46,12 @@ _SHARD = 2**31
 """No file of labels has this number: the starts are others than those of labels."""
 _BETTER_S = 1e-6
 ACTION_SETS = ("planned-rate", "restricted")
+_NAMES = {
+    "clairvoyant": "clairvoyant over planner",
+    "planned-rate": "`planned-rate` over planner",
+    "restricted": "`planned-rate`, discrete actions, over planner",
+}
+"""Rows beside the planner's, and the heads of their columns."""
 
 
 @dataclass
@@ -73,7 +81,8 @@ class Args:
     threads: int = 2
     """Threads that share the missions."""
     out: Path | None = None
-    """Folder for `headroom.json`; default: nothing is written."""
+    """Folder for SCENARIO-ROBOTS.json, as policy/headroom beside the policies' page, which then shows it;
+    default: nothing is written."""
     json: bool = False
     """Print one JSON object and nothing else."""
 
@@ -92,7 +101,8 @@ def main(words: Sequence[str]) -> int:
         make_folder("out", args.out)
     for found in measure(args, task):
         if args.out is not None:  # after each row, so that a kill loses no more than the next one
-            write_atomically(args.out / "headroom.json", json.dumps(found, indent=1, allow_nan=False) + "\n")
+            file = args.out / f"{task.name}-{task.robots}.json"
+            write_atomically(file, json.dumps(found, indent=1, allow_nan=False) + "\n")
         if not args.json:
             print(found["rows"][-1]["line"], flush=True)
     if args.json:
@@ -143,6 +153,39 @@ class PlannerMissions:
     times_s: np.ndarray
     moments: np.ndarray
     moments_to_go_s: np.ndarray
+
+
+def shown(folder: Path) -> str:
+    """What was written to a folder, as a Markdown table; nothing where nothing was.
+
+    Raises:
+        SettingError: Something else lies there.
+    """
+    files = sorted(folder.glob("*.json"))
+    head = ["task", "starts", "clairvoyant at one decision of", "planner", *_NAMES.values()]
+    return markdown_table(head, [_told(file) for file in files]) if files else ""
+
+
+def _told(file: Path) -> list[str]:
+    """The row of a file."""
+    try:
+        found = json.loads(file.read_text())
+        rows = {row["name"]: row for row in found["rows"]}
+        cells = [team_name(found["scenario"], found["robots"]), str(found["missions"]), str(found["every"])]
+        if found["horizon"] or found["divisor"] > 1:
+            cells[-1] += f", {found['horizon']} decisions deep, drawing 1/{found['divisor']}"
+        cells.append(f"{rows['planner']['median_s']:,.0f} s")
+        return cells + [_ratio_text(rows.get(name)) for name in _NAMES]
+    except (ValueError, KeyError, TypeError) as error:
+        wanted = "a file that python -m training.policy_improvement.headroom wrote"
+        raise SettingError("headroom", str(file), wanted) from error
+
+
+def _ratio_text(row: dict[str, Any] | None) -> str:
+    if row is None:
+        return "-"
+    ratio = Interval(*(row[f"mean_ratio{end}"] for end in ("", "_low", "_high")))
+    return ratio.text()
 
 
 def lead_by_planner(task: Scenario, seeds: Sequence[int], threads: int) -> PlannerMissions:

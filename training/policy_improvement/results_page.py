@@ -39,6 +39,7 @@ from entropy_explore_env.writing import write_atomically
 from training import extra  # noqa: F401 - before what is not there without it
 from training.checkpoints import latest_checkpoint, load_checkpoint
 from training.policy import POLICIES, policy_folder
+from training.policy_improvement import headroom
 from training.policy_improvement.comparison import Paired, paired
 
 _BEST, _DUNGEONS = resolved("best"), "dungeons"
@@ -186,6 +187,7 @@ def main(words: Sequence[str]) -> int:
         if name not in TESTS:
             raise SettingError("policies", name, "some of " + ", ".join(TESTS))
     make_folder("out", args.out)
+    what_is_to_win = headroom.shown(args.out / FILES / "headroom")
     rows = {
         name: [(test, strategy) for test in TESTS[name] for strategy in _strategies(name, test)]
         for name in names
@@ -213,7 +215,7 @@ def main(words: Sequence[str]) -> int:
     )
     found = {key: [each for cell in group for each in records[cell.id]] for key, group in cells.items()}
     page = args.out / "policy.md"
-    write_atomically(page, "\n".join(_page(names, found, args.confirm)))
+    write_atomically(page, "\n".join(_page(names, found, args.confirm, what_is_to_win)))
     write_archive(args.out / FILES / ARCHIVE, runs, missions)
     print(f"written: {page}")
     return 0
@@ -255,7 +257,7 @@ FILES = "policy"
 Found = Mapping[tuple[str, str, str], Sequence[Record]]
 
 
-def _page(names: Sequence[str], found: Found, confirmed: bool) -> list[str]:
+def _page(names: Sequence[str], found: Found, confirmed: bool, what_is_to_win: str) -> list[str]:
     """The page, part by part."""
     flags, said = (" --confirm", CONFIRMED) if confirmed else ("", "")
     parts = [
@@ -271,9 +273,22 @@ def _page(names: Sequence[str], found: Found, confirmed: bool) -> list[str]:
         "goal holds if the ratio of medians is at most the goal, for goals below 1 also its interval ends "
         "below 1, and the policy finished no fewer missions than the other.\n",
     ]
+    if what_is_to_win:
+        parts += [_TO_WIN, what_is_to_win]
     for name in names:
         parts += _policy_parts(name, found)
     return parts
+
+
+_TO_WIN = """## What there is to win
+
+Written by `python -m training.policy_improvement.headroom --out docs/results/policy/headroom` with
+`--scenario` and `--robots`, in worlds of training: geometric means of mission times over those of the
+planner, on the same starts. The planner takes its own choice among the candidates that policies choose
+among. The clairvoyant tries the eight best of them in branches of the mission as it will happen, each led to
+its end by the planner, and keeps the best: no policy can know what it knows. Discrete actions are those of
+`training.ppo`.
+"""
 
 
 def _policy_parts(name: str, found: Found) -> list[str]:

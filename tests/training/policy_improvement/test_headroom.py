@@ -13,6 +13,7 @@ import torch
 from baselines.cli.arguments import run_command
 from baselines.experiments.mission import run_mission, scripted, scripted_env
 from entropy_explore_env.command import BAD_INPUT
+from entropy_explore_env.errors import SettingError
 from entropy_explore_env.reports.metrics import mission_figures
 from entropy_explore_env.scenario import with_settings
 from training.policy_improvement import headroom
@@ -44,11 +45,28 @@ def test_the_command_compares_all_on_the_same_starts(tmp_path):
     with contextlib.redirect_stdout(text):
         code = run_command(headroom.main, words)
     found = json.loads(text.getvalue())
-    assert code == 0 and json.loads((tmp_path / "headroom.json").read_text()) == found
+    assert code == 0 and json.loads((tmp_path / "box-7x11x5-1.json").read_text()) == found
     assert [row["name"] for row in found["rows"]] == ["planner", "clairvoyant", "planned-rate", "restricted"]
     planner, *others = found["rows"]
     assert planner["ratio"] == planner["mean_ratio"] == 1.0
     assert all(row["finished"] == 2 and 0.2 < row["mean_ratio"] < 5.0 for row in others)
+
+
+def test_what_the_command_wrote_is_shown_as_a_table(tmp_path):
+    assert headroom.shown(tmp_path) == "" == headroom.shown(tmp_path / "none")
+    row = {"median_s": 52.4, "mean_ratio": 0.9, "mean_ratio_low": 0.85, "mean_ratio_high": 0.951}
+    found = {"scenario": "cave", "robots": 3, "missions": 8, "every": 2, "horizon": 0, "divisor": 1}
+    found["rows"] = [{"name": "planner", **row}, {"name": "clairvoyant", **row}]
+    (tmp_path / "cave-3.json").write_text(json.dumps(found))
+    (tmp_path / "office-1.json").write_text(
+        json.dumps({**found, "scenario": "office", "robots": 1, "horizon": 9})
+    )
+    _, _, cave, office = headroom.shown(tmp_path).strip().splitlines()
+    assert cave == "| cave, 3 robots | 8 | 2 | 52 s | 0.90 (0.85 … 0.95) | - | - |"
+    assert office.startswith("| office, 1 robot | 8 | 2, 9 decisions deep, drawing 1/1 | 52 s |")
+    (tmp_path / "other.json").write_text("[1]")
+    with pytest.raises(SettingError, match=r"other\.json"):
+        headroom.shown(tmp_path)
 
 
 def test_restricted_choices_are_actions_of_the_set():
