@@ -1,8 +1,9 @@
 """How long a reference strategy takes in each named scenario: `python -m baselines.mission_times`.
 
-Missions of the scenario's own team in worlds of the training split, with the seeds 0, 1, …; from their median
-the default cost of a second follows, `Reward.cost_per_s` = 0.2 / median, so that a mission as long as the
-median costs a fifth of all bits. `MISSION_TIMES` in entropy_explore_env/scenarios.py holds what this prints.
+Missions of the scenario's own team, or with `--robots 1` of one robot, in worlds of the training split, with
+the seeds 0, 1, …. From their median the default cost of a second follows, `Reward.cost_per_s` = 0.2 / median,
+so that a mission as long as the median costs a fifth of all bits. `MISSION_TIMES` in
+entropy_explore_env/scenarios.py holds what this prints.
 Missions are kept, a file each: an interrupted run continues where it was.
 """
 
@@ -39,6 +40,8 @@ class Args(WorkerOptions):
     """Named scenarios, commas between."""
     seeds: int = 24
     """Missions in each."""
+    robots: int | None = None
+    """In a team; default: as many as the scenario has."""
     runs: Path = Path("results/mission-times")
     """Folder that keeps the missions."""
     json: bool = False
@@ -49,13 +52,18 @@ def main(words: Sequence[str]) -> int:
     """Run the command."""
     args = parse(Args, words, description=__doc__)
     check_whole("seeds", args.seeds, 1)
+    if args.robots is not None:
+        check_whole("robots", args.robots, 1)
     workers = args.workers
     names = list(SCENARIOS) if args.scenarios == "all" else args.scenarios.split(",")
     for name in names:
         if name not in SCENARIOS:
             raise SettingError("scenarios", name, "all, or names out of " + ", ".join(SCENARIOS))
     make_folder("runs", args.runs)
-    cells = [Cell(name, _trained_in(name), reference(name), args.seeds, figures_record) for name in names]
+    cells = [
+        Cell(name, _trained_in(name, args.robots), reference(name), args.seeds, figures_record)
+        for name in names
+    ]
     records = run_cells(cells, args.runs, workers, "mission times", quiet=args.json)
     rows = [summary(name, records[name]) for name in names]
     if args.json:
@@ -67,9 +75,10 @@ def main(words: Sequence[str]) -> int:
     return 0
 
 
-def _trained_in(name: str) -> Scenario:
-    """A named scenario in worlds of the training split."""
-    return with_settings(SCENARIOS[name], {"split": "train"})
+def _trained_in(name: str, robots: int | None) -> Scenario:
+    """A named scenario in worlds of the training split, with another team size if one is given."""
+    team = {} if robots is None else {"robots": robots}
+    return with_settings(SCENARIOS[name], {"split": "train", **team})
 
 
 def reference(scenario: str) -> str:
