@@ -12,9 +12,10 @@ What a robot is, and what its mission asks for, decides how it explores:
 - Flying robots, and all in 3-D worlds: bits per time, with the recipe of narrow or of wide views.
 - Ground robots with a scanner that sees all around, in a plan, deciding at stops until the map has so little
   entropy: bits per time.
-- The same robots where everything is to be seen, or where they decide under way (`Robot.redecide`) until the
-  map has so little entropy: frontier cells, by `explorers.advantage_ahead`. Bits per time would leave what is
-  small until the end, and drive back for it.
+- The same robots where everything is to be seen: frontier cells on short tours, by `explorers.shared_tour`.
+  Bits per time would leave what is small until the end, and drive back for it.
+- The same robots where they decide under way (`Robot.redecide`) until the map has so little entropy: frontier
+  cells, by `explorers.advantage_ahead`, which sees the bulk sooner and drives farther in the end.
 - The same robots where a part may stay unseen: bits per time, of unknown voxels alone.
 """
 
@@ -26,6 +27,7 @@ from dataclasses import asdict, dataclass, replace
 import numpy as np
 
 from baselines.strategies.explorers.advantage_ahead import AdvantageAhead
+from baselines.strategies.explorers.shared_tour import SharedTour
 from entropy_explore_env.missions.view import RobotView
 from entropy_explore_env.missions.view_candidates import ViewProposer
 from entropy_explore_env.scenario import Scenario, with_settings
@@ -105,7 +107,7 @@ class PlannedRate:
         """A new mission begins."""
         self._frontiers = [explores_frontiers(scenario, kind) for kind in scenario.kinds]
         if any(self._frontiers):
-            self._plans = AdvantageAhead()
+            self._plans = SharedTour() if scenario.ending.by_seen else AdvantageAhead()
             self._plans.reset(scenario, rng)
         if not all(self._frontiers):
             one = with_settings(scenario, {"action": {"kind": "candidates", "candidates": 1}})

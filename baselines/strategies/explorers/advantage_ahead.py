@@ -32,7 +32,7 @@ import numpy as np
 from baselines.strategies.explorers.coordinated_frontier import taken
 from baselines.strategies.explorers.explorer import Explorer, Scene
 from baselines.strategies.explorers.nearest_frontier import best_of
-from baselines.strategies.explorers.teammates import centres_of, team_of
+from baselines.strategies.explorers.teammates import centres_of, left_to_robot, team_of
 from baselines.strategies.explorers.tour import Tour, TourConfig
 from entropy_explore_env.scenario import Scenario
 from entropy_explore_env.validation import check_count, check_not_negative, check_positive
@@ -138,16 +138,9 @@ class AdvantageAhead(Explorer):
         while True:
             voxels, lengths = scene.paths.frontiers_within(reach)
             if len(voxels) >= most or scene.paths.exhausted():
-                own = self._own(scene, voxels, lengths)
+                own = left_to_robot(scene, voxels, lengths)
                 return self._slivers.pick_among(scene, voxels[own], lengths[own])
             reach *= _EXTENSION
-
-    def _own(self, scene: Scene, voxels: np.ndarray, lengths: np.ndarray) -> np.ndarray:
-        """(K,) bool, frontier cells that are nearer to the robot than to where teammates go; all if none."""
-        own, places = np.ones(len(voxels), bool), centres_of(scene, voxels)
-        for target in team_of(scene).targets:
-            own &= lengths <= np.linalg.norm(places - target, axis=1)
-        return own if own.any() else np.ones(len(voxels), bool)
 
     def _by_way_of(self, scene: Scene, goal: int) -> int:
         """The goal, or a sliver that the way to it leaves behind, and that would be far to come back to."""

@@ -38,6 +38,20 @@ def centres_of(scene: Scene, voxels: np.ndarray) -> np.ndarray:
     return np.stack(np.unravel_index(voxels, scene.view.scenario.grid.shape), axis=-1) + 0.5
 
 
+def left_to_robot(scene: Scene, voxels: np.ndarray, lengths: np.ndarray) -> np.ndarray:
+    """(K,) bool, frontier cells that are nearer to the robot than to where teammates go; all if none is.
+
+    Args:
+        scene: Of the robot.
+        voxels: (K,) int32, the cells.
+        lengths: (K,) of the robot's paths to them, in voxel edges.
+    """
+    own, places = np.ones(len(voxels), bool), centres_of(scene, voxels)
+    for target in team_of(scene).targets:
+        own &= lengths <= np.linalg.norm(places - target, axis=1)
+    return own if own.any() else np.ones(len(voxels), bool)
+
+
 def lengths_of_all(scene: Scene, voxels: np.ndarray, lengths: np.ndarray, places: np.ndarray) -> np.ndarray:
     """(1 + M, K) lengths of paths from the robot, then from M teammates' voxels, to K frontier cells.
 

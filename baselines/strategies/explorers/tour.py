@@ -47,8 +47,8 @@ class TourConfig:
         SettingError: One of them is not allowed.
     """
 
-    near: float = 0.75
-    cover: float = 1.0
+    near: float = 0.4
+    cover: float = 0.4
     coarse: float = 1.0
     most_near: int = 120
     most_far: int = 20

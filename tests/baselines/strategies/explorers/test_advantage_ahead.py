@@ -7,18 +7,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from baselines.experiments.mission import run_mission, scripted
 from baselines.strategies.explorers.advantage_ahead import AdvantageAhead, AheadConfig
 from baselines.strategies.explorers.distance_advantage import DistanceAdvantage, DistanceAdvantageConfig
 from baselines.strategies.frontier.voxel.map import EDGE
-from baselines.strategies.planned_rate import PlannedRate, explores_frontiers
-from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
-from entropy_explore_env.reports.metrics import joint_figures, mission_figures
 from entropy_explore_env.scenario import with_settings
-from entropy_explore_env.scenarios import OFFICE, find_scenario
 from tests.baselines.strategies.explorers.scenes import cell, random_plan, scenario_of, scene_of
 from tests.baselines.strategies.explorers.test_coordination import mate, with_mates
-from tests.baselines.strategies.explorers.test_missions import small_plan
 from tests.baselines.strategies.explorers.test_rules import room_with_a_sliver
 from tests.reference import explorers as reference
 from tests.reference.scenes import drawn, seeds
@@ -189,49 +183,3 @@ def test_crowds_are_counted_edge_by_edge(seed):
     ]
     assert scene.cells.crowds(voxels, radius, 10_000).tolist() == wanted
     assert scene.cells.crowds(voxels, radius, 2).tolist() == [min(count, 2) for count in wanted]
-
-
-@pytest.mark.parametrize(
-    ("name", "settings", "wanted"),
-    [
-        ("office", {}, False),
-        ("office", {"robot": {"redecide": "on_scan"}, "sensor": {"scan_every_m": 0.5}}, True),
-        ("office", {"ending": {"seen_share": 1.0}, "track_truth": True}, True),
-        ("office", {"ending": {"seen_share": 0.99}, "track_truth": True}, False),
-        ("office", {"ending": {"unseen_free_voxels": 79}, "track_truth": True}, True),  # its rays: 80 voxels
-        ("office", {"ending": {"unseen_free_voxels": 80}, "track_truth": True}, False),
-        ("office", {"robot": {"redecide": 2.0}, "ending": {"seen_share": 0.9}, "track_truth": True}, False),
-        ("office-3d", {"ending": {"seen_share": 1.0}, "track_truth": True}, False),
-        ("room", {"robot": {"redecide": 0.5}}, False),
-    ],
-)
-def test_it_goes_for_frontiers_in_plans_where_all_is_to_be_seen_or_it_decides_under_way(
-    name, settings, wanted
-):
-    scenario = with_settings(find_scenario(name), settings)
-    assert explores_frontiers(scenario, scenario.kind_of(0)) == wanted
-
-
-@pytest.mark.parametrize("redecide", ["at_stop", "on_scan"])
-def test_planned_rate_sees_all_of_a_plan(redecide):
-    ending = {"seen_share": 1.0, "time_limit_s": 2000.0}
-    scenario = small_plan(ending=ending, robot={"body_radius_m": 0.0, "redecide": redecide})
-    env = EntropyExploreEnv(scenario)
-    run_mission(env, PlannedRate(), 3)
-    assert mission_figures(env.missions, 0)["finished"]
-    assert joint_figures(env.missions, 0)["explored"] == 1.0
-
-
-def test_a_team_in_a_plan_finishes_sooner_than_one_robot():
-    settings = {
-        "robot": {"redecide": "on_scan"},
-        "sensor": {"scan_every_m": 0.5},
-        "ending": {"seen_share": 0.9},
-        "track_truth": True,
-    }
-    seconds = []
-    for robots in (1, 3):
-        env = EntropyExploreEnv(with_settings(scripted(OFFICE), {**settings, "robots": robots}))
-        run_mission(env, PlannedRate(), 1)
-        seconds.append(mission_figures(env.missions, 0)["t_mission_s"])
-    assert seconds[1] < 0.75 * seconds[0]

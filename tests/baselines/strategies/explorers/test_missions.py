@@ -79,11 +79,11 @@ RULES = {
         partial(InformationGain, InformationGainConfig(weight=0.4, horizon=3.0)),
         lambda: reference.Textbook(partial(planners.information_gain, weight=0.4, horizon=3.0, reach=REACH)),
     ),
-    "tour": (Tour, lambda: reference.Textbook(planners.Tour(REACH, 1.5, 0.5, 1.0, 0.1))),
+    "tour": (Tour, lambda: reference.Textbook(planners.Tour(REACH, 0.4, 0.4, 1.0, 0.1))),
     "receding-horizon": (
         RecedingHorizon,
         lambda: reference.Textbook(
-            planners.RecedingHorizon(REACH, 2.0, 0.4, 1.5, (30, 120)), until_reached=True
+            planners.RecedingHorizon(REACH, 8.0, 0.4, 1.5, (30, 120)), until_reached=True
         ),
     ),
 }
