@@ -22,26 +22,28 @@ class MissionTimes(NamedTuple):
     """How many were measured; all of them were mapped."""
     strategy: str = "information-rate-v0"
     """Who explored."""
+    alone_s: float | None = None
+    """The median of one robot alone; None = not measured, or the scenario has one robot anyway."""
 
 
 MISSION_TIMES = MappingProxyType(
     {
-        "room": MissionTimes(33.0, 20),
-        "room-furnished": MissionTimes(61.3, 20),
-        "box-7x11x5": MissionTimes(17.9, 20),
-        "office": MissionTimes(231.1, 20),
-        "office-3d": MissionTimes(451.0, 20),
+        "room": MissionTimes(33.0, 20, alone_s=81.0),
+        "room-furnished": MissionTimes(61.3, 20, alone_s=225.8),
+        "box-7x11x5": MissionTimes(17.9, 20, alone_s=27.5),
+        "office": MissionTimes(231.1, 20, alone_s=578.1),
+        "office-3d": MissionTimes(451.0, 20, alone_s=747.1),
         "office-mixed": MissionTimes(547.3, 11),
-        "corridor": MissionTimes(152.5, 20),
-        "cluttered": MissionTimes(94.3, 20),
-        "hybrid": MissionTimes(341.7, 20),
-        "cave": MissionTimes(185.4, 20),
+        "corridor": MissionTimes(152.5, 20, alone_s=399.8),
+        "cluttered": MissionTimes(94.3, 20, alone_s=348.6),
+        "hybrid": MissionTimes(341.7, 20, alone_s=821.2),
+        "cave": MissionTimes(185.4, 20, alone_s=304.5),
         "terrain": MissionTimes(1315.2, 11),
         "terrain-smooth": MissionTimes(1391.3, 11),
         "terrain-rough": MissionTimes(1236.9, 11),
         "occlusions": MissionTimes(1472.0, 20),
-        "lab": MissionTimes(161.6, 20),
-        "bhattacharya-office": MissionTimes(86.5, 20),
+        "lab": MissionTimes(161.6, 20, alone_s=246.4),
+        "bhattacharya-office": MissionTimes(86.5, 20, alone_s=342.6),
         "bhattacharya-cluttered": MissionTimes(2631.7, 11, "per-time-visibility"),
         "cliff": MissionTimes(880.1, 20, "cliff-next-best-view"),
     }
@@ -55,14 +57,20 @@ COST_OF_A_MISSION = 0.2
 """What a mission as long as the median costs, in shares of all bits."""
 
 
-def usual_reward(name: str) -> Reward:
-    """The reward of a named scenario: a second costs 0.2 over the median mission time, a plain number.
+def usual_reward(name: str, alone: bool = False) -> Reward:
+    """The reward of a named scenario: the team's, a second costing 0.2 over the median mission time.
 
-    So the returns tell fast from slow. With the team's reward, or one robot, a mission as long as the median
-    returns about 0.8, one twice as long 0.6. With each robot's own reward it is less by what teammates sent:
-    as a mean over three robots that share, about 0.2.
+    So the returns tell fast from slow: a mission as long as the median returns about 0.8, one twice as long
+    0.6. With each robot's own reward, `kind="individual"`, it is less by what teammates sent: as a mean over
+    three robots that share, about 0.2.
+
+    Args:
+        name: Of the scenario.
+        alone: Whether one robot explores, which takes longer than the scenario's team.
     """
-    return Reward(cost_per_s=float(f"{COST_OF_A_MISSION / MISSION_TIMES[name].median_s:.3g}"))
+    times = MISSION_TIMES[name]
+    median_s = times.alone_s if alone and times.alone_s is not None else times.median_s
+    return Reward("team", float(f"{COST_OF_A_MISSION / median_s:.3g}"))
 
 
 _ROOM_GRID = Grid((41, 41, 17), 0.25, (-0.125, -0.125, -0.125))
@@ -318,8 +326,13 @@ SCENARIOS = MappingProxyType(
 """Name → Scenario."""
 
 
-def find_scenario(scenario: str | Scenario) -> Scenario:
+def find_scenario(scenario: str | Scenario, robots: object = None) -> Scenario:
     """The scenario with a name; a Scenario is given back as it is.
+
+    Args:
+        scenario: The name.
+        robots: The team size that it will be given, if any: seconds cost less where one robot explores a
+            scenario of a team.
 
     Raises:
         SettingError: No scenario has this name.
@@ -329,4 +342,7 @@ def find_scenario(scenario: str | Scenario) -> Scenario:
     if not isinstance(scenario, str) or scenario not in SCENARIOS:
         known = "one of " + ", ".join(SCENARIOS)
         raise SettingError("scenario", scenario, known + did_you_mean(scenario, SCENARIOS))
-    return SCENARIOS[scenario]
+    found = SCENARIOS[scenario]
+    if robots == 1 < found.robots:
+        return dataclasses.replace(found, reward=usual_reward(scenario, alone=True))
+    return found

@@ -20,6 +20,7 @@ from baselines.experiments.ray_cluster import RayCluster
 from baselines.experiments.runner import NOT_RUN, Conditions, run_all
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.scenario import Scenario
+from entropy_explore_env.settings import Reward
 
 _READERS = "entropy_explore_env.worlds.files"
 """Reads world files; its modules are imported by name in a process of their own."""
@@ -55,9 +56,9 @@ class Cell:
     def settings_digest(self) -> str:
         """Of the scenario, the strategy's name, what is recorded, and the files that these name.
 
-        Of files the content counts, and not where a world's file lies.
+        Of files the content counts, and not where a world's file lies. Rewards change no scripted mission.
         """
-        scenario = scripted(self.scenario)
+        scenario = dataclasses.replace(scripted(self.scenario), reward=Reward())
         if Path(scenario.world).is_file():
             scenario = dataclasses.replace(scenario, world=Path(scenario.world).name)
         described = repr(

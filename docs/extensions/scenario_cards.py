@@ -17,7 +17,7 @@ from entropy_explore_env import environment_id, scenarios
 from entropy_explore_env.errors import SettingError, counted
 from entropy_explore_env.missions.rules import rules_of
 from entropy_explore_env.scenario import Scenario, with_settings
-from entropy_explore_env.scenarios import MISSION_TIMES, SCENARIOS
+from entropy_explore_env.scenarios import MISSION_TIMES, SCENARIOS, usual_reward
 from entropy_explore_env.settings import RobotKind, gaussian_entropy_bits
 from entropy_explore_env.worlds.load import make_world
 from entropy_explore_env.worlds.pictures import picture
@@ -253,9 +253,14 @@ def _reward(scenario: Scenario) -> str:
     if times is not None and reward.cost_per_s:
         text += (
             f"\nA mission of {times.median_s:g} s, the median of `{times.strategy}` over {times.missions} "
-            'starts, costs 0.2. With `reward={"kind": "team"}`, or one robot, it returns about 0.8, '
-            "one twice as long 0.6."
+            "starts, returns about 0.8, one twice as long 0.6."
         )
+        if times.alone_s is not None:
+            alone = usual_reward(scenario.name, alone=True)
+            text += (
+                f" With `robots=1`, as under Gymnasium, a second costs {alone.cost_per_s:g}, by that robot's "
+                f"median of {times.alone_s:g} s."
+            )
     return text
 
 

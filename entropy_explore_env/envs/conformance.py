@@ -284,7 +284,7 @@ def check_conformance(
         WorldError: The world cannot be used.
     """
     limit = {} if steps is None else {"max_cycles": steps}
-    asked, given = with_given_worlds(find_scenario(scenario), {**settings, **limit})
+    asked, given = with_given_worlds(find_scenario(scenario, settings.get("robots")), {**settings, **limit})
     task = Task(asked if given else with_world(asked), check_seed(seed), given)
     for check in CHECKS:
         try:

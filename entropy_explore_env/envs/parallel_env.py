@@ -79,7 +79,7 @@ class EntropyExploreEnv(ParallelEnv[str, Any, Any]):
             WorldError: The world cannot be used.
         """
         check_render_mode(render_mode)
-        asked, given = with_given_worlds(find_scenario(scenario), settings)
+        asked, given = with_given_worlds(find_scenario(scenario, settings.get("robots")), settings)
         self._rewards = StepRewards(reward_function)
         self.missions = Missions(asked, given=given)
         self.missions.reward_function = self._rewards.name

@@ -62,7 +62,7 @@ class SingleRobotEnv(gymnasium.Env[Any, Any]):
         robots = settings.get("robots", 1)
         if not is_whole(robots, 1, 1):
             raise SettingError("robots", robots, "1; parallel_env() takes a team")
-        asked, given = with_given_worlds(find_scenario(scenario), {**settings, "robots": 1})
+        asked, given = with_given_worlds(find_scenario(scenario, 1), {**settings, "robots": 1})
         self._rewards = StepRewards(reward_function)
         self.missions = Missions(asked, given=given)
         self.missions.reward_function = self._rewards.name

@@ -96,7 +96,7 @@ class EntropyExploreVectorEnv(VectorEnv[Any, Any, Any]):
         except Exception:  # whatever was given, compared with the modes
             allowed = "one of " + ", ".join(mode.value for mode in AutoresetMode)
             raise SettingError("autoreset_mode", autoreset_mode, allowed) from None
-        asked, given = with_given_worlds(find_scenario(scenario), settings)
+        asked, given = with_given_worlds(find_scenario(scenario, settings.get("robots")), settings)
         self._rewards = StepRewards(reward_function)
         self.missions = Missions(asked, num_envs, threads, given)
         self.missions.reward_function = self._rewards.name

@@ -16,8 +16,8 @@ from entropy_explore_env.envs.infos import END_FIGURES
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.envs.robot_vec_env import RobotVecEnv
 from entropy_explore_env.envs.vector_env import EntropyExploreVectorEnv
-from entropy_explore_env.scenario import with_settings
-from entropy_explore_env.scenarios import BOX, MISSION_TIMES, SCENARIOS
+from entropy_explore_env.scenarios import BOX, MISSION_TIMES, SCENARIOS, find_scenario
+from entropy_explore_env.settings import Reward
 
 SHORT = {"robots": 2, "time_limit_s": 6.0, "action": {"kind": "discrete", "moves": "axes"}}
 
@@ -25,16 +25,14 @@ SHORT = {"robots": 2, "time_limit_s": 6.0, "action": {"kind": "discrete", "moves
 def test_a_second_costs_a_fifth_over_the_median_mission_time():
     assert set(MISSION_TIMES) == set(SCENARIOS)
     for name, times in MISSION_TIMES.items():
+        assert SCENARIOS[name].reward.kind == "team"
         assert SCENARIOS[name].reward.cost_per_s == pytest.approx(0.2 / times.median_s, rel=5e-3)
         assert times.strategy == mission_times.reference(name)
 
 
-def test_a_mission_as_long_as_the_median_returns_about_four_fifths():
-    env, returns, times_s = (
-        EntropyExploreEnv(scripted(with_settings(BOX, {"reward": {"kind": "team"}}))),
-        [],
-        [],
-    )
+@pytest.mark.parametrize("robots", [2, 1])
+def test_a_mission_as_long_as_the_median_returns_about_four_fifths(robots):
+    env, returns, times_s = EntropyExploreEnv("box-7x11x5", **scripted_settings(), robots=robots), [], []
     step = env.step
     for strategy, seeds in (("information-rate-v0", range(5)), ("random", range(5))):
         for seed in seeds:
@@ -50,8 +48,34 @@ def test_a_mission_as_long_as_the_median_returns_about_four_fifths():
             returns.append(sum(earned))
             times_s.append(float(env.missions.state.missions[0]["time_s"]))
     assert 0.7 < np.median(returns[:5]) < 0.9
-    slower = np.array(times_s) / MISSION_TIMES["box-7x11x5"].median_s
+    times = MISSION_TIMES["box-7x11x5"]
+    slower = np.array(times_s) / (times.median_s if robots == 2 else times.alone_s)
     np.testing.assert_allclose(returns, 1.0 - 0.2 * slower, atol=0.05)  # by what comes beyond the threshold
+
+
+def scripted_settings():
+    """Nothing observed, steps until a decision."""
+    made = scripted(BOX)
+    return {"decision_period_s": made.decision_period_s, "observation": made.observation}
+
+
+def test_one_robot_pays_by_its_own_median():
+    measured = {name: times.alone_s for name, times in MISSION_TIMES.items() if times.alone_s is not None}
+    assert {"room", "office", "cave"} < set(measured)
+    for name, alone_s in measured.items():
+        assert alone_s > MISSION_TIMES[name].median_s and SCENARIOS[name].robots > 1
+        assert find_scenario(name, 1).reward.cost_per_s == pytest.approx(0.2 / alone_s, rel=5e-3)
+        assert find_scenario(name, 2) is find_scenario(name) is SCENARIOS[name]
+    team, alone = SCENARIOS["room"].reward, find_scenario("room", 1).reward
+    for made, wanted in (
+        (gymnasium.make("entropy_explore_env/Room-v1").unwrapped, alone),
+        (gymnasium.make_vec("entropy_explore_env/Room-v1", num_envs=2).unwrapped, alone),
+        (gymnasium.make_vec("entropy_explore_env/Room-v1", num_envs=2, robots=3).unwrapped, team),
+        (EntropyExploreEnv("room", robots=1), alone),
+        (EntropyExploreEnv("room"), team),
+        (EntropyExploreEnv("room", robots=1, reward={"cost_per_s": 0.5}), Reward("team", 0.5)),
+    ):
+        assert made.scenario.reward == wanted
 
 
 def test_gymnasium_and_stable_baselines_show_mission_time_and_bits_per_bit():
