@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import gymnasium
 import numpy as np
 import pytest
@@ -67,14 +69,15 @@ def test_one_robot_pays_by_its_own_median():
         assert find_scenario(name, 1).reward.cost_per_s == pytest.approx(0.2 / alone_s, rel=5e-3)
         assert find_scenario(name, 2) is find_scenario(name) is SCENARIOS[name]
     team, alone = SCENARIOS["room"].reward, find_scenario("room", 1).reward
-    for made, wanted in (
+    environments: list[tuple[Any, Reward]] = [
         (gymnasium.make("entropy_explore_env/Room-v1").unwrapped, alone),
         (gymnasium.make_vec("entropy_explore_env/Room-v1", num_envs=2).unwrapped, alone),
         (gymnasium.make_vec("entropy_explore_env/Room-v1", num_envs=2, robots=3).unwrapped, team),
         (EntropyExploreEnv("room", robots=1), alone),
         (EntropyExploreEnv("room"), team),
         (EntropyExploreEnv("room", robots=1, reward={"cost_per_s": 0.5}), Reward("team", 0.5)),
-    ):
+    ]
+    for made, wanted in environments:
         assert made.scenario.reward == wanted
 
 
