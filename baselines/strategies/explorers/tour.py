@@ -51,7 +51,7 @@ class TourConfig:
     cover: float = 0.4
     coarse: float = 1.0
     most_near: int = 120
-    most_far: int = 20
+    most_far: int = 8
     stay: float = 0.1
 
     def __post_init__(self) -> None:
@@ -139,19 +139,19 @@ def lengths_between(paths: KnownPaths, here: int, places: np.ndarray) -> np.ndar
     Args:
         paths: Of the robot, with a complete search from where it is, which is another one afterwards.
         here: Its voxel.
-        places: (K,) int32 voxels that the search reached.
+        places: (K,) int32 voxels that the search reached, near ones first.
     """
     nodes = np.concatenate([[here], places]).astype(np.int32)
     lengths = paths.lengths_to(nodes)
     between = np.zeros((len(nodes), len(nodes)))
     between[0], between[:, 0] = lengths, lengths
-    for number in range(1, len(nodes) - 1):
-        later = nodes[number + 1 :]
+    for number in range(len(nodes) - 1, 1, -1):  # from far places first: near ones then need no long searches
+        nearer = nodes[1:number]
         paths.start(int(nodes[number]))
-        row = paths.lengths_to(later)
-        most = float((lengths[number] + lengths[number + 1 :]).max())
+        row = paths.lengths_to(nearer)
+        most = float((lengths[number] + lengths[1:number]).max())
         while paths.reach < most and not (row <= paths.reach).all():
             paths.extend(min(1.3 * paths.reach, most))
-            row = paths.lengths_to(later)
-        between[number, number + 1 :] = between[number + 1 :, number] = row
+            row = paths.lengths_to(nearer)
+        between[number, 1:number] = between[1:number, number] = row
     return between
