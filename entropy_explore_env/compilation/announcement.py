@@ -42,7 +42,7 @@ def begin_compiling(name: str, folder: Path | None) -> None:
     if not _progress.announced:
         _progress.announced = _progress.pending = True
         kept = "" if folder is None else f"; they are kept in {short_path(folder)}"
-        _say(f"entropy_explore_env: compiling kernels, 10 to 40 s{kept}")
+        _say(f"entropy_explore_env: compiling kernels, a minute or two{kept}")
 
 
 def end_compiling() -> None:
