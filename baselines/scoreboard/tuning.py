@@ -59,7 +59,12 @@ TUNINGS: Mapping[str, Tuning] = {
                 "edge": (0.2, 0.4, 0.8),
                 "places": (15, 30, 60),
             },
-            "tour": {"near": (0.4, 0.75, 1.5, 3), "cover": (0.25, 0.5, 1, 2), "stay": (0.02, 0.1, 0.3)},
+            "tour": {
+                "near": (0.25, 0.4, 0.75),
+                "cover": (0.2, 0.4, 1),
+                "most_far": (4, 8, 20),
+                "stay": (0.02, 0.1),
+            },
         },
         "nearest-frontier",
         PATH,
@@ -170,7 +175,12 @@ def ranged(ratio: Interval) -> str:
 
 
 def with_table(page: str, suite: str, table: str) -> str:
-    """A page with a new table between the marks of a suite.
+    """A page with new rows between the marks of a suite; rows of strategies that are not among them stay.
+
+    Args:
+        page: Its text.
+        suite: Which marks.
+        table: Markdown, with the strategy in the first column.
 
     Raises:
         SettingError: It has no marks.
@@ -179,7 +189,24 @@ def with_table(page: str, suite: str, table: str) -> str:
     if begin not in page or end not in page:
         raise SettingError("page", begin, f"a page with the lines {begin} and {end}")
     before, _, rest = page.partition(begin)
-    return f"{before}{begin}\n\n{table.strip()}\n\n{end}{rest.partition(end)[2]}"
+    there, _, after = rest.partition(end)
+    head, rows = _head_and_rows(table)
+    head_there, rows_there = _head_and_rows(there)
+    if head_there == head:
+        made = {_strategy_of(row) for row in rows}
+        rows += [row for row in rows_there if _strategy_of(row) not in made]
+        rows.sort(key=_strategy_of)
+    return "\n".join([f"{before}{begin}", "", *head, *rows, "", f"{end}{after}"])
+
+
+def _head_and_rows(table: str) -> tuple[list[str], list[str]]:
+    """The first two lines of a Markdown table, and the others."""
+    lines = table.strip().splitlines()
+    return lines[:2], lines[2:]
+
+
+def _strategy_of(row: str) -> str:
+    return row.split("|")[1].strip()
 
 
 def main(words: Sequence[str]) -> int:

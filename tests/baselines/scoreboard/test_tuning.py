@@ -60,20 +60,27 @@ def test_a_ratio_of_one_mission_in_each_plan_has_no_interval():
     assert ranged(Interval(0.956, 0.956, 0.956)) == "0.96"
 
 
-def test_a_new_table_takes_the_place_of_the_old_one():
+def test_new_rows_take_the_place_of_their_strategies_and_others_stay():
     begin, end = marks("plans")
+    head = "| strategy | setting |\n| --- | --- |\n"
     page = f"before\n{begin}\nold\n{end}\nafter\n"
-    once = with_table(page, "plans", "| new |")
+    once = with_table(page, "plans", head + "| `b` | x=1 |\n| `b` | x=2 |\n")
     assert "old" not in once and once.startswith("before\n") and once.endswith(f"{end}\nafter\n")
-    assert with_table(once, "plans", "| new |") == once
+    more = with_table(once, "plans", head + "| `c` | y=1 |\n")
+    both = with_table(more, "plans", head + "| `a` | z=1 |\n| `b` | x=3 |\n")
+    rows = [line for line in both.splitlines() if line.startswith("| `")]
+    assert rows == ["| `a` | z=1 |", "| `b` | x=3 |", "| `c` | y=1 |"]
+    assert with_table(both, "plans", head + "| `a` | z=1 |\n") == both
+    other = with_table(both, "plans", "| rule |\n| --- |\n| `d` |\n")  # of another form: nothing stays
+    assert [line for line in other.splitlines() if line.startswith("| `")] == ["| `d` |"]
     with pytest.raises(SettingError, match="a page with the lines"):
-        with_table(once, "volumes", "| new |")
+        with_table(once, "volumes", head)
 
 
 def test_the_command_writes_the_paths_over_the_defaults(tmp_path, monkeypatch, capsys):
     plan = small_plan(ending={"seen_share": 0.8, "time_limit_s": 500.0})
     hall = TUNINGS["plans"]._replace(
-        tasks=lambda n: (Task("hall", (Place("hall", plan, n),)),), grid={"tour": {"near": (0.75, 0.05)}}
+        tasks=lambda n: (Task("hall", (Place("hall", plan, n),)),), grid={"tour": {"near": (0.4, 0.05)}}
     )
     monkeypatch.setattr(command, "TUNINGS", {"plans": hall})
     page = tmp_path / "page.md"
