@@ -1,4 +1,4 @@
-"""How `planned-rate` explores plans: openings first, by advantage, what they show, and what turning costs.
+"""How `planned-rate` explores plans until their entropy is low: openings, by advantage, sight and turning.
 
     v* = argmax over openings v of
          mean over u of d(u, v) - d(robot, v) + g ln V(v) - b |turn(v)| / π - t(v)
