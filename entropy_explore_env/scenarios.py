@@ -48,12 +48,12 @@ MISSION_TIMES = MappingProxyType(
         "cliff": MissionTimes(880.1, 20, "cliff-next-best-view"),
     }
 )
-"""Name → mission times, as `python -m baselines.mission_times` prints them, with `--robots 1` those of one robot
-alone: 20 missions each, over terrain 7. Those of fewer than 20 missions are rough: a mission there computes
-for minutes. In `office-mixed` one robot alone finished none of 7. In two scenarios `information-rate-v0` is no measure. Its
-first mission in `bhattacharya-cluttered` was not done after a quarter of an hour. That in `cliff` was cut off
-after its 3600 s with 98 % of the bits, after ten minutes of computing: it knows nothing of the edge, and 3636
-of its 3861 drives were cut short, in the first 150 s all of them by the edge."""
+"""Name → mission times, as `python -m baselines.mission_times` prints them, and with `--robots 1` those of
+one robot alone: 20 missions each, over terrain 7; in `office-mixed` it finished none of 7. Those of fewer
+than 20 missions are rough: a mission there computes for minutes. In two scenarios `information-rate-v0` is no
+measure. Its first mission in `bhattacharya-cluttered` was not done after a quarter of an hour. That in
+`cliff` was cut off after its 3600 s with 98 % of the bits, after ten minutes of computing: it knows nothing
+of the edge, and 3636 of its 3861 drives were cut short, in the first 150 s all of them by the edge."""
 COST_OF_A_MISSION = 0.2
 """What a mission as long as the median costs, in shares of all bits."""
 

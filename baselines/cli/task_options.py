@@ -25,7 +25,7 @@ from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.localization_settings import Fiducials
 from entropy_explore_env.scenario import Scenario, with_settings
-from entropy_explore_env.scenarios import ROOM, find_scenario
+from entropy_explore_env.scenarios import ROOM, SCENARIOS, find_scenario
 from entropy_explore_env.settings import Ending, RangeSensor, Robot, RobotKind
 from entropy_explore_env.settings_json import dataclass_of, json_of, scenario_of, settings_of
 
@@ -228,6 +228,8 @@ def tasked(
     settings: dict[str, Any] = {"ending": ending, **{name: getattr(options, name) for name in names}}
     if robots is not None:
         settings["robots"] = robots
+        if scenario.name in SCENARIOS and scenario.reward == SCENARIOS[scenario.name].reward:
+            settings["reward"] = find_scenario(scenario.name, robots).reward
     if options.extra_kinds is not None:
         settings["extra_kinds"] = _kinds(options.extra_kinds)
     worlds = worlds_of(options)

@@ -12,12 +12,14 @@ from stable_baselines3.common.monitor import Monitor
 from stable_baselines3.common.vec_env import VecMonitor
 
 from baselines import mission_times
+from baselines.cli.task_options import base_task, tasked
 from baselines.experiments.mission import run_mission, scripted
 from baselines.strategies import make_strategy
 from entropy_explore_env.envs.infos import END_FIGURES
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.envs.robot_vec_env import RobotVecEnv
 from entropy_explore_env.envs.vector_env import EntropyExploreVectorEnv
+from entropy_explore_env.scenario import with_settings
 from entropy_explore_env.scenarios import BOX, MISSION_TIMES, SCENARIOS, find_scenario
 from entropy_explore_env.settings import Reward
 
@@ -79,6 +81,13 @@ def test_one_robot_pays_by_its_own_median():
     ]
     for made, wanted in environments:
         assert made.scenario.reward == wanted
+    options = base_task("room").defaults(None)
+    for scenario, robots, wanted in (
+        (SCENARIOS["room"], 1, alone),
+        (SCENARIOS["room"], 2, team),
+        (with_settings(SCENARIOS["room"], {"reward": {"cost_per_s": 0.5}}), 1, Reward("team", 0.5)),
+    ):
+        assert tasked(scenario, options, robots)[0].reward == wanted
 
 
 def test_gymnasium_and_stable_baselines_show_mission_time_and_bits_per_bit():
