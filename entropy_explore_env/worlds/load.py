@@ -94,9 +94,11 @@ def load_world(
             meshes: free space around them (None = none).
         ceiling_m: Height maps: the exposure surface above the ground (World.ceiling); None = none.
         fill: Meshes: whether the space that the surface encloses is solid; None = yes.
-        read_limit_s: Limit of the processor time for reading; None = 1.5 s, and 20 s for each MiB.
+        read_limit_s: Limit of the processor time for reading; None = 1.5 s, and 20 s for each MiB. On Windows
+            reading ends after ten times as much elapsed time and a minute.
         read_memory_mib: Limit of the memory of the process that reads; None = 448 MiB, and 16 for each MiB
-            of the file, of OctoMaps 512, up to 4096 in all. Voxels are only made at the wanted size.
+            of the file, of OctoMaps 512, up to 4096 in all. Voxels are only made at the wanted size. It holds
+            where the system has /proc, as Linux does; on macOS and Windows memory is not limited.
 
     Raises:
         WorldError: The file is missing, too large, broken, of no known kind or has no free space.
