@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 from entropy_explore_env import command
-from entropy_explore_env.command import UsageError, home_path, whole_number
+from entropy_explore_env.command import UsageError, home_path, whole_number, with_meant
 from entropy_explore_env.errors import MissingExtraError, SettingError
 
 if TYPE_CHECKING:
@@ -132,7 +132,7 @@ def _one_line(complaint: str) -> str:
     words = " ".join(_FRAME.sub(" ", complaint).split())
     words = _TITLE.sub("", words)
     words = _HELP.sub("", words).replace(" Perhaps you meant:", "; perhaps you meant")
-    return words.split(" For full helptext")[0] or "the arguments do not fit; see --help"
+    return with_meant(words.split(" For full helptext")[0]) or "the arguments do not fit; see --help"
 
 
 def run_command(main: Callable[[Sequence[str]], int], words: Sequence[str] | None = None) -> int:

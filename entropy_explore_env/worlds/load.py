@@ -5,9 +5,10 @@ from __future__ import annotations
 import dataclasses
 import inspect
 import math
-from functools import lru_cache
+from collections.abc import Callable, Mapping, Sequence
+from functools import lru_cache, wraps
 from pathlib import Path
-from typing import Any
+from typing import Any, ParamSpec
 
 import numpy as np
 
@@ -59,6 +60,30 @@ FORMATS = {
 """Suffix in lower case → how the file is read."""
 
 
+_Given = ParamSpec("_Given")
+
+
+def _with_known_options(load: Callable[_Given, World]) -> Callable[_Given, World]:
+    """A function that loads worlds, whose options that are unknown are refused by name."""
+    known = tuple(inspect.signature(load).parameters)
+
+    @wraps(load)
+    def checked(*args: _Given.args, **options: _Given.kwargs) -> World:
+        _refuse_unknown(options, known)
+        return load(*args, **options)
+
+    return checked
+
+
+def _refuse_unknown(options: Mapping[str, object], known: Sequence[str]) -> None:
+    """Raise a SettingError for the first option that is not known."""
+    for name, value in options.items():
+        if name not in known:
+            allowed = "one of the options " + ", ".join(known) + did_you_mean(name, known)
+            raise SettingError(name, value, allowed)
+
+
+@_with_known_options
 def load_world(
     path: Path | str,
     voxel_size_m: float | None = None,
@@ -102,7 +127,7 @@ def load_world(
 
     Raises:
         WorldError: The file is missing, too large, broken, of no known kind or has no free space.
-        SettingError: A setting is out of its range, missing, or does not apply to this file.
+        SettingError: A setting is unknown, out of its range, missing, or does not apply to this file.
         MissingExtraError: The package that reads this format is not installed.
     """
     options = {
@@ -131,6 +156,7 @@ LOAD_OPTIONS = tuple(inspect.signature(load_world).parameters)[1:]
 """The names of the options of `load_world`."""
 
 
+@_with_known_options
 def load_octomap(
     path: Path | str, voxel_size_m: float | None = None, *, read_memory_mib: float | None = None
 ) -> World:
@@ -292,10 +318,7 @@ def world_from_file(path: Path | str, voxel_size_m: float, **options: Any) -> Wo
         files = ", ".join(f"*{suffix}" for suffix in FORMATS)
         allowed = f"a recipe ({', '.join(RECIPES)}), a file ({files}) or, to an environment, a World"
         raise SettingError("Scenario.world", str(path), allowed + did_you_mean(str(path), RECIPES))
-    for name, value in options.items():
-        if name not in LOAD_OPTIONS:
-            known = "one of the options " + ", ".join(LOAD_OPTIONS)
-            raise SettingError(name, value, known + did_you_mean(name, LOAD_OPTIONS))
+    _refuse_unknown(options, LOAD_OPTIONS)
     size = {"voxel_size_m": voxel_size_m}
     _check(options)
     _check(size)

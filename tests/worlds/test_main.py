@@ -85,6 +85,18 @@ def test_bad_input_is_one_line(floor, tmp_path, monkeypatch, capsys, words):
     assert sorted(tmp_path.rglob("*")) == before
 
 
+@pytest.mark.parametrize(
+    ("words", "meant"),
+    [
+        (["shw", "office", "--out", "world.png"], "did you mean show?"),
+        (["show", "office", "--out", "world.png", "--split", "tests"], "did you mean test?"),
+    ],
+)
+def test_what_is_nearly_right_is_answered_with_the_right_word(words, meant, capsys):
+    assert run_command(main, words) == 2
+    assert meant in capsys.readouterr().err
+
+
 def test_as_a_process(tmp_path):
     words = [sys.executable, "-m", "entropy_explore_env.worlds", "show", "nowhere.obj", "--out", "w.png"]
     done = subprocess.run(words, capture_output=True, text=True, check=False)
