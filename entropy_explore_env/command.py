@@ -17,10 +17,9 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from entropy_explore_env.errors import EntropyExploreError, SettingError, did_you_mean
+from entropy_explore_env.starting import INTERRUPTED
 
 BAD_INPUT = 2
-INTERRUPTED = 130
-
 
 READ_MEMORY_VARIABLE = "ENTROPY_EXPLORE_READ_MEMORY_MIB"
 """Variable of the environment with the memory limit, in MiB, of reading world files that are given none."""
