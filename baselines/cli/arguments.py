@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
     WholeNumber = int
     INLINE: Any
+    ONCE_WORLD: Any
     _WHOLE: Any
     _PATH: Any
 else:
@@ -50,6 +51,8 @@ else:
         """Of a field: an int that may also be typed as 1e6, as all ints of commands may."""
         INLINE = arg(name="")
         """`Annotated[Options, INLINE]`: the options of a dataclass without the field's name before theirs."""
+        ONCE_WORLD = arg(aliases=("--world",))
+        """`Annotated[str, ONCE_WORLD]`: an option that was `--world`, which is still taken."""
     except ImportError:  # `parse` says what is missing
 
         class Positional:
@@ -59,7 +62,7 @@ else:
                 """The kind itself."""
                 return kind
 
-        OmitArgPrefixes, WholeNumber, INLINE = Positional, int, None
+        OmitArgPrefixes, WholeNumber, INLINE, ONCE_WORLD = Positional, int, None, None
 
 Arguments = TypeVar("Arguments")
 
