@@ -42,7 +42,7 @@ from baselines.scoreboard.chosen import (
     own_tasks,
 )
 from baselines.scoreboard.suites import Suite, find_suite
-from entropy_explore_env.errors import SettingError
+from entropy_explore_env.errors import SettingError, one_of
 from entropy_explore_env.scenarios import SCENARIOS
 from entropy_explore_env.validation import check_whole
 
@@ -157,7 +157,7 @@ def _suite(args: Args, words: Sequence[str]) -> tuple[Suite, list[str]]:
         strategies = chosen_strategies(args.strategies, args.suite)
         return find_suite(args.suite, args.quick, strategies), []
     if args.world_scenario is not None and args.world_scenario not in SCENARIOS:
-        raise SettingError("world_scenario", args.world_scenario, "one of " + ", ".join(SCENARIOS))
+        raise SettingError("world_scenario", args.world_scenario, one_of(args.world_scenario, SCENARIOS))
     strategies = chosen_strategies(args.strategies)
     missions: dict[str, list[Mission]] = {}
     changes: dict[str, list[str]] = {}

@@ -2,23 +2,28 @@
 
 Takes the record that `baselines.run --record FILE` (or `--out`) wrote, gives the environment the same
 commands, compares the state at the end with the record's digest, and draws the mission anew. Exit code 1
-where the end differs: another version of the library, or another machine's arithmetic.
+where the end differs: another version of the library, or another machine's arithmetic. A record holds its
+settings: options of a task, such as `--settings` or `--robots`, are refused.
 """
 
 from __future__ import annotations
 
+import itertools
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 
-from baselines.cli.arguments import OmitArgPrefixes, Positional, parse, run_command
+from baselines.cli.arguments import ONCE_WORLD, OmitArgPrefixes, Positional, parse, run_command
 from baselines.cli.mission_outputs import MissionLog, Outputs, Wanted, show_results
 from baselines.cli.progress import progress_bar
+from baselines.cli.task_options import named_in
 from entropy_explore_env.command import allow_read_memory
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
+from entropy_explore_env.errors import SettingError
 from entropy_explore_env.reports.mission_record import (
     MissionRecord,
     check_world,
@@ -30,6 +35,9 @@ from entropy_explore_env.reports.mission_record import (
 from entropy_explore_env.version import VERSION
 
 _DIFFERS = 1
+_OWN = ("world", "read_memory_mib")
+"""Options that a task has, too, and that change no setting here."""
+_OF_A_MISSION = ("robots", "seed", "strategy", "scenario")
 
 
 @dataclass
@@ -38,7 +46,7 @@ class Args:
 
     record: Positional[Path] = Path("mission.npz")
     """A mission record, mission.npz."""
-    world: str | None = None
+    world_file: Annotated[str | None, ONCE_WORLD] = None
     """Where the world's file lies now, if it was moved."""
     read_memory_mib: float | None = None
     """MiB of memory that reading a world file may take; default: by the file's size."""
@@ -49,11 +57,12 @@ class Args:
 
 def main(words: Sequence[str]) -> int:
     """Run the command."""
+    _refuse_settings(words)
     args = parse(Args, words, description=__doc__)
     allow_read_memory(args.read_memory_mib)
     record = load_record(args.record)
-    if args.world is not None:
-        record = replace(record, scenario=replace(record.scenario, world=args.world), world=None)
+    if args.world_file is not None:
+        record = replace(record, scenario=replace(record.scenario, world=args.world_file), world=None)
     wanted = Wanted(args.output, args.out, recorded=False)
     wanted.prepare()
     title = f"{record.scenario.name}, replayed"
@@ -70,6 +79,17 @@ def main(words: Sequence[str]) -> int:
     if not args.output.json:
         print("replayed bit for bit: the end state is the record's")
     return 0
+
+
+def _refuse_settings(words: Sequence[str]) -> None:
+    """Raise a SettingError for the first option that would set what a record holds."""
+    for word, following in itertools.zip_longest(words, words[1:], fillvalue="--"):
+        option, _, value = word.partition("=")
+        name = option.removeprefix("--").replace("-", "_")
+        if name in _OWN or not (named_in(word) or (option.startswith("--") and name in _OF_A_MISSION)):
+            continue
+        given = value or (None if following.startswith("--") else following)
+        raise SettingError(name, given, "left out: a record holds its settings, and runs again with them")
 
 
 def _replayed(

@@ -1,1 +1,5 @@
 """Speed beside peers, measured in the same run."""
+
+from __future__ import annotations
+
+import entropy_explore_env  # noqa: F401 - first, so that Ctrl-C is answered while the rest is imported

@@ -9,6 +9,9 @@ Importing registers, for every scenario (room → Room-v1), `gymnasium.make`, `g
 
 from __future__ import annotations
 
+from entropy_explore_env import starting  # noqa: F401 - first, since all that follows takes a while
+
+# isort: split
 import gymnasium
 import pettingzoo
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.metadata
 import os
 import platform
 import sys
@@ -13,18 +12,11 @@ from typing import Any
 
 from entropy_explore_env.compilation.announcement import short_path
 from entropy_explore_env.compilation.folder import SUFFIX, kernel_folder
+from entropy_explore_env.requirements import extras, needed, version_of
 from entropy_explore_env.version import VERSION
 
-NEEDED = ("numpy", "numba", "llvmlite", "scipy", "gymnasium", "pettingzoo", "pillow")
-EXTRAS = {
-    "baselines": ("matplotlib", "tyro", "rich", "pebble", "tabulate", "py-cpuinfo"),
-    "worlds": ("octomap-python", "pyyaml", "pypcd4", "trimesh", "tifffile"),
-    "render": ("pygame-ce",),
-    "viewer": ("av", "rerun-sdk"),
-    "training": ("stable-baselines3", "torch", "safetensors", "tensorboard"),
-    "rllib": ("ray",),
-}
-"""Extra → the packages that it brings."""
+_COMPILER = "llvmlite"
+"""What Numba compiles with: of another version than Numba wants, kernels do not compile."""
 
 
 def findings() -> dict[str, Any]:
@@ -36,7 +28,7 @@ def findings() -> dict[str, Any]:
     """
     folder = kernel_folder()
     kernels = _kernels(folder)
-    packages = {name: _installed(name) for name in NEEDED}
+    packages = {name: version_of(name) for name in (*needed(), _COMPILER)}
     problems = [f"{name} is not installed" for name, version in packages.items() if version is None]
     if folder is None:
         problems.append("no folder for compiled kernels: set NUMBA_CACHE_DIR, or every process compiles anew")
@@ -49,7 +41,7 @@ def findings() -> dict[str, Any]:
         "system": platform.platform(),
         "processors": os.cpu_count(),
         "packages": packages,
-        "extras": {extra: {name: _installed(name) for name in names} for extra, names in EXTRAS.items()},
+        "extras": {extra: {name: version_of(name) for name in names} for extra, names in extras().items()},
         "kernels": kernels,
         "problems": problems,
     }
@@ -68,6 +60,8 @@ def report(found: dict[str, Any]) -> str:
         lines.append(f"extra {extra}: {there or 'not installed'}")
         if missing and there:
             lines[-1] += f"; lacks {', '.join(missing)}"
+    if not found["extras"]:
+        lines.append("extras: not known where the library runs from its folder without being installed")
     kernels = found["kernels"]
     if kernels["folder"] is not None:
         lines.append(
@@ -79,13 +73,6 @@ def report(found: dict[str, Any]) -> str:
             lines.append("  none yet: the first step compiles for about 10 s, or `entropy-explore-warm` now")
     lines += [f"problem: {problem}" for problem in found["problems"]] or ["no problem found"]
     return "\n".join(lines)
-
-
-def _installed(name: str) -> str | None:
-    try:
-        return importlib.metadata.version(name)
-    except importlib.metadata.PackageNotFoundError:
-        return None
 
 
 def _named(packages: dict[str, str | None]) -> str:

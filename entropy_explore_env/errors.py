@@ -50,6 +50,12 @@ def did_you_mean(word: object, known: Iterable[str]) -> str:
     return f"; did you mean {alike[0]}?" if alike else ""
 
 
+def one_of(value: object, known: Iterable[str]) -> str:
+    """What is allowed where a value has to be one of some names; ends with the name that is most like it."""
+    names = list(known)
+    return "one of " + ", ".join(names) + did_you_mean(value, names)
+
+
 def counted(number: int, noun: str) -> str:
     """How many there are of something, as in `1 robot` and `3 robots`."""
     return f"{number} {noun}{'s' * (number != 1)}"

@@ -8,7 +8,7 @@ from typing import Literal
 
 import numpy as np
 
-from entropy_explore_env.errors import SettingError
+from entropy_explore_env.errors import SettingError, did_you_mean
 from entropy_explore_env.localization_settings import Localization
 from entropy_explore_env.validation import (
     check,
@@ -164,6 +164,7 @@ class Robot:
         periodic = is_number(self.redecide) and MIN_REDECIDE_S <= self.redecide < math.inf
         if not periodic and not (isinstance(self.redecide, str) and self.redecide in _REDECIDE):
             allowed = f"one of {', '.join(_REDECIDE)}, or a finite number of seconds ≥ {MIN_REDECIDE_S}"
+            allowed += did_you_mean(self.redecide, _REDECIDE)
             raise SettingError("Robot.redecide", self.redecide, allowed)
         check_kind(self, "localization", Localization)
 

@@ -11,7 +11,7 @@ from typing import Any, TypeGuard, get_args
 
 import numpy as np
 
-from entropy_explore_env.errors import SettingError
+from entropy_explore_env.errors import SettingError, one_of
 
 
 def is_number(value: object) -> TypeGuard[float]:
@@ -114,7 +114,7 @@ def check_choice(settings: object, name: str, choices: object) -> None:
     """The field is one of the values of a Literal."""
     value, members = getattr(settings, name), get_args(choices)
     if not isinstance(value, str) or value not in members:
-        raise SettingError(f"{type(settings).__name__}.{name}", value, "one of " + ", ".join(members))
+        raise SettingError(f"{type(settings).__name__}.{name}", value, one_of(value, members))
 
 
 def check_kind(settings: object, name: str, kind: type) -> None:

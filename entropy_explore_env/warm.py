@@ -10,7 +10,6 @@ input, 130 interrupted.
 from __future__ import annotations
 
 import argparse
-import difflib
 import multiprocessing
 import os
 import sys
@@ -25,7 +24,7 @@ from entropy_explore_env.command import LineParser, run_command
 from entropy_explore_env.compilation.announcement import compiled_kernels, short_path
 from entropy_explore_env.compilation.folder import kernel_folder
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
-from entropy_explore_env.errors import SettingError
+from entropy_explore_env.errors import SettingError, one_of
 from entropy_explore_env.scenarios import SCENARIOS
 
 _MAX_PROCESSES = 256
@@ -77,9 +76,7 @@ def _parser() -> argparse.ArgumentParser:
 
 def _check_name(name: str) -> None:
     if name not in SCENARIOS:
-        near = difflib.get_close_matches(name, SCENARIOS, n=1)
-        hint = f"; did you mean {near[0]}?" if near else ""
-        raise SettingError("scenario", name, "one of " + ", ".join(SCENARIOS) + hint)
+        raise SettingError("scenario", name, one_of(name, SCENARIOS))
 
 
 def _writable_folder() -> Path:

@@ -14,6 +14,7 @@ from baselines.cli import arguments as checkout
 from entropy_explore_env import command
 from entropy_explore_env.command import BAD_INPUT, INTERRUPTED, LineParser, UsageError
 from entropy_explore_env.errors import CallOrderError, SettingError, WorldError, counted
+from entropy_explore_env.starting import is_command
 
 
 @pytest.fixture(params=[command.run_command, checkout.run_command], ids=["library", "checkout"])
@@ -108,6 +109,43 @@ def test_the_help_of_a_command_comes_out_on_a_terminal_of_ascii(name):
     done = subprocess.run(words, env=variables, capture_output=True, timeout=120)
     assert done.returncode == 0, done.stderr.decode()
     assert b"--help" in done.stdout and b"Traceback" not in done.stderr
+
+
+def started(module, needed, folder, does):
+    """A command in a process of its own, where a package that it needs does something when it is imported."""
+    (folder / f"{needed}.py").write_text(f"import os, signal\n{does}\n")
+    paths = os.pathsep.join((str(folder), *sys.path))
+    words = [sys.executable, "-m", module, "--help"]
+    return subprocess.run(
+        words, env={**os.environ, "PYTHONPATH": paths}, capture_output=True, text=True, timeout=120
+    )
+
+
+@pytest.mark.parametrize(
+    ("module", "needed"),
+    [
+        ("baselines.run", "tyro"),
+        ("training.ppo", "torch"),
+        ("benchmarks.speed", "gymnasium"),
+        ("entropy_explore_env.worlds", "gymnasium"),
+    ],
+)
+def test_ctrl_c_while_a_command_is_importing_is_one_line(module, needed, tmp_path):
+    done = started(module, needed, tmp_path, "os.kill(os.getpid(), signal.SIGINT)")
+    assert (done.returncode, done.stdout, done.stderr) == (INTERRUPTED, "", "interrupted\n")
+
+
+def test_a_mistake_while_a_command_is_importing_is_shown_in_full(tmp_path):
+    done = started("baselines.run", "tyro", tmp_path, "1 // 0")
+    assert done.returncode == 1 and done.stderr.startswith("Traceback") and "ZeroDivision" in done.stderr
+
+
+def test_who_imports_the_library_gets_no_hook():
+    script = "import sys, baselines; assert sys.excepthook is sys.__excepthook__"
+    done = subprocess.run([sys.executable, "-c", script], cwd=Path(__file__).parents[1], check=False)
+    assert done.returncode == 0
+    assert is_command("/usr/bin/entropy-explore-warm") and is_command("-m")
+    assert not is_command("-c") and not is_command("/home/me/train.py") and not is_command("")
 
 
 def test_whole_numbers_have_exponents_and_paths_begin_at_home(monkeypatch, tmp_path):

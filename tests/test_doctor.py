@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import importlib
+import importlib.metadata
 import json
 import re
+import sys
 from pathlib import Path
 
 import pytest
@@ -56,10 +58,82 @@ def test_a_folder_that_cannot_be_written_is_a_problem(tmp_path, capsys, monkeypa
     assert "doctor" in capsys.readouterr().err
 
 
-def test_what_is_not_installed_is_said(monkeypatch):
-    monkeypatch.setattr(doctor, "EXTRAS", {"one": ("no-such-package",), "two": ("numpy", "no-such-package")})
-    said = doctor.report(doctor.findings())
-    assert "extra one: not installed" in said and re.search(r"extra two: numpy [\d.]+; lacks no-", said)
+def written_extras() -> dict[str, set[str]]:
+    """Extra → the packages of its list in pyproject.toml, without those of other extras."""
+    project = (ROOT / "pyproject.toml").read_text(encoding="utf-8")
+    part = project.split("[project.optional-dependencies]")[1].split("\n[")[0]
+    part = re.sub(r"^ *#.*$", "", part, flags=re.MULTILINE)
+    lists = re.findall(r"^(\w+) = \[(.*?)\]$", part, flags=re.MULTILINE | re.DOTALL)
+    return {
+        extra: {name for name in re.findall(r'"([\w.-]+)', names) if name != "entropy_explore_env"}
+        for extra, names in lists
+    }
+
+
+def test_the_extras_are_those_of_the_project_but_for_its_developers():
+    written, found = written_extras(), doctor.findings()["extras"]
+    assert {*written} - {*found} == {"test", "dev"} and len(found) == 11
+    for extra, packages in found.items():
+        if sys.version_info >= (3, 11) or extra not in ("viewer", "docs"):
+            assert written[extra] <= set(packages), extra
+            assert written[extra] == set(packages) or extra == "rllib"
+    assert {"cluster", "episodes", "docs", "bench", "benchmarl"} <= set(found)
+    assert found["baselines"]["scikit-image"] is not None
+
+
+@pytest.fixture
+def metadata(monkeypatch):
+    """Requirements of made-up distributions; to be filled."""
+    lists: dict[str, list[str]] = {}
+
+    def requires(name):
+        if name not in lists:
+            raise importlib.metadata.PackageNotFoundError(name)
+        return lists[name]
+
+    monkeypatch.setattr(importlib.metadata, "requires", requires)
+    return lists
+
+
+def test_what_is_not_installed_is_said(metadata):
+    metadata["entropy_explore_env"] = [
+        "numpy<3,>=1.26",
+        'no-such-package>=1; extra == "one"',
+        'numpy; extra == "two"',
+        'no-such-package[fast]>=2; python_version >= "3.10" and extra == "two"',
+        'scipy; python_version < "3.10" and extra == "two"',
+        'numpy[all]>=1; extra == "three"',
+        'entropy_explore_env[two]; extra == "three"',
+        'numpy; extra == "test"',
+    ]
+    metadata["numpy"] = ['other-package; extra == "all"', 'third; extra == "docs"', "always-there"]
+    metadata["numpy"].append('for-windows; sys_platform == "win32" and extra == "all"')
+    found = doctor.findings()
+    assert [*found["packages"]] == ["numpy", "llvmlite"] and [*found["extras"]] == ["one", "two", "three"]
+    assert [*found["extras"]["three"]] == ["numpy", "other-package"]
+    said = doctor.report(found)
+    assert "extra one: not installed" in said
+    assert re.search(r"extra two: numpy [\d.]+; lacks no-such-package\n", said)
+    assert re.search(r"extra three: numpy [\d.]+; lacks other-package\n", said)
+
+
+def test_plain_ray_is_no_rllib(metadata, monkeypatch):
+    metadata["entropy_explore_env"] = ['ray[rllib]>=2.60; extra == "rllib"', 'ray>=2.60; extra == "cluster"']
+    metadata["ray"] = ["click", 'no-such-tree; extra == "rllib"', 'other; extra == "tune"']
+    versions = {"ray": "2.60"}
+    monkeypatch.setattr(importlib.metadata, "version", lambda name: versions.get(name) or missing(name))
+
+    def missing(name):
+        raise importlib.metadata.PackageNotFoundError(name)
+
+    lines = doctor.report(doctor.findings()).splitlines()
+    assert "extra rllib: ray 2.60; lacks no-such-tree" in lines and "extra cluster: ray 2.60" in lines
+
+
+def test_a_library_that_is_not_installed_knows_no_extras(metadata):
+    assert metadata == {}
+    found = doctor.findings()
+    assert found["extras"] == {} and "extras: not known" in doctor.report(found)
 
 
 def test_console_scripts_name_functions():

@@ -1,1 +1,5 @@
 """Learning a policy: trainers, networks, checkpoints, and a policy as a strategy."""
+
+from __future__ import annotations
+
+import entropy_explore_env  # noqa: F401 - first, so that Ctrl-C is answered while the rest is imported

@@ -30,7 +30,7 @@ from safetensors import SafetensorError
 from safetensors.torch import load as tensors_of
 from safetensors.torch import save as bytes_of
 
-from entropy_explore_env.errors import EntropyExploreError
+from entropy_explore_env.errors import EntropyExploreError, one_of
 from entropy_explore_env.scenario import Scenario
 from entropy_explore_env.settings_json import scenario_of, settings_of
 from entropy_explore_env.viewpoints.candidate_features import FEATURES_VERSION
@@ -221,7 +221,7 @@ def _settings(folder: Path, head: Mapping[str, Any]) -> PolicySettings:
     """The PolicySettings that a head describes."""
     features, hidden = head.get("features"), head.get("hidden")
     if not isinstance(features, str) or features not in NETWORKS:
-        raise CheckpointError(f"{folder}: features", features, "one of " + ", ".join(NETWORKS))
+        raise CheckpointError(f"{folder}: features", features, one_of(features, NETWORKS))
     if not isinstance(hidden, list) or not all(type(units) is int and 0 < units <= 65536 for units in hidden):
         raise CheckpointError(f"{folder}: hidden", hidden, "a list of whole numbers from 1 to 65536")
     if sum(one * other for one, other in pairwise(hidden)) > _MOST_WEIGHTS:

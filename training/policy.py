@@ -12,7 +12,7 @@ from gymnasium import spaces
 from stable_baselines3.common.policies import ActorCriticPolicy
 from torch.distributions import Categorical, Normal
 
-from entropy_explore_env.errors import SettingError
+from entropy_explore_env.errors import SettingError, one_of
 from entropy_explore_env.missions.action import action_space
 from entropy_explore_env.missions.observation.layout import ObservationLayout
 from entropy_explore_env.missions.view import RobotView
@@ -248,7 +248,7 @@ def policy_folder(name: str) -> Path:
         return Path(name)
     known = sorted(path.name for path in PRETRAINED.glob("*") if path.is_dir())
     if name.removeprefix(PREFIX) not in known:
-        raise SettingError("strategy", name, "one of " + ", ".join(PREFIX + each for each in known))
+        raise SettingError("strategy", name, one_of(name, (PREFIX + each for each in known)))
     return PRETRAINED / name.removeprefix(PREFIX)
 
 

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 from entropy_explore_env import command
-from entropy_explore_env.command import UsageError, home_path, whole_number
+from entropy_explore_env.command import UsageError, home_path, whole_number, with_meant
 from entropy_explore_env.errors import MissingExtraError, SettingError
 
 if TYPE_CHECKING:
@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
     WholeNumber = int
     INLINE: Any
+    ONCE_WORLD: Any
     _WHOLE: Any
     _PATH: Any
 else:
@@ -50,6 +51,8 @@ else:
         """Of a field: an int that may also be typed as 1e6, as all ints of commands may."""
         INLINE = arg(name="")
         """`Annotated[Options, INLINE]`: the options of a dataclass without the field's name before theirs."""
+        ONCE_WORLD = arg(aliases=("--world",))
+        """`Annotated[str, ONCE_WORLD]`: an option that was `--world`, which is still taken."""
     except ImportError:  # `parse` says what is missing
 
         class Positional:
@@ -59,7 +62,7 @@ else:
                 """The kind itself."""
                 return kind
 
-        OmitArgPrefixes, WholeNumber, INLINE = Positional, int, None
+        OmitArgPrefixes, WholeNumber, INLINE, ONCE_WORLD = Positional, int, None, None
 
 Arguments = TypeVar("Arguments")
 
@@ -132,7 +135,7 @@ def _one_line(complaint: str) -> str:
     words = " ".join(_FRAME.sub(" ", complaint).split())
     words = _TITLE.sub("", words)
     words = _HELP.sub("", words).replace(" Perhaps you meant:", "; perhaps you meant")
-    return words.split(" For full helptext")[0] or "the arguments do not fit; see --help"
+    return with_meant(words.split(" For full helptext")[0]) or "the arguments do not fit; see --help"
 
 
 def run_command(main: Callable[[Sequence[str]], int], words: Sequence[str] | None = None) -> int:

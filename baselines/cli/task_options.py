@@ -75,6 +75,18 @@ class TaskOptions:
     """Short for --ending.time-limit-s."""
 
 
+def named_in(word: str) -> str | None:
+    """The option of a task that a word of a command line gives, without the fields of a part; None = none.
+
+    Args:
+        word: Such as `--channel.burst`, `--time-limit-s=60` or `--no-negate`.
+    """
+    names = [each.name for kind in (TaskOptions, Reading) for each in dataclasses.fields(kind)]
+    name = word.removeprefix("--").split("=")[0].split(".")[0].replace("-", "_")
+    known = [each for each in names if each != "world_file" and name in (each, f"no_{each}")]
+    return known[0] if word.startswith("--") and known else None
+
+
 class TaskArguments(Protocol):
     """The arguments of a command that runs missions; a dataclass."""
 

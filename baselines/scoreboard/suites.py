@@ -32,7 +32,7 @@ from baselines.experiments.cells import Cell
 from baselines.experiments.mission import Surroundings, scripted
 from baselines.scoreboard.mission import SETTINGS, SuiteMission
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
-from entropy_explore_env.errors import SettingError
+from entropy_explore_env.errors import SettingError, one_of
 from entropy_explore_env.scenario import Scenario, with_settings
 from entropy_explore_env.scenarios import SCENARIOS
 from entropy_explore_env.settings import Grid
@@ -260,7 +260,7 @@ def suite_strategies(name: str) -> tuple[str, ...]:
 def _check_suite(name: str) -> None:
     """Raise an error if no suite has this name."""
     if name not in SUITES:
-        raise SettingError("suite", name, "one of " + ", ".join(SUITES))
+        raise SettingError("suite", name, one_of(name, SUITES))
 
 
 def find_suite(name: str, quick: bool, strategies: tuple[str, ...]) -> Suite:

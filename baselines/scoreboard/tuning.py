@@ -23,7 +23,7 @@ from baselines.scoreboard.mission import SETTINGS
 from baselines.scoreboard.results import PATH, TIME, Measure, Results
 from baselines.scoreboard.suites import Suite, Task, training_plans, training_volumes
 from baselines.strategies import make_strategy
-from entropy_explore_env.errors import SettingError
+from entropy_explore_env.errors import SettingError, one_of
 from entropy_explore_env.validation import check_whole
 from entropy_explore_env.writing import write_atomically
 
@@ -121,7 +121,7 @@ def find_tuning(suite: str) -> Tuning:
         SettingError: Nothing is.
     """
     if suite not in TUNINGS:
-        raise SettingError("suite", suite, "one of " + ", ".join(TUNINGS))
+        raise SettingError("suite", suite, one_of(suite, TUNINGS))
     return TUNINGS[suite]
 
 
@@ -134,7 +134,7 @@ def variants(tuning: Tuning, strategy: str) -> list[str]:
         SettingError: There is no grid for the strategy.
     """
     if strategy not in tuning.grid:
-        raise SettingError("strategies", strategy, "one of " + ", ".join(tuning.grid))
+        raise SettingError("strategies", strategy, one_of(strategy, tuning.grid))
     config = getattr(make_strategy(strategy), "config", None)
     found = [strategy]
     for name, values in tuning.grid[strategy].items():

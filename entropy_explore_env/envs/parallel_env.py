@@ -15,7 +15,7 @@ from pettingzoo.utils.conversions import parallel_to_aec_wrapper
 from entropy_explore_env.envs.checks import ActionChecker
 from entropy_explore_env.envs.infos import robot_infos
 from entropy_explore_env.envs.rewards import RewardFunction, StepRewards
-from entropy_explore_env.errors import ActionError, CallOrderError, SettingError
+from entropy_explore_env.errors import ActionError, CallOrderError, SettingError, one_of
 from entropy_explore_env.missions.action import action_space
 from entropy_explore_env.missions.observation import layout
 from entropy_explore_env.missions.reset_options import mission_options, named_options
@@ -129,7 +129,7 @@ class EntropyExploreEnv(ParallelEnv[str, Any, Any]):
 
     def _checked(self, agent: str) -> str:
         if not isinstance(agent, str) or agent not in self._action_spaces:
-            raise SettingError("agent", agent, "one of " + ", ".join(self.possible_agents))
+            raise SettingError("agent", agent, one_of(agent, self.possible_agents))
         return agent
 
     def deciding_agents(self) -> list[str]:

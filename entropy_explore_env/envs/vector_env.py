@@ -13,7 +13,7 @@ from gymnasium.vector.utils import batch_space
 from entropy_explore_env.envs.checks import ActionChecker
 from entropy_explore_env.envs.infos import END_FIGURES, end_figures
 from entropy_explore_env.envs.rewards import RewardFunction, StepRewards
-from entropy_explore_env.errors import CallOrderError, SettingError
+from entropy_explore_env.errors import CallOrderError, SettingError, one_of
 from entropy_explore_env.missions.action import action_space
 from entropy_explore_env.missions.faults import failing
 from entropy_explore_env.missions.observation.layout import short_repr
@@ -94,7 +94,7 @@ class EntropyExploreVectorEnv(VectorEnv[Any, Any, Any]):
         try:
             self.autoreset_mode = AutoresetMode(autoreset_mode)
         except Exception:  # whatever was given, compared with the modes
-            allowed = "one of " + ", ".join(mode.value for mode in AutoresetMode)
+            allowed = one_of(autoreset_mode, (mode.value for mode in AutoresetMode))
             raise SettingError("autoreset_mode", autoreset_mode, allowed) from None
         asked, given = with_given_worlds(find_scenario(scenario, settings.get("robots")), settings)
         self._rewards = StepRewards(reward_function)

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from gymnasium import logger
 
-from entropy_explore_env.errors import CallOrderError, SettingError
+from entropy_explore_env.errors import CallOrderError, SettingError, did_you_mean
 from entropy_explore_env.missions.faults import failing
 from entropy_explore_env.missions.localization import pose_errors
 from entropy_explore_env.missions.simulation import Missions
@@ -35,7 +35,8 @@ def offered_modes() -> list[str]:
 def check_render_mode(render_mode: str | None) -> None:
     """Raise a SettingError unless the mode is None or known."""
     if render_mode is not None and (not isinstance(render_mode, str) or render_mode not in RENDER_MODES):
-        raise SettingError("render_mode", render_mode, "None, " + " or ".join(RENDER_MODES))
+        allowed = "None, " + " or ".join(RENDER_MODES) + did_you_mean(render_mode, RENDER_MODES)
+        raise SettingError("render_mode", render_mode, allowed)
 
 
 def entropy_share(missions: Missions, mission: int, robot: int) -> np.ndarray:

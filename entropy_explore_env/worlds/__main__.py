@@ -18,8 +18,9 @@ from pathlib import Path
 from entropy_explore_env.command import LineParser, run_command
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.randomness import Stream, check_seed, generator
-from entropy_explore_env.scenario import with_settings
+from entropy_explore_env.scenario import Scenario, with_settings
 from entropy_explore_env.scenarios import SCENARIOS
+from entropy_explore_env.validation import is_whole
 from entropy_explore_env.worlds.files.jacksboro import NAME as JACKSBORO
 from entropy_explore_env.worlds.load import FORMATS, load_world, make_world, save_world
 from entropy_explore_env.worlds.pictures import picture
@@ -38,6 +39,7 @@ _METRES = {
     "read-memory-mib": "limit of the memory for reading; default: by the file's size",
 }
 """Options of `load_world` that are numbers."""
+_OF_SCENARIOS = ("seed", "split", "world_number")
 
 
 def main(words: Sequence[str]) -> int:
@@ -82,8 +84,11 @@ def _parser() -> argparse.ArgumentParser:
         command.add_argument(
             "--hollow", action="store_true", help="meshes: do not fill the space that they enclose"
         )
-        command.add_argument("--seed", type=int, default=0, help="scenarios: of the mission in this world")
-        command.add_argument("--split", default="train", help="scenarios: train, validation or test")
+        command.add_argument("--seed", type=int, help="scenarios: of the mission in this world; default: 0")
+        command.add_argument(
+            "--world-number", type=int, help="scenarios: as of make_world, instead of --seed and --split"
+        )
+        command.add_argument("--split", help="scenarios: train, validation or test; default: train")
     return parser
 
 
@@ -113,12 +118,31 @@ def _world(args: argparse.Namespace) -> World:
     if args.negate:
         given["negate"] = True
     if args.source not in SCENARIOS:
+        _refuse(args, _OF_SCENARIOS, "not given for a file")
         return load_world(args.source, **given)
     for name, value in given.items():
         if value is not None:
             raise SettingError(name, value, "not given for a scenario")
-    scenario = with_settings(SCENARIOS[args.source], {"split": args.split})
-    return make_world(scenario, generator(check_seed(args.seed), 0, Stream.WORLD))
+    return _world_of_scenario(SCENARIOS[args.source], args)
+
+
+def _world_of_scenario(scenario: Scenario, args: argparse.Namespace) -> World:
+    """The world with a number, or that of a mission with a seed."""
+    if args.world_number is None:
+        scenario = with_settings(scenario, {"split": args.split or "train"})
+        return make_world(scenario, generator(check_seed(args.seed or 0), 0, Stream.WORLD))
+    _refuse(args, ("seed", "split"), "left out together with --world-number, which names the world")
+    if not is_whole(args.world_number, 0):
+        raise SettingError("world_number", args.world_number, "a whole number ≥ 0")
+    return make_world(scenario, args.world_number)
+
+
+def _refuse(args: argparse.Namespace, names: Sequence[str], allowed: str) -> None:
+    """Raise a SettingError for the first of some options that is given."""
+    for name in names:
+        value = getattr(args, name)
+        if value is not None:
+            raise SettingError(name, value, allowed)
 
 
 def _about(world: World) -> str:

@@ -5,9 +5,10 @@ from __future__ import annotations
 import dataclasses
 import inspect
 import math
-from functools import lru_cache
+from collections.abc import Callable, Mapping, Sequence
+from functools import lru_cache, wraps
 from pathlib import Path
-from typing import Any
+from typing import Any, ParamSpec
 
 import numpy as np
 
@@ -59,6 +60,30 @@ FORMATS = {
 """Suffix in lower case → how the file is read."""
 
 
+_Given = ParamSpec("_Given")
+
+
+def _with_known_options(load: Callable[_Given, World]) -> Callable[_Given, World]:
+    """A function that loads worlds, whose options that are unknown are refused by name."""
+    known = tuple(inspect.signature(load).parameters)
+
+    @wraps(load)
+    def checked(*args: _Given.args, **options: _Given.kwargs) -> World:
+        _refuse_unknown(options, known)
+        return load(*args, **options)
+
+    return checked
+
+
+def _refuse_unknown(options: Mapping[str, object], known: Sequence[str]) -> None:
+    """Raise a SettingError for the first option that is not known."""
+    for name, value in options.items():
+        if name not in known:
+            allowed = "one of the options " + ", ".join(known) + did_you_mean(name, known)
+            raise SettingError(name, value, allowed)
+
+
+@_with_known_options
 def load_world(
     path: Path | str,
     voxel_size_m: float | None = None,
@@ -94,13 +119,15 @@ def load_world(
             meshes: free space around them (None = none).
         ceiling_m: Height maps: the exposure surface above the ground (World.ceiling); None = none.
         fill: Meshes: whether the space that the surface encloses is solid; None = yes.
-        read_limit_s: Limit of the processor time for reading; None = 1.5 s, and 20 s for each MiB.
+        read_limit_s: Limit of the processor time for reading; None = 1.5 s, and 20 s for each MiB. On Windows
+            reading ends after ten times as much elapsed time and a minute.
         read_memory_mib: Limit of the memory of the process that reads; None = 448 MiB, and 16 for each MiB
-            of the file, of OctoMaps 512, up to 4096 in all. Voxels are only made at the wanted size.
+            of the file, of OctoMaps 512, up to 4096 in all. Voxels are only made at the wanted size. It holds
+            where the system has /proc, as Linux does; on macOS and Windows memory is not limited.
 
     Raises:
         WorldError: The file is missing, too large, broken, of no known kind or has no free space.
-        SettingError: A setting is out of its range, missing, or does not apply to this file.
+        SettingError: A setting is unknown, out of its range, missing, or does not apply to this file.
         MissingExtraError: The package that reads this format is not installed.
     """
     options = {
@@ -129,6 +156,7 @@ LOAD_OPTIONS = tuple(inspect.signature(load_world).parameters)[1:]
 """The names of the options of `load_world`."""
 
 
+@_with_known_options
 def load_octomap(
     path: Path | str, voxel_size_m: float | None = None, *, read_memory_mib: float | None = None
 ) -> World:
@@ -290,10 +318,7 @@ def world_from_file(path: Path | str, voxel_size_m: float, **options: Any) -> Wo
         files = ", ".join(f"*{suffix}" for suffix in FORMATS)
         allowed = f"a recipe ({', '.join(RECIPES)}), a file ({files}) or, to an environment, a World"
         raise SettingError("Scenario.world", str(path), allowed + did_you_mean(str(path), RECIPES))
-    for name, value in options.items():
-        if name not in LOAD_OPTIONS:
-            known = "one of the options " + ", ".join(LOAD_OPTIONS)
-            raise SettingError(name, value, known + did_you_mean(name, LOAD_OPTIONS))
+    _refuse_unknown(options, LOAD_OPTIONS)
     size = {"voxel_size_m": voxel_size_m}
     _check(options)
     _check(size)

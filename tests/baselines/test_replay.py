@@ -125,11 +125,32 @@ def test_a_world_file_that_changed_is_refused_and_one_that_moved_is_found(comman
     forget_worlds()
     gone = command(replay.main, path)
     assert gone.code == 2 and "room.npz" in gone.err
-    assert command(replay.main, path, "--world", moved, "--json").code == 0
+    for option in ("--world-file", "--world"):  # what it was called
+        assert command(replay.main, path, option, moved, "--json").code == 0
     save_world(started(free_box(world="furnished"), seed=2).worlds[0], moved)
     forget_worlds()
-    other = command(replay.main, path, "--world", moved)
+    other = command(replay.main, path, "--world-file", moved)
     assert other.code == 2 and "moved.npz" in other.err and other.out == ""
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--settings", "x.json"], "settings = 'x.json'"),
+        (["--robots", "3"], "robots = '3'"),
+        (["--robots=3", "--json"], "robots = '3'"),
+        (["--seed", "1"], "seed = '1'"),
+        (["--channel.burst", "3"], "channel.burst = '3'"),
+        (["--world-number", "3"], "world_number = '3'"),
+        (["--negate"], "negate = None"),
+        (["--no-hollow", "--json"], "no_hollow = None"),
+        (["--height-m=2.5"], "height_m = '2.5'"),
+    ],
+)
+def test_what_a_record_holds_is_refused_by_name(words, said, command, tmp_path):
+    ran = command(replay.main, tmp_path / "r.npz", *words)
+    assert (ran.code, ran.out) == (2, "")
+    assert ran.err.startswith(f"error: {said}: allowed is left out: a record holds its settings")
 
 
 def forget_worlds() -> None:

@@ -130,12 +130,20 @@ def test_values_that_cannot_be_shown_are_refused_all_the_same() -> None:
         ({"channel": {"brust": 3}}, "burst"),
         ({"world": "furnishd"}, "furnished"),
         ({"world": {"path": "x.npz", "hight_m": 3.0}}, "height_m"),
+        ({"split": "tests"}, "test"),
+        ({"robot": {"motion": "planr"}}, "planar"),
+        ({"robot": {"redecide": "on_scans"}}, "on_scan"),
+        ({"action": {"kind": "discret"}}, "discrete"),
+        ({"render_mode": "rgb_aray"}, "rgb_array"),
         ({"scenario": "xyz"}, None),
+        ({"split": "xyz"}, None),
+        ({"split": 3}, None),
+        ({"render_mode": "xyz"}, None),
         ({"xyz": 3}, None),
         ({"scenario": ["ofice"]}, None),
     ],
 )
-def test_names_that_are_nearly_right_are_answered_with_the_right_one(asked: Any, meant: str | None) -> None:
+def test_words_that_are_nearly_right_are_answered_with_the_right_one(asked: Any, meant: str | None) -> None:
     with pytest.raises(SettingError) as caught:
         parallel_env(**{"scenario": BOX, **asked})
     assert str(caught.value).endswith(f"; did you mean {meant}?") == (meant is not None)

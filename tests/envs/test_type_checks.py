@@ -17,13 +17,14 @@ from entropy_explore_env.envs.keywords import ScenarioSettings
 
 ROOT = Path(__file__).parents[2]
 GOOD = """
-from entropy_explore_env import EntropyExploreVectorEnv, SingleRobotEnv, env, parallel_env
+from entropy_explore_env import EntropyExploreVectorEnv, SingleRobotEnv, env, load_world, parallel_env
 from entropy_explore_env.channel_settings import Channel
 
 team = parallel_env("room", robots=3, channel={"burst": 32}, max_cycles=None, decision_period_s=None)
 turns = env("office", track_truth=True, world="map.png")
 batch = EntropyExploreVectorEnv("room", 4, channel=Channel(burst=8), time_limit_s=60.0)
 alone = SingleRobotEnv("room", split="test")
+world = load_world("map.png", 0.1, height_m=2.5)
 more = {"robots": 2, "reward": {"kind": "team"}}
 """
 BAD = (
@@ -32,6 +33,7 @@ BAD = (
     'EntropyExploreVectorEnv("room", 4, robots="3")',
     'SingleRobotEnv("room", split="tests")',
     'parallel_env("room", decision_period_s="1")',
+    'load_world("map.png", heigth_m=2.5)',
 )
 
 

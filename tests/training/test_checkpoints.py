@@ -227,6 +227,8 @@ def test_a_policy_of_one_grid_is_named_where_maps_differ(tmp_path):
 def test_an_unknown_policy_is_named():
     with pytest.raises(SettingError, match="pretrained:cellar"):
         make_strategy("pretrained:cellar")
+    with pytest.raises(SettingError, match=r"did you mean pretrained:plans\?$"):
+        make_strategy("pretrained:plan")
     with pytest.raises(SettingError, match="policy's folder"):
         make_strategy("runs/nowhere")
 

@@ -12,7 +12,7 @@ from benchmarks.reliability.world_samples import heights, npz, pgm, plan
 from entropy_explore_env.command import run_command
 from entropy_explore_env.scenarios import SCENARIOS
 from entropy_explore_env.worlds.__main__ import main
-from entropy_explore_env.worlds.load import FORMATS, load_world
+from entropy_explore_env.worlds.load import FORMATS, load_world, make_world
 
 
 @pytest.fixture
@@ -45,6 +45,35 @@ def test_show_writes_a_picture(floor, capsys, source):
     said = capsys.readouterr()
     assert said.out.startswith(f"{out}: ") and "voxels of" in said.out and said.err == ""
     assert out.read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_world_of_a_number_is_that_of_make_world(tmp_path, capsys):
+    for words in ([], ["--seed", "3"], ["--world-number", "3"]):
+        assert run_command(main, ["convert", "office", str(tmp_path / "office.npz"), *words]) == 0
+        found = load_world(tmp_path / "office.npz").occupied
+        is_third = np.array_equal(found, make_world("office", 3).occupied)
+        assert is_third == (words[:1] == ["--world-number"])
+    assert run_command(main, ["show", "office", "--world-number", "3", "--out", str(tmp_path / "o.png")]) == 0
+    assert capsys.readouterr().err == ""
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["office", "--world-number", "3", "--seed", "1"], "seed = 1: allowed is left out together with"),
+        (["office", "--world-number", "3", "--seed", "0"], "seed = 0: allowed is left out together with"),
+        (
+            ["office", "--world-number", "3", "--split", "test"],
+            "split = 'test': allowed is left out together with",
+        ),
+        (["office", "--world-number", "-3"], "world_number = -3: allowed is a whole number"),
+        (["FLOOR", "--world-number", "3"], "world_number = 3: allowed is not given for a file"),
+    ],
+)
+def test_a_seed_and_a_number_exclude_each_other(floor, words, said, capsys):
+    words = ["show", *(word.replace("FLOOR", str(floor)) for word in words)]
+    assert run_command(main, [*words, "--out", str(floor.parent / "world.png")]) == 2
+    assert capsys.readouterr().err.startswith(f"error: {said}")
 
 
 def test_convert_keeps_the_world(tmp_path, capsys):
@@ -83,6 +112,18 @@ def test_bad_input_is_one_line(floor, tmp_path, monkeypatch, capsys, words):
     said = capsys.readouterr()
     assert said.out == "" and said.err.startswith("error: ") and said.err.count("\n") == 1
     assert sorted(tmp_path.rglob("*")) == before
+
+
+@pytest.mark.parametrize(
+    ("words", "meant"),
+    [
+        (["shw", "office", "--out", "world.png"], "did you mean show?"),
+        (["show", "office", "--out", "world.png", "--split", "tests"], "did you mean test?"),
+    ],
+)
+def test_what_is_nearly_right_is_answered_with_the_right_word(words, meant, capsys):
+    assert run_command(main, words) == 2
+    assert meant in capsys.readouterr().err
 
 
 def test_as_a_process(tmp_path):

@@ -39,6 +39,11 @@ _HALVINGS_AT_ONCE = 8
 _POINTS_AT_ONCE = 1 << 18
 """Corners of small triangles that are made at once: memory follows the result, not the area."""
 
+_HOLLOW = (
+    "a map with free space at this voxel size: this mesh encloses all of it "
+    "(hollow keeps it free: fill=False, --hollow; clearance_m adds free space around)"
+)
+
 
 def read(path: Path, options: Options) -> Voxels:
     """The voxels of all meshes of a file, or of a PLY's points."""
@@ -72,7 +77,10 @@ def _voxels(mesh: Any, y_is_up: bool, options: Options) -> Voxels:  # noqa: ANN4
         vertices = np.column_stack((vertices[:, 0], -vertices[:, 2], vertices[:, 1]))
     solid, low = _surface(vertices - 0.5 * voxel_m, faces, voxel_m)
     if fill is not False:
-        solid = np.asarray(ndimage.binary_fill_holes(solid), np.bool_)
+        filled = np.asarray(ndimage.binary_fill_holes(solid), np.bool_)
+        if margin == 0 and filled.all() and not solid.all():
+            raise RefusedError(_HOLLOW)
+        solid = filled
     labels = np.full([n + 2 * margin for n in solid.shape], FREE, np.int8)
     inside = tuple(slice(margin, margin + n) for n in solid.shape)
     labels[inside][solid] = SOLID

@@ -2,7 +2,8 @@
 
 Most readers are third-party packages, which a hostile file may crash, keep busy or make use too much memory.
 The process (`worker`) reads one file after another and is restarted when it has died; each file has limits of
-processor time and memory. Usually the process reads one file; `kept_reader` keeps it for many.
+processor time and memory. Usually the process reads one file; `kept_reader` keeps it for many. Windows has no
+such limits: there elapsed time alone ends a process, and memory is not limited.
 """
 
 from __future__ import annotations
@@ -96,7 +97,7 @@ class ReaderProcess:
 
     Attributes:
         cost: Of the latest answer, or None if the process died: `cpu_s`, processor time since its
-            start, and `peak_kib`, its peak memory.
+            start, and `peak_kib`, its peak memory, NaN where the system does not tell it.
     """
 
     def __init__(self) -> None:
@@ -131,7 +132,13 @@ class ReaderProcess:
             "memory_bytes": _memory_bytes(limits, form, size),
         }
         process = self._running()
-        timer = threading.Timer(_START_S + _PATIENCE * allowed_s, process.kill)
+        ended = threading.Event()
+
+        def end() -> None:
+            ended.set()  # Windows has no signals, so that its exit code tells nothing
+            process.kill()
+
+        timer = threading.Timer(_START_S + _PATIENCE * allowed_s, end)
         timer.start()
         try:
             answer = _ask(process, request)
@@ -141,7 +148,7 @@ class ReaderProcess:
         finally:
             timer.cancel()
         if answer is None:
-            raise WorldError("world file", str(path), self._cause_of_death(form, allowed_s, request))
+            raise WorldError("world file", str(path), self._cause_of_death(form, request, ended.is_set()))
         header, arrays = answer
         self.cost = {"cpu_s": header["cpu_s"], "peak_kib": header["peak_kib"]}
         _raise_error(header, form, path)
@@ -175,15 +182,22 @@ class ReaderProcess:
             )
         return self._process
 
-    def _cause_of_death(self, form: Format, allowed_s: float, request: Mapping[str, Any]) -> str:
-        """What is allowed, in the terms of an error: a file that does not end the process."""
+    def _cause_of_death(self, form: Format, request: Mapping[str, Any], ended: bool) -> str:
+        """What is allowed, in the terms of an error: a file that does not end the process.
+
+        Args:
+            form: The file's format.
+            request: What was asked.
+            ended: Whether we ended the process because it took too long.
+        """
         assert self._process is not None
         code = self._process.wait()
         self.close()
         self.cost = None
         slow = code in (-getattr(signal, "SIGPROF", 27), -getattr(signal, "SIGKILL", 9))
-        if slow:
-            return f"a file that is read within {allowed_s:.3g} s of computing (read_limit_s allows more)"
+        if ended or slow:
+            within = f"read within {request['cpu_s']:.3g} s of computing"
+            return f"a file that is {within} (read_limit_s allows more)"
         if code == -signal.SIGABRT:  # libraries in C++ end so where there is no more memory
             return f"a whole {form.kind} that is {memory_allowed(request['memory_bytes'])}"
         return f"a whole {form.kind}"

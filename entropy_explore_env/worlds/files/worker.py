@@ -4,7 +4,8 @@ A request is a line of JSON: reader, path, options, `cpu_s` and `memory_bytes`. 
 with the numbers of a Voxels, or with the error to raise, and after it the bytes of its arrays. A reader that
 needs more time is ended by the system's timer, one that needs more memory by its limit. A broken file can
 break only this process, which cannot write files. To start fast it does not import the package's own
-`__init__` (see `process`).
+`__init__` (see `process`). Windows has neither limits nor timer: there a process ends only by its parent's
+clock, its memory is not limited, and it could write files.
 """
 
 from __future__ import annotations
@@ -13,9 +14,9 @@ import importlib
 import json
 import math
 import os
-import resource
 import signal
 import sys
+import time
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -23,6 +24,11 @@ import numpy as np
 
 from entropy_explore_env.errors import MissingExtraError, SettingError
 from entropy_explore_env.worlds.files.voxels import Options, RefusedError, Voxels, memory_allowed
+
+try:
+    import resource
+except ImportError:  # Windows
+    resource = None
 
 _READERS = "entropy_explore_env.worlds.files."
 
@@ -32,8 +38,9 @@ def serve() -> None:
     answers = os.fdopen(os.dup(1), "wb")
     nowhere = os.open(os.devnull, os.O_WRONLY)
     os.dup2(nowhere, 1)
-    for limit in (resource.RLIMIT_FSIZE, resource.RLIMIT_CORE):
-        resource.setrlimit(limit, (0, resource.getrlimit(limit)[1]))
+    if resource is not None:
+        for limit in (resource.RLIMIT_FSIZE, resource.RLIMIT_CORE):
+            resource.setrlimit(limit, (0, resource.getrlimit(limit)[1]))
     for line in sys.stdin.buffer:
         _send(answers, *_answer(json.loads(line)))
 
@@ -78,7 +85,7 @@ def _import(module: str, package: str) -> None:
 def _read(reader: Any, request: dict[str, Any]) -> Voxels:  # noqa: ANN401 - a module
     options = Options(request["options"])
     _limit_memory(request["memory_bytes"])
-    signal.setitimer(signal.ITIMER_PROF, request["cpu_s"])  # its signal ends the process
+    _limit_time(request["cpu_s"])
     try:
         voxels = reader.read(Path(request["path"]), options)
         options.refuse_unused(request["kind"])
@@ -87,11 +94,19 @@ def _read(reader: Any, request: dict[str, Any]) -> Voxels:  # noqa: ANN401 - a m
             raise RefusedError("a map whose place and size are finite")
         return voxels
     finally:
-        signal.setitimer(signal.ITIMER_PROF, 0.0)
+        _limit_time(0.0)
+
+
+def _limit_time(cpu_s: float) -> None:
+    """Let this process end after so much processor time, where the system has a timer for it; 0 = never."""
+    if hasattr(signal, "setitimer"):
+        signal.setitimer(signal.ITIMER_PROF, cpu_s)  # its signal ends the process
 
 
 def _limit_memory(most_bytes: int) -> None:
-    """Limit the memory of this process, where the system tells how much it uses."""
+    """Limit the memory of this process, where the system has limits and tells how much it uses."""
+    if resource is None:
+        return
     try:
         mapped, resident = (int(pages) for pages in Path("/proc/self/statm").read_text().split()[:2])
     except OSError:
@@ -101,19 +116,21 @@ def _limit_memory(most_bytes: int) -> None:
     resource.setrlimit(resource.RLIMIT_AS, (most, resource.getrlimit(resource.RLIMIT_AS)[1]))
 
 
-def _peak_kib() -> int:
-    """Peak memory of this process; `ru_maxrss` would include that of the process which started it."""
+def _peak_kib() -> float:
+    """Peak memory of this process, NaN where the system does not tell it.
+
+    `ru_maxrss` would include that of the process which started it.
+    """
     try:
         status = Path("/proc/self/status").read_text()
     except OSError:  # not every system has it
-        return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+        return math.nan if resource is None else resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     return int(status.split("VmHWM:")[1].split()[0])
 
 
 def _send(answers: BinaryIO, header: dict[str, Any], arrays: list[np.ndarray]) -> None:
     """Write an answer, with the processor time and memory used so far."""
-    usage = resource.getrusage(resource.RUSAGE_SELF)
-    header |= {"cpu_s": usage.ru_utime + usage.ru_stime, "peak_kib": _peak_kib()}
+    header |= {"cpu_s": time.process_time(), "peak_kib": _peak_kib()}
     answers.write(json.dumps(header).encode() + b"\n")
     for array in arrays:
         answers.write(np.ascontiguousarray(array).data)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
 
 import pytest
 
@@ -48,6 +49,21 @@ def test_words_that_do_not_fit_are_named_in_one_line_and_print_nothing(words, sa
     assert not set(str(error.value)) & set("│╭╮╰╯─")
     assert "helptext" not in str(error.value) and "---" not in str(error.value)
     assert capsys.readouterr() == ("", "")
+
+
+@dataclass
+class Choices:
+    """Choose."""
+
+    split: Literal["train", "validation", "test"] = "train"
+    """Of which worlds."""
+
+
+@pytest.mark.parametrize(("word", "meant"), [("tests", "; did you mean test?"), ("xyz", ")")])
+def test_a_choice_that_is_nearly_right_is_answered_with_the_right_one(word, meant):
+    with pytest.raises(UsageError, match=r"--split.*'train', 'validation', 'test'") as error:
+        parse(Choices, ["--split", word])
+    assert str(error.value).endswith(meant)
 
 
 @dataclass

@@ -55,8 +55,12 @@ def test_long_thin_triangles_are_cut_small_enough(tmp_path, kind, voxel_m):
 
 def test_a_hollow_box_keeps_its_inside(tmp_path):
     path = write(tmp_path, "stl", [((0, 0, 0), (3.5, 5.5, 2.5))])
-    with pytest.raises(WorldError, match="free space"):
+    with pytest.raises(
+        WorldError, match=r"free space .* encloses all of it \(.*fill=False, --hollow; clearance_m"
+    ):
         load_world(path, 0.5)
+    with pytest.raises(WorldError, match=r"a map with free space at this voxel size$"):
+        load_world(write(tmp_path, "obj", [((0, 0, 0), (0.5, 1.0, 0.5))]), 0.5)  # nothing is enclosed
     world = load_world(path, 0.5, fill=False)
     assert world.grid.shape == (7, 11, 5)
     assert not world.occupied[1:-1, 1:-1, 1:-1].any()
@@ -157,5 +161,5 @@ def test_faces_that_are_there_twice_are_drawn_once(monkeypatch):
     box = trimesh.creation.box((3.0, 2.0, 1.0))
     for faces in (box.faces, np.concatenate([box.faces, box.faces[::-1], np.roll(box.faces, 1, axis=1)])):
         mesh = trimesh.Trimesh(box.vertices, faces, process=False)
-        meshes._voxels(mesh, False, Options({"voxel_size_m": 0.25}))
+        meshes._voxels(mesh, False, Options({"voxel_size_m": 0.25, "fill": False}))
     assert drawn == [12, 12]

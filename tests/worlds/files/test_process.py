@@ -2,20 +2,31 @@
 
 from __future__ import annotations
 
+import math
 import os
 import signal
+import subprocess
 import time
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from benchmarks.reliability.world_samples import mesh, pgm, plan
+from benchmarks.reliability.world_samples import mesh, octomap_bytes, pgm, plan, png, saved_world
 from entropy_explore_env.errors import WorldError
 from entropy_explore_env.worlds.files import process
-from entropy_explore_env.worlds.files.process import Format, ReaderProcess, kept_reader
+from entropy_explore_env.worlds.files.process import Format, Limits, ReaderProcess, kept_reader
 from entropy_explore_env.worlds.load import load_world
 
+WINDOWS = """
+import signal, sys, time, types
+sys.modules["resource"] = None
+del signal.setitimer
+slow = types.ModuleType("entropy_explore_env.worlds.files.slow")
+slow.NEEDS, slow.read = (), lambda path, options: time.sleep(60.0)
+sys.modules[slow.__name__] = slow
+"""
+"""What a reading process begins with to lack what Windows lacks; and a reader that takes a minute."""
 IMAGE = Format("images", "PNG or PGM image")
 
 
@@ -93,3 +104,40 @@ def test_a_process_can_write_no_file_and_imports_little(picture):
         maps, limits = (about / "maps").read_text(), (about / "limits").read_text()
     assert "llvmlite" not in maps and "numpy" in maps
     assert [line.split()[3] for line in limits.splitlines() if line.startswith("Max file size")] == ["0"]
+
+
+@pytest.fixture
+def as_on_windows(monkeypatch):
+    """A reading process without limits and timer; that it was killed cannot be told by its exit code."""
+    monkeypatch.setattr(process, "_BOOT", WINDOWS + process._BOOT)
+    monkeypatch.setattr(subprocess.Popen, "kill", subprocess.Popen.terminate)
+    with kept_reader() as reader:
+        yield reader
+
+
+@pytest.mark.parametrize(
+    ("name", "data", "shape"),
+    [
+        ("plan.png", lambda: png(plan()), (11, 7, 1)),
+        ("world.npz", saved_world, (7, 11, 5)),
+        ("tree.bt", lambda: octomap_bytes(".bt"), None),
+    ],
+)
+def test_files_are_read_where_the_system_has_no_limits(tmp_path, as_on_windows, name, data, shape):
+    path = tmp_path / name
+    path.write_bytes(data())
+    world = load_world(path, read_memory_mib=1000.0)
+    assert shape is None or world.grid.shape == shape
+    cost = as_on_windows.cost
+    assert cost["cpu_s"] > 0.0 and (cost["peak_kib"] > 1000 or math.isnan(cost["peak_kib"]))
+    with kept_reader():
+        np.testing.assert_array_equal(load_world(path).occupied, world.occupied)
+
+
+def test_what_takes_too_long_is_ended_where_the_system_has_no_limits(picture, as_on_windows, monkeypatch):
+    with monkeypatch.context() as soon:
+        soon.setattr(process, "_START_S", 1.0)
+        with pytest.raises(WorldError, match=r"read within 0\.05 s of computing \(read_limit_s allows more"):
+            as_on_windows.read(Format("slow", "slow file"), picture, {}, Limits(cpu_s=0.05))
+    assert as_on_windows.cost is None
+    assert load_world(picture).grid.shape == (11, 7, 1)
