@@ -4,6 +4,7 @@ import re
 import runpy
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from tests.code_blocks import shown_files
@@ -25,14 +26,20 @@ def test_torchrl_rolls_out(capsys):
     assert re.search(r"Size\(\[100, 3, 144\]\) torch.Size\(\[100, 3, 1\]\) tensor\((\d+)\)", said), said
 
 
-def test_a_loop_in_cleanrl_s_form_stores_choices(capsys):
-    pytest.importorskip("torch", reason="torch is not installed")
-    stored = runpy.run_path(str(EXAMPLES / "cleanrl_loop.py"))["rollout"]
-    assert len(stored) == 64 and "choices to learn from" in capsys.readouterr().out
-    chosen = sum(int(one[2].sum()) for one in stored)
-    assert 0 < chosen < 64 * 4 * 3  # robots are busy most of the time
-    masked = [one[1] for one in stored]
-    assert masked[0].shape == (4, 3)
+def test_a_loop_in_cleanrl_s_form_learns_from_choices(capsys):
+    torch = pytest.importorskip("torch", reason="torch is not installed")
+    ran = runpy.run_path(str(EXAMPLES / "cleanrl_loop.py"))
+    lines = capsys.readouterr().out.splitlines()
+    updates, most = ran["UPDATES"], ran["MISSIONS"] * ran["ROBOTS"] * ran["LIMIT_S"]
+    assert [line.split(":")[0] for line in lines] == [f"update {number}" for number in range(updates)]
+    counts = [int(line.split()[2]) for line in lines]
+    assert all(0 < count < most // 2 for count in counts)  # robots are busy most of the time
+    assert len(ran["returns"]) == updates and np.isfinite(ran["returns"]).all()
+    assert max(ran["returns"]) > 0.0  # bits were gained
+    assert torch.isfinite(ran["loss"]) and all(one["mask"][one["action"]] for one in ran["learned"])
+    moved = [ran["optimiser"].state[weight]["exp_avg"].abs().max() for weight in ran["weights"]]
+    assert all(0.0 < float(each) < 1e3 for each in moved)
+    assert float(ran["optimiser"].state[ran["weights"][0]]["step"]) == updates * ran["EPOCHS"]
 
 
 @pytest.mark.filterwarnings("ignore")  # TorchRL's
