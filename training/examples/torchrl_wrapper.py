@@ -1,9 +1,20 @@
-"""A team in TorchRL: `PettingZooWrapper` takes infos that are numbers, and a mask of actions among them."""
+"""PPO for a team in TorchRL: `PettingZooWrapper` takes infos that are numbers, and a mask of actions."""
 
+from typing import Any
+
+import torch
 from pettingzoo.utils import BaseParallelWrapper
+from tensordict import TensorDict
+from tensordict.nn import TensorDictModule
+from torch import nn
 from torchrl.envs import PettingZooWrapper
+from torchrl.modules import MaskedCategorical, ProbabilisticActor, ValueOperator
+from torchrl.objectives import ClipPPOLoss
+from torchrl.objectives.value.functional import generalized_advantage_estimate
 
 import entropy_explore_env as eee
+
+UPDATES, MISSIONS, EPOCHS, GAMMA, LAMBDA = 3, 4, 6, 0.99, 0.95
 
 
 class NumbersOnly(BaseParallelWrapper):
@@ -18,9 +29,60 @@ class NumbersOnly(BaseParallelWrapper):
         return *results, {a: {k: infos[a][k] for k in ("deciding", "action_mask")} for a in infos}
 
 
-team = eee.parallel_env("room", robots=3, observation={"flat": True}, action={"kind": "discrete"})
+torch.manual_seed(0)
+discrete = {"kind": "discrete", "moves": "axes"}
+team = eee.parallel_env("room", robots=3, observation={"flat": True}, action=discrete, time_limit_s=30.0)
 env = PettingZooWrapper(NumbersOnly(team), seed=0)
-rollout = env.rollout(100)  # random actions among those that make sense; a policy goes here
-# Learn from these actions, (100, 3), only; rewards of a robot's other rows belong to its last one of these.
-chosen = rollout["robot", "info", "deciding"] > 0
-print(rollout["robot", "observation"].shape, rollout["next", "robot", "reward"].shape, chosen.sum())
+numbers = env.observation_spec["robot", "observation"].shape[-1]
+actions = env.observation_spec["robot", "action_mask"].shape[-1]
+scores = nn.Sequential(nn.Linear(numbers, 64), nn.Tanh(), nn.Linear(64, actions))
+inputs: Any = {"logits": "logits", "mask": "action_mask"}
+actor = ProbabilisticActor(  # one policy for all robots
+    TensorDictModule(scores, ["observation"], ["logits"]),
+    in_keys=inputs,
+    distribution_class=MaskedCategorical,
+    return_log_prob=True,
+)
+critic = ValueOperator(nn.Sequential(nn.Linear(numbers, 64), nn.Tanh(), nn.Linear(64, 1)), ["observation"])
+loss_module = ClipPPOLoss(actor, critic, entropy_coeff=0.001)
+optimiser = torch.optim.Adam(loss_module.parameters(), 3e-3)
+
+
+def choose(step: TensorDict) -> TensorDict:
+    """The team's actions: what the wrapper holds of the robots is a batch of its own."""
+    return step.set("robot", actor(step["robot"]))
+
+
+def choices_of(rollout: TensorDict) -> list[TensorDict]:
+    """What each robot chose, with advantages from choice to choice: a robot that drives cannot choose."""
+    found = []
+    for robot in range(rollout["robot"].shape[1]):
+        rows: Any = rollout["robot"][:, robot]
+        rewards = rollout["next", "robot", "reward"][:, robot, 0]
+        chosen = rows["info", "deciding"] > 0
+        latest = chosen.cumsum(0) - 1  # rewards of a robot's other rows belong to its latest choice
+        made = rows[chosen].clone()
+        earned = torch.zeros(len(made)).index_add(0, latest, rewards)[:, None]
+        values = critic(made)["state_value"].detach()
+        after = torch.cat([values[1:], torch.zeros(1, 1)])
+        ended = torch.zeros(len(made), 1, dtype=torch.bool)
+        ended[-1] = True
+        advantage, target = generalized_advantage_estimate(GAMMA, LAMBDA, values, after, earned, ended)
+        found.append(made.update({"advantage": advantage, "value_target": target}))
+    return found
+
+
+returns = []
+for update in range(UPDATES):
+    with torch.no_grad():
+        rollouts = [env.rollout(100, choose) for _ in range(MISSIONS)]
+    returns.append(sum(float(one["next", "robot", "reward"].sum(0).mean()) for one in rollouts) / MISSIONS)
+    batch = torch.cat([made for one in rollouts for made in choices_of(one)])
+    for _ in range(EPOCHS):
+        losses = loss_module(batch)
+        loss = losses["loss_objective"] + losses["loss_critic"] + losses["loss_entropy"]
+        optimiser.zero_grad()
+        loss.backward()
+        nn.utils.clip_grad_norm_(loss_module.parameters(), 0.5)
+        optimiser.step()
+    print(f"update {update}: {len(batch)} choices, mean return {returns[-1]:.3f}, loss {loss.item():.3f}")
