@@ -11,6 +11,7 @@ from entropy_explore_env.channel_settings import Channel
 from entropy_explore_env.errors import SettingError, did_you_mean
 from entropy_explore_env.scenario import Scenario
 from entropy_explore_env.settings import Ending, Grid, RangeSensor, Reward, Robot, RobotKind
+from entropy_explore_env.validation import is_whole
 
 
 class MissionTimes(NamedTuple):
@@ -344,6 +345,6 @@ def find_scenario(scenario: str | Scenario, robots: object = None) -> Scenario:
         known = "one of " + ", ".join(SCENARIOS)
         raise SettingError("scenario", scenario, known + did_you_mean(scenario, SCENARIOS))
     found = SCENARIOS[scenario]
-    if robots == 1 < found.robots:
+    if is_whole(robots, 1, 1) and found.robots > 1:
         return dataclasses.replace(found, reward=usual_reward(scenario, alone=True))
     return found

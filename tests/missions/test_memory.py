@@ -121,10 +121,10 @@ def test_more_than_there_is_is_refused_at_once_and_what_to_lower_is_named(
 ) -> None:
     monkeypatch.setattr(memory, "memory_there_is", lambda: 24 << 30)
     tracemalloc.start()
-    began = time.perf_counter()
+    began = time.process_time()  # also where other processes keep the machine busy
     with pytest.raises(SettingError, match=r"into 24\.0 GiB of memory: .* GiB, .* of them for") as caught:
         EntropyExploreVectorEnv("box-7x11x5", **settings)
-    took_s, peak = time.perf_counter() - began, tracemalloc.get_traced_memory()[1]
+    took_s, peak = time.process_time() - began, tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     assert caught.value.field == named and named in caught.value.allowed
     assert took_s < 2.0 and peak < 60e6
