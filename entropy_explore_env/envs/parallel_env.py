@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import inspect
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
@@ -264,7 +265,8 @@ def parallel_env(
     )
 
 
-parallel_env.__doc__ = f"{parallel_env.__doc__}\n\nWhat a robot observes. {_PARTS}"
+# Dedented first: beside text at the margin indented text stays indented, and its sections are no sections.
+parallel_env.__doc__ = f"{inspect.cleandoc(parallel_env.__doc__ or '')}\n\nWhat a robot observes. {_PARTS}"
 
 
 class TurnTakingEnv(OrderEnforcingWrapper[str, Any, Any]):
