@@ -25,6 +25,7 @@ from baselines.cli.arguments import INLINE, make_folder, parse, print_json, run_
 from baselines.cli.task_options import (
     TaskOptions,
     base_task,
+    files_told_apart,
     first_change,
     is_whole_scenario,
     parsed_for,
@@ -200,15 +201,18 @@ def _team_sizes(args: Args) -> tuple[int, ...]:
 
 
 def _command(args: Args, suite: Suite, changes: Sequence[str]) -> str:
-    """What makes the same page again, wherever the world files lie."""
+    """What makes the same page again, wherever the world files lie: no more of a path than tells it apart."""
     given: dict[str, str | None] = {"strategies": args.strategies}
     if args.suite is not None:
         given = {"suite": args.suite, **given}
     else:
         scenarios = args.scenarios or ",".join(dict.fromkeys(task.scenario.name for task in suite.tasks))
+        asked = scenarios.split(",")
+        files = [word for word in asked if word not in SCENARIOS]
+        told = dict(zip(files, files_told_apart(files), strict=True))
         alone = is_whole_scenario(args.task.settings)
         given |= {
-            "scenarios": None if alone else ",".join(Path(word).name for word in scenarios.split(",")),
+            "scenarios": None if alone else ",".join(told.get(word, word) for word in asked),
             "robots": ",".join(map(str, dict.fromkeys(task.scenario.robots for task in suite.tasks))),
             "seeds": str(suite.tasks[0].missions),
             "world-scenario": args.world_scenario,

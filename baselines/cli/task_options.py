@@ -28,6 +28,7 @@ from entropy_explore_env.scenario import Scenario, with_settings
 from entropy_explore_env.scenarios import ROOM, SCENARIOS, find_scenario
 from entropy_explore_env.settings import Ending, RangeSensor, Robot, RobotKind
 from entropy_explore_env.settings_json import dataclass_of, json_of, scenario_of, settings_of
+from entropy_explore_env.worlds.given import distinct_paths
 
 _WHOLE = ("name", "grid")
 """Settings of a file that is a scenario of its own, and no change of a named one."""
@@ -315,7 +316,7 @@ def first_change(options: TaskOptions) -> tuple[str, object] | None:
 
 
 def words_of(options: TaskOptions, task: BaseTask) -> dict[str, list[str]]:
-    """Options that differ from a task's own: name → words of a command line; of files, their names.
+    """Options that differ from a task's own: name → words of a command line; of files, what tells them apart.
 
     Args:
         options: Of the command.
@@ -331,7 +332,7 @@ def words_of(options: TaskOptions, task: BaseTask) -> dict[str, list[str]]:
             words[name] = [f"--{front}{dot}{'' if value else 'no-'}{last}"]
             continue
         if name in _FILES:
-            value = [_file_name(each) for each in ([value] if isinstance(value, str) else value)]
+            value = files_told_apart([value] if isinstance(value, str) else value)
         words[name] = [f"--{option}", *map(_word, _flattened(value))]
     return words
 
@@ -347,9 +348,11 @@ def _word(value: object) -> str:
     return short if not isinstance(value, float) or float(short) == value else repr(value)
 
 
-def _file_name(given: str) -> str:
-    """A file's name without its folders; a text of JSON as it is."""
-    return given if given.lstrip().startswith(("{", "[")) else Path(given).name
+def files_told_apart(given: Sequence[str]) -> list[str]:
+    """The names of files, with as many of their folders as tell them apart; texts of JSON as they are."""
+    files = [each for each in given if not each.lstrip().startswith(("{", "["))]
+    names = dict(zip(files, distinct_paths([Path(file) for file in files]), strict=True))
+    return [names.get(each, each) for each in given]
 
 
 def _changes(before: Mapping[str, Any], after: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:

@@ -265,6 +265,7 @@ def parallel_env(
     )
 
 
+# Dedented first: beside text at the margin indented text stays indented, and its sections are no sections.
 parallel_env.__doc__ = f"{inspect.cleandoc(parallel_env.__doc__ or '')}\n\nWhat a robot observes. {_PARTS}"
 
 

@@ -148,13 +148,22 @@ def distinct_names(paths: Sequence[Path]) -> list[str]:
     Files that differ in their suffix alone keep it; a file that is named twice has the same name twice.
     """
     whole = [path.absolute() for path in paths]
-    return [_distinct_name(path, {other for other in whole if other != path}) for path in whole]
+    bare = {path: path.with_suffix("") for path in whole}
+    return [
+        _tail(bare[path], [bare[other] for other in whole if other != path]) or path.name for path in whole
+    ]
 
 
-def _distinct_name(path: Path, others: set[Path]) -> str:
-    """A file's name beside others; absolute paths."""
+def distinct_paths(paths: Sequence[Path]) -> list[str]:
+    """The names of files, each with as many of its folders as make it differ from the others."""
+    whole = [path.absolute() for path in paths]
+    return [_tail(path, [other for other in whole if other != path]) or path.as_posix() for path in whole]
+
+
+def _tail(path: Path, others: Sequence[Path]) -> str | None:
+    """As much of a path's end as no other path ends with; None = another path is the same."""
     for length in range(1, len(path.parts)):
-        tail = path.with_suffix("").parts[-length:]
-        if all(other.with_suffix("").parts[-length:] != tail for other in others):
+        tail = path.parts[-length:]
+        if all(other.parts[-length:] != tail for other in others):
             return Path(*tail).as_posix()
-    return path.name
+    return None

@@ -448,7 +448,7 @@ def test_a_settings_file_and_flags_change_what_is_compared(tmp_path, capsys):
     assert run_command(benchmark.main, [*usual, *words, "--out", str(tmp_path / "out")]) == 0
     page = (tmp_path / "out" / "scoreboard.md").read_text()
     assert str(tmp_path) not in page and "world file `plan.png`, 22 × 15 voxels" in page
-    assert "--settings mine.json --world plan.png plan.png --robot.reach-m 2" in page
+    assert "--settings mine.json --world a/plan.png b/plan.png --robot.reach-m 2" in page
     runs = sorted((tmp_path / "out" / "runs").rglob("seed-*.json"))
     figures = [json.loads(run.read_text())["record"] for run in runs]
     assert [one["world"] for one in figures] == ["a/plan", "b/plan"]
@@ -459,6 +459,8 @@ def test_a_settings_file_and_flags_change_what_is_compared(tmp_path, capsys):
     assert run_command(benchmark.main, [*usual, *words, "--out", str(tmp_path / "each")]) == 0
     results = json.loads(capsys.readouterr().out)
     assert {row["task"] for row in results["tasks"]} == {"a/plan, 1 robot", "b/plan, 1 robot"}
+    page = (tmp_path / "each" / "scoreboard.md").read_text()
+    assert str(tmp_path) not in page and "--scenarios a/plan.png,b/plan.png --robots 1" in page
 
 
 @pytest.mark.parametrize(

@@ -13,7 +13,14 @@ from benchmarks.reliability.world_samples import pgm, plan
 from entropy_explore_env.errors import EntropyExploreError, SettingError, WorldError
 from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.settings import Grid
-from entropy_explore_env.worlds.given import GIVEN, in_given_worlds, with_given_worlds, world_in_turn
+from entropy_explore_env.worlds.given import (
+    GIVEN,
+    distinct_names,
+    distinct_paths,
+    in_given_worlds,
+    with_given_worlds,
+    world_in_turn,
+)
 from entropy_explore_env.worlds.load import load_world, save_world, world_bytes, world_from_bytes
 from entropy_explore_env.worlds.recipes.catalogue import RECIPES
 from entropy_explore_env.worlds.world import World
@@ -163,3 +170,22 @@ def test_paths_of_the_same_file_are_read_once(tmp_path, monkeypatch):
     assert first is second
     shutil.copy("plan.pgm", "other.pgm")
     assert with_given_worlds(free_box(), {"world": {"path": "other.pgm"}})[1][0] is not first
+
+
+@pytest.mark.parametrize(
+    ("paths", "names", "short"),
+    [
+        (["x/plan.png"], ["plan"], ["plan.png"]),
+        (
+            ["a/plan.png", "b/plan.png", "hut.bt"],
+            ["a/plan", "b/plan", "hut"],
+            ["a/plan.png", "b/plan.png", "hut.bt"],
+        ),
+        (["a/plan.png", "a/plan.pgm"], ["plan.png", "plan.pgm"], ["plan.png", "plan.pgm"]),
+        (["a/c/plan.png", "b/c/plan.png"], ["a/c/plan", "b/c/plan"], ["a/c/plan.png", "b/c/plan.png"]),
+        (["a/plan.png", "a/plan.png"], ["plan", "plan"], ["plan.png", "plan.png"]),
+    ],
+)
+def test_files_have_as_many_of_their_folders_as_tell_them_apart(paths, names, short):
+    assert distinct_names([Path(path) for path in paths]) == names
+    assert distinct_paths([Path(path) for path in paths]) == short

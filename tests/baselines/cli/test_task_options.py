@@ -133,7 +133,7 @@ def test_what_differs_from_the_scenario_is_told_as_words_that_say_it_again(plans
     assert "--read-memory-mib" not in told  # changes no mission
     again = parse(TaskOptions, told, default=task.defaults())
     of_names = dataclasses.replace(given.world_file, read_memory_mib=None)
-    assert again == dataclasses.replace(given, world=("plan.png", "plan.png"), world_file=of_names)
+    assert again == dataclasses.replace(given, world=("a/plan.png", "b/plan.png"), world_file=of_names)
     assert words_of(task.defaults(), task) == {} and first_change(TaskOptions()) is None
     assert first_change(TaskOptions(start_radius_m=1.5)) == ("start_radius_m", 1.5)
 
