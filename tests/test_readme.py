@@ -65,6 +65,9 @@ def test_the_addresses_are_those_of_the_project():
     (repository,) = re.findall(r'^Repository = "(.*)"$', project, flags=re.MULTILINE)
     assert f"git clone {repository}\n" in README
     assert f"pip install git+{repository}\n" in README
+    (documentation,) = re.findall(r'^Documentation = "(.*)"$', project, flags=re.MULTILINE)
+    owner, name = repository.removeprefix("https://github.com/").split("/")
+    assert documentation == f"https://{owner}.github.io/{name}/"  # where docs.yml publishes the site
 
 
 def test_the_model_card_tells_of_every_policy_what_its_file_says():

@@ -114,3 +114,19 @@ def test_indented_blocks_of_docstrings_are_literal():
     ]
     marked = mark_literal(lines)
     assert marked == [*lines[:3], "::", "", *lines[3:]]
+
+
+@pytest.mark.parametrize("width_px", [360, 390, 430])
+def test_the_first_title_fits_beside_the_buttons_of_a_phone(width_px):
+    style = (DOCS / "static" / "site.css").read_text(encoding="utf-8")
+    (title,) = re.findall("^# (.+)$", (DOCS / "index.md").read_text(encoding="utf-8"), flags=re.MULTILINE)
+    (share,) = re.findall(
+        r"@media \(max-width: 36em\) {\s+h1 {\s+font-size: clamp\([^,]+, ([\d.]+)vw,", style
+    )
+    margins, buttons, letter = (
+        32,
+        73,
+        0.52,
+    )  # as measured; a letter's mean width as a share of the font's size
+    assert len(title) * letter * float(share) / 100 * width_px <= width_px - margins - buttons
+    assert "td:has(img) ~ td code.literal .pre" in style.partition("@media")[2]  # ids in the gallery

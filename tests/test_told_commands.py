@@ -208,3 +208,23 @@ python -m c --d \\
 )
 def test_what_is_not_there_is_named(command, missing):
     assert faults(tuple(shlex.split(command))) == missing
+
+
+def test_workflows_make_what_the_makefile_has():
+    texts = {path.name: path.read_text(encoding="utf-8") for path in (ROOT / ".github").rglob("*.yml")}
+    made = {
+        name: re.findall(r"\brun: make ([\w-]+)$", text, flags=re.MULTILINE) for name, text in texts.items()
+    }
+    assert {target for targets in made.values() for target in targets} <= _TARGETS
+    regularly = {target for name, text in texts.items() if "schedule:" in text for target in made[name]}
+    assert regularly == {"docs-links", "night"}
+
+
+def test_the_page_of_speed_says_which_commands_share_missions_among_processes():
+    page = (ROOT / "docs" / "speed.md").read_text(encoding="utf-8")
+    (row,) = re.findall(r"\*\*Long jobs\.\*\*(.*?)\n(?:- |\n)", page, flags=re.DOTALL)
+    named = {name: "--jobs" in options_of(name, ()) for name in re.findall(r"`((?:\w+\.)+\w+)`", row)}
+    assert named.pop("baselines.world_sweep") is False
+    assert len(named) > 2 and all(named.values())
+    papers = [path.parent.name for path in (ROOT / "baselines" / "papers").glob("*/__main__.py")]
+    assert len(papers) > 3 and all("--jobs" in options_of(f"baselines.papers.{name}", ()) for name in papers)
