@@ -31,6 +31,8 @@ def test_torchrl_trains(capsys):
     assert all(float(state[weight]["step"]) == ran["UPDATES"] * ran["EPOCHS"] for weight in weights)
     assert all(float(state[weight]["exp_avg"].abs().max()) > 0.0 for weight in weights)
     rows = ran["batch"]
+    likeliest = ran["scores"](rows["observation"]).masked_fill(~rows["action_mask"], -np.inf).argmax(1)
+    assert (rows["action"] == likeliest).float().mean() < 0.5  # actions are drawn
     assert rows["action_mask"].gather(1, rows["action"][:, None]).all()
 
 

@@ -5,7 +5,7 @@ from typing import Any
 import torch
 from pettingzoo.utils import BaseParallelWrapper
 from tensordict import TensorDict
-from tensordict.nn import TensorDictModule
+from tensordict.nn import InteractionType, TensorDictModule
 from torch import nn
 from torchrl.envs import PettingZooWrapper
 from torchrl.modules import MaskedCategorical, ProbabilisticActor, ValueOperator
@@ -42,6 +42,7 @@ actor = ProbabilisticActor(  # one policy for all robots
     in_keys=inputs,
     distribution_class=MaskedCategorical,
     return_log_prob=True,
+    default_interaction_type=InteractionType.RANDOM,  # a rollout would take the likeliest action
 )
 critic = ValueOperator(nn.Sequential(nn.Linear(numbers, 64), nn.Tanh(), nn.Linear(64, 1)), ["observation"])
 loss_module = ClipPPOLoss(actor, critic, entropy_coeff=0.001)
