@@ -127,7 +127,8 @@ def test_the_options_of_the_task_hold_for_the_worlds_that_they_fit(folder, capsy
     rows = json.loads(capsys.readouterr().out)["worlds"]
     assert [row["world"] for row in rows] == [files[0], files[1], "floor.yaml"]
     assert [row.get("voxels") for row in rows] == ["9 × 12 × 7", "9 × 12 × 7", "22 × 15 × 5"]
-    told = "--plan-voxel-size-m 0.2 --world hut.npz hut.npz floor.yaml --height-m 1 --robot.reach-m 2"
+    worlds = f"{folder.name}/hut.npz below/hut.npz floor.yaml"
+    told = f"--plan-voxel-size-m 0.2 --world {worlds} --height-m 1 --robot.reach-m 2"
     assert f"python -m baselines.world_sweep --strategy random {told} --time-limit-s 20`" in out.read_text()
     assert run_command(world_sweep.main, [str(folder), "--robot.reach-m", "-1"]) == 2
     assert capsys.readouterr().err.startswith("error: ")
