@@ -8,7 +8,7 @@ from types import MappingProxyType
 from typing import NamedTuple
 
 from entropy_explore_env.channel_settings import Channel
-from entropy_explore_env.errors import SettingError, did_you_mean
+from entropy_explore_env.errors import SettingError, one_of
 from entropy_explore_env.scenario import Scenario
 from entropy_explore_env.settings import Ending, Grid, RangeSensor, Reward, Robot, RobotKind
 from entropy_explore_env.validation import is_whole
@@ -342,8 +342,7 @@ def find_scenario(scenario: str | Scenario, robots: object = None) -> Scenario:
     if isinstance(scenario, Scenario):
         return scenario
     if not isinstance(scenario, str) or scenario not in SCENARIOS:
-        known = "one of " + ", ".join(SCENARIOS)
-        raise SettingError("scenario", scenario, known + did_you_mean(scenario, SCENARIOS))
+        raise SettingError("scenario", scenario, one_of(scenario, SCENARIOS))
     found = SCENARIOS[scenario]
     if is_whole(robots, 1, 1) and found.robots > 1:
         return dataclasses.replace(found, reward=usual_reward(scenario, alone=True))
