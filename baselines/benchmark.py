@@ -58,7 +58,7 @@ class Args(WorkerOptions):
     """Compare strategies."""
 
     suite: str | None = None
-    """plans, volumes or teams: worlds and starts that are pinned."""
+    """plans, volumes, teams or others: worlds and starts that are pinned."""
     scenarios: str | None = None
     """In place of a suite: names and world files, commas between, each changed by the options of the task;
     default: room,room-furnished,lab,office,cave, or the scenario that --settings holds as a whole."""

@@ -138,6 +138,7 @@ def test_times_come_from_the_suites_of_the_scoreboard(tmp_path):
     for suite, column, row in (
         ("plans", "time_s_99_seen", "office,nearest-frontier,30,29,312.4,300,330"),
         ("volumes", "time_s_end", '"office, 3 robots",planned-rate,30,30,150,140,161'),
+        ("others", "time_s_end", '"office, 5 robots",gradient,5,4,200,,'),
         ("teams", "time_s_end", '"office, 8 robots",planned-rate,30,30,99,90,101'),
     ):
         folder = tmp_path / "scoreboard" / suite
@@ -146,6 +147,7 @@ def test_times_come_from_the_suites_of_the_scoreboard(tmp_path):
     text = scenario_times.times_table(SCENARIOS["office"], tmp_path)
     assert "| 1 robot (to 99 % seen) | `nearest-frontier` | 312 (300 … 330) | 29 of 30 |" in text
     assert "| 3 robots | `planned-rate` | 150 (140 … 161) | 30 of 30 |" in text
+    assert "| 5 robots | `gradient` | 200 | 4 of 5 |" in text
     assert "8 robots" not in text and "`random`" not in text
     bare = with_settings(SCENARIOS["office"], {"name": "mine"})
     assert scenario_times.times_table(bare, tmp_path) == ""

@@ -159,6 +159,7 @@ _TITLES: Mapping[str, str] = {
     "plans": "Plans: until everything is seen",
     "volumes": "Volumes and offices: until the map is known",
     "teams": "Teams and channels",
+    "others": "Other scenarios, as they stand",
     "own": "Scenarios of one's own",
 }
 

@@ -49,7 +49,11 @@ def times_table(scenario: Scenario, results: Path) -> str:
     return "## How long strategies take\n\n" + "\n\n".join(lines) if lines else ""
 
 
-SUITES = {"plans": ("time_s_99_seen", " (to 99 % seen)"), "volumes": ("time_s_end", "")}
+SUITES = {
+    "plans": ("time_s_99_seen", " (to 99 % seen)"),
+    "volumes": ("time_s_end", ""),
+    "others": ("time_s_end", ""),
+}
 """Suite → its column of times, and what is said of them; teams and channels stand on the page alone."""
 
 

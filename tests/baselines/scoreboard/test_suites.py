@@ -16,6 +16,7 @@ from baselines.scoreboard.page import about
 from baselines.scoreboard.suites import DUNGEON_UNSEEN, SUITES, WORLDS, find_suite
 from entropy_explore_env import load_world
 from entropy_explore_env.errors import SettingError, WorldError
+from entropy_explore_env.scenarios import SCENARIOS
 
 TEAMS = ("random", "gradient")
 NAMES = {
@@ -37,6 +38,17 @@ NAMES = {
             "4 robots, half of the messages lost",
         )
     ],
+    "others": [
+        "box-7x11x5, 2 robots",
+        "lab, 2 robots",
+        "occlusions, 1 robot",
+        "cliff, 1 robot",
+        "bhattacharya-office, 5 robots",
+        "bhattacharya-cluttered, 4 robots",
+        "office-mixed, 3 robots",
+        "terrain-smooth, 3 robots",
+        "terrain-rough, 3 robots",
+    ],
 }
 
 
@@ -50,6 +62,11 @@ def test_a_suite_is_pinned(name):
         assert task.scenario.split == "test" or task.name == "dungeons"  # which has no split
     ids = [cell.id for cell in suite.cells]
     assert len(set(ids)) == len(ids) and all("," not in each and " " not in each for each in ids)
+
+
+def test_every_named_scenario_stands_in_a_suite():
+    there = {task.name.partition(",")[0] for name in SUITES for task in find_suite(name, False, TEAMS).tasks}
+    assert set(SCENARIOS) <= there
 
 
 def test_the_worlds_are_those_that_they_were():
@@ -138,7 +155,7 @@ def test_teams_are_compared_with_one_robot_and_channels_with_the_whole_one():
 
 
 def test_unknown_suites_and_missing_worlds_are_named(monkeypatch):
-    with pytest.raises(SettingError, match=r"suite = 'plan': allowed is one of plans, volumes, teams"):
+    with pytest.raises(SettingError, match=r"suite = .plan.: allowed is one of plans, volumes, teams"):
         find_suite("plan", False, TEAMS)
     monkeypatch.setattr(suites, "WORLDS", Path("/nowhere"))
     with pytest.raises(SettingError, match=r"suite world = '/nowhere/geb079.npz'.*pack_worlds"):
