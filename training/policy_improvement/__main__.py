@@ -6,8 +6,9 @@
    missions. 2. `regression`: the residual learns that. 3. `search`: weights of features, by whole missions.
 4. `ppo`: PPO from there, rewarded by less the seconds. `--stage` does one of them, by default all are done,
 one after the other; `search` and `ppo` begin with what the last one before them wrote, else with the
-planner. What is there already is not done again, so that the same command continues a run that was stopped;
-every stage ends with a comparison with the planner, paired by start.
+planner, and the search with any policy that `--begin` names. What is there already is not done again, so
+that the same command continues a run that was stopped; every stage ends with a comparison with the planner,
+paired by start.
 `python -m training.evaluate --strategy runs/improved/search` evaluates what a stage came to.
 """
 
@@ -29,6 +30,7 @@ from entropy_explore_env.command import INTERRUPTED
 from entropy_explore_env.missions.observation.layout import ObservationLayout
 from entropy_explore_env.missions.privileged import PRIVILEGED
 from entropy_explore_env.scenario import Scenario
+from entropy_explore_env.viewpoints.candidate_features import COLUMNS
 from entropy_explore_env.writing import write_atomically
 from training import extra, ppo  # noqa: F401 - extra: before what is not there without it
 from training.candidate_network import CandidatePolicy
@@ -48,6 +50,7 @@ from training.policy import (
     check_same_networks,
     load_policy,
     make_policy,
+    policy_folder,
     settings_of_policy,
     weights_of,
 )
@@ -63,7 +66,7 @@ from training.policy_improvement.labelling import (
 from training.policy_improvement.ppo_stage import PpoStage, check_ppo, ppo_words
 from training.policy_improvement.regression import RegressionSettings, as_json, regress
 from training.policy_improvement.rollouts import RollOutEffort
-from training.policy_improvement.search import SearchSettings, search
+from training.policy_improvement.search import SEARCHED, SearchSettings, search
 from training.policy_improvement.stage_options import Args, check
 from training.policy_improvement.tasks import task_of
 from training.run_folder import FILE
@@ -83,6 +86,8 @@ def main(words: Sequence[str]) -> int:
         check_ppo(ppo_stage(args), tasks[0])  # before the stages that it comes after
     if wanted != ("ppo",):
         label_settings(args, tasks)  # refuses --policy before anything is written
+    if args.begin:
+        _policy_in(policy_folder(args.begin), described(args, tasks))  # refused before anything is written
     results: dict[str, Any] = {}
     for stage in wanted:
         make_folder("out", args.out / stage)
@@ -167,7 +172,7 @@ def learn_labels(args: Args, tasks: list[Scenario], interruption: Interruption) 
 def search_weights(args: Args, tasks: list[Scenario], interruption: Interruption) -> dict[str, Any] | None:
     """Stage 3; None if Ctrl-C stopped it."""
     folder, settings_of = args.out / "search", described(args, tasks)
-    before = _written(args, "regression")
+    before = _beginning_of_search(args)
     torch.manual_seed(args.seed)
     policy = make_policy(settings_of) if before is None else _policy_in(before, settings_of)
     assert isinstance(policy, CandidatePolicy)
@@ -189,10 +194,20 @@ def search_weights(args: Args, tasks: list[Scenario], interruption: Interruption
         return None
     with torch.no_grad():
         policy.actor.weights.add_(torch.as_tensor(result.weights, dtype=torch.float32))
-    found = {**result.as_json(), "line": result.line(), "begins": begins}
+    weights = policy.actor.weights.tolist()
+    found = {
+        "weights": {name: weights[COLUMNS[name]] for name in SEARCHED},
+        "rounds": result.rounds,
+        "tasks": list(args.tasks),
+        "line": result.line(),
+        "begins": begins,
+    }
     returns = Normaliser()
-    if before is not None:  # the scale of what its critic learned
-        returns.load_arrays("returns", load_checkpoint(before).normalisation)
+    if before is not None:
+        beginning = load_checkpoint(before)
+        returns.load_arrays("returns", beginning.normalisation)  # the scale of what its critic learned
+        if "search" in beginning.progress:
+            found["before"] = beginning.progress["search"]
     _save(args, tasks, "search", policy, found, returns)
     return _finished(args, tasks, "search", policy, found, digest)
 
@@ -231,18 +246,29 @@ def _written(args: Args, stage: str) -> Path | None:
     return latest_checkpoint(folder, *POLICIES) if any(folder.glob("best-*")) else None
 
 
+def _beginning_of_search(args: Args) -> Path | None:
+    """The checkpoint that the search begins with; None = the planner.
+
+    Raises:
+        CheckpointError: There is none where `--begin` says.
+    """
+    if args.begin:
+        return latest_checkpoint(policy_folder(args.begin), *POLICIES)
+    return _written(args, "regression")
+
+
 def _beginning_of_ppo(args: Args) -> Path | None:
     """The checkpoint that PPO begins with: the search's, else the regression's; None = the planner.
 
     Raises:
-        CheckpointError: The search began with another regression than the one that is there.
+        CheckpointError: The search began with another policy than it would today.
     """
-    searched, before = _written(args, "search"), _written(args, "regression")
+    searched, before = _written(args, "search"), _beginning_of_search(args)
     if searched is None:
         return before
     begins = "" if before is None else weights_digest(_policy_in(before))
     if load_checkpoint(searched).progress["search"].get("begins") != begins:
-        allowed = "those of the regression that is there: run --stage search again, or remove its folder"
+        allowed = "those that it would begin with today: run --stage search again, or remove its folder"
         raise CheckpointError(f"{searched}: weights that it began with", "others", allowed)
     return searched
 

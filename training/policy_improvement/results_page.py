@@ -348,16 +348,20 @@ def _how_learned(policy: str) -> str:
     learned = progress.get("search")
     if not learned:
         return ""
+    searches = [learned]
+    while "before" in searches[0]:
+        searches.insert(0, searches[0]["before"])
     rows = [
-        [str(number), f"{each['mean_s']:.1f} s", f"{each['slope']:.3f}"]
-        for number, each in enumerate(learned["rounds"], start=1)
+        [str(number), ", ".join(one.get("tasks", ())), f"{each['mean_s']:.1f} s", f"{each['slope']:.3f}"]
+        for one in searches
+        for number, each in enumerate(one["rounds"], start=1)
     ]
     heaviest = sorted(learned["weights"].items(), key=lambda item: -abs(item[1]))
     words = ", ".join(f"{name} {weight:+.2f}" for name, weight in heaviest)
     return (
         "How the search went: mission times (geometric mean over its tasks, around the weights of the "
         "round), and by which share they fall with a step of σ against the slope.\n\n"
-        + markdown_table(["round", "missions take", "slope"], rows)
+        + markdown_table(["round", "tasks", "missions take", "slope"], rows)
         + f"\nWeights of features, in the logits: {words}.\n"
     )
 

@@ -27,7 +27,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import torch
@@ -121,11 +121,6 @@ class Found(NamedTuple):
         """The search in one line."""
         slopes = ", ".join(f"{each['slope']:.3f}" for each in self.rounds)
         return f"{len(self.rounds)} rounds; slopes {slopes}"
-
-    def as_json(self) -> dict[str, Any]:
-        """As JSON holds it."""
-        weights = {name: float(self.weights[COLUMNS[name]]) for name in SEARCHED}
-        return {"weights": weights, "rounds": self.rounds}
 
 
 def search(

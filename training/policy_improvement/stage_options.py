@@ -63,6 +63,9 @@ class Args:
 
     rounds: int = 8
     """Of the search: how often it changes the weights."""
+    begin: str = ""
+    """A run, or pretrained:NAME, whose policy the search begins with; default: what the regression wrote,
+    else the planner."""
     pairs: int = 48
     """Of missions, in each task and round of the search."""
     sigma: float = 0.3

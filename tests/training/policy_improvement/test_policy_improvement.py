@@ -20,6 +20,7 @@ from entropy_explore_env.missions.privileged import PRIVILEGED, mission_times, r
 from entropy_explore_env.missions.view import view_of
 from entropy_explore_env.scenario import with_settings
 from entropy_explore_env.scenarios import find_scenario
+from entropy_explore_env.viewpoints.candidate_features import COLUMNS
 from training.candidate_network import CandidatePolicy
 from training.checkpoints import latest_checkpoint, load_checkpoint
 from training.errors import CheckpointError, LabelsError, RollOutError
@@ -35,6 +36,7 @@ from training.policy_improvement.rollouts import (
     RollOuts,
     candidates_to_try,
 )
+from training.policy_improvement.search import SEARCHED
 from training.policy_improvement.shards import shard_file
 from training.policy_improvement.tasks import task_of
 
@@ -163,6 +165,22 @@ def test_a_search_begins_with_the_regression_and_ppo_with_the_search(improved, t
     shutil.rmtree(folder / "ppo")
     assert improve("--out", str(folder), "--stage", "ppo") == BAD_INPUT
     assert "weights that it began with" in capsys.readouterr().err
+
+
+def test_a_search_goes_on_from_the_policy_of_another_run(improved, tmp_path, capsys):
+    out, _ = improved
+    before = load_checkpoint(latest_checkpoint(out / "search", "best"))
+    words = ["--out", str(tmp_path / "run"), "--stage", "search", "--begin"]
+    said = printed(*words, str(out / "search"), "--sigma", "0.2")["search"]
+    after = load_checkpoint(latest_checkpoint(tmp_path / "run" / "search", "best"))
+    assert said["begins"] and said["before"] == before.progress["search"] and len(said["rounds"]) == 2
+    name = "mlp_extractor.actor.weights"
+    known = [float(after.weights[name][COLUMNS[each]]) for each in SEARCHED]
+    assert list(said["weights"].values()) == known
+    for other in set(before.weights) - {name}:
+        assert torch.equal(before.weights[other], after.weights[other])
+    assert improve(*words[:1], str(tmp_path / "new"), *words[2:], str(tmp_path / "nowhere")) == BAD_INPUT
+    assert not (tmp_path / "new").exists() and "nowhere" in capsys.readouterr().err
 
 
 def test_ppo_alone_begins_with_the_planner(tmp_path):
