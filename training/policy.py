@@ -123,9 +123,11 @@ def choose_actions(
         (N,) int64, or (N, K) float32 within the space's bounds.
     """
     with torch.inference_mode():
+        if isinstance(policy, CandidatePolicy):
+            return policy.actor(torch.as_tensor(observations)).argmax(dim=1).numpy()
         chosen = policy.get_distribution(torch.as_tensor(observations)).distribution
         if isinstance(chosen, Categorical):
-            if rng is None or isinstance(policy, CandidatePolicy):
+            if rng is None:
                 return chosen.logits.argmax(dim=1).numpy()
             return torch.multinomial(chosen.probs, 1, generator=rng)[:, 0].numpy()
         assert isinstance(chosen, Normal)
