@@ -37,9 +37,10 @@ from entropy_explore_env.viewpoints.candidate_features import COLUMNS
 
 WIDTH = 64
 """D, units of each candidate."""
-_LAYERS = 2
+ATTENTION_LAYERS = 2
 HEADS = 4
 """Of each layer of attention; the width is a multiple of them."""
+_MOST_LAYERS = 16
 _BETA = 8.0
 """β before learning: a score that is a tenth smaller halves the odds."""
 _MARGIN = 0.1
@@ -54,6 +55,12 @@ def check_width(width: int) -> None:
     """Raise a SettingError unless networks may be so wide."""
     if not is_whole(width, HEADS, 1024) or width % HEADS:
         raise SettingError("width", width, f"a multiple of {HEADS}, at most 1024")
+
+
+def check_attention_layers(layers: int) -> None:
+    """Raise a SettingError unless networks may have so many layers of attention."""
+    if not is_whole(layers, 0, _MOST_LAYERS):
+        raise SettingError("attention_layers", layers, f"a whole number from 0 to {_MOST_LAYERS}")
 
 
 class CandidateParts(NamedTuple):
@@ -135,18 +142,21 @@ class _Attention(nn.Module):
 class CandidateActor(nn.Module):
     """Logits of candidates; see the head of this file."""
 
-    def __init__(self, parts: CandidateParts, width: int = WIDTH) -> None:
+    def __init__(
+        self, parts: CandidateParts, width: int = WIDTH, attention_layers: int = ATTENTION_LAYERS
+    ) -> None:
         """Make the network.
 
         Args:
             parts: What observations hold.
             width: D.
+            attention_layers: Number of layers of attention; without any, each candidate is judged alone.
         """
         super().__init__()
         self.parts = parts
         read = parts.candidates.shape[1] + parts.context.shape[0]
         self.each = nn.Sequential(nn.Linear(read, width), nn.ReLU(), nn.Linear(width, width))
-        self.layers = nn.ModuleList(_Attention(width, HEADS) for _ in range(_LAYERS))
+        self.layers = nn.ModuleList(_Attention(width, HEADS) for _ in range(attention_layers))
         self.after = nn.LayerNorm(width)
         self.residual = nn.Linear(width, 1)
         self.weights = nn.Parameter(torch.zeros(parts.candidates.shape[1]))
@@ -219,11 +229,11 @@ class CandidateCritic(nn.Module):
 class CandidateHeads(nn.Module):
     """Actor and critic, as Stable-Baselines3's policies hold them."""
 
-    def __init__(self, parts: CandidateParts, privileged: int, width: int) -> None:
+    def __init__(self, parts: CandidateParts, privileged: int, width: int, attention_layers: int) -> None:
         """Make both; see CandidateActor and CandidateCritic."""
         super().__init__()
         self.latent_dim_pi, self.latent_dim_vf = parts.candidates.shape[0], width
-        self.actor = CandidateActor(parts, width)
+        self.actor = CandidateActor(parts, width, attention_layers)
         self.critic = CandidateCritic(parts, privileged, width)
 
     def forward(self, features: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
@@ -257,6 +267,7 @@ class CandidatePolicy(ActorCriticPolicy):
         parts: CandidateParts,
         privileged: int = 0,
         width: int = WIDTH,
+        attention_layers: int = ATTENTION_LAYERS,
         **kwargs: Any,  # noqa: ANN401
     ) -> None:
         """Make the networks.
@@ -266,9 +277,10 @@ class CandidatePolicy(ActorCriticPolicy):
             parts: Where the network finds what it reads.
             privileged: P, numbers that follow an observation in training.
             width: D, units of each candidate.
+            attention_layers: Of the actor.
             **kwargs: Of ActorCriticPolicy.
         """
-        self._heads = (parts, privileged, width)
+        self._heads = (parts, privileged, width, attention_layers)
         super().__init__(*args, **kwargs)
 
     @property
@@ -287,11 +299,12 @@ class CandidatePolicy(ActorCriticPolicy):
 
     def _get_constructor_parameters(self) -> dict[str, Any]:
         """Arguments that `save` stores, to make the policy again."""
-        parts, privileged, width = self._heads
+        parts, privileged, width, attention_layers = self._heads
         return super()._get_constructor_parameters() | {
             "parts": parts,
             "privileged": privileged,
             "width": width,
+            "attention_layers": attention_layers,
         }
 
 

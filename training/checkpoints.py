@@ -30,10 +30,11 @@ from safetensors import SafetensorError
 from safetensors.torch import load as tensors_of
 from safetensors.torch import save as bytes_of
 
-from entropy_explore_env.errors import EntropyExploreError, one_of
+from entropy_explore_env.errors import EntropyExploreError, SettingError, one_of
 from entropy_explore_env.scenario import Scenario
 from entropy_explore_env.settings_json import scenario_of, settings_of
 from entropy_explore_env.viewpoints.candidate_features import FEATURES_VERSION
+from training.candidate_network import ATTENTION_LAYERS, check_attention_layers
 from training.errors import CheckpointError
 from training.networks import NETWORKS
 from training.stored_arrays import stored_arrays, stored_bytes
@@ -55,6 +56,7 @@ class PolicySettings:
         hidden: Units of each hidden layer of actor and critic; over candidates one number, the units of each.
         privileged: Numbers that follow an observation in training, which only the critic reads.
         features_version: Of the features of candidates, `FEATURES_VERSION`; None = it does not observe them.
+        attention_layers: Of the actor over candidates.
     """
 
     scenario: Scenario
@@ -62,6 +64,7 @@ class PolicySettings:
     hidden: tuple[int, ...] = (128, 128)
     privileged: int = 0
     features_version: int | None = None
+    attention_layers: int = ATTENTION_LAYERS
 
 
 @dataclass(frozen=True)
@@ -120,6 +123,7 @@ def save_checkpoint(folder: Path, checkpoint: Checkpoint) -> None:
             "hidden": list(checkpoint.settings.hidden),
             "privileged": checkpoint.settings.privileged,
             "features_version": checkpoint.settings.features_version,
+            "attention_layers": checkpoint.settings.attention_layers,
             "progress": checkpoint.progress,
             "sha256": {name: hashlib.sha256(content).hexdigest() for name, content in files.items()},
             "scenario": settings_of(checkpoint.settings.scenario),
@@ -235,9 +239,14 @@ def _settings(folder: Path, head: Mapping[str, Any]) -> PolicySettings:
     if version != current or isinstance(version, bool):
         allowed = f"{current}: its features of candidates are not those of this library"
         raise CheckpointError(f"{folder}: features_version", version, allowed)
+    layers = head.get("attention_layers", ATTENTION_LAYERS)
+    try:
+        check_attention_layers(layers)
+    except SettingError as error:
+        raise CheckpointError(f"{folder}: attention_layers", layers, error.allowed) from None
     try:
         scenario = scenario_of(head.get("scenario", {}))
-        return PolicySettings(scenario, features, tuple(hidden), privileged, version)
+        return PolicySettings(scenario, features, tuple(hidden), privileged, version, layers)
     except EntropyExploreError as error:
         raise CheckpointError(f"{folder}: scenario", str(error), "settings of this version") from None
 

@@ -20,7 +20,7 @@ from entropy_explore_env.errors import SettingError
 from entropy_explore_env.missions.action import action_space
 from entropy_explore_env.missions.observation.layout import ObservationLayout, Part
 from entropy_explore_env.scenario import Scenario
-from training.candidate_network import CandidatePolicy, candidate_parts
+from training.candidate_network import ATTENTION_LAYERS, CandidatePolicy, candidate_parts
 from training.distributions import MoveAndGaze
 
 _MAPS = ("patch", "overview")
@@ -264,7 +264,11 @@ def policy_class(features: str) -> type[ActorCriticPolicy]:
 
 
 def policy_keywords(
-    features: str, scenario: Scenario, hidden: tuple[int, ...], privileged: int = 0
+    features: str,
+    scenario: Scenario,
+    hidden: tuple[int, ...],
+    privileged: int = 0,
+    attention_layers: int = ATTENTION_LAYERS,
 ) -> dict[str, Any]:
     """`policy_kwargs` of a Stable-Baselines3 policy: orthogonal weights, tanh, separate actor and critic.
 
@@ -273,6 +277,7 @@ def policy_keywords(
         scenario: Whose observations and actions.
         hidden: Units of the hidden layers; over candidates one number, the units of each.
         privileged: Numbers that follow an observation in training, for the critic over candidates.
+        attention_layers: Of the actor over candidates.
 
     Raises:
         SettingError: The networks cannot have the scenario's actions or observations.
@@ -283,6 +288,7 @@ def policy_keywords(
             "parts": candidate_parts(layout),
             "privileged": privileged,
             "width": hidden[0],
+            "attention_layers": attention_layers,
             "ortho_init": False,
         }
     settings: dict[str, Any] = {

@@ -19,7 +19,7 @@ from entropy_explore_env.missions.view import RobotView
 from entropy_explore_env.missions.view_observation import ViewObserver
 from entropy_explore_env.scenario import Scenario
 from entropy_explore_env.viewpoints.candidate_features import FEATURES_VERSION
-from training.candidate_network import CandidatePolicy
+from training.candidate_network import ATTENTION_LAYERS, CandidatePolicy
 from training.checkpoints import Checkpoint, PolicySettings, latest_checkpoint, load_checkpoint
 from training.errors import CheckpointError
 from training.networks import VectorFeatures, policy_class, policy_keywords
@@ -44,12 +44,22 @@ def make_policy(
         spaces.Box(-np.inf, np.inf, (size,), np.float32),
         action_space(settings.scenario),
         schedule,
-        **policy_keywords(settings.features, settings.scenario, settings.hidden, settings.privileged),
+        **policy_keywords(
+            settings.features,
+            settings.scenario,
+            settings.hidden,
+            settings.privileged,
+            settings.attention_layers,
+        ),
     )
 
 
 def settings_of_policy(
-    scenario: Scenario, features: str, hidden: tuple[int, ...], privileged: int = 0
+    scenario: Scenario,
+    features: str,
+    hidden: tuple[int, ...],
+    privileged: int = 0,
+    attention_layers: int = ATTENTION_LAYERS,
 ) -> PolicySettings:
     """The settings of a new policy.
 
@@ -58,9 +68,10 @@ def settings_of_policy(
         features: A name of NETWORKS.
         hidden: Units of the hidden layers; over candidates one number, the units of each.
         privileged: Numbers that follow an observation in training, for the critic over candidates.
+        attention_layers: Of the actor over candidates.
     """
     version = FEATURES_VERSION if features == "candidates" else None
-    return PolicySettings(scenario, features, hidden, privileged, version)
+    return PolicySettings(scenario, features, hidden, privileged, version, attention_layers)
 
 
 def load_policy(checkpoint: Checkpoint) -> ActorCriticPolicy:
@@ -182,7 +193,7 @@ def check_same_networks(folder: Path, theirs: PolicySettings, ours: PolicySettin
         theirs: Settings that the weights were learned with.
         ours: Settings of the policy that is to begin with them.
     """
-    for name in ("features", "hidden", "privileged"):
+    for name in ("features", "hidden", "privileged", "attention_layers"):
         if getattr(theirs, name) != getattr(ours, name):
             raise CheckpointError(f"{folder}: {name}", getattr(theirs, name), f"{getattr(ours, name)}")
     if (differs := misfit(theirs.scenario, ours.scenario)) is not None:

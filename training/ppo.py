@@ -157,7 +157,9 @@ def set_up(args: Args, task: TrainingTask) -> TrainingState:
     envs = rows_of(task.scenario, args.missions, threads=args.threads, seeds=seeds, **around)
     layout = envs.vector_env.missions.layout
     size = int(np.prod(envs.observation_space.shape or ()))
-    settings = settings_of_policy(envs.scenario, args.networks, args.layers, size - layout.size)
+    settings = settings_of_policy(
+        envs.scenario, args.networks, args.layers, size - layout.size, args.attention_layers
+    )
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", message="You have specified a mini-batch")  # ours are of even size
         model = DecisionPPO(
@@ -180,7 +182,11 @@ def set_up(args: Args, task: TrainingTask) -> TrainingState:
                 "rng": np.random.default_rng(args.seed),
             },
             policy_kwargs=policy_keywords(
-                settings.features, settings.scenario, settings.hidden, settings.privileged
+                settings.features,
+                settings.scenario,
+                settings.hidden,
+                settings.privileged,
+                settings.attention_layers,
             ),
             seed=args.seed,
             device="cpu",

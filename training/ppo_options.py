@@ -26,7 +26,7 @@ from entropy_explore_env.errors import SettingError
 from entropy_explore_env.scenario import with_settings
 from entropy_explore_env.validation import check_whole
 from training.advantages import DiscountUnit
-from training.candidate_network import WIDTH, check_width
+from training.candidate_network import ATTENTION_LAYERS, WIDTH, check_attention_layers, check_width
 from training.options import check_options, check_share
 from training.training_task import TrainingTask
 
@@ -84,6 +84,8 @@ class Args:
     """Viewpoints that the planner proposes at most."""
     width: int = WIDTH
     """Units of each candidate in the networks of `--actions candidates`."""
+    attention_layers: int = ATTENTION_LAYERS
+    """Layers in which candidates look at each other; 0 = an MLP judges each alone."""
     critic: Literal["observed", "privileged"] = "observed"
     """privileged: in training the critic of `--actions candidates` also reads what no robot may know."""
     yaws: int = 16
@@ -160,7 +162,7 @@ def check(args: Args) -> None:
 
 
 _WITHOUT_CANDIDATES = ("features", "overview", "patch", "hidden", "yaws", "pitches")
-_WITH_CANDIDATES = ("critic", "critic_first", "width", "candidates")
+_WITH_CANDIDATES = ("critic", "critic_first", "width", "attention_layers", "candidates")
 
 
 def _check_candidates(args: Args) -> None:
@@ -173,6 +175,7 @@ def _check_candidates(args: Args) -> None:
             raise SettingError(name, getattr(args, name), f"left out {word} --actions candidates")
     if args.over_candidates:
         check_width(args.width)
+        check_attention_layers(args.attention_layers)
 
 
 def _check_costs(args: Args) -> None:

@@ -71,7 +71,7 @@ from training.policy_improvement.stage_options import Args, check
 from training.policy_improvement.tasks import task_of
 from training.run_folder import FILE
 
-_RESULT, _BEGINNING = "result.json", "begins-with.txt"
+RESULT, _BEGINNING = "result.json", "begins-with.txt"
 _STOPPED = "the shard that is under way is written first; of a search what is done is there already"
 
 
@@ -147,7 +147,7 @@ def label_settings(args: Args, tasks: list[Scenario]) -> tuple[LabelSettings, Ca
 
 def described(args: Args, tasks: list[Scenario]) -> PolicySettings:
     """Settings of the policy that is learned."""
-    return settings_of_policy(tasks[0], "candidates", (args.width,), len(PRIVILEGED))
+    return settings_of_policy(tasks[0], "candidates", (args.width,), len(PRIVILEGED), args.attention_layers)
 
 
 def learn_labels(args: Args, tasks: list[Scenario], interruption: Interruption) -> dict[str, Any] | None:
@@ -155,7 +155,7 @@ def learn_labels(args: Args, tasks: list[Scenario], interruption: Interruption) 
     settings, led_by = label_settings(args, tasks)
     labels = read_labels(settings, args.out / "labels", args.shards)
     learning = RegressionSettings(args.epochs, args.batch, args.learning_rate, seed=args.seed)
-    digest = _digest(settings.origin, args.shards, learning, args.width, args.compared)
+    digest = _digest(settings.origin, args.shards, learning, args.width, args.attention_layers, args.compared)
     if (known := _known(args.out / "regression", digest)) is not None:
         return known
     torch.manual_seed(args.seed)
@@ -178,7 +178,7 @@ def search_weights(args: Args, tasks: list[Scenario], interruption: Interruption
     assert isinstance(policy, CandidatePolicy)
     begins = "" if before is None else weights_digest(policy)
     settings = SearchSettings(tuple(tasks), args.rounds, args.pairs, args.sigma, args.step, args.seed, begins)
-    digest = _digest(settings.origin, args.width, args.compared)
+    digest = _digest(settings.origin, args.width, args.attention_layers, args.compared)
     if (known := _known(folder, digest)) is not None:
         return known
     result = search(
@@ -291,7 +291,8 @@ def _save(
 
 def ppo_stage(args: Args) -> PpoStage:
     """What the options say of the last stage."""
-    return PpoStage(args.candidates, args.width, args.seed, args.ppo_steps, args.ppo_options)
+    networks = (args.candidates, args.width, args.attention_layers)
+    return PpoStage(*networks, args.seed, args.ppo_steps, args.ppo_options)
 
 
 def _check_beginning(folder: Path, weights: str, begun: bool) -> None:
@@ -319,14 +320,14 @@ def _finished(
         compared.append({**comparison.as_json(), "line": comparison.line()})
     result = {**found, "compared": compared}
     text = json.dumps({"digest": digest, "result": result}, indent=1, allow_nan=False)
-    write_atomically(args.out / stage / _RESULT, text + "\n")
+    write_atomically(args.out / stage / RESULT, text + "\n")
     return result
 
 
 def _known(folder: Path, digest: str) -> dict[str, Any] | None:
     """What a stage came to that was done with the same options; None = it is to be done."""
     try:
-        known = json.loads((folder / _RESULT).read_text("utf-8"))
+        known = json.loads((folder / RESULT).read_text("utf-8"))
         return known["result"] if known["digest"] == digest else None
     except (OSError, ValueError, LookupError, TypeError):
         return None

@@ -10,7 +10,18 @@ from entropy_explore_env.errors import SettingError
 from entropy_explore_env.scenario import Scenario
 from training import ppo_options
 
-_OF_THE_STAGES = ("scenario", "robots", "actions", "candidates", "width", "critic", "start", "out", "resume")
+_OF_THE_STAGES = (
+    "scenario",
+    "robots",
+    "actions",
+    "candidates",
+    "width",
+    "attention-layers",
+    "critic",
+    "start",
+    "out",
+    "resume",
+)
 """Options of training.ppo that this command says."""
 
 
@@ -20,6 +31,7 @@ class PpoStage(NamedTuple):
     candidates: int
     width: int
     """Units of each candidate in the networks."""
+    attention_layers: int
     seed: int
     steps: int
     """Counted per robot."""
@@ -36,6 +48,7 @@ def ppo_words(stage: PpoStage, task: Scenario) -> list[str]:
         "actions": "candidates",
         "candidates": str(stage.candidates),
         "width": str(stage.width),
+        "attention-layers": str(stage.attention_layers),
         "critic": "privileged",
         "reward": "seconds",
         "discount": "seconds",

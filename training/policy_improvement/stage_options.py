@@ -8,7 +8,7 @@ from typing import Literal
 
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.validation import check_whole, is_whole
-from training.candidate_network import WIDTH, check_width
+from training.candidate_network import ATTENTION_LAYERS, WIDTH, check_attention_layers, check_width
 
 
 @dataclass
@@ -30,6 +30,8 @@ class Args:
     """Viewpoints that the planner proposes at most."""
     width: int = WIDTH
     """Units of each candidate in the networks."""
+    attention_layers: int = ATTENTION_LAYERS
+    """Layers in which candidates look at each other; 0 = an MLP judges each alone."""
     compared: int = 64
     """Starts on which each stage's policy is compared with the planner; 0 = it is not."""
     json: bool = False
@@ -108,6 +110,7 @@ def check(args: Args) -> None:
         )
     check_whole("draws", args.draws, 1)
     check_width(args.width)
+    check_attention_layers(args.attention_layers)
     if not 0.0 < args.learning_rate < float("inf"):
         raise SettingError("learning_rate", args.learning_rate, "a number above 0")
     for name in ("sigma", "step"):
