@@ -92,7 +92,7 @@ class Args:
     runs: Path = Path("runs/ablations")
     """Folder of the runs."""
     out: Path = Path("results/ablations")
-    """Folder for a file VARIANT-SEED.json each; the policies' page shows those of policy/ablations beside it."""
+    """Folder for VARIANT-SEED.json; the policies' page shows those in policy/ablations beside it."""
 
 
 def main(words: Sequence[str]) -> int:
