@@ -14,6 +14,8 @@ FORGET_EDGES, REMEMBERED = 6.0, 16
 """How far away from where it was a robot forgets what it could not do, and how much it remembers at most."""
 BLOCKED_DECISIONS = 4
 """Decisions during which a robot keeps clear of a teammate that was in its way."""
+EDGES = 64
+"""Places beyond the end of the ground that a robot remembers."""
 CLEAR = 1.1
 """How far it keeps clear, in sums of the two radii."""
 DREGS_SHARE = 0.01

@@ -43,7 +43,7 @@ def propose(proposer, situation, decision, candidates, described):
     experience, pool = situation.experience, proposer.scratch.pool
     chosen = chosen_number(candidates, decision)
     came_bits = _came_bits(proposer, situation, candidates, decision, chosen)
-    learn(experience, candidates, decision, chosen, came_bits, situation.here)
+    learn(experience, candidates, decision, chosen, came_bits, situation.here, proposer.drive.body_radius)
     weigh_time(proposer, experience, decision)
     if proposer.planned:
         start_paths(proposer, situation)

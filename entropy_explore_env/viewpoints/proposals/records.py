@@ -5,7 +5,7 @@ from __future__ import annotations
 import enum
 
 from entropy_explore_env.compilation.kernels import record_type
-from entropy_explore_env.viewpoints.proposals.planner_rules import REMEMBERED
+from entropy_explore_env.viewpoints.proposals.planner_rules import EDGES, REMEMBERED
 
 
 class Kind(enum.IntEnum):
@@ -48,6 +48,8 @@ EXPERIENCE = record_type(
         ("blocked", "i8"),  # decisions during which it keeps clear of teammates
         ("was_free", "?"),  # whether it ever was where a path led anywhere
         ("free_at", "f8", (3,)),  # where that was last
+        ("edges", "i8"),  # drives that the end of the ground cut short
+        ("edge_at", "f8", (EDGES, 3)),  # places just beyond it, the last of these drives
         ("failures", "i8"),  # how many of these are in use
         ("failed", "f8", (REMEMBERED, 5)),  # viewpoints that did not bring what was expected
         ("share", "f8", (REMEMBERED,)),  # of the expected bits that came; 0 = it was not reached

@@ -18,6 +18,7 @@ from entropy_explore_env.viewpoints.proposals.planner_rules import (
     CLEAR,
     DISAPPOINTING,
     DREGS_SHARE,
+    EDGES,
     FAILED_GAZES,
     FORGET_EDGES,
     MISSED_EDGES,
@@ -26,7 +27,7 @@ from entropy_explore_env.viewpoints.proposals.planner_rules import (
 from entropy_explore_env.viewpoints.proposals.records import Kind
 
 _NONE, _FAR = int(Kind.NONE), int(Kind.FAR)
-_TEAMMATE = MoveEnd.TEAMMATE.code
+_TEAMMATE, _EDGE = MoveEnd.TEAMMATE.code, MoveEnd.EDGE.code
 _ARRIVED, _CORNERS = MoveEnd.ARRIVED.code, MoveEnd.CORNERS.code
 _SAME_EDGES, _SAME_RAD = 2e-3, 2e-3
 """A viewpoint that was chosen is the candidate that differs by less: actions may be float32."""
@@ -98,7 +99,7 @@ def chosen_number(candidates, decision):
 
 
 @lean_kernel
-def learn(experience, candidates, decision, number, came_bits, here):
+def learn(experience, candidates, decision, number, came_bits, here, body_radius):
     """Compare what came with what was expected, and remember what is not worth another try.
 
     Args:
@@ -108,6 +109,7 @@ def learn(experience, candidates, decision, number, came_bits, here):
         number: Of the candidate that it chose; -1 = something else.
         came_bits: Those of its latest scan that count.
         here: (5,) where the robot is, grid units.
+        body_radius: Of the robot, voxel edges.
     """
     if number >= 0 or not decision.under_way:  # who is under way to what is out of reach keeps its goal
         experience.going = False
@@ -121,6 +123,8 @@ def learn(experience, candidates, decision, number, came_bits, here):
     experience.blocked = max(experience.blocked - 1, 0)
     if decision.move_end == _TEAMMATE:
         experience.blocked = BLOCKED_DECISIONS
+    if decision.move_end == _EDGE:
+        _remember_edge(experience, here, decision.target, body_radius)
     missed = distance_apart(decision.target, here)
     expected = candidates[number].bits if number >= 0 else 0.0
     came = max(came_bits, 0.0)
@@ -188,6 +192,18 @@ def _remember(experience, viewpoint, share, forget_at):
 
 
 @lean_kernel
+def _remember_edge(experience, here, target, body_radius):
+    """Remember the first place on the way to a target at which the ground does not carry a robot."""
+    length = distance_apart(here, target)
+    if length == 0.0:
+        return
+    at = experience.edge_at[experience.edges % EDGES]
+    for axis in range(3):
+        at[axis] = here[axis] + (body_radius + 1.0) * (target[axis] - here[axis]) / length
+    experience.edges += 1
+
+
+@lean_kernel
 def trust_in(experience, all_around, at):
     """Share of the expected bits that viewpoints like this one brought; 1 where none was a failure.
 
@@ -220,7 +236,9 @@ def worth_bits(proposer, situation, at, bits):
 
 @lean_kernel
 def trust_and_clearance(proposer, situation, at):
-    """Share of the expected bits that viewpoints like this one brought; 0 where a teammate is in the way.
+    """Share of the expected bits that viewpoints like this one brought; 0 where something is in the way.
+
+    That is a teammate, or a place where the ground ended under the robot before: a map does not show it.
 
     Whether a place is worth driving to at all is asked of this share, not of `worth_bits`: dregs are bits.
     """
@@ -230,6 +248,10 @@ def trust_and_clearance(proposer, situation, at):
             clear = CLEAR * (mate.body_radius + proposer.drive.body_radius)
             if mate.body_radius > 0.0 and _comes_near(situation.here, at, mate.place, clear):
                 return 0.0
+    clear = proposer.drive.body_radius + 0.5
+    for number in range(min(experience.edges, EDGES)):
+        if _comes_near(situation.here, at, experience.edge_at[number], clear):
+            return 0.0
     return trust_in(experience, proposer.all_around, at)
 
 

@@ -25,6 +25,7 @@ from baselines.strategies.next_best_view.cliff.elevation_view import (
 from baselines.strategies.next_best_view.cliff.plateau import PlateauPaths, safe_columns
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.missions.view import view_of
+from entropy_explore_env.reports.metrics import mission_figures
 from entropy_explore_env.robots.motion import MoveEnd
 from entropy_explore_env.scenario import with_settings
 from entropy_explore_env.scenarios import CLIFF, LAB
@@ -241,3 +242,12 @@ def test_others_than_rovers_and_settings_out_of_range_are_refused():
     ):
         with pytest.raises(SettingError, match=f"CliffConfig.{next(iter(bad))}"):
             CliffConfig(**bad)
+
+
+@pytest.mark.long
+def test_the_recommended_strategy_learns_where_the_ground_ends():
+    """No map shows the edge: it once drove against it 90 times in 200 s, and never came to the end."""
+    env = scripted_env(CLIFF, ending={"time_limit_s": 400.0})
+    run_mission(env, make_strategy("best"), seed=0)
+    figures = mission_figures(env.missions, 0)
+    assert figures["finished"] and figures["blocked_moves"] < 20

@@ -21,6 +21,7 @@ from entropy_explore_env.viewpoints.candidate_features import COLUMNS
 from entropy_explore_env.viewpoints.evaluation import is_line_free, new_scratch, robot_model
 from entropy_explore_env.viewpoints.imagined_scan import imagined_bits
 from entropy_explore_env.viewpoints.proposals.model import MATE, new_proposers
+from entropy_explore_env.viewpoints.proposals.planner_rules import EDGES
 from entropy_explore_env.viewpoints.proposals.propose import propose
 from entropy_explore_env.viewpoints.proposals.records import CANDIDATE, EXPERIENCE, Kind
 from entropy_explore_env.viewpoints.proposals.situation import (
@@ -43,6 +44,8 @@ ONE_RAY = with_settings(
 ALONG_X = np.array([0.5, 5.5, 2.5, 0.0, 0.0])
 BACK = np.array([6.5, 5.5, 2.5, math.pi, 0.0])
 PRIOR = 1.0 / 900.0
+RADIUS = 1.5
+"""Of the robot, voxel edges."""
 
 
 def unknown_world():
@@ -132,7 +135,7 @@ def decision(target, came_bits, move_end=MoveEnd.ARRIVED, under_way=False, uncer
 
 def learned(experience, candidates, last, here):
     """As where all bits count."""
-    learn(experience, candidates, last, chosen_number(candidates, last), last.came_bits, here)
+    learn(experience, candidates, last, chosen_number(candidates, last), last.came_bits, here, RADIUS)
 
 
 @pytest.fixture
@@ -174,6 +177,22 @@ def test_a_drive_that_was_cut_short_loses_its_goal_and_its_trust(proposed):
     learned(experience, candidates, decision(BACK, 60.0, MoveEnd.TEAMMATE), short)
     assert not experience["going"] and experience["blocked"] == 4
     assert trust_in(experience, False, BACK) == 0.0
+
+
+def test_where_the_ground_ended_is_remembered_just_beyond_the_body(proposed):
+    candidates, experience = proposed
+    short = np.array([3.5, 5.5, 2.5, 0.0, 0.0])
+    learned(experience, candidates, decision(BACK, 60.0, MoveEnd.EDGE), short)
+    assert experience["edges"] == 1
+    np.testing.assert_allclose(experience["edge_at"][0], (3.5 + 2.5, 5.5, 2.5))
+    aslant = short + np.array([3.0, 4.0, 0, 0, 0])
+    for _ in range(EDGES):  # the 65th takes the place of the first
+        learned(experience, candidates, decision(aslant, 60.0, MoveEnd.EDGE), short)
+    np.testing.assert_allclose(experience["edge_at"][0], (3.5 + 0.6 * 2.5, 5.5 + 0.8 * 2.5, 2.5))
+    learned(
+        experience, candidates, decision(short, 60.0, MoveEnd.EDGE), short
+    )  # it went nowhere: no direction
+    assert experience["edges"] == EDGES + 1
 
 
 def test_who_drives_on_judges_nothing_and_keeps_its_goal(proposed):

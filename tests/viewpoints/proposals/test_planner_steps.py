@@ -150,6 +150,19 @@ def test_a_robot_that_a_teammate_blocked_keeps_clear_of_it():
     assert worth == [0.0, 1.0, 1.0]
 
 
+def test_a_robot_does_not_drive_again_to_where_the_ground_ended():
+    """The body of 1.5 edges has half an edge to spare: drives that come nearer than 2 are refused."""
+    bodies = with_settings(PLAN, {"robot": {"body_radius_m": 0.15}})
+    proposer, situation = new_proposers(bodies)[0], half_known_plan()
+    situation.experience["edge_at"][0] = HERE[:3] + np.array([2.5, 0.0, 0.0])
+    steps = [(8.0, 0.0), (8.0, 6.0), (4.0, 8.0), (0.0, 6.0), (-4.0, 0.0), (0.0, 0.0)]
+    places = [HERE + np.array([dx, dy, 0.0, 0.0, 0.0]) for dx, dy in steps]
+    assert [trust_and_clearance(proposer, situation, at) for at in places] == [1.0] * 6
+    situation.experience["edges"] = 1
+    worth = [trust_and_clearance(proposer, situation, at) for at in places]
+    assert worth == [0.0, 0.0, 1.0, 1.0, 1.0, 1.0]
+
+
 def test_bodies_that_touch_may_part():
     bodies = with_settings(PLAN, {"robot": {"body_radius_m": 0.15}})
     proposer = new_proposers(bodies)[0]
