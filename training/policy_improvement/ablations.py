@@ -1,4 +1,4 @@
-"""What each stage of the learning is worth: the stages without one of them, on several seeds, in small.
+"""What each stage of the learning is worth: the stages without one of them, on several seeds, at small cost.
 
     python -m training.policy_improvement.ablations --out docs/results/policy/ablations
 
@@ -180,8 +180,16 @@ def shown(folder: Path) -> str:
         own = [each for each in found if each["variant"] == name]
         if own:
             rows.append(_row(variant, own))
+    if not rows:
+        return ""
+    budget = found[0]["budget"]
+    labelled, pairs = budget["shards"] * budget["missions"], budget["rounds"] * budget["pairs"]
+    said = (
+        f"\nOf each seed: states of {labelled} missions labelled, one decision in {budget['every']}; "
+        f"{budget['ppo_steps']:,} steps of PPO; a search over {pairs} pairs of missions.\n"
+    )
     head = ["learned by", "task", "mean of ratios, by seed", "over all seeds", "finished"]
-    return markdown_table(head, rows) if rows else ""
+    return markdown_table(head, rows) + said
 
 
 def _row(variant: Variant, found: Sequence[dict[str, Any]]) -> list[str]:
@@ -204,6 +212,7 @@ def _read(file: Path) -> dict[str, Any]:
         for name in ("mean_ratio", "finished", "missions"):
             float(found["compared"][name])
         str(found["task"]).split(":")[1]
+        dict(found["budget"])
         return found if found["variant"] in VARIANTS else _refuse(file)
     except (ValueError, KeyError, TypeError, IndexError):
         return _refuse(file)

@@ -173,19 +173,22 @@ def _told(file: Path) -> list[str]:
         rows = {row["name"]: row for row in found["rows"]}
         cells = [team_name(found["scenario"], found["robots"]), str(found["missions"]), str(found["every"])]
         if found["horizon"] or found["divisor"] > 1:
-            cells[-1] += f", {found['horizon']} decisions deep, drawing 1/{found['divisor']}"
+            deep = f"{found['horizon']} decisions deep" if found["horizon"] else "to the end"
+            cells[-1] += f", {deep}, drawing 1/{found['divisor']}"
         cells.append(f"{rows['planner']['median_s']:,.0f} s")
-        return cells + [_ratio_text(rows.get(name)) for name in _NAMES]
+        return cells + [_ratio_text(rows.get(name), found["missions"]) for name in _NAMES]
     except (ValueError, KeyError, TypeError) as error:
         wanted = "a file that python -m training.policy_improvement.headroom wrote"
         raise SettingError("headroom", str(file), wanted) from error
 
 
-def _ratio_text(row: dict[str, Any] | None) -> str:
+def _ratio_text(row: dict[str, Any] | None, missions: int) -> str:
+    """A row's ratio; where missions were cut off, and count with their time limit, how many were not."""
     if row is None:
         return "-"
     ratio = Interval(*(row[f"mean_ratio{end}"] for end in ("", "_low", "_high")))
-    return ratio.text()
+    finished = row["finished"]
+    return ratio.text() + ("" if finished == missions else f", {finished} of {missions} finished")
 
 
 def lead_by_planner(task: Scenario, seeds: Sequence[int], threads: int) -> PlannerMissions:

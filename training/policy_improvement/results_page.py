@@ -39,7 +39,7 @@ from entropy_explore_env.writing import write_atomically
 from training import extra  # noqa: F401 - before what is not there without it
 from training.checkpoints import latest_checkpoint, load_checkpoint
 from training.policy import POLICIES, policy_folder
-from training.policy_improvement import headroom
+from training.policy_improvement import ablations, headroom
 from training.policy_improvement.comparison import Paired, paired
 
 _BEST, _DUNGEONS = resolved("best"), "dungeons"
@@ -187,7 +187,8 @@ def main(words: Sequence[str]) -> int:
         if name not in TESTS:
             raise SettingError("policies", name, "some of " + ", ".join(TESTS))
     make_folder("out", args.out)
-    what_is_to_win = headroom.shown(args.out / FILES / "headroom")
+    beside = args.out / FILES
+    experiments = Experiments(headroom.shown(beside / "headroom"), ablations.shown(beside / "ablations"))
     rows = {
         name: [(test, strategy) for test in TESTS[name] for strategy in _strategies(name, test)]
         for name in names
@@ -215,8 +216,8 @@ def main(words: Sequence[str]) -> int:
     )
     found = {key: [each for cell in group for each in records[cell.id]] for key, group in cells.items()}
     page = args.out / "policy.md"
-    write_atomically(page, "\n".join(_page(names, found, args.confirm, what_is_to_win)))
-    write_archive(args.out / FILES / ARCHIVE, runs, missions)
+    write_atomically(page, "\n".join(_page(names, found, args.confirm, experiments)))
+    write_archive(beside / ARCHIVE, runs, missions)
     print(f"written: {page}")
     return 0
 
@@ -254,10 +255,19 @@ def _finished(record: Record) -> bool:
 
 FILES = "policy"
 """Folder beside the page."""
+
+
+class Experiments(NamedTuple):
+    """Tables of other commands, in Markdown; empty where they were not run."""
+
+    headroom: str
+    ablations: str
+
+
 Found = Mapping[tuple[str, str, str], Sequence[Record]]
 
 
-def _page(names: Sequence[str], found: Found, confirmed: bool, what_is_to_win: str) -> list[str]:
+def _page(names: Sequence[str], found: Found, confirmed: bool, experiments: Experiments) -> list[str]:
     """The page, part by part."""
     flags, said = (" --confirm", CONFIRMED) if confirmed else ("", "")
     parts = [
@@ -273,10 +283,12 @@ def _page(names: Sequence[str], found: Found, confirmed: bool, what_is_to_win: s
         "goal holds if the ratio of medians is at most the goal, for goals below 1 also its interval ends "
         "below 1, and the policy finished no fewer missions than the other.\n",
     ]
-    if what_is_to_win:
-        parts += [_TO_WIN, what_is_to_win]
+    if experiments.headroom:
+        parts += [_TO_WIN, experiments.headroom]
     for name in names:
         parts += _policy_parts(name, found)
+    if experiments.ablations:
+        parts += [_ABLATIONS, experiments.ablations]
     return parts
 
 
@@ -288,6 +300,15 @@ planner, on the same starts. The planner takes its own choice among the candidat
 among. The clairvoyant tries the eight best of them in branches of the mission as it will happen, each led to
 its end by the planner, and keeps the best: no policy can know what it knows. Discrete actions are those of
 `training.ppo`.
+"""
+
+
+_ABLATIONS = """## What the stages are worth
+
+Written by `python -m training.policy_improvement.ablations --out docs/results/policy/ablations`: the stages
+without one of them, at small cost, on several seeds of labels, weights and missions. Ratios are of mission
+times to those of the planner whose candidates are chosen among, in worlds of validation, paired by start,
+geometric means.
 """
 
 

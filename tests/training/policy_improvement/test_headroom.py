@@ -54,14 +54,27 @@ def test_the_command_compares_all_on_the_same_starts(tmp_path):
 
 def test_what_the_command_wrote_is_shown_as_a_table(tmp_path):
     assert headroom.shown(tmp_path) == "" == headroom.shown(tmp_path / "none")
-    row = {"median_s": 52.4, "mean_ratio": 0.9, "mean_ratio_low": 0.85, "mean_ratio_high": 0.951}
+    row = {
+        "median_s": 52.4,
+        "mean_ratio": 0.9,
+        "mean_ratio_low": 0.85,
+        "mean_ratio_high": 0.951,
+        "finished": 8,
+    }
     found = {"scenario": "cave", "robots": 3, "missions": 8, "every": 2, "horizon": 0, "divisor": 1}
     found["rows"] = [{"name": "planner", **row}, {"name": "clairvoyant", **row}]
     (tmp_path / "cave-3.json").write_text(json.dumps(found))
     (tmp_path / "office-1.json").write_text(
         json.dumps({**found, "scenario": "office", "robots": 1, "horizon": 9})
     )
-    _, _, cave, office = headroom.shown(tmp_path).strip().splitlines()
+    lost = [*found["rows"][:1], {**found["rows"][1], "name": "restricted", "finished": 3}]
+    (tmp_path / "room-2.json").write_text(
+        json.dumps({**found, "scenario": "room", "robots": 2, "rows": lost, "divisor": 2})
+    )
+    _, _, cave, office, room = headroom.shown(tmp_path).strip().splitlines()
+    assert room.endswith(
+        "| 2, to the end, drawing 1/2 | 52 s | - | - | 0.90 (0.85 … 0.95), 3 of 8 finished |"
+    )
     assert cave == "| cave, 3 robots | 8 | 2 | 52 s | 0.90 (0.85 … 0.95) | - | - |"
     assert office.startswith("| office, 1 robot | 8 | 2, 9 decisions deep, drawing 1/1 | 52 s |")
     (tmp_path / "other.json").write_text("[1]")
