@@ -44,7 +44,7 @@ class Variant(NamedTuple):
 
 _WHOLE = "whole"
 _FASTER = "--learning-rate 1e-3 --target-kl 0.03 --rollout-steps 128"
-"""PPO updates more often and moves farther: as the stage has it, a small budget leaves every choice as it was."""
+"""PPO updates more often and moves farther: a small budget would else leave every choice as it was."""
 VARIANTS: dict[str, Variant] = {
     _WHOLE: Variant("labels, regression, PPO", ("labels", "regression", "ppo")),
     "no-labels": Variant("PPO from the planner, without labels and regression", ("ppo",)),
