@@ -264,7 +264,8 @@ def about(task: Task, missions: int) -> str:
     grid, around = scenario.grid, task.places[0].surroundings
     files = [Path(scenario.world)] if around is None or not around.worlds else around.files()
     shape = " × ".join(map(str, grid.shape if not grid.flat else grid.shape[:2]))
-    kind = "ground" if scenario.planar else "flying"
+    moving = ["ground" if kind.robot.motion == "planar" else "flying" for kind in scenario.kinds]
+    kind = " and ".join(dict.fromkeys(moving))
     worlds = f"{len(task.places)} worlds" if len(task.places) > 1 else f"world `{scenario.world}`"
     if files[0].is_file() and len(task.places) == 1:
         names = [f"`{name}`" for name in dict.fromkeys(file.name for file in files)]
