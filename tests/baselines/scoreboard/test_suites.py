@@ -100,7 +100,7 @@ def test_the_page_says_with_what_plans_are_scanned():
     assert about(team, team.missions).startswith("2 starts, world")
     others = {task.name: about(task, 1) for task in find_suite("others", False, TEAMS).tasks}
     assert ", 1 ground robot, time limit" in others["cliff, 1 robot"]  # which looks down, and tilts
-    assert ", 3 flying and ground robots, time limit" in others["office-mixed, 3 robots"]
+    assert ", 3 ground and flying robots, time limit" in others["office-mixed, 3 robots"]
     assert about(team, 1).startswith("1 of 2 starts, world")
 
 
