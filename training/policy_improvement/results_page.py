@@ -3,9 +3,9 @@
 Each policy over candidates runs beside the strategy that is recommended, on the same starts, in worlds that
 nothing was learned in: in the tasks that it learned, there also beside the planner whose candidates it
 chooses among and `information-rate-v0`, and in others, with other teams, channels and sensors. Written is
-`policy.md`, and beside it all missions as one file, with which another run begins (`--archive`). Missions are
-kept, a file each: what was stopped goes on, and a page of a part says how many starts it holds. Tasks that
-stand in suites, too, are theirs: archives of the scoreboard serve as well.
+`policy.md`, and beside it each policy's part of the page and all of its missions as one file, with which
+another run begins (`--archive`). Missions are kept, a file each: what was stopped goes on, and a part says
+how many starts it holds. Tasks that stand in suites, too, are theirs: archives of the scoreboard serve, too.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from baselines.experiments.cells import Cell, missions_of, run_cells
 from baselines.experiments.outcome import Record
 from baselines.experiments.runner import NOT_RUN
 from baselines.experiments.tables import markdown_table
-from baselines.scoreboard.page import ARCHIVE, CONFIRMED
+from baselines.scoreboard.page import ARCHIVE, CONFIRMED, PART
 from baselines.scoreboard.results import Measure, limit_of, value
 from baselines.scoreboard.suites import Suite, Task, plans, task_in, team_name
 from baselines.strategies import resolved
@@ -139,7 +139,7 @@ class Args(WorkerOptions):
     seeds: int = 100
     """Starts of each task; the dungeons are 100."""
     policies: str = ",".join(TESTS)
-    """Which, commas between; the page holds these alone."""
+    """Which, commas between; of others the page keeps the parts that earlier runs wrote."""
     stop_after_s: float = math.inf
     """Time on the clock after which no mission is begun any more; the page then holds what was run."""
     wall_limit_s: float = 3600.0
@@ -151,7 +151,7 @@ class Args(WorkerOptions):
     """Files missions.jsonl.xz of earlier runs, of this page or of the scoreboard: their missions of the same
     settings are not run again; what other code ran counts with --confirm."""
     out: Path = Path("results/policy")
-    """Folder for policy.md and, in policy, its missions."""
+    """Folder for policy.md and, in policy, a folder of each policy."""
     runs: Path | None = None
     """Folder that keeps the missions; default: runs in --out."""
 
@@ -215,9 +215,15 @@ def main(words: Sequence[str]) -> int:
         confirm=args.confirm,
     )
     found = {key: [each for cell in group for each in records[cell.id]] for key, group in cells.items()}
+    for name in names:
+        make_folder("out", beside / name)
+        own = [cell for key, group in cells.items() if key[0] == name for cell in group]
+        write_archive(beside / name / ARCHIVE, runs, missions_of(own))
+        write_atomically(beside / name / PART, "\n".join(_policy_parts(name, found, args.confirm)))
+    parts = {name: beside / name / PART for name in TESTS}
+    written = [file.read_text("utf-8") for file in parts.values() if file.is_file()]
     page = args.out / "policy.md"
-    write_atomically(page, "\n".join(_page(names, found, args.confirm, experiments)))
-    write_archive(beside / ARCHIVE, runs, missions)
+    write_atomically(page, "\n".join(_page(written, experiments)))
     print(f"written: {page}")
     return 0
 
@@ -254,7 +260,7 @@ def _finished(record: Record) -> bool:
 
 
 FILES = "policy"
-"""Folder beside the page."""
+"""Folder beside the page, with one of each policy: its part of the page, and its missions."""
 
 
 class Experiments(NamedTuple):
@@ -267,13 +273,11 @@ class Experiments(NamedTuple):
 Found = Mapping[tuple[str, str, str], Sequence[Record]]
 
 
-def _page(names: Sequence[str], found: Found, confirmed: bool, experiments: Experiments) -> list[str]:
+def _page(policies: Sequence[str], experiments: Experiments) -> list[str]:
     """The page, part by part."""
-    flags, said = (" --confirm", CONFIRMED) if confirmed else ("", "")
     parts = [
         "# Policies that choose among a planner's candidates\n",
-        f"Written by `python -m training.policy_improvement.results_page{flags} --out docs/results`.{said} "
-        f"All missions lie in [`{ARCHIVE}`]({FILES}/{ARCHIVE}). The policies "
+        "The policies "
         f"come from `make policy`. Each runs beside the recommended strategy, `{_BEST}`, on the same starts, "
         "in worlds of the test split; the dungeons have no splits, and none was learned in. A ratio is the "
         "policy's over that of the other: below 1 the policy is faster. Intervals are 95 %, of a bootstrap "
@@ -285,8 +289,7 @@ def _page(names: Sequence[str], found: Found, confirmed: bool, experiments: Expe
     ]
     if experiments.headroom:
         parts += [_TO_WIN, experiments.headroom]
-    for name in names:
-        parts += _policy_parts(name, found)
+    parts += policies
     if experiments.ablations:
         parts += [_ABLATIONS, experiments.ablations]
     return parts
@@ -312,13 +315,17 @@ geometric means.
 """
 
 
-def _policy_parts(name: str, found: Found) -> list[str]:
-    """The section of a policy."""
-    policy = f"pretrained:{name}"
+def _policy_parts(name: str, found: Found, confirmed: bool) -> list[str]:
+    """The part of a policy."""
+    policy, flags, said = f"pretrained:{name}", "", ""
+    if confirmed:
+        flags, said = " --confirm", CONFIRMED
     learned = [test for test in TESTS[name] if test.learned]
     others = [test for test in TESTS[name] if not test.learned]
     return [
         f"## `{policy}`\n",
+        f"Written by `python -m training.policy_improvement.results_page --policies {name}{flags} "
+        f"--out docs/results`.{said} All missions lie in [`{ARCHIVE}`]({FILES}/{name}/{ARCHIVE}).\n",
         _how_learned(policy),
         f"In tasks that it learned, in other worlds, against `{_BEST}`:\n",
         _table(name, learned, _BEST, found),

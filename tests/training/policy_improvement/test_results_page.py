@@ -124,11 +124,16 @@ def test_the_page_is_written_stopped_and_gone_on_with(tmp_path, monkeypatch, cap
     assert run_command(results_page.main, options) == 0
     assert (tmp_path / "policy.md").read_text() == page
     capsys.readouterr()
-    archive, other = tmp_path / "policy" / "missions.jsonl.xz", tmp_path / "other"
+    archive, other = tmp_path / "policy" / "volumes" / "missions.jsonl.xz", tmp_path / "other"
     words = [*options, "--out", str(other), "--archive", str(archive), str(archive), "--stop-after-s", "1e-6"]
     assert run_command(results_page.main, words) == 0  # no mission is run
     assert (other / "policy.md").read_text() == page
+    (other / "policy" / "plans").mkdir()
+    (other / "policy" / "plans" / "part.txt").write_text("## What another run wrote\n")
+    monkeypatch.setattr(results_page, "TESTS", {"plans": (small,), **results_page.TESTS})
     said = capsys.readouterr().err
+    assert run_command(results_page.main, words) == 0
+    assert (other / "policy.md").read_text().replace("## What another run wrote\n\n", "") == page
     assert f"18 missions taken from {archive}" in said and f"0 missions taken from {archive}" in said
 
 
