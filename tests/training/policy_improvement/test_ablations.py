@@ -39,14 +39,14 @@ def test_variants_share_the_labels_of_the_whole_and_go_on_where_they_were_stoppe
 
 def test_the_table_holds_a_row_for_each_variant_and_the_mean_over_its_seeds(tmp_path):
     assert ablations.shown(tmp_path) == "" == ablations.shown(tmp_path / "none")
-    budget = {"shards": 2, "missions": 3, "every": 30, "rounds": 2, "pairs": 24, "ppo_steps": 12288}
+    budget = {"shards": 2, "missions": 3, "every": 30, "rounds": 2, "pairs": 24, "ppo_steps": 8192}
     for seed, ratio in enumerate((0.9, 1.0, 1.1)):
         compared = {"mean_ratio": ratio, "finished": 12 - seed, "missions": 12}
         found = {"variant": "bits", "seed": seed, "task": "office:1", "budget": budget, "compared": compared}
         (tmp_path / f"bits-{seed}.json").write_text(json.dumps(found))
     _, _, row, _, said = ablations.shown(tmp_path).strip().splitlines()
     assert row.endswith("| office, 1 robot | 0.900, 1.000, 1.100 | 0.997 | 33 of 36 |")
-    assert said.startswith("Of each seed: states of 6 missions labelled, one decision in 30; 12,288 steps")
+    assert said.startswith("Of each seed: states of 6 missions labelled, one decision in 30; 8,192 steps")
     (tmp_path / "other.json").write_text("[1]")
     with pytest.raises(SettingError, match=r"other\.json"):
         ablations.shown(tmp_path)
