@@ -105,7 +105,8 @@ Strategies on the same worlds, starts and seeds, in suites that are pinned (`bas
   lost, of the bits that the mission asks for.
 - Thirty starts a task are the whole; where fewer have been run yet rows say how many, and ratios are of
   those that both have run. Tasks of which none has been run are left out.
-- ms a decision: of one robot, the median over missions of their medians, and the worst of all.
+- ms a decision: of one robot, on the clock, the median over missions of their medians, and the worst of
+  all; other missions ran beside them, so that what they cost on a quiet machine is less ([speed](speed.md)).
 - `missions.jsonl.xz` among a suite's files holds all of its missions. A strategy of one's own takes part by
   `python -m baselines.benchmark --suite NAME --strategies MODULE:CLASS --archive FILE --confirm`: the others'
   missions are taken from the file, and run again only where the code has changed what comes out
