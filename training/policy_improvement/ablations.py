@@ -186,9 +186,11 @@ def shown(folder: Path) -> str:
         return ""
     budget = found[0]["budget"]
     labelled, pairs = budget["shards"] * budget["missions"], budget["rounds"] * budget["pairs"]
+    searched = any(each["variant"] == "search" for each in found)
+    search = f"; a search over {pairs} pairs of missions" if searched else ""
     said = (
         f"\nOf each seed: states of {labelled} missions labelled, one decision in {budget['every']}; "
-        f"{budget['ppo_steps']:,} steps of PPO (`{_FASTER}`); a search over {pairs} pairs of missions.\n"
+        f"{budget['ppo_steps']:,} steps of PPO (`{_FASTER}`){search}.\n"
     )
     head = ["learned by", "task", "mean of ratios, by seed", "over all seeds", "finished"]
     return markdown_table(head, rows) + said
