@@ -14,6 +14,7 @@ from entropy_explore_env.randomness import draw_gaussian, draw_uniform
 from entropy_explore_env.viewpoints.far_places import BitCount, fill_blocks, promised_around
 from entropy_explore_env.viewpoints.imagined_scan import imagined_bits
 from entropy_explore_env.viewpoints.proposals.nearby import copy_viewpoint, value_of, voxel_at
+from entropy_explore_env.viewpoints.proposals.planner_rules import FURTHER, POOR, STALE
 from entropy_explore_env.viewpoints.proposals.situation import distance_apart, worth_bits
 from entropy_explore_env.viewpoints.travel import WITHIN, travel_seconds
 
@@ -36,10 +37,9 @@ def _draw_gaze(proposer, rng, at):
 
 
 @lean_kernel
-def _insert_place(proposer, situation, place, worth, count):
+def _insert_place(proposer, situation, place, worth, far, count):
     """Insert a place among the far ones that are worth most, in order; returns how many there are."""
-    far, worths = proposer.scratch.far, proposer.scratch.worth
-    most = proposer.recipe.far_places
+    worths, most = proposer.scratch.worth, proposer.recipe.far_places
     if count == most and worth <= worths[count - 1]:
         return count
     at = min(count, most - 1)
@@ -63,15 +63,28 @@ def _put_place(proposer, situation, place, at):
 
 
 @lean_kernel
-def _far_viewpoints(proposer, situation, radius):
-    """Fill in the places worth most by what openings promise there, a few gazes each; returns how many."""
+def _count_blocks(proposer, situation, radius):
+    """Fill in the blocks of the belief as far as paths were searched."""
+    belief, recipe = situation.belief, proposer.recipe
+    start, window = voxel_at(belief.size, situation.here), math.ceil(radius)
+    count_of = BitCount(proposer.target_precision, proposer.exact.known_precision, recipe.behind)
+    fill_blocks(proposer.scratch.search, belief, count_of, proposer.layer, start, window, proposer.blocks)
+
+
+@lean_kernel
+def _far_viewpoints(proposer, situation, far, below):
+    """Fill in the places worth most by what openings promise there, a few gazes each; returns how many.
+
+    Args:
+        proposer: A Proposer, whose blocks have been counted; the worths are left in `scratch.worth`.
+        situation: A Situation.
+        far: Pool whose viewpoints are filled in.
+        below: Only places that are worth less than this; inf = all.
+    """
     scratch, blocks, recipe = proposer.scratch, proposer.blocks, proposer.recipe
-    belief, here, far, shape = situation.belief, situation.here, scratch.far, blocks.bits.shape
+    belief, here, shape = situation.belief, situation.here, blocks.bits.shape
     if recipe.far_places == 0:
         return 0
-    start, window = voxel_at(belief.size, here), math.ceil(radius)
-    count_of = BitCount(proposer.target_precision, proposer.exact.known_precision, recipe.behind)
-    fill_blocks(scratch.search, belief, count_of, proposer.layer, start, window, blocks)
     count, one = 0, len(far.viewpoints) - 1
     viewpoint, seconds = far.viewpoints[one : one + 1], far.seconds[one : one + 1]
     edge_m, drive = proposer.exact.voxel_size_m, proposer.drive
@@ -86,7 +99,8 @@ def _far_viewpoints(proposer, situation, radius):
                         scratch.search, belief.size, drive, edge_m, here, viewpoint, proposer.reach, seconds
                     )
                     worth = value_of(situation, bits, seconds[0])
-                    count = _insert_place(proposer, situation, place, worth, count)
+                    if worth < below:
+                        count = _insert_place(proposer, situation, place, worth, far, count)
     for place in range(count - 1, -1, -1):
         for gaze in range(recipe.far_gazes - 1, -1, -1):
             at = far.viewpoints[place * recipe.far_gazes + gaze]
@@ -97,42 +111,104 @@ def _far_viewpoints(proposer, situation, radius):
 
 
 @lean_kernel
-def propose_far(proposer, situation):
+def _evaluate_far(proposer, situation, far, count):
+    """Fill in what the first `count` viewpoints of a pool of far ones are worth.
+
+    Returns:
+        (value, bits): the most of each.
+    """
+    scratch, belief, here = proposer.scratch, situation.belief, situation.here
+    viewpoints, seconds, bits = far.viewpoints[:count], far.seconds[:count], far.bits[:count]
+    edge_m, gap = proposer.exact.voxel_size_m, proposer.recipe.gap_probability
+    drive, reach = proposer.drive, proposer.reach
+    travel_seconds(scratch.search, belief.size, drive, edge_m, here, viewpoints, reach, seconds)
+    imagined_bits(belief, proposer.exact, gap, viewpoints, situation.cones, scratch.scan, bits)
+    best, most = 0.0, 0.0
+    for k in range(count):
+        far.bits[k] = worth_bits(proposer, situation, far.viewpoints[k], far.bits[k])
+        far.values[k] = value_of(situation, far.bits[k], far.seconds[k])
+        best, most = max(best, far.values[k]), max(most, far.bits[k])
+    return best, most
+
+
+@lean_kernel
+def _look_further(proposer, situation, count, best, enough):
+    """Go on to places that promise less, where those that promise most would bring next to nothing.
+
+    Openings that no gaze gets to promise much and bring nothing: where so many are nearby, they would hide
+    whatever is left elsewhere. So the next best places are evaluated, and those after them, as long as one of
+    them could be worth more than the best that was found; the better ones take the places of the worse.
+
+    Args:
+        proposer: A Proposer; `scratch.far` holds `count` viewpoints.
+        situation: A Situation.
+        count: How many of them may be replaced.
+        best: What the best is worth.
+        enough: Bits of a viewpoint, from which on no further ones are looked for.
+
+    Returns:
+        What the best is worth then.
+    """
+    scratch, recipe = proposer.scratch, proposer.recipe
+    far, further = scratch.far, scratch.further
+    for _ in range(FURTHER):
+        if (
+            count == 0
+            or count < recipe.far_places * recipe.far_gazes
+            or scratch.worth[recipe.far_places - 1] <= best
+        ):
+            break
+        found = _far_viewpoints(proposer, situation, further, scratch.worth[recipe.far_places - 1])
+        value, bits = _evaluate_far(proposer, situation, further, found)
+        for number in range(found):
+            worst = 0
+            for other in range(count):
+                if far.values[other] < far.values[worst]:
+                    worst = other
+            if further.values[number] > far.values[worst]:
+                copy_viewpoint(further.viewpoints[number], far.viewpoints[worst])
+                far.bits[worst], far.seconds[worst] = further.bits[number], further.seconds[number]
+                far.values[worst] = further.values[number]
+        best = max(best, value)
+        if bits >= enough or found < recipe.far_places * recipe.far_gazes:
+            break
+    return best
+
+
+@lean_kernel
+def propose_far(proposer, situation, near_bits):
     """Fill `scratch.far` with far viewpoints; the nearer half of the world first.
 
     Paths are searched farther and farther until no place beyond could be worth more. The goal to which the
-    robot is on its way comes last, if there is one.
+    robot is on its way comes last, if there is one. A robot that has taken many poor scans from one place,
+    and finds nothing better, looks further.
 
     Args:
         proposer: A Proposer; paths within reach have been searched.
         situation: A Situation.
+        near_bits: Those that the best viewpoint nearby should bring.
 
     Returns:
         (count, value): how many there are, and what the best is worth.
     """
-    scratch, experience, belief = proposer.scratch, situation.experience, situation.belief
-    far, size, drive = scratch.far, belief.size, proposer.drive
+    scratch, experience, size = proposer.scratch, situation.experience, situation.belief.size
+    far, drive = scratch.far, proposer.drive
     everywhere = float(size[0] + size[1] + size[2]) * proposer.unknown_cost
     radius, edge_m = _FIRST_RADIUS * proposer.within, proposer.exact.voxel_size_m
+    enough = POOR * experience.most_bits
     while True:
         radius = min(radius, everywhere)
         resume_search(scratch.search, proposer.lattice, situation.costs, radius)
-        count = _far_viewpoints(proposer, situation, radius)
+        _count_blocks(proposer, situation, radius)
+        count = drawn = _far_viewpoints(proposer, situation, far, math.inf)
         if experience.going:
             copy_viewpoint(experience.goal, far.viewpoints[count])
             count += 1
-        viewpoints, seconds = far.viewpoints[:count], far.seconds[:count]
-        here, gap = situation.here, proposer.recipe.gap_probability
-        travel_seconds(scratch.search, size, drive, edge_m, here, viewpoints, proposer.reach, seconds)
-        bits = far.bits[:count]
-        imagined_bits(belief, proposer.exact, gap, viewpoints, situation.cones, scratch.scan, bits)
-        best = 0.0
-        for k in range(count):
-            far.bits[k] = worth_bits(proposer, situation, far.viewpoints[k], far.bits[k])
-            far.values[k] = value_of(situation, far.bits[k], far.seconds[k])
-            best = max(best, far.values[k])
+        best, bits = _evaluate_far(proposer, situation, far, count)
         beyond = value_of(situation, experience.most_bits, max(radius * edge_m / drive.max_speed_m_s, 1e-9))
         if radius >= everywhere or best >= beyond:
+            if experience.poor_scans >= STALE and max(near_bits, bits) < enough:
+                best = _look_further(proposer, situation, drawn, best, enough)
             return count, best
         radius *= 2.0
 

@@ -116,6 +116,8 @@ class ProposalScratch(NamedTuple):
     """(N,) int64, those of the pool that were refined last."""
     far: Pool
     """Far viewpoints."""
+    further: Pool
+    """Those that are looked at after them."""
     worth: np.ndarray
     """(N,) float64 of the far places that are worth most."""
     gazes: np.ndarray
@@ -247,6 +249,7 @@ def _new_scratch(scenario: Scenario, recipes: Sequence[Recipe]) -> ProposalScrat
         pool=_new_pool(pool),
         found=np.zeros(pool, np.int64),
         far=_new_pool(far),
+        further=_new_pool(far),
         worth=np.zeros(far),
         gazes=np.zeros((gazes, 5)),
         gaze_bits=np.zeros(gazes),
@@ -271,7 +274,7 @@ def proposal_bytes(scenario: Scenario) -> int:
     pool, far, _, longest = _sizes(scenario, recipes)
     blocks = sum(_block_count(scenario, recipe) for recipe in recipes)
     per_voxel = 9 + 4 + 8 + 4  # added, touched and left, path, marks, seen
-    kept = 14 * 8 * (pool + far) + candidates * (8 * candidates + VIEW.itemsize)
+    kept = 14 * 8 * (pool + 2 * far) + candidates * (8 * candidates + VIEW.itemsize)
     return search_bytes(voxels) + per_voxel * voxels + 12 * longest + kept + 24 * blocks
 
 

@@ -25,6 +25,13 @@ FAR_EVERY, PATIENCE = 8, 4
 TRIED_STOPS = 6
 """Far places of which the first stop is looked at; and gazes at stops that are proposed but not chosen."""
 POOR, NOTHING_BITS = 0.02, 1e-6
-"""A robot that is shut in leaves where a scan brings less than this share of the most bits ever expected."""
+"""A scan is poor that should bring less than this share of the most bits ever expected; what is nothing."""
+STALE = 64
+"""Poor scans in a row from one place after which a robot trusts its expectations less, looks further, and
+chooses by the plain rate, c = 1, until a scan is not poor."""
+STALE_DISAPPOINTING = 0.5
+"""As DISAPPOINTING, after so many."""
+FURTHER = 8
+"""How often it then goes on to the next best far places."""
 ELSEWHERE = 16
 """Places that are drawn where nothing is left nearby."""

@@ -45,6 +45,8 @@ EXPERIENCE = record_type(
         ("looked_far", "?"),  # whether that ever was
         ("far_at", "f8", (3,)),  # where the robot was then
         ("patience", "i8"),  # decisions until far places are looked at again on the same spot
+        ("stood_at", "f8", (3,)),  # where it stopped last, but for steps of less than a voxel edge
+        ("poor_scans", "i8"),  # poor scans in a row that it took there; once many, anywhere
         ("blocked", "i8"),  # decisions during which it keeps clear of teammates
         ("was_free", "?"),  # whether it ever was where a path led anywhere
         ("free_at", "f8", (3,)),  # where that was last

@@ -58,7 +58,7 @@ def _looks_far(proposer, situation, value, bits):
 
 
 @lean_kernel
-def add_far(proposer, situation, size, value, most):
+def add_far(proposer, situation, size, value, bits, most):
     """Add the first stops on the way to far places to the pool, and find the planner's far choice.
 
     Args:
@@ -66,6 +66,7 @@ def add_far(proposer, situation, size, value, most):
         situation: A Situation.
         size: Viewpoints in the pool.
         value: What the best one nearby is worth.
+        bits: That it should bring.
         most: Stops that are added at most.
 
     Returns:
@@ -73,7 +74,7 @@ def add_far(proposer, situation, size, value, most):
         -1 = one nearby is worth more.
     """
     scratch, experience, recipe = proposer.scratch, situation.experience, proposer.recipe
-    count, best = propose_far(proposer, situation)
+    count, best = propose_far(proposer, situation, bits)
     experience.far_value, experience.looked_far = best, True
     for axis in range(3):
         experience.far_at[axis] = situation.here[axis]
@@ -235,7 +236,7 @@ def choose(proposer, situation, size, most_far):
     if _looks_far(proposer, situation, value, bits):
         if not proposer.planned:
             start_paths(proposer, situation)
-        size, far = add_far(proposer, situation, size, value, most_far)
+        size, far = add_far(proposer, situation, size, value, bits, most_far)
         if far >= 0:
             experience.most_bits = max(experience.most_bits, pool.bits[far])
             best = far

@@ -22,7 +22,10 @@ from entropy_explore_env.viewpoints.proposals.planner_rules import (
     FAILED_GAZES,
     FORGET_EDGES,
     MISSED_EDGES,
+    POOR,
     REMEMBERED,
+    STALE,
+    STALE_DISAPPOINTING,
 )
 from entropy_explore_env.viewpoints.proposals.records import Kind
 
@@ -128,17 +131,31 @@ def learn(experience, candidates, decision, number, came_bits, here, body_radius
     missed = distance_apart(decision.target, here)
     expected = candidates[number].bits if number >= 0 else 0.0
     came = max(came_bits, 0.0)
+    _count_poor(experience, here, expected)
     arrived = decision.move_end == _ARRIVED or decision.move_end == _CORNERS
     if missed > MISSED_EDGES and not (arrived and decision.uncertain):
         _remember(experience, decision.target, 0.0, max(2.0 * missed, FORGET_EDGES))
         experience.going = False
-    elif came < DISAPPOINTING * expected:
+    elif came < (STALE_DISAPPOINTING if experience.poor_scans >= STALE else DISAPPOINTING) * expected:
         _remember(experience, decision.target, came / expected, FORGET_EDGES)
 
 
 @lean_kernel
+def _count_poor(experience, here, expected):
+    """Count the poor scans that a robot takes in a row from one place; once they are many, from any place."""
+    moved = distance_apart(experience.stood_at, here) >= ALIKE_EDGES
+    if moved:
+        for axis in range(3):
+            experience.stood_at[axis] = here[axis]
+    if expected >= POOR * experience.most_bits or (moved and experience.poor_scans < STALE):
+        experience.poor_scans = 0
+    if expected < POOR * experience.most_bits:
+        experience.poor_scans += 1
+
+
+@lean_kernel
 def weigh_time(proposer, experience, decision):
-    """Set how much time weighs in bits / s^c at this decision; see `Recipe.leave_below`.
+    """Set how much time weighs in bits / s^c at this decision; see `Recipe.leave_below` and `STALE`.
 
     Args:
         proposer: A Proposer.
@@ -150,7 +167,8 @@ def weigh_time(proposer, experience, decision):
     exponent = proposer.recipe.exponent
     came, seconds = decision.gained_bits - experience.decided_bits, decision.time_s - experience.decided_s
     mean_rate = decision.gained_bits / max(decision.time_s, 1e-9)
-    if came / max(seconds, 1e-9) < proposer.recipe.leave_below * mean_rate:
+    wanes = came / max(seconds, 1e-9) < proposer.recipe.leave_below * mean_rate
+    if wanes or experience.poor_scans >= STALE:
         exponent = min(exponent, 1.0)
     experience.looked_far &= exponent == experience.exponent
     experience.exponent = exponent

@@ -33,7 +33,7 @@ from entropy_explore_env.viewpoints.proposals.situation import (
     weigh_time,
 )
 from entropy_explore_env.viewpoints.proposals.views import clear_marks, look_from, mark_view
-from entropy_explore_env.viewpoints.recipe import NARROW_PLANNED, NARROW_STRAIGHT, recipe_for
+from entropy_explore_env.viewpoints.recipe import ALL_AROUND, NARROW_PLANNED, NARROW_STRAIGHT, recipe_for
 from tests.reference.scenes import drawn, free_box, put, random_belief, seeds, started
 
 SIZE, MOST = (7, 11, 5), 6
@@ -154,6 +154,51 @@ def test_what_brought_a_tenth_or_more_is_no_failure(proposed):
     learned(experience, candidates, decision(ALONG_X, 5.0), ALONG_X)
     assert experience["failures"] == 0 and not experience["going"]
     assert trust_in(experience, False, ALONG_X) == 1.0
+
+
+@pytest.mark.parametrize(("most", "scans", "failures"), [(2600.0, 64, 1), (2600.0, 63, 0), (2400.0, 64, 0)])
+def test_after_many_poor_scans_from_one_place_half_of_what_was_expected_is_asked(
+    proposed, most, scans, failures
+):
+    """50 bits are poor where more than 2,500 were ever expected; 24 of them came each time."""
+    candidates, experience = proposed
+    experience["most_bits"] = most
+    for _ in range(scans):
+        learned(experience, candidates, decision(ALONG_X, 24.0), ALONG_X)
+    assert experience["failures"] == failures
+    assert trust_in(experience, True, ALONG_X) == pytest.approx(24.0 / 50.0 if failures else 1.0)
+
+
+def test_poor_scans_are_counted_from_where_a_robot_went_last(proposed):
+    candidates, experience = proposed
+    experience["most_bits"] = 2600.0
+    step = np.array([0.0, 0.4, 0.0, 0.0, 0.0])
+    counts = []
+    for at in (ALONG_X, ALONG_X, ALONG_X + step, ALONG_X + 2 * step, ALONG_X + 3 * step, ALONG_X):
+        learned(experience, candidates, decision(at, 30.0), at)
+        counts.append(int(experience["poor_scans"]))
+    assert counts == [1, 2, 3, 4, 1, 1]
+    candidates["bits"] = 60.0
+    learned(experience, candidates, decision(ALONG_X, 30.0), ALONG_X)
+    assert experience["poor_scans"] == 0
+
+
+def test_many_poor_scans_count_until_one_is_not_poor_wherever_the_robot_goes(proposed):
+    """And as long as they do, it chooses by the plain rate, c = 1."""
+    candidates, experience = proposed
+    experience["most_bits"] = 2600.0
+    proposer = new_proposers(ONE_RAY, {0: ALL_AROUND})[0]
+
+    def exponent_after(at):
+        last = decision(at, 30.0, time_s=1.0, gained_bits=30.0)
+        learned(experience, candidates, last, at)
+        weigh_time(proposer, experience, last)
+        return float(experience["exponent"])
+
+    assert [exponent_after(ALONG_X) for _ in range(64)] == [1.15] * 63 + [1.0]
+    assert exponent_after(BACK) == 1.0
+    candidates["bits"] = 60.0
+    assert exponent_after(BACK) == 1.15
 
 
 def test_what_brought_less_is_remembered_until_it_is_far_behind(proposed):

@@ -17,6 +17,7 @@ from entropy_explore_env.settings import Grid
 from entropy_explore_env.viewpoints.proposals.far import first_stop, propose_far
 from entropy_explore_env.viewpoints.proposals.model import MATE, new_proposers
 from entropy_explore_env.viewpoints.proposals.nearby import propose_nearby, start_paths
+from entropy_explore_env.viewpoints.proposals.planner_rules import STALE
 from entropy_explore_env.viewpoints.proposals.records import EXPERIENCE, Kind
 from entropy_explore_env.viewpoints.proposals.selection import choose
 from entropy_explore_env.viewpoints.proposals.situation import Situation, trust_and_clearance, worth_bits
@@ -91,7 +92,7 @@ def far():
     experience = situation.experience
     experience["going"], experience["goal"] = True, (40.5, 30.5, 0.5, 0.3, 0.0)
     start_paths(proposer, situation)
-    count, best = propose_far(proposer, situation)
+    count, best = propose_far(proposer, situation, math.inf)
     return proposer, situation, count, best
 
 
@@ -105,6 +106,43 @@ def test_far_places_are_known_near_what_is_unknown_and_the_goal_is_last(far):
     assert (frontier_block > 10.0).all() and (frontier_block < 20.0).all()
     straight = np.linalg.norm(places.viewpoints[:count, :3] - HERE[:3], axis=1) * 0.1
     assert (places.seconds[:count] > straight / PLAN.robot.max_speed_m_s).all()
+
+
+def best_far(far_places, near_bits, failed=(), poor_scans=STALE):
+    """Value, bits and place of the best far viewpoint, where some places have failed before."""
+    proposer = new_proposers(PLAN, {0: dataclasses.replace(ALL_AROUND, far_places=far_places)})[0]
+    situation = half_known_plan(most_bits=1e9)
+    experience = situation.experience
+    for number, place in enumerate(failed):
+        experience["failed"][number, :3] = place
+    experience["failures"], experience["poor_scans"] = len(failed), poor_scans
+    start_paths(proposer, situation)
+    count, best = propose_far(proposer, situation, near_bits)
+    places = proposer.scratch.far
+    number = int(np.argmax(places.values[:count]))
+    assert best == places.values[number]
+    return best, places.bits[number], places.viewpoints[:count, :3].copy(), number
+
+
+def test_where_what_promises_most_brings_nothing_places_that_promise_less_are_looked_at():
+    """Two places are evaluated at a time; both fail, so the next two are, and so on."""
+    _, bits, first, _ = best_far(2, near_bits=0.0)
+    assert bits > 0.0
+    poor, plenty = 0.0, 1e9  # less, and not less, than a fiftieth of the most bits
+    nothing, _, places, _ = best_far(2, plenty, first)
+    assert nothing == 0.0 and (places == first).all()
+    assert best_far(2, poor, first, STALE - 1)[0] == 0.0
+    value, bits, places, number = best_far(2, poor, first)
+    everywhere = best_far(ALL_AROUND.far_places, plenty, first)
+    assert 0.0 < bits and value <= everywhere[0]
+    assert not (places[number] == first).all(axis=1).any()
+
+
+def test_of_all_places_the_best_is_found_two_by_two():
+    """As if all were evaluated at once, where no more of them are poor than may be looked at."""
+    whole = best_far(ALL_AROUND.far_places, near_bits=1e9)
+    pieces = best_far(6, near_bits=0.0)
+    assert pieces[0] == whole[0] and (pieces[2][pieces[3]] == whole[2][whole[3]]).all()
 
 
 def test_the_first_stop_on_the_way_is_within_reach_and_free(far):
@@ -124,7 +162,7 @@ def test_robots_that_drive_straight_stop_on_the_straight_part_of_the_path():
     straight = with_settings(PLAN, {"robot": {"navigator": "straight"}})
     proposer, situation = new_proposers(straight)[0], half_known_plan(most_bits=1e9)
     start_paths(proposer, situation)
-    propose_far(proposer, situation)
+    propose_far(proposer, situation, math.inf)
     stop = np.zeros(5)
     assert first_stop(proposer, situation, np.array([10.5, 40.5, 0.5, 0.0, 0.0]), stop)
     np.testing.assert_allclose(stop[:3], (10.5, 5.5 + 15.0, 0.5), rtol=1e-5)
