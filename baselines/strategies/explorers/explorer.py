@@ -8,7 +8,8 @@ Ours, where the rules say nothing:
 - A frontier cell from which a scan explored nothing is dropped, and what it alone touches with it, until the
   map changes around it; so is a cell to which a drive ended early.
 - Without a frontier, a finer σ counts as known, half the one before, down to the mission's σ_end, since a
-  mission may require more than having seen everything once. Then robots go to random viewpoints.
+  mission may require more than having seen everything once. Then robots go to random viewpoints, each until
+  its drive has ended, by however many scans the robot decides under way.
 - A robot that a teammate stops waits for one scan if its number is the lower, and steps aside, to a random
   viewpoint, if it is the higher or has waited before.
 - A sensor that looks one way is turned to where most is unknown.
@@ -84,6 +85,8 @@ class _Memory:
     """How often it has looked from where it stands."""
     blocked: int = 0
     """How many drives in a row a teammate stopped."""
+    elsewhere: np.ndarray | None = None
+    """(5,) a random viewpoint to which it is driving."""
     waited: bool = False
     """Whether it let a teammate pass at its latest decision."""
 
@@ -139,7 +142,10 @@ class Explorer(ABC):
         target = self._pick(view, memory, here, memory.target if kept else NONE)
         if target == NONE:
             memory.target, memory.viewpoint = NONE, None
-            return random_viewpoint(view, self._rng)
+            if memory.elsewhere is None or not view.under_way:
+                memory.elsewhere = random_viewpoint(view, self._rng)
+            return memory.elsewhere.copy()
+        memory.elsewhere = None
         return self._towards(view, memory, here, target)
 
     def _holds(self, cells: FrontierCells, target: int) -> bool:

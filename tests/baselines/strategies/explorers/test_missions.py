@@ -11,6 +11,7 @@ import pytest
 from baselines.experiments.mission import run_mission, scripted
 from baselines.strategies import make_strategy
 from baselines.strategies.explorers.distance_advantage import DistanceAdvantage, DistanceAdvantageConfig
+from baselines.strategies.explorers.frontier_cells import KNOWN_SIGMA
 from baselines.strategies.explorers.information_gain import InformationGain, InformationGainConfig
 from baselines.strategies.explorers.nearest_frontier import NearestFrontier
 from baselines.strategies.explorers.receding_horizon import RecedingHorizon
@@ -116,6 +117,33 @@ def test_over_thirty_starts_paths_are_as_long_as_the_textbooks(rule):
 @pytest.mark.parametrize("name", NAMES)
 def test_every_explorer_sees_a_plan(name):
     assert path_m(make_strategy(name), 3, small_plan()) < 60.0
+
+
+class SeenOnce(NearestFrontier):
+    """Content with having seen everything once."""
+
+    def reset(self, scenario, rng):
+        super().reset(scenario, rng)
+        self._finest = KNOWN_SIGMA
+
+
+def test_who_finds_no_frontier_drives_to_a_random_place_and_not_to_another_at_each_scan():
+    """The last voxels of a plan may lie behind one that is believed covered and is not."""
+    strategy, kept = SeenOnce(), []
+    env = EntropyExploreEnv(small_plan(ending={"sigma_end": 1e-3, "time_limit_s": 500.0}))
+    last, was_under_way = None, False
+
+    def look(env):
+        nonlocal last, was_under_way
+        memory = strategy._memories.get(0)
+        elsewhere = None if memory is None else memory.elsewhere
+        if elsewhere is not None and last is not None:
+            kept.append(bool((elsewhere == last).all()))
+            assert kept[-1] == was_under_way
+        last, was_under_way = elsewhere, env.view("robot_0").under_way
+
+    run_mission(env, strategy, 0, look)
+    assert kept.count(True) > 2 * kept.count(False) > 20
 
 
 @pytest.mark.parametrize("name", NAMES)
