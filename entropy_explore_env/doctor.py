@@ -12,7 +12,7 @@ from typing import Any
 
 from entropy_explore_env.compilation.announcement import short_path
 from entropy_explore_env.compilation.folder import SUFFIX, kernel_folder
-from entropy_explore_env.requirements import extras, needed, version_of
+from entropy_explore_env.requirements import extras, needed, pins, version_of
 from entropy_explore_env.version import VERSION
 
 _COMPILER = "llvmlite"
@@ -23,8 +23,9 @@ def findings() -> dict[str, Any]:
     """What there is, as plain values.
 
     Keys: `version`, `library` (its folder), `python`, `system`, `processors`; `packages` and `extras` (name →
-    version, None where it is not installed); `kernels`: `folder`, whether it is `writable`, the number of
-    `files` and of `mebibytes`, and `rooms` (packages of modules → files); `problems`, sentences.
+    version, None where it is not installed); `pins` (extra → packages of which another version is installed
+    than the only one that it takes, and this one); `kernels`: `folder`, whether it is `writable`, the number
+    of `files` and of `mebibytes`, and `rooms` (packages of modules → files); `problems`, sentences.
     """
     folder = kernel_folder()
     kernels = _kernels(folder)
@@ -42,6 +43,10 @@ def findings() -> dict[str, Any]:
         "processors": os.cpu_count(),
         "packages": packages,
         "extras": {extra: {name: version_of(name) for name in names} for extra, names in extras().items()},
+        "pins": {
+            extra: {name: pin for name, pin in versions.items() if version_of(name) not in (None, pin)}
+            for extra, versions in pins().items()
+        },
         "kernels": kernels,
         "problems": problems,
     }
@@ -56,6 +61,7 @@ def report(found: dict[str, Any]) -> str:
     ]
     for extra, packages in found["extras"].items():
         missing = [name for name, version in packages.items() if version is None]
+        missing += [f"{name} {pin}" for name, pin in found["pins"].get(extra, {}).items()]
         there = _named({name: version for name, version in packages.items() if version is not None})
         lines.append(f"extra {extra}: {there or 'not installed'}")
         if missing and there:

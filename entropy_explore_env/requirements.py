@@ -11,7 +11,8 @@ from typing import NamedTuple
 _OURS = "entropy_explore_env"
 _FOR_DEVELOPERS = ("test", "dev")
 """Extras for who works on the project: left out."""
-_WRITTEN = re.compile(r"([\w.-]+)\s*(?:\[([^]]*)\])?[^;]*(?:;(.*))?")
+_WRITTEN = re.compile(r"([\w.-]+)\s*(?:\[([^]]*)\])?([^;]*)(?:;(.*))?")
+_PIN = re.compile(r"==\s*([\w.]+)$")
 _CLAUSE = re.compile(r"""(\w+)\s*([<>=!]+)\s*["']([^"']*)["']""")
 
 
@@ -23,6 +24,8 @@ class Requirement(NamedTuple):
     """Which of the package's own extras are needed."""
     extra: str | None
     """The extra of the distribution that needs it; None = it is always needed."""
+    pin: str | None
+    """The only version that does; None = others do, too."""
 
 
 def needed() -> list[str]:
@@ -36,12 +39,28 @@ def extras() -> dict[str, list[str]]:
     `ray[rllib]` brings what Ray's own extra needs, too, as far as Ray is there to tell. What an extra takes
     from another one of ours stands there.
     """
-    found: dict[str, list[str]] = {}
+    return {
+        extra: list(dict.fromkeys(each.name for each in brought)) for extra, brought in _brought().items()
+    }
+
+
+def pins() -> dict[str, dict[str, str]]:
+    """Extra of the library → the packages of which it takes one version alone, and this version."""
+    exact = {
+        extra: {each.name: each.pin for each in brought if each.pin is not None}
+        for extra, brought in _brought().items()
+    }
+    return {extra: versions for extra, versions in exact.items() if versions}
+
+
+def _brought() -> dict[str, list[Requirement]]:
+    """Extra of the library → all that it brings."""
+    found: dict[str, list[Requirement]] = {}
     for each in _requirements(_OURS):
         if each.extra is None or each.extra in _FOR_DEVELOPERS or each.name == _OURS:
             continue
-        brought = [each.name, *(more.name for more in _requirements(each.name) if more.extra in each.extras)]
-        found[each.extra] = list(dict.fromkeys((*found.get(each.extra, ()), *brought)))
+        more = (other for other in _requirements(each.name) if other.extra in each.extras)
+        found.setdefault(each.extra, []).extend((each, *more))
     return found
 
 
@@ -61,13 +80,14 @@ def _requirements(distribution: str) -> Iterator[Requirement]:
         return
     for line in lines:
         written = _WRITTEN.match(line)
-        clauses = [] if written is None else _CLAUSE.findall(written[3] or "")
+        clauses = [] if written is None else _CLAUSE.findall(written[4] or "")
         conditions = [clause for clause in clauses if clause[0] != "extra"]
         if written is None or not all(_holds(*condition) for condition in conditions):
             continue
         extra = next((value for name, _, value in clauses if name == "extra"), None)
         asked = tuple(word.strip() for word in (written[2] or "").split(",") if word.strip())
-        yield Requirement(written[1], asked, extra)
+        pin = _PIN.search(written[3].strip())
+        yield Requirement(written[1], asked, extra, None if pin is None else pin[1])
 
 
 def _holds(name: str, compare: str, value: str) -> bool:

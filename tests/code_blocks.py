@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
-_FENCED = re.compile(r"^```python\n(.*?)^```", flags=re.DOTALL | re.MULTILINE)
+FENCED = re.compile(r"^```python\n(.*?)^```", flags=re.DOTALL | re.MULTILINE)
 _SHOWN = re.compile(r"^```\{literalinclude\} (\S+\.py)$", flags=re.MULTILINE)
 
 
@@ -35,7 +35,7 @@ def blocks() -> list[Block]:
     found = []
     for page in pages():
         text, name = page.read_text(encoding="utf-8"), page.relative_to(ROOT).as_posix()
-        found += [Block(f"{name}-{n}", block) for n, block in enumerate(_FENCED.findall(text))]
+        found += [Block(f"{name}-{n}", block) for n, block in enumerate(FENCED.findall(text))]
     for path in shown_files():
         found.append(Block(path.relative_to(ROOT).as_posix(), path.read_text(encoding="utf-8")))
     return found

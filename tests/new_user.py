@@ -38,7 +38,7 @@ env.step({"robot_0": env.action_space("robot_0").sample()})
 print(eee.__file__)
 """
 _ONLY_IN_SOME = ("benchmarl", "ray", "torchrl")
-"""Packages that examples name and that no extra here brings; without them they are skipped."""
+"""Packages that examples name and that the installed extras do not bring; without them they are skipped."""
 
 
 class StepError(Exception):
@@ -183,7 +183,7 @@ def examples(user: User) -> None:
     for block in blocks():
         missing = [name for name in _imported_of_some(block.text) if not user.can_import(name)]
         if missing:
-            print(f"    {block.name}: skipped, {missing[0]} is in no extra", file=sys.stderr)
+            print(f"    {block.name}: skipped, {missing[0]} is not installed here", file=sys.stderr)
             continue
         folder = user.home / "examples" / re.sub(r"\W", "-", block.name)
         folder.mkdir(parents=True)
@@ -193,7 +193,7 @@ def examples(user: User) -> None:
 
 
 def _imported_of_some(text: str) -> list[str]:
-    """The modules that an example imports from packages that no extra here brings."""
+    """The modules that an example imports from packages that the installed extras do not bring."""
     names = "|".join(_ONLY_IN_SOME)
     return re.findall(rf"^\s*(?:import|from) ((?:{names})\b[\w.]*)", text, re.MULTILINE)
 

@@ -15,6 +15,7 @@ from entropy_explore_env import command
 from entropy_explore_env.command import BAD_INPUT, INTERRUPTED, LineParser, UsageError
 from entropy_explore_env.errors import CallOrderError, SettingError, WorldError, counted
 from entropy_explore_env.starting import is_command
+from tests.systems import needs_posix
 
 
 @pytest.fixture(params=[command.run_command, checkout.run_command], ids=["library", "checkout"])
@@ -121,6 +122,7 @@ def started(module, needed, folder, does):
     )
 
 
+@needs_posix
 @pytest.mark.parametrize(
     ("module", "needed"),
     [

@@ -128,6 +128,14 @@ def test_plain_ray_is_no_rllib(metadata, monkeypatch):
 
     lines = doctor.report(doctor.findings()).splitlines()
     assert "extra rllib: ray 2.60; lacks no-such-tree" in lines and "extra cluster: ray 2.60" in lines
+    metadata["ray"].append('gymnasium==1.2.2; extra == "rllib"')
+    for there, said in (
+        ("1.4.0", "; lacks no-such-tree, gymnasium 1.2.2"),
+        ("1.2.2", "; lacks no-such-tree"),
+    ):
+        versions["gymnasium"] = there
+        lines = doctor.report(doctor.findings()).splitlines()
+        assert f"extra rllib: ray 2.60, gymnasium {there}{said}" in lines
 
 
 def test_a_library_that_is_not_installed_knows_no_extras(metadata):

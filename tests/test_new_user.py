@@ -47,7 +47,7 @@ def test_examples_of_packages_that_are_not_there_are_skipped(tmp_path, monkeypat
     written = (("here", "import json\nopen('ran', 'w').close()"), ("there", "from benchmarl.run import x"))
     monkeypatch.setattr(new_user, "blocks", lambda: [Block(*each) for each in written])
     new_user.examples(user)
-    assert "there: skipped, benchmarl.run is in no extra" in capsys.readouterr().err
+    assert "there: skipped, benchmarl.run is not installed here" in capsys.readouterr().err
     assert [path.parent.name for path in tmp_path.glob("examples/*/ran")] == ["here"]
 
 

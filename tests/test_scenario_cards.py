@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 import re
+from typing import Any
 
 import numpy as np
 import pytest
@@ -21,7 +22,7 @@ from entropy_explore_env.missions.observation.layout import ObservationLayout
 from entropy_explore_env.scenario import Scenario, with_settings
 from entropy_explore_env.scenarios import SCENARIOS
 from entropy_explore_env.version import VERSION
-from tests.code_blocks import DOCS
+from tests.code_blocks import DOCS, FENCED
 
 ALL_PARTS = {
     "observation": {"drive": True, "patch": True, "overview": True, "action_mask": True},
@@ -87,6 +88,15 @@ def test_texts_are_read_from_docstrings():
 
     assert attribute_docs(Thing) == {"a": "Both of them.", "b": "Both of them.", "c": "One: with a colon."}
     assert constant_docs(scenarios)["ROOM"].startswith("Rocha04's room, tables 1-2: 10 × 10 × 4 m")
+
+
+@pytest.mark.parametrize("name", SCENARIOS)
+def test_the_example_of_a_card_runs(name, tmp_path):
+    (block,) = FENCED.findall(card(SCENARIOS[name], tmp_path))
+    made: dict[str, Any] = {}
+    exec(compile(block, name, "exec"), made)
+    assert set(made["observations"]) == set(made["infos"]) == set(SCENARIOS[name].agents)
+    made["env"].close()
 
 
 @pytest.mark.parametrize("name", SCENARIOS)

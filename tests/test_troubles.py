@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import itertools
 import os
-import resource
 import time
 from contextlib import contextmanager
 from pathlib import Path
@@ -22,6 +21,8 @@ from benchmarks.reliability.kills import contents
 from entropy_explore_env.compilation import announcement
 from entropy_explore_env.compilation.folder import MAX_DAYS, SUFFIX, remove_old_kernels
 from entropy_explore_env.compilation.kernels import lean_kernel
+
+resource = pytest.importorskip("resource", reason="POSIX limits the size of files")
 
 TINY = ("--scenarios", "box-7x11x5", "--robots", "1", "--time-limit-s", "40", "--strategies", "gradient")
 SWEEP = (*TINY, "--seeds", "2", "--jobs", "1", "--out")

@@ -66,6 +66,7 @@ def progress_bar(title: str, hidden: bool) -> Iterator[Callable[[EntropyExploreE
             progress.stop()
 
 
+_MOVED_M, _ENOUGH_SCANS = 1.0, 10
 _OF_TEAMS = ("shared_measurements", "bits_sent", "balance", "entropy_mean_bits", "joint_bits")
 _ROWS: tuple[tuple[str, str, Callable[[Any], str]], ...] = (
     ("finished", "finished", lambda v: "yes" if v else "no"),
@@ -130,16 +131,25 @@ def _told(faults: dict[str, int]) -> str | None:
 
 
 def standing_still(figures: dict[str, Any], moved_m: float) -> list[str]:
-    """A warning of each robot that hardly drove and was blocked, or did not finish the map.
+    """A warning of each robot that drove less than `moved_m` and was blocked, or did not finish the map.
 
-    In a room without obstacles a robot may well map all from where it starts.
+    In a room without obstacles a robot may well map all from where it starts, and a mission of a few scans
+    says nothing.
     """
     return [
-        f"warning: robot {number} has not moved: {robot['scans']:,} scans from one spot, "
+        f"warning: robot {number} has hardly moved: {robot['distance_m']:.1f} m in {robot['scans']:,} scans, "
         f"{robot['blocked_moves']:,} moves blocked"
         for number, robot in enumerate(figures["per_robot"])
-        if robot["distance_m"] < moved_m and (robot["blocked_moves"] > 0 or not figures["finished"])
+        if robot["distance_m"] < moved_m
+        and robot["scans"] >= _ENOUGH_SCANS
+        and (robot["blocked_moves"] > 0 or not figures["finished"])
     ]
+
+
+def _moved_m(scenario: Scenario) -> float:
+    """What a robot that maps a world drives at least: a metre, its body's length twice, or a voxel."""
+    lengths_m = (2 * kind.robot.body_radius_m for kind in scenario.kinds)
+    return max(_MOVED_M, 2 * max(lengths_m), scenario.grid.voxel_size_m)
 
 
 def print_table(figures: dict[str, Any], written: list[Path], scenario: Scenario) -> None:
@@ -169,7 +179,7 @@ def print_table(figures: dict[str, Any], written: list[Path], scenario: Scenario
             table.add_row(label, shown(values[name]))
     console = Console()
     console.print(table)
-    for warning in standing_still(figures, scenario.grid.voxel_size_m):
+    for warning in standing_still(figures, _moved_m(scenario)):
         console.print(warning, style="yellow", highlight=False, soft_wrap=True)
     if written:
         console.print(f"written: {', '.join(map(str, written))}", highlight=False, soft_wrap=True)

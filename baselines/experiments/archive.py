@@ -3,7 +3,7 @@
 Who downloads it goes on where the page stopped, or sets a strategy of their own beside the missions that
 others ran. A line is the content of one file of `runner`, as JSON, with its name; what is read from an
 archive is checked like any kept file, so that nothing counts that other settings or other code made. Arrays
-that lie beside records take no part.
+that lie beside records take no part, nor do the traces of missions that failed, which name folders.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from baselines.experiments.runner import Work, kept_content, read_older_record
+from baselines.experiments.runner import Work, kept_content, read_older_record, without_trace
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.writing import write_atomically
 
@@ -35,7 +35,7 @@ def write_archive(archive: Path, folder: Path, works: Sequence[Work]) -> int:
     """
     kept = [work for work in works if read_older_record(folder, work) is not None]
     lines = [
-        json.dumps({_FILE: work.file, **kept_content(folder, work)}, allow_nan=False)
+        json.dumps({_FILE: work.file, **without_trace(kept_content(folder, work))}, allow_nan=False)
         for work in sorted(kept, key=lambda work: work.file)
     ]
     text = "".join(f"{line}\n" for line in lines)

@@ -12,6 +12,7 @@ from collections.abc import Sequence
 
 from baselines.experiments.outcome import Record
 from baselines.experiments.runner import (
+    TRACE,
     Conditions,
     Work,
     read_older_record,
@@ -51,5 +52,5 @@ def keep_confirmed(works: Sequence[Work], groups: Sequence[str], conditions: Con
 
 
 def _but_for_clock(record: Record) -> str:
-    """What a record says that is the same in every run."""
-    return json.dumps({name: value for name, value in record.items() if name != CLOCK}, sort_keys=True)
+    """What a record says that is the same in every run, on every machine."""
+    return json.dumps({k: value for k, value in record.items() if k not in (CLOCK, TRACE)}, sort_keys=True)

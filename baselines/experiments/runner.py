@@ -29,6 +29,8 @@ from entropy_explore_env.writing import write_atomically
 _PACE_PERIOD_S = 600.0
 """The bar estimates the time left from so much of the past: single missions differ a lot."""
 _LONGEST_REASON = 200
+TRACE = "trace"
+"""In records of work that failed: where, with folders of the machine that ran it."""
 NOT_RUN: Record = {"not_run": True}
 """In place of the record of work that was not begun."""
 _ADDRESS = re.compile(r" at 0x[0-9a-fA-F]+")
@@ -161,7 +163,7 @@ def failed_record(failure: Failure, limit_s: float) -> Record:
     """
     reason = _ADDRESS.sub(" at 0x…", failure.reason)
     reason = reason if len(reason) <= _LONGEST_REASON else reason[:_LONGEST_REASON] + " …"
-    return {"failed": reason, "trace": failure.trace, "limit_s": limit_s if failure.late else None}
+    return {"failed": reason, TRACE: failure.trace, "limit_s": limit_s if failure.late else None}
 
 
 def result_digest(work: Work, code: str) -> str:
@@ -187,6 +189,14 @@ def write_record(folder: Path, work: Work, code: str, record: Record) -> None:
         "record": record,
     }
     write_atomically(folder / f"{work.file}.json", json.dumps(content, allow_nan=False))
+
+
+def without_trace(content: dict[str, Any]) -> dict[str, Any]:
+    """What the file of some work holds, but where it failed: for others, on other machines."""
+    if not content["record"].get(TRACE):
+        return content
+    record = {**content["record"], TRACE: ""}
+    return {**content, "record": record, "checksum": _checksum(record)}
 
 
 def _checksum(record: object) -> str:

@@ -110,7 +110,7 @@ Strategies on the same worlds, starts and seeds, in suites that are pinned (`bas
 - `missions.jsonl.xz` among a suite's files holds all of its missions. A strategy of one's own takes part by
   `python -m baselines.benchmark --suite NAME --strategies MODULE:CLASS --archive FILE --confirm`: the others'
   missions are taken from the file, and run again only where the code has changed what comes out
-  (docs/own_strategy.md).
+  ([a strategy of one's own](../own_strategy.md)).
 """
 
 

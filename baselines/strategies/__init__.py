@@ -82,9 +82,9 @@ CLIFF_STRATEGIES: MappingProxyType[str, Callable[[], Strategy]] = MappingProxyTy
 """The same of strategies for rovers above a cliff alone; who asks for all strategies does not mean them."""
 
 ALIASES: MappingProxyType[str, str] = MappingProxyType(
-    {"best": "planned-rate", "information-rate": "information-rate-v0"}
+    {"best": "planned-rate", "information-rate": "planned-rate"}
 )
-"""Other name → the name that records and tables hold: of what we recommend, and of former versions."""
+"""Other name → the name that records and tables hold: of what we recommend, also under its former name."""
 
 _RECOMMENDED = MappingProxyType({"cliff": "cliff-next-best-view"})
 """Named scenario → what we recommend in it, where that is another one than elsewhere."""

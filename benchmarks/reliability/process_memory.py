@@ -4,8 +4,13 @@ from __future__ import annotations
 
 import math
 import os
-import resource
+import sys
 from pathlib import Path
+
+try:
+    import resource
+except ImportError:  # Windows
+    resource = None
 
 
 def resident_mib() -> float:
@@ -18,5 +23,8 @@ def resident_mib() -> float:
 
 
 def peak_mib() -> float:
-    """The most resident memory that this process ever held."""
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+    """The most resident memory that this process ever held; nan where the system does not say."""
+    if resource is None:
+        return math.nan
+    unit = 2**20 if sys.platform == "darwin" else 2**10  # macOS counts bytes, Linux KiB
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / unit

@@ -8,6 +8,7 @@ many files and prints a table; the proof of changed files (`file_fuzz`) reads an
 from __future__ import annotations
 
 import argparse
+import contextlib
 import io
 import re
 import struct
@@ -301,8 +302,9 @@ def fuzz(
     (inside / "sub").mkdir(parents=True)
     secret = folder / "outside.pgm"
     secret.write_bytes(b"P5\n3 2\n255\n" + b"\xfe" * 6)  # 3 × 2 and all free: no mutant of ours
-    (inside / "link.pgm").symlink_to(secret)
-    (inside / "linked").symlink_to(folder)
+    with contextlib.suppress(OSError):  # not everybody may make links on Windows
+        (inside / "link.pgm").symlink_to(secret)
+        (inside / "linked").symlink_to(folder)
     found = Outcome()
     there: dict[str, bytes] = {}
     before_mib = peak_mib()

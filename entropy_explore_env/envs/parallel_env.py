@@ -50,7 +50,7 @@ class EntropyExploreEnv(ParallelEnv[str, Any, Any]):
     """
 
     metadata = {  # noqa: RUF012 - the form that PettingZoo asks for
-        "name": "entropy_explore_env_v0",
+        "name": "entropy_explore_env_v1",
         "render_modes": offered_modes(),
         "render_fps": FRAMES_PER_S,
         "is_parallelizable": True,

@@ -31,6 +31,7 @@ from entropy_explore_env.reports.mission_record import load_record
 from entropy_explore_env.scenario import with_settings
 from entropy_explore_env.scenarios import BOX
 from entropy_explore_env.worlds.load import LOAD_OPTIONS
+from tests.systems import needs_posix
 
 ROOT = Path(__file__).parents[2]
 NAMED = (
@@ -114,14 +115,15 @@ def test_an_alias_runs_what_it_stands_for_and_says_so(figures, name):
     assert without_clock(printed) == without_clock(figures("--strategy", ALIASES[name], *SHORT))
 
 
-def test_the_table_warns_of_robots_that_have_not_moved():
-    def of(finished, *robots):
-        rows = [{"distance_m": m, "blocked_moves": blocked, "scans": 2262} for m, blocked in robots]
-        return standing_still({"finished": finished, "per_robot": rows}, 0.25)
+def test_the_table_warns_of_robots_that_have_hardly_moved():
+    def of(finished, *robots, scans=2262):
+        rows = [{"distance_m": m, "blocked_moves": blocked, "scans": scans} for m, blocked in robots]
+        return standing_still({"finished": finished, "per_robot": rows}, 1.0)
 
     (warning,) = of(True, (3.0, 9), (0.2, 810), (0.0, 0))
-    assert warning == "warning: robot 1 has not moved: 2,262 scans from one spot, 810 moves blocked"
-    assert len(of(False, (0.0, 0), (0.3, 0))) == 1
+    assert warning == "warning: robot 1 has hardly moved: 0.2 m in 2,262 scans, 810 moves blocked"
+    assert len(of(False, (0.0, 0), (0.3, 0), (1.3, 0))) == 2
+    assert of(False, (0.0, 0), scans=9) == []
 
 
 def test_what_is_not_said_is_the_scenario_s_own(figures):
@@ -524,11 +526,15 @@ def test_files_are_whole_or_not_there_when_writing_is_interrupted(done, command,
 # --- as a process
 
 
+def _heed_interrupts() -> None:
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
 def process(*words: str, **environment: str) -> subprocess.Popen[str]:
     """A process that heeds Ctrl-C, also where the tests run in the background, which ignores it."""
     return subprocess.Popen(
         [sys.executable, "-m", "baselines.run", *words],
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+        preexec_fn=_heed_interrupts if os.name == "posix" else None,
         cwd=ROOT,
         env={**os.environ, **environment},
         stdout=subprocess.PIPE,
@@ -553,6 +559,7 @@ def test_bad_input_ends_a_process_with_code_2():
 ENDLESS = ("--ending.sigma-end", "0.0002", "--ending.time-limit-s", "inf")
 
 
+@needs_posix
 def test_an_interrupted_process_ends_with_130_and_leaves_nothing(tmp_path):
     """The mission would go on for hours; it is interrupted as soon as its progress bar is seen."""
     words = ("box-7x11x5", *ENDLESS, "--out", str(tmp_path / "out"))

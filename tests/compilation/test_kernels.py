@@ -12,6 +12,7 @@ import pytest
 from numba.core.errors import NumbaError
 
 from entropy_explore_env.compilation.kernels import lean_kernel
+from tests.systems import needs_posix
 
 LEAF = """import numpy as np
 from entropy_explore_env.compilation.kernels import {decorator}
@@ -81,6 +82,7 @@ def test_a_kernel_changes_when_one_that_it_calls_changes_and_only_then(tmp_path,
     assert run(call, tmp_path) == "11.0 0"  # what was compiled first is still there
 
 
+@needs_posix
 def test_nothing_is_written_into_packages(tmp_path):
     """In a test folder, and where a package cannot be written; the user's cache folder takes it all."""
     for name, mode in (("tests_of_mine", 0o755), ("installed", 0o555)):

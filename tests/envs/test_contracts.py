@@ -21,6 +21,8 @@ from pettingzoo.test import (
 
 import entropy_explore_env
 from entropy_explore_env import env, environment_id, parallel_env
+from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
+from entropy_explore_env.scenarios import SCENARIOS
 from tests.envs.pairwise import params
 from tests.reference.scenes import SMALL
 
@@ -97,6 +99,11 @@ def test_pettingzoo_rendering(scenario: str, robots: int) -> None:
 
     render_test(functools.partial(env, scenario, robots=robots), {"rgb_array": is_picture})
     assert shapes == [(480, 640, 3)] * 5
+
+
+def test_the_environment_s_name_ends_in_the_version_of_the_ids():
+    (version,) = {environment_id(name).rpartition("-")[2] for name in SCENARIOS}
+    assert EntropyExploreEnv.metadata["name"] == f"entropy_explore_env_{version}"
 
 
 @pytest.mark.parametrize(("scenario", "kind", "parts"), params(*SINGLES))

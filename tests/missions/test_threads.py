@@ -9,6 +9,7 @@ import sys
 import pytest
 
 from entropy_explore_env.missions.threads import Threads
+from tests.systems import needs_posix
 
 FORKED = """
 import os, signal
@@ -36,7 +37,7 @@ print("the same")
 """
 
 
-@pytest.mark.skipif(not hasattr(os, "fork"), reason="this system cannot fork")
+@needs_posix
 def test_a_forked_child_steps_on_as_its_parent_does():
     """In a process of its own, which can be ended if the child hangs."""
     done = subprocess.run(

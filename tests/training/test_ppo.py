@@ -22,6 +22,7 @@ import torch
 from baselines.experiments.mission import Surroundings
 from entropy_explore_env.command import BAD_INPUT, INTERRUPTED
 from entropy_explore_env.envs.robot_vec_env import RobotVecEnv
+from tests.systems import needs_posix
 from training import ppo
 from training.advantages import DecisionBuffer
 from training.checkpoints import checkpoint_name, latest_checkpoint, load_checkpoint
@@ -132,6 +133,7 @@ def test_a_resumed_run_ends_bitwise_like_an_uninterrupted_one(uninterrupted, tmp
     assert load_checkpoint(latest_checkpoint(out, "best")).weights.keys()
 
 
+@needs_posix
 def test_a_run_killed_by_a_signal_can_be_resumed(tmp_path, uninterrupted):
     """At an arbitrary moment after its first checkpoint."""
     out = tmp_path / "run"

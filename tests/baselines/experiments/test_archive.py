@@ -8,9 +8,10 @@ import lzma
 import pytest
 
 from baselines.experiments.archive import read_archive, write_archive
-from baselines.experiments.runner import read_record, run_all
+from baselines.experiments.runner import TRACE, read_record, run_all, write_record
 from entropy_explore_env.errors import SettingError
 from tests.baselines.experiments.test_confirmation import Doubled, conditions, works
+from tests.code_blocks import ROOT
 
 
 def kept(folder, code="new", count=4):
@@ -65,6 +66,26 @@ def test_a_record_that_was_changed_by_hand_does_not_count(archive, tmp_path):
     archive.write_bytes(lzma.compress("\n".join(map(json.dumps, lines)).encode()))
     read_archive(archive, tmp_path / "second", works([]))
     assert kept(tmp_path / "second") == [0.0, 2.0, None, 6.0]
+
+
+def test_folders_of_the_machine_that_ran_it_are_left_out(tmp_path):
+    """A mission that failed: its trace stays here, its reason is told to others."""
+    (work,) = works([], count=1)
+    record = {"failed": "WorldError: no", TRACE: 'File "/home/me/clone/a.py", line 1', "limit_s": None}
+    write_record(tmp_path / "first", work, "new", record)
+    assert write_archive(tmp_path / "all.xz", tmp_path / "first", [work]) == 1
+    assert b"/home/me" not in lzma.decompress((tmp_path / "all.xz").read_bytes())
+    assert read_archive(tmp_path / "all.xz", tmp_path / "second", [work]) == 1
+    assert read_record(tmp_path / "second", work, "new") == {**record, TRACE: ""}
+    assert read_record(tmp_path / "first", work, "new") == record
+
+
+@pytest.mark.parametrize(
+    "path", sorted((ROOT / "docs" / "results").rglob("*.xz")), ids=lambda p: p.parent.name
+)
+def test_published_archives_name_no_folder_of_a_machine(path):
+    lines = lzma.decompress(path.read_bytes()).splitlines()
+    assert lines and not [line[:200] for line in lines if b"Traceback" in line or b'File \\"' in line]
 
 
 @pytest.mark.parametrize(

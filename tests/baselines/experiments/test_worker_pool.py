@@ -15,6 +15,7 @@ import pytest
 
 from baselines.experiments.worker_pool import Failure, run_each
 from entropy_explore_env.errors import SettingError
+from tests.systems import needs_posix
 
 ROOT = Path(__file__).parents[3]
 
@@ -102,13 +103,14 @@ def test_what_cannot_be_passed_on_is_a_failure_of_its_task_alone():
     assert (found[SQUARES[2]], found[SQUARES[4]]) == (4, 16)
 
 
-@pytest.mark.parametrize("jobs", [1, 2])
+@pytest.mark.parametrize("jobs", [pytest.param(1, marks=needs_posix), 2])
 def test_a_task_that_runs_past_its_limit_is_ended_even_if_it_catches_all_errors(jobs):
     found = outcomes([SQUARES[2], ("swallow", 0), SQUARES[3]], jobs, 0.3)
     assert found[SQUARES[2]] == 4 and found[SQUARES[3]] == 9
     assert found["swallow", 0] == Failure("ran past 0.3 s on the clock", late=True)
 
 
+@needs_posix
 def test_the_alarm_is_off_after_a_task():
     before = signal.getsignal(signal.SIGALRM)
     assert outcomes(SQUARES, 1, 0.05)[SQUARES[4]] == 16
@@ -116,6 +118,7 @@ def test_the_alarm_is_off_after_a_task():
     assert signal.getsignal(signal.SIGALRM) is before
 
 
+@needs_posix
 def test_a_process_that_hangs_or_ends_is_replaced():
     tasks = [("hang", 0), ("die", 7), ("kill", int(signal.SIGSEGV)), ("kill", int(signal.SIGKILL)), *SQUARES]
     started = time.monotonic()

@@ -198,7 +198,7 @@ def test_the_command_writes_a_page_resumes_and_says_it_as_json(tmp_path, capsys)
         "--robots",
         "3",
         "--strategies",
-        "random,information-rate",
+        "random,information-rate-v0",
     ]
     words += ["--time-limit-s", "60", "--jobs", "1", "--out", str(tmp_path), "--runs", str(tmp_path / "runs")]
     pages = []

@@ -11,12 +11,14 @@ import numpy as np
 import pytest
 
 from baselines.experiments.mission import run_mission, scripted
+from baselines.scoreboard.suites import WORLDS
 from baselines.strategies import STRATEGIES, make_strategy
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.robots.motion import MoveEnd
 from entropy_explore_env.scenario import Scenario, with_settings
 from entropy_explore_env.scenarios import CAVE, OFFICE
 from entropy_explore_env.settings import Grid
+from entropy_explore_env.worlds.load import load_world
 from entropy_explore_env.worlds.world import World
 
 
@@ -200,6 +202,17 @@ def test_robots_look_and_drive_elsewhere_when_a_teammate_hides_what_they_expect(
 def test_robots_that_have_covered_all_go_on_where_the_mission_asks_for_more():
     """Two robots stood for 87 s, each scanning for ever from the centre of its Voronoi cell."""
     assert longest_stand_s("tunnels", "voronoi", 2, seed=3) < 20.0
+
+
+def test_a_start_from_which_two_robots_once_stood_for_the_whole_mission():
+    """0.7 m apart in a dungeon; with information-rate-v0 one of them drives 0.2 m in 1,200 s."""
+    world = load_world(WORLDS / "dungeons" / "20.npz")
+    settings = {"robots": 2, "start_radius_m": 0.9, "ending": {"time_limit_s": 1200.0}}
+    env = EntropyExploreEnv(with_settings(scripted(OFFICE), {**settings, "grid": world.grid}))
+    run_mission(env, make_strategy("information-rate"), 20, options={"world": world})
+    state = env.missions.state
+    assert state.missions[0]["time_s"] < 600.0
+    assert (state.robots[0]["distance_m"] > 50.0).all()
 
 
 @pytest.mark.parametrize("strategy", ["nearest-frontier", "distance-advantage", "tour"])

@@ -22,6 +22,9 @@ from benchmarks.reliability.mutants import Args, main, row_of
 from benchmarks.reliability.quick_tests import SET_UP, Told
 from benchmarks.reliability.reached_lines import Reached, reached_lines
 from entropy_explore_env.errors import SettingError
+from tests.systems import needs_posix
+
+pytestmark = needs_posix
 
 SOURCE = '''
 """A file."""

@@ -14,6 +14,7 @@ from benchmarks.reliability import determinism, fault_table, file_fuzz, kills, m
 from benchmarks.reliability.__main__ import PROOFS, Proof, carry_on, main
 from benchmarks.reliability.page import Kept, read_rows
 from entropy_explore_env.errors import SettingError
+from tests.systems import needs_posix
 
 EMPTY = {name: Kept((), 0, 10) for name in PROOFS}
 NO_MORE = ({}, (), {"numpy": "2"})
@@ -319,11 +320,13 @@ def test_a_piece_of_soak(monkeypatch):
     assert (row["scenario"], row["channel"]) == ("box-7x11x5", 0) and row["cpu_s"] >= 0.2
 
 
+@needs_posix
 def test_a_few_kills_of_a_trainer(tmp_path, monkeypatch):
     monkeypatch.setattr(kills, "KILLS", 3)
     assert kills.kill_trainer(tmp_path / "run", random.Random(0)) >= 3
 
 
+@needs_posix
 @pytest.mark.long
 def test_kills_of_a_sweep(tmp_path):
     assert len(kills.kill_sweep(tmp_path / "sweep", random.Random(0))) == kills.KILLS

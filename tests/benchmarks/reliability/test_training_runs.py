@@ -11,7 +11,10 @@ from benchmarks.reliability import training_runs
 from benchmarks.reliability.settings_fuzz import BrokenPromiseError
 from benchmarks.reliability.training_runs import check_curve, check_policy, train
 from entropy_explore_env.scenarios import BOX
+from tests.systems import needs_posix
 from training.checkpoints import Checkpoint, PolicySettings, checkpoint_name, save_checkpoint
+
+pytestmark = needs_posix
 
 SMALL = (
     "--scenario box-7x11x5 --robots 2 --missions 2 --rollout-steps 32 --validation-missions 2 "

@@ -9,6 +9,7 @@ from benchmarks.reliability.world_samples import YAML, pgm, plan, png
 from entropy_explore_env.errors import WorldError
 from entropy_explore_env.worlds.files.map_server import labels_of
 from entropy_explore_env.worlds.load import load_world
+from tests.systems import needs_posix
 
 UNKNOWN, FREE, SOLID = -1, 0, 1
 OPAQUE = np.float32(255.0)
@@ -92,6 +93,7 @@ def test_an_image_in_a_folder_below_is_read(tmp_path):
     assert load_world(path).grid.shape == (11, 7, 1)
 
 
+@needs_posix
 def test_a_map_may_be_linked_to(tmp_path):
     """Yaml and image are links to one folder."""
     (tmp_path / "there").mkdir()
@@ -102,6 +104,7 @@ def test_a_map_may_be_linked_to(tmp_path):
     assert load_world(tmp_path / "here" / path.name).grid.shape == (11, 7, 1)
 
 
+@needs_posix
 @pytest.mark.parametrize(
     "image",
     [

@@ -11,6 +11,7 @@ from entropy_explore_env.errors import SettingError, WorldError
 from entropy_explore_env.worlds.files import meshes, process
 from entropy_explore_env.worlds.files.voxels import Options
 from entropy_explore_env.worlds.load import load_world
+from tests.systems import needs_posix
 
 trimesh = pytest.importorskip("trimesh", reason="trimesh is not installed")
 
@@ -85,6 +86,7 @@ def test_settings_and_sizes(tmp_path):
         load_world(path, 1e-3)
 
 
+@needs_posix
 def test_what_lies_beside_an_obj_is_not_read(tmp_path):
     """A material library that is a pipe would be waited for."""
     import os

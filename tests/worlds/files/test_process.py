@@ -17,6 +17,7 @@ from entropy_explore_env.errors import WorldError
 from entropy_explore_env.worlds.files import process
 from entropy_explore_env.worlds.files.process import Format, Limits, ReaderProcess, kept_reader
 from entropy_explore_env.worlds.load import load_world
+from tests.systems import needs_posix
 
 WINDOWS = """
 import signal, sys, time, types
@@ -37,6 +38,7 @@ def picture(tmp_path):
     return path
 
 
+@needs_posix
 def test_a_process_that_died_is_started_anew(picture):
     reader = ReaderProcess()
     first = reader.read(IMAGE, picture, {})
