@@ -64,6 +64,14 @@ def test_a_goal_asks_for_the_ratio_its_interval_and_finished_missions(ours, goal
     assert found is not None and found.holds(goal) is holds
 
 
+def test_where_missions_are_long_thirty_starts_are_run_and_all_where_they_are_short():
+    for test in (test for name in TESTS for test in TESTS[name]):
+        starts = sum(cell.seeds for cell in test.cells("planned-rate", 100))
+        assert starts == (100 if test.short else 30)
+        assert sum(cell.seeds for cell in test.cells("planned-rate", 3)) == 3
+    assert sum(test.short for test in TESTS["volumes"]) == 5
+
+
 def test_in_the_dungeons_the_path_counts(tmp_path):
     (dungeons,) = (test for test in TESTS["plans"] if test.name == "dungeons")
     found = compared(dungeons, [record(8.0)], [record(10.0)])
