@@ -19,21 +19,28 @@ from entropy_explore_env.scenario import Scenario, with_settings
 from entropy_explore_env.scenarios import SCENARIOS, find_scenario
 from entropy_explore_env.worlds.given import GIVEN, distinct_names
 
+_WHOLE_SUITE = "suite"
+"""In place of a name: those that stand in the suite's table."""
+
 
 def chosen_strategies(words: str | None, suite: str | None = None) -> tuple[str, ...]:
     """Strategies from names with commas between them.
 
     Args:
-        words: Names; `all` = every one; None = those of the suite's table, of which learned policies are left
-            out, and named, where what runs them is not installed; without a suite every one.
+        words: Names; `all` = every one; `suite`, also beside other names, or None = those of the suite's
+            table, of which learned policies are left out, and named, where what runs them is not installed;
+            None without a suite = every one.
         suite: Its name; its first reference is added, without a suite the random walk is.
 
     Raises:
         SettingError: No strategy, or no suite, has such a name.
     """
     if words is None and suite is not None:
-        words = ",".join(_runnable(suite_strategies(suite)))
+        words = _WHOLE_SUITE
     names = list(STRATEGIES) if words in (None, "all") else words.split(",")
+    if suite is not None and _WHOLE_SUITE in names:
+        at = names.index(_WHOLE_SUITE)
+        names[at : at + 1] = _runnable(suite_strategies(suite))
     for name in names:
         make_strategy(name)
     added = [BASELINE] if suite is None else [name for name in REFERENCES[:1] if name in STRATEGIES]

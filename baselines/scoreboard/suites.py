@@ -4,8 +4,8 @@
               seen is seen: how far it drives, and how long
     volumes   3-D worlds and the office, one robot and three, as the scenarios stand, until a map passes the
               mission's entropy threshold
-    teams     1, 2, 4 and 8 robots with a channel that carries everything; 4 also with a narrow one, and with
-              one that loses half of the messages
+    teams     1, 2, 4 and 8 robots with a channel that carries everything; 4 also with a narrow one, with one
+              that loses half of the messages, and with one that needs a line of sight
     others    the named scenarios that no other suite has, as they stand, with their own teams
 
 Worlds of recipes are those of the test split, which nothing was tuned on; mission k of a task has seed k for
@@ -200,6 +200,7 @@ def teams(quick: bool = False) -> tuple[Task, ...]:
         "": whole,
         ", burst 64": {"burst": 64},
         ", half of the messages lost": {**whole, "loss_probability": _LOSSY},
+        ", in line of sight": {**whole, "reach": "line_of_sight"},
     }
     return tuple(
         dataclasses.replace(

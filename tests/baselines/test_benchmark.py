@@ -25,7 +25,7 @@ from baselines.strategies import make_strategy
 from baselines.strategies.random_walk import RandomWalk
 from benchmarks.reliability.kills import contents
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
-from entropy_explore_env.errors import MissingExtraError
+from entropy_explore_env.errors import MissingExtraError, SettingError
 from entropy_explore_env.reports.metrics import mission_figures
 from entropy_explore_env.scenario import with_settings
 from entropy_explore_env.scenarios import BOX, LAB, SCENARIOS
@@ -318,6 +318,10 @@ def test_a_suite_says_who_stands_in_its_table():
     assert set(volumes) - set(plans) == {*of_teams, "pretrained:volumes"}
     assert "pretrained:plans" in plans
     assert set(chosen_strategies("all", "plans")) == set(strategies.STRATEGIES)
+    assert chosen_strategies("voronoi,suite", "plans")[:2] == ("nearest-frontier", "voronoi")
+    assert set(chosen_strategies("suite,voronoi", "plans")) == {*plans, "voronoi"}
+    with pytest.raises(SettingError, match="suite"):
+        chosen_strategies("suite")
 
 
 def test_without_what_runs_policies_a_suite_leaves_them_out_and_says_so(monkeypatch, capsys):

@@ -196,6 +196,7 @@ def test_nobody_who_acts_or_evaluates_can_see_what_only_training_may():
     allowed = ("entropy_explore_env.envs.privileged_vec_env", "training.policy_improvement.")
     assert direct and all(each.startswith(allowed) for each in direct)
     acting = ["training.policy", "training.evaluate", "training.validation", "entropy_explore_env"]
+    acting += [f"training.policy_improvement.{name}" for name in ("comparison", "results_page")]
     acting += [each for each in graph.modules if each.startswith("baselines")]
     for module in acting:
         assert graph.find_shortest_chain(module, privileged) is None, module

@@ -24,9 +24,7 @@ import numpy as np
 
 from baselines.cli.arguments import make_folder, parse, print_json, run_command
 from baselines.experiments.mission import run_mission, scripted, scripted_env
-from baselines.experiments.statistics import Interval, geometric_ratio_interval, median_ratio_interval
-from baselines.experiments.tables import markdown_table
-from baselines.scoreboard.suites import team_name
+from baselines.experiments.statistics import geometric_ratio_interval, median_ratio_interval
 from baselines.strategies import make_strategy
 from baselines.strategies.protocol import Strategy
 from entropy_explore_env.errors import SettingError
@@ -36,6 +34,7 @@ from entropy_explore_env.scenario import Scenario, with_settings
 from entropy_explore_env.validation import check_whole
 from entropy_explore_env.writing import write_atomically
 from training import extra  # noqa: F401 - before what is not there without it
+from training.policy_improvement.headroom_table import table_row
 from training.policy_improvement.restricted import RestrictedPlanner
 from training.policy_improvement.rollouts import PLANNER, BatchMissions, Branch, RollOutEffort, RollOuts
 from training.policy_improvement.tasks import task_of
@@ -46,12 +45,6 @@ _SHARD = 2**31
 """No file of labels has this number: the starts are others than those of labels."""
 _BETTER_S = 1e-6
 ACTION_SETS = ("planned-rate", "restricted")
-_NAMES = {
-    "clairvoyant": "clairvoyant over planner",
-    "planned-rate": "`planned-rate` over planner",
-    "restricted": "`planned-rate`, discrete actions, over planner",
-}
-"""Rows beside the planner's, and the heads of their columns."""
 
 
 @dataclass
@@ -100,14 +93,24 @@ def main(words: Sequence[str]) -> int:
     if args.out is not None:
         make_folder("out", args.out)
     for found in measure(args, task):
-        if args.out is not None:  # after each row, so that a kill loses no more than the next one
-            file = args.out / f"{task.name}-{task.robots}.json"
-            write_atomically(file, json.dumps(found, indent=1, allow_nan=False) + "\n")
+        if args.out is not None:
+            _keep(args.out / f"{task.name}-{task.robots}.json", found)
         if not args.json:
             print(found["rows"][-1]["line"], flush=True)
     if args.json:
         print_json(found)
     return 0
+
+
+def _keep(file: Path, found: dict[str, Any]) -> None:
+    """Write what is known after each row, but not over a file of the same options that holds more rows."""
+    if file.is_file():
+        table_row(file)  # refuses what this command did not write
+        before = json.loads(file.read_text("utf-8"))
+        same = all(before.get(name) == value for name, value in found.items() if name != "rows")
+        if same and len(before["rows"]) > len(found["rows"]):
+            return
+    write_atomically(file, json.dumps(found, indent=1, allow_nan=False) + "\n")
 
 
 def measure(args: Args, task: Scenario) -> Iterator[dict[str, Any]]:
@@ -153,42 +156,6 @@ class PlannerMissions:
     times_s: np.ndarray
     moments: np.ndarray
     moments_to_go_s: np.ndarray
-
-
-def shown(folder: Path) -> str:
-    """What was written to a folder, as a Markdown table; nothing where nothing was.
-
-    Raises:
-        SettingError: Something else lies there.
-    """
-    files = sorted(folder.glob("*.json"))
-    head = ["task", "starts", "clairvoyant at one decision of", "planner", *_NAMES.values()]
-    return markdown_table(head, [_told(file) for file in files]) if files else ""
-
-
-def _told(file: Path) -> list[str]:
-    """The row of a file."""
-    try:
-        found = json.loads(file.read_text())
-        rows = {row["name"]: row for row in found["rows"]}
-        cells = [team_name(found["scenario"], found["robots"]), str(found["missions"]), str(found["every"])]
-        if found["horizon"] or found["divisor"] > 1:
-            deep = f"{found['horizon']} decisions deep" if found["horizon"] else "to the end"
-            cells[-1] += f", {deep}, drawing 1/{found['divisor']}"
-        cells.append(f"{rows['planner']['median_s']:,.0f} s")
-        return cells + [_ratio_text(rows.get(name), found["missions"]) for name in _NAMES]
-    except (ValueError, KeyError, TypeError) as error:
-        wanted = "a file that python -m training.policy_improvement.headroom wrote"
-        raise SettingError("headroom", str(file), wanted) from error
-
-
-def _ratio_text(row: dict[str, Any] | None, missions: int) -> str:
-    """A row's ratio; where missions were cut off, and count with their time limit, how many were not."""
-    if row is None:
-        return "-"
-    ratio = Interval(*(row[f"mean_ratio{end}"] for end in ("", "_low", "_high")))
-    finished = row["finished"]
-    return ratio.text() + ("" if finished == missions else f", {finished} of {missions} finished")
 
 
 def lead_by_planner(task: Scenario, seeds: Sequence[int], threads: int) -> PlannerMissions:

@@ -64,6 +64,31 @@ def test_a_group_whose_sample_differs_is_run_again(tmp_path):
     assert log == [0, 2, 1, 3] and [record["twice"] for record in records] == [0.0, 2.0, 4.0, 6.0]
 
 
+class Ending(Doubled):
+    """A mission; with the old code those of even number but the first came to no end."""
+
+    def run(self):
+        self.log.append(self.number)
+        return Outcome({"finished": self.code == "new" or self.number % 4 != 2, "clock": {}})
+
+
+def test_missions_without_an_end_are_run_again_where_most_of_their_group_ended(tmp_path):
+    log = []
+    run_all([Ending(number, code="old") for number in range(6)], conditions(tmp_path))
+    fresh = [Ending(number, log=log) for number in range(6)]
+    assert keep_confirmed(fresh, ["a"] * 6, conditions(tmp_path)) == 4
+    assert log == [0, 2]
+    assert all(record["finished"] for record in run_all(fresh, conditions(tmp_path))) and log == [0, 2]
+
+
+def test_missions_without_an_end_are_kept_where_hardly_any_of_their_group_ended(tmp_path):
+    log = []
+    old, new = ([Ending(number, code=code, log=log) for number in (1, 2, 6)] for code in ("old", "new"))
+    run_all(old, conditions(tmp_path))
+    log.clear()
+    assert keep_confirmed(new, ["a"] * 3, conditions(tmp_path)) == 2 and log == [1]
+
+
 def test_each_older_code_of_a_group_has_a_sample_of_its_own(tmp_path):
     log = []
     run_all(works([], code="right")[:2], conditions(tmp_path))

@@ -36,6 +36,7 @@ NAMES = {
             "8 robots",
             "4 robots, burst 64",
             "4 robots, half of the messages lost",
+            "4 robots, in line of sight",
         )
     ],
     "others": [
@@ -142,6 +143,13 @@ def test_teams_differ_in_their_channel_alone():
     lossy = tasks["office, 4 robots, half of the messages lost"]
     assert whole.channel.burst >= whole.sensor.rays and whole.channel.i_min_bits == 0.0
     assert (narrow.channel.burst, lossy.channel.loss_probability) == (64, 0.5)
+    hidden = tasks["office, 4 robots, in line of sight"].channel
+    assert (hidden.reach, hidden.burst, hidden.loss_probability) == (
+        "line_of_sight",
+        whole.channel.burst,
+        0.0,
+    )
+    assert whole.channel.reach != "line_of_sight"
     assert lossy.channel.burst == whole.channel.burst and whole.channel.loss_probability == 0.0
 
 

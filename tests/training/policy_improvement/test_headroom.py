@@ -16,7 +16,7 @@ from entropy_explore_env.command import BAD_INPUT
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.reports.metrics import mission_figures
 from entropy_explore_env.scenario import with_settings
-from training.policy_improvement import headroom
+from training.policy_improvement import headroom, headroom_table
 from training.policy_improvement.headroom import Args, Clairvoyant, lead_by_planner
 from training.policy_improvement.restricted import ACTIONS, RestrictedPlanner
 from training.policy_improvement.tasks import task_of
@@ -47,13 +47,18 @@ def test_the_command_compares_all_on_the_same_starts(tmp_path):
     found = json.loads(text.getvalue())
     assert code == 0 and json.loads((tmp_path / "box-7x11x5-1.json").read_text()) == found
     assert [row["name"] for row in found["rows"]] == ["planner", "clairvoyant", "planned-rate", "restricted"]
+    kept = tmp_path / "box-7x11x5-1.json"
+    headroom._keep(kept, {**found, "rows": found["rows"][:1]})  # a run of the same that was stopped
+    assert json.loads(kept.read_text()) == found
+    headroom._keep(kept, {**found, "every": 5, "rows": found["rows"][:1]})
+    assert len(json.loads(kept.read_text())["rows"]) == 1
     planner, *others = found["rows"]
     assert planner["ratio"] == planner["mean_ratio"] == 1.0
     assert all(row["finished"] == 2 and 0.2 < row["mean_ratio"] < 5.0 for row in others)
 
 
 def test_what_the_command_wrote_is_shown_as_a_table(tmp_path):
-    assert headroom.shown(tmp_path) == "" == headroom.shown(tmp_path / "none")
+    assert headroom_table.shown(tmp_path) == "" == headroom_table.shown(tmp_path / "none")
     row = {
         "median_s": 52.4,
         "mean_ratio": 0.9,
@@ -71,7 +76,7 @@ def test_what_the_command_wrote_is_shown_as_a_table(tmp_path):
     (tmp_path / "room-2.json").write_text(
         json.dumps({**found, "scenario": "room", "robots": 2, "rows": lost, "divisor": 2})
     )
-    _, _, cave, office, room = headroom.shown(tmp_path).strip().splitlines()
+    _, _, cave, office, room = headroom_table.shown(tmp_path).strip().splitlines()
     assert room.endswith(
         "| 2, to the end, drawing 1/2 | 52 s | - | - | 0.90 (0.85 … 0.95), 3 of 8 finished |"
     )
@@ -79,7 +84,7 @@ def test_what_the_command_wrote_is_shown_as_a_table(tmp_path):
     assert office.startswith("| office, 1 robot | 8 | 2, 9 decisions deep, drawing 1/1 | 52 s |")
     (tmp_path / "other.json").write_text("[1]")
     with pytest.raises(SettingError, match=r"other\.json"):
-        headroom.shown(tmp_path)
+        headroom_table.shown(tmp_path)
 
 
 def test_restricted_choices_are_actions_of_the_set():

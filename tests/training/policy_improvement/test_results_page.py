@@ -12,8 +12,8 @@ from baselines.experiments.runner import NOT_RUN
 from baselines.scoreboard.suites import find_suite
 from entropy_explore_env.command import BAD_INPUT
 from entropy_explore_env.scenario import with_settings
-from training.policy_improvement import results_page
-from training.policy_improvement.results_page import TESTS, Test, compared
+from training.policy_improvement import results_page, results_text
+from training.policy_improvement.policy_tests import TESTS, Test, compared
 
 
 def record(seconds: float, finished: bool = True) -> dict:
@@ -69,7 +69,7 @@ def test_where_missions_are_long_thirty_starts_are_run_and_all_where_they_are_sh
         starts = sum(cell.seeds for cell in test.cells("planned-rate", 100))
         assert starts == (100 if test.short else 30)
         assert sum(cell.seeds for cell in test.cells("planned-rate", 3)) == 3
-    assert sum(test.short for test in TESTS["volumes"]) == 5
+    assert sum(test.short for test in TESTS["volumes"]) == 6
 
 
 def test_in_the_dungeons_the_path_counts(tmp_path):
@@ -119,7 +119,9 @@ def test_missions_of_the_scoreboard_are_those_of_the_page():
 
 def test_the_page_is_written_stopped_and_gone_on_with(tmp_path, monkeypatch, capsys):
     small = Test("box-7x11x5", 2, learned=True, goal=2.0, goal_v0=0.01)
-    monkeypatch.setattr(results_page, "TESTS", {"volumes": (small, Test("box-7x11x5", 1, goal=2.0))})
+    tests = {"volumes": (small, Test("box-7x11x5", 1, goal=2.0))}
+    monkeypatch.setattr(results_page, "TESTS", tests)
+    monkeypatch.setattr(results_text, "TESTS", tests)
     options = ["--policies", "volumes", "--seeds", "3", "--out", str(tmp_path), "--jobs", "1"]
     assert run_command(results_page.main, [*options, "--stop-after-s", "1e-6"]) == 0
     assert "| box-7x11x5" not in (tmp_path / "policy.md").read_text()
@@ -127,8 +129,9 @@ def test_the_page_is_written_stopped_and_gone_on_with(tmp_path, monkeypatch, cap
     page = (tmp_path / "policy.md").read_text()
     assert page.count("| box-7x11x5, 2 robots | 3 | 3 and 3 |") == 3  # beside three others
     assert page.count("| box-7x11x5, 1 robot | 3 |") == 1
-    assert page.count("| ≤ 2.00 | yes |") == 2 and page.count("| ≤ 0.01 | no |") == 1
+    assert page.count("| ≤ 2.00 | ") == 2 and page.count("| ≤ 0.01 | no |") == 1
     assert "nan" not in page
+    assert "- box-7x11x5, 2 robots, over `information-rate-v0`: " in page and "where 0.01 was asked" in page
     assert run_command(results_page.main, options) == 0
     assert (tmp_path / "policy.md").read_text() == page
     capsys.readouterr()
