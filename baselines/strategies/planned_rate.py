@@ -1,7 +1,7 @@
 """The strategy `planned-rate`: viewpoints nearby and far places on planned paths, by expected bits per time.
 
 Ours, not a paper's: the successor of `information-rate-v0`. Candidates and their expected bits are those of
-`viewpoints.proposals`, drawn and scored by what the robot is (`viewpoints.recipe`): the same that a policy
+`viewpoints.proposals`, drawn and scored by what the robot is (`viewpoints.recipe`), as those that a policy
 chooses among where candidates are the actions. A far place is driven to if it is worth more than every
 viewpoint nearby, along the shortest path by the robot's belief, and the robot decides anew at every stop.
 What did not come, and what could not be reached, is remembered: no place and gaze is tried again that brought

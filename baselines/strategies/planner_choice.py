@@ -1,7 +1,8 @@
 """The strategy `planner-choice`: of the candidates that a policy chooses among, the planner's own choice.
 
 Ours. It is `planned-rate` without the frontier cells by which that one explores some plans, and what a policy
-that chooses among candidates begins as.
+that chooses among candidates begins as. It draws gazes at more far places, for a list of candidates, so that
+its later draws differ from those of `planned-rate`, and single missions do.
 """
 
 from __future__ import annotations

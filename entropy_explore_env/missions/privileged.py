@@ -1,8 +1,8 @@
 """What training may do and know that no robot may: branch missions, and join what all robots' maps hold.
 
 This is the library's one interface for privileged training: roll-outs from a moment of a mission, and
-numbers for critics. Strategies and policies that act, and commands that evaluate them, do not import it; a
-test sees to it.
+numbers for critics. Strategies and policies that act, and the commands that test them, do not import it; a
+test sees to it. The commands that say what there is to win, or learn, do.
 """
 
 from __future__ import annotations
