@@ -100,7 +100,7 @@ def main(words: Sequence[str]) -> int:
     (suite, changes), workers = _suite(args, words), args.workers
     from baselines.scoreboard.page import ARCHIVE, FILES, write_page  # matplotlib: after the help
     from baselines.scoreboard.results import Results
-    from baselines.scoreboard.terminal import printed_results, show_results
+    from baselines.scoreboard.terminal import broken, printed_results, show_results
 
     runs = args.runs or args.out / "runs"
     make_folder("out", args.out)
@@ -133,6 +133,9 @@ def main(words: Sequence[str]) -> int:
     else:
         show_results(results)
         print(f"written: {page}, its tables and figures beside it", file=sys.stderr)
+    if names := broken(results):
+        print(f"error: every mission of {', '.join(names)} raised an error", file=sys.stderr)
+        return 1
     return 0
 
 

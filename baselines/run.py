@@ -43,7 +43,8 @@ class Args:
     information-per-scan, voronoi-nearest.
     Above a cliff: cliff-next-best-view, cliff-polygon-edge,
     cliff-straight-edge, cliff-raster, cliff-raster-fixed-yaw.
-    A learned policy: pretrained:room, or the folder of a run of training.
+    A learned policy: pretrained:room, pretrained:plans,
+    pretrained:volumes, or the folder of a run of training.
     Your own: my_package.my_module:MyStrategy, path/to/file.py:MyStrategy."""
     robots: int = 3
     """Team size."""

@@ -76,7 +76,7 @@ def report(found: dict[str, Any]) -> str:
         )
         lines += [f"  {room}: {files}" for room, files in kernels["rooms"].items()]
         if not kernels["files"]:
-            lines.append("  none yet: the first step compiles for about 10 s, or `entropy-explore-warm` now")
+            lines.append("  none yet: the first step compiles for half a minute, or entropy-explore-warm now")
     lines += [f"problem: {problem}" for problem in found["problems"]] or ["no problem found"]
     return "\n".join(lines)
 

@@ -63,7 +63,7 @@ def rows_of(text: str) -> list[dict[str, str]]:
 
 def test_the_scoreboard_is_of_the_page_that_it_links():
     section = README.split("## Scoreboard\n")[1].split("\n## ")[0]
-    (report,) = set(re.findall(r"\((docs/results/[\w-]+\.md)\)", section))
+    (report,) = set(re.findall(r"\[(docs/results/[\w-]+\.md)\]", section))
     written = [set(row.items()) for row in rows_of((ROOT / report).read_text(encoding="utf-8"))]
     shown = rows_of(section)
     assert len(shown) == 6 and all(len(row) >= 4 for row in shown)

@@ -70,8 +70,8 @@ class CandidateParts(NamedTuple):
         candidates: (K, F) features.
         context: (C,) numbers of the robot, its mission and its team.
         mask: (K,) 1 for each candidate that exists.
-        overlap: (K, K) what candidates k and l see in common, as a share of what the one that sees fewer sees;
-            None = it is left out.
+        overlap: (K, K) what candidates k and l see in common, as a share of what the one that sees fewer
+            sees; None = it is left out.
         score, chosen: Numbers of two features: what the planner holds a candidate to be worth, as a share of
             its own choice, and 1 for that.
         size: Numbers of an observation, without those that only training may know.

@@ -151,10 +151,10 @@ def compare(
         surroundings: World files and starts of the missions; None = those that the scenario says.
 
     Returns:
-        `scenario`, `robots`, `seeds`, and `rows`: of each strategy its name, `median_s` with its 95 %
-        interval (`low_s`, `high_s`), `mean_s`, `finished` of the missions, `scans` (median); of rivals also
-        `ratio`, the policy's median over theirs, with its paired interval, and `faster`, the number of seeds
-        on which the policy was faster.
+        `scenario`, `split` of its worlds, `robots`, `seeds`, and `rows`: of each strategy its name,
+        `median_s` with its 95 % interval (`low_s`, `high_s`), `mean_s`, `finished` of the missions, `scans`
+        (median); of rivals also `ratio`, the policy's median over theirs, with its paired interval, and
+        `faster`, the number of seeds on which the policy was faster.
         `better_rival` is the one of SIMPLE with the smaller median, `faster_than_simple` the number of seeds
         on which the policy was faster than all of SIMPLE among the rivals.
     """
@@ -170,6 +170,7 @@ def compare(
     simple = [name for name in SIMPLE if name in rivals]
     return {
         "scenario": scenario.name,
+        "split": scenario.split,
         "robots": scenario.robots,
         "seeds": seeds,
         "policy": policy,
@@ -207,7 +208,8 @@ def show(compared: dict[str, Any]) -> None:
     from rich.table import Table
 
     seeds, robots = compared["seeds"], compared["robots"]
-    table = Table(title=f"{compared['scenario']}, {counted(robots, 'robot')}, {seeds} test missions each")
+    missions = f"{counted(seeds, 'mission')} each, worlds of the split {compared['split']}"
+    table = Table(title=f"{compared['scenario']}, {counted(robots, 'robot')}, {missions}")
     table.add_column("strategy", overflow="fold", min_width=17)
     for head in ("mission time", "finished", "scans", "ratio", "faster"):
         table.add_column(head, justify="right")
@@ -217,9 +219,11 @@ def show(compared: dict[str, Any]) -> None:
     Console(highlight=False).print(table)
     print("mission time: median; ratio: the policy's median over the strategy's (95 % intervals);")
     print("faster: starts on which the policy was faster")
-    if compared["better_rival"] is not None:
+    there = {row["strategy"] for row in compared["rows"]}
+    simple = [name for name in SIMPLE if name in there]
+    if len(simple) > 1:
         print(
-            f"better one of {' and '.join(SIMPLE)}: {compared['better_rival']}; "
+            f"better one of {' and '.join(simple)}: {compared['better_rival']}; "
             f"faster than all of them in the table: on {compared['faster_than_simple']} of {seeds} starts"
         )
 

@@ -71,7 +71,7 @@ _CHANGEABLE = frozenset(
     ("video", "threads", "json", "total_steps", "validate_every", "checkpoint_every", "start")
 )
 """Options that may differ where a run is continued; where it began does not matter any more."""
-_STOPPED = "a checkpoint is written when this rollout and its update are done"
+_STOPPED = "a checkpoint is written when this rollout and its update, or this validation, are done"
 _RETURNS_MEMORY = 2e5
 """Decisions, about, whose returns normalise: the latest ones, since returns grow as the policy learns."""
 
@@ -267,6 +267,7 @@ def validate(args: Args, state: TrainingState, needs: Validating) -> bool:
     """Add a row to the curve, and keep the policy if it is the best so far; False if Ctrl-C cut it short."""
     model, progress, steps, out = state.model, state.progress, state.model.num_timesteps, args.out
     assert out is not None
+    needs.bar.say_validating(steps, args.validation_missions)
     with progress.timed("validating_s"):
         model.policy.set_training_mode(False)
         validation = needs.validator.validate(model.policy, lambda: needs.interruption.asked)

@@ -61,8 +61,14 @@ class TrainingBar:
             speed = (steps - self._first_steps) / max(now_s - self._began_s, 1e-9)
             left_min = max(self._total - steps, 0) / max(speed, 1e-9) / 60.0
             self.say(
-                f"{steps:>12,} steps of {self._total:,}, {speed:,.0f} a second, {left_min:,.0f} min left"
+                f"{steps:>12,} steps of {self._total:,}, {speed:,.0f} a second, {left_min:,.0f} min left, "
+                "and validations"
             )
+
+    def say_validating(self, steps: int, missions: int) -> None:
+        """Say that a validation begins, where lines stand in place of the bar."""
+        if self._lines:
+            self.say(f"{steps:>12,} steps: validating in {missions:,} missions")
 
     def show_validation(self, steps: int, validation: Validation) -> None:
         """Print what the validation after so many steps found."""

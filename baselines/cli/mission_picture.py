@@ -129,9 +129,9 @@ def _maps(recorder: Recorder) -> tuple[_Map, _Map, _Map]:
     where = "" if grid.flat else f"\nlayer at z = {height_m:.2f} m, paths at all heights"
     share = entropy_share(missions, 0, 0)[:, :, layer]
     cover = np.ma.masked_where(share > _UNKNOWN_ABOVE, missions.mean[0, 0][:, :, layer])
-    knows, unit = f"What robot_0 knows{where}", Normalize(0.0, 1.0)
+    left, knows, unit = f"What robot_0 has left{where}", f"What robot_0 knows{where}", Normalize(0.0, 1.0)
     return (
-        _Map(np.ma.masked_array(share), knows, "share of the entropy left", "magma", unit, "white"),
+        _Map(np.ma.masked_array(share), left, "share of the entropy left", "magma", unit, "white"),
         _Map(cover, knows, "coverage; blue: unknown", "Greys", unit, "black"),
         _Map(
             np.ma.masked_array(solid[:, :, layer]),
@@ -154,7 +154,7 @@ def _maps_from_above(recorder: Recorder, true_m: np.ndarray) -> tuple[_Map, _Map
     believed_m = np.ma.masked_where(~ground.known, ground.height_m)
     scale = _scale_of(true_m)
     knows, label = "What robot_0 knows, from above", "height of the ground (m)"
-    left = f"{knows}\nmean over each column"
+    left = "What robot_0 has left, from above\nmean over each column"
     return (
         _Map(share, left, "share of the entropy left", "magma", Normalize(0.0, 1.0), "white"),
         _Map(believed_m, f"{knows}\nblue: unknown", label, _HEIGHTS, scale, "black"),

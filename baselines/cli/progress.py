@@ -81,7 +81,7 @@ _ROWS: tuple[tuple[str, str, Callable[[Any], str]], ...] = (
     ("bits sent", "bits_sent", lambda v: f"{v:,}"),
     ("bits gained per bit sent", "bits_gained_per_bit_sent", lambda v: f"{v:.3f}"),
     ("measurements below I_min", "overlap", lambda v: f"{v:.0%}"),
-    ("explored by the team", "explored", lambda v: f"{v:.1%}"),
+    ("explored, of what can be seen", "explored", lambda v: f"{v:.1%}"),
     ("map error, mean", "error", lambda v: f"{v:.4f}"),
     ("voxels on the wrong side of ½", "wrong", lambda v: f"{v:.2%}"),
     ("imbalance between robots", "balance", lambda v: f"{v:.2f}"),

@@ -14,7 +14,7 @@ from baselines.scoreboard.results import BASELINE, REFERENCES
 from baselines.scoreboard.suites import Place, Task, suite_strategies, team_name
 from baselines.strategies import STRATEGIES, is_learned, learned_policies, make_strategy, resolved
 from baselines.world_sweep import is_plan
-from entropy_explore_env.errors import MissingExtraError, SettingError
+from entropy_explore_env.errors import MissingExtraError, SettingError, one_of
 from entropy_explore_env.scenario import Scenario, with_settings
 from entropy_explore_env.scenarios import SCENARIOS, find_scenario
 from entropy_explore_env.worlds.given import GIVEN, distinct_names
@@ -118,7 +118,7 @@ def chosen_entries(words: str, world_scenario: str | None) -> dict[str, Entry]:
 def _file_entry(word: str, name: str, world_scenario: str | None) -> Entry:
     path = Path(word)
     if not path.is_file():
-        raise SettingError("scenarios", word, "names out of " + ", ".join(SCENARIOS) + ", or world files")
+        raise SettingError("scenarios", word, f"{one_of(word, SCENARIOS)}, or a world file that is there")
     base = find_scenario(world_scenario or ("office" if is_plan(path) else "room"))
     return Entry(dataclasses.replace(base, name=name), word)
 

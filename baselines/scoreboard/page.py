@@ -242,11 +242,20 @@ def ranged(row: Row, name: str, form: str) -> str:
 
 
 def _failed_table(rows: list[Row]) -> str:
+    """A row of each strategy and reason."""
+    alike: dict[tuple[str, str], list[Row]] = {}
+    for row in rows:
+        alike.setdefault((row["strategy"], row["reason"]), []).append(row)
     shown = [
-        [row["task"], f"`{row['strategy']}`", ", ".join(map(str, row["missions"])), _plain(row["reason"])]
-        for row in rows
+        [f"`{strategy}`", "; ".join(_missions_of(row) for row in own), _plain(reason)]
+        for (strategy, reason), own in alike.items()
     ]
-    return markdown_table(["task", "strategy", "missions", "reason"], shown)
+    return markdown_table(["strategy", "tasks and missions", "reason"], shown)
+
+
+def _missions_of(row: Row) -> str:
+    numbers = row["missions"]
+    return f"{row['task']}: {', '.join(map(str, numbers))}"
 
 
 def _plain(text: str) -> str:

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import re
+from pathlib import Path
 from typing import Any
 
+from baselines.experiments.outcome import Record
+from baselines.experiments.runner import TRACE
 from baselines.scoreboard.page import ranged
-from baselines.scoreboard.results import Results, failed_rows, overall_rows, task_rows
+from baselines.scoreboard.results import Results, Row, failed_rows, overall_rows, task_rows
 
 
 def printed_results(results: Results) -> dict[str, Any]:
@@ -49,5 +53,30 @@ def show_results(results: Results) -> None:
     console.print(table)
     for row in failed_rows(results):
         missions = ", ".join(map(str, row["missions"]))
-        line = f"failed: {row['strategy']}, {row['task']}, missions {missions}: {row['reason']}"
-        console.print(line, markup=False, highlight=False)
+        place = _place_of(results, row)
+        line = f"failed: {row['strategy']}, {row['task']}, missions {missions}: {row['reason']}{place}"
+        console.print(line, markup=False, highlight=False, soft_wrap=True)
+    if not any(row["finished"] for row in overall_rows(results)):
+        console.print("No mission was finished in its time: the ratios say nothing.", highlight=False)
+
+
+def broken(results: Results) -> list[str]:
+    """Strategies of which every mission that was run raised an error, but for refusals of a scenario."""
+    return [who for who in results.ran if all(map(_raised, _records(results, who)))]
+
+
+def _records(results: Results, strategy: str) -> list[Record]:
+    return [record for task in results.suite.tasks for record in results.of(task, strategy)]
+
+
+def _raised(record: Record) -> bool:
+    said = record.get("failed", "")
+    return bool(record.get(TRACE)) and not said.startswith(("SettingError", "WorldError"))
+
+
+def _place_of(results: Results, row: Row) -> str:
+    """File and line where missions of a row failed, if their process told."""
+    (task,) = (task for task in results.suite.tasks if task.name == row["task"])
+    trace = results.numbered(task, row["strategy"])[row["missions"][0]].get(TRACE, "")
+    frames = re.findall(r'File "([^"]+)", line (\d+)', trace)
+    return f" ({Path(frames[-1][0]).name}, line {frames[-1][1]})" if frames else ""

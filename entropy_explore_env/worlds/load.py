@@ -223,6 +223,12 @@ def _check(options: dict[str, Any]) -> None:
             options[name] = float(value)
 
 
+_NO_SPACE = (
+    "a map with free space at this voxel size (solid are pixels darker than half of white, transparent ones, "
+    "and all that is unknown)"
+)
+
+
 def _world(voxels: Voxels, path: str, options: dict[str, Any], height_m: float | None) -> World:
     """The world of a file's voxels, resampled and extruded."""
     size_m = options["voxel_size_m"] or voxels.voxel_size_m
@@ -231,7 +237,7 @@ def _world(voxels: Voxels, path: str, options: dict[str, Any], height_m: float |
     except RefusedError as error:
         raise WorldError("voxel_size_m", size_m, str(error)) from None
     if (labels != FREE).all():
-        raise WorldError("world file", path, "a map with free space at this voxel size")
+        raise WorldError("world file", path, _NO_SPACE)
     if height_m is not None:
         if labels.shape[2] != 1:
             raise SettingError("height_m", height_m, "None: the file's world is 3-D already")

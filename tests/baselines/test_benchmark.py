@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import re
 import subprocess
 import sys
 import time
@@ -262,10 +263,12 @@ def test_a_mission_that_fails_is_a_row_with_its_reason(entered, tmp_path, capsys
     assert run_command(benchmark.main, [*FAILING, "--out", str(tmp_path)]) == 0
     said = capsys.readouterr()
     assert "failed: sleeps, box-7x11x5, 1 robot, missions 0, 1: ran past 0.5 s on the clock" in said.out
+    assert re.search(r"failed: raises, .*at <all> \(test_benchmark\.py, line \d+\)\n", said.out)
     page = (tmp_path / "scoreboard.md").read_text()
     failed = page.split("### Missions that failed")[1]
-    assert r"| box-7x11x5, 2 robots | `raises` | 0, 1 | ValueError: no \| way at \<all\> |" in failed
-    assert failed.count("`sleeps` | 0, 1 | ran past 0.5 s on the clock |") == 2
+    assert r"| `raises` | box-7x11x5, 2 robots: 0, 1 | ValueError: no \| way at \<all\> |" in failed
+    both = "box-7x11x5, 1 robot: 0, 1; box-7x11x5, 2 robots: 0, 1"
+    assert f"| `sleeps` | {both} | ran past 0.5 s on the clock |" in failed
     assert "| `raises` | 0 of 2 |" in page and "| `raises` | 0 of 2, 2 failed |" in page
     rows = rows_of(tmp_path / "scoreboard" / "own" / "tasks.csv")
     assert [row["failed"] for row in rows] == ["0", "0", "2", "0", "2", "2"]
@@ -289,6 +292,12 @@ def test_what_failed_stays_unless_the_limit_grows(entered, tmp_path, capsys):
     assert run_command(benchmark.main, words) == 0
     reasons = {row["reason"] for row in json.loads(capsys.readouterr().out)["failed"]}
     assert reasons == {"ran past 0.6 s on the clock", "ValueError: no | way at <all>"}
+
+
+def test_a_strategy_that_never_gets_through_ends_the_command_with_an_error(entered, tmp_path, capsys):
+    words = [*TINY, "--robots", "2", "--seeds", "1", "--jobs", "1", "--strategies", "raises"]
+    assert run_command(benchmark.main, [*words, "--out", str(tmp_path)]) == 1
+    assert capsys.readouterr().err.endswith("error: every mission of raises raised an error\n")
 
 
 def test_a_world_without_room_for_the_team_is_a_row_for_all(tmp_path, capsys):
