@@ -14,13 +14,13 @@ from baselines.experiments.mission import run_mission, scripted
 from baselines.strategies import make_strategy
 from baselines.strategies.next_best_view import NextBestView, NextBestViewConfig
 from baselines.strategies.protocol import Stopwatch, Strategy
-from benchmarks.rows import Effort, Goal, Row, alone, timed
+from benchmarks.rows import Effort, Goal, Row, alone, compared, timed
 from entropy_explore_env.belief.visibility import CONE, cone_of, mark_cones, visible_bits
 from entropy_explore_env.compilation.kernels import kernel
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.errors import counted
 from entropy_explore_env.scenario import Scenario, with_settings
-from entropy_explore_env.scenarios import CLIFF, LAB, OCCLUSIONS, OFFICE, ROOM
+from entropy_explore_env.scenarios import CAVE, CLIFF, LAB, OCCLUSIONS, OFFICE, ROOM
 from entropy_explore_env.settings import Grid
 
 TEAMMATES = 9
@@ -41,6 +41,7 @@ _DRIFTING = {
     "fiducials": {"number": 40},
 }
 _PLAN_STEPS = 60
+_MISSIONS = 3
 _WEIGHS_ERROR = NextBestViewConfig(error_weight=1.0)
 
 
@@ -49,6 +50,11 @@ def deciding_rows(effort: Effort) -> list[Row]:
     return [
         mutual_information_row(effort),
         decision_row(ROOM, 3, "information-rate-v0", effort.steps, 5.0),
+        decision_row(ROOM, 3, "planned-rate", effort.steps, 5.0),
+        decision_row(OFFICE, 1, "planned-rate", effort.steps, 10.0),
+        decision_row(CAVE, 1, "planned-rate", effort.steps, 25.0),
+        candidates_row(OFFICE, 1, effort),
+        candidates_row(CAVE, 3, effort),
         decision_row(LAB, 10, "mutual-information", effort.steps, 5.0),
         decision_row(_LARGE_CLIFF, 1, "cliff-next-best-view", min(effort.steps, _CLIFF_STEPS), 50.0),
         decision_row(_LARGE_PLAN, 1, "next-best-view", min(effort.steps, _PLAN_STEPS), 50.0),
@@ -98,11 +104,30 @@ def overlap_bits(
     return visible_bits(cones[len(cones) - 1], size, precision, known_precision, None, marks)[1]
 
 
-def plan_row(name: str, path: str, grid: Grid, steps: int) -> Row:
-    """A decision of `planned-rate` in a plan's file, where it decides at every scan under way."""
+def plan_rows(name: str, path: str, grid: Grid, steps: int) -> list[Row]:
+    """A decision of `planned-rate` in a plan's file, where it decides at every scan under way.
+
+    Until the map has so little entropy, by openings, and until all is seen, by tours through frontier cells.
+    """
     plan = dataclasses.replace(OFFICE, name=name, world=path, grid=grid)
     under_way = {"robot": {"redecide": "on_scan", "body_radius_m": 0.0}, "sensor": {"scan_every_m": 0.5}}
-    return decision_row(with_settings(plan, under_way), 1, "planned-rate", steps, 50.0)
+    whole = {**under_way, "name": f"{name} to be seen whole", "ending": {"seen_share": 1.0}}
+    return [
+        decision_row(with_settings(plan, settings), 1, "planned-rate", steps, 50.0)
+        for settings in (under_way, whole)
+    ]
+
+
+def candidates_row(scenario: Scenario, robots: int, effort: Effort) -> Row:
+    """Decisions a second of the planner that proposes 24 candidates, beside `planned-rate`, with one."""
+    rates: dict[str, list[float]] = {"planner-choice": [], "planned-rate": []}
+    for _ in range(_MISSIONS):
+        for strategy, own in rates.items():
+            row = decision_row(scenario, robots, strategy, effort.steps, math.inf)
+            own.append(1e3 / row.ours)
+    job = f"decisions among 24 candidates, {scenario.name}, {counted(robots, 'robot')}"
+    ours, theirs = rates["planner-choice"], rates["planned-rate"]
+    return compared(job, "planned-rate", ours, theirs, "/s", Goal("≥", 0.7))
 
 
 class Limit(NamedTuple):

@@ -18,7 +18,7 @@ from typing import Any
 
 from baselines.cli.arguments import parse, print_json, run_command
 from baselines.experiments.machine import processor
-from benchmarks.deciding import deciding_rows, plan_row
+from benchmarks.deciding import deciding_rows, plan_rows
 from benchmarks.drifting import drifting_rows
 from benchmarks.exploring import exploring_rows, mission_row
 from benchmarks.fusion import fusion_rows
@@ -105,7 +105,8 @@ def main(words: Sequence[str]) -> int:
         rows += startup_rows(effort, args.before) if job is startup_rows else job(effort)
         if job is exploring_rows and args.plan is not None and plan is not None:
             rows.append(mission_row(args.plan.stem, plan))
-            rows.append(plan_row(args.plan.stem, str(args.plan), plan.grid, effort.steps))
+        if job is deciding_rows and args.plan is not None and plan is not None:
+            rows += plan_rows(args.plan.stem, str(args.plan), plan.grid, effort.steps)
     about = {**machine(), "command": " ".join(["python -m benchmarks.speed", *words])}
     if args.out is not None:
         write_atomically(args.out, markdown(about, rows, args.only))

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from baselines.scoreboard.suites import WORLDS
-from benchmarks.deciding import decision_row, mutual_information_row, overlap_bits, plan_row
+from benchmarks.deciding import candidates_row, decision_row, mutual_information_row, overlap_bits, plan_rows
 from benchmarks.rows import Effort
 from entropy_explore_env.belief.visibility import CONE, cone_of
 from entropy_explore_env.scenarios import BOX
@@ -25,9 +25,16 @@ def test_rows_are_measured():
 
 def test_decisions_are_measured_in_a_plans_file():
     world = WORLDS / "depot.npz"
-    row = plan_row("depot", str(world), load_world(world).grid, TINY.steps)
-    assert row.job == "a decision of planned-rate, depot, 1 robot" and row.goal == "< 50 ms"
-    assert row.unit == "ms" and row.ours > 0
+    rows = plan_rows("depot", str(world), load_world(world).grid, TINY.steps)
+    for row, name in zip(rows, ("depot", "depot to be seen whole"), strict=True):
+        assert row.job == f"a decision of planned-rate, {name}, 1 robot" and row.goal == "< 50 ms"
+        assert row.unit == "ms" and row.ours > 0
+
+
+def test_candidates_are_proposed_beside_the_recommended_strategy():
+    row = candidates_row(BOX, 1, TINY)
+    assert row.peer == "planned-rate" and row.goal == "≥ 0.7 ×" and row.ratio is not None
+    assert row.theirs is not None and 0.0 < row.ours < 1e6 and row.theirs > 0.0
 
 
 def test_overlap_by_hand():

@@ -130,13 +130,13 @@ def test_a_scenario_full_of_chance_conforms() -> None:
     check_conformance(BOX, steps=25, robots=3, channel=channel, sensor={"range_noise_m": 0.1})
 
 
-@pytest.mark.long
-@pytest.mark.parametrize("redecide", ["at_stop", 0.7])
+@pytest.mark.parametrize("redecide", ["at_stop", pytest.param(0.7, marks=pytest.mark.long)])
+@pytest.mark.usefixtures("in_this_process")
 def test_candidates_as_actions_conform(redecide: str | float) -> None:
     observation = {"action_mask": True, "overlaps": True, "drive": True}
     robot = {"redecide": redecide, "navigator": "planned"}
     action = {"kind": "candidates", "candidates": 10}
-    check_conformance(BOX, steps=20, robots=3, action=action, observation=observation, robot=robot)
+    check_conformance(BOX, steps=8, robots=3, action=action, observation=observation, robot=robot)
 
 
 def test_bad_settings_are_refused() -> None:

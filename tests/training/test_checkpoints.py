@@ -13,7 +13,7 @@ import pytest
 import torch
 from safetensors.torch import save_file
 
-from baselines.experiments.mission import run_mission
+from baselines.experiments.mission import run_mission, scripted
 from baselines.experiments.provenance import code_digest
 from baselines.run import main as run_main
 from baselines.strategies import make_strategy
@@ -270,6 +270,17 @@ def test_evaluation_takes_worlds_that_training_never_sees():
     trained = PolicySettings(with_settings(find_scenario("room-furnished"), {"channel": {"burst": 7}}))
     there = evaluate.evaluation_scenario(trained)
     assert there.split == "test" and there.channel.burst == 7 and there.name == "room-furnished"
+
+
+@pytest.mark.parametrize(("name", "scenario"), [("plans", "office"), ("volumes", "room-furnished")])
+def test_the_policies_over_candidates_that_come_with_the_project_act(name, scenario):
+    """Their features are those that this version computes; else they would be refused."""
+    settings = {"robots": 2, "ending": {"time_limit_s": 25.0}}
+    env = EntropyExploreEnv(with_settings(scripted(find_scenario(scenario)), settings))
+    strategy = make_strategy(f"pretrained:{name}")
+    run_mission(env, strategy, 0)
+    figures = mission_figures(env.missions, 0)
+    assert figures["scans"] > 4 and figures["entropy_end_bits"] < 0.9 * figures["entropy_start_bits"]
 
 
 def test_the_policy_that_comes_with_the_project_maps_the_room():

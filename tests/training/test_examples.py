@@ -1,6 +1,7 @@
 """The examples for other trainers do what they say, and pages show all of them."""
 
 import runpy
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -18,8 +19,10 @@ def test_pages_show_the_files():
 
 
 @pytest.mark.filterwarnings("ignore")  # TorchRL's and PettingZoo's own
-def test_torchrl_trains(capsys):
+@pytest.mark.parametrize("words", [[], ["candidates"]])
+def test_torchrl_trains(words, capsys, monkeypatch):
     pytest.importorskip("torchrl", reason="torchrl is not installed")
+    monkeypatch.setattr(sys, "argv", ["torchrl_wrapper.py", *words])
     ran = runpy.run_path(str(EXAMPLES / "torchrl_wrapper.py"))
     lines = capsys.readouterr().out.splitlines()
     assert [line.split(":")[0] for line in lines] == [f"update {number}" for number in range(ran["UPDATES"])]

@@ -87,6 +87,15 @@ def test_a_run_changes_all_weights_and_writes_its_files(uninterrupted):
     assert all(not torch.equal(first[name], last[name]) for name in first if name.endswith("weight"))
 
 
+def test_robots_that_decide_under_way_are_trained_and_go_on(tmp_path):
+    """With `redecide`, robots choose while they drive; a run keeps it, and its policy acts so."""
+    under_way = ["--robot.redecide", "on_scan", "--sensor.scan-every-m", "0.4"]
+    assert learn(tmp_path / "run", *under_way, steps=192) == 0
+    assert resume(tmp_path / "run", "--total-steps", "384") == 0
+    learned = load_checkpoint(latest_checkpoint(tmp_path / "run", "step")).settings.scenario
+    assert learned.robot.redecide == "on_scan" and learned.sensor.scan_every_m == 0.4
+
+
 def test_missions_get_shorter_than_those_of_fresh_weights(tmp_path):
     """Six thousand steps in the box: by a quarter to a half, whatever the seed."""
     words = "--missions 16 --rollout-steps 32 --batch 256 --epochs 6 --learning-rate 0.01 --hidden 16 16"

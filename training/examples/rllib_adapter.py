@@ -1,11 +1,18 @@
-"""RLlib's PPO on a team by the adapter: a step is a decision of some robot, one policy drives them all."""
+"""RLlib's PPO on a team by the adapter: a step is a decision of some robot, one policy drives them all.
+
+With the word `candidates` robots choose among viewpoints that a planner proposes; the number of one that
+does not exist means the first, so that no mask is needed.
+"""
 
 # pyright: reportMissingImports=false
+import sys
+
 from ray.rllib.algorithms.ppo import PPOConfig
 
 from entropy_explore_env.envs.rllib_env import EntropyExploreMultiAgentEnv
 
-task = {"scenario": "box-7x11x5", "robots": 2, "seed": 0, "observation": {"flat": True}}
+action = {"kind": "candidates" if "candidates" in sys.argv[1:] else "continuous"}
+task = {"scenario": "box-7x11x5", "robots": 2, "seed": 0, "observation": {"flat": True}, "action": action}
 config = (
     PPOConfig()
     .environment(EntropyExploreMultiAgentEnv, env_config=task)

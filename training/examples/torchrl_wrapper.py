@@ -1,5 +1,9 @@
-"""PPO for a team in TorchRL: `PettingZooWrapper` takes infos that are numbers, and a mask of actions."""
+"""PPO for a team in TorchRL: `PettingZooWrapper` takes infos that are numbers, and a mask of actions.
 
+With the word `candidates` robots choose among viewpoints that a planner proposes.
+"""
+
+import sys
 from typing import Any
 
 import torch
@@ -30,8 +34,9 @@ class NumbersOnly(BaseParallelWrapper):
 
 
 torch.manual_seed(0)
-discrete = {"kind": "discrete", "moves": "axes"}
-team = eee.parallel_env("room", robots=3, observation={"flat": True}, action=discrete, time_limit_s=30.0)
+moves: Any = {"kind": "discrete", "moves": "axes"}
+action: Any = {"kind": "candidates"} if "candidates" in sys.argv[1:] else moves
+team = eee.parallel_env("room", robots=3, observation={"flat": True}, action=action, time_limit_s=30.0)
 env = PettingZooWrapper(NumbersOnly(team), seed=0)
 numbers = env.observation_spec["robot", "observation"].shape[-1]
 actions = env.observation_spec["robot", "action_mask"].shape[-1]

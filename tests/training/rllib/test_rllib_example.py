@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import runpy
+import sys
 from pathlib import Path
 
 import pytest
@@ -13,6 +14,8 @@ EXAMPLE = Path(__file__).parents[3] / "training" / "examples" / "rllib_adapter.p
 
 
 @pytest.mark.filterwarnings("ignore")  # RLlib's own
-def test_the_example_trains():
+@pytest.mark.parametrize("words", [[], ["candidates"]])
+def test_the_example_trains(words, monkeypatch):
+    monkeypatch.setattr(sys, "argv", ["rllib_adapter.py", *words])
     ran = runpy.run_path(str(EXAMPLE), run_name="__main__")
     assert ran["result"]["env_runners"]["num_env_steps_sampled"] >= 256
