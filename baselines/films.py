@@ -1,6 +1,6 @@
 """A small film of every named scenario: `python -m baselines.films` writes docs/films/NAME.gif.
 
-A mission each of the recommended strategy (but see QUICKER), with the scenario's own team, for README and the
+A mission each of the recommended strategy, with the scenario's own team, for README and the
 cards of scenarios. With `--beside STRATEGY` a film shows two missions, in the same world and from the same
 start: `NAME-FIRST-SECOND.gif`. The same version gives the same films.
 """
@@ -11,7 +11,6 @@ import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from types import MappingProxyType
 from typing import Literal
 
 import numpy as np
@@ -31,8 +30,6 @@ from entropy_explore_env.scenario import Scenario, with_settings
 from entropy_explore_env.scenarios import SCENARIOS
 from entropy_explore_env.validation import check_whole
 
-QUICKER = MappingProxyType({"bhattacharya-cluttered": "nearest-frontier"})
-"""Scenario → what is filmed in place of what we recommend, which computes for over ten minutes there."""
 _FRAME_S, _LAST = 0.15, 12
 """How long each picture is shown, and how often the last one."""
 
@@ -44,8 +41,7 @@ class Args:
     scenarios: str = "all"
     """Named scenarios, commas between."""
     strategy: str | None = None
-    """Chooses viewpoints, as in baselines.run; default: the one that is recommended in each scenario, or
-    nearest-frontier where that one computes for too long."""
+    """Chooses viewpoints, as in baselines.run; default: the one that is recommended in each scenario."""
     beside: str | None = None
     """A second strategy, shown to the right of the first one on the same clock."""
     split: Literal["train", "test"] | None = None
@@ -70,7 +66,7 @@ def main(words: Sequence[str]) -> int:
     for name in names:
         if name not in SCENARIOS:
             raise SettingError("scenarios", name, "all, or names out of " + ", ".join(SCENARIOS))
-    first = [args.strategy or QUICKER.get(name, recommended(name)) for name in names]
+    first = [args.strategy or recommended(name) for name in names]
     for strategy in {*first, *([args.beside] if args.beside else [])}:
         make_strategy(strategy)
     make_folder("out", args.out)

@@ -108,6 +108,8 @@ def resumed_options(
     try:
         run = json.loads((folder / FILE).read_text("utf-8"))
         started, files = dataclass_of(kind, run["args"], FILE), dict(run["files"])
+    except FileNotFoundError:
+        raise CheckpointError("resume", str(folder), f"the folder of a run; it has no {FILE}") from None
     except (OSError, ValueError, LookupError, TypeError) as error:
         reason = f": {error}" if isinstance(error, SettingError) else ""
         allowed = f"the folder of a run, with a {FILE} of this version{reason}"

@@ -74,6 +74,10 @@ _HELP = re.compile(r" Argument helptext: .*?(?= For full helptext|$)")
 """The text of the option that was wrong: `--help` has it."""
 
 
+_MEANT = re.compile(r" Perhaps you meant: (--[\w.-]+).*")
+"""An option that is like the one that is none, with its help."""
+
+
 def parse(
     kind: type[Arguments],
     words: Sequence[str],
@@ -134,7 +138,7 @@ def _one_line(complaint: str) -> str:
     """The parser's framed message as one line; tyro 1.0 has errors as values in a private module only."""
     words = " ".join(_FRAME.sub(" ", complaint).split())
     words = _TITLE.sub("", words)
-    words = _HELP.sub("", words).replace(" Perhaps you meant:", "; perhaps you meant")
+    words = _MEANT.sub(r"; did you mean \1?", _HELP.sub("", words))
     return with_meant(words.split(" For full helptext")[0]) or "the arguments do not fit; see --help"
 
 

@@ -118,7 +118,7 @@ def chosen_entries(words: str, world_scenario: str | None) -> dict[str, Entry]:
 def _file_entry(word: str, name: str, world_scenario: str | None) -> Entry:
     path = Path(word)
     if not path.is_file():
-        raise SettingError("scenarios", word, f"{one_of(word, SCENARIOS)}, or a world file that is there")
+        raise SettingError("scenarios", word, f"a world file that is there, or {one_of(word, SCENARIOS)}")
     base = find_scenario(world_scenario or ("office" if is_plan(path) else "room"))
     return Entry(dataclasses.replace(base, name=name), word)
 

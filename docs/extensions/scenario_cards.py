@@ -8,7 +8,6 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from baselines.films import QUICKER
 from baselines.strategies import recommended, resolved
 from docs.extensions.attribute_docs import attribute_docs, constant_docs
 from docs.extensions.scenario_times import times_table
@@ -175,8 +174,22 @@ def _world(scenario: Scenario) -> str:
             "one for each world number; those of `split` `train`, `validation` and `test` are disjoint",
         ],
         ["robots", robots],
+        *(row for kind in scenario.kinds for row in _kind_rows(kind)),
     ]
     return "## World and team\n\n" + table(["", ""], rows)
+
+
+def _kind_rows(kind: RobotKind) -> list[list[str]]:
+    """What a kind of robot is, and what it senses with."""
+    robot, sensor = kind.robot, kind.sensor
+    moves = "drives on the ground" if robot.motion == "planar" else "flies"
+    reach = "as far as the workspace" if math.isinf(robot.reach_m) else f"up to {robot.reach_m:g} m"
+    seen = "the whole workspace" if math.isinf(sensor.max_range_m) else f"{sensor.max_range_m:g} m"
+    widths = " × ".join(f"{math.degrees(width):.3g}°" for width in sensor.field_of_view_rad)
+    return [
+        ["a robot", f"{moves} at up to {robot.max_speed_m_s:g} m/s; a decision leads {reach} away"],
+        ["its sensor", f"{sensor.rays:,} rays in {widths} (yaw × pitch), range {seen}"],
+    ]
 
 
 def _numbers(numbers: Iterable[Numbers]) -> str:
@@ -354,12 +367,7 @@ def _film(name: str, docs: Path) -> str:
     """The film of a mission, if there is one, and who acts in it if that is not whom we recommend."""
     if not (docs / FILMS / f"{name}.gif").exists():
         return ""
-    film = f"![A mission in {name}](../{FILMS}/{name}.gif)\n"
-    if name not in QUICKER:
-        return film
-    return (
-        f"{film}\nFilmed with `{QUICKER[name]}`: what we recommend computes for more than ten minutes here.\n"
-    )
+    return f"![A mission in {name}](../{FILMS}/{name}.gif)\n"
 
 
 def _versions(name: str) -> str:

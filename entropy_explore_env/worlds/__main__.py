@@ -16,7 +16,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from entropy_explore_env.command import LineParser, run_command
-from entropy_explore_env.errors import SettingError
+from entropy_explore_env.errors import SettingError, one_of
 from entropy_explore_env.randomness import Stream, check_seed, generator
 from entropy_explore_env.scenario import Scenario, with_settings
 from entropy_explore_env.scenarios import SCENARIOS
@@ -119,6 +119,8 @@ def _world(args: argparse.Namespace) -> World:
         given["negate"] = True
     if args.source not in SCENARIOS:
         _refuse(args, _OF_SCENARIOS, "not given for a file")
+        if not Path(args.source).suffix and args.source != JACKSBORO:
+            raise SettingError("source", args.source, f"a world file, or {one_of(args.source, SCENARIOS)}")
         return load_world(args.source, **given)
     for name, value in given.items():
         if value is not None:

@@ -267,7 +267,7 @@ def test_a_run_is_neither_overwritten_nor_continued_with_other_options(uninterru
         told = capsys.readouterr().err
         assert told.startswith(said) and told.count("\n") == 1
     assert resume(tmp_path) == BAD_INPUT
-    assert "the folder of a run, with a run.json" in capsys.readouterr().err
+    assert "the folder of a run; it has no run.json" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

@@ -37,7 +37,7 @@ def test_words_become_arguments():
     [
         (["--number", "many"], "--number"),
         (["--number"], "--number"),
-        (["--nmber", "3"], "--nmber, 3; perhaps you meant --number"),
+        (["--nmber", "3"], "--nmber, 3; did you mean --number?"),
         (["stray"], "stray"),
         (["--loud", "yes"], "yes"),
     ],
