@@ -6,6 +6,7 @@ through known free cells; a diagonal step needs both cells beside it.
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable, Sequence
 
@@ -113,6 +114,42 @@ def coordinated(
         left.remove(robot)
         for other in cells:
             utility[other] -= max(1.0 - math.dist(other, taken) / reach, 0.0)
+
+
+def assigned(plan: np.ndarray, robots: list[Cell], radius: float) -> set[Cell]:
+    """Cells to which some assignment of groups to robots with the least sum of path lengths sends the first.
+
+    All assignments are tried. A group begins with the first cell that is in none, and holds all others within
+    the radius of it; each group has one robot at most, and as many robots as can be have one. A robot goes to
+    the nearest cell of its group, and one without a group to the nearest cell of all.
+
+    Args:
+        plan: The map that all of them have, in which each can reach all frontier cells or none.
+        robots: Where they are.
+        radius: Of groups, in cells.
+    """
+    lengths = [lengths_from(plan, robot) for robot in robots]
+    cells = [cell for cell in frontier_cells(plan) if math.isfinite(lengths[0][cell])]
+    members: list[list[Cell]] = []
+    for cell in cells:
+        home = next((group for group in members if math.dist(cell, group[0]) <= radius), None)
+        members.append([cell]) if home is None else home.append(cell)
+    count = min(len(robots), len(members))
+    sums: dict[int | None, float] = {}
+    for chosen_robots in itertools.permutations(range(len(robots)), count):
+        for chosen_groups in itertools.combinations(range(len(members)), count):
+            pairs = list(zip(chosen_robots, chosen_groups, strict=True))
+            total = sum(min(float(lengths[who][cell]) for cell in members[group]) for who, group in pairs)
+            mine = dict(pairs).get(0)
+            sums[mine] = min(total, sums.get(mine, math.inf))
+    least = min(sums.values(), default=math.inf)
+    found: set[Cell] = set()
+    for group, total in sums.items():
+        if total <= least + 1e-9:
+            near = cells if group is None else members[group]
+            nearest = min(float(lengths[0][cell]) for cell in near)
+            found |= {cell for cell in near if lengths[0][cell] <= nearest + 1e-9}
+    return found
 
 
 class Textbook:

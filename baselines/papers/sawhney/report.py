@@ -205,7 +205,7 @@ The finishing rule is ours: (V + v)/t with v = {BONUS["plans"]:g} m² in plans a
 over terrain. `nearest-candidate` and `coordinated-candidate` have
 the metrics of Yamauchi and Burgard on these same candidates; they are not the rules of those papers.
 What holds over them need not hold over `nearest-frontier` and `coordinated-frontier`, which weigh every
-frontier cell and may replan under way (docs/explorers.md); these were not run here.
+frontier cell and may replan under way (docs/explorers.md): they stand beside V/t in the scoreboard.
 Who waits for a synchronous team scans meanwhile, and so leaves up to 2 s after the last has
 scanned."""
 

@@ -89,6 +89,20 @@ def test_the_first_robot_pays_for_what_those_before_it_take():
     assert worth == pytest.approx([1.0 - 1.0 - 0.2, 1.0 - 0.5 - 0.6])
 
 
+@given(st.sampled_from([(13, 9), (17, 7)]), st.integers(0, 2), st.sampled_from([3.0, 6.0]), seeds)
+@drawn(40)
+def test_the_assignment_is_one_of_those_with_the_least_sum(shape, others, radius, seed):
+    """Beside all assignments; all mates are where a path leads."""
+    rng = np.random.default_rng(seed)
+    plan, robot = random_plan(shape, rng)
+    near = np.argwhere(np.isfinite(reference.lengths_from(plan, robot)))
+    places = [tuple(map(int, near[rng.integers(len(near))])) for _ in range(others)]
+    scene = with_mates(scene_of(plan, robot, block=1), [mate(place) for place in places])
+    picked = AssignedFrontier(CoordinatedConfig(group=radius / scene.cells.reach)).pick(scene)
+    allowed = reference.assigned(plan, [robot, *places], radius)
+    assert (picked == NONE) if not allowed else cell(plan, picked) in allowed
+
+
 def test_the_assignment_has_the_least_sum_by_hand():
     """Both robots are nearer to the left end; the least sum sends the right one to the right end."""
     plan = corridor()
