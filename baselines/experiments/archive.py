@@ -14,7 +14,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from baselines.experiments.runner import Work, kept_content, read_older_record, without_trace
+from baselines.experiments.runner import Work, kept_content, kept_file, read_older_record, without_trace
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.writing import write_atomically
 
@@ -62,7 +62,7 @@ def read_archive(archive: Path, folder: Path, works: Sequence[Work]) -> int:
     taken = [line for line in lines if line[_FILE] in wanted]
     for line in taken:
         content = {name: value for name, value in line.items() if name != _FILE}
-        write_atomically(folder / f"{line[_FILE]}.json", json.dumps(content, allow_nan=False))
+        write_atomically(kept_file(folder, line[_FILE]), json.dumps(content, allow_nan=False))
     return len(taken)
 
 

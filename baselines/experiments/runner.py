@@ -10,6 +10,7 @@ import hashlib
 import io
 import json
 import math
+import os
 import re
 import sys
 import time
@@ -29,6 +30,7 @@ from entropy_explore_env.writing import write_atomically
 _PACE_PERIOD_S = 600.0
 """The bar estimates the time left from so much of the past: single missions differ a lot."""
 _LONGEST_REASON = 200
+_NO_COLONS = os.name == "nt"
 TRACE = "trace"
 """In records of work that failed: where, with folders of the machine that ran it."""
 NOT_RUN: Record = {"not_run": True}
@@ -166,6 +168,11 @@ def failed_record(failure: Failure, limit_s: float) -> Record:
     return {"failed": reason, TRACE: failure.trace, "limit_s": limit_s if failure.late else None}
 
 
+def kept_file(folder: Path, name: str, suffix: str = ".json") -> Path:
+    """Where the result of work is kept: its name may hold a colon, which no file of Windows may."""
+    return folder / f"{name.replace(':', '_') if _NO_COLONS else name}{suffix}"
+
+
 def result_digest(work: Work, code: str) -> str:
     """Under which a result is kept."""
     return hashlib.sha256(f"{work.settings_digest} {code}".encode()).hexdigest()[:16]
@@ -175,7 +182,7 @@ def _write(folder: Path, order: _Order, outcome: Outcome) -> None:
     if outcome.arrays:
         buffer = io.BytesIO()
         np.savez_compressed(buffer, allow_pickle=False, **outcome.arrays)
-        write_atomically(folder / f"{order.work.file}.npz", buffer.getvalue())
+        write_atomically(kept_file(folder, order.work.file, ".npz"), buffer.getvalue())
     write_record(folder, order.work, order.code, outcome.record)
 
 
@@ -188,7 +195,7 @@ def write_record(folder: Path, work: Work, code: str, record: Record) -> None:
         "checksum": _checksum(record),
         "record": record,
     }
-    write_atomically(folder / f"{work.file}.json", json.dumps(content, allow_nan=False))
+    write_atomically(kept_file(folder, work.file), json.dumps(content, allow_nan=False))
 
 
 def without_trace(content: dict[str, Any]) -> dict[str, Any]:
@@ -226,7 +233,7 @@ def read_older_record(folder: Path, work: Work) -> tuple[str, Record] | None:
 def kept_content(folder: Path, work: Work) -> dict[str, Any]:
     """What the file of some work holds; nothing if there is none, or if it was changed by hand."""
     try:
-        content = json.loads((folder / f"{work.file}.json").read_text())
+        content = json.loads(kept_file(folder, work.file).read_text())
     except (OSError, ValueError):
         return {}
     record = content.get("record") if isinstance(content, dict) else None

@@ -7,6 +7,7 @@ import lzma
 
 import pytest
 
+from baselines.experiments import runner
 from baselines.experiments.archive import read_archive, write_archive
 from baselines.experiments.runner import TRACE, read_record, run_all, write_record
 from entropy_explore_env.errors import SettingError
@@ -66,6 +67,16 @@ def test_a_record_that_was_changed_by_hand_does_not_count(archive, tmp_path):
     archive.write_bytes(lzma.compress("\n".join(map(json.dumps, lines)).encode()))
     read_archive(archive, tmp_path / "second", works([]))
     assert kept(tmp_path / "second") == [0.0, 2.0, None, 6.0]
+
+
+def test_names_with_colons_are_kept_where_files_must_not_have_them(tmp_path, monkeypatch):
+    monkeypatch.setattr(runner, "_NO_COLONS", True)
+    assert (
+        runner.kept_file(tmp_path, "office/a.py:Mine/seed-0")
+        == tmp_path / "office" / "a.py_Mine" / "seed-0.json"
+    )
+    monkeypatch.setattr(runner, "_NO_COLONS", False)
+    assert runner.kept_file(tmp_path, "pretrained:plans", ".npz") == tmp_path / "pretrained:plans.npz"
 
 
 def test_folders_of_the_machine_that_ran_it_are_left_out(tmp_path):
