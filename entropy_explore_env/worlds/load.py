@@ -223,10 +223,9 @@ def _check(options: dict[str, Any]) -> None:
             options[name] = float(value)
 
 
-_NO_SPACE = (
-    "a map with free space at this voxel size (solid are pixels darker than half of white, transparent ones, "
-    "and all that is unknown)"
-)
+_NO_SPACE = "a map with free space at this voxel size"
+_IMAGES = (".pgm", ".png")
+_SHADES = " (pixels darker than half of white, and transparent ones, are solid)"
 
 
 def _world(voxels: Voxels, path: str, options: dict[str, Any], height_m: float | None) -> World:
@@ -237,7 +236,9 @@ def _world(voxels: Voxels, path: str, options: dict[str, Any], height_m: float |
     except RefusedError as error:
         raise WorldError("voxel_size_m", size_m, str(error)) from None
     if (labels != FREE).all():
-        raise WorldError("world file", path, _NO_SPACE)
+        raise WorldError(
+            "world file", path, _NO_SPACE + (_SHADES if Path(path).suffix.lower() in _IMAGES else "")
+        )
     if height_m is not None:
         if labels.shape[2] != 1:
             raise SettingError("height_m", height_m, "None: the file's world is 3-D already")

@@ -112,7 +112,8 @@ def test_a_caller_that_stops_asking_ends_what_runs(two_workers):
     started = time.monotonic()
     results.close()
     found = dict(run_each(work, [("square", 2), ("square", 3)], LOCAL))
-    assert found == {("square", 2): 4, ("square", 3): 9} and time.monotonic() - started < 30.0
+    assert found == {("square", 2): 4, ("square", 3): 9}
+    assert time.monotonic() - started < 55.0  # nobody waited for the sleep; new workers take a while
 
 
 SHORT = with_settings(BOX, {"time_limit_s": 60.0})
