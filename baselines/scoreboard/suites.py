@@ -246,6 +246,22 @@ def training_volumes(starts: int) -> tuple[Task, ...]:
     )
 
 
+def training_teams(starts: int) -> tuple[Task, ...]:
+    """Teams of four like those of the suite `teams` on which settings may be tuned: of the training split."""
+    whole: dict[str, Any] = {"burst": _UNLIMITED, "i_min_bits": 0.0}
+    channels = {"": whole, ", half of the messages lost": {**whole, "loss_probability": _LOSSY}}
+    return tuple(
+        task_in(
+            team_name(name, 4) + words,
+            with_settings(SCENARIOS[name], {"robots": 4, "channel": channel}),
+            starts,
+            "train",
+        )
+        for name in ("room-furnished", "office", "cave")
+        for words, channel in channels.items()
+    )
+
+
 SUITES = {"plans": plans, "volumes": volumes, "teams": teams, "others": others}
 """Name → a function of `quick` that makes the tasks."""
 

@@ -1,9 +1,9 @@
 """Tune the rivals, and ours: `python -m baselines.scoreboard.tuning`.
 
 Each setting of a rule is varied alone around its default, on training worlds (`suites.training_plans`,
-`suites.training_volumes`) with the same starts for every value. The table of paths, or of mission times,
-over the default's is written into the page that tells of the rules; who changes a default runs this again.
-Missions are kept, so that more starts run what is missing.
+`suites.training_volumes`, `suites.training_teams`) with the same starts for every value. The table of paths,
+or of mission times, over the default's is written into the page that tells of the rules; who changes a
+default runs this again. Missions are kept, so that more starts run what is missing.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from baselines.experiments.statistics import Interval
 from baselines.experiments.tables import markdown_table
 from baselines.scoreboard.mission import SETTINGS
 from baselines.scoreboard.results import PATH, TIME, Measure, Results
-from baselines.scoreboard.suites import Suite, Task, training_plans, training_volumes
+from baselines.scoreboard.suites import Suite, Task, training_plans, training_teams, training_volumes
 from baselines.strategies import make_strategy
 from entropy_explore_env.errors import SettingError, one_of
 from entropy_explore_env.validation import check_whole
@@ -77,9 +77,27 @@ TUNINGS: Mapping[str, Tuning] = {
                 "behind": (1, 4, 16, 64),
                 "far_places": (6, 12, 24, 48),
                 "leave_below": (0, 0.05, 0.1, 0.2),
-            }
+            },
+            "distance-advantage": {
+                "opening": (0, 0.1, 0.3),
+                "passing": (0, 0.06, 0.125),
+                "meanwhile": (0, 0.5, 1),
+            },
+            "information-gain": {"weight": (0.02, 0.05, 0.15, 0.4, 1), "horizon": (1, 3)},
+            "receding-horizon": {"decay": (2, 4, 8, 16), "edge": (0.2, 0.4, 0.8), "places": (15, 30, 60)},
+            "tour": {"near": (0.25, 0.4, 0.75), "cover": (0.2, 0.4, 1), "most_far": (4, 8, 20)},
         },
         "information-rate-v0",
+        TIME,
+        "mission time",
+    ),
+    "teams": Tuning(
+        training_teams,
+        {
+            "coordinated-frontier": {"beta": (0.1, 0.3, 1, 3, 10)},
+            "assigned-frontier": {"group": (0.125, 0.25, 0.5, 1)},
+        },
+        "nearest-frontier",
         TIME,
         "mission time",
     ),
@@ -92,7 +110,7 @@ class Args:
     """Vary settings on training worlds."""
 
     suite: str = "plans"
-    """plans: the rivals; volumes: ours."""
+    """plans: the rivals for one robot; volumes: they, and ours; teams: the coordinated rivals."""
     strategies: str | None = None
     """Which, commas between; default: all that the suite tunes."""
     starts: int = 5

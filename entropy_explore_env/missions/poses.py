@@ -72,6 +72,16 @@ def share_left(params, robot, time_s):
 
 
 @lean_kernel
+def since_scan_m(params, robot, time_s):
+    """Metres that a robot has driven since its latest scan, or since its start."""
+    if robot.deciding and not robot.under_way:
+        return 0.0
+    scanned_m = robot.scans_under_way * params.scan_every_m if robot.scans_under_way > 0 else 0.0
+    driven_m = (1.0 - share_left(params, robot, time_s)) * robot.path_m
+    return max(robot.scan_lead_m + driven_m - scanned_m, 0.0)
+
+
+@lean_kernel
 def speed_at(params, robot, time_s):
     """Speed of a robot on its path, in m/s, at a time as in `pose_at`."""
     if time_s >= robot.ready_s - params.scan_time_s:

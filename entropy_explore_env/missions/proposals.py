@@ -15,7 +15,14 @@ from entropy_explore_env.belief.paths.lattice import Costs
 from entropy_explore_env.compilation.kernels import lean_kernel
 from entropy_explore_env.missions.localization import believed_pose, estimate_in, pose_variance
 from entropy_explore_env.missions.observation.own_state import entropy_left
-from entropy_explore_env.missions.poses import copy_numbers, grid_size, pose_at, to_grid_units, within_grid
+from entropy_explore_env.missions.poses import (
+    copy_numbers,
+    grid_size,
+    pose_at,
+    since_scan_m,
+    to_grid_units,
+    within_grid,
+)
 from entropy_explore_env.missions.silence import silent_since
 from entropy_explore_env.missions.state import MissionEnd
 from entropy_explore_env.viewpoints.candidate_features import CONTEXT, FEATURES
@@ -50,6 +57,8 @@ class PlannerInput(NamedTuple):
     """Taken from its map by its latest scan."""
     move_end: int
     under_way: bool
+    since_scan_m: float
+    """That it has driven since its latest scan."""
     place_variance_m2: float
     """Of its pose estimate, the sum over x, y and z; 0 = it knows its pose."""
     yaw_variance_rad2: float
@@ -147,6 +156,7 @@ def propose_to(params, robot, given, proposer, candidates, experience, parts):
         scratch.cones[:cones],
         scratch.mates[:mates],
         experience,
+        given.since_scan_m / own.voxel_size_m,
     )
     copy_numbers(given.target, scratch.target_m, 5)
     decision = LastDecision(
@@ -233,6 +243,7 @@ def propose_missions(proposing, proposer, kind, offsets, first, last, out):
                     came,
                     own.move_end,
                     own.under_way,
+                    since_scan_m(params, own, clock.time_s),
                     place_variance,
                     yaw_variance,
                     proposing.heard[mission, index],

@@ -11,7 +11,7 @@ import numpy as np
 
 from entropy_explore_env.missions.action import ROUNDING, encode_viewpoint
 from entropy_explore_env.missions.localization import believed_pose
-from entropy_explore_env.missions.poses import place_at, pose_at, share_left, speed_at
+from entropy_explore_env.missions.poses import place_at, pose_at, since_scan_m, speed_at
 from entropy_explore_env.missions.rules import Rules
 from entropy_explore_env.missions.silence import is_silent
 from entropy_explore_env.missions.simulation import Missions
@@ -239,7 +239,7 @@ def view_of(missions: Missions, mission: int, robot: int) -> RobotView:
         deciding=bool(own["deciding"]),
         under_way=bool(own["under_way"]),
         speed_m_s=float(speed_at(rules.params[robot], own, time_s)),
-        since_scan_m=_since_scan_m(rules.params[robot], own, time_s),
+        since_scan_m=float(since_scan_m(rules.params[robot], own, time_s)),
         pose=np.array(believed_pose(estimate, params, pose_at(params, own, time_s))),
         mean=read_only(state.mean[here].reshape(shape)),
         precision=read_only(state.precision[here].reshape(shape)),
@@ -290,15 +290,6 @@ def _candidates(missions: Missions, mission: int, robot: int) -> np.ndarray:
         return read_only(np.zeros((0, 5)))
     candidates = state.candidates[mission, robot]
     return read_only(candidates["viewpoint"][candidates["kind"] != Kind.NONE])
-
-
-def _since_scan_m(params: np.void, own: np.void, time_s: float) -> float:
-    """Metres that a robot has driven since its latest scan, or since its start."""
-    if own["deciding"] and not own["under_way"]:
-        return 0.0
-    scanned_m = own["scans_under_way"] * params["scan_every_m"] if own["scans_under_way"] else 0.0
-    driven_m = (1.0 - share_left(params, own, time_s)) * own["path_m"]
-    return max(float(own["scan_lead_m"] + driven_m - scanned_m), 0.0)
 
 
 def _path_ahead(params: np.void, own: np.void, estimate: np.void | None, time_s: float) -> np.ndarray:

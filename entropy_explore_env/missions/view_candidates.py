@@ -80,6 +80,7 @@ class ViewProposer:
             float(view.scan.utility_bits.sum()),
             view.move_end.code,
             view.under_way,
+            view.since_scan_m,
             float(np.trace(view.covariance[:3, :3])),
             float(view.covariance[3, 3]),
             view.heard.copy(),

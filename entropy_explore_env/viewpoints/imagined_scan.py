@@ -73,7 +73,7 @@ def _imagine_ray(belief, scan, gap_probability, start, direction, count, scratch
 
 
 @lean_kernel
-def imagine_scan(belief, scan, gap_probability, at, scratch):
+def imagine_scan(belief, scan, gap_probability, at, scratch, count):
     """Add the precision that a scan from a viewpoint should bring to `scratch.added`.
 
     Args:
@@ -82,11 +82,11 @@ def imagine_scan(belief, scan, gap_probability, at, scratch):
         gap_probability: Probability that an unknown voxel beside a covered one stops a ray.
         at: (5,) x, y, z in grid units, yaw, pitch.
         scratch: A ScanScratch.
+        count: How many voxels other scans have touched, to which this one adds.
 
     Returns:
-        How many voxels are in `scratch.touched`.
+        How many voxels are in `scratch.touched` then.
     """
-    count = 0
     fill_rows(scan, at[4], scratch.rows)
     for column in range(len(scan.yaws)):
         yaw = at[3] + scan.yaws[column]
@@ -114,6 +114,6 @@ def imagined_bits(belief, scan, gap_probability, viewpoints, cones, scratch, bit
     """
     mark_cones(cones, belief.size, scratch.left, 1)
     for k in range(len(viewpoints)):
-        count = imagine_scan(belief, scan, gap_probability, viewpoints[k], scratch)
+        count = imagine_scan(belief, scan, gap_probability, viewpoints[k], scratch, 0)
         bits[k] = gathered_bits(belief, scratch, count)
     mark_cones(cones, belief.size, scratch.left, 0)

@@ -119,7 +119,7 @@ def test_no_voxel_is_touched_twice_where_rays_bring_nothing(stop_probability, si
     for is_imagined in (False, True):
         scratch = scratch._replace(touched=np.full(20 * voxels, -1, np.int32))
         if is_imagined:
-            count = imagine_scan(belief, scan, scan.stop_probability, viewpoint, scratch)
+            count = imagine_scan(belief, scan, scan.stop_probability, viewpoint, scratch, 0)
             gathered_bits(belief, scratch, count)
         else:
             expected_scan_bits(belief, scan, viewpoint, scratch)

@@ -32,6 +32,7 @@ from entropy_explore_env.missions.view import RobotView, TeammateView
 from entropy_explore_env.robots.motion import driving_time
 from entropy_explore_env.scenario import Scenario
 from entropy_explore_env.settings import RobotKind
+from entropy_explore_env.viewpoints.way_scans import fill_way_scans, planned_path
 
 _LOST_AFTER = 2.0
 """A silent robot counts as under way for this many times a drive along all sides of the workspace."""
@@ -40,6 +41,8 @@ _FIRST_REACH = 0.25
 range costs more than counting the few candidates beyond that could be better."""
 _EXTENSION = 1.4
 """Then they are searched this many times as far until that is enough."""
+_SHORTLISTED, _WAY_REACH = 8, 2.0
+"""Candidates whose way is counted: the best ones without it, of those so many sensor ranges away at most."""
 _PARTING_DRAWS = 8
 """So many places away from teammates are drawn, of which the farthest from them is taken."""
 
@@ -107,6 +110,7 @@ class Allocator:
         search: Search,
         ceiling: np.ndarray | None,
         lazy: bool,
+        way_scans: int = 0,
     ) -> None:
         """Nothing is explored yet.
 
@@ -118,6 +122,7 @@ class Allocator:
             search: Memory of path searches.
             ceiling: (X, Y) the exposure surface in layers; None = candidates are voxels.
             lazy: Whether candidates are counted only as far as a choice needs.
+            way_scans: Scans on the way to a candidate whose V counts, too.
         """
         self._value, self._lazy, self.search = value, lazy, search
         self._edge, self._scenario = scenario.grid.voxel_size_m, scenario
@@ -130,6 +135,9 @@ class Allocator:
         )
         self.costs = costs_of(self.candidates.traversal_cost, 1.0)
         self.counted = 0
+        self._every = kind.sensor.scan_every_m / self._edge if way_scans > 0 else math.inf
+        self._way = np.zeros((way_scans + 1, 5))
+        self._path = np.empty(0 if math.isinf(self._every) else scenario.grid.voxels, np.int32)
 
     def allocate(
         self, view: RobotView, stopped: Sequence[int], targets: Sequence[np.ndarray], everybody: bool = False
@@ -251,7 +259,8 @@ class Allocator:
         pose = view.pose if robot == view.robot else view.teammates[robot].pose
         whole = float(sum(self._scenario.grid.shape))
         if robot not in path_costs:
-            near = _FIRST_REACH * self.candidates.reach if self._lazy else math.inf
+            ranges = _FIRST_REACH if math.isinf(self._every) else _WAY_REACH
+            near = ranges * self.candidates.reach if self._lazy else math.inf
             path_costs[robot] = self._path_costs(pose, near if near < whole else math.inf)
         weighed = np.full(len(path_costs[robot].edges), np.nan)
         choice, sure = self._best_of(robot, path_costs[robot], taken, weighed)
@@ -268,8 +277,14 @@ class Allocator:
             self.candidates.replace_unreached(everywhere)
             path_costs.clear()  # candidates have moved
             path_costs[robot] = self._path_costs(pose, math.inf, whole_map)
-            choice, _ = self._best_of(robot, path_costs[robot], taken, np.full_like(weighed, np.nan))
-        return choice
+            weighed = np.full_like(weighed, np.nan)
+            choice, _ = self._best_of(robot, path_costs[robot], taken, weighed)
+        if choice is None or math.isinf(self._every):
+            return choice
+        if path_costs[robot].search != self.search.searches[0]:
+            path_costs[robot] = self._path_costs(pose, path_costs[robot].reach)
+        since = view.since_scan_m / self._edge if robot == view.robot else 0.0
+        return self._best_on_the_way(robot, since, path_costs[robot], taken, weighed)
 
     def _best_of(
         self, robot: int, path_costs: _PathCosts, taken: Sequence[np.ndarray], weighed: np.ndarray
@@ -291,10 +306,11 @@ class Allocator:
         )
         order = np.argsort(-bound, kind="stable")
         value = np.full(len(slots), -np.inf)
-        size = self.candidates.batch
+        size, shortlisted = self.candidates.batch, 1 if math.isinf(self._every) else _SHORTLISTED
+        shortlisted = max(min(shortlisted, len(slots)), 1)
         for first in range(0, len(order), size):
             batch = order[first : first + size]
-            if self._lazy and bound[batch[0]] < value.max():
+            if self._lazy and bound[batch[0]] < np.partition(value, -shortlisted)[-shortlisted]:
                 break
             seen = self._seen(slots[batch], weighed)
             worth = self._value(seen, seconds[batch], edges[batch], takes[batch])
@@ -306,6 +322,49 @@ class Allocator:
         if len(beyond) == 0 or math.isinf(path_costs.reach):
             return choice, True
         return choice, choice is not None and self._none_is_better(robot, beyond, path_costs, choice, weighed)
+
+    def _best_on_the_way(
+        self,
+        robot: int,
+        since: float,
+        path_costs: _PathCosts,
+        taken: Sequence[np.ndarray],
+        weighed: np.ndarray,
+    ) -> Choice:
+        """The best of the candidates that are best without the way, where V counts what is seen on it, too.
+
+        Args:
+            robot: Its number.
+            since: Voxel edges that it has driven since its latest scan.
+            path_costs: Of its paths, the latest that were searched.
+            taken: (3,) places to which others go.
+            weighed: (B,) what is seen from the candidates alone; NaN = not counted.
+        """
+        slots = np.flatnonzero((weighed > 0.0) & np.isfinite(path_costs.edges))
+        voxels, edges = self.candidates.voxels_of(slots), path_costs.edges[slots]
+        seconds, takes = self.seconds(robot, edges), self._taken(voxels, taken)
+        alone = self._value(weighed[slots] * self.candidates.point, seconds, edges, takes)
+        best = np.argsort(-alone, kind="stable")[:_SHORTLISTED]
+        seen = np.array(
+            [self._seen_on_the_way(int(slots[k]), int(voxels[k]), path_costs.start, since) for k in best],
+            np.float64,
+        )
+        value = self._value(seen * self.candidates.point, seconds[best], edges[best], takes[best])
+        number = int(np.argmax(value))
+        chosen = best[number]
+        return Choice(int(slots[chosen]), int(voxels[chosen]), float(value[number]), float(seconds[chosen]))
+
+    def _seen_on_the_way(self, slot: int, voxel: int, start: np.ndarray, since: float) -> float:
+        """V·(height factor) in points of a candidate, with what scans on the way to it see."""
+        here, at = np.zeros(5), np.zeros(5)
+        here[:3], at[:3] = start, self.place_of(voxel)
+        size, places = self._scenario.grid.shape, self._way
+        steps = planned_path(self.search, self.lattice, size, at, self._path)
+        count = fill_way_scans(
+            self.lattice, size, self._path, steps, here, at, self._every, since, places[:-1]
+        )
+        places[count] = at
+        return self.candidates.count_together(slot, places[: count + 1, :3])
 
     def _seen(self, slots: np.ndarray, weighed: np.ndarray) -> np.ndarray:
         """(K,) V·(height factor) of candidates in points' size; `weighed` as in `_best_of`."""

@@ -171,6 +171,10 @@ class Candidates(ABC, Generic[Map]):
         """(K,) V·(height factor): points expected to be seen, weighted by promises."""
 
     @abstractmethod
+    def count_together(self, slot: int, places: np.ndarray) -> float:
+        """V·(height factor) of a candidate whose V was counted, seen from any of (N, 3), grid units."""
+
+    @abstractmethod
     def promise(self, place: np.ndarray) -> None:
         """Note that a robot will scan at (3,), grid units: it promises to see the points visible there."""
 

@@ -13,7 +13,7 @@ from entropy_explore_env.compilation.kernels import lean_kernel
 from entropy_explore_env.randomness import draw_gaussian, draw_uniform
 from entropy_explore_env.viewpoints.far_places import BitCount, fill_blocks, promised_around
 from entropy_explore_env.viewpoints.imagined_scan import imagined_bits
-from entropy_explore_env.viewpoints.proposals.nearby import copy_viewpoint, value_of, voxel_at
+from entropy_explore_env.viewpoints.proposals.nearby import add_way_bits, copy_viewpoint, value_of, voxel_at
 from entropy_explore_env.viewpoints.proposals.planner_rules import FURTHER, POOR, STALE
 from entropy_explore_env.viewpoints.proposals.situation import distance_apart, worth_bits
 from entropy_explore_env.viewpoints.travel import WITHIN, travel_seconds
@@ -126,6 +126,9 @@ def _evaluate_far(proposer, situation, far, count):
     best, most = 0.0, 0.0
     for k in range(count):
         far.bits[k] = worth_bits(proposer, situation, far.viewpoints[k], far.bits[k])
+    if proposer.recipe.way_scans > 0:
+        add_way_bits(proposer, situation, proposer.exact, viewpoints, seconds, bits)
+    for k in range(count):
         far.values[k] = value_of(situation, far.bits[k], far.seconds[k])
         best, most = max(best, far.values[k]), max(most, far.bits[k])
     return best, most

@@ -77,6 +77,7 @@ class RecipeNumbers(NamedTuple):
     far_below: float
     keep: float
     dregs: float
+    way_scans: int
 
 
 class Pool(NamedTuple):
@@ -124,6 +125,8 @@ class ProposalScratch(NamedTuple):
     """(G, 5) float64, gazes at a stop."""
     gaze_bits: np.ndarray
     """(G,) float64."""
+    way: np.ndarray
+    """(W, 5) float64, where scans are taken on the way to a viewpoint."""
     marks: np.ndarray
     """(V,) uint64, zeros, which it is again afterwards: bit k = candidate k sees the voxel."""
     seen: np.ndarray
@@ -169,6 +172,8 @@ class Proposer(NamedTuple):
     """Largest distance at which places are drawn, voxel edges."""
     reach: float
     """Longest drive, voxel edges."""
+    scan_every: float
+    """Voxel edges from one scan under way to the next; inf = it takes none."""
     view_width_rad: float
     """Of the sensor's view, the wider one of its two sides."""
     target_precision: float
@@ -201,6 +206,7 @@ def recipe_numbers(recipe: Recipe, kind: RobotKind) -> RecipeNumbers:
         far_below=float(recipe.far_below),
         keep=float(recipe.keep),
         dregs=float(recipe.dregs),
+        way_scans=int(recipe.way_scans),
     )
 
 
@@ -253,6 +259,7 @@ def _new_scratch(scenario: Scenario, recipes: Sequence[Recipe]) -> ProposalScrat
         worth=np.zeros(far),
         gazes=np.zeros((gazes, 5)),
         gaze_bits=np.zeros(gazes),
+        way=np.zeros((max(recipe.way_scans for recipe in recipes), 5)),
         marks=np.zeros(voxels, np.uint64),
         seen=np.zeros(voxels, np.int32),
         views=np.zeros(candidates, VIEW),
@@ -337,6 +344,7 @@ def _proposer(scenario: Scenario, kind: RobotKind, recipe: Recipe, scratch: Prop
         axes=int(within.axes),
         within=float(within.reach),
         reach=float(min(kind.robot.reach_m / grid.voxel_size_m, float(sum(grid.shape)))),
+        scan_every=float(kind.sensor.scan_every_m / grid.voxel_size_m),
         view_width_rad=float(max(*kind.sensor.field_of_view_rad, kind.sensor.angular_step_rad)),
         target_precision=min(float(scenario.ending.sigma_end**-2), exact.scan.wanted_precision),
         unknown_cost=float(kind.robot.unknown_cost),

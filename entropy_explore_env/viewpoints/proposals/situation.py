@@ -50,6 +50,8 @@ class Situation(NamedTuple):
     """(M,) MATE, teammates that were heard."""
     experience: np.record
     """EXPERIENCE."""
+    since_scan: float = 0.0
+    """Voxel edges that it has driven since its latest scan."""
 
 
 class LastDecision(NamedTuple):

@@ -35,7 +35,7 @@ def look_from(proposer, situation, at, number, most_common):
         Whether it sees something else than each of those before.
     """
     scratch, belief, gap = proposer.scratch, situation.belief, proposer.recipe.gap_probability
-    touched = imagine_scan(belief, proposer.exact, gap, at, scratch.scan)
+    touched = imagine_scan(belief, proposer.exact, gap, at, scratch.scan, 0)
     view = scratch.views[number]
     _gather(proposer, situation, at, touched, view)
     common = scratch.common[number]

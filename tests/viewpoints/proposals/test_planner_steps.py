@@ -16,7 +16,7 @@ from entropy_explore_env.scenarios import BOX, OFFICE
 from entropy_explore_env.settings import Grid
 from entropy_explore_env.viewpoints.proposals.far import first_stop, propose_far
 from entropy_explore_env.viewpoints.proposals.model import MATE, new_proposers
-from entropy_explore_env.viewpoints.proposals.nearby import propose_nearby, start_paths
+from entropy_explore_env.viewpoints.proposals.nearby import draw_nearby, evaluate, propose_nearby, start_paths
 from entropy_explore_env.viewpoints.proposals.planner_rules import STALE
 from entropy_explore_env.viewpoints.proposals.records import EXPERIENCE, Kind
 from entropy_explore_env.viewpoints.proposals.selection import choose
@@ -253,3 +253,29 @@ def test_each_kind_has_its_recipe():
     given = new_proposers(PLAN, {0: NARROW_STRAIGHT})[0].recipe
     assert given.exponent == NARROW_STRAIGHT.exponent and given.turns == NARROW_STRAIGHT.turns
     assert new_proposers(PLAN)[0].recipe.exponent == ALL_AROUND.exponent
+
+
+@pytest.mark.parametrize("navigator", ["straight", "planned"])
+def test_scans_on_the_way_count_where_there_are_any(navigator):
+    """What a viewpoint is worth rises by what they add; what the scan there should bring stays as it is."""
+    under_way = {"sensor": {"scan_every_m": 0.3}, "robot": {"navigator": navigator}}
+    found = {}
+    for settings in ({"robot": {"navigator": navigator}}, under_way):
+        for way_scans in (0, 1, 4):
+            scenario = with_settings(PLAN, settings)
+            recipe = dataclasses.replace(ALL_AROUND, way_scans=way_scans)
+            proposer, situation = new_proposers(scenario, {0: recipe})[0], half_known_plan()
+            start_paths(proposer, situation)
+            size = draw_nearby(proposer, situation, proposer.scratch.pool.viewpoints)
+            evaluate(proposer, situation, proposer.exact, 0, size)
+            pool = proposer.scratch.pool
+            found[math.isfinite(proposer.scan_every), way_scans] = pool.bits[:size].copy()
+            np.testing.assert_array_equal(pool.stop_bits[:size], found[False, 0])
+            reached = np.isfinite(pool.seconds[:size])
+            values = pool.bits[:size] / pool.seconds[:size] ** recipe.exponent
+            np.testing.assert_allclose(pool.values[:size][reached], values[reached])
+    for way_scans in (1, 4):
+        np.testing.assert_array_equal(found[False, way_scans], found[False, 0])
+        assert (found[True, way_scans] >= found[False, 0] * (1.0 - 1e-6)).all()
+    np.testing.assert_array_equal(found[True, 0], found[False, 0])
+    assert found[True, 4].sum() > found[True, 1].sum() > 1.01 * found[True, 0].sum()

@@ -23,6 +23,7 @@ from baselines.strategies.frontier.terrain.visibility import (
     ViewModel,
     bound_columns,
     count_below,
+    count_below_together,
     count_columns_from,
     count_columns_in_ball,
     half_widths,
@@ -112,6 +113,11 @@ class TerrainCandidates(Candidates[TerrainMap]):
         factor = self._in_metres(counts.factor)
         self._map.seen[slots], self._factors[slots] = counts.seen, np.maximum(factor, 1e-12)
         return counts.weighed * factor
+
+    def count_together(self, slot: int, places: np.ndarray) -> float:
+        """See `Candidates`."""
+        arrays = self._counter, self._map, places, self._azimuths, self._view_model
+        return float(count_below_together(*arrays) * self._factors[slot])
 
     def _in_metres(self, factor: np.ndarray) -> np.ndarray:
         """(K,) height factors; without, 1 where a candidate is low enough to be one."""

@@ -80,7 +80,25 @@ def count_below(counter, terrain, eye, average, azimuths, view_model, marking):
         view_model: Reach, min_tangent and fade matter.
         marking: Whether the robot promises to see these columns.
     """
-    number, points, weighed = start_count(counter), 0, 0.0
+    number = start_count(counter)
+    return _count_more(counter, number, terrain, eye, average, azimuths, view_model, marking)
+
+
+@lean_kernel
+def count_below_together(counter, terrain, eyes, azimuths, view_model):
+    """Unexplored columns that are seen from any of (N, 3) places, weighed by promises; see `count_below`."""
+    number, weighed = start_count(counter), 0.0
+    for place in eyes:
+        eye = (place[0], place[1], place[2])
+        average = mean_ground(terrain, int(eye[0]), int(eye[1]), view_model.patch)
+        weighed += _count_more(counter, number, terrain, eye, average, azimuths, view_model, False)[1]
+    return weighed
+
+
+@lean_kernel
+def _count_more(counter, number, terrain, eye, average, azimuths, view_model, marking):
+    """`count_below`, of the columns that the count of this number has not met yet."""
+    points, weighed = 0, 0.0
     size, reach = terrain.size, view_model.reach
     for direction in azimuths:
         x, y = int(eye[0]), int(eye[1])

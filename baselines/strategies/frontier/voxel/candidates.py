@@ -30,6 +30,7 @@ from baselines.strategies.frontier.voxel.visibility import (
     count_from,
     count_in_ball,
     count_in_balls,
+    count_together,
     new_counter,
     rays_around,
     rays_towards,
@@ -113,6 +114,12 @@ class VoxelCandidates(Candidates[FrontierMap]):
             count_from(*arrays, self._tree, self._met, seen, weighed)
         self._map.seen[slots] = seen
         return weighed
+
+    def count_together(self, slot: int, places: np.ndarray) -> float:
+        """See `Candidates`."""
+        del slot
+        arrays = self._counter, self._map.state, self._size, places, self._directions
+        return float(count_together(*arrays, self.reach))
 
     def promise(self, place: np.ndarray) -> None:
         """See `Candidates`."""

@@ -141,7 +141,23 @@ def count_crossed(counter, state, size, start, directions, reach, marking):
         reach: Of the rays, in voxel edges; inf allowed.
         marking: Whether the robot promises to see these voxels.
     """
-    number, points, weighed = start_count(counter), 0, 0.0
+    number = start_count(counter)
+    return _count_more(counter, number, state, size, start, directions, reach, marking)
+
+
+@lean_kernel
+def count_together(counter, state, size, starts, directions, reach):
+    """Unexplored voxels that rays from any of (N, 3) places cross, weighed by promises: `count_crossed`."""
+    number, weighed = start_count(counter), 0.0
+    for start in starts:
+        weighed += _count_more(counter, number, state, size, start, directions, reach, False)[1]
+    return weighed
+
+
+@lean_kernel
+def _count_more(counter, number, state, size, start, directions, reach, marking):
+    """`count_crossed`, of the voxels that the count of this number has not met yet."""
+    points, weighed = 0, 0.0
     begin = (start[0], start[1], start[2])
     for ray in range(len(directions)):
         direction = (directions[ray, 0], directions[ray, 1], directions[ray, 2])

@@ -230,6 +230,12 @@ def test_bodies_and_a_short_reach_explore_an_office():
         (ExplorationConfig, {"metric": None}, "ExplorationConfig.metric"),
         (ExplorationConfig, {"metric": "V/t"}, "ExplorationConfig.metric"),
         (ExplorationConfig, {"metric": Metric}, "ExplorationConfig.metric"),
+        (ExplorationConfig, {"way_scans": -1}, "ExplorationConfig.way_scans"),
+        (
+            ExplorationConfig,
+            {"way_scans": 1, "frontiers": FrontierConfig(visibility="naive")},
+            "ExplorationConfig.way_scans",
+        ),
         (FrontierStrategy, {"config": "V/t"}, "config"),
         (FrontierConfig, {"sigma": 0.0}, "FrontierConfig.sigma"),
         (FrontierConfig, {"spacing_m": 0.0}, "FrontierConfig.spacing_m"),

@@ -22,6 +22,7 @@ from baselines.strategies.frontier.terrain.visibility import (
     ViewModel,
     bound_columns,
     count_below,
+    count_below_together,
     count_columns_from,
     count_columns_in_ball,
     half_widths,
@@ -100,6 +101,24 @@ def test_columns_are_those_whose_tops_rays_meet(seed, height, reach, min_tangent
         if math.dist((i + 0.5, j + 0.5, heights[i, j]), eye) <= reach
     }
     assert count_columns_in_ball(counter, terrain, eye, average, view_model, False)[0] == len(ball)
+
+
+def test_columns_seen_from_some_places_together_count_once():
+    ground, rng = hills(7)
+    terrain, counter = known_ground(ground), new_counter(9 * 13, SHAPE)
+    angles = 0.05 + np.arange(24) * (2 * math.pi / 24)
+    azimuths = np.stack([np.cos(angles), np.sin(angles)], axis=-1)
+    view_model = ViewModel(6.0, 0.0, 2, 0.5, math.inf, 6.0)
+    eyes = np.stack([*(np.floor(rng.random((3, 2)) * (9, 13)) + 0.5).T, np.array([6.5, 7.0, 7.5])], axis=-1)
+    together, alone = set[tuple[int, ...]](), []
+    for x, y, z in eyes.tolist():
+        average = reference.mean_height(terrain.ground, int(x), int(y), 2)
+        heights = reference.surface(terrain.ground, (x, y, z), average, 6.0)
+        seen = reference.seen_columns(heights, terrain.ground == NONE, (x, y, z), azimuths, 6.0, 0.0)
+        together |= seen
+        alone.append(len(seen))
+    assert max(alone) < len(together) < sum(alone)
+    assert count_below_together(counter, terrain, eyes, azimuths, view_model) == len(together)
 
 
 def test_a_ridge_hides_the_valley_behind_it_by_hand():

@@ -18,6 +18,7 @@ from baselines.strategies.frontier.voxel.visibility import (
     count_from,
     count_in_ball,
     count_in_balls,
+    count_together,
     new_counter,
     rays_around,
     rays_towards,
@@ -41,6 +42,22 @@ def scene(shape, seed, covered=0.15):
 def rays(shape, count=17):
     pitches = np.zeros(1) if shape[2] == 1 else np.array([-0.83, 0.11, 0.62])
     return rays_towards(0.123 + np.arange(count) * (2 * math.pi / count), pitches)
+
+
+@given(st.sampled_from(SHAPES), st.integers(1, 4), st.booleans(), seeds)
+@drawn(40)
+def test_from_some_places_together_each_point_counts_once(shape, count, promised, seed):
+    state, start, rng = scene(shape, seed)
+    places = np.floor(rng.random((count, 3)) * shape) + 0.5
+    counter, directions = new_counter(state.size, shape), rays(shape)
+    sets = [reference.seen_voxels(state, tuple(place), directions, 5.0) for place in places]
+    seen = set().union(*sets)
+    half = set()
+    if promised:
+        half = reference.seen_voxels(state, start, directions, 5.0)
+        count_crossed(counter, state.reshape(-1), shape, start, directions, 5.0, True)
+    found = count_together(counter, state.reshape(-1), shape, places, directions, 5.0)
+    assert found == pytest.approx(len(seen - half) + 0.5 * len(seen & half))
 
 
 @given(st.sampled_from(SHAPES), st.floats(1.0, 9.0), seeds)
