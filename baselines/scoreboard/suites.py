@@ -237,6 +237,11 @@ def training_plans(starts: int) -> tuple[Task, ...]:
     return (_dungeons(starts, every=2), *recipes)
 
 
+def training_dungeons(starts: int) -> tuple[Task, ...]:
+    """The first dungeons of odd number alone: plans of which a part may stay unseen."""
+    return (_dungeons(starts, every=2),)
+
+
 def training_volumes(starts: int) -> tuple[Task, ...]:
     """Worlds like those of the suite `volumes` on which settings may be tuned: of the training split."""
     return tuple(

@@ -21,7 +21,14 @@ from baselines.experiments.statistics import Interval
 from baselines.experiments.tables import markdown_table
 from baselines.scoreboard.mission import SETTINGS
 from baselines.scoreboard.results import PATH, TIME, Measure, Results
-from baselines.scoreboard.suites import Suite, Task, training_plans, training_teams, training_volumes
+from baselines.scoreboard.suites import (
+    Suite,
+    Task,
+    training_dungeons,
+    training_plans,
+    training_teams,
+    training_volumes,
+)
 from baselines.strategies import make_strategy
 from entropy_explore_env.errors import SettingError, one_of
 from entropy_explore_env.validation import check_whole
@@ -65,7 +72,15 @@ TUNINGS: Mapping[str, Tuning] = {
                 "most_far": (4, 8, 20),
                 "stay": (0.02, 0.1),
             },
+            "per-time-visibility": {"way_scans": (0, 4, 8)},
         },
+        "nearest-frontier",
+        PATH,
+        "path",
+    ),
+    "dungeons": Tuning(
+        training_dungeons,
+        {"planned-rate": {"way_scans": (1, 3)}},
         "nearest-frontier",
         PATH,
         "path",
@@ -110,7 +125,8 @@ class Args:
     """Vary settings on training worlds."""
 
     suite: str = "plans"
-    """plans: the rivals for one robot; volumes: they, and ours; teams: the coordinated rivals."""
+    """plans: the rivals for one robot; dungeons: ours where a part may stay unseen; volumes: the rivals and
+    ours; teams: the coordinated rivals."""
     strategies: str | None = None
     """Which, commas between; default: all that the suite tunes."""
     starts: int = 5
