@@ -41,7 +41,7 @@ class Tuning(NamedTuple):
     tasks: Callable[[int], tuple[Task, ...]]
     """Number of starts → tasks."""
     grid: Mapping[str, Mapping[str, tuple[float, ...]]]
-    """Strategy → setting → values, the default among them, unless robots of different kinds have several."""
+    """Strategy → setting → values, the default among them, unless it depends on the kind of robot."""
     yardstick: str
     """Strategy."""
     measure: Measure
@@ -72,7 +72,7 @@ TUNINGS: Mapping[str, Tuning] = {
                 "most_far": (4, 8, 20),
                 "stay": (0.02, 0.1),
             },
-            "per-time-visibility": {"way_scans": (0, 4, 8)},
+            "per-time-visibility": {"path_scans": (0, 4, 8)},
         },
         "nearest-frontier",
         PATH,
@@ -80,7 +80,7 @@ TUNINGS: Mapping[str, Tuning] = {
     ),
     "dungeons": Tuning(
         training_dungeons,
-        {"planned-rate": {"way_scans": (1, 3)}},
+        {"planned-rate": {"path_scans": (1, 3)}},
         "nearest-frontier",
         PATH,
         "path",

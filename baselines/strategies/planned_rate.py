@@ -68,7 +68,7 @@ class PlannedRateConfig:
         far_places: Likewise.
         leave_below: Likewise.
         dregs: Likewise.
-        way_scans: Likewise.
+        path_scans: Likewise.
 
     Raises:
         SettingError: One of them is not allowed.
@@ -79,13 +79,13 @@ class PlannedRateConfig:
     far_places: int | None = None
     leave_below: float | None = None
     dregs: float | None = None
-    way_scans: int | None = None
+    path_scans: int | None = None
 
     def __post_init__(self) -> None:
         """Check every field."""
         given = [name for name, value in asdict(self).items() if value is not None]
         for name in given:
-            if name in ("far_places", "way_scans"):
+            if name in ("far_places", "path_scans"):
                 check_count(self, name, 0, 100_000)
             elif name == "exponent":
                 check_positive(self, name)

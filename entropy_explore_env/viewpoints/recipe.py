@@ -46,8 +46,8 @@ class Recipe:
             marginal value theorem of Charnov 1976, by which foragers leave a patch).
         behind: How many times its own bits an unknown voxel beside a free one promises, where far places are
             looked for.
-        way_scans: Where the sensor scans under way, so many of the scans on the way to a viewpoint, spread
-            evenly, count for it, too; 0 = that at the viewpoint alone.
+        path_scans: So many of the scans on the path to a viewpoint, spread evenly over it, count in what it
+            is worth: those under way, and those at stops; 0 = that at the viewpoint alone.
     """
 
     exponent: float
@@ -71,7 +71,7 @@ class Recipe:
     dregs: float = 0.0
     leave_below: float = 0.0
     behind: float = 4.0
-    way_scans: int = 0
+    path_scans: int = 0
 
     def __post_init__(self) -> None:
         """Check every field."""
@@ -81,7 +81,7 @@ class Recipe:
             check(self, name, "a number from 0 to 1", lambda v: 0.0 <= v <= 1.0)
         check_count(self, "draw_thinning", 1, 1000)
         check_count(self, "thinning", 1, 1000)
-        for name in ("gazes", "turns", "places", "refinements", "far_places", "way_scans"):
+        for name in ("gazes", "turns", "places", "refinements", "far_places", "path_scans"):
             check_count(self, name, 0, 100_000)
         for name in ("refined", "far_gazes", "waypoint_gazes"):
             check_count(self, name, 1, 100_000)

@@ -48,7 +48,7 @@ def test_gazes_of_scanners_vary_between_rays_and_of_others_by_half_a_view():
         {"refined": 0},
         {"keep": float("nan")},
         {"leave_below": -0.1},
-        {"way_scans": -1},
+        {"path_scans": -1},
         {"behind": float("inf")},
         {"gazes": 0, "turns": 0, "places": 0},
     ],

@@ -108,8 +108,9 @@ class ExplorationConfig:
         finest_sigma: The last σ that counts as explored, no more than that of `frontiers`; None = the
             mission's σ_end.
         lazy: Whether V is counted only as far as a choice needs; the results are the same.
-        way_scans: Where the sensor scans under way (`RangeSensor.scan_every_m`), V counts what so many of the
-            scans on the way see, too, spread evenly over it, of the eight candidates that are best without;
+        path_scans: V counts what so many of the scans on the path see, too, spread evenly over it: those
+            under way, and those at stops. It does for the candidate that is best without these, and for the eight
+            best of those to which paths are no longer than two sensor ranges; teammates do not know of it.
             0 = what is seen from the candidate alone. It needs the `ray-cast` visibility.
 
     Raises:
@@ -122,7 +123,7 @@ class ExplorationConfig:
     frontiers: FrontierConfig = field(default_factory=FrontierConfig)
     finest_sigma: float | None = None
     lazy: bool = True
-    way_scans: int = 0
+    path_scans: int = 0
 
     def __post_init__(self) -> None:
         """Check every field."""
@@ -132,10 +133,10 @@ class ExplorationConfig:
         check_kind(self, "promises", bool)
         check_kind(self, "frontiers", FrontierConfig)
         check_kind(self, "lazy", bool)
-        check_count(self, "way_scans", 0, 1000)
-        if self.way_scans > 0 and self.frontiers.visibility != "ray-cast":
+        check_count(self, "path_scans", 0, 1000)
+        if self.path_scans > 0 and self.frontiers.visibility != "ray-cast":
             allowed = "0, where frontiers.visibility is not ray-cast"
-            raise SettingError("ExplorationConfig.way_scans", self.way_scans, allowed)
+            raise SettingError("ExplorationConfig.path_scans", self.path_scans, allowed)
         if self.finest_sigma is not None:
             allowed = "None, or a number above 0 and no more than frontiers.sigma"
             check(self, "finest_sigma", allowed, lambda v: 0.0 < v <= self.frontiers.sigma)
@@ -273,7 +274,7 @@ class FrontierStrategy:
                 self._search,
                 view.ceiling,
                 config.lazy,
-                config.way_scans,
+                config.path_scans,
             )
         return self._allocators[view.robot]
 

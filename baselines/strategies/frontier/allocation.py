@@ -32,7 +32,7 @@ from entropy_explore_env.missions.view import RobotView, TeammateView
 from entropy_explore_env.robots.motion import driving_time
 from entropy_explore_env.scenario import Scenario
 from entropy_explore_env.settings import RobotKind
-from entropy_explore_env.viewpoints.way_scans import fill_way_scans, planned_path
+from entropy_explore_env.viewpoints.path_scans import fill_path_scans, planned_path
 
 _LOST_AFTER = 2.0
 """A silent robot counts as under way for this many times a drive along all sides of the workspace."""
@@ -41,8 +41,9 @@ _FIRST_REACH = 0.25
 range costs more than counting the few candidates beyond that could be better."""
 _EXTENSION = 1.4
 """Then they are searched this many times as far until that is enough."""
-_SHORTLISTED, _WAY_REACH = 8, 2.0
-"""Candidates whose way is counted: the best ones without it, of those so many sensor ranges away at most."""
+_SHORTLISTED, _SHORT_RANGES = 8, 2.0
+"""Candidates for which scans on the path count: the best of all without these, and as many of those to which
+paths are no longer than so many sensor ranges."""
 _PARTING_DRAWS = 8
 """So many places away from teammates are drawn, of which the farthest from them is taken."""
 
@@ -110,7 +111,7 @@ class Allocator:
         search: Search,
         ceiling: np.ndarray | None,
         lazy: bool,
-        way_scans: int = 0,
+        path_scans: int = 0,
     ) -> None:
         """Nothing is explored yet.
 
@@ -122,7 +123,7 @@ class Allocator:
             search: Memory of path searches.
             ceiling: (X, Y) the exposure surface in layers; None = candidates are voxels.
             lazy: Whether candidates are counted only as far as a choice needs.
-            way_scans: Scans on the way to a candidate whose V counts, too.
+            path_scans: How many scans on the path to a candidate count in V.
         """
         self._value, self._lazy, self.search = value, lazy, search
         self._edge, self._scenario = scenario.grid.voxel_size_m, scenario
@@ -135,9 +136,9 @@ class Allocator:
         )
         self.costs = costs_of(self.candidates.traversal_cost, 1.0)
         self.counted = 0
-        self._every = kind.sensor.scan_every_m / self._edge if way_scans > 0 else math.inf
-        self._way = np.zeros((way_scans + 1, 5))
-        self._path = np.empty(0 if math.isinf(self._every) else scenario.grid.voxels, np.int32)
+        self._scan_poses = np.zeros((path_scans + 1, 5))
+        self._path_scans = path_scans
+        self._path = np.empty(scenario.grid.voxels if path_scans > 0 else 0, np.int32)
 
     def allocate(
         self, view: RobotView, stopped: Sequence[int], targets: Sequence[np.ndarray], everybody: bool = False
@@ -259,7 +260,7 @@ class Allocator:
         pose = view.pose if robot == view.robot else view.teammates[robot].pose
         whole = float(sum(self._scenario.grid.shape))
         if robot not in path_costs:
-            ranges = _FIRST_REACH if math.isinf(self._every) else _WAY_REACH
+            ranges = _FIRST_REACH if self._path_scans == 0 else _SHORT_RANGES
             near = ranges * self.candidates.reach if self._lazy else math.inf
             path_costs[robot] = self._path_costs(pose, near if near < whole else math.inf)
         weighed = np.full(len(path_costs[robot].edges), np.nan)
@@ -279,12 +280,11 @@ class Allocator:
             path_costs[robot] = self._path_costs(pose, math.inf, whole_map)
             weighed = np.full_like(weighed, np.nan)
             choice, _ = self._best_of(robot, path_costs[robot], taken, weighed)
-        if choice is None or math.isinf(self._every):
+        if choice is None or self._path_scans == 0:
             return choice
         if path_costs[robot].search != self.search.searches[0]:
             path_costs[robot] = self._path_costs(pose, path_costs[robot].reach)
-        since = view.since_scan_m / self._edge if robot == view.robot else 0.0
-        return self._best_on_the_way(robot, since, path_costs[robot], taken, weighed)
+        return self._best_with_path_scans(view, robot, path_costs[robot], taken, weighed)
 
     def _best_of(
         self, robot: int, path_costs: _PathCosts, taken: Sequence[np.ndarray], weighed: np.ndarray
@@ -306,11 +306,14 @@ class Allocator:
         )
         order = np.argsort(-bound, kind="stable")
         value = np.full(len(slots), -np.inf)
-        size, shortlisted = self.candidates.batch, 1 if math.isinf(self._every) else _SHORTLISTED
-        shortlisted = max(min(shortlisted, len(slots)), 1)
+        size, short = self.candidates.batch, edges <= _SHORT_RANGES * self.candidates.reach
+        shortlisted = min(_SHORTLISTED, int(short.sum())) if self._path_scans > 0 else 0
         for first in range(0, len(order), size):
             batch = order[first : first + size]
-            if self._lazy and bound[batch[0]] < np.partition(value, -shortlisted)[-shortlisted]:
+            least = value.max()
+            if shortlisted > 0:
+                least = min(least, np.partition(value[short], -shortlisted)[-shortlisted])
+            if self._lazy and bound[batch[0]] < least:
                 break
             seen = self._seen(slots[batch], weighed)
             worth = self._value(seen, seconds[batch], edges[batch], takes[batch])
@@ -323,19 +326,19 @@ class Allocator:
             return choice, True
         return choice, choice is not None and self._none_is_better(robot, beyond, path_costs, choice, weighed)
 
-    def _best_on_the_way(
+    def _best_with_path_scans(
         self,
+        view: RobotView,
         robot: int,
-        since: float,
         path_costs: _PathCosts,
         taken: Sequence[np.ndarray],
         weighed: np.ndarray,
     ) -> Choice:
-        """The best of the candidates that are best without the way, where V counts what is seen on it, too.
+        """The best of a few candidates, where V counts what scans on the path see, too.
 
         Args:
-            robot: Its number.
-            since: Voxel edges that it has driven since its latest scan.
+            view: Of the robot that allocates.
+            robot: The robot to which something is allocated.
             path_costs: Of its paths, the latest that were searched.
             taken: (3,) places to which others go.
             weighed: (B,) what is seen from the candidates alone; NaN = not counted.
@@ -343,28 +346,38 @@ class Allocator:
         slots = np.flatnonzero((weighed > 0.0) & np.isfinite(path_costs.edges))
         voxels, edges = self.candidates.voxels_of(slots), path_costs.edges[slots]
         seconds, takes = self.seconds(robot, edges), self._taken(voxels, taken)
-        alone = self._value(weighed[slots] * self.candidates.point, seconds, edges, takes)
-        best = np.argsort(-alone, kind="stable")[:_SHORTLISTED]
-        seen = np.array(
-            [self._seen_on_the_way(int(slots[k]), int(voxels[k]), path_costs.start, since) for k in best],
-            np.float64,
+        order = np.argsort(
+            -self._value(weighed[slots] * self.candidates.point, seconds, edges, takes), kind="stable"
         )
-        value = self._value(seen * self.candidates.point, seconds[best], edges[best], takes[best])
-        number = int(np.argmax(value))
-        chosen = best[number]
-        return Choice(int(slots[chosen]), int(voxels[chosen]), float(value[number]), float(seconds[chosen]))
+        short = edges[order] <= _SHORT_RANGES * self.candidates.reach
+        listed = np.unique(np.concatenate([order[:1], order[short][:_SHORTLISTED]]))
+        since_scan = view.since_scan_m / self._edge if robot == view.robot else 0.0
+        seen = np.array(
+            [
+                self._seen_with_path_scans(robot, int(slots[k]), int(voxels[k]), path_costs.start, since_scan)
+                for k in listed
+            ]
+        )
+        value = self._value(seen * self.candidates.point, seconds[listed], edges[listed], takes[listed])
+        best = int(np.argmax(value))
+        chosen = listed[best]
+        return Choice(int(slots[chosen]), int(voxels[chosen]), float(value[best]), float(seconds[chosen]))
 
-    def _seen_on_the_way(self, slot: int, voxel: int, start: np.ndarray, since: float) -> float:
-        """V·(height factor) in points of a candidate, with what scans on the way to it see."""
+    def _seen_with_path_scans(
+        self, robot: int, slot: int, voxel: int, start: np.ndarray, since_scan: float
+    ) -> float:
+        """V·(height factor) in points of a candidate, with what scans on the path to it see."""
         here, at = np.zeros(5), np.zeros(5)
         here[:3], at[:3] = start, self.place_of(voxel)
-        size, places = self._scenario.grid.shape, self._way
-        steps = planned_path(self.search, self.lattice, size, at, self._path)
-        count = fill_way_scans(
-            self.lattice, size, self._path, steps, here, at, self._every, since, places[:-1]
+        kind, size = self._scenario.kind_of(robot), self._scenario.grid.shape
+        every, reach = kind.sensor.scan_every_m / self._edge, kind.robot.reach_m / self._edge
+        path, scan_poses = self._path, self._scan_poses
+        steps = planned_path(self.search, self.lattice, size, at, path)
+        count = fill_path_scans(
+            self.lattice, size, path, steps, here, at, every, since_scan, reach, scan_poses[:-1]
         )
-        places[count] = at
-        return self.candidates.count_together(slot, places[: count + 1, :3])
+        scan_poses[count] = at
+        return self.candidates.count_together(slot, scan_poses[: count + 1, :3])
 
     def _seen(self, slots: np.ndarray, weighed: np.ndarray) -> np.ndarray:
         """(K,) V·(height factor) of candidates in points' size; `weighed` as in `_best_of`."""

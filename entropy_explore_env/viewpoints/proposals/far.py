@@ -13,7 +13,12 @@ from entropy_explore_env.compilation.kernels import lean_kernel
 from entropy_explore_env.randomness import draw_gaussian, draw_uniform
 from entropy_explore_env.viewpoints.far_places import BitCount, fill_blocks, promised_around
 from entropy_explore_env.viewpoints.imagined_scan import imagined_bits
-from entropy_explore_env.viewpoints.proposals.nearby import add_way_bits, copy_viewpoint, value_of, voxel_at
+from entropy_explore_env.viewpoints.proposals.nearby import (
+    copy_viewpoint,
+    value_of,
+    value_path_scans,
+    voxel_at,
+)
 from entropy_explore_env.viewpoints.proposals.planner_rules import FURTHER, POOR, STALE
 from entropy_explore_env.viewpoints.proposals.situation import distance_apart, worth_bits
 from entropy_explore_env.viewpoints.travel import WITHIN, travel_seconds
@@ -126,10 +131,10 @@ def _evaluate_far(proposer, situation, far, count):
     best, most = 0.0, 0.0
     for k in range(count):
         far.bits[k] = worth_bits(proposer, situation, far.viewpoints[k], far.bits[k])
-    if proposer.recipe.way_scans > 0:
-        add_way_bits(proposer, situation, proposer.exact, viewpoints, seconds, bits)
-    for k in range(count):
         far.values[k] = value_of(situation, far.bits[k], far.seconds[k])
+    if proposer.recipe.path_scans > 0:
+        value_path_scans(proposer, situation, proposer.exact, far, 0, count, True)
+    for k in range(count):
         best, most = max(best, far.values[k]), max(most, far.bits[k])
     return best, most
 
@@ -208,7 +213,8 @@ def propose_far(proposer, situation, near_bits):
             copy_viewpoint(experience.goal, far.viewpoints[count])
             count += 1
         best, bits = _evaluate_far(proposer, situation, far, count)
-        beyond = value_of(situation, experience.most_bits, max(radius * edge_m / drive.max_speed_m_s, 1e-9))
+        most_bits = (1 + proposer.recipe.path_scans) * experience.most_bits
+        beyond = value_of(situation, most_bits, max(radius * edge_m / drive.max_speed_m_s, 1e-9))
         if radius >= everywhere or best >= beyond:
             if experience.poor_scans >= STALE and max(near_bits, bits) < enough:
                 best = _look_further(proposer, situation, drawn, best, enough)

@@ -77,7 +77,7 @@ class RecipeNumbers(NamedTuple):
     far_below: float
     keep: float
     dregs: float
-    way_scans: int
+    path_scans: int
 
 
 class Pool(NamedTuple):
@@ -125,8 +125,8 @@ class ProposalScratch(NamedTuple):
     """(G, 5) float64, gazes at a stop."""
     gaze_bits: np.ndarray
     """(G,) float64."""
-    way: np.ndarray
-    """(W, 5) float64, where scans are taken on the way to a viewpoint."""
+    scan_poses: np.ndarray
+    """(S, 5) float64, of scans on the path to a viewpoint."""
     marks: np.ndarray
     """(V,) uint64, zeros, which it is again afterwards: bit k = candidate k sees the voxel."""
     seen: np.ndarray
@@ -206,7 +206,7 @@ def recipe_numbers(recipe: Recipe, kind: RobotKind) -> RecipeNumbers:
         far_below=float(recipe.far_below),
         keep=float(recipe.keep),
         dregs=float(recipe.dregs),
-        way_scans=int(recipe.way_scans),
+        path_scans=int(recipe.path_scans),
     )
 
 
@@ -259,7 +259,7 @@ def _new_scratch(scenario: Scenario, recipes: Sequence[Recipe]) -> ProposalScrat
         worth=np.zeros(far),
         gazes=np.zeros((gazes, 5)),
         gaze_bits=np.zeros(gazes),
-        way=np.zeros((max(recipe.way_scans for recipe in recipes), 5)),
+        scan_poses=np.zeros((max(recipe.path_scans for recipe in recipes), 5)),
         marks=np.zeros(voxels, np.uint64),
         seen=np.zeros(voxels, np.int32),
         views=np.zeros(candidates, VIEW),

@@ -11,10 +11,10 @@ from entropy_explore_env.compilation.kernels import lean_kernel
 from entropy_explore_env.randomness import draw_gaussian, draw_uniform
 from entropy_explore_env.viewpoints.evaluation import straight_seconds
 from entropy_explore_env.viewpoints.imagined_scan import imagined_bits
+from entropy_explore_env.viewpoints.path_scans import combined_bits, fill_path_scans, planned_path
 from entropy_explore_env.viewpoints.proposals.records import Kind
 from entropy_explore_env.viewpoints.proposals.situation import worth_bits
 from entropy_explore_env.viewpoints.travel import travel_seconds
-from entropy_explore_env.viewpoints.way_scans import fill_way_scans, planned_path, way_bits
 
 _SPOT, _NEAR = int(Kind.SPOT), int(Kind.NEAR)
 _BEST = 3
@@ -168,44 +168,47 @@ def evaluate(proposer, situation, scan, first, last):
     for k in range(first, last):
         at = pool.viewpoints[k]
         pool.bits[k] = pool.stop_bits[k] = worth_bits(proposer, situation, at, pool.bits[k])
-    if proposer.recipe.way_scans > 0:
-        add_way_bits(proposer, situation, scan, viewpoints, seconds, bits)
-    for k in range(first, last):
-        at = pool.viewpoints[k]
         pool.values[k] = value_of(situation, pool.bits[k], pool.seconds[k])
         moved = at[0] != here[0] or at[1] != here[1] or at[2] != here[2]
         pool.kinds[k] = _NEAR if moved else _SPOT
         copy_viewpoint(at, pool.goals[k])
+    if proposer.recipe.path_scans > 0:
+        value_path_scans(proposer, situation, scan, pool, first, last, proposer.planned)
 
 
 @lean_kernel
-def add_way_bits(proposer, situation, scan, viewpoints, seconds, bits):
-    """Write in place of the bits of viewpoints what they and scans on the way to them should bring together.
+def value_path_scans(proposer, situation, scan, pool, first, last, searched):
+    """Let scans on the path count in the values of viewpoints `first` … `last` - 1 of a pool.
 
     Args:
-        proposer: A Proposer; where the robot plans its paths, they have been searched.
+        proposer: A Proposer.
         situation: A Situation.
         scan: The ScanModel by which scans are imagined.
-        viewpoints: (K, 5).
-        seconds: (K,) until they are reached; inf = never.
-        bits: (K,) float64, what they are worth alone; replaced.
+        pool: With their bits, seconds and values.
+        first: The first one.
+        last: One past the last.
+        searched: Whether paths lead to them as the latest search found them; else they are straight.
     """
-    scratch, belief, here = proposer.scratch, situation.belief, situation.here
-    gap, every, since = proposer.recipe.gap_probability, proposer.scan_every, situation.since_scan
-    mark_cones(situation.cones, belief.size, scratch.scan.left, 1)
-    for k in range(len(viewpoints)):
-        if bits[k] <= 0.0 or math.isinf(seconds[k]):
+    scratch, belief, here, recipe = proposer.scratch, situation.belief, situation.here, proposer.recipe
+    size, every, since_scan = belief.size, proposer.scan_every, situation.since_scan
+    scan_poses, lattice = scratch.scan_poses[: recipe.path_scans], proposer.lattice
+    reach = proposer.reach if searched else math.inf
+    mark_cones(situation.cones, size, scratch.scan.left, 1)
+    for k in range(first, last):
+        at, count = pool.viewpoints[k], 0
+        if pool.values[k] <= 0.0:
             continue
-        at, count = viewpoints[k], 0
-        if proposer.planned:
-            count = planned_path(scratch.search, proposer.lattice, belief.size, at, scratch.path)
-        taken = fill_way_scans(
-            proposer.lattice, belief.size, scratch.path, count, here, at, every, since, scratch.way
+        if searched:
+            count = planned_path(scratch.search, lattice, size, at, scratch.path)
+        taken = fill_path_scans(
+            lattice, size, scratch.path, count, here, at, every, since_scan, reach, scan_poses
         )
         if taken > 0:
-            together = way_bits(belief, scan, gap, scratch.way[:taken], at, scratch.scan)
-            bits[k] = worth_bits(proposer, situation, at, together)
-    mark_cones(situation.cones, belief.size, scratch.scan.left, 0)
+            bits = combined_bits(belief, scan, recipe.gap_probability, scan_poses[:taken], at, scratch.scan)
+            bits -= taken * recipe.dregs * situation.experience.most_bits
+            bits = max(worth_bits(proposer, situation, at, bits), pool.bits[k])
+            pool.values[k] = value_of(situation, bits, pool.seconds[k])
+    mark_cones(situation.cones, size, scratch.scan.left, 0)
 
 
 @lean_kernel

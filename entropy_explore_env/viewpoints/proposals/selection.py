@@ -348,7 +348,8 @@ def _note_exactly(proposer, situation, number, bits):
     pool = proposer.scratch.pool
     if pool.seconds[number] < math.inf:
         pool.bits[number] = worth_bits(proposer, situation, pool.goals[number], bits)
-        pool.values[number] = value_of(situation, pool.bits[number], pool.seconds[number])
+        if proposer.recipe.path_scans == 0:
+            pool.values[number] = value_of(situation, pool.bits[number], pool.seconds[number])
         if pool.kinds[number] != _FAR:
             pool.stop_bits[number] = pool.bits[number]
 

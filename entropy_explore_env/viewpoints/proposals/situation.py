@@ -50,7 +50,7 @@ class Situation(NamedTuple):
     """(M,) MATE, teammates that were heard."""
     experience: np.record
     """EXPERIENCE."""
-    since_scan: float = 0.0
+    since_scan: float
     """Voxel edges that it has driven since its latest scan."""
 
 

@@ -54,7 +54,7 @@ def unknown_world():
     experience = np.zeros(1, EXPERIENCE)[0]
     belief = Belief(mean.reshape(-1), precision.reshape(-1), SIZE)
     nobody = np.zeros(0, CONE), np.zeros(0, MATE)
-    return precision, Situation(belief, costs, ALONG_X.copy(), *nobody, experience)
+    return precision, Situation(belief, costs, ALONG_X.copy(), *nobody, experience, 0.0)
 
 
 def test_one_ray_through_seven_unknown_voxels():

@@ -49,7 +49,7 @@ def situation_of(scenario, mean, precision, here=HERE, mates=(), most_bits=0.0):
     unknown_cost = scenario.robot.unknown_cost
     costs = belief_costs(mean, precision, scenario.sigma_prior**-2, unknown_cost, np.zeros(len(mean), bool))
     belief = Belief(mean, precision, scenario.grid.shape)
-    return Situation(belief, costs, here.copy(), np.zeros(0, CONE), heard, experience)
+    return Situation(belief, costs, here.copy(), np.zeros(0, CONE), heard, experience, 0.0)
 
 
 def half_known_plan(**changes):
@@ -256,26 +256,55 @@ def test_each_kind_has_its_recipe():
 
 
 @pytest.mark.parametrize("navigator", ["straight", "planned"])
-def test_scans_on_the_way_count_where_there_are_any(navigator):
+def test_scans_on_the_path_count_where_there_are_any(navigator):
     """What a viewpoint is worth rises by what they add; what the scan there should bring stays as it is."""
-    under_way = {"sensor": {"scan_every_m": 0.3}, "robot": {"navigator": navigator}}
     found = {}
-    for settings in ({"robot": {"navigator": navigator}}, under_way):
-        for way_scans in (0, 1, 4):
+    for every_m in (math.inf, 0.3):
+        for path_scans in (0, 1, 4):
+            settings = {"sensor": {"scan_every_m": every_m}, "robot": {"navigator": navigator}}
             scenario = with_settings(PLAN, settings)
-            recipe = dataclasses.replace(ALL_AROUND, way_scans=way_scans)
+            recipe = dataclasses.replace(ALL_AROUND, path_scans=path_scans)
             proposer, situation = new_proposers(scenario, {0: recipe})[0], half_known_plan()
             start_paths(proposer, situation)
-            size = draw_nearby(proposer, situation, proposer.scratch.pool.viewpoints)
+            size, pool = (
+                draw_nearby(proposer, situation, proposer.scratch.pool.viewpoints),
+                proposer.scratch.pool,
+            )
             evaluate(proposer, situation, proposer.exact, 0, size)
-            pool = proposer.scratch.pool
-            found[math.isfinite(proposer.scan_every), way_scans] = pool.bits[:size].copy()
-            np.testing.assert_array_equal(pool.stop_bits[:size], found[False, 0])
-            reached = np.isfinite(pool.seconds[:size])
-            values = pool.bits[:size] / pool.seconds[:size] ** recipe.exponent
-            np.testing.assert_allclose(pool.values[:size][reached], values[reached])
-    for way_scans in (1, 4):
-        np.testing.assert_array_equal(found[False, way_scans], found[False, 0])
-        assert (found[True, way_scans] >= found[False, 0] * (1.0 - 1e-6)).all()
-    np.testing.assert_array_equal(found[True, 0], found[False, 0])
-    assert found[True, 4].sum() > found[True, 1].sum() > 1.01 * found[True, 0].sum()
+            np.testing.assert_array_equal(pool.bits[:size], pool.stop_bits[:size])
+            found[every_m, path_scans] = pool.values[:size].copy()
+    plain = found[math.inf, 0]
+    for every_m, path_scans in ((math.inf, 1), (math.inf, 4), (0.3, 0)):
+        np.testing.assert_array_equal(found[every_m, path_scans], plain)
+    for path_scans in (1, 4):
+        assert (found[0.3, path_scans] >= plain * (1.0 - 1e-6)).all()
+    assert found[0.3, 4].sum() > found[0.3, 1].sum() > 1.01 * plain.sum()
+
+
+def test_each_kind_of_robot_counts_its_own_number_of_scans():
+    one = with_settings(PLAN, {"sensor": {"scan_every_m": 0.3}, "robots": 2})
+    under_way = dataclasses.replace(one, extra_kinds=one.kinds)
+    few, many = (dataclasses.replace(ALL_AROUND, path_scans=scans) for scans in (1, 8))
+    worth = []
+    for other in (few, many):
+        proposer, situation = new_proposers(under_way, {0: few, 1: other})[0], half_known_plan()
+        start_paths(proposer, situation)
+        size = draw_nearby(proposer, situation, proposer.scratch.pool.viewpoints)
+        evaluate(proposer, situation, proposer.exact, 0, size)
+        worth.append(proposer.scratch.pool.values[:size].copy())
+    np.testing.assert_array_equal(*worth)
+
+
+def test_paths_to_far_places_lead_around_walls_also_where_robots_drive_straight():
+    """Scans on the path are taken at its stops, none of them in the wall or beyond it."""
+    straight = with_settings(PLAN, {"robot": {"navigator": "straight", "reach_m": 0.8}})
+    recipe = dataclasses.replace(ALL_AROUND, path_scans=8)
+    proposer, situation = new_proposers(straight, {0: recipe})[0], half_known_plan(most_bits=1e9)
+    start_paths(proposer, situation)
+    count, best = propose_far(proposer, situation, 0.0)
+    assert count > 0 and best > 0.0
+    far, poses = proposer.scratch.far, proposer.scratch.scan_poses
+    alone = far.bits[:count] / far.seconds[:count] ** recipe.exponent
+    assert (far.values[:count] > 1.01 * alone).any()
+    voxels = np.floor(poses[:, :2]).astype(int)
+    assert (situation.belief.mean.reshape(PLAN.grid.shape)[voxels[:, 0], voxels[:, 1], 0] <= 0.5).all()

@@ -96,12 +96,12 @@ def between_doors():
     return missions
 
 
-@pytest.mark.parametrize(("way_scans", "right"), [(0, False), (1, False), (8, True)])
-def test_what_is_seen_on_the_way_decides(way_scans, right):
-    """The last scan before the right end sees one door: as much as on the left, which is nearer."""
+@pytest.mark.parametrize(("path_scans", "right"), [(0, False), (2, True), (8, True)])
+def test_what_scans_on_the_path_see_decides(path_scans, right):
+    """Both doors are seen on the path to the right end, and nothing on that to the left one."""
     strategy = FrontierStrategy(
         ExplorationConfig(
-            finest_sigma=ONCE, frontiers=FrontierConfig(spacing_m=0.5), way_scans=way_scans, promises=False
+            finest_sigma=ONCE, frontiers=FrontierConfig(spacing_m=0.5), path_scans=path_scans, promises=False
         )
     )
     missions = between_doors()
