@@ -134,7 +134,8 @@ def _shortfall(result: Compared, goal: float) -> str:
     """What of a goal is missed."""
     ratio, parts = result.measured.ratio, []
     if ratio.value > goal:
-        parts.append(f"{ratio.value:.2f} where {goal:.2f} was asked")
+        digits = 2 if round(ratio.value, 2) > goal else 4
+        parts.append(f"{ratio.value:.{digits}f} where {goal:.2f} was asked")
     if goal < 1.0 <= ratio.high:
         parts.append(f"the interval ends at {ratio.high:.2f}")
     if round(result.measured.worst_tenth, 2) > 1.0:

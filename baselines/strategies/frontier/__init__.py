@@ -109,9 +109,9 @@ class ExplorationConfig:
             mission's σ_end.
         lazy: Whether V is counted only as far as a choice needs; the results are the same.
         path_scans: V counts what so many of the scans on the path see, too, spread evenly over it: those
-            under way, and those at stops. It does for the candidate that is best without these, and for the eight
-            best of those to which paths are no longer than two sensor ranges; teammates do not know of it.
-            0 = what is seen from the candidate alone. It needs the `ray-cast` visibility.
+            under way, and those at stops. It does for the candidate that is best without these, and for the
+            eight best of those to which paths are no longer than two sensor ranges; teammates do not know of
+            it. 0 = what is seen from the candidate alone. It needs the `ray-cast` visibility.
 
     Raises:
         SettingError: A field has another value.
