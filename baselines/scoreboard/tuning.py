@@ -93,11 +93,6 @@ TUNINGS: Mapping[str, Tuning] = {
                 "far_places": (6, 12, 24, 48),
                 "leave_below": (0, 0.05, 0.1, 0.2),
             },
-            "distance-advantage": {
-                "opening": (0, 0.1, 0.3),
-                "passing": (0, 0.06, 0.125),
-                "meanwhile": (0, 0.5, 1),
-            },
             "information-gain": {"weight": (0.02, 0.05, 0.15, 0.4, 1), "horizon": (1, 3)},
             "receding-horizon": {"decay": (2, 4, 8, 16), "edge": (0.2, 0.4, 0.8), "places": (15, 30, 60)},
             "tour": {"near": (0.25, 0.4, 0.75), "cover": (0.2, 0.4, 1), "most_far": (4, 8, 20)},
