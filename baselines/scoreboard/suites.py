@@ -63,7 +63,14 @@ OTHERS = (
 )
 """Scenarios of the suite with this name."""
 _ALL: Mapping[str, Any] = {"seen_share": 1.0}
-_UNLIMITED, _LOSSY = 1_000_000, 0.5
+_WHOLE: Mapping[str, Any] = {"burst": 1_000_000, "i_min_bits": 0.0}
+_CHANNELS: Mapping[str, Mapping[str, Any]] = {
+    "": _WHOLE,
+    ", burst 64": {"burst": 64},
+    ", half of the messages lost": {**_WHOLE, "loss_probability": 0.5},
+    ", in line of sight": {**_WHOLE, "reach": "line_of_sight"},
+}
+"""Channels of teams: what stands after a task's name, and the settings; the first carries everything."""
 
 
 @dataclass(frozen=True)
@@ -195,13 +202,6 @@ def teams(quick: bool = False) -> tuple[Task, ...]:
     worlds = {name: SCENARIOS[name] for name in (names[:2] if quick else names)}
     if not quick:
         worlds["warehouse"] = _in_file(SCENARIOS["office"], "warehouse")
-    whole: dict[str, Any] = {"burst": _UNLIMITED, "i_min_bits": 0.0}
-    channels: Mapping[str, dict[str, Any]] = {
-        "": whole,
-        ", burst 64": {"burst": 64},
-        ", half of the messages lost": {**whole, "loss_probability": _LOSSY},
-        ", in line of sight": {**whole, "reach": "line_of_sight"},
-    }
     return tuple(
         dataclasses.replace(
             task_in(
@@ -212,7 +212,7 @@ def teams(quick: bool = False) -> tuple[Task, ...]:
             beside=team_name(name, robots) if words else team_name(name, 1) if robots > 1 else None,
         )
         for name, scenario in worlds.items()
-        for words, channel in channels.items()
+        for words, channel in _CHANNELS.items()
         for robots in ((1, 2, 4, 8) if not words else (4,))
     )
 
@@ -234,7 +234,7 @@ def training_plans(starts: int) -> tuple[Task, ...]:
     recipes = [
         task_in(name, _explored(SCENARIOS[name], {"seen_share": 1.0}), starts, "train") for name in names
     ]
-    return (_dungeons(starts, every=2), *recipes)
+    return (*training_dungeons(starts), *recipes)
 
 
 def training_dungeons(starts: int) -> tuple[Task, ...]:
@@ -253,17 +253,15 @@ def training_volumes(starts: int) -> tuple[Task, ...]:
 
 def training_teams(starts: int) -> tuple[Task, ...]:
     """Teams of four like those of the suite `teams` on which settings may be tuned: of the training split."""
-    whole: dict[str, Any] = {"burst": _UNLIMITED, "i_min_bits": 0.0}
-    channels = {"": whole, ", half of the messages lost": {**whole, "loss_probability": _LOSSY}}
     return tuple(
         task_in(
             team_name(name, 4) + words,
-            with_settings(SCENARIOS[name], {"robots": 4, "channel": channel}),
+            with_settings(SCENARIOS[name], {"robots": 4, "channel": _CHANNELS[words]}),
             starts,
             "train",
         )
         for name in ("room-furnished", "office", "cave")
-        for words, channel in channels.items()
+        for words in ("", ", half of the messages lost")
     )
 
 

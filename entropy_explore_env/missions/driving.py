@@ -26,6 +26,7 @@ from entropy_explore_env.missions.poses import (
     pose_at,
     profile_of,
     share_left,
+    since_scan_m,
     to_grid_units,
     within_grid,
 )
@@ -117,13 +118,11 @@ def leave_path(params, robot, time_s, braking):
         return 0
     braking_m = braking_metres(params, robot, time_s)
     left = share_left(params, robot, time_s)
-    driven_m = (1.0 - left) * robot.path_m
     robot.distance_m -= left * robot.path_m
     if robot.move_end != _ARRIVED and robot.move_end != _CORNERS:
         robot.blocked_moves -= 1
     if not math.isinf(params.scan_every_m):
-        since_m = robot.scan_lead_m + driven_m - robot.scans_under_way * params.scan_every_m
-        robot.scan_lead_m = min(max(since_m, 0.0), params.scan_every_m)
+        robot.scan_lead_m = min(since_scan_m(params, robot, time_s), params.scan_every_m)
     x, y, z, passed = resting_place(params, robot, time_s, braking_m)
     robot.lead_s = math.sqrt(2.0 * braking_m / params.acceleration_m_s2)
     if braking_m == 0.0:

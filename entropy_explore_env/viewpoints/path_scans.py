@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 
-from entropy_explore_env.belief.paths.search import extract_path
-from entropy_explore_env.belief.voxel_index import flat_index, grid_index
+from entropy_explore_env.belief.voxel_index import grid_index
 from entropy_explore_env.compilation.kernels import lean_kernel
 from entropy_explore_env.viewpoints.gathered_bits import gathered_bits
 from entropy_explore_env.viewpoints.imagined_scan import imagine_scan
@@ -13,19 +12,6 @@ from entropy_explore_env.viewpoints.travel import STRAIGHTENED
 
 _ROUNDING = 1e-6
 """A scan under way so near to a drive's end, as a share of the drive, is the one that is taken there."""
-
-
-@lean_kernel
-def planned_path(search, lattice, size, at, path):
-    """Write down the voxels of the path that the latest search found to a viewpoint (5,).
-
-    Returns:
-        How many; 0 = there is none.
-    """
-    voxel = flat_index(
-        size, min(int(at[0]), size[0] - 1), min(int(at[1]), size[1] - 1), min(int(at[2]), size[2] - 1)
-    )
-    return extract_path(search, lattice, voxel, path)
 
 
 @lean_kernel
@@ -40,7 +26,7 @@ def fill_path_scans(lattice, size, path, count, here, at, every, since_scan, rea
         lattice: Of the search; where it is one layer, all scans are at the robot's height.
         size: (X, Y, Z) voxels.
         path: (V,) int32, voxels from the robot's to the viewpoint's.
-        count: How many; 0 or 1 = the robot drives straight.
+        count: Number of voxels of the path; 0 or 1 = the robot drives straight.
         here: (5,) the robot.
         at: (5,) the viewpoint, whose gaze is taken to be that of all the scans.
         every: Voxel edges from one scan under way to the next; inf = none is taken.
@@ -49,7 +35,7 @@ def fill_path_scans(lattice, size, path, count, here, at, every, since_scan, rea
         scan_poses: (N, 5), of which the first are filled in.
 
     Returns:
-        How many; the scan at the viewpoint is none of them.
+        Number of poses that were filled in; the scan at the viewpoint itself is not among them.
     """
     most, steps = len(scan_poses), 0.0
     straight = math.sqrt((at[0] - here[0]) ** 2 + (at[1] - here[1]) ** 2 + (at[2] - here[2]) ** 2)

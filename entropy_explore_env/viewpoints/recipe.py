@@ -46,8 +46,8 @@ class Recipe:
             marginal value theorem of Charnov 1976, by which foragers leave a patch).
         behind: How many times its own bits an unknown voxel beside a free one promises, where far places are
             looked for.
-        path_scans: So many of the scans on the path to a viewpoint, spread evenly over it, count in what it
-            is worth: those under way, and those at stops; 0 = that at the viewpoint alone.
+        path_scans: Number of scans on the path to a viewpoint that its value includes, under way and at
+            stops, spread evenly over the path; 0 = the scan at the viewpoint alone.
     """
 
     exponent: float

@@ -1,4 +1,4 @@
-"""Scans on the way to a viewpoint: where they are, by hand, and what all of them bring, ray by ray."""
+"""Scans on the path to a viewpoint: where they are, by hand, and what all of them bring, ray by ray."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from entropy_explore_env.belief.fields import Belief
 from entropy_explore_env.belief.paths.lattice import belief_costs, new_lattice
 from entropy_explore_env.belief.paths.planning import search_paths
-from entropy_explore_env.belief.paths.search import new_search
+from entropy_explore_env.belief.paths.search import extract_path, new_search
 from entropy_explore_env.belief.raycast import longest_crossing
 from entropy_explore_env.belief.visibility import CONE
 from entropy_explore_env.missions.view import view_of
@@ -22,7 +22,7 @@ from entropy_explore_env.scenarios import BOX
 from entropy_explore_env.viewpoints.evaluation import robot_model
 from entropy_explore_env.viewpoints.expected_scan import new_scan_scratch
 from entropy_explore_env.viewpoints.imagined_scan import imagine_scan, imagined_bits
-from entropy_explore_env.viewpoints.path_scans import combined_bits, fill_path_scans, planned_path
+from entropy_explore_env.viewpoints.path_scans import combined_bits, fill_path_scans
 from entropy_explore_env.viewpoints.travel import STRAIGHTENED
 from tests.reference.scenes import drawn, free_box, seeds, started
 
@@ -113,17 +113,17 @@ def test_a_path_is_that_of_the_search():
     costs = belief_costs(mean, precision, 1e-3)
     search_paths(search, lattice, costs, np.array([start], np.int32), goal, math.inf)
     path = np.zeros(mean.size, np.int32)
-    count = planned_path(search, lattice, SIZE, np.array([5.5, 2.5, 2.5, 0.0, 0.0]), path)
+    count = extract_path(search, lattice, goal, path)
     assert path[0] == start and path[count - 1] == goal
     assert (np.stack(np.unravel_index(path[:count], SIZE))[1].max()) == 10
-    shut = np.array([3.5, 2.5, 2.5, 0.0, 0.0])
-    assert planned_path(search, lattice, SIZE, shut, path) == 0
+    shut = int(np.ravel_multi_index((3, 2, 2), SIZE))
+    assert extract_path(search, lattice, shut, path) == 0
 
 
 @given(st.integers(0, 4), seeds)
 @drawn(30)
 def test_all_scans_bring_what_their_precision_adds_up_to(count, seed):
-    """Σ ½ log2(1 + Σ added/p), scan by scan in NumPy; with none on the way that of the viewpoint alone."""
+    """Σ ½ log2(1 + Σ added/p), scan by scan in NumPy; with none on the path that of the viewpoint alone."""
     rng = np.random.default_rng(seed)
     mean = np.where(rng.random(SIZE) < 0.15, 0.9, 0.1).astype(np.float32).reshape(-1)
     precision = np.where(rng.random(SIZE) < 0.5, 1e-3, 100.0).astype(np.float32).reshape(-1)

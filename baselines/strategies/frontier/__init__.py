@@ -108,10 +108,10 @@ class ExplorationConfig:
         finest_sigma: The last σ that counts as explored, no more than that of `frontiers`; None = the
             mission's σ_end.
         lazy: Whether V is counted only as far as a choice needs; the results are the same.
-        path_scans: V counts what so many of the scans on the path see, too, spread evenly over it: those
-            under way, and those at stops. It does for the candidate that is best without these, and for the
-            eight best of those to which paths are no longer than two sensor ranges; teammates do not know of
-            it. 0 = what is seen from the candidate alone. It needs the `ray-cast` visibility.
+        path_scans: Number of scans on the path to a candidate that V includes, under way and at stops, spread
+            evenly over the path; 0 = V is counted from the candidate alone. They are included for the
+            candidate that is best without them, and for the eight best candidates whose paths are at most
+            two sensor ranges long. Promises do not include them. Needs the `ray-cast` visibility.
 
     Raises:
         SettingError: A field has another value.

@@ -26,13 +26,13 @@ from baselines.strategies.frontier.voxel.candidates import VoxelCandidates
 from baselines.strategies.frontier.voxel.map import NONE
 from entropy_explore_env.belief.paths.lattice import Lattice, costs_of, new_lattice
 from entropy_explore_env.belief.paths.planning import resume_search, search_paths, start_search
-from entropy_explore_env.belief.paths.search import Search, cost_to, costs_to_all
+from entropy_explore_env.belief.paths.search import Search, cost_to, costs_to_all, extract_path
 from entropy_explore_env.compilation.kernels import lean_kernel
 from entropy_explore_env.missions.view import RobotView, TeammateView
 from entropy_explore_env.robots.motion import driving_time
 from entropy_explore_env.scenario import Scenario
 from entropy_explore_env.settings import RobotKind
-from entropy_explore_env.viewpoints.path_scans import fill_path_scans, planned_path
+from entropy_explore_env.viewpoints.path_scans import fill_path_scans
 
 _LOST_AFTER = 2.0
 """A silent robot counts as under way for this many times a drive along all sides of the workspace."""
@@ -42,8 +42,8 @@ range costs more than counting the few candidates beyond that could be better.""
 _EXTENSION = 1.4
 """Then they are searched this many times as far until that is enough."""
 _SHORTLISTED, _SHORT_RANGES = 8, 2.0
-"""Candidates for which scans on the path count: the best of all without these, and as many of those to which
-paths are no longer than so many sensor ranges."""
+"""Scans on the path are counted for a shortlist: the candidate that is best without them, and this number of
+the best candidates whose paths are at most this number of sensor ranges long."""
 _PARTING_DRAWS = 8
 """So many places away from teammates are drawn, of which the farthest from them is taken."""
 
@@ -372,9 +372,9 @@ class Allocator:
         kind, size = self._scenario.kind_of(robot), self._scenario.grid.shape
         every, reach = kind.sensor.scan_every_m / self._edge, kind.robot.reach_m / self._edge
         path, scan_poses = self._path, self._scan_poses
-        steps = planned_path(self.search, self.lattice, size, at, path)
+        voxels = extract_path(self.search, self.lattice, voxel, path)
         count = fill_path_scans(
-            self.lattice, size, path, steps, here, at, every, since_scan, reach, scan_poses[:-1]
+            self.lattice, size, path, voxels, here, at, every, since_scan, reach, scan_poses[:-1]
         )
         scan_poses[count] = at
         return self.candidates.count_together(slot, scan_poses[: count + 1, :3])

@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 
 from entropy_explore_env.belief.paths.planning import resume_search, start_search
+from entropy_explore_env.belief.paths.search import extract_path
 from entropy_explore_env.belief.visibility import mark_cones
 from entropy_explore_env.belief.voxel_index import flat_index
 from entropy_explore_env.compilation.kernels import lean_kernel
 from entropy_explore_env.randomness import draw_gaussian, draw_uniform
 from entropy_explore_env.viewpoints.evaluation import straight_seconds
 from entropy_explore_env.viewpoints.imagined_scan import imagined_bits
-from entropy_explore_env.viewpoints.path_scans import combined_bits, fill_path_scans, planned_path
+from entropy_explore_env.viewpoints.path_scans import combined_bits, fill_path_scans
 from entropy_explore_env.viewpoints.proposals.records import Kind
 from entropy_explore_env.viewpoints.proposals.situation import worth_bits
 from entropy_explore_env.viewpoints.travel import travel_seconds
@@ -199,7 +200,7 @@ def value_path_scans(proposer, situation, scan, pool, first, last, searched):
         if pool.values[k] <= 0.0:
             continue
         if searched:
-            count = planned_path(scratch.search, lattice, size, at, scratch.path)
+            count = extract_path(scratch.search, lattice, voxel_at(size, at), scratch.path)
         taken = fill_path_scans(
             lattice, size, scratch.path, count, here, at, every, since_scan, reach, scan_poses
         )
