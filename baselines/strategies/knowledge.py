@@ -1,7 +1,8 @@
-"""What strategies read off a RobotView for kernels: the belief, and what teammates announced to see."""
+"""What strategies read off a RobotView: the belief, for kernels, and what is known of teammates."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 
 import numpy as np
@@ -9,7 +10,11 @@ import numpy as np
 from entropy_explore_env.belief.fields import Belief
 from entropy_explore_env.belief.visibility import CONE, cone_of
 from entropy_explore_env.missions.view import RobotView, TeammateView
+from entropy_explore_env.robots.motion import driving_time
 from entropy_explore_env.settings import Grid
+
+_LOST_AFTER = 2.0
+"""A silent robot counts as under way for this many times a drive along all sides of the workspace."""
 
 
 def belief_of(view: RobotView) -> Belief:
@@ -32,6 +37,31 @@ def teammates_that_share(view: RobotView) -> Mapping[int, TeammateView]:
     if view.scenario.channel.burst == 0:
         return {}
     return {mate: seen for mate, seen in view.teammates.items() if not seen.silent}
+
+
+def under_way(view: RobotView, mate: TeammateView, robot: int) -> bool:
+    """Whether a teammate, by what was heard of it, is on its way to the viewpoint that it announced.
+
+    It is until a scan from there is heard, or until so much time has passed that it must have arrived: then
+    it is out of the channel's range, or its messages were lost. Scans that are taken during a drive do not
+    count.
+    """
+    if mate.announced_s < 0.0:
+        return False
+    kind, size_m = view.scenario.kind_of(robot), view.scenario.grid.size_m
+    if mate.heard_s <= mate.announced_s:
+        drive_s = driving_time(float(sum(size_m)), kind.robot.max_speed_m_s, kind.robot.acceleration_m_s2)
+        return view.time_s - mate.announced_s <= _LOST_AFTER * drive_s + kind.sensor.scan_time_s
+    if math.isinf(kind.sensor.scan_every_m):
+        return False
+    apart_m = float(np.linalg.norm(mate.pose[:3] - mate.viewpoint[:3]))
+    return apart_m > view.scenario.grid.voxel_size_m
+
+
+def stays(view: RobotView, mate: TeammateView) -> bool:
+    """Whether a teammate waits: the viewpoint that it announced is where it was before."""
+    apart_m = float(np.linalg.norm(mate.pose[:3] - mate.viewpoint[:3]))
+    return apart_m < 0.5 * view.scenario.grid.voxel_size_m
 
 
 def announced_cone(grid: Grid, mate: TeammateView) -> np.void:

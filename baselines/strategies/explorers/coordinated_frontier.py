@@ -10,12 +10,12 @@ with V the length of the path in sensor ranges, and P(d) = 1 - d/range up to the
 assigned theirs first where a pair of robot and frontier cell is worth more, as in the paper's algorithm;
 the robot assumes that they have its own map.
 
-`assigned-frontier`: frontier cells are put into groups, each within half a sensor's range of one cell, and
-all robots that are known, under way or not, are assigned to different groups so that the sum of the path
-lengths is least (the Hungarian method, Kuhn 1955). A robot without a group, there being fewer than robots,
-goes to the nearest one.
+`assigned-frontier`: frontier cells are put into groups, each within a quarter of a sensor's range of one
+cell. All robots that are known, under way or not, are assigned to different groups so that the sum of the
+path lengths is least (the Hungarian method, Kuhn 1955). A robot without a group, there being fewer than
+robots, goes to the nearest one.
 
-Neither β nor the size of groups is tuned.
+β is the paper's; the radius of groups is tuned, see docs/explorers.md.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ class CoordinatedConfig:
     """
 
     beta: float = 1.0
-    group: float = 0.5
+    group: float = 0.25
 
     def __post_init__(self) -> None:
         """Check both."""

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Callable
 
 import numpy as np
 
@@ -119,6 +120,22 @@ class FrontierCells(VoxelCandidates):
         found = voxels != NONE
         return voxels[found], lengths[found]
 
+    def nearest_by(self, lengths_to: Callable[[np.ndarray], np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+        """Of each block the frontier cell with the shortest path, as `nearest_of_blocks` with all in reach.
+
+        Args:
+            lengths_to: (N,) int32 voxels → (N,) lengths of the paths to them; inf = no path.
+        """
+        blocks = np.flatnonzero(self._map.voxel != NONE)
+        cells = np.empty(len(blocks) * math.prod(self._map.across), np.int32)
+        ends = np.empty(len(blocks), np.int64)
+        collect_cells(self._map, blocks, cells, ends)
+        cells = cells[: ends[-1]] if len(ends) else cells
+        voxels, lengths = np.empty(len(blocks), np.int32), np.empty(len(blocks))
+        fill_nearest(cells, ends, lengths_to(cells), voxels, lengths)
+        found = voxels != NONE
+        return voxels[found], lengths[found]
+
     def of_blocks(self) -> tuple[np.ndarray, np.ndarray]:
         """(K,) int32 a frontier cell of each block, whether or not a path leads to it; (K,) float64 zeros."""
         voxels = self._map.voxel[self._map.voxel != NONE]
@@ -203,6 +220,44 @@ def fill_nearest_of_blocks(
                         length = cost_to(search, voxel)
                         if length <= reach and length < lengths[place]:
                             voxels[place], lengths[place] = voxel, length
+
+
+@lean_kernel
+def collect_cells(frontiers: FrontierMap, blocks: np.ndarray, cells: np.ndarray, ends: np.ndarray) -> None:
+    """Fill in the frontier cells of (K,) int64 blocks one after the other, and (K,) int64 where each ends."""
+    count = 0
+    for place in range(len(blocks)):
+        low, high = block_span(frontiers, blocks[place])
+        for x in range(low[0], high[0]):
+            for y in range(low[1], high[1]):
+                for z in range(low[2], high[2]):
+                    voxel = flat_index(frontiers.size, x, y, z)
+                    if frontiers.flags[voxel] & CANDIDATE:
+                        cells[count] = voxel
+                        count += 1
+        ends[place] = count
+
+
+@lean_kernel
+def fill_nearest(
+    cells: np.ndarray, ends: np.ndarray, lengths: np.ndarray, nearest: np.ndarray, least: np.ndarray
+) -> None:
+    """Fill (K,) int32 and float64 with the first of the nearest cells of each block; NONE, inf = no path.
+
+    Args:
+        cells: (N,) int32, as of `collect_cells`.
+        ends: (K,) int64, likewise.
+        lengths: (N,) of the paths to the cells.
+        nearest: Filled in.
+        least: Likewise, lengths.
+    """
+    cell = 0
+    for place in range(len(ends)):
+        nearest[place], least[place] = NONE, math.inf
+        while cell < ends[place]:
+            if lengths[cell] < least[place]:
+                nearest[place], least[place] = cells[cell], lengths[cell]
+            cell += 1
 
 
 @lean_kernel

@@ -12,6 +12,7 @@ import numpy as np
 
 from baselines.strategies.explorers.frontier_cells import FrontierCells
 from entropy_explore_env.belief.paths.lattice import Costs, Lattice, costs_of, new_lattice
+from entropy_explore_env.belief.paths.layer_lengths import fill_layer_lengths
 from entropy_explore_env.belief.paths.planning import resume_search, search_paths, start_search
 from entropy_explore_env.belief.paths.search import Search, cost_to, extract_path
 from entropy_explore_env.belief.paths.string_pulling import line_of_sight_cost, string_pulled
@@ -77,6 +78,50 @@ class KnownPaths:
         lengths = np.empty(len(voxels))
         fill_lengths(self.search, voxels, lengths)
         return lengths
+
+    def all_frontiers(self, here: int) -> tuple[np.ndarray, np.ndarray]:
+        """(K,) voxels and lengths: of each block the nearest frontier cell from a voxel; a new search."""
+        if self.lattice.layer >= 0:
+            return self._cells.nearest_by(lambda cells: self.lengths_from(here, cells))
+        self.start(here)
+        return self.frontiers_within(math.inf)
+
+    def lengths_from(self, voxel: int, others: np.ndarray, most: float = math.inf) -> np.ndarray:
+        """(K,) lengths of the paths from a voxel to (K,) int32 others; inf = no path. A new search.
+
+        Args:
+            voxel: Where a robot stands, whether or not its body is known to fit.
+            others: Where the paths end.
+            most: No path is longer.
+        """
+        if self.lattice.layer >= 0:
+            lengths, opened = np.empty(len(others)), self._cells.open_start(voxel)
+            fill_layer_lengths(self.search, self.lattice, self.costs, voxel, others, lengths)
+            self._cells.close(opened)
+            return lengths
+        self.start(voxel)
+        lengths = self.lengths_to(others)
+        while self.reach < most and not (lengths <= self.reach).all():
+            self.extend(most if math.isinf(most) else min(1.3 * self.reach, most))
+            lengths = self.lengths_to(others)
+        return lengths
+
+    def lengths_between(self, places: np.ndarray, lengths: np.ndarray) -> np.ndarray:
+        """(1 + K, 1 + K) lengths of the shortest paths between the robot and K places; new searches.
+
+        Args:
+            places: (K,) int32 voxels, near ones first.
+            lengths: (K,) of the paths from the robot to them.
+        """
+        between = np.zeros((1 + len(places), 1 + len(places)))
+        between[0, 1:], between[1:, 0] = lengths, lengths
+        for last in range(
+            len(places) - 1, 0, -1
+        ):  # from far places first: near ones then need no long searches
+            most = float((lengths[last] + lengths[:last]).max())
+            row = self.lengths_from(int(places[last]), places[:last], most)
+            between[1 + last, 1 : 1 + last] = between[1 : 1 + last, 1 + last] = row
+        return between
 
     def around(self, voxel: int, radius: int) -> np.ndarray:
         """(N,) int32 voxels that the latest search reached, up to `radius` voxels off along every axis."""

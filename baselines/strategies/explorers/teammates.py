@@ -7,8 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from baselines.strategies.explorers.explorer import Scene
-from baselines.strategies.frontier.allocation import stays, under_way
-from baselines.strategies.knowledge import teammates_that_share, voxel_of
+from baselines.strategies.knowledge import stays, teammates_that_share, under_way, voxel_of
 
 
 class Team(NamedTuple):
@@ -57,9 +56,4 @@ def lengths_of_all(scene: Scene, voxels: np.ndarray, lengths: np.ndarray, places
 
     The robot's own are `lengths`. Teammates are assumed to have the robot's own map.
     """
-    rows = [lengths]
-    for place in places:
-        scene.paths.start(int(place))
-        scene.paths.extend(np.inf)
-        rows.append(scene.paths.lengths_to(voxels))
-    return np.array(rows)
+    return np.array([lengths, *(scene.paths.lengths_from(int(place), voxels) for place in places)])

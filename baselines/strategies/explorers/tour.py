@@ -17,7 +17,6 @@ Tuned: `near` and `cover`, see `TourConfig`.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,7 +24,6 @@ import numpy as np
 from baselines.strategies.explorers.explorer import Explorer, Scene
 from baselines.strategies.explorers.nearest_frontier import best_of
 from baselines.strategies.explorers.open_tours import open_tour, tour_length
-from baselines.strategies.explorers.path_lengths import KnownPaths
 from baselines.strategies.explorers.teammates import centres_of
 from baselines.strategies.frontier.voxel.map import NONE
 from entropy_explore_env.validation import check, check_count, check_positive
@@ -73,13 +71,13 @@ class Tour(Explorer):
 
     def pick(self, scene: Scene) -> int:
         """See `Explorer`."""
-        return self.pick_among(scene, *scene.paths.frontiers_within(math.inf))
+        return self.pick_among(scene, *scene.paths.all_frontiers(scene.here))
 
     def pick_among(self, scene: Scene, voxels: np.ndarray, lengths: np.ndarray) -> int:
         """The first place of a tour through what (K,) frontier cells stand for; NONE = there are none.
 
         Args:
-            scene: What the robot knows; its search has reached the cells.
+            scene: What the robot knows.
             voxels: (K,) int32, the cells.
             lengths: (K,) of the paths to them, in voxel edges.
         """
@@ -90,8 +88,9 @@ class Tour(Explorer):
         near = lengths <= self.config.near * scene.cells.reach
         near[self.config.most_near :] = False
         kept, far = self._cover(scene, voxels[near]), self._coarse(scene, voxels[~near])
-        places = np.concatenate([voxels[near][kept], voxels[~near][far]]).astype(np.int32)
-        between = lengths_between(scene.paths, scene.here, places)
+        chosen = np.concatenate([np.flatnonzero(near)[kept], np.flatnonzero(~near)[far]]).astype(np.int64)
+        places = voxels[chosen]
+        between = scene.paths.lengths_between(places, lengths[chosen])
         if scene.target != NONE and scene.target in places:
             return self._begun(between, places, scene.target)
         return int(places[open_tour(between)[1] - 1])
@@ -122,36 +121,14 @@ class Tour(Explorer):
             left &= ~seen[best]
         return chosen
 
-    def _coarse(self, scene: Scene, voxels: np.ndarray) -> list[int]:
+    def _coarse(self, scene: Scene, voxels: np.ndarray) -> np.ndarray:
         """Of the far frontier cells, in order of distance, the first of each coarse cell; the target, too."""
         edge = max(self.config.coarse * scene.cells.reach, 1.0)
         cells = np.floor(centres_of(scene, voxels) / edge).astype(np.int64)
-        first: dict[tuple[int, ...], int] = {}
-        for number, cell in enumerate(map(tuple, cells.tolist())):
-            if cell not in first or voxels[number] == scene.target:
-                first[cell] = number
-        return sorted(first.values())[: self.config.most_far]
-
-
-def lengths_between(paths: KnownPaths, here: int, places: np.ndarray) -> np.ndarray:
-    """(1 + K, 1 + K) lengths of the shortest paths between the robot's voxel and K places.
-
-    Args:
-        paths: Of the robot, with a complete search from where it is, which is another one afterwards.
-        here: Its voxel.
-        places: (K,) int32 voxels that the search reached, near ones first.
-    """
-    nodes = np.concatenate([[here], places]).astype(np.int32)
-    lengths = paths.lengths_to(nodes)
-    between = np.zeros((len(nodes), len(nodes)))
-    between[0], between[:, 0] = lengths, lengths
-    for number in range(len(nodes) - 1, 1, -1):  # from far places first: near ones then need no long searches
-        nearer = nodes[1:number]
-        paths.start(int(nodes[number]))
-        row = paths.lengths_to(nearer)
-        most = float((lengths[number] + lengths[1:number]).max())
-        while paths.reach < most and not (row <= paths.reach).all():
-            paths.extend(min(1.3 * paths.reach, most))
-            row = paths.lengths_to(nearer)
-        between[number, 1:number] = between[1:number, number] = row
-    return between
+        if len(cells) == 0:
+            return np.zeros(0, np.int64)
+        numbers = np.ravel_multi_index(tuple(cells.T), tuple(cells.max(axis=0) + 1))
+        _, first, of_cell = np.unique(numbers, return_index=True, return_inverse=True)
+        target = np.flatnonzero(voxels == scene.target)
+        first[of_cell[target]] = target
+        return np.sort(first)[: self.config.most_far]

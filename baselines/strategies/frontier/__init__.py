@@ -32,10 +32,10 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from baselines.strategies.frontier.allocation import Allocator, Choice, Value, stays, under_way
+from baselines.strategies.frontier.allocation import Allocator, Choice, Value
 from baselines.strategies.frontier.candidates import FrontierConfig
 from baselines.strategies.frontier.voxel.map import NONE
-from baselines.strategies.knowledge import teammates_that_share
+from baselines.strategies.knowledge import stays, teammates_that_share, under_way
 from baselines.strategies.protocol import random_viewpoint
 from entropy_explore_env.belief.paths.search import extract_path, new_search
 from entropy_explore_env.belief.paths.string_pulling import string_pulled

@@ -21,21 +21,19 @@ from typing import Protocol
 import numpy as np
 
 from baselines.strategies.frontier.candidates import Candidates, FrontierConfig
+from baselines.strategies.frontier.path_scans import Leg, PathScans
 from baselines.strategies.frontier.terrain.candidates import TerrainCandidates
 from baselines.strategies.frontier.voxel.candidates import VoxelCandidates
 from baselines.strategies.frontier.voxel.map import NONE
 from entropy_explore_env.belief.paths.lattice import Lattice, costs_of, new_lattice
 from entropy_explore_env.belief.paths.planning import resume_search, search_paths, start_search
-from entropy_explore_env.belief.paths.search import Search, cost_to, costs_to_all, extract_path
+from entropy_explore_env.belief.paths.search import Search, cost_to, costs_to_all
 from entropy_explore_env.compilation.kernels import lean_kernel
-from entropy_explore_env.missions.view import RobotView, TeammateView
+from entropy_explore_env.missions.view import RobotView
 from entropy_explore_env.robots.motion import driving_time
 from entropy_explore_env.scenario import Scenario
 from entropy_explore_env.settings import RobotKind
-from entropy_explore_env.viewpoints.path_scans import fill_path_scans
 
-_LOST_AFTER = 2.0
-"""A silent robot counts as under way for this many times a drive along all sides of the workspace."""
 _FIRST_REACH = 0.25
 """Paths are searched so far at first, in sensor ranges: most choices are nearer, and a search over a whole
 range costs more than counting the few candidates beyond that could be better."""
@@ -136,9 +134,8 @@ class Allocator:
         )
         self.costs = costs_of(self.candidates.traversal_cost, 1.0)
         self.counted = 0
-        self._scan_poses = np.zeros((path_scans + 1, 5))
         self._path_scans = path_scans
-        self._path = np.empty(scenario.grid.voxels if path_scans > 0 else 0, np.int32)
+        self._on_path = PathScans(scenario, search, self.lattice, path_scans)
 
     def allocate(
         self, view: RobotView, stopped: Sequence[int], targets: Sequence[np.ndarray], everybody: bool = False
@@ -354,7 +351,11 @@ class Allocator:
         since_scan = view.since_scan_m / self._edge if robot == view.robot else 0.0
         seen = np.array(
             [
-                self._seen_with_path_scans(robot, int(slots[k]), int(voxels[k]), path_costs.start, since_scan)
+                self._on_path.seen(
+                    self.candidates,
+                    int(slots[k]),
+                    Leg(robot, path_costs.start, since_scan, int(voxels[k]), self.place_of(int(voxels[k]))),
+                )
                 for k in listed
             ]
         )
@@ -362,22 +363,6 @@ class Allocator:
         best = int(np.argmax(value))
         chosen = listed[best]
         return Choice(int(slots[chosen]), int(voxels[chosen]), float(value[best]), float(seconds[chosen]))
-
-    def _seen_with_path_scans(
-        self, robot: int, slot: int, voxel: int, start: np.ndarray, since_scan: float
-    ) -> float:
-        """V·(height factor) in points of a candidate, with what scans on the path to it see."""
-        here, at = np.zeros(5), np.zeros(5)
-        here[:3], at[:3] = start, self.place_of(voxel)
-        kind, size = self._scenario.kind_of(robot), self._scenario.grid.shape
-        every, reach = kind.sensor.scan_every_m / self._edge, kind.robot.reach_m / self._edge
-        path, scan_poses = self._path, self._scan_poses
-        voxels = extract_path(self.search, self.lattice, voxel, path)
-        count = fill_path_scans(
-            self.lattice, size, path, voxels, here, at, every, since_scan, reach, scan_poses[:-1]
-        )
-        scan_poses[count] = at
-        return self.candidates.count_together(slot, scan_poses[: count + 1, :3])
 
     def _seen(self, slots: np.ndarray, weighed: np.ndarray) -> np.ndarray:
         """(K,) V·(height factor) of candidates in points' size; `weighed` as in `_best_of`."""
@@ -454,28 +439,3 @@ def fill_driving_times(
 
 def _value_of(choice: Choice | None) -> float:
     return -math.inf if choice is None else choice.value
-
-
-def under_way(view: RobotView, mate: TeammateView, robot: int) -> bool:
-    """Whether a teammate, by what was heard of it, is on its way to the viewpoint that it announced.
-
-    It is until a scan from there is heard, or until so much time has passed that it must have arrived: then
-    it is out of the channel's range, or its messages were lost. Scans that are taken during a drive do not
-    count.
-    """
-    if mate.announced_s < 0.0:
-        return False
-    kind, size_m = view.scenario.kind_of(robot), view.scenario.grid.size_m
-    if mate.heard_s <= mate.announced_s:
-        drive_s = driving_time(float(sum(size_m)), kind.robot.max_speed_m_s, kind.robot.acceleration_m_s2)
-        return view.time_s - mate.announced_s <= _LOST_AFTER * drive_s + kind.sensor.scan_time_s
-    if math.isinf(kind.sensor.scan_every_m):
-        return False
-    apart_m = float(np.linalg.norm(mate.pose[:3] - mate.viewpoint[:3]))
-    return apart_m > view.scenario.grid.voxel_size_m
-
-
-def stays(view: RobotView, mate: TeammateView) -> bool:
-    """Whether a teammate waits: the viewpoint that it announced is where it was before."""
-    apart_m = float(np.linalg.norm(mate.pose[:3] - mate.viewpoint[:3]))
-    return apart_m < 0.5 * view.scenario.grid.voxel_size_m

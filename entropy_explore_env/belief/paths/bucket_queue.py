@@ -16,6 +16,8 @@ from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel,
 BUCKETS = 1024
 """Buckets of the ring, a power of two; keys beyond the ring go into the last one."""
 
+BUCKET_WIDTH = 1.0 - 2.0**-20
+"""Width of a bucket in cheapest steps: below 1, so that rounding puts no step's ends into one bucket."""
 _RING_MASK = BUCKETS - 1
 _BLOCK_ENTRIES = 15
 """Voxels of a block: with the number of the next block they fill 64 bytes."""

@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from entropy_explore_env.belief.paths.bucket_queue import (
+    BUCKET_WIDTH,
     advance,
     clear_queue,
     compact,
@@ -35,11 +36,11 @@ from entropy_explore_env.belief.paths.search import (
     NO_STEP,
     OPEN,
     SEARCH_SHIFT,
-    SEARCHES,
     STEP,
     STEP_SHIFT,
     TIGHT,
     Search,
+    begin_search,
     cost_per_edge,
     cost_to,
     extract_path,
@@ -54,8 +55,6 @@ from entropy_explore_env.validation import is_whole
 ANY_GOAL = -1
 """As a goal: paths to all voxels are wanted."""
 
-_BUCKET_WIDTH = 1.0 - 2.0**-20
-"""Width of a bucket in cheapest steps: below 1, so that rounding puts no step's ends into one bucket."""
 _BUCKETS_PER_STEP_TO_GOAL = 4.0
 """Buckets per cheapest step where there is a goal: fewer voxels are expanded twice."""
 
@@ -107,10 +106,7 @@ def start_search(search, lattice, costs, sources):
 
     Arguments as of `search_paths`.
     """
-    search.searches[0] += 1
-    if search.searches[0] > SEARCHES:  # once in millions of searches
-        search.mark[:] = 0
-        search.searches[0] = 1
+    begin_search(search)
     clear_queue(search.queue)
     for source in sources:
         x, y, z = grid_index(lattice.size, source)
@@ -257,7 +253,7 @@ def search_paths(search, lattice, costs, sources, goal, max_cost):
     """
     start_search(search, lattice, costs, sources)
     limit = np.nextafter(max_cost, math.inf)
-    per_cost = _BUCKET_WIDTH**-1 / costs.min_per_edge
+    per_cost = BUCKET_WIDTH**-1 / costs.min_per_edge
     indices = (0, 0, 0)
     if goal != ANY_GOAL:
         indices = grid_index(lattice.size, goal)
@@ -284,7 +280,7 @@ def resume_search(search, lattice, costs, max_cost):
         costs: As in the search.
         max_cost: No less than before; inf allowed.
     """
-    query = _Query(ANY_GOAL, (0, 0, 0), _BUCKET_WIDTH**-1 / costs.min_per_edge)
+    query = _Query(ANY_GOAL, (0, 0, 0), BUCKET_WIDTH**-1 / costs.min_per_edge)
     while advance(search.queue) and search.queue.state[0].current <= max_cost * query.per_cost:
         _expand_block(search, lattice, costs, query, math.inf)
 

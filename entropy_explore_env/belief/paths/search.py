@@ -63,6 +63,15 @@ def new_search(voxels: int) -> Search:
 
 
 @inlined_kernel
+def begin_search(search):
+    """Forget what the latest search found."""
+    search.searches[0] += 1
+    if search.searches[0] > SEARCHES:  # once in millions of searches
+        search.mark[:] = 0
+        search.searches[0] = 1
+
+
+@inlined_kernel
 def mark_of(search, lattice, costs, voxel, x, y, z):
     """Mark of a voxel in this search; classifies the voxel, and its block, where that was not done."""
     mark, number = np.int64(search.mark[voxel]), search.searches[0]

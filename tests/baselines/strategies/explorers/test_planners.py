@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 
 from baselines.strategies.explorers.receding_horizon import RecedingHorizon, RecedingHorizonConfig
-from baselines.strategies.explorers.tour import Tour, TourConfig, lengths_between
+from baselines.strategies.explorers.tour import Tour, TourConfig
 from tests.baselines.strategies.explorers.scenes import cell, corridor, random_plan, scene_of
 from tests.reference import explorers as reference
 from tests.reference.scenes import drawn, seeds
@@ -28,9 +28,8 @@ def test_lengths_between_places_are_those_of_paths_by_hand():
     """A corridor: from cell 8 to both ends 7 and 19, and 26 between them."""
     plan = corridor()
     scene = scene_of(plan, (8, 1))
-    scene.paths.extend(np.inf)
     ends = np.array([np.ravel_multi_index(place, plan.shape) for place in ((1, 1), (27, 1))], np.int32)
-    found = lengths_between(scene.paths, scene.here, ends)
+    found = scene.paths.lengths_between(ends, np.array([7.0, 19.0]))
     assert found == pytest.approx(np.array([[0, 7, 19], [7, 0, 26], [19, 26, 0]], float))
 
 
@@ -40,13 +39,13 @@ def test_lengths_between_places_are_the_shortest(seed):
     rng = np.random.default_rng(seed)
     plan, robot = random_plan((31, 14), rng)
     scene = scene_of(plan, robot)
-    scene.paths.extend(np.inf)
     reached = np.argwhere(np.isfinite(reference.lengths_from(plan, robot)))
     places = [tuple(map(int, place)) for place in reached[rng.integers(len(reached), size=4)]]
     voxels = np.array([np.ravel_multi_index(place, plan.shape) for place in places], np.int32)
     fields = reference.lengths_from_all(plan, [robot, *places])
     wanted = np.array([[field[place] for place in (robot, *places)] for field in fields])
-    assert lengths_between(scene.paths, scene.here, voxels) == pytest.approx(wanted, rel=1e-5, abs=1e-5)
+    found = scene.paths.lengths_between(voxels, scene.paths.lengths_from(scene.here, voxels))
+    assert found == pytest.approx(wanted, rel=1e-5, abs=1e-5)
 
 
 def test_a_tree_leads_to_where_something_is_unknown_and_else_to_the_nearest_frontier():

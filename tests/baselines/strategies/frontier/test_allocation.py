@@ -10,11 +10,11 @@ import pytest
 
 from baselines.experiments.mission import scripted
 from baselines.strategies.frontier import ExplorationConfig, FrontierStrategy
-from baselines.strategies.frontier.allocation import under_way
 from baselines.strategies.frontier.candidates import FrontierConfig
 from baselines.strategies.frontier.metrics import Nearest
 from baselines.strategies.frontier.voxel.candidates import VoxelCandidates
 from baselines.strategies.frontier.voxel.map import NONE
+from baselines.strategies.knowledge import under_way
 from entropy_explore_env.missions.view import view_of
 from entropy_explore_env.robots.motion import driving_time
 from entropy_explore_env.scenario import with_settings
