@@ -96,8 +96,8 @@ def test_plans_replan_at_every_scan_until_everything_is_seen():
 def test_the_page_says_with_what_plans_are_scanned():
     plan, *_ = find_suite("plans", True, TEAMS).tasks
     assert "1 ground robot that scans 720 rays of 8 m every 0.5 m, time limit" in about(plan, 4)
-    _, team, *_ = find_suite("teams", True, TEAMS).tasks
-    assert "2 flying robots, time limit" in about(team, team.missions)
+    _, team, *_ = find_suite("volumes", True, TEAMS).tasks
+    assert "3 flying robots, time limit" in about(team, team.missions)
     assert about(team, team.missions).startswith("2 starts, world")
     others = {task.name: about(task, 1) for task in find_suite("others", False, TEAMS).tasks}
     assert ", 1 ground robot, time limit" in others["cliff, 1 robot"]  # which looks down, and tilts
