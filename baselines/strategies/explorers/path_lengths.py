@@ -87,7 +87,9 @@ class KnownPaths:
         return self.frontiers_within(math.inf)
 
     def lengths_from(self, voxel: int, others: np.ndarray, most: float = math.inf) -> np.ndarray:
-        """(K,) lengths of the paths from a voxel to (K,) int32 others; inf = no path. A new search.
+        """(K,) lengths of the paths from a voxel to (K,) int32 others; inf = no path.
+
+        What the latest search found is lost: `start` another one.
 
         Args:
             voxel: Where a robot stands, whether or not its body is known to fit.
@@ -115,9 +117,8 @@ class KnownPaths:
         """
         between = np.zeros((1 + len(places), 1 + len(places)))
         between[0, 1:], between[1:, 0] = lengths, lengths
-        for last in range(
-            len(places) - 1, 0, -1
-        ):  # from far places first: near ones then need no long searches
+        # From far places first: near ones then need no long searches.
+        for last in range(len(places) - 1, 0, -1):
             most = float((lengths[last] + lengths[:last]).max())
             row = self.lengths_from(int(places[last]), places[:last], most)
             between[1 + last, 1 : 1 + last] = between[1 : 1 + last, 1 + last] = row

@@ -146,6 +146,7 @@ def fill_layer_lengths(search, lattice, costs, source, targets, lengths):
             settled += 1
     for place in range(len(targets)):
         lengths[place] = _length(search, targets[place])
+    clear_queue(queue)
     begin_search(search)  # these marks say nothing to those who read paths
 
 
