@@ -27,7 +27,6 @@ from baselines.strategies.frontier.voxel.map import (
     queue_block,
 )
 from baselines.strategies.frontier.voxel.visibility import count_from
-from entropy_explore_env.belief.paths.search import Search, cost_to
 from entropy_explore_env.belief.voxel_index import flat_index, grid_index
 from entropy_explore_env.compilation.kernels import lean_kernel
 from entropy_explore_env.missions.view import RobotView
@@ -104,35 +103,24 @@ class FrontierCells(VoxelCandidates):
         fill_crowds(self._map, voxels, radius, most, counts)
         return counts
 
-    def nearest_of_blocks(self, search: Search, reach: float) -> tuple[np.ndarray, np.ndarray]:
-        """Of each block the frontier cell that the latest search reached by the shortest path.
+    def nearest_of_blocks(
+        self, lengths_to: Callable[[np.ndarray], np.ndarray], reach: float = math.inf
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Of each block the frontier cell with the shortest path.
 
         Args:
-            search: Of paths from a robot's place, complete up to the reach.
+            lengths_to: (N,) int32 voxels → (N,) lengths of the paths to them; inf = no path.
             reach: Cells with longer paths are left out; inf allowed.
 
         Returns:
             (K,) int32 voxels and (K,) float64 lengths in voxel edges, in the order of the blocks.
         """
         blocks = np.flatnonzero(self._map.voxel != NONE)
-        voxels, lengths = np.empty(len(blocks), np.int32), np.empty(len(blocks))
-        fill_nearest_of_blocks(self._map, search, blocks, reach, voxels, lengths)
-        found = voxels != NONE
-        return voxels[found], lengths[found]
-
-    def nearest_by(self, lengths_to: Callable[[np.ndarray], np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
-        """Of each block the frontier cell with the shortest path, as `nearest_of_blocks` with all in reach.
-
-        Args:
-            lengths_to: (N,) int32 voxels → (N,) lengths of the paths to them; inf = no path.
-        """
-        blocks = np.flatnonzero(self._map.voxel != NONE)
         cells = np.empty(len(blocks) * math.prod(self._map.across), np.int32)
         ends = np.empty(len(blocks), np.int64)
-        collect_cells(self._map, blocks, cells, ends)
-        cells = cells[: ends[-1]] if len(ends) else cells
+        cells = cells[: collect_cells(self._map, blocks, cells, ends)]
         voxels, lengths = np.empty(len(blocks), np.int32), np.empty(len(blocks))
-        fill_nearest(cells, ends, lengths_to(cells), voxels, lengths)
+        fill_nearest(cells, ends, lengths_to(cells), reach, voxels, lengths)
         found = voxels != NONE
         return voxels[found], lengths[found]
 
@@ -191,40 +179,12 @@ class FrontierCells(VoxelCandidates):
 
 
 @lean_kernel
-def fill_nearest_of_blocks(
-    frontiers: FrontierMap,
-    search: Search,
-    blocks: np.ndarray,
-    reach: float,
-    voxels: np.ndarray,
-    lengths: np.ndarray,
-) -> None:
-    """Fill (K,) with the frontier cell of each of K blocks that has the shortest path; NONE = none has any.
+def collect_cells(frontiers: FrontierMap, blocks: np.ndarray, cells: np.ndarray, ends: np.ndarray) -> int:
+    """Fill in the frontier cells of (K,) int64 blocks one after the other, and (K,) int64 where each ends.
 
-    Args:
-        frontiers: FrontierMap.
-        search: The latest search.
-        blocks: (K,) int64 numbers of blocks.
-        reach: Longer paths do not count.
-        voxels: (K,) int32, filled in.
-        lengths: (K,) float64, filled in: of the paths, in voxel edges.
+    Returns:
+        How many cells there are.
     """
-    for place in range(len(blocks)):
-        low, high = block_span(frontiers, blocks[place])
-        voxels[place], lengths[place] = NONE, math.inf
-        for x in range(low[0], high[0]):
-            for y in range(low[1], high[1]):
-                for z in range(low[2], high[2]):
-                    voxel = flat_index(frontiers.size, x, y, z)
-                    if frontiers.flags[voxel] & CANDIDATE:
-                        length = cost_to(search, voxel)
-                        if length <= reach and length < lengths[place]:
-                            voxels[place], lengths[place] = voxel, length
-
-
-@lean_kernel
-def collect_cells(frontiers: FrontierMap, blocks: np.ndarray, cells: np.ndarray, ends: np.ndarray) -> None:
-    """Fill in the frontier cells of (K,) int64 blocks one after the other, and (K,) int64 where each ends."""
     count = 0
     for place in range(len(blocks)):
         low, high = block_span(frontiers, blocks[place])
@@ -236,11 +196,17 @@ def collect_cells(frontiers: FrontierMap, blocks: np.ndarray, cells: np.ndarray,
                         cells[count] = voxel
                         count += 1
         ends[place] = count
+    return count
 
 
 @lean_kernel
 def fill_nearest(
-    cells: np.ndarray, ends: np.ndarray, lengths: np.ndarray, nearest: np.ndarray, least: np.ndarray
+    cells: np.ndarray,
+    ends: np.ndarray,
+    lengths: np.ndarray,
+    reach: float,
+    nearest: np.ndarray,
+    least: np.ndarray,
 ) -> None:
     """Fill (K,) int32 and float64 with the first of the nearest cells of each block; NONE, inf = no path.
 
@@ -248,6 +214,7 @@ def fill_nearest(
         cells: (N,) int32, as of `collect_cells`.
         ends: (K,) int64, likewise.
         lengths: (N,) of the paths to the cells.
+        reach: Longer paths do not count.
         nearest: Filled in.
         least: Likewise, lengths.
     """
@@ -255,7 +222,7 @@ def fill_nearest(
     for place in range(len(ends)):
         nearest[place], least[place] = NONE, math.inf
         while cell < ends[place]:
-            if lengths[cell] < least[place]:
+            if lengths[cell] <= reach and lengths[cell] < least[place]:
                 nearest[place], least[place] = cells[cell], lengths[cell]
             cell += 1
 

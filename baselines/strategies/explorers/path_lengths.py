@@ -63,12 +63,12 @@ class KnownPaths:
     def frontiers_within(self, reach: float) -> tuple[np.ndarray, np.ndarray]:
         """(K,) voxels and lengths: of each block the nearest frontier cell, up to a length; inf = all."""
         self.extend(reach)
-        return self._cells.nearest_of_blocks(self.search, reach)
+        return self._cells.nearest_of_blocks(self.lengths_to, reach)
 
     def nearest_frontiers(self) -> tuple[np.ndarray, np.ndarray]:
         """(K,) frontier cells and lengths, one a block, among them the nearest of all."""
         while True:
-            voxels, lengths = self._cells.nearest_of_blocks(self.search, self.reach)
+            voxels, lengths = self._cells.nearest_of_blocks(self.lengths_to, self.reach)
             if len(voxels) or self.exhausted():
                 return voxels, lengths
             self.extend(_EXTENSION * self.reach)
@@ -82,7 +82,7 @@ class KnownPaths:
     def all_frontiers(self, here: int) -> tuple[np.ndarray, np.ndarray]:
         """(K,) voxels and lengths: of each block the nearest frontier cell from a voxel; a new search."""
         if self.lattice.layer >= 0:
-            return self._cells.nearest_by(lambda cells: self.lengths_from(here, cells))
+            return self._cells.nearest_of_blocks(lambda cells: self.lengths_from(here, cells))
         self.start(here)
         return self.frontiers_within(math.inf)
 
