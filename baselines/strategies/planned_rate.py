@@ -12,8 +12,9 @@ What a robot is, and what its mission asks for, decides how it explores:
 - Flying robots, and all in 3-D worlds: bits per time, with the recipe of narrow or of wide views.
 - Ground robots with a scanner that sees all around, in a plan, deciding at stops until the map has so little
   entropy: bits per time.
-- The same robots where everything is to be seen: frontier cells on short tours, by `explorers.shared_tour`.
-  Bits per time would leave what is small until the end, and drive back for it.
+- The same robots where everything is to be seen: frontier cells on short tours, by `explorers.shared_tour`,
+  with looks into pockets from outside. Bits per time would leave what is small until the end, and drive back
+  for it.
 - The same robots where they decide under way (`Robot.redecide`) until the map has so little entropy: frontier
   cells, by `explorers.advantage_ahead`, which sees the bulk sooner and drives farther in the end.
 - The same robots where a part may stay unseen: bits per time, of unknown voxels alone.
@@ -22,12 +23,13 @@ What a robot is, and what its mission asks for, decides how it explores:
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, fields, replace
+from typing import Any
 
 import numpy as np
 
 from baselines.strategies.explorers.advantage_ahead import AdvantageAhead
-from baselines.strategies.explorers.shared_tour import SharedTour
+from baselines.strategies.explorers.shared_tour import SharedTour, SharedTourConfig
 from entropy_explore_env.missions.view import RobotView
 from entropy_explore_env.missions.view_candidates import ViewProposer
 from entropy_explore_env.scenario import Scenario, with_settings
@@ -60,7 +62,7 @@ def _wants_everything(scenario: Scenario, kind: RobotKind) -> bool:
 
 @dataclass(frozen=True)
 class PlannedRateConfig:
-    """What differs from the recipe of every kind of robot; None = nothing. Who explores frontiers needs none.
+    """What differs from the recipe of every kind of robot, and from the tours' settings; None = nothing.
 
     Attributes:
         exponent: As in `viewpoints.recipe.Recipe`, likewise the others.
@@ -69,6 +71,8 @@ class PlannedRateConfig:
         leave_below: Likewise.
         dregs: Likewise.
         path_scans: Likewise.
+        pocket: As in `explorers.shared_tour.SharedTourConfig`, likewise the other.
+        sight: Likewise.
 
     Raises:
         SettingError: One of them is not allowed.
@@ -80,6 +84,8 @@ class PlannedRateConfig:
     leave_below: float | None = None
     dregs: float | None = None
     path_scans: int | None = None
+    pocket: float | None = None
+    sight: float | None = None
 
     def __post_init__(self) -> None:
         """Check every field."""
@@ -94,8 +100,16 @@ class PlannedRateConfig:
 
     def recipe(self, kind: RobotKind) -> Recipe:
         """Of a kind of robot."""
-        given = {name: value for name, value in asdict(self).items() if value is not None}
-        return replace(recipe_for(kind), **given)
+        return replace(recipe_for(kind), **self._given(Recipe))
+
+    def tour(self) -> SharedTourConfig:
+        """Of plans of which everything is to be seen."""
+        return SharedTourConfig(**self._given(SharedTourConfig))
+
+    def _given(self, settings: type[Recipe] | type[SharedTourConfig]) -> dict[str, Any]:
+        """Those of its fields that are also fields of other settings, and not None."""
+        known = {field.name for field in fields(settings)}
+        return {name: value for name, value in asdict(self).items() if name in known and value is not None}
 
 
 class PlannedRate:
@@ -109,7 +123,7 @@ class PlannedRate:
         """A new mission begins."""
         self._frontiers = [explores_frontiers(scenario, kind) for kind in scenario.kinds]
         if any(self._frontiers):
-            self._plans = SharedTour() if scenario.ending.by_seen else AdvantageAhead()
+            self._plans = SharedTour(self.config.tour()) if scenario.ending.by_seen else AdvantageAhead()
             self._plans.reset(scenario, rng)
         if not all(self._frontiers):
             one = with_settings(scenario, {"action": {"kind": "candidates", "candidates": 1}})

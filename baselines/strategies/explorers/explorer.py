@@ -13,6 +13,8 @@ Ours, where the rules say nothing:
 - A robot that a teammate stops waits for one scan if its number is the lower, and steps aside, to a random
   viewpoint, if it is the higher or has waited before.
 - A sensor that looks one way is turned to where most is unknown.
+- A rule may name a place from which its frontier cell is looked at. Where that shows nothing, the robot goes
+  on to the cell itself.
 """
 
 from __future__ import annotations
@@ -21,6 +23,7 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -68,6 +71,15 @@ class Scene:
     target: int
 
 
+class Goal(NamedTuple):
+    """Where a rule sends a robot."""
+
+    target: int
+    """The voxel that it explores, one in which the body may stand; NONE = no frontier can be reached."""
+    place: int
+    """The voxel to which the robot drives for that: the target itself, or one from which it is in sight."""
+
+
 @dataclass
 class _Memory:
     """What is kept of a robot from one decision to the next."""
@@ -77,6 +89,8 @@ class _Memory:
     level: float = KNOWN_SIGMA
     """σ from which on a voxel counts as known."""
     target: int = NONE
+    place: int = NONE
+    """Where it drives to explore the target."""
     viewpoint: np.ndarray | None = None
     """(5,) that was chosen last."""
     scanned: bool = False
@@ -94,8 +108,8 @@ class _Memory:
 class Explorer(ABC):
     """Drives robots to where a rule wants them; see the top of the file.
 
-    A rule is a subclass with `pick`. It may read what it needs from the Scene, and change nothing in it but
-    the state of the path search.
+    A rule is a subclass with `pick`, or with `goal`. It may read what it needs from the Scene, and change
+    nothing in it but the state of the path search.
     """
 
     rule = "this rule"
@@ -106,6 +120,11 @@ class Explorer(ABC):
     @abstractmethod
     def pick(self, scene: Scene) -> int:
         """The voxel to go to, one in which the body may stand; NONE = no frontier can be reached."""
+
+    def goal(self, scene: Scene) -> Goal:
+        """What to explore, and from where: what `pick` says, on the spot."""
+        target = self.pick(scene)
+        return Goal(target, target)
 
     def reset(self, scenario: Scenario, rng: np.random.Generator) -> None:
         """A new mission begins."""
@@ -138,15 +157,16 @@ class Explorer(ABC):
             return stopped
         kept = memory.target not in (NONE, here) and self._holds(memory.cells, memory.target)
         if kept and (self.until_reached or not memory.cells.changed):
-            return self._towards(view, memory, here, memory.target)
-        target = self._pick(view, memory, here, memory.target if kept else NONE)
-        if target == NONE:
+            place = memory.target if memory.place == here else memory.place
+            return self._towards(view, memory, here, Goal(memory.target, place))
+        goal = self._goal(view, memory, here, memory.target if kept else NONE)
+        if goal.target == NONE:
             memory.target, memory.viewpoint = NONE, None
             if memory.elsewhere is None or not view.under_way:
                 memory.elsewhere = random_viewpoint(view, self._rng)
             return memory.elsewhere.copy()
         memory.elsewhere = None
-        return self._towards(view, memory, here, target)
+        return self._towards(view, memory, here, goal)
 
     def _holds(self, cells: FrontierCells, target: int) -> bool:
         """Whether a target is one still."""
@@ -204,28 +224,27 @@ class Explorer(ABC):
         apart = [float(np.linalg.norm(view.teammates[mate].pose[:3] - view.pose[:3])) for mate in heard]
         return heard[int(np.argmin(apart))] if heard else -1
 
-    def _pick(self, view: RobotView, memory: _Memory, here: int, target: int) -> int:
-        """What the rule picks; where there is no frontier, of those at finer levels."""
+    def _goal(self, view: RobotView, memory: _Memory, here: int, target: int) -> Goal:
+        """What the rule says; where there is no frontier, of those at finer levels."""
         while True:
             memory.paths.start(here)
-            picked = self.pick(Scene(view, memory.cells, memory.paths, here, target))
-            if picked != NONE or memory.level <= self._finest:
-                return picked
+            goal = self.goal(Scene(view, memory.cells, memory.paths, here, target))
+            if goal.target != NONE or memory.level <= self._finest:
+                return goal
             memory.level = max(0.5 * memory.level, self._finest)
             memory.cells.readmit()
             memory.cells.update(view, memory.level)
 
-    def _towards(self, view: RobotView, memory: _Memory, here: int, target: int) -> np.ndarray:
-        """The viewpoint at a target, or at a stop on the path to it that is within reach."""
-        if target != memory.target:
-            memory.target, memory.viewpoint, memory.gazes = target, None, 0
+    def _towards(self, view: RobotView, memory: _Memory, here: int, goal: Goal) -> np.ndarray:
+        """The viewpoint at a goal's place, or at a stop on the path to it that is within reach."""
+        if goal != (memory.target, memory.place):
+            memory.target, memory.place, memory.viewpoint, memory.gazes = *goal, None, 0
         robot = view.kind.robot
         at_once = robot.navigator == "planned" and math.isinf(robot.reach_m)
         if memory.viewpoint is not None and (at_once or not self._stands_at(view, memory.viewpoint)):
             return memory.viewpoint.copy()
-        goal = self._centre(view, target)
-        place = goal if at_once else stop_towards(view, memory.paths, here, goal)
-        return self._look(view, memory, place)
+        end = self._centre(view, goal.place)
+        return self._look(view, memory, end if at_once else stop_towards(view, memory.paths, here, end))
 
     def _look(self, view: RobotView, memory: _Memory, place: np.ndarray) -> np.ndarray:
         """The viewpoint at a place (3,), with the gaze in which most is unknown."""

@@ -14,6 +14,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from baselines.strategies.explorers.lookouts import collect_standing, collect_unseen, first_lookout
 from baselines.strategies.frontier.candidates import FrontierConfig
 from baselines.strategies.frontier.voxel.candidates import VoxelCandidates
 from baselines.strategies.frontier.voxel.map import (
@@ -102,6 +103,32 @@ class FrontierCells(VoxelCandidates):
         counts = np.empty(len(voxels), np.int64)
         fill_crowds(self._map, voxels, radius, most, counts)
         return counts
+
+    def unseen_around(self, voxel: int, radius: int) -> np.ndarray:
+        """(N,) int32 unexplored voxels beside known free ones, at most so many voxels off along any axis.
+
+        Args:
+            voxel: A frontier cell.
+            radius: Beyond what its body touches.
+        """
+        wide = radius + self.body_reach
+        found = np.empty((2 * wide + 1) ** (2 if self._map.layer >= 0 else 3), np.int32)
+        return found[: collect_unseen(self._map, voxel, wide, found)]
+
+    def standing_around(self, voxel: int, radius: float) -> np.ndarray:
+        """(K,) int32 voxels in which the body may stand, no farther off than a radius in voxel edges."""
+        found = np.empty(min(self._map.state.size, (2 * int(radius) + 1) ** 3), np.int32)
+        return found[: collect_standing(self._map, voxel, radius, found)]
+
+    def first_lookout(self, places: np.ndarray, unseen: np.ndarray, reach: float) -> int:
+        """The index of the first of (K,) voxels that has all of (N,) others in sight; NONE = none has.
+
+        Args:
+            places: (K,) int32.
+            unseen: (N,) int32; if there are none, no place has them in sight.
+            reach: From how far off at most, in voxel edges.
+        """
+        return int(first_lookout(self._map, places, unseen, reach))
 
     def nearest_of_blocks(
         self, lengths_to: Callable[[np.ndarray], np.ndarray], reach: float = math.inf

@@ -22,7 +22,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from baselines.strategies.explorers.explorer import Explorer, Scene
-from baselines.strategies.explorers.nearest_frontier import best_of
 from baselines.strategies.explorers.open_tours import open_tour, tour_length
 from baselines.strategies.explorers.teammates import centres_of
 from baselines.strategies.frontier.voxel.map import NONE
@@ -81,8 +80,19 @@ class Tour(Explorer):
             voxels: (K,) int32, the cells.
             lengths: (K,) of the paths to them, in voxel edges.
         """
+        places = self.tour_among(scene, voxels, lengths)
+        return int(places[0]) if len(places) else NONE
+
+    def tour_among(self, scene: Scene, voxels: np.ndarray, lengths: np.ndarray) -> np.ndarray:
+        """(N,) int32 places in the order of a tour through what frontier cells stand for.
+
+        Args:
+            scene: What the robot knows.
+            voxels: (K,) int32, the cells.
+            lengths: (K,) of the paths to them, in voxel edges.
+        """
         if len(voxels) <= 1:
-            return best_of(voxels, -lengths, scene.target)
+            return voxels
         order = np.argsort(lengths, kind="stable")
         voxels, lengths = voxels[order], lengths[order]
         near = lengths <= self.config.near * scene.cells.reach
@@ -91,20 +101,23 @@ class Tour(Explorer):
         chosen = np.concatenate([np.flatnonzero(near)[kept], np.flatnonzero(~near)[far]]).astype(np.int64)
         places = voxels[chosen]
         between = scene.paths.lengths_between(places, lengths[chosen])
-        if scene.target != NONE and scene.target in places:
-            return self._begun(between, places, scene.target)
-        return int(places[open_tour(between)[1] - 1])
+        return places[self._ordered(between, np.flatnonzero(places == scene.target)) - 1]
 
-    def _begun(self, between: np.ndarray, places: np.ndarray, target: int) -> int:
-        """The first place of a short tour, the target where that is hardly longer."""
+    def _ordered(self, between: np.ndarray, target: np.ndarray) -> np.ndarray:
+        """(N,) int64 places 1 to N of a short tour from place 0, which begins with a target if hardly longer.
+
+        Args:
+            between: (1 + N, 1 + N) lengths of the paths.
+            target: (1,) or (0,), the place that was chosen last, less one.
+        """
         tour = open_tour(between)
-        first = 1 + int(np.flatnonzero(places == target)[0])
+        if len(target) == 0:
+            return tour[1:]
+        first = 1 + int(target[0])
         rest = np.array([first, *(n for n in range(1, len(between)) if n != first)])
         onward = rest[open_tour(between[np.ix_(rest, rest)])]
         length = float(between[0, first]) + tour_length(between, onward)
-        if length <= (1.0 + self.config.stay) * tour_length(between, tour):
-            return target
-        return int(places[tour[1] - 1])
+        return onward if length <= (1.0 + self.config.stay) * tour_length(between, tour) else tour[1:]
 
     def _cover(self, scene: Scene, voxels: np.ndarray) -> list[int]:
         """Which near frontier cells cover all of them: the target, then of equally good ones the nearest."""
