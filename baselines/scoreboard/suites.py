@@ -231,11 +231,15 @@ def training_plans(starts: int) -> tuple[Task, ...]:
     Worlds are those of the recipes' training split, and the dungeons of odd number. Of the plans in files
     there is one each, which nothing is tuned on.
     """
-    names = ("office", "corridor", "cluttered", "hybrid")
-    recipes = [
-        task_in(name, _explored(SCENARIOS[name], {"seen_share": 1.0}), starts, "train") for name in names
-    ]
-    return (*training_dungeons(starts), *recipes)
+    return (*training_dungeons(starts), *training_whole_plans(starts))
+
+
+def training_whole_plans(starts: int) -> tuple[Task, ...]:
+    """Those of `training_plans` of which everything is to be seen."""
+    return tuple(
+        task_in(name, _explored(SCENARIOS[name], {"seen_share": 1.0}), starts, "train")
+        for name in ("office", "corridor", "cluttered", "hybrid")
+    )
 
 
 def training_dungeons(starts: int) -> tuple[Task, ...]:

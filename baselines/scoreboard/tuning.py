@@ -28,6 +28,7 @@ from baselines.scoreboard.suites import (
     training_plans,
     training_teams,
     training_volumes,
+    training_whole_plans,
 )
 from baselines.strategies import make_strategy
 from entropy_explore_env.errors import SettingError, one_of
@@ -73,8 +74,14 @@ TUNINGS: Mapping[str, Tuning] = {
                 "stay": (0.02, 0.1),
             },
             "per-time-visibility": {"path_scans": (0, 4, 8)},
-            "planned-rate": {"pocket": (0, 0.06, 0.25), "sight": (0.25, 0.8)},
         },
+        "nearest-frontier",
+        PATH,
+        "path",
+    ),
+    "tours": Tuning(
+        training_whole_plans,
+        {"planned-rate": {"pocket": (0, 0.06, 0.25), "sight": (0.25, 0.8)}},
         "nearest-frontier",
         PATH,
         "path",
@@ -121,8 +128,8 @@ class Args:
     """Vary settings on training worlds."""
 
     suite: str = "plans"
-    """plans: the rivals for one robot, and our tours; dungeons: ours where a part may stay unseen; volumes:
-    the rivals and ours; teams: the coordinated rivals."""
+    """plans: the rivals for one robot; tours: ours where all is to be seen; dungeons: ours where a part
+    may stay unseen; volumes: the rivals and ours; teams: the coordinated rivals."""
     strategies: str | None = None
     """Which, commas between; default: all that the suite tunes."""
     starts: int = 5
