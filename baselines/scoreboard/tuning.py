@@ -256,8 +256,7 @@ def main(words: Sequence[str]) -> int:
     tuning = find_tuning(args.suite)
     strategies = list(tuning.grid) if args.strategies is None else args.strategies.split(",")
     entered = [variant for strategy in strategies for variant in variants(tuning, strategy)]
-    page = args.page.read_text(encoding="utf-8")
-    with_table(page, args.suite, "")  # refused before hours of missions
+    with_table(args.page.read_text(encoding="utf-8"), args.suite, "")  # refused before hours of missions
     make_folder("runs", args.runs)
     suite = Suite(args.suite, tuning.tasks(args.starts), (tuning.yardstick, *entered))
     records = run_cells(
@@ -272,6 +271,7 @@ def main(words: Sequence[str]) -> int:
         confirm=args.confirm,
     )
     table = tuning_table(Results(suite, records), tuning, strategies)
+    page = args.page.read_text(encoding="utf-8")  # as it is now: it may have been edited meanwhile
     write_atomically(args.page, with_table(page, args.suite, table))
     print(f"written: the table in {args.page}", file=sys.stderr)
     return 0

@@ -65,13 +65,13 @@ class PlannedRateConfig:
     """What differs from the recipe of every kind of robot, and from the tours' settings; None = nothing.
 
     Attributes:
-        exponent: As in `viewpoints.recipe.Recipe`, likewise the others.
+        exponent: As in `viewpoints.recipe.Recipe`.
         behind: Likewise.
         far_places: Likewise.
         leave_below: Likewise.
         dregs: Likewise.
         path_scans: Likewise.
-        pocket: As in `explorers.shared_tour.SharedTourConfig`, likewise the other.
+        pocket: As in `explorers.shared_tour.SharedTourConfig`.
         sight: Likewise.
 
     Raises:

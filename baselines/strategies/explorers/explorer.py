@@ -13,8 +13,8 @@ Ours, where the rules say nothing:
 - A robot that a teammate stops waits for one scan if its number is the lower, and steps aside, to a random
   viewpoint, if it is the higher or has waited before.
 - A sensor that looks one way is turned to where most is unknown.
-- A rule may name a place from which its frontier cell is looked at. Where that shows nothing, the robot goes
-  on to the cell itself.
+- A rule may name a place from which its frontier cell is looked at. Where a scan from there leaves the cell a
+  frontier, or the drive there ended early, the robot goes on to the cell itself.
 """
 
 from __future__ import annotations
@@ -62,6 +62,7 @@ class Scene:
         paths: Paths through its known free space; a search from where it stands has begun.
         here: The voxel in which it stands.
         target: The voxel that it chose last and has not reached, if it is a frontier cell still; else NONE.
+        looked: The target, if the robot goes on to it after a look from elsewhere; else NONE.
     """
 
     view: RobotView
@@ -69,6 +70,12 @@ class Scene:
     paths: KnownPaths
     here: int
     target: int
+    looked: int = NONE
+
+    @property
+    def scanned(self) -> bool:
+        """Whether the latest scan was taken where the robot is."""
+        return scanned_here(self.view)
 
 
 class Goal(NamedTuple):
@@ -78,6 +85,8 @@ class Goal(NamedTuple):
     """The voxel that it explores, one in which the body may stand; NONE = no frontier can be reached."""
     place: int
     """The voxel to which the robot drives for that: the target itself, or one from which it is in sight."""
+    looked: bool = False
+    """Whether the target was looked at from elsewhere, in vain: the robot then keeps going to it."""
 
 
 @dataclass
@@ -91,6 +100,8 @@ class _Memory:
     target: int = NONE
     place: int = NONE
     """Where it drives to explore the target."""
+    looked: bool = False
+    """Whether the target was looked at from elsewhere, or could not be."""
     viewpoint: np.ndarray | None = None
     """(5,) that was chosen last."""
     scanned: bool = False
@@ -105,11 +116,16 @@ class _Memory:
     """Whether it let a teammate pass at its latest decision."""
 
 
+def scanned_here(view: RobotView) -> bool:
+    """Whether a robot took its latest scan where it is, up to half a voxel."""
+    return view.since_scan_m < 0.5 * view.scenario.grid.voxel_size_m
+
+
 class Explorer(ABC):
     """Drives robots to where a rule wants them; see the top of the file.
 
-    A rule is a subclass with `pick`, or with `goal`. It may read what it needs from the Scene, and change
-    nothing in it but the state of the path search.
+    A rule is a subclass with `pick`; one that looks from elsewhere overrides `goal`, too. It may read what it
+    needs from the Scene, and change nothing in it but the state of the path search.
     """
 
     rule = "this rule"
@@ -156,9 +172,9 @@ class Explorer(ABC):
         if stopped is not None:
             return stopped
         kept = memory.target not in (NONE, here) and self._holds(memory.cells, memory.target)
-        if kept and (self.until_reached or not memory.cells.changed):
-            place = memory.target if memory.place == here else memory.place
-            return self._towards(view, memory, here, Goal(memory.target, place))
+        arrived = here == memory.place != memory.target
+        if kept and not arrived and (self.until_reached or not memory.cells.changed):
+            return self._towards(view, memory, here, Goal(memory.target, memory.place, memory.looked))
         goal = self._goal(view, memory, here, memory.target if kept else NONE)
         if goal.target == NONE:
             memory.target, memory.viewpoint = NONE, None
@@ -198,9 +214,12 @@ class Explorer(ABC):
             memory.blocked = 0
         memory.waited = False
         if view.move_end in _STOPPED:
+            if memory.place != memory.target:
+                memory.place, memory.looked, memory.viewpoint = memory.target, True, None
+                return None
             memory.cells.drop(memory.target, with_edges=False)
             memory.target, memory.viewpoint = NONE, None
-        elif here == memory.target and memory.cells.is_frontier(here):
+        elif here == memory.target and memory.cells.is_frontier(here) and scanned_here(view):
             memory.gazes += 1
             gaze = memory.cells.gaze(self._scenario.grid.in_grid_units(view.pose)[:3], view)
             turned = abs(gaze[0] - view.pose[3]) + abs(gaze[1] - view.pose[4]) > 0.1
@@ -228,7 +247,8 @@ class Explorer(ABC):
         """What the rule says; where there is no frontier, of those at finer levels."""
         while True:
             memory.paths.start(here)
-            goal = self.goal(Scene(view, memory.cells, memory.paths, here, target))
+            looked = target if memory.looked else NONE
+            goal = self.goal(Scene(view, memory.cells, memory.paths, here, target, looked))
             if goal.target != NONE or memory.level <= self._finest:
                 return goal
             memory.level = max(0.5 * memory.level, self._finest)
@@ -237,8 +257,9 @@ class Explorer(ABC):
 
     def _towards(self, view: RobotView, memory: _Memory, here: int, goal: Goal) -> np.ndarray:
         """The viewpoint at a goal's place, or at a stop on the path to it that is within reach."""
-        if goal != (memory.target, memory.place):
-            memory.target, memory.place, memory.viewpoint, memory.gazes = *goal, None, 0
+        if goal[:2] != (memory.target, memory.place):
+            memory.viewpoint, memory.gazes = None, 0
+        memory.target, memory.place, memory.looked = goal
         robot = view.kind.robot
         at_once = robot.navigator == "planned" and math.isinf(robot.reach_m)
         if memory.viewpoint is not None and (at_once or not self._stands_at(view, memory.viewpoint)):

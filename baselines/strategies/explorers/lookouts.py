@@ -50,7 +50,17 @@ def collect_unseen(frontiers: FrontierMap, voxel: int, radius: int, found: np.nd
 
 @lean_kernel
 def collect_standing(frontiers: FrontierMap, voxel: int, radius: float, found: np.ndarray) -> int:
-    """Fill in the voxels within a radius of a voxel in which the body may stand; returns their number."""
+    """Fill in the voxels within a radius of a voxel in which the body may stand.
+
+    Args:
+        frontiers: Of the robot.
+        voxel: In the middle.
+        radius: In voxel edges.
+        found: (≥ (2 radius + 1)^3,) int32, or as many as the map has voxels.
+
+    Returns:
+        How many there are.
+    """
     size, count, wide = frontiers.size, 0, int(radius)
     x, y, z = grid_index(size, voxel)
     for i in range(max(x - wide, 0), min(x + wide, size[0] - 1) + 1):

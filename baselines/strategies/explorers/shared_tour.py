@@ -5,10 +5,11 @@ to where teammates go, by the straight line; where there is none, through all of
 behind what it would have to come back for: in plans it drives shorter paths than rules that choose one
 frontier cell at a time.
 
-Beside a frontier cell at a pocket, few connected voxels, little can lie that would have to be entered. The
-robot drives only to a place from which all that is unknown around the cell is in sight, the one that makes
-the path over it to the tour's next place shortest. To an opening it drives on to the cell, since what lies
-behind has to be explored from there.
+A pocket is a frontier of few connected voxels: little lies behind it, and the robot need not drive to it. It
+drives to a place from which all that is unknown around the frontier cell is in sight, the one that makes the
+path over it to the tour's next place shortest, if that is shorter than over the cell. Where the look leaves
+the cell a frontier, the robot goes on to it. To an opening it drives at once, since what lies behind has to
+be explored from there.
 
 Tuned: `sight` and `pocket`, see docs/explorers.md.
 """
@@ -35,10 +36,11 @@ class SharedTourConfig(TourConfig):
     """What is near, how much a place covers, and what is looked at from afar.
 
     Attributes:
-        pocket: Frontier cells with fewer connected known free voxels beside unknown ones, in sensor ranges,
-            are looked at from where they are in sight; 0 = none is.
-        sight: From how far off at most, in sensor ranges.
-        around: So many voxels around the cell, along either axis, what is unknown is to be in sight.
+        pocket: A frontier cell is at a pocket if fewer known free voxels beside unknown ones are connected
+            there; their number over the sensor's range in voxels. 0 = there are no pockets.
+        sight: From how far off a pocket is looked at, at most, in sensor ranges.
+        around: Unknown voxels that are to be in sight lie at most so many voxels from the cell along either
+            axis, beyond what the body touches.
 
     Raises:
         SettingError: One of them is not allowed.
@@ -68,28 +70,38 @@ class SharedTour(Tour):
     def goal(self, scene: Scene) -> Goal:
         """See `Explorer`."""
         tour = self.tour_among(scene, *scene.paths.all_frontiers(scene.here))
-        return Goal(int(tour[0]), self._lookout(scene, tour)) if len(tour) else Goal(NONE, NONE)
+        if len(tour) == 0:
+            return Goal(NONE, NONE)
+        target = int(tour[0])
+        if target == scene.looked:
+            return Goal(target, target, looked=True)
+        return self._first_leg(scene, target, tour[1:2])
 
     def tour_among(self, scene: Scene, voxels: np.ndarray, lengths: np.ndarray) -> np.ndarray:
         """See `Tour`."""
         own = left_to_robot(scene, voxels, lengths)
         return super().tour_among(scene, voxels[own], lengths[own])
 
-    def _lookout(self, scene: Scene, tour: np.ndarray) -> int:
-        """Where the robot drives to explore the first of (N,) places of a tour, N > 0."""
-        cells, target = scene.cells, int(tour[0])
-        few = math.ceil(self.config.pocket * cells.reach)
+    def _first_leg(self, scene: Scene, target: int, onward: np.ndarray) -> Goal:
+        """To the target itself, or to a place from which it is looked at.
+
+        Args:
+            scene: What the robot knows.
+            target: The first place of the tour.
+            onward: (1,) the next one; (0,) there is none.
+        """
+        cells, few = scene.cells, math.ceil(self.config.pocket * scene.cells.reach)
         if cells.opening(target, few) >= few:
-            return target
+            return Goal(target, target)
         sight = self.config.sight * cells.reach
         unseen = cells.unseen_around(target, self.config.around)
         if cells.first_lookout(np.array([scene.here], np.int32), unseen, sight) != NONE:
-            return target  # what is in sight and was not seen is seen from nearby
+            return Goal(target, target, looked=True) if scene.scanned else Goal(target, scene.here)
         places = np.append(cells.standing_around(target, sight), np.int32(target))
         lengths = scene.paths.lengths_from(scene.here, places)
-        if len(tour) > 1:
-            lengths = lengths + scene.paths.lengths_from(int(tour[1]), places)
+        for place in onward:
+            lengths = lengths + scene.paths.lengths_from(int(place), places)
         order = np.argsort(lengths, kind="stable")
         shorter = places[order[lengths[order] < lengths[-1] - _SHORTER]]
         first = cells.first_lookout(shorter, unseen, sight)
-        return target if first == NONE else int(shorter[first])
+        return Goal(target, target if first == NONE else int(shorter[first]))

@@ -48,7 +48,9 @@ def scene_of(plan, robot, target=NONE, block=BLOCK):
     """What a robot there knows of a plan."""
     scenario = scenario_of(plan.shape)
     mean, precision = belief_of_plan(plan)
-    view = SimpleNamespace(mean=mean, precision=precision, scenario=scenario, teammates={}, robot=0)
+    view = SimpleNamespace(
+        mean=mean, precision=precision, scenario=scenario, teammates={}, robot=0, since_scan_m=0.0
+    )
     cells = FrontierCells(scenario, scenario.kind_of(0), block)
     cells.update(view, 0.5)  # type: ignore[arg-type]
     paths = KnownPaths(scenario, scenario.kind_of(0), cells, new_search(scenario.grid.voxels))

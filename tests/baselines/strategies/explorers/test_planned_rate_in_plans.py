@@ -35,7 +35,7 @@ def corridor(length=31):
 def picked(plan, robot, *mates):
     """The cell to which a robot goes, with teammates under way."""
     scene = with_mates(scene_of(plan, robot), list(mates))
-    return cell(plan, SharedTour().pick(scene))
+    return cell(plan, SharedTour().goal(scene).target)
 
 
 def test_a_robot_leaves_to_a_teammate_what_that_is_nearer_to_by_hand():
@@ -55,7 +55,7 @@ def test_where_teammates_are_nearer_to_all_a_robot_helps_by_hand():
 def test_alone_it_is_tour_and_in_a_team_cells_are_split_by_distance(shape, seed):
     rng = np.random.default_rng(seed)
     plan, robot = random_plan(shape, rng)
-    assert SharedTour().pick(scene_of(plan, robot)) == Tour().pick(scene_of(plan, robot))
+    assert SharedTour().goal(scene_of(plan, robot)).target == Tour().pick(scene_of(plan, robot))
     target = tuple(int(rng.integers(1, size)) for size in shape)
     scene = with_mates(scene_of(plan, robot), [mate((0, 0), target)])
     voxels, lengths = scene.paths.frontiers_within(np.inf)
