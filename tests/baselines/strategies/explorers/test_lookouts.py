@@ -145,7 +145,7 @@ def test_from_a_lookout_and_without_pockets_a_robot_drives_to_the_cell_itself():
 def test_between_scans_a_robot_stops_where_all_is_in_sight():
     plan = niche()
     scene = scene_of(plan, (10, 3))
-    scene.view.since_scan_m = 0.2
+    scene.view.since_scan_m = 0.2  # type: ignore[misc]
     assert SharedTour().goal(scene) == Goal(number(plan, (10, 6)), number(plan, (10, 3)))
 
 
