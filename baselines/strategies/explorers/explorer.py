@@ -72,11 +72,6 @@ class Scene:
     target: int
     looked: int = NONE
 
-    @property
-    def scanned(self) -> bool:
-        """Whether the latest scan was taken where the robot is."""
-        return scanned_here(self.view)
-
 
 class Goal(NamedTuple):
     """Where a rule sends a robot."""
@@ -86,7 +81,11 @@ class Goal(NamedTuple):
     place: int
     """The voxel to which the robot drives for that: the target itself, or one from which it is in sight."""
     looked: bool = False
-    """Whether the target was looked at from elsewhere, in vain: the robot then keeps going to it."""
+    """Whether the target was looked at from elsewhere in vain, or could not be; it is then driven to."""
+
+
+NOWHERE = Goal(NONE, NONE)
+"""No frontier can be reached."""
 
 
 @dataclass
@@ -97,11 +96,7 @@ class _Memory:
     paths: KnownPaths
     level: float = KNOWN_SIGMA
     """σ from which on a voxel counts as known."""
-    target: int = NONE
-    place: int = NONE
-    """Where it drives to explore the target."""
-    looked: bool = False
-    """Whether the target was looked at from elsewhere, or could not be."""
+    goal: Goal = NOWHERE
     viewpoint: np.ndarray | None = None
     """(5,) that was chosen last."""
     scanned: bool = False
@@ -171,13 +166,14 @@ class Explorer(ABC):
         stopped = self._note_end(view, memory, here)
         if stopped is not None:
             return stopped
-        kept = memory.target not in (NONE, here) and self._holds(memory.cells, memory.target)
-        arrived = here == memory.place != memory.target
+        target, place, _ = memory.goal
+        kept = target not in (NONE, here) and self._holds(memory.cells, target)
+        arrived = here == place != target
         if kept and not arrived and (self.until_reached or not memory.cells.changed):
-            return self._towards(view, memory, here, Goal(memory.target, memory.place, memory.looked))
-        goal = self._goal(view, memory, here, memory.target if kept else NONE)
+            return self._towards(view, memory, here, memory.goal)
+        goal = self._goal(view, memory, here, target if kept else NONE)
         if goal.target == NONE:
-            memory.target, memory.viewpoint = NONE, None
+            memory.goal, memory.viewpoint = NOWHERE, None
             if memory.elsewhere is None or not view.under_way:
                 memory.elsewhere = random_viewpoint(view, self._rng)
             return memory.elsewhere.copy()
@@ -205,7 +201,8 @@ class Explorer(ABC):
 
     def _note_end(self, view: RobotView, memory: _Memory, here: int) -> np.ndarray | None:
         """Learn from how the latest drive ended; a viewpoint where that alone decides."""
-        if memory.viewpoint is None or memory.target == NONE:
+        target, place, _ = memory.goal
+        if memory.viewpoint is None or target == NONE:
             return None
         if view.move_end is MoveEnd.TEAMMATE:
             memory.blocked += 1
@@ -214,12 +211,13 @@ class Explorer(ABC):
             memory.blocked = 0
         memory.waited = False
         if view.move_end in _STOPPED:
-            if memory.place != memory.target:
-                memory.place, memory.looked, memory.viewpoint = memory.target, True, None
-                return None
-            memory.cells.drop(memory.target, with_edges=False)
-            memory.target, memory.viewpoint = NONE, None
-        elif here == memory.target and memory.cells.is_frontier(here) and scanned_here(view):
+            memory.viewpoint = None
+            if place != target:
+                memory.goal = Goal(target, target, looked=True)
+            else:
+                memory.goal = NOWHERE
+                memory.cells.drop(target, with_edges=False)
+        elif here == target and memory.cells.is_frontier(here) and scanned_here(view):
             memory.gazes += 1
             gaze = memory.cells.gaze(self._scenario.grid.in_grid_units(view.pose)[:3], view)
             turned = abs(gaze[0] - view.pose[3]) + abs(gaze[1] - view.pose[4]) > 0.1
@@ -234,7 +232,7 @@ class Explorer(ABC):
         if memory.blocked == 1 and near > view.robot:
             memory.waited = True
             return view.pose.copy()
-        memory.target, memory.viewpoint, memory.blocked = NONE, None, 0
+        memory.goal, memory.viewpoint, memory.blocked = NOWHERE, None, 0
         return random_viewpoint(view, self._rng)
 
     def _nearest_mate(self, view: RobotView) -> int:
@@ -247,7 +245,7 @@ class Explorer(ABC):
         """What the rule says; where there is no frontier, of those at finer levels."""
         while True:
             memory.paths.start(here)
-            looked = target if memory.looked else NONE
+            looked = target if memory.goal.looked else NONE
             goal = self.goal(Scene(view, memory.cells, memory.paths, here, target, looked))
             if goal.target != NONE or memory.level <= self._finest:
                 return goal
@@ -257,9 +255,9 @@ class Explorer(ABC):
 
     def _towards(self, view: RobotView, memory: _Memory, here: int, goal: Goal) -> np.ndarray:
         """The viewpoint at a goal's place, or at a stop on the path to it that is within reach."""
-        if goal[:2] != (memory.target, memory.place):
+        if goal[:2] != memory.goal[:2]:
             memory.viewpoint, memory.gazes = None, 0
-        memory.target, memory.place, memory.looked = goal
+        memory.goal = goal
         robot = view.kind.robot
         at_once = robot.navigator == "planned" and math.isinf(robot.reach_m)
         if memory.viewpoint is not None and (at_once or not self._stands_at(view, memory.viewpoint)):

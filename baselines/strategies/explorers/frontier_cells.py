@@ -105,20 +105,24 @@ class FrontierCells(VoxelCandidates):
         return counts
 
     def unseen_around(self, voxel: int, radius: int) -> np.ndarray:
-        """(N,) int32 unexplored voxels beside known free ones, at most so many voxels off along any axis.
+        """(N,) int32 unexplored voxels that are beside known free ones and near a frontier cell.
 
         Args:
-            voxel: A frontier cell.
-            radius: Beyond what its body touches.
+            voxel: The frontier cell.
+            radius: Largest distance along each axis, in voxels, from what the body touches in the cell.
         """
         wide = radius + self.body_reach
-        found = np.empty((2 * wide + 1) ** (2 if self._map.layer >= 0 else 3), np.int32)
+        found = self._room_for(wide)
         return found[: collect_unseen(self._map, voxel, wide, found)]
 
     def standing_around(self, voxel: int, radius: float) -> np.ndarray:
         """(K,) int32 voxels in which the body may stand, no farther off than a radius in voxel edges."""
-        found = np.empty(min(self._map.state.size, (2 * int(radius) + 1) ** 3), np.int32)
+        found = self._room_for(int(radius))
         return found[: collect_standing(self._map, voxel, radius, found)]
+
+    def _room_for(self, radius: int) -> np.ndarray:
+        """An empty int32 array for all voxels that are at most so many voxels from one along each axis."""
+        return np.empty((2 * radius + 1) ** (2 if self._map.layer >= 0 else 3), np.int32)
 
     def first_lookout(self, places: np.ndarray, unseen: np.ndarray, reach: float) -> int:
         """The index of the first of (K,) voxels that has all of (N,) others in sight; NONE = none has.

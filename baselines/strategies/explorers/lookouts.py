@@ -10,7 +10,14 @@ import math
 
 import numpy as np
 
-from baselines.strategies.frontier.voxel.map import DROPPED, EDGE, NONE, UNEXPLORED, FrontierMap
+from baselines.strategies.frontier.voxel.map import (
+    DROPPED,
+    EDGE,
+    NONE,
+    UNEXPLORED,
+    FrontierMap,
+    shares_face,
+)
 from entropy_explore_env.belief.raycast import OPEN, Line, cast_range
 from entropy_explore_env.belief.voxel_index import flat_index, grid_index
 from entropy_explore_env.compilation.kernels import lean_kernel
@@ -27,22 +34,24 @@ def collect_unseen(frontiers: FrontierMap, voxel: int, radius: int, found: np.nd
 
     Args:
         frontiers: Of the robot.
-        voxel: In the middle.
+        voxel: In the middle; of planar robots in their layer.
         radius: Voxels that others may be off along any axis.
         found: (≥ (2 radius + 1)^3,) int32; in one layer (2 radius + 1)^2 are enough.
 
     Returns:
         How many there are.
     """
-    size, state, count = frontiers.size, frontiers.state, 0
+    size, state, flags, count = frontiers.size, frontiers.state, frontiers.flags, 0
     x, y, z = grid_index(size, voxel)
+    deep = 0 if frontiers.layer >= 0 else radius
     for i in range(max(x - radius, 0), min(x + radius, size[0] - 1) + 1):
         for j in range(max(y - radius, 0), min(y + radius, size[1] - 1) + 1):
-            for k in range(max(z - radius, 0), min(z + radius, size[2] - 1) + 1):
-                if frontiers.layer >= 0 and k != frontiers.layer:
-                    continue
+            for k in range(max(z - deep, 0), min(z + deep, size[2] - 1) + 1):
                 near = flat_index(size, i, j, k)
-                if state[near] & UNEXPLORED and _at_edge(frontiers, i, j, k):
+                edge = flags[near] & (EDGE | DROPPED) == EDGE
+                if state[near] & UNEXPLORED and (
+                    edge or shares_face(frontiers, flags, EDGE | DROPPED, EDGE, i, j, k)
+                ):
                     found[count] = near
                     count += 1
     return count
@@ -56,7 +65,7 @@ def collect_standing(frontiers: FrontierMap, voxel: int, radius: float, found: n
         frontiers: Of the robot.
         voxel: In the middle.
         radius: In voxel edges.
-        found: (≥ (2 radius + 1)^3,) int32, or as many as the map has voxels.
+        found: (≥ (2 radius + 1)^3,) int32; in one layer (2 radius + 1)^2 are enough.
 
     Returns:
         How many there are.
@@ -112,24 +121,3 @@ def in_sight(frontiers: FrontierMap, place: int, voxel: int, reach: float) -> bo
     start, direction = (a[0] + 0.5, a[1] + 0.5, a[2] + 0.5), (x / length, y / length, z / length)
     _, _, end = cast_range(frontiers.state, frontiers.size, Line(start, direction, until), _KNOWN_FREE)
     return end == OPEN
-
-
-@lean_kernel
-def _at_edge(frontiers: FrontierMap, x: int, y: int, z: int) -> bool:
-    """Whether a voxel is an edge that counts, or has one at a side."""
-    size, flags = frontiers.size, frontiers.flags
-    if flags[flat_index(size, x, y, z)] & (EDGE | DROPPED) == EDGE:
-        return True
-    for side in range(6):
-        step = 1 if side & 1 else -1
-        i, j, k = x, y, z
-        if side < 2:
-            i += step
-        elif side < 4:
-            j += step
-        else:
-            k += step
-        if 0 <= i < size[0] and 0 <= j < size[1] and 0 <= k < size[2]:
-            if flags[flat_index(size, i, j, k)] & (EDGE | DROPPED) == EDGE:
-                return True
-    return False

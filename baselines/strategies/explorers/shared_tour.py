@@ -21,7 +21,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from baselines.strategies.explorers.explorer import Goal, Scene
+from baselines.strategies.explorers.explorer import NOWHERE, Goal, Scene, scanned_here
 from baselines.strategies.explorers.teammates import left_to_robot
 from baselines.strategies.explorers.tour import Tour, TourConfig
 from baselines.strategies.frontier.voxel.map import NONE
@@ -39,8 +39,8 @@ class SharedTourConfig(TourConfig):
         pocket: A frontier cell is at a pocket if fewer known free voxels beside unknown ones are connected
             there; their number over the sensor's range in voxels. 0 = there are no pockets.
         sight: From how far off a pocket is looked at, at most, in sensor ranges.
-        around: Unknown voxels that are to be in sight lie at most so many voxels from the cell along either
-            axis, beyond what the body touches.
+        around: Distance in voxels, along each axis, from the frontier cell (and what the body touches there)
+            within which all unknown voxels of the frontier have to be in sight.
 
     Raises:
         SettingError: One of them is not allowed.
@@ -71,7 +71,7 @@ class SharedTour(Tour):
         """See `Explorer`."""
         tour = self.tour_among(scene, *scene.paths.all_frontiers(scene.here))
         if len(tour) == 0:
-            return Goal(NONE, NONE)
+            return NOWHERE
         target = int(tour[0])
         if target == scene.looked:
             return Goal(target, target, looked=True)
@@ -88,7 +88,7 @@ class SharedTour(Tour):
         Args:
             scene: What the robot knows.
             target: The first place of the tour.
-            onward: (1,) the next one; (0,) there is none.
+            onward: (1,) voxel, the second place of the tour; (0,) if the tour has only one.
         """
         cells, few = scene.cells, math.ceil(self.config.pocket * scene.cells.reach)
         if cells.opening(target, few) >= few:
@@ -96,7 +96,7 @@ class SharedTour(Tour):
         sight = self.config.sight * cells.reach
         unseen = cells.unseen_around(target, self.config.around)
         if cells.first_lookout(np.array([scene.here], np.int32), unseen, sight) != NONE:
-            return Goal(target, target, looked=True) if scene.scanned else Goal(target, scene.here)
+            return Goal(target, target, looked=True) if scanned_here(scene.view) else Goal(target, scene.here)
         places = np.append(cells.standing_around(target, sight), np.int32(target))
         lengths = scene.paths.lengths_from(scene.here, places)
         for place in onward:

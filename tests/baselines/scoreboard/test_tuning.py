@@ -99,4 +99,12 @@ def test_the_command_writes_the_paths_over_the_defaults(tmp_path, monkeypatch, c
     assert ratios[1][0] != 1.0 and math.isfinite(ratios[1][0])
     before = page.read_text()
     assert run_command(command.main, words) == 0 and page.read_text() == before
+    run_cells = command.run_cells
+
+    def edited_meanwhile(*args, **settings):
+        page.write_text(f"{page.read_text()}\nA sentence.")
+        return run_cells(*args, **settings)
+
+    monkeypatch.setattr(command, "run_cells", edited_meanwhile)
+    assert run_command(command.main, words) == 0 and page.read_text() == f"{before}\nA sentence."
     capsys.readouterr()

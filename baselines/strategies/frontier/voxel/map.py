@@ -242,9 +242,19 @@ def _at(size, x, y, z):
 
 
 @inlined_kernel
-def _beside_unexplored(frontiers, x, y, z):
-    """Whether a voxel shares a face with an unexplored one; of planar robots in their layer."""
-    size, state, found = frontiers.size, frontiers.state, False
+def shares_face(frontiers, marks, mask, value, x, y, z):
+    """Whether a voxel shares a face with one of certain marks; of planar robots in their layer.
+
+    Args:
+        frontiers: Of the robot.
+        marks: (V,) uint8, `state` or `flags`.
+        mask: Marks that are looked at.
+        value: What they have to be.
+        x: Of the voxel, likewise y and z.
+        y: Likewise.
+        z: Likewise.
+    """
+    size, found = frontiers.size, False
     for axis in range(2 if frontiers.layer >= 0 else 3):
         for step in (-1, 1):
             near = _at(
@@ -253,7 +263,7 @@ def _beside_unexplored(frontiers, x, y, z):
                 y + (step if axis == 1 else 0),
                 z + (step if axis == 2 else 0),
             )
-            if near != NONE and state[near] & UNEXPLORED:
+            if near != NONE and marks[near] & mask == value:
                 found = True
     return found
 
@@ -268,7 +278,10 @@ def _mark_edge(frontiers, block):
                 voxel = _at(frontiers.size, x, y, z)
                 frontiers.flags[voxel] &= CANDIDATE | EXCLUDED | DROPPED
                 free = frontiers.state[voxel] & (UNMAPPED | COVERED) == 0
-                if free and (frontiers.state[voxel] & UNEXPLORED or _beside_unexplored(frontiers, x, y, z)):
+                if free and (
+                    frontiers.state[voxel] & UNEXPLORED
+                    or shares_face(frontiers, frontiers.state, UNEXPLORED, UNEXPLORED, x, y, z)
+                ):
                     frontiers.flags[voxel] |= EDGE
 
 

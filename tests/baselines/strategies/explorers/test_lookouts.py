@@ -222,9 +222,7 @@ def test_where_a_look_shows_nothing_the_robot_goes_on_to_the_cell_and_does_not_c
     assert walk.goes((2, 4)) == (10, 4)
     assert walk.goes((6, 4), since_scan_m=0.3) == (10, 4)
     assert walk.goes((10, 4)) == (10, 6)
-    for step, place in enumerate(
-        [(10, 5), (10, 4), (9, 4), (9, 3)]
-    ):  # wherever it is driven, and sees something
+    for step, place in enumerate([(10, 5), (10, 4), (9, 4), (9, 3)]):
         walk.show_something((1 + step, 0))
         assert walk.goes(place) == (10, 6)
     assert walk.rule.cells_of(0).is_frontier(int(number(walk.plan, (10, 6))))
