@@ -12,8 +12,8 @@ import numpy as np
 
 from baselines.experiments.mission import run_mission, scripted
 from baselines.strategies import make_strategy
-from baselines.strategies.next_best_view import NextBestView, NextBestViewConfig
 from baselines.strategies.protocol import Stopwatch, Strategy
+from baselines.strategies.rules.next_best_view import NextBestView, NextBestViewConfig
 from benchmarks.rows import Effort, Goal, Row, alone, compared, timed
 from entropy_explore_env.belief.visibility import CONE, cone_of, mark_cones, visible_bits
 from entropy_explore_env.compilation.kernels import kernel

@@ -10,16 +10,16 @@ import numpy as np
 from baselines.experiments.mission import scripted
 from baselines.papers.sawhney.mission import Run, explore_until_done
 from baselines.papers.sawhney.sweep import world_cell
-from baselines.strategies.frontier import FrontierStrategy, Metric
-from baselines.strategies.frontier.allocation import Allocator
-from baselines.strategies.frontier.candidates import FrontierConfig
-from baselines.strategies.frontier.voxel.map import COVERED, UNEXPLORED, UNMAPPED
-from baselines.strategies.frontier.voxel.ray_tree import grow_tree
-from baselines.strategies.frontier.voxel.visibility import count_from, new_counter, rays_around
+from baselines.strategies.allocation import Allocator
+from baselines.strategies.rules.per_time_visibility import FrontierStrategy, Metric
 from benchmarks.planning import FLOOR, cluttered
 from benchmarks.rows import Effort, Goal, Row, alone, compared, timed
 from entropy_explore_env.belief.paths.search import new_search
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
+from entropy_explore_env.frontiers.candidates import FrontierConfig
+from entropy_explore_env.frontiers.ray_tree import grow_tree
+from entropy_explore_env.frontiers.voxel_map import COVERED, UNEXPLORED, UNMAPPED
+from entropy_explore_env.frontiers.voxel_visibility import count_from, new_counter, rays_around
 from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.missions.view import view_of
 from entropy_explore_env.scenario import Scenario, with_settings

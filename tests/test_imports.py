@@ -31,7 +31,10 @@ WRONG_IMPORTS = {
     f"{LIBRARY}.worlds.files.voxels": (f"{LIBRARY}.worlds.files.worker", f"{LIBRARY}.worlds.world"),
     f"{LIBRARY}.worlds.files.images": (f"{LIBRARY}.writing", f"{LIBRARY}.worlds.files.process"),
     f"{LIBRARY}.envs.infos": (LIBRARY, f"{LIBRARY}.envs.robot_vec_env", "baselines.run"),
-    "baselines.strategies.gradient": (f"{LIBRARY}.missions.simulation", "baselines.papers.rocha04.sweep"),
+    "baselines.strategies.rules.gradient": (
+        f"{LIBRARY}.missions.simulation",
+        "baselines.papers.rocha04.sweep",
+    ),
     "baselines.papers.rocha04.sweep": ("baselines.papers.rochami.sweep", "training.policy"),
     "training.policy": (f"{LIBRARY}.worlds.load", f"{LIBRARY}.robots.channel", "benchmarks.speed"),
 }

@@ -31,9 +31,9 @@ from safetensors.torch import load as tensors_of
 from safetensors.torch import save as bytes_of
 
 from entropy_explore_env.errors import EntropyExploreError, SettingError, one_of
+from entropy_explore_env.planner.candidate_features import FEATURES_VERSION
 from entropy_explore_env.scenario import Scenario
 from entropy_explore_env.settings_json import scenario_of, settings_of
-from entropy_explore_env.viewpoints.candidate_features import FEATURES_VERSION
 from training.candidate_network import ATTENTION_LAYERS, check_attention_layers
 from training.errors import CheckpointError
 from training.networks import NETWORKS

@@ -17,8 +17,8 @@ from entropy_explore_env.missions.action import action_space
 from entropy_explore_env.missions.observation.layout import ObservationLayout
 from entropy_explore_env.missions.view import RobotView
 from entropy_explore_env.missions.view_observation import ViewObserver
+from entropy_explore_env.planner.candidate_features import FEATURES_VERSION
 from entropy_explore_env.scenario import Scenario
-from entropy_explore_env.viewpoints.candidate_features import FEATURES_VERSION
 from training.candidate_network import ATTENTION_LAYERS, CandidatePolicy
 from training.checkpoints import Checkpoint, PolicySettings, latest_checkpoint, load_checkpoint
 from training.errors import CheckpointError

@@ -8,28 +8,27 @@ from functools import partial
 from pathlib import Path
 from types import MappingProxyType, ModuleType
 
-from baselines.strategies.explorers.coordinated_frontier import AssignedFrontier, CoordinatedFrontier
-from baselines.strategies.explorers.distance_advantage import DistanceAdvantage
-from baselines.strategies.explorers.information_gain import InformationGain
-from baselines.strategies.explorers.nearest_frontier import NearestFrontier
-from baselines.strategies.explorers.receding_horizon import RecedingHorizon
-from baselines.strategies.explorers.tour import Tour
-from baselines.strategies.frontier import FrontierStrategy
-from baselines.strategies.frontier.metrics import coordinated_candidate, nearest_candidate
-from baselines.strategies.gradient import GradientStrategy
-from baselines.strategies.information_rate_v0 import InformationRate, InformationRateConfig
 from baselines.strategies.loading import entry_points, is_reference, make_referenced, module_of
-from baselines.strategies.mutual_information import MutualInformation, MutualInformationConfig
-from baselines.strategies.next_best_view import NextBestView, NextBestViewConfig
-from baselines.strategies.next_best_view.cliff import CliffConfig, CliffMapping
-from baselines.strategies.next_best_view.raster import Raster, RasterConfig
-from baselines.strategies.planned_rate import PlannedRate
+from baselines.strategies.metrics import coordinated_candidate, nearest_candidate
 from baselines.strategies.planner_choice import PlannerChoice
 from baselines.strategies.protocol import Strategy
-from baselines.strategies.random_walk import RandomWalk
-from baselines.strategies.voronoi import VoronoiConfig, VoronoiCoverage
+from baselines.strategies.rules.cliff import CliffConfig, CliffMapping
+from baselines.strategies.rules.coordinated_frontier import AssignedFrontier, CoordinatedFrontier
+from baselines.strategies.rules.distance_advantage import DistanceAdvantage
+from baselines.strategies.rules.gradient import GradientStrategy
+from baselines.strategies.rules.information_gain import InformationGain
+from baselines.strategies.rules.mutual_information import MutualInformation, MutualInformationConfig
+from baselines.strategies.rules.nearest_frontier import NearestFrontier
+from baselines.strategies.rules.next_best_view import NextBestView, NextBestViewConfig
+from baselines.strategies.rules.per_time_visibility import FrontierStrategy
+from baselines.strategies.rules.planned_rate import PlannedRate
+from baselines.strategies.rules.random_walk import RandomWalk
+from baselines.strategies.rules.raster import Raster, RasterConfig
+from baselines.strategies.rules.receding_horizon import RecedingHorizon
+from baselines.strategies.rules.voronoi import VoronoiConfig, VoronoiCoverage
 from entropy_explore_env.command import home_path
 from entropy_explore_env.errors import MissingExtraError, SettingError, did_you_mean
+from entropy_explore_env.planner.tour import Tour
 
 STRATEGIES: MappingProxyType[str, Callable[[], Strategy]] = MappingProxyType(
     {
@@ -40,10 +39,6 @@ STRATEGIES: MappingProxyType[str, Callable[[], Strategy]] = MappingProxyType(
         "ground-gradient": partial(MutualInformation, MutualInformationConfig(coordinated=False)),
         "planned-rate": PlannedRate,
         "planner-choice": PlannerChoice,
-        "information-rate-v0": InformationRate,
-        "information-per-scan": partial(
-            InformationRate, InformationRateConfig(per_scan=True, candidates=120, gives_way=True)
-        ),
         "per-time-visibility": FrontierStrategy,
         "nearest-frontier": NearestFrontier,
         "coordinated-frontier": CoordinatedFrontier,

@@ -7,9 +7,11 @@ from typing import Protocol
 
 import numpy as np
 
+from entropy_explore_env.frontiers.knowledge import random_viewpoint
 from entropy_explore_env.missions.view import RobotView
 from entropy_explore_env.scenario import Scenario
-from entropy_explore_env.viewpoints.drawing import uniform_viewpoint
+
+__all__ = ["Stopwatch", "Strategy", "random_viewpoint"]
 
 
 class Strategy(Protocol):
@@ -58,9 +60,3 @@ class Stopwatch:
         chosen = self._strategy.choose(views)
         self.decisions_ms.append(1e3 * (self._clock() - started) / max(len(views), 1))
         return chosen
-
-
-def random_viewpoint(view: RobotView, rng: np.random.Generator) -> np.ndarray:
-    """(5,) a viewpoint drawn uniformly within a robot's reach, the gaze in any direction."""
-    grid, reach_m = view.scenario.grid, view.kind.robot.reach_m
-    return uniform_viewpoint(grid, reach_m, view.pose, view.planar, view.level, rng)

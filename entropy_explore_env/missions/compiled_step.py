@@ -20,10 +20,10 @@ from entropy_explore_env.missions.state import MissionEnd, MissionState
 from entropy_explore_env.missions.threads import Threads
 from entropy_explore_env.missions.tick import step_missions
 from entropy_explore_env.missions.workspace import Workspace, new_workspace
+from entropy_explore_env.planner.model import Proposer, new_proposers, thinned
+from entropy_explore_env.planner.records import Kind
 from entropy_explore_env.robots.navigator import new_navigators
 from entropy_explore_env.scenario import Scenario
-from entropy_explore_env.viewpoints.proposals.model import Proposer, new_proposers, thinned
-from entropy_explore_env.viewpoints.proposals.records import Kind
 
 _CHUNKS_PER_THREAD = 4
 """Missions differ in work; smaller chunks even it out."""

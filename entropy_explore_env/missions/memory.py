@@ -19,11 +19,11 @@ from entropy_explore_env.missions.rules import (
     overview_shape,
 )
 from entropy_explore_env.missions.state import state_arrays
+from entropy_explore_env.planner.model import proposal_bytes
 from entropy_explore_env.robots.map_summary import summary_bytes
 from entropy_explore_env.robots.navigator import navigator_bytes
 from entropy_explore_env.robots.range_sensor import scan_bytes
 from entropy_explore_env.scenario import Scenario
-from entropy_explore_env.viewpoints.proposals.model import proposal_bytes
 from entropy_explore_env.worlds.recipes.catalogue import RECIPES
 from entropy_explore_env.worlds.world import World
 

@@ -25,16 +25,16 @@ from entropy_explore_env.missions.poses import (
 )
 from entropy_explore_env.missions.silence import silent_since
 from entropy_explore_env.missions.state import MissionEnd
-from entropy_explore_env.viewpoints.candidate_features import CONTEXT, FEATURES
-from entropy_explore_env.viewpoints.proposals.features import (
+from entropy_explore_env.planner.candidate_features import CONTEXT, FEATURES
+from entropy_explore_env.planner.features import (
     RobotStatus,
     write_context,
     write_features,
     write_overlaps,
 )
-from entropy_explore_env.viewpoints.proposals.propose import propose
-from entropy_explore_env.viewpoints.proposals.records import Kind
-from entropy_explore_env.viewpoints.proposals.situation import LastDecision, Situation
+from entropy_explore_env.planner.propose import propose
+from entropy_explore_env.planner.records import Kind
+from entropy_explore_env.planner.situation import LastDecision, Situation
 
 _RUNNING = MissionEnd.RUNNING.code
 _NONE = int(Kind.NONE)

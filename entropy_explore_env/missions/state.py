@@ -16,11 +16,11 @@ import numpy as np
 from entropy_explore_env.belief.pooling import Cells
 from entropy_explore_env.compilation.kernels import record_type
 from entropy_explore_env.missions.rules import POINT, collision_bodies
+from entropy_explore_env.planner.records import CANDIDATE, EXPERIENCE
 from entropy_explore_env.robots.landmarks import LANDMARK
 from entropy_explore_env.robots.localization import COVARIANCE_NUMBERS, ESTIMATE
 from entropy_explore_env.robots.map_summary import PARCEL, SUMMARY, summary_bytes
 from entropy_explore_env.scenario import Scenario
-from entropy_explore_env.viewpoints.proposals.records import CANDIDATE, EXPERIENCE
 
 
 class MissionEnd(enum.Enum):

@@ -16,13 +16,13 @@ import numpy as np
 from entropy_explore_env.errors import RecordError
 from entropy_explore_env.missions.faults import COUNTED, OUTAGES
 from entropy_explore_env.missions.state import WAYPOINTS, MissionEnd
+from entropy_explore_env.planner.records import Kind
+from entropy_explore_env.planner.thresholds import REMEMBERED
 from entropy_explore_env.robots.map_summary import is_summary
 from entropy_explore_env.robots.motion import MoveEnd
 from entropy_explore_env.robots.range_sensor import Return
 from entropy_explore_env.scenario import Scenario
 from entropy_explore_env.settings import MAX_VOXELS
-from entropy_explore_env.viewpoints.proposals.planner_rules import REMEMBERED
-from entropy_explore_env.viewpoints.proposals.records import Kind
 
 FROM_WORLD = ("truth", "collision", "visible")
 """Arrays of the state that follow from a mission's world, which its seed and what was given determine."""

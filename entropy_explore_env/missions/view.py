@@ -15,12 +15,12 @@ from entropy_explore_env.missions.poses import place_at, pose_at, since_scan_m, 
 from entropy_explore_env.missions.rules import Rules
 from entropy_explore_env.missions.silence import is_silent
 from entropy_explore_env.missions.simulation import Missions
+from entropy_explore_env.planner.records import Kind
 from entropy_explore_env.robots.landmarks import LANDMARK
 from entropy_explore_env.robots.localization import believed_point
 from entropy_explore_env.robots.motion import MoveEnd
 from entropy_explore_env.scenario import Scenario
 from entropy_explore_env.settings import RobotKind
-from entropy_explore_env.viewpoints.proposals.records import Kind
 from entropy_explore_env.worlds.world import no_fly_mask
 
 

@@ -9,11 +9,11 @@ import numpy as np
 from entropy_explore_env.missions.proposals import PlannerInput, propose_to
 from entropy_explore_env.missions.rules import Rules, rules_of
 from entropy_explore_env.missions.view import RobotView
+from entropy_explore_env.planner.candidate_features import CONTEXT, FEATURES
+from entropy_explore_env.planner.model import new_proposers
+from entropy_explore_env.planner.recipe import Recipe
+from entropy_explore_env.planner.records import CANDIDATE, EXPERIENCE, Kind
 from entropy_explore_env.scenario import Scenario
-from entropy_explore_env.viewpoints.candidate_features import CONTEXT, FEATURES
-from entropy_explore_env.viewpoints.proposals.model import new_proposers
-from entropy_explore_env.viewpoints.proposals.records import CANDIDATE, EXPERIENCE, Kind
-from entropy_explore_env.viewpoints.recipe import Recipe
 
 _NO_CEILING = np.zeros(0, np.bool_)
 

@@ -14,12 +14,12 @@ from entropy_explore_env.missions.snapshot import restore, snapshot
 from entropy_explore_env.missions.view import view_of
 from entropy_explore_env.missions.view_candidates import ViewProposer
 from entropy_explore_env.missions.view_observation import ViewObserver
+from entropy_explore_env.planner.candidate_features import CONTEXT, FEATURES
+from entropy_explore_env.planner.records import Kind
 from entropy_explore_env.randomness import Stream, splitmix_states
 from entropy_explore_env.reports.state_values import state_digest
 from entropy_explore_env.scenario import with_settings
 from entropy_explore_env.settings import Grid
-from entropy_explore_env.viewpoints.candidate_features import CONTEXT, FEATURES
-from entropy_explore_env.viewpoints.proposals.records import Kind
 from tests.missions.replays import check_replay
 from tests.reference.scenes import free_box, random_actions, started, wander
 

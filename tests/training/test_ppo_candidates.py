@@ -17,7 +17,7 @@ from baselines.experiments.mission import Surroundings
 from entropy_explore_env.command import BAD_INPUT
 from entropy_explore_env.envs.privileged_vec_env import PrivilegedVecEnv
 from entropy_explore_env.missions.privileged import PRIVILEGED
-from entropy_explore_env.viewpoints.candidate_features import FEATURES_VERSION
+from entropy_explore_env.planner.candidate_features import FEATURES_VERSION
 from tests.training.test_ppo import checkpoint_bits
 from training import ppo
 from training.advantages import DecisionBuffer

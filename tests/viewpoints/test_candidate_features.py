@@ -1,7 +1,7 @@
 import pytest
 
 from entropy_explore_env.errors import SettingError
-from entropy_explore_env.viewpoints.candidate_features import (
+from entropy_explore_env.planner.candidate_features import (
     COLUMNS,
     CONTEXT,
     CONTEXT_COLUMNS,

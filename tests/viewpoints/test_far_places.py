@@ -12,7 +12,7 @@ from entropy_explore_env.belief.fields import Belief
 from entropy_explore_env.belief.paths.lattice import belief_costs, new_lattice
 from entropy_explore_env.belief.paths.planning import ANY_GOAL, search_paths
 from entropy_explore_env.belief.paths.search import cost_to, new_search
-from entropy_explore_env.viewpoints.far_places import (
+from entropy_explore_env.planner.far_places import (
     NOT_REACHED,
     BitCount,
     bits_around,

@@ -7,14 +7,14 @@ import dataclasses
 import pytest
 
 from entropy_explore_env.errors import SettingError
-from entropy_explore_env.scenarios import SCENARIOS
-from entropy_explore_env.viewpoints.recipe import (
+from entropy_explore_env.planner.recipe import (
     ALL_AROUND,
     NARROW_PLANNED,
     NARROW_STRAIGHT,
     angular_spread,
     recipe_for,
 )
+from entropy_explore_env.scenarios import SCENARIOS
 
 
 @pytest.mark.parametrize(

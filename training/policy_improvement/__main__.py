@@ -29,8 +29,8 @@ from baselines.cli.arguments import make_folder, parse, print_json, run_command
 from entropy_explore_env.command import INTERRUPTED
 from entropy_explore_env.missions.observation.layout import ObservationLayout
 from entropy_explore_env.missions.privileged import PRIVILEGED
+from entropy_explore_env.planner.candidate_features import COLUMNS
 from entropy_explore_env.scenario import Scenario
-from entropy_explore_env.viewpoints.candidate_features import COLUMNS
 from entropy_explore_env.writing import write_atomically
 from training import extra, ppo  # noqa: F401 - extra: before what is not there without it
 from training.candidate_network import CandidatePolicy

@@ -12,19 +12,19 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from baselines.strategies.knowledge import announced_cones, belief_of
 from entropy_explore_env.belief.fields import Belief
 from entropy_explore_env.belief.paths.lattice import belief_costs
 from entropy_explore_env.belief.paths.planning import ANY_GOAL, search_paths
 from entropy_explore_env.decision_settings import Action, Observation
+from entropy_explore_env.frontiers.knowledge import announced_cones, belief_of
 from entropy_explore_env.missions.view import RobotView
 from entropy_explore_env.missions.view_observation import ViewObserver
+from entropy_explore_env.planner.model import Proposer, new_proposers
+from entropy_explore_env.planner.nearby import AROUND_CORNERS
+from entropy_explore_env.planner.thresholds import DISAPPOINTING
 from entropy_explore_env.scenario import Scenario
 from entropy_explore_env.viewpoints.evaluation import straight_seconds
 from entropy_explore_env.viewpoints.imagined_scan import imagined_bits
-from entropy_explore_env.viewpoints.proposals.model import Proposer, new_proposers
-from entropy_explore_env.viewpoints.proposals.nearby import AROUND_CORNERS
-from entropy_explore_env.viewpoints.proposals.planner_rules import DISAPPOINTING
 from entropy_explore_env.viewpoints.travel import travel_seconds
 
 ACTIONS = Action(kind="discrete", moves="axes", yaws=16, pitches=7)

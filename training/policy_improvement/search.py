@@ -34,8 +34,8 @@ import torch
 
 from baselines.experiments.provenance import code_digest
 from entropy_explore_env.missions.privileged import deciding, finished, mission_times, running
+from entropy_explore_env.planner.candidate_features import COLUMNS
 from entropy_explore_env.scenario import Scenario
-from entropy_explore_env.viewpoints.candidate_features import COLUMNS
 from entropy_explore_env.writing import write_atomically
 from training.candidate_network import CandidatePolicy
 from training.errors import LabelsError, RollOutError

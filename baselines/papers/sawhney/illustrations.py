@@ -22,9 +22,9 @@ from baselines.experiments.cells import Cell
 from baselines.experiments.mission import scripted
 from baselines.papers.sawhney.mission import Run, explore_until_done
 from baselines.papers.sawhney.sweep import PLANS, POINT, TERRAINS, world_cell
-from baselines.strategies.frontier import FrontierStrategy, Metric
-from baselines.strategies.frontier.candidates import Chart
+from baselines.strategies.rules.per_time_visibility import FrontierStrategy, Metric
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
+from entropy_explore_env.frontiers.candidates import Chart
 from entropy_explore_env.missions.view import RobotView
 from entropy_explore_env.reports.recording import DrivenPaths
 from entropy_explore_env.settings import Grid

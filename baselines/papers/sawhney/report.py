@@ -44,7 +44,7 @@ from baselines.papers.sawhney.sweep import (
     TIME_LIMIT_S,
     cell_id,
 )
-from baselines.strategies.frontier.candidates import FrontierConfig
+from entropy_explore_env.frontiers.candidates import FrontierConfig
 from entropy_explore_env.writing import write_atomically
 
 PAPER_RUNS = {"plans": 160, "terrains": 120}

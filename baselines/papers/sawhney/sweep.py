@@ -19,9 +19,9 @@ from baselines.papers.sawhney.map_files import STARTS as MAP_STARTS
 from baselines.papers.sawhney.map_files import TEAM as MAP_TEAM
 from baselines.papers.sawhney.map_files import map_world
 from baselines.papers.sawhney.mission import MapRun, Run
-from baselines.strategies.frontier import ExplorationConfig, Metric
-from baselines.strategies.frontier.candidates import FrontierConfig
-from baselines.strategies.frontier.metrics import Coordinated, Nearest
+from baselines.strategies.metrics import Coordinated, Nearest
+from baselines.strategies.rules.per_time_visibility import ExplorationConfig, Metric
+from entropy_explore_env.frontiers.candidates import FrontierConfig
 from entropy_explore_env.scenario import Scenario, with_settings
 from entropy_explore_env.scenarios import find_scenario
 

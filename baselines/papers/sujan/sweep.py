@@ -8,7 +8,7 @@ import math
 from baselines.experiments.cells import Cell
 from baselines.experiments.mission import Surroundings
 from baselines.papers.sujan.mission import Run
-from baselines.strategies.next_best_view import NextBestViewConfig
+from baselines.strategies.rules.next_best_view import NextBestViewConfig
 from entropy_explore_env.scenario import Scenario, with_settings
 from entropy_explore_env.scenarios import OCCLUSIONS
 

@@ -15,14 +15,14 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from baselines.strategies.explorers.frontier_cells import KNOWN_SIGMA, FrontierCells
-from baselines.strategies.explorers.path_lengths import KnownPaths
-from baselines.strategies.explorers.stops import apart_m, stop_towards
-from baselines.strategies.knowledge import voxel_of
 from baselines.strategies.protocol import random_viewpoint
 from entropy_explore_env.belief.paths.search import new_search
 from entropy_explore_env.errors import SettingError
+from entropy_explore_env.frontiers.frontier_cells import KNOWN_SIGMA, FrontierCells
+from entropy_explore_env.frontiers.knowledge import voxel_of
+from entropy_explore_env.frontiers.path_lengths import KnownPaths
 from entropy_explore_env.missions.view import RobotView
+from entropy_explore_env.planner.stops import apart_m, stop_towards
 from entropy_explore_env.robots.motion import MoveEnd
 from entropy_explore_env.scenario import Scenario
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from baselines.strategies.explorers.path_lengths import KnownPaths
-from baselines.strategies.knowledge import belief_of, voxel_of
+from entropy_explore_env.frontiers.knowledge import belief_of, voxel_of
+from entropy_explore_env.frontiers.path_lengths import KnownPaths
 from entropy_explore_env.missions.view import RobotView
 from entropy_explore_env.viewpoints.expected_localization import Drive, Surveyor, growth_of_error
 

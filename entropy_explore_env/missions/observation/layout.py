@@ -49,8 +49,8 @@ from entropy_explore_env.missions.observation.own_state import SELF_VALUES
 from entropy_explore_env.missions.observation.patch import PATCH_CHANNELS
 from entropy_explore_env.missions.observation.team import TEAMMATE_VALUES
 from entropy_explore_env.missions.rules import Rules, overview_shape, rules_of
+from entropy_explore_env.planner.candidate_features import CONTEXT, FEATURES
 from entropy_explore_env.scenario import Scenario
-from entropy_explore_env.viewpoints.candidate_features import CONTEXT, FEATURES
 
 _Space = TypeVar("_Space", bound=spaces.Space)
 

@@ -13,16 +13,16 @@ from scipy import ndimage
 
 from baselines.experiments.mission import run_mission, scripted_env
 from baselines.strategies import CLIFF_STRATEGIES, make_strategy
-from baselines.strategies.next_best_view.cliff import CliffConfig, CliffMapping
-from baselines.strategies.next_best_view.cliff.edge import behind_line, find_edge, inside_polygon
-from baselines.strategies.next_best_view.cliff.elevation_view import (
+from baselines.strategies.next_best_view.edge import behind_line, find_edge, inside_polygon
+from baselines.strategies.next_best_view.elevation_view import (
     Camera,
     Ground,
     fill_new_information,
     fill_visibility,
     visibility,
 )
-from baselines.strategies.next_best_view.cliff.plateau import PlateauPaths, safe_columns
+from baselines.strategies.next_best_view.plateau import PlateauPaths, safe_columns
+from baselines.strategies.rules.cliff import CliffConfig, CliffMapping
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.missions.view import view_of
 from entropy_explore_env.reports.metrics import mission_figures

@@ -11,11 +11,11 @@ from scipy.ndimage import distance_transform_edt
 from baselines.experiments.mission import run_mission, scripted_env
 from baselines.strategies import make_strategy
 from baselines.strategies.drift_guard import DriftGuard
-from baselines.strategies.frontier import FrontierConfig
-from baselines.strategies.frontier.terrain.candidates import TerrainCandidates
-from baselines.strategies.next_best_view.cliff import CliffMapping
+from baselines.strategies.rules.cliff import CliffMapping
+from baselines.strategies.rules.per_time_visibility import FrontierConfig
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.errors import SettingError
+from entropy_explore_env.frontiers.terrain_candidates import TerrainCandidates
 from entropy_explore_env.localization_settings import Localization
 from entropy_explore_env.missions.view import view_of
 from entropy_explore_env.robots.motion import MoveEnd

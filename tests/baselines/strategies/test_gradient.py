@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from baselines.strategies.gradient import GradientStrategy, steepest_viewpoint
 from baselines.strategies.protocol import random_viewpoint
+from baselines.strategies.rules.gradient import GradientStrategy, steepest_viewpoint
 from entropy_explore_env.belief.fields import entropy_gradient
 from entropy_explore_env.missions.view import RobotView, read_only, view_of
 from entropy_explore_env.robots.motion import MoveEnd

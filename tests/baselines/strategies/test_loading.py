@@ -14,7 +14,7 @@ import pytest
 from baselines.experiments import provenance
 from baselines.experiments.provenance import code_digest
 from baselines.strategies import STRATEGIES, make_strategy, strategy_module
-from baselines.strategies.gradient import GradientStrategy
+from baselines.strategies.rules.gradient import GradientStrategy
 from entropy_explore_env.errors import SettingError
 from tests.code_blocks import shown_files
 
@@ -82,7 +82,7 @@ def test_a_class_and_a_function_of_a_file_are_made(file):
 
 
 def test_a_class_of_a_module_is_made():
-    assert isinstance(make_strategy("baselines.strategies.gradient:GradientStrategy"), GradientStrategy)
+    assert isinstance(make_strategy("baselines.strategies.rules.gradient:GradientStrategy"), GradientStrategy)
 
 
 def test_a_file_imports_its_neighbours(file, monkeypatch):
@@ -93,12 +93,12 @@ def test_a_file_imports_its_neighbours(file, monkeypatch):
 
 def test_an_entry_point_is_a_name(monkeypatch):
     declared = importlib.metadata.EntryPoint(
-        "uphill", "baselines.strategies.gradient:GradientStrategy", "entropy_explore_env.strategies"
+        "uphill", "baselines.strategies.rules.gradient:GradientStrategy", "entropy_explore_env.strategies"
     )
     found = {"entropy_explore_env.strategies": (declared,)}
     monkeypatch.setattr(importlib.metadata, "entry_points", lambda group: found.get(group, ()))
     assert isinstance(make_strategy("uphill"), GradientStrategy)
-    assert strategy_module("uphill") == "baselines.strategies.gradient"
+    assert strategy_module("uphill") == "baselines.strategies.rules.gradient"
     with pytest.raises(SettingError, match=r"did you mean uphill\?"):
         make_strategy("uphil")
 
@@ -154,7 +154,7 @@ def test_the_digest_covers_the_file_and_what_it_imports(file):
 
 
 def test_where_strategies_are_defined(file):
-    assert strategy_module("gradient-plane") == "baselines.strategies.gradient"
+    assert strategy_module("gradient-plane") == "baselines.strategies.rules.gradient"
     assert strategy_module(f"{file}:Own") == file.resolve()
     assert strategy_module("my_package.mine:Own") == "my_package.mine"
     assert all(str(strategy_module(name)).startswith("baselines.strategies.") for name in STRATEGIES)

@@ -11,7 +11,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from baselines.strategies import make_strategy
-from baselines.strategies.next_best_view import NextBestView, NextBestViewConfig, expected_view
+from baselines.strategies.next_best_view import expected_view
 from baselines.strategies.next_best_view.expected_view import (
     extrapolated,
     look,
@@ -20,8 +20,9 @@ from baselines.strategies.next_best_view.expected_view import (
     occupancy_map,
     voxels_in_view,
 )
-from baselines.strategies.next_best_view.raster import Raster, RasterConfig
 from baselines.strategies.next_best_view.rating import UNCERTAINTY, new_information, pose_distance, rating
+from baselines.strategies.rules.next_best_view import NextBestView, NextBestViewConfig
+from baselines.strategies.rules.raster import Raster, RasterConfig
 from entropy_explore_env.belief.elevation import completed
 from entropy_explore_env.belief.fields import Belief, occupancy_probability
 from entropy_explore_env.errors import SettingError

@@ -8,14 +8,14 @@ import pytest
 
 from baselines.experiments.mission import run_mission, scripted
 from baselines.strategies.information_rate_v0 import InformationRate
-from baselines.strategies.planned_rate import PlannedRate, PlannedRateConfig
 from baselines.strategies.planner_choice import PlannerChoice
+from baselines.strategies.rules.planned_rate import PlannedRate, PlannedRateConfig
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.errors import SettingError
+from entropy_explore_env.planner.recipe import recipe_for
 from entropy_explore_env.reports.metrics import mission_figures
 from entropy_explore_env.scenario import with_settings
 from entropy_explore_env.scenarios import BOX, ROOM, SCENARIOS, find_scenario
-from entropy_explore_env.viewpoints.recipe import recipe_for
 
 
 def figures_of(strategy, scenario=ROOM, seed=0, **settings):

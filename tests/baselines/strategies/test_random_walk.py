@@ -10,7 +10,7 @@ from scipy import stats
 
 from baselines.strategies import STRATEGIES, make_strategy
 from baselines.strategies.protocol import random_viewpoint
-from baselines.strategies.random_walk import RandomWalk
+from baselines.strategies.rules.random_walk import RandomWalk
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.missions.action import action_space, decode_action
 from entropy_explore_env.missions.simulation import Missions

@@ -18,9 +18,9 @@ from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.envs.vector_env import EntropyExploreVectorEnv
 from entropy_explore_env.missions.privileged import PRIVILEGED, mission_times, running
 from entropy_explore_env.missions.view import view_of
+from entropy_explore_env.planner.candidate_features import COLUMNS
 from entropy_explore_env.scenario import with_settings
 from entropy_explore_env.scenarios import find_scenario
-from entropy_explore_env.viewpoints.candidate_features import COLUMNS
 from training.candidate_network import CandidatePolicy
 from training.checkpoints import latest_checkpoint, load_checkpoint
 from training.errors import CheckpointError, LabelsError, RollOutError

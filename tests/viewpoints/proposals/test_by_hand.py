@@ -13,18 +13,12 @@ from entropy_explore_env.belief.paths.planning import shortest_path
 from entropy_explore_env.belief.paths.search import new_search
 from entropy_explore_env.belief.visibility import CONE
 from entropy_explore_env.localization_settings import Localization
-from entropy_explore_env.robots.motion import MoveEnd
-from entropy_explore_env.scenario import with_settings
-from entropy_explore_env.scenarios import BOX
-from entropy_explore_env.settings import Grid, RangeSensor
-from entropy_explore_env.viewpoints.candidate_features import COLUMNS
-from entropy_explore_env.viewpoints.evaluation import is_line_free, new_scratch, robot_model
-from entropy_explore_env.viewpoints.imagined_scan import imagined_bits
-from entropy_explore_env.viewpoints.proposals.model import MATE, new_proposers
-from entropy_explore_env.viewpoints.proposals.planner_rules import EDGES
-from entropy_explore_env.viewpoints.proposals.propose import propose
-from entropy_explore_env.viewpoints.proposals.records import CANDIDATE, EXPERIENCE, Kind
-from entropy_explore_env.viewpoints.proposals.situation import (
+from entropy_explore_env.planner.candidate_features import COLUMNS
+from entropy_explore_env.planner.model import MATE, new_proposers
+from entropy_explore_env.planner.propose import propose
+from entropy_explore_env.planner.recipe import ALL_AROUND, NARROW_PLANNED, NARROW_STRAIGHT, recipe_for
+from entropy_explore_env.planner.records import CANDIDATE, EXPERIENCE, Kind
+from entropy_explore_env.planner.situation import (
     LastDecision,
     Situation,
     chosen_number,
@@ -32,8 +26,14 @@ from entropy_explore_env.viewpoints.proposals.situation import (
     trust_in,
     weigh_time,
 )
-from entropy_explore_env.viewpoints.proposals.views import clear_marks, look_from, mark_view
-from entropy_explore_env.viewpoints.recipe import ALL_AROUND, NARROW_PLANNED, NARROW_STRAIGHT, recipe_for
+from entropy_explore_env.planner.thresholds import EDGES
+from entropy_explore_env.planner.views import clear_marks, look_from, mark_view
+from entropy_explore_env.robots.motion import MoveEnd
+from entropy_explore_env.scenario import with_settings
+from entropy_explore_env.scenarios import BOX
+from entropy_explore_env.settings import Grid, RangeSensor
+from entropy_explore_env.viewpoints.evaluation import is_line_free, new_scratch, robot_model
+from entropy_explore_env.viewpoints.imagined_scan import imagined_bits
 from tests.reference.scenes import drawn, free_box, put, random_belief, seeds, started
 
 SIZE, MOST = (7, 11, 5), 6

@@ -8,9 +8,9 @@ import pytest
 from entropy_explore_env import EntropyExploreVectorEnv
 from entropy_explore_env.belief.visibility import CONE, cone_of
 from entropy_explore_env.missions.view import view_of
-from entropy_explore_env.viewpoints.candidate_features import COLUMNS, CONTEXT_COLUMNS, FEATURES
-from entropy_explore_env.viewpoints.proposals.records import Kind
-from entropy_explore_env.viewpoints.recipe import recipe_for
+from entropy_explore_env.planner.candidate_features import COLUMNS, CONTEXT_COLUMNS, FEATURES
+from entropy_explore_env.planner.recipe import recipe_for
+from entropy_explore_env.planner.records import Kind
 from tests.reference import rocha04
 from tests.reference.candidate_views import Map, remaining_blocks, slivers, view_from
 

@@ -11,17 +11,17 @@ import pytest
 from entropy_explore_env.belief.fields import Belief
 from entropy_explore_env.belief.paths.lattice import belief_costs
 from entropy_explore_env.belief.visibility import CONE
+from entropy_explore_env.planner.far import first_stop, propose_far
+from entropy_explore_env.planner.model import MATE, new_proposers
+from entropy_explore_env.planner.nearby import draw_nearby, evaluate, propose_nearby, start_paths
+from entropy_explore_env.planner.recipe import ALL_AROUND, NARROW_PLANNED, NARROW_STRAIGHT
+from entropy_explore_env.planner.records import EXPERIENCE, Kind
+from entropy_explore_env.planner.selection import choose
+from entropy_explore_env.planner.situation import Situation, trust_and_clearance, worth_bits
+from entropy_explore_env.planner.thresholds import STALE
 from entropy_explore_env.scenario import with_settings
 from entropy_explore_env.scenarios import BOX, OFFICE
 from entropy_explore_env.settings import Grid
-from entropy_explore_env.viewpoints.proposals.far import first_stop, propose_far
-from entropy_explore_env.viewpoints.proposals.model import MATE, new_proposers
-from entropy_explore_env.viewpoints.proposals.nearby import draw_nearby, evaluate, propose_nearby, start_paths
-from entropy_explore_env.viewpoints.proposals.planner_rules import STALE
-from entropy_explore_env.viewpoints.proposals.records import EXPERIENCE, Kind
-from entropy_explore_env.viewpoints.proposals.selection import choose
-from entropy_explore_env.viewpoints.proposals.situation import Situation, trust_and_clearance, worth_bits
-from entropy_explore_env.viewpoints.recipe import ALL_AROUND, NARROW_PLANNED, NARROW_STRAIGHT
 
 ACTION = {"kind": "candidates", "candidates": 1}
 PLAN = with_settings(

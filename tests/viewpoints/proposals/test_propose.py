@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from entropy_explore_env import EntropyExploreVectorEnv
-from entropy_explore_env.viewpoints.candidate_features import COLUMNS, FEATURES
-from entropy_explore_env.viewpoints.proposals.records import Kind
+from entropy_explore_env.planner.candidate_features import COLUMNS, FEATURES
+from entropy_explore_env.planner.records import Kind
 
 MOST = 12
 ACTION = {"kind": "candidates", "candidates": MOST}

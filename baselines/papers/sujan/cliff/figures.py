@@ -13,7 +13,7 @@ from baselines.papers.sujan.cliff.claims import FEW, MORE, Records, looks_of, ne
 from baselines.papers.sujan.cliff.mission import known_columns, plateau_of
 from baselines.papers.sujan.cliff.sweep import METHODS, STEPS, cell_id, scenario_of, start_of
 from baselines.strategies import make_strategy
-from baselines.strategies.next_best_view.cliff import CliffMapping
+from baselines.strategies.rules.cliff import CliffMapping
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 
 _EVERY = 5

@@ -7,7 +7,7 @@ import numpy as np
 from baselines.experiments.mission import run_mission
 from baselines.experiments.outcome import Record
 from baselines.strategies import make_strategy
-from baselines.strategies.next_best_view.cliff import CliffMapping
+from baselines.strategies.rules.cliff import CliffMapping
 from entropy_explore_env.belief.elevation import elevation_map
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.missions.view import view_of

@@ -12,8 +12,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from baselines.strategies.next_best_view.cliff import CliffConfig
-from baselines.strategies.next_best_view.cliff.edge import Edge, find_edge
+from baselines.strategies.next_best_view.edge import Edge, find_edge
+from baselines.strategies.rules.cliff import CliffConfig
 from entropy_explore_env.belief.elevation import completed
 from entropy_explore_env.scenarios import CLIFF
 from entropy_explore_env.worlds.load import make_world

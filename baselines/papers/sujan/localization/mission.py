@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from baselines.experiments.mission import run_mission
 from baselines.experiments.outcome import Record
-from baselines.strategies.next_best_view import NextBestView, NextBestViewConfig
+from baselines.strategies.rules.next_best_view import NextBestView, NextBestViewConfig
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.reports.metrics import mission_figures
 

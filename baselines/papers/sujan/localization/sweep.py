@@ -7,7 +7,7 @@ import math
 from baselines.experiments.cells import Cell
 from baselines.papers.sujan.localization.mission import Run
 from baselines.papers.sujan.sweep import METHODS, in_the_middle, scenario_of
-from baselines.strategies.next_best_view import NextBestViewConfig
+from baselines.strategies.rules.next_best_view import NextBestViewConfig
 from entropy_explore_env.localization_settings import Localization
 from entropy_explore_env.scenario import Scenario, with_settings
 

@@ -26,7 +26,7 @@ from baselines.papers.sawhney.illustrations import (
 from baselines.papers.sawhney.mission import explore_until_done
 from baselines.papers.sawhney.sweep import PLANS, TERRAINS, world_cell
 from baselines.papers.sawhney.terrain_model import write_model
-from baselines.strategies.frontier import FrontierStrategy, Metric
+from baselines.strategies.rules.per_time_visibility import FrontierStrategy, Metric
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.scenario import with_settings
 from entropy_explore_env.settings import Grid

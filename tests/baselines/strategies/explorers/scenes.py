@@ -6,11 +6,11 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from baselines.strategies.explorers.explorer import Scene
-from baselines.strategies.explorers.frontier_cells import BLOCK, FrontierCells
-from baselines.strategies.explorers.path_lengths import KnownPaths
-from baselines.strategies.frontier.voxel.map import NONE
 from entropy_explore_env.belief.paths.search import new_search
+from entropy_explore_env.frontiers.frontier_cells import BLOCK, FrontierCells
+from entropy_explore_env.frontiers.path_lengths import KnownPaths
+from entropy_explore_env.frontiers.voxel_map import NONE
+from entropy_explore_env.planner.driver import Scene
 from entropy_explore_env.scenario import with_settings
 from entropy_explore_env.scenarios import find_scenario
 from entropy_explore_env.settings import Grid

@@ -10,14 +10,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from baselines.strategies.explorers.coordinated_frontier import (
+from baselines.strategies.rules.coordinated_frontier import (
     AssignedFrontier,
     CoordinatedConfig,
     CoordinatedFrontier,
     greedy_worth,
     groups,
 )
-from baselines.strategies.frontier.voxel.map import NONE
+from entropy_explore_env.frontiers.voxel_map import NONE
 from entropy_explore_env.missions.view import TeammateView
 from tests.baselines.strategies.explorers.scenes import cell, corridor, random_plan, scene_of
 from tests.reference import explorers as reference

@@ -10,14 +10,14 @@ import pytest
 
 from baselines.experiments.mission import run_mission, scripted
 from baselines.strategies import make_strategy
-from baselines.strategies.explorers.distance_advantage import DistanceAdvantage, DistanceAdvantageConfig
-from baselines.strategies.explorers.frontier_cells import KNOWN_SIGMA
-from baselines.strategies.explorers.information_gain import InformationGain, InformationGainConfig
-from baselines.strategies.explorers.nearest_frontier import NearestFrontier
-from baselines.strategies.explorers.receding_horizon import RecedingHorizon
-from baselines.strategies.explorers.tour import Tour
+from baselines.strategies.rules.distance_advantage import DistanceAdvantage, DistanceAdvantageConfig
+from baselines.strategies.rules.information_gain import InformationGain, InformationGainConfig
+from baselines.strategies.rules.nearest_frontier import NearestFrontier
+from baselines.strategies.rules.receding_horizon import RecedingHorizon
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.errors import SettingError
+from entropy_explore_env.frontiers.frontier_cells import KNOWN_SIGMA
+from entropy_explore_env.planner.tour import Tour
 from entropy_explore_env.reports.metrics import joint_figures, mission_figures
 from entropy_explore_env.scenario import with_settings
 from entropy_explore_env.scenarios import find_scenario

@@ -8,12 +8,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from baselines.experiments.mission import run_mission, scripted
-from baselines.strategies.explorers.advantage_ahead import AdvantageAhead
-from baselines.strategies.explorers.shared_tour import SharedTour
-from baselines.strategies.explorers.teammates import left_to_robot
-from baselines.strategies.explorers.tour import Tour
-from baselines.strategies.planned_rate import PlannedRate, explores_frontiers
+from baselines.strategies.rules.advantage_ahead import AdvantageAhead
+from baselines.strategies.rules.planned_rate import PlannedRate, explores_frontiers
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
+from entropy_explore_env.planner.shared_tour import SharedTour
+from entropy_explore_env.planner.teammates import left_to_robot
+from entropy_explore_env.planner.tour import Tour
 from entropy_explore_env.reports.metrics import joint_figures, mission_figures
 from entropy_explore_env.scenario import with_settings
 from entropy_explore_env.scenarios import OFFICE, find_scenario

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from hypothesis import given
 
-from baselines.strategies.explorers.receding_horizon import RecedingHorizon, RecedingHorizonConfig
-from baselines.strategies.explorers.tour import Tour, TourConfig
+from baselines.strategies.rules.receding_horizon import RecedingHorizon, RecedingHorizonConfig
+from entropy_explore_env.planner.tour import Tour, TourConfig
 from tests.baselines.strategies.explorers.scenes import cell, corridor, random_plan, scene_of
 from tests.reference import explorers as reference
 from tests.reference.scenes import drawn, seeds

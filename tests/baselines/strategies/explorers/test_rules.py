@@ -11,15 +11,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import ndimage
 
-from baselines.strategies.explorers.distance_advantage import (
+from baselines.strategies.rules.distance_advantage import (
     DistanceAdvantage,
     DistanceAdvantageConfig,
     advantages,
 )
-from baselines.strategies.explorers.frontier_cells import BLOCK
-from baselines.strategies.explorers.information_gain import InformationGain, InformationGainConfig
-from baselines.strategies.explorers.nearest_frontier import NearestFrontier, best_of
-from baselines.strategies.frontier.voxel.map import NONE
+from baselines.strategies.rules.information_gain import InformationGain, InformationGainConfig
+from baselines.strategies.rules.nearest_frontier import NearestFrontier, best_of
+from entropy_explore_env.frontiers.frontier_cells import BLOCK
+from entropy_explore_env.frontiers.voxel_map import NONE
 from tests.baselines.strategies.explorers.scenes import belief_of_plan, cell, random_plan, scene_of
 from tests.reference import explorers as reference
 from tests.reference.scenes import drawn, seeds

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from baselines.experiments.mission import scripted
-from baselines.strategies.frontier import ExplorationConfig, FrontierStrategy
-from baselines.strategies.frontier.candidates import FrontierConfig
-from baselines.strategies.frontier.metrics import Nearest
-from baselines.strategies.frontier.voxel.candidates import VoxelCandidates
-from baselines.strategies.frontier.voxel.map import NONE
-from baselines.strategies.knowledge import under_way
+from baselines.strategies.metrics import Nearest
+from baselines.strategies.rules.per_time_visibility import ExplorationConfig, FrontierStrategy
+from entropy_explore_env.frontiers.candidates import FrontierConfig
+from entropy_explore_env.frontiers.knowledge import under_way
+from entropy_explore_env.frontiers.voxel_candidates import VoxelCandidates
+from entropy_explore_env.frontiers.voxel_map import NONE
 from entropy_explore_env.missions.view import view_of
 from entropy_explore_env.robots.motion import driving_time
 from entropy_explore_env.scenario import with_settings

@@ -11,13 +11,13 @@ import pytest
 from baselines.experiments.mission import run_mission, scripted
 from baselines.papers.sawhney.mission import explore_until_done
 from baselines.strategies import make_strategy
-from baselines.strategies.frontier import ExplorationConfig, FrontierStrategy, Metric
-from baselines.strategies.frontier.candidates import FrontierConfig
-from baselines.strategies.frontier.metrics import Coordinated, Nearest
-from baselines.strategies.frontier.voxel.candidates import VoxelCandidates
-from baselines.strategies.frontier.voxel.map import COVERED, NONE
+from baselines.strategies.metrics import Coordinated, Nearest
+from baselines.strategies.rules.per_time_visibility import ExplorationConfig, FrontierStrategy, Metric
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.errors import SettingError
+from entropy_explore_env.frontiers.candidates import FrontierConfig
+from entropy_explore_env.frontiers.voxel_candidates import VoxelCandidates
+from entropy_explore_env.frontiers.voxel_map import COVERED, NONE
 from entropy_explore_env.missions.state import MissionEnd
 from entropy_explore_env.missions.view import view_of
 from entropy_explore_env.reports.metrics import joint_figures, mission_figures

@@ -1,1 +1,0 @@
-"""Frontier candidates over a height field below an exposure surface."""

@@ -1,1 +1,0 @@
-"""Frontier candidates in plans and any 3-D space."""

@@ -1,0 +1,87 @@
+"""The strategy `information-gain`: how much will be seen from a frontier cell, against the path to it.
+
+    v* = argmax over frontier cells v of λ log(1 + gain(v)) - d(robot, v)
+
+gain is the number of unknown voxels that the sensor would see from v, were all that is unknown free; d is
+the length of the path in voxel edges. This is the gain-maximising rule that Ericson, Pedro & Jensfelt 2025
+compare with; like theirs it considers frontier cells up to a horizon, beyond it only the nearest. Their
+gain is the true one, which no robot knows; this one is the robot's own expectation.
+
+Gains are counted only for cells that can be best: all that is known of a gain is that it is no more than at
+an earlier count, but for what has turned free since.
+
+Tuned: λ, see `InformationGainConfig`.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from baselines.strategies.rules.nearest_frontier import best_of
+from entropy_explore_env.planner.driver import Explorer, Scene
+from entropy_explore_env.validation import check_positive
+
+
+@dataclass(frozen=True)
+class InformationGainConfig:
+    """What gain is worth, and which frontier cells count.
+
+    Attributes:
+        weight: λ, in sensor ranges.
+        horizon: Longest path, in sensor ranges, to a frontier cell that counts though it is not the nearest.
+
+    Raises:
+        SettingError: One of them is not allowed.
+    """
+
+    weight: float = 0.05
+    horizon: float = 3.0
+
+    def __post_init__(self) -> None:
+        """Check both."""
+        check_positive(self, "weight")
+        check_positive(self, "horizon", finite=False)
+
+
+class InformationGain(Explorer):
+    """Goes to the frontier cell with the best balance of gain and path."""
+
+    rule = "information-gain"
+
+    def __init__(self, config: InformationGainConfig | None = None) -> None:
+        """Take the settings; None = the defaults."""
+        self.config = config or InformationGainConfig()
+
+    def pick(self, scene: Scene) -> int:
+        """See `Explorer`."""
+        horizon = self.config.horizon * scene.cells.reach
+        scene.paths.extend(horizon)
+        slots, voxels = scene.cells.listed(all_of_them=True)
+        lengths = scene.paths.lengths_to(voxels)
+        near = lengths <= min(horizon, scene.paths.reach)
+        if near.sum() <= 1:
+            voxels, lengths = scene.paths.nearest_frontiers()
+            return best_of(voxels, -lengths, scene.target)
+        slots, voxels, lengths = slots[near], voxels[near], lengths[near]
+        bounds = np.minimum(scene.cells.upper_bounds(slots), scene.cells.greatest_visibility())
+        return best_of(voxels, self._worths(scene, slots, voxels, lengths, bounds), scene.target)
+
+    def _worths(
+        self, scene: Scene, slots: np.ndarray, voxels: np.ndarray, lengths: np.ndarray, bounds: np.ndarray
+    ) -> np.ndarray:
+        """(K,) worths, as far as it takes to know the greatest; -inf for cells that cannot have it."""
+        weight = self.config.weight * scene.cells.reach
+        bound = weight * np.log1p(bounds) - lengths
+        order, size = np.argsort(-bound, kind="stable"), scene.cells.batch
+        worth, most = np.full(len(voxels), -np.inf), -math.inf
+        for first in range(0, len(order), size):
+            batch = order[first : first + size]
+            if bound[batch[0]] < most:
+                break
+            gains = scene.cells.count(slots[batch], voxels[batch])
+            worth[batch] = weight * np.log1p(gains) - lengths[batch]
+            most = float(worth.max())
+        return worth

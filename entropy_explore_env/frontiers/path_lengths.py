@@ -1,0 +1,245 @@
+"""Lengths of paths through known free space, in voxel edges: from a robot, and on average from around it.
+
+A path leads from voxel centre to voxel centre through voxels in which the body may stand, with diagonal
+steps: the navigator's own paths before they are pulled straight, where nothing is unknown.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from entropy_explore_env.belief.paths.lattice import Costs, Lattice, costs_of, new_lattice
+from entropy_explore_env.belief.paths.layer_lengths import fill_layer_lengths
+from entropy_explore_env.belief.paths.planning import resume_search, search_paths, start_search
+from entropy_explore_env.belief.paths.search import Search, cost_to, extract_path
+from entropy_explore_env.belief.paths.string_pulling import line_of_sight_cost, string_pulled
+from entropy_explore_env.belief.voxel_index import flat_index
+from entropy_explore_env.compilation.kernels import lean_kernel
+from entropy_explore_env.frontiers.frontier_cells import FrontierCells
+from entropy_explore_env.scenario import Scenario
+from entropy_explore_env.settings import RobotKind
+
+Corner = tuple[int, int, int]
+_FIRST_REACH = 8.0
+_EXTENSION = 1.5
+"""Searches go so far at first, in voxel edges, and then this many times as far until that is enough."""
+
+
+class KnownPaths:
+    """Shortest paths through the known free space of one robot's map.
+
+    Attributes:
+        search: Memory of the searches; one at a time, so that robots can share it.
+        reach: How far the latest search of `start` goes: lengths up to this are final.
+    """
+
+    def __init__(self, scenario: Scenario, kind: RobotKind, cells: FrontierCells, search: Search) -> None:
+        """Paths in the map of `cells`, which may change between searches."""
+        self._cells, self.search, self._grid = cells, search, scenario.grid
+        self.lattice = new_lattice(scenario.grid.shape, 0.0, scenario.layer_of(kind.robot))
+        self.costs = costs_of(cells.traversal_cost, 1.0)
+        self.reach = 0.0
+
+    def start(self, voxel: int) -> None:
+        """Begin a search from a voxel in which a robot stands, whether or not its body is known to fit."""
+        opened = self._cells.open_start(voxel)
+        start_search(self.search, self.lattice, self.costs, np.array([voxel], np.int32))
+        self.reach = max(_FIRST_REACH, 4.0 * self._cells.body_reach)
+        resume_search(self.search, self.lattice, self.costs, self.reach)
+        self._cells.close(opened)
+
+    def extend(self, reach: float) -> None:
+        """Continue the search of `start` until all lengths up to `reach` are final; inf = all."""
+        if reach > self.reach:
+            resume_search(self.search, self.lattice, self.costs, reach)
+            self.reach = reach
+
+    def exhausted(self) -> bool:
+        """Whether the search has found all that can be reached."""
+        return math.isinf(self.reach) or self.search.queue.state[0]["entries"] == 0
+
+    def frontiers_within(self, reach: float) -> tuple[np.ndarray, np.ndarray]:
+        """(K,) voxels and lengths: of each block the nearest frontier cell, up to a length; inf = all."""
+        self.extend(reach)
+        return self._cells.nearest_of_blocks(self.lengths_to, reach)
+
+    def nearest_frontiers(self) -> tuple[np.ndarray, np.ndarray]:
+        """(K,) frontier cells and lengths, one a block, among them the nearest of all."""
+        while True:
+            voxels, lengths = self._cells.nearest_of_blocks(self.lengths_to, self.reach)
+            if len(voxels) or self.exhausted():
+                return voxels, lengths
+            self.extend(_EXTENSION * self.reach)
+
+    def lengths_to(self, voxels: np.ndarray) -> np.ndarray:
+        """(K,) lengths to (K,) int32 voxels by the latest search, inf where it has not come."""
+        lengths = np.empty(len(voxels))
+        fill_lengths(self.search, voxels, lengths)
+        return lengths
+
+    def all_frontiers(self, here: int) -> tuple[np.ndarray, np.ndarray]:
+        """(K,) voxels and lengths: of each block the nearest frontier cell from a voxel; a new search."""
+        if self.lattice.layer >= 0:
+            return self._cells.nearest_of_blocks(lambda cells: self.lengths_from(here, cells))
+        self.start(here)
+        return self.frontiers_within(math.inf)
+
+    def lengths_from(self, voxel: int, others: np.ndarray, most: float = math.inf) -> np.ndarray:
+        """(K,) lengths of the paths from a voxel to (K,) int32 others; inf = no path.
+
+        What the latest search found is lost: `start` another one.
+
+        Args:
+            voxel: Where a robot stands, whether or not its body is known to fit.
+            others: Where the paths end.
+            most: No path is longer.
+        """
+        if self.lattice.layer >= 0:
+            lengths, opened = np.empty(len(others)), self._cells.open_start(voxel)
+            fill_layer_lengths(self.search, self.lattice, self.costs, voxel, others, lengths)
+            self._cells.close(opened)
+            return lengths
+        self.start(voxel)
+        lengths = self.lengths_to(others)
+        while self.reach < most and not (lengths <= self.reach).all():
+            self.extend(most if math.isinf(most) else min(1.3 * self.reach, most))
+            lengths = self.lengths_to(others)
+        return lengths
+
+    def lengths_between(self, places: np.ndarray, lengths: np.ndarray) -> np.ndarray:
+        """(1 + K, 1 + K) lengths of the shortest paths between the robot and K places; new searches.
+
+        Args:
+            places: (K,) int32 voxels, near ones first.
+            lengths: (K,) of the paths from the robot to them.
+        """
+        between = np.zeros((1 + len(places), 1 + len(places)))
+        between[0, 1:], between[1:, 0] = lengths, lengths
+        # From far places first: near ones then need no long searches.
+        for last in range(len(places) - 1, 0, -1):
+            most = float((lengths[last] + lengths[:last]).max())
+            row = self.lengths_from(int(places[last]), places[:last], most)
+            between[1 + last, 1 : 1 + last] = between[1 : 1 + last, 1 + last] = row
+        return between
+
+    def around(self, voxel: int, radius: int) -> np.ndarray:
+        """(N,) int32 voxels that the latest search reached, up to `radius` voxels off along every axis."""
+        low, high = [], []
+        for at, size in zip(np.unravel_index(voxel, self._grid.shape), self._grid.shape, strict=True):
+            low.append(max(int(at) - radius, 0))
+            high.append(min(int(at) + radius, size - 1) + 1)
+        if self.lattice.layer >= 0:
+            low[2], high[2] = self.lattice.layer, self.lattice.layer + 1
+        found = np.empty(math.prod(b - a for a, b in zip(low, high, strict=True)), np.int32)
+        corners = (low[0], low[1], low[2]), (high[0], high[1], high[2])
+        return found[: collect_reached(self.search, self.lattice.size, *corners, self.reach, found)]
+
+    def mean_length(self, voxel: int, others: np.ndarray, least: float, most: float) -> float:
+        """Mean length of the paths from (N,) int32 voxels to a voxel; a new search, which `lengths_to` reads.
+
+        Args:
+            voxel: Where the paths end.
+            others: Where they begin; those that no path of length `most` connects do not count.
+            least: Some path is at least so long.
+            most: No path is longer.
+        """
+        arrays = self.search, self.lattice, self.costs
+        return float(mean_length_from(*arrays, np.array([voxel], np.int32), others, least, most))
+
+    def in_sight(self, first: np.ndarray, second: np.ndarray) -> bool:
+        """Whether the straight line between two places (3,), in voxel edges, is known to be free."""
+        ends = [(float(p[0]), float(p[1]), float(p[2])) for p in (first, second)]
+        cost = line_of_sight_cost(self.search, self.lattice, self.costs, ends[0], ends[1])
+        return math.isfinite(cost)
+
+    def sights(self, places: np.ndarray, farthest: float) -> np.ndarray:
+        """(K, K) bool: between which of (K, 3) places the line is known free, and at most `farthest` long."""
+        seen = np.zeros((len(places), len(places)), np.bool_)
+        fill_sights(self.search, self.lattice, self.costs, np.ascontiguousarray(places), farthest, seen)
+        return seen
+
+    def route_to(self, goal: int) -> np.ndarray:
+        """(N,) int32 voxels of the path to a voxel by the latest search, from where it began."""
+        path = np.empty(extract_path(self.search, self.lattice, goal, np.empty(0, np.int32)), np.int32)
+        extract_path(self.search, self.lattice, goal, path)
+        return path
+
+    def path_to(self, start: int, goal: int) -> np.ndarray:
+        """(N,) int32 voxels of the shortest path between two voxels; none if there is none. A new search."""
+        opened = self._cells.open_start(start)
+        search_paths(self.search, self.lattice, self.costs, np.array([start], np.int32), goal, math.inf)
+        self._cells.close(opened)
+        return self.route_to(goal)
+
+    def corners_of(self, path: np.ndarray, start: np.ndarray, goal: np.ndarray) -> np.ndarray:
+        """(M, 3) points in grid units at which the latest path, pulled straight, turns; the goal last."""
+        return string_pulled(self.search, self.lattice, self.costs, path, start, goal)
+
+
+@lean_kernel
+def fill_lengths(search: Search, voxels: np.ndarray, lengths: np.ndarray) -> None:
+    """Fill (K,) float64 with the lengths of paths to (K,) int32 voxels by the latest search."""
+    for place in range(len(voxels)):
+        lengths[place] = cost_to(search, voxels[place])
+
+
+@lean_kernel
+def fill_sights(
+    search: Search, lattice: Lattice, costs: Costs, places: np.ndarray, farthest: float, seen: np.ndarray
+) -> None:
+    """Fill (K, K) bool; see `KnownPaths.sights`."""
+    for first in range(len(places)):
+        seen[first, first] = True
+        for second in range(first):
+            a = (places[first, 0], places[first, 1], places[first, 2])
+            b = (places[second, 0], places[second, 1], places[second, 2])
+            apart = math.sqrt((a[0] - b[0]) ** 2 + (a[1] - b[1]) ** 2 + (a[2] - b[2]) ** 2)
+            if apart <= farthest:
+                cost = line_of_sight_cost(search, lattice, costs, a, b)
+                seen[first, second] = seen[second, first] = not math.isinf(cost)
+
+
+@lean_kernel
+def collect_reached(
+    search: Search, size: Corner, low: Corner, high: Corner, reach: float, voxels: np.ndarray
+) -> int:
+    """Fill in the voxels between two corners whose paths are no longer than `reach`; returns their number."""
+    count = 0
+    for x in range(low[0], high[0]):
+        for y in range(low[1], high[1]):
+            for z in range(low[2], high[2]):
+                voxel = flat_index(size, x, y, z)
+                length = cost_to(search, voxel)
+                if length <= reach and not math.isinf(length):
+                    voxels[count] = voxel
+                    count += 1
+    return count
+
+
+@lean_kernel
+def mean_length_from(
+    search: Search,
+    lattice: Lattice,
+    costs: Costs,
+    source: np.ndarray,
+    voxels: np.ndarray,
+    least: float,
+    most: float,
+) -> float:
+    """Mean length of the paths from a source (1,) to (N,) int32 voxels; see `KnownPaths.mean_length`."""
+    start_search(search, lattice, costs, source)
+    reach = max(least, 1.0)
+    while True:
+        resume_search(search, lattice, costs, reach)
+        total, missing = 0.0, 0
+        for voxel in voxels:
+            length = cost_to(search, voxel)
+            if length <= reach and not math.isinf(length):
+                total += length
+            else:
+                missing += 1
+        if missing == 0 or reach >= most:
+            return total / max(len(voxels) - missing, 1)
+        reach = min(1.2 * reach, most)

@@ -1,0 +1,234 @@
+"""What is expected to be seen of a height field from above: V of Sawhney 2009 in 3-D (sects. 3.3-3.4).
+
+Points are the columns of a TerrainMap. Unexplored ground is assumed to slope down from the mean height z_av
+of the ground around the place: z = (1 - dist / range) z_av above the workspace's floor. A column is seen if a
+ray from the place meets its top: along every direction the steepest slope to the columns passed is the
+horizon. Grid units: heights are in layers.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel
+from entropy_explore_env.frontiers.voxel_map import NONE
+from entropy_explore_env.frontiers.voxel_visibility import count_point, grid_indices, start_count
+
+
+class ColumnCounts(NamedTuple):
+    """What is seen from K places."""
+
+    seen: np.ndarray
+    """(K,) float64, columns."""
+    weighed: np.ndarray
+    """(K,) float64, columns weighed by promises."""
+    factor: np.ndarray
+    """(K,) float64, the height factor."""
+
+
+class ViewModel(NamedTuple):
+    """How columns are seen from candidates; lengths in columns and layers."""
+
+    reach: float
+    """Of the sensor, > 0."""
+    min_tangent: float
+    """Tangent of the smallest angle below the horizon at which the sensor sees."""
+    patch: int
+    """Half the width of the patch whose mean ground is z_av."""
+    gamma: float
+    """γ of the height factor."""
+    highest: float
+    """The greatest z_f - z_av of a candidate."""
+    fade: float
+    """Distance at which unexplored ground is assumed to reach the floor; inf = it is level."""
+
+
+@lean_kernel
+def mean_ground(terrain, x, y, patch):
+    """z_av: mean ground of the mapped columns within `patch` of one along both axes; 0 where none is."""
+    total, count = 0.0, 0
+    for i in range(max(x - patch, 0), min(x + patch, terrain.size[0] - 1) + 1):
+        for j in range(max(y - patch, 0), min(y + patch, terrain.size[1] - 1) + 1):
+            if terrain.ground[i, j] != NONE:
+                total += terrain.ground[i, j]
+                count += 1
+    return total / count if count > 0 else 0.0
+
+
+@inlined_kernel
+def height_at(terrain, x, y, eye, average, fade):
+    """Height of a column: its ground if mapped, else extrapolated (sect. 3.4), 0 from `fade` columns on."""
+    if terrain.ground[x, y] != NONE:
+        return np.float64(terrain.ground[x, y])
+    dx, dy = x + 0.5 - eye[0], y + 0.5 - eye[1]
+    return max((1.0 - math.sqrt(dx * dx + dy * dy) / fade) * average, 0.0)
+
+
+@lean_kernel
+def count_below(counter, terrain, eye, average, azimuths, view_model, marking):
+    """Unexplored columns that are seen from a place: (all, weighed by promises).
+
+    Args:
+        counter: The counter.
+        terrain: The map.
+        eye: (x, y, z) of the place.
+        average: z_av there.
+        azimuths: (D, 2) float64 unit vectors.
+        view_model: Reach, min_tangent and fade matter.
+        marking: Whether the robot promises to see these columns.
+    """
+    number = start_count(counter)
+    return _count_more(counter, number, terrain, eye, average, azimuths, view_model, marking)
+
+
+@lean_kernel
+def count_below_together(counter, terrain, eyes, azimuths, view_model):
+    """Unexplored columns that are seen from any of (N, 3) places, weighed by promises; see `count_below`."""
+    number, weighed = start_count(counter), 0.0
+    for place in eyes:
+        eye = (place[0], place[1], place[2])
+        average = mean_ground(terrain, int(eye[0]), int(eye[1]), view_model.patch)
+        weighed += _count_more(counter, number, terrain, eye, average, azimuths, view_model, False)[1]
+    return weighed
+
+
+@lean_kernel
+def _count_more(counter, number, terrain, eye, average, azimuths, view_model, marking):
+    """`count_below`, of the columns that the count of this number has not met yet."""
+    points, weighed = 0, 0.0
+    size, reach = terrain.size, view_model.reach
+    for direction in azimuths:
+        x, y = int(eye[0]), int(eye[1])
+        step_x, step_y = 1 if direction[0] > 0.0 else -1, 1 if direction[1] > 0.0 else -1
+        gap_x = 1.0 / abs(direction[0]) if direction[0] != 0.0 else math.inf
+        gap_y = 1.0 / abs(direction[1]) if direction[1] != 0.0 else math.inf
+        face_x = (x + 1 - eye[0] if step_x > 0 else eye[0] - x) * gap_x if gap_x < math.inf else math.inf
+        face_y = (y + 1 - eye[1] if step_y > 0 else eye[1] - y) * gap_y if gap_y < math.inf else math.inf
+        enters, horizon = 0.0, -math.inf
+        while enters <= reach:
+            leaves = min(face_x, face_y)
+            height = height_at(terrain, x, y, eye, average, view_model.fade)
+            drop = eye[2] - height
+            if drop <= 0.0:
+                break  # it hides the tops of all lower columns behind it
+            slope = -drop / leaves
+            column = x * size[1] + y
+            near = enters * enters + drop * drop <= reach * reach
+            if slope > horizon and near and drop >= view_model.min_tangent * enters:
+                if terrain.unexplored[column] and counter.stamp[column] != number:
+                    counter.stamp[column] = number
+                    points += 1
+                    weighed += count_point(counter, column, marking)
+            horizon = max(horizon, slope)
+            enters = leaves
+            if face_x <= face_y:
+                x, face_x = x + step_x, face_x + gap_x
+            else:
+                y, face_y = y + step_y, face_y + gap_y
+            if not (0 <= x < size[0] and 0 <= y < size[1]):
+                break
+    return points, weighed
+
+
+@lean_kernel
+def count_columns_in_ball(counter, terrain, eye, average, view_model, marking):
+    """The naive V: unexplored columns whose tops, extrapolated, lie in a ball, seen or not."""
+    points, weighed, size, reach = 0, 0.0, terrain.size, view_model.reach
+    wide = min(reach, size[0] + size[1])
+    for x in range(max(int(eye[0] - wide - 0.5), 0), min(int(eye[0] + wide + 1.0), size[0])):
+        for y in range(max(int(eye[1] - wide - 0.5), 0), min(int(eye[1] + wide + 1.0), size[1])):
+            column = x * size[1] + y
+            if not terrain.unexplored[column]:
+                continue
+            drop = eye[2] - height_at(terrain, x, y, eye, average, view_model.fade)
+            dx, dy = x + 0.5 - eye[0], y + 0.5 - eye[1]
+            if dx * dx + dy * dy + drop * drop <= reach * reach:
+                points += 1
+                weighed += count_point(counter, column, marking)
+    return points, weighed
+
+
+@lean_kernel
+def count_columns_from(counter, terrain, voxels, azimuths, view_model, naive, counts):
+    """Count the columns seen from K voxels, also weighed by promises, and the height factor of each.
+
+    The factor is (z_f - z_av)^γ z_f^(1 - γ), heights above the workspace's floor in layers (sect. 3.3); 0 for
+    places so high above the ground that little of it can be seen, which are no candidates.
+
+    Args:
+        counter: The counter.
+        terrain: The map.
+        voxels: (K,) int32.
+        azimuths: (D, 2) float64.
+        view_model: How columns are seen.
+        naive: Whether columns in a ball are counted.
+        counts: ColumnCounts, filled in.
+    """
+    seen, weighed, factor = counts.seen, counts.weighed, counts.factor
+    for place in range(len(voxels)):
+        x, y, z = grid_indices(terrain.size, voxels[place])
+        eye = (x + 0.5, y + 0.5, z + 0.5)
+        average = mean_ground(terrain, x, y, view_model.patch)
+        seen[place], weighed[place] = 0.0, 0.0
+        factor[place] = _height_factor(eye[2], average, view_model)
+        if factor[place] == 0.0:
+            continue
+        if naive:
+            points, value = count_columns_in_ball(counter, terrain, eye, average, view_model, False)
+        else:
+            points, value = count_below(counter, terrain, eye, average, azimuths, view_model, False)
+        seen[place], weighed[place] = points, value
+
+
+@inlined_kernel
+def _height_factor(height, average, view_model):
+    """(z_f - z_av)^γ z_f^(1 - γ); 0 where z_f - z_av is too much. See `count_columns_from`."""
+    above, gamma = height - average, view_model.gamma
+    return 0.0 if above > view_model.highest else max(above, 1e-3) ** gamma * height ** (1.0 - gamma)
+
+
+@lean_kernel
+def sum_rows(terrain, sums):
+    """Fill (X, Y + 1) int32 with the unexplored columns of each row along y before a column."""
+    for x in range(terrain.size[0]):
+        sums[x, 0] = 0
+        for y in range(terrain.size[1]):
+            sums[x, y + 1] = sums[x, y] + terrain.unexplored[x * terrain.size[1] + y]
+
+
+def half_widths(reach: float) -> np.ndarray:
+    """(W,) int64, how far on along y columns touch a disc of this radius, by their distance along x.
+
+    The disc is about the middle of a column; distances are in columns.
+    """
+    within = reach + math.sqrt(0.5)  # the middle of a column that touches it
+    return np.array([int(math.sqrt(within**2 - across**2)) for across in range(int(within) + 1)], np.int64)
+
+
+@lean_kernel
+def bound_columns(terrain, sums, widths, voxels, view_model, most, factor):
+    """Fill (K,) with the unexplored columns in range of K voxels, seen or not, and the height factors.
+
+    No more than this can be seen from there.
+
+    Args:
+        terrain: The map.
+        sums: (X, Y + 1) of `sum_rows`.
+        widths: (W,) of `half_widths`, for the sensor's reach.
+        voxels: (K,) int32.
+        view_model: How columns are seen.
+        most: (K,) filled in.
+        factor: (K,) filled in.
+    """
+    size, last = terrain.size, len(widths) - 1
+    for place in range(len(voxels)):
+        x, y, z = grid_indices(size, voxels[place])
+        factor[place] = _height_factor(z + 0.5, mean_ground(terrain, x, y, view_model.patch), view_model)
+        found = 0
+        for i in range(max(x - last, 0), min(x + last, size[0] - 1) + 1):
+            wide = widths[abs(i - x)]
+            found += sums[i, min(y + wide + 1, size[1])] - sums[i, max(y - wide, 0)]
+        most[place] = found

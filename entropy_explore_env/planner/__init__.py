@@ -1,0 +1,1 @@
+"""The planner: from what one robot knows to the viewpoint to which it drives next."""

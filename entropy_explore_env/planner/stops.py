@@ -1,0 +1,52 @@
+"""Where a robot stops on its way to a place that is farther than one drive may lead."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from entropy_explore_env.frontiers.knowledge import RobotKnowledge, voxel_of
+from entropy_explore_env.frontiers.path_lengths import KnownPaths
+
+_WITHIN_REACH = 0.999
+"""Share of the reach that is used, so that rounding never moves a place towards the robot."""
+
+
+def stop_towards(view: RobotKnowledge, paths: KnownPaths, here: int, goal: np.ndarray) -> np.ndarray:
+    """(3,) the farthest place on the known path to a goal to which one drive leads.
+
+    A robot that plans drives to the last place of the path within its reach; one that drives straight to the
+    first corner of the path, pulled straight.
+
+    Args:
+        view: Of the robot.
+        paths: Through its known free space; a new search is made.
+        here: The voxel in which it stands.
+        goal: (3,) or more numbers, in metres, map frame; itself where no path leads there.
+    """
+    grid, robot, goal = view.scenario.grid, view.kind.robot, goal[:3]
+    reach_m = robot.reach_m * _WITHIN_REACH
+    if robot.navigator == "planned" and apart_m(view, goal) <= reach_m:
+        return goal
+    path = paths.path_to(here, voxel_of(view, goal))
+    if len(path) == 0:
+        return goal
+    if robot.navigator == "planned":
+        places = grid.centre_of(np.stack(np.unravel_index(path, grid.shape), axis=-1))
+        axes = 2 if view.planar else 3
+        beyond = np.flatnonzero(np.linalg.norm(places[:, :axes] - view.pose[:axes], axis=1) > reach_m)
+        last = (int(beyond[0]) if len(beyond) else len(path)) - 1
+        return np.asarray(places[max(last, 0)])
+    start, end = (grid.in_grid_units(np.append(p, (0.0, 0.0)))[:3] for p in (view.pose[:3], goal))
+    if paths.lattice.layer >= 0:
+        end[2] = start[2]
+    corners = paths.corners_of(path, start, end)
+    first = np.asarray(grid.origin_m) + (corners[0] if len(corners) else end) * grid.voxel_size_m
+    return np.asarray(
+        view.pose[:3] + (first - view.pose[:3]) * min(1.0, reach_m / max(apart_m(view, first), 1e-9))
+    )
+
+
+def apart_m(view: RobotKnowledge, place: np.ndarray) -> float:
+    """Straight distance from a robot to a place, map frame; of planar robots along the plane."""
+    axes = 2 if view.planar else 3
+    return float(np.linalg.norm(place[:axes] - view.pose[:axes]))

@@ -1,0 +1,188 @@
+"""What candidates should see: which voxels, with which other candidates, and what they leave beside."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from entropy_explore_env.belief.raycast import STOP_AT_COVERED
+from entropy_explore_env.belief.visibility import in_cone
+from entropy_explore_env.belief.voxel_index import flat_index, grid_index
+from entropy_explore_env.compilation.kernels import lean_kernel
+from entropy_explore_env.planner.candidate_features import ANNOUNCED, SEEN_BITS
+from entropy_explore_env.viewpoints.imagined_scan import imagine_scan
+
+_SEEN_RATIO = 2.0 ** (2.0 * SEEN_BITS) - 1.0
+"""Precision added to a voxel, as a share of its precision, that brings SEEN_BITS."""
+_FOLD_ABOVE = 1e250
+"""A product of ratios is folded into bits, by its logarithm, before it could leave a float64."""
+_ONE = np.uint64(1)
+
+
+@lean_kernel
+def look_from(proposer, situation, at, number, most_common):
+    """Find out what a scan from a viewpoint should see, and mark it, unless another candidate sees the same.
+
+    Args:
+        proposer: A Proposer; candidates with lower numbers have been looked from.
+        situation: A Situation.
+        at: (5,) the viewpoint, grid units.
+        number: Of the candidate; `scratch.views` and `scratch.common` of it are filled in.
+        most_common: Largest share of the voxels of either that one before and it may both see.
+
+    Returns:
+        Whether it sees something else than each of those before.
+    """
+    scratch, belief, gap = proposer.scratch, situation.belief, proposer.recipe.gap_probability
+    touched = imagine_scan(belief, proposer.exact, gap, at, scratch.scan, 0)
+    view = scratch.views[number]
+    _gather(proposer, situation, at, touched, view)
+    common = scratch.common[number]
+    for other in range(number + 1):
+        common[other] = 0
+    for i in range(view.seen):
+        marks = scratch.marks[scratch.scan.touched[i]]
+        other = 0
+        while marks != 0:
+            common[other] += np.int64(marks & _ONE)
+            marks >>= _ONE
+            other += 1
+    for other in range(number):
+        fewer = min(view.seen, scratch.views[other].seen)
+        if common[other] > most_common * fewer:
+            return False
+    return True
+
+
+@lean_kernel
+def _gather(proposer, situation, at, touched, view):
+    """Sum up what an imagined scan adds, and clear it; voxels that count as seen come first in `touched`."""
+    scan, belief, cones = proposer.scratch.scan, situation.belief, situation.cones
+    cone_bits = proposer.scratch.cone_bits
+    bits, all_bits, again_bits = 0.0, 0.0, 0.0
+    growth, all_growth, again_growth = 1.0, 1.0, 1.0
+    seen, unknown, distance = 0, 0, 0.0
+    for mate in range(len(cones)):
+        cone_bits[mate] = 0.0
+    for i in range(touched):
+        voxel = scan.touched[i]
+        precision = np.float64(belief.precision[voxel])
+        share = np.float64(scan.added[voxel]) / precision
+        scan.added[voxel] = 0.0
+        x, y, z = grid_index(belief.size, voxel)
+        dx, dy, dz = x + 0.5 - at[0], y + 0.5 - at[1], z + 0.5 - at[2]
+        left = False
+        for mate in range(len(cones)):
+            cone = cones[mate]
+            if in_cone(cone, x + 0.5 - cone.apex[0], y + 0.5 - cone.apex[1], z + 0.5 - cone.apex[2]):
+                left = True
+                cone_bits[mate] += 0.5 * math.log2(1.0 + share)
+        all_growth *= 1.0 + share
+        if not left:
+            growth *= 1.0 + share
+            again_growth *= (1.0 + 2.0 * share) / (1.0 + share)
+        if all_growth > _FOLD_ABOVE or again_growth > _FOLD_ABOVE:
+            bits, all_bits = bits + math.log2(growth), all_bits + math.log2(all_growth)
+            again_bits += math.log2(again_growth)
+            growth, all_growth, again_growth = 1.0, 1.0, 1.0
+        if share >= _SEEN_RATIO:
+            scan.touched[seen] = voxel
+            seen += 1
+            unknown += int(precision < proposer.exact.known_precision)
+            distance += math.sqrt(dx * dx + dy * dy + dz * dz)
+    view.bits = 0.5 * (bits + math.log2(growth))
+    view.all_bits = 0.5 * (all_bits + math.log2(all_growth))
+    view.again_bits = 0.5 * (again_bits + math.log2(again_growth))
+    view.seen, view.unknown, view.distance = seen, unknown, distance
+    view.slivers, view.unique = 0, 0.0
+    _sort_shared(cone_bits, len(cones), view.shared)
+
+
+@lean_kernel
+def _sort_shared(cone_bits, count, shared):
+    """Write down the largest of some numbers, the largest first; 0 where there are fewer."""
+    for place in range(ANNOUNCED):
+        shared[place] = 0.0
+    for mate in range(count):
+        bits = cone_bits[mate]
+        for place in range(ANNOUNCED):
+            if bits > shared[place]:
+                bits, shared[place] = shared[place], bits
+
+
+@lean_kernel
+def mark_view(proposer, belief, number, marked):
+    """Mark the voxels that a candidate sees, as `look_from` left them, and count slivers beside them.
+
+    Args:
+        proposer: A Proposer.
+        belief: A Belief.
+        number: Of the candidate.
+        marked: How many voxels are in `scratch.seen`.
+
+    Returns:
+        How many are there now.
+    """
+    scratch, bit = proposer.scratch, _ONE << np.uint64(number)
+    marks, touched, view = scratch.marks, scratch.scan.touched, scratch.views[number]
+    for i in range(view.seen):
+        voxel = touched[i]
+        if marks[voxel] == 0:
+            scratch.seen[marked] = voxel
+            marked += 1
+        marks[voxel] |= bit
+    slivers, known = 0, proposer.exact.known_precision
+    for i in range(view.seen):
+        if belief.precision[touched[i]] < known:
+            slivers += _slivers_beside(belief, touched[i], known, marks, bit)
+    view.slivers = slivers
+    return marked
+
+
+@lean_kernel
+def _is_left(belief, x, y, z, known, marks, bit):
+    """Whether a voxel is unknown and stays so: it is in the workspace, and the candidate does not see it."""
+    size = belief.size
+    if not (0 <= x < size[0] and 0 <= y < size[1] and 0 <= z < size[2]):
+        return False
+    voxel = flat_index(size, x, y, z)
+    return (
+        belief.precision[voxel] < known and belief.mean[voxel] <= STOP_AT_COVERED and not marks[voxel] & bit
+    )
+
+
+@lean_kernel
+def _slivers_beside(belief, voxel, known, marks, bit):
+    """How many of a voxel's six neighbours are left unknown though what lies behind each is not."""
+    x, y, z = grid_index(belief.size, voxel)
+    count = 0
+    for axis in range(3):
+        for side in range(2):
+            step = 2 * side - 1
+            dx = step if axis == 0 else 0
+            dy = step if axis == 1 else 0
+            dz = step if axis == 2 else 0
+            if _is_left(belief, x + dx, y + dy, z + dz, known, marks, bit):
+                behind = _is_left(belief, x + 2 * dx, y + 2 * dy, z + 2 * dz, known, marks, bit)
+                count += int(not behind)
+    return count
+
+
+@lean_kernel
+def clear_marks(proposer, marked):
+    """Sum up how unique the views are, and clear the marks of all candidates."""
+    scratch = proposer.scratch
+    for i in range(marked):
+        voxel = scratch.seen[i]
+        marks, count = scratch.marks[voxel], 0
+        while marks != 0:
+            count += 1
+            marks &= marks - _ONE
+        marks, number = scratch.marks[voxel], 0
+        while marks != 0:
+            if marks & _ONE:
+                scratch.views[number].unique += 1.0 / count
+            marks >>= _ONE
+            number += 1
+        scratch.marks[voxel] = 0

@@ -1,0 +1,239 @@
+"""Frontiers and visibility over a height field: beside a slow reference, and by hand."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from entropy_explore_env.frontiers.terrain_map import (
+    TILE,
+    choose_reached_columns,
+    new_terrain_map,
+    reset_bounds,
+    update_columns,
+    update_terrain,
+)
+from entropy_explore_env.frontiers.terrain_visibility import (
+    ColumnCounts,
+    ViewModel,
+    bound_columns,
+    count_below,
+    count_below_together,
+    count_columns_from,
+    count_columns_in_ball,
+    half_widths,
+    mean_ground,
+    sum_rows,
+)
+from entropy_explore_env.frontiers.voxel_map import NONE, queue_block
+from entropy_explore_env.frontiers.voxel_visibility import new_counter
+from tests.reference import sawhney as reference
+from tests.reference.scenes import drawn, seeds
+
+LEVELS = np.float32(4.0), np.float32(4.0)
+SHAPE = (9, 13, 8)
+CEILING = 7
+
+
+def known_ground(ground, shape=SHAPE, ceiling=CEILING, radius=0.0, spacing=2, rise=2):
+    """A map in which the columns with ground ≥ 0 are known."""
+    terrain = new_terrain_map(shape, radius, spacing, rise, np.full(shape[:2], ceiling, np.int32))
+    survey_ground(terrain, ground, shape)
+    return terrain
+
+
+def survey_ground(terrain, ground, shape=SHAPE):
+    mean = np.where(np.arange(shape[2]) < ground[:, :, None], 0.9, 0.1).astype(np.float32)
+    precision = np.where(ground[:, :, None] < 0, 0.1, 9.0) * np.ones(shape)
+    update_terrain(terrain, mean.reshape(-1), precision.astype(np.float32).reshape(-1), LEVELS)
+
+
+def hills(seed, known=0.7, shape=SHAPE):
+    rng = np.random.default_rng(seed)
+    ground = rng.integers(1, 5, shape[:2]).astype(np.int32)
+    ground[rng.random(shape[:2]) > known] = NONE
+    return ground, rng
+
+
+@given(seeds)
+@drawn(30)
+def test_ground_is_the_known_covered_voxel_below_a_known_free_one(seed):
+    rng = np.random.default_rng(seed)
+    mean = np.where(rng.random(SHAPE) < 0.5, 0.9, 0.1).astype(np.float32)
+    precision = np.where(rng.random(SHAPE) < 0.3, 0.1, 9.0).astype(np.float32)
+    terrain = new_terrain_map(SHAPE, 0.0, 3, 2, np.full(SHAPE[:2], CEILING, np.int32))
+    update_terrain(terrain, mean.reshape(-1), precision.reshape(-1), LEVELS)
+    state = np.where(precision < 4.0, 3, 0) | np.where((mean > 0.5) & (precision >= 4.0), 4, 0)
+    np.testing.assert_array_equal(terrain.ground, reference.ground_of(state))
+
+
+@given(seeds, st.floats(0.5, 7.5), st.floats(3.0, 12.0), st.sampled_from([0.0, 0.3]), st.booleans())
+@drawn(60)
+def test_columns_are_those_whose_tops_rays_meet(seed, height, reach, min_tangent, level):
+    ground, rng = hills(seed)
+    x, y = int(rng.integers(0, 9)), int(rng.integers(0, 13))
+    ground[x, y] = 0 if ground[x, y] == NONE else min(ground[x, y], int(height))
+    terrain, eye = known_ground(ground), (x + 0.5, y + 0.5, height)
+    angles = 0.05 + np.arange(24) * (2 * math.pi / 24)
+    azimuths = np.stack([np.cos(angles), np.sin(angles)], axis=-1)
+    average = mean_ground(terrain, x, y, 2)
+    assert average == pytest.approx(reference.mean_height(terrain.ground, x, y, 2))
+    fade = math.inf if level else reach
+    heights = reference.surface(terrain.ground, eye, average, fade)
+    unexplored = terrain.ground == NONE
+    wanted = reference.seen_columns(heights, unexplored, eye, azimuths, reach, min_tangent)
+    counter = new_counter(9 * 13, SHAPE)
+    view_model = ViewModel(reach, min_tangent, 2, 0.5, math.inf, fade)
+    points, value = count_below(counter, terrain, eye, average, azimuths, view_model, True)
+    marked = {
+        tuple(map(int, np.unravel_index(c, (9, 13))))
+        for c in counter.promised_points[: counter.promised_count[0]]
+    }
+    assert (points, value, marked) == (len(wanted), len(wanted), wanted)
+    assert count_below(counter, terrain, eye, average, azimuths, view_model, False)[1] == len(wanted) / 2
+    ball = {
+        (i, j)
+        for i, j in np.argwhere(unexplored).tolist()
+        if math.dist((i + 0.5, j + 0.5, heights[i, j]), eye) <= reach
+    }
+    assert count_columns_in_ball(counter, terrain, eye, average, view_model, False)[0] == len(ball)
+
+
+def test_columns_seen_from_some_places_together_count_once():
+    ground, rng = hills(7)
+    terrain, counter = known_ground(ground), new_counter(9 * 13, SHAPE)
+    angles = 0.05 + np.arange(24) * (2 * math.pi / 24)
+    azimuths = np.stack([np.cos(angles), np.sin(angles)], axis=-1)
+    view_model = ViewModel(6.0, 0.0, 2, 0.5, math.inf, 6.0)
+    eyes = np.stack([*(np.floor(rng.random((3, 2)) * (9, 13)) + 0.5).T, np.array([6.5, 7.0, 7.5])], axis=-1)
+    together, alone = set[tuple[int, ...]](), []
+    for x, y, z in eyes.tolist():
+        average = reference.mean_height(terrain.ground, int(x), int(y), 2)
+        heights = reference.surface(terrain.ground, (x, y, z), average, 6.0)
+        seen = reference.seen_columns(heights, terrain.ground == NONE, (x, y, z), azimuths, 6.0, 0.0)
+        together |= seen
+        alone.append(len(seen))
+    assert max(alone) < len(together) < sum(alone)
+    assert count_below_together(counter, terrain, eyes, azimuths, view_model) == len(together)
+
+
+def test_a_ridge_hides_the_valley_behind_it_by_hand():
+    """Ground 1, a ridge of 4 at x = 4, unknown beyond: from 3 above the floor nothing is seen past it."""
+    ground = np.ones((9, 3), np.int32)
+    ground[4], ground[6:] = 4, NONE
+    east = np.array([[1.0, 0.0]])
+    counter, view_model = new_counter(27, (9, 3, 8)), ViewModel(10.0, 0.0, 2, 0.5, math.inf, fade=10.0)
+    terrain = known_ground(ground, (9, 3, 8))
+    for height, wanted in ((3.5, 0), (5.5, 1), (7.5, 2)):
+        # z_av = 1: extrapolated 1 - d/10. From 5.5 over the ridge's far edge at d = 4.5: slope -1/3, which
+        # meets height 0.4 … at d ≈ 15; from 7.5 slope -7/9: 0.2 … 0.4 at d ≈ 9; the last tops end at d = 8.5
+        eye = (0.5, 1.5, height)
+        found = count_below(counter, terrain, eye, 1.0, east, view_model, False)[0]
+        heights = reference.surface(ground, eye, 1.0, 10.0)
+        assert found == len(reference.seen_columns(heights, ground < 0, eye, east, 10.0, 0.0))
+        assert found <= wanted
+    ground[4] = 1
+    flat = known_ground(ground, (9, 3, 8))
+    assert count_below(counter, flat, (0.5, 1.5, 5.5), 1.0, east, view_model, False)[0] == 3
+
+
+def test_candidates_hang_above_the_edge_between_ground_and_ceiling():
+    ground = np.ones((9, 13), np.int32)
+    ground[5:] = NONE
+    terrain = known_ground(ground, spacing=1)
+    found = np.stack(np.unravel_index(terrain.voxel[terrain.voxel != NONE], SHAPE), axis=-1)
+    assert set(found[:, 0]) == {4} and set(found[:, 1]) == set(range(13))
+    assert set(found[:, 2]) == {2, 4, 6}  # a layer of air below, two apart, and below layer 7
+    traversal_cost = terrain.traversal_cost.reshape(SHAPE)
+    assert np.isfinite(traversal_cost[:5, :, 1:7]).all() and np.isinf(traversal_cost[5:]).all()
+    assert np.isinf(traversal_cost[:, :, 0]).all() and np.isinf(traversal_cost[:, :, 7]).all()
+    ground[5:7] = 2
+    survey_ground(terrain, ground)
+    found = np.stack(np.unravel_index(terrain.voxel[terrain.voxel != NONE], SHAPE), axis=-1)
+    assert set(found[:, 0]) == {6} and set(found[:, 2]) == {3, 5}
+
+
+def test_a_block_gives_a_column_that_was_reached_or_has_room_left():
+    """Known ground at x = 0 and x = 2 in a block of four columns: the middle one first, then the other."""
+    ground = np.full((4, 4), NONE, np.int32)
+    ground[0, 1], ground[2, 1] = 1, 1
+    terrain = known_ground(ground, (4, 4, 8), spacing=4)
+    near, far = 2 * 4 + 1, 1
+    assert terrain.column[0] == near
+    cost = np.full(4 * 4 * 8, np.inf)
+    choose_reached_columns(terrain, cost)
+    assert terrain.column[0] == near  # neither was reached
+    cost[far * 8 + 4] = 3.0
+    terrain.seen[:] = 5.0
+    choose_reached_columns(terrain, cost)
+    assert terrain.column[0] == far and np.isinf(terrain.seen).all()
+    assert set(terrain.voxel[terrain.voxel != NONE] // 8) == {far}
+    terrain.excluded[near * 8 :][:8] = 1
+    update_columns(terrain, queue_block(terrain, 0, 0))
+    assert terrain.column[0] == far  # nothing is left above the middle one
+    terrain.excluded[far * 8 :][:8] = 1
+    update_columns(terrain, queue_block(terrain, 0, 0))
+    assert terrain.column[0] == NONE and (terrain.voxel == NONE).all()
+
+
+def test_the_height_factor_by_hand():
+    """(z_f - z_av)^γ z_f^(1 - γ), and nothing for who is too high."""
+    ground = np.full((9, 13), 2, np.int32)
+    ground[7:] = NONE
+    terrain = known_ground(ground)
+    voxels = np.array([(4 * 13 + 5) * 8 + z for z in (3, 6)], np.int32)  # z_f = 3.5 and 6.5, z_av = 2
+    counts = ColumnCounts(np.empty(2), np.empty(2), np.empty(2))
+    seen, factor = counts.seen, counts.factor
+    azimuths = np.array([[1.0, 0.0]])
+    counter = new_counter(9 * 13, SHAPE)
+    view_model = ViewModel(10.0, 0.0, patch=1, gamma=0.5, highest=9.0, fade=10.0)
+    count_columns_from(counter, terrain, voxels, azimuths, view_model, False, counts)
+    assert factor.tolist() == pytest.approx([math.sqrt(1.5 * 3.5), math.sqrt(4.5 * 6.5)])
+    assert seen.tolist() == [1.0, 2.0]  # from 3.5 one ends on the line of sight over the edge
+    view_model = view_model._replace(gamma=1.0, highest=4.0)
+    count_columns_from(counter, terrain, voxels, azimuths, view_model, False, counts)
+    assert factor.tolist() == pytest.approx([1.5, 0.0]) and seen[1] == 0.0
+
+
+@given(seeds, st.floats(0.6, 12.0), st.booleans())
+@drawn(60)
+def test_no_more_is_seen_than_lies_in_range(seed, reach, naive):
+    ground, rng = hills(seed)
+    terrain = known_ground(ground)
+    voxels = rng.integers(0, math.prod(SHAPE), 20).astype(np.int32)
+    angles = 0.05 + np.arange(40) * (2 * math.pi / 40)
+    azimuths, view_model = (
+        np.stack([np.cos(angles), np.sin(angles)], axis=-1),
+        ViewModel(reach, 0.0, 2, 0.4, 5.0, reach),
+    )
+    most, same, counts = np.empty(20), np.empty(20), ColumnCounts(*(np.empty(20) for _ in range(3)))
+    seen, factor = counts.seen, counts.factor
+    counter, sums = new_counter(9 * 13, SHAPE), np.empty((9, 14), np.int32)
+    count_columns_from(counter, terrain, voxels, azimuths, view_model, naive, counts)
+    sum_rows(terrain, sums)
+    bound_columns(terrain, sums, half_widths(reach), voxels, view_model, most, same)
+    np.testing.assert_array_equal(same, factor)
+    assert (seen <= most).all()
+    for voxel, bound in zip(voxels.tolist(), most, strict=True):
+        x, y, _ = np.unravel_index(voxel, SHAPE)
+        near = [math.dist((x, y), place) <= reach + math.sqrt(0.5) for place in np.ndindex(9, 13)]
+        assert bound == np.count_nonzero(np.reshape(near, (9, 13)) & (terrain.ground == NONE))
+
+
+def test_what_was_seen_is_forgotten_near_new_ground_and_nowhere_else():
+    size = (40, 30, 1)
+    voxels = np.array([0, 20 * 30 + 15, NONE, 39 * 30 + 29], np.int32)
+    seen = np.array([5.0, 6.0, 7.0, 8.0], np.float32)
+    changed = np.zeros((40 // TILE + 1, 30 // TILE + 1), np.uint8)
+    reset_bounds(changed, size, voxels, seen, 5.0)
+    assert seen.tolist() == [5.0, 6.0, 7.0, 8.0]
+    changed[0, 0] = 1
+    reset_bounds(changed, size, voxels, seen, 5.0)
+    assert seen.tolist() == [math.inf, 6.0, 7.0, 8.0] and not changed.any()
+    changed[2, 1] = 1  # x 16 … 23, y 8 … 15
+    reset_bounds(changed, size, voxels, seen, 100.0)
+    assert np.isinf(seen[[0, 1, 3]]).all() and seen[2] == 7.0

@@ -1,0 +1,129 @@
+"""Frontier candidates of a map, kept up to date: beside a slow reference, and by hand."""
+
+from __future__ import annotations
+
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+
+from entropy_explore_env.frontiers.voxel_map import (
+    CANDIDATE,
+    COVERED,
+    MAX_TRACKED_OPENINGS,
+    NONE,
+    UNEXPLORED,
+    UNMAPPED,
+    new_frontier_map,
+    update_frontiers,
+)
+from tests.reference import sawhney as reference
+from tests.reference.scenes import drawn, seeds
+
+LEVELS, FINER = (np.float32(4.0), np.float32(1.0)), (np.float32(8.0), np.float32(1.0))
+SHAPES = ((7, 11, 1), (9, 6, 1), (4, 7, 5), (13, 2, 3))
+
+
+def random_map(shape, rng):
+    """Mean and precision in patches, so that there is room for bodies."""
+    mean = np.where(rng.random(shape) < 0.1, 0.9, 0.1).astype(np.float32)
+    precision = np.where(rng.random(shape) < 0.25, 0.5, 9.0).astype(np.float32)
+    precision[rng.random(shape) < 0.1] = 2.0
+    return mean, precision
+
+
+def state_of(mean, precision, levels=LEVELS):
+    state = np.where(precision < levels[0], UNEXPLORED, 0) | np.where(precision < levels[1], UNMAPPED, 0)
+    return state | np.where((mean > 0.5) & (precision >= levels[1]), COVERED, 0)
+
+
+def updated(frontiers, mean, precision, levels=LEVELS):
+    update_frontiers(frontiers, mean.reshape(-1), precision.reshape(-1), levels)
+
+
+@given(st.sampled_from(SHAPES), st.sampled_from([0.0, 1.0, 1.3]), st.integers(1, 4), seeds)
+@drawn(40)
+def test_candidates_and_rates_are_those_of_the_definition_after_every_change(shape, radius, spacing, seed):
+    rng = np.random.default_rng(seed)
+    layer = 0 if shape[2] == 1 else None
+    frontiers = new_frontier_map(shape, radius, layer, spacing)
+    mean, precision = random_map(shape, rng)
+    for levels in (LEVELS, LEVELS, FINER, FINER):
+        updated(frontiers, mean, precision, levels)
+        state = state_of(mean, precision, levels)
+        np.testing.assert_array_equal(frontiers.state.reshape(shape), state)
+        ball = frontiers.footprint.tolist()
+        np.testing.assert_array_equal(
+            np.isfinite(frontiers.traversal_cost.reshape(shape)), reference.standing(state, ball)
+        )
+        wanted = reference.candidates(state, ball)
+        np.testing.assert_array_equal((frontiers.flags & CANDIDATE > 0).reshape(shape), wanted)
+        check_blocks(frontiers, wanted, spacing)
+        here = tuple(rng.integers(0, n) for n in shape)
+        patch = tuple(slice(max(i - 1, 0), i + 2) for i in here)
+        precision[patch] += rng.choice([0.5, 9.0])
+        mean[patch] = rng.choice([0.1, 0.9])
+
+
+def check_blocks(frontiers, wanted, spacing):
+    """One candidate a block that has any: none is nearer to its middle."""
+    shape = wanted.shape
+    across = (spacing, spacing, shape[2] if shape[2] == 1 else spacing)
+    of_block = np.full(frontiers.blocks, NONE)
+    for place in np.argwhere(wanted):
+        block = tuple(place // across)
+        low = np.array(block) * across
+        middle = 0.5 * (low + np.minimum(low + across, shape))
+        apart = ((place + 0.5 - middle) ** 2).sum()
+        found = frontiers.voxel.reshape(frontiers.blocks)[block]
+        assert found != NONE
+        chosen = np.stack(np.unravel_index(found, shape))
+        assert wanted[tuple(chosen)] and ((chosen + 0.5 - middle) ** 2).sum() <= apart + 1e-9
+        of_block[block] = found
+    np.testing.assert_array_equal(frontiers.voxel.reshape(frontiers.blocks), of_block)
+
+
+def test_a_corridor_by_hand():
+    """Nine voxels in a row, the first five explored: the fifth is the frontier, and moves on."""
+    mean, precision = np.full((9, 3, 1), 0.9, np.float32), np.full((9, 3, 1), 9.0, np.float32)
+    mean[:, 1], precision[5:] = 0.1, 0.5
+    frontiers = new_frontier_map((9, 3, 1), 0.0, 0, 2)
+    updated(frontiers, mean, precision)
+    assert frontiers.voxel[frontiers.voxel != NONE].tolist() == [4 * 3 + 1]
+    frontiers.seen[:] = 1.0
+    precision[5:7] = 9.0
+    updated(frontiers, mean, precision)
+    block = np.flatnonzero(frontiers.voxel != NONE)
+    assert frontiers.voxel[block].tolist() == [6 * 3 + 1] and np.isinf(frontiers.seen[block]).all()
+    precision[:] = 9.0
+    updated(frontiers, mean, precision)
+    assert (frontiers.voxel == NONE).all()
+
+
+def test_what_turned_out_free_is_noted_by_hand():
+    """Of twelve covered voxels one becomes free; then all are asked for at a finer level."""
+    shape = (4, 3, 1)
+    mean, precision = np.full(12, 0.9, np.float32), np.full(12, 9.0, np.float32)
+    frontiers = new_frontier_map(shape, 0.0, 0, 2)
+    update_frontiers(frontiers, mean, precision, LEVELS)
+    assert frontiers.opened_count[0] == 0
+    mean[7], precision[7] = 0.1, 10.0
+    update_frontiers(frontiers, mean, precision, LEVELS)
+    assert frontiers.opened_count[0] == 1 and frontiers.opened[0] == 7
+    update_frontiers(frontiers, mean, precision, (np.float32(16.0), np.float32(1.0)))
+    assert (
+        frontiers.opened_count[0] > MAX_TRACKED_OPENINGS
+    )  # all is unexplored again: more may be seen anywhere
+
+
+def test_more_openings_than_are_noted():
+    shape = (70, 61, 1)
+    mean, precision = np.full(70 * 61, 0.9, np.float32), np.full(70 * 61, 9.0, np.float32)
+    frontiers = new_frontier_map(shape, 0.0, 0, 8)
+    update_frontiers(frontiers, mean, precision, LEVELS)
+    mean[:MAX_TRACKED_OPENINGS], precision[:MAX_TRACKED_OPENINGS] = 0.1, 10.0
+    update_frontiers(frontiers, mean, precision, LEVELS)
+    assert frontiers.opened_count[0] == MAX_TRACKED_OPENINGS
+    np.testing.assert_array_equal(frontiers.opened, np.arange(MAX_TRACKED_OPENINGS))
+    mean[MAX_TRACKED_OPENINGS], precision[MAX_TRACKED_OPENINGS] = 0.1, 10.0
+    update_frontiers(frontiers, mean, precision, LEVELS)
+    assert frontiers.opened_count[0] == MAX_TRACKED_OPENINGS + 1
