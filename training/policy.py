@@ -242,7 +242,11 @@ class LearnedPolicy:
             raise CheckpointError(f"{self._folder}: {reason.what}", reason.given, allowed)
         self._rng = torch.Generator().manual_seed(int(rng.integers(2**63)))
 
-    def choose(self, views: Sequence[RobotView]) -> list[np.ndarray]:
+    def choose(self, view: RobotView) -> np.ndarray:
+        """Return the viewpoint (5,) of one robot."""
+        return self.choose_all([view])[0]
+
+    def choose_all(self, views: Sequence[RobotView]) -> list[np.ndarray]:
         """The policy's viewpoint for each view."""
         if not views:  # all robots drive
             return []

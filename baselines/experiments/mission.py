@@ -13,11 +13,11 @@ import numpy as np
 
 from baselines.experiments.outcome import Record
 from baselines.strategies import make_strategy
-from baselines.strategies.drift_guard import DriftGuard
-from baselines.strategies.protocol import Strategy
+from baselines.strategies.protocol import Strategy, choose_all
 from entropy_explore_env.decision_settings import Observation
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
-from entropy_explore_env.errors import ActionError
+from entropy_explore_env.missions.view import RobotView
+from entropy_explore_env.planner.driver import Driver, Trail
 from entropy_explore_env.reports.metrics import mission_figures
 from entropy_explore_env.reports.recording import Recorder
 from entropy_explore_env.scenario import Scenario, with_settings
@@ -98,7 +98,7 @@ def run_mission(
     after_step: Callable[[EntropyExploreEnv], None] | None = None,
     before_step: Callable[[Mapping[str, Any]], None] | None = None,
     options: dict[str, Any] | None = None,
-    guarded: bool = True,
+    backs_off: bool = True,
 ) -> None:
     """Reset the environment and let a strategy act until the mission is over.
 
@@ -109,20 +109,20 @@ def run_mission(
         after_step: Called after the reset and after every step.
         before_step: Called with the actions before every step.
         options: Of the reset: where the robots start, and in which world.
-        guarded: Whether robots that drift back off from what blocks them: see `strategies.drift_guard`.
+        backs_off: Whether robots that drift back off from what blocks them: see `planner.back_off`.
     """
     env.reset(seed=seed, options=options)
-    if guarded and env.scenario.drifts:
-        strategy = DriftGuard(strategy)
+    if isinstance(strategy, Driver):
+        strategy.backs_off = backs_off
+    elif env.scenario.drifts and backs_off:
+        strategy = Followed(strategy)
     strategy.reset(env.scenario, env.strategy_generator())
     actions = {agent: _idle_action(env, agent) for agent in env.agents}
     if after_step is not None:
         after_step(env)
     while env.agents:
         views = [env.view(agent) for agent in env.deciding_agents()]
-        chosen = list(strategy.choose(views))
-        if len(chosen) != len(views):
-            raise ActionError("viewpoints chosen", len(chosen), f"one for each of {len(views)} views")
+        chosen = choose_all(strategy, views)
         for view, viewpoint in zip(views, chosen, strict=True):
             actions[env.agents[view.robot]] = view.action_for(viewpoint)
         if before_step is not None:
@@ -130,6 +130,29 @@ def run_mission(
         env.step(actions)
         if after_step is not None:
             after_step(env)
+
+
+class Followed(Driver):
+    """Follows any strategy, so that robots that drift back off from what blocks them."""
+
+    most_blocked = 0
+    repeats = True
+
+    def __init__(self, strategy: Strategy) -> None:
+        """Take the strategy."""
+        self._strategy = strategy
+
+    def reset(self, scenario: Scenario, rng: np.random.Generator) -> None:
+        """Begin a mission; the strategy draws as it does alone."""
+        self._strategy.reset(scenario, rng)
+        super().reset(scenario, rng)
+
+    def give_way(self, view: RobotView, trail: Trail) -> None:
+        """Leave it to the strategy."""
+
+    def decide(self, view: RobotView) -> np.ndarray:
+        """Return what the strategy chooses."""
+        return choose_all(self._strategy, [view])[0]
 
 
 def _idle_action(env: EntropyExploreEnv, agent: str) -> np.ndarray | np.int64:

@@ -10,6 +10,7 @@ import hashlib
 import importlib
 import importlib.metadata
 import importlib.util
+import inspect
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -21,7 +22,8 @@ from entropy_explore_env.errors import EntropyExploreError, SettingError
 
 ENTRY_POINTS = "entropy_explore_env.strategies"
 """The group in which packages declare strategies."""
-_METHODS = ("reset", "choose")
+_METHODS = (("reset",), ("choose", "choose_all"))
+"""A strategy has one of the methods of each group."""
 _FORM = "module:Class or path/to/file.py:Class"
 
 
@@ -128,9 +130,15 @@ def _made(name: str, attribute: str, make: Callable[[], Any]) -> Strategy:
     except Exception as error:
         allowed = f"a class that can be made without arguments; {attribute}() raised {_said(error)}"
         raise SettingError("strategy", name, allowed) from error
-    missing = [method for method in _METHODS if not callable(getattr(strategy, method, None))]
+    missing = [group[0] for group in _METHODS if not _has_one_of(strategy, group)]
     if missing:
         allowed = f"a Strategy, with the methods reset and choose; {' and '.join(missing)} missing"
+        raise SettingError("strategy", name, allowed)
+    choose = getattr(strategy, "choose", None)
+    if choose is not None and "views" in inspect.signature(choose).parameters:
+        allowed = (
+            "a Strategy with choose(view), of one robot; the choice for several at once is choose_all(views)"
+        )
         raise SettingError("strategy", name, allowed)
     return strategy
 
@@ -142,8 +150,13 @@ def _strategies_in(module: ModuleType) -> list[str]:
         for name, thing in vars(module).items()
         if isinstance(thing, type)
         and thing.__module__ == module.__name__
-        and all(callable(getattr(thing, method, None)) for method in _METHODS)
+        and all(_has_one_of(thing, group) for group in _METHODS)
     ]
+
+
+def _has_one_of(thing: object, methods: tuple[str, ...]) -> bool:
+    """Whether a strategy, or its class, has one of some methods."""
+    return any(callable(getattr(thing, method, None)) for method in methods)
 
 
 def _said(error: BaseException) -> str:

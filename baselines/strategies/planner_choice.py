@@ -7,8 +7,6 @@ its later draws differ from those of `planned-rate`, and single missions do.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from entropy_explore_env.missions.view import RobotView
@@ -26,7 +24,7 @@ class PlannerChoice:
             scenario = with_settings(scenario, {"action": {"kind": "candidates"}})
             self._proposer = ViewProposer(scenario, rng)
 
-    def choose(self, views: Sequence[RobotView]) -> list[np.ndarray]:
-        """The viewpoint of each view; where candidates are the actions, one of those that were proposed."""
-        proposed = [view.candidates if self._proposed else self._proposer.propose(view) for view in views]
-        return [candidates[0].copy() for candidates in proposed]
+    def choose(self, view: RobotView) -> np.ndarray:
+        """Return the viewpoint (5,); where candidates are the actions, one of those that were proposed."""
+        proposed = view.candidates if self._proposed else self._proposer.propose(view)
+        return proposed[0].copy()

@@ -1,4 +1,4 @@
-"""What a strategy is: it chooses viewpoints for robots from what each of them knows."""
+"""What a strategy is: it chooses a viewpoint for each robot from what that robot knows."""
 
 from __future__ import annotations
 
@@ -7,22 +7,25 @@ from typing import Protocol
 
 import numpy as np
 
+from entropy_explore_env.errors import ActionError
 from entropy_explore_env.frontiers.knowledge import random_viewpoint
 from entropy_explore_env.missions.view import RobotView
 from entropy_explore_env.scenario import Scenario
 
-__all__ = ["Stopwatch", "Strategy", "random_viewpoint"]
+__all__ = ["Stopwatch", "Strategy", "choose_all", "random_viewpoint"]
 
 
 class Strategy(Protocol):
-    """Chooses viewpoints for a team, robot by robot.
+    """Chooses viewpoints for the robots of a team, one by one.
 
     A strategy sees RobotViews and nothing else. What it returns goes through the environment's
-    action space, like a learned policy's choice.
+    action space, like a learned policy's choice. A strategy that decides for several robots at once
+    has a method `choose_all`, of the views of all robots that decide now, by number; it is called in
+    place of `choose` and returns one viewpoint for each view.
     """
 
     def reset(self, scenario: Scenario, rng: np.random.Generator) -> None:
-        """A new mission begins.
+        """Begin a mission.
 
         Args:
             scenario: The public settings.
@@ -30,33 +33,52 @@ class Strategy(Protocol):
         """
         ...
 
-    def choose(self, views: Sequence[RobotView]) -> list[np.ndarray]:
-        """Choose where robots go.
+    def choose(self, view: RobotView) -> np.ndarray:
+        """Choose where a robot goes.
 
         Args:
-            views: One of each robot that decides now, by number.
+            view: What the robot knows; it decides now.
 
         Returns:
-            For each view a viewpoint (5,): x, y, z, yaw, pitch; map frame, metres, radians.
+            (5,) viewpoint: x, y, z, yaw, pitch; map frame, metres, radians.
         """
         ...
 
 
+def choose_all(strategy: Strategy, views: Sequence[RobotView]) -> list[np.ndarray]:
+    """Return a viewpoint (5,) for each view, in their order.
+
+    Raises:
+        ActionError: The strategy's own `choose_all` returned another number of viewpoints.
+    """
+    together = getattr(strategy, "choose_all", None)
+    if together is None:
+        return [strategy.choose(view) for view in views]
+    chosen = list(together(views))
+    if len(chosen) != len(views):
+        raise ActionError("viewpoints chosen", len(chosen), f"one for each of {len(views)} views")
+    return chosen
+
+
 class Stopwatch:
-    """A strategy whose decisions are timed, in milliseconds a robot."""
+    """A strategy whose decisions are timed, in milliseconds for each robot."""
 
     def __init__(self, strategy: Strategy, clock: Callable[[], float]) -> None:
-        """Nothing is measured yet; `clock` tells seconds."""
+        """Measure nothing yet; `clock` returns seconds."""
         self._strategy, self._clock = strategy, clock
         self.decisions_ms: list[float] = []
 
     def reset(self, scenario: Scenario, rng: np.random.Generator) -> None:
-        """A new mission begins."""
+        """Begin a mission."""
         self._strategy.reset(scenario, rng)
 
-    def choose(self, views: Sequence[RobotView]) -> list[np.ndarray]:
-        """What the strategy chooses; notes the time that it took for each view."""
+    def choose(self, view: RobotView) -> np.ndarray:
+        """Return what the strategy chooses for one robot."""
+        return self.choose_all([view])[0]
+
+    def choose_all(self, views: Sequence[RobotView]) -> list[np.ndarray]:
+        """Return what the strategy chooses, and note the time that it took for each view."""
         started = self._clock()
-        chosen = self._strategy.choose(views)
+        chosen = choose_all(self._strategy, views)
         self.decisions_ms.append(1e3 * (self._clock() - started) / max(len(views), 1))
         return chosen

@@ -13,11 +13,8 @@ class NearestUnknown:
         self._unknown = 1.1 * scenario.sigma_prior**-2  # 1/σ² of a voxel that was hardly ever measured
         self._rng = rng
 
-    def choose(self, views):
-        """A viewpoint (x, y, z, yaw, pitch) for each robot that decides, in metres and radians."""
-        return [self._choose(view) for view in views]
-
-    def _choose(self, view):
+    def choose(self, view):
+        """Return a viewpoint (x, y, z, yaw, pitch) for a robot that decides, in metres and radians."""
         grid, here = view.scenario.grid, view.pose[:3]
         unknown = np.argwhere(view.precision < self._unknown)  # view.mean and view.precision: (X, Y, Z)
         if view.move_end.name not in ("ARRIVED", "SEEN", "UNDER_WAY") or len(unknown) == 0:

@@ -58,6 +58,15 @@ class TeammateKnowledge(Protocol):
         ...
 
 
+class ScanKnowledge(Protocol):
+    """A robot's latest scan."""
+
+    @property
+    def utility_bits(self) -> np.ndarray:
+        """(R,) bits that each ray took from the robot's own map."""
+        ...
+
+
 class RobotKnowledge(Protocol):
     """What one robot knows at one of its decisions; map frame, metres, radians."""
 
@@ -119,6 +128,21 @@ class RobotKnowledge(Protocol):
     @property
     def precision(self) -> np.ndarray:
         """(X, Y, Z) float32, 1/σ² of it."""
+        ...
+
+    @property
+    def depth_m(self) -> float:
+        """Mean measured distance of its latest scan."""
+        ...
+
+    @property
+    def half_angle_rad(self) -> float:
+        """Largest angle of a measured ray of its latest scan from the gaze."""
+        ...
+
+    @property
+    def scan(self) -> ScanKnowledge:
+        """Its latest scan."""
         ...
 
     @property

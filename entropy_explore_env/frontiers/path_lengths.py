@@ -18,10 +18,13 @@ from entropy_explore_env.belief.paths.string_pulling import line_of_sight_cost, 
 from entropy_explore_env.belief.voxel_index import flat_index
 from entropy_explore_env.compilation.kernels import lean_kernel
 from entropy_explore_env.frontiers.frontier_cells import FrontierCells
+from entropy_explore_env.frontiers.voxel_map import NONE
 from entropy_explore_env.scenario import Scenario
 from entropy_explore_env.settings import RobotKind
 
 Corner = tuple[int, int, int]
+_ROOM, _ROOM_DRAWS = 40, 64
+"""Voxels along each axis within which places are drawn that make room for others, and how many are drawn."""
 _FIRST_REACH = 8.0
 _EXTENSION = 1.5
 """Searches go so far at first, in voxel edges, and then this many times as far until that is enough."""
@@ -135,6 +138,30 @@ class KnownPaths:
         found = np.empty(math.prod(b - a for a, b in zip(low, high, strict=True)), np.int32)
         corners = (low[0], low[1], low[2]), (high[0], high[1], high[2])
         return found[: collect_reached(self.search, self.lattice.size, *corners, self.reach, found)]
+
+    def place_away_from(self, here: int, others: list[int], rng: np.random.Generator) -> int:
+        """Return a voxel to which the path from a voxel is shorter than from all others; a new search.
+
+        Args:
+            here: Where the robot stands.
+            others: Where its teammates stand.
+            rng: Draws some places, of which the farthest from the others is taken.
+
+        Returns:
+            A voxel in which the body is known to fit; NONE = none was found, or there are no others.
+        """
+        if not others:
+            return NONE
+        self.start(here)
+        self.extend(2.0 * _ROOM)
+        around = self.around(here, _ROOM)
+        if len(around) == 0:
+            return NONE
+        drawn = rng.choice(around, _ROOM_DRAWS)
+        own = self.lengths_to(drawn)
+        apart = np.min([self.lengths_from(other, drawn) for other in others], axis=0)
+        nearer = np.flatnonzero((own < apart) & (drawn != here))
+        return int(drawn[nearer[np.argmax(apart[nearer])]]) if len(nearer) else NONE
 
     def mean_length(self, voxel: int, others: np.ndarray, least: float, most: float) -> float:
         """Mean length of the paths from (N,) int32 voxels to a voxel; a new search, which `lengths_to` reads.

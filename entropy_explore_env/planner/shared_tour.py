@@ -22,7 +22,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from entropy_explore_env.frontiers.voxel_map import NONE
-from entropy_explore_env.planner.driver import NOWHERE, Goal, Scene, scanned_here
+from entropy_explore_env.planner.frontier_rule import NOWHERE, Goal, Scene, scanned_here
 from entropy_explore_env.planner.teammates import left_to_robot
 from entropy_explore_env.planner.tour import Tour, TourConfig
 from entropy_explore_env.validation import check_count, check_not_negative
@@ -67,8 +67,8 @@ class SharedTour(Tour):
         """Take the settings; None = the defaults."""
         super().__init__(config or SharedTourConfig())
 
-    def goal(self, scene: Scene) -> Goal:
-        """See `Explorer`."""
+    def pick(self, scene: Scene) -> Goal:
+        """Return the voxel to go to; see `FrontierRule`."""
         tour = self.tour_among(scene, *scene.paths.all_frontiers(scene.here))
         if len(tour) == 0:
             return NOWHERE

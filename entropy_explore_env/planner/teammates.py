@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from entropy_explore_env.frontiers.knowledge import stays, teammates_that_share, under_way, voxel_of
-from entropy_explore_env.planner.driver import Scene
+from entropy_explore_env.planner.frontier_rule import Scene
 
 
 class Team(NamedTuple):

@@ -23,7 +23,7 @@ import numpy as np
 
 from entropy_explore_env.frontiers.open_tours import open_tour, tour_length
 from entropy_explore_env.frontiers.voxel_map import NONE
-from entropy_explore_env.planner.driver import Explorer, Scene
+from entropy_explore_env.planner.frontier_rule import FrontierRule, Scene
 from entropy_explore_env.planner.teammates import centres_of
 from entropy_explore_env.validation import check, check_count, check_positive
 
@@ -59,7 +59,7 @@ class TourConfig:
         check(self, "stay", "a number from 0 to 1", lambda v: 0.0 <= v <= 1.0)
 
 
-class Tour(Explorer):
+class Tour(FrontierRule):
     """Goes to the first place of a tour through what is left to explore."""
 
     rule = "tour"
@@ -69,7 +69,7 @@ class Tour(Explorer):
         self.config = config or TourConfig()
 
     def pick(self, scene: Scene) -> int:
-        """See `Explorer`."""
+        """Return the voxel to go to; see `FrontierRule`."""
         return self.pick_among(scene, *scene.paths.all_frontiers(scene.here))
 
     def pick_among(self, scene: Scene, voxels: np.ndarray, lengths: np.ndarray) -> int:

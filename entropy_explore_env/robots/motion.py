@@ -48,7 +48,15 @@ class MoveEnd(enum.Enum):
         """Number of this end in arrays."""
         return list(MoveEnd).index(self)
 
+    @property
+    def blocked(self) -> bool:
+        """Whether something that does not move was in the way: the same drive would end there again."""
+        return self in _BLOCKED
 
+
+_BLOCKED = frozenset(
+    {MoveEnd.OBSTACLE, MoveEnd.GROUND, MoveEnd.CEILING, MoveEnd.WALL, MoveEnd.EDGE, MoveEnd.NO_PATH}
+)
 _ARRIVED, _WALL = MoveEnd.ARRIVED.code, MoveEnd.WALL.code
 _OBSTACLE, _GROUND, _CEILING = MoveEnd.OBSTACLE.code, MoveEnd.GROUND.code, MoveEnd.CEILING.code
 _ENDS_AT = (_ARRIVED, _OBSTACLE, _GROUND, _CEILING, MoveEnd.EDGE.code)

@@ -234,18 +234,18 @@ def test_killed_twenty_times_it_ends_with_the_same_bytes(pair, tmp_path):
 class Raises(RandomWalk):
     """In the middle of some missions."""
 
-    def choose(self, views):
-        if views[0].time_s > 5.0 and len(views[0].scenario.agents) == 2:
+    def choose(self, view):
+        if view.time_s > 5.0 and len(view.scenario.agents) == 2:
             raise ValueError("no | way\nat <all>")
-        return super().choose(views)
+        return super().choose(view)
 
 
 class Sleeps(RandomWalk):
     """Longer than anybody waits."""
 
-    def choose(self, views):
+    def choose(self, view):
         time.sleep(60.0)
-        return super().choose(views)
+        return super().choose(view)
 
 
 @pytest.fixture

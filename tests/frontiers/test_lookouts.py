@@ -17,7 +17,7 @@ from entropy_explore_env.errors import SettingError
 from entropy_explore_env.frontiers.frontier_cells import KNOWN_SIGMA
 from entropy_explore_env.frontiers.lookouts import in_sight
 from entropy_explore_env.frontiers.voxel_map import NONE
-from entropy_explore_env.planner.driver import Goal
+from entropy_explore_env.planner.frontier_rule import Goal
 from entropy_explore_env.planner.shared_tour import SharedTour, SharedTourConfig
 from entropy_explore_env.planner.tour import Tour
 from entropy_explore_env.reports.metrics import mission_figures
@@ -100,7 +100,7 @@ def test_a_lookout_makes_the_way_over_it_shortest_of_all_that_see_the_same(shape
     rng = np.random.default_rng(seed)
     plan, robot = random_plan(shape, rng)
     scene, rule = scene_of(plan, robot), SharedTour(SharedTourConfig(pocket=1.0))
-    goal = rule.goal(scene)
+    goal = rule.pick(scene)
     assert goal.target == Tour().pick(scene_of(plan, robot))
     if goal.target == NONE:
         return
@@ -126,27 +126,27 @@ def test_a_lookout_makes_the_way_over_it_shortest_of_all_that_see_the_same(shape
 
 def test_a_robot_looks_into_a_pocket_from_where_its_end_is_in_sight_by_hand():
     plan = niche()
-    goal = SharedTour().goal(scene_of(plan, (2, 4)))
+    goal = SharedTour().pick(scene_of(plan, (2, 4)))
     assert cell(plan, goal.target) == (10, 6)
     # A line from (9, 3), the best place beside column 10, would lead through the jamb (9, 5).
     assert cell(plan, goal.place) == (10, 4)
     plan[9, 5] = plan[11, 5] = reference.FREE
-    assert cell(plan, SharedTour().goal(scene_of(plan, (2, 4))).place)[0] == 9
+    assert cell(plan, SharedTour().pick(scene_of(plan, (2, 4))).place)[0] == 9
 
 
 def test_from_a_lookout_and_without_pockets_a_robot_drives_to_the_cell_itself():
     plan = niche()
     target = number(plan, (10, 6))
-    assert SharedTour().goal(scene_of(plan, (10, 3))) == Goal(target, target, looked=True)
-    assert SharedTour(SharedTourConfig(pocket=0.0)).goal(scene_of(plan, (2, 4))) == Goal(target, target)
-    assert SharedTour(SharedTourConfig(sight=0.0)).goal(scene_of(plan, (2, 4))) == Goal(target, target)
+    assert SharedTour().pick(scene_of(plan, (10, 3))) == Goal(target, target, looked=True)
+    assert SharedTour(SharedTourConfig(pocket=0.0)).pick(scene_of(plan, (2, 4))) == Goal(target, target)
+    assert SharedTour(SharedTourConfig(sight=0.0)).pick(scene_of(plan, (2, 4))) == Goal(target, target)
 
 
 def test_between_scans_a_robot_stops_where_all_is_in_sight():
     plan = niche()
     scene = scene_of(plan, (10, 3))
     scene.view.since_scan_m = 0.2  # type: ignore[misc]
-    assert SharedTour().goal(scene) == Goal(number(plan, (10, 6)), number(plan, (10, 3)))
+    assert SharedTour().pick(scene) == Goal(number(plan, (10, 6)), number(plan, (10, 3)))
 
 
 def test_a_robot_that_has_looked_keeps_going_to_the_cell():
@@ -154,7 +154,7 @@ def test_a_robot_that_has_looked_keeps_going_to_the_cell():
     target = int(number(plan, (10, 6)))
     scene = scene_of(plan, (2, 4), target)
     scene.looked = target
-    assert SharedTour().goal(scene) == Goal(target, target, looked=True)
+    assert SharedTour().pick(scene) == Goal(target, target, looked=True)
 
 
 @pytest.mark.parametrize("wide", [0, 1])
@@ -165,7 +165,7 @@ def test_an_opening_is_of_as_many_edges_as_an_eighth_of_the_range(wide):
     across = few - 1 + wide
     plan[12 : 12 + across, 5:7] = reference.FREE
     plan[12 : 12 + across, 7] = reference.UNKNOWN
-    goal = SharedTour().goal(scene_of(plan, (2, 4)))
+    goal = SharedTour().pick(scene_of(plan, (2, 4)))
     assert goal.target != NONE
     assert (goal.place == goal.target) == (wide == 1)
 
@@ -198,7 +198,7 @@ class Walk:
             since_scan_m=since_scan_m,
             time_s=0.0,
         )
-        viewpoint = self.rule.choose([view])[0]
+        viewpoint = self.rule.choose(view)
         return cell(self.plan, np.ravel_multi_index(self.place_of(viewpoint), (*self.plan.shape, 1)))
 
     def place_of(self, viewpoint):
@@ -243,7 +243,7 @@ def test_where_the_drive_to_a_lookout_ends_early_the_robot_goes_to_the_cell_itse
 def test_without_a_frontier_there_is_no_goal():
     plan = niche()
     plan[10, 7] = reference.WALL
-    assert SharedTour().goal(scene_of(plan, (2, 4))) == Goal(NONE, NONE)
+    assert SharedTour().pick(scene_of(plan, (2, 4))) == Goal(NONE, NONE)
 
 
 @pytest.mark.parametrize(("setting", "value"), [("pocket", -0.1), ("sight", float("nan")), ("around", 0)])

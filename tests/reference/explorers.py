@@ -171,7 +171,11 @@ class Textbook:
         del scenario, rng
         self.before, self.target, self.dropped = np.zeros((0, 0)), None, set[Cell]()
 
-    def choose(self, views: Sequence[RobotView]) -> list[np.ndarray]:
+    def choose(self, view: RobotView) -> np.ndarray:
+        """The viewpoint of one robot."""
+        return self.choose_all([view])[0]
+
+    def choose_all(self, views: Sequence[RobotView]) -> list[np.ndarray]:
         """(5,) the viewpoint of the robot."""
         view = views[0]
         if not self.before.size:

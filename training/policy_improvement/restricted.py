@@ -43,7 +43,11 @@ class RestrictedPlanner:
         self._tried: dict[int, set[tuple[float, ...]]] = {}
         self._latest: dict[int, tuple[tuple[float, ...], float]] = {}
 
-    def choose(self, views: Sequence[RobotView]) -> list[np.ndarray]:
+    def choose(self, view: RobotView) -> np.ndarray:
+        """Return the viewpoint (5,) of one robot."""
+        return self.choose_all([view])[0]
+
+    def choose_all(self, views: Sequence[RobotView]) -> list[np.ndarray]:
         """The viewpoint of each view."""
         return [self._choose(view) for view in views]
 

@@ -100,7 +100,7 @@ def explore_until_done(
     times_s, shares = [0.0], [0.0]
     while env.agents:
         views = [env.view(agent) for agent in env.deciding_agents()]
-        chosen = explorer.choose(views)
+        chosen = [explorer.choose(view) for view in views]
         over_terrain = views[0].ceiling is not None
         times_s.append(views[0].time_s)
         shares.append(

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -73,13 +72,13 @@ class KnownSpace(ABC):
         self._voxels = np.arange(scenario.grid.voxels, dtype=np.int32)
         self._memories: dict[int, Memory] = {}
 
-    def choose(self, views: Sequence[RobotView]) -> list[np.ndarray]:
-        """(5,) viewpoint of each view, map frame, by its own belief.
+    def choose(self, view: RobotView) -> np.ndarray:
+        """Return the viewpoint (5,), map frame, by its own belief.
 
         Raises:
             SettingError: The world has an exposure surface.
         """
-        return [self._choose(view) for view in views]
+        return self._choose(view)
 
     @abstractmethod
     def pick(self, view: RobotView, memory: Memory, reachable: np.ndarray) -> np.ndarray | None:

@@ -17,7 +17,6 @@ uniformly and look down by up to 60°; unknown heights have a standard deviation
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Literal
 
@@ -156,9 +155,9 @@ class CliffMapping:
         self._memories: dict[int, Memory] = {}
         self.looks: dict[int, list[Look]] = {}
 
-    def choose(self, views: Sequence[RobotView]) -> list[np.ndarray]:
-        """(5,) viewpoint of each view, map frame, by its own belief."""
-        return [self._choose(view) for view in views]
+    def choose(self, view: RobotView) -> np.ndarray:
+        """Return the viewpoint (5,), map frame, by its own belief."""
+        return self._choose(view)
 
     def interest(self, robot: int) -> np.ndarray:
         """(X, Y) interest of a rover in each column (eq. 9)."""

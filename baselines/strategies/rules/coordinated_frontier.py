@@ -30,7 +30,7 @@ from scipy.optimize import linear_sum_assignment
 from baselines.strategies.rules.nearest_frontier import best_of
 from entropy_explore_env.frontiers.knowledge import teammates_that_share, voxel_of
 from entropy_explore_env.frontiers.voxel_map import NONE
-from entropy_explore_env.planner.driver import Explorer, Scene
+from entropy_explore_env.planner.frontier_rule import FrontierRule, Scene
 from entropy_explore_env.planner.teammates import centres_of, lengths_of_all, team_of
 from entropy_explore_env.validation import check_positive
 
@@ -58,7 +58,7 @@ class CoordinatedConfig:
         check_positive(self, "beta", "group")
 
 
-class _Coordinated(Explorer):
+class _Coordinated(FrontierRule):
     """A rule that weighs all frontier cells that a path leads to by what teammates do."""
 
     def __init__(self, config: CoordinatedConfig | None = None) -> None:
@@ -66,7 +66,7 @@ class _Coordinated(Explorer):
         self.config = config or CoordinatedConfig()
 
     def pick(self, scene: Scene) -> int:
-        """See `Explorer`."""
+        """Return the voxel to go to; see `FrontierRule`."""
         voxels, lengths = scene.paths.frontiers_within(math.inf)
         return NONE if len(voxels) == 0 else self.pick_among(scene, voxels, lengths)
 

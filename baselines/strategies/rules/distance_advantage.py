@@ -30,7 +30,7 @@ import numpy as np
 from baselines.strategies.rules.nearest_frontier import best_of
 from entropy_explore_env.frontiers.path_lengths import KnownPaths
 from entropy_explore_env.frontiers.voxel_map import NONE
-from entropy_explore_env.planner.driver import Explorer, Scene
+from entropy_explore_env.planner.frontier_rule import FrontierRule, Scene
 from entropy_explore_env.validation import check, check_count, check_positive
 
 
@@ -70,7 +70,7 @@ Counts = Callable[[int, float], bool]
 """Whether a frontier cell, with a path of this length to it, counts."""
 
 
-class DistanceAdvantage(Explorer):
+class DistanceAdvantage(FrontierRule):
     """Goes to the frontier cell with the greatest distance advantage."""
 
     rule = "distance-advantage"
@@ -80,7 +80,7 @@ class DistanceAdvantage(Explorer):
         self.config = config or DistanceAdvantageConfig()
 
     def pick(self, scene: Scene) -> int:
-        """See `Explorer`."""
+        """Return the voxel to go to; see `FrontierRule`."""
         config, cells, paths = self.config, scene.cells, scene.paths
         least = round(config.opening * cells.reach)
         if least <= 1:

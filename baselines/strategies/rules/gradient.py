@@ -3,27 +3,27 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 
 import numpy as np
 
-from baselines.strategies.protocol import random_viewpoint
 from entropy_explore_env.belief.fields import entropy_gradient
 from entropy_explore_env.compilation.kernels import kernel
-from entropy_explore_env.missions.view import RobotView
-from entropy_explore_env.robots.motion import MoveEnd
-from entropy_explore_env.scenario import Scenario
+from entropy_explore_env.frontiers.knowledge import RobotKnowledge, random_viewpoint
+from entropy_explore_env.planner.driver import Driver, Trail
 
 _REACH_TOLERANCE = 1e-6
 
 
-class GradientStrategy:
+class GradientStrategy(Driver):
     """Goes to the voxel within reach with the steepest entropy that is likely free; looks along the gradient.
 
     Free-flying robots follow eqs. 33-34, planar ones the projection on their motion plane, eqs.
     38-40. A robot wanders (a random viewpoint) where the chosen gradient vanishes, as the paper
-    says, and where it is stuck: its latest drive was blocked.
+    says, and where it is stuck: its latest drive was blocked, by a teammate or by what does not move.
     """
+
+    rule = "gradient"
+    most_blocked = 1
 
     def __init__(self, motion_plane: bool | None = None) -> None:
         """Take the rule.
@@ -34,26 +34,22 @@ class GradientStrategy:
         """
         self._motion_plane = motion_plane
 
-    def reset(self, scenario: Scenario, rng: np.random.Generator) -> None:
-        """A new mission begins."""
-        self._rng = rng
+    def give_way(self, view: RobotKnowledge, trail: Trail) -> np.ndarray:
+        """Wander (Rocha04, sect. 4)."""
+        return random_viewpoint(view, self._rng)
 
-    def choose(self, views: Sequence[RobotView]) -> list[np.ndarray]:
-        """The viewpoint of each view by its own belief."""
-        return [self._choose(view) for view in views]
-
-    def _choose(self, view: RobotView) -> np.ndarray:
+    def decide(self, view: RobotKnowledge) -> np.ndarray | None:
+        """Return the viewpoint (5,) by the robot's own belief; None where the gradient vanishes."""
         grid, robot = view.scenario.grid, view.kind.robot
         projected = view.planar if self._motion_plane is None else self._motion_plane
-        stuck = view.move_end not in (MoveEnd.ARRIVED, MoveEnd.UNDER_WAY)
         position = grid.in_grid_units(view.pose)[:3]
         reach = min(robot.reach_m / grid.voxel_size_m, float(sum(grid.shape)))
         viewpoint = view.pose.copy()
-        found = not stuck and steepest_viewpoint(
+        found = steepest_viewpoint(
             view.mean, view.precision, position, view.pose[3], view.pose[4], reach, projected, viewpoint
         )
         if not found:
-            return random_viewpoint(view, self._rng)
+            return None
         viewpoint[:3] = np.asarray(grid.origin_m) + viewpoint[:3] * grid.voxel_size_m
         if view.planar:
             viewpoint[2], viewpoint[4] = view.pose[2], 0.0

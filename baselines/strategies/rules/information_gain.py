@@ -21,7 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from baselines.strategies.rules.nearest_frontier import best_of
-from entropy_explore_env.planner.driver import Explorer, Scene
+from entropy_explore_env.planner.frontier_rule import FrontierRule, Scene
 from entropy_explore_env.validation import check_positive
 
 
@@ -46,7 +46,7 @@ class InformationGainConfig:
         check_positive(self, "horizon", finite=False)
 
 
-class InformationGain(Explorer):
+class InformationGain(FrontierRule):
     """Goes to the frontier cell with the best balance of gain and path."""
 
     rule = "information-gain"
@@ -56,7 +56,7 @@ class InformationGain(Explorer):
         self.config = config or InformationGainConfig()
 
     def pick(self, scene: Scene) -> int:
-        """See `Explorer`."""
+        """Return the voxel to go to; see `FrontierRule`."""
         horizon = self.config.horizon * scene.cells.reach
         scene.paths.extend(horizon)
         slots, voxels = scene.cells.listed(all_of_them=True)

@@ -19,21 +19,23 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
 
 from baselines.strategies.mutual_information.candidates import FACTORS, MATE, Body, Team, best_candidate
-from baselines.strategies.protocol import random_viewpoint
 from entropy_explore_env.belief.paths.lattice import new_lattice
 from entropy_explore_env.belief.raycast import longest_crossing
 from entropy_explore_env.belief.visibility import CONE, Occlusion, mark_cone
 from entropy_explore_env.errors import SettingError
-from entropy_explore_env.frontiers.knowledge import announced_cone, belief_of
-from entropy_explore_env.missions.view import RobotView
-from entropy_explore_env.robots.motion import MoveEnd
+from entropy_explore_env.frontiers.knowledge import (
+    RobotKnowledge,
+    announced_cone,
+    belief_of,
+    random_viewpoint,
+)
+from entropy_explore_env.planner.driver import Driver, Trail
 from entropy_explore_env.scenario import Scenario
 from entropy_explore_env.settings import RobotKind, gaussian_entropy_bits
 from entropy_explore_env.validation import check, check_kind, check_not_negative, check_positive
@@ -115,7 +117,7 @@ class _Memory:
     chosen: deque[np.ndarray] = field(default_factory=deque)
 
 
-class MutualInformation:
+class MutualInformation(Driver):
     """Chooses viewpoints by eq. 13; coordinated or not.
 
     Attributes:
@@ -124,14 +126,18 @@ class MutualInformation:
             teammate was in the way, no candidate had a gain, or it was a trap.
     """
 
+    rule = "mutual-information"
+    most_blocked = 0
+    repeats = True
+
     def __init__(self, config: MutualInformationConfig | None = None) -> None:
         """Take the settings; None = the defaults."""
         self.config = config or MutualInformationConfig()
 
     def reset(self, scenario: Scenario, rng: np.random.Generator) -> None:
         """A new mission begins."""
+        super().reset(scenario, rng)
         grid, settings = scenario.grid, self.config
-        self._rng = rng
         self.decisions = {"rule": 0, "blocked": 0, "nothing": 0, "trap": 0}
         self._memories = [_Memory(deque(maxlen=settings.memory)) for _ in range(scenario.robots)]
         self._models = [_kind_model(scenario, kind) for kind in scenario.kinds]
@@ -147,17 +153,20 @@ class MutualInformation:
         unknown_bits = gaussian_entropy_bits(scenario.sigma_prior) - gaussian_entropy_bits(sigma)
         self._unknown_bits = max(unknown_bits, 0.0)
 
-    def choose(self, views: Sequence[RobotView]) -> list[np.ndarray]:
-        """The viewpoint of each view, by its own belief and what it has heard."""
-        return [self._choose(view) for view in views]
+    def give_way(self, view: RobotKnowledge, trail: Trail) -> np.ndarray | None:
+        """Wander; where robots wait in place (`Robot.when_blocked`), go on by the rule (RochaMI)."""
+        if view.kind.robot.when_blocked != "wander":
+            return None
+        self.decisions["blocked"] += 1
+        return random_viewpoint(view, self._rng)
 
-    def _choose(self, view: RobotView) -> np.ndarray:
+    def decide(self, view: RobotKnowledge) -> np.ndarray | None:
+        """Return the viewpoint (5,) by the robot's belief and what it has heard; None = there is no gain."""
         memory, grid = self._memories[view.robot], view.scenario.grid
-        blocked = view.move_end is MoveEnd.TEAMMATE and view.kind.robot.when_blocked == "wander"
-        viewpoint = None if blocked else self._best(view)
+        viewpoint = self._best(view)
         if viewpoint is None:
-            self.decisions["blocked" if blocked else "nothing"] += 1
-            return random_viewpoint(view, self._rng)
+            self.decisions["nothing"] += 1
+            return None
         alike = sum(_alike(viewpoint, earlier, grid.voxel_size_m) for earlier in memory.chosen)
         if alike >= self.config.repeats:
             memory.chosen.clear()
@@ -167,7 +176,7 @@ class MutualInformation:
         self.decisions["rule"] += 1
         return viewpoint
 
-    def _best(self, view: RobotView) -> np.ndarray | None:
+    def _best(self, view: RobotKnowledge) -> np.ndarray | None:
         """(5,) the viewpoint of eq. 13, map frame; None if no candidate has a gain above 0."""
         grid, settings = view.scenario.grid, self.config
         edge, origin = grid.voxel_size_m, np.asarray(grid.origin_m)
@@ -196,10 +205,10 @@ class MutualInformation:
         chosen = candidates[best]
         return np.array([*(origin + chosen["place"] * edge), chosen["yaw"], chosen["pitch"]])
 
-    def _model_of(self, view: RobotView) -> _KindModel:
+    def _model_of(self, view: RobotKnowledge) -> _KindModel:
         return self._models[view.robot % len(self._models)]
 
-    def _near(self, view: RobotView, position: np.ndarray, radius: float) -> np.ndarray:
+    def _near(self, view: RobotKnowledge, position: np.ndarray, radius: float) -> np.ndarray:
         """(K,) CANDIDATE with a gradient."""
         layer = view.scenario.layer_of(view.kind.robot)
         across = 2 * math.floor(radius) + 3
@@ -220,11 +229,11 @@ class MutualInformation:
         shuffled = self._rng.permutation(len(candidates))
         return shuffled[np.argsort(-most[shuffled], kind="stable")]
 
-    def _occlusion(self, view: RobotView) -> Occlusion:
+    def _occlusion(self, view: RobotKnowledge) -> Occlusion:
         model = self._model_of(view)
         return Occlusion(view.mean.reshape(-1), model.crossed, model.entered)
 
-    def _own_cone(self, view: RobotView, depth: float) -> np.ndarray:
+    def _own_cone(self, view: RobotKnowledge, depth: float) -> np.ndarray:
         """The robot's cone, without an apex yet; sets ξ, which is relative to the bits that it could hold."""
         angle = view.half_angle_rad or self._model_of(view).half_angle_rad
         self._cone["radius"], self._cone["cosine"] = depth, math.cos(angle)
@@ -234,7 +243,7 @@ class MutualInformation:
         self._factors["scale_bits"] = max(scale_bits, 1e-9) if counts else math.inf
         return self._cone[0]
 
-    def _heard(self, view: RobotView) -> np.ndarray:
+    def _heard(self, view: RobotKnowledge) -> np.ndarray:
         """(M,) MATE, the teammates that the robot has heard; marks the voxels of their cones."""
         settings, grid = self.config, view.scenario.grid
         mates = [number for number, mate in view.teammates.items() if mate.heard_s >= 0.0]

@@ -13,16 +13,16 @@ from __future__ import annotations
 import numpy as np
 
 from entropy_explore_env.frontiers.voxel_map import NONE
-from entropy_explore_env.planner.driver import Explorer, Scene
+from entropy_explore_env.planner.frontier_rule import FrontierRule, Scene
 
 
-class NearestFrontier(Explorer):
+class NearestFrontier(FrontierRule):
     """Goes to the nearest frontier cell."""
 
     rule = "nearest-frontier"
 
     def pick(self, scene: Scene) -> int:
-        """See `Explorer`."""
+        """Return the voxel to go to; see `FrontierRule`."""
         voxels, lengths = scene.paths.nearest_frontiers()
         return best_of(voxels, -lengths, scene.target)
 

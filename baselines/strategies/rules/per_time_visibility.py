@@ -26,7 +26,6 @@ Ours, where the paper says nothing:
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Literal, NamedTuple
 
@@ -211,9 +210,9 @@ class FrontierStrategy:
         self.idle = [False] * scenario.robots
         self.trips = list[Trip]()
 
-    def choose(self, views: Sequence[RobotView]) -> list[np.ndarray]:
-        """(5,) viewpoint of each view, map frame, by its own belief and what it has heard."""
-        return [self._choose(view) for view in views]
+    def choose(self, view: RobotView) -> np.ndarray:
+        """Return the viewpoint (5,), map frame, by its own belief and what it has heard."""
+        return self._choose(view)
 
     def mapped_share(self) -> float:
         """Share of the points in the map of a robot that knows most of them: of columns over terrain."""

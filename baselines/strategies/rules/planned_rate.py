@@ -20,7 +20,6 @@ What a robot is, and what its mission asks for, decides how it explores:
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import asdict, dataclass, fields, replace
 from typing import Any
 
@@ -125,11 +124,11 @@ class PlannedRate:
             recipes = {number: self.config.recipe(kind) for number, kind in enumerate(scenario.kinds)}
             self._proposer = ViewProposer(one, rng, recipes=recipes)
 
-    def choose(self, views: Sequence[RobotView]) -> list[np.ndarray]:
-        """The viewpoint of each view, by its own belief and what it has heard."""
-        return [self._choose(view) for view in views]
+    def choose(self, view: RobotView) -> np.ndarray:
+        """Return the viewpoint (5,) by the robot's own belief and what it has heard."""
+        return self._choose(view)
 
     def _choose(self, view: RobotView) -> np.ndarray:
         if self._frontiers[view.robot % len(self._frontiers)]:
-            return self._plans.choose([view])[0]
+            return self._plans.choose(view)
         return self._proposer.propose(view)[0].copy()

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
-from baselines.strategies.protocol import random_viewpoint
+from entropy_explore_env.frontiers.knowledge import random_viewpoint
 from entropy_explore_env.missions.view import RobotView
 from entropy_explore_env.scenario import Scenario
 
@@ -15,10 +13,10 @@ class RandomWalk:
     """Goes anywhere within reach and looks anywhere."""
 
     def reset(self, scenario: Scenario, rng: np.random.Generator) -> None:
-        """A new mission begins."""
+        """Begin a mission."""
         del scenario
         self._rng = rng
 
-    def choose(self, views: Sequence[RobotView]) -> list[np.ndarray]:
-        """A random viewpoint for each view."""
-        return [random_viewpoint(view, self._rng) for view in views]
+    def choose(self, view: RobotView) -> np.ndarray:
+        """Return a random viewpoint (5,)."""
+        return random_viewpoint(view, self._rng)

@@ -25,7 +25,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from baselines.strategies.rules.nearest_frontier import best_of
-from entropy_explore_env.planner.driver import Explorer, Scene
+from entropy_explore_env.planner.frontier_rule import FrontierRule, Scene
 from entropy_explore_env.scenario import Scenario
 from entropy_explore_env.validation import check_count, check_positive
 
@@ -79,7 +79,7 @@ class _Tree:
         self.places.append(place)
 
 
-class RecedingHorizon(Explorer):
+class RecedingHorizon(FrontierRule):
     """Drives along the first edge of the best branch of a random tree."""
 
     rule = "receding-horizon"
@@ -96,7 +96,7 @@ class RecedingHorizon(Explorer):
         self._branches: dict[int, list[np.ndarray]] = {}
 
     def pick(self, scene: Scene) -> int:
-        """See `Explorer`."""
+        """Return the voxel to go to; see `FrontierRule`."""
         robot, config = scene.view.robot, self.config
         scanned = self._scanned.setdefault(robot, set())
         scanned.add(scene.here)

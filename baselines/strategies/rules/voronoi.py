@@ -8,13 +8,11 @@ with perfect messages.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
 
-from baselines.strategies.protocol import random_viewpoint
 from baselines.strategies.voronoi.controls import (
     CellFunctional,
     gradient_step,
@@ -30,9 +28,13 @@ from entropy_explore_env.belief.paths.geodesic_cells import (
     tessellate,
 )
 from entropy_explore_env.belief.visibility import CONE
-from entropy_explore_env.frontiers.knowledge import belief_of, teammates_that_share, voxel_of
-from entropy_explore_env.missions.view import RobotView
-from entropy_explore_env.robots.motion import MoveEnd
+from entropy_explore_env.frontiers.knowledge import (
+    RobotKnowledge,
+    belief_of,
+    teammates_that_share,
+    voxel_of,
+)
+from entropy_explore_env.planner.driver import Driver
 from entropy_explore_env.scenario import Scenario
 from entropy_explore_env.validation import check, check_choice, check_count
 from entropy_explore_env.viewpoints.evaluation import (
@@ -50,8 +52,6 @@ Known = Literal["occupancy", "deviation"]
 
 _GAZES = 16
 _PITCHES = (-0.6, 0.0, 0.6)
-_NOTHING = 0.01
-"""A scan that brings less than this share of the most that one brought has brought nothing."""
 _WITHIN_REACH = 0.999
 """Share of the reach that is used, so that rounding never moves a place towards the robot."""
 
@@ -105,16 +105,12 @@ class _TravelPlan:
     """(N,) voxels to the target that are still ahead."""
     to_see: bool = False
     """Whether the target was uncertain when it was chosen."""
-    failures: int = 0
-    """Consecutive drives that ended early."""
-    viewpoint: np.ndarray = field(default_factory=lambda: np.full(5, np.nan))
-    """(5,) as chosen at the latest decision."""
-    most_bits: float = 0.0
-    """Of a scan so far."""
 
 
-class VoronoiCoverage:
+class VoronoiCoverage(Driver):
     """Goes to a target in the robot's own geodesic Voronoi cell, and looks where most bits are expected."""
+
+    rule = "voronoi"
 
     def __init__(self, config: VoronoiConfig | None = None) -> None:
         """Take the settings; None = the defaults."""
@@ -122,40 +118,34 @@ class VoronoiCoverage:
 
     def reset(self, scenario: Scenario, rng: np.random.Generator) -> None:
         """A new mission begins."""
+        super().reset(scenario, rng)
         grid = scenario.grid
-        self._rng = rng
         self._plans = [_TravelPlan() for _ in range(scenario.robots)]
         self._models = [robot_model(scenario, kind) for kind in scenario.kinds]
         self._space, self._inner = new_tessellation(grid.shape), new_tessellation(grid.shape)
         self._entropy = np.empty(grid.shape, np.float32)
         self._scratch = new_scratch(grid, self._models)
 
-    def choose(self, views: Sequence[RobotView]) -> list[np.ndarray]:
-        """The viewpoint of each view, by its own belief and where it last heard the others."""
-        return [self._choose(view) for view in views]
+    def forget_goal(self, view: RobotKnowledge) -> None:
+        """Choose a target anew at the next decision."""
+        self._plans[view.robot].path = np.zeros(0, np.int64)
 
-    def _choose(self, view: RobotView) -> np.ndarray:
+    def note_blocked(self, view: RobotKnowledge) -> None:
+        """Choose a target anew: the way to this one is blocked."""
+        self.forget_goal(view)
+
+    def decide(self, view: RobotKnowledge) -> np.ndarray:
+        """Return the viewpoint (5,) by the robot's own belief and where it last heard the others."""
         plan, here = self._plans[view.robot], voxel_of(view, view.pose)
-        ended_early = view.move_end not in (MoveEnd.ARRIVED, MoveEnd.SEEN, MoveEnd.UNDER_WAY)
-        plan.failures = plan.failures + 1 if ended_early else 0
-        if plan.failures > 1:  # the same belief would lead to the same choice
-            plan.path, plan.failures = plan.path[:0], 0
-            return random_viewpoint(view, self._rng)
         entropy = self._uncertainty(view)
         traversal_cost = self._traversal_cost(view, entropy, here)
         ahead = np.flatnonzero(plan.path == here)
         plan.path = plan.path[ahead[-1] + 1 :] if len(ahead) else plan.path[:0]
-        if ended_early or not self._is_valid(plan, entropy, traversal_cost):
+        if not self._is_valid(plan, entropy, traversal_cost):
             self._choose_target(view, entropy, traversal_cost, here)
-        viewpoint = self._towards(view, plan)
-        came_bits = float(view.scan.utility_bits.sum())
-        plan.most_bits = max(plan.most_bits, came_bits)
-        if np.allclose(viewpoint, plan.viewpoint) and came_bits < _NOTHING * plan.most_bits:
-            viewpoint = random_viewpoint(view, self._rng)
-        plan.viewpoint = viewpoint.copy()
-        return viewpoint
+        return self._towards(view, plan)
 
-    def _uncertainty(self, view: RobotView) -> np.ndarray:
+    def _uncertainty(self, view: RobotKnowledge) -> np.ndarray:
         """(X, Y, Z) float32 nats, filtered."""
         out, mean, precision = self._entropy.reshape(-1), view.mean.reshape(-1), view.precision.reshape(-1)
         if self.config.known == "occupancy":
@@ -165,7 +155,7 @@ class VoronoiCoverage:
             fill_deviation_entropy(precision, prior, end, out)
         return filtered(self._entropy)
 
-    def _traversal_cost(self, view: RobotView, entropy: np.ndarray, here: int) -> np.ndarray:
+    def _traversal_cost(self, view: RobotKnowledge, entropy: np.ndarray, here: int) -> np.ndarray:
         """(X, Y, Z) float32, by the metric that is set; inf where the body does not fit."""
         lattice, shape = self._model_of(view).lattice, view.scenario.grid.shape
         traversal_cost = entropy.copy() if self.config.metric == "entropy" else np.ones(shape, np.float32)
@@ -182,7 +172,7 @@ class VoronoiCoverage:
         return not plan.to_see or bool(entropy.reshape(-1)[plan.path[-1]] >= self.config.tau)
 
     def _choose_target(
-        self, view: RobotView, entropy: np.ndarray, traversal_cost: np.ndarray, here: int
+        self, view: RobotKnowledge, entropy: np.ndarray, traversal_cost: np.ndarray, here: int
     ) -> None:
         """Divide the belief, and choose the target in the robot's own cell."""
         config, plan = self.config, self._plans[view.robot]
@@ -230,7 +220,7 @@ class VoronoiCoverage:
             here = step
         return np.array(path, np.int64)
 
-    def _sources(self, view: RobotView, here: int) -> tuple[np.ndarray, int]:
+    def _sources(self, view: RobotKnowledge, here: int) -> tuple[np.ndarray, int]:
         """Voxels of the robots that are heard and share, and of this one, by number; and this one's index."""
         heard = {
             mate: voxel_of(view, seen.pose)
@@ -241,7 +231,7 @@ class VoronoiCoverage:
         robots = sorted(heard)
         return np.array([heard[robot] for robot in robots], np.int64), robots.index(view.robot)
 
-    def _towards(self, view: RobotView, plan: _TravelPlan) -> np.ndarray:
+    def _towards(self, view: RobotKnowledge, plan: _TravelPlan) -> np.ndarray:
         """The farthest place on the path that one drive reaches, and the best gaze there."""
         grid, robot = view.scenario.grid, view.kind.robot
         viewpoint = view.pose.copy()
@@ -255,14 +245,14 @@ class VoronoiCoverage:
                 break
         return self._gazing(view, viewpoint)
 
-    def _in_sight(self, view: RobotView, place: np.ndarray) -> bool:
+    def _in_sight(self, view: RobotKnowledge, place: np.ndarray) -> bool:
         """Whether the straight line to a place (3,), map frame, is free by the belief."""
         extent = (place - view.pose[:3]) / view.scenario.grid.voxel_size_m
         start = view.scenario.grid.in_grid_units(view.pose)
         radius = self._model_of(view).drive.body_radius
         return is_line_free(belief_of(view), start, extent, radius, self._scratch)
 
-    def _gazing(self, view: RobotView, viewpoint: np.ndarray) -> np.ndarray:
+    def _gazing(self, view: RobotKnowledge, viewpoint: np.ndarray) -> np.ndarray:
         """The viewpoint with the gaze from which most bits are expected; unchanged if the sensor sees all."""
         model, kind, grid = self._model_of(view), view.kind, view.scenario.grid
         if view.planar and sees_all_around(kind.sensor):
@@ -279,5 +269,5 @@ class VoronoiCoverage:
         viewpoint[3:] = gazes[int(np.argmax(bits))]
         return viewpoint
 
-    def _model_of(self, view: RobotView) -> RobotModel:
+    def _model_of(self, view: RobotKnowledge) -> RobotModel:
         return self._models[view.robot % len(self._models)]

@@ -30,7 +30,7 @@ class Noting:
         self.rng = rng
         self.first = rng.bit_generator.state
 
-    def choose(self, views: Sequence[RobotView]) -> list[np.ndarray]:
+    def choose_all(self, views: Sequence[RobotView]) -> list[np.ndarray]:
         self.asked.append(list(views))
         return [random_viewpoint(view, self.rng) for view in views]
 
@@ -87,6 +87,6 @@ def test_scripted_scenarios_step_from_decision_to_decision_and_observe_nothing()
 
 def test_a_strategy_that_chooses_for_too_few_robots_is_refused():
     strategy = Noting()
-    strategy.choose = lambda views: []
+    strategy.choose_all = lambda views: []
     with pytest.raises(ActionError, match="one for each of 3 views"):
         run_mission(EntropyExploreEnv(scripted(BOX), robots=3), strategy, 4)

@@ -191,7 +191,7 @@ def test_a_goal_that_cannot_be_reached_is_given_up_and_teams_map_on():
     view, memory = view_of(env.missions, 0, 0), made._memories[0]
     memory.goal = view.pose + np.array([1.0, 0.0, 0.0, 0.0, 0.0])
     goal, looks = memory.goal, len(made.looks[0])
-    made.choose([dataclasses.replace(view, move_end=MoveEnd.TEAMMATE)])
+    made.choose(dataclasses.replace(view, move_end=MoveEnd.TEAMMATE))
     assert memory.goal is not goal and len(made.looks[0]) == looks + 1
 
 

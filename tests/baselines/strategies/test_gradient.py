@@ -247,7 +247,7 @@ def prepared(scenario, field=None, seed=0):
 def chosen(view: RobotView, seed=3, motion_plane=None):
     strategy = GradientStrategy(motion_plane)
     strategy.reset(view.scenario, np.random.default_rng(seed))
-    (viewpoint,) = strategy.choose([view])
+    viewpoint = strategy.choose(view)
     return viewpoint
 
 
@@ -309,7 +309,7 @@ def test_planar_robots_stay_level_and_in_their_plane(changes, motion_plane):
         boxes = np.zeros((1, 2, 3))
         for robot in np.flatnonzero(missions.state.robots[0]["deciding"]):
             view = view_of(missions, 0, int(robot))
-            (viewpoint,) = strategy.choose([view])
+            viewpoint = strategy.choose(view)
             assert (viewpoint[2], viewpoint[4]) == (height, 0.0)
             steep += view.move_end is MoveEnd.ARRIVED
             boxes[0, robot] = view.action_for(viewpoint)

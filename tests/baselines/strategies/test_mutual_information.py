@@ -43,7 +43,7 @@ def chosen(missions, coordination=None, times=20, robot=0, heard=None):
         missions.state.robots[0, robot]["half_angle_rad"] = 0.5
         if heard is not None:
             heard(missions.state.heard[0, robot])
-        found.append(strategy.choose([view_of(missions, 0, robot)])[0])
+        found.append(strategy.choose(view_of(missions, 0, robot)))
     return np.array(found)
 
 
@@ -124,7 +124,7 @@ def test_candidates_lie_within_the_mean_depth_but_for_a_floor_and_a_cap():
     missions.state.robots[0, 0]["depth_m"] = 0.1
     strategy = MutualInformation(MutualInformationConfig(least_radius_m=0.8))
     strategy.reset(missions.scenario, np.random.default_rng(0))
-    viewpoint = strategy.choose([view_of(missions, 0, 0)])[0]
+    viewpoint = strategy.choose(view_of(missions, 0, 0))
     assert 0.1 < np.linalg.norm(viewpoint[:2] - (1.75, 2.75)) <= 0.8 + 1e-6
 
 
@@ -155,7 +155,7 @@ def test_a_viewpoint_chosen_too_often_is_a_trap():
     missions.precision[0, 0][3, 5, 2] = 1.0
     missions.state.robots[0, 0]["depth_m"] = 0.0
     put(missions, 0, (1.75, 2.75, 1.25, 0.0, 0.0))
-    picks = [strategy.choose([view_of(missions, 0, 0)])[0] for _ in range(12)]
+    picks = [strategy.choose(view_of(missions, 0, 0)) for _ in range(12)]
     gazes = [round(float(pick[3]), 3) for pick in picks]
     usual = max(set(gazes), key=gazes.count)
     assert usual == pytest.approx(math.atan2(1, 1), abs=2e-3) or gazes.count(usual) >= 4

@@ -186,7 +186,7 @@ def play(missions, strategy, decisions):
         views = [view_of(missions, 0, robot) for robot in range(team)]
         deciding = [view for view in views if view.deciding]
         actions = np.zeros((1, team, 3))
-        for view, viewpoint in zip(deciding, strategy.choose(deciding), strict=True):
+        for view, viewpoint in zip(deciding, [strategy.choose(view) for view in deciding], strict=True):
             actions[0, view.robot] = view.action_for(viewpoint)
             chosen.append((view, viewpoint))
         missions.step(actions, np.zeros((1, team), np.int64))
@@ -269,7 +269,7 @@ def test_what_should_have_been_seen_and_was_not_loses_interest():
     known = np.flatnonzero(view.precision.ravel() > np.float32(PRIOR))[:3].astype(np.int32)
     memory.goal, memory.expected = view.pose.copy(), np.concatenate([unknown, known])
     before = memory.interest.copy()
-    strategy.choose([view])
+    strategy.choose(view)
     assert memory.interest[unknown] == pytest.approx(sujan.interest(before[unknown], 1.0, 0.7))
     np.testing.assert_array_equal(memory.interest[known], before[known])
 
@@ -304,7 +304,7 @@ def drifting_mission(error_weight, drift=0.05):
     strategy.reset(task, np.random.default_rng(4))
     for _ in range(16):
         view = view_of(missions, 0, 0)
-        chosen.append(strategy.choose([view])[0])
+        chosen.append(strategy.choose(view))
         toward(missions, chosen[-1])
         unsure += float(np.trace(view_of(missions, 0, 0).covariance))
     return unsure, chosen
@@ -331,10 +331,10 @@ def test_who_is_stopped_by_a_teammate_of_whom_it_never_heard_goes_on():
     )
     missions, strategy = started(task, 3), NextBestView(NextBestViewConfig())
     strategy.reset(task, np.random.default_rng(4))
-    toward(missions, *strategy.choose([view_of(missions, 0, robot) for robot in range(2)]))
+    toward(missions, *[strategy.choose(view_of(missions, 0, robot)) for robot in range(2)])
     view = view_of(missions, 0, 0)
     assert all(seen.heard_s < 0.0 for seen in view.teammates.values())
     stopped = dataclasses.replace(view, move_end=MoveEnd.TEAMMATE)
     for _ in range(4):
-        (chosen,) = strategy.choose([stopped])
+        chosen = strategy.choose(stopped)
         assert np.isfinite(chosen).all() and np.linalg.norm(chosen[:3] - view.pose[:3]) > 0.0

@@ -9,7 +9,7 @@ import pytest
 from scipy import stats
 
 from baselines.strategies import STRATEGIES, make_strategy
-from baselines.strategies.protocol import random_viewpoint
+from baselines.strategies.protocol import choose_all, random_viewpoint
 from baselines.strategies.rules.random_walk import RandomWalk
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.missions.action import action_space, decode_action
@@ -107,10 +107,10 @@ def test_each_view_gets_a_viewpoint_of_its_own_from_the_stream():
     views = [view_of(missions, 0, robot) for robot in range(3)]
     walk = RandomWalk()
     walk.reset(missions.scenario, np.random.default_rng(4))
-    ours, rng = walk.choose(views), np.random.default_rng(4)
+    ours, rng = [walk.choose(view) for view in views], np.random.default_rng(4)
     assert [a.tolist() for a in ours] == [random_viewpoint(view, rng).tolist() for view in views]
     walk.reset(missions.scenario, np.random.default_rng(4))
-    assert [a.tolist() for a in walk.choose(views[:2])] == [a.tolist() for a in ours[:2]]
+    assert [walk.choose(view).tolist() for view in views[:2]] == [a.tolist() for a in ours[:2]]
 
 
 def test_strategies_by_name():
@@ -150,7 +150,7 @@ def acted(missions: Missions, strategy_name: str, steps: int):
         numbers = np.zeros((1, robots), np.int64)
         deciding = np.flatnonzero(missions.state.robots[0]["deciding"])
         views = [view_of(missions, 0, int(robot)) for robot in deciding]
-        for robot, view, viewpoint in zip(deciding, views, strategy.choose(views), strict=True):
+        for robot, view, viewpoint in zip(deciding, views, choose_all(strategy, views), strict=True):
             action = view.action_for(viewpoint)
             assert space.contains(action)
             boxes[0, robot], numbers[0, robot] = (0.0, action) if discrete else (action, 0)

@@ -109,7 +109,7 @@ def chosen(missions, coverage):
     strategy = VoronoiCoverage(coverage)
     strategy.reset(missions.scenario, np.random.default_rng(0))
     views = [view_of(missions, 0, robot) for robot in range(2)]
-    return [missions.grid.voxel_of(v[:3])[1] for v in strategy.choose(views)]
+    return [missions.grid.voxel_of(v[:3])[1] for v in [strategy.choose(view) for view in views]]
 
 
 def test_robots_that_know_all_spread_to_the_middles_of_their_halves():

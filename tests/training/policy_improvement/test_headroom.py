@@ -92,8 +92,8 @@ def test_restricted_choices_are_actions_of_the_set():
     env, seen = scripted_env(task), []
 
     class Watched(RestrictedPlanner):
-        def choose(self, views):
-            chosen = super().choose(views)
+        def choose_all(self, views):
+            chosen = super().choose_all(views)
             seen.extend((view.pose.copy(), viewpoint) for view, viewpoint in zip(views, chosen, strict=True))
             return chosen
 

@@ -39,5 +39,5 @@ class Run:
                 in_a_row = 0
             most, blocked_before, scans_before = max(most, in_a_row), blocked, scans
 
-        run_mission(env, make_strategy(strategy), seed, note, guarded=self.guarded)
+        run_mission(env, make_strategy(strategy), seed, note, backs_off=self.guarded)
         return {**mission_figures(env.missions, 0, floor=False), "most_blocked": most}

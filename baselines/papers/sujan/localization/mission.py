@@ -48,5 +48,5 @@ class Run:
             for name, number in found.items():
                 series[name].append(round(float(number), 4))
 
-        run_mission(env, NextBestView(self.config), seed, note, guarded=False)
+        run_mission(env, NextBestView(self.config), seed, note, backs_off=False)
         return {**mission_figures(env.missions, 0, floor=False), **series}

@@ -10,7 +10,7 @@ from entropy_explore_env.belief.paths.search import new_search
 from entropy_explore_env.frontiers.frontier_cells import BLOCK, FrontierCells
 from entropy_explore_env.frontiers.path_lengths import KnownPaths
 from entropy_explore_env.frontiers.voxel_map import NONE
-from entropy_explore_env.planner.driver import Scene
+from entropy_explore_env.planner.frontier_rule import Scene
 from entropy_explore_env.scenario import with_settings
 from entropy_explore_env.scenarios import find_scenario
 from entropy_explore_env.settings import Grid

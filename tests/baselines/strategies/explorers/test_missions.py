@@ -135,8 +135,7 @@ def test_who_finds_no_frontier_drives_to_a_random_place_and_not_to_another_at_ea
 
     def look(env):
         nonlocal last, was_under_way
-        memory = strategy._memories.get(0)
-        elsewhere = None if memory is None else memory.elsewhere
+        elsewhere = strategy._trails[0].random
         if elsewhere is not None and last is not None:
             kept.append(bool((elsewhere == last).all()))
             assert kept[-1] == was_under_way

@@ -60,7 +60,7 @@ def sent(missions, **config):
     for assignment in strategy._assignments:
         assignment.scanned = True
     views = [view_of(missions, 0, robot) for robot in range(missions.scenario.robots)]
-    return [int(missions.grid.voxel_of(v[:3])[1]) for v in strategy.choose(views)]
+    return [int(missions.grid.voxel_of(v[:3])[1]) for v in [strategy.choose(view) for view in views]]
 
 
 def test_who_stops_at_the_same_time_shares_the_frontiers():
@@ -107,7 +107,7 @@ def test_what_scans_on_the_path_see_decides(path_scans, right):
     missions = between_doors()
     strategy.reset(missions.scenario, np.random.default_rng(0))
     strategy._assignments[0].scanned = True
-    strategy.choose([view_of(missions, 0, 0)])
+    strategy.choose(view_of(missions, 0, 0))
     voxel = strategy.allocator_of(0).allocate(view_of(missions, 0, 0), [], [])[0].voxel
     assert (np.unravel_index(voxel, missions.grid.shape)[0] > 6) == right
 
@@ -116,7 +116,7 @@ def allocator_in(missions, robot):
     """The candidates of a robot, by its belief as it is."""
     strategy = FrontierStrategy(ExplorationConfig(finest_sigma=ONCE))
     strategy.reset(missions.scenario, np.random.default_rng(0))
-    strategy.choose([view_of(missions, 0, robot)])
+    strategy.choose(view_of(missions, 0, robot))
     allocator = strategy.allocator_of(robot)
     allocator.candidates.update(view_of(missions, 0, robot), ONCE)
     return allocator
@@ -224,7 +224,7 @@ def check_against_reference(missions, known):
     views = [view_of(missions, 0, robot) for robot in range(3)]
     for assignment in strategy._assignments:
         assignment.scanned = True
-    places = [tuple(missions.grid.voxel_of(v[:3]).tolist()) for v in strategy.choose(views)]
+    places = [tuple(missions.grid.voxel_of(strategy.choose(view)[:3]).tolist()) for view in views]
     allocator = strategy._allocators[0]
     assert isinstance(allocator.candidates, VoxelCandidates)
     _, voxels = allocator.candidates.listed()

@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 from scipy.ndimage import distance_transform_edt
 
-from baselines.experiments.mission import run_mission, scripted_env
+from baselines.experiments.mission import Followed, run_mission, scripted_env
 from baselines.strategies import make_strategy
-from baselines.strategies.drift_guard import DriftGuard
 from baselines.strategies.rules.cliff import CliffMapping
 from baselines.strategies.rules.per_time_visibility import FrontierConfig
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
@@ -38,24 +37,24 @@ class Fixed:
     def reset(self, scenario, rng):
         self.rng = rng
 
-    def choose(self, views):
+    def choose(self, view):
         self.draws.append(self.rng.random())
-        return [(self.viewpoints.pop(0) if len(self.viewpoints) > 1 else self.viewpoints[0]).copy()]
+        return (self.viewpoints.pop(0) if len(self.viewpoints) > 1 else self.viewpoints[0]).copy()
 
 
 def guarded(*viewpoints):
-    """A guard of such a strategy, and a function that lets it choose after a drive that ended so."""
+    """A function that lets such a strategy choose after a drive that ended so."""
     scenario = free_box(robots=1, robot={"localization": DRIFT})
     missions = started(scenario)
     put(missions, 0, HERE)
-    guard = DriftGuard(Fixed(*viewpoints))
+    guard = Followed(Fixed(*viewpoints))
     guard.reset(scenario, np.random.default_rng(5))
     view = view_of(missions, 0, 0)
 
     def choose(end, uncertain=True, pose=HERE):
         covariance = np.eye(4) * 0.01 if uncertain else np.zeros((4, 4))
         now = dataclasses.replace(view, move_end=end, covariance=covariance, pose=np.array(pose))
-        return guard.choose([now])[0]
+        return guard.choose(now)
 
     return choose
 
@@ -103,11 +102,11 @@ def test_the_strategy_draws_as_it_does_alone():
     scenario, draws = free_box(robots=1, robot={"localization": DRIFT}), []
     for guards in (False, True):
         strategy = Fixed(AHEAD)
-        used = DriftGuard(strategy) if guards else strategy
+        used = Followed(strategy) if guards else strategy
         used.reset(scenario, np.random.default_rng(5))
         view = dataclasses.replace(view_of(started(scenario), 0, 0), covariance=np.eye(4))
         for end in (MoveEnd.ARRIVED, MoveEnd.OBSTACLE, MoveEnd.OBSTACLE):
-            used.choose([dataclasses.replace(view, move_end=end)])
+            used.choose(dataclasses.replace(view, move_end=end))
         draws.append(strategy.draws)
     assert draws[0] == draws[1]
 
@@ -126,7 +125,7 @@ def test_margin_and_guard_end_endless_blocks():
             },
         )
         env = scripted_env(task)
-        run_mission(env, make_strategy("nearest-frontier"), 0, guarded=guards)
+        run_mission(env, make_strategy("nearest-frontier"), 0, backs_off=guards)
         most[guards] = int(env.missions.state.robots[0]["blocked_moves"][0])
     assert most[False] > 50 and most[True] < 5
 
