@@ -12,8 +12,9 @@ from baselines.strategies.loading import entry_points, is_reference, make_refere
 from baselines.strategies.metrics import coordinated_candidate, nearest_candidate
 from baselines.strategies.planner_choice import PlannerChoice
 from baselines.strategies.protocol import Strategy
+from baselines.strategies.rules.assigned_frontier import AssignedFrontier
 from baselines.strategies.rules.cliff import CliffConfig, CliffMapping
-from baselines.strategies.rules.coordinated_frontier import AssignedFrontier, CoordinatedFrontier
+from baselines.strategies.rules.coordinated_frontier import CoordinatedFrontier
 from baselines.strategies.rules.distance_advantage import DistanceAdvantage
 from baselines.strategies.rules.gradient import GradientStrategy
 from baselines.strategies.rules.information_gain import InformationGain

@@ -20,7 +20,6 @@ import math
 from abc import abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
@@ -31,51 +30,12 @@ from entropy_explore_env.frontiers.knowledge import RobotKnowledge, voxel_of
 from entropy_explore_env.frontiers.path_lengths import KnownPaths
 from entropy_explore_env.frontiers.voxel_map import NONE
 from entropy_explore_env.planner.driver import Driver
+from entropy_explore_env.planner.scene import NOWHERE, STAY, Goal, Scene, scanned_here
 from entropy_explore_env.planner.stops import apart_m, stop_towards
 from entropy_explore_env.scenario import Scenario
 
-STAY = -2
-"""As a goal: the robot stays where it is, and scans."""
 _GAZES = 4
 """A cell is dropped when the robot has looked from it in this many directions."""
-
-
-class Goal(NamedTuple):
-    """Where a rule sends a robot."""
-
-    target: int
-    """The voxel that it explores, one in which the body may stand; NONE = none can be reached; STAY."""
-    place: int
-    """The voxel to which the robot drives for that: the target itself, or one from which it is visible."""
-    looked: bool = False
-    """Whether the target was looked at from elsewhere in vain, or could not be; the robot drives to it."""
-    gaze: tuple[float, float] | None = None
-    """(yaw, pitch) of the scan at the target; None = where most is unknown."""
-
-
-NOWHERE = Goal(NONE, NONE)
-"""No goal can be reached."""
-
-
-@dataclass
-class Scene:
-    """What one robot knows and remembers, as a rule needs it.
-
-    Attributes:
-        view: What the robot knows now.
-        cells: Its frontier cells, up to date.
-        paths: Paths through its known free space; a search from where it stands has begun.
-        here: The voxel in which it stands.
-        target: The voxel that it chose last and has not reached, if that is a frontier cell still; else NONE.
-        looked: The target, if the robot drives on to it after a look from elsewhere; else NONE.
-    """
-
-    view: RobotKnowledge
-    cells: FrontierCells
-    paths: KnownPaths
-    here: int
-    target: int
-    looked: int = NONE
 
 
 @dataclass
@@ -93,11 +53,6 @@ class _Memory:
     """Whether the first scan was taken."""
     gazes: int = 0
     """Number of directions in which it has looked from where it stands."""
-
-
-def scanned_here(view: RobotKnowledge) -> bool:
-    """Whether a robot took its latest scan where it is, up to half a voxel."""
-    return view.since_scan_m < 0.5 * view.scenario.grid.voxel_size_m
 
 
 class FrontierRule(Driver):

@@ -22,8 +22,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from entropy_explore_env.frontiers.voxel_map import NONE
-from entropy_explore_env.planner.frontier_rule import NOWHERE, Goal, Scene, scanned_here
-from entropy_explore_env.planner.teammates import left_to_robot
+from entropy_explore_env.planner.scene import NOWHERE, Goal, Scene, scanned_here
 from entropy_explore_env.planner.tour import Tour, TourConfig
 from entropy_explore_env.validation import check_count, check_not_negative
 
@@ -79,7 +78,7 @@ class SharedTour(Tour):
 
     def tour_among(self, scene: Scene, voxels: np.ndarray, lengths: np.ndarray) -> np.ndarray:
         """See `Tour`."""
-        own = left_to_robot(scene, voxels, lengths)
+        own = scene.nearer_than_teammates(voxels, lengths)
         return super().tour_among(scene, voxels[own], lengths[own])
 
     def _first_leg(self, scene: Scene, target: int, onward: np.ndarray) -> Goal:

@@ -23,8 +23,8 @@ import numpy as np
 
 from entropy_explore_env.frontiers.open_tours import open_tour, tour_length
 from entropy_explore_env.frontiers.voxel_map import NONE
-from entropy_explore_env.planner.frontier_rule import FrontierRule, Scene
-from entropy_explore_env.planner.teammates import centres_of
+from entropy_explore_env.planner.frontier_rule import FrontierRule
+from entropy_explore_env.planner.scene import Scene
 from entropy_explore_env.validation import check, check_count, check_positive
 
 
@@ -123,7 +123,7 @@ class Tour(FrontierRule):
         """Which near frontier cells cover all of them: the target, then of equally good ones the nearest."""
         if len(voxels) == 0:
             return []
-        seen = scene.paths.sights(centres_of(scene, voxels), self.config.cover * scene.cells.reach)
+        seen = scene.paths.sights(scene.centres(voxels), self.config.cover * scene.cells.reach)
         left, chosen = np.ones(len(voxels), bool), []
         for target in np.flatnonzero(voxels == scene.target):
             chosen.append(int(target))
@@ -137,7 +137,7 @@ class Tour(FrontierRule):
     def _coarse(self, scene: Scene, voxels: np.ndarray) -> np.ndarray:
         """Of the far frontier cells, in order of distance, the first of each coarse cell; the target, too."""
         edge = max(self.config.coarse * scene.cells.reach, 1.0)
-        cells = np.floor(centres_of(scene, voxels) / edge).astype(np.int64)
+        cells = np.floor(scene.centres(voxels) / edge).astype(np.int64)
         if len(cells) == 0:
             return np.zeros(0, np.int64)
         numbers = np.ravel_multi_index(tuple(cells.T), tuple(cells.max(axis=0) + 1))

@@ -27,10 +27,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from baselines.strategies.rules.nearest_frontier import best_of
 from entropy_explore_env.frontiers.path_lengths import KnownPaths
 from entropy_explore_env.frontiers.voxel_map import NONE
-from entropy_explore_env.planner.frontier_rule import FrontierRule, Scene
+from entropy_explore_env.planner.frontier_rule import FrontierRule
+from entropy_explore_env.planner.scene import Scene, best_of
 from entropy_explore_env.validation import check, check_count, check_positive
 
 

@@ -20,8 +20,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from baselines.strategies.rules.nearest_frontier import best_of
-from entropy_explore_env.planner.frontier_rule import FrontierRule, Scene
+from entropy_explore_env.planner.frontier_rule import FrontierRule
+from entropy_explore_env.planner.scene import Scene, best_of
 from entropy_explore_env.validation import check_positive
 
 

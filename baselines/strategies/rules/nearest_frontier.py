@@ -10,10 +10,8 @@ It has no parameters.
 
 from __future__ import annotations
 
-import numpy as np
-
-from entropy_explore_env.frontiers.voxel_map import NONE
-from entropy_explore_env.planner.frontier_rule import FrontierRule, Scene
+from entropy_explore_env.planner.frontier_rule import FrontierRule
+from entropy_explore_env.planner.scene import Scene, best_of
 
 
 class NearestFrontier(FrontierRule):
@@ -25,20 +23,3 @@ class NearestFrontier(FrontierRule):
         """Return the voxel to go to; see `FrontierRule`."""
         voxels, lengths = scene.paths.nearest_frontiers()
         return best_of(voxels, -lengths, scene.target)
-
-
-def best_of(voxels: np.ndarray, worth: np.ndarray, target: int) -> int:
-    """The voxel that is worth most, of equals the target; NONE = there are no voxels, or all are worth -inf.
-
-    Args:
-        voxels: (K,) candidates.
-        worth: (K,) of them.
-        target: The voxel that was chosen before; NONE = none was.
-    """
-    if len(voxels) == 0 or worth.max() == -np.inf:
-        return NONE
-    kept = np.flatnonzero(voxels == target)
-    most = float(worth.max())
-    if len(kept) and worth[kept[0]] >= most - 1e-9 * max(abs(most), 1.0):
-        return target
-    return int(voxels[int(np.argmax(worth))])

@@ -10,12 +10,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from baselines.strategies.rules.assigned_frontier import AssignedConfig, AssignedFrontier, groups
 from baselines.strategies.rules.coordinated_frontier import (
-    AssignedFrontier,
     CoordinatedConfig,
     CoordinatedFrontier,
     greedy_worth,
-    groups,
 )
 from entropy_explore_env.frontiers.voxel_map import NONE
 from entropy_explore_env.missions.view import TeammateView
@@ -98,7 +97,7 @@ def test_the_assignment_is_one_of_those_with_the_least_sum(shape, others, radius
     near = np.argwhere(np.isfinite(reference.lengths_from(plan, robot)))
     places = [tuple(map(int, near[rng.integers(len(near))])) for _ in range(others)]
     scene = with_mates(scene_of(plan, robot, block=1), [mate(place) for place in places])
-    picked = AssignedFrontier(CoordinatedConfig(group=radius / scene.cells.reach)).pick(scene)
+    picked = AssignedFrontier(AssignedConfig(group=radius / scene.cells.reach)).pick(scene)
     allowed = reference.assigned(plan, [robot, *places], radius)
     assert (picked == NONE) if not allowed else cell(plan, picked) in allowed
 
@@ -107,7 +106,7 @@ def test_the_assignment_has_the_least_sum_by_hand():
     """Both robots are nearer to the left end; the least sum sends the right one to the right end."""
     plan = corridor()
     left, right = (3, 1), (9, 1)
-    small = CoordinatedConfig(group=0.05)
+    small = AssignedConfig(group=0.05)
     alone = AssignedFrontier(small).pick(with_mates(scene_of(plan, right), []))
     together = AssignedFrontier(small).pick(with_mates(scene_of(plan, right), [mate(left)]))
     assert cell(plan, alone) == (1, 1) and cell(plan, together) == (27, 1)

@@ -11,7 +11,6 @@ from baselines.experiments.mission import run_mission, scripted
 from baselines.strategies.rules.planned_rate import PlannedRate, explores_frontiers
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.planner.shared_tour import SharedTour
-from entropy_explore_env.planner.teammates import left_to_robot
 from entropy_explore_env.planner.tour import Tour
 from entropy_explore_env.reports.metrics import joint_figures, mission_figures
 from entropy_explore_env.scenario import with_settings
@@ -61,7 +60,7 @@ def test_alone_it_is_tour_and_in_a_team_cells_are_split_by_distance(shape, seed)
     places = [cell(plan, voxel) for voxel in voxels]
     apart = [np.hypot(place[0] - target[0], place[1] - target[1]) for place in places]
     wanted = [length <= far for length, far in zip(lengths, apart, strict=True)]
-    own = left_to_robot(scene, voxels, lengths)
+    own = scene.nearer_than_teammates(voxels, lengths)
     assert own.tolist() == (wanted if any(wanted) else [True] * len(places))
 
 

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from hypothesis import given
 
-from baselines.strategies.rules.receding_horizon import RecedingHorizon, RecedingHorizonConfig
+from baselines.strategies.rules import receding_horizon
+from baselines.strategies.rules.receding_horizon import RecedingHorizon
 from entropy_explore_env.planner.tour import Tour, TourConfig
 from tests.baselines.strategies.explorers.scenes import cell, corridor, random_plan, scene_of
 from tests.reference import explorers as reference
@@ -48,15 +49,17 @@ def test_lengths_between_places_are_the_shortest(seed):
     assert found == pytest.approx(wanted, rel=1e-5, abs=1e-5)
 
 
-def test_a_tree_leads_to_where_something_is_unknown_and_else_to_the_nearest_frontier():
+def test_a_tree_leads_to_where_something_is_unknown_and_else_to_the_nearest_frontier(monkeypatch):
     plan = np.full((40, 5), reference.WALL, np.int8)
     plan[1:30, 1:4] = reference.FREE
     plan[30:38, 1:4] = reference.UNKNOWN
     scene = scene_of(plan, (15, 2))
-    planner = RecedingHorizon(RecedingHorizonConfig(edge=0.1))
+    monkeypatch.setattr(receding_horizon, "_EDGE", 0.1)
+    planner = RecedingHorizon()
     planner.reset(scene.view.scenario, np.random.default_rng(5))
     x, _ = cell(plan, planner.pick(scene))
     assert x != 15 and plan[cell(plan, planner.pick(scene_of(plan, (15, 2))))] == reference.FREE
-    none = RecedingHorizon(RecedingHorizonConfig(least_gain=1e9))
+    monkeypatch.setattr(receding_horizon, "_LEAST_GAIN", 1e9)
+    none = RecedingHorizon()
     none.reset(scene.view.scenario, np.random.default_rng(5))
     assert cell(plan, none.pick(scene_of(plan, (15, 2)))) == (29, 2)
