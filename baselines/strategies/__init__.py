@@ -10,6 +10,7 @@ from types import MappingProxyType, ModuleType
 
 from baselines.strategies.loading import entry_points, is_reference, make_referenced, module_of
 from baselines.strategies.metrics import coordinated_candidate, nearest_candidate
+from baselines.strategies.mutual_information.neighbourhood import MutualInformationConfig
 from baselines.strategies.planner_choice import PlannerChoice
 from baselines.strategies.protocol import Strategy
 from baselines.strategies.rules.assigned_frontier import AssignedFrontier
@@ -18,7 +19,7 @@ from baselines.strategies.rules.coordinated_frontier import CoordinatedFrontier
 from baselines.strategies.rules.distance_advantage import DistanceAdvantage
 from baselines.strategies.rules.gradient import GradientStrategy
 from baselines.strategies.rules.information_gain import InformationGain
-from baselines.strategies.rules.mutual_information import MutualInformation, MutualInformationConfig
+from baselines.strategies.rules.mutual_information import MutualInformation
 from baselines.strategies.rules.nearest_frontier import NearestFrontier
 from baselines.strategies.rules.next_best_view import NextBestView, NextBestViewConfig
 from baselines.strategies.rules.per_time_visibility import FrontierStrategy
@@ -26,7 +27,8 @@ from baselines.strategies.rules.planned_rate import PlannedRate
 from baselines.strategies.rules.random_walk import RandomWalk
 from baselines.strategies.rules.raster import Raster, RasterConfig
 from baselines.strategies.rules.receding_horizon import RecedingHorizon
-from baselines.strategies.rules.voronoi import VoronoiConfig, VoronoiCoverage
+from baselines.strategies.rules.voronoi import VoronoiCoverage
+from baselines.strategies.voronoi.territory import VoronoiConfig
 from entropy_explore_env.command import home_path
 from entropy_explore_env.errors import MissingExtraError, SettingError, did_you_mean
 from entropy_explore_env.planner.tour import Tour

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from baselines.experiments.mission import Record, record_mission
 from baselines.papers.rochami.coverage import TeamCoverage
 from baselines.strategies import make_strategy
-from baselines.strategies.rules.mutual_information import MutualInformation, MutualInformationConfig
+from baselines.strategies.mutual_information.neighbourhood import MutualInformationConfig
+from baselines.strategies.rules.mutual_information import MutualInformation
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 
 

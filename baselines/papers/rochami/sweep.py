@@ -10,7 +10,7 @@ from typing import Any
 from baselines.experiments.cells import Cell
 from baselines.experiments.outcome import Record
 from baselines.papers.rochami.mission import Run
-from baselines.strategies.rules.mutual_information import MutualInformationConfig
+from baselines.strategies.mutual_information.neighbourhood import MutualInformationConfig
 from entropy_explore_env.scenario import Scenario, with_settings
 from entropy_explore_env.scenarios import LAB, ROOM
 

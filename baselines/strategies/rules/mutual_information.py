@@ -19,102 +19,15 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from dataclasses import dataclass, field
-from typing import NamedTuple
 
 import numpy as np
 
-from baselines.strategies.mutual_information.candidates import FACTORS, MATE, Body, Team, best_candidate
-from entropy_explore_env.belief.paths.lattice import new_lattice
-from entropy_explore_env.belief.raycast import longest_crossing
-from entropy_explore_env.belief.visibility import CONE, Occlusion, mark_cone
-from entropy_explore_env.errors import SettingError
-from entropy_explore_env.frontiers.knowledge import (
-    RobotKnowledge,
-    announced_cone,
-    belief_of,
-    random_viewpoint,
-)
+from baselines.strategies.mutual_information.neighbourhood import MutualInformationConfig, Neighbourhood
+from entropy_explore_env.frontiers.knowledge import RobotKnowledge, random_viewpoint
 from entropy_explore_env.planner.driver import Driver, Trail
 from entropy_explore_env.scenario import Scenario
-from entropy_explore_env.settings import RobotKind, gaussian_entropy_bits
-from entropy_explore_env.validation import check, check_kind, check_not_negative, check_positive
-from entropy_explore_env.viewpoints.gradient_candidates import CANDIDATE, find_gradient_candidates
 
 _ALIKE_RAD = math.radians(15.0)
-
-
-@dataclass(frozen=True)
-class MutualInformationConfig:
-    """How viewpoints are weighed (RochaMI, eq. 13).
-
-    Attributes:
-        coordinated: Whether λ, η and ρ use what teammates announce.
-        overlap: Whether λ does (eq. 12); else it is 1.
-        overlap_scale: ξ, as a share of what the robot's cone would hold if nothing were known in it.
-        interference: η for each teammate in the candidate's cone, in ]0, 1]; 1 = they do not count.
-        teammates_block: Whether ρ is 0 where a teammate stands or drives.
-        static_reach: Whether ρ depends on what is believed covered; else it is 1.
-        occlusion: Whether obstacles hide voxels of cones; the paper's ignore them.
-        distance_cost: κ.
-        least_radius_m: Lower bound of the radius of the neighbourhood in which candidates lie, which is r̂ of
-            the latest scan.
-        most_radius_m: Upper bound of that radius; the robot's reach is another.
-        known_sigma: σ of a voxel that counts as known, H = 0; None = the mission's σ_end.
-        repeats: A viewpoint that was chosen this often among the latest decisions is a trap.
-        memory: Number of latest decisions that are remembered.
-    """
-
-    coordinated: bool = True
-    overlap: bool = True
-    overlap_scale: float = 0.1
-    interference: float = 0.5
-    teammates_block: bool = True
-    static_reach: bool = True
-    occlusion: bool = False
-    distance_cost: float = 0.0
-    least_radius_m: float = 0.5
-    most_radius_m: float = math.inf
-    known_sigma: float | None = None
-    repeats: int = 2
-    memory: int = 8
-
-    def __post_init__(self) -> None:
-        """Check every field."""
-        for name in ("coordinated", "overlap", "teammates_block", "static_reach", "occlusion"):
-            check_kind(self, name, bool)
-        check_positive(self, "overlap_scale", "least_radius_m")
-        check_positive(self, "most_radius_m", finite=False)
-        check(self, "interference", "a number above 0 up to 1", lambda v: 0 < v <= 1)
-        check_not_negative(self, "distance_cost")
-        if self.known_sigma is not None:
-            check(self, "known_sigma", "None, or a number from 1e-6 to 1e4", lambda v: 1e-6 <= v <= 1e4)
-        for name in ("repeats", "memory"):
-            check(self, name, "a whole number ≥ 1", lambda v: v >= 1 and v == int(v))
-        if self.most_radius_m < self.least_radius_m:
-            raise SettingError(
-                "MutualInformationConfig.most_radius_m", self.most_radius_m, "at least least_radius_m"
-            )
-
-
-class _KindModel(NamedTuple):
-    """A kind of robot, for kernels."""
-
-    footprint: np.ndarray
-    """(B, 3) int64 index offsets of the voxels that its body touches."""
-    half_angle_rad: float
-    """Of its sensor's widest ray; used before the first scan."""
-    crossed: np.ndarray
-    """(L,) int32, scratch space of `cast_ray`."""
-    entered: np.ndarray
-    """(L,) int64."""
-
-
-@dataclass
-class _Memory:
-    """The latest viewpoints that a robot chose."""
-
-    chosen: deque[np.ndarray] = field(default_factory=deque)
 
 
 class MutualInformation(Driver):
@@ -135,23 +48,11 @@ class MutualInformation(Driver):
         self.config = config or MutualInformationConfig()
 
     def reset(self, scenario: Scenario, rng: np.random.Generator) -> None:
-        """A new mission begins."""
+        """Begin a mission."""
         super().reset(scenario, rng)
-        grid, settings = scenario.grid, self.config
         self.decisions = {"rule": 0, "blocked": 0, "nothing": 0, "trap": 0}
-        self._memories = [_Memory(deque(maxlen=settings.memory)) for _ in range(scenario.robots)]
-        self._models = [_kind_model(scenario, kind) for kind in scenario.kinds]
-        self._marks = np.zeros(grid.voxels, np.uint8)
-        self._candidates = np.zeros(0, CANDIDATE)
-        self._cone = np.zeros(1, CONE)
-        self._factors = np.zeros(1, FACTORS)
-        sigma = scenario.ending.sigma_end if settings.known_sigma is None else settings.known_sigma
-        self._factors["known_precision"] = sigma**-2
-        self._factors["distance_cost"] = settings.distance_cost
-        self._factors["static_reach"] = settings.static_reach
-        self._factors["interference"] = settings.interference if settings.coordinated else 1.0
-        unknown_bits = gaussian_entropy_bits(scenario.sigma_prior) - gaussian_entropy_bits(sigma)
-        self._unknown_bits = max(unknown_bits, 0.0)
+        self._chosen = [deque[np.ndarray](maxlen=self.config.memory) for _ in range(scenario.robots)]
+        self._neighbourhood = Neighbourhood(self.config, scenario, rng)
 
     def give_way(self, view: RobotKnowledge, trail: Trail) -> np.ndarray | None:
         """Wander; where robots wait in place (`Robot.when_blocked`), go on by the rule (RochaMI)."""
@@ -162,120 +63,19 @@ class MutualInformation(Driver):
 
     def decide(self, view: RobotKnowledge) -> np.ndarray | None:
         """Return the viewpoint (5,) by the robot's belief and what it has heard; None = there is no gain."""
-        memory, grid = self._memories[view.robot], view.scenario.grid
-        viewpoint = self._best(view)
+        chosen, edge_m = self._chosen[view.robot], view.scenario.grid.voxel_size_m
+        viewpoint = self._neighbourhood.best(view)
         if viewpoint is None:
             self.decisions["nothing"] += 1
             return None
-        alike = sum(_alike(viewpoint, earlier, grid.voxel_size_m) for earlier in memory.chosen)
+        alike = sum(_alike(viewpoint, earlier, edge_m) for earlier in chosen)
         if alike >= self.config.repeats:
-            memory.chosen.clear()
+            chosen.clear()
             self.decisions["trap"] += 1
             return random_viewpoint(view, self._rng)
-        memory.chosen.append(viewpoint)
+        chosen.append(viewpoint)
         self.decisions["rule"] += 1
         return viewpoint
-
-    def _best(self, view: RobotKnowledge) -> np.ndarray | None:
-        """(5,) the viewpoint of eq. 13, map frame; None if no candidate has a gain above 0."""
-        grid, settings = view.scenario.grid, self.config
-        edge, origin = grid.voxel_size_m, np.asarray(grid.origin_m)
-        position = grid.in_grid_units(view.pose)[:3]
-        depth_m = max(view.depth_m, settings.least_radius_m)
-        most_m = min(settings.most_radius_m, view.kind.robot.reach_m, float(grid.size_m.sum()))
-        radius = min(depth_m, most_m) / edge
-        candidates = self._near(view, position, radius)
-        if len(candidates) == 0:
-            return None
-        cone = self._own_cone(view, depth_m / edge)
-        x, y, z = position.tolist()
-        model, body_radius = self._model_of(view), view.kind.robot.planning_radius_m / edge
-        best = best_candidate(
-            candidates,
-            self._order(candidates, radius),
-            belief_of(view),
-            Body((x, y, z), radius, body_radius, model.footprint, model.crossed, model.entered),
-            Team(self._heard(view), self._marks),
-            cone,
-            self._occlusion(view) if settings.occlusion else None,
-            self._factors[0],
-        )
-        if best < 0:
-            return None
-        chosen = candidates[best]
-        return np.array([*(origin + chosen["place"] * edge), chosen["yaw"], chosen["pitch"]])
-
-    def _model_of(self, view: RobotKnowledge) -> _KindModel:
-        return self._models[view.robot % len(self._models)]
-
-    def _near(self, view: RobotKnowledge, position: np.ndarray, radius: float) -> np.ndarray:
-        """(K,) CANDIDATE with a gradient."""
-        layer = view.scenario.layer_of(view.kind.robot)
-        across = 2 * math.floor(radius) + 3
-        most = min(across, view.mean.shape[0]) * min(across, view.mean.shape[1])
-        most *= 1 if layer is not None else min(across, view.mean.shape[2])
-        if len(self._candidates) < most:
-            self._candidates = np.zeros(most, CANDIDATE)
-        known = self._factors["known_precision"][0]
-        flat = -1 if layer is None else layer
-        count = find_gradient_candidates(view.precision, known, position, radius, flat, self._candidates)
-        return self._candidates[:count]
-
-    def _order(self, candidates: np.ndarray, radius: float) -> np.ndarray:
-        """(K,) numbers of the candidates by the upper bound of their value, highest first; ties at random."""
-        most = candidates["steepness"] / candidates["steepness"].max()
-        if self.config.distance_cost > 0.0:
-            most = most - self.config.distance_cost * candidates["distance"] / radius
-        shuffled = self._rng.permutation(len(candidates))
-        return shuffled[np.argsort(-most[shuffled], kind="stable")]
-
-    def _occlusion(self, view: RobotKnowledge) -> Occlusion:
-        model = self._model_of(view)
-        return Occlusion(view.mean.reshape(-1), model.crossed, model.entered)
-
-    def _own_cone(self, view: RobotKnowledge, depth: float) -> np.ndarray:
-        """The robot's cone, without an apex yet; sets ξ, which is relative to the bits that it could hold."""
-        angle = view.half_angle_rad or self._model_of(view).half_angle_rad
-        self._cone["radius"], self._cone["cosine"] = depth, math.cos(angle)
-        voxels = 2.0 / 3.0 * math.pi * depth**3 * (1.0 - math.cos(angle))
-        scale_bits = self.config.overlap_scale * voxels * self._unknown_bits
-        counts = self.config.coordinated and self.config.overlap
-        self._factors["scale_bits"] = max(scale_bits, 1e-9) if counts else math.inf
-        return self._cone[0]
-
-    def _heard(self, view: RobotKnowledge) -> np.ndarray:
-        """(M,) MATE, the teammates that the robot has heard; marks the voxels of their cones."""
-        settings, grid = self.config, view.scenario.grid
-        mates = [number for number, mate in view.teammates.items() if mate.heard_s >= 0.0]
-        if not settings.coordinated or not mates:
-            return np.zeros(0, MATE)
-        heard = np.zeros(len(mates), MATE)
-        self._marks[:] = 0
-        occlusion = self._occlusion(view) if settings.occlusion else None
-        own_m = view.kind.robot.body_radius_m
-        for place, number in enumerate(mates):
-            mate = view.teammates[number]
-            under_way = mate.announced_s >= mate.heard_s
-            touching_m = own_m + view.scenario.kind_of(number).robot.body_radius_m
-            heard[place]["begin"] = grid.in_grid_units(mate.pose)[:3]
-            heard[place]["end"] = grid.in_grid_units(mate.viewpoint if under_way else mate.pose)[:3]
-            heard[place]["touching"] = touching_m / grid.voxel_size_m if settings.teammates_block else -1.0
-            if settings.overlap and mate.announced_s >= 0.0 and mate.depth_m > 0.0:
-                mark_cone(announced_cone(grid, mate), grid.shape, occlusion, self._marks, 1)
-        return heard
-
-
-def _kind_model(scenario: Scenario, kind: RobotKind) -> _KindModel:
-    grid, sensor = scenario.grid, kind.sensor
-    radius = kind.robot.planning_radius_m / grid.voxel_size_m
-    widest = 0.5 * sensor.angular_step_rad * math.hypot(sensor.columns - 1, sensor.rows - 1)
-    longest = longest_crossing(*grid.shape, math.inf, 1)
-    return _KindModel(
-        footprint=new_lattice(grid.shape, radius, scenario.layer_of(kind.robot)).footprint,
-        half_angle_rad=min(widest, math.pi),
-        crossed=np.zeros(longest, np.int32),
-        entered=np.zeros(longest, np.int64),
-    )
 
 
 def _alike(one: np.ndarray, other: np.ndarray, voxel_size_m: float) -> bool:

@@ -1,110 +1,30 @@
 """The strategy `voronoi`: explore and cover by geodesic Voronoi cells (Bhattacharya, Michael & Kumar 2010).
 
+    target = argmin over uncertain q in the own cell of |q - C|   (eqs. 6-8)
+    C = Σ q φ(q) / Σ φ(q) over the cell
+
 Each robot divides its own belief among the team, by the positions at which it last heard the others. A path
-costs the entropy along it. The robot goes to a target in its own cell. A centralised team is the same code
-with perfect messages.
+costs the entropy along it, and φ is the entropy, no less than τ′. The robot goes to the target in its own
+cell. A centralised team is the same code with perfect messages.
+
+`voronoi-gradient` takes steps down the coverage functional (eq. 3) and falls back on the projected centroid
+where none helps and the cell is not explored; `voronoi-nearest`, ours, goes to the uncertain voxel that costs
+least.
+
+Once all is explored the projected centroid may lead robots in circles, as on a known map in the paper's
+reproduction. Its guard (`Rules.guarded`) is not part of this strategy, since missions end by then.
 """
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass, field
-from typing import Literal
-
 import numpy as np
 
-from baselines.strategies.voronoi.controls import (
-    CellFunctional,
-    gradient_step,
-    nearest_uncertain,
-    projected_centroids,
-)
-from baselines.strategies.voronoi.uncertainty import fill_deviation_entropy, filtered, inflate_obstacles
-from entropy_explore_env.belief.entropy import fill_occupancy_entropy
-from entropy_explore_env.belief.paths.geodesic_cells import (
-    UNREACHED,
-    extract_path,
-    new_tessellation,
-    tessellate,
-)
-from entropy_explore_env.belief.visibility import CONE
-from entropy_explore_env.frontiers.knowledge import (
-    RobotKnowledge,
-    belief_of,
-    teammates_that_share,
-    voxel_of,
-)
+from baselines.strategies.voronoi.controls import CellFunctional, nearest_uncertain, projected_centroids
+from baselines.strategies.voronoi.territory import Division, Territory, VoronoiConfig
+from entropy_explore_env.belief.paths.geodesic_cells import UNREACHED
+from entropy_explore_env.frontiers.knowledge import RobotKnowledge, voxel_of
 from entropy_explore_env.planner.driver import Driver
 from entropy_explore_env.scenario import Scenario
-from entropy_explore_env.validation import check, check_choice, check_count
-from entropy_explore_env.viewpoints.evaluation import (
-    RobotModel,
-    is_line_free,
-    new_scratch,
-    robot_model,
-    sees_all_around,
-)
-from entropy_explore_env.viewpoints.imagined_scan import imagined_bits
-
-Control = Literal["projected-centroid", "gradient-search", "nearest"]
-Metric = Literal["entropy", "length"]
-Known = Literal["occupancy", "deviation"]
-
-_GAZES = 16
-_PITCHES = (-0.6, 0.0, 0.6)
-_WITHIN_REACH = 0.999
-"""Share of the reach that is used, so that rounding never moves a place towards the robot."""
-
-
-@dataclass(frozen=True)
-class VoronoiConfig:
-    """How robots divide the workspace and choose targets.
-
-    Once all is explored the projected centroid may lead robots in circles, as on a known map in the paper's
-    reproduction. Its guard (`Rules.guarded`) is not part of this strategy, since missions end by then.
-    Where a mission asks for more than the paper does, robots that have covered all would scan from one spot
-    for ever: a robot whose scan brought nothing, and which would repeat it, goes anywhere (ours).
-
-    Attributes:
-        control: `projected-centroid` (eqs. 6-8); `gradient-search` (eq. 3), which takes `steps` steps a
-            decision and falls back on the projected centroid where none helps and the cell is not explored;
-            `nearest`: the uncertain voxel of the own cell that costs least to reach (ours).
-        metric: What paths cost until all is explored: `entropy` (sect. 5.2) or `length`.
-        known: What makes a voxel certain: its `occupancy` (p = P(c > ½), as in the paper), or its
-            `deviation`, which has to fall to the mission's σ_end (ours).
-        eta: η, cost of a voxel edge of path in addition to its entropy.
-        tau: τ in nats: voxels with at least this entropy are uncertain.
-        tau_floor: τ′, the least density, below τ.
-        steps: Steps of the gradient search per decision.
-    """
-
-    control: Control = "projected-centroid"
-    metric: Metric = "entropy"
-    known: Known = "occupancy"
-    eta: float = 0.01
-    tau: float = 0.35
-    tau_floor: float = 0.33
-    steps: int = 5
-
-    def __post_init__(self) -> None:
-        """Check every field."""
-        check_choice(self, "control", Control)
-        check_choice(self, "metric", Metric)
-        check_choice(self, "known", Known)
-        check(self, "eta", "a number from 1e-6 to 1e3", lambda v: 1e-6 <= v <= 1e3)
-        check(self, "tau", "a number from 1e-6 to ln 2", lambda v: 1e-6 <= v <= 0.6931)
-        check(self, "tau_floor", "a number above 0 and below tau", lambda v: 0.0 < v < self.tau)
-        check_count(self, "steps", 1, 1000)
-
-
-@dataclass
-class _TravelPlan:
-    """What a robot remembers from one decision to the next."""
-
-    path: np.ndarray = field(default_factory=lambda: np.zeros(0, np.int64))
-    """(N,) voxels to the target that are still ahead."""
-    to_see: bool = False
-    """Whether the target was uncertain when it was chosen."""
 
 
 class VoronoiCoverage(Driver):
@@ -117,157 +37,60 @@ class VoronoiCoverage(Driver):
         self.config = config or VoronoiConfig()
 
     def reset(self, scenario: Scenario, rng: np.random.Generator) -> None:
-        """A new mission begins."""
+        """Begin a mission."""
         super().reset(scenario, rng)
-        grid = scenario.grid
-        self._plans = [_TravelPlan() for _ in range(scenario.robots)]
-        self._models = [robot_model(scenario, kind) for kind in scenario.kinds]
-        self._space, self._inner = new_tessellation(grid.shape), new_tessellation(grid.shape)
-        self._entropy = np.empty(grid.shape, np.float32)
-        self._scratch = new_scratch(grid, self._models)
+        self._paths = [np.zeros(0, np.int64) for _ in range(scenario.robots)]
+        self._to_see = [False] * scenario.robots
+        self._territory = Territory(scenario, self.config)
 
     def forget_goal(self, view: RobotKnowledge) -> None:
         """Choose a target anew at the next decision."""
-        self._plans[view.robot].path = np.zeros(0, np.int64)
+        self._paths[view.robot] = np.zeros(0, np.int64)
 
     def note_blocked(self, view: RobotKnowledge) -> None:
-        """Choose a target anew: the way to this one is blocked."""
+        """Choose a target anew, since the path to this one is blocked."""
         self.forget_goal(view)
 
     def decide(self, view: RobotKnowledge) -> np.ndarray:
-        """Return the viewpoint (5,) by the robot's own belief and where it last heard the others."""
-        plan, here = self._plans[view.robot], voxel_of(view, view.pose)
-        entropy = self._uncertainty(view)
-        traversal_cost = self._traversal_cost(view, entropy, here)
-        ahead = np.flatnonzero(plan.path == here)
-        plan.path = plan.path[ahead[-1] + 1 :] if len(ahead) else plan.path[:0]
-        if not self._is_valid(plan, entropy, traversal_cost):
-            self._choose_target(view, entropy, traversal_cost, here)
-        return self._towards(view, plan)
+        """Return the viewpoint (5,) on the path to the target; see `Driver`."""
+        here, path, land = voxel_of(view, view.pose), self._paths[view.robot], self._territory
+        land.observe(view, here)
+        passed = np.flatnonzero(path == here)
+        path = path[passed[-1] + 1 :] if len(passed) else path[:0]
+        entropy, cost = land.entropy.reshape(-1), land.traversal_cost.reshape(-1)
+        leads = len(path) > 0 and not np.isinf(cost[path]).any()
+        if not leads or (self._to_see[view.robot] and entropy[path[-1]] < self.config.tau):
+            path, by_steps = self._path_to_target(view, here)
+            uncertain = len(path) > 0 and bool(entropy[path[-1]] >= self.config.tau)
+            self._to_see[view.robot] = uncertain and not by_steps
+        self._paths[view.robot] = path
+        return land.viewpoint_on(view, path)
 
-    def _uncertainty(self, view: RobotKnowledge) -> np.ndarray:
-        """(X, Y, Z) float32 nats, filtered."""
-        out, mean, precision = self._entropy.reshape(-1), view.mean.reshape(-1), view.precision.reshape(-1)
-        if self.config.known == "occupancy":
-            fill_occupancy_entropy(mean, precision, out)
-        else:
-            prior, end = view.scenario.sigma_prior**-2, view.scenario.ending.sigma_end**-2
-            fill_deviation_entropy(precision, prior, end, out)
-        return filtered(self._entropy)
-
-    def _traversal_cost(self, view: RobotKnowledge, entropy: np.ndarray, here: int) -> np.ndarray:
-        """(X, Y, Z) float32, by the metric that is set; inf where the body does not fit."""
-        lattice, shape = self._model_of(view).lattice, view.scenario.grid.shape
-        traversal_cost = entropy.copy() if self.config.metric == "entropy" else np.ones(shape, np.float32)
-        x, y, z = (int(i) for i in np.unravel_index(here, shape))
-        inflate_obstacles(
-            view.mean, lattice.footprint, lattice.margin, lattice.layer, (x, y, z), traversal_cost
-        )
-        return traversal_cost
-
-    def _is_valid(self, plan: _TravelPlan, entropy: np.ndarray, traversal_cost: np.ndarray) -> bool:
-        """Whether the plan leads to a target that is still worth going to, without a known obstacle."""
-        if len(plan.path) == 0 or np.isinf(traversal_cost.reshape(-1)[plan.path]).any():
-            return False
-        return not plan.to_see or bool(entropy.reshape(-1)[plan.path[-1]] >= self.config.tau)
-
-    def _choose_target(
-        self, view: RobotKnowledge, entropy: np.ndarray, traversal_cost: np.ndarray, here: int
-    ) -> None:
-        """Divide the belief, and choose the target in the robot's own cell."""
-        config, plan = self.config, self._plans[view.robot]
-        sources, own = self._sources(view, here)
-        density = np.maximum(entropy, np.float32(config.tau_floor))
-        by_length = config.metric == "length"
-        metric = (0.0 if by_length else config.eta, by_length)
-        tessellate(self._space, traversal_cost, sources, *metric)
-        targets, uncertain = projected_centroids(self._space.cells, density, config.tau, len(sources))
-        if not uncertain.any() and not by_length:  # all is explored: now the task is coverage
-            traversal_cost, metric = (
-                np.where(np.isinf(traversal_cost), traversal_cost, np.float32(1.0)),
-                (0.0, True),
+    def _path_to_target(self, view: RobotKnowledge, here: int) -> tuple[np.ndarray, bool]:
+        """Return the voxels (N,) of the path in the robot's own cell, and whether it goes down by steps."""
+        config, land = self.config, self._territory
+        density = np.maximum(land.entropy, np.float32(config.tau_floor))
+        division = land.divided(view, here)
+        targets, uncertain = projected_centroids(division.cells, density, config.tau, len(division.sources))
+        if not uncertain.any():
+            division = land.divided(view, here, explored=True)
+            targets, uncertain = projected_centroids(
+                division.cells, density, config.tau, len(division.sources)
             )
-            tessellate(self._space, traversal_cost, sources, *metric)
-            targets, uncertain = projected_centroids(self._space.cells, density, config.tau, len(sources))
-        target = int(targets[own])
-        if uncertain[own] and config.control == "nearest":
-            arrays = self._space.cells, self._space.costs, density
-            target = int(nearest_uncertain(*arrays, config.tau, len(sources))[own])
-        plan.path, plan.to_see = np.zeros(0, np.int64), False
+        target, own = int(targets[division.own]), bool(uncertain[division.own])
+        if own and config.control == "nearest":
+            cells, costs, sources = division.cells, division.costs, len(division.sources)
+            target = int(nearest_uncertain(cells, costs, density, config.tau, sources)[division.own])
         if config.control == "gradient-search":
-            plan.path = self._descent(traversal_cost, density, own, here, metric)
-        if (
-            len(plan.path) == 0
-            and target != UNREACHED
-            and (config.control != "gradient-search" or uncertain[own])
-        ):
-            plan.path = extract_path(self._space, traversal_cost, target, *metric)[1:]
-            plan.to_see = bool(entropy.reshape(-1)[target] >= config.tau)
+            path = self._descent(division, density, here)
+            if len(path) > 0 or not own:
+                return path, True
+        return np.zeros(0, np.int64) if target == UNREACHED else land.path_to(division, target), False
 
-    def _descent(
-        self, traversal_cost: np.ndarray, density: np.ndarray, own: int, here: int, metric: tuple[float, bool]
-    ) -> np.ndarray:
-        """(N,) voxels, the steps of a gradient search; empty if no neighbour is better."""
-        cell, path = self._space.cells == own, list[int]()
-        if not cell.any():
-            return np.zeros(0, np.int64)
-        functional = CellFunctional(self._inner, traversal_cost, density, cell)
-        for _ in range(self.config.steps):
-            step = gradient_step(functional, cell, here, *metric)
-            if step == here:
-                break
-            path.append(step)
-            here = step
+    def _descent(self, division: Division, density: np.ndarray, here: int) -> np.ndarray:
+        """Return the voxels (N,) of the steps of a gradient search; none if no neighbour is better."""
+        cell, path = division.cells == division.own, list[int]()
+        if cell.any():
+            functional = CellFunctional(self._territory.inner, self._territory.traversal_cost, density, cell)
+            path = functional.descent(here, self.config.steps, *division.metric)
         return np.array(path, np.int64)
-
-    def _sources(self, view: RobotKnowledge, here: int) -> tuple[np.ndarray, int]:
-        """Voxels of the robots that are heard and share, and of this one, by number; and this one's index."""
-        heard = {
-            mate: voxel_of(view, seen.pose)
-            for mate, seen in teammates_that_share(view).items()
-            if seen.heard_s >= 0.0
-        }
-        heard[view.robot] = here
-        robots = sorted(heard)
-        return np.array([heard[robot] for robot in robots], np.int64), robots.index(view.robot)
-
-    def _towards(self, view: RobotKnowledge, plan: _TravelPlan) -> np.ndarray:
-        """The farthest place on the path that one drive reaches, and the best gaze there."""
-        grid, robot = view.scenario.grid, view.kind.robot
-        viewpoint = view.pose.copy()
-        places = grid.centre_of(np.stack(np.unravel_index(plan.path, grid.shape), axis=-1))
-        if view.planar:
-            places[:, 2] = view.pose[2]
-        within = np.linalg.norm(places - view.pose[:3], axis=1) <= robot.reach_m * _WITHIN_REACH
-        for index in np.flatnonzero(within)[::-1]:
-            if index == 0 or robot.navigator == "planned" or self._in_sight(view, places[index]):
-                viewpoint[:3] = places[index]
-                break
-        return self._gazing(view, viewpoint)
-
-    def _in_sight(self, view: RobotKnowledge, place: np.ndarray) -> bool:
-        """Whether the straight line to a place (3,), map frame, is free by the belief."""
-        extent = (place - view.pose[:3]) / view.scenario.grid.voxel_size_m
-        start = view.scenario.grid.in_grid_units(view.pose)
-        radius = self._model_of(view).drive.body_radius
-        return is_line_free(belief_of(view), start, extent, radius, self._scratch)
-
-    def _gazing(self, view: RobotKnowledge, viewpoint: np.ndarray) -> np.ndarray:
-        """The viewpoint with the gaze from which most bits are expected; unchanged if the sensor sees all."""
-        model, kind, grid = self._model_of(view), view.kind, view.scenario.grid
-        if view.planar and sees_all_around(kind.sensor):
-            return viewpoint
-        yaws = view.pose[3] + np.arange(_GAZES) * (2.0 * math.pi / _GAZES)
-        pitches = (0.0,) if view.planar else _PITCHES
-        gazes = np.stack(np.meshgrid(yaws, pitches, indexing="ij"), axis=-1).reshape(-1, 2)
-        drawn = np.tile(grid.in_grid_units(viewpoint), (len(gazes), 1))
-        drawn[:, 3:] = gazes
-        bits, no_cones = np.empty(len(drawn)), np.zeros(0, CONE)
-        imagined_bits(
-            belief_of(view), model.scan, model.scan.stop_probability, drawn, no_cones, self._scratch, bits
-        )
-        viewpoint[3:] = gazes[int(np.argmax(bits))]
-        return viewpoint
-
-    def _model_of(self, view: RobotKnowledge) -> RobotModel:
-        return self._models[view.robot % len(self._models)]

@@ -170,7 +170,7 @@ class CellFunctional:
             density: (X, Y, Z) float32, φ.
             cell: (X, Y, Z) bool, the cell.
         """
-        self._space, self._density = space, density
+        self._space, self._density, self._cell = space, density, cell
         self._traversal_cost = np.where(cell, traversal_cost, np.float32(np.inf))
 
     def value(self, voxel: int, length_cost: float, by_length: bool) -> float:
@@ -180,6 +180,17 @@ class CellFunctional:
         if reached < np.count_nonzero(np.isfinite(self._traversal_cost)):
             return math.inf
         return float(coverage_functionals(self._space.cells, self._space.costs, self._density, 1)[0])
+
+    def descent(self, voxel: int, most: int, length_cost: float, by_length: bool) -> list[int]:
+        """Return the voxels of at most `most` steps of `gradient_step`, each from the one before."""
+        path = list[int]()
+        for _ in range(most):
+            step = gradient_step(self, self._cell, voxel, length_cost, by_length)
+            if step == voxel:
+                break
+            path.append(step)
+            voxel = step
+        return path
 
 
 def neighbours(free: np.ndarray, voxel: int) -> list[int]:

@@ -9,7 +9,8 @@ import pytest
 
 from baselines.experiments.mission import run_mission, scripted
 from baselines.strategies import STRATEGIES, make_strategy
-from baselines.strategies.rules.mutual_information import MutualInformation, MutualInformationConfig
+from baselines.strategies.mutual_information.neighbourhood import MutualInformationConfig
+from baselines.strategies.rules.mutual_information import MutualInformation
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.missions.state import MissionEnd

@@ -11,7 +11,8 @@ from scipy import stats
 
 from baselines.experiments.mission import run_mission, scripted
 from baselines.strategies import make_strategy
-from baselines.strategies.rules.voronoi import VoronoiConfig, VoronoiCoverage
+from baselines.strategies.rules.voronoi import VoronoiCoverage
+from baselines.strategies.voronoi.territory import VoronoiConfig
 from baselines.strategies.voronoi.uncertainty import fill_deviation_entropy, filtered, inflate_obstacles
 from entropy_explore_env.belief.entropy import LN2, fill_occupancy_entropy
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
