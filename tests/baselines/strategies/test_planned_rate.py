@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import pytest
 
 from baselines.experiments.mission import run_mission, scripted
-from baselines.strategies.information_rate_v0 import InformationRate
 from baselines.strategies.planner_choice import PlannerChoice
-from baselines.strategies.rules.planned_rate import PlannedRate, PlannedRateConfig
+from baselines.strategies.rules.nearest_frontier import NearestFrontier
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.errors import SettingError
+from entropy_explore_env.explorer import PlannedRate, PlannedRateConfig
 from entropy_explore_env.planner.recipe import recipe_for
 from entropy_explore_env.reports.metrics import mission_figures
 from entropy_explore_env.scenario import with_settings
@@ -28,10 +26,10 @@ def figures_of(strategy, scenario=ROOM, seed=0, **settings):
     ("name", "robots", "share"),
     [("room-furnished", 3, 0.98), ("office", 1, 0.85), ("cave", 1, 0.8), ("cave", 3, 0.95)],
 )
-def test_it_is_sooner_done_than_its_predecessor(name, robots, share):
+def test_it_is_sooner_done_than_the_nearest_frontier(name, robots, share):
     ours, before = (
         [figures_of(make(), find_scenario(name), seed, robots=robots)["t_mission_s"] for seed in (0, 1)]
-        for make in (PlannedRate, InformationRate)
+        for make in (PlannedRate, NearestFrontier)
     )
     assert sum(ours) < share * sum(before)
 
@@ -52,16 +50,15 @@ def test_a_configuration_changes_the_recipe_of_every_kind_of_robot():
         kind = SCENARIOS[name].kinds[0]
         assert PlannedRateConfig().recipe(kind) == recipe_for(kind)
         changed = PlannedRateConfig(behind=7.0, far_places=5).recipe(kind)
-        assert changed == replace(recipe_for(kind), behind=7.0, far_places=5)
+        assert changed == recipe_for(kind)._replace(behind=7.0, far_places=5)
 
 
 @pytest.mark.parametrize(
     "wrong",
     [
-        {"exponent": 0.0},
         {"behind": float("inf")},
         {"leave_below": -0.1},
-        {"dregs": float("nan")},
+        {"sight": float("nan")},
         {"far_places": 2.5},
         {"far_places": -1},
     ],

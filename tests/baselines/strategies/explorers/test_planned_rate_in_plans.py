@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from baselines.strategies.rules.advantage_ahead import AdvantageAhead
 from hypothesis import given
 from hypothesis import strategies as st
 
 from baselines.experiments.mission import run_mission, scripted
-from baselines.strategies.rules.advantage_ahead import AdvantageAhead
-from baselines.strategies.rules.planned_rate import PlannedRate, explores_frontiers
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
+from entropy_explore_env.explorer import PlannedRate, explores_frontiers
 from entropy_explore_env.planner.shared_tour import SharedTour
 from entropy_explore_env.planner.teammates import left_to_robot
 from entropy_explore_env.planner.tour import Tour

@@ -1,27 +1,22 @@
-"""The strategy `planned-rate`: viewpoints nearby and far places on planned paths, by expected bits per time.
+"""The planner as a strategy, `planned-rate`: to each robot the viewpoint to which it drives next.
 
-Ours, not a paper's: the successor of `information-rate-v0`. Candidates and their expected bits are those of
-`viewpoints.proposals`, drawn and scored by what the robot is (`viewpoints.recipe`), as those that a policy
-chooses among where candidates are the actions. A far place is driven to if it is worth more than every
-viewpoint nearby, along the shortest path by the robot's belief, and the robot decides anew at every stop.
-What did not come, and what could not be reached, is remembered: no place and gaze is tried again that brought
-nothing, and robots whose bodies block each other part.
-
-What a robot is, and what its mission asks for, decides how it explores:
+Ours, not a paper's. Candidates are drawn, scored by expected bits per time and remembered as `planner` says,
+as those that a policy chooses among where candidates are the actions. A far place is driven to if it is worth
+more than every viewpoint nearby, along the shortest path by the robot's belief, and the robot decides anew at
+every stop. What a robot is, and what its mission asks for, decides how it explores:
 
 - Flying robots, and all in 3-D worlds: bits per time, with the recipe of narrow or of wide views.
-- Ground robots with a scanner that sees all around, in a plan, until the map has so little entropy: bits per
+- Ground robots with a scanner that sees all around, in a plan, until the map has a given entropy: bits per
   time.
-- The same robots where everything is to be seen: frontier cells on short tours, by `explorers.shared_tour`,
-  with looks into pockets from outside. Bits per time would leave what is small until the end, and drive back
-  for it.
+- The same robots where everything is to be seen: frontier cells on short tours, see `planner.shared_tour`.
+  Bits per time would leave what is small until the end, and drive back for it.
 - The same robots where a part may stay unseen: bits per time, of unknown voxels alone.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import asdict, dataclass, fields
 from typing import Any
 
 import numpy as np
@@ -32,22 +27,22 @@ from entropy_explore_env.planner.recipe import Recipe, recipe_for
 from entropy_explore_env.planner.shared_tour import SharedTour, SharedTourConfig
 from entropy_explore_env.scenario import Scenario, with_settings
 from entropy_explore_env.settings import RobotKind
-from entropy_explore_env.validation import check_count, check_not_negative, check_positive
+from entropy_explore_env.validation import check_count, check_not_negative
 from entropy_explore_env.viewpoints.evaluation import sees_all_around
 
 _EVERYTHING = 0.995
-"""Who is to see such a share of what can be seen has to look into every corner."""
+"""Share of what can be seen from which on every corner must be seen."""
 
 
 def explores_frontiers(scenario: Scenario, kind: RobotKind) -> bool:
-    """Whether robots of a kind go for frontier cells, and not for bits."""
+    """Return whether robots of a kind go for frontier cells, and not for bits."""
     if not (scenario.grid.flat and kind.robot.motion == "planar" and sees_all_around(kind.sensor)):
         return False
     return scenario.ending.by_seen and _wants_everything(scenario, kind)
 
 
 def _wants_everything(scenario: Scenario, kind: RobotKind) -> bool:
-    """Whether a mission that ends by what is seen leaves no more unseen than a sliver between two rays."""
+    """Return whether a mission that ends by what is seen leaves no more unseen than a sliver between rays."""
     ending = scenario.ending
     if ending.seen_share is not None:
         return ending.seen_share >= _EVERYTHING
@@ -57,54 +52,44 @@ def _wants_everything(scenario: Scenario, kind: RobotKind) -> bool:
 
 @dataclass(frozen=True)
 class PlannedRateConfig:
-    """What differs from the recipe of every kind of robot, and from the tours' settings; None = nothing.
+    """What differs from the recipe of every kind of robot, and from the settings of tours; None = nothing.
 
     Attributes:
-        exponent: As in `viewpoints.recipe.Recipe`.
-        behind: Likewise.
-        far_places: Likewise.
-        leave_below: Likewise.
-        dregs: Likewise.
-        path_scans: Likewise.
-        pocket: As in `explorers.shared_tour.SharedTourConfig`.
-        sight: Likewise.
+        behind: As in `planner.recipe.Recipe`.
+        far_places: As in `planner.recipe.Recipe`.
+        leave_below: As in `planner.recipe.Recipe`.
+        pocket: As in `planner.shared_tour.SharedTourConfig`.
+        sight: As in `planner.shared_tour.SharedTourConfig`.
 
     Raises:
         SettingError: One of them is not allowed.
     """
 
-    exponent: float | None = None
     behind: float | None = None
     far_places: int | None = None
     leave_below: float | None = None
-    dregs: float | None = None
-    path_scans: int | None = None
     pocket: float | None = None
     sight: float | None = None
 
     def __post_init__(self) -> None:
         """Check every field."""
-        given = [name for name, value in asdict(self).items() if value is not None]
-        for name in given:
-            if name in ("far_places", "path_scans"):
+        for name in (name for name, value in asdict(self).items() if value is not None):
+            if name == "far_places":
                 check_count(self, name, 0, 100_000)
-            elif name == "exponent":
-                check_positive(self, name)
             else:
                 check_not_negative(self, name)
 
     def recipe(self, kind: RobotKind) -> Recipe:
-        """Of a kind of robot."""
-        return replace(recipe_for(kind), **self._given(Recipe))
+        """Return the recipe of a kind of robot."""
+        return recipe_for(kind)._replace(**self._given(Recipe._fields))
 
     def tour(self) -> SharedTourConfig:
-        """Of plans of which everything is to be seen."""
-        return SharedTourConfig(**self._given(SharedTourConfig))
+        """Return the settings of tours in plans of which everything is to be seen."""
+        return SharedTourConfig(**self._given([field.name for field in fields(SharedTourConfig)]))
 
-    def _given(self, settings: type[Recipe] | type[SharedTourConfig]) -> dict[str, Any]:
-        """Those of its fields that are also fields of other settings, and not None."""
-        known = {field.name for field in fields(settings)}
-        return {name: value for name, value in asdict(self).items() if name in known and value is not None}
+    def _given(self, names: Sequence[str]) -> dict[str, Any]:
+        """Return those of its fields that have one of some names and are not None."""
+        return {name: value for name, value in asdict(self).items() if name in names and value is not None}
 
 
 class PlannedRate:
@@ -115,7 +100,7 @@ class PlannedRate:
         self.config = config or PlannedRateConfig()
 
     def reset(self, scenario: Scenario, rng: np.random.Generator) -> None:
-        """A new mission begins."""
+        """Begin a new mission."""
         self._frontiers = [explores_frontiers(scenario, kind) for kind in scenario.kinds]
         if any(self._frontiers):
             self._plans = SharedTour(self.config.tour())
@@ -126,7 +111,7 @@ class PlannedRate:
             self._proposer = ViewProposer(one, rng, recipes=recipes)
 
     def choose(self, views: Sequence[RobotView]) -> list[np.ndarray]:
-        """The viewpoint of each view, by its own belief and what it has heard."""
+        """Return the viewpoint of each view, by its own belief and what it has heard."""
         return [self._choose(view) for view in views]
 
     def _choose(self, view: RobotView) -> np.ndarray:
