@@ -32,7 +32,7 @@ class ViewProposer:
         overlaps: bool = False,
         recipes: Mapping[int, Recipe] | None = None,
     ) -> None:
-        """A mission begins.
+        """Begin a mission.
 
         Args:
             scenario: With candidates as actions; views may be of a scenario with others.

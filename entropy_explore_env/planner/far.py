@@ -112,8 +112,8 @@ def _evaluate_further(proposer, situation, count, best, enough):
     """Go on to places that promise less, where those that promise most would bring little.
 
     Openings that no gaze gets to promise much and bring nothing; where many are nearby, they would hide
-    whatever is left elsewhere. So the next best places are evaluated, and those after them, as long as one of
-    them could be worth more than the best that was found; the better ones take the places of the worse.
+    what is left in other places. So the next best places are evaluated, and those after them, as long as
+    one of them could be worth more than the best that was found; the better ones replace the worse.
 
     Args:
         proposer: See `nearby`; `scratch.far` holds `count` viewpoints that may be replaced.

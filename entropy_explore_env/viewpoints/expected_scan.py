@@ -6,7 +6,8 @@ is too near for the sensor, they bring nothing. A ray goes on from a voxel with 
 - from an unknown one with 1 - `stop_probability`, or 1 - `gap_probability` where a voxel beside it is
   believed covered: rays that lie apart leave gaps in what they see of a wall;
 - from a known one of expected coverage μ ≤ ½, where a wall was hit at a flat angle, with 1 - 2 μ; from the
-  voxel in which it starts, it always does.
+  voxel in which it starts, it always does. So none gets beyond what is believed covered, whatever
+  `voxels_behind` says.
 
 What all rays add to a voxel counts once,
 
