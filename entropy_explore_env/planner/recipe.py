@@ -83,7 +83,7 @@ def checked(recipe: Recipe) -> Recipe:
     check(recipe, "places", "above 0 where neither gazes nor turns are drawn", lambda _: drawn > 0)
     counts = {name for name, _, _ in _COUNTS}
     numbers = recipe._asdict().items()
-    return Recipe(**{name: int(value) if name in counts else float(value) for name, value in numbers})
+    return Recipe._make(int(value) if name in counts else float(value) for name, value in numbers)
 
 
 ALL_AROUND = Recipe(
