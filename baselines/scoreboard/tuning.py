@@ -24,7 +24,6 @@ from baselines.scoreboard.results import PATH, TIME, Measure, Results
 from baselines.scoreboard.suites import (
     Suite,
     Task,
-    training_dungeons,
     training_plans,
     training_teams,
     training_volumes,
@@ -73,7 +72,6 @@ TUNINGS: Mapping[str, Tuning] = {
                 "most_far": (4, 8, 20),
                 "stay": (0.02, 0.1),
             },
-            "per-time-visibility": {"path_scans": (0, 4, 8)},
         },
         "nearest-frontier",
         PATH,
@@ -82,13 +80,6 @@ TUNINGS: Mapping[str, Tuning] = {
     "tours": Tuning(
         training_whole_plans,
         {"planned-rate": {"pocket": (0, 0.06, 0.25), "sight": (0.25, 0.8)}},
-        "nearest-frontier",
-        PATH,
-        "path",
-    ),
-    "dungeons": Tuning(
-        training_dungeons,
-        {"planned-rate": {"path_scans": (1, 3)}},
         "nearest-frontier",
         PATH,
         "path",
@@ -128,8 +119,8 @@ class Args:
     """Vary settings on training worlds."""
 
     suite: str = "plans"
-    """plans: the rivals for one robot; tours: ours where all is to be seen; dungeons: ours where a part
-    may stay unseen; volumes: the rivals and ours; teams: the coordinated rivals."""
+    """plans: the rivals for one robot; tours: ours where all is to be seen; volumes: the rivals and ours;
+    teams: the coordinated rivals."""
     strategies: str | None = None
     """Which, commas between; default: all that the suite tunes."""
     starts: int = 5

@@ -23,7 +23,6 @@ from baselines.strategies.rules.mutual_information import MutualInformation
 from baselines.strategies.rules.nearest_frontier import NearestFrontier
 from baselines.strategies.rules.next_best_view import NextBestView, NextBestViewConfig
 from baselines.strategies.rules.per_time_visibility import FrontierStrategy
-from baselines.strategies.rules.planned_rate import PlannedRate
 from baselines.strategies.rules.random_walk import RandomWalk
 from baselines.strategies.rules.raster import Raster, RasterConfig
 from baselines.strategies.rules.receding_horizon import RecedingHorizon
@@ -31,6 +30,7 @@ from baselines.strategies.rules.voronoi import VoronoiCoverage
 from baselines.strategies.voronoi.territory import VoronoiConfig
 from entropy_explore_env.command import home_path
 from entropy_explore_env.errors import MissingExtraError, SettingError, did_you_mean
+from entropy_explore_env.explorer import PlannedRate
 from entropy_explore_env.planner.tour import Tour
 
 STRATEGIES: MappingProxyType[str, Callable[[], Strategy]] = MappingProxyType(

@@ -15,53 +15,23 @@ from entropy_explore_env.belief.paths.lattice import Costs
 from entropy_explore_env.compilation.kernels import lean_kernel
 from entropy_explore_env.missions.localization import believed_pose, estimate_in, pose_variance
 from entropy_explore_env.missions.observation.own_state import entropy_left
-from entropy_explore_env.missions.poses import (
-    copy_numbers,
-    grid_size,
-    pose_at,
-    since_scan_m,
-    to_grid_units,
-    within_grid,
-)
+from entropy_explore_env.missions.poses import copy_numbers, grid_size, pose_at, to_grid_units, within_grid
 from entropy_explore_env.missions.silence import silent_since
 from entropy_explore_env.missions.state import MissionEnd
 from entropy_explore_env.planner.candidate_features import CONTEXT, FEATURES
-from entropy_explore_env.planner.features import (
-    RobotStatus,
-    write_context,
-    write_features,
-    write_overlaps,
-)
+from entropy_explore_env.planner.features import write_context, write_features, write_overlaps
+from entropy_explore_env.planner.model import Situation
 from entropy_explore_env.planner.propose import propose
 from entropy_explore_env.planner.records import Kind
-from entropy_explore_env.planner.situation import LastDecision, Situation
 
 _RUNNING = MissionEnd.RUNNING.code
 _NONE = int(Kind.NONE)
 _WIDTH, _CONTEXT = len(FEATURES), len(CONTEXT)
 
 
-class PlannerInput(NamedTuple):
-    """What candidates are proposed to one robot from, all of which it knows; map frame."""
+class RobotArrays(NamedTuple):
+    """What candidates are proposed to one robot from, beside its KNOWLEDGE, and where they are kept."""
 
-    pose: tuple[float, float, float, float, float]
-    time_s: float
-    entropy_bits: float
-    gained_bits: float
-    """Taken from its map by its own scans."""
-    heard_bits: float
-    """Taken from its map by teammates' measurements."""
-    target: np.ndarray
-    """(5,) the viewpoint that it chose last."""
-    came_bits: float
-    """Taken from its map by its latest scan."""
-    move_end: int
-    under_way: bool
-    since_scan_m: float
-    """That it has driven since its latest scan."""
-    place_variance_m2: float
-    """Of its pose estimate, the sum over x, y and z; 0 = it knows its pose."""
-    yaw_variance_rad2: float
     heard: np.ndarray
     """(A,) HEARD."""
     mean: np.ndarray
@@ -70,6 +40,10 @@ class PlannerInput(NamedTuple):
     """(V,) float32."""
     no_fly: np.ndarray
     """(V,) bool, where its body would reach above the ceiling; (0,) = nowhere."""
+    candidates: np.ndarray
+    """(K,) CANDIDATE, its former ones; replaced."""
+    experience: np.record
+    """EXPERIENCE, changed in place."""
 
 
 class Proposing(NamedTuple):
@@ -100,11 +74,47 @@ class Proposing(NamedTuple):
 
 
 @lean_kernel
-def _hear(params, robot, given, scratch):
-    """Fill in the teammates that were heard, and the views that they announced; returns how many of each."""
+def locate(own, pose, target, variances, entropy_bits, knowledge):
+    """Fill in where a robot is, how sure it is of that, where it goes, and what is left of its map.
+
+    Args:
+        own: Its PARAMS.
+        pose: (5,) where it believes to be, map frame.
+        target: (5,) the viewpoint that it chose last, map frame.
+        variances: Of its pose estimate: of its place, summed over the axes, m², and of its yaw, rad².
+        entropy_bits: Of its map.
+        knowledge: KNOWLEDGE, of which these are filled in.
+    """
+    copy_numbers(within_grid(own, pose), knowledge.pose, 3)
+    copy_numbers(to_grid_units(own, target), knowledge.target, 3)
+    for axis in range(3, 5):
+        knowledge.pose[axis], knowledge.target[axis] = pose[axis], target[axis]
+    knowledge.place_variance = variances[0] / (own.voxel_size_m * own.voxel_size_m)
+    knowledge.yaw_variance = variances[1]
+    knowledge.entropy_left = entropy_left(own, entropy_bits)
+
+
+@lean_kernel
+def _fill_knowledge(proposing, mission, index, knowledge):
+    """Fill in the KNOWLEDGE of a robot from the arrays of missions."""
+    own, params = proposing.robots[mission, index], proposing.params[index]
+    time_s, came = proposing.missions[mission].time_s, 0.0
+    for ray in range(params.rays):
+        came += proposing.utility_bits[mission, index, ray]
+    estimate = estimate_in(proposing.estimates, mission, index)
+    pose = believed_pose(estimate, params, pose_at(params, own, time_s))
+    locate(params, pose, own.target, pose_variance(estimate), own.entropy_bits, knowledge)
+    knowledge.time_s, knowledge.came_bits, knowledge.move_end = time_s, came, own.move_end
+    knowledge.gained_bits, knowledge.heard_bits = own.gained_bits, own.heard_bits
+    knowledge.under_way, knowledge.teammates = own.under_way, len(proposing.params) - 1
+
+
+@lean_kernel
+def _hear(params, robot, all_heard, time_s, scratch):
+    """Fill in the teammates that were heard, and the views that they announced; return how many of each."""
     mates, cones = 0, 0
-    for number in range(len(given.heard)):
-        heard, own = given.heard[number], params[number]
+    for number in range(len(all_heard)):
+        heard, own = all_heard[number], params[number]
         if number == robot or heard.heard_s < 0.0:
             continue
         mate = scratch.mates[mates]
@@ -112,7 +122,7 @@ def _hear(params, robot, given, scratch):
         copy_numbers(to_grid_units(own, heard.pose), mate.place, 3)
         mate.max_speed_m_s, mate.acceleration_m_s2 = own.max_speed_m_s, own.acceleration_m_s2
         mate.scan_time_s, mate.body_radius = own.scan_time_s, own.body_radius_m / own.voxel_size_m
-        mate.silent = silent_since(own, heard, given.time_s)
+        mate.silent = silent_since(own, heard, time_s)
         if heard.announced_s >= 0.0 and heard.announced[5] > 0.0 and not mate.silent:
             cone, there = scratch.cones[cones], heard.announced
             cones += 1
@@ -125,65 +135,39 @@ def _hear(params, robot, given, scratch):
 
 
 @lean_kernel
-def propose_to(params, robot, given, proposer, candidates, experience, parts):
+def propose_to(params, robot, knowledge, arrays, proposer, parts):
     """Propose candidates to one robot.
 
     Args:
         params: (A,) PARAMS.
         robot: Its number.
-        given: PlannerInput of it.
+        knowledge: KNOWLEDGE of it.
+        arrays: RobotArrays of it.
         proposer: Proposer of its kind.
-        candidates: (K,) CANDIDATE, its former ones; replaced.
-        experience: EXPERIENCE, changed in place.
         parts: (candidates, context, overlaps), each a (N,) float32 to fill in, of which any may be empty.
     """
-    own, scratch = params[robot], proposer.scratch
-    place = within_grid(own, given.pose)
-    copy_numbers(place, scratch.here, 3)
-    scratch.here[3], scratch.here[4] = given.pose[3], given.pose[4]
-    copy_numbers(to_grid_units(own, given.target), scratch.target, 3)
-    scratch.target[3], scratch.target[4] = given.target[3], given.target[4]
+    own, scratch, mean, precision = params[robot], proposer.scratch, arrays.mean, arrays.precision
     for scan in (proposer.drawn, proposer.exact):
-        scan.pose_variance[0] = given.place_variance_m2 / (own.voxel_size_m * own.voxel_size_m)
-        scan.pose_variance[1] = given.yaw_variance_rad2
-    mates, cones = _hear(params, robot, given, scratch)
-    mean, precision, none = given.mean, given.precision, given.mean[:0]
+        scan.pose_variance[0], scan.pose_variance[1] = knowledge.place_variance, knowledge.yaw_variance
+    mates, cones = _hear(params, robot, arrays.heard, knowledge.time_s, scratch)
     known, cost = proposer.exact.known_precision, proposer.unknown_cost
     situation = Situation(
+        knowledge,
         Belief(mean, precision, grid_size(own)),
-        Costs(mean, precision, known, cost, none, 1.0, given.no_fly),
-        scratch.here,
+        Costs(mean, precision, known, cost, mean[:0], 1.0, arrays.no_fly),
         scratch.cones[:cones],
         scratch.mates[:mates],
-        experience,
-        given.since_scan_m / own.voxel_size_m,
+        arrays.experience,
     )
-    copy_numbers(given.target, scratch.target_m, 5)
-    decision = LastDecision(
-        scratch.target,
-        scratch.target_m,
-        own.voxel_size_m,
-        given.came_bits,
-        given.move_end,
-        given.under_way,
-        given.place_variance_m2 > 0.0 or given.yaw_variance_rad2 > 0.0,
-        given.time_s,
-        given.gained_bits,
-    )
+    candidates = arrays.candidates
+    for k in range(len(candidates)):
+        copy_numbers(to_grid_units(own, candidates[k].viewpoint), candidates[k].viewpoint, 3)
     features, context, overlaps = parts
     described = len(features) > 0 or len(context) > 0
-    selection = propose(proposer, situation, decision, candidates, described)
+    selection = propose(proposer, situation, candidates, described)
     if described:
-        bits = given.gained_bits + given.heard_bits
-        status = RobotStatus(
-            entropy_left(own, given.entropy_bits),
-            given.heard_bits / bits if bits > 0.0 else 0.0,
-            given.time_s,
-            given.under_way,
-            len(given.heard) - 1,
-        )
         write_features(proposer, situation, selection, features)
-        write_context(proposer, situation, status, selection, context)
+        write_context(proposer, situation, selection, context)
     if len(overlaps) > 0:
         write_overlaps(proposer, selection.count, overlaps)
     for k in range(len(candidates)):
@@ -194,7 +178,7 @@ def propose_to(params, robot, given, proposer, candidates, experience, parts):
 
 @lean_kernel
 def _end(begin, size):
-    """(begin, end) of a part of an observation; (0, 0) where it is left out."""
+    """Return (begin, end) of a part of an observation; (0, 0) where it is left out."""
     return (begin, begin + size) if begin >= 0 else (0, 0)
 
 
@@ -211,11 +195,10 @@ def propose_missions(proposing, proposer, kind, offsets, first, last, out):
         last: One past the last.
         out: (E, A, F) float32, of which those parts are filled in: with zeros for robots that do not decide.
     """
-    most = proposing.candidates.shape[2]
+    most, knowledge = proposing.candidates.shape[2], proposer.scratch.knowledge[0]
     features, context = _end(offsets.candidates, most * _WIDTH), _end(offsets.context, _CONTEXT)
     overlaps, masked = _end(offsets.overlaps, most * most), _end(offsets.action_mask, most)
     for mission in range(first, last):
-        clock = proposing.missions[mission]
         for index in range(proposing.robots.shape[1]):
             own, params = proposing.robots[mission, index], proposing.params[index]
             if params.kind != kind:
@@ -226,33 +209,18 @@ def propose_missions(proposing, proposer, kind, offsets, first, last, out):
                 row[context[0] : context[1]],
                 row[overlaps[0] : overlaps[1]],
             )
-            decides = own.deciding and clock.end == _RUNNING
+            decides = own.deciding and proposing.missions[mission].end == _RUNNING
             if decides:
-                came = 0.0
-                for ray in range(params.rays):
-                    came += proposing.utility_bits[mission, index, ray]
-                estimate = estimate_in(proposing.estimates, mission, index)
-                place_variance, yaw_variance = pose_variance(estimate)
-                given = PlannerInput(
-                    believed_pose(estimate, params, pose_at(params, own, clock.time_s)),
-                    clock.time_s,
-                    own.entropy_bits,
-                    own.gained_bits,
-                    own.heard_bits,
-                    own.target,
-                    came,
-                    own.move_end,
-                    own.under_way,
-                    since_scan_m(params, own, clock.time_s),
-                    place_variance,
-                    yaw_variance,
+                _fill_knowledge(proposing, mission, index, knowledge)
+                arrays = RobotArrays(
                     proposing.heard[mission, index],
                     proposing.mean[mission, index],
                     proposing.precision[mission, index],
                     proposing.no_fly[mission * params.bodies + params.body_number],
+                    candidates,
+                    proposing.experience[mission, index],
                 )
-                experience = proposing.experience[mission, index]
-                propose_to(proposing.params, index, given, proposer, candidates, experience, parts)
+                propose_to(proposing.params, index, knowledge, arrays, proposer, parts)
             else:
                 for part in parts:
                     for number in range(len(part)):

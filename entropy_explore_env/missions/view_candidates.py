@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from entropy_explore_env.missions.proposals import PlannerInput, propose_to
+from entropy_explore_env.missions.proposals import RobotArrays, locate, propose_to
 from entropy_explore_env.missions.rules import Rules, rules_of
 from entropy_explore_env.missions.view import RobotView
 from entropy_explore_env.planner.candidate_features import CONTEXT, FEATURES
@@ -32,7 +32,7 @@ class ViewProposer:
         overlaps: bool = False,
         recipes: Mapping[int, Recipe] | None = None,
     ) -> None:
-        """A mission begins.
+        """Begin a mission.
 
         Args:
             scenario: With candidates as actions; views may be of a scenario with others.
@@ -52,7 +52,7 @@ class ViewProposer:
         self._proposed_s = np.full(team, -1.0)
 
     def propose(self, view: RobotView) -> np.ndarray:
-        """The viewpoints that are proposed to a robot that decides; asked again at the same time, the same.
+        """Return the viewpoints that are proposed to a robot that decides: at the same time, always the same.
 
         Args:
             view: Of the robot, which decides.
@@ -68,54 +68,45 @@ class ViewProposer:
         return candidates["viewpoint"][candidates["kind"] != Kind.NONE]
 
     def _propose(self, view: RobotView) -> None:
-        robot, no_fly = view.robot, view.no_fly_mask()
-        x, y, z, yaw, pitch = view.pose.tolist()
-        given = PlannerInput(
-            (x, y, z, yaw, pitch),
-            view.time_s,
-            view.entropy_bits,
-            view.gained_bits,
-            view.heard_bits,
-            view.target.copy(),
-            float(view.scan.utility_bits.sum()),
-            view.move_end.code,
-            view.under_way,
-            view.since_scan_m,
-            float(np.trace(view.covariance[:3, :3])),
-            float(view.covariance[3, 3]),
+        robot, no_fly, params = view.robot, view.no_fly_mask(), self._rules.params
+        proposer = self._proposers[int(params[robot]["kind"])]
+        known = proposer.scratch.knowledge[0]
+        variances = float(np.trace(view.covariance[:3, :3])), float(view.covariance[3, 3])
+        locate(params[robot], view.pose, view.target, variances, view.entropy_bits, known)
+        known["time_s"], known["came_bits"] = view.time_s, view.scan.utility_bits.sum()
+        known["gained_bits"], known["heard_bits"] = view.gained_bits, view.heard_bits
+        known["move_end"], known["under_way"] = view.move_end.code, view.under_way
+        known["teammates"] = len(params) - 1
+        arrays = RobotArrays(
             view.heard.copy(),
             writable(view.mean),
             writable(view.precision),
             _NO_CEILING if no_fly is None else no_fly.reshape(-1),
+            self._candidates[robot],
+            self._experience[robot],
         )
-        parts = (
-            self._features[robot].reshape(-1),
-            self._context[robot],
-            self._overlaps[robot].reshape(-1),
-        )
-        proposer = self._proposers[int(self._rules.params[robot]["kind"])]
-        candidates, experience = self._candidates[robot], self._experience[robot]
-        propose_to(self._rules.params, robot, given, proposer, candidates, experience, parts)
+        parts = (self._features[robot].reshape(-1), self._context[robot], self._overlaps[robot].reshape(-1))
+        propose_to(params, robot, known, arrays, proposer, parts)
 
     def features(self, robot: int) -> np.ndarray:
-        """(K, F) float32 of the candidates proposed to a robot last: `candidate_features.FEATURES`."""
+        """Return (K, F) float32 of the candidates proposed to a robot last: `candidate_features.FEATURES`."""
         return self._features[robot]
 
     def context(self, robot: int) -> np.ndarray:
-        """(C,) float32 of the same moment: `candidate_features.CONTEXT`."""
+        """Return (C,) float32 of the same moment: `candidate_features.CONTEXT`."""
         return self._context[robot]
 
     def overlaps(self, robot: int) -> np.ndarray:
-        """(K, K) float32 of the same candidates, where overlaps are wanted."""
+        """Return (K, K) float32 of the same candidates, where overlaps are wanted."""
         return self._overlaps[robot]
 
     def viewpoint(self, robot: int, number: int) -> np.ndarray:
-        """(5,) the viewpoint of a candidate proposed last, map frame; of one that is none, the first."""
+        """Return (5,) the viewpoint of a candidate proposed last, map frame; else the first one."""
         return self._candidates[robot, number]["viewpoint"].copy()
 
 
 def writable(array: np.ndarray) -> np.ndarray:
-    """(V,) an array of a view in the one type for which kernels are compiled; nothing writes to it."""
+    """Return (V,) an array of a view in the one type for which kernels are compiled; nothing writes to it."""
     flat = array.reshape(-1).view()
     flat.setflags(write=True)
     return flat

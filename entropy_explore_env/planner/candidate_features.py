@@ -3,7 +3,7 @@
 All lie in [-1, 1]. All but `bits_log`, `seconds` and `time` are ratios, so that they mean the same in any
 world, whatever its size, its voxels, its sensor, and whatever the team. What one voxel adds to them is told
 with it: a view sees the voxels of which a scan from there should take at least `SEEN_BITS` each. Policies
-depend on the order and the meaning of the features: whoever changes one raises `FEATURES_VERSION`.
+depend on the order and the meaning of the features: a change of one raises `FEATURES_VERSION`.
 """
 
 from __future__ import annotations
@@ -11,14 +11,12 @@ from __future__ import annotations
 from types import MappingProxyType
 from typing import NamedTuple
 
-from entropy_explore_env.errors import SettingError
-
 FEATURES_VERSION = 1
-"""Of all that this table says; a checkpoint holds the one that it was trained with."""
+"""Version of this table; a checkpoint holds the one that it was trained with."""
 SEEN_BITS = 0.1
 """Expected bits from which on a voxel counts as seen from a viewpoint."""
 ANNOUNCED = 3
-"""Announced views of teammates that a candidate is compared with: those that it shares most with."""
+"""Number of announced views of teammates with which a candidate is compared: those that share most."""
 
 
 class Feature(NamedTuple):
@@ -58,8 +56,8 @@ FEATURES: tuple[Feature, ...] = (
     Feature("directness", "straight distance to it, as a share of the path's length; 1 on the spot"),
     Feature("distance", "straight distance to it, in workspace diagonals"),
     Feature("announced_most", "share of its bits in the announced view that it shares most with"),
-    Feature("announced_second", "the same of the second one; 0 without"),
-    Feature("announced_third", "the same of the third one; 0 without"),
+    Feature("announced_second", "share of its bits in the one that it shares second most with; 0 without"),
+    Feature("announced_third", "share of its bits in the one that it shares third most with; 0 without"),
     Feature(
         "contest",
         "seconds m of the teammate that is there soonest, less its own s, as (m - s)/(m + s); 1 without",
@@ -73,7 +71,7 @@ FEATURES: tuple[Feature, ...] = (
     Feature("turn_sin", "sin of it", "-", -1.0),
     Feature("pitch", "pitch of the gaze, downwards, in π/2 radians", "-", -1.0),
 )
-"""Of each candidate, in their order."""
+"""Features of each candidate, in their order."""
 
 CONTEXT: tuple[Feature, ...] = (
     Feature("entropy", "entropy left in the robot's map: 1 at the start, 0 with all voxels known"),
@@ -97,21 +95,9 @@ CONTEXT: tuple[Feature, ...] = (
         "a scan's share of the seconds of a scan, a quarter turn and a drive as far as it reaches",
     ),
 )
-"""Of the robot's situation, in their order."""
+"""Features of the robot's situation, in their order."""
 
 COLUMNS: MappingProxyType[str, int] = MappingProxyType({f.name: i for i, f in enumerate(FEATURES)})
 """Name → number of a candidate's feature."""
 CONTEXT_COLUMNS: MappingProxyType[str, int] = MappingProxyType({f.name: i for i, f in enumerate(CONTEXT)})
 """Name → number of a situation's feature."""
-
-
-def check_features_version(version: object) -> None:
-    """Raise a SettingError unless features of this version are those of this table.
-
-    Args:
-        version: What a checkpoint holds.
-    """
-    if version != FEATURES_VERSION or isinstance(version, bool):
-        raise SettingError(
-            "FEATURES_VERSION", version, f"{FEATURES_VERSION}, as this library's features have"
-        )

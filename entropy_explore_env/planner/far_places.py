@@ -22,6 +22,8 @@ from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel
 
 NOT_REACHED = -1
 """As a place: no voxel of the block that is known to be free was reached."""
+_FOLD_ABOVE = 1e250
+"""A product is folded into bits before it could leave a float64."""
 
 
 class BitCount(NamedTuple):
@@ -32,7 +34,7 @@ class BitCount(NamedTuple):
     known_precision: float
     """1/σ² from which on a voxel counts as seen."""
     behind: float
-    """How many times its own bits an opening promises."""
+    """Bits that an opening promises, in multiples of its own."""
 
 
 class Blocks(NamedTuple):
@@ -43,20 +45,20 @@ class Blocks(NamedTuple):
     bits: np.ndarray
     """(I, J, K) float64, remaining bits; 0 outside the window that was looked at."""
     promised: np.ndarray
-    """(I, J, K) float64, those that openings promise."""
+    """(I, J, K) float64, bits that openings and known voxels promise."""
     place: np.ndarray
     """(I, J, K) int64, the known free voxel reached nearest to the block's centre, or NOT_REACHED."""
 
 
 def new_blocks(shape: tuple[int, int, int], edge: int) -> Blocks:
-    """Memory for the blocks of a grid, `edge` voxels along each axis that has so many."""
+    """Return memory for the blocks of a grid, with edges of up to `edge` voxels."""
     count = tuple(math.ceil(n / edge) for n in shape)
     return Blocks(edge, np.zeros(count), np.zeros(count), np.full(count, NOT_REACHED, np.int64))
 
 
 @lean_kernel
 def _is_opening(belief, known_precision, x, y, z):
-    """Whether one of the six voxels beside an unknown one is known to be free."""
+    """Return whether one of the six voxels beside an unknown one is known to be free."""
     size = belief.size
     for axis in range(3):
         for step in (-1, 1):
@@ -70,7 +72,7 @@ def _is_opening(belief, known_precision, x, y, z):
 
 @inlined_kernel
 def _fill_block(search, belief, count, layer, low, high):
-    """(bits, promised, place) of the block of the voxels from `low` up to, not including, `high`."""
+    """Return (bits, promised, place) of the block of the voxels from `low` up to, not including, `high`."""
     bits, promised, place, nearest = 0.0, 0.0, NOT_REACHED, math.inf
     for x in range(low[0], high[0]):
         for y in range(low[1], high[1]):
@@ -129,7 +131,7 @@ def fill_blocks(search, belief, count, layer, start, radius, blocks):
 
 @lean_kernel
 def bits_around(bits, i, j, k):
-    """Sum of the (I, J, K) bits of a block and of its neighbours."""
+    """Return the sum of the (I, J, K) bits of a block and of its neighbours."""
     total, count = 0.0, bits.shape
     for x in range(max(i - 1, 0), min(i + 2, count[0])):
         for y in range(max(j - 1, 0), min(j + 2, count[1])):
@@ -140,5 +142,28 @@ def bits_around(bits, i, j, k):
 
 @lean_kernel
 def promised_around(blocks, i, j, k):
-    """What openings promise in a block and its neighbours: no more bits than remain there."""
+    """Return what openings promise in a block and its neighbours: no more bits than remain there."""
     return min(bits_around(blocks.bits, i, j, k), bits_around(blocks.promised, i, j, k))
+
+
+@lean_kernel
+def fill_remaining(belief, target_precision, blocks):
+    """Fill in the remaining bits of all blocks of a belief, and return their sum."""
+    shape, edge, size, total = blocks.bits.shape, blocks.edge, belief.size, 0.0
+    for i in range(shape[0]):
+        for j in range(shape[1]):
+            for k in range(shape[2]):
+                bits, growth = 0.0, 1.0
+                for x in range(i * edge, min((i + 1) * edge, size[0])):
+                    for y in range(j * edge, min((j + 1) * edge, size[1])):
+                        for z in range(k * edge, min((k + 1) * edge, size[2])):
+                            voxel = flat_index(size, x, y, z)
+                            precision = belief.precision[voxel]
+                            if precision < target_precision and belief.mean[voxel] <= STOP_AT_COVERED:
+                                growth *= target_precision / precision
+                                if growth > _FOLD_ABOVE:
+                                    bits += math.log2(growth)
+                                    growth = 1.0
+                blocks.bits[i, j, k] = 0.5 * (bits + math.log2(growth))
+                total += blocks.bits[i, j, k]
+    return total

@@ -9,12 +9,11 @@ from entropy_explore_env.belief.paths.search import cost_to
 from entropy_explore_env.compilation.kernels import lean_kernel
 from entropy_explore_env.planner.candidate_features import COLUMNS, CONTEXT_COLUMNS, FEATURES
 from entropy_explore_env.planner.far_places import bits_around
-from entropy_explore_env.planner.nearby import voxel_at
+from entropy_explore_env.planner.memory import distance_apart, trust_in
 from entropy_explore_env.planner.records import Kind
-from entropy_explore_env.planner.situation import distance_apart, trust_in
 from entropy_explore_env.planner.thresholds import REMEMBERED
 from entropy_explore_env.robots.motion import driving_time
-from entropy_explore_env.viewpoints.travel import STRAIGHTENED
+from entropy_explore_env.viewpoints.evaluation import STRAIGHTENED, voxel_at
 
 _SPOT, _NEAR, _FAR = int(Kind.SPOT), int(Kind.NEAR), int(Kind.FAR)
 _WIDTH = len(FEATURES)
@@ -31,18 +30,6 @@ _HALF_SECONDS, _HALF_TIME_S, _HALF_MATES, _MOST_LOG_BITS = 10.0, 300.0, 2.0, 20.
     _C_ENTROPY, _C_REPORTED, _C_BITS, _C_RATE, _C_FAR, _C_AROUND, _C_TIME, _C_CANDIDATES, _C_MATES, _C_HEARD,
     _C_NEAREST, _C_BLOCKED, _C_FAILURES, _C_UNDER_WAY, _C_PLANAR, _C_ALL_AROUND, _C_SCAN_TIME,
 ) = CONTEXT_COLUMNS.values()  # fmt: skip
-
-
-class RobotStatus(NamedTuple):
-    """What `write_context` says of a robot beside its belief and its pose."""
-
-    entropy: float
-    """Share of its map's entropy that is left."""
-    reported: float
-    """Share of the bits taken from its map that teammates' measurements took."""
-    time_s: float
-    under_way: bool
-    teammates: int
 
 
 class Selection(NamedTuple):
@@ -62,7 +49,7 @@ class Selection(NamedTuple):
 
 @lean_kernel
 def clip(value):
-    """A share: within [0, 1], 0 for what is no number."""
+    """Return a share: within [0, 1], 0 for what is no number."""
     return min(max(value, 0.0), 1.0) if value == value else 0.0
 
 
@@ -78,8 +65,8 @@ def _rate(bits, seconds):
 
 @lean_kernel
 def _path_length(proposer, situation, goal, kind):
-    """Length of the path to a goal in voxel edges: straight where the robot drives straight there."""
-    straight = distance_apart(goal, situation.here)
+    """Return the length of the path to a goal in voxel edges, straight where the robot drives so."""
+    straight = distance_apart(goal, situation.knowledge.pose)
     if straight > 1e-9 and (proposer.planned or kind == _FAR):
         cost = cost_to(proposer.scratch.search, voxel_at(situation.belief.size, goal))
         if cost < math.inf:
@@ -89,7 +76,7 @@ def _path_length(proposer, situation, goal, kind):
 
 @lean_kernel
 def _distance_to_remaining(blocks, goal, remaining):
-    """Mean straight distance of a place to the remaining bits, block by block."""
+    """Return the mean straight distance of a place to the remaining bits, block by block."""
     if remaining <= 0.0:
         return 0.0
     total, edge, shape = 0.0, blocks.edge, blocks.bits.shape
@@ -106,7 +93,7 @@ def _distance_to_remaining(blocks, goal, remaining):
 
 @lean_kernel
 def _share_around(proposer, size, at, remaining):
-    """Share of the remaining bits that is in the block of a place and those beside it."""
+    """Return the share of the remaining bits that is in the block of a place and those beside it."""
     blocks = proposer.blocks
     if remaining <= 0.0:
         return 0.0
@@ -118,7 +105,7 @@ def _share_around(proposer, size, at, remaining):
 
 @lean_kernel
 def _contest(proposer, situation, goal, seconds):
-    """Seconds of the teammate that is at a goal soonest, driving straight, compared with the robot's own."""
+    """Compare the seconds of the teammate that is at a goal soonest, driving straight, with the robot's."""
     soonest = math.inf
     for mate in situation.mates:
         if not mate.silent:
@@ -132,11 +119,11 @@ def _contest(proposer, situation, goal, seconds):
 
 @lean_kernel
 def write_features(proposer, situation, selection, out):
-    """Fill in the features of all candidates; zeros for those that there are not.
+    """Fill in the features of all candidates; zeros where there is no candidate.
 
     Args:
-        proposer: A Proposer, with what was selected; its blocks hold the map's remaining bits.
-        situation: A Situation.
+        proposer: See `nearby`, with what was selected; its blocks hold the map's remaining bits.
+        situation: See `nearby`.
         selection: Selection.
         out: (K·F,) float32, filled in.
     """
@@ -144,16 +131,16 @@ def write_features(proposer, situation, selection, out):
     pool, taken = scratch.pool, scratch.taken
     for number in range(len(out)):
         out[number] = 0.0
-    best_rate, fewest_s, choice = 0.0, math.inf, pool.values[taken[0]]
+    best_rate, fewest_s, choice = 0.0, math.inf, pool[taken[0]].value
     for k in range(selection.count):
-        seconds = pool.seconds[taken[k]]
-        best_rate = max(best_rate, _rate(pool.bits[taken[k]], seconds))
+        seconds = pool[taken[k]].seconds
+        best_rate = max(best_rate, _rate(pool[taken[k]].bits, seconds))
         fewest_s = min(fewest_s, seconds)
-        choice = max(choice, pool.values[taken[k]])
+        choice = max(choice, pool[taken[k]].value)
     experience.best_rate = max(experience.best_rate, best_rate)
     for k in range(selection.count):
         row, number = out[k * _WIDTH : (k + 1) * _WIDTH], taken[k]
-        bits, seconds, value = pool.bits[number], pool.seconds[number], pool.values[number]
+        bits, seconds, value = pool[number].bits, pool[number].seconds, pool[number].value
         rate = _rate(bits, seconds)
         row[_SCORE] = 1.0 if k == 0 else _NEXT_BEST * clip(value / choice)
         row[_CHOSEN] = 1.0 if k == 0 else 0.0
@@ -165,7 +152,7 @@ def write_features(proposer, situation, selection, out):
         row[_RATE_EVER] = clip(rate / experience.best_rate)
         better = 0
         for other in range(selection.count):
-            better += int(pool.values[taken[other]] > value)
+            better += int(pool[taken[other]].value > value)
         row[_RANK] = 1.0 - better / max(selection.count - 1, 1)
         row[_KEPT] = 1.0 if number == selection.kept or _is_goal(situation, pool, number) else 0.0
         _write_view(proposer, k, row)
@@ -174,10 +161,10 @@ def write_features(proposer, situation, selection, out):
 
 @lean_kernel
 def _is_goal(situation, pool, number):
-    """Whether a viewpoint of the pool leads to the far place to which the robot is on its way."""
-    if not situation.experience.going or pool.kinds[number] != _FAR:
+    """Return whether a viewpoint of the pool leads to the far place to which the robot is on its way."""
+    if not situation.experience.going or pool[number].kind != _FAR:
         return False
-    return distance_apart(pool.goals[number], situation.experience.goal) < 1e-6
+    return distance_apart(pool[number].goal, situation.experience.goal) < 1e-6
 
 
 @lean_kernel
@@ -202,8 +189,8 @@ def _write_view(proposer, k, row):
 @lean_kernel
 def _write_place(proposer, situation, number, selection, row):
     """Fill in the features of where a viewpoint of the pool is, and of the way to it."""
-    pool, here, size = proposer.scratch.pool, situation.here, situation.belief.size
-    at, goal, kind = pool.viewpoints[number], pool.goals[number], pool.kinds[number]
+    pool, here, size = proposer.scratch.pool, situation.knowledge.pose, situation.belief.size
+    at, goal, kind = pool[number].viewpoint, pool[number].goal, pool[number].kind
     diagonal = _diagonal(size)
     row[_ON_SPOT] = 1.0 if kind == _SPOT else 0.0
     row[_IS_NEAR] = 1.0 if kind == _NEAR else 0.0
@@ -214,7 +201,7 @@ def _write_place(proposer, situation, number, selection, row):
     row[_ADVANTAGE] = min(max((away - path) / diagonal, -1.0), 1.0)
     row[_DIRECTNESS] = clip(straight / path) if path > 1e-9 else 1.0
     row[_DISTANCE] = clip(straight / diagonal)
-    row[_CONTEST] = _contest(proposer, situation, goal, pool.seconds[number])
+    row[_CONTEST] = _contest(proposer, situation, goal, pool[number].seconds)
     row[_TRUST] = trust_in(situation.experience, proposer.all_around, goal)
     along, across = math.cos(here[3]), math.sin(here[3])
     x, y, z = at[0] - here[0], at[1] - here[1], at[2] - here[2]
@@ -226,43 +213,44 @@ def _write_place(proposer, situation, number, selection, row):
 
 
 @lean_kernel
-def write_context(proposer, situation, status, selection, out):
+def write_context(proposer, situation, selection, out):
     """Fill in the features of a robot's situation.
 
     Args:
-        proposer: A Proposer, with what was selected.
-        situation: A Situation.
-        status: RobotStatus.
+        proposer: See `nearby`, with what was selected.
+        situation: See `nearby`.
         selection: Selection.
         out: (C,) float32, filled in.
     """
-    scratch, experience, drive = proposer.scratch, situation.experience, proposer.drive
-    pool, taken, size = scratch.pool, scratch.taken, situation.belief.size
+    known, experience, drive = situation.knowledge, situation.experience, proposer.drive
+    pool, taken, size = proposer.scratch.pool, proposer.scratch.taken, situation.belief.size
     most_bits, best_rate, heard, nearest = 0.0, 0.0, 0, math.inf
     for k in range(selection.count):
-        bits = pool.bits[taken[k]]
+        bits = pool[taken[k]].bits
         most_bits = max(most_bits, bits)
-        best_rate = max(best_rate, _rate(bits, pool.seconds[taken[k]]))
+        best_rate = max(best_rate, _rate(bits, pool[taken[k]].seconds))
     for mate in situation.mates:
         if not mate.silent:
             heard += 1
-            nearest = min(nearest, distance_apart(mate.place, situation.here))
+            nearest = min(nearest, distance_apart(mate.place, known.pose))
     reach_m = proposer.reach * proposer.exact.voxel_size_m
     once_s = driving_time(reach_m, drive.max_speed_m_s, drive.acceleration_m_s2) + drive.scan_time_s
     once_s += 0.5 * math.pi / drive.turn_rate_rad_s
-    out[_C_ENTROPY], out[_C_REPORTED] = clip(status.entropy), clip(status.reported)
+    bits = known.gained_bits + known.heard_bits
+    out[_C_ENTROPY] = clip(known.entropy_left)
+    out[_C_REPORTED] = clip(known.heard_bits / bits if bits > 0.0 else 0.0)
     out[_C_BITS] = clip(most_bits / experience.most_bits)
     out[_C_RATE] = clip(best_rate / experience.best_rate)
     out[_C_FAR] = clip(selection.far_value / (selection.far_value + selection.near_value))
-    out[_C_AROUND] = _share_around(proposer, size, situation.here, selection.remaining)
-    out[_C_TIME] = status.time_s / (status.time_s + _HALF_TIME_S)
+    out[_C_AROUND] = _share_around(proposer, size, known.pose, selection.remaining)
+    out[_C_TIME] = known.time_s / (known.time_s + _HALF_TIME_S)
     out[_C_CANDIDATES] = selection.count / len(taken)
-    out[_C_MATES] = status.teammates / (status.teammates + _HALF_MATES)
-    out[_C_HEARD] = clip(heard / max(status.teammates, 1))
+    out[_C_MATES] = known.teammates / (known.teammates + _HALF_MATES)
+    out[_C_HEARD] = clip(heard / max(known.teammates, 1))
     out[_C_NEAREST] = clip(nearest / _diagonal(size))
     out[_C_BLOCKED] = 1.0 if experience.blocked > 0 else 0.0
     out[_C_FAILURES] = experience.failures / REMEMBERED
-    out[_C_UNDER_WAY] = 1.0 if status.under_way else 0.0
+    out[_C_UNDER_WAY] = 1.0 if known.under_way else 0.0
     out[_C_PLANAR] = 1.0 if proposer.planar else 0.0
     out[_C_ALL_AROUND] = 1.0 if proposer.all_around else 0.0
     out[_C_SCAN_TIME] = clip(drive.scan_time_s / once_s)
@@ -273,9 +261,9 @@ def write_overlaps(proposer, count, out):
     """Fill in the voxels that two candidates both see, as a share of those of the one that sees fewer.
 
     Args:
-        proposer: A Proposer, with what was selected.
+        proposer: See `nearby`, with what was selected.
         count: Candidates.
-        out: (K·K,) float32, filled in; 1 for a candidate with itself, 0 for those that there are not.
+        out: (K·K,) float32, filled in; 1 for a candidate with itself, 0 where there is none.
     """
     scratch = proposer.scratch
     most = len(scratch.taken)

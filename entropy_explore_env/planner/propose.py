@@ -1,102 +1,98 @@
-"""A robot's candidates, from what it knows: drawn, refined, chosen, selected, and described."""
+"""A robot's candidates, from what it knows: drawn, refined, chosen, selected, and described.
+
+All in grid units; `proposer` and `situation` as in `nearby`.
+"""
 
 from __future__ import annotations
 
 import math
 
+from entropy_explore_env.belief.visibility import mark_cones
 from entropy_explore_env.compilation.kernels import lean_kernel
-from entropy_explore_env.planner.far import remaining_bits_by_block
+from entropy_explore_env.planner.choice import choose
+from entropy_explore_env.planner.far_places import fill_remaining
 from entropy_explore_env.planner.features import Selection
-from entropy_explore_env.planner.nearby import (
-    copy_viewpoint,
-    evaluate,
-    propose_nearby,
-    start_paths,
-)
+from entropy_explore_env.planner.memory import chosen_number, copy_numbers, distance_apart, learn, weigh_time
+from entropy_explore_env.planner.nearby import evaluate, propose_nearby, start_paths
 from entropy_explore_env.planner.records import Kind
-from entropy_explore_env.planner.selection import choose, most_far_of, select
-from entropy_explore_env.planner.situation import (
-    chosen_number,
-    distance_apart,
-    learn,
-    weigh_time,
-)
-from entropy_explore_env.viewpoints.imagined_scan import imagined_bits
+from entropy_explore_env.planner.selection import most_far_of, select
+from entropy_explore_env.planner.thresholds import KEEP_GOAL
+from entropy_explore_env.viewpoints.expected_scan import expected_bits
 
 _NONE, _FAR = int(Kind.NONE), int(Kind.FAR)
 
 
 @lean_kernel
-def propose(proposer, situation, decision, candidates, described):
+def propose(proposer, situation, candidates, described):
     """Propose candidates to a robot; what they are is left in `proposer.scratch`.
 
     Args:
-        proposer: A Proposer of the robot's kind.
-        situation: A Situation; its experience is changed in place.
-        decision: LastDecision of the robot.
-        candidates: (K,) CANDIDATE, those among which it chose; replaced, in grid units.
+        proposer: See `nearby`.
+        situation: See `nearby`; its experience is changed in place.
+        candidates: (K,) CANDIDATE in grid units, those among which it chose; replaced.
         described: Whether features will be written.
 
     Returns:
         Selection.
     """
-    experience, pool = situation.experience, proposer.scratch.pool
-    chosen = chosen_number(candidates, decision)
-    came_bits = _came_bits(proposer, situation, candidates, decision, chosen)
-    learn(experience, candidates, decision, chosen, came_bits, situation.here, proposer.drive.body_radius)
-    weigh_time(proposer, experience, decision)
+    knowledge, experience, scratch = situation.knowledge, situation.experience, proposer.scratch
+    belief, pool = situation.belief, scratch.pool
+    mark_cones(situation.cones, belief.size, scratch.scan.left, 1)
+    chosen = chosen_number(candidates, knowledge.target)
+    came_bits = _came_bits(proposer, situation, candidates, chosen)
+    learn(experience, candidates, knowledge, chosen, came_bits, proposer.drive.body_radius)
+    state = weigh_time(proposer.recipe, experience, knowledge)
     if proposer.planned:
         start_paths(proposer, situation)
-    size = propose_nearby(proposer, situation)
-    near_value = pool.values[proposer.scratch.found[0]]
-    near = size
-    size, choice = choose(proposer, situation, size, most_far_of(len(candidates)))
-    far_value = 0.0
+    near = size = propose_nearby(proposer, situation)
+    near_value, far_value = pool[scratch.order[0]].value, 0.0
+    size, choice = choose(proposer, situation, state, size, most_far_of(len(candidates)))
     for k in range(near, size):
-        if pool.kinds[k] == _FAR:
-            far_value = max(far_value, pool.values[k])
+        if pool[k].kind == _FAR:
+            far_value = max(far_value, pool[k].value)
     kept = -1
-    if decision.under_way:
+    if knowledge.under_way:
         kept, size = size, size + 1
-        _keep_target(proposer, situation, decision, kept)
-        if pool.values[choice] <= proposer.recipe.keep * pool.values[kept]:
+        _keep_target(proposer, situation, kept)
+        if pool[choice].value <= KEEP_GOAL * pool[kept].value:
             choice = kept
+    mark_cones(situation.cones, belief.size, scratch.scan.left, 0)
     count = select(proposer, situation, size, choice, kept)
-    remaining = remaining_bits_by_block(proposer, situation.belief) if described else 0.0
-    _write_candidates(proposer, situation.here, candidates, count)
+    remaining = 0.0
+    if described:
+        remaining = fill_remaining(belief, proposer.target_precision, proposer.blocks)
+    _write_candidates(proposer, knowledge.pose, candidates, count)
     return Selection(count, kept, near_value, far_value, remaining)
 
 
 @lean_kernel
-def _came_bits(proposer, situation, candidates, decision, chosen):
-    """Bits that the latest scan brought, of those that count.
+def _came_bits(proposer, situation, candidates, chosen):
+    """Return the bits that the latest scan brought, of those that count.
 
     Where only unknown voxels count, they are what the same view promises less than before: a scan of known
     walls brings bits, too, however often it is taken.
     """
-    if math.isinf(proposer.exact.wanted_precision) or chosen < 0 or decision.under_way:
-        return decision.came_bits
-    left, gap = proposer.scratch.gaze_bits[:1], proposer.recipe.gap_probability
-    viewpoint = proposer.scratch.gazes[:1]
-    copy_viewpoint(decision.target, viewpoint[0])
-    scratch = proposer.scratch.scan
-    imagined_bits(situation.belief, proposer.exact, gap, viewpoint, situation.cones, scratch, left)
-    return candidates[chosen].bits - left[0]
+    knowledge = situation.knowledge
+    if math.isinf(proposer.exact.wanted_precision) or chosen < 0 or knowledge.under_way:
+        return knowledge.came_bits
+    left = expected_bits(situation.belief, proposer.exact, knowledge.target, proposer.scratch.scan)
+    return candidates[chosen].bits - left
 
 
 @lean_kernel
-def _keep_target(proposer, situation, decision, number):
+def _keep_target(proposer, situation, number):
     """Add the viewpoint that a robot under way is driving to, pulled within its reach, to the pool."""
-    pool, here, experience = proposer.scratch.pool, situation.here, situation.experience
-    at = pool.viewpoints[number]
-    copy_viewpoint(decision.target, at)
+    knowledge, experience = situation.knowledge, situation.experience
+    options = proposer.scratch.pool[number : number + 1]
+    at = options[0].viewpoint
+    copy_numbers(knowledge.target, at)
     for axis in range(3):
         at[axis] = min(max(at[axis], 0.0), float(situation.belief.size[axis]))
-    _pull_within(proposer, here, at)
-    evaluate(proposer, situation, proposer.exact, number, number + 1)
+    _pull_within(proposer, knowledge.pose, at)
+    evaluate(proposer, situation, proposer.exact, options, proposer.planned, math.inf)
     if experience.going:
-        copy_viewpoint(experience.goal, pool.goals[number])
-        pool.kinds[number] = _FAR
+        copy_numbers(experience.goal, options[0].goal)
+        options[0].kind = _FAR
 
 
 @lean_kernel
@@ -110,12 +106,12 @@ def _pull_within(proposer, here, at):
 
 @lean_kernel
 def _write_candidates(proposer, here, candidates, count):
-    """Write down the candidates, in grid units; those that there are not are the first one."""
+    """Write down the candidates; those beyond `count` are none, with the viewpoint of the first one."""
     pool, taken = proposer.scratch.pool, proposer.scratch.taken
     for k in range(len(candidates)):
-        number, candidate = taken[k if k < count else 0], candidates[k]
-        _pull_within(proposer, here, pool.viewpoints[number])
-        copy_viewpoint(pool.viewpoints[number], candidate.viewpoint)
-        copy_viewpoint(pool.goals[number], candidate.goal)
-        candidate.bits = pool.stop_bits[number]
-        candidate.kind = pool.kinds[number] if k < count else _NONE
+        option, candidate = pool[taken[k if k < count else 0]], candidates[k]
+        _pull_within(proposer, here, option.viewpoint)
+        copy_numbers(option.viewpoint, candidate.viewpoint)
+        copy_numbers(option.goal, candidate.goal)
+        candidate.bits = option.stop_bits
+        candidate.kind = option.kind if k < count else _NONE

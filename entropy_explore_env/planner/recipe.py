@@ -1,94 +1,89 @@
-"""How a robot's candidate viewpoints are drawn and scored: by what it is, not by where it explores.
+"""How many viewpoints a robot draws and how it scores them, by what the robot is.
 
-What a candidate is worth is bits / s^c, with s the seconds until its scan is taken. With c = 1 that is a
-rate; a larger c favours what is soon done, which pays where little is left behind by doing so. The values
-come from missions in worlds of the train split.
+A viewpoint is worth bits / s^c, with s the seconds until its scan is taken. With c = 1 that is a rate; a
+larger c favours what is soon done, which pays where little is left behind by doing so. All values were tuned
+on missions in worlds of the train split.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from entropy_explore_env.settings import RobotKind
 from entropy_explore_env.validation import check, check_count, check_not_negative, check_positive
 from entropy_explore_env.viewpoints.evaluation import sees_all_around
 
 
-@dataclass(frozen=True)
-class Recipe:
-    """How viewpoints are drawn and scored; K = gazes + turns + places are drawn first.
-
-    Attributes:
-        exponent: c of bits / s^c.
-        stop_probability: Probability that an unknown voxel stops an imagined ray.
-        gap_probability: The same of one beside something believed covered.
-        draw_thinning: One in this many columns, and rows, of the sensor's rays is imagined for those drawn.
-        thinning: The same where they are refined, and for far places; 1 = exactly the sensor's rays.
-        gazes: Drawn around the present gaze, on the spot.
-        turns: Drawn on the spot with any gaze.
-        places: Drawn within reach with any gaze.
-        yaw_spread: Standard deviation of `gazes`, in widths of the field of view.
-        pitch_spread: The same in its heights.
-        refinements: How often viewpoints are drawn around the best three.
-        refined: How many each time.
-        far_places: Known free places that are evaluated beyond those within reach.
-        far_gazes: Gazes at each.
-        waypoint_gazes: Gazes that are evaluated at a stop on the way to one.
-        far_below: Far places are looked for where the best viewpoint nearby brings less than this share of
-            the most bits ever expected; 1 = whenever one could be worth more.
-        keep: A far place, once chosen, is kept unless another is worth this many times as much.
-        block_m: Edge of the blocks that far places are taken from.
-        dregs: What any scan of known ground still brings, as a share of the most bits ever expected of one:
-            bits below that are worth next to nothing, and bits above it so much less.
-        leave_below: A robot whose last decision brought fewer bits a second than this share of its mission's
-            mean so far chooses by the plain rate, c = 1: what is left where it is holds it no longer (the
-            marginal value theorem of Charnov 1976, by which foragers leave a patch).
-        behind: How many times its own bits an unknown voxel beside a free one promises, where far places are
-            looked for.
-        path_scans: Number of scans on the path to a viewpoint that its value includes, under way and at
-            stops, spread evenly over the path; 0 = the scan at the viewpoint alone.
-    """
+class Recipe(NamedTuple):
+    """How viewpoints are drawn and scored, in plain numbers that kernels take; see `checked`."""
 
     exponent: float
+    """c of bits / s^c."""
     stop_probability: float
+    """Probability that an unknown voxel stops an imagined ray."""
     gap_probability: float
+    """Probability that an unknown voxel beside a covered one stops an imagined ray."""
     draw_thinning: int
-    thinning: int
+    """One in this many columns, and rows, of the sensor's rays is imagined for viewpoints that are drawn; for
+    those that are refined, and for far places, all rays are."""
     gazes: int
+    """Viewpoints that are drawn around the present gaze, on the spot."""
     turns: int
+    """Viewpoints that are drawn on the spot with any gaze."""
     places: int
-    yaw_spread: float = 1.2
-    pitch_spread: float = 1.5
+    """Viewpoints that are drawn within reach with any gaze."""
     refinements: int = 2
+    """How often viewpoints are drawn around the best ones so far."""
     refined: int = 12
+    """Viewpoints that are drawn in each refinement."""
     far_places: int = 24
+    """Known free places that are evaluated beyond those within reach."""
     far_gazes: int = 1
+    """Gazes that are evaluated at each far place."""
     waypoint_gazes: int = 1
+    """Gazes that are evaluated at a stop on the way to a far place."""
     far_below: float = 1.0
-    keep: float = 1.15
+    """Far places are looked for where the best viewpoint nearby brings less than this share of the most bits
+    ever expected; 1 = whenever one could be worth more."""
     block_m: float = 1.0
-    dregs: float = 0.0
+    """Edge of the blocks that far places are taken from, in metres."""
+    known_ground_share: float = 0.0
+    """Bits that a scan of known ground still brings, as a share of the most bits ever expected of a scan;
+    bits up to that are worth next to nothing, and bits above count without them."""
     leave_below: float = 0.0
+    """A robot whose last decision brought fewer bits a second than this share of its mission's mean so far
+    chooses by the plain rate, c = 1 (the marginal value theorem of Charnov 1976: foragers leave a patch)."""
     behind: float = 4.0
-    path_scans: int = 0
+    """Bits that an unknown voxel beside a free one promises, in multiples of its own, where far places are
+    looked for."""
 
-    def __post_init__(self) -> None:
-        """Check every field."""
-        check_positive(self, "exponent", "keep", "block_m")
-        check_not_negative(self, "yaw_spread", "pitch_spread", "far_below", "dregs", "leave_below", "behind")
-        for name in ("stop_probability", "gap_probability"):
-            check(self, name, "a number from 0 to 1", lambda v: 0.0 <= v <= 1.0)
-        check_count(self, "draw_thinning", 1, 1000)
-        check_count(self, "thinning", 1, 1000)
-        for name in ("gazes", "turns", "places", "refinements", "far_places", "path_scans"):
-            check_count(self, name, 0, 100_000)
-        for name in ("refined", "far_gazes", "waypoint_gazes"):
-            check_count(self, name, 1, 100_000)
-        check(self, "places", "above 0 where neither gazes nor turns are drawn", self._any_drawn)
 
-    def _any_drawn(self, places: int) -> bool:
-        return self.gazes + self.turns + places > 0
+_COUNTS = (
+    ("draw_thinning", 1, 1000),
+    *((name, 0, 100_000) for name in ("gazes", "turns", "places", "refinements", "far_places")),
+    *((name, 1, 100_000) for name in ("refined", "far_gazes", "waypoint_gazes")),
+)
+"""Fields of a Recipe that are counts, and their ranges."""
+
+
+def checked(recipe: Recipe) -> Recipe:
+    """Return a recipe with its numbers in the types for which kernels are compiled.
+
+    Raises:
+        SettingError: A field has a value that makes no sense.
+    """
+    check_positive(recipe, "exponent", "block_m")
+    check_not_negative(recipe, "far_below", "known_ground_share", "leave_below", "behind")
+    for name in ("stop_probability", "gap_probability"):
+        check(recipe, name, "a number from 0 to 1", lambda v: 0.0 <= v <= 1.0)
+    for name, least, most in _COUNTS:
+        check_count(recipe, name, least, most)
+    drawn = recipe.gazes + recipe.turns + recipe.places
+    check(recipe, "places", "above 0 where neither gazes nor turns are drawn", lambda _: drawn > 0)
+    counts = {name for name, _, _ in _COUNTS}
+    numbers = recipe._asdict().items()
+    return Recipe._make(int(value) if name in counts else float(value) for name, value in numbers)
 
 
 ALL_AROUND = Recipe(
@@ -96,20 +91,18 @@ ALL_AROUND = Recipe(
     stop_probability=0.1,
     gap_probability=0.5,
     draw_thinning=1,
-    thinning=1,
     gazes=4,
     turns=0,
     places=28,
     behind=64.0,
 )
-"""Scanners that see all around: where to, not which way to look."""
+"""Scanners that see all around: they choose places, not gazes."""
 
 NARROW_PLANNED = Recipe(
     exponent=1.0,
     stop_probability=0.4,
     gap_probability=0.9,
     draw_thinning=2,
-    thinning=1,
     gazes=20,
     turns=20,
     places=40,
@@ -118,7 +111,7 @@ NARROW_PLANNED = Recipe(
     far_gazes=3,
     waypoint_gazes=24,
     block_m=1.6,
-    dregs=0.0025,
+    known_ground_share=0.0025,
 )
 """Narrow fields of view, on planned paths."""
 
@@ -127,7 +120,6 @@ NARROW_STRAIGHT = Recipe(
     stop_probability=0.02,
     gap_probability=0.02,
     draw_thinning=2,
-    thinning=1,
     gazes=36,
     turns=36,
     places=8,
@@ -142,16 +134,16 @@ NARROW_STRAIGHT = Recipe(
 
 
 def recipe_for(kind: RobotKind) -> Recipe:
-    """The recipe of a kind of robot."""
+    """Return the recipe of a kind of robot."""
     if sees_all_around(kind.sensor):
         return ALL_AROUND
     return NARROW_PLANNED if kind.robot.navigator == "planned" else NARROW_STRAIGHT
 
 
 def angular_spread(kind: RobotKind) -> float:
-    """Standard deviation in radians by which refined gazes differ, before it shrinks: half a field of view.
+    """Return the standard deviation in radians by which refined gazes differ at first: half a field of view.
 
-    Where a sensor sees all around only the place of its rays between each other matters.
+    Where a sensor sees all around, only the place of its rays between each other matters.
     """
     if sees_all_around(kind.sensor):
         return 0.25 * kind.sensor.angular_step_rad

@@ -1,11 +1,14 @@
-"""What is kept of a robot's candidates from one decision to the next, as plain arrays."""
+"""The records of the planner: what a robot knows, what it remembers, and viewpoints, as structured arrays.
+
+Places and viewpoints (x, y, z, yaw, pitch) are in grid units and radians, but where a line says otherwise.
+"""
 
 from __future__ import annotations
 
 import enum
 
 from entropy_explore_env.compilation.kernels import record_type
-from entropy_explore_env.planner.thresholds import EDGES, REMEMBERED
+from entropy_explore_env.planner.thresholds import REMEMBERED, REMEMBERED_EDGES
 
 
 class Kind(enum.IntEnum):
@@ -21,15 +24,76 @@ class Kind(enum.IntEnum):
     """The first stop on the way to a far place."""
 
 
+KNOWLEDGE = record_type(
+    [
+        ("pose", "f8", (5,)),  # where it believes to be
+        ("target", "f8", (5,)),  # the viewpoint that it chose last
+        ("time_s", "f8"),
+        ("entropy_left", "f8"),  # share of its map's entropy
+        ("gained_bits", "f8"),  # taken from its map by its own scans
+        ("heard_bits", "f8"),  # taken from its map by teammates' measurements
+        ("came_bits", "f8"),  # taken from its map by its latest scan
+        ("move_end", "i8"),  # code of a MoveEnd: why its latest drive ended
+        ("under_way", "?"),  # whether it still drives to its target
+        (
+            "place_variance",
+            "f8",
+        ),  # of its pose estimate, over all axes, squared voxel edges; 0 = exact
+        ("yaw_variance", "f8"),  # rad²
+        ("teammates", "i8"),  # number of them
+    ],
+)
+"""What one robot knows at a decision, beside its belief, its teammates and its experience."""
+
+MATE = record_type(
+    [
+        ("place", "f8", (3,)),  # where it was last heard
+        ("max_speed_m_s", "f8"),
+        ("acceleration_m_s2", "f8"),
+        ("scan_time_s", "f8"),
+        ("body_radius", "f8"),  # voxel edges
+        ("silent", "?"),  # whether it counts as silent
+    ],
+)
+"""A teammate that was heard."""
+
+OPTION = record_type(
+    [
+        ("viewpoint", "f8", (5,)),
+        ("goal", "f8", (5,)),  # the far viewpoint to which it leads, else itself
+        ("bits", "f8"),  # that a scan at the goal should bring
+        ("stop_bits", "f8"),  # that a scan at the viewpoint should bring
+        ("seconds", "f8"),  # until the scan at the goal is taken; inf = there is no path
+        ("value", "f8"),  # what it is worth to the planner: bits / s^c
+        ("kind", "i8"),  # a Kind
+    ],
+)
+"""A viewpoint of the pool out of which candidates are selected."""
+
 CANDIDATE = record_type(
     [
-        ("viewpoint", "f8", (5,)),  # map frame: x, y, z, yaw, pitch; of those that are none, the first one's
-        ("goal", "f8", (5,)),  # grid units: the far viewpoint to which it leads; else itself
+        ("viewpoint", "f8", (5,)),  # map frame, metres; of those that are none, the first one's
+        ("goal", "f8", (5,)),  # the far viewpoint to which it leads, else itself
         ("bits", "f8"),  # that a scan at the viewpoint should bring
         ("kind", "i8"),  # a Kind
     ],
 )
 """A viewpoint that is proposed to a robot."""
+
+VIEW = record_type(
+    [
+        ("bits", "f8"),  # of a scan, but for what is left to teammates
+        ("all_bits", "f8"),  # with what is left to teammates
+        ("again_bits", "f8"),  # of a second scan, but for what is left to teammates
+        ("seen", "i8"),  # voxels that count as seen
+        ("unknown", "i8"),  # unknown ones of these
+        ("distance", "f8"),  # sum over those seen, voxel edges
+        ("slivers", "i8"),  # unknown voxels left beside them, one voxel thick
+        ("unique", "f8"),  # sum over those seen of 1/n, with n the candidates that see the voxel
+        ("shared", "f8", (3,)),  # most bits in announced views, the largest first
+    ],
+)
+"""What is expected to be seen from a candidate, or from the far place to which it leads."""
 
 EXPERIENCE = record_type(
     [
@@ -40,22 +104,22 @@ EXPERIENCE = record_type(
         ("exponent", "f8"),  # c of bits / s^c, now
         ("best_rate", "f8"),  # most bits per second of a candidate
         ("going", "?"),  # whether it is on its way to a far place
-        ("goal", "f8", (5,)),  # which one
-        ("far_value", "f8"),  # what the best far place was worth when they were last looked at
-        ("looked_far", "?"),  # whether that ever was
+        ("goal", "f8", (5,)),  # that far place
+        ("far_value", "f8"),  # what the best far place was worth when they were last evaluated
+        ("looked_far", "?"),  # whether they ever were, with this exponent
         ("far_at", "f8", (3,)),  # where the robot was then
-        ("patience", "i8"),  # decisions until far places are looked at again on the same spot
+        ("patience", "i8"),  # decisions until far places are evaluated again on the same spot
         ("stood_at", "f8", (3,)),  # where it stopped last, but for steps of less than a voxel edge
-        ("poor_scans", "i8"),  # poor scans in a row that it took there; once many, anywhere
+        ("low_gain_scans", "i8"),  # in a row, taken there; once they are DEPLETED_SCANS, taken anywhere
         ("blocked", "i8"),  # decisions during which it keeps clear of teammates
         ("was_free", "?"),  # whether it ever was where a path led anywhere
         ("free_at", "f8", (3,)),  # where that was last
         ("edges", "i8"),  # drives that the end of the ground cut short
-        ("edge_at", "f8", (EDGES, 3)),  # places just beyond it, the last of these drives
+        ("edge_at", "f8", (REMEMBERED_EDGES, 3)),  # places just beyond it, the last of these drives
         ("failures", "i8"),  # how many of these are in use
         ("failed", "f8", (REMEMBERED, 5)),  # viewpoints that did not bring what was expected
         ("share", "f8", (REMEMBERED,)),  # of the expected bits that came; 0 = it was not reached
-        ("forget_at", "f8", (REMEMBERED,)),  # distance from it at which it is forgotten, voxel edges
+        ("forget_at", "f8", (REMEMBERED,)),  # distance from it at which it is forgotten
     ],
 )
-"""What a robot remembers; places and viewpoints in grid units."""
+"""What a robot remembers from one decision to the next."""

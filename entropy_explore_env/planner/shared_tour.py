@@ -5,66 +5,40 @@ to where teammates go, by the straight line; where there is none, through all of
 behind what it would have to come back for: in plans it drives shorter paths than rules that choose one
 frontier cell at a time.
 
-A pocket is a frontier of few connected voxels: little lies behind it, and the robot need not drive to it. It
-drives to a place from which all that is unknown around the frontier cell is in sight, the one that makes the
-path over it to the tour's next place shortest, if that is shorter than over the cell. Where the look leaves
-the cell a frontier, the robot goes on to it. To an opening it drives at once, since what lies behind has to
-be explored from there.
+A dead end is a frontier of few connected voxels: little lies behind it, and the robot need not drive to it.
+It drives to a place from which all that is unknown around the frontier cell is in sight, the one that makes
+the path over it to the tour's next place shortest, if that is shorter than over the cell. Where the look
+leaves the cell a frontier, the robot goes on to it. To an opening it drives at once, since what lies behind
+has to be explored from there.
 
-Tuned: `sight` and `pocket`, see docs/explorers.md.
+Tuned: `opening` and `view`, see docs/explorers.md.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
 from entropy_explore_env.frontiers.voxel_map import NONE
 from entropy_explore_env.planner.scene import NOWHERE, Goal, Scene, scanned_here
-from entropy_explore_env.planner.tour import Tour, TourConfig
-from entropy_explore_env.validation import check_count, check_not_negative
+from entropy_explore_env.planner.tour import Tour
 
 _SHORTER = 1e-6
 """A way is shorter if it is so by this many voxel edges."""
 
 
-@dataclass(frozen=True)
-class SharedTourConfig(TourConfig):
-    """What is near, how much a place covers, and what is looked at from afar.
-
-    Attributes:
-        pocket: A frontier cell is at a pocket if fewer known free voxels beside unknown ones are connected
-            there; their number over the sensor's range in voxels. 0 = there are no pockets.
-        sight: From how far off a pocket is looked at, at most, in sensor ranges.
-        around: Distance in voxels, along each axis, from the frontier cell (and what the body touches there)
-            within which all unknown voxels of the frontier have to be in sight.
-
-    Raises:
-        SettingError: One of them is not allowed.
-    """
-
-    pocket: float = 0.125
-    sight: float = 0.5
-    around: int = 3
-
-    def __post_init__(self) -> None:
-        """Check every field."""
-        super().__post_init__()
-        check_not_negative(self, "pocket", "sight")
-        check_count(self, "around", 1, 1000)
-
-
 class SharedTour(Tour):
-    """Goes through what teammates leave to the robot on a tour, and looks into pockets from outside."""
+    """Goes on a tour through what teammates leave to the robot, and looks into dead ends from outside."""
 
     rule = "planned-rate"
-    config: SharedTourConfig
-
-    def __init__(self, config: SharedTourConfig | None = None) -> None:
-        """Take the settings; None = the defaults."""
-        super().__init__(config or SharedTourConfig())
+    opening = 0.125
+    """Least share of the sensor's range in connected known free voxels beside unknown ones; fewer are a dead end."""
+    view = 0.5
+    """Largest distance from which a dead end is looked at, in sensor ranges."""
+    around = 3
+    """Distance in voxels, along each axis, from what the body touches in the frontier cell, within which all
+    unknown voxels of the frontier have to be visible."""
 
     def pick(self, scene: Scene) -> Goal:
         """Return the voxel to go to; see `FrontierRule`."""
@@ -89,11 +63,11 @@ class SharedTour(Tour):
             target: The first place of the tour.
             onward: (1,) voxel, the second place of the tour; (0,) if the tour has only one.
         """
-        cells, few = scene.cells, math.ceil(self.config.pocket * scene.cells.reach)
+        cells, few = scene.cells, math.ceil(self.opening * scene.cells.reach)
         if cells.opening(target, few) >= few:
             return Goal(target, target)
-        sight = self.config.sight * cells.reach
-        unseen = cells.unseen_around(target, self.config.around)
+        sight = self.view * cells.reach
+        unseen = cells.unseen_around(target, self.around)
         if cells.first_lookout(np.array([scene.here], np.int32), unseen, sight) != NONE:
             return Goal(target, target, looked=True) if scanned_here(scene.view) else Goal(target, scene.here)
         places = np.append(cells.standing_around(target, sight), np.int32(target))

@@ -12,75 +12,39 @@ improved by 2-opt and Or-opt moves (`open_tours`).
 
 Ours: the place chosen last stays the first unless that makes the tour longer by more than a share.
 
-Tuned: `near` and `cover`, see `TourConfig`.
+Tuned: `near` and `cover`, see docs/explorers.md.
 """
 
 from __future__ import annotations
-
-from dataclasses import dataclass
 
 import numpy as np
 
 from entropy_explore_env.frontiers.open_tours import open_tour, tour_length
 from entropy_explore_env.frontiers.voxel_map import NONE
 from entropy_explore_env.planner.frontier_rule import FrontierRule
-from entropy_explore_env.planner.scene import Scene
-from entropy_explore_env.validation import check, check_count, check_positive
-
-
-@dataclass(frozen=True)
-class TourConfig:
-    """What is near, and how much a place covers.
-
-    Attributes:
-        near: Longest path to a near frontier cell, in sensor ranges.
-        cover: From how far off a frontier cell is seen close enough, in sensor ranges.
-        coarse: Edge of the coarse cells, in sensor ranges.
-        most_near: Near places at most; the nearest count.
-        most_far: Far ones at most.
-        stay: The share by which a tour may be longer to begin where the last one did.
-
-    Raises:
-        SettingError: One of them is not allowed.
-    """
-
-    near: float = 0.4
-    cover: float = 0.4
-    coarse: float = 1.0
-    most_near: int = 120
-    most_far: int = 8
-    stay: float = 0.1
-
-    def __post_init__(self) -> None:
-        """Check every field."""
-        check_positive(self, "near", "cover", "coarse")
-        check_count(self, "most_near", 1, 10_000)
-        check_count(self, "most_far", 0, 10_000)
-        check(self, "stay", "a number from 0 to 1", lambda v: 0.0 <= v <= 1.0)
+from entropy_explore_env.planner.scene import Goal, Scene
 
 
 class Tour(FrontierRule):
     """Goes to the first place of a tour through what is left to explore."""
 
     rule = "tour"
+    near = 0.4
+    """Longest path to a near frontier cell, in sensor ranges."""
+    cover = 0.4
+    """Largest distance from which a frontier cell is seen close enough, in sensor ranges."""
+    most_near = 120
+    """Near places at most, the nearest ones."""
+    most_far = 8
+    """Far places at most."""
+    coarse = 1.0
+    """Edge of the coarse cells, in sensor ranges."""
+    stay = 0.1
+    """Share by which a tour may be longer to begin where the last one did."""
 
-    def __init__(self, config: TourConfig | None = None) -> None:
-        """Take the settings; None = the defaults."""
-        self.config = config or TourConfig()
-
-    def pick(self, scene: Scene) -> int:
+    def pick(self, scene: Scene) -> int | Goal:
         """Return the voxel to go to; see `FrontierRule`."""
-        return self.pick_among(scene, *scene.paths.all_frontiers(scene.here))
-
-    def pick_among(self, scene: Scene, voxels: np.ndarray, lengths: np.ndarray) -> int:
-        """The first place of a tour through what (K,) frontier cells stand for; NONE = there are none.
-
-        Args:
-            scene: What the robot knows.
-            voxels: (K,) int32, the cells.
-            lengths: (K,) of the paths to them, in voxel edges.
-        """
-        places = self.tour_among(scene, voxels, lengths)
+        places = self.tour_among(scene, *scene.paths.all_frontiers(scene.here))
         return int(places[0]) if len(places) else NONE
 
     def tour_among(self, scene: Scene, voxels: np.ndarray, lengths: np.ndarray) -> np.ndarray:
@@ -95,8 +59,8 @@ class Tour(FrontierRule):
             return voxels
         order = np.argsort(lengths, kind="stable")
         voxels, lengths = voxels[order], lengths[order]
-        near = lengths <= self.config.near * scene.cells.reach
-        near[self.config.most_near :] = False
+        near = lengths <= self.near * scene.cells.reach
+        near[self.most_near :] = False
         kept, far = self._cover(scene, voxels[near]), self._coarse(scene, voxels[~near])
         chosen = np.concatenate([np.flatnonzero(near)[kept], np.flatnonzero(~near)[far]]).astype(np.int64)
         places = voxels[chosen]
@@ -117,13 +81,13 @@ class Tour(FrontierRule):
         rest = np.array([first, *(n for n in range(1, len(between)) if n != first)])
         onward = rest[open_tour(between[np.ix_(rest, rest)])]
         length = float(between[0, first]) + tour_length(between, onward)
-        return onward if length <= (1.0 + self.config.stay) * tour_length(between, tour) else tour[1:]
+        return onward if length <= (1.0 + self.stay) * tour_length(between, tour) else tour[1:]
 
     def _cover(self, scene: Scene, voxels: np.ndarray) -> list[int]:
         """Which near frontier cells cover all of them: the target, then of equally good ones the nearest."""
         if len(voxels) == 0:
             return []
-        seen = scene.paths.sights(scene.centres(voxels), self.config.cover * scene.cells.reach)
+        seen = scene.paths.sights(scene.centres(voxels), self.cover * scene.cells.reach)
         left, chosen = np.ones(len(voxels), bool), []
         for target in np.flatnonzero(voxels == scene.target):
             chosen.append(int(target))
@@ -136,7 +100,7 @@ class Tour(FrontierRule):
 
     def _coarse(self, scene: Scene, voxels: np.ndarray) -> np.ndarray:
         """Of the far frontier cells, in order of distance, the first of each coarse cell; the target, too."""
-        edge = max(self.config.coarse * scene.cells.reach, 1.0)
+        edge = max(self.coarse * scene.cells.reach, 1.0)
         cells = np.floor(scene.centres(voxels) / edge).astype(np.int64)
         if len(cells) == 0:
             return np.zeros(0, np.int64)
@@ -144,4 +108,4 @@ class Tour(FrontierRule):
         _, first, of_cell = np.unique(numbers, return_index=True, return_inverse=True)
         target = np.flatnonzero(voxels == scene.target)
         first[of_cell[target]] = target
-        return np.sort(first)[: self.config.most_far]
+        return np.sort(first)[: self.most_far]

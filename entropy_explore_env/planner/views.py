@@ -11,7 +11,7 @@ from entropy_explore_env.belief.visibility import in_cone
 from entropy_explore_env.belief.voxel_index import flat_index, grid_index
 from entropy_explore_env.compilation.kernels import lean_kernel
 from entropy_explore_env.planner.candidate_features import ANNOUNCED, SEEN_BITS
-from entropy_explore_env.viewpoints.imagined_scan import imagine_scan
+from entropy_explore_env.viewpoints.expected_scan import imagine_scan
 
 _SEEN_RATIO = 2.0 ** (2.0 * SEEN_BITS) - 1.0
 """Precision added to a voxel, as a share of its precision, that brings SEEN_BITS."""
@@ -22,20 +22,20 @@ _ONE = np.uint64(1)
 
 @lean_kernel
 def look_from(proposer, situation, at, number, most_common):
-    """Find out what a scan from a viewpoint should see, and mark it, unless another candidate sees the same.
+    """Find out what a scan from a viewpoint should see, and how much of that other candidates see.
 
     Args:
-        proposer: A Proposer; candidates with lower numbers have been looked from.
-        situation: A Situation.
+        proposer: See `nearby`; candidates with lower numbers have been looked from.
+        situation: See `nearby`.
         at: (5,) the viewpoint, grid units.
         number: Of the candidate; `scratch.views` and `scratch.common` of it are filled in.
         most_common: Largest share of the voxels of either that one before and it may both see.
 
     Returns:
-        Whether it sees something else than each of those before.
+        Whether it sees something other than each candidate before.
     """
-    scratch, belief, gap = proposer.scratch, situation.belief, proposer.recipe.gap_probability
-    touched = imagine_scan(belief, proposer.exact, gap, at, scratch.scan, 0)
+    scratch = proposer.scratch
+    touched = imagine_scan(situation.belief, proposer.exact, at, scratch.scan)
     view = scratch.views[number]
     _gather(proposer, situation, at, touched, view)
     common = scratch.common[number]
@@ -116,7 +116,7 @@ def mark_view(proposer, belief, number, marked):
     """Mark the voxels that a candidate sees, as `look_from` left them, and count slivers beside them.
 
     Args:
-        proposer: A Proposer.
+        proposer: See `nearby`.
         belief: A Belief.
         number: Of the candidate.
         marked: How many voxels are in `scratch.seen`.
@@ -142,7 +142,7 @@ def mark_view(proposer, belief, number, marked):
 
 @lean_kernel
 def _is_left(belief, x, y, z, known, marks, bit):
-    """Whether a voxel is unknown and stays so: it is in the workspace, and the candidate does not see it."""
+    """Return whether a voxel is unknown and stays so: in the workspace, and not seen by the candidate."""
     size = belief.size
     if not (0 <= x < size[0] and 0 <= y < size[1] and 0 <= z < size[2]):
         return False
@@ -154,7 +154,7 @@ def _is_left(belief, x, y, z, known, marks, bit):
 
 @lean_kernel
 def _slivers_beside(belief, voxel, known, marks, bit):
-    """How many of a voxel's six neighbours are left unknown though what lies behind each is not."""
+    """Return how many of a voxel's six neighbours are left unknown though what lies behind each is not."""
     x, y, z = grid_index(belief.size, voxel)
     count = 0
     for axis in range(3):

@@ -1,4 +1,4 @@
-"""What viewpoints are worth to a robot: expected bits, seconds, and whether the line there is free."""
+"""Models of a robot's scans and drives, the seconds until a scan is taken, and whether a line is free."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import numpy as np
 
 from entropy_explore_env.belief.fields import Belief
 from entropy_explore_env.belief.paths.lattice import KNOWN_RATIO, Lattice, new_lattice
+from entropy_explore_env.belief.paths.search import cost_to
 from entropy_explore_env.belief.raycast import (
     NONE_BEHIND,
     OPEN,
@@ -20,21 +21,19 @@ from entropy_explore_env.belief.raycast import (
     cast_ray,
     longest_crossing,
 )
-from entropy_explore_env.belief.visibility import mark_cones
-from entropy_explore_env.compilation.kernels import lean_kernel
+from entropy_explore_env.belief.voxel_index import flat_index
+from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel
 from entropy_explore_env.robots.motion import driving_time, turning_time
 from entropy_explore_env.scenario import Scenario
 from entropy_explore_env.settings import Grid, RangeSensor, RobotKind, centred_angles
-from entropy_explore_env.viewpoints.expected_scan import (
-    ScanModel,
-    ScanScratch,
-    expected_scan_bits,
-    new_scan_scratch,
-)
+from entropy_explore_env.viewpoints.expected_scan import ScanModel, ScanScratch, new_scan_scratch
+
+STRAIGHTENED = 0.96
+"""Length of a path after string pulling, as a share of the sum of its steps."""
 
 
 class DriveModel(NamedTuple):
-    """How long a straight drive and the scan at its end take, and whether the line has to be free."""
+    """How long drives and the scans at their ends take."""
 
     max_speed_m_s: float
     acceleration_m_s2: float
@@ -42,8 +41,6 @@ class DriveModel(NamedTuple):
     scan_time_s: float
     body_radius: float
     """Voxel edges."""
-    line_must_be_free: bool = True
-    """Whether a viewpoint behind something believed covered is worth nothing."""
 
 
 class RobotModel(NamedTuple):
@@ -57,30 +54,26 @@ class RobotModel(NamedTuple):
     """Largest number of voxels that one of its rays crosses."""
 
 
-class Outlook(NamedTuple):
-    """What is expected of K viewpoints."""
-
-    bits: np.ndarray
-    """(K,) float64 of a scan there; 0 where the line is not free."""
-    seconds: np.ndarray
-    """(K,) float64 until the scan is taken."""
-
-
 def sees_all_around(sensor: RangeSensor) -> bool:
-    """Whether a sensor's rays leave no gap around it, so that its yaw does not matter."""
+    """Return whether a sensor's rays leave no gap around it, so that its yaw does not matter."""
     return sensor.field_of_view_rad[0] > 2.0 * math.pi - 1.5 * sensor.angular_step_rad
 
 
 def robot_model(
-    scenario: Scenario, kind: RobotKind, thinning: int = 2, stop_probability: float = 0.02
+    scenario: Scenario,
+    kind: RobotKind,
+    thinning: int = 2,
+    stop_probability: float = 0.02,
+    gap_probability: float | None = None,
 ) -> RobotModel:
-    """The model of a kind of robot.
+    """Return the model of a kind of robot.
 
     Args:
         scenario: The mission's settings.
         kind: The kind.
         thinning: One in this many columns, and rows, of the sensor's rays is imagined.
         stop_probability: Probability that an unknown voxel stops a ray.
+        gap_probability: Probability that one beside a covered voxel does; None = `stop_probability`.
     """
     grid, sensor, robot = scenario.grid, kind.sensor, kind.robot
     step, edge = sensor.angular_step_rad, grid.voxel_size_m
@@ -99,6 +92,7 @@ def robot_model(
         voxels_behind=int(sensor.voxels_behind),
         known_precision=known_precision,
         stop_probability=float(stop_probability),
+        gap_probability=float(stop_probability if gap_probability is None else gap_probability),
         pose_variance=np.zeros(2),
         wanted_precision=known_precision if scenario.ending.by_seen else math.inf,
     )
@@ -118,14 +112,14 @@ def robot_model(
 
 
 def new_scratch(grid: Grid, models: Sequence[RobotModel]) -> ScanScratch:
-    """Scratch space to evaluate viewpoints of robots of these kinds."""
+    """Return memory to evaluate viewpoints of robots of these kinds."""
     longest = max(model.longest_ray for model in models) + sum(grid.shape)
     return new_scan_scratch(grid.voxels, longest, max(len(model.scan.pitches) for model in models))
 
 
 @lean_kernel
 def line_is_free(belief, start, direction, length, body_radius, scratch):
-    """Whether a ball-shaped body meets nothing believed covered on a straight line, and no boundary.
+    """Return whether a ball-shaped body meets nothing believed covered on a straight line, and no boundary.
 
     Tested along the line of its centre and, for bodies larger than half a voxel, of four points at its sides.
 
@@ -174,7 +168,7 @@ def line_is_free(belief, start, direction, length, body_radius, scratch):
 def is_line_free(
     belief: Belief, start: np.ndarray, extent: np.ndarray, body_radius: float, scratch: ScanScratch
 ) -> bool:
-    """Whether the straight line from a place (3,) along an extent (3,), grid units, is free by the belief."""
+    """Return whether the line from a place (3,) along an extent (3,), grid units, is free by the belief."""
     length = float(np.linalg.norm(extent))
     if length < 1e-9:
         return True
@@ -182,72 +176,60 @@ def is_line_free(
     return bool(line_is_free(belief, start, (x, y, z), length, body_radius, scratch))
 
 
-@lean_kernel
-def evaluate_viewpoints(belief, scan, drive, here, viewpoints, cones, scratch, outlook):
-    """Fill in the expected bits of a scan at each viewpoint, and the seconds until it is taken.
+@inlined_kernel
+def _seconds(drive, length_m, hops, here, at):
+    """Return the seconds until a scan at the end of a path in equal hops, with a scan after each."""
+    drive_s = hops * driving_time(length_m, drive.max_speed_m_s, drive.acceleration_m_s2)
+    drive_s += (hops - 1) * drive.scan_time_s
+    turn_s = turning_time(here[3], here[4], at[3], at[4], drive.turn_rate_rad_s)
+    return max(drive_s, turn_s) + drive.scan_time_s
 
-    Args:
-        belief: A Belief.
-        scan: A ScanModel.
-        drive: A DriveModel.
-        here: (5,) the robot, in grid units.
-        viewpoints: (K, 5) in grid units.
-        cones: (M,) CONE, which are left to teammates.
-        scratch: A ScanScratch.
-        outlook: An Outlook, filled in.
+
+@lean_kernel
+def straight_seconds(belief, voxel_size_m, drive, here, at, scratch):
+    """Return the seconds until the scan at a viewpoint (5,) is taken, on a straight line from `here` (5,).
+
+    It is inf where the line is not free by the belief; `scratch` is a ScanScratch.
     """
-    mark_cones(cones, belief.size, scratch.left, 1)
-    for k in range(len(viewpoints)):
-        viewpoint = viewpoints[k]
-        x, y, z = viewpoint[0] - here[0], viewpoint[1] - here[1], viewpoint[2] - here[2]
-        length = math.sqrt(x * x + y * y + z * z)
-        drive_s = driving_time(length * scan.voxel_size_m, drive.max_speed_m_s, drive.acceleration_m_s2)
-        turn_s = turning_time(here[3], here[4], viewpoint[3], viewpoint[4], drive.turn_rate_rad_s)
-        outlook.seconds[k] = max(drive_s, turn_s) + drive.scan_time_s
-        outlook.bits[k] = 0.0
-        if length > 1e-9 and drive.line_must_be_free:
-            direction = (x / length, y / length, z / length)
-            if not line_is_free(belief, here, direction, length, drive.body_radius, scratch):
-                continue
-        outlook.bits[k] = expected_scan_bits(belief, scan, viewpoint, scratch)
-    mark_cones(cones, belief.size, scratch.left, 0)
+    x, y, z = at[0] - here[0], at[1] - here[1], at[2] - here[2]
+    length = math.sqrt(x * x + y * y + z * z)
+    if length > 1e-9:
+        direction = (x / length, y / length, z / length)
+        if not line_is_free(belief, here, direction, length, drive.body_radius, scratch):
+            return math.inf
+    return _seconds(drive, length * voxel_size_m, 1, here, at)
 
 
 @lean_kernel
-def straight_seconds(belief, voxel_size_m, drive, here, viewpoints, scratch, seconds):
-    """Fill in the seconds until the scans at viewpoints are taken, on straight lines.
+def travel_seconds(search, size, drive, voxel_size_m, here, at, reach):
+    """Return the seconds until the scan at a viewpoint (5,) is taken, on the path that a search found.
 
     Args:
-        belief: A Belief.
+        search: The latest search, from the robot's voxel.
+        size: (X, Y, Z) voxels.
+        drive: A DriveModel.
         voxel_size_m: Edge of a voxel.
-        drive: A DriveModel.
         here: (5,) the robot, in grid units.
-        viewpoints: (K, 5) in grid units.
-        scratch: A ScanScratch.
-        seconds: (K,) float64, filled in; inf = the line is not free.
+        at: (5,) the viewpoint, in grid units.
+        reach: Longest hop in voxel edges, with a scan after each; inf allowed.
+
+    Returns:
+        Seconds; inf = the search did not reach it.
     """
-    for k in range(len(viewpoints)):
-        at = viewpoints[k]
-        x, y, z = at[0] - here[0], at[1] - here[1], at[2] - here[2]
-        length = math.sqrt(x * x + y * y + z * z)
-        drive_s = driving_time(length * voxel_size_m, drive.max_speed_m_s, drive.acceleration_m_s2)
-        turn_s = turning_time(here[3], here[4], at[3], at[4], drive.turn_rate_rad_s)
-        seconds[k] = max(drive_s, turn_s) + drive.scan_time_s
-        if length > 1e-9:
-            direction = (x / length, y / length, z / length)
-            if not line_is_free(belief, here, direction, length, drive.body_radius, scratch):
-                seconds[k] = math.inf
+    straight = math.sqrt((at[0] - here[0]) ** 2 + (at[1] - here[1]) ** 2 + (at[2] - here[2]) ** 2)
+    length = 0.0
+    if straight > 1e-9:
+        length = max(straight, STRAIGHTENED * cost_to(search, voxel_at(size, at)))
+    if math.isinf(length):
+        return math.inf
+    hops = max(math.ceil(length / reach - 1e-9), 1)
+    return _seconds(drive, length / hops * voxel_size_m, hops, here, at)
 
 
-def expected_outlook(
-    belief: Belief,
-    model: RobotModel,
-    here: np.ndarray,
-    viewpoints: np.ndarray,
-    cones: np.ndarray,
-    scratch: ScanScratch,
-) -> Outlook:
-    """What is expected of (K, 5) viewpoints; see `evaluate_viewpoints`."""
-    outlook = Outlook(np.zeros(len(viewpoints)), np.zeros(len(viewpoints)))
-    evaluate_viewpoints(belief, model.scan, model.drive, here, viewpoints, cones, scratch, outlook)
-    return outlook
+@lean_kernel
+def voxel_at(size, at):
+    """Return the number of the voxel of a place in the workspace, grid units."""
+    x = min(max(int(at[0]), 0), size[0] - 1)
+    y = min(max(int(at[1]), 0), size[1] - 1)
+    z = min(max(int(at[2]), 0), size[2] - 1)
+    return flat_index(size, x, y, z)

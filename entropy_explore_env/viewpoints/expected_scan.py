@@ -1,4 +1,21 @@
-"""The bits that a scan from a viewpoint is expected to take from a robot's own map."""
+"""The bits that a scan from a viewpoint is expected to take from a robot's own map.
+
+Rays go through the belief as those of a scan do, up to the first voxel that is believed covered. Where that
+is too near for the sensor, they bring nothing. A ray goes on from a voxel with a probability:
+
+- from an unknown one with 1 - `stop_probability`, or 1 - `gap_probability` where a voxel beside it is
+  believed covered: rays that lie apart leave gaps in what they see of a wall;
+- from a known one of expected coverage μ ≤ ½, where a wall was hit at a flat angle, with 1 - 2 μ; from the
+  voxel in which it starts, it always does. So none gets beyond what is believed covered, whatever
+  `voxels_behind` says.
+
+What all rays add to a voxel counts once,
+
+    I = Σ ½ log2(1 + Σ_rays w/σ(d)² / p),
+
+with p the voxel's precision, d the ray's length and w the probability that it gets there (Rocha04, eqs. 5, 17
+and 27). Voxels that are left to teammates count nothing. All places are in grid units.
+"""
 
 from __future__ import annotations
 
@@ -9,8 +26,16 @@ import numpy as np
 
 from entropy_explore_env.belief.measurement_model import measurement_precision
 from entropy_explore_env.belief.raycast import OPEN, OPEN_END, STOP_AT_COVERED, Crossing, Line, cast_ray
+from entropy_explore_env.belief.visibility import mark_cones
+from entropy_explore_env.belief.voxel_index import grid_index
 from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel
-from entropy_explore_env.viewpoints.gathered_bits import LEAST_GAIN, gathered_bits, touch
+
+_LEAST_SHARE = 1e-3
+"""Rays that get on with less probability are not followed."""
+_LEAST_GAIN = 1e-45
+"""Precision that float32 still holds: what is added to a voxel is more than 0."""
+_FOLD_ABOVE = 1e250
+"""A product of ratios is folded into bits, by its logarithm, before it could leave a float64."""
 
 
 class ScanModel(NamedTuple):
@@ -33,15 +58,17 @@ class ScanModel(NamedTuple):
     """Voxels with less precision are unknown."""
     stop_probability: float
     """Probability that an unknown voxel stops a ray."""
+    gap_probability: float
+    """Probability that an unknown voxel beside a covered one stops a ray."""
     pose_variance: np.ndarray
     """(2,) float64: of the robot's place, summed over its axes, in squared voxel edges, and of its yaw, rad²;
     zeros = it knows its pose."""
     wanted_precision: float = math.inf
-    """Voxels with at least so much precision bring nothing that counts; inf = all voxels count."""
+    """Voxels with at least this precision bring nothing that counts; inf = all voxels count."""
 
 
 class ScanScratch(NamedTuple):
-    """Scratch space of `expected_scan_bits` for V voxels, rays across L of them, and R rows of rays."""
+    """Memory to imagine scans of V voxels, rays across L of them, and R rows of rays."""
 
     added: np.ndarray
     """(V,) float32, zeros, which it is again afterwards."""
@@ -58,7 +85,7 @@ class ScanScratch(NamedTuple):
 
 
 def new_scan_scratch(voxels: int, longest_ray: int, rows: int) -> ScanScratch:
-    """Scratch space for a grid, rays that cross at most so many of its voxels, and at most so many rows."""
+    """Return memory for a grid, the most of its voxels that a ray crosses, and the most rows of rays."""
     return ScanScratch(
         np.zeros(voxels, np.float32),
         np.zeros(voxels + 1, np.int32),
@@ -70,23 +97,11 @@ def new_scan_scratch(voxels: int, longest_ray: int, rows: int) -> ScanScratch:
 
 
 @inlined_kernel
-def fill_rows(scan, pitch, rows):
-    """Fill in cosine and sine of the pitch of each row of rays, by the pitch of the gaze."""
-    for row in range(len(scan.pitches)):
-        rows[row, 0], rows[row, 1] = math.cos(pitch + scan.pitches[row]), math.sin(pitch + scan.pitches[row])
-
-
-@inlined_kernel
-def expected_precision(scan, length, direction):
-    """Precision of the coverage that a ray of the sensor should measure, less what the pose makes uncertain.
+def _expected_precision(scan, length, direction):
+    """Return the precision that a ray of the sensor should measure, less what the pose makes uncertain.
 
     1/σ² with σ² = σ(d)² + off, and off the mean square of how far the measured point is off in voxel edges,
     as `localization.weigh_by_covariance` fuses it, but for what place and yaw have in common.
-
-    Args:
-        scan: A ScanModel.
-        length: Of the ray, voxel edges.
-        direction: (x, y, z), unit vector.
     """
     range_m = length * scan.voxel_size_m
     precision = measurement_precision(range_m, scan.sigma_min, scan.sigma_slope_per_m, scan.sigma_exponent)
@@ -97,57 +112,124 @@ def expected_precision(scan, length, direction):
     return precision
 
 
+@inlined_kernel
+def _is_beside_covered(belief, voxel):
+    """Return whether a voxel shares a face with one that is believed covered."""
+    size, mean = belief.size, belief.mean
+    x, y, z = grid_index(size, voxel)
+    row, column = size[2], size[1] * size[2]
+    return (
+        (x > 0 and mean[voxel - column] > STOP_AT_COVERED)
+        or (x < size[0] - 1 and mean[voxel + column] > STOP_AT_COVERED)
+        or (y > 0 and mean[voxel - row] > STOP_AT_COVERED)
+        or (y < size[1] - 1 and mean[voxel + row] > STOP_AT_COVERED)
+        or (z > 0 and mean[voxel - 1] > STOP_AT_COVERED)
+        or (z < size[2] - 1 and mean[voxel + 1] > STOP_AT_COVERED)
+    )
+
+
+@inlined_kernel
+def _touch(scratch, voxel, gain, count):
+    """Add precision to a voxel, note it if it is the first that is added, and return how many are noted.
+
+    It is always written down, and kept where it is the first: a branch that nothing predicts costs more. A
+    gain of less than _LEAST_GAIN would be noted anew by every ray.
+    """
+    before = scratch.added[voxel]
+    scratch.touched[np.uint32(count)] = voxel
+    scratch.added[voxel] = before + gain
+    return count + int(before == 0.0)
+
+
+@inlined_kernel
+def _imagine_ray(belief, scan, start, direction, count, scratch):
+    """Add the precision that one ray should bring to `scratch.added`, and return the touched voxels."""
+    length, n, end = cast_ray(
+        belief.mean,
+        belief.size,
+        Line(start, direction, scan.max_range_m / scan.voxel_size_m),
+        STOP_AT_COVERED,
+        OPEN_END,
+        scan.voxels_behind,
+        Crossing(scratch.crossed, scratch.entered),
+    )
+    range_m = length * scan.voxel_size_m
+    if end != OPEN and range_m < scan.min_range_m:
+        return count
+    share = 1.0
+    gain = scan.sensor_rays * _expected_precision(scan, length, direction)
+    if gain * _LEAST_SHARE < _LEAST_GAIN:
+        return count
+    for i in range(n):
+        voxel = np.uint32(scratch.crossed[np.uint32(i)])
+        if belief.precision[voxel] < scan.wanted_precision:
+            count = _touch(scratch, voxel, gain * share, count)
+        if belief.precision[voxel] < scan.known_precision:
+            gap = scan.gap_probability != scan.stop_probability and _is_beside_covered(belief, voxel)
+            share *= 1.0 - (scan.gap_probability if gap else scan.stop_probability)
+        elif i > 0:
+            share *= 1.0 - min(2.0 * belief.mean[voxel], 1.0)
+        if share < _LEAST_SHARE:
+            break
+    return count
+
+
 @lean_kernel
-def expected_scan_bits(belief, scan, viewpoint, scratch):
-    """Bits that a scan from a viewpoint is expected to take from the robot's map.
-
-    Rays go through the belief like those of a scan, until something believed covered; where that is too near
-    for the sensor, they bring nothing. A voxel that was never measured stops a ray with the probability
-    `stop_probability`, so what lies behind counts for less. What all rays add to a voxel counts once,
-
-        I = Σ ½ log2(1 + Σ_rays w/σ(d)² / p),
-
-    with p the voxel's precision, d the ray's length and w the probability that it gets there (Rocha04, eqs.
-    5, 17 and 27). Voxels that `scratch.left` marks are left to teammates, and count nothing.
+def imagine_scan(belief, scan, at, scratch):
+    """Add the precision that a scan from a viewpoint should bring to `scratch.added`.
 
     Args:
         belief: A Belief.
         scan: A ScanModel.
-        viewpoint: (5,) x, y, z in grid units, yaw, pitch.
+        at: (5,) x, y, z, yaw, pitch.
         scratch: A ScanScratch.
 
     Returns:
-        Bits ≥ 0.
+        How many voxels are in `scratch.touched`.
     """
-    start, count = (viewpoint[0], viewpoint[1], viewpoint[2]), 0
-    reach = scan.max_range_m / scan.voxel_size_m
-    fill_rows(scan, viewpoint[4], scratch.rows)
+    start, count = (at[0], at[1], at[2]), 0
+    for row in range(len(scan.pitches)):
+        pitch = at[4] + scan.pitches[row]
+        scratch.rows[row, 0], scratch.rows[row, 1] = math.cos(pitch), math.sin(pitch)
     for column in range(len(scan.yaws)):
-        yaw = viewpoint[3] + scan.yaws[column]
+        yaw = at[3] + scan.yaws[column]
         along, across = math.cos(yaw), math.sin(yaw)
         for row in range(len(scan.pitches)):
             level = scratch.rows[row, 0]
             direction = (along * level, across * level, -scratch.rows[row, 1])
-            length, n, end = cast_ray(
-                belief.mean,
-                belief.size,
-                Line(start, direction, reach),
-                STOP_AT_COVERED,
-                OPEN_END,
-                scan.voxels_behind,
-                Crossing(scratch.crossed, scratch.entered),
-            )
-            range_m = length * scan.voxel_size_m
-            if end != OPEN and range_m < scan.min_range_m:
-                continue
-            gain = scan.sensor_rays * expected_precision(scan, length, direction)
-            if gain < LEAST_GAIN:
-                continue
-            for i in range(n):
-                voxel = np.uint32(scratch.crossed[np.uint32(i)])
-                count = touch(scratch, voxel, np.float32(gain), count)
-                if belief.precision[voxel] < scan.known_precision:
-                    gain *= 1.0 - scan.stop_probability
-                    if gain < LEAST_GAIN:
-                        break
-    return gathered_bits(belief, scratch, count)
+            count = _imagine_ray(belief, scan, start, direction, count, scratch)
+    return count
+
+
+@lean_kernel
+def expected_bits(belief, scan, at, scratch):
+    """Return the bits that a scan from a viewpoint (5,) should bring; `scratch.left` is marked before."""
+    count = imagine_scan(belief, scan, at, scratch)
+    bits, growth = 0.0, 1.0
+    for i in range(count):
+        voxel = np.uint32(scratch.touched[np.uint32(i)])
+        share = np.float64(scratch.added[voxel]) / np.float64(belief.precision[voxel])
+        scratch.added[voxel] = 0.0
+        growth *= 1.0 + (0.0 if scratch.left[voxel] else share)
+        if growth > _FOLD_ABOVE:
+            bits += math.log2(growth)
+            growth = 1.0
+    return 0.5 * (bits + math.log2(growth))
+
+
+@lean_kernel
+def fill_expected_bits(belief, scan, viewpoints, cones, scratch, bits):
+    """Fill in (K,) bits that a scan from each viewpoint (K, 5) should bring.
+
+    Args:
+        belief: A Belief.
+        scan: A ScanModel.
+        viewpoints: (K, 5) x, y, z, yaw, pitch.
+        cones: (M,) CONE; voxels whose centres lie in one are left to teammates.
+        scratch: A ScanScratch.
+        bits: (K,) float64, filled in.
+    """
+    mark_cones(cones, belief.size, scratch.left, 1)
+    for k in range(len(viewpoints)):
+        bits[k] = expected_bits(belief, scan, viewpoints[k], scratch)
+    mark_cones(cones, belief.size, scratch.left, 0)

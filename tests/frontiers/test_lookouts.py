@@ -11,14 +11,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from baselines.experiments.mission import run_mission
-from baselines.strategies.rules.planned_rate import PlannedRate, PlannedRateConfig
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
-from entropy_explore_env.errors import SettingError
 from entropy_explore_env.frontiers.frontier_cells import KNOWN_SIGMA
 from entropy_explore_env.frontiers.lookouts import in_sight
 from entropy_explore_env.frontiers.voxel_map import NONE
 from entropy_explore_env.planner.frontier_rule import Goal
-from entropy_explore_env.planner.shared_tour import SharedTour, SharedTourConfig
+from entropy_explore_env.planner.shared_tour import SharedTour
 from entropy_explore_env.planner.tour import Tour
 from entropy_explore_env.reports.metrics import mission_figures
 from entropy_explore_env.robots.motion import MoveEnd
@@ -28,6 +26,7 @@ from tests.baselines.strategies.explorers.scenes import (
     random_plan,
     scenario_of,
     scene_of,
+    varied,
 )
 from tests.baselines.strategies.explorers.test_missions import small_plan
 from tests.reference import explorers as reference
@@ -99,7 +98,7 @@ def unseen_around(plan, place):
 def test_a_lookout_makes_the_way_over_it_shortest_of_all_that_see_the_same(shape, seed):
     rng = np.random.default_rng(seed)
     plan, robot = random_plan(shape, rng)
-    scene, rule = scene_of(plan, robot), SharedTour(SharedTourConfig(pocket=1.0))
+    scene, rule = scene_of(plan, robot), varied(SharedTour(), opening=1.0)
     goal = rule.pick(scene)
     assert goal.target == Tour().pick(scene_of(plan, robot))
     if goal.target == NONE:
@@ -138,8 +137,8 @@ def test_from_a_lookout_and_without_pockets_a_robot_drives_to_the_cell_itself():
     plan = niche()
     target = number(plan, (10, 6))
     assert SharedTour().pick(scene_of(plan, (10, 3))) == Goal(target, target, looked=True)
-    assert SharedTour(SharedTourConfig(pocket=0.0)).pick(scene_of(plan, (2, 4))) == Goal(target, target)
-    assert SharedTour(SharedTourConfig(sight=0.0)).pick(scene_of(plan, (2, 4))) == Goal(target, target)
+    assert varied(SharedTour(), opening=0.0).pick(scene_of(plan, (2, 4))) == Goal(target, target)
+    assert varied(SharedTour(), view=0.0).pick(scene_of(plan, (2, 4))) == Goal(target, target)
 
 
 def test_between_scans_a_robot_stops_where_all_is_in_sight():
@@ -246,12 +245,6 @@ def test_without_a_frontier_there_is_no_goal():
     assert SharedTour().pick(scene_of(plan, (2, 4))) == Goal(NONE, NONE)
 
 
-@pytest.mark.parametrize(("setting", "value"), [("pocket", -0.1), ("sight", float("nan")), ("around", 0)])
-def test_settings_are_checked(setting, value):
-    with pytest.raises(SettingError, match=setting):
-        SharedTourConfig(**{setting: value})
-
-
 @pytest.mark.parametrize("radius", [0.0, 0.05])
 @pytest.mark.parametrize("redecide", ["at_stop", "on_scan", 0.7])
 def test_robots_with_and_without_a_body_see_everything_on_short_paths(redecide, radius):
@@ -264,15 +257,3 @@ def test_robots_with_and_without_a_body_see_everything_on_short_paths(redecide, 
         assert figures["finished"]
         driven_m.append(figures["distance_m"])
     assert driven_m[1] < 1.1 * driven_m[0]
-
-
-def test_settings_of_planned_rate_reach_its_tours_and_no_recipe():
-    strategy = PlannedRate(PlannedRateConfig(pocket=0.2, sight=0.3))
-    scenario = small_plan(ending={"seen_share": 1.0})
-    strategy.reset(scenario, np.random.default_rng(0))
-    assert strategy._plans.config == SharedTourConfig(pocket=0.2, sight=0.3)
-    kind = scenario.kind_of(0)
-    assert strategy.config.recipe(kind) == PlannedRateConfig().recipe(kind)
-    for setting in ("pocket", "sight"):
-        with pytest.raises(SettingError, match=setting):
-            PlannedRateConfig(**{setting: -1.0})

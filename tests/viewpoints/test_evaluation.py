@@ -8,22 +8,25 @@ import numpy as np
 import pytest
 
 from entropy_explore_env.belief.fields import Belief
-from entropy_explore_env.belief.visibility import CONE, cone_of
+from entropy_explore_env.belief.paths.lattice import belief_costs, new_lattice
+from entropy_explore_env.belief.paths.planning import ANY_GOAL, search_paths
+from entropy_explore_env.belief.paths.search import new_search
 from entropy_explore_env.scenarios import BOX
 from entropy_explore_env.settings import RangeSensor
 from entropy_explore_env.viewpoints.evaluation import (
-    Outlook,
-    evaluate_viewpoints,
-    expected_outlook,
+    DriveModel,
     is_line_free,
     new_scratch,
     robot_model,
     sees_all_around,
+    straight_seconds,
+    travel_seconds,
 )
 from entropy_explore_env.viewpoints.expected_scan import new_scan_scratch
-from tests.reference.scenes import random_belief
 
 SIZE = (7, 11, 5)
+WALLED, EDGE_M = (9, 13, 1), 0.5
+DRIVE = DriveModel(1.0, 1.0, math.pi / 2, 0.5, 0.0)
 
 
 def line_free(mean, start, finish, radius):
@@ -46,22 +49,20 @@ def test_lines_leave_room_for_the_body():
     assert line_free(mean, south, south, 3.0)  # nothing is driven
 
 
-def test_a_viewpoint_behind_an_obstacle_is_worth_nothing_unless_the_line_does_not_matter():
+def test_a_viewpoint_behind_an_obstacle_is_never_reached_straight():
     model = robot_model(BOX, BOX.kinds[0])
     scratch = new_scratch(BOX.grid, [model])
     x, y, z = BOX.grid.shape
-    mean, precision = np.zeros(BOX.grid.shape, np.float32), np.full(BOX.grid.shape, 0.01, np.float32)
+    mean = np.zeros(BOX.grid.shape, np.float32)
     mean[:, y // 2] = 1.0
+    belief = Belief(mean.ravel(), mean.ravel(), BOX.grid.shape)
     here = np.array([0.5 * x, 1.5, 0.5 * z, 0.0, 0.0])
     beyond, turned = here.copy(), here.copy()
     beyond[1], turned[3] = y - 1.5, math.pi / 2
-    belief, viewpoints = Belief(mean.ravel(), precision.ravel(), BOX.grid.shape), np.array([beyond, turned])
-    found = expected_outlook(belief, model, here, viewpoints, np.zeros(0, CONE), scratch)
-    assert found.bits[0] == 0.0 and found.bits[1] > 0.0
-    assert found.seconds[0] > found.seconds[1] >= model.drive.scan_time_s
-    anywhere = model._replace(drive=model.drive._replace(line_must_be_free=False))
-    everywhere = expected_outlook(belief, anywhere, here, viewpoints, np.zeros(0, CONE), scratch)
-    assert everywhere.bits[0] > 0.0 and everywhere.bits[1] == found.bits[1]
+    drive, edge_m = model.drive, BOX.grid.voxel_size_m
+    assert math.isinf(straight_seconds(belief, edge_m, drive, here, beyond, scratch))
+    turning = straight_seconds(belief, edge_m, drive, here, turned, scratch)
+    assert turning == pytest.approx(0.5 * math.pi / drive.turn_rate_rad_s + drive.scan_time_s)
 
 
 @pytest.mark.parametrize(("degrees", "all_around"), [(360.0, True), (350.0, True), (340.0, False)])
@@ -70,20 +71,44 @@ def test_a_sensor_sees_all_around_if_its_rays_leave_no_gap(degrees, all_around):
     assert sees_all_around(sensor) == all_around
 
 
-def test_what_is_left_to_teammates_counts_nothing_and_is_forgotten_afterwards():
-    """On the spot, so that no line has to be free; the cone holds all that there is, or nothing."""
-    size = BOX.grid.shape
-    model = robot_model(BOX, BOX.kinds[0])
-    mean, precision = random_belief(size, 3)
-    belief = Belief(mean.reshape(-1), precision.reshape(-1), size)
-    here, scratch = np.array([3.5, 5.5, 2.5]), new_scratch(BOX.grid, [model])
-    viewpoints = np.array([[*here, yaw, 0.0] for yaw in (0.0, 2.0)])
-    everywhere = np.array([cone_of(np.array([*here, 0.0, 0.0]), math.inf, math.pi)])
-    told = []
-    for cones in (np.zeros(0, CONE), everywhere, np.zeros(0, CONE)):
-        outlook = Outlook(np.full(2, np.nan), np.full(2, np.nan))
-        at = np.array([*here, 0.0, 0.0])
-        evaluate_viewpoints(belief, model.scan, model.drive, at, viewpoints, cones, scratch, outlook)
-        told.append(outlook.bits)
-    assert (told[0] > 0.0).all() and (told[1] == 0.0).all()
-    np.testing.assert_array_equal(told[0], told[2])
+@pytest.fixture
+def search():
+    """A robot at (1.5, 1.5); a wall at x = 4 that is open at y = 12."""
+    mean = np.zeros(WALLED, np.float32)
+    mean[4, :12] = 1.0
+    costs = belief_costs(mean, np.full(WALLED, 100.0, np.float32), 1e-3)
+    found, lattice = new_search(mean.size), new_lattice(WALLED)
+    source = np.array([np.ravel_multi_index((1, 1, 0), WALLED)], np.int32)
+    search_paths(found, lattice, costs, source, ANY_GOAL, math.inf)
+    return found
+
+
+def seconds_of(search, viewpoints, reach=math.inf):
+    here = np.array([1.5, 1.5, 0.5, 0.0, 0.0])
+    return [travel_seconds(search, WALLED, DRIVE, EDGE_M, here, np.array(at), reach) for at in viewpoints]
+
+
+def test_seconds_are_those_of_the_longer_of_drive_and_turn_and_of_the_scan(search):
+    stay, turn, ahead, wall = seconds_of(
+        search,
+        [
+            (1.5, 1.5, 0.5, 0.0, 0.0),
+            (1.5, 1.5, 0.5, -math.pi / 2, 0.0),
+            (1.5, 9.5, 0.5, 0.0, 0.0),
+            (4.5, 3.5, 0.5, 0.0, 0.0),
+        ],
+    )
+    assert (stay, turn) == pytest.approx((0.5, 1.5))
+    assert ahead == pytest.approx(4.0 + 1.0 + 0.5)  # 4 m at 1 m/s, and a second for the ramps
+    assert math.isinf(wall)
+
+
+def test_paths_around_corners_are_longer_than_the_straight_line(search):
+    (around,) = seconds_of(search, [(6.5, 1.5, 0.5, 0.0, 0.0)])
+    steps = 2 * (8 + 3 * math.sqrt(2.0)) + 2 - 1  # up to the gap and down again; corners are not cut
+    assert 0.9 * steps * EDGE_M < around - 1.5 < 1.1 * steps * EDGE_M
+
+
+def test_long_paths_take_hops_of_equal_length_with_a_scan_each(search):
+    (hops,) = seconds_of(search, [(1.5, 9.5, 0.5, 0.0, 0.0)], reach=4.0)
+    assert hops == pytest.approx(2 * (2.0 + 1.0 + 0.5))

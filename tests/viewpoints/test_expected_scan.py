@@ -12,12 +12,17 @@ from hypothesis import strategies as st
 from entropy_explore_env.belief.fields import Belief
 from entropy_explore_env.belief.map_update import fuse_scan
 from entropy_explore_env.belief.raycast import longest_crossing
-from entropy_explore_env.belief.visibility import CONE, cone_of, mark_cones
+from entropy_explore_env.belief.visibility import CONE, cone_of
 from entropy_explore_env.robots.range_sensor import Scene, SensorPose, new_scan, sensor_model, take_scan
+from entropy_explore_env.scenarios import BOX
 from entropy_explore_env.settings import Grid, RangeSensor
-from entropy_explore_env.viewpoints.expected_scan import ScanModel, expected_scan_bits, new_scan_scratch
-from entropy_explore_env.viewpoints.gathered_bits import gathered_bits
-from entropy_explore_env.viewpoints.imagined_scan import imagine_scan
+from entropy_explore_env.viewpoints.evaluation import new_scratch, robot_model
+from entropy_explore_env.viewpoints.expected_scan import (
+    ScanModel,
+    expected_bits,
+    fill_expected_bits,
+    new_scan_scratch,
+)
 from tests.reference.scenes import (
     drawn,
     random_cover,
@@ -25,6 +30,7 @@ from tests.reference.scenes import (
 )
 
 SIZE = (7, 11, 5)
+MODEL = robot_model(BOX, BOX.kinds[0], 1, 0.1)
 NO_CONES = np.zeros(0, CONE)
 SENSOR = RangeSensor((math.pi / 3, math.pi / 4), math.pi / 24, sigma_min=0.1, sigma_slope_per_m=0.05)
 
@@ -44,6 +50,7 @@ def model(stop_probability=0.0, known_precision=0.0, rays=1.0, sensor=SENSOR, po
         sensor.voxels_behind,
         known_precision,
         stop_probability,
+        stop_probability,
         np.array(pose_variance, float),
     )
 
@@ -53,10 +60,10 @@ def expected(mean, precision, viewpoint, scan, cones=NO_CONES):
         mean.size, longest_crossing(*SIZE, math.inf, scan.voxels_behind), len(scan.pitches)
     )
     belief = Belief(mean.ravel(), precision.ravel(), SIZE)
-    mark_cones(cones, SIZE, scratch.left, 1)
-    bits = expected_scan_bits(belief, scan, np.asarray(viewpoint, float), scratch)
-    assert not scratch.added.any()
-    return bits
+    viewpoints, bits = np.array([viewpoint], float), np.full(1, np.nan)
+    fill_expected_bits(belief, scan, viewpoints, cones, scratch, bits)
+    assert not scratch.added.any() and not scratch.left.any()
+    return bits[0]
 
 
 @drawn(40)
@@ -64,7 +71,7 @@ def expected(mean, precision, viewpoint, scan, cones=NO_CONES):
     seeds,
     st.floats(-math.pi, math.pi),
     st.floats(-1.2, 1.2),
-    st.integers(0, 2),
+    st.integers(0, 1),
     st.sampled_from([2.0, math.inf]),
     st.sampled_from([0.0, 1.1]),
 )
@@ -116,15 +123,10 @@ def test_no_voxel_is_touched_twice_where_rays_bring_nothing(stop_probability, si
     scratch = new_scan_scratch(voxels, longest_crossing(*SIZE, math.inf, scan.voxels_behind), fine.rows)
     belief = Belief(np.zeros(voxels, np.float32), np.full(voxels, 4.0, np.float32), SIZE)
     viewpoint = np.array([1.5, 5.5, 2.5, 0.3, 0.0])
-    for is_imagined in (False, True):
-        scratch = scratch._replace(touched=np.full(20 * voxels, -1, np.int32))
-        if is_imagined:
-            count = imagine_scan(belief, scan, scan.stop_probability, viewpoint, scratch, 0)
-            gathered_bits(belief, scratch, count)
-        else:
-            expected_scan_bits(belief, scan, viewpoint, scratch)
-        assert (scratch.touched[voxels + 1 :] == -1).all()
-        assert not scratch.added.any()
+    scratch = scratch._replace(touched=np.full(20 * voxels, -1, np.int32))
+    expected_bits(belief, scan, viewpoint, scratch)
+    assert (scratch.touched[voxels + 1 :] == -1).all()
+    assert not scratch.added.any()
 
 
 def test_voxels_left_to_teammates_count_nothing():
@@ -149,3 +151,55 @@ def test_what_an_uncertain_pose_adds_to_the_variance_of_a_ray():
         added = 1.0 / (0.1**2 + off)
         found = expected(mean.astype(np.float32), precision.astype(np.float32), at, scan)
         assert found == pytest.approx(voxels * 0.5 * math.log2(1.0 + added), rel=1e-5)
+
+
+def row_belief(mean_of_second, known=True):
+    """A row of 9 voxels along x: known and free but for the third, with its own mean."""
+    size = (9, 1, 1)
+    mean, precision = np.zeros(9, np.float32), np.full(9, 100.0, np.float32)
+    mean[2] = mean_of_second
+    if not known:
+        precision[2] = 1.0 / 900.0
+    return Belief(mean, precision, size), size
+
+
+def one_ray(size):
+    scan = MODEL.scan._replace(
+        yaws=np.zeros(1), pitches=np.zeros(1), sensor_rays=1.0, max_range_m=4.5, voxels_behind=0
+    )
+    return MODEL._replace(scan=scan), np.array([[0.5, 0.5, 0.5, 0.0, 0.0]])
+
+
+def imagined(belief, viewpoints, gap, model, size):
+    scratch, bits = new_scratch(Grid(size, 0.5), [model]), np.full(len(viewpoints), np.nan)
+    scan = model.scan._replace(gap_probability=gap)
+    fill_expected_bits(belief, scan, viewpoints, NO_CONES, scratch, bits)
+    return bits
+
+
+@pytest.mark.parametrize(("mean", "beyond"), [(0.0, 1.0), (0.1, 0.8), (0.5, 0.0)])
+def test_a_partly_covered_voxel_stops_a_ray_with_twice_its_coverage(mean, beyond):
+    """By hand: 3 voxels with the whole gain, 6 with what gets through."""
+    belief, size = row_belief(mean)
+    model, viewpoint = one_ray(size)
+    gain = (model.scan.sigma_min + model.scan.sigma_slope_per_m * 4.25) ** -2
+    expected = 1.5 * math.log2(1.0 + gain / 100.0) + 3.0 * math.log2(1.0 + beyond * gain / 100.0)
+    assert imagined(belief, viewpoint, 0.9, model, size)[0] == pytest.approx(expected, rel=1e-5)
+
+
+def test_an_unknown_voxel_beside_a_covered_one_hides_what_lies_behind():
+    size = (9, 3, 1)
+    mean, precision = np.zeros(size, np.float32), np.full(size, 100.0, np.float32)
+    mean[4, 0, 0] = mean[4, 2, 0] = 1.0  # a wall, in which the middle was not hit
+    precision[4, 1, 0] = 1.0 / 900.0
+    precision[5:] = 1.0 / 900.0
+    belief = Belief(mean.reshape(-1), precision.reshape(-1), size)
+    model, viewpoint = one_ray(size)
+    viewpoint[0, 1] = 1.5
+    open_wall, closed = (imagined(belief, viewpoint, gap, model, size)[0] for gap in (0.1, 1.0))
+    mean[4, 0, 0] = mean[4, 2, 0] = 0.0
+    no_wall = imagined(belief, viewpoint, 1.0, model, size)[0]
+    assert no_wall == pytest.approx(open_wall, rel=1e-6)
+    gain = (model.scan.sigma_min + model.scan.sigma_slope_per_m * 4.25) ** -2
+    known, unknown = 0.5 * math.log2(1.0 + gain / 100.0), 0.5 * math.log2(1.0 + gain * 900.0)
+    assert closed == pytest.approx(4 * known + unknown, rel=1e-5)

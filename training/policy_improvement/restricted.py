@@ -20,12 +20,10 @@ from entropy_explore_env.frontiers.knowledge import announced_cones, belief_of
 from entropy_explore_env.missions.view import RobotView
 from entropy_explore_env.missions.view_observation import ViewObserver
 from entropy_explore_env.planner.model import Proposer, new_proposers
-from entropy_explore_env.planner.nearby import AROUND_CORNERS
-from entropy_explore_env.planner.thresholds import DISAPPOINTING
+from entropy_explore_env.planner.thresholds import FAILED_SHARE, PATHS_WITHIN
 from entropy_explore_env.scenario import Scenario
-from entropy_explore_env.viewpoints.evaluation import straight_seconds
-from entropy_explore_env.viewpoints.imagined_scan import imagined_bits
-from entropy_explore_env.viewpoints.travel import travel_seconds
+from entropy_explore_env.viewpoints.evaluation import straight_seconds, travel_seconds
+from entropy_explore_env.viewpoints.expected_scan import fill_expected_bits
 
 ACTIONS = Action(kind="discrete", moves="axes", yaws=16, pitches=7)
 """Those of `training.ppo`: 7 moves × 16 yaws × 7 pitches; of planar robots 5 × 16."""
@@ -60,8 +58,7 @@ class RestrictedPlanner:
         places = np.stack([grid.in_grid_units(viewpoint) for viewpoint in viewpoints])
         proposer, belief = self._proposers[view.robot % len(self._proposers)], belief_of(view)
         bits = np.empty(len(places))
-        gap, cones, scratch = proposer.recipe.gap_probability, announced_cones(view), proposer.scratch.scan
-        imagined_bits(belief, proposer.exact, gap, places, cones, scratch, bits)
+        fill_expected_bits(belief, proposer.exact, places, announced_cones(view), proposer.scratch.scan, bits)
         seconds = _seconds(view, proposer, belief, here, places)
         exponent = proposer.recipe.exponent
         worth = np.where(np.isfinite(seconds), bits / np.maximum(seconds, 1e-9) ** exponent, 0.0)
@@ -74,7 +71,7 @@ class RestrictedPlanner:
     def _remember(self, view: RobotView) -> None:
         """Note what brought nothing."""
         latest = self._latest.get(view.robot)
-        if latest is not None and float(view.scan.utility_bits.sum()) < DISAPPOINTING * latest[1]:
+        if latest is not None and float(view.scan.utility_bits.sum()) < FAILED_SHARE * latest[1]:
             self._tried.setdefault(view.robot, set()).add(latest[0])
 
 
@@ -82,19 +79,20 @@ def _seconds(
     view: RobotView, proposer: Proposer, belief: Belief, here: np.ndarray, places: np.ndarray
 ) -> np.ndarray:
     """(K,) seconds until scans at viewpoints (K, 5), grid units; inf = there is no path."""
-    edge_m, scratch, seconds = view.scenario.grid.voxel_size_m, proposer.scratch, np.empty(len(places))
+    edge_m, scratch, drive = view.scenario.grid.voxel_size_m, proposer.scratch, proposer.drive
     if not proposer.planned:
-        straight_seconds(belief, edge_m, proposer.drive, here, places, scratch.scan, seconds)
-        return seconds
+        return np.array(
+            [straight_seconds(belief, edge_m, drive, here, place, scratch.scan) for place in places]
+        )
     no_fly, prior = view.no_fly_mask(), view.scenario.sigma_prior**-2
     no_fly = None if no_fly is None else no_fly.reshape(-1)
     costs = belief_costs(belief.mean, belief.precision, prior, proposer.unknown_cost, no_fly)
     at = np.clip(here[:3].astype(np.int64), 0, np.array(belief.size) - 1)
     source = np.array([np.ravel_multi_index(tuple(at), belief.size)], np.int32)
-    farthest = AROUND_CORNERS * proposer.within + 1.0
+    farthest = PATHS_WITHIN * proposer.within + 1.0
     search_paths(scratch.search, proposer.lattice, costs, source, ANY_GOAL, farthest)
-    travel_seconds(scratch.search, belief.size, proposer.drive, edge_m, here, places, math.inf, seconds)
-    return seconds
+    search, size = scratch.search, belief.size
+    return np.array([travel_seconds(search, size, drive, edge_m, here, place, math.inf) for place in places])
 
 
 def _key(viewpoint: np.ndarray) -> tuple[float, ...]:

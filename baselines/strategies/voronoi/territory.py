@@ -30,7 +30,7 @@ from entropy_explore_env.viewpoints.evaluation import (
     robot_model,
     sees_all_around,
 )
-from entropy_explore_env.viewpoints.imagined_scan import imagined_bits
+from entropy_explore_env.viewpoints.expected_scan import fill_expected_bits
 
 Control = Literal["projected-centroid", "gradient-search", "nearest"]
 Metric = Literal["entropy", "length"]
@@ -187,8 +187,7 @@ class Territory:
         drawn = np.tile(grid.in_grid_units(viewpoint), (len(gazes), 1))
         drawn[:, 3:] = gazes
         bits, no_cones = np.empty(len(drawn)), np.zeros(0, CONE)
-        gap = model.scan.stop_probability
-        imagined_bits(belief_of(view), model.scan, gap, drawn, no_cones, self._scratch, bits)
+        fill_expected_bits(belief_of(view), model.scan, drawn, no_cones, self._scratch, bits)
         viewpoint[3:] = gazes[int(np.argmax(bits))]
         return viewpoint
 

@@ -59,6 +59,14 @@ def scene_of(plan, robot, target=NONE, block=BLOCK):
     return Scene(view, cells, paths, here, target)  # type: ignore[arg-type]
 
 
+def varied(rule, **settings):
+    """The rule with other settings than those of its class."""
+    for name, value in settings.items():
+        assert hasattr(rule, name)
+        setattr(rule, name, value)
+    return rule
+
+
 def cell(plan, voxel):
     x, y = np.unravel_index(voxel, plan.shape)
     return int(x), int(y)

@@ -78,24 +78,10 @@ def test_lazily_is_as_eagerly_in_plans(metric, allocation):
     assert all(lazy.idle) and done[1][-1] > 0.99
 
 
-@pytest.mark.parametrize("robots", [1, 3])
-def test_lazily_is_as_eagerly_with_scans_on_the_path(robots):
-    plan = small_plan(
-        robots=robots,
-        robot={"reach_m": math.inf, "body_radius_m": 0.0, "unknown_cost": 1e4, "redecide": "on_scan"},
-        sensor={"max_range_m": 1.5, "angular_step_rad": math.pi / 90, "scan_every_m": 0.4},
-    )
-    _, lazy, done = explored(plan, 1, path_scans=3)
-    _, eager, same = explored(plan, 1, path_scans=3, lazy=False)
-    assert done == same and lazy.counted() < eager.counted()
-    assert done != explored(plan, 1)[2]
-
-
 @pytest.mark.parametrize(
     "settings",
     [
         {},
-        {"path_scans": 2},
         {"frontiers": FrontierConfig(gamma=None)},
         {"metric": Metric(60.0)},
         {"frontiers": FrontierConfig(visibility="naive")},
@@ -244,12 +230,6 @@ def test_bodies_and_a_short_reach_explore_an_office():
         (ExplorationConfig, {"metric": None}, "ExplorationConfig.metric"),
         (ExplorationConfig, {"metric": "V/t"}, "ExplorationConfig.metric"),
         (ExplorationConfig, {"metric": Metric}, "ExplorationConfig.metric"),
-        (ExplorationConfig, {"path_scans": -1}, "ExplorationConfig.path_scans"),
-        (
-            ExplorationConfig,
-            {"path_scans": 1, "frontiers": FrontierConfig(visibility="naive")},
-            "ExplorationConfig.path_scans",
-        ),
         (FrontierStrategy, {"config": "V/t"}, "config"),
         (FrontierConfig, {"sigma": 0.0}, "FrontierConfig.sigma"),
         (FrontierConfig, {"spacing_m": 0.0}, "FrontierConfig.spacing_m"),

@@ -8,7 +8,7 @@ import pytest
 from entropy_explore_env import EntropyExploreVectorEnv
 from entropy_explore_env.belief.visibility import CONE, cone_of
 from entropy_explore_env.missions.view import view_of
-from entropy_explore_env.planner.candidate_features import COLUMNS, CONTEXT_COLUMNS, FEATURES
+from entropy_explore_env.planner.candidate_features import COLUMNS, CONTEXT, CONTEXT_COLUMNS, FEATURES
 from entropy_explore_env.planner.recipe import recipe_for
 from entropy_explore_env.planner.records import Kind
 from tests.reference import rocha04
@@ -255,3 +255,9 @@ def test_the_context_says_what_is_true_of_all(moments):
         near = sum(b for i, b in moment.blocks.items() if np.abs(np.array(i) - block).max() <= 1)
         assert moment.about("around") == pytest.approx(near / sum(moment.blocks.values()), abs=1e-5)
         assert len(FEATURES) == moment.rows.shape[1]
+
+
+@pytest.mark.parametrize(("table", "columns"), [(FEATURES, COLUMNS), (CONTEXT, CONTEXT_COLUMNS)])
+def test_columns_number_the_names_of_the_table(table, columns):
+    assert [columns[feature.name] for feature in table] == list(range(len(table)))
+    assert all(feature.meaning and feature.least in (-1.0, 0.0) for feature in table)

@@ -1,6 +1,5 @@
 """What candidates see and what a robot learns, computed by hand; candidates in beliefs drawn at random."""
 
-import dataclasses
 import math
 
 import numpy as np
@@ -14,26 +13,19 @@ from entropy_explore_env.belief.paths.search import new_search
 from entropy_explore_env.belief.visibility import CONE
 from entropy_explore_env.localization_settings import Localization
 from entropy_explore_env.planner.candidate_features import COLUMNS
-from entropy_explore_env.planner.model import MATE, new_proposers
+from entropy_explore_env.planner.memory import chosen_number, learn, trust_in, weigh_time
+from entropy_explore_env.planner.model import Situation, new_proposers
 from entropy_explore_env.planner.propose import propose
 from entropy_explore_env.planner.recipe import ALL_AROUND, NARROW_PLANNED, NARROW_STRAIGHT, recipe_for
-from entropy_explore_env.planner.records import CANDIDATE, EXPERIENCE, Kind
-from entropy_explore_env.planner.situation import (
-    LastDecision,
-    Situation,
-    chosen_number,
-    learn,
-    trust_in,
-    weigh_time,
-)
-from entropy_explore_env.planner.thresholds import EDGES
+from entropy_explore_env.planner.records import CANDIDATE, EXPERIENCE, KNOWLEDGE, MATE, Kind
+from entropy_explore_env.planner.thresholds import REMEMBERED_EDGES
 from entropy_explore_env.planner.views import clear_marks, look_from, mark_view
 from entropy_explore_env.robots.motion import MoveEnd
 from entropy_explore_env.scenario import with_settings
 from entropy_explore_env.scenarios import BOX
 from entropy_explore_env.settings import Grid, RangeSensor
 from entropy_explore_env.viewpoints.evaluation import is_line_free, new_scratch, robot_model
-from entropy_explore_env.viewpoints.imagined_scan import imagined_bits
+from entropy_explore_env.viewpoints.expected_scan import fill_expected_bits
 from tests.reference.scenes import drawn, free_box, put, random_belief, seeds, started
 
 SIZE, MOST = (7, 11, 5), 6
@@ -54,7 +46,7 @@ def unknown_world():
     experience = np.zeros(1, EXPERIENCE)[0]
     belief = Belief(mean.reshape(-1), precision.reshape(-1), SIZE)
     nobody = np.zeros(0, CONE), np.zeros(0, MATE)
-    return precision, Situation(belief, costs, ALONG_X.copy(), *nobody, experience, 0.0)
+    return precision, Situation(knowledge(ALONG_X, 0.0), belief, costs, *nobody, experience)
 
 
 def test_one_ray_through_seven_unknown_voxels():
@@ -88,13 +80,13 @@ def test_where_a_mission_ends_by_what_is_seen_known_voxels_bring_nothing():
     by_seen = with_settings(ONE_RAY, {"ending": {"seen_share": 1.0}, "track_truth": True})
     bits = {}
     for scenario in (ONE_RAY, by_seen):
-        recipe = dataclasses.replace(recipe_for(scenario.kinds[0]), thinning=1, stop_probability=0.0)
+        recipe = recipe_for(scenario.kinds[0])._replace(stop_probability=0.0, gap_probability=0.0)
         proposer = new_proposers(scenario, {0: recipe})[0]
         precision, situation = unknown_world()
         precision[:4, 5, 2] = 100.0
         viewpoint, found = ALONG_X[None], np.zeros(1)
         scan = proposer.exact
-        imagined_bits(situation.belief, scan, 0.0, viewpoint, situation.cones, proposer.scratch.scan, found)
+        fill_expected_bits(situation.belief, scan, viewpoint, situation.cones, proposer.scratch.scan, found)
         sensor = scenario.sensor
         gain = (sensor.sigma_min + sensor.sigma_slope_per_m * 3.25) ** -2
         bits[scenario.ending.by_seen] = found[0]
@@ -112,30 +104,35 @@ def test_there_a_scan_failed_if_what_it_was_to_show_is_still_unknown(known, fail
     precision, situation = unknown_world()
     candidates = np.zeros(MOST, CANDIDATE)
     for part in (False, True):
-        last = decision(ALONG_X, 1e6 if part else 0.0)
-        propose(proposer, situation, last, candidates, False)
+        last = knowledge(ALONG_X, 1e6 if part else 0.0)
+        propose(proposer, situation._replace(knowledge=last), candidates, False)
         assert situation.experience["failures"] == (failures if part else 0)
         scan, found = proposer.exact, np.zeros(1)
-        imagined_bits(
-            situation.belief, scan, 0.9, ALONG_X[None], situation.cones, proposer.scratch.scan, found
+        fill_expected_bits(
+            situation.belief, scan, ALONG_X[None], situation.cones, proposer.scratch.scan, found
         )
-        candidates[0]["viewpoint"] = [*(0.5 * ALONG_X[:3]), *ALONG_X[3:]]
+        candidates[0]["viewpoint"] = ALONG_X
         candidates[0]["kind"], candidates[0]["bits"] = Kind.SPOT, found[0]
         if known:
             precision[:] = 100.0
 
 
-def decision(target, came_bits, move_end=MoveEnd.ARRIVED, under_way=False, uncertain=False, **so_far):
-    target = np.asarray(target, float)
-    in_metres = np.concatenate([0.5 * target[:3], target[3:]])
-    time_s, gained_bits = so_far.get("time_s", 0.0), so_far.get("gained_bits", 0.0)
-    came = (came_bits, move_end.code, under_way, uncertain)
-    return LastDecision(target, in_metres, 0.5, *came, time_s, gained_bits)
+def knowledge(target, came_bits, move_end=MoveEnd.ARRIVED, here=ALONG_X, uncertain=False, **others):
+    """What a robot knows after a drive to a target; the rest is 0 unless given."""
+    known = np.zeros(1, KNOWLEDGE)[0]
+    known["target"], known["pose"], known["came_bits"] = target, here, came_bits
+    known["move_end"], known["place_variance"] = move_end.code, 0.1 * uncertain
+    for name, value in others.items():
+        known[name] = value
+    return known
 
 
-def learned(experience, candidates, last, here):
-    """As where all bits count."""
-    learn(experience, candidates, last, chosen_number(candidates, last), last.came_bits, here, RADIUS)
+def learned(experience, candidates, here, *args, **others):
+    """Learn from what a robot at `here` knows, as where all bits count; see `knowledge`."""
+    known = knowledge(*args, here=here, **others)
+    number = chosen_number(candidates, known["target"])
+    learn(experience, candidates, known, number, known["came_bits"], RADIUS)
+    return known
 
 
 @pytest.fixture
@@ -143,7 +140,7 @@ def proposed():
     """What was proposed: a gaze that should bring 50 bits, and the first stop on the way to a far place."""
     candidates, experience = np.zeros(MOST, CANDIDATE), np.zeros(1, EXPERIENCE)[0]
     for number, (at, kind) in enumerate([(ALONG_X, Kind.SPOT), (BACK, Kind.FAR)]):
-        candidates[number]["viewpoint"] = [*(0.5 * at[:3]), *at[3:]]
+        candidates[number]["viewpoint"] = at
         candidates[number]["goal"], candidates[number]["kind"] = at + np.array([0, 2, 0, 0, 0]), kind
         candidates[number]["bits"] = 50.0
     return candidates, experience
@@ -151,48 +148,47 @@ def proposed():
 
 def test_what_brought_a_tenth_or_more_is_no_failure(proposed):
     candidates, experience = proposed
-    learned(experience, candidates, decision(ALONG_X, 5.0), ALONG_X)
+    learned(experience, candidates, ALONG_X, ALONG_X, 5.0)
     assert experience["failures"] == 0 and not experience["going"]
     assert trust_in(experience, False, ALONG_X) == 1.0
 
 
 @pytest.mark.parametrize(("most", "scans", "failures"), [(2600.0, 64, 1), (2600.0, 63, 0), (2400.0, 64, 0)])
-def test_after_many_poor_scans_from_one_place_half_of_what_was_expected_is_asked(
+def test_after_many_low_gain_scans_from_one_place_half_of_what_was_expected_is_asked(
     proposed, most, scans, failures
 ):
     """50 bits are poor where more than 2,500 were ever expected; 24 of them came each time."""
     candidates, experience = proposed
     experience["most_bits"] = most
     for _ in range(scans):
-        learned(experience, candidates, decision(ALONG_X, 24.0), ALONG_X)
+        learned(experience, candidates, ALONG_X, ALONG_X, 24.0)
     assert experience["failures"] == failures
     assert trust_in(experience, True, ALONG_X) == pytest.approx(24.0 / 50.0 if failures else 1.0)
 
 
-def test_poor_scans_are_counted_from_where_a_robot_went_last(proposed):
+def test_low_gain_scans_are_counted_from_where_a_robot_went_last(proposed):
     candidates, experience = proposed
     experience["most_bits"] = 2600.0
     step = np.array([0.0, 0.4, 0.0, 0.0, 0.0])
     counts = []
     for at in (ALONG_X, ALONG_X, ALONG_X + step, ALONG_X + 2 * step, ALONG_X + 3 * step, ALONG_X):
-        learned(experience, candidates, decision(at, 30.0), at)
-        counts.append(int(experience["poor_scans"]))
+        learned(experience, candidates, at, at, 30.0)
+        counts.append(int(experience["low_gain_scans"]))
     assert counts == [1, 2, 3, 4, 1, 1]
     candidates["bits"] = 60.0
-    learned(experience, candidates, decision(ALONG_X, 30.0), ALONG_X)
-    assert experience["poor_scans"] == 0
+    learned(experience, candidates, ALONG_X, ALONG_X, 30.0)
+    assert experience["low_gain_scans"] == 0
 
 
-def test_many_poor_scans_count_until_one_is_not_poor_wherever_the_robot_goes(proposed):
+def test_many_low_gain_scans_count_until_one_is_not_poor_wherever_the_robot_goes(proposed):
     """And as long as they do, it chooses by the plain rate, c = 1."""
     candidates, experience = proposed
     experience["most_bits"] = 2600.0
     proposer = new_proposers(ONE_RAY, {0: ALL_AROUND})[0]
 
     def exponent_after(at):
-        last = decision(at, 30.0, time_s=1.0, gained_bits=30.0)
-        learned(experience, candidates, last, at)
-        weigh_time(proposer, experience, last)
+        last = learned(experience, candidates, at, at, 30.0, time_s=1.0, gained_bits=30.0)
+        weigh_time(proposer.recipe, experience, last)
         return float(experience["exponent"])
 
     assert [exponent_after(ALONG_X) for _ in range(64)] == [1.15] * 63 + [1.0]
@@ -203,23 +199,23 @@ def test_many_poor_scans_count_until_one_is_not_poor_wherever_the_robot_goes(pro
 
 def test_what_brought_less_is_remembered_until_it_is_far_behind(proposed):
     candidates, experience = proposed
-    learned(experience, candidates, decision(ALONG_X, 4.0), ALONG_X)
+    learned(experience, candidates, ALONG_X, ALONG_X, 4.0)
     assert experience["failures"] == 1
     alike, turned = ALONG_X + np.array([0.5, 0, 0, 0.05, 0]), ALONG_X + np.array([0, 0, 0, 0.2, 0])
     assert trust_in(experience, False, alike) == pytest.approx(4.0 / 50.0)
     assert trust_in(experience, False, turned) == 1.0
     assert trust_in(experience, True, turned) == pytest.approx(4.0 / 50.0)
     away = ALONG_X + np.array([6.1, 0, 0, 0, 0])
-    learned(experience, candidates, decision(away, 60.0), away)
+    learned(experience, candidates, away, away, 60.0)
     assert experience["failures"] == 0
 
 
 def test_a_drive_that_was_cut_short_loses_its_goal_and_its_trust(proposed):
     candidates, experience = proposed
-    learned(experience, candidates, decision(BACK, 60.0), BACK)
+    learned(experience, candidates, BACK, BACK, 60.0)
     assert experience["going"] and experience["goal"].tolist() == (BACK + np.array([0, 2, 0, 0, 0])).tolist()
     short = BACK - np.array([2.0, 0, 0, 0, 0])
-    learned(experience, candidates, decision(BACK, 60.0, MoveEnd.TEAMMATE), short)
+    learned(experience, candidates, short, BACK, 60.0, MoveEnd.TEAMMATE)
     assert not experience["going"] and experience["blocked"] == 4
     assert trust_in(experience, False, BACK) == 0.0
 
@@ -227,37 +223,35 @@ def test_a_drive_that_was_cut_short_loses_its_goal_and_its_trust(proposed):
 def test_where_the_ground_ended_is_remembered_just_beyond_the_body(proposed):
     candidates, experience = proposed
     short = np.array([3.5, 5.5, 2.5, 0.0, 0.0])
-    learned(experience, candidates, decision(BACK, 60.0, MoveEnd.EDGE), short)
+    learned(experience, candidates, short, BACK, 60.0, MoveEnd.EDGE)
     assert experience["edges"] == 1
     np.testing.assert_allclose(experience["edge_at"][0], (3.5 + 2.5, 5.5, 2.5))
     aslant = short + np.array([3.0, 4.0, 0, 0, 0])
-    for _ in range(EDGES):  # the 65th takes the place of the first
-        learned(experience, candidates, decision(aslant, 60.0, MoveEnd.EDGE), short)
+    for _ in range(REMEMBERED_EDGES):  # the 65th takes the place of the first
+        learned(experience, candidates, short, aslant, 60.0, MoveEnd.EDGE)
     np.testing.assert_allclose(experience["edge_at"][0], (3.5 + 0.6 * 2.5, 5.5 + 0.8 * 2.5, 2.5))
-    learned(
-        experience, candidates, decision(short, 60.0, MoveEnd.EDGE), short
-    )  # it went nowhere: no direction
-    assert experience["edges"] == EDGES + 1
+    learned(experience, candidates, short, short, 60.0, MoveEnd.EDGE)  # it went nowhere: no direction
+    assert experience["edges"] == REMEMBERED_EDGES + 1
 
 
 def test_who_drives_on_judges_nothing_and_keeps_its_goal(proposed):
     candidates, experience = proposed
-    learned(experience, candidates, decision(BACK, 0.0, under_way=True), ALONG_X)
+    learned(experience, candidates, ALONG_X, BACK, 0.0, under_way=True)
     assert experience["going"] and experience["failures"] == 0
 
 
 def test_who_is_under_way_beyond_reach_keeps_its_goal_until_it_stops(proposed):
     """Its target was pulled within reach when it was proposed again, so that it is like no candidate."""
     candidates, experience = proposed
-    learned(experience, candidates, decision(BACK, 60.0), BACK)
+    learned(experience, candidates, BACK, BACK, 60.0)
     goal = experience["goal"].tolist()
     beyond = BACK + np.array([0, 4.0, 0, 0, 0])
-    learned(experience, candidates, decision(beyond, 0.0, under_way=True), ALONG_X)
+    learned(experience, candidates, ALONG_X, beyond, 0.0, under_way=True)
     assert experience["going"] and experience["goal"].tolist() == goal
-    learned(experience, candidates, decision(ALONG_X, 0.0, under_way=True), ALONG_X)
+    learned(experience, candidates, ALONG_X, ALONG_X, 0.0, under_way=True)
     assert not experience["going"]  # it chose a gaze nearby instead
-    learned(experience, candidates, decision(BACK, 60.0), BACK)
-    learned(experience, candidates, decision(beyond, 60.0), beyond)
+    learned(experience, candidates, BACK, BACK, 60.0)
+    learned(experience, candidates, beyond, beyond, 60.0)
     assert not experience["going"]
 
 
@@ -265,17 +259,17 @@ def test_who_is_under_way_beyond_reach_keeps_its_goal_until_it_stops(proposed):
 def test_who_drifts_is_where_it_meant_to_be_if_nothing_cut_its_drive_short(proposed, end):
     candidates, experience = proposed
     off = BACK + np.array([-0.3, 0.2, 0, 0.01, 0])
-    learned(experience, candidates, decision(BACK, 60.0, end, uncertain=True), off)
+    learned(experience, candidates, off, BACK, 60.0, end, uncertain=True)
     assert experience["going"] and experience["failures"] == 0
-    learned(experience, candidates, decision(BACK, 4.0, end, uncertain=True), off)
+    learned(experience, candidates, off, BACK, 4.0, end, uncertain=True)
     assert trust_in(experience, False, BACK) == pytest.approx(4.0 / 50.0)
-    learned(experience, candidates, decision(BACK, 60.0, MoveEnd.OBSTACLE, uncertain=True), off)
+    learned(experience, candidates, off, BACK, 60.0, MoveEnd.OBSTACLE, uncertain=True)
     assert not experience["going"] and trust_in(experience, False, BACK) == 0.0
 
 
 def test_who_does_not_drift_is_judged_by_where_it_stands(proposed):
     candidates, experience = proposed
-    learned(experience, candidates, decision(BACK, 60.0, MoveEnd.CORNERS), BACK - np.array([0.3, 0, 0, 0, 0]))
+    learned(experience, candidates, BACK - np.array([0.3, 0, 0, 0, 0]), BACK, 60.0, MoveEnd.CORNERS)
     assert not experience["going"] and trust_in(experience, False, BACK) == 0.0
 
 
@@ -322,8 +316,8 @@ def test_nothing_is_remembered_of_free_drives_with_drift():
 
 
 def fail_at(candidates, experience, target, came_bits=1.0):
-    candidates[0]["viewpoint"] = [*(0.5 * target[:3]), *target[3:]]
-    learned(experience, candidates, decision(target, came_bits), target)
+    candidates[0]["viewpoint"] = target
+    learned(experience, candidates, target, target, came_bits)
 
 
 def test_more_failures_than_are_remembered_push_out_the_oldest(proposed):
@@ -357,8 +351,8 @@ def test_robots_leave_where_a_decision_brings_a_tenth_of_the_mean_rate(proposed)
 
     def exponent_after(bits, under_way=False):
         experience["decided_s"], experience["decided_bits"] = 8.0, 1000.0 - bits
-        came = decision(ALONG_X, 7.0, under_way=under_way, time_s=10.0, gained_bits=1000.0)
-        weigh_time(proposer, experience, came)
+        came = knowledge(ALONG_X, 7.0, under_way=under_way, time_s=10.0, gained_bits=1000.0)
+        weigh_time(proposer.recipe, experience, came)
         return experience["exponent"], experience["decided_s"], experience["decided_bits"]
 
     assert exponent_after(20.0) == (2.2, 10.0, 1000.0)
@@ -371,12 +365,12 @@ def test_robots_leave_where_a_decision_brings_a_tenth_of_the_mean_rate(proposed)
 
 
 def test_a_recipe_with_a_small_exponent_keeps_it_when_a_robot_leaves(proposed):
-    recipe = dataclasses.replace(NARROW_STRAIGHT, exponent=0.7)
+    recipe = NARROW_STRAIGHT._replace(exponent=0.7)
     proposer, experience = new_proposers(ONE_RAY, {0: recipe})[0], proposed[1]
-    weigh_time(proposer, experience, decision(ALONG_X, 0.0, time_s=10.0, gained_bits=0.0))
+    weigh_time(proposer.recipe, experience, knowledge(ALONG_X, 0.0, time_s=10.0, gained_bits=0.0))
     assert experience["exponent"] == 0.7
-    weigh_time(proposer, experience, decision(ALONG_X, 0.0, time_s=20.0, gained_bits=1.0))
-    weigh_time(proposer, experience, decision(ALONG_X, 0.0, time_s=30.0, gained_bits=1.0))
+    weigh_time(proposer.recipe, experience, knowledge(ALONG_X, 0.0, time_s=20.0, gained_bits=1.0))
+    weigh_time(proposer.recipe, experience, knowledge(ALONG_X, 0.0, time_s=30.0, gained_bits=1.0))
     assert experience["exponent"] == 0.7
 
 

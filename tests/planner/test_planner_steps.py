@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 
 import numpy as np
@@ -11,14 +10,14 @@ import pytest
 from entropy_explore_env.belief.fields import Belief
 from entropy_explore_env.belief.paths.lattice import belief_costs
 from entropy_explore_env.belief.visibility import CONE
+from entropy_explore_env.planner.choice import choose
 from entropy_explore_env.planner.far import first_stop, propose_far
-from entropy_explore_env.planner.model import MATE, new_proposers
-from entropy_explore_env.planner.nearby import draw_nearby, evaluate, propose_nearby, start_paths
+from entropy_explore_env.planner.memory import trust_and_clearance, worth_bits
+from entropy_explore_env.planner.model import Situation, new_proposers
+from entropy_explore_env.planner.nearby import propose_nearby, start_paths
 from entropy_explore_env.planner.recipe import ALL_AROUND, NARROW_PLANNED, NARROW_STRAIGHT
-from entropy_explore_env.planner.records import EXPERIENCE, Kind
-from entropy_explore_env.planner.selection import choose
-from entropy_explore_env.planner.situation import Situation, trust_and_clearance, worth_bits
-from entropy_explore_env.planner.thresholds import STALE
+from entropy_explore_env.planner.records import EXPERIENCE, KNOWLEDGE, MATE, Kind
+from entropy_explore_env.planner.states import PlannerState
 from entropy_explore_env.scenario import with_settings
 from entropy_explore_env.scenarios import BOX, OFFICE
 from entropy_explore_env.settings import Grid
@@ -35,6 +34,7 @@ PLAN = with_settings(
 )
 HERE = np.array([10.5, 5.5, 0.5, 0.3, 0.0])
 UNKNOWN = 1.0 / 900.0
+EXPLORING = int(PlannerState.EXPLORING)
 
 
 def situation_of(scenario, mean, precision, here=HERE, mates=(), most_bits=0.0):
@@ -49,7 +49,9 @@ def situation_of(scenario, mean, precision, here=HERE, mates=(), most_bits=0.0):
     unknown_cost = scenario.robot.unknown_cost
     costs = belief_costs(mean, precision, scenario.sigma_prior**-2, unknown_cost, np.zeros(len(mean), bool))
     belief = Belief(mean, precision, scenario.grid.shape)
-    return Situation(belief, costs, here.copy(), np.zeros(0, CONE), heard, experience, 0.0)
+    knowledge = np.zeros(1, KNOWLEDGE)[0]
+    knowledge["pose"] = here
+    return Situation(knowledge, belief, costs, np.zeros(0, CONE), heard, experience)
 
 
 def half_known_plan(**changes):
@@ -65,23 +67,23 @@ def test_nearby_viewpoints_of_a_flying_robot_lie_within_reach_and_inside():
     proposer, here = new_proposers(box)[0], np.array([3.2, 5.1, 2.4, 0.3, -0.2])
     situation = situation_of(box, np.full(shape, 0.5), np.full(shape, UNKNOWN), here)
     pool, size = proposer.scratch.pool, propose_nearby(proposer, situation)
-    viewpoints = pool.viewpoints[:size]
+    viewpoints = pool["viewpoint"][:size]
     apart = np.linalg.norm(viewpoints[:, :3] - here[:3], axis=1)
     assert 0.0 < apart.max() <= 2.0 * (1 + 1e-9) and (viewpoints[:, :3] > 0.0).all()
     assert (viewpoints[:, :3] < shape).all() and np.abs(viewpoints[:, 3]).max() <= math.pi
-    assert (pool.kinds[:size] == np.where(apart == 0.0, Kind.SPOT, Kind.NEAR)).all()
-    assert (pool.bits[:size] > 0.0).any() and (pool.seconds[:size] >= BOX.sensor.scan_time_s).all()
+    assert (pool["kind"][:size] == np.where(apart == 0.0, Kind.SPOT, Kind.NEAR)).all()
+    assert (pool["bits"][:size] > 0.0).any() and (pool["seconds"][:size] >= BOX.sensor.scan_time_s).all()
 
 
 def test_refining_never_loses_the_best():
     best = []
     for refinements in (0, 1, 2, 3):
-        recipe = dataclasses.replace(ALL_AROUND, refinements=refinements)
+        recipe = ALL_AROUND._replace(refinements=refinements)
         proposer, situation = new_proposers(PLAN, {0: recipe})[0], half_known_plan()
         situation.experience["exponent"] = 0.3
         start_paths(proposer, situation)
         propose_nearby(proposer, situation)
-        best.append(proposer.scratch.pool.values[proposer.scratch.found[0]])
+        best.append(proposer.scratch.pool["value"][proposer.scratch.order[0]])
     assert best == sorted(best) and best[-1] > best[0]
 
 
@@ -92,47 +94,47 @@ def far():
     experience = situation.experience
     experience["going"], experience["goal"] = True, (40.5, 30.5, 0.5, 0.3, 0.0)
     start_paths(proposer, situation)
-    count, best = propose_far(proposer, situation, math.inf)
+    count, best = propose_far(proposer, situation, EXPLORING, math.inf)
     return proposer, situation, count, best
 
 
 def test_far_places_are_known_near_what_is_unknown_and_the_goal_is_last(far):
     proposer, situation, count, best = far
     places = proposer.scratch.far
-    np.testing.assert_array_equal(places.viewpoints[count - 1], situation.experience["goal"])
-    assert 4 < count <= ALL_AROUND.far_places + 1 and best == places.values[:count].max() > 0.0
-    assert np.isfinite(places.seconds[:count]).all() and (places.viewpoints[:count, 3] == 0.3).all()
-    frontier_block = places.viewpoints[: count - 1, 1]  # unknown is what lies beyond y = 20
+    np.testing.assert_array_equal(places["viewpoint"][count - 1], situation.experience["goal"])
+    assert 4 < count <= ALL_AROUND.far_places + 1 and best == places["value"][:count].max() > 0.0
+    assert np.isfinite(places["seconds"][:count]).all() and (places["viewpoint"][:count, 3] == 0.3).all()
+    frontier_block = places["viewpoint"][: count - 1, 1]  # unknown is what lies beyond y = 20
     assert (frontier_block > 10.0).all() and (frontier_block < 20.0).all()
-    straight = np.linalg.norm(places.viewpoints[:count, :3] - HERE[:3], axis=1) * 0.1
-    assert (places.seconds[:count] > straight / PLAN.robot.max_speed_m_s).all()
+    straight = np.linalg.norm(places["viewpoint"][:count, :3] - HERE[:3], axis=1) * 0.1
+    assert (places["seconds"][:count] > straight / PLAN.robot.max_speed_m_s).all()
 
 
-def best_far(far_places, near_bits, failed=(), poor_scans=STALE):
+def best_far(far_places, near_bits, failed=(), state=PlannerState.DEPLETED):
     """Value, bits and place of the best far viewpoint, where some places have failed before."""
-    proposer = new_proposers(PLAN, {0: dataclasses.replace(ALL_AROUND, far_places=far_places)})[0]
+    proposer = new_proposers(PLAN, {0: ALL_AROUND._replace(far_places=far_places)})[0]
     situation = half_known_plan(most_bits=1e9)
     experience = situation.experience
     for number, place in enumerate(failed):
         experience["failed"][number, :3] = place
-    experience["failures"], experience["poor_scans"] = len(failed), poor_scans
+    experience["failures"] = len(failed)
     start_paths(proposer, situation)
-    count, best = propose_far(proposer, situation, near_bits)
+    count, best = propose_far(proposer, situation, int(state), near_bits)
     places = proposer.scratch.far
-    number = int(np.argmax(places.values[:count]))
-    assert best == places.values[number]
-    return best, places.bits[number], places.viewpoints[:count, :3].copy(), number
+    number = int(np.argmax(places["value"][:count]))
+    assert best == places["value"][number]
+    return best, places["bits"][number], places["viewpoint"][:count, :3].copy(), number
 
 
 def test_where_what_promises_most_brings_nothing_places_that_promise_less_are_looked_at():
     """Two places are evaluated at a time; both fail, so the next two are, and so on."""
     _, bits, first, _ = best_far(2, near_bits=0.0)
     assert bits > 0.0
-    poor, plenty = 0.0, 1e9  # less, and not less, than a fiftieth of the most bits
+    little, plenty = 0.0, 1e9  # less, and not less, than a fiftieth of the most bits
     nothing, _, places, _ = best_far(2, plenty, first)
     assert nothing == 0.0 and (places == first).all()
-    assert best_far(2, poor, first, STALE - 1)[0] == 0.0
-    value, bits, places, number = best_far(2, poor, first)
+    assert best_far(2, little, first, EXPLORING)[0] == 0.0
+    value, bits, places, number = best_far(2, little, first)
     everywhere = best_far(ALL_AROUND.far_places, plenty, first)
     assert 0.0 < bits and value <= everywhere[0]
     assert not (places[number] == first).all(axis=1).any()
@@ -162,15 +164,15 @@ def test_robots_that_drive_straight_stop_on_the_straight_part_of_the_path():
     straight = with_settings(PLAN, {"robot": {"navigator": "straight"}})
     proposer, situation = new_proposers(straight)[0], half_known_plan(most_bits=1e9)
     start_paths(proposer, situation)
-    propose_far(proposer, situation, math.inf)
+    propose_far(proposer, situation, EXPLORING, math.inf)
     stop = np.zeros(5)
     assert first_stop(proposer, situation, np.array([10.5, 40.5, 0.5, 0.0, 0.0]), stop)
     np.testing.assert_allclose(stop[:3], (10.5, 5.5 + 15.0, 0.5), rtol=1e-5)
 
 
 def test_what_any_scan_brings_is_worth_next_to_nothing():
-    """Of 1,000 bits at most, 0.25 % is dregs: the first 2.5 of any scan."""
-    dull = new_proposers(PLAN, {0: dataclasses.replace(NARROW_PLANNED, dregs=0.0025)})[0]
+    """Of 1,000 bits at most, 0.25 % is what known ground brings: the first 2.5 of any scan."""
+    dull = new_proposers(PLAN, {0: NARROW_PLANNED._replace(known_ground_share=0.0025)})[0]
     plain, situation = new_proposers(PLAN)[0], half_known_plan(most_bits=1000.0)
     worth = [worth_bits(dull, situation, HERE, bits) for bits in (2.0, 4.5, 502.5)]
     np.testing.assert_allclose(worth, [0.02, 2.0, 500.0])
@@ -216,9 +218,9 @@ def choice_of(situation):
     """The viewpoint that the planner chooses."""
     proposer = new_proposers(PLAN)[0]
     start_paths(proposer, situation)
-    size, number = choose(proposer, situation, propose_nearby(proposer, situation), 1)
+    size, number = choose(proposer, situation, EXPLORING, propose_nearby(proposer, situation), 1)
     assert number < size
-    return proposer.scratch.pool.viewpoints[number].copy()
+    return proposer.scratch.pool["viewpoint"][number].copy()
 
 
 def known_plan(shut):
@@ -253,58 +255,3 @@ def test_each_kind_has_its_recipe():
     given = new_proposers(PLAN, {0: NARROW_STRAIGHT})[0].recipe
     assert given.exponent == NARROW_STRAIGHT.exponent and given.turns == NARROW_STRAIGHT.turns
     assert new_proposers(PLAN)[0].recipe.exponent == ALL_AROUND.exponent
-
-
-@pytest.mark.parametrize("navigator", ["straight", "planned"])
-def test_scans_on_the_path_count_where_there_are_any(navigator):
-    """What a viewpoint is worth rises by what they add; what the scan there should bring stays as it is."""
-    found = {}
-    for every_m in (math.inf, 0.3):
-        for path_scans in (0, 1, 4):
-            settings = {"sensor": {"scan_every_m": every_m}, "robot": {"navigator": navigator}}
-            scenario = with_settings(PLAN, settings)
-            recipe = dataclasses.replace(ALL_AROUND, path_scans=path_scans)
-            proposer, situation = new_proposers(scenario, {0: recipe})[0], half_known_plan()
-            start_paths(proposer, situation)
-            size, pool = (
-                draw_nearby(proposer, situation, proposer.scratch.pool.viewpoints),
-                proposer.scratch.pool,
-            )
-            evaluate(proposer, situation, proposer.exact, 0, size)
-            np.testing.assert_array_equal(pool.bits[:size], pool.stop_bits[:size])
-            found[every_m, path_scans] = pool.values[:size].copy()
-    plain = found[math.inf, 0]
-    for every_m, path_scans in ((math.inf, 1), (math.inf, 4), (0.3, 0)):
-        np.testing.assert_array_equal(found[every_m, path_scans], plain)
-    for path_scans in (1, 4):
-        assert (found[0.3, path_scans] >= plain * (1.0 - 1e-6)).all()
-    assert found[0.3, 4].sum() > found[0.3, 1].sum() > 1.01 * plain.sum()
-
-
-def test_each_kind_of_robot_counts_its_own_number_of_scans():
-    one = with_settings(PLAN, {"sensor": {"scan_every_m": 0.3}, "robots": 2})
-    under_way = dataclasses.replace(one, extra_kinds=one.kinds)
-    few, many = (dataclasses.replace(ALL_AROUND, path_scans=scans) for scans in (1, 8))
-    worth = []
-    for other in (few, many):
-        proposer, situation = new_proposers(under_way, {0: few, 1: other})[0], half_known_plan()
-        start_paths(proposer, situation)
-        size = draw_nearby(proposer, situation, proposer.scratch.pool.viewpoints)
-        evaluate(proposer, situation, proposer.exact, 0, size)
-        worth.append(proposer.scratch.pool.values[:size].copy())
-    np.testing.assert_array_equal(*worth)
-
-
-def test_paths_to_far_places_lead_around_walls_also_where_robots_drive_straight():
-    """Scans on the path are taken at its stops, none of them in the wall or beyond it."""
-    straight = with_settings(PLAN, {"robot": {"navigator": "straight", "reach_m": 0.8}})
-    recipe = dataclasses.replace(ALL_AROUND, path_scans=8)
-    proposer, situation = new_proposers(straight, {0: recipe})[0], half_known_plan(most_bits=1e9)
-    start_paths(proposer, situation)
-    count, best = propose_far(proposer, situation, 0.0)
-    assert count > 0 and best > 0.0
-    far, poses = proposer.scratch.far, proposer.scratch.scan_poses
-    alone = far.bits[:count] / far.seconds[:count] ** recipe.exponent
-    assert (far.values[:count] > 1.01 * alone).any()
-    voxels = np.floor(poses[:, :2]).astype(int)
-    assert (situation.belief.mean.reshape(PLAN.grid.shape)[voxels[:, 0], voxels[:, 1], 0] <= 0.5).all()

@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import pytest
 
 from baselines.experiments.mission import run_mission, scripted
-from baselines.strategies.information_rate_v0 import InformationRate
 from baselines.strategies.planner_choice import PlannerChoice
-from baselines.strategies.rules.planned_rate import PlannedRate, PlannedRateConfig
+from baselines.strategies.rules.nearest_frontier import NearestFrontier
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
-from entropy_explore_env.errors import SettingError
-from entropy_explore_env.planner.recipe import recipe_for
+from entropy_explore_env.explorer import PlannedRate
 from entropy_explore_env.reports.metrics import mission_figures
 from entropy_explore_env.scenario import with_settings
 from entropy_explore_env.scenarios import BOX, ROOM, SCENARIOS, find_scenario
@@ -26,12 +22,12 @@ def figures_of(strategy, scenario=ROOM, seed=0, **settings):
 
 @pytest.mark.parametrize(
     ("name", "robots", "share"),
-    [("room-furnished", 3, 0.98), ("office", 1, 0.85), ("cave", 1, 0.8), ("cave", 3, 0.95)],
+    [("room-furnished", 3, 0.5), ("office", 1, 0.8)],
 )
-def test_it_is_sooner_done_than_its_predecessor(name, robots, share):
+def test_it_is_sooner_done_than_the_nearest_frontier(name, robots, share):
     ours, before = (
         [figures_of(make(), find_scenario(name), seed, robots=robots)["t_mission_s"] for seed in (0, 1)]
-        for make in (PlannedRate, InformationRate)
+        for make in (PlannedRate, NearestFrontier)
     )
     assert sum(ours) < share * sum(before)
 
@@ -45,30 +41,6 @@ def test_mixed_teams_take_the_recipe_of_each_kind():
     mixed = find_scenario("office-mixed")
     figures = figures_of(PlannedRate(), mixed, seed=1, robots=2, ending={"time_limit_s": 40.0})
     assert all(robot["scans"] > 4 for robot in figures["per_robot"])
-
-
-def test_a_configuration_changes_the_recipe_of_every_kind_of_robot():
-    for name in ("room", "office", "cave"):
-        kind = SCENARIOS[name].kinds[0]
-        assert PlannedRateConfig().recipe(kind) == recipe_for(kind)
-        changed = PlannedRateConfig(behind=7.0, far_places=5).recipe(kind)
-        assert changed == replace(recipe_for(kind), behind=7.0, far_places=5)
-
-
-@pytest.mark.parametrize(
-    "wrong",
-    [
-        {"exponent": 0.0},
-        {"behind": float("inf")},
-        {"leave_below": -0.1},
-        {"dregs": float("nan")},
-        {"far_places": 2.5},
-        {"far_places": -1},
-    ],
-)
-def test_settings_that_make_no_sense_are_refused_at_once(wrong):
-    with pytest.raises(SettingError, match=rf"PlannedRateConfig\.{next(iter(wrong))}"):
-        PlannedRateConfig(**wrong)
 
 
 def test_where_everything_is_to_be_seen_no_time_goes_to_known_walls():

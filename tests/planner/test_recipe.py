@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
-
 import pytest
 
 from entropy_explore_env.errors import SettingError
@@ -12,6 +10,7 @@ from entropy_explore_env.planner.recipe import (
     NARROW_PLANNED,
     NARROW_STRAIGHT,
     angular_spread,
+    checked,
     recipe_for,
 )
 from entropy_explore_env.scenarios import SCENARIOS
@@ -44,15 +43,20 @@ def test_gazes_of_scanners_vary_between_rays_and_of_others_by_half_a_view():
         {"exponent": 0.0},
         {"gap_probability": 1.5},
         {"stop_probability": -0.1},
-        {"thinning": 0},
+        {"draw_thinning": 0},
         {"refined": 0},
-        {"keep": float("nan")},
+        {"known_ground_share": float("nan")},
+        {"far_places": 2.5},
         {"leave_below": -0.1},
-        {"path_scans": -1},
         {"behind": float("inf")},
         {"gazes": 0, "turns": 0, "places": 0},
     ],
 )
 def test_what_makes_no_sense_is_refused_by_name(change):
     with pytest.raises(SettingError, match=r"Recipe\."):
-        dataclasses.replace(ALL_AROUND, **change)
+        checked(ALL_AROUND._replace(**change))
+
+
+def test_whole_numbers_become_the_types_for_which_kernels_are_compiled():
+    recipe = checked(ALL_AROUND._replace(exponent=1, gazes=True + 1))
+    assert [type(number) for number in recipe] == [type(number) for number in ALL_AROUND]
