@@ -1,8 +1,8 @@
 """Rules that map from a plateau with a rover that must not drive over its edge; a subclass chooses the poses.
 
 A rover begins by looking at the ground all around it. Ours: it drives only where all of its body, and a
-column more, stands on columns that were measured, or on which it stood before. One that a teammate stopped, or
-that is blocked, chooses anew: a random viewpoint may lie beyond the edge.
+column more, stands on columns that were measured, or on which it stood before. One that a teammate stopped,
+or that is blocked, chooses anew: a random viewpoint may lie beyond the edge.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The strategy `cliff-next-best-view`: mapping a cliff from the plateau above it (Sujan, sect. 3.2, methods 3-5).
+"""The strategy `cliff-next-best-view`: mapping a cliff from above it (Sujan, sect. 3.2, methods 3-5).
 
 A rover with a camera that pans and tilts maps an elevation map and must not drive over the edge. Of m poses
 drawn on its plateau it takes the one with the best rating (eq. 23)

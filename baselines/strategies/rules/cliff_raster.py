@@ -1,7 +1,7 @@
-"""The strategy `cliff-raster`: raster scanning from the plateau above a cliff (Sujan, sect. 3.2, methods 1-2).
+"""The strategy `cliff-raster`: raster scanning from above a cliff (Sujan, sect. 3.2, methods 1-2).
 
-A rover takes the next place of a lattice, row by row, with one look along x (method 1, `cliff-raster-fixed-yaw`)
-or looks in all directions (method 2).
+A rover takes the next place of a lattice on its plateau, row by row. It looks in all directions there (method
+2) or, as `cliff-raster-fixed-yaw`, along x alone (method 1).
 
 Ours: it looks 30° down, from places a metre apart, and, where no place is left, scans again from where it is.
 """
