@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from entropy_explore_env.frontiers.knowledge import belief_of, voxel_of
+from entropy_explore_env.frontiers.knowledge import RobotKnowledge, belief_of, voxel_of
 from entropy_explore_env.frontiers.path_lengths import KnownPaths
 from entropy_explore_env.missions.view import RobotView
 from entropy_explore_env.viewpoints.expected_localization import Drive, Surveyor, growth_of_error
 
 
-def localization_error(view: RobotView, paths: KnownPaths, pose: np.ndarray) -> float:
-    """Return LE of a drive on the known path to a pose (5,), in metres; 0 where robots know their pose.
+def localization_error(view: RobotKnowledge, paths: KnownPaths, pose: np.ndarray) -> float:
+    """Return LE of a drive on the known path to a pose (5,), in metres; 0 where its pose is exact.
 
     Points count as far away as the robot's latest scan measured on average, r̂.
 
@@ -20,9 +20,9 @@ def localization_error(view: RobotView, paths: KnownPaths, pose: np.ndarray) -> 
         paths: Through its known free space; their latest search begins where it stands.
         pose: Map frame.
     """
-    grid, sensor, robot = view.scenario.grid, view.kind.sensor, view.kind.robot
-    if view.rules.localization is None:
+    if not isinstance(view, RobotView) or view.rules.localization is None:  # only missions have fiducials
         return 0.0
+    grid, sensor, robot = view.scenario.grid, view.kind.sensor, view.kind.robot
     x, y, z = grid.origin_m
     scan_every_m = min(sensor.scan_every_m, robot.reach_m)
     surveyor = Surveyor(
@@ -42,7 +42,7 @@ def localization_error(view: RobotView, paths: KnownPaths, pose: np.ndarray) -> 
     return float(growth_of_error(view.covariance, surveyor, drive, view.depth_m, np.empty((4, 4))))
 
 
-def _path_to(view: RobotView, paths: KnownPaths, pose: np.ndarray) -> np.ndarray:
+def _path_to(view: RobotKnowledge, paths: KnownPaths, pose: np.ndarray) -> np.ndarray:
     """Return (N, 3) points of the known path to a pose, pulled straight, in metres."""
     grid, goal = view.scenario.grid, voxel_of(view, pose)
     if goal == voxel_of(view, view.pose):
