@@ -14,17 +14,19 @@ from baselines.strategies.mutual_information.neighbourhood import MutualInformat
 from baselines.strategies.planner_choice import PlannerChoice
 from baselines.strategies.protocol import Strategy
 from baselines.strategies.rules.assigned_frontier import AssignedFrontier
-from baselines.strategies.rules.cliff import CliffConfig, CliffMapping
+from baselines.strategies.rules.cliff import CliffConfig, CliffNextBestView
+from baselines.strategies.rules.cliff_raster import CliffRaster
 from baselines.strategies.rules.coordinated_frontier import CoordinatedFrontier
 from baselines.strategies.rules.distance_advantage import DistanceAdvantage
 from baselines.strategies.rules.gradient import GradientStrategy
 from baselines.strategies.rules.information_gain import InformationGain
+from baselines.strategies.rules.most_unmapped import LeastMapped, MostUnmapped, RandomKnown
 from baselines.strategies.rules.mutual_information import MutualInformation
 from baselines.strategies.rules.nearest_frontier import NearestFrontier
-from baselines.strategies.rules.next_best_view import NextBestView, NextBestViewConfig
+from baselines.strategies.rules.next_best_view import NextBestView
 from baselines.strategies.rules.per_time_visibility import FrontierStrategy
 from baselines.strategies.rules.random_walk import RandomWalk
-from baselines.strategies.rules.raster import Raster, RasterConfig
+from baselines.strategies.rules.raster import Raster
 from baselines.strategies.rules.receding_horizon import RecedingHorizon
 from baselines.strategies.rules.voronoi import VoronoiCoverage
 from baselines.strategies.voronoi.territory import VoronoiConfig
@@ -51,11 +53,11 @@ STRATEGIES: MappingProxyType[str, Callable[[], Strategy]] = MappingProxyType(
         "receding-horizon": RecedingHorizon,
         "tour": Tour,
         "next-best-view": NextBestView,
-        "most-unmapped": partial(NextBestView, NextBestViewConfig("most-unmapped")),
-        "least-mapped": partial(NextBestView, NextBestViewConfig("least-mapped")),
-        "random-known": partial(NextBestView, NextBestViewConfig("random")),
+        "most-unmapped": MostUnmapped,
+        "least-mapped": LeastMapped,
+        "random-known": RandomKnown,
         "raster": Raster,
-        "raster-fixed-yaw": partial(Raster, RasterConfig(turning=False)),
+        "raster-fixed-yaw": partial(Raster, turning=False),
         "nearest-candidate": nearest_candidate,
         "coordinated-candidate": coordinated_candidate,
         "voronoi": VoronoiCoverage,
@@ -70,11 +72,11 @@ STRATEGIES: MappingProxyType[str, Callable[[], Strategy]] = MappingProxyType(
 
 CLIFF_STRATEGIES: MappingProxyType[str, Callable[[], Strategy]] = MappingProxyType(
     {
-        "cliff-raster-fixed-yaw": partial(CliffMapping, CliffConfig("raster", turning=False)),
-        "cliff-raster": partial(CliffMapping, CliffConfig("raster")),
-        "cliff-straight-edge": partial(CliffMapping, CliffConfig(edge="line", interest_decay=0.0)),
-        "cliff-polygon-edge": partial(CliffMapping, CliffConfig(interest_decay=0.0)),
-        "cliff-next-best-view": CliffMapping,
+        "cliff-raster-fixed-yaw": partial(CliffRaster, turning=False),
+        "cliff-raster": CliffRaster,
+        "cliff-straight-edge": partial(CliffNextBestView, CliffConfig(edge="line", interest_decay=0.0)),
+        "cliff-polygon-edge": partial(CliffNextBestView, CliffConfig(interest_decay=0.0)),
+        "cliff-next-best-view": CliffNextBestView,
     }
 )
 """The same of strategies for rovers above a cliff alone; who asks for all strategies does not mean them."""

@@ -64,6 +64,10 @@ class FrontierRule(Driver):
     most_blocked = 0
     until_reached = False
     """Whether a target holds, once picked, until it is reached; else until the map changes."""
+    refines = True
+    """Whether a finer σ counts as known where the rule finds no goal."""
+    turns_first = True
+    """Whether a robot turns to where most is unknown for its first scan."""
 
     @abstractmethod
     def pick(self, scene: Scene) -> int | Goal:
@@ -74,7 +78,7 @@ class FrontierRule(Driver):
         super().reset(scenario, rng)
         self._search: Search = new_search(scenario.grid.voxels)
         self._memories: dict[int, _Memory] = {}
-        self._finest = min(scenario.ending.sigma_end, KNOWN_SIGMA)
+        self._finest = min(scenario.ending.sigma_end, KNOWN_SIGMA) if self.refines else KNOWN_SIGMA
 
     def cells_of(self, robot: int) -> FrontierCells:
         """Return the frontier cells of a robot; available after its first choice."""
@@ -131,13 +135,15 @@ class FrontierRule(Driver):
         memory, here = self._memories[view.robot], voxel_of(view, view.pose)
         if not memory.scanned:
             memory.scanned = True
-            return self._look(view, memory, view.pose)
-        target, place = memory.goal[:2]
-        if here == target and memory.viewpoint is not None:
+            gaze = None if self.turns_first else (float(view.pose[3]), float(view.pose[4]))
+            return self._look(view, memory, view.pose, gaze)
+        target, place, _, gaze = memory.goal
+        reached = here == target and not (view.under_way and gaze is not None)
+        if reached and memory.viewpoint is not None:
             turned = self.arrive(view, memory.cells, here)
             if turned is not None:
                 return turned
-        kept = target not in (NONE, here) and self._holds(memory.cells, target)
+        kept = target != NONE and not reached and self._holds(memory.cells, target)
         arrived = here == place != target
         if kept and not arrived and (self.until_reached or not memory.cells.changed):
             return self._towards(view, memory, here, memory.goal)

@@ -32,7 +32,8 @@ class Goal(NamedTuple):
     looked: bool = False
     """Whether the target was looked at from elsewhere in vain, or could not be; the robot drives to it."""
     gaze: tuple[float, float] | None = None
-    """(yaw, pitch) of the scan at the target; None = where most is unknown."""
+    """(yaw, pitch) of the scan at the target, which is reached only when the drive has ended; None = the
+    robot looks where most is unknown, and has reached the target as soon as it is in that voxel."""
 
 
 NOWHERE = Goal(NONE, NONE)

@@ -10,7 +10,7 @@ from scipy.ndimage import distance_transform_edt
 
 from baselines.experiments.mission import Followed, run_mission, scripted_env
 from baselines.strategies import make_strategy
-from baselines.strategies.rules.cliff import CliffMapping
+from baselines.strategies.rules.cliff import CliffNextBestView
 from baselines.strategies.rules.per_time_visibility import FrontierConfig
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.errors import SettingError
@@ -167,12 +167,11 @@ def test_a_margin_keeps_rovers_from_the_edge():
     env = scripted_env(with_settings(CLIFF, {"max_cycles": 6}))
     strategy = make_strategy("cliff-next-best-view")
     run_mission(env, strategy, 0)
-    assert isinstance(strategy, CliffMapping)
-    view, memory = env.view("robot_0"), strategy._memories[0]
-    here = strategy._column(view.pose)
+    assert isinstance(strategy, CliffNextBestView)
+    view, ground = env.view("robot_0"), strategy.ground_of(0)
     drifting = {"robot": {"localization": {**DRIFT, "margin_m": 0.25}}}
     wider = dataclasses.replace(view, scenario=with_settings(view.scenario, drifting))
-    safe, safer = strategy._safe(view, memory, here), strategy._safe(wider, memory, here)
+    safe, safer = ground.safe(view, "polygon"), ground.safe(wider, "polygon")
     assert 0 < safer.sum() < safe.sum() and safe[safer].all()
     away = np.asarray(distance_transform_edt(safe))
     assert away[safer].min() >= 1.5  # 0.25 m are two columns, between middles of voxels

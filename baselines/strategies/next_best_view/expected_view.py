@@ -1,4 +1,4 @@
-"""What a scan from a place is expected to show: known and unknown voxels in view, by their occupancy.
+"""What a scan from a viewpoint is expected to show: known and unknown voxels in view, by their occupancy.
 
 Rays go through the belief like those of a scan, until something believed covered; unknown voxels let them
 through. Each voxel counts once. Places are in grid units.
@@ -15,7 +15,7 @@ from entropy_explore_env.belief.elevation import completed
 from entropy_explore_env.belief.fields import Belief, occupancy_probability
 from entropy_explore_env.belief.raycast import OPEN_END, STOP_AT_COVERED, Crossing, Line, cast_ray
 from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel
-from entropy_explore_env.viewpoints.expected_scan import ScanModel
+from entropy_explore_env.settings import Grid, RangeSensor
 
 LEVELS = 20
 """Intervals of occupancy, and of stretched occupancy, whose histograms are taken."""
@@ -39,7 +39,7 @@ class OccupancyMap(NamedTuple):
 
 
 class View(NamedTuple):
-    """What is expected to be seen from one viewpoint; filled in by `look`."""
+    """What is expected to be seen from one viewpoint, filled in by `look`, and working space for that."""
 
     shares: np.ndarray
     """(2, LEVELS) float64: number of known (row 0) and unknown (row 1) voxels in view by occupancy, each
@@ -48,39 +48,36 @@ class View(NamedTuple):
     """(2,) int64: known and unknown voxels in view."""
     seen: np.ndarray
     """(V,) int32, the unknown voxels in view first."""
-
-
-class Scratch(NamedTuple):
-    """Working space of `look`."""
-
     stamps: np.ndarray
-    """(V,) int32, zeros at first: the latest look that met each voxel."""
+    """(V,) int32, number of the latest look that met each voxel."""
     looks: np.ndarray
-    """(1,) int64, how many looks there were."""
+    """(1,) int64, number of looks taken."""
     crossed: np.ndarray
     """(L,) int32, see `cast_ray`."""
     entered: np.ndarray
     """(L,) int64."""
 
 
-def new_view(voxels: int) -> View:
-    """Room for what is seen in a grid of so many voxels."""
-    return View(np.zeros((2, LEVELS)), np.zeros(2, np.int64), np.zeros(voxels, np.int32))
-
-
-def new_scratch(voxels: int, longest_ray: int) -> Scratch:
-    """Working space for a grid, and rays that cross at most so many of its voxels."""
-    crossed, entered = np.zeros(longest_ray, np.int32), np.zeros(longest_ray, np.int64)
-    return Scratch(np.zeros(voxels, np.int32), np.zeros(1, np.int64), crossed, entered)
+def new_view(voxels: int, longest_ray: int) -> View:
+    """Return an empty View of a grid, for rays that cross at most a number of its voxels."""
+    return View(
+        shares=np.zeros((2, LEVELS)),
+        counts=np.zeros(2, np.int64),
+        seen=np.zeros(voxels, np.int32),
+        stamps=np.zeros(voxels, np.int32),
+        looks=np.zeros(1, np.int64),
+        crossed=np.zeros(longest_ray + 1, np.int32),
+        entered=np.zeros(longest_ray + 1, np.int64),
+    )
 
 
 def occupancy_map(belief: Belief, prior_precision: float, interest: np.ndarray) -> OccupancyMap:
-    """The occupancies of a belief; ½ where nothing is known.
+    """Return the occupancies of a belief; ½ where nothing is known.
 
     Args:
         belief: Of the robot.
-        prior_precision: Precision of a voxel that nobody has measured.
-        interest: (V,) float32, kept as it is.
+        prior_precision: Precision of a voxel that was never measured.
+        interest: (V,) float32, not copied.
     """
     occupancy, unknown = np.empty(len(belief.mean), np.float32), np.empty(len(belief.mean), np.uint8)
     _fill_occupancy(belief.mean, belief.precision, np.float32(prior_precision), occupancy, unknown)
@@ -88,7 +85,7 @@ def occupancy_map(belief: Belief, prior_precision: float, interest: np.ndarray) 
 
 
 def extrapolated(known: OccupancyMap, before: np.ndarray | None, reach: float) -> OccupancyMap:
-    """A plan's map in which unknown cells have the mean occupancy of their neighbours (Sujan, sect. 2.3.2).
+    """Return a plan's map in which unknown cells have the mean occupancy of their neighbours (sect. 2.3.2).
 
     In 3-D they keep ½, and so do those of large plans that cannot be seen yet: in their rows or columns no
     known cell is within the sensor's reach.
@@ -102,15 +99,20 @@ def extrapolated(known: OccupancyMap, before: np.ndarray | None, reach: float) -
     if known.belief.size[2] > 1 or known.unknown.all():
         return known
     measured = (known.unknown == 0).reshape(plan)
-    window = _window(measured, reach) if measured.size > _WHOLE_CELLS else (slice(None), slice(None))
+    window = window_in_reach(measured, reach if measured.size > _WHOLE_CELLS else math.inf)
     begin = None if before is None else before.reshape(plan)[window]
     filled = known.occupancy.reshape(plan).copy()
     filled[window] = completed(filled[window], measured[window], _TOLERANCE, begin)
     return known._replace(occupancy=filled.reshape(-1))
 
 
-def _window(measured: np.ndarray, reach: float) -> tuple[slice, slice]:
-    """The rows and columns that can be seen from where something is measured, and one more."""
+def window_in_reach(measured: np.ndarray, reach: float) -> tuple[slice, slice]:
+    """Return the rows and columns of (X, Y) cells that can be seen from measured ones, and one more.
+
+    Args:
+        measured: (X, Y) bool.
+        reach: Of the sensor, in cells; inf allowed.
+    """
     beyond = math.ceil(min(reach, sum(measured.shape))) + 1
     rows, columns = (np.flatnonzero(measured.any(axis=axis)) for axis in (1, 0))
     return (
@@ -131,18 +133,17 @@ def _fill_occupancy(mean, precision, prior, occupancy, unknown):
 
 
 @lean_kernel
-def look(known, scan, viewpoint, stretched, scratch, view):
-    """What a scan from a viewpoint is expected to show.
+def look(known, scan, viewpoint, stretched, view):
+    """Fill in what a scan from a viewpoint is expected to show.
 
     Args:
         known: OccupancyMap.
         scan: ScanModel, all rays of the sensor.
         viewpoint: (5,) x, y, z in grid units, yaw, pitch.
         stretched: Whether occupancies are stretched by distance (Sujan, eq. 7).
-        scratch: Scratch.
-        view: View, filled in.
+        view: View.
     """
-    scratch.looks[0] += 1
+    view.looks[0] += 1
     view.counts[0] = view.counts[1] = 0
     for level in range(LEVELS):
         view.shares[0, level] = view.shares[1, level] = 0.0
@@ -160,18 +161,18 @@ def look(known, scan, viewpoint, stretched, scratch, view):
                 STOP_AT_COVERED,
                 OPEN_END,
                 max(scan.voxels_behind, 1),
-                Crossing(scratch.crossed, scratch.entered),
+                Crossing(view.crossed, view.entered),
             )
             for i in range(end.voxels):
-                _count(known, scan, start, stretched, scratch, view, scratch.crossed[i])
+                _count(known, scan, start, stretched, view, view.crossed[i])
 
 
 @inlined_kernel
-def _count(known, scan, start, stretched, scratch, view, voxel):
+def _count(known, scan, start, stretched, view, voxel):
     """Count a voxel in view, unless this look has met it before."""
-    if scratch.stamps[voxel] == scratch.looks[0]:
+    if view.stamps[voxel] == view.looks[0]:
         return
-    scratch.stamps[voxel] = scratch.looks[0]
+    view.stamps[voxel] = view.looks[0]
     p, row = np.float64(known.occupancy[voxel]), np.int64(known.unknown[voxel])
     if stretched:
         size = known.belief.size
@@ -187,23 +188,19 @@ def _count(known, scan, start, stretched, scratch, view, voxel):
 
 @inlined_kernel
 def stretched_occupancy(p, distance_m):
-    """p″ of eq. 7, kept within [0, 1]; nearer than a metre counts as a metre."""
+    """Return p″ of eq. 7, kept within [0, 1]; nearer than a metre counts as a metre."""
     sure = 1.0 - p if p < 0.5 else p
     stretched = 0.5 * (1.0 / (sure * max(distance_m, 1.0)) - 1.0)
     return min(max(stretched if p < 0.5 else 1.0 - stretched, 0.0), 1.0)
 
 
-def voxels_in_view(scan: ScanModel, field_of_view_rad: tuple[float, float], flat: bool, most: int) -> float:
-    """The largest number of voxels that the sensor can see, N of eqs. 6 and 8.
+def voxels_in_view(sensor: RangeSensor, grid: Grid) -> float:
+    """Return the largest number of voxels that a sensor can see, N of eqs. 6 and 8.
 
-    Args:
-        scan: Of the sensor.
-        field_of_view_rad: Full widths (yaw, pitch).
-        flat: Whether the grid is a plan: then the view is a sector, else a part of a ball.
-        most: Voxels of the grid.
+    Its view in a plan is a sector, else a part of a ball.
     """
-    reach, (wide, high) = scan.max_range_m / scan.voxel_size_m, field_of_view_rad
+    reach, (wide, high) = sensor.max_range_m / grid.voxel_size_m, sensor.field_of_view_rad
     if math.isinf(reach):
-        return float(most)
-    inside = 0.5 * wide * reach**2 if flat else wide * 2.0 * math.sin(0.5 * high) * reach**3 / 3.0
-    return float(min(max(inside, 1.0), most))
+        return float(grid.voxels)
+    inside = 0.5 * wide * reach**2 if grid.flat else wide * 2.0 * math.sin(0.5 * high) * reach**3 / 3.0
+    return float(min(max(inside, 1.0), grid.voxels))

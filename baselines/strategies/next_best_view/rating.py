@@ -16,7 +16,7 @@ UNCERTAINTY = -(_MIDDLES * np.log2(_MIDDLES) + (1.0 - _MIDDLES) * np.log2(1.0 - 
 def new_information(
     shares: np.ndarray, most: float, weights: np.ndarray | None = UNCERTAINTY, linear: bool = False
 ) -> float:
-    """NI in bits of the histograms of a view.
+    """Return NI in bits of the histograms of a view.
 
         NI = Σ_known u(p_k)·(-q_k log2 q_k) + Σ_unknown u(p_k)·(-q_k log2 q_k)
 
@@ -35,14 +35,14 @@ def new_information(
 
 
 def pose_distance(pose: np.ndarray, viewpoint: np.ndarray) -> float:
-    """D of eq. 22 with all α = 1: metres and radians alike; (5,) each, x, y, z, yaw, pitch."""
+    """Return D of eq. 22 with all α = 1, between poses (5,): x, y, z in metres, yaw and pitch in radians."""
     apart = viewpoint - pose
     apart[3] = (apart[3] + math.pi) % (2.0 * math.pi) - math.pi
     return float(np.linalg.norm(apart))
 
 
 def rating(information_bits: float, costs_bits: float, occupancy: float) -> float:
-    """RF of eq. 23 with w_NI = 1.
+    """Return RF of eq. 23 with w_NI = 1.
 
     Args:
         information_bits: NI.

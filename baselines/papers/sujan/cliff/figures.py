@@ -13,7 +13,7 @@ from baselines.papers.sujan.cliff.claims import FEW, MORE, Records, looks_of, ne
 from baselines.papers.sujan.cliff.mission import known_columns, plateau_of
 from baselines.papers.sujan.cliff.sweep import METHODS, STEPS, cell_id, scenario_of, start_of
 from baselines.strategies import make_strategy
-from baselines.strategies.rules.cliff import CliffMapping
+from baselines.strategies.next_best_view.plateau_rule import PlateauRule
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 
 _EVERY = 5
@@ -74,7 +74,7 @@ def figure_views() -> Figure:
         plateau, unreadable = plateau_of(world.occupied), np.asarray(world.unreadable.any(axis=2))
         _outline(axes, plateau, unreadable)
         axes.set(title=f"method {method} after {steps} steps", xticks=[], yticks=[])
-        interest = strategy.interest(0)
+        interest = strategy.ground_of(0).interest
     shown = panels[-1].imshow(interest.T, origin="lower", cmap="magma", vmin=0.0, vmax=1.0)
     _outline(panels[-1], plateau, unreadable)
     panels[-1].set(title=f"interest left after {FEW} steps of method 5", xticks=[], yticks=[])
@@ -88,12 +88,12 @@ def _outline(axes: Axes, plateau: np.ndarray, unreadable: np.ndarray) -> None:
     axes.contour(unreadable.T, [0.5], colors="red", linewidths=1.0, linestyles="dotted")
 
 
-def _played(method: int, steps: int) -> tuple[EntropyExploreEnv, CliffMapping]:
+def _played(method: int, steps: int) -> tuple[EntropyExploreEnv, PlateauRule]:
     """A mission in world 0 after some steps."""
     scenario = scenario_of(steps)
     env = scripted_env(scenario)
     strategy = make_strategy(METHODS[method])
-    assert isinstance(strategy, CliffMapping)
+    assert isinstance(strategy, PlateauRule)
     run_mission(env, strategy, 0, options={"world": 0, "starts": [start_of(scenario)]})
     return env, strategy
 

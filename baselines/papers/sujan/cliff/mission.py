@@ -7,7 +7,7 @@ import numpy as np
 from baselines.experiments.mission import run_mission
 from baselines.experiments.outcome import Record
 from baselines.strategies import make_strategy
-from baselines.strategies.rules.cliff import CliffMapping
+from baselines.strategies.next_best_view.plateau_rule import PlateauRule
 from entropy_explore_env.belief.elevation import elevation_map
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.missions.view import view_of
@@ -25,7 +25,7 @@ def record_mapping(env: EntropyExploreEnv, strategy: str, seed: int) -> Record:
         `edge_stops`, drives that the edge ended.
     """
     made = make_strategy(strategy)
-    assert isinstance(made, CliffMapping)
+    assert isinstance(made, PlateauRule)
     columns: list[int] = [0]
     interest: list[tuple[float, float]] = [(1.0, 1.0)]
     edge_stops = 0
@@ -40,7 +40,7 @@ def record_mapping(env: EntropyExploreEnv, strategy: str, seed: int) -> Record:
         world = env.missions.worlds[0]
         assert world is not None and world.unreadable is not None
         dark, below = world.unreadable.any(axis=2), ~plateau_of(world.occupied)
-        weights = made.interest(0)
+        weights = made.ground_of(0).interest
         interest.append((float(weights[dark].mean()), float(weights[below & ~dark].mean())))
 
     run_mission(env, made, seed, note)
@@ -49,8 +49,8 @@ def record_mapping(env: EntropyExploreEnv, strategy: str, seed: int) -> Record:
         "columns": columns,
         "interest_unreadable": [round(dark, 5) for dark, _ in interest],
         "interest_readable": [round(lit, 5) for _, lit in interest],
-        "expected": [round(look.expected, 2) for look in made.looks[0]],
-        "obtained": [look.obtained for look in made.looks[0]],
+        "expected": [round(look.expected, 2) for look in made.ground_of(0).looks],
+        "obtained": [look.obtained for look in made.ground_of(0).looks],
         "edge_stops": edge_stops,
     }
 

@@ -13,7 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from baselines.strategies.next_best_view.edge import Edge, find_edge
-from baselines.strategies.rules.cliff import CliffConfig
+from baselines.strategies.next_best_view.ground_map import WHEEL_M
 from entropy_explore_env.belief.elevation import completed
 from entropy_explore_env.scenarios import CLIFF
 from entropy_explore_env.worlds.load import make_world
@@ -70,7 +70,7 @@ def figure_completion() -> Figure:
 def edge_of_world(number: int) -> tuple[np.ndarray, Edge]:
     """Heights (X, Y) in voxel edges of a world of `cliff`, and the edge of its plateau."""
     heights = make_world(CLIFF, number).occupied.sum(axis=2).astype(np.float64)
-    wheel = CliffConfig().wheel_m / CLIFF.grid.voxel_size_m
+    wheel = WHEEL_M / CLIFF.grid.voxel_size_m
     return heights, find_edge(heights, (16, 48), wheel, wheel, wheel)
 
 

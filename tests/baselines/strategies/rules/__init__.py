@@ -1,0 +1,1 @@
+"""Tests of rules: a package, since tests of worlds have some of their names."""
