@@ -33,7 +33,7 @@ class SharedTour(Tour):
 
     rule = "planned-rate"
     opening = 0.125
-    """Least share of the sensor's range in connected known free voxels beside unknown ones; fewer are a dead end."""
+    """A frontier is a dead end if it has fewer connected known free voxels; over the sensor's range."""
     view = 0.5
     """Largest distance from which a dead end is looked at, in sensor ranges."""
     around = 3

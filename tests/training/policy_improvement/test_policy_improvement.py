@@ -428,5 +428,7 @@ def test_roll_outs_draw_fewer_viewpoints_and_observe_nothing():
     runs = RollOuts(scenario(), (1, 2, 1), RollOutEffort(5, 3), 1)
     whole = EntropyExploreVectorEnv(scenario(), 1, action_masks=False).missions
     thin, full = (each._compiled_step.proposers[0][0].recipe for each in (runs._missions, whole))
-    assert thin.gazes == -(-full.gazes // 3) and thin.refined < full.refined and thin.keep == full.keep
+    assert (
+        thin.gazes == -(-full.gazes // 3) and thin.refined < full.refined and thin.exponent == full.exponent
+    )
     assert runs._missions.observations.size == 0
