@@ -73,7 +73,6 @@ TUNINGS: Mapping[str, Tuning] = {
                 "most_far": (4, 8, 20),
                 "stay": (0.02, 0.1),
             },
-            "per-time-visibility": {"path_scans": (0, 4, 8)},
         },
         "nearest-frontier",
         PATH,

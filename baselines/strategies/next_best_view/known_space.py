@@ -17,7 +17,8 @@ import numpy as np
 from baselines.strategies.protocol import random_viewpoint
 from entropy_explore_env.belief.paths.search import new_search
 from entropy_explore_env.errors import SettingError
-from entropy_explore_env.frontiers.frontier_cells import KNOWN_SIGMA, FrontierCells
+from entropy_explore_env.frontiers.candidates import KNOWN_SIGMA
+from entropy_explore_env.frontiers.frontier_cells import FrontierCells
 from entropy_explore_env.frontiers.knowledge import voxel_of
 from entropy_explore_env.frontiers.path_lengths import KnownPaths
 from entropy_explore_env.missions.view import RobotView

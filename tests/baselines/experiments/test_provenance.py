@@ -11,6 +11,8 @@ from functools import partial
 from pathlib import Path
 
 import pytest
+from baselines.strategies.information_rate_v0 import InformationRate, InformationRateConfig
+from baselines.strategies.metrics import Nearest
 
 from baselines import strategies
 from baselines.experiments import mission, provenance
@@ -19,8 +21,6 @@ from baselines.experiments.outcome import Outcome
 from baselines.experiments.provenance import CodeChangedError, code_digest, imported, modules_of
 from baselines.experiments.runner import Conditions, run_all
 from baselines.papers.sawhney.mission import MapRun
-from baselines.strategies.information_rate_v0 import InformationRate, InformationRateConfig
-from baselines.strategies.metrics import Nearest
 from baselines.strategies.rules.gradient import GradientStrategy
 from baselines.strategies.rules.per_time_visibility import ExplorationConfig
 from baselines.strategies.rules.random_walk import RandomWalk

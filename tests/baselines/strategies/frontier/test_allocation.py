@@ -7,9 +7,9 @@ import math
 
 import numpy as np
 import pytest
+from baselines.strategies.metrics import Nearest
 
 from baselines.experiments.mission import scripted
-from baselines.strategies.metrics import Nearest
 from baselines.strategies.rules.per_time_visibility import ExplorationConfig, FrontierStrategy
 from entropy_explore_env.frontiers.candidates import FrontierConfig
 from entropy_explore_env.frontiers.knowledge import under_way

@@ -7,11 +7,11 @@ import math
 
 import numpy as np
 import pytest
+from baselines.strategies.metrics import Coordinated, Nearest
 
 from baselines.experiments.mission import run_mission, scripted
 from baselines.papers.sawhney.mission import explore_until_done
 from baselines.strategies import make_strategy
-from baselines.strategies.metrics import Coordinated, Nearest
 from baselines.strategies.rules.per_time_visibility import ExplorationConfig, FrontierStrategy, Metric
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.errors import SettingError
