@@ -119,11 +119,11 @@ class PerTimeVisibility(FrontierRule):
         return cast("FrontierCells", TerrainCandidates(self._scenario, kind, frontiers, view.ceiling))
 
     def mapped_share(self) -> float:
-        """Return the share of points in the map of a robot that knows most of them: of columns over terrain."""
+        """Return the largest share of points that a robot has mapped: of columns over terrain."""
         return max((memory.cells.mapped_share() for memory in self._memories.values()), default=0.0)
 
     def options(self, view: RobotKnowledge) -> tuple[np.ndarray, np.ndarray]:
-        """Return (K,) seconds and (K,) V·(height factor) of what a robot can choose, after its first choice."""
+        """Return (K,) seconds and (K,) V·(height factor) of what a robot can choose; it has chosen before."""
         memory = self._memories[view.robot]
         memory.paths.start(voxel_of(view, view.pose))
         return Allocator(view, memory.cells, memory.paths, self.config.metric).options()
@@ -133,7 +133,7 @@ class PerTimeVisibility(FrontierRule):
         cells.exclude(here)
 
     def pick(self, scene: Scene) -> int:
-        """Return the voxel of the candidate with the greatest value, in the robot's turn; see `FrontierRule`."""
+        """Return the voxel of the candidate of greatest value that is the robot's; see `FrontierRule`."""
         view, together = scene.view, self.config.allocation == "synchronous"
         latest = self._rounds[view.robot]
         latest.arrive(view)

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 
 import pytest
-from baselines.strategies.information_rate_v0 import InformationRate
 
 from baselines.experiments.mission import run_mission, scripted
+from baselines.strategies.information_rate_v0 import InformationRate
 from baselines.strategies.planner_choice import PlannerChoice
 from baselines.strategies.rules.planned_rate import PlannedRate, PlannedRateConfig
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv

@@ -1,4 +1,4 @@
-"""Which robot is allotted which frontier, and who makes room: by hand, and beside a slow reference."""
+"""Which robot is allocated which candidate, and which makes room: by hand, and beside a slow reference."""
 
 from __future__ import annotations
 
@@ -7,14 +7,13 @@ import math
 
 import numpy as np
 import pytest
-from baselines.strategies.metrics import Nearest
 
 from baselines.experiments.mission import scripted
-from baselines.strategies.rules.per_time_visibility import ExplorationConfig, FrontierStrategy
-from entropy_explore_env.frontiers.candidates import FrontierConfig
+from baselines.strategies.rules.metrics import Nearest
+from baselines.strategies.rules.per_time_visibility import ExplorationConfig, PerTimeVisibility
+from entropy_explore_env.frontiers.candidates import KNOWN_SIGMA, FrontierConfig
 from entropy_explore_env.frontiers.knowledge import under_way
 from entropy_explore_env.frontiers.voxel_candidates import VoxelCandidates
-from entropy_explore_env.frontiers.voxel_map import NONE
 from entropy_explore_env.missions.view import view_of
 from entropy_explore_env.robots.motion import driving_time
 from entropy_explore_env.scenario import with_settings
@@ -22,8 +21,6 @@ from entropy_explore_env.scenarios import BOX, find_scenario
 from entropy_explore_env.settings import Grid
 from tests.reference import sawhney as reference
 from tests.reference.scenes import build, free_box, put, started
-
-ONCE = 0.5
 
 
 def corridor(places, heard=True):
@@ -51,89 +48,30 @@ def corridor(places, heard=True):
     return missions
 
 
+def chosen(missions, spacing_m, **config):
+    """The strategy, and the voxels to which it sends robots that have scanned once."""
+    frontiers = FrontierConfig(spacing_m=spacing_m)
+    strategy = PerTimeVisibility(ExplorationConfig(once=True, frontiers=frontiers, **config))
+    strategy.reset(missions.scenario, np.random.default_rng(0))
+    views = [view_of(missions, 0, robot) for robot in range(missions.scenario.robots)]
+    for view in views:
+        strategy.observe(view)
+        strategy._memories[view.robot].scanned = True
+    return strategy, [tuple(missions.grid.voxel_of(strategy.choose(view)[:3]).tolist()) for view in views]
+
+
 def sent(missions, **config):
     """Layers along y to which robots go that have scanned once."""
-    strategy = FrontierStrategy(
-        ExplorationConfig(**{"finest_sigma": ONCE, "frontiers": FrontierConfig(spacing_m=0.5), **config})
-    )
-    strategy.reset(missions.scenario, np.random.default_rng(0))
-    for assignment in strategy._assignments:
-        assignment.scanned = True
-    views = [view_of(missions, 0, robot) for robot in range(missions.scenario.robots)]
-    return [int(missions.grid.voxel_of(v[:3])[1]) for v in [strategy.choose(view) for view in views]]
+    return [voxel[1] for voxel in chosen(missions, 0.5, **config)[1]]
 
 
-def test_who_stops_at_the_same_time_shares_the_frontiers():
+def test_robots_that_stop_at_the_same_time_share_the_frontiers():
     assert sent(corridor((4, 6))) == [2, 8]
     assert sent(corridor((3, 4))) == [2, 8]  # the second would be nearer to the first one's, too
     assert sent(corridor((4, 3))) == [8, 2]
     assert sent(corridor((3, 4)), promises=False) == [2, 2]
     assert sent(corridor((3, 4)), metric=Nearest(), promises=False) == [2, 2]
     assert sent(corridor((3, 4), heard=False)) == [2, 2]  # nothing was heard: each for itself
-
-
-def between_doors():
-    """A robot in the middle of a corridor with unexplored ends, two voxels on the left and one on the right.
-
-    On the way to the right there are two doors, one unexplored voxel behind each.
-    """
-    shape = (13, 7, 1)
-    changes = {
-        "grid": Grid(shape, 0.5),
-        "robot": {"reach_m": math.inf, "body_radius_m": 0.0, "acceleration_m_s2": 100.0},
-        "sensor": {"max_range_m": 1.3, "scan_every_m": 0.5, "scan_time_s": 5.0},
-    }
-    missions = started(free_box(**changes))
-    solid = np.ones(shape, bool)
-    solid[:, 3] = solid[[8, 10], 1:3] = False
-    build(missions, solid)
-    pose = np.zeros(5)
-    pose[:3] = missions.grid.centre_of(np.array([6, 3, 0]))
-    put(missions, 0, pose)
-    missions.mean[0, 0], missions.precision[0, 0] = np.where(solid, 1.0, 0.0), 1e4
-    for unknown in ((0, 3), (1, 3), (12, 3), (8, 1), (10, 1)):
-        missions.mean[0, 0][unknown], missions.precision[0, 0][unknown] = 0.5, 1e-3
-    return missions
-
-
-@pytest.mark.parametrize(("path_scans", "right"), [(0, False), (2, True), (8, True)])
-def test_what_scans_on_the_path_see_decides(path_scans, right):
-    """Both doors are seen on the path to the right end, and nothing on that to the left one."""
-    strategy = FrontierStrategy(
-        ExplorationConfig(
-            finest_sigma=ONCE, frontiers=FrontierConfig(spacing_m=0.5), path_scans=path_scans, promises=False
-        )
-    )
-    missions = between_doors()
-    strategy.reset(missions.scenario, np.random.default_rng(0))
-    strategy._assignments[0].scanned = True
-    strategy.choose(view_of(missions, 0, 0))
-    voxel = strategy.allocator_of(0).allocate(view_of(missions, 0, 0), [], [])[0].voxel
-    assert (np.unravel_index(voxel, missions.grid.shape)[0] > 6) == right
-
-
-def allocator_in(missions, robot):
-    """The candidates of a robot, by its belief as it is."""
-    strategy = FrontierStrategy(ExplorationConfig(finest_sigma=ONCE))
-    strategy.reset(missions.scenario, np.random.default_rng(0))
-    strategy.choose(view_of(missions, 0, robot))
-    allocator = strategy.allocator_of(robot)
-    allocator.candidates.update(view_of(missions, 0, robot), ONCE)
-    return allocator
-
-
-@pytest.mark.parametrize(
-    ("places", "robot", "away"),
-    [((4, 6), 0, 2), ((4, 6), 1, 8), ((3, 4, 5), 0, 2), ((3, 4, 5), 2, 8), ((3, 4, 5), 1, None)],
-)
-def test_who_makes_room_goes_where_nobody_else_is_nearer(places, robot, away):
-    """Between two others there is no such place; nor where nobody was heard."""
-    missions = corridor(places)
-    allocator, rng = allocator_in(missions, robot), np.random.default_rng(0)
-    voxel = allocator.away_from(view_of(missions, 0, robot), rng)
-    assert voxel == (NONE if away is None else np.ravel_multi_index((3, away, 2), missions.grid.shape))
-    alone = corridor(places, heard=False)
-    assert allocator_in(alone, robot).away_from(view_of(alone, 0, robot), rng) == NONE
 
 
 @pytest.mark.parametrize(("apart", "moves"), [(1, True), (2, False)])
@@ -154,7 +92,7 @@ def test_a_path_leaves_known_space_only_where_the_robot_stands_in_none():
     missions.mean[0, 0], missions.precision[0, 0] = 0.0, 1e4
     missions.mean[0, 0][4:] = 1.0
     candidates = VoxelCandidates(missions.scenario, missions.scenario.kind_of(0), FrontierConfig())
-    candidates.update(view_of(missions, 0, 0), ONCE)
+    candidates.update(view_of(missions, 0, 0), KNOWN_SIGMA)
     stands = np.isfinite(candidates.traversal_cost).reshape(size)
     assert stands[1:3, 1:10, 1:4].all() and stands.sum() == 2 * 9 * 3
     assert candidates.open_start(int(np.ravel_multi_index((2, 5, 2), size))) == []
@@ -187,7 +125,7 @@ def test_promises_stand_until_the_scan_is_heard():
     assert sent(missions)[1] == 2
 
 
-def test_allotment_is_the_paper_s_loop():
+def test_allocation_is_the_paper_s_loop():
     """Beside the slow reference, in a plan of which little is known: three robots that have all stopped."""
     shape = (14, 12, 1)
     rng = np.random.default_rng(3)
@@ -219,17 +157,12 @@ def test_allotment_is_the_paper_s_loop():
 
 
 def check_against_reference(missions, known):
-    strategy = FrontierStrategy(ExplorationConfig(finest_sigma=ONCE, frontiers=FrontierConfig(spacing_m=1.0)))
-    strategy.reset(missions.scenario, np.random.default_rng(0))
+    strategy, places = chosen(missions, 1.0)
     views = [view_of(missions, 0, robot) for robot in range(3)]
-    for assignment in strategy._assignments:
-        assignment.scanned = True
-    places = [tuple(missions.grid.voxel_of(strategy.choose(view)[:3]).tolist()) for view in views]
-    allocator = strategy._allocators[0]
-    assert isinstance(allocator.candidates, VoxelCandidates)
-    _, voxels = allocator.candidates.listed()
+    candidates = strategy.cells_of(0)
+    _, voxels = candidates.listed()
     state = np.where(known, 0, 3)
-    directions, reach = allocator.candidates._directions, allocator.candidates.reach
+    directions, reach = candidates._directions, candidates.reach
     shape, edge = known.shape, missions.grid.voxel_size_m
     where = {int(v): np.stack(np.unravel_index(int(v), shape)) for v in voxels}
     sees = {v: reference.seen_voxels(state, place + 0.5, directions, reach) for v, place in where.items()}
