@@ -141,7 +141,7 @@ class Allocator:
         return self._best_listed(robot, taken)
 
     def _best_listed(self, robot: int, taken: Sequence[np.ndarray]) -> Choice | None:
-        """Return the best of a robot's candidates: V is counted, and paths are searched, as far as is needed.
+        """Return the best of a robot's candidates, counting V and searching paths only as far as that needs.
 
         A candidate beyond the search has at most the value that it has for the shortest path that is still
         possible. While it is the best by that, paths are searched farther.
@@ -170,13 +170,13 @@ class Allocator:
             self._search(robot, _EXTENSION * reach)
 
     def _values(self, slots: np.ndarray, voxels: np.ndarray, paths: Paths, counted: np.ndarray) -> np.ndarray:
-        """Return (K,) values of candidates; -inf of those that cannot be the best, and those that see nothing.
+        """Return (K,) values of candidates; -inf where nothing is seen, or the candidate cannot be the best.
 
         Args:
             slots: (K,) of the candidates.
             voxels: (K,) in which they lie.
             paths: To them.
-            counted: (K,) V·(height factor) in points' size where it was counted, else NaN; brought up to date.
+            counted: (K,) V·(height factor) in points' size where it was counted, else NaN; filled in.
         """
         most = np.minimum(self._candidates.upper_bounds(slots), self._candidates.greatest_visibility())
         most = np.where(np.isnan(counted), most * self._candidates.point, counted)
@@ -265,8 +265,8 @@ class Round:
 
         A teammate has if it waits, or if it left after the robot arrived, since it had waited for all others
         then. Where robots stop at corners, leaving a corner looks like leaving for a new target. There a
-        teammate has to stand at the target that the robot estimated, or its time for the drive has to be over.
-        The estimate may be wrong, as robots do not know from where others have scanned.
+        teammate has to stand at the target that the robot estimated, or the time for its drive has to be
+        over. The estimate may be wrong, as robots do not know from where others have scanned.
         """
         axes = 2 if view.planar else 3
         for mate, seen in view.teammates.items():
