@@ -22,10 +22,11 @@ from entropy_explore_env.frontiers.frontier_cells import FrontierCells
 from entropy_explore_env.frontiers.knowledge import voxel_of
 from entropy_explore_env.frontiers.path_lengths import KnownPaths
 from entropy_explore_env.frontiers.ray_tree import grow_tree
-from entropy_explore_env.frontiers.voxel_map import COVERED, UNEXPLORED, UNMAPPED
+from entropy_explore_env.frontiers.voxel_map import COVERED, NONE, UNEXPLORED, UNMAPPED
 from entropy_explore_env.frontiers.voxel_visibility import count_from, new_counter, rays_around
 from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.missions.view import view_of
+from entropy_explore_env.planner.scene import Scene
 from entropy_explore_env.scenario import Scenario, with_settings
 from entropy_explore_env.scenarios import find_scenario
 from entropy_explore_env.settings import Grid
@@ -102,9 +103,10 @@ class Deciding:
         scenario, solid = rooms_plan(side)
         self._missions, self._scans = _half_known(scenario, solid), 0
         self._view, kind = view_of(self._missions, 0, 0), scenario.kind_of(0)
-        self._here = voxel_of(self._view, self._view.pose)
+        here = voxel_of(self._view, self._view.pose)
         self.candidates = FrontierCells(scenario, kind, FrontierConfig(spacing_m=3.0))
-        self._paths = KnownPaths(scenario, kind, self.candidates, new_search(scenario.grid.voxels))
+        paths = KnownPaths(scenario, kind, self.candidates, new_search(scenario.grid.voxels))
+        self._scene = Scene(self._view, self.candidates, paths, here, NONE)
 
     def decide_ms(self) -> float:
         """Milliseconds of the next decision."""
@@ -116,8 +118,8 @@ class Deciding:
         mean[500 + scan, 400:420], precision[500 + scan, 400:420] = 0.1, 100.0 + self._scans
         started = time.thread_time()
         self.candidates.update(self._view, KNOWN_SIGMA)
-        self._paths.start(self._here)
-        Allocator(self._view, self.candidates, self._paths, Metric()).allocate([], [])
+        self._scene.paths.start(self._scene.here)
+        Allocator(self._scene, Metric()).allocate([], [])
         return 1e3 * (time.thread_time() - started)
 
 

@@ -15,14 +15,13 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from baselines.strategies.rules.metrics import Value
-from entropy_explore_env.frontiers.candidates import Candidates
 from entropy_explore_env.frontiers.knowledge import RobotKnowledge, stays, under_way, voxel_of
-from entropy_explore_env.frontiers.path_lengths import KnownPaths
+from entropy_explore_env.planner.scene import Scene
 from entropy_explore_env.robots.motion import driving_time
 
 _FIRST_REACH = 0.25
@@ -67,21 +66,12 @@ class _Lengths(NamedTuple):
 class Allocator:
     """Allocates the candidates of one robot's map, at one of its decisions."""
 
-    def __init__(
-        self, view: RobotKnowledge, candidates: Candidates[Any], paths: KnownPaths, value: Value
-    ) -> None:
-        """Take what the robot knows.
-
-        Args:
-            view: Of the robot.
-            candidates: Up to date with its belief.
-            paths: Through its map; a search from where it stands has begun.
-            value: The metric.
-        """
-        self._view, self._candidates, self._paths, self._value = view, candidates, paths, value
-        self._grid = view.scenario.grid
+    def __init__(self, scene: Scene, value: Value) -> None:
+        """Take what the robot knows, and the metric."""
+        self._view, self._candidates, self._paths = scene.view, scene.cells, scene.paths
+        self._centres, self._grid, self._value = scene.centres, scene.view.scenario.grid, value
         self._lengths: dict[int, _Lengths] = {}
-        self._searched = view.robot
+        self._searched = scene.view.robot
         """The robot of the latest search."""
 
     def allocate(
@@ -112,7 +102,7 @@ class Allocator:
             unassigned.remove(best)
             if best == self._view.robot and not everybody:
                 break
-            place = self._places(np.array([choice.voxel]))[0]
+            place = self._centres(np.array([choice.voxel]))[0]
             self._candidates.promise(place)
             taken.append(place)
         self._candidates.release()
@@ -149,8 +139,8 @@ class Allocator:
         slots, voxels = self._candidates.listed()
         if robot not in self._lengths:
             self._search(robot, _FIRST_REACH * self._candidates.reach)
-        start = self._places(np.array([self._voxel_of(robot)]))
-        apart = np.linalg.norm(self._places(voxels) - start, axis=1)
+        start = self._centres(np.array([self._voxel_of(robot)]))
+        apart = np.linalg.norm(self._centres(voxels) - start, axis=1)
         takes, counted = self._taken(voxels, taken), np.full(len(slots), np.nan)
         while True:
             reach, edges = self._lengths[robot].reach, self._lengths[robot].edges[slots]
@@ -222,15 +212,11 @@ class Allocator:
 
     def _taken(self, voxels: np.ndarray, taken: Sequence[np.ndarray]) -> np.ndarray:
         """Return (K,) Σ over targets of P(d) = 1 - d/range, within the range (Burgard 2005, eq. 6)."""
-        places, total = self._places(voxels), np.zeros(len(voxels))
+        places, total = self._centres(voxels), np.zeros(len(voxels))
         for target in taken:
             apart = np.linalg.norm(places - target[:3], axis=1)
             total += np.maximum(1.0 - apart / self._candidates.reach, 0.0)
         return total
-
-    def _places(self, voxels: np.ndarray) -> np.ndarray:
-        """Return (K, 3) centres of (K,) voxels, grid units."""
-        return np.stack(np.unravel_index(voxels, self._grid.shape), axis=-1) + 0.5
 
 
 @dataclass

@@ -124,9 +124,9 @@ class PerTimeVisibility(FrontierRule):
 
     def options(self, view: RobotKnowledge) -> tuple[np.ndarray, np.ndarray]:
         """Return (K,) seconds and (K,) V·(height factor) of what a robot can choose; it has chosen before."""
-        memory = self._memories[view.robot]
-        memory.paths.start(voxel_of(view, view.pose))
-        return Allocator(view, memory.cells, memory.paths, self.config.metric).options()
+        memory, here = self._memories[view.robot], voxel_of(view, view.pose)
+        memory.paths.start(here)
+        return Allocator(Scene(view, memory.cells, memory.paths, here, NONE), self.config.metric).options()
 
     def arrive(self, view: RobotKnowledge, cells: FrontierCells, here: int) -> None:
         """Take out the candidate from which the robot has scanned."""
@@ -154,7 +154,7 @@ class PerTimeVisibility(FrontierRule):
     def _allocated(self, scene: Scene, known: list[int], moving: list[int]) -> dict[int, Choice]:
         """Return what is allocated to the robot and to teammates that choose with it."""
         view, config = scene.view, self.config
-        allocator = Allocator(view, scene.cells, scene.paths, config.metric)
+        allocator = Allocator(scene, config.metric)
         if not config.promises:
             return allocator.allocate([], [])
         grid, stopped = self._scenario.grid, [mate for mate in known if mate not in moving]
