@@ -11,17 +11,22 @@ from baselines.experiments.mission import scripted
 from baselines.papers.sawhney.mission import Run, explore_until_done
 from baselines.papers.sawhney.sweep import world_cell
 from baselines.strategies.allocation import Allocator
-from baselines.strategies.rules.per_time_visibility import FrontierStrategy, Metric
+from baselines.strategies.rules.metrics import Metric
+from baselines.strategies.rules.per_time_visibility import PerTimeVisibility
 from benchmarks.planning import FLOOR, cluttered
 from benchmarks.rows import Effort, Goal, Row, alone, compared, timed
 from entropy_explore_env.belief.paths.search import new_search
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
-from entropy_explore_env.frontiers.candidates import FrontierConfig
+from entropy_explore_env.frontiers.candidates import KNOWN_SIGMA, FrontierConfig
+from entropy_explore_env.frontiers.frontier_cells import FrontierCells
+from entropy_explore_env.frontiers.knowledge import voxel_of
+from entropy_explore_env.frontiers.path_lengths import KnownPaths
 from entropy_explore_env.frontiers.ray_tree import grow_tree
-from entropy_explore_env.frontiers.voxel_map import COVERED, UNEXPLORED, UNMAPPED
+from entropy_explore_env.frontiers.voxel_map import COVERED, NONE, UNEXPLORED, UNMAPPED
 from entropy_explore_env.frontiers.voxel_visibility import count_from, new_counter, rays_around
 from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.missions.view import view_of
+from entropy_explore_env.planner.scene import Scene
 from entropy_explore_env.scenario import Scenario, with_settings
 from entropy_explore_env.scenarios import find_scenario
 from entropy_explore_env.settings import Grid
@@ -40,8 +45,8 @@ _WARM = (90, 70, 1)
 
 def exploring_rows(effort: Effort) -> list[Row]:
     """A step with 720 rays on 480 × 640, decisions on large plans, expected visibility, a whole mission."""
-    decisions = [decision_row(effort, lazy) for lazy in (True, False)]
-    return [step_row(effort), *decisions, larger_row(effort), visibility_row(effort), floor_row(effort)]
+    decisions = [decision_row(effort), larger_row(effort)]
+    return [step_row(effort), *decisions, visibility_row(effort), floor_row(effort)]
 
 
 def dense_plan() -> Scenario:
@@ -89,19 +94,19 @@ def rooms_plan(side: int = _SIDE) -> tuple[Scenario, np.ndarray]:
 class Deciding:
     """Decisions among some 200 candidates, 500 × 1000 cells of a plan known, the others not.
 
-    Between decisions the robot scans: a decision takes the new belief in, searches paths, and counts; lazily
-    as far as the choice needs it, else paths to all candidates and V of each.
+    Between decisions the robot scans: a decision takes the new belief in, searches paths, and counts V as far
+    as the choice needs it.
     """
 
-    def __init__(self, lazy: bool, side: int = _SIDE) -> None:
+    def __init__(self, side: int = _SIDE) -> None:
         """Prepare the plan."""
         scenario, solid = rooms_plan(side)
         self._missions, self._scans = _half_known(scenario, solid), 0
         self._view, kind = view_of(self._missions, 0, 0), scenario.kind_of(0)
-        search = new_search(scenario.grid.voxels)
-        self.allocator = Allocator(
-            scenario, kind, FrontierConfig(spacing_m=3.0), Metric(), search, None, lazy
-        )
+        here = voxel_of(self._view, self._view.pose)
+        self.candidates = FrontierCells(scenario, kind, FrontierConfig(spacing_m=3.0))
+        paths = KnownPaths(scenario, kind, self.candidates, new_search(scenario.grid.voxels))
+        self._scene = Scene(self._view, self.candidates, paths, here, NONE)
 
     def decide_ms(self) -> float:
         """Milliseconds of the next decision."""
@@ -112,8 +117,9 @@ class Deciding:
         precision[455 + scan : 475 + scan, 455:475] += 1.0
         mean[500 + scan, 400:420], precision[500 + scan, 400:420] = 0.1, 100.0 + self._scans
         started = time.thread_time()
-        self.allocator.candidates.update(self._view, 0.5)
-        self.allocator.allocate(self._view, [], [])
+        self.candidates.update(self._view, KNOWN_SIGMA)
+        self._scene.paths.start(self._scene.here)
+        Allocator(self._scene, Metric()).allocate([], [])
         return 1e3 * (time.thread_time() - started)
 
 
@@ -132,19 +138,18 @@ def _half_known(scenario: Scenario, solid: np.ndarray) -> Missions:
     return missions
 
 
-def decision_row(effort: Effort, lazy: bool) -> Row:
+def decision_row(effort: Effort) -> Row:
     """Milliseconds a decision on 1000 × 1000 cells."""
-    deciding = Deciding(lazy)
+    deciding = Deciding()
     taken = [deciding.decide_ms() for _ in range(effort.rounds + 2)]
-    count = len(deciding.allocator.candidates.listed()[0])
-    job = f"a decision of per-time-visibility, 1000 × 1000, {count} candidates, "
-    job += "as far as the choice needs" if lazy else "paths to all and V of each"
+    count = len(deciding.candidates.listed()[0])
+    job = f"a decision of per-time-visibility, 1000 × 1000, {count} candidates, as far as the choice needs"
     return alone(job, taken[2:], "ms", Goal("<", 50.0, "ms"))
 
 
 def larger_row(effort: Effort) -> Row:
     """The same in a map of four times as many cells, of which as much is known and as much changes."""
-    small, large = Deciding(True), Deciding(True, 2 * _SIDE)
+    small, large = Deciding(), Deciding(2 * _SIDE)
     ours, theirs = np.array([(large.decide_ms(), small.decide_ms()) for _ in range(effort.rounds + 2)])[2:].T
     job = "a decision of per-time-visibility, 2000 × 2000, as much known and changed"
     return compared(job, "1000 × 1000", ours.tolist(), theirs.tolist(), "ms")
@@ -198,7 +203,7 @@ def mission_s(world: World) -> float:
     assert isinstance(cell.record, Run)
     settings = {"grid": world.grid, "sensor": {"max_range_m": 10.0}, "ending": {"time_limit_s": 1e5}}
     scenario = with_settings(scripted(cell.scenario), settings)
-    env, explorer = EntropyExploreEnv(scenario, world=world), FrontierStrategy(cell.record.exploring)
+    env, explorer = EntropyExploreEnv(scenario, world=world), PerTimeVisibility(cell.record.exploring)
     started = time.perf_counter()
     explore_until_done(env, explorer, 0)
     return time.perf_counter() - started

@@ -9,7 +9,6 @@ from pathlib import Path
 from types import MappingProxyType, ModuleType
 
 from baselines.strategies.loading import entry_points, is_reference, make_referenced, module_of
-from baselines.strategies.metrics import coordinated_candidate, nearest_candidate
 from baselines.strategies.mutual_information.neighbourhood import MutualInformationConfig
 from baselines.strategies.planner_choice import PlannerChoice
 from baselines.strategies.protocol import Strategy
@@ -20,11 +19,12 @@ from baselines.strategies.rules.coordinated_frontier import CoordinatedFrontier
 from baselines.strategies.rules.distance_advantage import DistanceAdvantage
 from baselines.strategies.rules.gradient import GradientStrategy
 from baselines.strategies.rules.information_gain import InformationGain
+from baselines.strategies.rules.metrics import Coordinated, Nearest
 from baselines.strategies.rules.most_unmapped import LeastMapped, MostUnmapped, RandomKnown
 from baselines.strategies.rules.mutual_information import MutualInformation
 from baselines.strategies.rules.nearest_frontier import NearestFrontier
 from baselines.strategies.rules.next_best_view import NextBestView
-from baselines.strategies.rules.per_time_visibility import FrontierStrategy
+from baselines.strategies.rules.per_time_visibility import ExplorationConfig, PerTimeVisibility
 from baselines.strategies.rules.random_walk import RandomWalk
 from baselines.strategies.rules.raster import Raster
 from baselines.strategies.rules.receding_horizon import RecedingHorizon
@@ -44,7 +44,7 @@ STRATEGIES: MappingProxyType[str, Callable[[], Strategy]] = MappingProxyType(
         "ground-gradient": partial(MutualInformation, MutualInformationConfig(coordinated=False)),
         "planned-rate": PlannedRate,
         "planner-choice": PlannerChoice,
-        "per-time-visibility": FrontierStrategy,
+        "per-time-visibility": PerTimeVisibility,
         "nearest-frontier": NearestFrontier,
         "coordinated-frontier": CoordinatedFrontier,
         "assigned-frontier": AssignedFrontier,
@@ -58,8 +58,8 @@ STRATEGIES: MappingProxyType[str, Callable[[], Strategy]] = MappingProxyType(
         "random-known": RandomKnown,
         "raster": Raster,
         "raster-fixed-yaw": partial(Raster, turning=False),
-        "nearest-candidate": nearest_candidate,
-        "coordinated-candidate": coordinated_candidate,
+        "nearest-candidate": partial(PerTimeVisibility, ExplorationConfig(metric=Nearest(), promises=False)),
+        "coordinated-candidate": partial(PerTimeVisibility, ExplorationConfig(metric=Coordinated())),
         "voronoi": VoronoiCoverage,
         "voronoi-gradient": partial(VoronoiCoverage, VoronoiConfig(control="gradient-search")),
         "voronoi-nearest": partial(

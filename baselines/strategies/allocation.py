@@ -13,58 +13,31 @@ arrived; or if nothing was heard of it for longer than any drive takes.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
-from dataclasses import dataclass
-from typing import Protocol
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 
-from entropy_explore_env.belief.paths.lattice import Lattice, costs_of, new_lattice
-from entropy_explore_env.belief.paths.planning import resume_search, search_paths, start_search
-from entropy_explore_env.belief.paths.search import Search, cost_to, costs_to_all
-from entropy_explore_env.compilation.kernels import lean_kernel
-from entropy_explore_env.frontiers.candidates import Candidates, FrontierConfig
-from entropy_explore_env.frontiers.terrain_candidates import TerrainCandidates
-from entropy_explore_env.frontiers.voxel_candidates import VoxelCandidates
-from entropy_explore_env.frontiers.voxel_map import NONE
-from entropy_explore_env.missions.view import RobotView
+from baselines.strategies.rules.metrics import Value
+from entropy_explore_env.frontiers.knowledge import RobotKnowledge, stays, under_way, voxel_of
+from entropy_explore_env.planner.scene import Scene
 from entropy_explore_env.robots.motion import driving_time
-from entropy_explore_env.scenario import Scenario
-from entropy_explore_env.settings import RobotKind
 
 _FIRST_REACH = 0.25
 """Paths are searched so far at first, in sensor ranges: most choices are nearer, and a search over a whole
 range costs more than counting the few candidates beyond that could be better."""
 _EXTENSION = 1.4
 """Then they are searched this many times as far until that is enough."""
-_PARTING_DRAWS = 8
-"""So many places away from teammates are drawn, of which the farthest from them is taken."""
-
-
-class Value(Protocol):
-    """Values of candidates; never greater for less V, or for a longer path."""
-
-    def __call__(
-        self, seen: np.ndarray, seconds: np.ndarray, edges: np.ndarray, taken: np.ndarray
-    ) -> np.ndarray:
-        """(K,) values; -inf = no candidate.
-
-        Args:
-            seen: (K,) V·(height factor) in points' size.
-            seconds: (K,) travel and scan.
-            edges: (K,) length of the path in voxel edges.
-            taken: (K,) share of a frontier's utility that robots take which go near it, ≥ 0 (Burgard 2005).
-        """
-        ...
+_driving_times = np.vectorize(driving_time, otypes=[float])
+_DELAY = 1.5
+"""Others may be under way this many times the estimated time, which does not include stops at corners."""
 
 
 @dataclass(frozen=True)
 class Choice:
     """A candidate that was allocated to a robot."""
 
-    slot: int
-    """Of the candidate in its map."""
     voxel: int
     """The voxel in which it lies."""
     value: float
@@ -73,69 +46,40 @@ class Choice:
     """Of travel and scan."""
 
 
-@dataclass(frozen=True)
-class _PathCosts:
-    """Lengths of a robot's paths to all candidates."""
+class Paths(NamedTuple):
+    """Paths to K candidates, as a Value takes them."""
 
-    start: np.ndarray
-    """(3,) where they start, grid units."""
+    seconds: np.ndarray
+    edges: np.ndarray
+    taken: np.ndarray
+
+
+class _Lengths(NamedTuple):
+    """Lengths of a robot's paths to candidates."""
+
     reach: float
     """Up to which length they were searched, in voxel edges."""
     edges: np.ndarray
-    """(B,) float64, lengths by the candidates' slots; inf = no path up to that length."""
-    search: int
-    """Number of their search, which can be resumed as long as it is the latest."""
+    """(S,) float64, by the candidates' slots; inf = no path up to that length."""
 
 
 class Allocator:
-    """Candidates of one robot's belief, and their allocation.
+    """Allocates the candidates of one robot's map, at one of its decisions."""
 
-    Attributes:
-        candidates: See candidates.py.
-        search: Memory of path searches, shared with other robots.
-        counted: How many candidates were counted in all.
-    """
-
-    def __init__(
-        self,
-        scenario: Scenario,
-        kind: RobotKind,
-        frontiers: FrontierConfig,
-        value: Value,
-        search: Search,
-        ceiling: np.ndarray | None,
-        lazy: bool,
-    ) -> None:
-        """Nothing is explored yet.
-
-        Args:
-            scenario: The mission's settings.
-            kind: Of the robot.
-            frontiers: Where candidates lie, and how V is counted.
-            value: The metric.
-            search: Memory of path searches.
-            ceiling: (X, Y) the exposure surface in layers; None = candidates are voxels.
-            lazy: Whether candidates are counted only as far as a choice needs.
-        """
-        self._value, self._lazy, self.search = value, lazy, search
-        self._edge, self._scenario = scenario.grid.voxel_size_m, scenario
-        layer = scenario.layer_of(kind.robot)
-        self.lattice: Lattice = new_lattice(scenario.grid.shape, 0.0, layer)
-        self.candidates: Candidates = (
-            VoxelCandidates(scenario, kind, frontiers)
-            if ceiling is None
-            else TerrainCandidates(scenario, kind, frontiers, ceiling)
-        )
-        self.costs = costs_of(self.candidates.traversal_cost, 1.0)
-        self.counted = 0
+    def __init__(self, scene: Scene, value: Value) -> None:
+        """Take what the robot knows, and the metric."""
+        self._view, self._candidates, self._paths = scene.view, scene.cells, scene.paths
+        self._centres, self._grid, self._value = scene.centres, scene.view.scenario.grid, value
+        self._lengths: dict[int, _Lengths] = {}
+        self._searched = scene.view.robot
+        """The robot of the latest search."""
 
     def allocate(
-        self, view: RobotView, stopped: Sequence[int], targets: Sequence[np.ndarray], everybody: bool = False
+        self, stopped: Sequence[int], targets: Sequence[np.ndarray], everybody: bool = False
     ) -> dict[int, Choice]:
-        """The candidates that are allocated to a robot and to those before it.
+        """Allocate candidates to the robot and to those that come before it.
 
         Args:
-            view: Of the robot; the candidates are up to date with its belief.
             stopped: Teammates that are allocated something at the same time.
             targets: (3,) places in grid units to which others are under way.
             everybody: Whether the allocation continues after this robot's turn.
@@ -144,239 +88,187 @@ class Allocator:
             Robot → candidate. The robot is missing if from no candidate that it reaches anything unexplored
             can be seen.
         """
-        candidates, taken = self.candidates, list(targets)
+        taken = list(targets)
         for target in targets:
-            candidates.promise(target)
-        unassigned, found = [view.robot, *sorted(stopped)], dict[int, Choice]()
-        path_costs: dict[int, _PathCosts] = {}
+            self._candidates.promise(target)
+        unassigned, found = [self._view.robot, *sorted(stopped)], dict[int, Choice]()
         while unassigned:
-            choices = {robot: self._best(view, robot, path_costs, taken) for robot in unassigned}
+            choices = {robot: self._best(robot, taken) for robot in unassigned}
             best = max(sorted(unassigned), key=lambda robot: _value_of(choices[robot]))
             choice = choices[best]
             if choice is None:
                 break
             found[best] = choice
             unassigned.remove(best)
-            if best == view.robot and not everybody:
+            if best == self._view.robot and not everybody:
                 break
-            place = self.place_of(choice.voxel)
-            candidates.promise(place)
+            place = self._centres(np.array([choice.voxel]))[0]
+            self._candidates.promise(place)
             taken.append(place)
-        candidates.release()
+        self._candidates.release()
         return found
 
-    def options(self, view: RobotView) -> tuple[np.ndarray, np.ndarray]:
-        """What the robot can choose from now: (K,) seconds and (K,) V·(height factor) of each candidate.
-
-        The candidates must be up to date with the belief; no promises count.
-        """
-        path_costs = self._path_costs(view.pose, math.inf)
-        slots, voxels = self.candidates.listed()
-        reached = np.isfinite(path_costs.edges[slots])
-        slots, voxels = slots[reached], voxels[reached]
-        seen = self.candidates.count(slots, voxels) * self.candidates.point
-        return self.seconds(view.robot, path_costs.edges[slots]), seen
-
-    def away_from(self, view: RobotView, rng: np.random.Generator) -> int:
-        """A voxel to which the robot has a shorter path than any teammate of which it heard; NONE = none.
-
-        Of some that are drawn the one that is farthest from teammates.
-        """
-        heard = [mate.pose for mate in view.teammates.values() if mate.heard_s >= 0.0]
-        if not heard:
-            return NONE
-        apart = np.min([self._costs_everywhere(pose) for pose in heard], axis=0)
-        own = self._costs_everywhere(view.pose)
-        own[self.start_of(view.pose)] = math.inf
-        nearer = np.flatnonzero(own < apart)
-        if len(nearer) == 0:
-            return NONE
-        drawn = rng.choice(nearer, _PARTING_DRAWS)
-        return int(drawn[np.argmax(apart[drawn])])
-
-    def _costs_everywhere(self, pose: np.ndarray) -> np.ndarray:
-        """(V,) float64 lengths of the paths from a pose to all voxels; inf = no path through mapped space."""
-        costs = np.empty(self._scenario.grid.voxels)
-        with self._passable_start(pose) as source:
-            start_search(self.search, self.lattice, self.costs, source)
-            resume_search(self.search, self.lattice, self.costs, math.inf)
-        costs_to_all(self.search, costs)
-        return costs
-
-    def place_of(self, voxel: int) -> np.ndarray:
-        """(3,) centre of a voxel, grid units."""
-        return np.stack(np.unravel_index(voxel, self._scenario.grid.shape)).astype(float) + 0.5
-
-    def start_of(self, pose: np.ndarray) -> int:
-        """Number of the voxel of a pose (5,), map frame."""
-        grid = self._scenario.grid
-        place = np.clip(grid.voxel_of(pose[:3]), 0, np.array(grid.shape) - 1)
-        if self.lattice.layer >= 0:
-            place[2] = self.lattice.layer
-        return int(np.ravel_multi_index(tuple(place), grid.shape))
-
-    def search_path(self, pose: np.ndarray, goal: int) -> None:
-        """Search the path from a pose to a voxel, through the mapped region."""
-        with self._passable_start(pose) as source:
-            search_paths(self.search, self.lattice, self.costs, source, goal, math.inf)
-
-    @contextmanager
-    def _passable_start(self, pose: np.ndarray) -> Iterator[np.ndarray]:
-        """(1,) int32, the voxel of a pose, which is made passable meanwhile."""
-        start = self.start_of(pose)
-        opened = self.candidates.open_start(start)
-        try:
-            yield np.array([start], np.int32)
-        finally:
-            self.candidates.close(opened)
-
-    def _path_costs(self, pose: np.ndarray, reach: float, before: _PathCosts | None = None) -> _PathCosts:
-        """Shortest-path costs from a robot's last known pose; extends `before` where it can."""
-        arrays = self.search, self.lattice, self.costs
-        with self._passable_start(pose) as source:
-            if before is None or before.search != self.search.searches[0]:
-                start_search(*arrays, source)
-            resume_search(*arrays, reach)
-        voxels = self.candidates.voxels_of(slice(None))
-        edges = np.full(len(voxels), np.inf)
-        ask_costs(self.search, voxels, reach, edges)
-        return _PathCosts(self.place_of(int(source[0])), reach, edges, int(self.search.searches[0]))
-
-    def _best(
-        self, view: RobotView, robot: int, path_costs: dict[int, _PathCosts], taken: Sequence[np.ndarray]
-    ) -> Choice | None:
-        """The best candidate of a robot; paths are searched, and stored, no farther than is needed."""
-        pose = view.pose if robot == view.robot else view.teammates[robot].pose
-        whole = float(sum(self._scenario.grid.shape))
-        if robot not in path_costs:
-            near = _FIRST_REACH * self.candidates.reach if self._lazy else math.inf
-            path_costs[robot] = self._path_costs(pose, near if near < whole else math.inf)
-        weighed = np.full(len(path_costs[robot].edges), np.nan)
-        choice, sure = self._best_of(robot, path_costs[robot], taken, weighed)
-        while not sure:
-            farther = _EXTENSION * path_costs[robot].reach
-            path_costs[robot] = self._path_costs(
-                pose, farther if farther < whole else math.inf, path_costs[robot]
-            )
-            choice, sure = self._best_of(robot, path_costs[robot], taken, weighed)
-        if choice is None and robot == view.robot and len(self.candidates.listed(all_of_them=True)[0]) > 0:
-            whole_map = self._path_costs(pose, math.inf, path_costs[robot])
-            everywhere = np.empty(self._scenario.grid.voxels)
-            costs_to_all(self.search, everywhere)
-            self.candidates.replace_unreached(everywhere)
-            path_costs.clear()  # candidates have moved
-            path_costs[robot] = self._path_costs(pose, math.inf, whole_map)
-            weighed = np.full_like(weighed, np.nan)
-            choice, _ = self._best_of(robot, path_costs[robot], taken, weighed)
-        return choice
-
-    def _best_of(
-        self, robot: int, path_costs: _PathCosts, taken: Sequence[np.ndarray], weighed: np.ndarray
-    ) -> tuple[Choice | None, bool]:
-        """The best of the candidates that were reached, and whether none beyond can be better.
-
-        Counts are stored in `weighed`, (B,) by slot; NaN = not counted yet.
-        """
-        slots, voxels = self.candidates.listed(all_of_them=not self._lazy)
-        edges, point = path_costs.edges[slots], self.candidates.point
+    def options(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return (K,) seconds and (K,) V·(height factor) of what the robot can choose; no promises count."""
+        self._search(self._view.robot, math.inf)
+        slots, voxels = self._candidates.listed()
+        edges = self._lengths[self._view.robot].edges[slots]
         reached = np.isfinite(edges)
-        beyond = slots[~reached]
-        slots, voxels, edges = slots[reached], voxels[reached], edges[reached]
-        seconds = self.seconds(robot, edges)
-        takes = self._taken(voxels, taken)
-        most = self.candidates.upper_bounds(slots) if self._lazy else np.full(len(slots), np.inf)
-        bound = self._value(
-            np.minimum(most, self.candidates.greatest_visibility()) * point, seconds, edges, takes
-        )
-        order = np.argsort(-bound, kind="stable")
-        value = np.full(len(slots), -np.inf)
-        size = self.candidates.batch
-        for first in range(0, len(order), size):
-            batch = order[first : first + size]
-            if self._lazy and bound[batch[0]] < value.max():
-                break
-            seen = self._seen(slots[batch], weighed)
-            worth = self._value(seen, seconds[batch], edges[batch], takes[batch])
-            value[batch] = np.where(seen > 0.0, worth, -np.inf)
-        best = int(np.argmax(value)) if len(value) else -1
-        choice = None
-        if best >= 0 and value[best] > -np.inf:
-            choice = Choice(int(slots[best]), int(voxels[best]), float(value[best]), float(seconds[best]))
-        if len(beyond) == 0 or math.isinf(path_costs.reach):
-            return choice, True
-        return choice, choice is not None and self._none_is_better(robot, beyond, path_costs, choice, weighed)
+        seen = self._candidates.count(slots[reached], voxels[reached]) * self._candidates.point
+        return self._seconds(self._view.robot, edges[reached]), seen
 
-    def _seen(self, slots: np.ndarray, weighed: np.ndarray) -> np.ndarray:
-        """(K,) V·(height factor) of candidates in points' size; `weighed` as in `_best_of`."""
-        new = slots[np.isnan(weighed[slots])]
-        weighed[new] = self.candidates.count(new, self.candidates.voxels_of(new))
-        self.counted += len(new)
-        return weighed[slots] * self.candidates.point
+    def _best(self, robot: int, taken: Sequence[np.ndarray]) -> Choice | None:
+        """Return a robot's best candidate; if it has none, after those that no path reaches are replaced."""
+        choice = self._best_listed(robot, taken)
+        if choice is not None or robot != self._view.robot:
+            return choice
+        if len(self._candidates.listed(all_of_them=True)[0]) == 0:
+            return None
+        self._search(robot, math.inf)
+        everywhere = self._paths.lengths_to(np.arange(self._grid.voxels, dtype=np.int32))
+        self._candidates.replace_unreached(everywhere)
+        self._lengths.clear()  # candidates have moved
+        return self._best_listed(robot, taken)
 
-    def _none_is_better(
-        self, robot: int, slots: np.ndarray, path_costs: _PathCosts, choice: Choice, weighed: np.ndarray
-    ) -> bool:
-        """Whether no candidate beyond the search's reach can have the value of one that was found.
+    def _best_listed(self, robot: int, taken: Sequence[np.ndarray]) -> Choice | None:
+        """Return the best of a robot's candidates, counting V and searching paths only as far as that needs.
 
-        Its path is longer than the reach, and than the straight line. The most promising ones are counted,
-        since that takes less time than a longer search; `weighed` as in `_best_of`.
+        A candidate beyond the search has at most the value that it has for the shortest path that is still
+        possible. While it is the best by that, paths are searched farther.
         """
-        apart = np.linalg.norm(self._places(self.candidates.voxels_of(slots)) - path_costs.start, axis=1)
-        edges = np.maximum(path_costs.reach, apart - 2.0)  # paths lead from centre to centre
-        seconds, none_taken = self.seconds(robot, edges), np.zeros(len(slots))
-        most = np.minimum(self.candidates.upper_bounds(slots), self.candidates.greatest_visibility())
-        bound = self._value(most * self.candidates.point, seconds, edges, none_taken)
-        better = np.flatnonzero(bound >= choice.value)
-        order, size = better[np.argsort(-bound[better], kind="stable")], self.candidates.batch
+        slots, voxels = self._candidates.listed()
+        if robot not in self._lengths:
+            self._search(robot, _FIRST_REACH * self._candidates.reach)
+        start = self._centres(np.array([self._voxel_of(robot)]))
+        apart = np.linalg.norm(self._centres(voxels) - start, axis=1)
+        takes, counted = self._taken(voxels, taken), np.full(len(slots), np.nan)
+        while True:
+            reach, edges = self._lengths[robot].reach, self._lengths[robot].edges[slots]
+            if math.isinf(reach):
+                arrays, near = (slots, voxels, apart, takes, counted, edges), np.isfinite(edges)
+                slots, voxels, apart, takes, counted, edges = (array[near] for array in arrays)
+            if len(slots) == 0:
+                return None
+            least = np.where(np.isfinite(edges), edges, np.maximum(reach, apart - 2.0))  # centre to centre
+            seconds = self._seconds(robot, least)
+            value = self._values(slots, voxels, Paths(seconds, least, takes), counted)
+            best = int(np.argmax(value))
+            if value[best] == -math.inf:
+                return None
+            if math.isfinite(edges[best]):
+                return Choice(int(voxels[best]), float(value[best]), float(seconds[best]))
+            self._search(robot, _EXTENSION * reach)
+
+    def _values(self, slots: np.ndarray, voxels: np.ndarray, paths: Paths, counted: np.ndarray) -> np.ndarray:
+        """Return (K,) values of candidates; -inf where nothing is seen, or the candidate cannot be the best.
+
+        Args:
+            slots: (K,) of the candidates.
+            voxels: (K,) in which they lie.
+            paths: To them.
+            counted: (K,) V·(height factor) in points' size where it was counted, else NaN; filled in.
+        """
+        most = np.minimum(self._candidates.upper_bounds(slots), self._candidates.greatest_visibility())
+        most = np.where(np.isnan(counted), most * self._candidates.point, counted)
+        bound, value = self._value(most, *paths), np.full(len(slots), -np.inf)
+        order, size = np.argsort(-bound, kind="stable"), self._candidates.batch
         for first in range(0, len(order), size):
             batch = order[first : first + size]
-            seen = self._seen(slots[batch], weighed)
-            worth = self._value(seen, seconds[batch], edges[batch], none_taken[batch])
-            if (worth[seen > 0.0] >= choice.value).any():
-                return False
-        return True
+            if bound[batch[0]] < value.max():
+                break
+            fresh = batch[np.isnan(counted[batch])]
+            counted[fresh] = self._candidates.count(slots[fresh], voxels[fresh]) * self._candidates.point
+            worth = self._value(counted[batch], *(array[batch] for array in paths))
+            value[batch] = np.where(counted[batch] > 0.0, worth, -np.inf)
+        return value
 
-    def seconds(self, robot: int, edges: np.ndarray) -> np.ndarray:
-        """(K,) seconds of the drives along paths of these lengths, and of the scans at their stops."""
-        kind = self._scenario.kind_of(robot)
-        length_m = edges * self._edge
+    def _search(self, robot: int, reach: float) -> None:
+        """Search a robot's paths up to a length, and keep the lengths of those that lead to candidates."""
+        if self._searched != robot:
+            self._paths.start(self._voxel_of(robot))
+            self._searched = robot
+        farthest = float(sum(self._grid.shape))
+        self._paths.extend(reach if reach < farthest else math.inf)
+        slots, voxels = self._candidates.listed(all_of_them=True)
+        lengths = self._paths.lengths_to(voxels)
+        edges = np.full(len(self._candidates.voxels_of(slice(None))), np.inf)
+        edges[slots] = np.where(lengths <= self._paths.reach, lengths, np.inf)
+        self._lengths[robot] = _Lengths(self._paths.reach, edges)
+
+    def _voxel_of(self, robot: int) -> int:
+        """Return the voxel in which a robot was when it was last heard, in the layer of planar robots."""
+        view = self._view
+        voxel = voxel_of(view, view.pose if robot == view.robot else view.teammates[robot].pose)
+        layer, layers = self._paths.lattice.layer, self._grid.shape[2]
+        return voxel if layer < 0 else voxel - voxel % layers + layer
+
+    def _seconds(self, robot: int, edges: np.ndarray) -> np.ndarray:
+        """Return (K,) seconds of the drives along paths of these lengths, and of the scans at their stops."""
+        kind = self._view.scenario.kind_of(robot)
+        length_m = edges * self._grid.voxel_size_m
         stops = np.maximum(np.ceil(length_m / kind.robot.reach_m), 1.0)
-        hops_s = np.empty(len(edges))
-        fill_driving_times(length_m / stops, kind.robot.max_speed_m_s, kind.robot.acceleration_m_s2, hops_s)
+        hops_s = _driving_times(length_m / stops, kind.robot.max_speed_m_s, kind.robot.acceleration_m_s2)
         return stops * (hops_s + kind.sensor.scan_time_s)
 
     def _taken(self, voxels: np.ndarray, taken: Sequence[np.ndarray]) -> np.ndarray:
-        """(K,) Σ over targets of P(d) = 1 - d/range, within the range (Burgard 2005, eq. 6)."""
-        places = self._places(voxels)
-        total = np.zeros(len(voxels))
+        """Return (K,) Σ over targets of P(d) = 1 - d/range, within the range (Burgard 2005, eq. 6)."""
+        places, total = self._centres(voxels), np.zeros(len(voxels))
         for target in taken:
             apart = np.linalg.norm(places - target[:3], axis=1)
-            total += np.maximum(1.0 - apart / self.candidates.reach, 0.0)
+            total += np.maximum(1.0 - apart / self._candidates.reach, 0.0)
         return total
 
-    def _places(self, voxels: np.ndarray) -> np.ndarray:
-        """(K, 3) centres of (K,) voxels, grid units."""
-        return np.stack(np.unravel_index(voxels, self._scenario.grid.shape), axis=-1) + 0.5
 
+@dataclass
+class Round:
+    """What a robot of a synchronous team remembers of its latest drive, to know whether others end theirs."""
 
-@lean_kernel
-def ask_costs(search: Search, voxels: np.ndarray, reach: float, out: np.ndarray) -> None:
-    """Fill (K,) with the costs of (K,) voxels in the latest search, inf above the reach; skips NONE."""
-    for place in range(len(voxels)):
-        if voxels[place] >= 0:
-            cost = cost_to(search, voxels[place])
-            out[place] = cost if cost <= reach else math.inf
+    arrived_s: float = 0.0
+    """When it had scanned at its latest candidate."""
+    left: bool = False
+    """Whether it has left for a candidate since then."""
+    plan: dict[int, tuple[np.ndarray, float]] = field(default_factory=dict)
+    """Estimated targets (3,), map frame, of the others when it chose its own, and their arrival times."""
 
+    def arrive(self, view: RobotKnowledge) -> None:
+        """Note that the robot chooses anew, if it had left."""
+        if self.left:
+            self.arrived_s, self.left = view.time_s, False
 
-@lean_kernel
-def fill_driving_times(
-    lengths_m: np.ndarray, max_speed_m_s: float, acceleration_m_s2: float, out: np.ndarray
-) -> None:
-    """Fill (K,) with the seconds of drives from rest to rest; inf for infinite lengths."""
-    for place in range(len(lengths_m)):
-        out[place] = math.inf
-        if lengths_m[place] < math.inf:
-            out[place] = driving_time(lengths_m[place], max_speed_m_s, acceleration_m_s2)
+    def leave(self, view: RobotKnowledge, found: dict[int, Choice]) -> None:
+        """Note what was allocated to the robot and to others."""
+        self.left, grid = view.robot in found, view.scenario.grid
+        self.plan = {
+            mate: (
+                grid.centre_of(np.stack(np.unravel_index(choice.voxel, grid.shape))),
+                view.time_s + _DELAY * choice.seconds,
+            )
+            for mate, choice in found.items()
+        }
+
+    def over(self, view: RobotKnowledge) -> bool:
+        """Whether all teammates have scanned at their targets.
+
+        A teammate has if it waits, or if it left after the robot arrived, since it had waited for all others
+        then. Where robots stop at corners, leaving a corner looks like leaving for a new target. There a
+        teammate has to stand at the target that the robot estimated, or the time for its drive has to be
+        over. The estimate may be wrong, as robots do not know from where others have scanned.
+        """
+        axes = 2 if view.planar else 3
+        for mate, seen in view.teammates.items():
+            if seen.announced_s < 0.0 or stays(view, seen):
+                continue
+            if seen.announced_s < self.arrived_s and under_way(view, seen, mate):
+                return False
+            robot = view.scenario.kind_of(mate).robot
+            at_once = robot.navigator == "planned" and math.isinf(robot.reach_m)
+            if mate in self.plan and not at_once:
+                target, due_s = self.plan[mate]
+                apart_m = float(np.linalg.norm(seen.pose[:axes] - target[:axes]))
+                if apart_m > 1.5 * view.scenario.grid.voxel_size_m and view.time_s < due_s:
+                    return False
+                del self.plan[mate]  # it has been there: now it is on its way to its next target
+        return True
 
 
 def _value_of(choice: Choice | None) -> float:

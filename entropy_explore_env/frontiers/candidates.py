@@ -5,6 +5,7 @@ Two kinds: voxel/candidates.py, in plans and in any 3-D space, and terrain/candi
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import Generic, Literal, NamedTuple, Protocol, TypeVar
@@ -27,16 +28,17 @@ from entropy_explore_env.validation import check, check_choice, check_positive
 
 Visibility = Literal["ray-cast", "naive"]
 UnexploredGround = Literal["falling", "level"]
+KNOWN_SIGMA = 0.5
+"""σ from which on a voxel is known: a single measurement of our sensors brings it far below."""
 BATCH_CELLS = 7500
 """Cells that are visited in about the time of a Python call."""
 
 
 @dataclass(frozen=True)
 class FrontierConfig:
-    """What counts as explored, where candidates lie, and how V is counted.
+    """Where candidates lie, and how V is counted.
 
     Attributes:
-        sigma: σ at which a voxel is explored, and mapped.
         spacing_m: Distance between candidates, at least a voxel; None = a sixth of the range.
         rise_m: Vertical distance between candidates, over terrain; None = a sixth of the range.
         visibility: `ray-cast`, or the `naive` count of all unexplored points in a ball.
@@ -50,7 +52,6 @@ class FrontierConfig:
         SettingError: A field has another value.
     """
 
-    sigma: float = 0.5
     spacing_m: float | None = None
     rise_m: float | None = None
     visibility: Visibility = "ray-cast"
@@ -61,7 +62,6 @@ class FrontierConfig:
 
     def __post_init__(self) -> None:
         """Check every field."""
-        check(self, "sigma", "a number from 1e-4 to 1e4", lambda v: 1e-4 <= v <= 1e4)
         for name in ("spacing_m", "rise_m"):
             if getattr(self, name) is not None:
                 check_positive(self, name)
@@ -74,7 +74,7 @@ class FrontierConfig:
     def levels(self, sigma: float, prior_precision: float) -> tuple[np.float32, np.float32]:
         """The precisions from which on a voxel counts as explored now, at σ, and as mapped."""
         explored, mapped = (
-            np.float32(max(level**-2, prior_precision * (1.0 + 1e-6))) for level in (sigma, self.sigma)
+            np.float32(max(level**-2, prior_precision * (1.0 + 1e-6))) for level in (sigma, KNOWN_SIGMA)
         )
         return explored, mapped
 
@@ -227,6 +227,10 @@ class Candidates(ABC, Generic[Map]):
         for voxel in excluded:
             count = queue_block(self._map, self._block_of(*self._axes_of(int(voxel))), count)
         self._update_blocks(count)
+
+    def is_known_free(self, voxel: int) -> bool:
+        """Whether the body may be in a voxel, by what is known."""
+        return math.isfinite(self._map.traversal_cost[voxel])
 
     def open_start(self, voxel: int) -> list[int]:
         """Make the place where a robot stands passable; returns the numbers of the voxels that were not."""

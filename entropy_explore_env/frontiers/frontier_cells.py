@@ -35,9 +35,7 @@ from entropy_explore_env.scenario import Scenario
 from entropy_explore_env.settings import RobotKind
 
 BLOCK = 4
-"""Voxels along the edge of a block."""
-KNOWN_SIGMA = 0.5
-"""σ from which on a voxel is known: a single measurement of our sensors brings it far below."""
+"""Voxels along the edge of a block, unless settings say otherwise."""
 
 
 class FrontierCells(VoxelCandidates):
@@ -50,10 +48,10 @@ class FrontierCells(VoxelCandidates):
         body_reach: Voxels that the body extends beyond its own, along an axis.
     """
 
-    def __init__(self, scenario: Scenario, kind: RobotKind, block: int = BLOCK) -> None:
-        """Nothing is known yet; blocks have an edge of this many voxels."""
-        block_m = block * scenario.grid.voxel_size_m
-        super().__init__(scenario, kind, FrontierConfig(sigma=KNOWN_SIGMA, spacing_m=block_m))
+    def __init__(self, scenario: Scenario, kind: RobotKind, frontiers: FrontierConfig | None = None) -> None:
+        """Nothing is known yet; without settings, blocks have an edge of BLOCK voxels."""
+        edge = scenario.grid.voxel_size_m
+        super().__init__(scenario, kind, frontiers or FrontierConfig(spacing_m=BLOCK * edge))
         self.body_reach = int(np.abs(self._map.footprint).max(initial=0))
         self._radius = self.body_reach + 2
         self._dropped: dict[int, tuple[int, np.ndarray]] = {}
@@ -69,10 +67,6 @@ class FrontierCells(VoxelCandidates):
     def is_frontier(self, voxel: int) -> bool:
         """Whether a voxel is a frontier cell."""
         return bool(self._map.flags[voxel] & CANDIDATE)
-
-    def is_known_free(self, voxel: int) -> bool:
-        """Whether the body may stand in a voxel, by what is known."""
-        return math.isfinite(self._map.traversal_cost[voxel])
 
     def gains(self, voxels: np.ndarray) -> np.ndarray:
         """(K,) how many unknown voxels the sensor would see, all around, from (K,) int32 voxels."""
@@ -177,9 +171,10 @@ class FrontierCells(VoxelCandidates):
         self._refresh(voxel)
 
     def readmit(self) -> None:
-        """Let all that was dropped count again, for a finer level."""
+        """See `Candidates`; dropped cells count again, too."""
         for voxel in list(self._dropped):
             self._restore(voxel)
+        super().readmit()
 
     def _restore(self, voxel: int) -> None:
         _, edges = self._dropped.pop(voxel)

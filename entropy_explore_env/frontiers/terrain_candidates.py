@@ -68,6 +68,7 @@ class TerrainCandidates(Candidates[TerrainMap]):
         self._sums = np.zeros((x, y + 1), np.int32)
         self._widths = half_widths(self.reach)
         self.batch = 1 + BATCH_CELLS // max(math.ceil(turns * self.reach), 1)
+        self.body_reach = self._map.reach
         self._unit = edge if frontiers.gamma is not None else 1.0
 
     def update(self, view: RobotKnowledge, sigma: float) -> None:
@@ -144,6 +145,11 @@ class TerrainCandidates(Candidates[TerrainMap]):
     def _update_blocks(self, count: int) -> None:
         """See `Candidates`."""
         update_columns(self._map, count)
+
+    def drop(self, voxel: int, with_edges: bool) -> None:
+        """Take out a candidate that could not be reached."""
+        del with_edges
+        self.exclude(voxel)
 
     def replace_unreached(self, cost: np.ndarray) -> None:
         """See `Candidates`."""

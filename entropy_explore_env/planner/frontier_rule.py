@@ -25,12 +25,13 @@ import numpy as np
 
 from entropy_explore_env.belief.paths.search import Search, new_search
 from entropy_explore_env.errors import ActionError, SettingError
-from entropy_explore_env.frontiers.frontier_cells import KNOWN_SIGMA, FrontierCells
+from entropy_explore_env.frontiers.candidates import KNOWN_SIGMA
+from entropy_explore_env.frontiers.frontier_cells import FrontierCells
 from entropy_explore_env.frontiers.knowledge import RobotKnowledge, voxel_of
 from entropy_explore_env.frontiers.path_lengths import KnownPaths
 from entropy_explore_env.frontiers.voxel_map import NONE
 from entropy_explore_env.planner.driver import Driver
-from entropy_explore_env.planner.scene import NOWHERE, STAY, Goal, Scene, scanned_here
+from entropy_explore_env.planner.scene import NOWHERE, ROOM, STAY, Goal, Scene, scanned_here
 from entropy_explore_env.planner.stops import apart_m, stop_towards
 from entropy_explore_env.scenario import Scenario
 
@@ -154,6 +155,9 @@ class FrontierRule(Driver):
         if goal.target == STAY:
             memory.goal = NOWHERE
             return self._look(view, memory, view.pose)
+        if goal.target == ROOM:
+            memory.goal = NOWHERE
+            return self.make_room(view)
         return self._towards(view, memory, here, goal)
 
     def arrive(self, view: RobotKnowledge, cells: FrontierCells, here: int) -> np.ndarray | None:
@@ -195,7 +199,7 @@ class FrontierRule(Driver):
         goal = picked if isinstance(picked, Goal) else Goal(picked, picked)  # type: ignore[arg-type]
         for voxel in goal[:2]:
             whole = isinstance(voxel, (int, np.integer)) and not isinstance(voxel, bool)
-            if not whole or not STAY <= voxel < self._scenario.grid.voxels:
+            if not whole or not ROOM <= voxel < self._scenario.grid.voxels:
                 numbers = f"0 to {self._scenario.grid.voxels - 1}"
                 raise ActionError(f"pick of {self.rule}", voxel, f"the number of a voxel, {numbers}, or NONE")
             if voxel >= 0 and voxel != here and not cells.is_known_free(int(voxel)):

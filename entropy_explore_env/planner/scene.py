@@ -20,13 +20,15 @@ from entropy_explore_env.frontiers.voxel_map import NONE
 
 STAY = -2
 """As a goal: the robot stays where it is, and scans."""
+ROOM = -3
+"""As a goal: the robot makes room for its teammates."""
 
 
 class Goal(NamedTuple):
     """Where a rule sends a robot."""
 
     target: int
-    """The voxel that it explores, one in which the body may stand; NONE = none can be reached; STAY."""
+    """The voxel that it explores, one in which the body may stand; NONE = none can be reached; STAY; ROOM."""
     place: int
     """The voxel to which the robot drives for that: the target itself, or one from which it is visible."""
     looked: bool = False

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from baselines.experiments.mission import run_mission
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
-from entropy_explore_env.frontiers.frontier_cells import KNOWN_SIGMA
+from entropy_explore_env.frontiers.candidates import KNOWN_SIGMA
 from entropy_explore_env.frontiers.lookouts import in_sight
 from entropy_explore_env.frontiers.voxel_map import NONE
 from entropy_explore_env.planner.frontier_rule import Goal

@@ -11,9 +11,9 @@ from scipy.ndimage import distance_transform_edt
 from baselines.experiments.mission import Followed, run_mission, scripted_env
 from baselines.strategies import make_strategy
 from baselines.strategies.rules.cliff import CliffNextBestView
-from baselines.strategies.rules.per_time_visibility import FrontierConfig
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.errors import SettingError
+from entropy_explore_env.frontiers.candidates import FrontierConfig
 from entropy_explore_env.frontiers.terrain_candidates import TerrainCandidates
 from entropy_explore_env.localization_settings import Localization
 from entropy_explore_env.missions.view import view_of

@@ -22,7 +22,8 @@ from baselines.experiments.cells import Cell
 from baselines.experiments.mission import scripted
 from baselines.papers.sawhney.mission import Run, explore_until_done
 from baselines.papers.sawhney.sweep import PLANS, POINT, TERRAINS, world_cell
-from baselines.strategies.rules.per_time_visibility import FrontierStrategy, Metric
+from baselines.strategies.rules.metrics import Metric
+from baselines.strategies.rules.per_time_visibility import PerTimeVisibility
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.frontiers.candidates import Chart
 from entropy_explore_env.missions.view import RobotView
@@ -152,26 +153,26 @@ def _options_on_the_way() -> tuple[np.ndarray, np.ndarray]:
     """T and V of what one robot could choose in `hybrid` when half of it was explored."""
     found: list[tuple[np.ndarray, np.ndarray]] = []
     cell = world_cell("hybrid", 1, "ptv")
-    explorer = FrontierStrategy(_run(cell).exploring)
+    explorer = PerTimeVisibility(_run(cell).exploring)
 
     latest = list[RobotView]()
 
     def look(share: float, views: Sequence[RobotView], _: Sequence[np.ndarray]) -> None:
         latest[:] = views
         if share >= 0.5 and not found:
-            found.append(explorer.allocator_of(0).options(views[0]))
+            found.append(explorer.options(views[0]))
 
     explore_until_done(_environment(cell), explorer, 0, look)
-    return found[0] if found else explorer.allocator_of(0).options(latest[0])
+    return found[0] if found else explorer.options(latest[0])
 
 
 def snapshots(cell: Cell, seed: int, marks: Sequence[float] = _MARKS) -> list[Snapshot]:
     """A mission of a cell when shares but for the last were explored, as far as they were, and its end."""
-    env, explorer = _environment(cell), FrontierStrategy(_run(cell).exploring)
+    env, explorer = _environment(cell), PerTimeVisibility(_run(cell).exploring)
     driven, taken, grid = DrivenPaths(cell.scenario.robots), list[Snapshot](), cell.scenario.grid
 
     def snap(time_s: float, share: float, targets: Sequence[np.ndarray]) -> None:
-        candidates, finished = explorer.allocator_of(0).candidates, all(explorer.idle)
+        candidates, finished = explorer.cells_of(0), all(explorer.idle)
         expected = np.zeros(grid.shape[:2], bool)
         for target in () if finished else targets:
             expected |= candidates.expected(grid.in_grid_units(target)[:3])

@@ -17,7 +17,7 @@ from functools import lru_cache
 import numpy as np
 
 from baselines.experiments.outcome import Record
-from baselines.strategies.rules.per_time_visibility import ExplorationConfig, FrontierStrategy
+from baselines.strategies.rules.per_time_visibility import ExplorationConfig, PerTimeVisibility
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.missions.view import RobotView
 from entropy_explore_env.reports.metrics import joint_figures, mission_figures
@@ -53,7 +53,7 @@ class Run:
         """
         del strategy
         env = self.placed(env)
-        explorer = FrontierStrategy(self.exploring)
+        explorer = PerTimeVisibility(self.exploring)
         times_s, shares = explore_until_done(env, explorer, seed)
         figures = mission_figures(env.missions, 0)
         limit_s = env.scenario.ending.time_limit_s
@@ -79,7 +79,7 @@ class Run:
 
 def explore_until_done(
     env: EntropyExploreEnv,
-    explorer: FrontierStrategy,
+    explorer: PerTimeVisibility,
     seed: int,
     look: Callable[[float, Sequence[RobotView], Sequence[np.ndarray]], None] | None = None,
 ) -> tuple[Sequence[float], Sequence[float]]:

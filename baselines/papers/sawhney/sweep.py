@@ -19,9 +19,9 @@ from baselines.papers.sawhney.map_files import STARTS as MAP_STARTS
 from baselines.papers.sawhney.map_files import TEAM as MAP_TEAM
 from baselines.papers.sawhney.map_files import map_world
 from baselines.papers.sawhney.mission import MapRun, Run
-from baselines.strategies.metrics import Coordinated, Nearest
-from baselines.strategies.rules.per_time_visibility import ExplorationConfig, Metric
-from entropy_explore_env.frontiers.candidates import FrontierConfig
+from baselines.strategies.rules.metrics import Coordinated, Metric, Nearest
+from baselines.strategies.rules.per_time_visibility import ExplorationConfig
+from entropy_explore_env.frontiers.candidates import KNOWN_SIGMA, FrontierConfig
 from entropy_explore_env.scenario import Scenario, with_settings
 from entropy_explore_env.scenarios import find_scenario
 
@@ -38,7 +38,7 @@ POINT = {"plans": 0.05, "terrains": 4.0}
 BONUS = {"plans": 0.5, "terrains": 40.0}
 """Of the finishing rule."""
 STRATEGY = "per-time-visibility"
-SIGMA = 0.5
+SIGMA = KNOWN_SIGMA
 TIME_LIMIT_S = 3600.0
 CHANGED_TEAM = 3
 """Team size at which one thing is changed at a time."""
@@ -110,7 +110,7 @@ def part_of(world: str) -> str:
 def methods(part: str, quick: bool) -> dict[str, dict[str, Any]]:
     """Name of a method → fields of ExplorationConfig."""
     betas = (*(QUICK_BETAS if quick else BETAS), *FARTHER_BETAS[part])
-    frontiers = {"frontiers": FrontierConfig(sigma=SIGMA, visibility="naive")}
+    frontiers = {"frontiers": FrontierConfig(visibility="naive")}
     found: dict[str, dict[str, Any]] = {
         "ptv": {},
         "sync": {"allocation": "synchronous"},
@@ -121,7 +121,7 @@ def methods(part: str, quick: bool) -> dict[str, dict[str, Any]]:
         "coordinated": {"metric": Coordinated()},
     }
     if part == "terrains":
-        found["no-height"] = {"frontiers": FrontierConfig(sigma=SIGMA, gamma=None)}
+        found["no-height"] = {"frontiers": FrontierConfig(gamma=None)}
     return found
 
 
@@ -170,7 +170,7 @@ def experiment(
             for world in (QUICK_CHANGED_IN if quick else CHANGED_IN)[part]:
                 for method in CHANGED_METHODS[part]:
                     exploring = {**methods(part, False)[method], **change.exploring}
-                    frontiers = exploring.get("frontiers", FrontierConfig(sigma=SIGMA))
+                    frontiers = exploring.get("frontiers", FrontierConfig())
                     exploring["frontiers"] = replace(frontiers, **change.frontiers)
                     cell = _cell(world, CHANGED_TEAM, method, exploring, seeds, None, change.settings, name)
                     cells.append(cell)
@@ -201,7 +201,7 @@ def _cell(
 
 def _exploring(fields: dict[str, Any]) -> ExplorationConfig:
     """How robots share frontiers: the experiment's settings, and some of a method."""
-    return ExplorationConfig(**{"frontiers": FrontierConfig(sigma=SIGMA), "finest_sigma": SIGMA, **fields})
+    return ExplorationConfig(**{"once": True, **fields})
 
 
 def _scenario(world: str, robots: int, settings: dict[str, Any]) -> Scenario:

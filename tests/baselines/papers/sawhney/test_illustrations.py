@@ -26,7 +26,8 @@ from baselines.papers.sawhney.illustrations import (
 from baselines.papers.sawhney.mission import explore_until_done
 from baselines.papers.sawhney.sweep import PLANS, TERRAINS, world_cell
 from baselines.papers.sawhney.terrain_model import write_model
-from baselines.strategies.rules.per_time_visibility import FrontierStrategy, Metric
+from baselines.strategies.rules.metrics import Metric
+from baselines.strategies.rules.per_time_visibility import PerTimeVisibility
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.scenario import with_settings
 from entropy_explore_env.settings import Grid
@@ -92,11 +93,11 @@ def test_snapshots_are_of_one_mission_as_it_goes_on(world):
 def test_expected_is_what_those_who_choose_now_will_see():
     """By the snapshot's own candidates, from the viewpoints that were just chosen."""
     cell, chosen_at = small_cell("office", 1), {}
-    explorer, env = FrontierStrategy(cell.record.exploring), EntropyExploreEnv(scripted(cell.scenario))
+    explorer, env = PerTimeVisibility(cell.record.exploring), EntropyExploreEnv(scripted(cell.scenario))
 
     def look(share, views, chosen):
         place = env.missions.grid.in_grid_units(chosen[0])[:3]
-        chosen_at[views[0].time_s] = explorer.allocator_of(0).candidates.expected(place)
+        chosen_at[views[0].time_s] = explorer.cells_of(0).expected(place)
 
     explore_until_done(env, explorer, 0, look)
     taken = snapshots(cell, 0)

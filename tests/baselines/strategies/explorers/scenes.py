@@ -7,6 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 
 from entropy_explore_env.belief.paths.search import new_search
+from entropy_explore_env.frontiers.candidates import FrontierConfig
 from entropy_explore_env.frontiers.frontier_cells import BLOCK, FrontierCells
 from entropy_explore_env.frontiers.path_lengths import KnownPaths
 from entropy_explore_env.frontiers.voxel_map import NONE
@@ -51,7 +52,8 @@ def scene_of(plan, robot, target=NONE, block=BLOCK):
     view = SimpleNamespace(
         mean=mean, precision=precision, scenario=scenario, teammates={}, robot=0, since_scan_m=0.0
     )
-    cells = FrontierCells(scenario, scenario.kind_of(0), block)
+    spacing_m = block * scenario.grid.voxel_size_m
+    cells = FrontierCells(scenario, scenario.kind_of(0), FrontierConfig(spacing_m=spacing_m))
     cells.update(view, 0.5)  # type: ignore[arg-type]
     paths = KnownPaths(scenario, scenario.kind_of(0), cells, new_search(scenario.grid.voxels))
     here = int(np.ravel_multi_index(robot, plan.shape))

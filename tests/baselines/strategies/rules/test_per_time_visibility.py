@@ -1,4 +1,4 @@
-"""The strategies of frontiers: how they allocate, that lazily is as eagerly, and how missions end."""
+"""Per-time visibility: lazily it allocates as eagerly, robots wait for each other, and missions end."""
 
 from __future__ import annotations
 
@@ -11,11 +11,15 @@ import pytest
 from baselines.experiments.mission import run_mission, scripted
 from baselines.papers.sawhney.mission import explore_until_done
 from baselines.strategies import make_strategy
-from baselines.strategies.metrics import Coordinated, Nearest
-from baselines.strategies.rules.per_time_visibility import ExplorationConfig, FrontierStrategy, Metric
+from baselines.strategies.allocation import Allocator, Choice
+from baselines.strategies.rules import per_time_visibility
+from baselines.strategies.rules.metrics import Coordinated, Metric, Nearest
+from baselines.strategies.rules.per_time_visibility import ExplorationConfig, PerTimeVisibility
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.frontiers.candidates import FrontierConfig
+from entropy_explore_env.frontiers.frontier_cells import FrontierCells
+from entropy_explore_env.frontiers.terrain_candidates import TerrainCandidates
 from entropy_explore_env.frontiers.voxel_candidates import VoxelCandidates
 from entropy_explore_env.frontiers.voxel_map import COVERED, NONE
 from entropy_explore_env.missions.state import MissionEnd
@@ -27,7 +31,6 @@ from entropy_explore_env.settings import Grid
 
 NAMES = ("per-time-visibility", "nearest-candidate", "coordinated-candidate")
 PERFECT = {"burst": 10_000, "i_min_bits": 0.0}
-ONCE = 0.5
 
 
 def small_plan(**settings):
@@ -60,21 +63,84 @@ def small_terrain(**settings):
     return with_settings(base, {**changes, **settings})
 
 
+class Eager(Allocator):
+    """Searches paths to all candidates, and counts V of each."""
+
+    def _best_listed(self, robot, taken):
+        self._search(robot, math.inf)
+        slots, voxels = self._candidates.listed(all_of_them=True)
+        edges = self._lengths[robot].edges[slots]
+        reached = np.isfinite(edges)
+        slots, voxels, edges = slots[reached], voxels[reached], edges[reached]
+        seen = self._candidates.count(slots, voxels) * self._candidates.point
+        seconds = self._seconds(robot, edges)
+        value = self._value(seen, seconds, edges, self._taken(voxels, taken))
+        value = np.where(seen > 0.0, value, -math.inf)
+        best = int(np.argmax(value)) if len(value) else -1
+        if best < 0 or value[best] == -math.inf:
+            return None
+        return Choice(int(voxels[best]), float(value[best]), float(seconds[best]))
+
+
+class Noting(PerTimeVisibility):
+    """Notes when each robot left for its candidates, and when it was through with each, in seconds."""
+
+    def reset(self, scenario, rng):
+        super().reset(scenario, rng)
+        self.trips = [[] for _ in range(scenario.robots)]
+
+    def pick(self, scene):
+        trips, now_s = self.trips[scene.view.robot], scene.view.time_s
+        if trips and len(trips[-1]) == 1:
+            trips[-1].append(now_s)
+        picked = super().pick(scene)
+        if picked >= 0:
+            trips.append([now_s])
+        return picked
+
+    def rounds(self):
+        """(left, ended) of the first trip of each robot, of the second, and so on."""
+        ended = [[trip for trip in trips if len(trip) == 2] for trips in self.trips]
+        most = max(map(len, ended))
+        return [[trips[number] for trips in ended if number < len(trips)] for number in range(most)]
+
+
 def explored(scenario, seed=0, **config):
     """A mission up to no frontier: environment, strategy, and what was done."""
-    explorer = FrontierStrategy(ExplorationConfig(**{"finest_sigma": ONCE, **config}))
+    explorer = Noting(ExplorationConfig(**{"once": True, **config}))
     env = EntropyExploreEnv(scenario)
     times_s, shares = explore_until_done(env, explorer, seed)
     return env, explorer, (list(times_s), list(shares), mission_figures(env.missions, 0)["distance_m"])
 
 
+def check_lazily_is_as_eagerly(monkeypatch, scenario, seed, **settings):
+    """The same mission, for which fewer candidates are counted; returns what was done."""
+    counted = []
+    for kind in (FrontierCells, TerrainCandidates):
+        monkeypatch.setattr(kind, "count", counting(kind.count, counted))
+    _, lazy, done = explored(scenario, seed, **settings)
+    lazily = sum(counted)
+    monkeypatch.setattr(per_time_visibility, "Allocator", Eager)
+    _, _, same = explored(scenario, seed, **settings)
+    assert done == same and lazily < sum(counted) - lazily
+    return lazy, done
+
+
+def counting(count, counted):
+    """`Candidates.count` that notes how many it counts."""
+
+    def noted(self, slots, voxels):
+        counted.append(len(slots))
+        return count(self, slots, voxels)
+
+    return noted
+
+
 @pytest.mark.parametrize("metric", [Metric(), Metric(0.5), Metric(bonus=0.5), Nearest(), Coordinated()])
 @pytest.mark.parametrize("allocation", ["asynchronous", "synchronous"])
-def test_lazily_is_as_eagerly_in_plans(metric, allocation):
+def test_lazily_is_as_eagerly_in_plans(monkeypatch, metric, allocation):
     settings = {"metric": metric, "allocation": allocation}
-    _, lazy, done = explored(small_plan(), 1, **settings)
-    _, eager, same = explored(small_plan(), 1, lazy=False, **settings)
-    assert done == same and lazy.counted() < eager.counted()
+    lazy, done = check_lazily_is_as_eagerly(monkeypatch, small_plan(), 1, **settings)
     assert all(lazy.idle) and done[1][-1] > 0.99
 
 
@@ -88,14 +154,12 @@ def test_lazily_is_as_eagerly_in_plans(metric, allocation):
         {"frontiers": FrontierConfig(unexplored_ground="level")},
     ],
 )
-def test_lazily_is_as_eagerly_over_terrain(settings):
-    _, lazy, done = explored(small_terrain(), 2, **settings)
-    _, eager, same = explored(small_terrain(), 2, lazy=False, **settings)
-    assert done == same and lazy.counted() < eager.counted()
+def test_lazily_is_as_eagerly_over_terrain(monkeypatch, settings):
+    check_lazily_is_as_eagerly(monkeypatch, small_terrain(), 2, **settings)
 
 
-@pytest.mark.parametrize(("seed", "finest"), [(753, 0.2), (89, 0.05)])
-def test_bounds_stay_bounds_through_a_noisy_mission(monkeypatch, seed, finest):
+@pytest.mark.parametrize("seed", [753, 89])
+def test_bounds_stay_bounds_through_a_noisy_mission(monkeypatch, seed):
     """After every update no kept count is less than a new one, through walls that turn out free, too."""
     opened, levels, update = [], set(), VoxelCandidates.update
 
@@ -113,7 +177,7 @@ def test_bounds_stay_bounds_through_a_noisy_mission(monkeypatch, seed, finest):
 
     monkeypatch.setattr(VoxelCandidates, "update", checked)
     noisy = {"max_range_m": 1.5, "angular_step_rad": math.pi / 90, "scan_time_s": 2.0, "range_noise_m": 0.3}
-    explored(small_plan(sensor=noisy), seed, allocation="synchronous", finest_sigma=finest)
+    explored(small_plan(sensor=noisy), seed, allocation="synchronous", once=False)
     assert max(opened) > 5 and len(levels) > 1
 
 
@@ -145,25 +209,17 @@ def test_synchronous_robots_over_terrain_wait_for_this_journey_and_no_other(navi
     scenario = small_terrain(robots=3, robot=robot)
     _, explorer, _ = explored(scenario, 1, allocation="synchronous")
     late_s = []
-    for before, after in itertools.pairwise(rounds(explorer)):
+    for before, after in itertools.pairwise(explorer.rounds()):
         ended_s = max(end for _, end in before)
         late_s += [left_s - ended_s for left_s, _ in after] if len(before) == len(after) == 3 else []
     assert len(late_s) >= 9
     assert np.mean(late_s) < 2.0 * scenario.kind_of(0).sensor.scan_time_s + 0.5
 
 
-def rounds(explorer):
-    """(left, ended) of the trips of each round, s."""
-    by_round: dict[int, list[tuple[float, float]]] = {}
-    for trip in explorer.trips:
-        by_round.setdefault(trip.number, []).append((trip.ended_s - trip.seconds, trip.ended_s))
-    return [by_round[number] for number in sorted(by_round)]
-
-
 @pytest.mark.parametrize("scenario", [small_plan(), small_terrain()])
 def test_where_a_robot_scanned_is_a_candidate_again_once_more_is_asked_for(scenario):
     env, explorer, _ = explored(scenario, 2)
-    candidates = explorer._allocators[0].candidates
+    candidates = explorer.cells_of(0)
     view = view_of(env.missions, 0, 0)
     candidates.readmit()
     candidates.update(view, 0.5)
@@ -178,9 +234,9 @@ def test_where_a_robot_scanned_is_a_candidate_again_once_more_is_asked_for(scena
 
 
 def test_synchronous_robots_leave_together():
-    """Nobody sets out on its next trip before all have ended their latest one."""
+    """No robot sets out on its next trip before all have ended their latest one."""
     _, explorer, _ = explored(small_plan(), 4, allocation="synchronous")
-    found = rounds(explorer)
+    found = explorer.rounds()
     assert len(found) > 5
     for before, after in itertools.pairwise(found):
         if len(before) == 3:
@@ -211,7 +267,7 @@ def test_bodies_and_a_short_reach_explore_an_office():
     env = EntropyExploreEnv(
         with_settings(scripted(find_scenario("office")), {"robots": 2, "track_truth": True})
     )
-    explorer = FrontierStrategy(ExplorationConfig(finest_sigma=ONCE))
+    explorer = PerTimeVisibility(ExplorationConfig(once=True))
     explore_until_done(env, explorer, 1)
     assert all(explorer.idle) or env.missions.over(0) is MissionEnd.MAPPED
     explored = joint_figures(env.missions, 0)["explored"]
@@ -225,13 +281,12 @@ def test_bodies_and_a_short_reach_explore_an_office():
         (Metric, {"bonus": -0.1}, "Metric.bonus"),
         (Coordinated, {"beta": math.nan}, "Coordinated.beta"),
         (ExplorationConfig, {"allocation": "central"}, "ExplorationConfig.allocation"),
-        (ExplorationConfig, {"finest_sigma": 0.6}, "ExplorationConfig.finest_sigma"),
+        (ExplorationConfig, {"once": 1}, "ExplorationConfig.once"),
         (ExplorationConfig, {"promises": 1}, "ExplorationConfig.promises"),
         (ExplorationConfig, {"metric": None}, "ExplorationConfig.metric"),
         (ExplorationConfig, {"metric": "V/t"}, "ExplorationConfig.metric"),
         (ExplorationConfig, {"metric": Metric}, "ExplorationConfig.metric"),
-        (FrontierStrategy, {"config": "V/t"}, "config"),
-        (FrontierConfig, {"sigma": 0.0}, "FrontierConfig.sigma"),
+        (PerTimeVisibility, {"config": "V/t"}, "config"),
         (FrontierConfig, {"spacing_m": 0.0}, "FrontierConfig.spacing_m"),
         (FrontierConfig, {"visibility": "all"}, "FrontierConfig.visibility"),
         (FrontierConfig, {"gamma": 1.5}, "FrontierConfig.gamma"),

@@ -1,4 +1,4 @@
-"""Which robot is allotted which frontier, and who makes room: by hand, and beside a slow reference."""
+"""Which robot is allocated which candidate, and which makes room: by hand, and beside a slow reference."""
 
 from __future__ import annotations
 
@@ -9,12 +9,11 @@ import numpy as np
 import pytest
 
 from baselines.experiments.mission import scripted
-from baselines.strategies.metrics import Nearest
-from baselines.strategies.rules.per_time_visibility import ExplorationConfig, FrontierStrategy
-from entropy_explore_env.frontiers.candidates import FrontierConfig
+from baselines.strategies.rules.metrics import Nearest
+from baselines.strategies.rules.per_time_visibility import ExplorationConfig, PerTimeVisibility
+from entropy_explore_env.frontiers.candidates import KNOWN_SIGMA, FrontierConfig
 from entropy_explore_env.frontiers.knowledge import under_way
 from entropy_explore_env.frontiers.voxel_candidates import VoxelCandidates
-from entropy_explore_env.frontiers.voxel_map import NONE
 from entropy_explore_env.missions.view import view_of
 from entropy_explore_env.robots.motion import driving_time
 from entropy_explore_env.scenario import with_settings
@@ -22,8 +21,6 @@ from entropy_explore_env.scenarios import BOX, find_scenario
 from entropy_explore_env.settings import Grid
 from tests.reference import sawhney as reference
 from tests.reference.scenes import build, free_box, put, started
-
-ONCE = 0.5
 
 
 def corridor(places, heard=True):
@@ -51,49 +48,30 @@ def corridor(places, heard=True):
     return missions
 
 
+def chosen(missions, spacing_m, **config):
+    """The strategy, and the voxels to which it sends robots that have scanned once."""
+    frontiers = FrontierConfig(spacing_m=spacing_m)
+    strategy = PerTimeVisibility(ExplorationConfig(once=True, frontiers=frontiers, **config))
+    strategy.reset(missions.scenario, np.random.default_rng(0))
+    views = [view_of(missions, 0, robot) for robot in range(missions.scenario.robots)]
+    for view in views:
+        strategy.observe(view)
+        strategy._memories[view.robot].scanned = True
+    return strategy, [tuple(missions.grid.voxel_of(strategy.choose(view)[:3]).tolist()) for view in views]
+
+
 def sent(missions, **config):
     """Layers along y to which robots go that have scanned once."""
-    strategy = FrontierStrategy(
-        ExplorationConfig(**{"finest_sigma": ONCE, "frontiers": FrontierConfig(spacing_m=0.5), **config})
-    )
-    strategy.reset(missions.scenario, np.random.default_rng(0))
-    for assignment in strategy._assignments:
-        assignment.scanned = True
-    views = [view_of(missions, 0, robot) for robot in range(missions.scenario.robots)]
-    return [int(missions.grid.voxel_of(v[:3])[1]) for v in [strategy.choose(view) for view in views]]
+    return [voxel[1] for voxel in chosen(missions, 0.5, **config)[1]]
 
 
-def test_who_stops_at_the_same_time_shares_the_frontiers():
+def test_robots_that_stop_at_the_same_time_share_the_frontiers():
     assert sent(corridor((4, 6))) == [2, 8]
     assert sent(corridor((3, 4))) == [2, 8]  # the second would be nearer to the first one's, too
     assert sent(corridor((4, 3))) == [8, 2]
     assert sent(corridor((3, 4)), promises=False) == [2, 2]
     assert sent(corridor((3, 4)), metric=Nearest(), promises=False) == [2, 2]
     assert sent(corridor((3, 4), heard=False)) == [2, 2]  # nothing was heard: each for itself
-
-
-def allocator_in(missions, robot):
-    """The candidates of a robot, by its belief as it is."""
-    strategy = FrontierStrategy(ExplorationConfig(finest_sigma=ONCE))
-    strategy.reset(missions.scenario, np.random.default_rng(0))
-    strategy.choose(view_of(missions, 0, robot))
-    allocator = strategy.allocator_of(robot)
-    allocator.candidates.update(view_of(missions, 0, robot), ONCE)
-    return allocator
-
-
-@pytest.mark.parametrize(
-    ("places", "robot", "away"),
-    [((4, 6), 0, 2), ((4, 6), 1, 8), ((3, 4, 5), 0, 2), ((3, 4, 5), 2, 8), ((3, 4, 5), 1, None)],
-)
-def test_who_makes_room_goes_where_nobody_else_is_nearer(places, robot, away):
-    """Between two others there is no such place; nor where nobody was heard."""
-    missions = corridor(places)
-    allocator, rng = allocator_in(missions, robot), np.random.default_rng(0)
-    voxel = allocator.away_from(view_of(missions, 0, robot), rng)
-    assert voxel == (NONE if away is None else np.ravel_multi_index((3, away, 2), missions.grid.shape))
-    alone = corridor(places, heard=False)
-    assert allocator_in(alone, robot).away_from(view_of(alone, 0, robot), rng) == NONE
 
 
 @pytest.mark.parametrize(("apart", "moves"), [(1, True), (2, False)])
@@ -114,7 +92,7 @@ def test_a_path_leaves_known_space_only_where_the_robot_stands_in_none():
     missions.mean[0, 0], missions.precision[0, 0] = 0.0, 1e4
     missions.mean[0, 0][4:] = 1.0
     candidates = VoxelCandidates(missions.scenario, missions.scenario.kind_of(0), FrontierConfig())
-    candidates.update(view_of(missions, 0, 0), ONCE)
+    candidates.update(view_of(missions, 0, 0), KNOWN_SIGMA)
     stands = np.isfinite(candidates.traversal_cost).reshape(size)
     assert stands[1:3, 1:10, 1:4].all() and stands.sum() == 2 * 9 * 3
     assert candidates.open_start(int(np.ravel_multi_index((2, 5, 2), size))) == []
@@ -147,7 +125,7 @@ def test_promises_stand_until_the_scan_is_heard():
     assert sent(missions)[1] == 2
 
 
-def test_allotment_is_the_paper_s_loop():
+def test_allocation_is_the_paper_s_loop():
     """Beside the slow reference, in a plan of which little is known: three robots that have all stopped."""
     shape = (14, 12, 1)
     rng = np.random.default_rng(3)
@@ -179,17 +157,12 @@ def test_allotment_is_the_paper_s_loop():
 
 
 def check_against_reference(missions, known):
-    strategy = FrontierStrategy(ExplorationConfig(finest_sigma=ONCE, frontiers=FrontierConfig(spacing_m=1.0)))
-    strategy.reset(missions.scenario, np.random.default_rng(0))
+    strategy, places = chosen(missions, 1.0)
     views = [view_of(missions, 0, robot) for robot in range(3)]
-    for assignment in strategy._assignments:
-        assignment.scanned = True
-    places = [tuple(missions.grid.voxel_of(strategy.choose(view)[:3]).tolist()) for view in views]
-    allocator = strategy._allocators[0]
-    assert isinstance(allocator.candidates, VoxelCandidates)
-    _, voxels = allocator.candidates.listed()
+    candidates = strategy.cells_of(0)
+    _, voxels = candidates.listed()
     state = np.where(known, 0, 3)
-    directions, reach = allocator.candidates._directions, allocator.candidates.reach
+    directions, reach = candidates._directions, candidates.reach
     shape, edge = known.shape, missions.grid.voxel_size_m
     where = {int(v): np.stack(np.unravel_index(int(v), shape)) for v in voxels}
     sees = {v: reference.seen_voxels(state, place + 0.5, directions, reach) for v, place in where.items()}

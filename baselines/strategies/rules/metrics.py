@@ -1,0 +1,105 @@
+"""Metrics by which robots choose frontier candidates: settings of `per-time-visibility`.
+
+Nearest and Coordinated are the metrics of Yamauchi 1998 and of Burgard et al. 2005. All else is as in
+per-time visibility: few candidates, one a block; those from which nothing unexplored can be seen are ignored;
+a robot drives to its candidate before it chooses again. So `nearest-candidate` and `coordinated-candidate`
+compare metrics, and are not the rules of those papers as their authors run them: those are
+`nearest-frontier` and `coordinated-frontier`.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from entropy_explore_env.validation import check, check_not_negative
+
+
+class Value(Protocol):
+    """Values of candidates; never greater for less V, or for a longer path."""
+
+    def __call__(
+        self, seen: np.ndarray, seconds: np.ndarray, edges: np.ndarray, taken: np.ndarray
+    ) -> np.ndarray:
+        """Return (K,) values.
+
+        Args:
+            seen: (K,) V·(height factor) in points' size.
+            seconds: (K,) travel and scan.
+            edges: (K,) length of the path in voxel edges.
+            taken: (K,) share of a frontier's utility that robots take which go near it, ≥ 0 (Burgard 2005).
+        """
+        ...
+
+
+@dataclass(frozen=True)
+class Metric:
+    """V/t, or V - βt; or (V + bonus)/t, a finishing rule of ours.
+
+    Attributes:
+        beta: β; None = V/t.
+        bonus: Value of any frontier in addition to V, in V's units: slivers nearby are then explored in
+            passing instead of at the end. 0 = the paper's metric.
+
+    Raises:
+        SettingError: One of them is no number that is allowed.
+    """
+
+    beta: float | None = None
+    bonus: float = 0.0
+
+    def __post_init__(self) -> None:
+        """Check both."""
+        if self.beta is not None:
+            check(self, "beta", "None, or a number ≥ 0", lambda v: 0.0 <= v < math.inf)
+        check_not_negative(self, "bonus")
+
+    def __call__(
+        self, seen: np.ndarray, seconds: np.ndarray, edges: np.ndarray, taken: np.ndarray
+    ) -> np.ndarray:
+        """See `Value`."""
+        del edges, taken
+        worth = seen + self.bonus
+        return worth / seconds if self.beta is None else worth - self.beta * seconds
+
+
+@dataclass(frozen=True)
+class Nearest:
+    """The candidate with the shortest path (Yamauchi 1998)."""
+
+    def __call__(
+        self, seen: np.ndarray, seconds: np.ndarray, edges: np.ndarray, taken: np.ndarray
+    ) -> np.ndarray:
+        """See `Value`."""
+        del seen, seconds, taken
+        return -edges
+
+
+@dataclass(frozen=True)
+class Coordinated:
+    """Utility minus cost, U - β·length; U falls near others' frontiers (Burgard et al. 2005, eqs. 5-7).
+
+    U = 1 - Σ P(d), with P(d) = 1 - d/range within the range of a frontier that another robot goes to.
+
+    Attributes:
+        beta: β, cost of a voxel edge of path; the paper finds 0.01 … 50 alike.
+
+    Raises:
+        SettingError: β is no number ≥ 0.
+    """
+
+    beta: float = 0.01
+
+    def __post_init__(self) -> None:
+        """Check β."""
+        check_not_negative(self, "beta")
+
+    def __call__(
+        self, seen: np.ndarray, seconds: np.ndarray, edges: np.ndarray, taken: np.ndarray
+    ) -> np.ndarray:
+        """See `Value`."""
+        del seen, seconds
+        return 1.0 - taken - self.beta * edges
