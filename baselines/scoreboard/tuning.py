@@ -53,13 +53,7 @@ TUNINGS: Mapping[str, Tuning] = {
     "plans": Tuning(
         training_plans,
         {
-            "distance-advantage": {
-                "radius": (30, 60, 120, 270),
-                "horizon": (30, 61, 120, 270),
-                "opening": (0, 0.05, 0.1, 0.2, 0.3),
-                "passing": (0, 0.06, 0.125),
-                "meanwhile": (0, 0.25, 0.5, 1),
-            },
+            "distance-advantage": {"radius": (30, 60, 120, 270), "horizon": (30, 61, 120, 270)},
             "information-gain": {"weight": (0.02, 0.05, 0.15, 0.4, 1, 2), "horizon": (1, 3)},
             "receding-horizon": {
                 "decay": (0.5, 1, 2, 4, 8, 16),

@@ -73,7 +73,7 @@ REACH = 15.0
 RULES = {
     "nearest-frontier": (NearestFrontier, lambda: reference.Textbook(reference.nearest_frontier)),
     "distance-advantage": (
-        partial(DistanceAdvantage, DistanceAdvantageConfig(radius=25, horizon=26.0, opening=0.0)),
+        partial(DistanceAdvantage, DistanceAdvantageConfig(radius=25, horizon=26.0)),
         lambda: reference.Textbook(partial(reference.distance_advantage, radius=25, horizon=26.0)),
     ),
     "information-gain": (

@@ -47,7 +47,7 @@ def test_advantages_are_the_textbooks_and_the_greatest_of_one_cell_a_block_is_ch
     plan, robot = random_plan(shape, np.random.default_rng(seed))
     scene = scene_of(plan, robot)
     wanted = reference.distance_advantage(plan, robot, radius, horizon)
-    config = DistanceAdvantageConfig(radius=radius, horizon=horizon, opening=0.0)
+    config = DistanceAdvantageConfig(radius=radius, horizon=horizon)
     picked = DistanceAdvantage(config).pick(scene)
     if not wanted:
         assert picked == NONE
@@ -78,7 +78,7 @@ def test_sparing_searches_changes_no_greatest_advantage(seed):
     if len(voxels) == 0:
         return
     around = scene.paths.around(scene.here, 12)
-    worth = advantages(scene.paths, voxels, lengths, around, lambda *_: True)
+    worth = advantages(scene.paths, voxels, lengths, around)
     all_of_them = reference.distance_advantage(plan, robot, 12, math.inf)
     wanted = np.array([all_of_them[cell(plan, voxel)] for voxel in voxels])
     known = np.isfinite(worth)
@@ -185,35 +185,3 @@ def test_openings_are_the_connected_frontier_cells_of_the_textbook(seed):
         assert [scene.cells.opening(voxel, most) for most in (2, 5, 1000)] == [
             min(whole, m) for m in (2, 5, 1000)
         ]
-
-
-def room_with_a_sliver(apart):
-    """A known room; four unknown voxels beyond its right wall's gap, one beyond its left wall.
-
-    The robot is `apart` voxels from the sliver on the left, and farther from the opening on the right.
-    """
-    plan = np.full((30, 9), reference.WALL, np.int8)
-    plan[2:25, 1:8] = reference.FREE
-    plan[25, 2:6] = plan[1, 4] = reference.UNKNOWN
-    return plan, (2 + apart, 4)
-
-
-@pytest.mark.parametrize(
-    ("apart", "passing", "meanwhile", "wanted"),
-    [(4, 0.0, 0.0, 24), (4, 0.1, 0.0, 2), (7, 0.05, 0.0, 24), (4, 0.0, 0.2, 24), (4, 0.0, 0.25, 2)],
-)
-def test_slivers_wait_unless_they_are_near_by_hand(apart, passing, meanwhile, wanted):
-    """The range is 80 voxels: openings of four count, and slivers up to so many shares of it away.
-
-    The opening is 18 steps from the robot that is 4 from the sliver: more than a fifth of that, less than a
-    quarter.
-    """
-    plan, robot = room_with_a_sliver(apart)
-    config = DistanceAdvantageConfig(opening=0.05, passing=passing, meanwhile=meanwhile)
-    assert cell(plan, DistanceAdvantage(config).pick(scene_of(plan, robot)))[0] == wanted
-
-
-def test_slivers_are_all_that_count_where_there_is_nothing_else():
-    plan, robot = room_with_a_sliver(9)
-    plan[25, 2:6] = reference.WALL
-    assert cell(plan, DistanceAdvantage().pick(scene_of(plan, robot))) == (2, 4)
