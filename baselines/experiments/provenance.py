@@ -24,7 +24,7 @@ from baselines.experiments import PROCESS_STARTED_NS
 
 PACKAGES = ("entropy_explore_env", "baselines", "training")
 """Packages whose modules count; those of a strategy from elsewhere do, too."""
-_TABLE = strategies.__name__
+_TABLE = (strategies.__name__, f"{strategies.__name__}.table")
 _INSTALLED = ("site-packages", "dist-packages")
 
 
@@ -123,13 +123,13 @@ def _imports(tree: ast.Module) -> Iterator[_Import]:
 
 
 @lru_cache(maxsize=256)
-def imported(source: str | Path, skipped: str | None = None) -> Mapping[str, Path]:
+def imported(source: str | Path, skipped: tuple[str, ...] = ()) -> Mapping[str, Path]:
     """A module and all modules of ours that it imports, however far away.
 
     Args:
         source: The module's name, or its file. Where it is none of ours, the modules of its package count as
             well, or those beside its file.
-        skipped: Name of a module that is left out, with what only that imports.
+        skipped: Names of modules that are left out, with what only they import.
 
     Returns:
         Name → file.
@@ -141,7 +141,7 @@ def imported(source: str | Path, skipped: str | None = None) -> Mapping[str, Pat
         found, waiting = dict[str, Path](), [source]
     while waiting:
         name = waiting.pop()
-        file = None if name in found or name == skipped else _located(name, home)
+        file = None if name in found or name in skipped else _located(name, home)
         if file is not None:
             found[name] = file
             waiting += _named(name, file)

@@ -172,9 +172,15 @@ def _overall_parts(results: Results, rows: list[Row]) -> list[str]:
 
 
 def _overall_table(results: Results, rows: list[Row]) -> str:
-    pairs = [(measure, reference) for measure in results.judged_by for reference in results.references]
-    head = ["strategy", "tasks", "missions", "finished", *(f"{m.words}, over `{r}`" for m, r in pairs)]
-    first = f"{results.judged_by[0].name}_over_{results.references[0]}"
+    measures, reference = results.judged_by, results.reference
+    head = [
+        "strategy",
+        "tasks",
+        "missions",
+        "finished",
+        *(f"{m.words}, over `{reference}`" for m in measures),
+    ]
+    first = f"{measures[0].name}_over_{reference}"
     ordered = sorted(rows, key=lambda row: (row[first] is None, row[first]))
     shown = [
         [
@@ -182,7 +188,7 @@ def _overall_table(results: Results, rows: list[Row]) -> str:
             row["tasks"],
             row["missions"],
             "-" if row["finished"] is None else f"{row['finished']:.0%}",
-            *(ranged(row, f"{m.name}_over_{r}", ".2f") for m, r in pairs),
+            *(ranged(row, f"{m.name}_over_{reference}", ".2f") for m in measures),
             *_milliseconds(row),
         ]
         for row in ordered
@@ -198,7 +204,7 @@ def _task_table(results: Results, rows: list[Row]) -> str:
     unit = "path (m)" if plans else "time (s)"
     head = ["strategy", "finished", *(measure.words for measure in results.judged_by)]
     head += [f"{unit} to " + " / ".join(str(mark.share) for mark in marks) + f" % {marks[0].of}"]
-    head += [f"over `{reference}`" for reference in results.references]
+    head += [f"over `{results.reference}`"]
     first = results.judged_by[0]
     shown = [
         [
@@ -207,7 +213,7 @@ def _task_table(results: Results, rows: list[Row]) -> str:
             + (f", {row['failed']} failed" if row["failed"] else ""),
             *(_limited(row, measure) for measure in results.judged_by),
             " / ".join(_number(row[f"median_{mark.name}"]) for mark in marks),
-            *(ranged(row, f"{first.name}_over_{reference}", ".2f") for reference in results.references),
+            ranged(row, f"{first.name}_over_{results.reference}", ".2f"),
             *_milliseconds(row),
         ]
         for row in sorted(rows, key=lambda row: row[first.name])

@@ -19,9 +19,9 @@ from baselines.experiments.outcome import Outcome
 from baselines.experiments.provenance import CodeChangedError, code_digest, imported, modules_of
 from baselines.experiments.runner import Conditions, run_all
 from baselines.papers.sawhney.mission import MapRun
-from baselines.strategies.information_rate_v0 import InformationRate, InformationRateConfig
 from baselines.strategies.metrics import Nearest
 from baselines.strategies.rules.gradient import GradientStrategy
+from baselines.strategies.rules.next_best_view import NextBestView, NextBestViewConfig
 from baselines.strategies.rules.per_time_visibility import ExplorationConfig
 from baselines.strategies.rules.random_walk import RandomWalk
 from entropy_explore_env.scenarios import find_scenario
@@ -163,8 +163,8 @@ def test_settings_of_a_strategy_are_part_of_its_digest(entered):
         a=GradientStrategy,
         b=partial(GradientStrategy, motion_plane=True),
         c=partial(GradientStrategy, motion_plane=False),
-        d=partial(InformationRate, InformationRateConfig(candidates=80)),
-        e=partial(InformationRate, InformationRateConfig(candidates=81)),
+        d=partial(NextBestView, NextBestViewConfig("most-unmapped")),
+        e=partial(NextBestView, NextBestViewConfig("random")),
     )
     assert len({code_digest(strategy=name) for name in "abcde"}) == 5
 
