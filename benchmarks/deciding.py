@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -137,9 +137,9 @@ class FirstCandidate:
         """Begin a new mission."""
         self._proposer = ViewProposer(with_settings(scenario, {"action": {"kind": "candidates"}}), rng)
 
-    def choose(self, views: Sequence[RobotView]) -> list[np.ndarray]:
-        """Return the viewpoint (5,) of each view: x, y, z, yaw, pitch; map frame, metres, radians."""
-        return [self._proposer.propose(view)[0].copy() for view in views]
+    def choose(self, view: RobotView) -> np.ndarray:
+        """Return the viewpoint (5,) of the first candidate, map frame."""
+        return self._proposer.propose(view)[0].copy()
 
 
 class Limit(NamedTuple):

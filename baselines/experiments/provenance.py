@@ -21,6 +21,7 @@ from typing import Any, NamedTuple
 
 from baselines import strategies
 from baselines.experiments import PROCESS_STARTED_NS
+from baselines.strategies import loading
 
 PACKAGES = ("entropy_explore_env", "baselines", "training")
 """Packages whose modules count; those of a strategy from elsewhere do, too."""
@@ -59,6 +60,8 @@ def code_digest(*modules: str, strategy: str | None = None) -> str:
     elif strategy is not None:
         files |= imported(strategies.strategy_module(strategy))
         maker = strategies.scripted_maker(strategies.resolved(strategy))
+        if maker is None:
+            files |= imported(loading.__name__)  # with the driver of rules that are functions
         hasher.update(repr(strategy.rpartition(":")[2] if maker is None else _described(maker)).encode())
     for name, file in sorted(files.items()):
         hasher.update(f"{name} {_module(file).digest}\n".encode())
