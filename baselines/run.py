@@ -14,14 +14,21 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
-from baselines.cli.arguments import INLINE, OmitArgPrefixes, Positional, run_command
+from baselines.cli.arguments import INLINE, OmitArgPrefixes, Positional, option_help, run_command
 from baselines.cli.mission_outputs import MissionLog, Outputs, Wanted, show_results
 from baselines.cli.progress import progress_bar
 from baselines.cli.task_options import TaskOptions, base_task, first_parsed, parsed_for, tasked
 from baselines.experiments.mission import run_mission, scripted_env
 from baselines.strategies import make_strategy, resolved
+from baselines.strategies.table import help_text
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.validation import check_whole
+
+_STRATEGY = f"""Chooses viewpoints. We recommend best, which is {resolved("best")}.
+{help_text()}
+A learned policy: pretrained:room, pretrained:plans,
+pretrained:volumes, or the folder of a run of training.
+Your own: my_package.my_module:MyStrategy, path/to/file.py:MyStrategy."""
 
 
 @dataclass
@@ -30,22 +37,7 @@ class Args:
 
     scenario: Positional[str] = "room"
     """A named scenario: room, office, cave, … (docs/environments.md lists them)."""
-    strategy: str = "gradient"
-    """Chooses viewpoints. We recommend best, which is planned-rate.
-    Of papers: random, gradient, gradient-plane, mutual-information,
-    ground-gradient, voronoi, voronoi-gradient, next-best-view,
-    most-unmapped, least-mapped, random-known, raster, raster-fixed-yaw,
-    per-time-visibility, nearest-candidate, coordinated-candidate.
-    Of papers, as their authors run them: nearest-frontier,
-    coordinated-frontier, assigned-frontier, information-gain,
-    distance-advantage, receding-horizon, tour.
-    Ours: planned-rate, planner-choice, information-rate-v0,
-    information-per-scan, voronoi-nearest.
-    Above a cliff: cliff-next-best-view, cliff-polygon-edge,
-    cliff-straight-edge, cliff-raster, cliff-raster-fixed-yaw.
-    A learned policy: pretrained:room, pretrained:plans,
-    pretrained:volumes, or the folder of a run of training.
-    Your own: my_package.my_module:MyStrategy, path/to/file.py:MyStrategy."""
+    strategy: Annotated[str, option_help(_STRATEGY)] = "gradient"
     robots: int = 3
     """Team size."""
     seed: int = 0

@@ -19,6 +19,8 @@ from entropy_explore_env.belief.visibility import CONE, cone_of, mark_cones, vis
 from entropy_explore_env.compilation.kernels import kernel
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.errors import counted
+from entropy_explore_env.missions.view import RobotView
+from entropy_explore_env.missions.view_candidates import ViewProposer
 from entropy_explore_env.scenario import Scenario, with_settings
 from entropy_explore_env.scenarios import CAVE, CLIFF, LAB, OCCLUSIONS, OFFICE, ROOM
 from entropy_explore_env.settings import Grid
@@ -49,7 +51,6 @@ def deciding_rows(effort: Effort) -> list[Row]:
     """Mutual information in the laboratory, and a decision of each strategy that has a limit."""
     return [
         mutual_information_row(effort),
-        decision_row(ROOM, 3, "information-rate-v0", effort.steps, 5.0),
         decision_row(ROOM, 3, "planned-rate", effort.steps, 5.0),
         decision_row(OFFICE, 1, "planned-rate", effort.steps, 10.0),
         decision_row(CAVE, 1, "planned-rate", effort.steps, 25.0),
@@ -120,14 +121,25 @@ def plan_rows(name: str, path: str, grid: Grid, steps: int) -> list[Row]:
 
 def candidates_row(scenario: Scenario, robots: int, effort: Effort) -> Row:
     """Decisions a second of the planner that proposes 24 candidates, beside `planned-rate`, with one."""
-    rates: dict[str, list[float]] = {"planner-choice": [], "planned-rate": []}
+    limit = Limit(effort.steps, math.inf)
+    ours, theirs = list[float](), list[float]()
     for _ in range(_MISSIONS):
-        for strategy, own in rates.items():
-            row = decision_row(scenario, robots, strategy, effort.steps, math.inf)
-            own.append(1e3 / row.ours)
+        ours.append(1e3 / strategy_row(scenario, robots, "the first candidate", FirstCandidate, limit).ours)
+        theirs.append(1e3 / decision_row(scenario, robots, "planned-rate", *limit).ours)
     job = f"decisions among 24 candidates, {scenario.name}, {counted(robots, 'robot')}"
-    ours, theirs = rates["planner-choice"], rates["planned-rate"]
     return compared(job, "planned-rate", ours, theirs, "/s", Goal("≥", 0.7))
+
+
+class FirstCandidate:
+    """Chooses the first of the candidates that the planner proposes to a policy, which is its own choice."""
+
+    def reset(self, scenario: Scenario, rng: np.random.Generator) -> None:
+        """Begin a new mission."""
+        self._proposer = ViewProposer(with_settings(scenario, {"action": {"kind": "candidates"}}), rng)
+
+    def choose(self, view: RobotView) -> np.ndarray:
+        """Return the viewpoint (5,) of the first candidate, map frame."""
+        return self._proposer.propose(view)[0].copy()
 
 
 class Limit(NamedTuple):

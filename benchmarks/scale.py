@@ -37,7 +37,7 @@ _SLEEP_S = 1.0
 _IDLE = 0.5
 """Processes that may want the processors while two workers are compared with one."""
 _TEAM = with_settings(ROOM, {"robots": 3})
-_STRATEGIES = ("random", "information-rate-v0", "planned-rate")
+_STRATEGIES = ("random", "planned-rate")
 _OBSERVED = Observation(panorama_utility="log2", flat=True, while_busy=False)
 
 
@@ -163,7 +163,7 @@ def cluster_rows(missions: int) -> list[tuple[str, str, str]]:
     if others > _IDLE:
         gain = f"not measured: {others:.1f} other processes wanted the processors"
     else:
-        cell = Cell("room", _TEAM, "information-rate-v0", 4 * missions, figures_record)
+        cell = Cell("room", _TEAM, "planned-rate", 4 * missions, figures_record)
         played = [CellMission(cell, seed) for seed in range(4 * missions)]
         one_s, two_s = (wall_s(play, played, workers) for workers in (1, 2))
         gain = f"{one_s / two_s:.2f} ×"

@@ -341,8 +341,8 @@ class Reward:
     Attributes:
         kind: `individual`: bits that the robot's own measurements took from its own map;
             `team`: mean decrease of the robots' map entropies.
-        cost_per_s: Subtracted for every second that passes, 0 to 1e6. In the named scenarios 0.2 / the median
-            mission time of a good strategy (`scenarios.MISSION_TIMES`), so that returns tell fast from slow.
+        cost_per_s: Subtracted for every second that passes, 0 to 1e6. In the named scenarios 0.2 / the
+            time of a good strategy's mission, so that returns tell fast from slow.
     """
 
     kind: Literal["individual", "team"] = "individual"

@@ -6,8 +6,6 @@ from pathlib import Path
 
 import pytest
 
-from baselines.strategies import STRATEGIES
-
 ROOT = Path(__file__).parent.parent
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 PAGES = [
@@ -92,8 +90,3 @@ def test_the_model_card_tells_of_every_policy_what_its_file_says():
         else:
             assert f"{progress['steps']:,} robot-steps" in told
             assert f"{progress['validation']['median_s']:g} s" in told
-
-
-def test_the_page_of_strategies_names_all_of_them():
-    page = (ROOT / "docs" / "strategies.md").read_text(encoding="utf-8")
-    assert [name for name in (*STRATEGIES, "best") if f"`{name}`" not in page] == []

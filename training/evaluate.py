@@ -54,7 +54,7 @@ class Args(WorkerOptions):
     """The folder of a run of training.ppo, or of one of its checkpoints."""
     against: str | None = None
     """Strategies to compare with, as in baselines.run, separated by commas; default:
-    gradient,random,information-rate-v0, and for a policy over candidates planner-choice before them."""
+    gradient,random, and for a policy over candidates planned-rate before them."""
     scenario: str | None = None
     """Named scenario; default: that of training, with its robots, sensors and channel."""
     robots: int | None = None
@@ -104,9 +104,9 @@ def main(words: Sequence[str]) -> int:
 
 
 def default_rivals(trained: Scenario) -> list[str]:
-    """Strategies that a policy is compared with; one over candidates also with the planner's own choice."""
-    planner = ["planner-choice"] if trained.action.kind == "candidates" else []
-    return [*planner, *SIMPLE, "information-rate-v0"]
+    """Return the strategies that a policy is compared with; one over candidates also with the planner."""
+    planner = ["planned-rate"] if trained.action.kind == "candidates" else []
+    return [*planner, *SIMPLE]
 
 
 def evaluation_scenario(

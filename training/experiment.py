@@ -31,7 +31,7 @@ from training.evaluate import SIMPLE, compare, evaluation_scenario
 from training.policy import POLICIES
 from training.run_folder import FILE
 
-RIVALS = (*SIMPLE, "information-rate-v0")
+RIVALS = (*SIMPLE, "planned-rate")
 SEEDS = 3
 """Runs of each ablation, with the seeds 0, 1, …"""
 

@@ -14,7 +14,7 @@ from entropy_explore_env.writing import write_atomically
 from training.evaluate import SIMPLE, table_cells
 from training.experiment import ABLATIONS, ExperimentResults, Task, planned_runs
 
-_LINES = {"gradient": "--", "random": ":", "information-rate-v0": "-."}
+_LINES = {"gradient": "--", "random": ":", "planned-rate": "-."}
 
 
 def write_page(out: Path, results: ExperimentResults, command: str) -> Path:
@@ -98,7 +98,7 @@ def _verdicts(task: Task, results: ExperimentResults) -> str:
     compared = results.comparisons[task.scenario]
     rows = {row["strategy"]: row for row in compared["rows"]}
     starts, better = compared["seeds"], rows[compared["better_rival"]]
-    policy, informed = rows[compared["policy"]], rows["information-rate-v0"]
+    policy, informed = rows[compared["policy"]], rows["planned-rate"]
     faster, needed = compared["faster_than_simple"], int(np.ceil(0.95 * starts))
     goals = [
         (
@@ -109,7 +109,7 @@ def _verdicts(task: Task, results: ExperimentResults) -> str:
         (f"faster than both on at least {needed} of {starts} starts", f"{faster}", faster >= needed),
         ("every mission finished", f"{policy['finished']} of {starts}", policy["finished"] == starts),
         (
-            "stretch: median at most 0.9 × that of information-rate-v0",
+            "stretch: median at most 0.9 × that of planned-rate",
             f"{informed['ratio']:.2f} ({informed['ratio_low']:.2f} … {informed['ratio_high']:.2f})",
             informed["ratio"] <= 0.9,
         ),

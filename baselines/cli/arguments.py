@@ -78,6 +78,15 @@ _MEANT = re.compile(r" Perhaps you meant: (--[\w.-]+).*")
 """An option that is like the one that is none, with its help."""
 
 
+def option_help(text: str) -> Any:  # noqa: ANN401 - tyro's
+    """Return the annotation that gives an option a computed help text."""
+    try:
+        from tyro.conf import arg
+    except ImportError:  # `parse` says what is missing
+        return None
+    return arg(help=text)
+
+
 def parse(
     kind: type[Arguments],
     words: Sequence[str],

@@ -21,10 +21,11 @@ from typing import Any, NamedTuple
 
 from baselines import strategies
 from baselines.experiments import PROCESS_STARTED_NS
+from baselines.strategies import loading
 
 PACKAGES = ("entropy_explore_env", "baselines", "training")
 """Packages whose modules count; those of a strategy from elsewhere do, too."""
-_TABLE = strategies.__name__
+_TABLE = (strategies.__name__, f"{strategies.__name__}.table")
 _INSTALLED = ("site-packages", "dist-packages")
 
 
@@ -59,6 +60,8 @@ def code_digest(*modules: str, strategy: str | None = None) -> str:
     elif strategy is not None:
         files |= imported(strategies.strategy_module(strategy))
         maker = strategies.scripted_maker(strategies.resolved(strategy))
+        if maker is None:
+            files |= imported(loading.__name__)  # with the driver of rules that are functions
         hasher.update(repr(strategy.rpartition(":")[2] if maker is None else _described(maker)).encode())
     for name, file in sorted(files.items()):
         hasher.update(f"{name} {_module(file).digest}\n".encode())
@@ -123,13 +126,13 @@ def _imports(tree: ast.Module) -> Iterator[_Import]:
 
 
 @lru_cache(maxsize=256)
-def imported(source: str | Path, skipped: str | None = None) -> Mapping[str, Path]:
+def imported(source: str | Path, skipped: tuple[str, ...] = ()) -> Mapping[str, Path]:
     """A module and all modules of ours that it imports, however far away.
 
     Args:
         source: The module's name, or its file. Where it is none of ours, the modules of its package count as
             well, or those beside its file.
-        skipped: Name of a module that is left out, with what only that imports.
+        skipped: Names of modules that are left out, with what only they import.
 
     Returns:
         Name → file.
@@ -141,7 +144,7 @@ def imported(source: str | Path, skipped: str | None = None) -> Mapping[str, Pat
         found, waiting = dict[str, Path](), [source]
     while waiting:
         name = waiting.pop()
-        file = None if name in found or name == skipped else _located(name, home)
+        file = None if name in found or name in skipped else _located(name, home)
         if file is not None:
             found[name] = file
             waiting += _named(name, file)

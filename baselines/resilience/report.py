@@ -132,8 +132,6 @@ small part of it: with `Channel.silent_after_s=1` 1.56 are left.
 - `voronoi`, one of two robots lost: two robots are twice as quick as isolated ones (174 s and 349 s), so
 that the survivor needs its share and no less, 1.49 where 1.5 is allowed. Where the second one is silent
 instead, it is the same, 1.50.
-- `coordinated-candidate`, one of four robots lost: 1.21 where 1.17 is allowed. The five ratios lie so far
-apart that their interval, 1.08 to 1.38, holds both answers.
 - `coordinated-frontier`, `assigned-frontier` and `voronoi`, never slower than in isolation: where next to
 nothing arrives (90 % lost, a range of 3 m, a robot lost) they are as quick as isolated robots, by other
 ways: the ratios are 0.95 to 1.07, and with five seeds an interval reaches 5 to 14 % farther.
@@ -141,14 +139,10 @@ ways: the ratios are 0.95 to 1.07, and with five seeds an interval reaches 5 to 
 Where only viewpoints were announced, `coordinated-frontier` with four robots had been slower than in
 isolation (1.22), since it left frontiers to teammates whose scans never came. With teammates' targets left
 out 1.03 was left of it, with all that was heard left out 1.00. It leaves them nothing any more where no
-scans are shared; so do `assigned-frontier`, `voronoi`, `per-time-visibility` and `coordinated-candidate`."""
+scans are shared; so do `assigned-frontier`, `voronoi` and `per-time-visibility`."""
 
 _WHY_OFFICE = """In the office, with four robots:
 
-- `information-rate-v0` stops moving where robots do not communicate, a known defect: in the missions of
-isolated robots of which one is lost and that were cut off, the team drove 32 to 68 m and scanned about 5,000
-times. So it is where one is lost and the others share (1.42): in one of five missions 738 moves were
-blocked by bodies, and 162 m driven. `planned-rate`, its successor, does not stand.
 - `assigned-frontier`, one robot lost: in one of five missions the robot stopped in a corridor, and the others
 were stopped by its body 950 times. Paths are planned through what is known to be free, bodies are not in the
 map. The other four took 0.99 to 1.24 of the time.

@@ -23,10 +23,8 @@ Records = dict[str, list[Record]]
 
 STRATEGIES = (
     "planned-rate",
-    "information-rate-v0",
     "mutual-information",
     "per-time-visibility",
-    "coordinated-candidate",
     "coordinated-frontier",
     "assigned-frontier",
     "voronoi",

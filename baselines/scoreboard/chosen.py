@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from baselines.cli.task_options import BaseTask, TaskOptions, tasked
 from baselines.experiments.mission import Surroundings, scripted_env
-from baselines.scoreboard.results import BASELINE, REFERENCES
+from baselines.scoreboard.results import BASELINE, REFERENCE
 from baselines.scoreboard.suites import Place, Task, suite_strategies, team_name
 from baselines.strategies import STRATEGIES, is_learned, learned_policies, make_strategy, resolved
 from baselines.world_sweep import is_plan
@@ -30,7 +30,8 @@ def chosen_strategies(words: str | None, suite: str | None = None) -> tuple[str,
         words: Names; `all` = every one; `suite`, also beside other names, or None = those of the suite's
             table, of which learned policies are left out, and named, where what runs them is not installed;
             None without a suite = every one.
-        suite: Its name; its first reference is added, without a suite the random walk is.
+        suite: Its name; the strategy that ratios are relative to is added, without a suite the
+            random walk is.
 
     Raises:
         SettingError: No strategy, or no suite, has such a name.
@@ -43,8 +44,8 @@ def chosen_strategies(words: str | None, suite: str | None = None) -> tuple[str,
         names[at : at + 1] = _runnable(suite_strategies(suite))
     for name in names:
         make_strategy(name)
-    added = [BASELINE] if suite is None else [name for name in REFERENCES[:1] if name in STRATEGIES]
-    return tuple(dict.fromkeys([*added, *map(resolved, names)]))
+    added = BASELINE if suite is None else REFERENCE
+    return tuple(dict.fromkeys([added, *map(resolved, names)]))
 
 
 def _runnable(names: Sequence[str]) -> list[str]:

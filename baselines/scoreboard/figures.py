@@ -15,7 +15,7 @@ _INK = (0.1, 0.1, 0.1)
 
 def ratio_figure(results: Results, rows: list[Row]) -> Figure:
     """A panel a measure: each strategy's ratio to the first reference over all tasks, best above."""
-    reference = results.references[0]
+    reference = results.reference
     measures = results.judged_by
     figure = Figure(figsize=(4.6 * len(measures), 0.32 * len(rows) + 1.2), layout="constrained")
     panels = figure.subplots(1, len(measures), squeeze=False)[0]
@@ -42,7 +42,7 @@ def ratio_figure(results: Results, rows: list[Row]) -> Figure:
 
 def task_figure(results: Results) -> Figure:
     """A column a task: each strategy's ratio to the first reference, a colour a ratio, numbers within."""
-    reference, measure = results.references[0], results.judged_by[0]
+    reference, measure = results.reference, results.judged_by[0]
     strategies = results.ran
     tasks = [task for task in results.suite.tasks if any(results.of(task, who) for who in strategies)]
     ratios = np.full((len(strategies), len(tasks)), np.nan)

@@ -27,7 +27,7 @@ from baselines.strategies import resolved
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.writing import write_atomically
 
-_BEST, _BEFORE = resolved("best"), "information-rate-v0"
+_BEST = resolved("best")
 _ENDS = {"SEEN", "MAPPED"}
 _LOST = ", half of the messages lost"
 _TEAMS_WORLDS = ("cave", "office", "warehouse")
@@ -55,29 +55,10 @@ class Goal(NamedTuple):
         return f"`{self.ours}` over `{self.other}`"
 
 
-def _volumes(task: str, most: float) -> Goal:
-    return Goal("volumes", (task,), TIME, _BEST, _BEFORE, most)
-
-
-def _teams(robots: str, most: float) -> tuple[Goal, ...]:
-    return tuple(
-        Goal("teams", (f"{world}, {robots}",), TIME, _BEST, _BEFORE, most) for world in _TEAMS_WORLDS
-    )
-
-
 GOALS = (
     Goal("plans", (), PATH, "distance-advantage", "nearest-frontier", 0.86),
     Goal("plans", (), PATH, _BEST, "distance-advantage", 0.95),
     Goal("plans", (), TIME_99, _BEST, "per-time-visibility", 0.80),
-    Goal("plans", (), TIME_99, _BEST, _BEFORE, 0.80),
-    _volumes("room-furnished, 3 robots", 0.85),
-    _volumes("office, 1 robot", 0.70),
-    _volumes("office, 3 robots", 0.75),
-    _volumes("cave, 3 robots", 0.78),
-    _volumes("room, 1 robot", 1.0),
-    _volumes("room, 3 robots", 1.0),
-    *_teams("4 robots", 0.75),
-    *_teams("8 robots", 0.70),
     *(
         Goal("teams", (f"{world}, 4 robots",), TIME, _BEST, _BEST, 1.25, beside=_LOST)
         for world in _TEAMS_WORLDS
@@ -191,6 +172,10 @@ ratio is the geometric mean of paired missions' ratios, over several tasks the g
 with a 95 % interval of a bootstrap over pairs; missions that were not finished count with the time limit. A
 goal below 1 also asks that the interval ends below 1. Intervals over few missions are too narrow. Why goals
 are missed: [rules of exploration](../explorers.md).
+
+Thirteen more goals were ratios over `information-rate-v0`, whose code commit `aefa487` holds: `planned-rate`
+took 0.76 (0.68 … 0.84) of its time in plans, 0.71 to 0.99 in volumes, and 0.43 to 0.74 with four and eight
+robots. Nine of them were reached.
 """
 
 

@@ -20,8 +20,8 @@ from baselines.experiments.statistics import Interval, geometric_ratio_interval,
 from baselines.scoreboard.suites import Suite, Task
 
 BASELINE = "random"
-REFERENCES = ("nearest-frontier", "information-rate-v0")
-"""Strategies that ratios are relative to; where neither takes part, the random walk is."""
+REFERENCE = "nearest-frontier"
+"""The strategy that ratios are relative to; where it does not take part, the random walk is."""
 SEEN = (50, 90, 95, 99, 100)
 """Per cent of what can be seen."""
 BITS = (50, 90, 99)
@@ -96,10 +96,9 @@ class Results:
     records: dict[str, list[Record]]
 
     @property
-    def references(self) -> tuple[str, ...]:
-        """Strategies that ratios are relative to."""
-        present = tuple(name for name in REFERENCES if name in self.suite.strategies)
-        return present or tuple(name for name in (BASELINE,) if name in self.suite.strategies)
+    def reference(self) -> str:
+        """The strategy that ratios are relative to."""
+        return REFERENCE if REFERENCE in self.suite.strategies else BASELINE
 
     @property
     def ran(self) -> tuple[str, ...]:
@@ -209,9 +208,8 @@ def _task_row(results: Results, task: Task, strategy: str) -> Row:
         limit = limit_of(task, measure)
         row |= interval_columns(measure.name, median_interval(results.values(task, strategy, measure)))
         row[f"{measure.name}_limit"] = limit if math.isfinite(limit) else None
-        for reference in results.references:
-            name = f"{measure.name}_over_{reference}"
-            row |= interval_columns(name, results.ratio(strategy, reference, measure, [task]))
+        ratio = results.ratio(strategy, results.reference, measure, [task])
+        row |= interval_columns(f"{measure.name}_over_{results.reference}", ratio)
     for measure in MARKS:
         reached = [each for each in (value(record, measure) for record in records) if each is not None]
         name = f"median_{measure.name}"
@@ -242,9 +240,8 @@ def overall_rows(results: Results) -> list[Row]:
             "finished": finished / len(records) if records else None,
         }
         for measure in results.judged_by:
-            for reference in results.references:
-                ratio = results.ratio(strategy, reference, measure, tasks)
-                row |= interval_columns(f"{measure.name}_over_{reference}", ratio)
+            ratio = results.ratio(strategy, results.reference, measure, tasks)
+            row |= interval_columns(f"{measure.name}_over_{results.reference}", ratio)
         rows.append(row | _clock(records))
     return rows
 

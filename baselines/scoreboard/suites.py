@@ -31,7 +31,8 @@ from typing import Any
 
 from baselines.experiments.cells import Cell
 from baselines.experiments.mission import Surroundings, scripted
-from baselines.scoreboard.mission import SETTINGS, SuiteMission
+from baselines.scoreboard.mission import SuiteMission
+from baselines.strategies.table import suite_names
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.errors import SettingError, one_of
 from entropy_explore_env.scenario import Scenario, with_settings
@@ -130,7 +131,7 @@ class Suite:
     Attributes:
         name: `plans`, `volumes`, `teams`, `others`, or `own` for scenarios of one's own.
         tasks: The rows of each strategy.
-        strategies: Names; of those that are tuned with the settings that differ (`name::setting=value`).
+        strategies: Names.
     """
 
     name: str
@@ -149,9 +150,9 @@ class Suite:
             Cell(
                 self.cell_id(task, place, strategy),
                 place.scenario,
-                strategy.partition(SETTINGS)[0],
+                strategy,
                 place.missions,
-                SuiteMission(place.start, strategy.partition(SETTINGS)[2]),
+                SuiteMission(place.start),
                 place.surroundings,
                 round=sum(before.missions for before in task.places[:number]),
                 group=f"{task.folder}/{strategy}",
@@ -225,96 +226,21 @@ def others(quick: bool = False) -> tuple[Task, ...]:
     return tuple(task_in(team_name(name, SCENARIOS[name].robots), SCENARIOS[name], starts) for name in names)
 
 
-def training_plans(starts: int) -> tuple[Task, ...]:
-    """Plans like those of the suite on which settings may be tuned, so many starts of each.
-
-    Worlds are those of the recipes' training split, and the dungeons of odd number. Of the plans in files
-    there is one each, which nothing is tuned on.
-    """
-    return (*training_dungeons(starts), *training_whole_plans(starts))
-
-
-def training_whole_plans(starts: int) -> tuple[Task, ...]:
-    """Those of `training_plans` of which everything is to be seen."""
-    return tuple(
-        task_in(name, _explored(SCENARIOS[name], {"seen_share": 1.0}), starts, "train")
-        for name in ("office", "corridor", "cluttered", "hybrid")
-    )
-
-
-def training_dungeons(starts: int) -> tuple[Task, ...]:
-    """The first dungeons of odd number alone: plans of which a part may stay unseen."""
-    return (_dungeons(starts, every=2),)
-
-
-def training_volumes(starts: int) -> tuple[Task, ...]:
-    """Worlds like those of the suite `volumes` on which settings may be tuned: of the training split."""
-    return tuple(
-        task_in(team_name(name, robots), with_settings(SCENARIOS[name], {"robots": robots}), starts, "train")
-        for name in ("room-furnished", "office", "office-3d", "cave")
-        for robots in (1, 3)
-    )
-
-
-def training_teams(starts: int) -> tuple[Task, ...]:
-    """Teams of four like those of the suite `teams` on which settings may be tuned: of the training split."""
-    return tuple(
-        task_in(
-            team_name(name, 4) + words,
-            with_settings(SCENARIOS[name], {"robots": 4, "channel": _CHANNELS[words]}),
-            starts,
-            "train",
-        )
-        for name in ("room-furnished", "office", "cave")
-        for words in ("", ", half of the messages lost")
-    )
-
-
 SUITES = {"plans": plans, "volumes": volumes, "teams": teams, "others": others}
 """Name → a function of `quick` that makes the tasks."""
 
-_OF_ONE_ROBOT = (
-    "random",
-    "gradient",
-    "mutual-information",
-    "per-time-visibility",
-    "next-best-view",
-    "nearest-frontier",
-    "information-gain",
-    "distance-advantage",
-    "receding-horizon",
-    "tour",
-    "information-rate-v0",
-    "planned-rate",
-)
-_OF_TEAMS = ("voronoi", "coordinated-frontier", "assigned-frontier")
-_OF_OTHERS = (
-    "random",
-    "gradient",
-    "per-time-visibility",
-    "next-best-view",
-    "nearest-frontier",
-    "information-rate-v0",
-    "planned-rate",
-)
 _PLANS_POLICY, _VOLUMES_POLICY = "pretrained:plans", "pretrained:volumes"
 
 
 def suite_strategies(name: str) -> tuple[str, ...]:
-    """Who stands in a suite's table: the rules of the five papers, the frontier rules, ours, and policies.
-
-    Variants of a rule do not, as `raster-fixed-yaw`; nor, where one robot explores, do rules that coordinate
-    teams.
+    """Return the strategies of a suite's table: those that the table of names puts there, and policies.
 
     Raises:
         SettingError: No suite has this name.
     """
     _check_suite(name)
-    if name == "plans":
-        return (*_OF_ONE_ROBOT, _PLANS_POLICY)
-    if name == "others":
-        return _OF_OTHERS
-    return (*_OF_ONE_ROBOT, *_OF_TEAMS, _PLANS_POLICY, _VOLUMES_POLICY)
+    policies = {"plans": (_PLANS_POLICY,), "others": ()}.get(name, (_PLANS_POLICY, _VOLUMES_POLICY))
+    return (*suite_names(name), *policies)
 
 
 def _check_suite(name: str) -> None:

@@ -28,7 +28,7 @@ def show_results(results: Results) -> None:
     from rich.console import Console
     from rich.table import Table
 
-    measure, reference = results.judged_by[0], results.references[0]
+    measure, reference = results.judged_by[0], results.reference
     names = ", ".join(task.name for task in results.suite.tasks)
     table = Table(
         title=f"{names}\nratios: over {reference}'s",

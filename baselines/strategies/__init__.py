@@ -9,82 +9,10 @@ from pathlib import Path
 from types import MappingProxyType, ModuleType
 
 from baselines.strategies.loading import entry_points, is_reference, make_referenced, module_of
-from baselines.strategies.mutual_information.neighbourhood import MutualInformationConfig
-from baselines.strategies.planner_choice import PlannerChoice
 from baselines.strategies.protocol import Strategy
-from baselines.strategies.rules.assigned_frontier import AssignedFrontier
-from baselines.strategies.rules.cliff import CliffConfig, CliffNextBestView
-from baselines.strategies.rules.cliff_raster import CliffRaster
-from baselines.strategies.rules.coordinated_frontier import CoordinatedFrontier
-from baselines.strategies.rules.distance_advantage import DistanceAdvantage
-from baselines.strategies.rules.gradient import GradientStrategy
-from baselines.strategies.rules.information_gain import InformationGain
-from baselines.strategies.rules.metrics import Coordinated, Nearest
-from baselines.strategies.rules.most_unmapped import LeastMapped, MostUnmapped, RandomKnown
-from baselines.strategies.rules.mutual_information import MutualInformation
-from baselines.strategies.rules.nearest_frontier import NearestFrontier
-from baselines.strategies.rules.next_best_view import NextBestView
-from baselines.strategies.rules.per_time_visibility import ExplorationConfig, PerTimeVisibility
-from baselines.strategies.rules.random_walk import RandomWalk
-from baselines.strategies.rules.raster import Raster
-from baselines.strategies.rules.receding_horizon import RecedingHorizon
-from baselines.strategies.rules.voronoi import VoronoiCoverage
-from baselines.strategies.voronoi.territory import VoronoiConfig
+from baselines.strategies.table import ALIASES, CLIFF_STRATEGIES, STRATEGIES
 from entropy_explore_env.command import home_path
 from entropy_explore_env.errors import MissingExtraError, SettingError, did_you_mean
-from entropy_explore_env.explorer import PlannedRate
-from entropy_explore_env.planner.tour import Tour
-
-STRATEGIES: MappingProxyType[str, Callable[[], Strategy]] = MappingProxyType(
-    {
-        "random": RandomWalk,
-        "gradient": GradientStrategy,
-        "gradient-plane": partial(GradientStrategy, motion_plane=True),
-        "mutual-information": MutualInformation,
-        "ground-gradient": partial(MutualInformation, MutualInformationConfig(coordinated=False)),
-        "planned-rate": PlannedRate,
-        "planner-choice": PlannerChoice,
-        "per-time-visibility": PerTimeVisibility,
-        "nearest-frontier": NearestFrontier,
-        "coordinated-frontier": CoordinatedFrontier,
-        "assigned-frontier": AssignedFrontier,
-        "information-gain": InformationGain,
-        "distance-advantage": DistanceAdvantage,
-        "receding-horizon": RecedingHorizon,
-        "tour": Tour,
-        "next-best-view": NextBestView,
-        "most-unmapped": MostUnmapped,
-        "least-mapped": LeastMapped,
-        "random-known": RandomKnown,
-        "raster": Raster,
-        "raster-fixed-yaw": partial(Raster, turning=False),
-        "nearest-candidate": partial(PerTimeVisibility, ExplorationConfig(metric=Nearest(), promises=False)),
-        "coordinated-candidate": partial(PerTimeVisibility, ExplorationConfig(metric=Coordinated())),
-        "voronoi": VoronoiCoverage,
-        "voronoi-gradient": partial(VoronoiCoverage, VoronoiConfig(control="gradient-search")),
-        "voronoi-nearest": partial(
-            VoronoiCoverage,
-            VoronoiConfig(control="nearest", metric="length", known="deviation", tau=0.02, tau_floor=0.01),
-        ),
-    }
-)
-"""Name → a function that makes the strategy."""
-
-CLIFF_STRATEGIES: MappingProxyType[str, Callable[[], Strategy]] = MappingProxyType(
-    {
-        "cliff-raster-fixed-yaw": partial(CliffRaster, turning=False),
-        "cliff-raster": CliffRaster,
-        "cliff-straight-edge": partial(CliffNextBestView, CliffConfig(edge="line", interest_decay=0.0)),
-        "cliff-polygon-edge": partial(CliffNextBestView, CliffConfig(interest_decay=0.0)),
-        "cliff-next-best-view": CliffNextBestView,
-    }
-)
-"""The same of strategies for rovers above a cliff alone; who asks for all strategies does not mean them."""
-
-ALIASES: MappingProxyType[str, str] = MappingProxyType(
-    {"best": "planned-rate", "information-rate": "planned-rate"}
-)
-"""Other name → the name that records and tables hold: of what we recommend, also under its former name."""
 
 _RECOMMENDED = MappingProxyType({"cliff": "cliff-next-best-view"})
 """Named scenario → what we recommend in it, where that is another one than elsewhere."""

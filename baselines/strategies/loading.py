@@ -1,4 +1,4 @@
-"""Strategies from outside the package: classes named by module or file, and installed entry points.
+"""Strategies from outside the package: classes and rules named by module or file, and entry points.
 
 They are named `my_package.my_module:MyStrategy` or `path/to/file.py:MyStrategy`, or have a name that an
 installed package declares in the entry-point group `entropy_explore_env.strategies`: docs/own_strategy.md.
@@ -19,6 +19,7 @@ from typing import Any
 
 from baselines.strategies.protocol import Strategy
 from entropy_explore_env.errors import EntropyExploreError, SettingError
+from entropy_explore_env.planner.frontier_rule import PickRule
 
 ENTRY_POINTS = "entropy_explore_env.strategies"
 """The group in which packages declare strategies."""
@@ -51,7 +52,8 @@ def make_referenced(name: str) -> Strategy:
     """A new strategy of a class named by its module or file.
 
     Args:
-        name: `module:Class` or `path/to/file.py:Class`; the class, or function, is called without arguments.
+        name: `module:Class` or `path/to/file.py:Class`. A class, or a function without arguments, makes the
+            strategy; a function of one argument is itself a rule, `pick(scene)`, that the driver follows.
 
     Raises:
         SettingError: There is no such module, file or class; it raises an error; what it makes is no
@@ -66,6 +68,8 @@ def make_referenced(name: str) -> Strategy:
             f", such as {', '.join(classes)}" if classes else "; it defines no class with reset and choose"
         )
         raise SettingError("strategy", name, f"a class in {source}{known} ({attribute} is none)")
+    if inspect.isfunction(make) and _takes_one(make):
+        return PickRule(make)
     return _made(name, attribute, make)
 
 
@@ -152,6 +156,14 @@ def _strategies_in(module: ModuleType) -> list[str]:
         and thing.__module__ == module.__name__
         and all(_has_one_of(thing, group) for group in _METHODS)
     ]
+
+
+def _takes_one(function: Callable[..., Any]) -> bool:
+    """Return whether a function needs exactly one positional argument."""
+    parameters = inspect.signature(function).parameters.values()
+    positional = (inspect.Parameter.POSITIONAL_ONLY, inspect.Parameter.POSITIONAL_OR_KEYWORD)
+    needed = [each for each in parameters if each.default is each.empty and each.kind in positional]
+    return len(needed) == 1
 
 
 def _has_one_of(thing: object, methods: tuple[str, ...]) -> bool:

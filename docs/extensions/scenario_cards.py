@@ -16,7 +16,7 @@ from entropy_explore_env import environment_id, scenarios
 from entropy_explore_env.errors import SettingError, counted
 from entropy_explore_env.missions.rules import rules_of
 from entropy_explore_env.scenario import Scenario, with_settings
-from entropy_explore_env.scenarios import MISSION_TIMES, SCENARIOS, usual_reward
+from entropy_explore_env.scenarios import COST_PER_S_ALONE, SCENARIOS
 from entropy_explore_env.settings import RobotKind, gaussian_entropy_bits
 from entropy_explore_env.worlds.load import make_world
 from entropy_explore_env.worlds.pictures import picture
@@ -58,6 +58,8 @@ def _write(path: Path, content: bytes) -> Path:
     return path
 
 
+_COST_OF_A_MISSION = 0.2
+"""What a mission of the usual length costs, in shares of all bits."""
 _WHOSE = {
     "any": "any robot's map",
     "all": "the last robot's map",
@@ -262,18 +264,17 @@ def _reward(scenario: Scenario) -> str:
     gained = "own bits" if reward.kind == "individual" else "mean over the team of own and received bits"
     cost = f" - {reward.cost_per_s:g} × seconds" if reward.cost_per_s else ""
     text = f"## Reward\n\n`{reward.kind}`: {gained} gained in the step / (H(0) - H_th){cost}."
-    times = MISSION_TIMES.get(scenario.name)
-    if times is not None and reward.cost_per_s:
+    if reward.cost_per_s:
         text += (
-            f"\nA mission of {times.median_s:g} s, the median of `{times.strategy}` over {times.missions} "
-            "starts, returns about 0.8, one twice as long 0.6."
+            f"\nA mission of {_COST_OF_A_MISSION / reward.cost_per_s:.3g} s returns about 0.8, one twice as "
+            "long 0.6."
         )
-        if times.alone_s is not None:
-            alone = usual_reward(scenario.name, alone=True)
-            text += (
-                f" With `robots=1`, as under Gymnasium, a second costs {alone.cost_per_s:g}, by that robot's "
-                f"median of {times.alone_s:g} s."
-            )
+    if scenario.name in COST_PER_S_ALONE:
+        alone = COST_PER_S_ALONE[scenario.name]
+        text += (
+            f" With `robots=1`, as under Gymnasium, a second costs {alone:g}: there a mission of "
+            f"{_COST_OF_A_MISSION / alone:.3g} s returns about 0.8."
+        )
     return text
 
 

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import NamedTuple
 
 from entropy_explore_env.scenario import Scenario
-from entropy_explore_env.scenarios import MISSION_TIMES
 
 
 class Time(NamedTuple):
@@ -28,25 +27,16 @@ def times_table(scenario: Scenario, results: Path) -> str:
         scenario: One of the named scenarios.
         results: The folder with the pages of results and their tables.
     """
-    lines = []
-    measured = MISSION_TIMES.get(scenario.name)
-    if measured is not None:
-        lines.append(
-            f"`{measured.strategy}`: median {measured.median_s:g} s over {measured.missions} starts of the "
-            "training split, this scenario's own team (`python -m baselines.mission_times`)."
-        )
     times = scoreboard_times(scenario.name, results)
-    if times:
-        rows = [
-            f"| {t.task} | `{t.strategy}` | {t.seconds} | {t.finished} of {t.missions} "
-            f"| [{t.page}](../results/{t.page}.md) |"
-            for t in times
-        ]
-        lines.append(
-            "| team | strategy | mission time (s) | finished | from |\n| --- | --- | --- | --- | --- |\n"
-            + "\n".join(rows)
-        )
-    return "## How long strategies take\n\n" + "\n\n".join(lines) if lines else ""
+    if not times:
+        return ""
+    rows = [
+        f"| {t.task} | `{t.strategy}` | {t.seconds} | {t.finished} of {t.missions} "
+        f"| [{t.page}](../results/{t.page}.md) |"
+        for t in times
+    ]
+    head = "| team | strategy | mission time (s) | finished | from |\n| --- | --- | --- | --- | --- |\n"
+    return "## How long strategies take\n\n" + head + "\n".join(rows)
 
 
 SUITES = {

@@ -316,7 +316,6 @@ def test_random_is_always_there_and_first():
     assert chosen_strategies("gradient,random") == ("random", "gradient")
     assert set(chosen_strategies("all")) == set(chosen_strategies(None)) == set(strategies.STRATEGIES)
     assert chosen_strategies("gradient", "plans") == ("nearest-frontier", "gradient")
-    assert chosen_strategies("information-rate,planned-rate") == ("random", "planned-rate")
     assert chosen_strategies("best") == ("random", strategies.ALIASES["best"])
 
 

@@ -19,7 +19,7 @@ TINY = Effort(rounds=2, steps=6)
 def test_rows_are_measured():
     overlap = mutual_information_row(TINY)
     assert overlap.unit == "ms" and overlap.goal == "< 0.2 ms" and overlap.ours > 0
-    decision = decision_row(BOX, 2, "information-rate-v0", TINY.steps, 5.0)
+    decision = decision_row(BOX, 2, "planned-rate", TINY.steps, 5.0)
     assert decision.unit == "ms" and decision.goal == "< 5 ms" and decision.ours > 0
 
 

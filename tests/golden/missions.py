@@ -38,9 +38,6 @@ _OF_ROBOTS = tuple(
     "messages_lost messages_out_of_range".split()
 )
 
-_NOW = {"information-rate": "information-rate-v0"}
-"""Name under which a mission was recorded → the name that its strategy has now."""
-
 
 def run_again(record: MissionRecord) -> tuple[MissionRecord, Missions]:
     """The same strategy in the same scenario with the same seed: its record, and the missions at its end."""
@@ -55,8 +52,7 @@ def run_again(record: MissionRecord) -> tuple[MissionRecord, Missions]:
     def before_step(actions: object) -> None:
         recorders[0].command(actions)  # type: ignore[arg-type]
 
-    strategy = make_strategy(_NOW.get(record.strategy, record.strategy))
-    run_mission(env, strategy, record.seed, after_step, before_step)
+    run_mission(env, make_strategy(record.strategy), record.seed, after_step, before_step)
     return recorders[0].record(record.strategy), env.missions
 
 

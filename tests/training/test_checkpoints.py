@@ -261,9 +261,9 @@ def test_evaluate_puts_a_policy_beside_strategies(saved, tmp_path, capsys):
 def test_a_policy_over_candidates_is_compared_with_the_planner_unasked():
     """It begins as the planner: whether it became better than that is the question."""
     over = with_settings(SCENARIO, {"action": {"kind": "candidates"}})
-    others = ["gradient", "random", "information-rate-v0"]
+    others = ["gradient", "random"]
     assert evaluate.default_rivals(SCENARIO) == others
-    assert evaluate.default_rivals(over) == ["planner-choice", *others]
+    assert evaluate.default_rivals(over) == ["planned-rate", *others]
 
 
 def test_evaluation_takes_worlds_that_training_never_sees():

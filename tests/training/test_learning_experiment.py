@@ -46,7 +46,7 @@ def results(ratio: float, faster: int) -> ExperimentResults:
         row("runs/room-3-seed-0", 50.0),
         rival("gradient", 50.0 / ratio, ratio, faster),
         rival("random", 400.0, 0.125, 20),
-        rival("information-rate-v0", 40.0, 1.25, 3),
+        rival("planned-rate", 40.0, 1.25, 3),
     ]
     compared = {
         "scenario": "room",
@@ -68,7 +68,7 @@ def test_goals_are_judged_by_what_was_found(tmp_path: Path, ratio: float, faster
     page = write_page(tmp_path, results(ratio, faster), "the command").read_text()
     assert f"| {ratio:.2f} ({ratio - 0.1:.2f} … {ratio + 0.1:.2f}) | {said} |" in page
     assert f"| faster than both on at least 19 of 20 starts | {faster} | {said} |" in page
-    assert "| stretch: median at most 0.9 × that of information-rate-v0 | 1.25 (1.15 … 1.35) | no |" in page
+    assert "| stretch: median at most 0.9 × that of planned-rate | 1.25 (1.15 … 1.35) | no |" in page
     assert "| room-3-seed-0 | 200 | 2.0 | 1.5 | 67% | 50.0 s at 200 |" in page
     assert {path.name for path in (tmp_path / "ppo").iterdir()} == {
         "curve-room.png",

@@ -1,11 +1,11 @@
 """The policies that come with the project, tested: `python -m training.policy_improvement.results_page`.
 
 Each policy over candidates runs beside the strategy that is recommended, on the same starts, in worlds that
-nothing was learned in: in the tasks that it learned, there also beside the planner whose candidates it
-chooses among and `information-rate-v0`, and in others, with other teams, channels and sensors. Written is
-`policy.md`, and beside it each policy's part of the page and all of its missions as one file, with which
-another run begins (`--archive`). Missions are kept, a file each: what was stopped goes on, and a part says
-how many starts it holds. Tasks that stand in suites, too, are theirs: archives of the scoreboard serve, too.
+nothing was learned in: in the tasks that it learned, and in others, with other teams, channels and sensors.
+Written is `policy.md`, and beside it each policy's part of the page and all of its missions as one file, with
+which another run begins (`--archive`). Missions are kept, a file each: what was stopped goes on, and a part
+says how many starts it holds. Tasks that stand in suites, too, are theirs: archives of the scoreboard serve,
+too.
 """
 
 from __future__ import annotations
@@ -74,8 +74,7 @@ def main(words: Sequence[str]) -> int:
         headroom_table.shown(beside / "headroom"), ablations_table.shown(beside / "ablations")
     )
     rows = {
-        name: [(test, strategy) for test in TESTS[name] for strategy in strategies_of(name, test)]
-        for name in names
+        name: [(test, strategy) for test in TESTS[name] for strategy in strategies_of(name)] for name in names
     }
     cells = {
         (name, test.title, strategy): test.cells(strategy, args.seeds)

@@ -16,7 +16,7 @@ from baselines.experiments.tables import markdown_table
 from entropy_explore_env.scenario import with_settings
 from entropy_explore_env.scenarios import find_scenario
 
-FLYING = ("voronoi", "voronoi-nearest", "gradient", "information-rate-v0")
+FLYING = ("voronoi", "voronoi-nearest", "gradient", "planned-rate")
 FLYING_LIMIT_S = 600.0
 
 CHANNELS: dict[str, dict[str, Any]] = {

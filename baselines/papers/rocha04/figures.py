@@ -22,7 +22,7 @@ from baselines.papers.rocha04.sweep import (
 _LABELS = {
     "random": "random walk",
     "gradient-plane": "motion plane",
-    "information-rate-v0": "information-rate-v0 (ours)",
+    "planned-rate": "planned-rate (ours)",
 }
 
 

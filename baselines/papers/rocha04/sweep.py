@@ -14,7 +14,7 @@ BURSTS = (32, 64, 128)
 I_MINS = (0.6215, 0.3219, 0.0291)
 STANDARD = (64, 0.3219)
 """burst and I_min of figure 4."""
-ALTERNATIVES = ("random", "gradient-plane", "information-rate-v0")
+ALTERNATIVES = ("random", "gradient-plane", "planned-rate")
 """Strategies compared with eqs. 33-34 for every team size: a random walk, the motion-plane rule, and ours."""
 
 CHANGES: dict[str, tuple[str, dict[str, Any], str]] = {

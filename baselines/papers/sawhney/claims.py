@@ -237,10 +237,10 @@ def _our_claims(records: Records, part: str, name: str) -> list[Claim]:
         ratio = compared(records, part, "finish", "ptv", end)
         text = f"ours, {name}, {ENDS[end]}: (V + bonus)/t is faster than V/t; t ratio"
         claims.append(_faster(f"{part}-finish-{end}", text, None, ratio))
-    for other in ("nearest", "coordinated"):
+    for other, metric in (("nearest", "Yamauchi"), ("coordinated", "Burgard")):
         for end in ("t95_s", "t_none_s"):
             ratio = compared(records, part, "ptv", other, end)
-            text = f"ours, {name}, {ENDS[end]}: V/t is faster than `{other}-candidate`; t ratio"
+            text = f"ours, {name}, {ENDS[end]}: V/t is faster than {metric}'s metric; t ratio"
             claims.append(_faster(f"{part}-{other}-{end}", text, None, ratio))
     for n in teams_in(records, part):
         if n > 1:

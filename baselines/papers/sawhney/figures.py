@@ -111,8 +111,8 @@ def figure_teams(records: Records, part: str) -> tuple[Figure, Table]:
         "naive": "naive V",
         f"beta-{best}": f"best β ({best})",
         "finish": "finishing rule",
-        "nearest": "nearest candidate",
-        "coordinated": "coordinated candidate",
+        "nearest": "Yamauchi's metric",
+        "coordinated": "Burgard's metric",
     }
     if part == "terrains":
         methods["no-height"] = "no height factor"

@@ -202,10 +202,10 @@ and gives no unit: its β are taken to count points of {POINT["plans"]:g} m² in
 {POINT["terrains"]:g} m³ over terrain, so that its numbers 1 … 70 reach from well below to well above what
 a robot discovers a second. Promises weigh 1/(1 + promises): a literal 1/n_r would make the first one free.
 The finishing rule is ours: (V + v)/t with v = {BONUS["plans"]:g} m² in plans and {BONUS["terrains"]:g} m³
-over terrain. `nearest-candidate` and `coordinated-candidate` have
-the metrics of Yamauchi and Burgard on these same candidates; they are not the rules of those papers.
-What holds over them need not hold over `nearest-frontier` and `coordinated-frontier`, which weigh every
-frontier cell and may replan under way (docs/explorers.md): they stand beside V/t in the scoreboard.
+over terrain. The metrics of Yamauchi and Burgard stand on these same candidates; so they are not the rules
+of those papers. What holds over them need not hold over `nearest-frontier` and `coordinated-frontier`, which
+weigh every frontier cell and may replan under way (docs/explorers.md); these stand beside V/t in the
+scoreboard.
 Who waits for a synchronous team scans meanwhile, and so leaves up to 2 s after the last has
 scanned."""
 

@@ -22,7 +22,7 @@ from baselines.experiments import ray_cluster, ray_pool
 from baselines.experiments.cells import Cell, run_cells
 from baselines.experiments.ray_cluster import RayCluster
 from baselines.experiments.worker_pool import Failure, run_each
-from baselines.mission_times import main as mission_times
+from baselines.resilience.__main__ import main as resilience
 from entropy_explore_env.errors import MissingExtraError, SettingError
 from entropy_explore_env.scenario import with_settings
 from entropy_explore_env.scenarios import BOX
@@ -170,8 +170,9 @@ def test_a_sweep_whose_workers_are_killed_leaves_the_same_bytes(two_workers, tmp
 def test_a_command_on_a_cluster_prints_and_keeps_the_same(two_workers, tmp_path, capsys):
     printed = []
     for place in (["--jobs", "1"], ["--cluster", "local"]):
-        words = ["--scenarios", "box-7x11x5", "--seeds", "3", "--json", *place]
-        assert run_command(mission_times, [*words, "--runs", str(tmp_path / place[0])]) == 0
+        words = [*"--scenarios box-7x11x5 --robots 2 --strategies random --seeds 2 --json".split(), *place]
+        folders = ["--runs", str(tmp_path / place[0]), "--out", str(tmp_path / "out")]
+        assert run_command(resilience, [*words, *folders, "--time-limit-s", "20"]) == 0
         printed.append(capsys.readouterr().out)
     assert printed[0] == printed[1] and printed[0].startswith("{")
     assert content(tmp_path / "--jobs") == content(tmp_path / "--cluster") != {}
@@ -197,8 +198,9 @@ def test_an_address_where_no_cluster_answers_is_one_line(tmp_path, capsys, monke
     if ray.is_initialized():
         ray.shutdown()
     monkeypatch.setattr(ray_cluster, "ANSWER_TIMEOUT_S", 3.0)
-    words = "--scenarios box-7x11x5 --seeds 1 --cluster 127.0.0.1:9 --json".split()
-    assert run_command(mission_times, [*words, "--runs", str(tmp_path)]) == 2
+    words = "--scenarios box-7x11x5 --seeds 2 --cluster 127.0.0.1:9 --json".split()
+    folders = ["--runs", str(tmp_path / "runs"), "--out", str(tmp_path / "out")]
+    assert run_command(resilience, [*words, *folders]) == 2
     said = capsys.readouterr().err
     assert said == "error: cluster = '127.0.0.1:9': allowed is that of a Ray cluster that answers\n"
 

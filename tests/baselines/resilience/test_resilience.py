@@ -198,7 +198,7 @@ def test_the_command_writes_a_page_resumes_and_says_it_as_json(tmp_path, capsys)
         "--robots",
         "3",
         "--strategies",
-        "random,information-rate-v0",
+        "random,planned-rate",
     ]
     words += ["--time-limit-s", "60", "--jobs", "1", "--out", str(tmp_path), "--runs", str(tmp_path / "runs")]
     pages = []
@@ -209,7 +209,7 @@ def test_the_command_writes_a_page_resumes_and_says_it_as_json(tmp_path, capsys)
     printed = json.loads(capsys.readouterr().out)
     assert pages[0] == pages[1] and printed["claims"][0]["ours"] == 0.0
     assert "`python -m baselines.resilience --quick --scenarios box-7x11x5 --robots 3" in pages[0]
-    assert "information-rate-v0" in pages[0] and "40 missions" in pages[0]
+    assert "planned-rate" in pages[0] and "40 missions" in pages[0]
     for name in ("loss.png", "loss.csv", "faults.png", "faults.csv"):
         assert (tmp_path / "resilience" / name).stat().st_size > 100
     assert len(list((tmp_path / "runs").rglob("seed-*.json"))) == 40

@@ -12,14 +12,18 @@ from pathlib import Path
 import pytest
 
 from baselines.experiments import provenance
+from baselines.experiments.mission import run_mission, scripted_env
 from baselines.experiments.provenance import code_digest
 from baselines.strategies import STRATEGIES, make_strategy, strategy_module
 from baselines.strategies.rules.gradient import GradientStrategy
-from entropy_explore_env.errors import SettingError
+from entropy_explore_env.errors import ActionError, SettingError
+from entropy_explore_env.planner.frontier_rule import PickRule
+from entropy_explore_env.scenario import with_settings
+from entropy_explore_env.scenarios import BOX
 from tests.code_blocks import shown_files
 
 ROOT = Path(__file__).parents[3]
-EXAMPLE = ROOT / "docs/examples/own_strategy.py"
+EXAMPLE, SECOND_NEAREST = (ROOT / f"docs/examples/{name}.py" for name in ("own_strategy", "second_nearest"))
 SOURCE = """
 class Own:
     def reset(self, scenario, rng): pass
@@ -72,13 +76,32 @@ def test_the_example_runs_and_is_benchmarked_from_a_folder_outside(tmp_path):
 
 
 def test_the_page_shows_the_example_as_it_is():
-    assert EXAMPLE in shown_files()
-    assert len(EXAMPLE.read_text().splitlines()) <= 30
+    assert {EXAMPLE, SECOND_NEAREST} <= set(shown_files())
+    assert len(EXAMPLE.read_text().splitlines()) <= 30 and len(SECOND_NEAREST.read_text().splitlines()) <= 12
 
 
 def test_a_class_and_a_function_of_a_file_are_made(file):
     assert type(make_strategy(f"{file}:Own")).__name__ == "Own"
     assert type(make_strategy(f"{file}:settings")) is type(make_strategy(f"{file}:Own"))  # imported once
+
+
+@pytest.mark.parametrize("robots", [1, 2])
+def test_a_function_of_one_argument_is_a_rule(robots):
+    strategy = make_strategy(f"{SECOND_NEAREST}:pick")
+    assert isinstance(strategy, PickRule) and strategy.rule == "pick"
+    env = scripted_env(with_settings(BOX, {"robots": robots, "ending": {"time_limit_s": 20.0}}))
+    run_mission(env, strategy, 0)
+    state = env.missions.state
+    assert state.missions[0]["entropy_end_bits"] < state.missions[0]["entropy_start_bits"]
+    assert (state.robots[0]["distance_m"] > 0.5).all()
+
+
+@pytest.mark.parametrize("picked", ["-7", "10**9", "2.5", "None", "True"])
+def test_what_a_rule_returns_must_be_a_voxel(file, picked):
+    (file.parent / "rule.py").write_text(f"def mine(scene, extra=0): return {picked}\n")
+    strategy = make_strategy(f"{file.parent}/rule.py:mine")
+    with pytest.raises(ActionError, match="pick of mine"):
+        run_mission(scripted_env(with_settings(BOX, {"robots": 1})), strategy, 0)
 
 
 def test_a_class_of_a_module_is_made():
@@ -144,7 +167,7 @@ def test_the_digest_covers_the_file_and_what_it_imports(file):
 
     first = digest(SOURCE)
     assert digest(SOURCE + "# the same") == first
-    changed = digest(SOURCE.replace("view.pose for", "view.target for"))
+    changed = digest(SOURCE.replace("return view.pose", "return view.target"))
     assert changed != first
     assert digest(SOURCE + "import baselines.strategies.gradient\n") not in (first, changed)
     (file.parent / "own_neighbour.py").write_text("A = 1\n")
@@ -157,4 +180,5 @@ def test_where_strategies_are_defined(file):
     assert strategy_module("gradient-plane") == "baselines.strategies.rules.gradient"
     assert strategy_module(f"{file}:Own") == file.resolve()
     assert strategy_module("my_package.mine:Own") == "my_package.mine"
-    assert all(str(strategy_module(name)).startswith("baselines.strategies.") for name in STRATEGIES)
+    rooms = ("baselines.strategies.", "entropy_explore_env.planner.")
+    assert all(str(strategy_module(name)).startswith(rooms) for name in STRATEGIES)

@@ -14,7 +14,6 @@ STRATEGIES = {
     "voronoi": "Bhattacharya",
     "per-time-visibility": "Sawhney",
     "next-best-view": "Sujan",
-    "information-rate-v0": "ours",
     "planned-rate": "ours",
     "nearest-frontier": "Yamauchi",
 }
@@ -28,7 +27,7 @@ MARGIN_M = 0.1
 FIDUCIALS = 10
 SEEN_SHARE = 0.8
 LIMIT_S = 250.0
-PLAIN = ("nearest-frontier", "information-rate-v0")
+PLAIN = ("nearest-frontier", "planned-rate")
 """Strategies that are run without margin and guard, too."""
 
 

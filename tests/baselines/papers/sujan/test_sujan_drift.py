@@ -46,7 +46,7 @@ def test_claims_by_hand():
     assert claims["seen-gradient-low"].ours == pytest.approx(0.75)
     assert claims["seen-gradient-high"].ours == 1.0
     failed = {name for name, claim in claims.items() if not claim.holds}
-    unchanged = {"nearest-frontier-high", "information-rate-v0-low", "information-rate-v0-high"}
+    unchanged = {"nearest-frontier-high", "planned-rate-low", "planned-rate-high"}
     assert failed == {"half-voronoi-high", "half-gradient-low", "seen-gradient-low"} | {
         f"{what}-{n}" for what in ("blocked", "guard") for n in unchanged
     }

@@ -1,4 +1,4 @@
-"""How planned-rate explores plans: which rule it takes where, and tours that a team shares."""
+"""How planned-rate explores plans: where it goes for frontiers, and tours that a team shares."""
 
 from __future__ import annotations
 

@@ -10,7 +10,6 @@ import pytest
 
 from baselines.experiments.mission import run_mission, scripted
 from baselines.papers.sawhney.mission import explore_until_done
-from baselines.strategies import make_strategy
 from baselines.strategies.allocation import Allocator, Choice
 from baselines.strategies.rules import per_time_visibility
 from baselines.strategies.rules.metrics import Coordinated, Metric, Nearest
@@ -29,7 +28,11 @@ from entropy_explore_env.scenario import with_settings
 from entropy_explore_env.scenarios import BOX, find_scenario
 from entropy_explore_env.settings import Grid
 
-NAMES = ("per-time-visibility", "nearest-candidate", "coordinated-candidate")
+SETTINGS = {
+    "per-time-visibility": ExplorationConfig(),
+    "the metric of Yamauchi": ExplorationConfig(metric=Nearest(), promises=False),
+    "the metric of Burgard": ExplorationConfig(metric=Coordinated()),
+}
 PERFECT = {"burst": 10_000, "i_min_bits": 0.0}
 
 
@@ -244,19 +247,19 @@ def test_synchronous_robots_leave_together():
             assert all(left_s >= ended_s - 1e-6 for left_s, _ in after)
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", SETTINGS)
 def test_missions_in_a_box_end(name):
     env = EntropyExploreEnv(with_settings(scripted(BOX), {"time_limit_s": 2000.0}))
-    run_mission(env, make_strategy(name), 0)
+    run_mission(env, PerTimeVisibility(SETTINGS[name]), 0)
     figures = mission_figures(env.missions, 0)
     assert figures["finished"], figures["end_reason"]
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", SETTINGS)
 def test_the_same_seed_gives_the_same_mission(name):
     def figures():
         env = EntropyExploreEnv(with_settings(scripted(BOX), {"robots": 3, "time_limit_s": 60.0}))
-        run_mission(env, make_strategy(name), 4)
+        run_mission(env, PerTimeVisibility(SETTINGS[name]), 4)
         return mission_figures(env.missions, 0)
 
     assert figures() == figures()
