@@ -75,6 +75,14 @@ class Scene:
         """Return the centres (K, 3) of (K,) voxels, in voxel edges."""
         return np.stack(np.unravel_index(voxels, self.view.scenario.grid.shape), axis=-1) + 0.5
 
+    def free_around(self, radius: int) -> np.ndarray:
+        """Return the voxels (N,) int64 up to `radius` off in which the body is known to fit."""
+        shape = self.view.scenario.grid.shape
+        low = [max(int(at) - radius, 0) for at in np.unravel_index(self.here, shape)]
+        box = tuple(slice(a, a + 2 * radius + 1) for a in low)
+        free = np.argwhere(np.isfinite(self.cells.traversal_cost.reshape(shape)[box]))
+        return np.asarray(np.ravel_multi_index(tuple((free + low).T), shape))
+
     def team(self) -> Team:
         """Return where teammates are and where they go, by what the robot heard."""
         view, places, targets = self.view, [], []

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import math
 
-from entropy_explore_env.belief.fields import remaining_entropy_gradient
-from entropy_explore_env.compilation.kernels import lean_kernel, record_type
+import numpy as np
+
+from entropy_explore_env.belief.fields import entropy_gradient, remaining_entropy_gradient
+from entropy_explore_env.compilation.kernels import kernel, lean_kernel, record_type
 
 CANDIDATE = record_type(
     [
@@ -18,6 +20,7 @@ CANDIDATE = record_type(
 )
 """A voxel, and the gaze along the gradient there."""
 _TOLERANCE = 1e-6
+"""Relative rounding of the radius."""
 
 
 @lean_kernel
@@ -67,3 +70,86 @@ def find_gradient_candidates(precision, known_precision, position, radius, layer
                 candidate.steepness, candidate.distance = steepness, math.sqrt(squared)
                 count += 1
     return count
+
+
+@kernel
+def steepest_viewpoint(
+    mean: np.ndarray,
+    precision: np.ndarray,
+    position: np.ndarray,
+    yaw: float,
+    pitch: float,
+    reach: float,
+    projected: bool,
+    viewpoint: np.ndarray,
+) -> bool:
+    """Choose among the voxels within reach (Rocha04, eqs. 32-34, or 38-40 if projected).
+
+        free-flying:  argmax ‖∇h(l)‖ (1 - μ_l),                     gaze along ∇h
+        projected:    argmax ρ(pos, l) ‖proj ∇h(l)‖ (1 - μ_l),      gaze along proj ∇h
+
+    Of equal voxels the first in C order is taken.
+
+    Args:
+        mean: (X, Y, Z) float32, expected coverage.
+        precision: (X, Y, Z) float32, 1/σ².
+        position: (3,) float64, the robot in grid units.
+        yaw: Of the robot, radians.
+        pitch: Of the robot, radians, downwards.
+        reach: ξ in grid units.
+        projected: Whether the robot's motion plane counts.
+        viewpoint: (5,) float64, filled with the voxel's centre in grid units, yaw and pitch.
+
+    Returns:
+        Whether the gradient there is not zero; if it is, `viewpoint` is as it was.
+    """
+    ahead = (math.cos(yaw) * math.cos(pitch), math.sin(yaw) * math.cos(pitch), -math.sin(pitch))
+    left = (-math.sin(yaw), math.cos(yaw), 0.0)
+    best, found = 0.0, False
+    low_x, high_x = _span(position[0], reach, mean.shape[0])
+    low_y, high_y = _span(position[1], reach, mean.shape[1])
+    low_z, high_z = _span(position[2], reach, mean.shape[2])
+    for i in range(low_x, high_x):
+        for j in range(low_y, high_y):
+            for k in range(low_z, high_z):
+                step = (i + 0.5 - position[0], j + 0.5 - position[1], k + 0.5 - position[2])
+                length = math.sqrt(step[0] ** 2 + step[1] ** 2 + step[2] ** 2)
+                if length > reach * (1.0 + _TOLERANCE):
+                    continue
+                slope = entropy_gradient(precision, i, j, k, 1.0)
+                reachable = 1.0
+                if projected:
+                    slope = _on_plane(slope, ahead, left)
+                    if length > 0.0:
+                        step = _on_plane(step, ahead, left)
+                        reachable = math.sqrt(step[0] ** 2 + step[1] ** 2 + step[2] ** 2) / length
+                steepness = math.sqrt(slope[0] ** 2 + slope[1] ** 2 + slope[2] ** 2)
+                score = reachable * steepness * (1.0 - mean[i, j, k])
+                if score > best:
+                    best, found = score, True
+                    viewpoint[0], viewpoint[1], viewpoint[2] = i + 0.5, j + 0.5, k + 0.5
+                    viewpoint[3] = (
+                        yaw if slope[0] == 0.0 and slope[1] == 0.0 else math.atan2(slope[1], slope[0])
+                    )
+                    viewpoint[4] = -math.asin(min(max(slope[2] / steepness, -1.0), 1.0))
+    return found
+
+
+@kernel
+def _span(position: float, reach: float, size: int) -> tuple[int, int]:
+    """First and one past the last index along an axis whose voxel may be within reach."""
+    return max(math.floor(position - reach), 0), min(math.floor(position + reach) + 1, size)
+
+
+@kernel
+def _on_plane(
+    vector: tuple[float, float, float], ahead: tuple[float, float, float], left: tuple[float, float, float]
+) -> tuple[float, float, float]:
+    """Projection on the robot's motion plane (Rocha04, eq. 37)."""
+    along = vector[0] * ahead[0] + vector[1] * ahead[1] + vector[2] * ahead[2]
+    across = vector[0] * left[0] + vector[1] * left[1] + vector[2] * left[2]
+    return (
+        along * ahead[0] + across * left[0],
+        along * ahead[1] + across * left[1],
+        along * ahead[2] + across * left[2],
+    )

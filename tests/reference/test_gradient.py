@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from baselines.strategies.rules.gradient import steepest_viewpoint
+from entropy_explore_env.viewpoints.gradient_candidates import steepest_viewpoint
 from tests.reference import rocha04
 from tests.reference.scenes import SHAPES, as_reference, drawn, random_belief, seeds
 

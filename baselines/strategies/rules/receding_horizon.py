@@ -78,7 +78,7 @@ class RecedingHorizon(FrontierRule):
             if not scene.paths.in_sight(tree.places[-1], place):
                 break
             tree.add(place, len(tree.places) - 1)
-        free = _free_around(scene)
+        free = scene.free_around(max(int(_AROUND * scene.cells.reach), 1))
         for size in _SIZES:
             self._grow(scene, tree, free, size)
             worth = _gains(scene, tree, scanned)
@@ -114,16 +114,6 @@ def _gains(scene: Scene, tree: Tree, scanned: set[int]) -> np.ndarray:
     for place in range(1, len(gains)):
         gains[place] += gains[tree.parents[place]]
     return np.asarray(gains)
-
-
-def _free_around(scene: Scene) -> np.ndarray:
-    """Return the voxels (N,) int64 in the box around the robot in which its body is known to fit."""
-    shape = scene.view.scenario.grid.shape
-    half = max(int(_AROUND * scene.cells.reach), 1)
-    low = [max(int(at) - half, 0) for at in np.unravel_index(scene.here, shape)]
-    box = tuple(slice(a, a + 2 * half + 1) for a in low)
-    free = np.argwhere(np.isfinite(scene.cells.traversal_cost.reshape(shape)[box]))
-    return np.asarray(np.ravel_multi_index(tuple((free + low).T), shape))
 
 
 def _voxel(scene: Scene, place: np.ndarray) -> int:

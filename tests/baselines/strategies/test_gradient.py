@@ -11,11 +11,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from baselines.strategies.protocol import random_viewpoint
-from baselines.strategies.rules.gradient import GradientStrategy, steepest_viewpoint
+from baselines.strategies.rules.gradient import GradientStrategy
 from entropy_explore_env.belief.fields import entropy_gradient
 from entropy_explore_env.missions.view import RobotView, read_only, view_of
 from entropy_explore_env.robots.motion import MoveEnd
 from entropy_explore_env.settings import Grid
+from entropy_explore_env.viewpoints.gradient_candidates import steepest_viewpoint
 from tests.reference import rocha04
 from tests.reference.scenes import (
     SHAPES,
