@@ -16,10 +16,10 @@ from benchmarks.planning import FLOOR, cluttered
 from benchmarks.rows import Effort, Goal, Row, alone, compared, timed
 from entropy_explore_env.belief.paths.search import new_search
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
-from entropy_explore_env.frontiers.candidates import FrontierConfig
+from entropy_explore_env.frontiers.blocks import COVERED, UNEXPLORED, UNMAPPED
+from entropy_explore_env.frontiers.frontier_map import FrontierConfig
 from entropy_explore_env.frontiers.ray_tree import grow_tree
-from entropy_explore_env.frontiers.voxel_map import COVERED, UNEXPLORED, UNMAPPED
-from entropy_explore_env.frontiers.voxel_visibility import count_from, new_counter, rays_around
+from entropy_explore_env.frontiers.visibility import count_from, new_counter, rays_around
 from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.missions.view import view_of
 from entropy_explore_env.scenario import Scenario, with_settings

@@ -20,15 +20,14 @@ from typing import Protocol
 
 import numpy as np
 
-from baselines.strategies.path_scans import Leg, PathScans
 from entropy_explore_env.belief.paths.lattice import Lattice, costs_of, new_lattice
 from entropy_explore_env.belief.paths.planning import resume_search, search_paths, start_search
 from entropy_explore_env.belief.paths.search import Search, cost_to, costs_to_all
 from entropy_explore_env.compilation.kernels import lean_kernel
-from entropy_explore_env.frontiers.candidates import Candidates, FrontierConfig
-from entropy_explore_env.frontiers.terrain_candidates import TerrainCandidates
-from entropy_explore_env.frontiers.voxel_candidates import VoxelCandidates
-from entropy_explore_env.frontiers.voxel_map import NONE
+from entropy_explore_env.frontiers.blocks import NONE
+from entropy_explore_env.frontiers.frontier_map import FrontierConfig, FrontierMap
+from entropy_explore_env.frontiers.terrain_frontiers import TerrainFrontiers
+from entropy_explore_env.frontiers.voxel_frontiers import VoxelFrontiers
 from entropy_explore_env.missions.view import RobotView
 from entropy_explore_env.robots.motion import driving_time
 from entropy_explore_env.scenario import Scenario
@@ -39,9 +38,6 @@ _FIRST_REACH = 0.25
 range costs more than counting the few candidates beyond that could be better."""
 _EXTENSION = 1.4
 """Then they are searched this many times as far until that is enough."""
-_SHORTLISTED, _SHORT_RANGES = 8, 2.0
-"""Scans on the path are counted for a shortlist: the candidate that is best without them, and this number of
-the best candidates whose paths are at most this number of sensor ranges long."""
 _PARTING_DRAWS = 8
 """So many places away from teammates are drawn, of which the farthest from them is taken."""
 
@@ -109,7 +105,6 @@ class Allocator:
         search: Search,
         ceiling: np.ndarray | None,
         lazy: bool,
-        path_scans: int = 0,
     ) -> None:
         """Nothing is explored yet.
 
@@ -121,21 +116,18 @@ class Allocator:
             search: Memory of path searches.
             ceiling: (X, Y) the exposure surface in layers; None = candidates are voxels.
             lazy: Whether candidates are counted only as far as a choice needs.
-            path_scans: How many scans on the path to a candidate count in V.
         """
         self._value, self._lazy, self.search = value, lazy, search
         self._edge, self._scenario = scenario.grid.voxel_size_m, scenario
         layer = scenario.layer_of(kind.robot)
         self.lattice: Lattice = new_lattice(scenario.grid.shape, 0.0, layer)
-        self.candidates: Candidates = (
-            VoxelCandidates(scenario, kind, frontiers)
+        self.candidates: FrontierMap = (
+            VoxelFrontiers(scenario, kind, frontiers)
             if ceiling is None
-            else TerrainCandidates(scenario, kind, frontiers, ceiling)
+            else TerrainFrontiers(scenario, kind, frontiers, ceiling)
         )
         self.costs = costs_of(self.candidates.traversal_cost, 1.0)
         self.counted = 0
-        self._path_scans = path_scans
-        self._on_path = PathScans(scenario, search, self.lattice, path_scans)
 
     def allocate(
         self, view: RobotView, stopped: Sequence[int], targets: Sequence[np.ndarray], everybody: bool = False
@@ -257,8 +249,7 @@ class Allocator:
         pose = view.pose if robot == view.robot else view.teammates[robot].pose
         whole = float(sum(self._scenario.grid.shape))
         if robot not in path_costs:
-            ranges = _FIRST_REACH if self._path_scans == 0 else _SHORT_RANGES
-            near = ranges * self.candidates.reach if self._lazy else math.inf
+            near = _FIRST_REACH * self.candidates.reach if self._lazy else math.inf
             path_costs[robot] = self._path_costs(pose, near if near < whole else math.inf)
         weighed = np.full(len(path_costs[robot].edges), np.nan)
         choice, sure = self._best_of(robot, path_costs[robot], taken, weighed)
@@ -277,11 +268,7 @@ class Allocator:
             path_costs[robot] = self._path_costs(pose, math.inf, whole_map)
             weighed = np.full_like(weighed, np.nan)
             choice, _ = self._best_of(robot, path_costs[robot], taken, weighed)
-        if choice is None or self._path_scans == 0:
-            return choice
-        if path_costs[robot].search != self.search.searches[0]:
-            path_costs[robot] = self._path_costs(pose, path_costs[robot].reach)
-        return self._best_with_path_scans(view, robot, path_costs[robot], taken, weighed)
+        return choice
 
     def _best_of(
         self, robot: int, path_costs: _PathCosts, taken: Sequence[np.ndarray], weighed: np.ndarray
@@ -298,19 +285,13 @@ class Allocator:
         seconds = self.seconds(robot, edges)
         takes = self._taken(voxels, taken)
         most = self.candidates.upper_bounds(slots) if self._lazy else np.full(len(slots), np.inf)
-        bound = self._value(
-            np.minimum(most, self.candidates.greatest_visibility()) * point, seconds, edges, takes
-        )
+        bound = self._value(most * point, seconds, edges, takes)
         order = np.argsort(-bound, kind="stable")
         value = np.full(len(slots), -np.inf)
-        size, short = self.candidates.batch, edges <= _SHORT_RANGES * self.candidates.reach
-        shortlisted = min(_SHORTLISTED, int(short.sum())) if self._path_scans > 0 else 0
+        size = self.candidates.batch
         for first in range(0, len(order), size):
             batch = order[first : first + size]
-            least = value.max()
-            if shortlisted > 0:
-                least = min(least, np.partition(value[short], -shortlisted)[-shortlisted])
-            if self._lazy and bound[batch[0]] < least:
+            if self._lazy and bound[batch[0]] < value.max():
                 break
             seen = self._seen(slots[batch], weighed)
             worth = self._value(seen, seconds[batch], edges[batch], takes[batch])
@@ -322,47 +303,6 @@ class Allocator:
         if len(beyond) == 0 or math.isinf(path_costs.reach):
             return choice, True
         return choice, choice is not None and self._none_is_better(robot, beyond, path_costs, choice, weighed)
-
-    def _best_with_path_scans(
-        self,
-        view: RobotView,
-        robot: int,
-        path_costs: _PathCosts,
-        taken: Sequence[np.ndarray],
-        weighed: np.ndarray,
-    ) -> Choice:
-        """The best of a few candidates, where V counts what scans on the path see, too.
-
-        Args:
-            view: Of the robot that allocates.
-            robot: The robot to which something is allocated.
-            path_costs: Of its paths, the latest that were searched.
-            taken: (3,) places to which others go.
-            weighed: (B,) what is seen from the candidates alone; NaN = not counted.
-        """
-        slots = np.flatnonzero((weighed > 0.0) & np.isfinite(path_costs.edges))
-        voxels, edges = self.candidates.voxels_of(slots), path_costs.edges[slots]
-        seconds, takes = self.seconds(robot, edges), self._taken(voxels, taken)
-        order = np.argsort(
-            -self._value(weighed[slots] * self.candidates.point, seconds, edges, takes), kind="stable"
-        )
-        short = edges[order] <= _SHORT_RANGES * self.candidates.reach
-        listed = np.unique(np.concatenate([order[:1], order[short][:_SHORTLISTED]]))
-        since_scan = view.since_scan_m / self._edge if robot == view.robot else 0.0
-        seen = np.array(
-            [
-                self._on_path.seen(
-                    self.candidates,
-                    int(slots[k]),
-                    Leg(robot, path_costs.start, since_scan, int(voxels[k]), self.place_of(int(voxels[k]))),
-                )
-                for k in listed
-            ]
-        )
-        value = self._value(seen * self.candidates.point, seconds[listed], edges[listed], takes[listed])
-        best = int(np.argmax(value))
-        chosen = listed[best]
-        return Choice(int(slots[chosen]), int(voxels[chosen]), float(value[best]), float(seconds[chosen]))
 
     def _seen(self, slots: np.ndarray, weighed: np.ndarray) -> np.ndarray:
         """(K,) V·(height factor) of candidates in points' size; `weighed` as in `_best_of`."""
@@ -382,7 +322,7 @@ class Allocator:
         apart = np.linalg.norm(self._places(self.candidates.voxels_of(slots)) - path_costs.start, axis=1)
         edges = np.maximum(path_costs.reach, apart - 2.0)  # paths lead from centre to centre
         seconds, none_taken = self.seconds(robot, edges), np.zeros(len(slots))
-        most = np.minimum(self.candidates.upper_bounds(slots), self.candidates.greatest_visibility())
+        most = self.candidates.upper_bounds(slots)
         bound = self._value(most * self.candidates.point, seconds, edges, none_taken)
         better = np.flatnonzero(bound >= choice.value)
         order, size = better[np.argsort(-bound[better], kind="stable")], self.candidates.batch

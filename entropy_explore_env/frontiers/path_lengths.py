@@ -17,7 +17,7 @@ from entropy_explore_env.belief.paths.search import Search, cost_to, extract_pat
 from entropy_explore_env.belief.paths.string_pulling import line_of_sight_cost, string_pulled
 from entropy_explore_env.belief.voxel_index import flat_index
 from entropy_explore_env.compilation.kernels import lean_kernel
-from entropy_explore_env.frontiers.frontier_cells import FrontierCells
+from entropy_explore_env.frontiers.voxel_frontiers import VoxelFrontiers
 from entropy_explore_env.scenario import Scenario
 from entropy_explore_env.settings import RobotKind
 
@@ -35,7 +35,7 @@ class KnownPaths:
         reach: How far the latest search of `start` goes: lengths up to this are final.
     """
 
-    def __init__(self, scenario: Scenario, kind: RobotKind, cells: FrontierCells, search: Search) -> None:
+    def __init__(self, scenario: Scenario, kind: RobotKind, cells: VoxelFrontiers, search: Search) -> None:
         """Paths in the map of `cells`, which may change between searches."""
         self._cells, self.search, self._grid = cells, search, scenario.grid
         self.lattice = new_lattice(scenario.grid.shape, 0.0, scenario.layer_of(kind.robot))

@@ -29,10 +29,11 @@ import numpy as np
 
 from entropy_explore_env.belief.paths.search import Search, new_search
 from entropy_explore_env.errors import SettingError
-from entropy_explore_env.frontiers.frontier_cells import KNOWN_SIGMA, FrontierCells
+from entropy_explore_env.frontiers.blocks import NONE
+from entropy_explore_env.frontiers.frontier_map import KNOWN_SIGMA
 from entropy_explore_env.frontiers.knowledge import RobotKnowledge, random_viewpoint, voxel_of
 from entropy_explore_env.frontiers.path_lengths import KnownPaths
-from entropy_explore_env.frontiers.voxel_map import NONE
+from entropy_explore_env.frontiers.voxel_frontiers import VoxelFrontiers
 from entropy_explore_env.planner.stops import apart_m, stop_towards
 from entropy_explore_env.robots.motion import MoveEnd
 from entropy_explore_env.scenario import Scenario
@@ -64,7 +65,7 @@ class Scene:
     """
 
     view: RobotKnowledge
-    cells: FrontierCells
+    cells: VoxelFrontiers
     paths: KnownPaths
     here: int
     target: int
@@ -90,7 +91,7 @@ NOWHERE = Goal(NONE, NONE)
 class _Memory:
     """What is kept of a robot from one decision to the next."""
 
-    cells: FrontierCells
+    cells: VoxelFrontiers
     paths: KnownPaths
     level: float = KNOWN_SIGMA
     """σ from which on a voxel counts as known."""
@@ -150,7 +151,7 @@ class Explorer(ABC):
         """
         return [self._choose(view) for view in views]
 
-    def cells_of(self, robot: int) -> FrontierCells:
+    def cells_of(self, robot: int) -> VoxelFrontiers:
         """The frontier cells of a robot; available after its first choice."""
         return self._memories[robot].cells
 
@@ -178,7 +179,7 @@ class Explorer(ABC):
         memory.elsewhere = None
         return self._towards(view, memory, here, goal)
 
-    def _holds(self, cells: FrontierCells, target: int) -> bool:
+    def _holds(self, cells: VoxelFrontiers, target: int) -> bool:
         """Whether a target is one still."""
         return cells.is_known_free(target) if self.until_reached else cells.is_frontier(target)
 
@@ -192,7 +193,7 @@ class Explorer(ABC):
                 " per-time-visibility, nearest-candidate and coordinated-candidate know",
             )
         if view.robot not in self._memories:
-            cells = FrontierCells(self._scenario, view.kind)
+            cells = VoxelFrontiers(self._scenario, view.kind)
             paths = KnownPaths(self._scenario, view.kind, cells, self._search)
             self._memories[view.robot] = _Memory(cells, paths)
         return self._memories[view.robot]

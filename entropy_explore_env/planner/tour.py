@@ -21,8 +21,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from entropy_explore_env.frontiers.blocks import NONE
 from entropy_explore_env.frontiers.open_tours import open_tour, tour_length
-from entropy_explore_env.frontiers.voxel_map import NONE
 from entropy_explore_env.planner.driver import Explorer, Scene
 from entropy_explore_env.planner.teammates import centres_of
 from entropy_explore_env.validation import check, check_count, check_positive

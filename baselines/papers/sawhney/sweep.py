@@ -21,7 +21,7 @@ from baselines.papers.sawhney.map_files import map_world
 from baselines.papers.sawhney.mission import MapRun, Run
 from baselines.strategies.metrics import Coordinated, Nearest
 from baselines.strategies.rules.per_time_visibility import ExplorationConfig, Metric
-from entropy_explore_env.frontiers.candidates import FrontierConfig
+from entropy_explore_env.frontiers.frontier_map import FrontierConfig
 from entropy_explore_env.scenario import Scenario, with_settings
 from entropy_explore_env.scenarios import find_scenario
 

@@ -18,9 +18,10 @@ import numpy as np
 from baselines.strategies.protocol import random_viewpoint
 from entropy_explore_env.belief.paths.search import new_search
 from entropy_explore_env.errors import SettingError
-from entropy_explore_env.frontiers.frontier_cells import KNOWN_SIGMA, FrontierCells
+from entropy_explore_env.frontiers.frontier_map import KNOWN_SIGMA
 from entropy_explore_env.frontiers.knowledge import voxel_of
 from entropy_explore_env.frontiers.path_lengths import KnownPaths
+from entropy_explore_env.frontiers.voxel_frontiers import VoxelFrontiers
 from entropy_explore_env.missions.view import RobotView
 from entropy_explore_env.planner.stops import apart_m, stop_towards
 from entropy_explore_env.robots.motion import MoveEnd
@@ -40,7 +41,7 @@ _PARTING_DRAWS = 8
 class Memory:
     """What is kept of a robot from one decision to the next."""
 
-    cells: FrontierCells
+    cells: VoxelFrontiers
     paths: KnownPaths
     interest: np.ndarray
     """(V,) float32, eq. 9."""
@@ -154,7 +155,7 @@ class KnownSpace(ABC):
         if view.ceiling is not None:
             raise SettingError("strategy", "next-best-view", "a world without an exposure surface")
         if view.robot not in self._memories:
-            cells = FrontierCells(self._scenario, view.kind)
+            cells = VoxelFrontiers(self._scenario, view.kind)
             paths = KnownPaths(self._scenario, view.kind, cells, self._search)
             interest = np.ones(self._scenario.grid.voxels, np.float32)
             self._memories[view.robot] = Memory(cells, paths, interest)

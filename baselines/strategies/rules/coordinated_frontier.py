@@ -28,8 +28,8 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from baselines.strategies.rules.nearest_frontier import best_of
+from entropy_explore_env.frontiers.blocks import NONE
 from entropy_explore_env.frontiers.knowledge import teammates_that_share, voxel_of
-from entropy_explore_env.frontiers.voxel_map import NONE
 from entropy_explore_env.planner.driver import Explorer, Scene
 from entropy_explore_env.planner.teammates import centres_of, lengths_of_all, team_of
 from entropy_explore_env.validation import check_positive

@@ -28,8 +28,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from baselines.strategies.rules.nearest_frontier import best_of
+from entropy_explore_env.frontiers.blocks import NONE
 from entropy_explore_env.frontiers.path_lengths import KnownPaths
-from entropy_explore_env.frontiers.voxel_map import NONE
 from entropy_explore_env.planner.driver import Explorer, Scene
 from entropy_explore_env.validation import check, check_count, check_positive
 

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from entropy_explore_env.frontiers.voxel_map import NONE
+from entropy_explore_env.frontiers.blocks import NONE
 from entropy_explore_env.planner.driver import Explorer, Scene
 
 

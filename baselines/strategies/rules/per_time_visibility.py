@@ -37,13 +37,13 @@ from baselines.strategies.protocol import random_viewpoint
 from entropy_explore_env.belief.paths.search import extract_path, new_search
 from entropy_explore_env.belief.paths.string_pulling import string_pulled
 from entropy_explore_env.errors import SettingError
-from entropy_explore_env.frontiers.candidates import FrontierConfig
+from entropy_explore_env.frontiers.blocks import NONE
+from entropy_explore_env.frontiers.frontier_map import FrontierConfig
 from entropy_explore_env.frontiers.knowledge import stays, teammates_that_share, under_way
-from entropy_explore_env.frontiers.voxel_map import NONE
 from entropy_explore_env.missions.view import RobotView
 from entropy_explore_env.robots.motion import MoveEnd
 from entropy_explore_env.scenario import Scenario
-from entropy_explore_env.validation import check, check_choice, check_count, check_kind, check_not_negative
+from entropy_explore_env.validation import check, check_choice, check_kind, check_not_negative
 
 Allocation = Literal["asynchronous", "synchronous"]
 _WITHIN_REACH = 0.999
@@ -108,10 +108,6 @@ class ExplorationConfig:
         finest_sigma: The last σ that counts as explored, no more than that of `frontiers`; None = the
             mission's σ_end.
         lazy: Whether V is counted only as far as a choice needs; the results are the same.
-        path_scans: Number of scans on the path to a candidate that V includes, under way and at stops, spread
-            evenly over the path; 0 = V is counted from the candidate alone. They are included for the
-            candidate that is best without them, and for the eight best candidates whose paths are at most
-            two sensor ranges long. Promises do not include them. Needs the `ray-cast` visibility.
 
     Raises:
         SettingError: A field has another value.
@@ -123,7 +119,6 @@ class ExplorationConfig:
     frontiers: FrontierConfig = field(default_factory=FrontierConfig)
     finest_sigma: float | None = None
     lazy: bool = True
-    path_scans: int = 0
 
     def __post_init__(self) -> None:
         """Check every field."""
@@ -133,10 +128,6 @@ class ExplorationConfig:
         check_kind(self, "promises", bool)
         check_kind(self, "frontiers", FrontierConfig)
         check_kind(self, "lazy", bool)
-        check_count(self, "path_scans", 0, 1000)
-        if self.path_scans > 0 and self.frontiers.visibility != "ray-cast":
-            allowed = "0, where frontiers.visibility is not ray-cast"
-            raise SettingError("ExplorationConfig.path_scans", self.path_scans, allowed)
         if self.finest_sigma is not None:
             allowed = "None, or a number above 0 and no more than frontiers.sigma"
             check(self, "finest_sigma", allowed, lambda v: 0.0 < v <= self.frontiers.sigma)
@@ -274,7 +265,6 @@ class FrontierStrategy:
                 self._search,
                 view.ceiling,
                 config.lazy,
-                config.path_scans,
             )
         return self._allocators[view.robot]
 

@@ -15,7 +15,7 @@ from baselines.strategies.rules.cliff import CliffMapping
 from baselines.strategies.rules.per_time_visibility import FrontierConfig
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.errors import SettingError
-from entropy_explore_env.frontiers.terrain_candidates import TerrainCandidates
+from entropy_explore_env.frontiers.terrain_frontiers import TerrainFrontiers
 from entropy_explore_env.localization_settings import Localization
 from entropy_explore_env.missions.view import view_of
 from entropy_explore_env.robots.motion import MoveEnd
@@ -157,10 +157,8 @@ def test_a_margin_keeps_from_ceilings_and_from_steep_ground():
     np.testing.assert_array_equal(env.missions._no_fly[0], wider.ravel())
     kind, frontiers = env.scenario.kinds[0], FrontierConfig()
     exact = dataclasses.replace(kind, robot=dataclasses.replace(kind.robot, localization=Localization()))
-    reach = [
-        TerrainCandidates(env.scenario, each, frontiers, view.ceiling)._map.reach for each in (exact, kind)
-    ]
-    assert reach == [1, 2]
+    maps = [TerrainFrontiers(env.scenario, each, frontiers, view.ceiling)._map for each in (exact, kind)]
+    assert [terrain.columns.reach for terrain in maps] == [1, 2]
 
 
 def test_a_margin_keeps_rovers_from_the_edge():

@@ -11,10 +11,10 @@ import pytest
 from baselines.experiments.mission import scripted
 from baselines.strategies.metrics import Nearest
 from baselines.strategies.rules.per_time_visibility import ExplorationConfig, FrontierStrategy
-from entropy_explore_env.frontiers.candidates import FrontierConfig
+from entropy_explore_env.frontiers.blocks import NONE
+from entropy_explore_env.frontiers.frontier_map import FrontierConfig
 from entropy_explore_env.frontiers.knowledge import under_way
-from entropy_explore_env.frontiers.voxel_candidates import VoxelCandidates
-from entropy_explore_env.frontiers.voxel_map import NONE
+from entropy_explore_env.frontiers.voxel_frontiers import VoxelFrontiers
 from entropy_explore_env.missions.view import view_of
 from entropy_explore_env.robots.motion import driving_time
 from entropy_explore_env.scenario import with_settings
@@ -72,46 +72,6 @@ def test_who_stops_at_the_same_time_shares_the_frontiers():
     assert sent(corridor((3, 4), heard=False)) == [2, 2]  # nothing was heard: each for itself
 
 
-def between_doors():
-    """A robot in the middle of a corridor with unexplored ends, two voxels on the left and one on the right.
-
-    On the way to the right there are two doors, one unexplored voxel behind each.
-    """
-    shape = (13, 7, 1)
-    changes = {
-        "grid": Grid(shape, 0.5),
-        "robot": {"reach_m": math.inf, "body_radius_m": 0.0, "acceleration_m_s2": 100.0},
-        "sensor": {"max_range_m": 1.3, "scan_every_m": 0.5, "scan_time_s": 5.0},
-    }
-    missions = started(free_box(**changes))
-    solid = np.ones(shape, bool)
-    solid[:, 3] = solid[[8, 10], 1:3] = False
-    build(missions, solid)
-    pose = np.zeros(5)
-    pose[:3] = missions.grid.centre_of(np.array([6, 3, 0]))
-    put(missions, 0, pose)
-    missions.mean[0, 0], missions.precision[0, 0] = np.where(solid, 1.0, 0.0), 1e4
-    for unknown in ((0, 3), (1, 3), (12, 3), (8, 1), (10, 1)):
-        missions.mean[0, 0][unknown], missions.precision[0, 0][unknown] = 0.5, 1e-3
-    return missions
-
-
-@pytest.mark.parametrize(("path_scans", "right"), [(0, False), (2, True), (8, True)])
-def test_what_scans_on_the_path_see_decides(path_scans, right):
-    """Both doors are seen on the path to the right end, and nothing on that to the left one."""
-    strategy = FrontierStrategy(
-        ExplorationConfig(
-            finest_sigma=ONCE, frontiers=FrontierConfig(spacing_m=0.5), path_scans=path_scans, promises=False
-        )
-    )
-    missions = between_doors()
-    strategy.reset(missions.scenario, np.random.default_rng(0))
-    strategy._assignments[0].scanned = True
-    strategy.choose([view_of(missions, 0, 0)])
-    voxel = strategy.allocator_of(0).allocate(view_of(missions, 0, 0), [], [])[0].voxel
-    assert (np.unravel_index(voxel, missions.grid.shape)[0] > 6) == right
-
-
 def allocator_in(missions, robot):
     """The candidates of a robot, by its belief as it is."""
     strategy = FrontierStrategy(ExplorationConfig(finest_sigma=ONCE))
@@ -153,7 +113,7 @@ def test_a_path_leaves_known_space_only_where_the_robot_stands_in_none():
     size = missions.grid.shape  # 7 × 11 × 5 voxels; the body touches the 26 around its own
     missions.mean[0, 0], missions.precision[0, 0] = 0.0, 1e4
     missions.mean[0, 0][4:] = 1.0
-    candidates = VoxelCandidates(missions.scenario, missions.scenario.kind_of(0), FrontierConfig())
+    candidates = VoxelFrontiers(missions.scenario, missions.scenario.kind_of(0), FrontierConfig())
     candidates.update(view_of(missions, 0, 0), ONCE)
     stands = np.isfinite(candidates.traversal_cost).reshape(size)
     assert stands[1:3, 1:10, 1:4].all() and stands.sum() == 2 * 9 * 3
@@ -226,7 +186,7 @@ def check_against_reference(missions, known):
         assignment.scanned = True
     places = [tuple(missions.grid.voxel_of(v[:3]).tolist()) for v in strategy.choose(views)]
     allocator = strategy._allocators[0]
-    assert isinstance(allocator.candidates, VoxelCandidates)
+    assert isinstance(allocator.candidates, VoxelFrontiers)
     _, voxels = allocator.candidates.listed()
     state = np.where(known, 0, 3)
     directions, reach = allocator.candidates._directions, allocator.candidates.reach

@@ -15,9 +15,9 @@ from baselines.strategies.metrics import Coordinated, Nearest
 from baselines.strategies.rules.per_time_visibility import ExplorationConfig, FrontierStrategy, Metric
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.errors import SettingError
-from entropy_explore_env.frontiers.candidates import FrontierConfig
-from entropy_explore_env.frontiers.voxel_candidates import VoxelCandidates
-from entropy_explore_env.frontiers.voxel_map import COVERED, NONE
+from entropy_explore_env.frontiers.blocks import COVERED, NONE
+from entropy_explore_env.frontiers.frontier_map import FrontierConfig
+from entropy_explore_env.frontiers.voxel_frontiers import VoxelFrontiers
 from entropy_explore_env.missions.state import MissionEnd
 from entropy_explore_env.missions.view import view_of
 from entropy_explore_env.reports.metrics import joint_figures, mission_figures
@@ -78,24 +78,10 @@ def test_lazily_is_as_eagerly_in_plans(metric, allocation):
     assert all(lazy.idle) and done[1][-1] > 0.99
 
 
-@pytest.mark.parametrize("robots", [1, 3])
-def test_lazily_is_as_eagerly_with_scans_on_the_path(robots):
-    plan = small_plan(
-        robots=robots,
-        robot={"reach_m": math.inf, "body_radius_m": 0.0, "unknown_cost": 1e4, "redecide": "on_scan"},
-        sensor={"max_range_m": 1.5, "angular_step_rad": math.pi / 90, "scan_every_m": 0.4},
-    )
-    _, lazy, done = explored(plan, 1, path_scans=3)
-    _, eager, same = explored(plan, 1, path_scans=3, lazy=False)
-    assert done == same and lazy.counted() < eager.counted()
-    assert done != explored(plan, 1)[2]
-
-
 @pytest.mark.parametrize(
     "settings",
     [
         {},
-        {"path_scans": 2},
         {"frontiers": FrontierConfig(gamma=None)},
         {"metric": Metric(60.0)},
         {"frontiers": FrontierConfig(visibility="naive")},
@@ -111,21 +97,21 @@ def test_lazily_is_as_eagerly_over_terrain(settings):
 @pytest.mark.parametrize(("seed", "finest"), [(753, 0.2), (89, 0.05)])
 def test_bounds_stay_bounds_through_a_noisy_mission(monkeypatch, seed, finest):
     """After every update no kept count is less than a new one, through walls that turn out free, too."""
-    opened, levels, update = [], set(), VoxelCandidates.update
+    opened, levels, update = [], set(), VoxelFrontiers.update
 
     def checked(self, view, sigma):
-        before = self._map.state.copy()
+        before = self._states.state.copy()
         update(self, view, sigma)
-        opened.append(np.count_nonzero(before & COVERED > self._map.state & COVERED))
+        opened.append(np.count_nonzero(before & COVERED > self._states.state & COVERED))
         levels.add(sigma)
-        slots = np.flatnonzero((self._map.voxel != NONE) & np.isfinite(self._map.seen))
-        bounds = self._map.seen[slots].copy()
-        kept = self._map.seen.copy()
-        self.count(slots, self._map.voxel[slots])
-        assert (bounds >= self._map.seen[slots]).all()
-        self._map.seen[:] = kept
+        slots = np.flatnonzero((self._voxels != NONE) & np.isfinite(self._bounds))
+        bounds = self._bounds[slots].copy()
+        kept = self._bounds.copy()
+        self.count(slots, self._voxels[slots])
+        assert (bounds >= self._bounds[slots]).all()
+        self._bounds[:] = kept
 
-    monkeypatch.setattr(VoxelCandidates, "update", checked)
+    monkeypatch.setattr(VoxelFrontiers, "update", checked)
     noisy = {"max_range_m": 1.5, "angular_step_rad": math.pi / 90, "scan_time_s": 2.0, "range_noise_m": 0.3}
     explored(small_plan(sensor=noisy), seed, allocation="synchronous", finest_sigma=finest)
     assert max(opened) > 5 and len(levels) > 1
@@ -244,18 +230,11 @@ def test_bodies_and_a_short_reach_explore_an_office():
         (ExplorationConfig, {"metric": None}, "ExplorationConfig.metric"),
         (ExplorationConfig, {"metric": "V/t"}, "ExplorationConfig.metric"),
         (ExplorationConfig, {"metric": Metric}, "ExplorationConfig.metric"),
-        (ExplorationConfig, {"path_scans": -1}, "ExplorationConfig.path_scans"),
-        (
-            ExplorationConfig,
-            {"path_scans": 1, "frontiers": FrontierConfig(visibility="naive")},
-            "ExplorationConfig.path_scans",
-        ),
         (FrontierStrategy, {"config": "V/t"}, "config"),
         (FrontierConfig, {"sigma": 0.0}, "FrontierConfig.sigma"),
         (FrontierConfig, {"spacing_m": 0.0}, "FrontierConfig.spacing_m"),
         (FrontierConfig, {"visibility": "all"}, "FrontierConfig.visibility"),
         (FrontierConfig, {"gamma": 1.5}, "FrontierConfig.gamma"),
-        (FrontierConfig, {"too_high": 0.0}, "FrontierConfig.too_high"),
     ],
 )
 def test_what_is_refused(kind, settings, field):

@@ -14,9 +14,9 @@ from baselines.experiments.mission import run_mission
 from baselines.strategies.rules.planned_rate import PlannedRate, PlannedRateConfig
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.errors import SettingError
-from entropy_explore_env.frontiers.frontier_cells import KNOWN_SIGMA
-from entropy_explore_env.frontiers.lookouts import in_sight
-from entropy_explore_env.frontiers.voxel_map import NONE
+from entropy_explore_env.frontiers.blocks import NONE
+from entropy_explore_env.frontiers.frontier_map import KNOWN_SIGMA
+from entropy_explore_env.frontiers.viewing_places import is_visible
 from entropy_explore_env.planner.driver import Goal
 from entropy_explore_env.planner.shared_tour import SharedTour, SharedTourConfig
 from entropy_explore_env.planner.tour import Tour
@@ -69,7 +69,7 @@ def niche():
 def test_in_sight_is_what_a_line_through_known_free_cells_reaches(shape, seed):
     rng = np.random.default_rng(seed)
     plan, robot = random_plan(shape, rng)
-    frontiers = scene_of(plan, robot).cells._map
+    frontiers = scene_of(plan, robot).cells._blocks
     free = np.argwhere(plan == reference.FREE)
     unknown = np.argwhere(plan == reference.UNKNOWN)
     if len(unknown) == 0:
@@ -79,8 +79,8 @@ def test_in_sight_is_what_a_line_through_known_free_cells_reaches(shape, seed):
             continue
         apart = float(np.linalg.norm(place - voxel))
         wanted = all(plan[at] == reference.FREE for at in crossed(place, voxel))
-        assert in_sight(frontiers, number(plan, place), number(plan, voxel), 100.0) == wanted
-        assert not in_sight(frontiers, number(plan, place), number(plan, voxel), apart - 0.01)
+        assert is_visible(frontiers, number(plan, place), number(plan, voxel), 100.0) == wanted
+        assert not is_visible(frontiers, number(plan, place), number(plan, voxel), apart - 0.01)
 
 
 def unseen_around(plan, place):
@@ -110,10 +110,11 @@ def test_a_lookout_makes_the_way_over_it_shortest_of_all_that_see_the_same(shape
     tour = rule.tour_among(scene, *scene.paths.all_frontiers(scene.here))
     if len(tour) > 1:
         ways = ways + reference.lengths_from(plan, cell(plan, tour[1]))
-    frontiers, reach = scene.cells._map, 0.5 * scene.cells.reach
+    frontiers, reach = scene.cells._blocks, 0.5 * scene.cells.reach
     for place in np.argwhere(np.isfinite(ways)):
         at = number(plan, place)
-        seeing[tuple(place)] = len(unseen) and all(in_sight(frontiers, at, voxel, reach) for voxel in unseen)
+        visible = [is_visible(frontiers, at, voxel, reach) for voxel in unseen]
+        seeing[tuple(place)] = len(visible) > 0 and all(visible)
     assert goal.looked == bool(seeing[robot])
     if seeing[robot] or goal.place == goal.target:
         assert goal.place == goal.target
@@ -142,7 +143,7 @@ def test_from_a_lookout_and_without_pockets_a_robot_drives_to_the_cell_itself():
     assert SharedTour(SharedTourConfig(sight=0.0)).goal(scene_of(plan, (2, 4))) == Goal(target, target)
 
 
-def test_between_scans_a_robot_stops_where_all_is_in_sight():
+def test_between_scans_a_robot_stops_where_all_is_is_visible():
     plan = niche()
     scene = scene_of(plan, (10, 3))
     scene.view.since_scan_m = 0.2  # type: ignore[misc]
