@@ -11,13 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from entropy_explore_env.frontiers.blocks import EDGE, NONE, UNEXPLORED, queue_all_around, replace_unreached
-from entropy_explore_env.frontiers.frontier_map import (
-    BATCH_CELLS,
-    Chart,
-    FrontierConfig,
-    FrontierMap,
-    as_tuple,
-)
+from entropy_explore_env.frontiers.frontier_map import BATCH_CELLS, Chart, FrontierConfig, FrontierMap
 from entropy_explore_env.frontiers.knowledge import RobotKnowledge
 from entropy_explore_env.frontiers.terrain_map import (
     fill_column_costs,
@@ -119,9 +113,9 @@ class TerrainFrontiers(FrontierMap):
         else:
             count_below(*arrays, self._azimuths, self._view_model, True)
 
-    def _from(self, place: np.ndarray) -> tuple[tuple[float, float, float], float]:
+    def _from(self, place: np.ndarray) -> tuple[tuple[float, ...], float]:
         """Return an eye at (3,), grid units, and z_av there."""
-        eye = as_tuple(place)
+        eye = tuple(place.tolist())
         return eye, mean_ground(self._map, int(eye[0]), int(eye[1]), self._view_model.patch)
 
     def _refresh(self, voxels: np.ndarray, radius: int) -> None:

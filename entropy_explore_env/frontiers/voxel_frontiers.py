@@ -28,13 +28,7 @@ from entropy_explore_env.frontiers.blocks import (
     queue_all_around,
     replace_unreached,
 )
-from entropy_explore_env.frontiers.frontier_map import (
-    BATCH_CELLS,
-    Chart,
-    FrontierConfig,
-    FrontierMap,
-    as_tuple,
-)
+from entropy_explore_env.frontiers.frontier_map import BATCH_CELLS, Chart, FrontierConfig, FrontierMap
 from entropy_explore_env.frontiers.knowledge import RobotKnowledge
 from entropy_explore_env.frontiers.ray_tree import grow_tree
 from entropy_explore_env.frontiers.viewing_places import first_viewing_place
@@ -47,12 +41,14 @@ from entropy_explore_env.frontiers.visibility import (
     rays_towards,
 )
 from entropy_explore_env.frontiers.voxel_map import (
+    box_around,
     collect_candidates,
     count_connected,
     keep_unseen,
     new_voxel_map,
     update_blocks,
     update_voxels,
+    voxels_in,
 )
 from entropy_explore_env.scenario import Scenario
 from entropy_explore_env.settings import RobotKind
@@ -137,7 +133,7 @@ class VoxelFrontiers(FrontierMap):
         arrays = self._counter, self._states.state, self._size
         if self._naive:
             for place, centre in enumerate(self._axes_of(voxels) + 0.5):
-                found = count_in_ball(*arrays, as_tuple(centre), self.reach, False)
+                found = count_in_ball(*arrays, tuple(centre.tolist()), self.reach, False)
                 seen[place], weighed[place] = found
         else:
             count_from(*arrays, voxels, self._tree, self._met, seen, weighed)
@@ -145,7 +141,7 @@ class VoxelFrontiers(FrontierMap):
 
     def promise(self, place: np.ndarray) -> None:
         """See `FrontierMap`."""
-        arrays = self._counter, self._states.state, self._size, as_tuple(place)
+        arrays = self._counter, self._states.state, self._size, tuple(place.tolist())
         if self._naive:
             count_in_ball(*arrays, self.reach, True)
         else:
@@ -291,7 +287,7 @@ class VoxelFrontiers(FrontierMap):
         turn, tilt = view.kind.sensor.field_of_view_rad
         pitches = self._pitches if view.planar else np.linspace(pitch - tilt / 2, pitch + tilt / 2, 5)
         rays = rays_towards(np.linspace(yaw - turn / 2, yaw + turn / 2, 24), pitches)
-        arrays = self._counter, self._states.state, self._size, as_tuple(place), rays
+        arrays = self._counter, self._states.state, self._size, tuple(place.tolist()), rays
         return int(count_crossed(*arrays, self.reach, False)[0])
 
 
@@ -302,17 +298,3 @@ def _pitches(kind: RobotKind, flies: bool) -> np.ndarray:
         return (np.arange(_ROWS) + 0.5) * (math.pi / _ROWS) - math.pi / 2
     rows = min(kind.sensor.rows, _ROWS)
     return np.linspace(-tilt / 2, tilt / 2, rows) if rows > 1 else np.zeros(1)
-
-
-def box_around(size: tuple[int, int, int], voxel: int, radius: int, layer: int) -> tuple[slice, ...]:
-    """Return slices of the voxels within a radius along every axis, in one layer or, with -1, in all."""
-    box = [
-        slice(max(int(at) - radius, 0), min(int(at) + radius + 1, n))
-        for at, n in zip(np.unravel_index(voxel, size), size, strict=True)
-    ]
-    return (*box[:2], box[2] if layer < 0 else slice(layer, layer + 1))
-
-
-def voxels_in(box: tuple[slice, ...], size: tuple[int, int, int]) -> np.ndarray:
-    """Return (N,) int32 voxels of a box in C order."""
-    return np.asarray(np.ravel_multi_index(np.ogrid[box], size), np.int32).reshape(-1)

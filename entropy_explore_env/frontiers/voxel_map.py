@@ -189,3 +189,17 @@ def keep_unseen(blocks, voxels):
             voxels[count] = voxel
             count += 1
     return count
+
+
+def box_around(size: tuple[int, int, int], voxel: int, radius: int, layer: int) -> tuple[slice, ...]:
+    """Return slices of the voxels within a radius along every axis, in one layer or, with -1, in all."""
+    box = [
+        slice(max(int(at) - radius, 0), min(int(at) + radius + 1, n))
+        for at, n in zip(np.unravel_index(voxel, size), size, strict=True)
+    ]
+    return (*box[:2], box[2] if layer < 0 else slice(layer, layer + 1))
+
+
+def voxels_in(box: tuple[slice, ...], size: tuple[int, int, int]) -> np.ndarray:
+    """Return (N,) int32 voxels of a box in C order."""
+    return np.asarray(np.ravel_multi_index(np.ogrid[box], size), np.int32).reshape(-1)

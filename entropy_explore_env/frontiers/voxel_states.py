@@ -9,11 +9,12 @@ import math
 from typing import NamedTuple
 
 import numpy as np
+from scipy import ndimage
 
 from entropy_explore_env.belief.raycast import STOP_AT_COVERED
 from entropy_explore_env.belief.voxel_index import grid_index
 from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel
-from entropy_explore_env.frontiers.blocks import COVERED, NONE, UNEXPLORED, UNMAPPED
+from entropy_explore_env.frontiers.blocks import COVERED, UNEXPLORED, UNMAPPED
 
 TILE = 8
 """Width in voxels of the square tiles, seen from above, by which changes are noted."""
@@ -103,31 +104,11 @@ def note_more(states, voxel):
     states.tiles[x // TILE, y // TILE] = 1
 
 
-@lean_kernel
-def reset_bounds(states, voxels, bounds, reach):
-    """Reset the bounds of candidates within reach of a noted tile, and clear the notes.
-
-    Args:
-        states: Of the robot.
-        voxels: (K,) int32 candidates, NONE = none.
-        bounds: (K,) float64, set to inf.
-        reach: In voxel edges.
-    """
-    size, tiles, some = states.size, states.tiles, False
-    for i in range(tiles.shape[0]):
-        for j in range(tiles.shape[1]):
-            some = some or tiles[i, j] > 0
-    if not some:
-        return
-    wide = int(min(reach, size[0] + size[1])) + 1
-    for place in range(len(voxels)):
-        if voxels[place] == NONE or math.isinf(bounds[place]):
-            continue
-        x, y, _ = grid_index(size, voxels[place])
-        for i in range(max(x - wide, 0) // TILE, min((x + wide) // TILE, tiles.shape[0] - 1) + 1):
-            for j in range(max(y - wide, 0) // TILE, min((y + wide) // TILE, tiles.shape[1] - 1) + 1):
-                if tiles[i, j]:
-                    bounds[place] = math.inf
-    for i in range(tiles.shape[0]):
-        for j in range(tiles.shape[1]):
-            tiles[i, j] = 0
+def take_notes(states: VoxelStates, reach: float) -> np.ndarray | None:
+    """Return (X / TILE, Y / TILE) bool, tiles within reach of noted ones; None = none. Clear the notes."""
+    if not states.tiles.any():
+        return None
+    wide = math.ceil(min(reach, sum(states.size)) / TILE)
+    near = ndimage.maximum_filter(states.tiles, 2 * wide + 1, mode="constant") > 0
+    states.tiles[:] = 0
+    return np.asarray(near)

@@ -123,7 +123,7 @@ class Tour(Explorer):
         """Which near frontier cells cover all of them: the target, then of equally good ones the nearest."""
         if len(voxels) == 0:
             return []
-        seen = scene.paths.sights(centres_of(scene, voxels), self.config.cover * scene.cells.reach)
+        seen = scene.paths.free_lines(centres_of(scene, voxels), self.config.cover * scene.cells.reach)
         left, chosen = np.ones(len(voxels), bool), []
         for target in np.flatnonzero(voxels == scene.target):
             chosen.append(int(target))

@@ -1,4 +1,4 @@
-"""From where robots look at pockets: lines of sight beside a slow reference, and tours that use them."""
+"""Viewing places: lines of sight beside a slow reference, and tours that use them."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ def niche():
 
 @given(SHAPES, seeds)
 @drawn(40)
-def test_in_sight_is_what_a_line_through_known_free_cells_reaches(shape, seed):
+def test_visible_is_what_a_line_through_known_free_cells_reaches(shape, seed):
     rng = np.random.default_rng(seed)
     plan, robot = random_plan(shape, rng)
     frontiers = scene_of(plan, robot).cells._blocks
@@ -96,7 +96,7 @@ def unseen_around(plan, place):
 
 @given(SHAPES, seeds)
 @drawn(60)
-def test_a_lookout_makes_the_way_over_it_shortest_of_all_that_see_the_same(shape, seed):
+def test_a_viewing_place_makes_the_way_over_it_shortest_of_all_that_see_the_same(shape, seed):
     rng = np.random.default_rng(seed)
     plan, robot = random_plan(shape, rng)
     scene, rule = scene_of(plan, robot), SharedTour(SharedTourConfig(pocket=1.0))
@@ -125,7 +125,7 @@ def test_a_lookout_makes_the_way_over_it_shortest_of_all_that_see_the_same(shape
         assert ways[cell(plan, goal.place)] < ways[cell(plan, goal.target)]
 
 
-def test_a_robot_looks_into_a_pocket_from_where_its_end_is_in_sight_by_hand():
+def test_a_robot_looks_into_a_pocket_from_where_its_end_is_visible_by_hand():
     plan = niche()
     goal = SharedTour().goal(scene_of(plan, (2, 4)))
     assert cell(plan, goal.target) == (10, 6)
@@ -135,7 +135,7 @@ def test_a_robot_looks_into_a_pocket_from_where_its_end_is_in_sight_by_hand():
     assert cell(plan, SharedTour().goal(scene_of(plan, (2, 4))).place)[0] == 9
 
 
-def test_from_a_lookout_and_without_pockets_a_robot_drives_to_the_cell_itself():
+def test_from_a_viewing_place_and_without_pockets_a_robot_drives_to_the_cell_itself():
     plan = niche()
     target = number(plan, (10, 6))
     assert SharedTour().goal(scene_of(plan, (10, 3))) == Goal(target, target, looked=True)
@@ -229,7 +229,7 @@ def test_where_a_look_shows_nothing_the_robot_goes_on_to_the_cell_and_does_not_c
     assert walk.rule.cells_of(0).is_frontier(int(number(walk.plan, (10, 6))))
 
 
-def test_where_the_drive_to_a_lookout_ends_early_the_robot_goes_to_the_cell_itself():
+def test_where_the_drive_to_a_viewing_place_ends_early_the_robot_goes_to_the_cell_itself():
     walk = Walk(far_niche())
     assert walk.goes((2, 4)) == (10, 4)
     assert walk.goes((5, 4), MoveEnd.NO_PATH) == (10, 6)

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
 from entropy_explore_env.frontiers.blocks import CANDIDATE, COVERED, NONE, UNEXPLORED, UNMAPPED
 from entropy_explore_env.frontiers.voxel_map import new_voxel_map, update_voxels
-from entropy_explore_env.frontiers.voxel_states import new_states, reset_bounds
+from entropy_explore_env.frontiers.voxel_states import new_states, take_notes
 from tests.reference import sawhney as reference
 from tests.reference.scenes import drawn, seeds
 
@@ -111,15 +109,13 @@ def test_where_more_may_be_visible_is_noted_by_hand():
     assert tiles.all()  # all is unexplored again
 
 
-def test_what_was_seen_is_forgotten_where_more_may_be_visible_and_nowhere_else():
+def test_tiles_within_reach_of_a_note_are_found_once():
     states = new_states((40, 30, 1))
-    voxels = np.array([0, 20 * 30 + 15, NONE, 39 * 30 + 29], np.int32)
-    bounds = np.array([5.0, 6.0, 7.0, 8.0])
-    reset_bounds(states, voxels, bounds, 5.0)
-    assert bounds.tolist() == [5.0, 6.0, 7.0, 8.0]
+    assert take_notes(states, 5.0) is None
     states.tiles[0, 0] = 1
-    reset_bounds(states, voxels, bounds, 5.0)
-    assert bounds.tolist() == [math.inf, 6.0, 7.0, 8.0] and not states.tiles.any()
+    near = take_notes(states, 5.0)
+    assert near is not None and near[:2, :2].all() and near.sum() == 4
+    assert take_notes(states, 5.0) is None
     states.tiles[2, 1] = 1  # x 16 … 23, y 8 … 15
-    reset_bounds(states, voxels, bounds, 100.0)
-    assert np.isinf(bounds[[0, 1, 3]]).all() and bounds[2] == 7.0
+    near = take_notes(states, 100.0)
+    assert near is not None and near.all()

@@ -116,7 +116,7 @@ class RecedingHorizon(Explorer):
         tree = _Tree()
         tree.add(self._place(scene, scene.here), 0)
         for place in branch:
-            if not scene.paths.in_sight(tree.places[-1], place):
+            if not scene.paths.is_line_free(tree.places[-1], place):
                 break
             tree.add(place, len(tree.places) - 1)
         return tree
@@ -133,7 +133,7 @@ class RecedingHorizon(Explorer):
             start = tree.places[nearest]
             place = start + (drawn - start) * min(1.0, longest / max(float(apart[nearest]), 1e-9))
             place = np.floor(place) + 0.5
-            if (place != start).any() and scene.paths.in_sight(start, place):
+            if (place != start).any() and scene.paths.is_line_free(start, place):
                 tree.add(place, nearest)
 
     def _gains(self, scene: Scene, tree: _Tree, scanned: set[int]) -> np.ndarray:
