@@ -17,13 +17,13 @@ from benchmarks.planning import FLOOR, cluttered
 from benchmarks.rows import Effort, Goal, Row, alone, compared, timed
 from entropy_explore_env.belief.paths.search import new_search
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
-from entropy_explore_env.frontiers.candidates import KNOWN_SIGMA, FrontierConfig
-from entropy_explore_env.frontiers.frontier_cells import FrontierCells
+from entropy_explore_env.frontiers.blocks import COVERED, NONE, UNEXPLORED, UNMAPPED
+from entropy_explore_env.frontiers.frontier_map import KNOWN_SIGMA, FrontierConfig
 from entropy_explore_env.frontiers.knowledge import voxel_of
 from entropy_explore_env.frontiers.path_lengths import KnownPaths
 from entropy_explore_env.frontiers.ray_tree import grow_tree
-from entropy_explore_env.frontiers.voxel_map import COVERED, NONE, UNEXPLORED, UNMAPPED
-from entropy_explore_env.frontiers.voxel_visibility import count_from, new_counter, rays_around
+from entropy_explore_env.frontiers.visibility import count_from, new_counter, rays_around
+from entropy_explore_env.frontiers.voxel_frontiers import VoxelFrontiers
 from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.missions.view import view_of
 from entropy_explore_env.planner.scene import Scene
@@ -104,7 +104,7 @@ class Deciding:
         self._missions, self._scans = _half_known(scenario, solid), 0
         self._view, kind = view_of(self._missions, 0, 0), scenario.kind_of(0)
         here = voxel_of(self._view, self._view.pose)
-        self.candidates = FrontierCells(scenario, kind, FrontierConfig(spacing_m=3.0))
+        self.candidates = VoxelFrontiers(scenario, kind, FrontierConfig(spacing_m=3.0))
         paths = KnownPaths(scenario, kind, self.candidates, new_search(scenario.grid.voxels))
         self._scene = Scene(self._view, self.candidates, paths, here, NONE)
 

@@ -168,8 +168,8 @@ class Allocator:
             paths: To them.
             counted: (K,) V·(height factor) in points' size where it was counted, else NaN; filled in.
         """
-        most = np.minimum(self._candidates.upper_bounds(slots), self._candidates.greatest_visibility())
-        most = np.where(np.isnan(counted), most * self._candidates.point, counted)
+        most = self._candidates.upper_bounds(slots) * self._candidates.point
+        most = np.where(np.isnan(counted), most, counted)
         bound, value = self._value(most, *paths), np.full(len(slots), -np.inf)
         order, size = np.argsort(-bound, kind="stable"), self._candidates.batch
         for first in range(0, len(order), size):

@@ -1,6 +1,6 @@
 """A rule of one's own: it goes to the second nearest frontier cell, if there are two."""
 
-from entropy_explore_env.frontiers.voxel_map import NONE
+from entropy_explore_env.frontiers.blocks import NONE
 
 
 def pick(scene):

@@ -20,145 +20,105 @@ from entropy_explore_env.viewpoints.drawing import uniform_viewpoint
 
 
 class TeammateKnowledge(Protocol):
-    """What a robot last heard of a teammate; times are -1 s where it heard nothing."""
+    """What a robot last heard of a teammate; times are -1 s where it heard nothing.
+
+    Attributes:
+        heard_s: When the last message was sent that arrived.
+        pose: (5,) the teammate's pose then, map frame.
+        announced_s: When the last announcement was sent that arrived.
+        viewpoint: (5,) the announced viewpoint, map frame.
+        depth_m: Mean measured distance of the teammate's latest scan then.
+        half_angle_rad: Largest angle of a measured ray from its gaze.
+        silent: Whether the teammate counts as silent now.
+    """
 
     @property
-    def heard_s(self) -> float:
-        """When the last message was sent that arrived."""
-        ...
-
+    def heard_s(self) -> float: ...
     @property
-    def pose(self) -> np.ndarray:
-        """(5,) the teammate's pose then, map frame."""
-        ...
-
+    def pose(self) -> np.ndarray: ...
     @property
-    def announced_s(self) -> float:
-        """When the last announcement was sent that arrived."""
-        ...
-
+    def announced_s(self) -> float: ...
     @property
-    def viewpoint(self) -> np.ndarray:
-        """(5,) the announced viewpoint, map frame."""
-        ...
-
+    def viewpoint(self) -> np.ndarray: ...
     @property
-    def depth_m(self) -> float:
-        """Mean measured distance of the teammate's latest scan then."""
-        ...
-
+    def depth_m(self) -> float: ...
     @property
-    def half_angle_rad(self) -> float:
-        """Largest angle of a measured ray from its gaze."""
-        ...
-
+    def half_angle_rad(self) -> float: ...
     @property
-    def silent(self) -> bool:
-        """Whether the teammate counts as silent now."""
-        ...
+    def silent(self) -> bool: ...
 
 
 class ScanKnowledge(Protocol):
-    """A robot's latest scan."""
+    """A robot's latest scan.
+
+    Attributes:
+        utility_bits: (R,) bits that each ray took from the robot's own map.
+    """
 
     @property
-    def utility_bits(self) -> np.ndarray:
-        """(R,) bits that each ray took from the robot's own map."""
-        ...
+    def utility_bits(self) -> np.ndarray: ...
 
 
 class RobotKnowledge(Protocol):
-    """What one robot knows at one of its decisions; map frame, metres, radians."""
+    """What one robot knows at one of its decisions; map frame, metres, radians.
+
+    Attributes:
+        robot: Number of the robot.
+        scenario: The public settings.
+        kind: Its body and its sensor.
+        planar: Whether it stays in its plane.
+        level: Whether it never looks up or down.
+        time_s: Simulated time.
+        under_way: Whether it decides while it drives.
+        since_scan_m: Distance driven since its latest scan.
+        pose: (5,) x, y, z, yaw, pitch, as it believes.
+        covariance: (4, 4) of x, y, z and yaw; zeros where the pose is exact.
+        mean: (X, Y, Z) float32, expected coverage.
+        precision: (X, Y, Z) float32, 1/σ² of it.
+        depth_m: Mean measured distance of its latest scan.
+        half_angle_rad: Largest angle of a measured ray of its latest scan from the gaze.
+        scan: Its latest scan.
+        move_end: Why its latest drive ended.
+        ceiling: (X, Y) int32, lowest layer of the no-fly zone; None = there is none.
+        teammates: Number of a teammate → what was heard of it.
+    """
 
     @property
-    def robot(self) -> int:
-        """Number of the robot."""
-        ...
-
+    def robot(self) -> int: ...
     @property
-    def scenario(self) -> Scenario:
-        """The public settings."""
-        ...
-
+    def scenario(self) -> Scenario: ...
     @property
-    def kind(self) -> RobotKind:
-        """Its body and its sensor."""
-        ...
-
+    def kind(self) -> RobotKind: ...
     @property
-    def planar(self) -> bool:
-        """Whether it stays in its plane."""
-        ...
-
+    def planar(self) -> bool: ...
     @property
-    def level(self) -> bool:
-        """Whether it never looks up or down."""
-        ...
-
+    def level(self) -> bool: ...
     @property
-    def time_s(self) -> float:
-        """Simulated time."""
-        ...
-
+    def time_s(self) -> float: ...
     @property
-    def under_way(self) -> bool:
-        """Whether it decides while it drives."""
-        ...
-
+    def under_way(self) -> bool: ...
     @property
-    def since_scan_m(self) -> float:
-        """Distance driven since its latest scan."""
-        ...
-
+    def since_scan_m(self) -> float: ...
     @property
-    def pose(self) -> np.ndarray:
-        """(5,) x, y, z, yaw, pitch, as it believes."""
-        ...
-
+    def pose(self) -> np.ndarray: ...
     @property
-    def covariance(self) -> np.ndarray:
-        """(4, 4) of x, y, z and yaw; zeros where the pose is exact."""
-        ...
-
+    def covariance(self) -> np.ndarray: ...
     @property
-    def mean(self) -> np.ndarray:
-        """(X, Y, Z) float32, expected coverage."""
-        ...
-
+    def mean(self) -> np.ndarray: ...
     @property
-    def precision(self) -> np.ndarray:
-        """(X, Y, Z) float32, 1/σ² of it."""
-        ...
-
+    def precision(self) -> np.ndarray: ...
     @property
-    def depth_m(self) -> float:
-        """Mean measured distance of its latest scan."""
-        ...
-
+    def depth_m(self) -> float: ...
     @property
-    def half_angle_rad(self) -> float:
-        """Largest angle of a measured ray of its latest scan from the gaze."""
-        ...
-
+    def half_angle_rad(self) -> float: ...
     @property
-    def scan(self) -> ScanKnowledge:
-        """Its latest scan."""
-        ...
-
+    def scan(self) -> ScanKnowledge: ...
     @property
-    def move_end(self) -> MoveEnd:
-        """Why its latest drive ended."""
-        ...
-
+    def move_end(self) -> MoveEnd: ...
     @property
-    def ceiling(self) -> np.ndarray | None:
-        """(X, Y) int32, lowest layer of the no-fly zone; None = there is none."""
-        ...
-
+    def ceiling(self) -> np.ndarray | None: ...
     @property
-    def teammates(self) -> Mapping[int, TeammateKnowledge]:
-        """Number of a teammate → what was heard of it."""
-        ...
+    def teammates(self) -> Mapping[int, TeammateKnowledge]: ...
 
 
 _LOST_AFTER = 2.0
@@ -166,21 +126,21 @@ _LOST_AFTER = 2.0
 
 
 def belief_of(view: RobotKnowledge) -> Belief:
-    """The belief of a view's robot."""
+    """Return the belief of a view's robot."""
     return Belief(view.mean.reshape(-1), view.precision.reshape(-1), view.scenario.grid.shape)
 
 
 def voxel_of(view: RobotKnowledge, pose: np.ndarray) -> int:
-    """Number of the voxel of a pose (3,) or (5,), map frame; the nearest one for poses outside."""
+    """Return the number of the voxel of a pose (3,) or (5,), map frame; the nearest one for poses outside."""
     grid = view.scenario.grid
     indices = np.clip(grid.voxel_of(pose[:3]), 0, np.array(grid.shape) - 1)
     return int(np.ravel_multi_index(tuple(indices), grid.shape))
 
 
 def teammates_that_share(view: RobotKnowledge) -> Mapping[int, TeammateKnowledge]:
-    """Teammates whose scans may reach the robot: no silent ones, and none where the channel carries no scans.
+    """Return the teammates whose scans may reach the robot: none that is silent.
 
-    What the others go to see it has to see itself: nothing is left to them.
+    Where the channel carries no scans there are none: what others see the robot has to see itself.
     """
     if view.scenario.channel.burst == 0:
         return {}
@@ -213,7 +173,7 @@ def stays(view: RobotKnowledge, mate: TeammateKnowledge) -> bool:
 
 
 def announced_cone(grid: Grid, mate: TeammateKnowledge) -> np.void:
-    """The CONE that a teammate announced, in grid units: V(Yˢ, r̂, α̂) (RochaMI)."""
+    """Return the CONE that a teammate announced, in grid units: V(Yˢ, r̂, α̂) (RochaMI)."""
     cones = np.zeros(1, CONE)
     depth = mate.depth_m / grid.voxel_size_m
     cones[0] = cone_of(grid.in_grid_units(mate.viewpoint), depth, mate.half_angle_rad)
@@ -221,7 +181,7 @@ def announced_cone(grid: Grid, mate: TeammateKnowledge) -> np.void:
 
 
 def announced_cones(view: RobotKnowledge) -> np.ndarray:
-    """(M,) CONE of what teammates have announced to see, in grid units."""
+    """Return (M,) CONE of what teammates have announced to see, in grid units."""
     heard = [mate for mate in view.teammates.values() if mate.announced_s >= 0.0 and mate.depth_m > 0.0]
     cones = np.zeros(len(heard), CONE)
     for place, mate in enumerate(heard):

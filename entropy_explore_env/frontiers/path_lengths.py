@@ -15,14 +15,13 @@ from entropy_explore_env.belief.paths.layer_lengths import fill_layer_lengths
 from entropy_explore_env.belief.paths.planning import resume_search, search_paths, start_search
 from entropy_explore_env.belief.paths.search import Search, cost_to, extract_path
 from entropy_explore_env.belief.paths.string_pulling import line_of_sight_cost, string_pulled
-from entropy_explore_env.belief.voxel_index import flat_index
 from entropy_explore_env.compilation.kernels import lean_kernel
-from entropy_explore_env.frontiers.frontier_cells import FrontierCells
-from entropy_explore_env.frontiers.voxel_map import NONE
+from entropy_explore_env.frontiers.blocks import NONE
+from entropy_explore_env.frontiers.voxel_frontiers import VoxelFrontiers
+from entropy_explore_env.frontiers.voxel_map import box_around, voxels_in
 from entropy_explore_env.scenario import Scenario
 from entropy_explore_env.settings import RobotKind
 
-Corner = tuple[int, int, int]
 _ROOM, _ROOM_DRAWS = 40, 64
 """Voxels along each axis within which places are drawn that make room for others, and how many are drawn."""
 _FIRST_REACH = 8.0
@@ -38,7 +37,7 @@ class KnownPaths:
         reach: How far the latest search of `start` goes: lengths up to this are final.
     """
 
-    def __init__(self, scenario: Scenario, kind: RobotKind, cells: FrontierCells, search: Search) -> None:
+    def __init__(self, scenario: Scenario, kind: RobotKind, cells: VoxelFrontiers, search: Search) -> None:
         """Paths in the map of `cells`, which may change between searches."""
         self._cells, self.search, self._grid = cells, search, scenario.grid
         self.lattice = new_lattice(scenario.grid.shape, 0.0, scenario.layer_of(kind.robot))
@@ -64,12 +63,12 @@ class KnownPaths:
         return math.isinf(self.reach) or self.search.queue.state[0]["entries"] == 0
 
     def frontiers_within(self, reach: float) -> tuple[np.ndarray, np.ndarray]:
-        """(K,) voxels and lengths: of each block the nearest frontier cell, up to a length; inf = all."""
+        """Return (K,) voxels and lengths of the nearest frontier cells of blocks, up to a length."""
         self.extend(reach)
         return self._cells.nearest_of_blocks(self.lengths_to, reach)
 
     def nearest_frontiers(self) -> tuple[np.ndarray, np.ndarray]:
-        """(K,) frontier cells and lengths, one a block, among them the nearest of all."""
+        """Return (K,) frontier cells and lengths, one a block, among them the nearest of all."""
         while True:
             voxels, lengths = self._cells.nearest_of_blocks(self.lengths_to, self.reach)
             if len(voxels) or self.exhausted():
@@ -77,20 +76,20 @@ class KnownPaths:
             self.extend(_EXTENSION * self.reach)
 
     def lengths_to(self, voxels: np.ndarray) -> np.ndarray:
-        """(K,) lengths to (K,) int32 voxels by the latest search, inf where it has not come."""
+        """Return (K,) lengths to (K,) int32 voxels by the latest search, inf where it has not come."""
         lengths = np.empty(len(voxels))
         fill_lengths(self.search, voxels, lengths)
         return lengths
 
     def all_frontiers(self, here: int) -> tuple[np.ndarray, np.ndarray]:
-        """(K,) voxels and lengths: of each block the nearest frontier cell from a voxel; a new search."""
+        """Return (K,) voxels and lengths of the frontier cells of blocks nearest to a voxel; a new search."""
         if self.lattice.layer >= 0:
             return self._cells.nearest_of_blocks(lambda cells: self.lengths_from(here, cells))
         self.start(here)
         return self.frontiers_within(math.inf)
 
     def lengths_from(self, voxel: int, others: np.ndarray, most: float = math.inf) -> np.ndarray:
-        """(K,) lengths of the paths from a voxel to (K,) int32 others; inf = no path.
+        """Return (K,) lengths of the paths from a voxel to (K,) int32 others; inf = no path.
 
         What the latest search found is lost: `start` another one.
 
@@ -112,7 +111,7 @@ class KnownPaths:
         return lengths
 
     def lengths_between(self, places: np.ndarray, lengths: np.ndarray) -> np.ndarray:
-        """(1 + K, 1 + K) lengths of the shortest paths between the robot and K places; new searches.
+        """Return (1 + K, 1 + K) lengths of the shortest paths between the robot and K places; new searches.
 
         Args:
             places: (K,) int32 voxels, near ones first.
@@ -128,16 +127,11 @@ class KnownPaths:
         return between
 
     def around(self, voxel: int, radius: int) -> np.ndarray:
-        """(N,) int32 voxels that the latest search reached, up to `radius` voxels off along every axis."""
-        low, high = [], []
-        for at, size in zip(np.unravel_index(voxel, self._grid.shape), self._grid.shape, strict=True):
-            low.append(max(int(at) - radius, 0))
-            high.append(min(int(at) + radius, size - 1) + 1)
-        if self.lattice.layer >= 0:
-            low[2], high[2] = self.lattice.layer, self.lattice.layer + 1
-        found = np.empty(math.prod(b - a for a, b in zip(low, high, strict=True)), np.int32)
-        corners = (low[0], low[1], low[2]), (high[0], high[1], high[2])
-        return found[: collect_reached(self.search, self.lattice.size, *corners, self.reach, found)]
+        """Return (N,) int32 voxels that the latest search reached, within a radius along every axis."""
+        box = box_around(self._grid.shape, voxel, radius, self.lattice.layer)
+        near = voxels_in(box, self._grid.shape)
+        lengths = self.lengths_to(near)
+        return near[(lengths <= self.reach) & np.isfinite(lengths)]
 
     def place_away_from(self, here: int, others: list[int], rng: np.random.Generator) -> int:
         """Return a voxel to which the path from a voxel is shorter than from all others; a new search.
@@ -164,44 +158,53 @@ class KnownPaths:
         return int(drawn[nearer[np.argmax(apart[nearer])]]) if len(nearer) else NONE
 
     def mean_length(self, voxel: int, others: np.ndarray, least: float, most: float) -> float:
-        """Mean length of the paths from (N,) int32 voxels to a voxel; a new search, which `lengths_to` reads.
+        """Return the mean length of the paths from (N,) int32 voxels to a voxel.
+
+        It makes a new search, which `lengths_to` reads.
 
         Args:
             voxel: Where the paths end.
             others: Where they begin; those that no path of length `most` connects do not count.
-            least: Some path is at least so long.
+            least: Some path is at least this long.
             most: No path is longer.
         """
-        arrays = self.search, self.lattice, self.costs
-        return float(mean_length_from(*arrays, np.array([voxel], np.int32), others, least, most))
+        start_search(self.search, self.lattice, self.costs, np.array([voxel], np.int32))
+        self.reach, reach = 0.0, max(least, 1.0)
+        while True:
+            self.extend(reach)
+            lengths = self.lengths_to(others)
+            near = lengths[(lengths <= reach) & np.isfinite(lengths)]
+            if len(near) == len(others) or reach >= most:
+                return float(near.mean()) if len(near) else 0.0
+            reach = min(1.2 * reach, most)
 
-    def in_sight(self, first: np.ndarray, second: np.ndarray) -> bool:
+    def is_line_free(self, first: np.ndarray, second: np.ndarray) -> bool:
         """Whether the straight line between two places (3,), in voxel edges, is known to be free."""
         ends = [(float(p[0]), float(p[1]), float(p[2])) for p in (first, second)]
         cost = line_of_sight_cost(self.search, self.lattice, self.costs, ends[0], ends[1])
         return math.isfinite(cost)
 
-    def sights(self, places: np.ndarray, farthest: float) -> np.ndarray:
-        """(K, K) bool: between which of (K, 3) places the line is known free, and at most `farthest` long."""
+    def free_lines(self, places: np.ndarray, farthest: float) -> np.ndarray:
+        """Return (K, K) bool, pairs of (K, 3) places with a known free line up to `farthest` between them."""
         seen = np.zeros((len(places), len(places)), np.bool_)
-        fill_sights(self.search, self.lattice, self.costs, np.ascontiguousarray(places), farthest, seen)
+        fill_free_lines(self.search, self.lattice, self.costs, np.ascontiguousarray(places), farthest, seen)
         return seen
 
     def route_to(self, goal: int) -> np.ndarray:
-        """(N,) int32 voxels of the path to a voxel by the latest search, from where it began."""
+        """Return (N,) int32 voxels of the path to a voxel by the latest search, from where it began."""
         path = np.empty(extract_path(self.search, self.lattice, goal, np.empty(0, np.int32)), np.int32)
         extract_path(self.search, self.lattice, goal, path)
         return path
 
     def path_to(self, start: int, goal: int) -> np.ndarray:
-        """(N,) int32 voxels of the shortest path between two voxels; none if there is none. A new search."""
+        """Return (N,) int32 voxels of the shortest path between two voxels; N is 0 without one."""
         opened = self._cells.open_start(start)
         search_paths(self.search, self.lattice, self.costs, np.array([start], np.int32), goal, math.inf)
         self._cells.close(opened)
         return self.route_to(goal)
 
     def corners_of(self, path: np.ndarray, start: np.ndarray, goal: np.ndarray) -> np.ndarray:
-        """(M, 3) points in grid units at which the latest path, pulled straight, turns; the goal last."""
+        """Return (M, 3) points, grid units, where the latest path, pulled straight, turns; the goal last."""
         return string_pulled(self.search, self.lattice, self.costs, path, start, goal)
 
 
@@ -213,10 +216,10 @@ def fill_lengths(search: Search, voxels: np.ndarray, lengths: np.ndarray) -> Non
 
 
 @lean_kernel
-def fill_sights(
+def fill_free_lines(
     search: Search, lattice: Lattice, costs: Costs, places: np.ndarray, farthest: float, seen: np.ndarray
 ) -> None:
-    """Fill (K, K) bool; see `KnownPaths.sights`."""
+    """Fill in (K, K) bool; see `KnownPaths.free_lines`."""
     for first in range(len(places)):
         seen[first, first] = True
         for second in range(first):
@@ -226,47 +229,3 @@ def fill_sights(
             if apart <= farthest:
                 cost = line_of_sight_cost(search, lattice, costs, a, b)
                 seen[first, second] = seen[second, first] = not math.isinf(cost)
-
-
-@lean_kernel
-def collect_reached(
-    search: Search, size: Corner, low: Corner, high: Corner, reach: float, voxels: np.ndarray
-) -> int:
-    """Fill in the voxels between two corners whose paths are no longer than `reach`; returns their number."""
-    count = 0
-    for x in range(low[0], high[0]):
-        for y in range(low[1], high[1]):
-            for z in range(low[2], high[2]):
-                voxel = flat_index(size, x, y, z)
-                length = cost_to(search, voxel)
-                if length <= reach and not math.isinf(length):
-                    voxels[count] = voxel
-                    count += 1
-    return count
-
-
-@lean_kernel
-def mean_length_from(
-    search: Search,
-    lattice: Lattice,
-    costs: Costs,
-    source: np.ndarray,
-    voxels: np.ndarray,
-    least: float,
-    most: float,
-) -> float:
-    """Mean length of the paths from a source (1,) to (N,) int32 voxels; see `KnownPaths.mean_length`."""
-    start_search(search, lattice, costs, source)
-    reach = max(least, 1.0)
-    while True:
-        resume_search(search, lattice, costs, reach)
-        total, missing = 0.0, 0
-        for voxel in voxels:
-            length = cost_to(search, voxel)
-            if length <= reach and not math.isinf(length):
-                total += length
-            else:
-                missing += 1
-        if missing == 0 or reach >= most:
-            return total / max(len(voxels) - missing, 1)
-        reach = min(1.2 * reach, most)

@@ -20,7 +20,7 @@ from entropy_explore_env.belief.raycast import (
     cast_ray,
     longest_crossing,
 )
-from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel
+from entropy_explore_env.compilation.kernels import lean_kernel
 
 
 class RayTree(NamedTuple):
@@ -36,14 +36,6 @@ class RayTree(NamedTuple):
     """(N,) uint32, the next node if this one stops its rays."""
     cells: int
     """Number of different voxels C."""
-    box: np.ndarray
-    """(C,) int64, their numbers in a box that extends `margin` to all sides of the first voxel; ascending."""
-    margin: tuple[int, int, int]
-    """See `box`."""
-    nodes: np.ndarray
-    """(N,) uint32, nodes in the order of their cells."""
-    first: np.ndarray
-    """(C + 1,) int64, index in `nodes` of each cell's first node, and one past the last cell's last."""
     low: tuple[int, int, int]
     """Smallest steps along the axes."""
     high: tuple[int, int, int]
@@ -51,7 +43,7 @@ class RayTree(NamedTuple):
 
 
 def grow_tree(directions: np.ndarray, reach: float, size: tuple[int, int, int]) -> RayTree:
-    """The tree of the voxels that rays cross where nothing stops them.
+    """Return the tree of the voxels that rays cross where nothing stops them.
 
     Args:
         directions: (D, 3) float64 unit vectors, D ≥ 1.
@@ -83,25 +75,9 @@ def grow_tree(directions: np.ndarray, reach: float, size: tuple[int, int, int]) 
         cell.astype(np.uint32),
         after.astype(np.uint32),
         cells=len(cells),
-        box=cells.astype(np.int64),
-        margin=(int(margin[0]), int(margin[1]), int(margin[2])),
-        nodes=np.argsort(cell, kind="stable").astype(np.uint32),
-        first=np.concatenate([[0], np.cumsum(np.bincount(cell))]).astype(np.int64),
         low=tuple(low),
         high=tuple(high),
     )
-
-
-@inlined_kernel
-def cell_at(tree, x, y, z):
-    """Number of the cell at a step from the first voxel; -1 = no ray crosses it."""
-    margin = tree.margin
-    if abs(x) > margin[0] or abs(y) > margin[1] or abs(z) > margin[2]:
-        return -1
-    wide, high = 2 * margin[1] + 1, 2 * margin[2] + 1
-    number = ((x + margin[0]) * wide + y + margin[1]) * high + z + margin[2]
-    cell = np.searchsorted(tree.box, number)
-    return cell if cell < len(tree.box) and tree.box[cell] == number else -1
 
 
 @lean_kernel

@@ -1,10 +1,9 @@
-"""Frontiers of a height field below an exposure surface (Sawhney 2009).
+"""The frontier of a height field below an exposure surface (Sawhney 2009).
 
 Points are columns. A column is explored once the voxel of its surface is: the highest one that is known and
 believed covered, with a known free voxel above it. Robots may be between the ground and the exposure surface
-of explored columns, whether or not a ray went through that air. On the edge lie explored columns beside
-unexplored ones (see voxel/map.py). Each block of columns is represented by the candidate nearest to its
-middle, at several heights (sect. 3.2). Grid units: heights are in layers.
+of explored columns, whether or not a ray went through that air. Columns lie in blocks as cells do; the one
+that represents a block has candidates at several heights (sect. 3.2). Grid units: heights are in layers.
 """
 
 from __future__ import annotations
@@ -16,198 +15,146 @@ import numpy as np
 
 from entropy_explore_env.belief.voxel_index import flat_index
 from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel
-from entropy_explore_env.frontiers.voxel_map import (
+from entropy_explore_env.frontiers.blocks import (
     CANDIDATE,
     COVERED,
-    EDGE,
     NONE,
     UNEXPLORED,
     UNMAPPED,
-    new_frontier_map,
-    queue_block,
-    state_of,
+    Blocks,
+    block_span,
+    choose_candidate,
+    mark_edges,
+    new_blocks,
+    queue_around,
+    set_room,
 )
-
-TILE = 8
-"""Width in columns of the square tiles by which changes are noted."""
+from entropy_explore_env.frontiers.voxel_map import body_footprint
+from entropy_explore_env.frontiers.voxel_states import VoxelStates, new_states, note_more, update_states
 
 
 class TerrainMap(NamedTuple):
     """What is read off one robot's belief of a height field; B blocks of columns, H heights each."""
 
-    state: np.ndarray
-    """(V,) uint8, flags as in a FrontierMap."""
-    excluded: np.ndarray
-    """(V,) uint8, EXCLUDED where a scan was taken."""
+    states: VoxelStates
+    columns: Blocks
+    """Of which a column's state is that of its surface, UNEXPLORED and UNMAPPED where it has none."""
     ground: np.ndarray
     """(X, Y) int32, solid layers of a mapped column; NONE = not mapped."""
-    unexplored: np.ndarray
-    """(X·Y,) uint8, whether a column's surface is unexplored at the level that counts now."""
-    flags: np.ndarray
-    """(X·Y,) uint8: EDGE, CANDIDATE."""
+    excluded: np.ndarray
+    """(V,) uint8, EXCLUDED where a scan was taken."""
     traversal_cost: np.ndarray
     """(V,) float32, 1 where the body may be, else inf."""
-    column: np.ndarray
-    """(B,) int32, the candidate column of a block; NONE = it has none."""
     voxel: np.ndarray
-    """(B·H,) int32, its candidates; NONE = none at this height."""
-    seen: np.ndarray
-    """(B·H,) float32, points that can be seen from it; inf = not counted since a change nearby."""
-    dirty: np.ndarray
-    """(B,) uint8, whether a block has to be updated."""
-    queued: np.ndarray
-    """(B,) int32, the blocks that have to be updated."""
-    changed: np.ndarray
-    """(X / TILE, Y / TILE) uint8, where ground was found."""
+    """(B·H,) int32, candidates; NONE = none at this height."""
+    bounds: np.ndarray
+    """(B·H,) float64, upper bound of V·(height factor) from there; inf = unknown."""
     ceiling: np.ndarray
     """(X, Y) int32, lowest layer of the no-fly zone."""
     size: tuple[int, int, int]
-    spacing: int
     rise: int
     """Layers between two candidates above each other."""
-    heights: int
-    """H."""
-    rows: int
-    """Blocks along y."""
     footprint: np.ndarray
     """(N, 3) int64 index offsets of the voxels that the body touches."""
-    reach: int
-    """Largest of these offsets."""
 
 
 def new_terrain_map(
-    shape: tuple[int, int, int], body_radius: float, spacing: int, rise: int, ceiling: np.ndarray
+    shape: tuple[int, int, int], body_radius: float, spacing: int, ceiling: np.ndarray
 ) -> TerrainMap:
-    """A map of which nothing is explored; arguments as of `new_frontier_map`."""
-    footprint = new_frontier_map((3, 3, 3), body_radius, None, 1).footprint
-    columns, voxels, heights = shape[0] * shape[1], math.prod(shape), math.ceil(shape[2] / rise)
-    rows = math.ceil(shape[1] / spacing)
-    count = math.ceil(shape[0] / spacing) * rows
+    """Return a map of which nothing is explored.
+
+    Args:
+        shape: (X, Y, Z) voxels.
+        body_radius: In voxel edges.
+        spacing: Voxels between candidates, along all axes.
+        ceiling: (X, Y) lowest layer of the no-fly zone.
+    """
+    footprint, states = body_footprint((3, 3, 3), body_radius, None), new_states(shape)
+    within = np.arange(-int(np.abs(footprint).max()), int(np.abs(footprint).max()) + 1)
+    square = np.stack(np.meshgrid(within, within, [0], indexing="ij"), axis=-1).reshape(-1, 3)
+    state = np.full(shape[0] * shape[1], UNEXPLORED | UNMAPPED, np.uint8)
+    columns = new_blocks((*shape[:2], 1), state, square, 0, spacing)
+    slots, voxels = len(columns.candidate) * math.ceil(shape[2] / spacing), math.prod(shape)
     return TerrainMap(
-        state=np.full(voxels, UNEXPLORED | UNMAPPED, np.uint8),
-        excluded=np.zeros(voxels, np.uint8),
+        states=states,
+        columns=columns,
         ground=np.full(shape[:2], NONE, np.int32),
-        unexplored=np.ones(columns, np.uint8),
-        flags=np.zeros(columns, np.uint8),
+        excluded=np.zeros(voxels, np.uint8),
         traversal_cost=np.full(voxels, np.inf, np.float32),
-        column=np.full(count, NONE, np.int32),
-        voxel=np.full(count * heights, NONE, np.int32),
-        seen=np.full(count * heights, np.inf, np.float32),
-        dirty=np.zeros(count, np.uint8),
-        queued=np.zeros(count, np.int32),
-        changed=np.zeros((shape[0] // TILE + 1, shape[1] // TILE + 1), np.uint8),
+        voxel=np.full(slots, NONE, np.int32),
+        bounds=np.full(slots, np.inf),
         ceiling=np.ascontiguousarray(ceiling, np.int32).copy(),
-        size=(int(shape[0]), int(shape[1]), int(shape[2])),
-        spacing=spacing,
-        rise=rise,
-        heights=heights,
-        rows=rows,
+        size=states.size,
+        rise=spacing,
         footprint=footprint,
-        reach=int(np.abs(footprint).max()),
     )
-
-
-@inlined_kernel
-def _differs(state, mean, precision, levels, first, last):
-    """Whether the flags of voxels `first` … `last` - 1 are not those of the belief."""
-    different = np.uint8(0)
-    for voxel in range(first, last):
-        different |= state[voxel] ^ state_of(mean[voxel], precision[voxel], levels)
-    return different != 0
 
 
 @lean_kernel
 def update_terrain(terrain, mean, precision, levels):
-    """Bring the map up to date with a belief, voxel by voxel; arguments as of `update_frontiers`."""
-    size, count = terrain.size, 0
-    for column in range(size[0] * size[1]):
-        first, last = column * size[2], (column + 1) * size[2]
-        if _differs(terrain.state, mean, precision, levels, first, last):
-            for voxel in range(first, last):
-                terrain.state[voxel] = state_of(mean[voxel], precision[voxel], levels)
-            x, y = column // size[1], column % size[1]
-            if find_ground(terrain, x, y):
-                terrain.changed[x // TILE, y // TILE] = 1
-            count = _queue_around(terrain, x, y, terrain.reach + 2, count)
+    """Bring a TerrainMap up to date with a belief; arguments as of `update_states`."""
+    columns, count, before = terrain.columns, 0, NONE
+    for place in range(update_states(terrain.states, mean, precision, levels)):
+        voxel = terrain.states.changed[place]
+        column = voxel // terrain.size[2]
+        if column != before:
+            if _find_ground(terrain, column):
+                note_more(terrain.states, voxel)
+            count, before = queue_around(columns, column, columns.reach + 2, count), column
     update_columns(terrain, count)
 
 
 @lean_kernel
 def update_columns(terrain, count):
-    """Find the edge, the free space and the candidates of the queued blocks."""
+    """Find the edge, the free space and the candidates of the first `count` queued blocks."""
+    columns = terrain.columns
+    mark_edges(columns, count)
     for place in range(count):
-        _mark_edge(terrain, terrain.queued[place])
-    for place in range(count):
-        _choose_candidates(terrain, terrain.queued[place])
-        terrain.dirty[terrain.queued[place]] = 0
+        block = columns.queued[place]
+        _find_room(terrain, block)
+        choose_candidate(columns, block)
+        take_column(terrain, block)
 
 
 @lean_kernel
-def _queue_around(terrain, x, y, reach, count):
-    """Queue the blocks that have a column within `reach` along both axes."""
-    size, wide = terrain.size, terrain.spacing
-    for i in range(max(x - reach, 0) // wide, min(x + reach, size[0] - 1) // wide + 1):
-        for j in range(max(y - reach, 0) // wide, min(y + reach, size[1] - 1) // wide + 1):
-            count = queue_block(terrain, i * terrain.rows + j, count)
-    return count
-
-
-@lean_kernel
-def find_ground(terrain, x, y):
-    """Find a column's ground from its voxels' states; returns whether its state changed."""
-    size, state = terrain.size, terrain.state
-    column = x * size[1] + y
-    ground, unexplored = NONE, 1
-    for layer in range(size[2] - 1, -1, -1):
-        voxel = column * size[2] + layer
-        if state[voxel] & COVERED and state[voxel] & UNMAPPED == 0:
-            clear = layer == size[2] - 1 or state[voxel + 1] & (UNMAPPED | COVERED) == 0
-            if clear:
-                ground = layer + 1
-                unexplored = 1 if state[voxel] & UNEXPLORED else 0
+def _find_ground(terrain, column):
+    """Find a column's ground from its voxels' states; return whether its state changed."""
+    x, y, high, state = (
+        column // terrain.size[1],
+        column % terrain.size[1],
+        terrain.size[2],
+        terrain.states.state,
+    )
+    ground, now = NONE, UNEXPLORED | UNMAPPED
+    for layer in range(high - 1, -1, -1):
+        voxel = column * high + layer
+        if state[voxel] & COVERED:
+            if layer == high - 1 or state[voxel + 1] & (UNMAPPED | COVERED) == 0:
+                ground, now = layer + 1, state[voxel] & UNEXPLORED
             break
-    different = ground != terrain.ground[x, y] or unexplored != terrain.unexplored[column]
-    terrain.ground[x, y], terrain.unexplored[column] = ground, unexplored
+    different = ground != terrain.ground[x, y] or now != terrain.columns.state[column]
+    terrain.ground[x, y], terrain.columns.state[column] = ground, now
     return different
 
 
-@inlined_kernel
-def _span(terrain, block):
-    """First column of a block along x and y, and one past its last."""
-    i, j, wide = block // terrain.rows, block % terrain.rows, terrain.spacing
-    return i * wide, min((i + 1) * wide, terrain.size[0]), j * wide, min((j + 1) * wide, terrain.size[1])
-
-
-@inlined_kernel
-def _apart(terrain, block, x, y):
-    """Squared distance, in half columns, of a column from the middle of its block."""
-    i0, i1, j0, j1 = _span(terrain, block)
-    dx, dy = 2 * x + 1 - i0 - i1, 2 * y + 1 - j0 - j1
-    return dx * dx + dy * dy
+@lean_kernel
+def _find_room(terrain, block):
+    """Set traversal costs in a block, and ROOM where there is a candidate above a column."""
+    low, high = block_span(terrain.columns, block)
+    for x in range(low[0], high[0]):
+        for y in range(low[1], high[1]):
+            column = x * terrain.size[1] + y
+            for z in range(terrain.size[2]):
+                voxel = column * terrain.size[2] + z
+                terrain.traversal_cost[voxel] = 1.0 if _may_fly(terrain, x, y, z) else math.inf
+            room = False
+            for height in range(_heights(terrain)):
+                room = room or _at_height(terrain, column, height) != NONE
+            set_room(terrain.columns, column, room)
 
 
 @lean_kernel
-def _mark_edge(terrain, block):
-    """Set EDGE in a block: mapped columns that are, or are beside, unexplored ones."""
-    size, ground, unexplored = terrain.size, terrain.ground, terrain.unexplored
-    i0, i1, j0, j1 = _span(terrain, block)
-    for x in range(i0, i1):
-        for y in range(j0, j1):
-            column = x * size[1] + y
-            terrain.flags[column] &= CANDIDATE
-            if ground[x, y] == NONE:
-                continue
-            found = unexplored[column] > 0
-            found |= x > 0 and unexplored[column - size[1]] > 0
-            found |= x < size[0] - 1 and unexplored[column + size[1]] > 0
-            found |= y > 0 and unexplored[column - 1] > 0
-            found |= y < size[1] - 1 and unexplored[column + 1] > 0
-            if found:
-                terrain.flags[column] |= EDGE
-
-
-@lean_kernel
-def may_fly(terrain, x, y, z):
+def _may_fly(terrain, x, y, z):
     """Whether a body's footprint is above mapped ground, below the ceiling and not covered."""
     size = terrain.size
     for offset in terrain.footprint:
@@ -217,132 +164,47 @@ def may_fly(terrain, x, y, z):
         ground = terrain.ground[i, j]
         if ground == NONE or k < ground or k >= terrain.ceiling[i, j]:
             return False
-        if terrain.state[flat_index(size, i, j, k)] & COVERED:
+        if terrain.states.state[flat_index(size, i, j, k)] & COVERED:
             return False
     return True
 
 
-@lean_kernel
-def _choose_candidates(terrain, block):
-    """Set traversal costs and CANDIDATE in a block, choose its column, and the heights above it."""
-    size = terrain.size
-    i0, i1, j0, j1 = _span(terrain, block)
-    best, nearest = NONE, math.inf
-    for x in range(i0, i1):
-        for y in range(j0, j1):
-            column = x * size[1] + y
-            for z in range(size[2]):
-                terrain.traversal_cost[column * size[2] + z] = 1.0 if may_fly(terrain, x, y, z) else math.inf
-            terrain.flags[column] &= EDGE
-            if _near_edge(terrain, x, y) and _has_room(terrain, column):
-                terrain.flags[column] |= CANDIDATE
-                apart = _apart(terrain, block, x, y)
-                if apart < nearest:
-                    best, nearest = column, apart
-    _take_column(terrain, block, best)
+@inlined_kernel
+def _heights(terrain):
+    """Return H."""
+    return len(terrain.voxel) // len(terrain.columns.candidate)
 
 
 @inlined_kernel
 def _at_height(terrain, column, height):
-    """The voxel at a height of the candidates above a column; NONE where a body cannot be, or has scanned."""
-    layer = terrain.ground[column // terrain.size[1], column % terrain.size[1]] + 1 + height * terrain.rise
-    if layer >= terrain.size[2]:
+    """Return the voxel at a height above a column; NONE where a body cannot be, or has scanned."""
+    ground = terrain.ground[column // terrain.size[1], column % terrain.size[1]]
+    layer = ground + 1 + height * terrain.rise
+    if ground == NONE or layer >= terrain.size[2]:
         return NONE
     voxel = column * terrain.size[2] + layer
     return NONE if math.isinf(terrain.traversal_cost[voxel]) or terrain.excluded[voxel] else voxel
 
 
-@inlined_kernel
-def _has_room(terrain, column):
-    """Whether there is a candidate above a column."""
-    if terrain.ground[column // terrain.size[1], column % terrain.size[1]] == NONE:
-        return False
-    for height in range(terrain.heights):
-        if _at_height(terrain, column, height) != NONE:
-            return True
-    return False
-
-
 @lean_kernel
-def _take_column(terrain, block, column):
-    """Set the candidate column of a block, or NONE, and its candidates."""
-    changed = column != terrain.column[block]
-    terrain.column[block] = column
-    for height in range(terrain.heights):
-        place = block * terrain.heights + height
+def take_column(terrain, block):
+    """Set the candidates of a block above the column that represents it."""
+    column = terrain.columns.candidate[block]
+    for height in range(_heights(terrain)):
+        slot = block * _heights(terrain) + height
         voxel = _at_height(terrain, column, height) if column != NONE else NONE
-        if changed or voxel != terrain.voxel[place]:
-            terrain.voxel[place] = voxel
-            terrain.seen[place] = math.inf
+        if voxel != terrain.voxel[slot]:
+            terrain.voxel[slot] = voxel
+            terrain.bounds[slot] = math.inf
 
 
 @lean_kernel
-def choose_reached_columns(terrain, cost):
-    """Choose another column for blocks whose candidates no path reaches; (V,) path costs, inf = none."""
-    size = terrain.size
-    for block in range(len(terrain.column)):
-        if terrain.column[block] == NONE or _is_reached(terrain, terrain.column[block], cost):
-            continue
-        i0, i1, j0, j1 = _span(terrain, block)
-        best, nearest = NONE, math.inf
-        for x in range(i0, i1):
-            for y in range(j0, j1):
-                column, apart = x * size[1] + y, _apart(terrain, block, x, y)
-                wanted = terrain.flags[column] & CANDIDATE and apart < nearest
-                if wanted and _is_reached(terrain, column, cost):
-                    best, nearest = column, apart
-        if best != NONE:
-            _take_column(terrain, block, best)
-
-
-@inlined_kernel
-def _is_reached(terrain, column, cost):
-    """Whether a candidate above a column was reached."""
-    for height in range(terrain.heights):
-        voxel = _at_height(terrain, column, height)
-        if voxel != NONE and not math.isinf(cost[voxel]):
-            return True
-    return False
-
-
-@inlined_kernel
-def _near_edge(terrain, x, y):
-    """Whether a column of the edge is within the body's reach of this one."""
-    size, reach = terrain.size, terrain.reach
-    for i in range(max(x - reach, 0), min(x + reach, size[0] - 1) + 1):
-        for j in range(max(y - reach, 0), min(y + reach, size[1] - 1) + 1):
-            if terrain.flags[i * size[1] + j] & EDGE:
-                return True
-    return False
-
-
-@lean_kernel
-def reset_bounds(changed, size, voxels, seen, reach):
-    """Reset the counts of candidates within reach of a changed tile, and clear the changes.
-
-    Args:
-        changed: (TX, TY) uint8, cleared.
-        size: (X, Y, Z) voxels.
-        voxels: (B,) int32 candidates, NONE = none.
-        seen: (B,) float32, set to inf.
-        reach: In voxel edges, at most as far as the grid is wide.
-    """
-    some = False
-    for i in range(changed.shape[0]):
-        for j in range(changed.shape[1]):
-            some = some or changed[i, j] > 0
-    if not some:
-        return
-    wide = int(min(reach, size[0] + size[1])) + 1
-    for place in range(len(voxels)):
-        if voxels[place] == NONE or math.isinf(seen[place]):
-            continue
-        column = voxels[place] // size[2]
-        x, y = column // size[1], column % size[1]
-        for i in range(max(x - wide, 0) // TILE, min((x + wide) // TILE, changed.shape[0] - 1) + 1):
-            for j in range(max(y - wide, 0) // TILE, min((y + wide) // TILE, changed.shape[1] - 1) + 1):
-                if changed[i, j]:
-                    seen[place] = math.inf
-    for i in range(changed.shape[0]):
-        for j in range(changed.shape[1]):
-            changed[i, j] = 0
+def fill_column_costs(terrain, cost, least):
+    """Fill (X·Y,) with the least of (V,) float64 path costs to the candidates that a column may have."""
+    for column in range(len(least)):
+        least[column] = math.inf
+        if terrain.columns.flags[column] & CANDIDATE:
+            for height in range(_heights(terrain)):
+                voxel = _at_height(terrain, column, height)
+                if voxel != NONE:
+                    least[column] = min(least[column], cost[voxel])

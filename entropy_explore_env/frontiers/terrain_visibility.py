@@ -13,20 +13,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from entropy_explore_env.belief.voxel_index import grid_index
 from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel
-from entropy_explore_env.frontiers.voxel_map import NONE
-from entropy_explore_env.frontiers.voxel_visibility import count_point, grid_indices, start_count
-
-
-class ColumnCounts(NamedTuple):
-    """What is seen from K places."""
-
-    seen: np.ndarray
-    """(K,) float64, columns."""
-    weighed: np.ndarray
-    """(K,) float64, columns weighed by promises."""
-    factor: np.ndarray
-    """(K,) float64, the height factor."""
+from entropy_explore_env.frontiers.blocks import NONE, UNEXPLORED
+from entropy_explore_env.frontiers.visibility import count_point, start_count
 
 
 class ViewModel(NamedTuple):
@@ -39,7 +29,9 @@ class ViewModel(NamedTuple):
     patch: int
     """Half the width of the patch whose mean ground is z_av."""
     gamma: float
-    """γ of the height factor."""
+    """γ of the height factor; negative = no height factor."""
+    unit: float
+    """Metres a layer, in the height factor."""
     highest: float
     """The greatest z_f - z_av of a candidate."""
     fade: float
@@ -69,7 +61,7 @@ def height_at(terrain, x, y, eye, average, fade):
 
 @lean_kernel
 def count_below(counter, terrain, eye, average, azimuths, view_model, marking):
-    """Unexplored columns that are seen from a place: (all, weighed by promises).
+    """Count the unexplored columns that are seen from a place: (all, weighed by promises).
 
     Args:
         counter: The counter.
@@ -80,25 +72,7 @@ def count_below(counter, terrain, eye, average, azimuths, view_model, marking):
         view_model: Reach, min_tangent and fade matter.
         marking: Whether the robot promises to see these columns.
     """
-    number = start_count(counter)
-    return _count_more(counter, number, terrain, eye, average, azimuths, view_model, marking)
-
-
-@lean_kernel
-def count_below_together(counter, terrain, eyes, azimuths, view_model):
-    """Unexplored columns that are seen from any of (N, 3) places, weighed by promises; see `count_below`."""
-    number, weighed = start_count(counter), 0.0
-    for place in eyes:
-        eye = (place[0], place[1], place[2])
-        average = mean_ground(terrain, int(eye[0]), int(eye[1]), view_model.patch)
-        weighed += _count_more(counter, number, terrain, eye, average, azimuths, view_model, False)[1]
-    return weighed
-
-
-@lean_kernel
-def _count_more(counter, number, terrain, eye, average, azimuths, view_model, marking):
-    """`count_below`, of the columns that the count of this number has not met yet."""
-    points, weighed = 0, 0.0
+    number, points, weighed = start_count(counter), 0, 0.0
     size, reach = terrain.size, view_model.reach
     for direction in azimuths:
         x, y = int(eye[0]), int(eye[1])
@@ -118,7 +92,7 @@ def _count_more(counter, number, terrain, eye, average, azimuths, view_model, ma
             column = x * size[1] + y
             near = enters * enters + drop * drop <= reach * reach
             if slope > horizon and near and drop >= view_model.min_tangent * enters:
-                if terrain.unexplored[column] and counter.stamp[column] != number:
+                if terrain.columns.state[column] & UNEXPLORED and counter.stamp[column] != number:
                     counter.stamp[column] = number
                     points += 1
                     weighed += count_point(counter, column, marking)
@@ -135,13 +109,13 @@ def _count_more(counter, number, terrain, eye, average, azimuths, view_model, ma
 
 @lean_kernel
 def count_columns_in_ball(counter, terrain, eye, average, view_model, marking):
-    """The naive V: unexplored columns whose tops, extrapolated, lie in a ball, seen or not."""
+    """Count the naive V: unexplored columns whose tops, extrapolated, lie in a ball, seen or not."""
     points, weighed, size, reach = 0, 0.0, terrain.size, view_model.reach
     wide = min(reach, size[0] + size[1])
     for x in range(max(int(eye[0] - wide - 0.5), 0), min(int(eye[0] + wide + 1.0), size[0])):
         for y in range(max(int(eye[1] - wide - 0.5), 0), min(int(eye[1] + wide + 1.0), size[1])):
             column = x * size[1] + y
-            if not terrain.unexplored[column]:
+            if not terrain.columns.state[column] & UNEXPLORED:
                 continue
             drop = eye[2] - height_at(terrain, x, y, eye, average, view_model.fade)
             dx, dy = x + 0.5 - eye[0], y + 0.5 - eye[1]
@@ -152,11 +126,8 @@ def count_columns_in_ball(counter, terrain, eye, average, view_model, marking):
 
 
 @lean_kernel
-def count_columns_from(counter, terrain, voxels, azimuths, view_model, naive, counts):
-    """Count the columns seen from K voxels, also weighed by promises, and the height factor of each.
-
-    The factor is (z_f - z_av)^γ z_f^(1 - γ), heights above the workspace's floor in layers (sect. 3.3); 0 for
-    places so high above the ground that little of it can be seen, which are no candidates.
+def count_columns_from(counter, terrain, voxels, azimuths, view_model, naive, seen, weighed):
+    """Count the columns seen from K voxels, times the height factor of each.
 
     Args:
         counter: The counter.
@@ -165,70 +136,62 @@ def count_columns_from(counter, terrain, voxels, azimuths, view_model, naive, co
         azimuths: (D, 2) float64.
         view_model: How columns are seen.
         naive: Whether columns in a ball are counted.
-        counts: ColumnCounts, filled in.
+        seen: (K,) filled in.
+        weighed: (K,) filled in, with columns weighed by promises.
     """
-    seen, weighed, factor = counts.seen, counts.weighed, counts.factor
     for place in range(len(voxels)):
-        x, y, z = grid_indices(terrain.size, voxels[place])
-        eye = (x + 0.5, y + 0.5, z + 0.5)
-        average = mean_ground(terrain, x, y, view_model.patch)
-        seen[place], weighed[place] = 0.0, 0.0
-        factor[place] = _height_factor(eye[2], average, view_model)
-        if factor[place] == 0.0:
-            continue
-        if naive:
+        x, y, z = grid_index(terrain.size, voxels[place])
+        eye, average = (x + 0.5, y + 0.5, z + 0.5), mean_ground(terrain, x, y, view_model.patch)
+        factor = height_factor(eye[2], average, view_model)
+        points, value = 0, 0.0
+        if factor > 0.0 and naive:
             points, value = count_columns_in_ball(counter, terrain, eye, average, view_model, False)
-        else:
+        elif factor > 0.0:
             points, value = count_below(counter, terrain, eye, average, azimuths, view_model, False)
-        seen[place], weighed[place] = points, value
+        seen[place], weighed[place] = points * factor, value * factor
 
 
 @inlined_kernel
-def _height_factor(height, average, view_model):
-    """(z_f - z_av)^γ z_f^(1 - γ); 0 where z_f - z_av is too much. See `count_columns_from`."""
+def height_factor(height, average, view_model):
+    """Return (z_f - z_av)^γ z_f^(1 - γ), heights above the workspace's floor in metres (sect. 3.3).
+
+    It is 0 for places so high above the ground that little of it can be seen, which are no candidates.
+    """
     above, gamma = height - average, view_model.gamma
-    return 0.0 if above > view_model.highest else max(above, 1e-3) ** gamma * height ** (1.0 - gamma)
-
-
-@lean_kernel
-def sum_rows(terrain, sums):
-    """Fill (X, Y + 1) int32 with the unexplored columns of each row along y before a column."""
-    for x in range(terrain.size[0]):
-        sums[x, 0] = 0
-        for y in range(terrain.size[1]):
-            sums[x, y + 1] = sums[x, y] + terrain.unexplored[x * terrain.size[1] + y]
+    if above > view_model.highest:
+        return 0.0
+    return 1.0 if gamma < 0.0 else max(above, 1e-3) ** gamma * height ** (1.0 - gamma) * view_model.unit
 
 
 def half_widths(reach: float) -> np.ndarray:
-    """(W,) int64, how far on along y columns touch a disc of this radius, by their distance along x.
+    """Return (W,) int64, how far on along y columns touch a disc of this radius, by their distance along x.
 
     The disc is about the middle of a column; distances are in columns.
     """
     within = reach + math.sqrt(0.5)  # the middle of a column that touches it
-    return np.array([int(math.sqrt(within**2 - across**2)) for across in range(int(within) + 1)], np.int64)
+    return np.sqrt(within**2 - np.arange(int(within) + 1) ** 2).astype(np.int64)
 
 
 @lean_kernel
-def bound_columns(terrain, sums, widths, voxels, view_model, most, factor):
-    """Fill (K,) with the unexplored columns in range of K voxels, seen or not, and the height factors.
+def bound_columns(terrain, sums, widths, voxels, view_model, bounds):
+    """Fill in the unexplored columns in range of K voxels, seen or not, times the height factors.
 
     No more than this can be seen from there.
 
     Args:
         terrain: The map.
-        sums: (X, Y + 1) of `sum_rows`.
+        sums: (X, Y + 1) int32, the unexplored columns of each row along y before a column.
         widths: (W,) of `half_widths`, for the sensor's reach.
         voxels: (K,) int32.
         view_model: How columns are seen.
-        most: (K,) filled in.
-        factor: (K,) filled in.
+        bounds: (K,) filled in.
     """
     size, last = terrain.size, len(widths) - 1
     for place in range(len(voxels)):
-        x, y, z = grid_indices(size, voxels[place])
-        factor[place] = _height_factor(z + 0.5, mean_ground(terrain, x, y, view_model.patch), view_model)
+        x, y, z = grid_index(size, voxels[place])
         found = 0
         for i in range(max(x - last, 0), min(x + last, size[0] - 1) + 1):
             wide = widths[abs(i - x)]
             found += sums[i, min(y + wide + 1, size[1])] - sums[i, max(y - wide, 0)]
-        most[place] = found
+        average = mean_ground(terrain, x, y, view_model.patch)
+        bounds[place] = found * height_factor(z + 0.5, average, view_model)

@@ -25,11 +25,11 @@ import numpy as np
 
 from entropy_explore_env.belief.paths.search import Search, new_search
 from entropy_explore_env.errors import ActionError, SettingError
-from entropy_explore_env.frontiers.candidates import KNOWN_SIGMA
-from entropy_explore_env.frontiers.frontier_cells import FrontierCells
+from entropy_explore_env.frontiers.blocks import NONE
+from entropy_explore_env.frontiers.frontier_map import KNOWN_SIGMA
 from entropy_explore_env.frontiers.knowledge import RobotKnowledge, voxel_of
 from entropy_explore_env.frontiers.path_lengths import KnownPaths
-from entropy_explore_env.frontiers.voxel_map import NONE
+from entropy_explore_env.frontiers.voxel_frontiers import VoxelFrontiers
 from entropy_explore_env.planner.driver import Driver
 from entropy_explore_env.planner.scene import NOWHERE, ROOM, STAY, Goal, Scene, scanned_here
 from entropy_explore_env.planner.stops import apart_m, stop_towards
@@ -43,7 +43,7 @@ _GAZES = 4
 class _Memory:
     """What is kept of a robot from one decision to the next."""
 
-    cells: FrontierCells
+    cells: VoxelFrontiers
     paths: KnownPaths
     level: float
     """σ from which on a voxel counts as known."""
@@ -81,7 +81,7 @@ class FrontierRule(Driver):
         self._memories: dict[int, _Memory] = {}
         self._finest = min(scenario.ending.sigma_end, KNOWN_SIGMA) if self.refines else KNOWN_SIGMA
 
-    def cells_of(self, robot: int) -> FrontierCells:
+    def cells_of(self, robot: int) -> VoxelFrontiers:
         """Return the frontier cells of a robot; available after its first choice."""
         return self._memories[robot].cells
 
@@ -94,7 +94,7 @@ class FrontierRule(Driver):
         memory = self._memories[view.robot]
         memory.cells.update(view, memory.level)
 
-    def new_cells(self, view: RobotKnowledge) -> FrontierCells:
+    def new_cells(self, view: RobotKnowledge) -> VoxelFrontiers:
         """Return the empty frontier cells of a robot; an exposure surface is not known before its first view.
 
         Raises:
@@ -103,7 +103,7 @@ class FrontierRule(Driver):
         if view.ceiling is not None:
             allowed = "a world without an exposure surface: there frontiers are columns of ground, which"
             raise SettingError("strategy", self.rule, f"{allowed} per-time-visibility knows")
-        return FrontierCells(self._scenario, view.kind)
+        return VoxelFrontiers(self._scenario, view.kind)
 
     def note_blocked(self, view: RobotKnowledge) -> None:
         """Drop the cell to which the drive was blocked, or go on to it where it was to be looked at."""
@@ -160,7 +160,7 @@ class FrontierRule(Driver):
             return self.make_room(view)
         return self._towards(view, memory, here, goal)
 
-    def arrive(self, view: RobotKnowledge, cells: FrontierCells, here: int) -> np.ndarray | None:
+    def arrive(self, view: RobotKnowledge, cells: VoxelFrontiers, here: int) -> np.ndarray | None:
         """Learn from the scan at the target; return a viewpoint (5,) that turns the robot there, or None."""
         if not (cells.is_frontier(here) and scanned_here(view)):
             return None
@@ -173,7 +173,7 @@ class FrontierRule(Driver):
         cells.drop(here, with_edges=True)
         return None
 
-    def _holds(self, cells: FrontierCells, target: int) -> bool:
+    def _holds(self, cells: VoxelFrontiers, target: int) -> bool:
         """Whether a target is one still."""
         return cells.is_known_free(target) if self.until_reached else cells.is_frontier(target)
 
@@ -190,7 +190,7 @@ class FrontierRule(Driver):
             memory.cells.readmit()
             memory.cells.update(view, memory.level)
 
-    def _checked(self, picked: object, cells: FrontierCells, here: int) -> Goal:
+    def _checked(self, picked: object, cells: VoxelFrontiers, here: int) -> Goal:
         """Return what a rule picked as a Goal.
 
         Raises:

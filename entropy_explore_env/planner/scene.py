@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from entropy_explore_env.frontiers.frontier_cells import FrontierCells
+from entropy_explore_env.frontiers.blocks import NONE
 from entropy_explore_env.frontiers.knowledge import (
     RobotKnowledge,
     stays,
@@ -16,7 +16,7 @@ from entropy_explore_env.frontiers.knowledge import (
     voxel_of,
 )
 from entropy_explore_env.frontiers.path_lengths import KnownPaths
-from entropy_explore_env.frontiers.voxel_map import NONE
+from entropy_explore_env.frontiers.voxel_frontiers import VoxelFrontiers
 
 STAY = -2
 """As a goal: the robot stays where it is, and scans."""
@@ -65,7 +65,7 @@ class Scene:
     """
 
     view: RobotKnowledge
-    cells: FrontierCells
+    cells: VoxelFrontiers
     paths: KnownPaths
     here: int
     target: int

@@ -20,7 +20,7 @@ import math
 
 import numpy as np
 
-from entropy_explore_env.frontiers.voxel_map import NONE
+from entropy_explore_env.frontiers.blocks import NONE
 from entropy_explore_env.planner.scene import NOWHERE, Goal, Scene, scanned_here
 from entropy_explore_env.planner.tour import Tour
 
@@ -68,7 +68,7 @@ class SharedTour(Tour):
             return Goal(target, target)
         sight = self.view * cells.reach
         unseen = cells.unseen_around(target, self.around)
-        if cells.first_lookout(np.array([scene.here], np.int32), unseen, sight) != NONE:
+        if cells.first_viewing_place(np.array([scene.here], np.int32), unseen, sight) != NONE:
             return Goal(target, target, looked=True) if scanned_here(scene.view) else Goal(target, scene.here)
         places = np.append(cells.standing_around(target, sight), np.int32(target))
         lengths = scene.paths.lengths_from(scene.here, places)
@@ -76,5 +76,5 @@ class SharedTour(Tour):
             lengths = lengths + scene.paths.lengths_from(int(place), places)
         order = np.argsort(lengths, kind="stable")
         shorter = places[order[lengths[order] < lengths[-1] - _SHORTER]]
-        first = cells.first_lookout(shorter, unseen, sight)
+        first = cells.first_viewing_place(shorter, unseen, sight)
         return Goal(target, target if first == NONE else int(shorter[first]))

@@ -19,8 +19,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from entropy_explore_env.frontiers.blocks import NONE
 from entropy_explore_env.frontiers.open_tours import open_tour, tour_length
-from entropy_explore_env.frontiers.voxel_map import NONE
 from entropy_explore_env.planner.frontier_rule import FrontierRule
 from entropy_explore_env.planner.scene import Goal, Scene
 
@@ -87,7 +87,7 @@ class Tour(FrontierRule):
         """Which near frontier cells cover all of them: the target, then of equally good ones the nearest."""
         if len(voxels) == 0:
             return []
-        seen = scene.paths.sights(scene.centres(voxels), self.cover * scene.cells.reach)
+        seen = scene.paths.free_lines(scene.centres(voxels), self.cover * scene.cells.reach)
         left, chosen = np.ones(len(voxels), bool), []
         for target in np.flatnonzero(voxels == scene.target):
             chosen.append(int(target))

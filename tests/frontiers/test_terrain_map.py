@@ -9,28 +9,24 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from entropy_explore_env.frontiers.blocks import NONE, UNEXPLORED, queue_around, replace_unreached
 from entropy_explore_env.frontiers.terrain_map import (
-    TILE,
-    choose_reached_columns,
+    fill_column_costs,
     new_terrain_map,
-    reset_bounds,
+    take_column,
     update_columns,
     update_terrain,
 )
 from entropy_explore_env.frontiers.terrain_visibility import (
-    ColumnCounts,
     ViewModel,
     bound_columns,
     count_below,
-    count_below_together,
     count_columns_from,
     count_columns_in_ball,
     half_widths,
     mean_ground,
-    sum_rows,
 )
-from entropy_explore_env.frontiers.voxel_map import NONE, queue_block
-from entropy_explore_env.frontiers.voxel_visibility import new_counter
+from entropy_explore_env.frontiers.visibility import new_counter
 from tests.reference import sawhney as reference
 from tests.reference.scenes import drawn, seeds
 
@@ -39,9 +35,9 @@ SHAPE = (9, 13, 8)
 CEILING = 7
 
 
-def known_ground(ground, shape=SHAPE, ceiling=CEILING, radius=0.0, spacing=2, rise=2):
+def known_ground(ground, shape=SHAPE, ceiling=CEILING, radius=0.0, spacing=2):
     """A map in which the columns with ground ≥ 0 are known."""
-    terrain = new_terrain_map(shape, radius, spacing, rise, np.full(shape[:2], ceiling, np.int32))
+    terrain = new_terrain_map(shape, radius, spacing, np.full(shape[:2], ceiling, np.int32))
     survey_ground(terrain, ground, shape)
     return terrain
 
@@ -59,13 +55,21 @@ def hills(seed, known=0.7, shape=SHAPE):
     return ground, rng
 
 
+def replaced(terrain, cost):
+    """Replace candidates that (V,) path costs do not reach, as TerrainFrontiers does."""
+    costs = np.empty(len(terrain.columns.state))
+    fill_column_costs(terrain, cost, costs)
+    replace_unreached(terrain.columns, costs)
+    take_column(terrain, 0)
+
+
 @given(seeds)
 @drawn(30)
 def test_ground_is_the_known_covered_voxel_below_a_known_free_one(seed):
     rng = np.random.default_rng(seed)
     mean = np.where(rng.random(SHAPE) < 0.5, 0.9, 0.1).astype(np.float32)
     precision = np.where(rng.random(SHAPE) < 0.3, 0.1, 9.0).astype(np.float32)
-    terrain = new_terrain_map(SHAPE, 0.0, 3, 2, np.full(SHAPE[:2], CEILING, np.int32))
+    terrain = new_terrain_map(SHAPE, 0.0, 3, np.full(SHAPE[:2], CEILING, np.int32))
     update_terrain(terrain, mean.reshape(-1), precision.reshape(-1), LEVELS)
     state = np.where(precision < 4.0, 3, 0) | np.where((mean > 0.5) & (precision >= 4.0), 4, 0)
     np.testing.assert_array_equal(terrain.ground, reference.ground_of(state))
@@ -87,7 +91,7 @@ def test_columns_are_those_whose_tops_rays_meet(seed, height, reach, min_tangent
     unexplored = terrain.ground == NONE
     wanted = reference.seen_columns(heights, unexplored, eye, azimuths, reach, min_tangent)
     counter = new_counter(9 * 13, SHAPE)
-    view_model = ViewModel(reach, min_tangent, 2, 0.5, math.inf, fade)
+    view_model = ViewModel(reach, min_tangent, 2, 0.5, 1.0, math.inf, fade)
     points, value = count_below(counter, terrain, eye, average, azimuths, view_model, True)
     marked = {
         tuple(map(int, np.unravel_index(c, (9, 13))))
@@ -103,30 +107,12 @@ def test_columns_are_those_whose_tops_rays_meet(seed, height, reach, min_tangent
     assert count_columns_in_ball(counter, terrain, eye, average, view_model, False)[0] == len(ball)
 
 
-def test_columns_seen_from_some_places_together_count_once():
-    ground, rng = hills(7)
-    terrain, counter = known_ground(ground), new_counter(9 * 13, SHAPE)
-    angles = 0.05 + np.arange(24) * (2 * math.pi / 24)
-    azimuths = np.stack([np.cos(angles), np.sin(angles)], axis=-1)
-    view_model = ViewModel(6.0, 0.0, 2, 0.5, math.inf, 6.0)
-    eyes = np.stack([*(np.floor(rng.random((3, 2)) * (9, 13)) + 0.5).T, np.array([6.5, 7.0, 7.5])], axis=-1)
-    together, alone = set[tuple[int, ...]](), []
-    for x, y, z in eyes.tolist():
-        average = reference.mean_height(terrain.ground, int(x), int(y), 2)
-        heights = reference.surface(terrain.ground, (x, y, z), average, 6.0)
-        seen = reference.seen_columns(heights, terrain.ground == NONE, (x, y, z), azimuths, 6.0, 0.0)
-        together |= seen
-        alone.append(len(seen))
-    assert max(alone) < len(together) < sum(alone)
-    assert count_below_together(counter, terrain, eyes, azimuths, view_model) == len(together)
-
-
 def test_a_ridge_hides_the_valley_behind_it_by_hand():
     """Ground 1, a ridge of 4 at x = 4, unknown beyond: from 3 above the floor nothing is seen past it."""
     ground = np.ones((9, 3), np.int32)
     ground[4], ground[6:] = 4, NONE
     east = np.array([[1.0, 0.0]])
-    counter, view_model = new_counter(27, (9, 3, 8)), ViewModel(10.0, 0.0, 2, 0.5, math.inf, fade=10.0)
+    counter, view_model = new_counter(27, (9, 3, 8)), ViewModel(10.0, 0.0, 2, 0.5, 1.0, math.inf, fade=10.0)
     terrain = known_ground(ground, (9, 3, 8))
     for height, wanted in ((3.5, 0), (5.5, 1), (7.5, 2)):
         # z_av = 1: extrapolated 1 - d/10. From 5.5 over the ridge's far edge at d = 4.5: slope -1/3, which
@@ -144,9 +130,9 @@ def test_a_ridge_hides_the_valley_behind_it_by_hand():
 def test_candidates_hang_above_the_edge_between_ground_and_ceiling():
     ground = np.ones((9, 13), np.int32)
     ground[5:] = NONE
-    terrain = known_ground(ground, spacing=1)
+    terrain = known_ground(ground)
     found = np.stack(np.unravel_index(terrain.voxel[terrain.voxel != NONE], SHAPE), axis=-1)
-    assert set(found[:, 0]) == {4} and set(found[:, 1]) == set(range(13))
+    assert set(found[:, 0]) == {4} and set(found[:, 1]) == set(range(0, 13, 2))
     assert set(found[:, 2]) == {2, 4, 6}  # a layer of air below, two apart, and below layer 7
     traversal_cost = terrain.traversal_cost.reshape(SHAPE)
     assert np.isfinite(traversal_cost[:5, :, 1:7]).all() and np.isinf(traversal_cost[5:]).all()
@@ -163,21 +149,21 @@ def test_a_block_gives_a_column_that_was_reached_or_has_room_left():
     ground[0, 1], ground[2, 1] = 1, 1
     terrain = known_ground(ground, (4, 4, 8), spacing=4)
     near, far = 2 * 4 + 1, 1
-    assert terrain.column[0] == near
+    assert terrain.columns.candidate[0] == near
     cost = np.full(4 * 4 * 8, np.inf)
-    choose_reached_columns(terrain, cost)
-    assert terrain.column[0] == near  # neither was reached
-    cost[far * 8 + 4] = 3.0
-    terrain.seen[:] = 5.0
-    choose_reached_columns(terrain, cost)
-    assert terrain.column[0] == far and np.isinf(terrain.seen).all()
+    replaced(terrain, cost)
+    assert terrain.columns.candidate[0] == near  # neither was reached
+    cost[far * 8 + 2] = 3.0
+    terrain.bounds[:] = 5.0
+    replaced(terrain, cost)
+    assert terrain.columns.candidate[0] == far and np.isinf(terrain.bounds).all()
     assert set(terrain.voxel[terrain.voxel != NONE] // 8) == {far}
     terrain.excluded[near * 8 :][:8] = 1
-    update_columns(terrain, queue_block(terrain, 0, 0))
-    assert terrain.column[0] == far  # nothing is left above the middle one
+    update_columns(terrain, queue_around(terrain.columns, 0, 0, 0))
+    assert terrain.columns.candidate[0] == far  # nothing is left above the middle one
     terrain.excluded[far * 8 :][:8] = 1
-    update_columns(terrain, queue_block(terrain, 0, 0))
-    assert terrain.column[0] == NONE and (terrain.voxel == NONE).all()
+    update_columns(terrain, queue_around(terrain.columns, 0, 0, 0))
+    assert terrain.columns.candidate[0] == NONE and (terrain.voxel == NONE).all()
 
 
 def test_the_height_factor_by_hand():
@@ -186,54 +172,44 @@ def test_the_height_factor_by_hand():
     ground[7:] = NONE
     terrain = known_ground(ground)
     voxels = np.array([(4 * 13 + 5) * 8 + z for z in (3, 6)], np.int32)  # z_f = 3.5 and 6.5, z_av = 2
-    counts = ColumnCounts(np.empty(2), np.empty(2), np.empty(2))
-    seen, factor = counts.seen, counts.factor
+    seen, weighed = np.empty(2), np.empty(2)
     azimuths = np.array([[1.0, 0.0]])
     counter = new_counter(9 * 13, SHAPE)
-    view_model = ViewModel(10.0, 0.0, patch=1, gamma=0.5, highest=9.0, fade=10.0)
-    count_columns_from(counter, terrain, voxels, azimuths, view_model, False, counts)
-    assert factor.tolist() == pytest.approx([math.sqrt(1.5 * 3.5), math.sqrt(4.5 * 6.5)])
-    assert seen.tolist() == [1.0, 2.0]  # from 3.5 one ends on the line of sight over the edge
-    view_model = view_model._replace(gamma=1.0, highest=4.0)
-    count_columns_from(counter, terrain, voxels, azimuths, view_model, False, counts)
-    assert factor.tolist() == pytest.approx([1.5, 0.0]) and seen[1] == 0.0
+    view_model = ViewModel(10.0, 0.0, patch=1, gamma=0.5, unit=2.0, highest=9.0, fade=10.0)
+    # From 3.5 one column is seen, which ends on the line over the edge, from 6.5 two; a layer is 2 m high.
+    for changed, wanted in (
+        ({}, [2.0 * math.sqrt(1.5 * 3.5), 4.0 * math.sqrt(4.5 * 6.5)]),
+        ({"gamma": 1.0, "highest": 4.0}, [2.0 * 1.5, 0.0]),
+        ({"gamma": -1.0, "highest": 4.0}, [1.0, 0.0]),
+    ):
+        changed_model = view_model._replace(**changed)
+        count_columns_from(counter, terrain, voxels, azimuths, changed_model, False, seen, weighed)
+        assert seen.tolist() == weighed.tolist() == pytest.approx(wanted)
 
 
-@given(seeds, st.floats(0.6, 12.0), st.booleans())
+@given(seeds, st.floats(0.6, 12.0), st.booleans(), st.sampled_from([0.4, -1.0]))
 @drawn(60)
-def test_no_more_is_seen_than_lies_in_range(seed, reach, naive):
+def test_no_more_is_seen_than_lies_in_range(seed, reach, naive, gamma):
     ground, rng = hills(seed)
     terrain = known_ground(ground)
     voxels = rng.integers(0, math.prod(SHAPE), 20).astype(np.int32)
     angles = 0.05 + np.arange(40) * (2 * math.pi / 40)
     azimuths, view_model = (
         np.stack([np.cos(angles), np.sin(angles)], axis=-1),
-        ViewModel(reach, 0.0, 2, 0.4, 5.0, reach),
+        ViewModel(reach, 0.0, 2, gamma, 1.0, 5.0, reach),
     )
-    most, same, counts = np.empty(20), np.empty(20), ColumnCounts(*(np.empty(20) for _ in range(3)))
-    seen, factor = counts.seen, counts.factor
-    counter, sums = new_counter(9 * 13, SHAPE), np.empty((9, 14), np.int32)
-    count_columns_from(counter, terrain, voxels, azimuths, view_model, naive, counts)
-    sum_rows(terrain, sums)
-    bound_columns(terrain, sums, half_widths(reach), voxels, view_model, most, same)
-    np.testing.assert_array_equal(same, factor)
+    seen, weighed, most = np.empty((3, 20))
+    unexplored = terrain.columns.state.reshape(9, 13) & UNEXPLORED
+    sums = np.pad(np.cumsum(unexplored, 1, np.int32), ((0, 0), (1, 0)))
+    count_columns_from(
+        new_counter(9 * 13, SHAPE), terrain, voxels, azimuths, view_model, naive, seen, weighed
+    )
+    bound_columns(terrain, sums, half_widths(reach), voxels, view_model, most)
     assert (seen <= most).all()
     for voxel, bound in zip(voxels.tolist(), most, strict=True):
-        x, y, _ = np.unravel_index(voxel, SHAPE)
+        x, y, z = np.unravel_index(voxel, SHAPE)
+        above = z + 0.5 - reference.mean_height(terrain.ground, x, y, 2)
+        factor = 0.0 if above > 5.0 else max(above, 1e-3) ** 0.4 * (z + 0.5) ** 0.6 if gamma > 0.0 else 1.0
         near = [math.dist((x, y), place) <= reach + math.sqrt(0.5) for place in np.ndindex(9, 13)]
-        assert bound == np.count_nonzero(np.reshape(near, (9, 13)) & (terrain.ground == NONE))
-
-
-def test_what_was_seen_is_forgotten_near_new_ground_and_nowhere_else():
-    size = (40, 30, 1)
-    voxels = np.array([0, 20 * 30 + 15, NONE, 39 * 30 + 29], np.int32)
-    seen = np.array([5.0, 6.0, 7.0, 8.0], np.float32)
-    changed = np.zeros((40 // TILE + 1, 30 // TILE + 1), np.uint8)
-    reset_bounds(changed, size, voxels, seen, 5.0)
-    assert seen.tolist() == [5.0, 6.0, 7.0, 8.0]
-    changed[0, 0] = 1
-    reset_bounds(changed, size, voxels, seen, 5.0)
-    assert seen.tolist() == [math.inf, 6.0, 7.0, 8.0] and not changed.any()
-    changed[2, 1] = 1  # x 16 … 23, y 8 … 15
-    reset_bounds(changed, size, voxels, seen, 100.0)
-    assert np.isinf(seen[[0, 1, 3]]).all() and seen[2] == 7.0
+        found = np.count_nonzero(np.reshape(near, (9, 13)) & (terrain.ground == NONE))
+        assert bound == pytest.approx(found * factor)

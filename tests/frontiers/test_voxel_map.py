@@ -6,16 +6,9 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from entropy_explore_env.frontiers.voxel_map import (
-    CANDIDATE,
-    COVERED,
-    MAX_TRACKED_OPENINGS,
-    NONE,
-    UNEXPLORED,
-    UNMAPPED,
-    new_frontier_map,
-    update_frontiers,
-)
+from entropy_explore_env.frontiers.blocks import CANDIDATE, COVERED, NONE, UNEXPLORED, UNMAPPED
+from entropy_explore_env.frontiers.voxel_map import new_voxel_map, update_voxels
+from entropy_explore_env.frontiers.voxel_states import new_states, take_notes
 from tests.reference import sawhney as reference
 from tests.reference.scenes import drawn, seeds
 
@@ -37,7 +30,7 @@ def state_of(mean, precision, levels=LEVELS):
 
 
 def updated(frontiers, mean, precision, levels=LEVELS):
-    update_frontiers(frontiers, mean.reshape(-1), precision.reshape(-1), levels)
+    update_voxels(frontiers, mean.reshape(-1), precision.reshape(-1), levels)
 
 
 @given(st.sampled_from(SHAPES), st.sampled_from([0.0, 1.0, 1.3]), st.integers(1, 4), seeds)
@@ -45,18 +38,18 @@ def updated(frontiers, mean, precision, levels=LEVELS):
 def test_candidates_and_rates_are_those_of_the_definition_after_every_change(shape, radius, spacing, seed):
     rng = np.random.default_rng(seed)
     layer = 0 if shape[2] == 1 else None
-    frontiers = new_frontier_map(shape, radius, layer, spacing)
+    frontiers = new_voxel_map(shape, radius, layer, spacing)
     mean, precision = random_map(shape, rng)
     for levels in (LEVELS, LEVELS, FINER, FINER):
         updated(frontiers, mean, precision, levels)
         state = state_of(mean, precision, levels)
-        np.testing.assert_array_equal(frontiers.state.reshape(shape), state)
-        ball = frontiers.footprint.tolist()
+        np.testing.assert_array_equal(frontiers.states.state.reshape(shape), state)
+        ball = frontiers.blocks.footprint.tolist()
         np.testing.assert_array_equal(
             np.isfinite(frontiers.traversal_cost.reshape(shape)), reference.standing(state, ball)
         )
         wanted = reference.candidates(state, ball)
-        np.testing.assert_array_equal((frontiers.flags & CANDIDATE > 0).reshape(shape), wanted)
+        np.testing.assert_array_equal((frontiers.blocks.flags & CANDIDATE > 0).reshape(shape), wanted)
         check_blocks(frontiers, wanted, spacing)
         here = tuple(rng.integers(0, n) for n in shape)
         patch = tuple(slice(max(i - 1, 0), i + 2) for i in here)
@@ -68,62 +61,61 @@ def check_blocks(frontiers, wanted, spacing):
     """One candidate a block that has any: none is nearer to its middle."""
     shape = wanted.shape
     across = (spacing, spacing, shape[2] if shape[2] == 1 else spacing)
-    of_block = np.full(frontiers.blocks, NONE)
+    of_block = np.full(frontiers.blocks.blocks, NONE)
     for place in np.argwhere(wanted):
         block = tuple(place // across)
         low = np.array(block) * across
         middle = 0.5 * (low + np.minimum(low + across, shape))
         apart = ((place + 0.5 - middle) ** 2).sum()
-        found = frontiers.voxel.reshape(frontiers.blocks)[block]
+        found = frontiers.blocks.candidate.reshape(frontiers.blocks.blocks)[block]
         assert found != NONE
         chosen = np.stack(np.unravel_index(found, shape))
         assert wanted[tuple(chosen)] and ((chosen + 0.5 - middle) ** 2).sum() <= apart + 1e-9
         of_block[block] = found
-    np.testing.assert_array_equal(frontiers.voxel.reshape(frontiers.blocks), of_block)
+    np.testing.assert_array_equal(frontiers.blocks.candidate.reshape(frontiers.blocks.blocks), of_block)
 
 
 def test_a_corridor_by_hand():
     """Nine voxels in a row, the first five explored: the fifth is the frontier, and moves on."""
     mean, precision = np.full((9, 3, 1), 0.9, np.float32), np.full((9, 3, 1), 9.0, np.float32)
     mean[:, 1], precision[5:] = 0.1, 0.5
-    frontiers = new_frontier_map((9, 3, 1), 0.0, 0, 2)
+    frontiers = new_voxel_map((9, 3, 1), 0.0, 0, 2)
     updated(frontiers, mean, precision)
-    assert frontiers.voxel[frontiers.voxel != NONE].tolist() == [4 * 3 + 1]
-    frontiers.seen[:] = 1.0
+    assert frontiers.blocks.candidate[frontiers.blocks.candidate != NONE].tolist() == [4 * 3 + 1]
+    frontiers.bounds[:] = 1.0
     precision[5:7] = 9.0
     updated(frontiers, mean, precision)
-    block = np.flatnonzero(frontiers.voxel != NONE)
-    assert frontiers.voxel[block].tolist() == [6 * 3 + 1] and np.isinf(frontiers.seen[block]).all()
+    block = np.flatnonzero(frontiers.blocks.candidate != NONE)
+    assert (
+        frontiers.blocks.candidate[block].tolist() == [6 * 3 + 1] and np.isinf(frontiers.bounds[block]).all()
+    )
     precision[:] = 9.0
     updated(frontiers, mean, precision)
-    assert (frontiers.voxel == NONE).all()
+    assert (frontiers.blocks.candidate == NONE).all()
 
 
-def test_what_turned_out_free_is_noted_by_hand():
-    """Of twelve covered voxels one becomes free; then all are asked for at a finer level."""
-    shape = (4, 3, 1)
-    mean, precision = np.full(12, 0.9, np.float32), np.full(12, 9.0, np.float32)
-    frontiers = new_frontier_map(shape, 0.0, 0, 2)
-    update_frontiers(frontiers, mean, precision, LEVELS)
-    assert frontiers.opened_count[0] == 0
-    mean[7], precision[7] = 0.1, 10.0
-    update_frontiers(frontiers, mean, precision, LEVELS)
-    assert frontiers.opened_count[0] == 1 and frontiers.opened[0] == 7
-    update_frontiers(frontiers, mean, precision, (np.float32(16.0), np.float32(1.0)))
-    assert (
-        frontiers.opened_count[0] > MAX_TRACKED_OPENINGS
-    )  # all is unexplored again: more may be seen anywhere
+def test_where_more_may_be_visible_is_noted_by_hand():
+    """Of covered voxels one becomes free; then all are asked for at a finer level."""
+    shape = (20, 3, 1)
+    mean, precision = np.full(60, 0.9, np.float32), np.full(60, 9.0, np.float32)
+    voxels = new_voxel_map(shape, 0.0, 0, 2)
+    tiles = voxels.states.tiles
+    update_voxels(voxels, mean, precision, LEVELS)
+    assert not tiles.any()
+    mean[9 * 3 + 1], precision[9 * 3 + 1] = 0.1, 10.0
+    update_voxels(voxels, mean, precision, LEVELS)
+    assert tiles.tolist() == [[0], [1], [0]]
+    update_voxels(voxels, mean, precision, (np.float32(16.0), np.float32(1.0)))
+    assert tiles.all()  # all is unexplored again
 
 
-def test_more_openings_than_are_noted():
-    shape = (70, 61, 1)
-    mean, precision = np.full(70 * 61, 0.9, np.float32), np.full(70 * 61, 9.0, np.float32)
-    frontiers = new_frontier_map(shape, 0.0, 0, 8)
-    update_frontiers(frontiers, mean, precision, LEVELS)
-    mean[:MAX_TRACKED_OPENINGS], precision[:MAX_TRACKED_OPENINGS] = 0.1, 10.0
-    update_frontiers(frontiers, mean, precision, LEVELS)
-    assert frontiers.opened_count[0] == MAX_TRACKED_OPENINGS
-    np.testing.assert_array_equal(frontiers.opened, np.arange(MAX_TRACKED_OPENINGS))
-    mean[MAX_TRACKED_OPENINGS], precision[MAX_TRACKED_OPENINGS] = 0.1, 10.0
-    update_frontiers(frontiers, mean, precision, LEVELS)
-    assert frontiers.opened_count[0] == MAX_TRACKED_OPENINGS + 1
+def test_tiles_within_reach_of_a_note_are_found_once():
+    states = new_states((40, 30, 1))
+    assert take_notes(states, 5.0) is None
+    states.tiles[0, 0] = 1
+    near = take_notes(states, 5.0)
+    assert near is not None and near[:2, :2].all() and near.sum() == 4
+    assert take_notes(states, 5.0) is None
+    states.tiles[2, 1] = 1  # x 16 … 23, y 8 … 15
+    near = take_notes(states, 100.0)
+    assert near is not None and near.all()

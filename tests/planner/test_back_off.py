@@ -13,8 +13,8 @@ from baselines.strategies import make_strategy
 from baselines.strategies.rules.cliff import CliffNextBestView
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.errors import SettingError
-from entropy_explore_env.frontiers.candidates import FrontierConfig
-from entropy_explore_env.frontiers.terrain_candidates import TerrainCandidates
+from entropy_explore_env.frontiers.frontier_map import FrontierConfig
+from entropy_explore_env.frontiers.terrain_frontiers import TerrainFrontiers
 from entropy_explore_env.localization_settings import Localization
 from entropy_explore_env.missions.view import view_of
 from entropy_explore_env.robots.motion import MoveEnd
@@ -157,7 +157,7 @@ def test_a_margin_keeps_from_ceilings_and_from_steep_ground():
     kind, frontiers = env.scenario.kinds[0], FrontierConfig()
     exact = dataclasses.replace(kind, robot=dataclasses.replace(kind.robot, localization=Localization()))
     reach = [
-        TerrainCandidates(env.scenario, each, frontiers, view.ceiling)._map.reach for each in (exact, kind)
+        TerrainFrontiers(env.scenario, each, frontiers, view.ceiling).body_reach for each in (exact, kind)
     ]
     assert reach == [1, 2]
 

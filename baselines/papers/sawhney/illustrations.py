@@ -25,7 +25,8 @@ from baselines.papers.sawhney.sweep import PLANS, POINT, TERRAINS, world_cell
 from baselines.strategies.rules.metrics import Metric
 from baselines.strategies.rules.per_time_visibility import PerTimeVisibility
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
-from entropy_explore_env.frontiers.candidates import Chart
+from entropy_explore_env.frontiers.frontier_map import Chart
+from entropy_explore_env.frontiers.terrain_frontiers import PATCH_M
 from entropy_explore_env.missions.view import RobotView
 from entropy_explore_env.reports.recording import DrivenPaths
 from entropy_explore_env.settings import Grid
@@ -270,11 +271,11 @@ def figure_section(cell: Cell) -> Figure:
     """Figs. 2-4: a section along x through a UAV: ground and surface, what is known, seen and assumed."""
     now, world = snapshots(cell, 0, (0.2, 1.0))[0], _world_of(cell)
     grid, edge = world.grid, world.grid.voxel_size_m
-    reach_m, patch_m = cell.scenario.sensor.max_range_m, _run(cell).exploring.frontiers.patch_m
+    reach_m = cell.scenario.sensor.max_range_m
     x, y, z = (int(i) for i in grid.voxel_of(now.paths_m[0][-1]))
     across = grid.centre_of(np.stack([np.arange(grid.shape[0]), *np.zeros((2, grid.shape[0]))], -1))[:, 0]
     ground, known = edge * ground_of(world)[:, y], edge * now.chart.ground[:, y]
-    patch = round(patch_m / edge)
+    patch = round(PATCH_M / edge)
     near = now.chart.ground[max(x - patch, 0) : x + patch + 1, max(y - patch, 0) : y + patch + 1]
     average = edge * float(np.nanmean(near))
     assumed = np.maximum(1.0 - np.abs(across - across[x]) / reach_m, 0.0) * average

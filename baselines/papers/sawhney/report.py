@@ -44,7 +44,8 @@ from baselines.papers.sawhney.sweep import (
     TIME_LIMIT_S,
     cell_id,
 )
-from entropy_explore_env.frontiers.candidates import FrontierConfig
+from entropy_explore_env.frontiers.frontier_map import FrontierConfig
+from entropy_explore_env.frontiers.terrain_frontiers import PATCH_M, TOO_HIGH
 from entropy_explore_env.writing import write_atomically
 
 PAPER_RUNS = {"plans": 160, "terrains": 120}
@@ -189,8 +190,8 @@ these numbers.
 
 A cell of a plan, or the surface of a column of ground, is explored once its σ has fallen below {SIGMA:g}.
 Candidates lie a sixth of the sensor's range apart, over terrain in height as well; γ = {_FRONTIERS.gamma:g},
-z_av is the mean ground within {_FRONTIERS.patch_m:g} m, and candidates higher above it than
-{_FRONTIERS.too_high:g} of the range are dropped. "95 %" is a share of the cells that can be seen from where
+z_av is the mean ground within {PATCH_M:g} m, and candidates higher above it than
+{TOO_HIGH:g} of the range are dropped. "95 %" is a share of the cells that can be seen from where
 robots can be, measured at all; over terrain a share of all columns. t takes ways along the grid; robots
 drive them pulled straight, up to 8 % shorter in plans and 11 % in the air. What somebody under way has
 promised to see is worked out anew from its target at each decision, by the map as it is then; in the paper

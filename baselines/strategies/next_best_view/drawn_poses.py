@@ -16,8 +16,8 @@ from baselines.strategies.next_best_view.expected_view import (
     occupancy_map,
 )
 from baselines.strategies.next_best_view.poses import drawn_poses, reachable_voxels
-from entropy_explore_env.frontiers.frontier_cells import FrontierCells
 from entropy_explore_env.frontiers.knowledge import RobotKnowledge, belief_of
+from entropy_explore_env.frontiers.voxel_frontiers import VoxelFrontiers
 from entropy_explore_env.planner.frontier_rule import FrontierRule
 from entropy_explore_env.planner.scene import NOWHERE, Goal, Scene
 from entropy_explore_env.scenario import Scenario
@@ -114,7 +114,7 @@ class DrawnPoses(FrontierRule):
                 expectations.visible = self.seen.seen[: self.seen.counts[1]].copy()
         return best
 
-    def arrive(self, view: RobotKnowledge, cells: FrontierCells, here: int) -> None:
+    def arrive(self, view: RobotKnowledge, cells: VoxelFrontiers, here: int) -> None:
         """Lose interest in voxels that should have been visible and did not answer (eq. 9, with P_V = 1)."""
         expectations = self._expectations[view.robot]
         precision = view.precision.reshape(-1)[expectations.visible]

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from entropy_explore_env.frontiers.voxel_map import NONE
+from entropy_explore_env.frontiers.blocks import NONE
 from entropy_explore_env.planner.scene import Scene
 
 _NARROWEST_RAD = 0.1

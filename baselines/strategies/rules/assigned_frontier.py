@@ -15,8 +15,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
+from entropy_explore_env.frontiers.blocks import NONE
 from entropy_explore_env.frontiers.knowledge import teammates_that_share, voxel_of
-from entropy_explore_env.frontiers.voxel_map import NONE
 from entropy_explore_env.planner.frontier_rule import FrontierRule
 from entropy_explore_env.planner.scene import Scene, best_of
 from entropy_explore_env.validation import check_positive

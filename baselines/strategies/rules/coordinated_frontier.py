@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from entropy_explore_env.frontiers.voxel_map import NONE
+from entropy_explore_env.frontiers.blocks import NONE
 from entropy_explore_env.planner.frontier_rule import FrontierRule
 from entropy_explore_env.planner.scene import Scene, best_of
 from entropy_explore_env.validation import check_positive

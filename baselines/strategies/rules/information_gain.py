@@ -66,7 +66,7 @@ class InformationGain(FrontierRule):
             voxels, lengths = scene.paths.nearest_frontiers()
             return best_of(voxels, -lengths, scene.target)
         slots, voxels, lengths = slots[near], voxels[near], lengths[near]
-        bounds = np.minimum(scene.cells.upper_bounds(slots), scene.cells.greatest_visibility())
+        bounds = scene.cells.upper_bounds(slots)
         return best_of(voxels, self._worths(scene, slots, voxels, lengths, bounds), scene.target)
 
     def _worths(

@@ -29,8 +29,8 @@ import numpy as np
 from baselines.strategies.allocation import Allocator, Choice, Round
 from baselines.strategies.rules.metrics import Metric, Value
 from entropy_explore_env.errors import SettingError
-from entropy_explore_env.frontiers.candidates import KNOWN_SIGMA, FrontierConfig
-from entropy_explore_env.frontiers.frontier_cells import FrontierCells
+from entropy_explore_env.frontiers.blocks import NONE
+from entropy_explore_env.frontiers.frontier_map import KNOWN_SIGMA, FrontierConfig
 from entropy_explore_env.frontiers.knowledge import (
     RobotKnowledge,
     stays,
@@ -38,8 +38,8 @@ from entropy_explore_env.frontiers.knowledge import (
     under_way,
     voxel_of,
 )
-from entropy_explore_env.frontiers.terrain_candidates import TerrainCandidates
-from entropy_explore_env.frontiers.voxel_map import NONE
+from entropy_explore_env.frontiers.terrain_frontiers import TerrainFrontiers
+from entropy_explore_env.frontiers.voxel_frontiers import VoxelFrontiers
 from entropy_explore_env.planner.frontier_rule import FrontierRule
 from entropy_explore_env.planner.scene import ROOM, STAY, Scene
 from entropy_explore_env.planner.stops import apart_m
@@ -110,13 +110,13 @@ class PerTimeVisibility(FrontierRule):
         self.idle = [False] * scenario.robots
         self._rounds = [Round() for _ in range(scenario.robots)]
 
-    def new_cells(self, view: RobotKnowledge) -> FrontierCells:
+    def new_cells(self, view: RobotKnowledge) -> VoxelFrontiers:
         """Return the empty map of a robot's candidates; see `FrontierRule`."""
         kind, frontiers = view.kind, self.config.frontiers
         if view.ceiling is None:
-            return FrontierCells(self._scenario, kind, frontiers)
+            return VoxelFrontiers(self._scenario, kind, frontiers)
         # This rule and what drives it need of a map what candidates of both kinds have.
-        return cast("FrontierCells", TerrainCandidates(self._scenario, kind, frontiers, view.ceiling))
+        return cast("VoxelFrontiers", TerrainFrontiers(self._scenario, kind, frontiers, view.ceiling))
 
     def mapped_share(self) -> float:
         """Return the largest share of points that a robot has mapped: of columns over terrain."""
@@ -128,7 +128,7 @@ class PerTimeVisibility(FrontierRule):
         memory.paths.start(here)
         return Allocator(Scene(view, memory.cells, memory.paths, here, NONE), self.config.metric).options()
 
-    def arrive(self, view: RobotKnowledge, cells: FrontierCells, here: int) -> None:
+    def arrive(self, view: RobotKnowledge, cells: VoxelFrontiers, here: int) -> None:
         """Take out the candidate from which the robot has scanned."""
         cells.exclude(here)
 

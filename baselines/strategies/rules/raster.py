@@ -19,9 +19,9 @@ from baselines.strategies.next_best_view.poses import (
     reachable_voxels,
     yaws_around,
 )
-from entropy_explore_env.frontiers.frontier_cells import FrontierCells
+from entropy_explore_env.frontiers.blocks import NONE
 from entropy_explore_env.frontiers.knowledge import RobotKnowledge
-from entropy_explore_env.frontiers.voxel_map import NONE
+from entropy_explore_env.frontiers.voxel_frontiers import VoxelFrontiers
 from entropy_explore_env.planner.frontier_rule import FrontierRule
 from entropy_explore_env.planner.scene import NOWHERE, Goal, Scene
 from entropy_explore_env.scenario import Scenario
@@ -61,7 +61,7 @@ class Raster(FrontierRule):
             return NOWHERE
         return Goal(voxel, voxel, gaze=(yaws[taken[voxel] - 1], 0.0))
 
-    def arrive(self, view: RobotKnowledge, cells: FrontierCells, here: int) -> None:
+    def arrive(self, view: RobotKnowledge, cells: VoxelFrontiers, here: int) -> None:
         """Learn nothing: the next gaze is the raster's."""
 
     def _places(self, kind: RobotKind, reachable: np.ndarray) -> list[int]:

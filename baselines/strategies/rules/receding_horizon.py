@@ -75,7 +75,7 @@ class RecedingHorizon(FrontierRule):
         scanned.add(scene.here)
         tree = Tree(scene.centres(np.array([scene.here]))[0])
         for place in self._branches.get(robot, []):
-            if not scene.paths.in_sight(tree.places[-1], place):
+            if not scene.paths.is_line_free(tree.places[-1], place):
                 break
             tree.add(place, len(tree.places) - 1)
         free = scene.free_around(max(int(_AROUND * scene.cells.reach), 1))
@@ -101,7 +101,7 @@ class RecedingHorizon(FrontierRule):
             start = tree.places[nearest]
             place = start + (drawn - start) * min(1.0, longest / max(float(apart[nearest]), 1e-9))
             place = np.floor(place) + 0.5
-            if (place != start).any() and scene.paths.in_sight(start, place):
+            if (place != start).any() and scene.paths.is_line_free(start, place):
                 tree.add(place, nearest)
 
 

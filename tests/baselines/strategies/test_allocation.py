@@ -11,9 +11,9 @@ import pytest
 from baselines.experiments.mission import scripted
 from baselines.strategies.rules.metrics import Nearest
 from baselines.strategies.rules.per_time_visibility import ExplorationConfig, PerTimeVisibility
-from entropy_explore_env.frontiers.candidates import KNOWN_SIGMA, FrontierConfig
+from entropy_explore_env.frontiers.frontier_map import KNOWN_SIGMA, FrontierConfig
 from entropy_explore_env.frontiers.knowledge import under_way
-from entropy_explore_env.frontiers.voxel_candidates import VoxelCandidates
+from entropy_explore_env.frontiers.voxel_frontiers import VoxelFrontiers
 from entropy_explore_env.missions.view import view_of
 from entropy_explore_env.robots.motion import driving_time
 from entropy_explore_env.scenario import with_settings
@@ -91,7 +91,7 @@ def test_a_path_leaves_known_space_only_where_the_robot_stands_in_none():
     size = missions.grid.shape  # 7 × 11 × 5 voxels; the body touches the 26 around its own
     missions.mean[0, 0], missions.precision[0, 0] = 0.0, 1e4
     missions.mean[0, 0][4:] = 1.0
-    candidates = VoxelCandidates(missions.scenario, missions.scenario.kind_of(0), FrontierConfig())
+    candidates = VoxelFrontiers(missions.scenario, missions.scenario.kind_of(0), FrontierConfig())
     candidates.update(view_of(missions, 0, 0), KNOWN_SIGMA)
     stands = np.isfinite(candidates.traversal_cost).reshape(size)
     assert stands[1:3, 1:10, 1:4].all() and stands.sum() == 2 * 9 * 3

@@ -7,10 +7,10 @@ from types import SimpleNamespace
 import numpy as np
 
 from entropy_explore_env.belief.paths.search import new_search
-from entropy_explore_env.frontiers.candidates import FrontierConfig
-from entropy_explore_env.frontiers.frontier_cells import BLOCK, FrontierCells
+from entropy_explore_env.frontiers.blocks import NONE
+from entropy_explore_env.frontiers.frontier_map import FrontierConfig
 from entropy_explore_env.frontiers.path_lengths import KnownPaths
-from entropy_explore_env.frontiers.voxel_map import NONE
+from entropy_explore_env.frontiers.voxel_frontiers import BLOCK, VoxelFrontiers
 from entropy_explore_env.planner.frontier_rule import Scene
 from entropy_explore_env.scenario import with_settings
 from entropy_explore_env.scenarios import find_scenario
@@ -53,7 +53,7 @@ def scene_of(plan, robot, target=NONE, block=BLOCK):
         mean=mean, precision=precision, scenario=scenario, teammates={}, robot=0, since_scan_m=0.0
     )
     spacing_m = block * scenario.grid.voxel_size_m
-    cells = FrontierCells(scenario, scenario.kind_of(0), FrontierConfig(spacing_m=spacing_m))
+    cells = VoxelFrontiers(scenario, scenario.kind_of(0), FrontierConfig(spacing_m=spacing_m))
     cells.update(view, 0.5)  # type: ignore[arg-type]
     paths = KnownPaths(scenario, scenario.kind_of(0), cells, new_search(scenario.grid.voxels))
     here = int(np.ravel_multi_index(robot, plan.shape))

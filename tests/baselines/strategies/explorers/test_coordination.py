@@ -16,7 +16,7 @@ from baselines.strategies.rules.coordinated_frontier import (
     CoordinatedFrontier,
     greedy_worth,
 )
-from entropy_explore_env.frontiers.voxel_map import NONE
+from entropy_explore_env.frontiers.blocks import NONE
 from entropy_explore_env.missions.view import TeammateView
 from tests.baselines.strategies.explorers.scenes import cell, corridor, random_plan, scene_of
 from tests.reference import explorers as reference

@@ -16,7 +16,7 @@ from baselines.strategies.rules.nearest_frontier import NearestFrontier
 from baselines.strategies.rules.receding_horizon import RecedingHorizon
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.errors import SettingError
-from entropy_explore_env.frontiers.candidates import KNOWN_SIGMA
+from entropy_explore_env.frontiers.frontier_map import KNOWN_SIGMA
 from entropy_explore_env.planner.tour import Tour
 from entropy_explore_env.reports.metrics import joint_figures, mission_figures
 from entropy_explore_env.scenario import with_settings

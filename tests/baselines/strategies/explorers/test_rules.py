@@ -18,8 +18,8 @@ from baselines.strategies.rules.distance_advantage import (
 )
 from baselines.strategies.rules.information_gain import InformationGain, InformationGainConfig
 from baselines.strategies.rules.nearest_frontier import NearestFrontier, best_of
-from entropy_explore_env.frontiers.frontier_cells import BLOCK
-from entropy_explore_env.frontiers.voxel_map import NONE
+from entropy_explore_env.frontiers.blocks import NONE
+from entropy_explore_env.frontiers.voxel_frontiers import BLOCK
 from tests.baselines.strategies.explorers.scenes import belief_of_plan, cell, random_plan, scene_of
 from tests.reference import explorers as reference
 from tests.reference.scenes import drawn, seeds

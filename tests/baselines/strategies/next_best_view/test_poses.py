@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from baselines.strategies.next_best_view.poses import drawn_poses, next_of_raster, raster_rows, yaws_around
-from entropy_explore_env.frontiers.voxel_map import NONE
+from entropy_explore_env.frontiers.blocks import NONE
 
 
 def test_a_raster_goes_row_by_row_and_takes_all_scans_of_a_place_first():

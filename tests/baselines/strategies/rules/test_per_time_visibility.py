@@ -16,11 +16,10 @@ from baselines.strategies.rules.metrics import Coordinated, Metric, Nearest
 from baselines.strategies.rules.per_time_visibility import ExplorationConfig, PerTimeVisibility
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.errors import SettingError
-from entropy_explore_env.frontiers.candidates import FrontierConfig
-from entropy_explore_env.frontiers.frontier_cells import FrontierCells
-from entropy_explore_env.frontiers.terrain_candidates import TerrainCandidates
-from entropy_explore_env.frontiers.voxel_candidates import VoxelCandidates
-from entropy_explore_env.frontiers.voxel_map import COVERED, NONE
+from entropy_explore_env.frontiers.blocks import COVERED, NONE
+from entropy_explore_env.frontiers.frontier_map import FrontierConfig
+from entropy_explore_env.frontiers.terrain_frontiers import TerrainFrontiers
+from entropy_explore_env.frontiers.voxel_frontiers import VoxelFrontiers
 from entropy_explore_env.missions.state import MissionEnd
 from entropy_explore_env.missions.view import view_of
 from entropy_explore_env.reports.metrics import joint_figures, mission_figures
@@ -119,7 +118,7 @@ def explored(scenario, seed=0, **config):
 def check_lazily_is_as_eagerly(monkeypatch, scenario, seed, **settings):
     """The same mission, for which fewer candidates are counted; returns what was done."""
     counted = []
-    for kind in (FrontierCells, TerrainCandidates):
+    for kind in (VoxelFrontiers, TerrainFrontiers):
         monkeypatch.setattr(kind, "count", counting(kind.count, counted))
     _, lazy, done = explored(scenario, seed, **settings)
     lazily = sum(counted)
@@ -164,7 +163,7 @@ def test_lazily_is_as_eagerly_over_terrain(monkeypatch, settings):
 @pytest.mark.parametrize("seed", [753, 89])
 def test_bounds_stay_bounds_through_a_noisy_mission(monkeypatch, seed):
     """After every update no kept count is less than a new one, through walls that turn out free, too."""
-    opened, levels, update = [], set(), VoxelCandidates.update
+    opened, levels, update = [], set(), VoxelFrontiers.update
 
     def checked(self, view, sigma):
         before = self._map.state.copy()
@@ -178,7 +177,7 @@ def test_bounds_stay_bounds_through_a_noisy_mission(monkeypatch, seed):
         assert (bounds >= self._map.seen[slots]).all()
         self._map.seen[:] = kept
 
-    monkeypatch.setattr(VoxelCandidates, "update", checked)
+    monkeypatch.setattr(VoxelFrontiers, "update", checked)
     noisy = {"max_range_m": 1.5, "angular_step_rad": math.pi / 90, "scan_time_s": 2.0, "range_noise_m": 0.3}
     explored(small_plan(sensor=noisy), seed, allocation="synchronous", once=False)
     assert max(opened) > 5 and len(levels) > 1

@@ -1,4 +1,4 @@
-"""From where robots look at pockets: lines of sight beside a slow reference, and tours that use them."""
+"""Viewing places: lines of sight beside a slow reference, and tours that use them."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from hypothesis import strategies as st
 
 from baselines.experiments.mission import run_mission
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
-from entropy_explore_env.frontiers.candidates import KNOWN_SIGMA
-from entropy_explore_env.frontiers.lookouts import in_sight
-from entropy_explore_env.frontiers.voxel_map import NONE
-from entropy_explore_env.planner.frontier_rule import Goal
+from entropy_explore_env.frontiers.blocks import NONE
+from entropy_explore_env.frontiers.frontier_map import KNOWN_SIGMA
+from entropy_explore_env.frontiers.viewing_places import is_visible
+from entropy_explore_env.planner.scene import Goal
 from entropy_explore_env.planner.shared_tour import SharedTour
 from entropy_explore_env.planner.tour import Tour
 from entropy_explore_env.reports.metrics import mission_figures
@@ -65,10 +65,10 @@ def niche():
 
 @given(SHAPES, seeds)
 @drawn(40)
-def test_in_sight_is_what_a_line_through_known_free_cells_reaches(shape, seed):
+def test_visible_is_what_a_line_through_known_free_cells_reaches(shape, seed):
     rng = np.random.default_rng(seed)
     plan, robot = random_plan(shape, rng)
-    frontiers = scene_of(plan, robot).cells._map
+    frontiers = scene_of(plan, robot).cells._blocks
     free = np.argwhere(plan == reference.FREE)
     unknown = np.argwhere(plan == reference.UNKNOWN)
     if len(unknown) == 0:
@@ -78,8 +78,8 @@ def test_in_sight_is_what_a_line_through_known_free_cells_reaches(shape, seed):
             continue
         apart = float(np.linalg.norm(place - voxel))
         wanted = all(plan[at] == reference.FREE for at in crossed(place, voxel))
-        assert in_sight(frontiers, number(plan, place), number(plan, voxel), 100.0) == wanted
-        assert not in_sight(frontiers, number(plan, place), number(plan, voxel), apart - 0.01)
+        assert is_visible(frontiers, number(plan, place), number(plan, voxel), 100.0) == wanted
+        assert not is_visible(frontiers, number(plan, place), number(plan, voxel), apart - 0.01)
 
 
 def unseen_around(plan, place):
@@ -95,7 +95,7 @@ def unseen_around(plan, place):
 
 @given(SHAPES, seeds)
 @drawn(60)
-def test_a_lookout_makes_the_way_over_it_shortest_of_all_that_see_the_same(shape, seed):
+def test_a_viewing_place_makes_the_way_over_it_shortest_of_all_that_see_the_same(shape, seed):
     rng = np.random.default_rng(seed)
     plan, robot = random_plan(shape, rng)
     scene, rule = scene_of(plan, robot), varied(SharedTour(), opening=1.0)
@@ -109,10 +109,11 @@ def test_a_lookout_makes_the_way_over_it_shortest_of_all_that_see_the_same(shape
     tour = rule.tour_among(scene, *scene.paths.all_frontiers(scene.here))
     if len(tour) > 1:
         ways = ways + reference.lengths_from(plan, cell(plan, tour[1]))
-    frontiers, reach = scene.cells._map, 0.5 * scene.cells.reach
+    frontiers, reach = scene.cells._blocks, 0.5 * scene.cells.reach
     for place in np.argwhere(np.isfinite(ways)):
         at = number(plan, place)
-        seeing[tuple(place)] = len(unseen) and all(in_sight(frontiers, at, voxel, reach) for voxel in unseen)
+        visible = [is_visible(frontiers, at, voxel, reach) for voxel in unseen]
+        seeing[tuple(place)] = len(visible) > 0 and all(visible)
     assert goal.looked == bool(seeing[robot])
     if seeing[robot] or goal.place == goal.target:
         assert goal.place == goal.target
@@ -123,7 +124,7 @@ def test_a_lookout_makes_the_way_over_it_shortest_of_all_that_see_the_same(shape
         assert ways[cell(plan, goal.place)] < ways[cell(plan, goal.target)]
 
 
-def test_a_robot_looks_into_a_pocket_from_where_its_end_is_in_sight_by_hand():
+def test_a_robot_looks_into_a_pocket_from_where_its_end_is_visible_by_hand():
     plan = niche()
     goal = SharedTour().pick(scene_of(plan, (2, 4)))
     assert cell(plan, goal.target) == (10, 6)
@@ -133,7 +134,7 @@ def test_a_robot_looks_into_a_pocket_from_where_its_end_is_in_sight_by_hand():
     assert cell(plan, SharedTour().pick(scene_of(plan, (2, 4))).place)[0] == 9
 
 
-def test_from_a_lookout_and_without_pockets_a_robot_drives_to_the_cell_itself():
+def test_from_a_viewing_place_and_without_pockets_a_robot_drives_to_the_cell_itself():
     plan = niche()
     target = number(plan, (10, 6))
     assert SharedTour().pick(scene_of(plan, (10, 3))) == Goal(target, target, looked=True)
@@ -141,7 +142,7 @@ def test_from_a_lookout_and_without_pockets_a_robot_drives_to_the_cell_itself():
     assert varied(SharedTour(), view=0.0).pick(scene_of(plan, (2, 4))) == Goal(target, target)
 
 
-def test_between_scans_a_robot_stops_where_all_is_in_sight():
+def test_between_scans_a_robot_stops_where_all_is_is_visible():
     plan = niche()
     scene = scene_of(plan, (10, 3))
     scene.view.since_scan_m = 0.2  # type: ignore[misc]
@@ -227,7 +228,7 @@ def test_where_a_look_shows_nothing_the_robot_goes_on_to_the_cell_and_does_not_c
     assert walk.rule.cells_of(0).is_frontier(int(number(walk.plan, (10, 6))))
 
 
-def test_where_the_drive_to_a_lookout_ends_early_the_robot_goes_to_the_cell_itself():
+def test_where_the_drive_to_a_viewing_place_ends_early_the_robot_goes_to_the_cell_itself():
     walk = Walk(far_niche())
     assert walk.goes((2, 4)) == (10, 4)
     assert walk.goes((5, 4), MoveEnd.NO_PATH) == (10, 6)

@@ -1,0 +1,234 @@
+"""Cells in blocks: where mapped space ends (Yamauchi 1998), and one frontier candidate for each block.
+
+A cell is a voxel, or a column of ground. The edge consists of mapped free cells next to unexplored ones; at a
+finer level also of mapped cells that are unexplored themselves. A candidate is a cell that has room and whose
+footprint meets the edge; the one nearest to the middle of its block represents the block. Cells are known by
+number, C order; lengths are in cells.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from entropy_explore_env.belief.voxel_index import flat_index, grid_index
+from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel
+
+UNEXPLORED = 1
+"""σ is above the level that counts as explored now."""
+UNMAPPED = 2
+"""σ is above the first such level: no place to drive through."""
+COVERED = 4
+"""Believed covered: it stops rays and bodies."""
+
+EDGE = 1
+"""Mapped and free, and itself unexplored at the level that counts now, or beside such a cell."""
+CANDIDATE = 2
+EXCLUDED = 4
+"""A scan was taken here: no candidate any more."""
+DROPPED = 8
+"""An edge that a scan from beside it did not explore: nothing beside it alone is a candidate."""
+ROOM = 16
+"""A robot may scan from here, and has not yet."""
+_ALL_FLAGS = 31
+NONE = -1
+"""In place of the number of a cell or voxel: there is none."""
+
+
+class Blocks(NamedTuple):
+    """N cells in B blocks, and the candidate of each block."""
+
+    state: np.ndarray
+    """(N,) uint8: UNEXPLORED, UNMAPPED, COVERED."""
+    flags: np.ndarray
+    """(N,) uint8: EDGE, CANDIDATE, EXCLUDED, DROPPED, ROOM."""
+    candidate: np.ndarray
+    """(B,) int32, cell; NONE = the block has no candidate."""
+    dirty: np.ndarray
+    """(B,) uint8, whether a block is queued."""
+    queued: np.ndarray
+    """(B,) int32, the blocks that have to be updated."""
+    size: tuple[int, int, int]
+    """Cells along each axis."""
+    across: tuple[int, int, int]
+    """Cells of a block along each axis."""
+    blocks: tuple[int, int, int]
+    """Blocks along each axis."""
+    footprint: np.ndarray
+    """(F, 3) int64 index offsets of the cells that a body touches; its own first."""
+    reach: int
+    """Largest of these offsets."""
+    layer: int
+    """The only layer with candidates (planar robots); -1 = all."""
+
+
+def new_blocks(
+    shape: tuple[int, ...], state: np.ndarray, footprint: np.ndarray, layer: int | None, spacing: int
+) -> Blocks:
+    """Return blocks without a candidate.
+
+    Args:
+        shape: (X, Y, Z) cells.
+        state: (N,) uint8, kept up to date by others.
+        footprint: (F, 3) int64 index offsets.
+        layer: The only one with candidates; None = all.
+        spacing: Cells along the edge of a block.
+    """
+    flat = shape[2] == 1 or layer is not None
+    across = (spacing, spacing, int(shape[2]) if flat else spacing)
+    blocks = [math.ceil(n / width) for n, width in zip(shape, across, strict=True)]
+    count = math.prod(blocks)
+    return Blocks(
+        state=state,
+        flags=np.zeros(math.prod(shape), np.uint8),
+        candidate=np.full(count, NONE, np.int32),
+        dirty=np.zeros(count, np.uint8),
+        queued=np.zeros(count, np.int32),
+        size=(int(shape[0]), int(shape[1]), int(shape[2])),
+        across=across,
+        blocks=(blocks[0], blocks[1], blocks[2]),
+        footprint=footprint,
+        reach=int(np.abs(footprint).max(initial=0)),
+        layer=-1 if layer is None else int(layer),
+    )
+
+
+@lean_kernel
+def queue_around(blocks, cell, radius, count):
+    """Queue the blocks with a cell within `radius` along every axis; return how many are queued."""
+    size, across = blocks.size, blocks.across
+    x, y, z = grid_index(size, cell)
+    for i in range(max(x - radius, 0) // across[0], min(x + radius, size[0] - 1) // across[0] + 1):
+        for j in range(max(y - radius, 0) // across[1], min(y + radius, size[1] - 1) // across[1] + 1):
+            for k in range(max(z - radius, 0) // across[2], min(z + radius, size[2] - 1) // across[2] + 1):
+                block = flat_index(blocks.blocks, i, j, k)
+                if blocks.dirty[block] == 0:
+                    blocks.dirty[block] = 1
+                    blocks.queued[count] = block
+                    count += 1
+    return count
+
+
+@lean_kernel
+def queue_all_around(blocks, cells, radius):
+    """Queue the blocks around (K,) cells; return how many are queued."""
+    count = 0
+    for cell in cells:
+        count = queue_around(blocks, cell, radius, count)
+    return count
+
+
+@inlined_kernel
+def block_span(blocks, block):
+    """Return the first cell of a block along each axis, and one past its last."""
+    size, across, shape = blocks.size, blocks.across, blocks.blocks
+    k = block % shape[2]
+    j = block // shape[2] % shape[1]
+    i = block // (shape[2] * shape[1])
+    low, high = k * across[2], min((k + 1) * across[2], size[2])
+    if blocks.layer >= 0:
+        low, high = blocks.layer, blocks.layer + 1
+    return (
+        (i * across[0], j * across[1], low),
+        (min((i + 1) * across[0], size[0]), min((j + 1) * across[1], size[1]), high),
+    )
+
+
+@inlined_kernel
+def cell_at(size, x, y, z):
+    """Return the number of a cell; NONE = outside."""
+    if 0 <= x < size[0] and 0 <= y < size[1] and 0 <= z < size[2]:
+        return flat_index(size, x, y, z)
+    return NONE
+
+
+@inlined_kernel
+def shares_face(blocks, marks, mask, value, x, y, z):
+    """Whether a neighbour of a cell, of planar robots in the layer, has a value in the masked (N,) marks."""
+    size, found = blocks.size, False
+    for axis in range(2 if blocks.layer >= 0 else 3):
+        for step in (-1, 1):
+            near = cell_at(size, x + step * (axis == 0), y + step * (axis == 1), z + step * (axis == 2))
+            if near != NONE and marks[near] & mask == value:
+                found = True
+    return found
+
+
+@lean_kernel
+def mark_edges(blocks, count):
+    """Set EDGE in the first `count` queued blocks."""
+    for place in range(count):
+        low, high = block_span(blocks, blocks.queued[place])
+        for x in range(low[0], high[0]):
+            for y in range(low[1], high[1]):
+                for z in range(low[2], high[2]):
+                    cell = flat_index(blocks.size, x, y, z)
+                    blocks.flags[cell] &= _ALL_FLAGS - EDGE
+                    free = blocks.state[cell] & (UNMAPPED | COVERED) == 0
+                    if free and (
+                        blocks.state[cell] & UNEXPLORED
+                        or shares_face(blocks, blocks.state, UNEXPLORED, UNEXPLORED, x, y, z)
+                    ):
+                        blocks.flags[cell] |= EDGE
+
+
+@inlined_kernel
+def set_room(blocks, cell, room):
+    """Set or clear ROOM."""
+    blocks.flags[cell] &= _ALL_FLAGS - ROOM
+    if room:
+        blocks.flags[cell] |= ROOM
+
+
+@inlined_kernel
+def _from_middle(low, high, x, y, z):
+    """Return the squared distance of a cell from the middle of its block, in half cells."""
+    dx, dy, dz = 2 * x + 1 - low[0] - high[0], 2 * y + 1 - low[1] - high[1], 2 * z + 1 - low[2] - high[2]
+    return dx * dx + dy * dy + dz * dz
+
+
+@lean_kernel
+def choose_candidate(blocks, block):
+    """Set CANDIDATE in a block and choose the block's candidate; return whether that is another one."""
+    low, high = block_span(blocks, block)
+    best, nearest, before = NONE, math.inf, blocks.candidate[block]
+    for x in range(low[0], high[0]):
+        for y in range(low[1], high[1]):
+            for z in range(low[2], high[2]):
+                cell = flat_index(blocks.size, x, y, z)
+                blocks.flags[cell] &= _ALL_FLAGS - CANDIDATE
+                if blocks.flags[cell] & ROOM and _meets_edge(blocks, x, y, z):
+                    blocks.flags[cell] |= CANDIDATE
+                    apart = _from_middle(low, high, x, y, z)
+                    if apart < nearest:
+                        best, nearest = cell, apart
+    blocks.candidate[block], blocks.dirty[block] = best, 0
+    return best != before
+
+
+@inlined_kernel
+def _meets_edge(blocks, x, y, z):
+    """Whether the footprint in a cell meets the edge."""
+    for offset in blocks.footprint:
+        near = cell_at(blocks.size, x + offset[0], y + offset[1], z + offset[2])
+        if near != NONE and blocks.flags[near] & (EDGE | DROPPED) == EDGE:
+            return True
+    return False
+
+
+@lean_kernel
+def replace_unreached(blocks, cost):
+    """Choose other candidates where no path leads to a block's; (N,) float64 path costs, inf = no path."""
+    for block in range(len(blocks.candidate)):
+        if blocks.candidate[block] == NONE or not math.isinf(cost[blocks.candidate[block]]):
+            continue
+        low, high = block_span(blocks, block)
+        nearest = math.inf
+        for x in range(low[0], high[0]):
+            for y in range(low[1], high[1]):
+                for z in range(low[2], high[2]):
+                    cell, apart = flat_index(blocks.size, x, y, z), _from_middle(low, high, x, y, z)
+                    if blocks.flags[cell] & CANDIDATE and apart < nearest and not math.isinf(cost[cell]):
+                        blocks.candidate[block], nearest = cell, apart

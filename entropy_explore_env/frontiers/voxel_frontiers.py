@@ -1,0 +1,295 @@
+"""The frontier in a map of voxels: cells to stand in, and how many unexplored voxels are seen from them.
+
+The frontier of Yamauchi 1998 are known free cells beside unknown ones. A body that is larger than a voxel
+cannot stand in each of them. A frontier cell here is a voxel in which the body may stand and from which it
+touches one: its footprint meets a known free voxel beside an unknown one. For a point robot that is the
+textbook's frontier cell itself. Voxels lie in blocks. The cell nearest to the middle of its block stands for
+all of it in `listed`, the one with the shortest path in `nearest_of_blocks`.
+
+Counts are reused as upper bounds: while the map grows, no more unexplored voxels can be seen from a place
+than before, but for where a voxel turned out free or is unexplored again.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from entropy_explore_env.frontiers.blocks import (
+    CANDIDATE,
+    COVERED,
+    DROPPED,
+    EDGE,
+    EXCLUDED,
+    NONE,
+    UNMAPPED,
+    queue_all_around,
+    replace_unreached,
+)
+from entropy_explore_env.frontiers.frontier_map import BATCH_CELLS, Chart, FrontierConfig, FrontierMap
+from entropy_explore_env.frontiers.knowledge import RobotKnowledge
+from entropy_explore_env.frontiers.ray_tree import grow_tree
+from entropy_explore_env.frontiers.viewing_places import first_viewing_place
+from entropy_explore_env.frontiers.visibility import (
+    count_crossed,
+    count_from,
+    count_in_ball,
+    new_counter,
+    rays_around,
+    rays_towards,
+)
+from entropy_explore_env.frontiers.voxel_map import (
+    box_around,
+    collect_candidates,
+    count_connected,
+    keep_unseen,
+    new_voxel_map,
+    update_blocks,
+    update_voxels,
+    voxels_in,
+)
+from entropy_explore_env.scenario import Scenario
+from entropy_explore_env.settings import RobotKind
+
+BLOCK = 4
+"""Voxels along the edge of a block, unless settings say otherwise."""
+_ROWS = 15
+"""Rows of imagined rays for robots that look up and down."""
+
+
+class VoxelFrontiers(FrontierMap):
+    """The frontier cells of one robot's belief; the points of V are voxels.
+
+    Attributes:
+        changed: How many voxels the latest update found in another state.
+    """
+
+    def __init__(self, scenario: Scenario, kind: RobotKind, frontiers: FrontierConfig | None = None) -> None:
+        """Nothing is explored yet; without settings, blocks have an edge of BLOCK voxels."""
+        edge, layer = scenario.grid.voxel_size_m, scenario.layer_of(kind.robot)
+        super().__init__(scenario, kind, frontiers or FrontierConfig(spacing_m=BLOCK * edge))
+        self._map = new_voxel_map(self._size, kind.robot.planning_radius_m / edge, layer, self._spacing)
+        self._states, self._blocks = self._map.states, self._map.blocks
+        self._costs, self._bounds = self._map.traversal_cost, self._map.bounds
+        self._voxels, self._marks = self._blocks.candidate, self._blocks.flags
+        self._counter = new_counter(scenario.grid.voxels, self._size)
+        self._pitches = _pitches(kind, layer is None)
+        self._directions = rays_around(self.reach, self._pitches)
+        self._tree = grow_tree(self._directions, self.reach, self._size)
+        self._met = np.empty(self._tree.cells, np.int32)
+        self.batch = 1 + BATCH_CELLS // self._tree.cells
+        self.point = edge ** (2 if scenario.grid.flat else 3)
+        wide = self.reach + 2.0
+        ball = math.pi * wide**2 if self._size[2] == 1 else 4.0 / 3.0 * math.pi * wide**3
+        self._most = min(ball, float(scenario.grid.voxels))
+        """No more is seen from any place."""
+        self.changed, self.body_reach = 0, self._blocks.reach
+        self._radius = self.body_reach + 2
+        self._dropped: dict[int, tuple[bytes, np.ndarray]] = {}
+        """Voxel → what its surroundings were when it was dropped, and which edges were dropped with it."""
+
+    def update(self, view: RobotKnowledge, sigma: float) -> None:
+        """See `FrontierMap`; dropped cells count again where the map has changed around them."""
+        mean, precision = view.mean.reshape(-1), view.precision.reshape(-1)
+        self.changed = int(update_voxels(self._map, mean, precision, self._levels(sigma)))
+        self._forget_bounds(self.reach + 1.0)
+        if self.changed:
+            for voxel in [v for v, (was, _) in self._dropped.items() if self._surroundings(v) != was]:
+                self._restore(voxel)
+
+    def mapped_share(self) -> float:
+        """See `FrontierMap`."""
+        return float((self._states.state & UNMAPPED == 0).mean())
+
+    def chart(self) -> Chart:
+        """See `FrontierMap`."""
+        layers = slice(None) if self._blocks.layer < 0 else slice(self._blocks.layer, self._blocks.layer + 1)
+        state, flags = (
+            array.reshape(self._size)[:, :, layers] for array in (self._states.state, self._marks)
+        )
+        marks = state & UNMAPPED == 0, state & COVERED > 0, flags & EDGE > 0
+        mapped, covered, edge = (np.asarray(mark.any(2)) for mark in marks)
+        return Chart(mapped, covered, edge, np.full(self._size[:2], np.nan))
+
+    def upper_bounds(self, slots: np.ndarray) -> np.ndarray:
+        """See `FrontierMap`."""
+        return np.minimum(self._bounds[slots], self._most)
+
+    def count(self, slots: np.ndarray, voxels: np.ndarray) -> np.ndarray:
+        """See `FrontierMap`."""
+        self._bounds[slots], weighed = self._counted(voxels)
+        return weighed
+
+    def gains(self, voxels: np.ndarray) -> np.ndarray:
+        """Return (K,) how many unknown voxels the sensor would see, all around, from (K,) int32 voxels."""
+        return self._counted(voxels)[0]
+
+    def _counted(self, voxels: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return (K,) points that are seen from (K,) int32 voxels, and (K,) these weighed by promises."""
+        seen, weighed = np.empty(len(voxels)), np.empty(len(voxels))
+        arrays = self._counter, self._states.state, self._size
+        if self._naive:
+            for place, centre in enumerate(self._axes_of(voxels) + 0.5):
+                found = count_in_ball(*arrays, tuple(centre.tolist()), self.reach, False)
+                seen[place], weighed[place] = found
+        else:
+            count_from(*arrays, voxels, self._tree, self._met, seen, weighed)
+        return seen, weighed
+
+    def promise(self, place: np.ndarray) -> None:
+        """See `FrontierMap`."""
+        arrays = self._counter, self._states.state, self._size, tuple(place.tolist())
+        if self._naive:
+            count_in_ball(*arrays, self.reach, True)
+        else:
+            count_crossed(*arrays, self._directions, self.reach, True)
+
+    def _refresh(self, voxels: np.ndarray, radius: int) -> None:
+        """See `FrontierMap`."""
+        update_blocks(self._map, queue_all_around(self._blocks, voxels, radius))
+
+    def replace_unreached(self, cost: np.ndarray) -> None:
+        """See `FrontierMap`."""
+        before = self._voxels.copy()
+        replace_unreached(self._blocks, cost)
+        self._bounds[self._voxels != before] = math.inf
+
+    def open_start(self, voxel: int) -> list[int]:
+        """See `FrontierMap`."""
+        if self.is_known_free(voxel):
+            return []
+        beside = self._touched_from(voxel)
+        free = self._states.state[beside] & (UNMAPPED | COVERED) == 0
+        opened: list[int] = beside[free & np.isinf(self._costs[beside])].tolist()
+        self._costs[opened] = 1.0
+        return opened
+
+    def is_frontier(self, voxel: int) -> bool:
+        """Whether a voxel is a frontier cell."""
+        return bool(self._marks[voxel] & CANDIDATE)
+
+    def opening(self, voxel: int, most: int) -> int:
+        """Return how many connected known free voxels beside unknown ones there are at a frontier cell.
+
+        Args:
+            voxel: The frontier cell.
+            most: No more are counted.
+        """
+        edges = self._edges_beside(voxel)
+        found = np.concatenate([edges, np.empty(most, np.int64)])
+        return int(count_connected(self._blocks, found, len(edges), most))
+
+    def unseen_around(self, voxel: int, radius: int) -> np.ndarray:
+        """Return (N,) int32 unexplored voxels that are beside known free ones and near a frontier cell.
+
+        Args:
+            voxel: The frontier cell.
+            radius: Largest distance along each axis, in voxels, from what the body touches in the cell.
+        """
+        near = voxels_in(
+            box_around(self._size, voxel, radius + self.body_reach, self._blocks.layer), self._size
+        )
+        return near[: keep_unseen(self._blocks, near)]
+
+    def standing_around(self, voxel: int, radius: float) -> np.ndarray:
+        """Return (K,) int32 voxels in which the body may stand, within a radius in voxel edges."""
+        near = voxels_in(box_around(self._size, voxel, int(radius), self._blocks.layer), self._size)
+        apart = ((self._axes_of(near) - self._axes_of(np.array(voxel))) ** 2).sum(1)
+        return near[(apart <= radius * radius) & np.isfinite(self._costs[near])]
+
+    def first_viewing_place(self, places: np.ndarray, voxels: np.ndarray, reach: float) -> int:
+        """Return the index of the first of (K,) int32 places from which (N,) int32 voxels are all visible.
+
+        It is NONE where there is none. How far off they are visible at most, `reach`, is in voxel edges.
+        """
+        return int(first_viewing_place(self._blocks, places, voxels, reach))
+
+    def nearest_of_blocks(
+        self, lengths_to: Callable[[np.ndarray], np.ndarray], reach: float = math.inf
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Find the frontier cell with the shortest path in each block.
+
+        Args:
+            lengths_to: (N,) int32 voxels → (N,) lengths of the paths to them; inf = no path.
+            reach: Cells with longer paths are left out; inf allowed.
+
+        Returns:
+            (K,) int32 voxels and (K,) float64 lengths in voxel edges, in the order of the blocks.
+        """
+        blocks = np.flatnonzero(self._voxels != NONE)
+        most = len(blocks) * math.prod(self._blocks.across)
+        cells, of_block = np.empty(most, np.int32), np.empty(most, np.int64)
+        count = collect_candidates(self._blocks, blocks, cells, of_block)
+        cells, of_block = cells[:count], of_block[:count]
+        lengths, least = lengths_to(cells), np.full(len(blocks), np.inf)
+        np.minimum.at(least, of_block, lengths)
+        nearest = np.flatnonzero(np.isfinite(lengths) & (lengths <= reach) & (lengths == least[of_block]))
+        nearest = nearest[np.unique(of_block[nearest], return_index=True)[1]]
+        return cells[nearest], lengths[nearest]
+
+    def drop(self, voxel: int, with_edges: bool) -> None:
+        """Take out a frontier cell until the map changes around it.
+
+        Args:
+            voxel: It could not be reached, or a scan from there did not explore what is unknown beside it.
+            with_edges: Whether cells that touch no other known free voxel beside unknown ones go with it.
+        """
+        edges = self._edges_beside(voxel) if with_edges else np.empty(0, np.int64)
+        if voxel in self._dropped:
+            edges = np.union1d(edges, self._dropped[voxel][1])
+        self._marks[edges] |= DROPPED
+        self._marks[voxel] |= EXCLUDED
+        self._dropped[voxel] = self._surroundings(voxel), edges
+        self._refresh(np.array([voxel]), 2 * self._radius)
+
+    def readmit(self) -> None:
+        """See `FrontierMap`; dropped cells count again, too."""
+        for voxel in list(self._dropped):
+            self._restore(voxel)
+        super().readmit()
+
+    def _restore(self, voxel: int) -> None:
+        """Let a dropped cell count again."""
+        _, edges = self._dropped.pop(voxel)
+        self._marks[edges] &= np.uint8(~DROPPED & 0xFF)
+        self._marks[voxel] &= np.uint8(~EXCLUDED & 0xFF)
+        self._refresh(np.array([voxel]), 2 * self._radius)
+
+    def _surroundings(self, voxel: int) -> bytes:
+        """Return the states of the voxels around one."""
+        box = box_around(self._size, voxel, self._radius, -1)
+        return self._states.state.reshape(self._size)[box].tobytes()
+
+    def _edges_beside(self, voxel: int) -> np.ndarray:
+        """Return (N,) int64 voxels of the body's footprint in a voxel that lie beside unknown ones."""
+        beside = self._touched_from(voxel)
+        return beside[self._marks[beside] & EDGE > 0]
+
+    def _touched_from(self, voxel: int) -> np.ndarray:
+        """Return (N,) int64 voxels of the body's footprint in a voxel."""
+        places = self._axes_of(np.array(voxel)) + self._blocks.footprint
+        places = places[((places >= 0) & (places < self._size)).all(1)]
+        return np.asarray(np.ravel_multi_index(tuple(places.T), self._size))
+
+    def _gaze_pitches(self, view: RobotKnowledge) -> Sequence[float]:
+        """See `FrontierMap`."""
+        return (0.0,) if view.planar else (0.0, -0.7, 0.7)
+
+    def _points_ahead(self, place: np.ndarray, view: RobotKnowledge, yaw: float, pitch: float) -> int:
+        """See `FrontierMap`."""
+        turn, tilt = view.kind.sensor.field_of_view_rad
+        pitches = self._pitches if view.planar else np.linspace(pitch - tilt / 2, pitch + tilt / 2, 5)
+        rays = rays_towards(np.linspace(yaw - turn / 2, yaw + turn / 2, 24), pitches)
+        arrays = self._counter, self._states.state, self._size, tuple(place.tolist()), rays
+        return int(count_crossed(*arrays, self.reach, False)[0])
+
+
+def _pitches(kind: RobotKind, flies: bool) -> np.ndarray:
+    """Return (rows,) pitches of imagined rays: all of them for flying robots, else the sensor's."""
+    tilt = kind.sensor.field_of_view_rad[1]
+    if flies:
+        return (np.arange(_ROWS) + 0.5) * (math.pi / _ROWS) - math.pi / 2
+    rows = min(kind.sensor.rows, _ROWS)
+    return np.linspace(-tilt / 2, tilt / 2, rows) if rows > 1 else np.zeros(1)

@@ -1,0 +1,114 @@
+"""What is known of each voxel of one robot's belief, and where more may have become visible.
+
+A voxel is explored once its σ has fallen to a stated level. Grid units; voxels by number, C order.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from scipy import ndimage
+
+from entropy_explore_env.belief.raycast import STOP_AT_COVERED
+from entropy_explore_env.belief.voxel_index import grid_index
+from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel
+from entropy_explore_env.frontiers.blocks import COVERED, UNEXPLORED, UNMAPPED
+
+TILE = 8
+"""Width in voxels of the square tiles, seen from above, by which changes are noted."""
+_SUMMED = 128
+"""Voxels that are checked together for new measurements."""
+
+
+class VoxelStates(NamedTuple):
+    """States of V voxels."""
+
+    state: np.ndarray
+    """(V,) uint8: UNEXPLORED, UNMAPPED, COVERED."""
+    changed: np.ndarray
+    """(V,) int32, the voxels that changed in the latest update come first."""
+    tiles: np.ndarray
+    """(X / TILE, Y / TILE) uint8, where more may be visible than before."""
+    sums: np.ndarray
+    """(V / _SUMMED,) uint64, sums of the bit patterns of precisions at the latest update."""
+    levels: np.ndarray
+    """(2,) float32, levels at the latest update; NaN = there was none."""
+    size: tuple[int, int, int]
+
+
+def new_states(shape: tuple[int, int, int]) -> VoxelStates:
+    """Return the states of (X, Y, Z) voxels of which nothing is explored."""
+    voxels = math.prod(shape)
+    return VoxelStates(
+        state=np.full(voxels, UNEXPLORED | UNMAPPED, np.uint8),
+        changed=np.zeros(voxels, np.int32),
+        tiles=np.zeros((shape[0] // TILE + 1, shape[1] // TILE + 1), np.uint8),
+        sums=np.zeros(math.ceil(voxels / _SUMMED), np.uint64),
+        levels=np.full(2, np.nan, np.float32),
+        size=(int(shape[0]), int(shape[1]), int(shape[2])),
+    )
+
+
+@inlined_kernel
+def _state_of(mean, precision, levels):
+    """Return the state of a voxel without branches: for many voxels at once."""
+    unexplored, unmapped = np.uint8(precision < levels[0]), np.uint8(precision < levels[1])
+    covered = np.uint8(mean > np.float32(STOP_AT_COVERED)) & ~unmapped
+    return np.uint8(unexplored * UNEXPLORED | unmapped * UNMAPPED | covered * COVERED)
+
+
+@lean_kernel
+def update_states(states, mean, precision, levels):
+    """Bring the states up to date with a belief: sums over all voxels, and work where something changed.
+
+    A measurement raises a voxel's precision, and with it the integer that its bit pattern represents. So the
+    sum over some voxels is unchanged only if none of them was measured. (A measurement too weak to raise a
+    float32 does not change the mean either.)
+
+    Args:
+        states: Of the robot.
+        mean: (V,) float32, changed since the latest update only where the precision was raised.
+        precision: (V,) float32 1/σ², nowhere less than at the latest update.
+        levels: (explored, mapped): precisions from which on a voxel is explored, and mapped.
+
+    Returns:
+        How many voxels are in another state than at the latest update.
+    """
+    state, count, bits = states.state, 0, precision.view(np.uint32)
+    as_before = states.levels[0] == levels[0] and states.levels[1] == levels[1]
+    states.levels[0], states.levels[1] = levels[0], levels[1]
+    for first in range(0, len(state), _SUMMED):
+        last, total = min(first + _SUMMED, len(state)), np.uint64(0)
+        for voxel in range(first, last):
+            total += np.uint64(bits[voxel])
+        if as_before and total == states.sums[first // _SUMMED]:
+            continue
+        states.sums[first // _SUMMED] = total
+        for voxel in range(first, last):
+            before, now = state[voxel], _state_of(mean[voxel], precision[voxel], levels)
+            if now != before:
+                state[voxel] = now
+                states.changed[count] = voxel
+                count += 1
+                if before & COVERED > now & COVERED or before & UNEXPLORED < now & UNEXPLORED:
+                    note_more(states, voxel)
+    return count
+
+
+@lean_kernel
+def note_more(states, voxel):
+    """Note that more may be visible around a voxel than before."""
+    x, y, _ = grid_index(states.size, voxel)
+    states.tiles[x // TILE, y // TILE] = 1
+
+
+def take_notes(states: VoxelStates, reach: float) -> np.ndarray | None:
+    """Return (X / TILE, Y / TILE) bool, tiles within reach of noted ones; None = none. Clear the notes."""
+    if not states.tiles.any():
+        return None
+    wide = math.ceil(min(reach, sum(states.size)) / TILE)
+    near = ndimage.maximum_filter(states.tiles, 2 * wide + 1, mode="constant") > 0
+    states.tiles[:] = 0
+    return np.asarray(near)
