@@ -11,7 +11,7 @@ from baselines.experiments.mission import scripted
 from baselines.papers.sawhney.mission import Run, explore_until_done
 from baselines.papers.sawhney.sweep import world_cell
 from baselines.strategies.allocation import Allocator
-from baselines.strategies.rules.metrics import Metric
+from baselines.strategies.metrics import Metric
 from baselines.strategies.rules.per_time_visibility import PerTimeVisibility
 from benchmarks.planning import FLOOR, cluttered
 from benchmarks.rows import Effort, Goal, Row, alone, compared, timed

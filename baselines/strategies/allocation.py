@@ -19,9 +19,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from baselines.strategies.rules.metrics import Value
+from baselines.strategies.metrics import Value
 from entropy_explore_env.frontiers.knowledge import RobotKnowledge, stays, under_way, voxel_of
 from entropy_explore_env.planner.scene import Scene
+from entropy_explore_env.planner.stops import apart_m
 from entropy_explore_env.robots.motion import driving_time
 
 _FIRST_REACH = 0.25
@@ -273,3 +274,10 @@ class Round:
 
 def _value_of(choice: Choice | None) -> float:
     return -math.inf if choice is None else choice.value
+
+
+def bodies_touch(view: RobotKnowledge, mate: int) -> bool:
+    """Return whether a teammate's body was last heard to be no farther than a voxel edge from the robot's."""
+    scenario, apart = view.scenario, apart_m(view, view.teammates[mate].pose)
+    bodies_m = view.kind.robot.body_radius_m + scenario.kind_of(mate).robot.body_radius_m
+    return apart <= bodies_m + scenario.grid.voxel_size_m

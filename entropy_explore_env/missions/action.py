@@ -11,7 +11,7 @@ Discrete: number m·D + g means move m of `discrete_moves` (a voxel offset from 
 that voxel's centre) and gaze g of the D in `gaze_set`.
 
 Candidates: the number of one of the viewpoints that were proposed to the robot when it began to decide
-(`viewpoints/proposals`); that of one that does not exist means the first, the planner's own choice.
+(`planner`); that of one that does not exist means the first, the planner's own choice.
 
 All robots of a team have the same actions. Where only some fly, the numbers for height and pitch mean
 nothing to the others; a discrete move beyond a robot's own reach is shortened to it.

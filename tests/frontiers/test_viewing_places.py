@@ -197,6 +197,7 @@ class Walk:
             under_way=since_scan_m > 0.0,
             since_scan_m=since_scan_m,
             time_s=0.0,
+            scan=SimpleNamespace(utility_bits=np.ones(1)),
         )
         viewpoint = self.rule.choose(view)
         return cell(self.plan, np.ravel_multi_index(self.place_of(viewpoint), (*self.plan.shape, 1)))

@@ -22,7 +22,7 @@ from baselines.experiments.cells import Cell
 from baselines.experiments.mission import scripted
 from baselines.papers.sawhney.mission import Run, explore_until_done
 from baselines.papers.sawhney.sweep import PLANS, POINT, TERRAINS, world_cell
-from baselines.strategies.rules.metrics import Metric
+from baselines.strategies.metrics import Metric
 from baselines.strategies.rules.per_time_visibility import PerTimeVisibility
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.frontiers.frontier_map import Chart

@@ -17,7 +17,8 @@ from functools import lru_cache
 import numpy as np
 
 from baselines.experiments.outcome import Record
-from baselines.strategies.rules.per_time_visibility import ExplorationConfig, PerTimeVisibility
+from baselines.strategies.metrics import ExplorationConfig
+from baselines.strategies.rules.per_time_visibility import PerTimeVisibility
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.missions.view import RobotView
 from entropy_explore_env.reports.metrics import joint_figures, mission_figures

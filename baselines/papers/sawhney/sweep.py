@@ -19,8 +19,7 @@ from baselines.papers.sawhney.map_files import STARTS as MAP_STARTS
 from baselines.papers.sawhney.map_files import TEAM as MAP_TEAM
 from baselines.papers.sawhney.map_files import map_world
 from baselines.papers.sawhney.mission import MapRun, Run
-from baselines.strategies.rules.metrics import Coordinated, Metric, Nearest
-from baselines.strategies.rules.per_time_visibility import ExplorationConfig
+from baselines.strategies.metrics import Coordinated, ExplorationConfig, Metric, Nearest
 from entropy_explore_env.frontiers.frontier_map import KNOWN_SIGMA, FrontierConfig
 from entropy_explore_env.scenario import Scenario, with_settings
 from entropy_explore_env.scenarios import find_scenario

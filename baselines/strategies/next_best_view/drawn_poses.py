@@ -15,7 +15,7 @@ from baselines.strategies.next_best_view.expected_view import (
     new_view,
     occupancy_map,
 )
-from baselines.strategies.next_best_view.poses import drawn_poses, reachable_voxels
+from baselines.strategies.next_best_view.pose_samples import drawn_poses, reachable_voxels
 from entropy_explore_env.frontiers.knowledge import RobotKnowledge, belief_of
 from entropy_explore_env.frontiers.voxel_frontiers import VoxelFrontiers
 from entropy_explore_env.planner.frontier_rule import FrontierRule

@@ -15,7 +15,7 @@ import numpy as np
 
 from baselines.strategies.next_best_view.ground_map import EdgeForm, GroundMap, column_of
 from baselines.strategies.next_best_view.plateau import PlateauPaths
-from baselines.strategies.next_best_view.poses import yaws_around
+from baselines.strategies.next_best_view.pose_samples import yaws_around
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.frontiers.knowledge import RobotKnowledge
 from entropy_explore_env.planner.driver import Driver, Trail

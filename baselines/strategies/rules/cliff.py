@@ -20,7 +20,7 @@ import numpy as np
 from baselines.strategies.next_best_view.elevation_view import fill_new_information
 from baselines.strategies.next_best_view.ground_map import EdgeForm, GroundMap, camera_of
 from baselines.strategies.next_best_view.plateau_rule import STEEP_RAD, PlateauRule, pose_at
-from baselines.strategies.next_best_view.poses import drawn_poses
+from baselines.strategies.next_best_view.pose_samples import drawn_poses
 from baselines.strategies.next_best_view.rating import pose_distance, rating
 from entropy_explore_env.frontiers.knowledge import RobotKnowledge
 from entropy_explore_env.validation import check_choice, check_within

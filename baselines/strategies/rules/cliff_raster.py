@@ -14,7 +14,7 @@ import numpy as np
 
 from baselines.strategies.next_best_view.ground_map import GroundMap
 from baselines.strategies.next_best_view.plateau_rule import PlateauRule, pose_at
-from baselines.strategies.next_best_view.poses import next_of_raster, raster_rows, yaws_around
+from baselines.strategies.next_best_view.pose_samples import next_of_raster, raster_rows, yaws_around
 from entropy_explore_env.frontiers.blocks import NONE
 from entropy_explore_env.frontiers.knowledge import RobotKnowledge
 from entropy_explore_env.scenario import Scenario

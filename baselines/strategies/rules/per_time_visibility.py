@@ -21,16 +21,15 @@ Ours, where the paper says nothing:
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from typing import Literal, cast
+from typing import cast
 
 import numpy as np
 
-from baselines.strategies.allocation import Allocator, Choice, Round
-from baselines.strategies.rules.metrics import Metric, Value
+from baselines.strategies.allocation import Allocator, Choice, Round, bodies_touch
+from baselines.strategies.metrics import ExplorationConfig
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.frontiers.blocks import NONE
-from entropy_explore_env.frontiers.frontier_map import KNOWN_SIGMA, FrontierConfig
+from entropy_explore_env.frontiers.frontier_map import KNOWN_SIGMA
 from entropy_explore_env.frontiers.knowledge import (
     RobotKnowledge,
     stays,
@@ -42,42 +41,7 @@ from entropy_explore_env.frontiers.terrain_frontiers import TerrainFrontiers
 from entropy_explore_env.frontiers.voxel_frontiers import VoxelFrontiers
 from entropy_explore_env.planner.frontier_rule import FrontierRule
 from entropy_explore_env.planner.scene import ROOM, STAY, Scene
-from entropy_explore_env.planner.stops import apart_m
 from entropy_explore_env.scenario import Scenario
-from entropy_explore_env.validation import check_choice, check_kind
-
-Allocation = Literal["asynchronous", "synchronous"]
-
-
-@dataclass(frozen=True)
-class ExplorationConfig:
-    """How robots choose frontiers.
-
-    Attributes:
-        metric: The values of candidates.
-        allocation: Whether robots choose when they stop, or all together.
-        promises: Whether points that teammates announced to see have less weight.
-        frontiers: Where candidates lie and what is seen from them.
-        once: Whether no finer σ counts as explored where no candidate is left: robots wait then.
-
-    Raises:
-        SettingError: A field has another value.
-    """
-
-    metric: Value = field(default_factory=Metric)
-    allocation: Allocation = "asynchronous"
-    promises: bool = True
-    frontiers: FrontierConfig = field(default_factory=FrontierConfig)
-    once: bool = False
-
-    def __post_init__(self) -> None:
-        """Check every field."""
-        if isinstance(self.metric, type) or not callable(self.metric):
-            raise SettingError("ExplorationConfig.metric", self.metric, "a Metric, or another Value")
-        check_choice(self, "allocation", Allocation)
-        check_kind(self, "promises", bool)
-        check_kind(self, "frontiers", FrontierConfig)
-        check_kind(self, "once", bool)
 
 
 class PerTimeVisibility(FrontierRule):
@@ -147,7 +111,7 @@ class PerTimeVisibility(FrontierRule):
             self.idle[view.robot] = view.robot not in found
         if view.robot in found:
             return found[view.robot].voxel
-        if any(_touches(view, mate) for mate in moving):
+        if any(bodies_touch(view, mate) for mate in moving):
             return ROOM
         return STAY if moving or self.config.once else NONE
 
@@ -160,10 +124,3 @@ class PerTimeVisibility(FrontierRule):
         grid, stopped = self._scenario.grid, [mate for mate in known if mate not in moving]
         targets = [grid.in_grid_units(view.teammates[mate].viewpoint)[:3] for mate in moving]
         return allocator.allocate(stopped, targets, everybody=config.allocation == "synchronous")
-
-
-def _touches(view: RobotKnowledge, mate: int) -> bool:
-    """Whether a teammate's body was last heard to be no farther than a voxel edge from the robot's."""
-    scenario, apart = view.scenario, apart_m(view, view.teammates[mate].pose)
-    bodies_m = view.kind.robot.body_radius_m + scenario.kind_of(mate).robot.body_radius_m
-    return apart <= bodies_m + scenario.grid.voxel_size_m

@@ -13,7 +13,7 @@ import math
 
 import numpy as np
 
-from baselines.strategies.next_best_view.poses import (
+from baselines.strategies.next_best_view.pose_samples import (
     next_of_raster,
     raster_rows,
     reachable_voxels,

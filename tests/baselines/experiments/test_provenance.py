@@ -19,10 +19,9 @@ from baselines.experiments.outcome import Outcome
 from baselines.experiments.provenance import CodeChangedError, code_digest, imported, modules_of
 from baselines.experiments.runner import Conditions, run_all
 from baselines.papers.sawhney.mission import MapRun
+from baselines.strategies.metrics import ExplorationConfig, Nearest
 from baselines.strategies.rules.gradient import GradientStrategy
-from baselines.strategies.rules.metrics import Nearest
 from baselines.strategies.rules.next_best_view import NextBestView, NextBestViewConfig
-from baselines.strategies.rules.per_time_visibility import ExplorationConfig
 from baselines.strategies.rules.random_walk import RandomWalk
 from entropy_explore_env.scenarios import find_scenario
 

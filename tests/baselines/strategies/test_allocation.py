@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from baselines.experiments.mission import scripted
-from baselines.strategies.rules.metrics import Nearest
-from baselines.strategies.rules.per_time_visibility import ExplorationConfig, PerTimeVisibility
+from baselines.strategies.metrics import ExplorationConfig, Nearest
+from baselines.strategies.rules.per_time_visibility import PerTimeVisibility
 from entropy_explore_env.frontiers.frontier_map import KNOWN_SIGMA, FrontierConfig
 from entropy_explore_env.frontiers.knowledge import under_way
 from entropy_explore_env.frontiers.voxel_frontiers import VoxelFrontiers

@@ -16,7 +16,7 @@ class Run:
     """Runs a mission of a cell.
 
     Attributes:
-        guarded: Whether a robot that drifts backs off from what blocks it: see `strategies.drift_guard`.
+        guarded: Whether a robot that drifts backs off from what blocks it: see `planner.back_off`.
     """
 
     guarded: bool = True

@@ -61,7 +61,7 @@ High drift: the standard deviation of x, and that of y, grows by 0.02 m a √m, 
 √m and a √rad; low drift: 0.3 times as much. {fiducials} landmarks on obstacles correct the estimate:
 without any, single missions in an office came to a stop half-mapped even with low drift. Robots that drift
 plan for a body {margin:g} m wider (`Localization.margin_m`), and back off from what blocked them
-(`strategies.drift_guard`); "plain" has neither. Wrong is the share of the measured voxels on the wrong side
+(`planner.back_off`); "plain" has neither. Wrong is the share of the measured voxels on the wrong side
 of ½, of a map of all scans. Intervals are 95 % paired bootstrap intervals over worlds."""
 
 

@@ -15,7 +15,7 @@ from entropy_explore_env.reports.metrics import mission_figures
 class Run:
     """Runs a mission of a cell with `next-best-view`, whatever the strategy that the cell names.
 
-    Without what lets robots that drift back off from what blocks them (`strategies.drift_guard`): the paper's
+    Without what lets robots that drift back off from what blocks them (`planner.back_off`): the paper's
     have nothing of the kind.
     """
 

@@ -26,7 +26,7 @@ from baselines.papers.sawhney.illustrations import (
 from baselines.papers.sawhney.mission import explore_until_done
 from baselines.papers.sawhney.sweep import PLANS, TERRAINS, world_cell
 from baselines.papers.sawhney.terrain_model import write_model
-from baselines.strategies.rules.metrics import Metric
+from baselines.strategies.metrics import Metric
 from baselines.strategies.rules.per_time_visibility import PerTimeVisibility
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.scenario import with_settings

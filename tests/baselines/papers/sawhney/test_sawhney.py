@@ -34,8 +34,7 @@ from baselines.papers.sawhney.sweep import (
 )
 from baselines.papers.sawhney.sweep import experiment as cells_of
 from baselines.papers.sawhney.terrain_model import write_model
-from baselines.strategies.rules.metrics import Metric, Nearest
-from baselines.strategies.rules.per_time_visibility import ExplorationConfig
+from baselines.strategies.metrics import ExplorationConfig, Metric, Nearest
 from entropy_explore_env.scenario import with_settings
 from entropy_explore_env.settings import Grid
 from entropy_explore_env.worlds.load import load_world

@@ -11,9 +11,9 @@ import pytest
 from baselines.experiments.mission import run_mission, scripted
 from baselines.papers.sawhney.mission import explore_until_done
 from baselines.strategies.allocation import Allocator, Choice
+from baselines.strategies.metrics import Coordinated, ExplorationConfig, Metric, Nearest
 from baselines.strategies.rules import per_time_visibility
-from baselines.strategies.rules.metrics import Coordinated, Metric, Nearest
-from baselines.strategies.rules.per_time_visibility import ExplorationConfig, PerTimeVisibility
+from baselines.strategies.rules.per_time_visibility import PerTimeVisibility
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.frontiers.blocks import COVERED, NONE

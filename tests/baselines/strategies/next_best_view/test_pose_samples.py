@@ -7,7 +7,12 @@ import math
 import numpy as np
 import pytest
 
-from baselines.strategies.next_best_view.poses import drawn_poses, next_of_raster, raster_rows, yaws_around
+from baselines.strategies.next_best_view.pose_samples import (
+    drawn_poses,
+    next_of_raster,
+    raster_rows,
+    yaws_around,
+)
 from entropy_explore_env.frontiers.blocks import NONE
 
 

@@ -2,20 +2,21 @@
 
 Nearest and Coordinated are the metrics of Yamauchi 1998 and of Burgard et al. 2005. All else is as in
 per-time visibility: few candidates, one a block; those from which nothing unexplored can be seen are ignored;
-a robot drives to its candidate before it chooses again. So `nearest-candidate` and `coordinated-candidate`
-compare metrics, and are not the rules of those papers as their authors run them: those are
-`nearest-frontier` and `coordinated-frontier`.
+a robot drives to its candidate before it chooses again. So they compare metrics, and are not the rules of
+those papers as their authors run them: those are `nearest-frontier` and `coordinated-frontier`.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import Protocol
+from dataclasses import dataclass, field
+from typing import Literal, Protocol
 
 import numpy as np
 
-from entropy_explore_env.validation import check, check_not_negative
+from entropy_explore_env.errors import SettingError
+from entropy_explore_env.frontiers.frontier_map import FrontierConfig
+from entropy_explore_env.validation import check, check_choice, check_kind, check_not_negative
 
 
 class Value(Protocol):
@@ -103,3 +104,37 @@ class Coordinated:
         """See `Value`."""
         del seen, seconds
         return 1.0 - taken - self.beta * edges
+
+
+Allocation = Literal["asynchronous", "synchronous"]
+
+
+@dataclass(frozen=True)
+class ExplorationConfig:
+    """How robots choose frontiers.
+
+    Attributes:
+        metric: The values of candidates.
+        allocation: Whether robots choose when they stop, or all together.
+        promises: Whether points that teammates announced to see have less weight.
+        frontiers: Where candidates lie and what is seen from them.
+        once: Whether no finer σ counts as explored where no candidate is left: robots wait then.
+
+    Raises:
+        SettingError: A field has another value.
+    """
+
+    metric: Value = field(default_factory=Metric)
+    allocation: Allocation = "asynchronous"
+    promises: bool = True
+    frontiers: FrontierConfig = field(default_factory=FrontierConfig)
+    once: bool = False
+
+    def __post_init__(self) -> None:
+        """Check every field."""
+        if isinstance(self.metric, type) or not callable(self.metric):
+            raise SettingError("ExplorationConfig.metric", self.metric, "a Metric, or another Value")
+        check_choice(self, "allocation", Allocation)
+        check_kind(self, "promises", bool)
+        check_kind(self, "frontiers", FrontierConfig)
+        check_kind(self, "once", bool)
