@@ -21,8 +21,8 @@ from entropy_explore_env.frontiers.blocks import COVERED, NONE, UNEXPLORED, UNMA
 from entropy_explore_env.frontiers.frontier_map import KNOWN_SIGMA, FrontierConfig
 from entropy_explore_env.frontiers.knowledge import voxel_of
 from entropy_explore_env.frontiers.path_lengths import KnownPaths
-from entropy_explore_env.frontiers.ray_tree import grow_tree
-from entropy_explore_env.frontiers.visibility import count_from, new_counter, rays_around
+from entropy_explore_env.frontiers.ray_tree import grow_tree, rays_around
+from entropy_explore_env.frontiers.visibility import count_from, new_counter
 from entropy_explore_env.frontiers.voxel_frontiers import VoxelFrontiers
 from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.missions.view import view_of

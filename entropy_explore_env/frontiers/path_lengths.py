@@ -168,15 +168,8 @@ class KnownPaths:
             least: Some path is at least this long.
             most: No path is longer.
         """
-        start_search(self.search, self.lattice, self.costs, np.array([voxel], np.int32))
-        self.reach, reach = 0.0, max(least, 1.0)
-        while True:
-            self.extend(reach)
-            lengths = self.lengths_to(others)
-            near = lengths[(lengths <= reach) & np.isfinite(lengths)]
-            if len(near) == len(others) or reach >= most:
-                return float(near.mean()) if len(near) else 0.0
-            reach = min(1.2 * reach, most)
+        source, arrays = np.array([voxel], np.int32), (self.search, self.lattice, self.costs)
+        return float(mean_length_from(*arrays, source, others, least, most))
 
     def is_line_free(self, first: np.ndarray, second: np.ndarray) -> bool:
         """Whether the straight line between two places (3,), in voxel edges, is known to be free."""
@@ -229,3 +222,30 @@ def fill_free_lines(
             if apart <= farthest:
                 cost = line_of_sight_cost(search, lattice, costs, a, b)
                 seen[first, second] = seen[second, first] = not math.isinf(cost)
+
+
+@lean_kernel
+def mean_length_from(
+    search: Search,
+    lattice: Lattice,
+    costs: Costs,
+    source: np.ndarray,
+    voxels: np.ndarray,
+    least: float,
+    most: float,
+) -> float:
+    """Return the mean length of the paths from a source (1,) to voxels; see `KnownPaths.mean_length`."""
+    start_search(search, lattice, costs, source)
+    reach = max(least, 1.0)
+    while True:
+        resume_search(search, lattice, costs, reach)
+        total, missing = 0.0, 0
+        for voxel in voxels:
+            length = cost_to(search, voxel)
+            if length <= reach and not math.isinf(length):
+                total += length
+            else:
+                missing += 1
+        if missing == 0 or reach >= most:
+            return total / max(len(voxels) - missing, 1)
+        reach = min(1.2 * reach, most)

@@ -20,7 +20,12 @@ from entropy_explore_env.belief.raycast import (
     cast_ray,
     longest_crossing,
 )
-from entropy_explore_env.compilation.kernels import lean_kernel
+from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel
+from entropy_explore_env.settings import RobotKind
+
+MOST_RAYS = 720
+_ROWS = 15
+"""Rows of imagined rays for robots that look up and down."""
 
 
 class RayTree(NamedTuple):
@@ -36,10 +41,45 @@ class RayTree(NamedTuple):
     """(N,) uint32, the next node if this one stops its rays."""
     cells: int
     """Number of different voxels C."""
+    box: np.ndarray
+    """(C,) int64, their numbers in a box that extends `margin` to all sides of the first voxel; ascending."""
+    margin: tuple[int, int, int]
+    """See `box`."""
+    nodes: np.ndarray
+    """(N,) uint32, nodes in the order of their cells."""
+    first: np.ndarray
+    """(C + 1,) int64, index in `nodes` of each cell's first node, and one past the last cell's last."""
     low: tuple[int, int, int]
     """Smallest steps along the axes."""
     high: tuple[int, int, int]
     """Largest steps along the axes. Where all voxels between lie inside, no ray leaves the workspace."""
+
+
+def imagined_pitches(kind: RobotKind, flies: bool) -> np.ndarray:
+    """Return (rows,) pitches of imagined rays: all of them for flying robots, else the sensor's."""
+    tilt = kind.sensor.field_of_view_rad[1]
+    if flies:
+        return (np.arange(_ROWS) + 0.5) * (math.pi / _ROWS) - math.pi / 2
+    rows = min(kind.sensor.rows, _ROWS)
+    return np.linspace(-tilt / 2, tilt / 2, rows) if rows > 1 else np.zeros(1)
+
+
+def rays_around(reach: float, pitches: np.ndarray) -> np.ndarray:
+    """Return (D, 3) float64 unit vectors all around: in plans one for every voxel edge at `reach`.
+
+    Args:
+        reach: In voxel edges; there are MOST_RAYS at most.
+        pitches: (rows,) radians downwards; with more than one row at most 32 to a turn.
+    """
+    turns = min(math.ceil(2.0 * math.pi * min(reach, 1e4)), MOST_RAYS if len(pitches) == 1 else 32)
+    return rays_towards((np.arange(turns) + 0.5) * (2.0 * math.pi / turns), pitches)
+
+
+def rays_towards(yaws: np.ndarray, pitches: np.ndarray) -> np.ndarray:
+    """Return (D, 3) float64 unit vectors of all pairs of yaw and pitch, radians."""
+    yaw, pitch = (axis.reshape(-1) for axis in np.meshgrid(yaws, pitches, indexing="ij"))
+    level = np.cos(pitch)
+    return np.stack([np.cos(yaw) * level, np.sin(yaw) * level, -np.sin(pitch)], axis=-1)
 
 
 def grow_tree(directions: np.ndarray, reach: float, size: tuple[int, int, int]) -> RayTree:
@@ -75,9 +115,25 @@ def grow_tree(directions: np.ndarray, reach: float, size: tuple[int, int, int]) 
         cell.astype(np.uint32),
         after.astype(np.uint32),
         cells=len(cells),
+        box=cells.astype(np.int64),
+        margin=(int(margin[0]), int(margin[1]), int(margin[2])),
+        nodes=np.argsort(cell, kind="stable").astype(np.uint32),
+        first=np.concatenate([[0], np.cumsum(np.bincount(cell))]).astype(np.int64),
         low=tuple(low),
         high=tuple(high),
     )
+
+
+@inlined_kernel
+def cell_at(tree, x, y, z):
+    """Return the number of the cell at a step from the first voxel; -1 = no ray crosses it."""
+    margin = tree.margin
+    if abs(x) > margin[0] or abs(y) > margin[1] or abs(z) > margin[2]:
+        return -1
+    wide, high = 2 * margin[1] + 1, 2 * margin[2] + 1
+    number = ((x + margin[0]) * wide + y + margin[1]) * high + z + margin[2]
+    cell = np.searchsorted(tree.box, number)
+    return cell if cell < len(tree.box) and tree.box[cell] == number else -1
 
 
 @lean_kernel

@@ -9,6 +9,7 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
+from scipy import ndimage
 
 from entropy_explore_env.frontiers.blocks import EDGE, NONE, UNEXPLORED, queue_all_around, replace_unreached
 from entropy_explore_env.frontiers.frontier_map import BATCH_CELLS, Chart, FrontierConfig, FrontierMap
@@ -35,6 +36,8 @@ from entropy_explore_env.settings import RobotKind
 
 PATCH_M = 5.0
 """Half the width of the patch whose mean ground is z_av."""
+TILE = 8
+"""Width in columns of the square tiles by which changes are noted."""
 TOO_HIGH = 0.9
 """Candidates higher above z_av than this share of the range are dropped."""
 
@@ -66,7 +69,7 @@ class TerrainFrontiers(FrontierMap):
             fade=self.reach if frontiers.unexplored_ground == "falling" else math.inf,
         )
         self.point = edge**2
-        self._widths = half_widths(self.reach)
+        self._widths, self._far = half_widths(self.reach), self.reach + self._view_model.patch
         self.batch = 1 + BATCH_CELLS // max(math.ceil(turns * self.reach), 1)
         factor = 1.0 if frontiers.gamma is None else edge * high
         self._most = min(math.pi * (self.reach + 2.0) ** 2, float(x * y)) * factor
@@ -75,7 +78,13 @@ class TerrainFrontiers(FrontierMap):
     def update(self, view: RobotKnowledge, sigma: float) -> None:
         """See `FrontierMap`."""
         update_terrain(self._map, view.mean.reshape(-1), view.precision.reshape(-1), self._levels(sigma))
-        self._forget_bounds(self.reach + self._view_model.patch)
+        count = int(self._states.noted_count[0])
+        self._states.noted_count[0] = 0
+        if count > 0:
+            slots = np.flatnonzero(self._voxels != NONE)
+            near = tiles_near(self._axes_of(self._states.noted[:count]), self._size, self._far)
+            x, y, _ = (self._axes_of(self._voxels[slots]) // TILE).T
+            self._bounds[slots[near[x, y]]] = math.inf
 
     def mapped_share(self) -> float:
         """See `FrontierMap`."""
@@ -135,9 +144,19 @@ class TerrainFrontiers(FrontierMap):
         """Return one: down, with the lowest rays straight down."""
         return (0.5 * math.pi - 0.5 * self._tilt,)
 
-    def _points_ahead(self, place: np.ndarray, view: RobotKnowledge, yaw: float, pitch: float) -> int:
+    def _points_ahead(
+        self, place: np.ndarray, view: RobotKnowledge, pitch: float, yaws: Sequence[float]
+    ) -> list[int]:
         """See `FrontierMap`."""
         half_turn = 0.5 * view.kind.sensor.field_of_view_rad[0]
-        ahead = self._azimuths @ (math.cos(yaw), math.sin(yaw)) >= math.cos(half_turn)
-        arrays = self._counter, self._map, *self._from(place), self._azimuths[ahead]
-        return int(count_below(*arrays, self._view_model, False)[0])
+        arrays, azimuths = (self._counter, self._map, *self._from(place)), self._azimuths
+        ahead = (azimuths @ (math.cos(yaw), math.sin(yaw)) >= math.cos(half_turn) for yaw in yaws)
+        return [count_below(*arrays, azimuths[seen], self._view_model, False)[0] for seen in ahead]
+
+
+def tiles_near(places: np.ndarray, size: tuple[int, int, int], reach: float) -> np.ndarray:
+    """Return (X / TILE, Y / TILE) bool, the tiles within reach of (N, 3) indices of voxels."""
+    tiles = np.zeros((size[0] // TILE + 1, size[1] // TILE + 1), bool)
+    tiles[places[:, 0] // TILE, places[:, 1] // TILE] = True
+    wide = math.ceil(min(reach, sum(size)) / TILE)
+    return np.asarray(ndimage.maximum_filter(tiles, 2 * wide + 1, mode="constant"))

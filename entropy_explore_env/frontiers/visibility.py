@@ -22,12 +22,11 @@ from entropy_explore_env.belief.raycast import (
     cast_ray,
     longest_crossing,
 )
-from entropy_explore_env.belief.voxel_index import flat_index
+from entropy_explore_env.belief.voxel_index import flat_index, grid_index
 from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel
-from entropy_explore_env.frontiers.blocks import UNEXPLORED
-from entropy_explore_env.frontiers.ray_tree import RayTree
+from entropy_explore_env.frontiers.blocks import NONE, UNEXPLORED
+from entropy_explore_env.frontiers.ray_tree import RayTree, cell_at
 
-MOST_RAYS = 720
 _STOPS_RAYS = 3
 """States above this do."""
 _WEIGHTS = 1.0 / (1.0 + np.arange(256))
@@ -67,30 +66,13 @@ def new_counter(points: int, shape: tuple[int, int, int]) -> VisibilityCounter:
     )
 
 
-def rays_around(reach: float, pitches: np.ndarray) -> np.ndarray:
-    """Return (D, 3) float64 unit vectors all around: in plans one for every voxel edge at `reach`.
-
-    Args:
-        reach: In voxel edges; there are MOST_RAYS at most.
-        pitches: (rows,) radians downwards; with more than one row at most 32 to a turn.
-    """
-    turns = min(math.ceil(2.0 * math.pi * min(reach, 1e4)), MOST_RAYS if len(pitches) == 1 else 32)
-    return rays_towards((np.arange(turns) + 0.5) * (2.0 * math.pi / turns), pitches)
-
-
-def rays_towards(yaws: np.ndarray, pitches: np.ndarray) -> np.ndarray:
-    """Return (D, 3) float64 unit vectors of all pairs of yaw and pitch, radians."""
-    yaw, pitch = (axis.reshape(-1) for axis in np.meshgrid(yaws, pitches, indexing="ij"))
-    level = np.cos(pitch)
-    return np.stack([np.cos(yaw) * level, np.sin(yaw) * level, -np.sin(pitch)], axis=-1)
-
-
 @inlined_kernel
 def start_count(counter):
     """Start a new count; return its number."""
     counter.latest[0] += 1
     if counter.latest[0] > 2**31 - 2:  # once in a lifetime
-        counter.stamp[:] = 0
+        for point in range(len(counter.stamp)):
+            counter.stamp[point] = 0
         counter.latest[0] = 1
     return np.int32(counter.latest[0])
 
@@ -98,7 +80,7 @@ def start_count(counter):
 @inlined_kernel
 def count_point(counter, point, marking):
     """Return the weight of a visible point; if `marking`, one more robot promises to see it."""
-    value = _WEIGHTS[counter.promised[point]]
+    value = 1.0 / (1.0 + counter.promised[point])
     if marking:
         if counter.promised[point] == 0:
             counter.promised_points[counter.promised_count[0]] = point
@@ -165,6 +147,16 @@ class _Rays(NamedTuple):
     """(C,) int32, the latest start whose rays met each cell of the tree."""
 
 
+class _Start(NamedTuple):
+    """The voxel in which rays start."""
+
+    voxel: np.int64
+    at: tuple[int, int, int]
+    """Its indices."""
+    place: int
+    """Its number in the call."""
+
+
 @lean_kernel
 def count_from(counter, state, size, voxels, tree, met, seen, weighed):
     """Count from the centres of K voxels what `count_crossed` finds there, with the rays as a tree.
@@ -181,19 +173,25 @@ def count_from(counter, state, size, voxels, tree, met, seen, weighed):
     """
     for cell in range(len(met)):
         met[cell] = -1
-    promises, rays = counter.promised_count[0] > 0, _Rays(state, size, tree, met)
+    promises, nodes, rays = counter.promised_count[0] > 0, len(tree.offset), _Rays(state, size, tree, met)
     for place in range(len(voxels)):
-        voxel = np.int64(voxels[place])
-        column = voxel // size[2]
-        at = column // size[1], column % size[1], voxel - column * size[2]
-        inside = _inside(tree, size, at)
+        start = _start_of(size, voxels[place], place)
+        inside = _inside(tree, size, start.at)
         if inside and not promises:
-            points, value = _count_branches(counter, rays, voxel, at, place, True, False)
+            points, value = _count_branches(counter, rays, start, 0, nodes, True, False)
         elif inside:
-            points, value = _count_branches(counter, rays, voxel, at, place, True, True)
+            points, value = _count_branches(counter, rays, start, 0, nodes, True, True)
         else:
-            points, value = _count_branches(counter, rays, voxel, at, place, False, True)
+            points, value = _count_branches(counter, rays, start, 0, nodes, False, True)
         seen[place], weighed[place] = points, value
+
+
+@inlined_kernel
+def _start_of(size, voxel, place):
+    """Return the _Start in a voxel; division by whole numbers is 10 % faster here than `grid_index`."""
+    voxel = np.int64(voxel)
+    column = voxel // size[2]
+    return _Start(voxel, (column // size[1], column % size[1], voxel - column * size[2]), place)
 
 
 @inlined_kernel
@@ -206,14 +204,15 @@ def _inside(tree, size, at):
 
 
 @inlined_kernel
-def _count_branches(counter, rays, voxel, at, place, inside, promises):
-    """Count from a voxel with the indices `at`, the one of number `place` in the call, as `count_from` says.
+def _count_branches(counter, rays, start, first, last, inside, promises):
+    """Count along the tree's branches, its nodes `first` … `last` - 1: (all, weighed). See `count_from`.
 
     With `inside` no ray leaves the workspace, and without `promises` all weights are 1: both save time.
     """
     state, size, tree, met = rays.state, rays.size, rays.tree, rays.met
-    points, weighed, node = 0, 0.0, np.uint32(0)
-    while node < np.uint32(len(tree.offset)):
+    voxel, at, place = start.voxel, start.at, start.place
+    points, weighed, node = 0, 0.0, np.uint32(first)
+    while node < np.uint32(last):
         if not inside:
             x, y, z = at[0] + tree.steps[node, 0], at[1] + tree.steps[node, 1], at[2] + tree.steps[node, 2]
             if not (0 <= x < size[0] and 0 <= y < size[1] and 0 <= z < size[2]):
@@ -231,3 +230,51 @@ def _count_branches(counter, rays, voxel, at, place, inside, promises):
         else:
             node += np.uint32(1)
     return points, weighed if promises else float(points)
+
+
+@lean_kernel
+def add_opened(counter, state, size, opened, voxels, tree, met, bounds):
+    """Add to upper bounds of what is seen from K voxels what becomes visible through newly freed voxels.
+
+    So the bounds stay valid: nothing else can make more visible than before.
+
+    Args:
+        counter: The counter; not changed.
+        state: (V,) uint8, states of voxels.
+        size: (X, Y, Z) voxels.
+        opened: (N,) int32, voxels that turned free since the bounds were last updated.
+        voxels: (K,) int32; NONE = no voxel.
+        tree: The RayTree of C cells with which the bounds were counted.
+        met: (C,) int32 scratch space.
+        bounds: (K,) float64, changed in place; inf = unknown, and stays so.
+    """
+    rays = _Rays(state, size, tree, met)
+    for cell in range(len(met)):
+        met[cell] = -1
+    for place in range(len(voxels)):
+        if voxels[place] == NONE or math.isinf(bounds[place]):
+            continue
+        start = _start_of(size, voxels[place], place)
+        for other in opened:
+            x, y, z = grid_index(size, other)
+            cell = cell_at(tree, x - start.at[0], y - start.at[1], z - start.at[2])
+            for number in range(tree.first[max(cell, 0)], tree.first[cell + 1]):
+                node = np.int64(tree.nodes[number])
+                if node > 0 and _is_reached(state, start.voxel, tree, node):
+                    first, last = node + 1, tree.after[node]
+                    bounds[place] += _count_branches(counter, rays, start, first, last, False, False)[0]
+
+
+@lean_kernel
+def _is_reached(state, voxel, tree, node):
+    """Whether nothing stops the rays from a voxel before a node of their tree."""
+    at = np.int64(0)
+    while at != node:
+        after = np.int64(tree.after[at])
+        if node >= after:
+            at = after
+        elif at > 0 and state[voxel + tree.offset[at]] > _STOPS_RAYS:
+            return False
+        else:
+            at += 1
+    return True

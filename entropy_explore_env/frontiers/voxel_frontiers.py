@@ -7,7 +7,7 @@ textbook's frontier cell itself. Voxels lie in blocks. The cell nearest to the m
 all of it in `listed`, the one with the shortest path in `nearest_of_blocks`.
 
 Counts are reused as upper bounds: while the map grows, no more unexplored voxels can be seen from a place
-than before, but for where a voxel turned out free or is unexplored again.
+than before. Only voxels that turn free may open new views, and those are added to the bounds.
 """
 
 from __future__ import annotations
@@ -30,20 +30,20 @@ from entropy_explore_env.frontiers.blocks import (
 )
 from entropy_explore_env.frontiers.frontier_map import BATCH_CELLS, Chart, FrontierConfig, FrontierMap
 from entropy_explore_env.frontiers.knowledge import RobotKnowledge
-from entropy_explore_env.frontiers.ray_tree import grow_tree
+from entropy_explore_env.frontiers.ray_tree import grow_tree, imagined_pitches, rays_around, rays_towards
 from entropy_explore_env.frontiers.viewing_places import first_viewing_place
 from entropy_explore_env.frontiers.visibility import (
+    add_opened,
     count_crossed,
     count_from,
     count_in_ball,
     new_counter,
-    rays_around,
-    rays_towards,
 )
 from entropy_explore_env.frontiers.voxel_map import (
     box_around,
     collect_candidates,
     count_connected,
+    fill_nearest,
     keep_unseen,
     new_voxel_map,
     update_blocks,
@@ -55,8 +55,8 @@ from entropy_explore_env.settings import RobotKind
 
 BLOCK = 4
 """Voxels along the edge of a block, unless settings say otherwise."""
-_ROWS = 15
-"""Rows of imagined rays for robots that look up and down."""
+_MOST_OPENED = 256
+"""Where more voxels turned free, or are unexplored again, counting anew is as fast as raising bounds."""
 
 
 class VoxelFrontiers(FrontierMap):
@@ -75,7 +75,7 @@ class VoxelFrontiers(FrontierMap):
         self._costs, self._bounds = self._map.traversal_cost, self._map.bounds
         self._voxels, self._marks = self._blocks.candidate, self._blocks.flags
         self._counter = new_counter(scenario.grid.voxels, self._size)
-        self._pitches = _pitches(kind, layer is None)
+        self._pitches = imagined_pitches(kind, layer is None)
         self._directions = rays_around(self.reach, self._pitches)
         self._tree = grow_tree(self._directions, self.reach, self._size)
         self._met = np.empty(self._tree.cells, np.int32)
@@ -94,10 +94,20 @@ class VoxelFrontiers(FrontierMap):
         """See `FrontierMap`; dropped cells count again where the map has changed around them."""
         mean, precision = view.mean.reshape(-1), view.precision.reshape(-1)
         self.changed = int(update_voxels(self._map, mean, precision, self._levels(sigma)))
-        self._forget_bounds(self.reach + 1.0)
+        self._raise_bounds()
         if self.changed:
             for voxel in [v for v, (was, _) in self._dropped.items() if self._surroundings(v) != was]:
                 self._restore(voxel)
+
+    def _raise_bounds(self) -> None:
+        """Add to the bounds what may be visible past voxels that turned free."""
+        count = int(self._states.noted_count[0])
+        self._states.noted_count[0] = 0
+        if count > _MOST_OPENED:
+            self._bounds[:] = math.inf
+        elif count > 0 and not self._naive:
+            arrays = self._states.noted[:count], self._voxels, self._tree, self._met
+            add_opened(self._counter, self._states.state, self._size, *arrays, self._bounds)
 
     def mapped_share(self) -> float:
         """See `FrontierMap`."""
@@ -200,10 +210,7 @@ class VoxelFrontiers(FrontierMap):
         return near[(apart <= radius * radius) & np.isfinite(self._costs[near])]
 
     def first_viewing_place(self, places: np.ndarray, voxels: np.ndarray, reach: float) -> int:
-        """Return the index of the first of (K,) int32 places from which (N,) int32 voxels are all visible.
-
-        It is NONE where there is none. How far off they are visible at most, `reach`, is in voxel edges.
-        """
+        """Return the index of the first of (K,) int32 places; arguments as of the kernel of this name."""
         return int(first_viewing_place(self._blocks, places, voxels, reach))
 
     def nearest_of_blocks(
@@ -223,10 +230,9 @@ class VoxelFrontiers(FrontierMap):
         cells, of_block = np.empty(most, np.int32), np.empty(most, np.int64)
         count = collect_candidates(self._blocks, blocks, cells, of_block)
         cells, of_block = cells[:count], of_block[:count]
-        lengths, least = lengths_to(cells), np.full(len(blocks), np.inf)
-        np.minimum.at(least, of_block, lengths)
-        nearest = np.flatnonzero(np.isfinite(lengths) & (lengths <= reach) & (lengths == least[of_block]))
-        nearest = nearest[np.unique(of_block[nearest], return_index=True)[1]]
+        lengths, nearest = lengths_to(cells), np.full(len(blocks), NONE)
+        fill_nearest(lengths, of_block, reach, nearest)
+        nearest = nearest[nearest != NONE]
         return cells[nearest], lengths[nearest]
 
     def drop(self, voxel: int, with_edges: bool) -> None:
@@ -277,19 +283,12 @@ class VoxelFrontiers(FrontierMap):
         """See `FrontierMap`."""
         return (0.0,) if view.planar else (0.0, -0.7, 0.7)
 
-    def _points_ahead(self, place: np.ndarray, view: RobotKnowledge, yaw: float, pitch: float) -> int:
+    def _points_ahead(
+        self, place: np.ndarray, view: RobotKnowledge, pitch: float, yaws: Sequence[float]
+    ) -> list[int]:
         """See `FrontierMap`."""
         turn, tilt = view.kind.sensor.field_of_view_rad
         pitches = self._pitches if view.planar else np.linspace(pitch - tilt / 2, pitch + tilt / 2, 5)
-        rays = rays_towards(np.linspace(yaw - turn / 2, yaw + turn / 2, 24), pitches)
-        arrays = self._counter, self._states.state, self._size, tuple(place.tolist()), rays
-        return int(count_crossed(*arrays, self.reach, False)[0])
-
-
-def _pitches(kind: RobotKind, flies: bool) -> np.ndarray:
-    """Return (rows,) pitches of imagined rays: all of them for flying robots, else the sensor's."""
-    tilt = kind.sensor.field_of_view_rad[1]
-    if flies:
-        return (np.arange(_ROWS) + 0.5) * (math.pi / _ROWS) - math.pi / 2
-    rows = min(kind.sensor.rows, _ROWS)
-    return np.linspace(-tilt / 2, tilt / 2, rows) if rows > 1 else np.zeros(1)
+        arrays = self._counter, self._states.state, self._size, tuple(place.tolist())
+        fans = (rays_towards(np.linspace(yaw - turn / 2, yaw + turn / 2, 24), pitches) for yaw in yaws)
+        return [count_crossed(*arrays, rays, self.reach, False)[0] for rays in fans]

@@ -146,6 +146,16 @@ def collect_candidates(blocks, listed, found, of_block):
 
 
 @lean_kernel
+def fill_nearest(lengths, of_block, reach, nearest):
+    """Set (K,) indices of the first of the nearest cells of K blocks, by (N,) lengths up to `reach`."""
+    for cell in range(len(lengths)):
+        best = nearest[of_block[cell]]
+        near = lengths[cell] <= reach and not math.isinf(lengths[cell])
+        if near and (best == NONE or lengths[cell] < lengths[best]):
+            nearest[of_block[cell]] = cell
+
+
+@lean_kernel
 def count_connected(blocks, found, count, most):
     """Return how many EDGE voxels are connected with some, by sides, edges or corners; at most `most`.
 

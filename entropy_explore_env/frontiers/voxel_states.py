@@ -9,15 +9,11 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from scipy import ndimage
 
 from entropy_explore_env.belief.raycast import STOP_AT_COVERED
-from entropy_explore_env.belief.voxel_index import grid_index
 from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel
 from entropy_explore_env.frontiers.blocks import COVERED, UNEXPLORED, UNMAPPED
 
-TILE = 8
-"""Width in voxels of the square tiles, seen from above, by which changes are noted."""
 _SUMMED = 128
 """Voxels that are checked together for new measurements."""
 
@@ -29,8 +25,10 @@ class VoxelStates(NamedTuple):
     """(V,) uint8: UNEXPLORED, UNMAPPED, COVERED."""
     changed: np.ndarray
     """(V,) int32, the voxels that changed in the latest update come first."""
-    tiles: np.ndarray
-    """(X / TILE, Y / TILE) uint8, where more may be visible than before."""
+    noted: np.ndarray
+    """(V + X·Y,) int32, the first `noted_count` are voxels past which more may be visible than before."""
+    noted_count: np.ndarray
+    """(1,) int64; set to 0 by those that have read the notes."""
     sums: np.ndarray
     """(V / _SUMMED,) uint64, sums of the bit patterns of precisions at the latest update."""
     levels: np.ndarray
@@ -44,7 +42,8 @@ def new_states(shape: tuple[int, int, int]) -> VoxelStates:
     return VoxelStates(
         state=np.full(voxels, UNEXPLORED | UNMAPPED, np.uint8),
         changed=np.zeros(voxels, np.int32),
-        tiles=np.zeros((shape[0] // TILE + 1, shape[1] // TILE + 1), np.uint8),
+        noted=np.zeros(voxels + shape[0] * shape[1], np.int32),
+        noted_count=np.zeros(1, np.int64),
         sums=np.zeros(math.ceil(voxels / _SUMMED), np.uint64),
         levels=np.full(2, np.nan, np.float32),
         size=(int(shape[0]), int(shape[1]), int(shape[2])),
@@ -57,6 +56,13 @@ def _state_of(mean, precision, levels):
     unexplored, unmapped = np.uint8(precision < levels[0]), np.uint8(precision < levels[1])
     covered = np.uint8(mean > np.float32(STOP_AT_COVERED)) & ~unmapped
     return np.uint8(unexplored * UNEXPLORED | unmapped * UNMAPPED | covered * COVERED)
+
+
+@inlined_kernel
+def note_more(states, voxel):
+    """Note that more may be visible past a voxel than before."""
+    states.noted[states.noted_count[0]] = voxel
+    states.noted_count[0] += 1
 
 
 @lean_kernel
@@ -95,20 +101,3 @@ def update_states(states, mean, precision, levels):
                 if before & COVERED > now & COVERED or before & UNEXPLORED < now & UNEXPLORED:
                     note_more(states, voxel)
     return count
-
-
-@lean_kernel
-def note_more(states, voxel):
-    """Note that more may be visible around a voxel than before."""
-    x, y, _ = grid_index(states.size, voxel)
-    states.tiles[x // TILE, y // TILE] = 1
-
-
-def take_notes(states: VoxelStates, reach: float) -> np.ndarray | None:
-    """Return (X / TILE, Y / TILE) bool, tiles within reach of noted ones; None = none. Clear the notes."""
-    if not states.tiles.any():
-        return None
-    wide = math.ceil(min(reach, sum(states.size)) / TILE)
-    near = ndimage.maximum_filter(states.tiles, 2 * wide + 1, mode="constant") > 0
-    states.tiles[:] = 0
-    return np.asarray(near)

@@ -10,6 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from entropy_explore_env.frontiers.blocks import NONE, UNEXPLORED, queue_around, replace_unreached
+from entropy_explore_env.frontiers.terrain_frontiers import tiles_near
 from entropy_explore_env.frontiers.terrain_map import (
     fill_column_costs,
     new_terrain_map,
@@ -213,3 +214,11 @@ def test_no_more_is_seen_than_lies_in_range(seed, reach, naive, gamma):
         near = [math.dist((x, y), place) <= reach + math.sqrt(0.5) for place in np.ndindex(9, 13)]
         found = np.count_nonzero(np.reshape(near, (9, 13)) & (terrain.ground == NONE))
         assert bound == pytest.approx(found * factor)
+
+
+def test_tiles_within_reach_of_a_change_are_those_near_it():
+    near = tiles_near(np.array([[0, 0, 3]]), (40, 30, 8), 5.0)
+    assert near[:2, :2].all() and near.sum() == 4
+    near = tiles_near(np.array([[17, 9, 3], [39, 29, 0]]), (40, 30, 8), 1.0)
+    assert near[1:4, 0:3].all() and near[3:, 2:].all() and near.sum() == 14
+    assert tiles_near(np.array([[17, 9, 3]]), (40, 30, 8), 100.0).all()

@@ -10,14 +10,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from entropy_explore_env.frontiers.blocks import COVERED, UNEXPLORED
-from entropy_explore_env.frontiers.ray_tree import grow_tree
+from entropy_explore_env.frontiers.ray_tree import grow_tree, rays_around, rays_towards
 from entropy_explore_env.frontiers.visibility import (
+    add_opened,
     count_crossed,
     count_from,
     count_in_ball,
     new_counter,
-    rays_around,
-    rays_towards,
 )
 from tests.reference import sawhney as reference
 from tests.reference.scenes import drawn, seeds
@@ -142,3 +141,54 @@ def test_what_rays_share_is_walked_once():
     assert tree.after.tolist() == [10, 10, 10, 6, 6, 6, 10, 9, 9, 10]
     assert tree.cells == 8 and tree.cell[4] == tree.cell[7] != tree.cell[6]
     assert tree.offset.tolist() == [9 * x + y for x, y, _ in tree.steps.tolist()]
+
+
+@given(st.sampled_from(SHAPES), st.floats(0.6, 9.0) | st.just(math.inf), seeds)
+@drawn(80)
+def test_bounds_stay_bounds_when_walls_turn_out_free(shape, reach, seed):
+    state, _, rng = scene(shape, seed, covered=0.4)
+    counter, flat, tree = (
+        new_counter(state.size, shape),
+        state.reshape(-1),
+        grow_tree(rays(shape), reach, shape),
+    )
+    voxels, met = np.arange(-1, state.size, dtype=np.int32), np.empty(tree.cells, np.int32)
+    counted, now, _ = np.empty((3, state.size))
+    count_from(counter, flat, shape, voxels[1:], tree, met, counted, _)
+    seen = np.concatenate([[5.0], counted])
+    seen[3] = math.inf
+    walls = np.flatnonzero(flat & COVERED)
+    opened = rng.choice(walls, min(int(rng.integers(0, 4)), len(walls)), replace=False).astype(np.int32)
+    flat[opened] &= ~np.uint8(COVERED)
+    add_opened(counter, flat, shape, opened, voxels, tree, met, seen)
+    count_from(counter, flat, shape, voxels[1:], tree, met, now, _)
+    assert (seen[1:] >= now).all()
+    assert seen[0] == 5.0 and math.isinf(seen[3])
+    same = np.delete(np.arange(state.size), 2)
+    through = _reached_through(flat, shape, opened, voxels[1:], rays(shape), reach)
+    assert (seen[1:][same] == counted[same])[~through[same]].all()
+
+
+def _reached_through(state, shape, opened, voxels, directions, reach):
+    """Whether a ray from each voxel passes one that was opened, and so may show more."""
+    marked = np.zeros_like(state)
+    marked[opened] = UNEXPLORED
+    counter, free = new_counter(state.size, shape), (state & COVERED) | marked
+    starts = [tuple(int(i) + 0.5 for i in np.unravel_index(voxel, shape)) for voxel in voxels]
+    passed = [count_crossed(counter, free, shape, start, directions, reach, False)[0] for start in starts]
+    return np.array(passed) > 0
+
+
+def test_behind_a_wall_that_turned_out_free_by_hand():
+    """Looking east along six voxels, the wall at 3 hides two; once it is free they are added."""
+    state = np.full(6, UNEXPLORED, np.uint8)
+    state[0], state[3] = 0, COVERED
+    shape, east = (6, 1, 1), np.array([[1.0, 0.0, 0.0]])
+    tree, counter, seen = grow_tree(east, 9.0, shape), new_counter(6, shape), np.array([2.0, 0.0])
+    voxels, met, wall = np.array([0, 4], np.int32), np.empty(tree.cells, np.int32), np.array([3], np.int32)
+    state[3] = 0
+    add_opened(counter, state, shape, wall, voxels, tree, met, seen)
+    assert seen.tolist() == [4.0, 0.0]
+    state[2] = COVERED  # something nearer hides the hole
+    add_opened(counter, state, shape, wall, voxels, tree, met, seen)
+    assert seen.tolist() == [4.0, 0.0]

@@ -8,7 +8,6 @@ from hypothesis import strategies as st
 
 from entropy_explore_env.frontiers.blocks import CANDIDATE, COVERED, NONE, UNEXPLORED, UNMAPPED
 from entropy_explore_env.frontiers.voxel_map import new_voxel_map, update_voxels
-from entropy_explore_env.frontiers.voxel_states import new_states, take_notes
 from tests.reference import sawhney as reference
 from tests.reference.scenes import drawn, seeds
 
@@ -95,27 +94,15 @@ def test_a_corridor_by_hand():
 
 
 def test_where_more_may_be_visible_is_noted_by_hand():
-    """Of covered voxels one becomes free; then all are asked for at a finer level."""
-    shape = (20, 3, 1)
-    mean, precision = np.full(60, 0.9, np.float32), np.full(60, 9.0, np.float32)
-    voxels = new_voxel_map(shape, 0.0, 0, 2)
-    tiles = voxels.states.tiles
+    """Of twelve covered voxels one becomes free; then all are asked for at a finer level."""
+    mean, precision = np.full(12, 0.9, np.float32), np.full(12, 9.0, np.float32)
+    voxels = new_voxel_map((4, 3, 1), 0.0, 0, 2)
+    states = voxels.states
     update_voxels(voxels, mean, precision, LEVELS)
-    assert not tiles.any()
-    mean[9 * 3 + 1], precision[9 * 3 + 1] = 0.1, 10.0
+    assert states.noted_count[0] == 0
+    mean[7], precision[7] = 0.1, 10.0
     update_voxels(voxels, mean, precision, LEVELS)
-    assert tiles.tolist() == [[0], [1], [0]]
+    assert states.noted_count[0] == 1 and states.noted[0] == 7
+    states.noted_count[0] = 0
     update_voxels(voxels, mean, precision, (np.float32(16.0), np.float32(1.0)))
-    assert tiles.all()  # all is unexplored again
-
-
-def test_tiles_within_reach_of_a_note_are_found_once():
-    states = new_states((40, 30, 1))
-    assert take_notes(states, 5.0) is None
-    states.tiles[0, 0] = 1
-    near = take_notes(states, 5.0)
-    assert near is not None and near[:2, :2].all() and near.sum() == 4
-    assert take_notes(states, 5.0) is None
-    states.tiles[2, 1] = 1  # x 16 … 23, y 8 … 15
-    near = take_notes(states, 100.0)
-    assert near is not None and near.all()
+    assert states.noted[: states.noted_count[0]].tolist() == list(range(12))  # all is unexplored again
