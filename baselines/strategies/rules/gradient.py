@@ -11,8 +11,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from entropy_explore_env.frontiers.knowledge import RobotKnowledge, random_viewpoint
+from entropy_explore_env.frontiers.knowledge import RobotKnowledge
 from entropy_explore_env.planner.driver import Driver, Trail
+from entropy_explore_env.robots.motion import MoveEnd
 from entropy_explore_env.viewpoints.gradient_candidates import steepest_viewpoint
 
 
@@ -21,11 +22,12 @@ class GradientStrategy(Driver):
 
     Free-flying robots follow eqs. 33-34, planar ones the projection on their motion plane, eqs.
     38-40. A robot wanders (a random viewpoint) where the chosen gradient vanishes, as the paper
-    says, and where it is stuck: its latest drive was blocked, by a teammate or by what does not move.
+    says, and where it is stuck: its latest drive did not arrive.
     """
 
     rule = "gradient"
-    most_blocked = 1
+    most_blocked = 0
+    repeats = True
 
     def __init__(self, motion_plane: bool | None = None) -> None:
         """Take the rule.
@@ -36,12 +38,13 @@ class GradientStrategy(Driver):
         """
         self._motion_plane = motion_plane
 
-    def give_way(self, view: RobotKnowledge, trail: Trail) -> np.ndarray:
-        """Wander (Rocha04, sect. 4)."""
-        return random_viewpoint(view, self._rng)
+    def give_way(self, view: RobotKnowledge, trail: Trail) -> None:
+        """Leave it to the rule, by which robots that are stuck wander."""
 
     def decide(self, view: RobotKnowledge) -> np.ndarray | None:
-        """Return the viewpoint (5,) by the robot's own belief; None where the gradient vanishes."""
+        """Return the viewpoint (5,) by the robot's own belief; None = the robot wanders."""
+        if view.move_end not in (MoveEnd.ARRIVED, MoveEnd.UNDER_WAY):
+            return None
         grid, robot = view.scenario.grid, view.kind.robot
         projected = view.planar if self._motion_plane is None else self._motion_plane
         position = grid.in_grid_units(view.pose)[:3]

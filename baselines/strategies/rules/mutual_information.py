@@ -25,6 +25,7 @@ import numpy as np
 from baselines.strategies.mutual_information.neighbourhood import MutualInformationConfig, Neighbourhood
 from entropy_explore_env.frontiers.knowledge import RobotKnowledge, random_viewpoint
 from entropy_explore_env.planner.driver import Driver, Trail
+from entropy_explore_env.robots.motion import MoveEnd
 from entropy_explore_env.scenario import Scenario
 
 _ALIKE_RAD = math.radians(15.0)
@@ -54,15 +55,14 @@ class MutualInformation(Driver):
         self._chosen = [deque[np.ndarray](maxlen=self.config.memory) for _ in range(scenario.robots)]
         self._neighbourhood = Neighbourhood(self.config, scenario, rng)
 
-    def give_way(self, view: RobotKnowledge, trail: Trail) -> np.ndarray | None:
-        """Wander; where robots wait in place (`Robot.when_blocked`), go on by the rule (RochaMI)."""
-        if view.kind.robot.when_blocked != "wander":
-            return None
-        self.decisions["blocked"] += 1
-        return random_viewpoint(view, self._rng)
+    def give_way(self, view: RobotKnowledge, trail: Trail) -> None:
+        """Leave it to the rule: by RochaMI a robot wanders, or waits in place (`Robot.when_blocked`)."""
 
     def decide(self, view: RobotKnowledge) -> np.ndarray | None:
-        """Return the viewpoint (5,) by the robot's belief and what it has heard; None = there is no gain."""
+        """Return the viewpoint (5,) by the robot's belief and what it has heard; None = it wanders."""
+        if view.move_end is MoveEnd.TEAMMATE and view.kind.robot.when_blocked == "wander":
+            self.decisions["blocked"] += 1
+            return None
         chosen, edge_m = self._chosen[view.robot], view.scenario.grid.voxel_size_m
         viewpoint = self._neighbourhood.best(view)
         if viewpoint is None:

@@ -180,5 +180,5 @@ def test_where_strategies_are_defined(file):
     assert strategy_module("gradient-plane") == "baselines.strategies.rules.gradient"
     assert strategy_module(f"{file}:Own") == file.resolve()
     assert strategy_module("my_package.mine:Own") == "my_package.mine"
-    rooms = ("baselines.strategies.", "entropy_explore_env.planner.")
+    rooms = ("baselines.strategies.", "entropy_explore_env.planner.", "entropy_explore_env.explorer")
     assert all(str(strategy_module(name)).startswith(rooms) for name in STRATEGIES)

@@ -166,16 +166,16 @@ def test_bounds_stay_bounds_through_a_noisy_mission(monkeypatch, seed):
     opened, levels, update = [], set(), VoxelFrontiers.update
 
     def checked(self, view, sigma):
-        before = self._map.state.copy()
+        before = self._states.state.copy()
         update(self, view, sigma)
-        opened.append(np.count_nonzero(before & COVERED > self._map.state & COVERED))
+        opened.append(np.count_nonzero(before & COVERED > self._states.state & COVERED))
         levels.add(sigma)
-        slots = np.flatnonzero((self._map.voxel != NONE) & np.isfinite(self._map.seen))
-        bounds = self._map.seen[slots].copy()
-        kept = self._map.seen.copy()
-        self.count(slots, self._map.voxel[slots])
-        assert (bounds >= self._map.seen[slots]).all()
-        self._map.seen[:] = kept
+        slots = np.flatnonzero((self._voxels != NONE) & np.isfinite(self._bounds))
+        bounds = self._bounds[slots].copy()
+        kept = self._bounds.copy()
+        self.count(slots, self._voxels[slots])
+        assert (bounds >= self._bounds[slots]).all()
+        self._bounds[:] = kept
 
     monkeypatch.setattr(VoxelFrontiers, "update", checked)
     noisy = {"max_range_m": 1.5, "angular_step_rad": math.pi / 90, "scan_time_s": 2.0, "range_noise_m": 0.3}
@@ -292,7 +292,6 @@ def test_bodies_and_a_short_reach_explore_an_office():
         (FrontierConfig, {"spacing_m": 0.0}, "FrontierConfig.spacing_m"),
         (FrontierConfig, {"visibility": "all"}, "FrontierConfig.visibility"),
         (FrontierConfig, {"gamma": 1.5}, "FrontierConfig.gamma"),
-        (FrontierConfig, {"too_high": 0.0}, "FrontierConfig.too_high"),
     ],
 )
 def test_what_is_refused(kind, settings, field):
