@@ -63,7 +63,7 @@ test-long: $(STAMP)dev
 # Checks are part of what compiled kernels are named after: those without stay as they are.
 boundscheck: $(STAMP)dev
 	NUMBA_BOUNDSCHECK=1 $(RUN) pytest -n auto --maxprocesses 4 --dist worksteal \
-		tests/belief tests/robots tests/missions tests/baselines/strategies
+		tests/belief tests/robots tests/viewpoints tests/frontiers tests/planner tests/missions tests/baselines/strategies
 
 test-rllib: $(VENV_RLLIB)/installed
 	$(VENV_RLLIB)/bin/python -m pytest tests/training/rllib tests/training/test_rllib_refusals.py

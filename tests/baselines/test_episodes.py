@@ -12,6 +12,7 @@ import pytest
 from baselines.cli.arguments import run_command
 from baselines.experiments.mission import mission_record, scripted_env
 from baselines.strategies import make_strategy
+from baselines.strategies.protocol import choose_all
 from entropy_explore_env.scenarios import BOX
 
 pq = pytest.importorskip("pyarrow.parquet", reason="pip install 'entropy_explore_env[episodes]'")
@@ -52,7 +53,7 @@ def test_rows_say_what_each_robot_saw_chose_and_earned(written, capsys):
     agents, actions = list(env.agents), {}
     for step in range(10_000):
         views = {agent: env.view(agent) for agent in env.deciding_agents()}
-        chosen = strategy.choose(list(views.values()))
+        chosen = choose_all(strategy, list(views.values()))
         for (agent, view), viewpoint in zip(views.items(), chosen, strict=True):
             actions[agent] = view.action_for(viewpoint)
         began_s = float(env.missions.state.missions[0]["time_s"])

@@ -26,7 +26,7 @@ def test_rows_are_positive_and_have_goals(monkeypatch):
     small = exploring.floor_row
     monkeypatch.setattr(exploring, "floor_row", lambda effort: small(effort, (90, 70, 1)))
     rows = exploring_rows(Effort(rounds=1, long_rounds=1, steps=3))
-    assert len(rows) == 6 and all(row.ours > 0.0 for row in rows)
+    assert len(rows) == 5 and all(row.ours > 0.0 for row in rows)
     assert all(row.goal for row in (*rows[:3], *rows[4:]))
     assert rows[3].ratio == rows[3].ours / rows[3].theirs  # of the only round
     for row in rows[1:3]:
