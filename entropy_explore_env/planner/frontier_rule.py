@@ -63,6 +63,8 @@ class FrontierRule(Driver):
     """
 
     most_blocked = 0
+    stops_at_corners = False
+    """Whether robots that plan their paths, no farther than a reach, stop and scan at corners, too."""
     until_reached = False
     """Whether a target holds, once picked, until it is reached; else until the map changes."""
     refines = True
@@ -218,7 +220,7 @@ class FrontierRule(Driver):
         if memory.viewpoint is not None and (at_once or not self._stands_at(view, memory.viewpoint)):
             return memory.viewpoint.copy()
         end = self._centre(view, goal.place)
-        stop = end if at_once else stop_towards(view, memory.paths, here, end)
+        stop = end if at_once else stop_towards(view, memory.paths, here, end, self.stops_at_corners)
         return self._look(view, memory, stop, goal.gaze)
 
     def _look(

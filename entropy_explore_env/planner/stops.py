@@ -11,26 +11,30 @@ _WITHIN_REACH = 0.999
 """Share of the reach that is used, so that rounding never moves a place towards the robot."""
 
 
-def stop_towards(view: RobotKnowledge, paths: KnownPaths, here: int, goal: np.ndarray) -> np.ndarray:
-    """(3,) the farthest place on the known path to a goal to which one drive leads.
+def stop_towards(
+    view: RobotKnowledge, paths: KnownPaths, here: int, goal: np.ndarray, at_corners: bool = False
+) -> np.ndarray:
+    """Return the farthest place (3,) on the known path to a goal to which one drive leads.
 
-    A robot that plans drives to the last place of the path within its reach; one that drives straight to the
-    first corner of the path, pulled straight.
+    A robot that plans drives to the last place of the path within its reach; one that drives straight, or
+    scans at corners, to the first corner of the path, pulled straight.
 
     Args:
         view: Of the robot.
         paths: Through its known free space; a new search is made.
         here: The voxel in which it stands.
         goal: (3,) or more numbers, in metres, map frame; itself where no path leads there.
+        at_corners: Whether a robot that plans stops at corners, too.
     """
     grid, robot, goal = view.scenario.grid, view.kind.robot, goal[:3]
     reach_m = robot.reach_m * _WITHIN_REACH
-    if robot.navigator == "planned" and apart_m(view, goal) <= reach_m:
+    passes_corners = robot.navigator == "planned" and not at_corners
+    if passes_corners and apart_m(view, goal) <= reach_m:
         return goal
     path = paths.path_to(here, voxel_of(view, goal))
     if len(path) == 0:
         return goal
-    if robot.navigator == "planned":
+    if passes_corners:
         places = grid.centre_of(np.stack(np.unravel_index(path, grid.shape), axis=-1))
         axes = 2 if view.planar else 3
         beyond = np.flatnonzero(np.linalg.norm(places[:, :axes] - view.pose[:axes], axis=1) > reach_m)

@@ -54,6 +54,7 @@ class PerTimeVisibility(FrontierRule):
 
     rule = "per-time-visibility"
     until_reached = True
+    stops_at_corners = True
     repeats = True
 
     def __init__(self, config: ExplorationConfig | None = None) -> None:
