@@ -3,8 +3,8 @@
 A rule says where a robot goes by what it knows, and the driver does what no formula says:
 
 - A robot that a teammate stopped waits for one scan if its number is the lower one. Otherwise, or if it is
-  stopped again, it steps aside to a random viewpoint. If it is stopped a third time in a row, it makes room:
-  for some decisions it goes to places that it reaches sooner than its teammates do.
+  stopped again, it steps aside to a random viewpoint. If that happened twice in a row, it makes room: for
+  some decisions it goes to places that it reaches sooner than its teammates do.
 - A robot that is blocked by what does not move is told so, since the same drive would end there again; after
   a number of such drives in a row it goes to a random viewpoint.
 - A robot to which its rule gives no viewpoint goes to random ones, each until its drive has ended.
@@ -28,6 +28,8 @@ from entropy_explore_env.planner.back_off import BackOff
 from entropy_explore_env.robots.motion import MoveEnd
 from entropy_explore_env.scenario import Scenario
 
+_ASIDE = 2
+"""How often in a row a robot steps aside before it makes room."""
 _MOST_DECISIONS = 4
 """Most decisions for which a robot makes room after a block."""
 _NOTHING = 0.01
@@ -45,7 +47,9 @@ class Trail:
     random: np.ndarray | None = None
     """(5,) a random viewpoint to which the robot is driving because its rule gave none."""
     stopped: int = 0
-    """Number of drives in a row that a teammate stopped."""
+    """Number of drives in a row that a teammate stopped since the robot stepped aside."""
+    aside: int = 0
+    """How often it stepped aside since a drive of its rule was not stopped."""
     waited: bool = False
     """Whether the robot waited for a teammate at its latest decision."""
     room: int = 0
@@ -101,9 +105,10 @@ class Driver(ABC):
             trail.waited = True
             return view.pose.copy()
         self.forget_goal(view)
-        if trail.stopped <= 2:
+        trail.stopped, trail.aside = 0, trail.aside + 1
+        if trail.aside <= _ASIDE:
             return random_viewpoint(view, self._rng)
-        trail.room = min(trail.stopped - 2, _MOST_DECISIONS) - 1
+        trail.room = min(trail.aside - _ASIDE, _MOST_DECISIONS) - 1
         return self.make_room(view)
 
     def choose(self, view: RobotKnowledge) -> np.ndarray:
@@ -141,7 +146,7 @@ class Driver(ABC):
             trail.stopped += 1
             return self.give_way(view, trail)
         if not trail.waited:  # a robot that waited has not arrived anywhere
-            trail.stopped = 0
+            trail.stopped = trail.aside = 0
         trail.waited = False
         if not view.move_end.blocked:
             trail.blocked = 0
