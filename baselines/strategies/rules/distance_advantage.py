@@ -4,7 +4,7 @@
 
 u are the free cells around the robot: those that it can reach, up to a radius off along either axis. d is
 the length of the path through known free space. What would be far to come back to is taken now. Only
-frontier cells whose path is no longer than a horizon count; where there is none, the nearest one does.
+frontier cells whose path is no longer than a horizon count; if none is within it, the nearest one counts.
 
 What there is to gain is no part of the worth, and leaves no cell out: a single frontier cell that is left for
 later costs a way back to it.

@@ -2,7 +2,7 @@
 
     v* = argmax over candidates v of V(v)/t(v)
 
-or by another metric (`metrics`). V is what is expected to be seen from v and that nobody has promised to see;
+or by another metric (`metrics`). V is what v is expected to show and no robot has promised to see;
 t is the time of the drive to v and of the scan there. Over terrain V is multiplied by
 (z_f - z_av)^γ z_f^(1 - γ) (sect. 3.3). V is in m² of plan or ground (in 3-D without an exposure surface m³;
 over terrain with the height factor m³, heights in metres), t in seconds. A robot drives to its candidate
