@@ -27,10 +27,10 @@ def test_rows_are_positive_and_have_goals(monkeypatch):
     monkeypatch.setattr(exploring, "floor_row", lambda effort: small(effort, (90, 70, 1)))
     rows = exploring_rows(Effort(rounds=1, long_rounds=1, steps=3))
     assert len(rows) == 5 and all(row.ours > 0.0 for row in rows)
-    assert all(row.goal for row in (*rows[:3], *rows[4:]))
-    assert rows[3].ratio == rows[3].ours / rows[3].theirs  # of the only round
-    for row in rows[1:3]:
-        assert 200 <= int(row.job.split(" candidates")[0].split()[-1]) <= 400
+    step, decision, larger, visibility, floor = rows
+    assert all(row.goal for row in (step, decision, visibility, floor))
+    assert larger.ratio == larger.ours / larger.theirs  # of the only round
+    assert 200 <= int(decision.job.split(" candidates")[0].split()[-1]) <= 400
 
 
 def test_a_plan_from_a_file_is_explored_at_its_own_resolution(tmp_path):
