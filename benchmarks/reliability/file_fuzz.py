@@ -14,9 +14,9 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from benchmarks.proofs.world_samples import samples
 from benchmarks.reliability.saved_files import KINDS, play_files
 from benchmarks.reliability.world_files import fuzz
-from benchmarks.reliability.world_samples import samples
 from entropy_explore_env.worlds.files.process import ReaderProcess
 
 BATCH = 500
@@ -37,7 +37,7 @@ WORLDS = (
     "geotiff",
     "world npz",
 )
-"""Loaders of worlds, as `world_samples` names them."""
+"""Loaders of worlds, as `benchmarks.proofs.world_samples` names them."""
 LOADERS = (*KINDS, *WORLDS)
 CASES = len(LOADERS) * FILES // BATCH
 _IN_MEMORY = "/dev/shm"

@@ -25,9 +25,9 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks.proofs.world_samples import Sample, glb_of_json, samples
 from benchmarks.reliability.changed_bytes import doubled, flipped, overwritten, truncated
 from benchmarks.reliability.process_memory import peak_mib
-from benchmarks.reliability.world_samples import Sample, glb_of_json, samples
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.worlds.files.process import CPU_S, ReaderProcess, kept_reader
 from entropy_explore_env.worlds.load import load_world

@@ -23,7 +23,7 @@ from baselines.cli.progress import standing_still
 from baselines.cli.world_options import Reading
 from baselines.experiments.mission import run_mission, scripted
 from baselines.strategies import ALIASES, STRATEGIES, make_strategy
-from benchmarks.reliability.world_samples import pgm
+from benchmarks.proofs.world_samples import pgm
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.missions.state import MissionEnd
 from entropy_explore_env.reports.metrics import mission_figures

@@ -9,7 +9,7 @@ import pytest
 
 from baselines import world_sweep
 from baselines.cli.arguments import run_command
-from benchmarks.reliability.world_samples import pgm
+from benchmarks.proofs.world_samples import pgm
 from entropy_explore_env.settings import Grid
 from entropy_explore_env.worlds.load import FORMATS, save_world
 from entropy_explore_env.worlds.world import World

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from benchmarks.proofs.world_samples import samples
 from benchmarks.reliability.world_files import MUTATORS, Outcome, drawn_octree, fuzz, mutants, table
-from benchmarks.reliability.world_samples import samples
 from entropy_explore_env.errors import WorldError
 from entropy_explore_env.worlds.files.process import ReaderProcess, kept_reader
 from entropy_explore_env.worlds.load import load_world

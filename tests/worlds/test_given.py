@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.reliability.world_samples import pgm, plan
+from benchmarks.proofs.world_samples import pgm, plan
 from entropy_explore_env.errors import EntropyExploreError, SettingError, WorldError
 from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.settings import Grid

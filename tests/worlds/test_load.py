@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import entropy_explore_env
-from benchmarks.reliability.world_samples import npz, pgm, plan, samples
+from benchmarks.proofs.world_samples import npz, pgm, plan, samples
 from entropy_explore_env import EntropyExploreEnv, EntropyExploreVectorEnv
 from entropy_explore_env.envs.episodes import require_same, snapshot
 from entropy_explore_env.errors import SettingError, WorldError

@@ -8,7 +8,7 @@ import sys
 import numpy as np
 import pytest
 
-from benchmarks.reliability.world_samples import heights, npz, pgm, plan
+from benchmarks.proofs.world_samples import heights, npz, pgm, plan
 from entropy_explore_env.command import run_command
 from entropy_explore_env.scenarios import SCENARIOS
 from entropy_explore_env.worlds.__main__ import main

@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from benchmarks.reliability.world_samples import npz, saved_world
+from benchmarks.proofs.world_samples import npz, saved_world
 from entropy_explore_env.errors import WorldError
 from entropy_explore_env.settings import Grid
 from entropy_explore_env.worlds.load import load_world, save_world

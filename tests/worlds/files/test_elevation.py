@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from benchmarks.reliability.world_samples import geotiff, heights, npz
+from benchmarks.proofs.world_samples import geotiff, heights, npz
 from entropy_explore_env.errors import SettingError, WorldError
 from entropy_explore_env.worlds.files.elevation import columns, degrees_as_metres
 from entropy_explore_env.worlds.files.voxels import Options

@@ -8,7 +8,7 @@ import zlib
 import numpy as np
 import pytest
 
-from benchmarks.reliability.world_samples import pgm, png
+from benchmarks.proofs.world_samples import pgm, png
 from entropy_explore_env.errors import SettingError, WorldError
 from entropy_explore_env.worlds.load import load_world
 

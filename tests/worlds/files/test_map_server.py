@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from benchmarks.reliability.world_samples import YAML, pgm, plan, png
+from benchmarks.proofs.world_samples import YAML, pgm, plan, png
 from entropy_explore_env.errors import WorldError
 from entropy_explore_env.worlds.files.map_server import labels_of
 from entropy_explore_env.worlds.load import load_world

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from benchmarks.reliability.world_samples import pcd, ply, points
+from benchmarks.proofs.world_samples import pcd, ply, points
 from entropy_explore_env.errors import SettingError, WorldError
 from entropy_explore_env.worlds.files import point_clouds
 from entropy_explore_env.worlds.files.voxels import Options

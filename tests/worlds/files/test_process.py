@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.reliability.world_samples import mesh, octomap_bytes, pgm, plan, png, saved_world
+from benchmarks.proofs.world_samples import mesh, octomap_bytes, pgm, plan, png, saved_world
 from entropy_explore_env.errors import WorldError
 from entropy_explore_env.worlds.files import process
 from entropy_explore_env.worlds.files.process import Format, Limits, ReaderProcess, kept_reader

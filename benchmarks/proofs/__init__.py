@@ -1,0 +1,1 @@
+"""Proofs that missions never hang, crash or leave the contract."""
