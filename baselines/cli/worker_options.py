@@ -1,17 +1,22 @@
-"""Where a command runs its missions: the same two options in every command that runs many.
+"""Where a command runs its missions, and which again: the same options in every command that runs many.
 
-A command's `Args` inherits WorkerOptions, and hands `args.workers` to `cells.run_cells`.
+A command's `Args` inherits WorkerOptions or TrialOptions, and hands `args.workers` or `args.how` on.
 """
 
 from __future__ import annotations
 
 import importlib.util
+import math
 import os
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from baselines.experiments.ray_cluster import AUTO, LOCAL, RayCluster, check_address
 from entropy_explore_env.errors import MissingExtraError
 from entropy_explore_env.validation import check_whole
+
+if TYPE_CHECKING:
+    from baselines.experiments.trials import How
 
 
 @dataclass
@@ -40,3 +45,30 @@ class WorkerOptions:
         if importlib.util.find_spec("ray") is None:
             raise MissingExtraError("ray", "cluster")
         return RayCluster(self.cluster, self.jobs)
+
+
+@dataclass
+class TrialOptions(WorkerOptions):
+    """Where trials run, and which of them again."""
+
+    rerun: bool = False
+    """Run all of them, also those that the table has."""
+    since: str | None = None
+    """Run those again whose row is of a git commit before this one."""
+
+    def how(self, title: str, quiet: bool, limit_s: float = math.inf, **more: bool | float) -> How:
+        """Return how trials are run.
+
+        Args:
+            title: Of the progress bar.
+            quiet: Show no bar.
+            limit_s: Of every trial.
+            **more: Other fields of `How`.
+
+        Raises:
+            SettingError: An option is not allowed, or contradicts another one.
+        """
+        from baselines.experiments.trials import How  # the environments: after the help
+
+        named = {"rerun": self.rerun, "since": self.since, "limit_s": limit_s, **more}
+        return How(self.workers, title, quiet, **named)

@@ -11,8 +11,8 @@ from pathlib import Path
 
 import pytest
 
-from baselines.experiments.cells import Cell, run_cells
 from baselines.experiments.ray_cluster import RayCluster
+from baselines.experiments.trials import Cell, How, run_cells
 from baselines.experiments.worker_pool import run_each
 from entropy_explore_env.scenario import with_settings
 from entropy_explore_env.scenarios import BOX
@@ -96,22 +96,19 @@ def test_tasks_of_a_machine_that_is_lost_are_begun_again_elsewhere(machines, tmp
         assert (tmp_path / name).read_text("ascii").split()[-1] != lost
 
 
-def content(folder: Path) -> dict[str, bytes]:
-    return {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
-
-
 def test_a_sweep_that_loses_a_machine_leaves_the_same_bytes(machines, tmp_path):
     cluster, second = machines
-    whole = run_cells(CELLS, tmp_path / "here", 1, "here", True)
+    table = tmp_path / "there.jsonl"
+    whole = run_cells(CELLS, tmp_path / "here.jsonl", How(1))
 
     def lose() -> None:
-        while len(list((tmp_path / "there").rglob("seed-*.json"))) < 4:
+        while not table.exists() or table.read_bytes().count(b"\n") < 4:
             time.sleep(0.01)
         cluster.remove_node(second, allow_graceful=False)
 
     loser = threading.Thread(target=lose)
     loser.start()
-    found = run_cells(CELLS, tmp_path / "there", RayCluster(cluster.address), "there", True)
+    assert run_cells(CELLS, table, How(RayCluster(cluster.address))) == whole
     loser.join()
-    assert found == whole and content(tmp_path / "there") == content(tmp_path / "here")
+    assert table.read_bytes() == (tmp_path / "here.jsonl").read_bytes()
     assert alive_machines() == 1

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import random
 import signal
@@ -17,13 +16,11 @@ from typing import Any
 
 import pytest
 
-from baselines.cli.arguments import run_command
 from baselines.cli.worker_options import WorkerOptions
 from baselines.experiments import ray_cluster, ray_pool
-from baselines.experiments.cells import Cell, run_cells
 from baselines.experiments.ray_cluster import RayCluster
+from baselines.experiments.trials import Cell, How, run_cells
 from baselines.experiments.worker_pool import Failure, run_each
-from baselines.resilience.__main__ import main as resilience
 from entropy_explore_env.errors import MissingExtraError, SettingError
 from entropy_explore_env.scenario import with_settings
 from entropy_explore_env.scenarios import BOX
@@ -62,12 +59,8 @@ def work(task):
             raise SettingError("field", 3, "less")
         case "lambda", _:
             return lambda: None
-        case "swallow", _:
-            while True:
-                try:
-                    time.sleep(0.01)
-                except BaseException:
-                    pass
+        case "late", _:
+            time.sleep(60.0)
         case "die once", trace:
             if not Path(trace).exists():
                 Path(trace).touch()
@@ -83,10 +76,9 @@ def work(task):
 
 def test_results_errors_limits_and_lost_workers(two_workers, tmp_path, monkeypatch, capfd):
     monkeypatch.setattr(ray_pool, "ATTEMPTS", 2)
-    monkeypatch.setattr(ray_pool, "GRACE_S", 0.5)
     squares = [("square", number) for number in range(5)]
     unpicklable = ("square", threading.Lock())
-    tasks = [*squares, ("raise", 0), ("lambda", 0), unpicklable, ("swallow", 0), ("die", 0)]
+    tasks = [*squares, ("raise", 0), ("lambda", 0), unpicklable, ("late", 0), ("die", 0)]
     once = ("die once", str(tmp_path / "died"))
     found: dict[Any, Any] = dict(run_each(work, [*tasks, once], LOCAL, 1.0))
     assert len(found) == len(tasks) + 1
@@ -94,7 +86,7 @@ def test_results_errors_limits_and_lost_workers(two_workers, tmp_path, monkeypat
     assert found["raise", 0].reason == "SettingError: field = 3: allowed is less"
     assert isinstance(found["raise", 0].error, SettingError) and "in work" in found["raise", 0].trace
     assert "pickle" in found["lambda", 0].reason and "pickle" in found[unpicklable].reason
-    assert found["swallow", 0] == Failure("ran past 1 s on the clock", late=True)
+    assert found["late", 0] == Failure("ran past 1 s on the clock", late=True)
     assert found["die", 0].reason == "its worker was lost 2 times: WorkerCrashedError"
     assert found[once] == "alive"  # the second time
     assert capfd.readouterr().out == ""
@@ -121,17 +113,13 @@ SHORT = with_settings(BOX, {"time_limit_s": 60.0})
 CELLS = (Cell("walk", SHORT, "random", 24), Cell("steep", SHORT, "gradient", 16))
 
 
-def content(folder: Path) -> dict[str, bytes]:
-    return {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
-
-
 def mission_workers() -> list[int]:
     """Processes of this cluster in which workers run missions now."""
     found = []
     for path in Path("/proc").glob("[0-9]*/cmdline"):
         try:
             ours = MARK.encode() in path.with_name("environ").read_bytes()
-            if ours and path.read_bytes().startswith(b"ray::_fulfil"):
+            if ours and path.read_bytes().startswith(b"ray::trial"):
                 found.append(int(path.parent.name))
         except OSError:
             pass
@@ -152,32 +140,20 @@ def test_a_sweep_whose_workers_are_killed_leaves_the_same_bytes(two_workers, tmp
     killer = threading.Thread(target=kill)
     killer.start()
     try:
-        records = run_cells(CELLS, tmp_path / "cluster", LOCAL, "the sweep", quiet=False)
+        rows = run_cells(CELLS, tmp_path / "cluster.jsonl", How(LOCAL, "the sweep", quiet=False))
     finally:
         done.set()
         killer.join()
     assert len(kills) >= 3, "missions were done before workers were killed"
     said = capsys.readouterr()
     assert "the sweep" in said.err and "40/40" in said.err and said.out == ""
-    assert run_cells(CELLS, tmp_path / "here", 1, "test", quiet=True) == records
-    assert content(tmp_path / "cluster") == content(tmp_path / "here")
-    (tmp_path / "cluster/walk/seed-3.json").unlink()
-    stamps = {path: path.stat().st_mtime_ns for path in (tmp_path / "cluster").rglob("*.json")}
-    assert run_cells(CELLS, tmp_path / "cluster", LOCAL, "test", quiet=True) == records
-    assert content(tmp_path / "cluster") == content(tmp_path / "here")
-    assert all(path.stat().st_mtime_ns == stamp for path, stamp in stamps.items())
-
-
-def test_a_command_on_a_cluster_prints_and_keeps_the_same(two_workers, tmp_path, capsys):
-    printed = []
-    for place in (["--jobs", "1"], ["--cluster", "local"]):
-        words = [*"--scenarios box-7x11x5 --robots 2 --strategies random --seeds 2 --json".split(), *place]
-        folders = ["--runs", str(tmp_path / place[0]), "--out", str(tmp_path / "out")]
-        assert run_command(resilience, [*words, *folders, "--time-limit-s", "20"]) == 0
-        printed.append(json.loads(capsys.readouterr().out))
-        del printed[-1]["wall_s"]
-    assert printed[0] == printed[1]
-    assert content(tmp_path / "--jobs") == content(tmp_path / "--cluster") != {}
+    assert run_cells(CELLS, tmp_path / "here.jsonl", How(2)) == rows
+    whole = (tmp_path / "here.jsonl").read_bytes()
+    assert (tmp_path / "cluster.jsonl").read_bytes() == whole
+    lines = whole.splitlines(keepends=True)
+    (tmp_path / "cluster.jsonl").write_bytes(b"".join(lines[:7] + lines[9:]))
+    assert run_cells(CELLS, tmp_path / "cluster.jsonl", How(LOCAL)) == rows
+    assert (tmp_path / "cluster.jsonl").read_bytes() == whole
 
 
 # --- options
@@ -196,19 +172,18 @@ def test_what_options_ask_for(monkeypatch):
         _ = WorkerOptions(cluster="auto").workers
 
 
-def test_an_address_where_no_cluster_answers_is_one_line(tmp_path, capsys, monkeypatch):
+def test_an_address_where_no_cluster_answers_is_one_line(monkeypatch):
     if ray.is_initialized():
         ray.shutdown()
     monkeypatch.setattr(ray_cluster, "ANSWER_TIMEOUT_S", 3.0)
-    words = "--scenarios box-7x11x5 --seeds 2 --cluster 127.0.0.1:9 --json".split()
-    folders = ["--runs", str(tmp_path / "runs"), "--out", str(tmp_path / "out")]
-    assert run_command(resilience, [*words, *folders]) == 2
-    said = capsys.readouterr().err
-    assert said == "error: cluster = '127.0.0.1:9': allowed is that of a Ray cluster that answers\n"
+    with pytest.raises(SettingError) as said:
+        list(run_each(work, [("square", 2)], RayCluster("127.0.0.1:9")))
+    assert str(said.value) == "cluster = '127.0.0.1:9': allowed is that of a Ray cluster that answers"
 
 
 COMMAND = """
 from baselines.experiments.ray_cluster import RayCluster
+from baselines.experiments.trials import Cell, How, run_cells
 from baselines.experiments.worker_pool import run_each
 
 def double(number):
