@@ -36,7 +36,7 @@ from entropy_explore_env.errors import SettingError, WorldError, counted
 from entropy_explore_env.reports.metrics import mission_figures
 from entropy_explore_env.writing import write_atomically
 
-_IMAGES = (".png", ".pgm")
+_IMAGES = (".png", ".pgm", ".ppm", ".pnm", ".jpg", ".jpeg", ".bmp", ".gif")
 _PLANS = (".yaml", ".yml", *_IMAGES)
 _MESHES = (".obj", ".stl", ".glb", ".ply")
 _HEIGHTS = (".tif", ".tiff", ".npz")
@@ -44,6 +44,9 @@ _OF_SOME = {
     "height_m": _PLANS,
     "resolution_m": _IMAGES,
     "negate": _IMAGES,
+    "occupied_below": _PLANS,
+    "free_above": _PLANS,
+    "map_rule": (".yaml", ".yml"),
     "elevation_step_m": _IMAGES,
     "clearance_m": (*_HEIGHTS, *_MESHES),
     "ceiling_m": _HEIGHTS,
@@ -51,7 +54,7 @@ _OF_SOME = {
 }
 """Option of reading → the files that it is for; a YAML says itself how its image is read."""
 _OWN = {"ending": {"time_limit_s": 600.0}}
-_SUFFIXES = tuple(".bt .ot .yaml .yml .png .pgm .pcd .ply .obj .stl .glb .npz .tif .tiff".split())
+_SUFFIXES = (".bt", ".ot", *_PLANS, ".pcd", *_MESHES, *_HEIGHTS)
 
 
 @dataclass

@@ -29,6 +29,7 @@ from entropy_explore_env.errors import (
     RecordError,
     SettingError,
     WorldError,
+    WorldWarning,
 )
 from entropy_explore_env.fault_settings import Faults, Outage, RadioFault, SensorFault
 from entropy_explore_env.localization_settings import Fiducials, Localization
@@ -82,6 +83,7 @@ __all__ = [
     "StepFigures",
     "World",
     "WorldError",
+    "WorldWarning",
     "env",
     "find_scenario",
     "load_octomap",

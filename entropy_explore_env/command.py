@@ -12,11 +12,12 @@ import math
 import os
 import re
 import sys
+import warnings
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, NoReturn
 
-from entropy_explore_env.errors import EntropyExploreError, SettingError, did_you_mean
+from entropy_explore_env.errors import EntropyExploreError, SettingError, WorldWarning, did_you_mean
 from entropy_explore_env.starting import INTERRUPTED
 
 BAD_INPUT = 2
@@ -94,6 +95,18 @@ class LineParser(argparse.ArgumentParser):
         raise UsageError(f"{with_meant(message)}; see --help")
 
 
+def _showing_worlds_in_a_line(show: Callable[..., None]) -> Callable[..., None]:
+    """Return a function that shows warnings as `show` does, those about world files in one line."""
+
+    def shown(message: Warning | str, category: type[Warning], *more: Any) -> None:  # noqa: ANN401 - as Python's
+        if issubclass(category, WorldWarning):
+            print(f"warning: {message}", file=sys.stderr)
+        else:
+            show(message, category, *more)
+
+    return shown
+
+
 def run_command(main: Callable[[Sequence[str]], int], words: Sequence[str] | None = None) -> int:
     """Run a command's main function; its errors become one line on standard error and an exit code.
 
@@ -107,7 +120,10 @@ def run_command(main: Callable[[Sequence[str]], int], words: Sequence[str] | Non
         if isinstance(stream, io.TextIOWrapper) and stream.errors == "strict":
             stream.reconfigure(errors="replace")
     try:
-        return main(sys.argv[1:] if words is None else words)
+        with warnings.catch_warnings():
+            warnings.simplefilter("always", WorldWarning)
+            warnings.showwarning = _showing_worlds_in_a_line(warnings.showwarning)
+            return main(sys.argv[1:] if words is None else words)
     except EntropyExploreError as error:
         print("error: " + " ".join(str(error).split()), file=sys.stderr)
         return BAD_INPUT

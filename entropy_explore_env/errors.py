@@ -86,6 +86,10 @@ class WorldError(SettingError):
     """A world cannot be used: a file that is missing or broken, or no room for the robots."""
 
 
+class WorldWarning(UserWarning):
+    """A world file was read in a way that its author may not have meant."""
+
+
 class RecordError(SettingError):
     """A mission record cannot be used: missing, broken, edited or of another format."""
 

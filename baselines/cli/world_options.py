@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 from entropy_explore_env.errors import SettingError
 
@@ -20,6 +20,12 @@ class Reading:
     """Edge of an image's pixel, or spacing of a height map that does not say it."""
     negate: bool = False
     """Images: bright is solid."""
+    occupied_below: float | None = None
+    """Plans: pixels darker than this shade, 0 to 255, are solid."""
+    free_above: float | None = None
+    """Plans: pixels lighter than this shade are free, those between unknown."""
+    map_rule: Literal["nav2", "map_server"] | None = None
+    """How a YAML's thresholds and opacity are read: as Nav2 has it (default), or as before 2025."""
     elevation_step_m: float | None = None
     """Height of one count of a 16-bit image."""
     clearance_m: float | None = None

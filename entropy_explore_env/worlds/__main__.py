@@ -22,16 +22,19 @@ from entropy_explore_env.scenario import Scenario, with_settings
 from entropy_explore_env.scenarios import SCENARIOS
 from entropy_explore_env.validation import is_whole
 from entropy_explore_env.worlds.files.jacksboro import NAME as JACKSBORO
+from entropy_explore_env.worlds.files.map_server import RULES
 from entropy_explore_env.worlds.load import FORMATS, load_world, make_world, save_world
 from entropy_explore_env.worlds.pictures import picture
 from entropy_explore_env.worlds.recipes.catalogue import RECIPES
 from entropy_explore_env.worlds.world import World
 from entropy_explore_env.writing import write_atomically
 
-_METRES = {
+_NUMBERS = {
     "voxel-size-m": "edge of the voxels; default: the file's own",
     "height-m": "extrude a plan to this height",
     "resolution-m": "edge of an image's pixel, or spacing of a height map that does not state it",
+    "occupied-below": "plans: pixels darker than this shade, 0 to 255, are solid",
+    "free-above": "plans: pixels lighter than this shade are free, those between unknown",
     "elevation-step-m": "height of one count of a 16-bit image",
     "clearance-m": "free space above a height map, or around a mesh",
     "ceiling-m": "height of the exposure surface above the ground of a height map",
@@ -39,6 +42,10 @@ _METRES = {
     "read-memory-mib": "limit of the memory for reading; default: by the file's size",
 }
 """Options of `load_world` that are numbers."""
+_WORDS = {
+    "map-rule": (RULES, "how a YAML's thresholds and opacity are read: nav2 (default), or as before 2025"),
+}
+"""Options of `load_world` that are words: those that they may be, and what they say."""
 _OF_SCENARIOS = ("seed", "split", "world_number")
 
 
@@ -76,11 +83,13 @@ def _parser() -> argparse.ArgumentParser:
     convert.add_argument("source", metavar="IN")
     convert.add_argument("out", type=Path, metavar="OUT.npz")
     for command in (show, convert):
-        for name, text in _METRES.items():
+        for name, text in _NUMBERS.items():
             command.add_argument(f"--{name}", type=float, help=text)
         command.add_argument(
             "--negate", action="store_true", default=None, help="images: bright pixels are solid"
         )
+        for name, (known, text) in _WORDS.items():
+            command.add_argument(f"--{name}", choices=known, help=text)
         command.add_argument(
             "--hollow", action="store_true", help="meshes: do not fill the space that they enclose"
         )
@@ -112,7 +121,7 @@ def _list(folder: Path | None) -> None:
 
 def _world(args: argparse.Namespace) -> World:
     """The world that a name or a file stands for."""
-    given = {name.replace("-", "_"): getattr(args, name.replace("-", "_")) for name in _METRES}
+    given = {name.replace("-", "_"): getattr(args, name.replace("-", "_")) for name in (*_NUMBERS, *_WORDS)}
     if args.hollow:
         given["fill"] = False
     if args.negate:

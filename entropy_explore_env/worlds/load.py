@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import inspect
 import math
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from functools import lru_cache, wraps
 from pathlib import Path
@@ -12,13 +13,14 @@ from typing import Any, ParamSpec
 
 import numpy as np
 
-from entropy_explore_env.errors import SettingError, WorldError, did_you_mean
+from entropy_explore_env.errors import SettingError, WorldError, WorldWarning, did_you_mean, one_of
 from entropy_explore_env.scenario import Scenario
 from entropy_explore_env.scenarios import find_scenario
 from entropy_explore_env.settings import Grid
 from entropy_explore_env.validation import check_instance, checked_path, is_number, is_whole
 from entropy_explore_env.worlds.files.archives import restored, saved
 from entropy_explore_env.worlds.files.jacksboro import NAME as JACKSBORO
+from entropy_explore_env.worlds.files.map_server import RULES
 from entropy_explore_env.worlds.files.process import Format, Limits, read_apart
 from entropy_explore_env.worlds.files.resampling import extruded, resampled
 from entropy_explore_env.worlds.files.voxels import (
@@ -37,7 +39,7 @@ from entropy_explore_env.writing import write_atomically
 
 _OCTOMAP = Format("octomap_tree", "OctoMap tree", memory_per_byte=512)  # octomap's own nodes take 230
 _MAP_SERVER = Format("map_server", "YAML of map_server with its image")
-_IMAGE = Format("images", "PNG or PGM image")
+_IMAGE = Format("images", "PNG, PGM, JPEG, BMP or GIF image")
 _GEOTIFF = Format("geotiff", "GeoTIFF height map")
 _MESH = Format("meshes", "mesh")
 _JACKSBORO = Format("jacksboro", "elevation model")
@@ -46,8 +48,7 @@ FORMATS = {
     ".ot": _OCTOMAP,
     ".yaml": _MAP_SERVER,
     ".yml": _MAP_SERVER,
-    ".png": _IMAGE,
-    ".pgm": _IMAGE,
+    **dict.fromkeys((".png", ".pgm", ".ppm", ".pnm", ".jpg", ".jpeg", ".bmp", ".gif"), _IMAGE),
     ".pcd": Format("point_clouds", "PCD point cloud"),
     ".ply": _MESH,
     ".obj": _MESH,
@@ -91,6 +92,9 @@ def load_world(
     *,
     resolution_m: float | None = None,
     negate: bool | None = None,
+    occupied_below: float | None = None,
+    free_above: float | None = None,
+    map_rule: str | None = None,
     elevation_step_m: float | None = None,
     clearance_m: float | None = None,
     ceiling_m: float | None = None,
@@ -101,10 +105,10 @@ def load_world(
     """The world in a file; its voxels lie in the file's frame, in metres. Unknown space is solid.
 
     By suffix: OctoMap (`.bt`, `.ot`), map_server (`.yaml`, `.yml`), plans as images and 16-bit height maps
-    (`.png`, `.pgm`), point clouds (`.pcd`, `.ply`), meshes (`.obj`, `.stl`, `.glb`, `.ply`), height maps
-    (`.npz`, `.tif`, `.tiff`), worlds of `save_world` (`.npz`); and matplotlib's elevation model by the name
-    `jacksboro`. Each format is described in its file in `worlds/files`. Settings that do not apply to a
-    file are refused.
+    (`.png`, `.pgm`, `.jpg`, `.bmp`, `.gif`), point clouds (`.pcd`, `.ply`), meshes (`.obj`, `.stl`, `.glb`,
+    `.ply`), height maps (`.npz`, `.tif`, `.tiff`), worlds of `save_world` (`.npz`); and matplotlib's
+    elevation model by the name `jacksboro`. Each format is described in its file in `worlds/files`. Settings
+    that do not apply to a file are refused.
 
     Args:
         path: The file, or `jacksboro`.
@@ -114,6 +118,12 @@ def load_world(
         height_m: Plans are extruded to this height; None = they stay 2-D.
         resolution_m: Edge of an image's pixel (None = 0.05); spacing of a height map that does not state it.
         negate: Images: bright pixels are solid.
+        occupied_below: Images and map_server: pixels darker than this shade, 0 to 255, are solid. None =
+            127.5, or by the YAML's threshold.
+        free_above: Images and map_server: pixels lighter than this shade are free, and those between unknown.
+            None = all that are not solid, or by the YAML's threshold.
+        map_rule: map_server: "nav2" (the default), thresholds count and transparent pixels are unknown; or
+            "map_server", the rule before 2025, thresholds do not count and opacity is averaged with colours.
         elevation_step_m: 16-bit images: height of one count; None = 1.
         clearance_m: Height maps: sky above the highest ground (None = 5 voxels, or up to the ceiling);
             meshes: free space around them (None = none).
@@ -129,11 +139,18 @@ def load_world(
         WorldError: The file is missing, too large, broken, of no known kind or has no free space.
         SettingError: A setting is unknown, out of its range, missing, or does not apply to this file.
         MissingExtraError: The package that reads this format is not installed.
+
+    Warns:
+        WorldWarning: The file was read in a way that its author may not have meant: of a plan of shades that
+            map savers write for unknown, and of margins that were cropped.
     """
     options = {
         "voxel_size_m": voxel_size_m,
         "resolution_m": resolution_m,
         "negate": negate,
+        "occupied_below": occupied_below,
+        "free_above": free_above,
+        "map_rule": map_rule,
         "elevation_step_m": elevation_step_m,
         "clearance_m": clearance_m,
         "ceiling_m": ceiling_m,
@@ -210,22 +227,29 @@ def world_from_bytes(data: bytes) -> World:
 
 
 def _check(options: dict[str, Any]) -> None:
-    """Check that numbers are > 0 and finite, and flags booleans."""
+    """Check that numbers are > 0 and finite, shades in their range, words known and flags booleans."""
     for name, value in options.items():
         if value is None:
             continue
         if name in ("negate", "fill"):
             if not isinstance(value, bool):
                 raise SettingError(name, value, "True or False")
+        elif name in _WORDS:
+            if not isinstance(value, str) or value not in _WORDS[name]:
+                raise SettingError(name, value, one_of(value, _WORDS[name]))
+        elif name in ("occupied_below", "free_above"):
+            if not is_number(value) or not 0 <= value <= 255:
+                raise SettingError(name, value, "a shade from 0 (black) to 255")
+            options[name] = float(value)
         elif not is_number(value) or not 0 < value < math.inf:
             raise SettingError(name, value, "a number > 0")
         else:
             options[name] = float(value)
 
 
+_WORDS = {"map_rule": RULES}
 _NO_SPACE = "a map with free space at this voxel size"
-_IMAGES = (".pgm", ".png")
-_SHADES = " (pixels darker than half of white, and transparent ones, are solid)"
+_SHADES = " (pixels darker than half of white are solid; occupied_below, --occupied-below, sets the limit)"
 
 
 def _world(voxels: Voxels, path: str, options: dict[str, Any], height_m: float | None) -> World:
@@ -235,10 +259,17 @@ def _world(voxels: Voxels, path: str, options: dict[str, Any], height_m: float |
         labels, ceiling = resampled(voxels, size_m)
     except RefusedError as error:
         raise WorldError("voxel_size_m", size_m, str(error)) from None
-    if (labels != FREE).all():
-        raise WorldError(
-            "world file", path, _NO_SPACE + (_SHADES if Path(path).suffix.lower() in _IMAGES else "")
+    if labels.size > MAX_FILE_VOXELS:
+        allowed = (
+            f"a map of at most {MAX_FILE_VOXELS} of its {labels.size} voxels; a larger voxel_size_m has fewer"
         )
+        raise WorldError("world file", path, allowed)
+    if (labels != FREE).all():
+        is_image = FORMATS.get(Path(path).suffix.lower()) is _IMAGE
+        reasons = "".join(f"; {note}" for note in voxels.notes)
+        raise WorldError("world file", path, _NO_SPACE + (_SHADES if is_image else "") + reasons)
+    for note in voxels.notes:
+        warnings.warn(f"{path}: {note}", WorldWarning, stacklevel=2)
     if height_m is not None:
         if labels.shape[2] != 1:
             raise SettingError("height_m", height_m, "None: the file's world is 3-D already")

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.proofs.world_samples import pgm, plan
+from benchmarks.proofs.world_samples import pgm, sketch
 from entropy_explore_env.errors import EntropyExploreError, SettingError, WorldError
 from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.settings import Grid
@@ -105,7 +105,7 @@ def test_a_given_world_is_the_same_mission_as_its_file_in_every_split(split, tmp
 
 
 def test_a_mapping_loads_a_file_with_its_options(tmp_path):
-    (tmp_path / "plan.pgm").write_bytes(pgm(plan()))
+    (tmp_path / "plan.pgm").write_bytes(pgm(sketch()))
     asked = {"path": tmp_path / "plan.pgm", "negate": True, "resolution_m": 0.1, "height_m": 0.5}
     scenario, given = with_given_worlds(free_box(grid=Grid((4, 5, 3), 0.1)), {"world": asked})
     expected = load_world(tmp_path / "plan.pgm", 0.1, height_m=0.5, negate=True, resolution_m=0.1)
@@ -163,7 +163,7 @@ def test_a_world_as_bytes_comes_back_whole():
 
 
 def test_paths_of_the_same_file_are_read_once(tmp_path, monkeypatch):
-    (tmp_path / "plan.pgm").write_bytes(pgm(plan()))
+    (tmp_path / "plan.pgm").write_bytes(pgm(sketch()))
     monkeypatch.chdir(tmp_path)
     near, far = ({"path": p} for p in ("plan.pgm", Path("..") / tmp_path.name / "plan.pgm"))
     first, second = (with_given_worlds(free_box(), {"world": asked})[1][0] for asked in (near, far))

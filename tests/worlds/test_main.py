@@ -8,7 +8,7 @@ import sys
 import numpy as np
 import pytest
 
-from benchmarks.proofs.world_samples import heights, npz, pgm, plan
+from benchmarks.proofs.world_samples import heights, npz, pgm, sketch
 from entropy_explore_env.command import run_command
 from entropy_explore_env.scenarios import SCENARIOS
 from entropy_explore_env.worlds.__main__ import main
@@ -18,7 +18,7 @@ from entropy_explore_env.worlds.load import FORMATS, load_world, make_world
 @pytest.fixture
 def floor(tmp_path):
     path = tmp_path / "floor.pgm"
-    path.write_bytes(pgm(plan()))
+    path.write_bytes(pgm(sketch()))
     return path
 
 

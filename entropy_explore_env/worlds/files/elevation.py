@@ -20,7 +20,9 @@ from entropy_explore_env.worlds.files.voxels import (
     Options,
     RefusedError,
     Voxels,
+    box_of_use,
     checked_shape,
+    cropped_note,
 )
 
 SKY_VOXELS = 5
@@ -56,6 +58,12 @@ def columns(
     elevation_m = np.where(np.isfinite(elevation_m), elevation_m, np.nan)
     if elevation_m.size == 0 or np.isnan(elevation_m).all():
         raise RefusedError("a height map with heights in it")
+    notes: tuple[str, ...] = ()
+    if (box := box_of_use(~np.isnan(elevation_m))) is not None:
+        notes = (cropped_note(elevation_m.shape, box),)
+        elevation_m = elevation_m[box]
+        steps = (box[0].start * spacing_m[0], box[1].start * spacing_m[1])
+        corner_m = (corner_m[0] + steps[0], corner_m[1] + steps[1])
     low, high = float(np.nanmin(elevation_m)), float(np.nanmax(elevation_m))
     floor_m = low - voxel_m
     if clearance_m is None:
@@ -74,7 +82,7 @@ def columns(
     ceiling = None
     if ceiling_m is not None:
         ceiling = np.maximum(_layers_below(top_m + ceiling_m, floor_m, voxel_m, shape[2]), layers)
-    return Voxels(labels, voxel_m, (*corner_m, floor_m), ceiling=ceiling)
+    return Voxels(labels, voxel_m, (*corner_m, floor_m), ceiling=ceiling, notes=notes)
 
 
 def _layers_below(height_m: np.ndarray, floor_m: float, voxel_m: float, most: int) -> np.ndarray:

@@ -27,7 +27,7 @@ from entropy_explore_env.command import READ_MEMORY_VARIABLE
 from entropy_explore_env.errors import MissingExtraError, SettingError, WorldError
 from entropy_explore_env.worlds.files.voxels import (
     MAX_FILE_BYTES,
-    MAX_FILE_VOXELS,
+    MAX_PIXELS,
     Voxels,
     memory_allowed,
 )
@@ -155,7 +155,13 @@ class ReaderProcess:
         x, y, z = header["origin_m"]
         ceiling = arrays[1] if len(arrays) > 1 else None
         return Voxels(
-            arrays[0], header["voxel_size_m"], (x, y, z), header["yaw_rad"], ceiling, header["name"]
+            arrays[0],
+            header["voxel_size_m"],
+            (x, y, z),
+            header["yaw_rad"],
+            ceiling,
+            header["name"],
+            tuple(header["notes"]),
         )
 
     def close(self) -> None:
@@ -235,7 +241,7 @@ def _ask(
         return None
     header, arrays = json.loads(line), []
     for shape, dtype in zip(header.get("shapes", ()), (np.int8, np.int32), strict=False):
-        if math.prod(shape) > MAX_FILE_VOXELS:
+        if math.prod(shape) > MAX_PIXELS:
             process.kill()
             return None
         array = np.empty(shape, dtype)

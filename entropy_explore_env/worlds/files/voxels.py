@@ -26,6 +26,10 @@ so much is solid; sums of volumes are compared with this slack, as a share of a 
 MAX_FILE_BYTES = 256 << 20
 MAX_FILE_VOXELS = 130_000_000
 """Voxels of one file, at its own resolution or at the one asked for."""
+MAX_PIXELS = 1 << 29
+"""Pixels of a plan, which becomes voxels of the size asked for."""
+WORTH_CROPPING = 1 << 20
+"""Margins of fewer pixels, samples or columns than this stay."""
 
 
 class RefusedError(Exception):
@@ -43,6 +47,7 @@ class Voxels:
         yaw_rad: Rotation of the voxels' axes against the file's frame, about `origin_m`.
         ceiling: (X, Y) int32, the lowest layer of the no-fly zone in each column, or None.
         name: Of the world, where the file states one.
+        notes: What the user should know of how the file was read, a sentence without a stop each.
     """
 
     labels: np.ndarray
@@ -51,6 +56,7 @@ class Voxels:
     yaw_rad: float = 0.0
     ceiling: np.ndarray | None = None
     name: str | None = None
+    notes: tuple[str, ...] = ()
 
 
 class Options:
@@ -82,6 +88,31 @@ class Options:
         for name, value in self._given.items():
             if name not in self._asked:
                 raise SettingError(name, value, f"None: it does not apply to {kind}")
+
+
+def box_of_use(used: np.ndarray) -> tuple[slice, slice] | None:
+    """Return the box of what is of use in a plan, with a margin of one, if the rest is worth to be cropped.
+
+    Args:
+        used: (X, Y) bool.
+
+    Returns:
+        The box's slices; None where the plan should stay whole.
+    """
+    box = []
+    for axis in range(2):
+        along = np.flatnonzero(used.any(axis=1 - axis))
+        if len(along) == 0:
+            return None
+        box.append(slice(max(0, int(along[0]) - 1), min(used.shape[axis], int(along[-1]) + 2)))
+    kept = (box[0].stop - box[0].start) * (box[1].stop - box[1].start)
+    return None if used.size - kept < WORTH_CROPPING else (box[0], box[1])
+
+
+def cropped_note(shape: Sequence[int], box: tuple[slice, slice]) -> str:
+    """Return the note on a plan (X, Y) of which only a box is kept."""
+    x, y = (each.stop - each.start for each in box)
+    return f"cropped from {shape[0]} × {shape[1]} to {x} × {y}, as no robot can get beyond"
 
 
 def memory_allowed(limit_bytes: int) -> str:

@@ -69,6 +69,7 @@ def _answer(request: dict[str, Any]) -> tuple[dict[str, Any], list[np.ndarray]]:
         "origin_m": voxels.origin_m,
         "yaw_rad": voxels.yaw_rad,
         "name": voxels.name,
+        "notes": voxels.notes,
     }
     return header, arrays
 

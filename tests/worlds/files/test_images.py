@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import io
 import struct
 import zlib
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from benchmarks.proofs.world_samples import pgm, png
-from entropy_explore_env.errors import SettingError, WorldError
+from entropy_explore_env.errors import SettingError, WorldError, WorldWarning
 from entropy_explore_env.worlds.load import load_world
 
 
@@ -19,7 +21,7 @@ def load(tmp_path, data, name="plan.png", **options):
 
 
 def test_dark_is_solid_and_the_last_row_is_the_lowest(tmp_path):
-    shades = np.full((5, 7), 200, np.uint8)
+    shades = np.full((5, 7), 230, np.uint8)
     shades[4, 1], shades[0, 6], shades[2, 3], shades[2, 4] = 0, 60, 127, 128  # half of white is 127.5
     for name, data in (("plan.png", png(shades)), ("plan.PGM", pgm(shades))):
         world = load(tmp_path, data, name)
@@ -31,13 +33,56 @@ def test_dark_is_solid_and_the_last_row_is_the_lowest(tmp_path):
         assert opposite.grid.voxel_size_m == 0.2
 
 
-def test_colours_are_averaged_and_transparent_pixels_are_solid(tmp_path):
+@pytest.mark.filterwarnings("ignore::entropy_explore_env.errors.WorldWarning")
+def test_colours_are_averaged_and_transparent_pixels_are_unknown(tmp_path):
     pixels = np.full((2, 3, 4), 255, np.uint8)
     pixels[0, 0, :3] = (255, 128, 0)  # 127.7
     pixels[0, 1, :3] = (255, 126, 0)  # 127
     pixels[1, 2, 3] = 254
     world = load(tmp_path, png(pixels))
     assert np.argwhere(world.occupied).tolist() == [[1, 1, 0], [2, 0, 0]]
+    assert np.argwhere(world.unknown).tolist() == [[2, 0, 0]]
+
+
+def test_grey_walls_are_told_and_a_limit_makes_them_solid(tmp_path):
+    shades = np.full((5, 8), 255, np.uint8)
+    shades[:, 3] = 150
+    with pytest.warns(WorldWarning, match="grey pixels, of shades from 90 to 204, 5 count as free"):
+        assert not load(tmp_path, png(shades)).occupied.any()
+    world = load(tmp_path, png(shades), occupied_below=200)
+    assert np.unique(np.nonzero(world.occupied)[0]).tolist() == [3]
+    some = load(tmp_path, png(shades), free_above=200)
+    assert some.unknown is not None and (some.unknown == world.occupied).all()
+    with pytest.warns(WorldWarning, match="cropped from 2000 × 600"):
+        large = np.full((600, 2000), 150, np.uint8)
+        large[100:110, 40:60] = 255
+        assert load(tmp_path, png(large), occupied_below=200).grid.origin_m == (39 * 0.05, 489 * 0.05, 0.0)
+
+
+@pytest.mark.parametrize("kind", ["PNG", "PPM", "JPEG", "BMP", "GIF"])
+def test_the_content_decides_what_kind_of_image_it_is(tmp_path, kind):
+    shades = np.full((16, 24), 255, np.uint8)
+    shades[:, 8:16] = 0
+    buffer = io.BytesIO()
+    Image.fromarray(shades).save(buffer, kind)
+    for suffix in (".png", ".pgm", ".jpg", ".JPEG", ".bmp", ".gif"):
+        world = load(tmp_path, buffer.getvalue(), f"plan{suffix}")
+        np.testing.assert_array_equal(world.occupied[:, :, 0], shades[::-1].T == 0)
+
+
+@pytest.mark.parametrize("mode", ["1", "P", "CMYK", "RGBA", "LA", "I;16"])
+def test_every_mode_of_pixels_is_read(tmp_path, mode):
+    picture = Image.new("L", (9, 4), 255)
+    picture.paste(0, (2, 0, 4, 4))
+    if mode == "I;16":  # a PGM, as a 16-bit PNG is a height map
+        shades = np.asarray(picture).astype(">u2") * 257
+        data, name = b"P5\n9 4\n65535\n" + shades.tobytes(), "plan.pgm"
+    else:
+        buffer, name = io.BytesIO(), "plan.jpg"
+        picture.convert(mode).save(buffer, "JPEG" if mode == "CMYK" else "PNG")
+        data = buffer.getvalue()
+    world = load(tmp_path, data, name)
+    assert np.unique(np.nonzero(world.occupied)[0]).tolist() == [2, 3]
 
 
 def test_a_plan_is_resampled_and_extruded(tmp_path):
@@ -77,12 +122,11 @@ def bomb(edge):
 
 
 def test_absurd_sizes_are_refused_by_the_header(tmp_path):
-    with pytest.raises(WorldError, match="at most 33554432 pixels"):
-        load(tmp_path, bomb(6000))
-    with pytest.raises(WorldError, match="at most 33554432 pixels"):
-        load(tmp_path, b"P5\n6000 6000\n255\n", "plan.pgm")
+    for data in (bomb(24000), b"P5\n24000 24000\n255\n"):
+        with pytest.raises(WorldError, match="at most 536870912 pixels"):
+            load(tmp_path, data)
 
 
-def test_an_image_of_another_kind_is_refused_whatever_its_name(tmp_path):
-    with pytest.raises(WorldError, match="a whole PNG or PGM image"):
-        load(tmp_path, pgm(np.zeros((3, 4), np.uint8)), "plan.png")
+def test_what_is_no_image_is_refused(tmp_path):
+    with pytest.raises(WorldError, match="a PNG, PGM, JPEG, BMP or GIF, whatever its suffix"):
+        load(tmp_path, b"once upon a time", "plan.png")

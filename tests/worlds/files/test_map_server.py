@@ -6,24 +6,39 @@ import numpy as np
 import pytest
 
 from benchmarks.proofs.world_samples import YAML, pgm, plan, png
-from entropy_explore_env.errors import WorldError
-from entropy_explore_env.worlds.files.map_server import labels_of
+from entropy_explore_env.errors import SettingError, WorldError, WorldWarning
+from entropy_explore_env.worlds.files.map_server import labelling
 from entropy_explore_env.worlds.load import load_world
 from tests.systems import needs_posix
 
 UNKNOWN, FREE, SOLID = -1, 0, 1
-OPAQUE = np.float32(255.0)
 
 
-def labels(shades, mode, negate=False, free=0.196, occupied=0.65, opacity=None):
-    shades = np.array([shades], np.float32)
-    clear = np.full(shades.shape, OPAQUE) if opacity is None else np.array([opacity], np.float32)
-    return labels_of(shades, clear, mode, negate, free, occupied)[0].tolist()
+def labels(shades, mode, negate=False, free=0.196, occupied=0.65, **more):
+    return labelling(mode, negate, free, occupied, **more)(np.array(shades, np.float64)).tolist()
 
 
 def test_trinary_by_hand():
     """p = (255 - x)/255: 89 → 0.651, 90 → 0.647, 205 → 0.1961, 206 → 0.192."""
     assert labels([0, 89, 90, 205, 206, 255], "trinary") == [SOLID, SOLID, UNKNOWN, UNKNOWN, FREE, FREE]
+
+
+def test_thresholds_count_unless_the_old_rule_is_asked_for():
+    """p = 0.4 at 153 and 0.6 at 102: thresholds themselves."""
+    at, between = [255, 153, 102, 0], [154, 152, 103, 101]
+    assert labels(at, "trinary", free=0.4, occupied=0.6) == [FREE, FREE, SOLID, SOLID]
+    assert labels(at, "trinary", free=0.4, occupied=0.6, strict=True) == [FREE, UNKNOWN, UNKNOWN, SOLID]
+    for strict in (False, True):
+        found = labels(between, "trinary", free=0.4, occupied=0.6, strict=strict)
+        assert found == [FREE, UNKNOWN, UNKNOWN, SOLID]
+    assert labels([0, 255], "trinary", free=0.0, occupied=1.0) == [SOLID, FREE]
+
+
+def test_shades_that_are_given_stand_in_for_thresholds():
+    given = labels([0, 149, 150, 205, 206], "trinary", given=(150.0, 205.0))
+    assert given == [SOLID, SOLID, UNKNOWN, UNKNOWN, FREE]
+    inverted = labels([255, 106, 105, 50, 49], "trinary", negate=True, given=(150.0, 205.0))
+    assert inverted == given
 
 
 def test_negate_by_hand():
@@ -36,8 +51,8 @@ def test_scale_by_hand():
     """Thresholds 0.2 and 0.6: 1 + 98 (p - 0.2)/0.4 is 49.0 for x = 154 and 51.0 for x = 152."""
     found = labels([255, 210, 154, 152, 110, 0], "scale", free=0.2, occupied=0.6)
     assert found == [FREE, FREE, FREE, SOLID, SOLID, SOLID]
-    clear = labels([255, 255, 0], "scale", opacity=[255, 254, 0])
-    assert clear == [FREE, UNKNOWN, UNKNOWN]
+    assert labels([205], "scale") == [UNKNOWN]
+    assert labels([205], "scale", strict=True) == [FREE]
 
 
 def test_raw_by_hand():
@@ -75,15 +90,24 @@ def test_png_and_pgm_give_the_same_world(tmp_path, suffix):
     np.testing.assert_array_equal(load_world(path).occupied, first.occupied)
 
 
-def test_colours_and_opacity_are_averaged_in_trinary_mode(tmp_path):
+IGNORED = pytest.mark.filterwarnings("ignore::entropy_explore_env.errors.WorldWarning")
+
+
+@IGNORED
+def test_opacity_is_averaged_in_trinary_mode_by_the_old_rule_only(tmp_path):
     """Black is 63.75 with its opacity, p = 0.75; shade 150 is 176.25, p = 0.31, and 0.41 without."""
     pixels = np.zeros((2, 3, 4), np.uint8)
     pixels[:, :, 3] = 255
     pixels[0, 1:, :3] = 255
     pixels[1, :, :3] = 150
     yaml = YAML.replace(b"plan.pgm", b"plan.png").replace(b"free_thresh: 0.196", b"free_thresh: 0.35")
-    trinary = load_world(write(tmp_path, yaml, png(pixels), "plan.png"))
+    path = write(tmp_path, yaml, png(pixels), "plan.png")
+    trinary = load_world(path, map_rule="map_server")
     assert trinary.occupied[:, :, 0].tolist() == [[False, True], [False, False], [False, False]]
+    with pytest.warns(WorldWarning, match="grey pixels, of shades from 90 to 204, 3 count as unknown"):
+        now = load_world(path)
+    assert now.occupied[:, :, 0].tolist() == [[True, True], [True, False], [True, False]]
+    assert now.unknown is not None and now.unknown.sum() == 3
     raw = load_world(write(tmp_path, yaml.replace(b"trinary", b"raw"), png(pixels[:, :, :3]), "plan.png"))
     assert raw.occupied[:, :, 0].tolist() == [[True, False], [True, True], [True, True]]
 
@@ -129,21 +153,114 @@ def test_images_outside_the_folder_are_refused(tmp_path, image):
 
 
 @pytest.mark.parametrize(
+    "entry",
+    ["/home/me/plan.pgm", "~/plan.pgm", "../maps/plan.pgm", "C:\\maps\\plan.pgm", "PLAN.pgm", "sub/Plan.PGM"],
+)
+def test_an_image_that_lies_beside_the_yaml_is_read_wherever_the_entry_leads(tmp_path, entry):
+    path = write(tmp_path, YAML.replace(b"plan.pgm", entry.encode()), pgm(plan()))
+    with pytest.warns(WorldWarning, match=r"is read from plan\.pgm beside the YAML"):
+        assert load_world(path).grid.shape == (11, 7, 1)
+
+
+def test_an_absolute_path_into_the_folder_is_no_other_file(tmp_path):
+    path = write(tmp_path, YAML.replace(b"plan.pgm", str(tmp_path / "plan.pgm").encode()), pgm(plan()))
+    assert load_world(path).grid.shape == (11, 7, 1)
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        (b"resolution: 0.1", b"resolution: 1e-1"),
+        (b"resolution: 0.1", b"resolution: '0.1'"),
+        (b"[-1.0, 2.0, 0.5]", b"[-1, '2.0', 5e-1]"),
+        (b"mode: trinary", b"mode: Trinary"),
+        (b"negate: 0", b"negate: 0.0"),
+        (b"negate: 0", b"negate: 'False'"),
+        (b"negate: 0", b"negate: off"),
+        (b"negate: 0", b""),
+        (b"mode: trinary", b""),
+    ],
+)
+def test_numbers_modes_and_truth_values_are_those_of_map_server(tmp_path, old, new):
+    first = load_world(write(tmp_path, YAML, pgm(plan())))
+    again = load_world(write(tmp_path, YAML.replace(old, new), pgm(plan())))
+    assert again.grid == first.grid and again.yaw_rad == first.yaw_rad
+    np.testing.assert_array_equal(again.occupied, first.occupied)
+
+
+def test_negate_in_words(tmp_path):
+    first = load_world(write(tmp_path, YAML.replace(b"negate: 0", b"negate: 1"), pgm(plan())))
+    again = load_world(write(tmp_path, YAML.replace(b"negate: 0", b"negate: TRUE"), pgm(plan())))
+    np.testing.assert_array_equal(again.occupied, first.occupied)
+
+
+def house(unknown=205):
+    """A floor of 6 x 3 pixels in walls, in 10 x 20 pixels of unknown."""
+    shades = np.full((20, 10), unknown, np.uint8)
+    shades[4:9, 1:9] = 0
+    shades[5:8, 2:8] = 254
+    return shades
+
+
+def test_unknown_that_counts_as_free_is_told(tmp_path):
+    path = write(tmp_path, YAML.replace(b"free_thresh: 0.196", b"free_thresh: 0.25"), pgm(house()))
+    with pytest.warns(WorldWarning, match="160 pixels of shade 205, .* count as free"):
+        world = load_world(path)
+    assert (~world.occupied).sum() == 18 + 160
+    known = load_world(path, free_above=205)
+    assert known.unknown is not None
+    assert ((~known.occupied).sum(), known.unknown.sum()) == (18, 160)
+
+
+def test_opaque_alpha_changes_nothing_and_any_transparency_is_unknown(tmp_path):
+    yaml = YAML.replace(b"plan.pgm", b"plan.png")
+    first = load_world(write(tmp_path, YAML, pgm(house())))
+    pixels = np.stack((house(), np.full_like(house(), 255)), axis=2)
+    again = load_world(write(tmp_path, yaml, png(pixels), "plan.png"))
+    np.testing.assert_array_equal(again.occupied, first.occupied)
+    np.testing.assert_array_equal(again.unknown, first.unknown)
+    pixels[5:8, 2:8, 1] = 254
+    with pytest.raises(WorldError, match="18 pixels that are not wholly opaque count as unknown"):
+        load_world(write(tmp_path, yaml, png(pixels), "plan.png"))
+
+
+def test_large_margins_are_cropped_and_places_stay(tmp_path):
+    """The house in 1100 x 1000 pixels: its corner is column 501 and row 11 from below."""
+    shades = np.full((1000, 1100), 205, np.uint8)
+    shades[980:1000, 500:510] = house()
+    yaml = YAML.replace(b"0.5]", b"1.5707963267948966]")
+    with pytest.warns(WorldWarning, match="cropped from 1100 × 1000 to 8 × 5, as no robot can get beyond"):
+        world = load_world(write(tmp_path, yaml, pgm(shades)))
+    assert world.grid.shape == (8, 5, 1)
+    assert (~world.occupied).sum() == 18
+    assert world.grid.origin_m == pytest.approx((-1.0 - 1.1, 2.0 + 50.1, 0.0))
+
+
+def test_limits_of_shades_are_checked(tmp_path):
+    path = write(tmp_path, image=pgm(house()))
+    for setting in ({"occupied_below": 256}, {"free_above": -1}, {"map_rule": "ros"}):
+        with pytest.raises(SettingError, match=f"{next(iter(setting))} = "):
+            load_world(path, **setting)
+    with pytest.raises(SettingError, match="free_above = 100"):
+        load_world(path, free_above=100, occupied_below=150)
+
+
+@pytest.mark.parametrize(
     ("old", "new", "allowed"),
     [
         (b"resolution: 0.1\n", b"", "the entry resolution"),
         (b"resolution: 0.1", b"resolution: 0", "resolution"),
         (b"resolution: 0.1", b"resolution: .nan", "resolution"),
-        (b"resolution: 0.1", b"resolution: '0.1'", "resolution"),
+        (b"resolution: 0.1", b"resolution: 0_1", "resolution"),
         (b"free_thresh: 0.196", b"free_thresh: 0.8", "free_thresh is at most"),
         (b"negate: 0", b"negate: 2", "negate"),
         (b"mode: trinary", b"mode: quaternary", "trinary, scale, raw"),
-        (b"[-1.0, 2.0, 0.5]", b"[-1.0, 2.0]", "three numbers"),
+        (b"[-1.0, 2.0, 0.5]", b"[-1.0, 2.0]", "three finite numbers"),
         (b"[-1.0, 2.0, 0.5]", b"[-1.0, .inf, 0.5]", "three finite numbers"),
         (b"image: plan.pgm", b"image: &x plan.pgm\nsame: *x", "aliases"),
         (b"image: plan.pgm", b"image: !!python/object/apply:os.getcwd []", "aliases and tags"),
         (b"image: plan.pgm", b"image: nowhere.pgm", "exists"),
-        (b"image: plan.pgm", b"image: map.yaml", r"\.png or \.pgm"),
+        (b"image: plan.pgm", b"image: map.yaml", "PNG, PGM, JPEG, BMP or GIF"),
     ],
 )
 def test_what_a_yaml_may_say(tmp_path, old, new, allowed):

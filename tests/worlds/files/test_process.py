@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.proofs.world_samples import mesh, octomap_bytes, pgm, plan, png, saved_world
+from benchmarks.proofs.world_samples import mesh, octomap_bytes, pgm, png, saved_world, sketch
 from entropy_explore_env.errors import WorldError
 from entropy_explore_env.worlds.files import process
 from entropy_explore_env.worlds.files.process import Format, Limits, ReaderProcess, kept_reader
@@ -34,7 +34,7 @@ IMAGE = Format("images", "PNG or PGM image")
 @pytest.fixture
 def picture(tmp_path):
     path = tmp_path / "plan.pgm"
-    path.write_bytes(pgm(plan()))
+    path.write_bytes(pgm(sketch()))
     return path
 
 
@@ -67,14 +67,14 @@ def test_what_takes_too_long_is_ended_and_says_so(tmp_path):
 
 def test_what_takes_too_much_memory_is_refused_and_the_process_lives(tmp_path, monkeypatch):
     path = tmp_path / "plan.pgm"
-    path.write_bytes(pgm(plan(3000, 1000)))
+    path.write_bytes(pgm(np.full((3000, 1000), 254, np.uint8)))
     with kept_reader() as reader:
         with monkeypatch.context() as little:
             little.setattr(process, "_MOST_MEMORY_BYTES", 8 << 20)
             with pytest.raises(WorldError, match="read within 8 MiB"):
                 load_world(path)
         number = reader._process.pid
-        path.write_bytes(pgm(plan()))
+        path.write_bytes(pgm(sketch()))
         assert load_world(path).grid.shape == (11, 7, 1)
         assert reader._process.pid == number
 
@@ -120,7 +120,7 @@ def as_on_windows(monkeypatch):
 @pytest.mark.parametrize(
     ("name", "data", "shape"),
     [
-        ("plan.png", lambda: png(plan()), (11, 7, 1)),
+        ("plan.png", lambda: png(sketch()), (11, 7, 1)),
         ("world.npz", saved_world, (7, 11, 5)),
         ("tree.bt", lambda: octomap_bytes(".bt"), None),
     ],
