@@ -11,7 +11,7 @@ VENV_BENCHMARL := .venv-benchmarl
 STYLE := $(RUN) ruff check . && $(RUN) ruff format --check . && $(VENV)/bin/lint-imports --no-cache
 WARM := $(RUN) entropy_explore_env.warm --processes 1
 
-.PHONY: help demo new-user docs docs-links test test-long boundscheck test-rllib test-benchmarl lint bench policy \
+.PHONY: help demo new-user docs docs-links test test-long boundscheck test-rllib test-benchmarl lint bench \
 	reliability night reproduce clean
 .NOTPARALLEL:
 
@@ -28,7 +28,6 @@ help:
 	@echo "make test-benchmarl   the tutorial with BenchMARL"
 	@echo "make lint         ruff, pyright and the contracts of imports"
 	@echo "make bench        speed against peers"
-	@echo "make policy       trains pretrained:plans and pretrained:volumes, and tests them: many hours"
 	@echo "make reliability  goes on with the proofs of docs/results/reliability.md: many hours"
 	@echo "make night        a thousand drawn scenarios, others every night, and a little of the other proofs"
 	@echo "make reproduce    the experiments of the five papers, into docs/results: many hours"
@@ -77,17 +76,6 @@ lint: $(STAMP)dev
 
 bench: $(STAMP)training $(STAMP)bench
 	$(RUN) benchmarks.speed
-
-# Each takes an hour of a processor, the tests many more; what is there is not done again.
-IMPROVE := $(RUN) training.policy_improvement --stage search
-policy: $(STAMP)training
-	$(IMPROVE) --tasks office:1 office:3 hybrid:1 --rounds 8 --pairs 30 --out runs/policy-plans
-	$(IMPROVE) --tasks room-furnished:3 cave:3 office-3d:3 --rounds 4 --pairs 24 --out runs/policy-volumes
-	for name in plans volumes; do \
-		mkdir -p training/pretrained/$$name && \
-		cp runs/policy-$$name/search/best-*/* training/pretrained/$$name || exit 1; \
-	done
-	$(RUN) training.policy_improvement.results_page --out docs/results
 
 # What was played is kept in results; what is missing is played.
 reliability: $(STAMP)dev

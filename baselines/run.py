@@ -26,8 +26,8 @@ from entropy_explore_env.validation import check_whole
 
 _STRATEGY = f"""Chooses viewpoints. We recommend best, which is {resolved("best")}.
 {help_text()}
-A learned policy: pretrained:room, pretrained:plans,
-pretrained:volumes, or the folder of a run of training.
+A learned policy: pretrained:room, the folder of a run of training,
+or the planner with weights of your own: weights.json.
 Your own: my_package.my_module:MyStrategy, path/to/file.py:MyStrategy."""
 
 

@@ -11,6 +11,9 @@ every stop. What a robot is, and what its mission asks for, decides how it explo
 - The same robots where everything is to be seen: frontier cells on short tours, see `planner.shared_tour`.
   Bits per time would leave what is small until the end, and drive back for it.
 - The same robots where a part may stay unseen: bits per time, of unknown voxels alone.
+
+With learned weights (`planner.weights`) a robot chooses among several candidates of the same planner, in any
+mission.
 """
 
 from __future__ import annotations
@@ -20,6 +23,7 @@ import numpy as np
 from entropy_explore_env.missions.view import RobotView
 from entropy_explore_env.missions.view_candidates import ViewProposer
 from entropy_explore_env.planner.shared_tour import SharedTour
+from entropy_explore_env.planner.weights import PlannerWeights
 from entropy_explore_env.scenario import Scenario, with_settings
 from entropy_explore_env.settings import RobotKind
 from entropy_explore_env.viewpoints.evaluation import sees_all_around
@@ -47,19 +51,30 @@ def _wants_everything(scenario: Scenario, kind: RobotKind) -> bool:
 class PlannedRate:
     """Chooses among candidates nearby and far away by bits / s^c; in some plans among frontier cells."""
 
+    def __init__(self, weights: PlannerWeights | None = None) -> None:
+        """Take the weights of features by which candidates are chosen; None = by bits / s^c alone."""
+        self.weights = weights
+
     def reset(self, scenario: Scenario, rng: np.random.Generator) -> None:
         """Begin a mission."""
-        self._frontiers = [explores_frontiers(scenario, kind) for kind in scenario.kinds]
+        weights = self.weights
+        self._frontiers = [weights is None and explores_frontiers(scenario, kind) for kind in scenario.kinds]
         if any(self._frontiers):
             self._tours = SharedTour()
             self._tours.backs_off = False  # whatever the planner chooses is followed so
             self._tours.reset(scenario, rng)
         if not all(self._frontiers):
-            one = with_settings(scenario, {"action": {"kind": "candidates", "candidates": 1}})
-            self._proposer = ViewProposer(one, rng)
+            most = 1 if weights is None else weights.candidates
+            proposing = with_settings(scenario, {"action": {"kind": "candidates", "candidates": most}})
+            self._proposer = ViewProposer(proposing, rng)
 
     def choose(self, view: RobotView) -> np.ndarray:
         """Return the viewpoint (5,) by the robot's own belief and what it has heard."""
         if self._frontiers[view.robot % len(self._frontiers)]:
             return self._tours.choose(view)
-        return self._proposer.propose(view)[0].copy()
+        proposed = self._proposer.propose(view)
+        if self.weights is None:
+            return proposed[0].copy()
+        features = self._proposer.features(view.robot)
+        counts = np.array([len(proposed)], np.int64)
+        return proposed[self.weights.choices(features[None], counts)[0]].copy()

@@ -9,32 +9,6 @@ class CheckpointError(SettingError):
     """A checkpoint cannot be used: missing, broken, foreign, or of a policy for something else."""
 
 
-class LabelsError(SettingError):
-    """Labels of roll-outs cannot be used: broken, of other settings, or of another version of the code."""
-
-
-class RollOutError(EntropyExploreError):
-    """A roll-out makes no headway: its mission takes steps and comes to no decision or end."""
-
-    def __init__(self, scenario: str, seed: int, episode: int, steps: int, time_s: float) -> None:
-        """Say which mission, from its seed, and how long it went on."""
-        super().__init__(
-            f"roll-out of seed {seed}, episode {episode} of {scenario} at {time_s:.1f} s: {steps:,} steps "
-            f"without an end: allowed are roll-outs that come to their horizon or their end"
-        )
-
-
-class DivergedError(EntropyExploreError):
-    """A regression ends farther from its labels than it began, or with numbers that are not finite."""
-
-    def __init__(self, loss: float, at_first: float, epoch: int) -> None:
-        """Show the loss, the one before learning, and the epoch."""
-        super().__init__(
-            f"regression loss = {loss:.4g} after epoch {epoch}: allowed is less than ten times that before "
-            f"learning ({at_first:.4g}); a smaller --learning-rate may help"
-        )
-
-
 class NotFiniteError(EntropyExploreError):
     """Training met a number that is not finite."""
 

@@ -1,8 +1,9 @@
 """Compare a learned policy with the strategies: `python -m training.evaluate --pretrained room`.
 
 Runs the policy and its rivals on the same seeds, in worlds of the test split, which no training uses, and
-prints how long their missions take. `--strategy runs/room-3` takes the best policy of a run instead.
-`baselines.run` and `baselines.benchmark` know both as strategies: `pretrained:room` and `runs/room-3`.
+prints how long their missions take. `--strategy runs/room-3` takes the best policy of a run instead,
+`--strategy runs/weights/weights.json` the planner with the weights that a search found. `baselines.run` and
+`baselines.benchmark` know all of them as strategies: `pretrained:room`, `runs/room-3`, …
 """
 
 from __future__ import annotations
@@ -31,13 +32,14 @@ from baselines.experiments.mission import Surroundings
 from baselines.experiments.outcome import Record
 from baselines.experiments.ray_cluster import RayCluster
 from baselines.experiments.statistics import median_interval, median_ratio_interval
-from baselines.strategies import make_strategy, resolved
+from baselines.strategies import is_learned, make_strategy, resolved
 from entropy_explore_env.errors import SettingError, counted
+from entropy_explore_env.explorer import PlannedRate
 from entropy_explore_env.scenario import Scenario, with_settings
 from entropy_explore_env.scenarios import SCENARIOS, find_scenario
 from entropy_explore_env.validation import check_whole
 from training import extra  # noqa: F401 - before what is not there without it
-from training.checkpoints import PolicySettings, latest_checkpoint, load_checkpoint
+from training.checkpoints import latest_checkpoint, load_checkpoint
 from training.policy import POLICIES, PREFIX, policy_folder
 
 SIMPLE = ("gradient", "random")
@@ -49,12 +51,12 @@ class Args(WorkerOptions):
     """Compare a learned policy with the strategies."""
 
     pretrained: str | None = None
-    """A policy that comes with the project: room, plans or volumes."""
+    """A policy that comes with the project: room or plans."""
     strategy: str | None = None
-    """The folder of a run of training.ppo, or of one of its checkpoints."""
+    """The folder of a run of training.ppo, or of one of its checkpoints, or a file of planner weights."""
     against: str | None = None
     """Strategies to compare with, as in baselines.run, separated by commas; default:
-    gradient,random, and for a policy over candidates planned-rate before them."""
+    gradient,random, and for one over candidates planned-rate before them."""
     scenario: str | None = None
     """Named scenario; default: that of training, with its robots, sensors and channel."""
     robots: int | None = None
@@ -78,7 +80,7 @@ def main(words: Sequence[str]) -> int:
     workers = args.workers
     policy = args.strategy if args.pretrained is None else PREFIX + args.pretrained
     assert policy is not None
-    trained = load_checkpoint(latest_checkpoint(policy_folder(policy), *POLICIES)).settings
+    trained = trained_in(policy)
     base = base_task(evaluation_scenario(trained, args.scenario, args.robots), args.task.settings)
     if args.scenario is not None and is_whole_scenario(args.task.settings):
         raise SettingError("scenario", args.scenario, "left out: --settings holds a scenario of its own")
@@ -86,10 +88,10 @@ def main(words: Sequence[str]) -> int:
     args = parsed_for(base, args, words, __doc__)
     elsewhere = args.scenario or args.task.settings or args.task.world
     made = {scenario.world for scenario in SCENARIOS.values()}  # the recipes
-    if trained.scenario.world not in made and not elsewhere:
+    if trained.world not in made and not elsewhere:
         raise SettingError("world", "left out", "world files to test in, as the policy learned in files")
     scenario, surroundings = tasked(base.scenario, args.task, args.robots)
-    against = default_rivals(trained.scenario) if args.against is None else args.against.split(",")
+    against = default_rivals(policy, trained) if args.against is None else args.against.split(",")
     rivals = list(dict.fromkeys(map(resolved, against)))
     for name in (policy, *rivals):
         make_strategy(name).reset(scenario, np.random.default_rng(0))
@@ -103,23 +105,57 @@ def main(words: Sequence[str]) -> int:
     return 0
 
 
-def default_rivals(trained: Scenario) -> list[str]:
+def planner_tasks(policy: str) -> tuple[str, ...] | None:
+    """Return the tasks NAME:ROBOTS that planner weights were found in; None = of a policy of networks."""
+    if is_learned(policy):
+        return None
+    strategy = make_strategy(policy)
+    if not isinstance(strategy, PlannedRate) or strategy.weights is None:
+        raise SettingError("strategy", policy, "a learned policy or a file of planner weights; see --against")
+    return strategy.weights.tasks
+
+
+def trained_in(policy: str) -> Scenario:
+    """Return the scenario that a policy, or the first one that planner weights, learned in.
+
+    Raises:
+        SettingError: It is no policy, or does not say where it learned.
+        CheckpointError: It cannot be used.
+    """
+    tasks = planner_tasks(policy)
+    if tasks is None:
+        return load_checkpoint(latest_checkpoint(policy_folder(policy), *POLICIES)).settings.scenario
+    if not tasks:
+        raise SettingError("tasks", tasks, f"a task NAME:ROBOTS in the weights {policy}")
+    return task_of(tasks[0])
+
+
+def task_of(task: str) -> Scenario:
+    """Return the scenario NAME:ROBOTS.
+
+    Raises:
+        SettingError: There is no such scenario, or no such team.
+    """
+    name, _, robots = task.partition(":")
+    if not robots.isdecimal() or int(robots) < 1:
+        raise SettingError("tasks", task, "NAME:ROBOTS, a named scenario and a number of robots")
+    return with_settings(find_scenario(name), {"robots": int(robots)})
+
+
+def default_rivals(policy: str, trained: Scenario) -> list[str]:
     """Return the strategies that a policy is compared with; one over candidates also with the planner."""
-    planner = ["planned-rate"] if trained.action.kind == "candidates" else []
-    return [*planner, *SIMPLE]
+    over_candidates = trained.action.kind == "candidates" or planner_tasks(policy) is not None
+    return [*(["planned-rate"] if over_candidates else []), *SIMPLE]
 
 
-def evaluation_scenario(
-    trained: PolicySettings, name: str | None = None, robots: int | None = None
-) -> Scenario:
+def evaluation_scenario(learned: Scenario, name: str | None = None, robots: int | None = None) -> Scenario:
     """The scenario of a test: as its name says, with test worlds, and of training the robots and the channel.
 
     Args:
-        trained: The policy's settings.
+        learned: The scenario of training.
         name: Of the scenario; None = that of training.
         robots: Team size; None = that of training.
     """
-    learned = trained.scenario
     size = learned.robots if robots is None else robots
     changes = {"robots": size, "split": "test", "channel": learned.channel}
     if name is not None:

@@ -18,6 +18,7 @@ from entropy_explore_env.missions.observation.layout import ObservationLayout
 from entropy_explore_env.missions.view import RobotView
 from entropy_explore_env.missions.view_observation import ViewObserver
 from entropy_explore_env.planner.candidate_features import FEATURES_VERSION
+from entropy_explore_env.planner.weights import SHIPPED
 from entropy_explore_env.scenario import Scenario
 from training.candidate_network import ATTENTION_LAYERS, CandidatePolicy
 from training.checkpoints import Checkpoint, PolicySettings, latest_checkpoint, load_checkpoint
@@ -265,7 +266,8 @@ def policy_folder(name: str) -> Path:
         return Path(name)
     known = sorted(path.name for path in PRETRAINED.glob("*") if path.is_dir())
     if name.removeprefix(PREFIX) not in known:
-        raise SettingError("strategy", name, one_of(name, (PREFIX + each for each in known)))
+        weights = (file.stem for file in SHIPPED.glob("*.json"))
+        raise SettingError("strategy", name, one_of(name, (PREFIX + each for each in (*known, *weights))))
     return PRETRAINED / name.removeprefix(PREFIX)
 
 

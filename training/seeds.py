@@ -4,7 +4,7 @@
 | --- | --- |
 | tables and tests | 0, 1, 2, … |
 | validation | 2³² + 0, 1, 2, … |
-| learning, labels of roll-outs, and pairs of missions | ≥ 2⁶³, drawn for each run |
+| learning, and pairs of missions | ≥ 2⁶³, drawn for each run |
 """
 
 from __future__ import annotations
@@ -12,17 +12,12 @@ from __future__ import annotations
 import numpy as np
 
 _VALIDATION, _LEARNING = 2**32, 2**63
-_LABELS_KEY, _PAIRS_KEY = 1, 2
+_PAIRS_KEY = 2
 
 
-def validation_seeds(missions: int, first: int = 0) -> list[int]:
-    """Seeds for validation from a first one on; every run has the same, so that runs compare."""
-    return [_VALIDATION + first + mission for mission in range(missions)]
-
-
-def label_seeds(seed: int, shard: int, missions: int) -> list[int]:
-    """Seeds of the missions of one file of roll-out labels; those of learning, and never one twice."""
-    return _drawn(seed, (_LABELS_KEY, shard), missions)
+def validation_seeds(missions: int) -> list[int]:
+    """Return the seeds of validation; every run has the same, so that runs compare."""
+    return [_VALIDATION + mission for mission in range(missions)]
 
 
 def pair_seeds(seed: int, part: int, pairs: int) -> list[int]:

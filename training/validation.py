@@ -39,9 +39,7 @@ class Validation:
 class Validator:
     """The same missions every time: worlds of the validation split, where robots decide whenever they can."""
 
-    def __init__(
-        self, scenario: Scenario, surroundings: Surroundings, missions: int, threads: int, first: int = 0
-    ) -> None:
+    def __init__(self, scenario: Scenario, surroundings: Surroundings, missions: int, threads: int) -> None:
         """Make the missions.
 
         Args:
@@ -49,14 +47,13 @@ class Validator:
             surroundings: World files and starts of the missions.
             missions: How many missions to run.
             threads: Threads that share them.
-            first: How many of the seeds for validation are left out before.
         """
         validation = with_settings(scenario, {"split": "validation", "decision_period_s": None})
         around = surroundings.settings()
         self._env = EntropyExploreVectorEnv(
             validation, missions, threads=threads, action_masks=False, **around
         )
-        self._seeds = validation_seeds(missions, first)
+        self._seeds = validation_seeds(missions)
         self._planner_s: np.ndarray | None = None
 
     def validate(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
@@ -12,9 +11,9 @@ from baselines.cli.task_options import BaseTask, TaskOptions, tasked
 from baselines.experiments.mission import Surroundings, scripted_env
 from baselines.scoreboard.results import BASELINE, REFERENCE
 from baselines.scoreboard.suites import Place, Task, suite_strategies, team_name
-from baselines.strategies import STRATEGIES, is_learned, learned_policies, make_strategy, resolved
+from baselines.strategies import STRATEGIES, make_strategy, resolved
 from baselines.world_sweep import is_plan
-from entropy_explore_env.errors import MissingExtraError, SettingError, one_of
+from entropy_explore_env.errors import SettingError, one_of
 from entropy_explore_env.scenario import Scenario, with_settings
 from entropy_explore_env.scenarios import SCENARIOS, find_scenario
 from entropy_explore_env.worlds.given import GIVEN, distinct_names
@@ -28,8 +27,7 @@ def chosen_strategies(words: str | None, suite: str | None = None) -> tuple[str,
 
     Args:
         words: Names; `all` = every one; `suite`, also beside other names, or None = those of the suite's
-            table, of which learned policies are left out, and named, where what runs them is not installed;
-            None without a suite = every one.
+            table; None without a suite = every one.
         suite: Its name; the strategy that ratios are relative to is added, without a suite the
             random walk is.
 
@@ -41,21 +39,11 @@ def chosen_strategies(words: str | None, suite: str | None = None) -> tuple[str,
     names = list(STRATEGIES) if words in (None, "all") else words.split(",")
     if suite is not None and _WHOLE_SUITE in names:
         at = names.index(_WHOLE_SUITE)
-        names[at : at + 1] = _runnable(suite_strategies(suite))
+        names[at : at + 1] = suite_strategies(suite)
     for name in names:
         make_strategy(name)
     added = BASELINE if suite is None else REFERENCE
     return tuple(dict.fromkeys([added, *map(resolved, names)]))
-
-
-def _runnable(names: Sequence[str]) -> list[str]:
-    """The strategies that can be run with what is installed; says which others there are."""
-    try:
-        learned_policies()
-    except MissingExtraError as error:
-        print(f"without {', '.join(name for name in names if is_learned(name))}: {error}", file=sys.stderr)
-        return [name for name in names if not is_learned(name)]
-    return list(names)
 
 
 class Entry(NamedTuple):

@@ -229,18 +229,15 @@ def others(quick: bool = False) -> tuple[Task, ...]:
 SUITES = {"plans": plans, "volumes": volumes, "teams": teams, "others": others}
 """Name → a function of `quick` that makes the tasks."""
 
-_PLANS_POLICY, _VOLUMES_POLICY = "pretrained:plans", "pretrained:volumes"
-
 
 def suite_strategies(name: str) -> tuple[str, ...]:
-    """Return the strategies of a suite's table: those that the table of names puts there, and policies.
+    """Return the strategies of a suite's table.
 
     Raises:
         SettingError: No suite has this name.
     """
     _check_suite(name)
-    policies = {"plans": (_PLANS_POLICY,), "others": ()}.get(name, (_PLANS_POLICY, _VOLUMES_POLICY))
-    return (*suite_names(name), *policies)
+    return suite_names(name)
 
 
 def _check_suite(name: str) -> None:

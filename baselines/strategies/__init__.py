@@ -13,6 +13,8 @@ from baselines.strategies.protocol import Strategy
 from baselines.strategies.table import ALIASES, CLIFF_STRATEGIES, STRATEGIES
 from entropy_explore_env.command import home_path
 from entropy_explore_env.errors import MissingExtraError, SettingError, did_you_mean
+from entropy_explore_env.explorer import PlannedRate
+from entropy_explore_env.planner.weights import read_weights
 
 _RECOMMENDED = MappingProxyType({"cliff": "cliff-next-best-view"})
 """Named scenario → what we recommend in it, where that is another one than elsewhere."""
@@ -21,6 +23,10 @@ _LEARNED = "training.policy"
 """Makes strategies of learned policies. It is looked up when one is asked for, so that strategies need
 neither trainers nor networks."""
 _PRETRAINED = "pretrained:"
+_GONE = MappingProxyType(
+    {"pretrained:volumes": "planned-rate, its equal: its missions took 1.00 of the time; this policy is gone"}
+)
+"""Former name → what is allowed in its place."""
 
 
 def make_strategy(name: str) -> Strategy:
@@ -28,14 +34,16 @@ def make_strategy(name: str) -> Strategy:
 
     Args:
         name: One of STRATEGIES or ALIASES; `pretrained:NAME`, a policy that comes with the project; the
-            folder of a policy that was trained; `module:Class` or `path/to/file.py:Class`; or a name that an
-            installed package declares (see `loading`).
+            folder of a policy that was trained; a file of planner weights, `weights.json`; `module:Class` or
+            `path/to/file.py:Class`; or a name that an installed package declares (see `loading`).
 
     Raises:
         SettingError: No strategy has this name, or its class cannot be made.
         MissingExtraError: A policy was asked for, and what runs it is not installed.
     """
     name = resolved(name)
+    if name in _GONE:
+        raise SettingError("strategy", name, _GONE[name])
     maker = scripted_maker(name)
     if maker is not None:
         return maker()
@@ -45,7 +53,13 @@ def make_strategy(name: str) -> Strategy:
 
 
 def scripted_maker(name: str) -> Callable[[], Strategy] | None:
-    """What makes the strategy of the package with this name; None = there is none."""
+    """Return what makes the strategy of the package with this name; None = there is none.
+
+    Raises:
+        SettingError: It names a file of planner weights that cannot be used.
+    """
+    if name.endswith(".json"):
+        return partial(PlannedRate, read_weights(Path(name)))
     return STRATEGIES.get(name) or CLIFF_STRATEGIES.get(name)
 
 
@@ -85,7 +99,7 @@ def _reference(name: str) -> str:
     if name in declared:
         return declared[name]
     known = [*STRATEGIES, *CLIFF_STRATEGIES, *ALIASES, *declared]
-    others = f"{_PRETRAINED}NAME, a policy's folder, module:Class or file.py:Class"
+    others = f"{_PRETRAINED}room, a policy's folder, weights.json, module:Class or file.py:Class"
     if len(Path(name).parts) > 1:
         raise SettingError("strategy", name, f"a strategy's name, {others}; there is no such folder")
     raise SettingError("strategy", name, f"one of {', '.join(known)}, {others}" + did_you_mean(name, known))

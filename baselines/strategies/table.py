@@ -36,6 +36,7 @@ from baselines.strategies.rules.voronoi import VoronoiCoverage
 from baselines.strategies.voronoi.territory import VoronoiConfig
 from entropy_explore_env.explorer import PlannedRate
 from entropy_explore_env.planner.tour import Tour
+from entropy_explore_env.planner.weights import shipped_weights
 
 
 class Family(Enum):
@@ -219,6 +220,13 @@ TABLE: tuple[Entry, ...] = (
         "argmax of expected bits for their time, over viewpoints nearby and far places on planned paths; "
         "ground robots that explore a plan until all is seen follow short tours through frontier cells",
         _EVERYWHERE,
+    ),
+    Entry(
+        "pretrained:plans",
+        Family.OWN,
+        partial(PlannedRate, shipped_weights("plans")),
+        "`planned-rate` that chooses among 24 candidates by learned weights of 19 features",
+        _NAMED_SUITES,
     ),
     Entry(
         "voronoi-nearest",

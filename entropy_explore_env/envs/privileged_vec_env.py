@@ -1,7 +1,7 @@
 """Rows for training whose observations end with numbers that no robot may know: for critics.
 
 A policy that is trained on them must not act on the last P numbers; `training.candidate_network` reads them
-in its critic alone. Whoever acts or evaluates has RobotView and the other adapters, without them.
+in its critic alone. Policies that act or are evaluated have RobotView and the other adapters, without them.
 """
 
 from __future__ import annotations

@@ -20,7 +20,7 @@ from entropy_explore_env.missions.state import MissionEnd, MissionState
 from entropy_explore_env.missions.threads import Threads
 from entropy_explore_env.missions.tick import step_missions
 from entropy_explore_env.missions.workspace import Workspace, new_workspace
-from entropy_explore_env.planner.model import Proposer, new_proposers, thinned
+from entropy_explore_env.planner.model import Proposer, new_proposers
 from entropy_explore_env.planner.records import Kind
 from entropy_explore_env.robots.navigator import new_navigators
 from entropy_explore_env.scenario import Scenario
@@ -95,10 +95,6 @@ class CompiledStep:
     def knows_ceiling(self) -> bool:
         """Whether some robot plans below a world's ceiling, so that it needs no-fly zones."""
         return bool(self.navigators[0]) or self.proposes
-
-    def thin_candidates(self, divisor: int) -> None:
-        """Draw and refine so many times fewer viewpoints as candidates from now on."""
-        self.proposers = [[thinned(each, divisor) for each in thread] for thread in self.proposers]
 
     def step(self, arrays: Arrays, continuous: np.ndarray, discrete: np.ndarray) -> None:
         """Advance and observe all missions: each thread takes the next chunk as soon as it is free.

@@ -1,24 +1,19 @@
-"""What training may do and know that no robot may: branch missions, and join what all robots' maps hold.
+"""What only training may know: numbers for critics that join what all robots' maps hold.
 
-This is the library's one interface for privileged training: roll-outs from a moment of a mission, and
-numbers for critics. Strategies and policies that act, and the commands that test them, do not import it; a
-test sees to it. The commands that say what there is to win, or learn, do.
+This is the library's one interface for privileged training. Strategies and policies that act, and the
+commands that test them, do not import it; a test sees to it.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from entropy_explore_env.compilation.kernels import kernel
-from entropy_explore_env.errors import CallOrderError, SettingError
 from entropy_explore_env.missions.poses import pose_at
 from entropy_explore_env.missions.simulation import Missions
-from entropy_explore_env.missions.state import MissionEnd, MissionState, goals_reached
-from entropy_explore_env.scenario import with_settings
 
 _FOLD = 1e150
 """Ratios of voxels are multiplied up to this before their logarithm is taken."""
@@ -26,8 +21,6 @@ _SOON_S = 10.0
 """Seconds that become ½ as s / (s + 10)."""
 _LEAST_LEFT = 1e-3
 """Share of the work left below which its logarithm does not go on."""
-_RNG = "_rng"
-"""How the names of random states end, among arrays and among fields of arrays."""
 
 
 class Number(NamedTuple):
@@ -134,108 +127,3 @@ def _joint_gain(precision, prior, bits):
                 logs += math.log2(product)
                 product = 1.0
         bits[mission] = 0.5 * (logs + math.log2(product))
-
-
-def copy_missions(source: Missions, rows: Sequence[int], target: Missions, at: Sequence[int]) -> None:
-    """Put copies of missions in place of others: what follows is bitwise what would follow in the source.
-
-    Args:
-        source: Where they are; it stays as it is.
-        rows: (N,) numbers of missions in it; one may be there several times.
-        target: Other missions of the same scenario. They may observe something else: then their observations
-            are those that they had, until the next step.
-        at: (N,) numbers of missions in it that are replaced.
-
-    Raises:
-        SettingError: The scenarios differ, or there are no such missions. Nothing has changed then.
-        CallOrderError: A mission was never reset.
-    """
-    if target is source or not _same_states(source, target):
-        allowed = "other missions of the same scenario as the source"
-        raise SettingError("target", target.scenario.name, allowed)
-    wanted, places = np.asarray(rows, np.int64), np.asarray(at, np.int64)
-    for name, given, missions in (("rows", wanted, source), ("at", places, target)):
-        inside = given.shape == wanted.shape and ((given >= 0) & (given < missions.count)).all()
-        if given.ndim != 1 or not inside:
-            raise SettingError(
-                name, given, f"{len(wanted)} numbers of missions from 0 to {missions.count - 1}"
-            )
-    if any(source.episodes[row] < 0 for row in wanted.tolist()):
-        raise CallOrderError("copy_missions before reset: call reset() first")
-    target.take_no_fly_zones(source, wanted, places)
-    for name, array in source.state._asdict().items():
-        kept = getattr(target.state, name)
-        if not array.size or (name == "collision" and kept is target.state.truth):
-            continue
-        per_mission = len(array) // source.count  # one row a mission but for collision masks
-        shape = (-1, per_mission, *array.shape[1:])
-        kept.reshape(shape)[places] = array.reshape(shape)[wanted]
-    if target.scenario == source.scenario:
-        target.observations[places] = source.observations[wanted]
-    target.world_numbers[places] = source.world_numbers[wanted]
-    for row, place in zip(wanted.tolist(), places.tolist(), strict=True):
-        for name in ("worlds", "options", "seeds", "episodes"):
-            getattr(target, name)[place] = getattr(source, name)[row]
-
-
-def _same_states(one: Missions, other: Missions) -> bool:
-    """Whether two batches differ in nothing but their number, their threads and what is observed."""
-    alike = with_settings(other.scenario, {"observation": one.scenario.observation}) == one.scenario
-    return alike and one.state.pooled.shape[1:] == other.state.pooled.shape[1:]
-
-
-def reseed(missions: Missions, at: Sequence[int], keys: Sequence[int]) -> None:
-    """Let what happens by chance from now on be drawn anew; missions with the same key draw the same numbers.
-
-    Args:
-        missions: Some of which are changed.
-        at: (N,) their numbers.
-        keys: (N,) whole numbers ≥ 0.
-    """
-    states = _random_states(missions.state)
-    for place, key in zip(at, keys, strict=True):
-        for number, array in enumerate(states):
-            drawn = np.random.SeedSequence(entropy=int(key), spawn_key=(number,))
-            own = array[place]
-            own[...] = drawn.generate_state(own.size, np.uint64).reshape(own.shape)
-
-
-def _random_states(state: MissionState) -> list[np.ndarray]:
-    """The random states among the arrays, each with leading axis E."""
-    found = []
-    for name, array in state._asdict().items():
-        if name.endswith(_RNG):
-            found.append(array)
-        found += [array[field] for field in array.dtype.names or () if field.endswith(_RNG)]
-    return found
-
-
-def stop(missions: Missions, at: np.ndarray) -> None:
-    """End missions where they are, so that steps leave them alone.
-
-    Args:
-        missions: Some of which are ended.
-        at: (E,) bool, which of them.
-    """
-    clocks = missions.state.missions
-    clocks["end"][at & running(missions)] = MissionEnd.CYCLES_UP.code
-
-
-def mission_times(missions: Missions) -> np.ndarray:
-    """(E,) float64, how far the clock of each mission is, seconds."""
-    return missions.state.missions["time_s"].copy()
-
-
-def running(missions: Missions) -> np.ndarray:
-    """(E,) bool, which missions go on."""
-    return missions.state.missions["end"] == MissionEnd.RUNNING.code
-
-
-def finished(missions: Missions) -> np.ndarray:
-    """(E,) bool, which missions came to what they ask for."""
-    return goals_reached(missions.state.missions["end"])
-
-
-def deciding(missions: Missions) -> np.ndarray:
-    """(E, A) bool, which robots choose in the next step."""
-    return missions.state.robots["deciding"].copy()

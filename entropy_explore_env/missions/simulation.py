@@ -216,28 +216,6 @@ class Missions:
             if self._no_fly.size:
                 self._no_fly[row] = world.no_fly_mask(kind.robot.planning_radius_m).ravel()
 
-    def thin_candidates(self, divisor: int) -> None:
-        """Draw and refine so many times fewer viewpoints as candidates from now on."""
-        self._compiled_step.thin_candidates(divisor)
-
-    def take_no_fly_zones(self, source: Missions, rows: np.ndarray, at: np.ndarray) -> None:
-        """Take over the no-fly zones of another batch's missions, and room for collision masks of their own.
-
-        Args:
-            source: Missions of the same scenario.
-            rows: (N,) which of them.
-            at: (N,) which of these missions they replace.
-        """
-        if source.state.collision is not source.state.truth and self.state.collision is self.state.truth:
-            self.state = self.state._replace(collision=self.state.truth.copy())
-        if source._no_fly.size and not self._no_fly.size:
-            self._no_fly = np.zeros((len(self._no_fly), self.grid.voxels), np.bool_)
-        if self._no_fly.size:
-            masks = self._no_fly.reshape(self.count, -1, self.grid.voxels)
-            masks[at] = 0
-            if source._no_fly.size:
-                masks[at] = source._no_fly.reshape(source.count, -1, self.grid.voxels)[rows]
-
     def strategy_generator(self, mission: int) -> np.random.Generator:
         """The random stream of whoever chooses the actions in this mission's episode.
 

@@ -204,17 +204,6 @@ def new_proposers(scenario: Scenario, recipes: Mapping[int, Recipe] | None = Non
     ]
 
 
-def thinned(proposer: Proposer, divisor: int) -> Proposer:
-    """Return a proposer in the same memory that draws and refines 1/`divisor` of the viewpoints."""
-    recipe = proposer.recipe
-    fewer = {
-        name: -(-getattr(recipe, name) // divisor)
-        for name in ("gazes", "turns", "places", "refined", "far_places", "waypoint_gazes")
-    }
-    refinements = min(recipe.refinements, max(1, recipe.refinements // divisor))
-    return proposer._replace(recipe=recipe._replace(**fewer, refinements=refinements))
-
-
 def _proposer(scenario: Scenario, kind: RobotKind, recipe: Recipe, scratch: ProposalScratch) -> Proposer:
     grid, robot, sensor = scenario.grid, kind.robot, kind.sensor
     drawn, exact = (

@@ -26,7 +26,7 @@ from baselines.strategies import make_strategy
 from baselines.strategies.rules.random_walk import RandomWalk
 from benchmarks.reliability.kills import contents
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
-from entropy_explore_env.errors import MissingExtraError, SettingError
+from entropy_explore_env.errors import SettingError
 from entropy_explore_env.reports.metrics import mission_figures
 from entropy_explore_env.scenario import with_settings
 from entropy_explore_env.scenarios import BOX, LAB, SCENARIOS
@@ -323,23 +323,13 @@ def test_a_suite_says_who_stands_in_its_table():
     plans, volumes = chosen_strategies(None, "plans"), chosen_strategies(None, "volumes")
     assert plans[0] == "nearest-frontier" and strategies.ALIASES["best"] in plans
     of_teams = {"voronoi", "coordinated-frontier", "assigned-frontier"}
-    assert set(volumes) - set(plans) == {*of_teams, "pretrained:volumes"}
-    assert "pretrained:plans" in plans
+    assert set(volumes) - set(plans) == of_teams
+    assert "pretrained:plans" in plans and "pretrained:volumes" not in volumes
     assert set(chosen_strategies("all", "plans")) == set(strategies.STRATEGIES)
     assert chosen_strategies("voronoi,suite", "plans")[:2] == ("nearest-frontier", "voronoi")
     assert set(chosen_strategies("suite,voronoi", "plans")) == {*plans, "voronoi"}
     with pytest.raises(SettingError, match="suite"):
         chosen_strategies("suite")
-
-
-def test_without_what_runs_policies_a_suite_leaves_them_out_and_says_so(monkeypatch, capsys):
-    monkeypatch.setattr(strategies, "_LEARNED", "no_such_module")
-    plans = chosen_strategies(None, "plans")
-    assert "planned-rate" in plans and not any(map(strategies.is_learned, plans))
-    said = capsys.readouterr().err
-    assert said.startswith("without pretrained:plans: ") and "[training]" in said and said.count("\n") == 1
-    with pytest.raises(MissingExtraError):
-        chosen_strategies("pretrained:plans", "plans")
 
 
 def test_scenarios_are_names_and_files(tmp_path):

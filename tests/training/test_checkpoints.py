@@ -13,7 +13,7 @@ import pytest
 import torch
 from safetensors.torch import save_file
 
-from baselines.experiments.mission import run_mission, scripted
+from baselines.experiments.mission import run_mission
 from baselines.experiments.provenance import code_digest
 from baselines.run import main as run_main
 from baselines.strategies import make_strategy
@@ -21,6 +21,7 @@ from entropy_explore_env.command import BAD_INPUT
 from entropy_explore_env.decision_settings import Observation
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.errors import SettingError
+from entropy_explore_env.planner.weights import PlannerWeights
 from entropy_explore_env.reports.metrics import mission_figures
 from entropy_explore_env.scenario import with_settings
 from entropy_explore_env.scenarios import find_scenario
@@ -229,6 +230,8 @@ def test_an_unknown_policy_is_named():
         make_strategy("pretrained:cellar")
     with pytest.raises(SettingError, match=r"did you mean pretrained:plans\?$"):
         make_strategy("pretrained:plan")
+    with pytest.raises(SettingError, match=r"pretrained:volumes.*planned-rate, its equal"):
+        make_strategy("pretrained:volumes")
     with pytest.raises(SettingError, match="policy's folder"):
         make_strategy("runs/nowhere")
 
@@ -261,26 +264,32 @@ def test_evaluate_puts_a_policy_beside_strategies(saved, tmp_path, capsys):
 def test_a_policy_over_candidates_is_compared_with_the_planner_unasked():
     """It begins as the planner: whether it became better than that is the question."""
     over = with_settings(SCENARIO, {"action": {"kind": "candidates"}})
-    others = ["gradient", "random"]
-    assert evaluate.default_rivals(SCENARIO) == others
-    assert evaluate.default_rivals(over) == ["planned-rate", *others]
+    others, room = ["gradient", "random"], "pretrained:room"
+    assert evaluate.default_rivals(room, SCENARIO) == others
+    assert evaluate.default_rivals(room, over) == ["planned-rate", *others]
+    assert evaluate.default_rivals("pretrained:plans", SCENARIO) == ["planned-rate", *others]
+
+
+def test_weights_of_the_planner_are_evaluated_where_they_were_found(tmp_path, capsys):
+    assert evaluate.trained_in("pretrained:plans").name == "office"
+    file = tmp_path / "weights.json"
+    file.write_text(PlannerWeights({"seconds": -1.0}, tasks=("box-7x11x5:2",)).text())
+    words = ["--strategy", str(file), "--against", "random", "--seeds", "1", "--jobs", "1", "--json"]
+    assert evaluate.run_command(evaluate.main, [*words, "--runs", str(tmp_path / "missions")]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert (found["scenario"], found["robots"]) == ("box-7x11x5", 2)
+    assert evaluate.run_command(evaluate.main, ["--strategy", "gradient", "--seeds", "1"]) == BAD_INPUT
+    assert "strategy = 'gradient'" in capsys.readouterr().err
+    for tasks in ((), ("box-7x11x5",)):
+        file.write_text(PlannerWeights(tasks=tasks).text())
+        assert evaluate.run_command(evaluate.main, words) == BAD_INPUT
+        assert "tasks" in capsys.readouterr().err
 
 
 def test_evaluation_takes_worlds_that_training_never_sees():
-    trained = PolicySettings(with_settings(find_scenario("room-furnished"), {"channel": {"burst": 7}}))
+    trained = with_settings(find_scenario("room-furnished"), {"channel": {"burst": 7}})
     there = evaluate.evaluation_scenario(trained)
     assert there.split == "test" and there.channel.burst == 7 and there.name == "room-furnished"
-
-
-@pytest.mark.parametrize(("name", "scenario"), [("plans", "office"), ("volumes", "room-furnished")])
-def test_the_policies_over_candidates_that_come_with_the_project_act(name, scenario):
-    """Their features are those that this version computes; else they would be refused."""
-    settings = {"robots": 2, "ending": {"time_limit_s": 25.0}}
-    env = EntropyExploreEnv(with_settings(scripted(find_scenario(scenario)), settings))
-    strategy = make_strategy(f"pretrained:{name}")
-    run_mission(env, strategy, 0)
-    figures = mission_figures(env.missions, 0)
-    assert figures["scans"] > 4 and figures["entropy_end_bits"] < 0.9 * figures["entropy_start_bits"]
 
 
 def test_the_policy_that_comes_with_the_project_maps_the_room():
