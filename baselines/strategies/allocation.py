@@ -19,11 +19,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from baselines.strategies.metrics import Value
+from baselines.strategies.metrics import Options, Value
+from baselines.strategies.rules.coordinated_frontier import taken
 from entropy_explore_env.frontiers.knowledge import RobotKnowledge, stays, under_way, voxel_of
 from entropy_explore_env.planner.scene import Scene
 from entropy_explore_env.planner.stops import apart_m
 from entropy_explore_env.robots.motion import driving_time
+from entropy_explore_env.scenario import Scenario
 
 _FIRST_REACH = 0.25
 """Paths are searched so far at first, in sensor ranges: most choices are nearer, and a search over a whole
@@ -45,14 +47,6 @@ class Choice:
     """By the metric."""
     seconds: float
     """Of travel and scan."""
-
-
-class Paths(NamedTuple):
-    """Paths to K candidates, as a Value takes them."""
-
-    seconds: np.ndarray
-    edges: np.ndarray
-    taken: np.ndarray
 
 
 class _Lengths(NamedTuple):
@@ -89,12 +83,12 @@ class Allocator:
             Robot → candidate. The robot is missing if from no candidate that it reaches anything unexplored
             can be seen.
         """
-        taken = list(targets)
+        aims = list(targets)
         for target in targets:
             self._candidates.promise(target)
         unassigned, found = [self._view.robot, *sorted(stopped)], dict[int, Choice]()
         while unassigned:
-            choices = {robot: self._best(robot, taken) for robot in unassigned}
+            choices = {robot: self._best(robot, aims) for robot in unassigned}
             best = max(sorted(unassigned), key=lambda robot: _value_of(choices[robot]))
             choice = choices[best]
             if choice is None:
@@ -105,22 +99,13 @@ class Allocator:
                 break
             place = self._centres(np.array([choice.voxel]))[0]
             self._candidates.promise(place)
-            taken.append(place)
+            aims.append(place)
         self._candidates.release()
         return found
 
-    def options(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return (K,) seconds and (K,) V·(height factor) of what the robot can choose; no promises count."""
-        self._search(self._view.robot, math.inf)
-        slots, voxels = self._candidates.listed()
-        edges = self._lengths[self._view.robot].edges[slots]
-        reached = np.isfinite(edges)
-        seen = self._candidates.count(slots[reached], voxels[reached]) * self._candidates.point
-        return self._seconds(self._view.robot, edges[reached]), seen
-
-    def _best(self, robot: int, taken: Sequence[np.ndarray]) -> Choice | None:
+    def _best(self, robot: int, targets: Sequence[np.ndarray]) -> Choice | None:
         """Return a robot's best candidate; if it has none, after those that no path reaches are replaced."""
-        choice = self._best_listed(robot, taken)
+        choice = self._best_listed(robot, targets)
         if choice is not None or robot != self._view.robot:
             return choice
         if len(self._candidates.listed(all_of_them=True)[0]) == 0:
@@ -129,9 +114,9 @@ class Allocator:
         everywhere = self._paths.lengths_to(np.arange(self._grid.voxels, dtype=np.int32))
         self._candidates.replace_unreached(everywhere)
         self._lengths.clear()  # candidates have moved
-        return self._best_listed(robot, taken)
+        return self._best_listed(robot, targets)
 
-    def _best_listed(self, robot: int, taken: Sequence[np.ndarray]) -> Choice | None:
+    def _best_listed(self, robot: int, targets: Sequence[np.ndarray]) -> Choice | None:
         """Return the best of a robot's candidates, counting V and searching paths only as far as that needs.
 
         A candidate beyond the search has at most the value that it has for the shortest path that is still
@@ -140,19 +125,22 @@ class Allocator:
         slots, voxels = self._candidates.listed()
         if robot not in self._lengths:
             self._search(robot, _FIRST_REACH * self._candidates.reach)
-        start = self._centres(np.array([self._voxel_of(robot)]))
-        apart = np.linalg.norm(self._centres(voxels) - start, axis=1)
-        takes, counted = self._taken(voxels, taken), np.full(len(slots), np.nan)
+        start, places = self._centres(np.array([self._voxel_of(robot)])), self._centres(voxels)
+        apart, takes = np.linalg.norm(places - start, axis=1), np.zeros(len(slots))
+        for target in targets:
+            takes += taken(places, target[:3], self._candidates.reach)
+        counted = np.full(len(slots), np.nan)
         while True:
             reach, edges = self._lengths[robot].reach, self._lengths[robot].edges[slots]
             if math.isinf(reach):
-                arrays, near = (slots, voxels, apart, takes, counted, edges), np.isfinite(edges)
-                slots, voxels, apart, takes, counted, edges = (array[near] for array in arrays)
+                near = np.flatnonzero(np.isfinite(edges))
+                slots, voxels, edges, apart = slots[near], voxels[near], edges[near], apart[near]
+                takes, counted = takes[near], counted[near]
             if len(slots) == 0:
                 return None
             least = np.where(np.isfinite(edges), edges, np.maximum(reach, apart - 2.0))  # centre to centre
-            seconds = self._seconds(robot, least)
-            value = self._values(slots, voxels, Paths(seconds, least, takes), counted)
+            seconds = seconds_of(self._view.scenario, robot, least)
+            value = self._values(slots, voxels, Options(counted, seconds, least, takes))
             best = int(np.argmax(value))
             if value[best] == -math.inf:
                 return None
@@ -160,26 +148,23 @@ class Allocator:
                 return Choice(int(voxels[best]), float(value[best]), float(seconds[best]))
             self._search(robot, _EXTENSION * reach)
 
-    def _values(self, slots: np.ndarray, voxels: np.ndarray, paths: Paths, counted: np.ndarray) -> np.ndarray:
+    def _values(self, slots: np.ndarray, voxels: np.ndarray, options: Options) -> np.ndarray:
         """Return (K,) values of candidates; -inf where nothing is seen, or the candidate cannot be the best.
 
-        Args:
-            slots: (K,) of the candidates.
-            voxels: (K,) in which they lie.
-            paths: To them.
-            counted: (K,) V·(height factor) in points' size where it was counted, else NaN; filled in.
+        `options.seen` is NaN where it was not counted yet; it is filled in.
         """
+        counted = options.seen
         most = self._candidates.upper_bounds(slots) * self._candidates.point
-        most = np.where(np.isnan(counted), most, counted)
-        bound, value = self._value(most, *paths), np.full(len(slots), -np.inf)
-        order, size = np.argsort(-bound, kind="stable"), self._candidates.batch
+        bound = self._value(options._replace(seen=np.where(np.isnan(counted), most, counted)))
+        value, size = np.full(len(slots), -np.inf), self._candidates.batch
+        order = np.argsort(-bound, kind="stable")
         for first in range(0, len(order), size):
             batch = order[first : first + size]
             if bound[batch[0]] < value.max():
                 break
             fresh = batch[np.isnan(counted[batch])]
             counted[fresh] = self._candidates.count(slots[fresh], voxels[fresh]) * self._candidates.point
-            worth = self._value(counted[batch], *(array[batch] for array in paths))
+            worth = self._value(Options(*(array[batch] for array in options)))
             value[batch] = np.where(counted[batch] > 0.0, worth, -np.inf)
         return value
 
@@ -203,21 +188,14 @@ class Allocator:
         layer, layers = self._paths.lattice.layer, self._grid.shape[2]
         return voxel if layer < 0 else voxel - voxel % layers + layer
 
-    def _seconds(self, robot: int, edges: np.ndarray) -> np.ndarray:
-        """Return (K,) seconds of the drives along paths of these lengths, and of the scans at their stops."""
-        kind = self._view.scenario.kind_of(robot)
-        length_m = edges * self._grid.voxel_size_m
-        stops = np.maximum(np.ceil(length_m / kind.robot.reach_m), 1.0)
-        hops_s = _driving_times(length_m / stops, kind.robot.max_speed_m_s, kind.robot.acceleration_m_s2)
-        return stops * (hops_s + kind.sensor.scan_time_s)
 
-    def _taken(self, voxels: np.ndarray, taken: Sequence[np.ndarray]) -> np.ndarray:
-        """Return (K,) Σ over targets of P(d) = 1 - d/range, within the range (Burgard 2005, eq. 6)."""
-        places, total = self._centres(voxels), np.zeros(len(voxels))
-        for target in taken:
-            apart = np.linalg.norm(places - target[:3], axis=1)
-            total += np.maximum(1.0 - apart / self._candidates.reach, 0.0)
-        return total
+def seconds_of(scenario: Scenario, robot: int, edges: np.ndarray) -> np.ndarray:
+    """Return (K,) seconds of a robot's drives along paths of (K,) voxel edges, and of the scans at stops."""
+    kind = scenario.kind_of(robot)
+    length_m = edges * scenario.grid.voxel_size_m
+    stops = np.maximum(np.ceil(length_m / kind.robot.reach_m), 1.0)
+    hops_s = _driving_times(length_m / stops, kind.robot.max_speed_m_s, kind.robot.acceleration_m_s2)
+    return stops * (hops_s + kind.sensor.scan_time_s)
 
 
 @dataclass

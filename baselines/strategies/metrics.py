@@ -4,13 +4,15 @@ Nearest and Coordinated are the metrics of Yamauchi 1998 and of Burgard et al. 2
 per-time visibility: few candidates, one a block; those from which nothing unexplored can be seen are ignored;
 a robot drives to its candidate before it chooses again. So they compare metrics, and are not the rules of
 those papers as their authors run them: those are `nearest-frontier` and `coordinated-frontier`.
+
+A metric gives the values (K,) of K options. It is never greater for less V, or for a longer path.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import Literal, Protocol
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -19,21 +21,17 @@ from entropy_explore_env.frontiers.frontier_map import FrontierConfig
 from entropy_explore_env.validation import check, check_choice, check_kind, check_not_negative
 
 
-class Value(Protocol):
-    """Values of candidates; never greater for less V, or for a longer path."""
+class Options(NamedTuple):
+    """K candidates that a robot can go to; an array (K,) each."""
 
-    def __call__(
-        self, seen: np.ndarray, seconds: np.ndarray, edges: np.ndarray, taken: np.ndarray
-    ) -> np.ndarray:
-        """Return (K,) values.
-
-        Args:
-            seen: (K,) V·(height factor) in points' size.
-            seconds: (K,) travel and scan.
-            edges: (K,) length of the path in voxel edges.
-            taken: (K,) share of a frontier's utility that robots take which go near it, ≥ 0 (Burgard 2005).
-        """
-        ...
+    seen: np.ndarray
+    """V·(height factor) in points' size."""
+    seconds: np.ndarray
+    """Of the drives, and of the scans at their stops."""
+    edges: np.ndarray
+    """Length of the path in voxel edges."""
+    taken: np.ndarray
+    """Share of a frontier's utility that robots take which go near it, ≥ 0 (Burgard 2005)."""
 
 
 @dataclass(frozen=True)
@@ -44,9 +42,6 @@ class Metric:
         beta: β; None = V/t.
         bonus: Value of any frontier in addition to V, in V's units: slivers nearby are then explored in
             passing instead of at the end. 0 = the paper's metric.
-
-    Raises:
-        SettingError: One of them is no number that is allowed.
     """
 
     beta: float | None = None
@@ -58,25 +53,19 @@ class Metric:
             check(self, "beta", "None, or a number ≥ 0", lambda v: 0.0 <= v < math.inf)
         check_not_negative(self, "bonus")
 
-    def __call__(
-        self, seen: np.ndarray, seconds: np.ndarray, edges: np.ndarray, taken: np.ndarray
-    ) -> np.ndarray:
-        """See `Value`."""
-        del edges, taken
-        worth = seen + self.bonus
-        return worth / seconds if self.beta is None else worth - self.beta * seconds
+    def __call__(self, options: Options) -> np.ndarray:
+        """Return the values."""
+        worth = options.seen + self.bonus
+        return worth / options.seconds if self.beta is None else worth - self.beta * options.seconds
 
 
 @dataclass(frozen=True)
 class Nearest:
     """The candidate with the shortest path (Yamauchi 1998)."""
 
-    def __call__(
-        self, seen: np.ndarray, seconds: np.ndarray, edges: np.ndarray, taken: np.ndarray
-    ) -> np.ndarray:
-        """See `Value`."""
-        del seen, seconds, taken
-        return -edges
+    def __call__(self, options: Options) -> np.ndarray:
+        """Return the values."""
+        return -options.edges
 
 
 @dataclass(frozen=True)
@@ -87,9 +76,6 @@ class Coordinated:
 
     Attributes:
         beta: β, cost of a voxel edge of path; the paper finds 0.01 … 50 alike.
-
-    Raises:
-        SettingError: β is no number ≥ 0.
     """
 
     beta: float = 0.01
@@ -98,14 +84,12 @@ class Coordinated:
         """Check β."""
         check_not_negative(self, "beta")
 
-    def __call__(
-        self, seen: np.ndarray, seconds: np.ndarray, edges: np.ndarray, taken: np.ndarray
-    ) -> np.ndarray:
-        """See `Value`."""
-        del seen, seconds
-        return 1.0 - taken - self.beta * edges
+    def __call__(self, options: Options) -> np.ndarray:
+        """Return the values."""
+        return 1.0 - options.taken - self.beta * options.edges
 
 
+Value = Metric | Nearest | Coordinated
 Allocation = Literal["asynchronous", "synchronous"]
 
 
@@ -119,9 +103,6 @@ class ExplorationConfig:
         promises: Whether points that teammates announced to see have less weight.
         frontiers: Where candidates lie and what is seen from them.
         once: Whether no finer σ counts as explored where no candidate is left: robots wait then.
-
-    Raises:
-        SettingError: A field has another value.
     """
 
     metric: Value = field(default_factory=Metric)
@@ -132,8 +113,8 @@ class ExplorationConfig:
 
     def __post_init__(self) -> None:
         """Check every field."""
-        if isinstance(self.metric, type) or not callable(self.metric):
-            raise SettingError("ExplorationConfig.metric", self.metric, "a Metric, or another Value")
+        if not isinstance(self.metric, Value):
+            raise SettingError("ExplorationConfig.metric", self.metric, "a Metric, Nearest or Coordinated")
         check_choice(self, "allocation", Allocation)
         check_kind(self, "promises", bool)
         check_kind(self, "frontiers", FrontierConfig)

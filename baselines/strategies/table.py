@@ -33,7 +33,6 @@ from baselines.strategies.rules.random_walk import RandomWalk
 from baselines.strategies.rules.raster import Raster
 from baselines.strategies.rules.receding_horizon import RecedingHorizon
 from baselines.strategies.rules.voronoi import VoronoiCoverage
-from baselines.strategies.voronoi.territory import VoronoiConfig
 from entropy_explore_env.explorer import PlannedRate
 from entropy_explore_env.planner.tour import Tour
 from entropy_explore_env.planner.weights import shipped_weights
@@ -115,7 +114,7 @@ TABLE: tuple[Entry, ...] = (
     Entry(
         "voronoi-gradient",
         Family.PAPER,
-        partial(VoronoiCoverage, VoronoiConfig(control="gradient-search")),
+        partial(VoronoiCoverage, "gradient-search"),
         "the same cells, one step down the coverage functional's gradient (Bhattacharya, eq. 3)",
     ),
     Entry(
@@ -231,10 +230,7 @@ TABLE: tuple[Entry, ...] = (
     Entry(
         "voronoi-nearest",
         Family.OWN,
-        partial(
-            VoronoiCoverage,
-            VoronoiConfig(control="nearest", metric="length", known="deviation", tau=0.02, tau_floor=0.01),
-        ),
+        partial(VoronoiCoverage, "nearest"),
         "the nearest uncertain voxel of the robot's geodesic cell",
     ),
     Entry(

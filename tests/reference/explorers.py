@@ -83,12 +83,12 @@ def chosen(values: dict[Cell, float]) -> Cell | None:
 
 
 def coordinated(
-    plan: np.ndarray, robots: list[Cell], targets: list[Cell], beta: float, reach: float
+    plan: np.ndarray, robots: list[Cell], targets: list[Cell], beta: float, reach: float, last: bool = False
 ) -> dict[Cell, float]:
     """Burgard 2005's algorithm: frontier cell → U - β V for the first of several robots that choose together.
 
-    In turn the pair of robot and cell that is worth most is taken, of equal ones the first; what is worth
-    less then is told when it is the first robot's turn.
+    In turn the pair of robot and cell that is worth most is taken; what the cells are worth then is told when
+    it is the first robot's turn.
 
     Args:
         plan: The map that all of them have.
@@ -96,8 +96,9 @@ def coordinated(
         targets: Where others are under way to.
         beta: Cost of a path as long as the reach.
         reach: The sensor's range, in cells.
+        last: Whether the last of equal pairs is taken; else the first.
     """
-    cells = frontier_cells(plan)
+    cells = frontier_cells(plan)[:: -1 if last else 1]
     utility = {cell: 1.0 - sum(max(1.0 - math.dist(cell, t) / reach, 0.0) for t in targets) for cell in cells}
     lengths = [lengths_from(plan, robot) for robot in robots]
     left = list(range(len(robots)))
@@ -108,7 +109,7 @@ def coordinated(
             for cell in cells
             if math.isfinite(lengths[robot][cell])
         }
-        robot, taken = max(worth, key=worth.__getitem__, default=(0, None))
+        robot, taken = max(worth, key=lambda pair: round(worth[pair], 9), default=(0, None))
         if taken is None or robot == 0:
             return {cell: value for (who, cell), value in worth.items() if who == 0}
         left.remove(robot)

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from baselines.strategies.mutual_information.candidates import FACTORS, MATE, Body, Team, best_candidate
+from baselines.strategies.mutual_information.candidates import MATE, Body, Factors, Team, best_candidate
 from entropy_explore_env.belief.fields import Belief
 from entropy_explore_env.belief.visibility import CONE, cone_of, mark_cone
 from entropy_explore_env.viewpoints.gradient_candidates import CANDIDATE, find_gradient_candidates
@@ -40,10 +40,7 @@ def ours(belief, position, radius, cone, mates, weights, planar, ranked=None):
             mark_cone(_cone(c.apex, c.yaw, c.pitch, c.radius, c.half_angle), SIZE, None, marks, 1)
     if count == 0:
         return candidates, -1
-    factors = np.zeros(1, FACTORS)
-    factors["distance_cost"], factors["scale_bits"] = weights.kappa, weights.scale_bits
-    factors["interference"], factors["static_reach"] = weights.interference, True
-    factors["known_precision"] = known
+    factors = Factors(weights.kappa, weights.scale_bits, weights.interference, True, known)
     most = candidates["steepness"] / candidates["steepness"].max()
     most = most - weights.kappa * candidates["distance"] / radius
     order = np.argsort(-most, kind="stable") if ranked is None else ranked(most)
@@ -52,11 +49,11 @@ def ours(belief, position, radius, cone, mates, weights, planar, ranked=None):
         candidates,
         order,
         Belief(mean.ravel(), precision.ravel(), SIZE),
-        Body(tuple(map(float, position)), radius, 0.0, OUR_BALL, *ray_space(SIZE, behind=1)),
+        Body(tuple(map(float, position)), radius, 0.0, OUR_BALL, ray_space(SIZE, behind=1)),
         Team(heard, marks),
         own,
         None,
-        factors[0],
+        factors,
     )
     return candidates, best
 

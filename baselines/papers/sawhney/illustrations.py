@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,10 +23,14 @@ from baselines.experiments.cells import Cell
 from baselines.experiments.mission import scripted
 from baselines.papers.sawhney.mission import Run, explore_until_done
 from baselines.papers.sawhney.sweep import PLANS, POINT, TERRAINS, world_cell
-from baselines.strategies.metrics import Metric
+from baselines.strategies.allocation import seconds_of
+from baselines.strategies.metrics import Metric, Options
 from baselines.strategies.rules.per_time_visibility import PerTimeVisibility
+from entropy_explore_env.belief.paths.search import new_search
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.frontiers.frontier_map import Chart
+from entropy_explore_env.frontiers.knowledge import voxel_of
+from entropy_explore_env.frontiers.path_lengths import KnownPaths
 from entropy_explore_env.frontiers.terrain_frontiers import PATCH_M
 from entropy_explore_env.missions.view import RobotView
 from entropy_explore_env.reports.recording import DrivenPaths
@@ -104,7 +109,7 @@ def example_options() -> tuple[np.ndarray, np.ndarray]:
 
 def first_options(metric: Metric, seconds: np.ndarray, seen: np.ndarray) -> np.ndarray:
     """The first ten options by a metric; of equals the one with less t."""
-    value = metric(seen, seconds, seconds, np.zeros(len(seen)))
+    value = metric(Options(seen, seconds, seconds, np.zeros(len(seen))))
     return np.lexsort((seconds, -value))[:_FIRST]
 
 
@@ -161,10 +166,23 @@ def _options_on_the_way() -> tuple[np.ndarray, np.ndarray]:
     def look(share: float, views: Sequence[RobotView], _: Sequence[np.ndarray]) -> None:
         latest[:] = views
         if share >= 0.5 and not found:
-            found.append(explorer.options(views[0]))
+            found.append(_options(explorer, views[0]))
 
     explore_until_done(_environment(cell), explorer, 0, look)
-    return found[0] if found else explorer.options(latest[0])
+    return found[0] if found else _options(explorer, latest[0])
+
+
+def _options(explorer: PerTimeVisibility, view: RobotView) -> tuple[np.ndarray, np.ndarray]:
+    """T and V of what a robot that has chosen before can choose now; no promises count."""
+    cells, scenario = explorer.cells_of(view.robot), view.scenario
+    paths = KnownPaths(scenario, view.kind, cells, new_search(scenario.grid.voxels))
+    paths.start(voxel_of(view, view.pose))
+    paths.extend(math.inf)
+    slots, voxels = cells.listed()
+    edges = paths.lengths_to(voxels)
+    reached = np.isfinite(edges)
+    seen = cells.count(slots[reached], voxels[reached]) * cells.point
+    return seconds_of(scenario, view.robot, edges[reached]), seen
 
 
 def snapshots(cell: Cell, seed: int, marks: Sequence[float] = _MARKS) -> list[Snapshot]:

@@ -26,16 +26,21 @@ from entropy_explore_env.robots.motion import distance_to_teammate, line_believe
 
 MATE = record_type([("begin", "f8", (3,)), ("end", "f8", (3,)), ("touching", "f8")])
 """Where a teammate was heard to be, and to drive to, in grid units; `touching`: sum of the two radii."""
-FACTORS = record_type(
-    [
-        ("distance_cost", "f8"),  # κ
-        ("scale_bits", "f8"),  # ξ of eq. 12; inf = λ is 1
-        ("interference", "f8"),  # η for each teammate in view
-        ("static_reach", "?"),  # whether ρ depends on what is believed covered
-        ("known_precision", "f8"),  # 1/σ² of a voxel that counts as known
-    ],
-)
-"""Parameters of eq. 13."""
+
+
+class Factors(NamedTuple):
+    """Parameters of eq. 13."""
+
+    distance_cost: float
+    """κ."""
+    scale_bits: float
+    """ξ of eq. 12; inf = λ is 1."""
+    interference: float
+    """η for each teammate in view."""
+    static_reach: bool
+    """Whether ρ depends on what is believed covered."""
+    known_precision: float
+    """1/σ² of a voxel that counts as known."""
 
 
 class Body(NamedTuple):
@@ -47,10 +52,7 @@ class Body(NamedTuple):
     radius: float
     footprint: np.ndarray
     """(B, 3) int64 index offsets of the voxels that it touches."""
-    crossed: np.ndarray
-    """(L,) int32, see `cast_ray`."""
-    entered: np.ndarray
-    """(L,) int64."""
+    crossing: Crossing
 
 
 class Team(NamedTuple):
@@ -62,8 +64,8 @@ class Team(NamedTuple):
     """(V,) uint8, 1 for the voxels that their cones cover."""
 
 
-@lean_kernel
-def fits(belief, footprint, place):
+@inlined_kernel
+def _fits(belief, footprint, place):
     """Whether a body touches nothing believed covered, nor the boundary."""
     size = belief.size
     for offset in footprint:
@@ -87,30 +89,20 @@ def reachability(belief, body, end):
         body: A Body.
         end: (x, y, z) of the candidate.
     """
-    mean, size, begin = belief.mean, belief.size, body.position
+    mean, size, begin, crossing = belief.mean, belief.size, body.position, body.crossing
     x, y, z = end[0] - begin[0], end[1] - begin[1], end[2] - begin[2]
     length = math.sqrt(x * x + y * y + z * z)
     if length <= 0.0:
         return 1.0
-    if not fits(belief, body.footprint, end):
+    if not _fits(belief, body.footprint, end):
         return 0.0
-    if line_believed_blocked(
-        mean, size, body.footprint, body.radius, begin, end, Crossing(body.crossed, body.entered)
-    ):
+    if line_believed_blocked(mean, size, body.footprint, body.radius, begin, end, crossing):
         return 0.0
-    direction = (x / length, y / length, z / length)
-    _, n, _ = cast_ray(
-        mean,
-        size,
-        Line(begin, direction, length),
-        STOP_AT_COVERED,
-        OPEN_END,
-        NONE_BEHIND,
-        Crossing(body.crossed, body.entered),
-    )
+    line = Line(begin, (x / length, y / length, z / length), length)
+    _, n, _ = cast_ray(mean, size, line, STOP_AT_COVERED, OPEN_END, NONE_BEHIND, crossing)
     covered = 0.0
     for step in range(1, n - 1):
-        covered = max(covered, mean[body.crossed[step]])
+        covered = max(covered, mean[crossing.voxels[step]])
     return 1.0 - covered
 
 
@@ -143,7 +135,7 @@ def best_candidate(candidates, order, belief, body, team, cone, occlusion, facto
         team: A Team.
         cone: A CONE with r̂ and α̂; its apex and gaze are overwritten.
         occlusion: An Occlusion, or None; see belief/visibility.py.
-        factors: A FACTORS.
+        factors: Factors.
 
     Returns:
         Its number; -1 if no candidate has a gain above 0.
@@ -167,7 +159,8 @@ def best_candidate(candidates, order, belief, body, team, cone, occlusion, facto
                 continue
             _place_cone(cone, candidate)
             for mate in team.mates:
-                if _in_view(cone, mate):
+                to = mate.end[0] - cone.apex[0], mate.end[1] - cone.apex[1], mate.end[2] - cone.apex[2]
+                if in_cone(cone, to[0], to[1], to[2]):
                     gain *= factors.interference
             if gain - cost <= best:
                 continue
@@ -188,10 +181,3 @@ def _place_cone(cone, candidate):
     cone.gaze[2] = -math.sin(candidate.pitch)
     for axis in range(3):
         cone.apex[axis] = candidate.place[axis]
-
-
-@inlined_kernel
-def _in_view(cone, mate):
-    """Whether a teammate stands, or will stand, in a cone."""
-    x, y, z = mate.end[0] - cone.apex[0], mate.end[1] - cone.apex[1], mate.end[2] - cone.apex[2]
-    return in_cone(cone, x, y, z)

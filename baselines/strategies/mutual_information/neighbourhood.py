@@ -4,20 +4,21 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
-from baselines.strategies.mutual_information.candidates import FACTORS, MATE, Body, Team, best_candidate
+from baselines.strategies.mutual_information.candidates import MATE, Body, Factors, Team, best_candidate
 from entropy_explore_env.belief.paths.lattice import new_lattice
-from entropy_explore_env.belief.raycast import longest_crossing
+from entropy_explore_env.belief.raycast import Crossing, longest_crossing
 from entropy_explore_env.belief.visibility import CONE, Occlusion, mark_cone
-from entropy_explore_env.errors import SettingError
 from entropy_explore_env.frontiers.knowledge import RobotKnowledge, announced_cone, belief_of
 from entropy_explore_env.scenario import Scenario
-from entropy_explore_env.settings import RobotKind, gaussian_entropy_bits
+from entropy_explore_env.settings import gaussian_entropy_bits
 from entropy_explore_env.validation import check, check_kind, check_not_negative, check_positive
 from entropy_explore_env.viewpoints.gradient_candidates import CANDIDATE, find_gradient_candidates
+
+_LEAST_RADIUS_M = 0.5
+"""Lower bound of the radius within which candidates lie, which is r̂ of the latest scan or the reach."""
 
 
 @dataclass(frozen=True)
@@ -33,12 +34,8 @@ class MutualInformationConfig:
         static_reach: Whether ρ depends on what is believed covered; else it is 1.
         occlusion: Whether obstacles hide voxels of cones; the paper's ignore them.
         distance_cost: κ.
-        least_radius_m: Lower bound of the radius of the neighbourhood in which candidates lie, which is r̂ of
-            the latest scan.
-        most_radius_m: Upper bound of that radius; the robot's reach is another.
         known_sigma: σ of a voxel that counts as known, H = 0; None = the mission's σ_end.
-        repeats: A viewpoint that was chosen this often among the latest decisions is a trap.
-        memory: Number of latest decisions that are remembered.
+        repeats: A viewpoint that was chosen this often among the latest eight is a trap.
     """
 
     coordinated: bool = True
@@ -49,41 +46,19 @@ class MutualInformationConfig:
     static_reach: bool = True
     occlusion: bool = False
     distance_cost: float = 0.0
-    least_radius_m: float = 0.5
-    most_radius_m: float = math.inf
     known_sigma: float | None = None
     repeats: int = 2
-    memory: int = 8
 
     def __post_init__(self) -> None:
         """Check every field."""
         for name in ("coordinated", "overlap", "teammates_block", "static_reach", "occlusion"):
             check_kind(self, name, bool)
-        check_positive(self, "overlap_scale", "least_radius_m")
-        check_positive(self, "most_radius_m", finite=False)
+        check_positive(self, "overlap_scale")
         check(self, "interference", "a number above 0 up to 1", lambda v: 0 < v <= 1)
         check_not_negative(self, "distance_cost")
         if self.known_sigma is not None:
             check(self, "known_sigma", "None, or a number from 1e-6 to 1e4", lambda v: 1e-6 <= v <= 1e4)
-        for name in ("repeats", "memory"):
-            check(self, name, "a whole number ≥ 1", lambda v: v >= 1 and v == int(v))
-        if self.most_radius_m < self.least_radius_m:
-            raise SettingError(
-                "MutualInformationConfig.most_radius_m", self.most_radius_m, "at least least_radius_m"
-            )
-
-
-class _KindModel(NamedTuple):
-    """A kind of robot, for kernels."""
-
-    footprint: np.ndarray
-    """(B, 3) int64 index offsets of the voxels that its body touches."""
-    half_angle_rad: float
-    """Of its sensor's widest ray; used before the first scan."""
-    crossed: np.ndarray
-    """(L,) int32, scratch space of `cast_ray`."""
-    entered: np.ndarray
-    """(L,) int64."""
+        check(self, "repeats", "a whole number ≥ 1", lambda v: v >= 1 and v == int(v))
 
 
 class Neighbourhood:
@@ -91,63 +66,66 @@ class Neighbourhood:
 
     def __init__(self, config: MutualInformationConfig, scenario: Scenario, rng: np.random.Generator) -> None:
         """Begin a mission; `rng` decides between equal voxels."""
-        self.config, self._rng = config, rng
-        self._models = [_kind_model(scenario, kind) for kind in scenario.kinds]
-        self._marks = np.zeros(scenario.grid.voxels, np.uint8)
-        self._candidates = np.zeros(0, CANDIDATE)
-        self._cone = np.zeros(1, CONE)
-        self._factors = np.zeros(1, FACTORS)
+        self.config, self._rng, grid = config, rng, scenario.grid
+        self._footprints = [
+            new_lattice(
+                grid.shape, kind.robot.planning_radius_m / grid.voxel_size_m, scenario.layer_of(kind.robot)
+            ).footprint
+            for kind in scenario.kinds
+        ]
+        longest = longest_crossing(*grid.shape, math.inf, 1)
+        self._crossing = Crossing(np.zeros(longest, np.int32), np.zeros(longest, np.int64))
+        self._marks, self._candidates = np.zeros(grid.voxels, np.uint8), np.zeros(0, CANDIDATE)
         sigma = scenario.ending.sigma_end if config.known_sigma is None else config.known_sigma
-        self._factors["known_precision"] = sigma**-2
-        self._factors["distance_cost"] = config.distance_cost
-        self._factors["static_reach"] = config.static_reach
-        self._factors["interference"] = config.interference if config.coordinated else 1.0
+        self._known_precision = float(sigma**-2)
         unknown_bits = gaussian_entropy_bits(scenario.sigma_prior) - gaussian_entropy_bits(sigma)
         self._unknown_bits = max(unknown_bits, 0.0)
 
     def best(self, view: RobotKnowledge) -> np.ndarray | None:
         """Return the viewpoint (5,) of eq. 13, map frame; None if no candidate has a gain above 0."""
-        grid, settings = view.scenario.grid, self.config
+        grid, settings, robot = view.scenario.grid, self.config, view.kind.robot
         edge, origin = grid.voxel_size_m, np.asarray(grid.origin_m)
         position = grid.in_grid_units(view.pose)[:3]
-        depth_m = max(view.depth_m, settings.least_radius_m)
-        most_m = min(settings.most_radius_m, view.kind.robot.reach_m, float(grid.size_m.sum()))
-        radius = min(depth_m, most_m) / edge
+        depth_m = max(view.depth_m, _LEAST_RADIUS_M)
+        radius = min(depth_m, robot.reach_m, float(grid.size_m.sum())) / edge
         candidates = self._near(view, position, radius)
         if len(candidates) == 0:
             return None
-        cone = self._own_cone(view, depth_m / edge)
         x, y, z = position.tolist()
-        model, body_radius = self._model_of(view), view.kind.robot.planning_radius_m / edge
+        footprint = self._footprints[view.robot % len(self._footprints)]
+        cone, scale_bits = self._own_cone(view, depth_m / edge)
         best = best_candidate(
             candidates,
             self._order(candidates, radius),
             belief_of(view),
-            Body((x, y, z), radius, body_radius, model.footprint, model.crossed, model.entered),
+            Body((x, y, z), radius, float(robot.planning_radius_m / edge), footprint, self._crossing),
             Team(self._heard(view), self._marks),
             cone,
-            self._occlusion(view) if settings.occlusion else None,
-            self._factors[0],
+            self._occlusion(view),
+            Factors(
+                float(settings.distance_cost),
+                scale_bits,
+                float(settings.interference) if settings.coordinated else 1.0,
+                settings.static_reach,
+                self._known_precision,
+            ),
         )
         if best < 0:
             return None
         chosen = candidates[best]
         return np.array([*(origin + chosen["place"] * edge), chosen["yaw"], chosen["pitch"]])
 
-    def _model_of(self, view: RobotKnowledge) -> _KindModel:
-        return self._models[view.robot % len(self._models)]
-
     def _near(self, view: RobotKnowledge, position: np.ndarray, radius: float) -> np.ndarray:
         """(K,) CANDIDATE with a gradient."""
         layer = view.scenario.layer_of(view.kind.robot)
-        across = 2 * math.floor(radius) + 3
-        most = min(across, view.mean.shape[0]) * min(across, view.mean.shape[1])
-        most *= 1 if layer is not None else min(across, view.mean.shape[2])
+        across = [min(2 * math.floor(radius) + 3, size) for size in view.mean.shape]
+        most = across[0] * across[1] * (1 if layer is not None else across[2])
         if len(self._candidates) < most:
             self._candidates = np.zeros(most, CANDIDATE)
-        known = self._factors["known_precision"][0]
         flat = -1 if layer is None else layer
-        count = find_gradient_candidates(view.precision, known, position, radius, flat, self._candidates)
+        count = find_gradient_candidates(
+            view.precision, self._known_precision, position, radius, flat, self._candidates
+        )
         return self._candidates[:count]
 
     def _order(self, candidates: np.ndarray, radius: float) -> np.ndarray:
@@ -158,19 +136,20 @@ class Neighbourhood:
         shuffled = self._rng.permutation(len(candidates))
         return shuffled[np.argsort(-most[shuffled], kind="stable")]
 
-    def _occlusion(self, view: RobotKnowledge) -> Occlusion:
-        model = self._model_of(view)
-        return Occlusion(view.mean.reshape(-1), model.crossed, model.entered)
+    def _occlusion(self, view: RobotKnowledge) -> Occlusion | None:
+        return Occlusion(view.mean.reshape(-1), *self._crossing) if self.config.occlusion else None
 
-    def _own_cone(self, view: RobotKnowledge, depth: float) -> np.ndarray:
-        """The robot's cone, without an apex yet; sets ξ, which is relative to the bits that it could hold."""
-        angle = view.half_angle_rad or self._model_of(view).half_angle_rad
-        self._cone["radius"], self._cone["cosine"] = depth, math.cos(angle)
-        voxels = 2.0 / 3.0 * math.pi * depth**3 * (1.0 - math.cos(angle))
-        scale_bits = self.config.overlap_scale * voxels * self._unknown_bits
-        counts = self.config.coordinated and self.config.overlap
-        self._factors["scale_bits"] = max(scale_bits, 1e-9) if counts else math.inf
-        return self._cone[0]
+    def _own_cone(self, view: RobotKnowledge, depth: float) -> tuple[np.ndarray, float]:
+        """The robot's cone, without an apex yet, and ξ, which is relative to the bits that it could hold."""
+        sensor = view.kind.sensor
+        widest = 0.5 * sensor.angular_step_rad * math.hypot(sensor.columns - 1, sensor.rows - 1)
+        cone = np.zeros(1, CONE)
+        cosine = math.cos(view.half_angle_rad or min(widest, math.pi))  # before the first scan the widest ray
+        cone["radius"], cone["cosine"] = depth, cosine
+        if not (self.config.coordinated and self.config.overlap):
+            return cone[0], math.inf
+        voxels = 2.0 / 3.0 * math.pi * depth**3 * (1.0 - cosine)
+        return cone[0], max(self.config.overlap_scale * voxels * self._unknown_bits, 1e-9)
 
     def _heard(self, view: RobotKnowledge) -> np.ndarray:
         """(M,) MATE, the teammates that the robot has heard; marks the voxels of their cones."""
@@ -180,7 +159,7 @@ class Neighbourhood:
             return np.zeros(0, MATE)
         heard = np.zeros(len(mates), MATE)
         self._marks[:] = 0
-        occlusion = self._occlusion(view) if settings.occlusion else None
+        occlusion = self._occlusion(view)
         own_m = view.kind.robot.body_radius_m
         for place, number in enumerate(mates):
             mate = view.teammates[number]
@@ -192,16 +171,3 @@ class Neighbourhood:
             if settings.overlap and mate.announced_s >= 0.0 and mate.depth_m > 0.0:
                 mark_cone(announced_cone(grid, mate), grid.shape, occlusion, self._marks, 1)
         return heard
-
-
-def _kind_model(scenario: Scenario, kind: RobotKind) -> _KindModel:
-    grid, sensor = scenario.grid, kind.sensor
-    radius = kind.robot.planning_radius_m / grid.voxel_size_m
-    widest = 0.5 * sensor.angular_step_rad * math.hypot(sensor.columns - 1, sensor.rows - 1)
-    longest = longest_crossing(*grid.shape, math.inf, 1)
-    return _KindModel(
-        footprint=new_lattice(grid.shape, radius, scenario.layer_of(kind.robot)).footprint,
-        half_angle_rad=min(widest, math.pi),
-        crossed=np.zeros(longest, np.int32),
-        entered=np.zeros(longest, np.int64),
-    )

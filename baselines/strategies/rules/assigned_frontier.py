@@ -10,7 +10,6 @@ The radius of groups is tuned; see docs/explorers.md.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import linear_sum_assignment
@@ -19,38 +18,17 @@ from entropy_explore_env.frontiers.blocks import NONE
 from entropy_explore_env.frontiers.knowledge import teammates_that_share, voxel_of
 from entropy_explore_env.planner.frontier_rule import FrontierRule
 from entropy_explore_env.planner.scene import Scene, best_of
-from entropy_explore_env.validation import check_positive
 
 _UNREACHED = 1e9
 """Length, in voxel edges, in place of inf, which the assignment cannot take."""
-
-
-@dataclass(frozen=True)
-class AssignedConfig:
-    """How large groups of frontier cells are.
-
-    Attributes:
-        group: Radius of a group, in sensor ranges.
-
-    Raises:
-        SettingError: It is no number > 0.
-    """
-
-    group: float = 0.25
-
-    def __post_init__(self) -> None:
-        """Check it."""
-        check_positive(self, "group")
 
 
 class AssignedFrontier(FrontierRule):
     """Goes to the group of frontier cells that the optimal assignment of all robots gives it."""
 
     rule = "assigned-frontier"
-
-    def __init__(self, config: AssignedConfig | None = None) -> None:
-        """Take the settings; None = the defaults."""
-        self.config = config or AssignedConfig()
+    radius = 0.25
+    """Radius of a group, in sensor ranges."""
 
     def pick(self, scene: Scene) -> int:
         """Return the voxel to go to; see `FrontierRule`."""
@@ -59,7 +37,7 @@ class AssignedFrontier(FrontierRule):
             return NONE
         heard = [mate for mate in teammates_that_share(scene.view).values() if mate.heard_s >= 0.0]
         known = np.array([voxel_of(scene.view, mate.pose) for mate in heard], np.int32)
-        group = groups(scene.centres(voxels), self.config.group * scene.cells.reach)
+        group = groups(scene.centres(voxels), self.radius * scene.cells.reach)
         apart = scene.lengths_of_team(voxels, lengths, known)
         least = np.full((len(apart), int(group.max()) + 1), _UNREACHED)
         for robot, row in enumerate(apart):

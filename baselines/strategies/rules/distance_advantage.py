@@ -16,57 +16,33 @@ the best advantage so far are never searched from. The choice is the same.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from entropy_explore_env.frontiers.path_lengths import KnownPaths
 from entropy_explore_env.planner.frontier_rule import FrontierRule
 from entropy_explore_env.planner.scene import Scene, best_of
-from entropy_explore_env.validation import check_count, check_positive
-
-
-@dataclass(frozen=True)
-class DistanceAdvantageConfig:
-    """Around which place means are taken, and which frontier cells count.
-
-    Attributes:
-        radius: Voxels, along either axis, that u may be off the robot.
-        horizon: Longest path, in voxel edges, to a frontier cell that counts though it is not the nearest.
-        detour: u that are farther from the robot than this many radii, by path, do not count; inf = all do.
-
-    Raises:
-        SettingError: One of them is not allowed.
-    """
-
-    radius: int = 60
-    horizon: float = 61.0
-    detour: float = 8.0
-
-    def __post_init__(self) -> None:
-        """Check every field."""
-        check_count(self, "radius", 1, 1_000_000)
-        check_positive(self, "horizon", "detour", finite=False)
 
 
 class DistanceAdvantage(FrontierRule):
     """Goes to the frontier cell with the greatest distance advantage."""
 
     rule = "distance-advantage"
-
-    def __init__(self, config: DistanceAdvantageConfig | None = None) -> None:
-        """Take the settings; None = the defaults."""
-        self.config = config or DistanceAdvantageConfig()
+    radius = 60
+    """Voxels, along either axis, that u may be off the robot."""
+    horizon = 61.0
+    """Longest path, in voxel edges, to a frontier cell that counts though it is not the nearest."""
+    detour = 8.0
+    """u that are farther from the robot than this many radii, by path, do not count."""
 
     def pick(self, scene: Scene) -> int:
         """Return the voxel to go to; see `FrontierRule`."""
-        config, paths = self.config, scene.paths
-        voxels, lengths = paths.frontiers_within(config.horizon)
+        paths = scene.paths
+        voxels, lengths = paths.frontiers_within(self.horizon)
         if len(voxels) == 0:
             voxels, lengths = paths.nearest_frontiers()
             return best_of(voxels, -lengths, scene.target)
-        paths.extend(config.detour * config.radius)
-        around = paths.around(scene.here, config.radius)
+        paths.extend(self.detour * self.radius)
+        around = paths.around(scene.here, self.radius)
         return best_of(voxels, advantages(paths, voxels, lengths, around), scene.target)
 
 

@@ -10,54 +10,31 @@ gain is the true one, which no robot knows; this one is the robot's own expectat
 Gains are counted only for cells that can be best: all that is known of a gain is that it is no more than at
 an earlier count, but for what has turned free since.
 
-Tuned: λ, see `InformationGainConfig`.
+λ is tuned: docs/explorers.md.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
 from entropy_explore_env.planner.frontier_rule import FrontierRule
 from entropy_explore_env.planner.scene import Scene, best_of
-from entropy_explore_env.validation import check_positive
-
-
-@dataclass(frozen=True)
-class InformationGainConfig:
-    """What gain is worth, and which frontier cells count.
-
-    Attributes:
-        weight: λ, in sensor ranges.
-        horizon: Longest path, in sensor ranges, to a frontier cell that counts though it is not the nearest.
-
-    Raises:
-        SettingError: One of them is not allowed.
-    """
-
-    weight: float = 0.05
-    horizon: float = 3.0
-
-    def __post_init__(self) -> None:
-        """Check both."""
-        check_positive(self, "weight")
-        check_positive(self, "horizon", finite=False)
 
 
 class InformationGain(FrontierRule):
     """Goes to the frontier cell with the best balance of gain and path."""
 
     rule = "information-gain"
-
-    def __init__(self, config: InformationGainConfig | None = None) -> None:
-        """Take the settings; None = the defaults."""
-        self.config = config or InformationGainConfig()
+    weight = 0.05
+    """λ, in sensor ranges."""
+    horizon = 3.0
+    """Longest path, in sensor ranges, to a frontier cell that counts though it is not the nearest."""
 
     def pick(self, scene: Scene) -> int:
         """Return the voxel to go to; see `FrontierRule`."""
-        horizon = self.config.horizon * scene.cells.reach
+        horizon = self.horizon * scene.cells.reach
         scene.paths.extend(horizon)
         slots, voxels = scene.cells.listed(all_of_them=True)
         lengths = scene.paths.lengths_to(voxels)
@@ -73,7 +50,7 @@ class InformationGain(FrontierRule):
         self, scene: Scene, slots: np.ndarray, voxels: np.ndarray, lengths: np.ndarray, bounds: np.ndarray
     ) -> np.ndarray:
         """(K,) worths, as far as it takes to know the greatest; -inf for cells that cannot have it."""
-        weight = self.config.weight * scene.cells.reach
+        weight = self.weight * scene.cells.reach
         bound = weight * np.log1p(bounds) - lengths
         order, size = np.argsort(-bound, kind="stable"), scene.cells.batch
         worth, most = np.full(len(voxels), -np.inf), -math.inf

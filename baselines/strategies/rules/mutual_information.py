@@ -29,6 +29,8 @@ from entropy_explore_env.robots.motion import MoveEnd
 from entropy_explore_env.scenario import Scenario
 
 _ALIKE_RAD = math.radians(15.0)
+_MEMORY = 8
+"""Latest choices of a robot among which repeated ones are a trap."""
 
 
 class MutualInformation(Driver):
@@ -52,7 +54,7 @@ class MutualInformation(Driver):
         """Begin a mission."""
         super().reset(scenario, rng)
         self.decisions = {"rule": 0, "blocked": 0, "nothing": 0, "trap": 0}
-        self._chosen = [deque[np.ndarray](maxlen=self.config.memory) for _ in range(scenario.robots)]
+        self._chosen = [deque[np.ndarray](maxlen=_MEMORY) for _ in range(scenario.robots)]
         self._neighbourhood = Neighbourhood(self.config, scenario, rng)
 
     def give_way(self, view: RobotKnowledge, trail: Trail) -> None:

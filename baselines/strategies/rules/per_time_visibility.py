@@ -35,7 +35,6 @@ from entropy_explore_env.frontiers.knowledge import (
     stays,
     teammates_that_share,
     under_way,
-    voxel_of,
 )
 from entropy_explore_env.frontiers.terrain_frontiers import TerrainFrontiers
 from entropy_explore_env.frontiers.voxel_frontiers import VoxelFrontiers
@@ -86,12 +85,6 @@ class PerTimeVisibility(FrontierRule):
     def mapped_share(self) -> float:
         """Return the largest share of points that a robot has mapped: of columns over terrain."""
         return max((memory.cells.mapped_share() for memory in self._memories.values()), default=0.0)
-
-    def options(self, view: RobotKnowledge) -> tuple[np.ndarray, np.ndarray]:
-        """Return (K,) seconds and (K,) V·(height factor) of what a robot can choose; it has chosen before."""
-        memory, here = self._memories[view.robot], voxel_of(view, view.pose)
-        memory.paths.start(here)
-        return Allocator(Scene(view, memory.cells, memory.paths, here, NONE), self.config.metric).options()
 
     def arrive(self, view: RobotKnowledge, cells: VoxelFrontiers, here: int) -> None:
         """Take out the candidate from which the robot has scanned."""

@@ -8,8 +8,8 @@ costs the entropy along it, and φ is the entropy, no less than τ′. The robot
 cell. A centralised team is the same code with perfect messages.
 
 `voronoi-gradient` takes steps down the coverage functional (eq. 3) and falls back on the projected centroid
-where none helps and the cell is not explored; `voronoi-nearest`, ours, goes to the uncertain voxel that costs
-least.
+where none helps and the cell is not explored. `voronoi-nearest`, ours, goes to the uncertain voxel that costs
+least; by length, and a voxel is certain when its deviation has fallen to the mission's σ_end.
 
 Once all is explored the projected centroid may lead robots in circles, as on a known map in the paper's
 reproduction. Its guard (`Rules.guarded`) is not part of this strategy, since missions end by then.
@@ -17,14 +17,27 @@ reproduction. Its guard (`Rules.guarded`) is not part of this strategy, since mi
 
 from __future__ import annotations
 
+from typing import Literal, get_args
+
 import numpy as np
 
-from baselines.strategies.voronoi.controls import CellFunctional, nearest_uncertain, projected_centroids
-from baselines.strategies.voronoi.territory import Division, Territory, VoronoiConfig
+from baselines.strategies.voronoi.controls import CellFunctional, nearest_uncertain, projected_centroid
+from baselines.strategies.voronoi.territory import Territory
 from entropy_explore_env.belief.paths.geodesic_cells import UNREACHED
+from entropy_explore_env.errors import SettingError
 from entropy_explore_env.frontiers.knowledge import RobotKnowledge, voxel_of
 from entropy_explore_env.planner.driver import Driver
 from entropy_explore_env.scenario import Scenario
+
+Control = Literal["projected-centroid", "gradient-search", "nearest"]
+_LENGTH_COST = 0.01
+"""η, cost of a voxel edge of path in addition to its entropy."""
+_STEPS = 5
+"""Steps of the gradient search per decision."""
+_UNCERTAIN, _LEAST = 0.35, 0.33
+"""τ and τ′ in nats: voxels with at least the first are uncertain, and no density is less than the second."""
+_NEAREST_UNCERTAIN, _NEAREST_LEAST = 0.02, 0.01
+"""The same for `nearest`, where entropy follows the deviation."""
 
 
 class VoronoiCoverage(Driver):
@@ -32,16 +45,25 @@ class VoronoiCoverage(Driver):
 
     rule = "voronoi"
 
-    def __init__(self, config: VoronoiConfig | None = None) -> None:
-        """Take the settings; None = the defaults."""
-        self.config = config or VoronoiConfig()
+    def __init__(self, control: Control = "projected-centroid") -> None:
+        """Take where in its cell a robot goes.
+
+        Raises:
+            SettingError: There is no such control.
+        """
+        if control not in get_args(Control):
+            raise SettingError("control", control, f"one of {', '.join(get_args(Control))}")
+        self._control = control
+        self._tau, self._floor = _UNCERTAIN, _LEAST
+        if control == "nearest":
+            self._tau, self._floor = _NEAREST_UNCERTAIN, _NEAREST_LEAST
 
     def reset(self, scenario: Scenario, rng: np.random.Generator) -> None:
         """Begin a mission."""
         super().reset(scenario, rng)
         self._paths = [np.zeros(0, np.int64) for _ in range(scenario.robots)]
         self._to_see = [False] * scenario.robots
-        self._territory = Territory(scenario, self.config)
+        self._territory = Territory(scenario, _LENGTH_COST, self._control == "nearest")
 
     def forget_goal(self, view: RobotKnowledge) -> None:
         """Choose a target anew at the next decision."""
@@ -59,38 +81,40 @@ class VoronoiCoverage(Driver):
         path = path[passed[-1] + 1 :] if len(passed) else path[:0]
         entropy, cost = land.entropy.reshape(-1), land.traversal_cost.reshape(-1)
         leads = len(path) > 0 and not np.isinf(cost[path]).any()
-        if not leads or (self._to_see[view.robot] and entropy[path[-1]] < self.config.tau):
+        if not leads or (self._to_see[view.robot] and entropy[path[-1]] < self._tau):
             path, by_steps = self._path_to_target(view, here)
-            uncertain = len(path) > 0 and bool(entropy[path[-1]] >= self.config.tau)
+            uncertain = len(path) > 0 and bool(entropy[path[-1]] >= self._tau)
             self._to_see[view.robot] = uncertain and not by_steps
         self._paths[view.robot] = path
         return land.viewpoint_on(view, path)
 
     def _path_to_target(self, view: RobotKnowledge, here: int) -> tuple[np.ndarray, bool]:
         """Return the voxels (N,) of the path in the robot's own cell, and whether it goes down by steps."""
-        config, land = self.config, self._territory
-        density = np.maximum(land.entropy, np.float32(config.tau_floor))
-        division = land.divided(view, here)
-        targets, uncertain = projected_centroids(division.cells, density, config.tau, len(division.sources))
-        if not uncertain.any():
-            division = land.divided(view, here, explored=True)
-            targets, uncertain = projected_centroids(
-                division.cells, density, config.tau, len(division.sources)
-            )
-        target, own = int(targets[division.own]), bool(uncertain[division.own])
-        if own and config.control == "nearest":
-            cells, costs, sources = division.cells, division.costs, len(division.sources)
-            target = int(nearest_uncertain(cells, costs, density, config.tau, sources)[division.own])
-        if config.control == "gradient-search":
-            path = self._descent(division, density, here)
+        land = self._territory
+        density = np.maximum(land.entropy, np.float32(self._floor))
+        cell = land.divide(view, here)
+        if not (density[land.space.cells != UNREACHED] >= self._tau).any():
+            cell = land.divide(view, here, explored=True)
+        own = len(cell) > 0 and bool(density.reshape(-1)[cell].max() >= self._tau)
+        if self._control == "gradient-search":
+            path = self._descent(cell, density, here)
             if len(path) > 0 or not own:
                 return path, True
-        return np.zeros(0, np.int64) if target == UNREACHED else land.path_to(division, target), False
+        if own and self._control == "nearest":
+            target = nearest_uncertain(cell, land.space.costs, density, self._tau)
+        else:
+            target = projected_centroid(cell, density, self._tau)
+        return np.zeros(0, np.int64) if target == UNREACHED else land.path_to(target), False
 
-    def _descent(self, division: Division, density: np.ndarray, here: int) -> np.ndarray:
+    def _descent(self, cell: np.ndarray, density: np.ndarray, here: int) -> np.ndarray:
         """Return the voxels (N,) of the steps of a gradient search; none if no neighbour is better."""
-        cell, path = division.cells == division.own, list[int]()
-        if cell.any():
-            functional = CellFunctional(self._territory.inner, self._territory.traversal_cost, density, cell)
-            path = functional.descent(here, self.config.steps, *division.metric)
+        inside, path, land = np.zeros(density.shape, bool), list[int](), self._territory
+        inside.reshape(-1)[cell] = True
+        functional = CellFunctional(land.inner, land.traversal_cost, density, inside, land.metric)
+        for _ in range(_STEPS if len(cell) else 0):
+            step = functional.step(here)
+            if step == here:
+                break
+            path.append(step)
+            here = step
         return np.array(path, np.int64)

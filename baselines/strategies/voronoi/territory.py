@@ -1,20 +1,21 @@
 """One robot's belief as the Voronoi rules see it: how uncertain voxels are, what paths cost, who owns what.
 
-Arrays have the shape of the grid; voxels are numbered in C order.
+Arrays have the shape of the grid; voxels are numbered in C order. Entropies are in nats: that of occupancy
+(Bhattacharya 2010, belief/entropy.py), or one by standard deviation, ours.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
+from scipy import ndimage
 
-from baselines.strategies.voronoi.uncertainty import fill_deviation_entropy, filtered, inflate_obstacles
-from entropy_explore_env.belief.entropy import fill_occupancy_entropy
+from entropy_explore_env.belief.entropy import LN2, fill_occupancy_entropy
 from entropy_explore_env.belief.paths.geodesic_cells import extract_path, new_tessellation, tessellate
+from entropy_explore_env.belief.raycast import STOP_AT_COVERED
 from entropy_explore_env.belief.visibility import CONE
+from entropy_explore_env.compilation.kernels import lean_kernel
 from entropy_explore_env.frontiers.knowledge import (
     RobotKnowledge,
     belief_of,
@@ -22,7 +23,6 @@ from entropy_explore_env.frontiers.knowledge import (
     voxel_of,
 )
 from entropy_explore_env.scenario import Scenario
-from entropy_explore_env.validation import check, check_choice, check_count
 from entropy_explore_env.viewpoints.evaluation import (
     RobotModel,
     is_line_free,
@@ -32,66 +32,10 @@ from entropy_explore_env.viewpoints.evaluation import (
 )
 from entropy_explore_env.viewpoints.expected_scan import fill_expected_bits
 
-Control = Literal["projected-centroid", "gradient-search", "nearest"]
-Metric = Literal["entropy", "length"]
-Known = Literal["occupancy", "deviation"]
 _GAZES = 16
 _PITCHES = (-0.6, 0.0, 0.6)
 _WITHIN_REACH = 0.999
 """Share of the reach that is used, so that rounding never moves a place towards the robot."""
-
-
-@dataclass(frozen=True)
-class VoronoiConfig:
-    """How robots divide the workspace and choose targets.
-
-    Attributes:
-        control: `projected-centroid`, `gradient-search` or `nearest`: see rules/voronoi.py.
-        metric: What paths cost until all is explored: `entropy` (sect. 5.2) or `length`.
-        known: What makes a voxel certain: its `occupancy` (p = P(c > ½), as in the paper), or its
-            `deviation`, which has to fall to the mission's σ_end (ours).
-        eta: η, cost of a voxel edge of path in addition to its entropy.
-        tau: τ in nats: voxels with at least this entropy are uncertain.
-        tau_floor: τ′, the least density, below τ.
-        steps: Steps of the gradient search per decision.
-    """
-
-    control: Control = "projected-centroid"
-    metric: Metric = "entropy"
-    known: Known = "occupancy"
-    eta: float = 0.01
-    tau: float = 0.35
-    tau_floor: float = 0.33
-    steps: int = 5
-
-    def __post_init__(self) -> None:
-        """Check every field."""
-        check_choice(self, "control", Control)
-        check_choice(self, "metric", Metric)
-        check_choice(self, "known", Known)
-        check(self, "eta", "a number from 1e-6 to 1e3", lambda v: 1e-6 <= v <= 1e3)
-        check(self, "tau", "a number from 1e-6 to ln 2", lambda v: 1e-6 <= v <= 0.6931)
-        check(self, "tau_floor", "a number above 0 and below tau", lambda v: 0.0 < v < self.tau)
-        check_count(self, "steps", 1, 1000)
-
-
-@dataclass
-class Division:
-    """The workspace divided among the robots that are heard, S cells.
-
-    Attributes:
-        cells: (X, Y, Z) int32, the cell of each voxel.
-        costs: (X, Y, Z) float64, of the path to each voxel from its robot.
-        sources: (S,) int64 voxels of the robots, by number.
-        own: The robot's own cell.
-        metric: (cost of a voxel edge of path beside its entropy, whether lengths alone count).
-    """
-
-    cells: np.ndarray
-    costs: np.ndarray
-    sources: np.ndarray
-    own: int
-    metric: tuple[float, bool]
 
 
 class Territory:
@@ -100,66 +44,74 @@ class Territory:
     Attributes:
         entropy: (X, Y, Z) float32 nats, filtered (sect. 5.3).
         traversal_cost: (X, Y, Z) float32; inf where the body does not fit.
+        metric: `length_cost` and `by_length` of `tessellate`, of the latest division.
+        space: The latest division.
         inner: Memory for tessellations of one cell.
     """
 
-    def __init__(self, scenario: Scenario, config: VoronoiConfig) -> None:
-        """Take what makes a voxel certain, what paths cost, and η."""
-        grid = scenario.grid
-        self._known, self._by_length, self._eta = config.known, config.metric == "length", config.eta
+    def __init__(self, scenario: Scenario, length_cost: float, by_length: bool) -> None:
+        """Take what paths cost until all is explored.
+
+        Args:
+            scenario: Of the mission.
+            length_cost: Of a voxel edge of path, beside the entropy along it.
+            by_length: Whether lengths alone count, and a voxel is certain when its deviation has fallen to
+                the mission's σ_end. Else entropy is that of occupancy, p = P(c > ½), as in the paper.
+        """
+        shape = scenario.grid.shape
+        self._exploring = (0.0, True) if by_length else (length_cost, False)
         self._models = [robot_model(scenario, kind) for kind in scenario.kinds]
-        self._space, self.inner = new_tessellation(grid.shape), new_tessellation(grid.shape)
-        self._scratch = new_scratch(grid, self._models)
-        self.entropy = np.empty(grid.shape, np.float32)
-        self.traversal_cost = np.empty(grid.shape, np.float32)
+        self._scratch = new_scratch(scenario.grid, self._models)
+        self.space, self.inner, self.metric = new_tessellation(shape), new_tessellation(shape), (0.0, True)
+        self.entropy, self.traversal_cost = np.empty(shape, np.float32), np.empty(shape, np.float32)
 
     def observe(self, view: RobotKnowledge, here: int) -> None:
         """Bring entropies and costs up to date with the belief of a robot that stands in a voxel."""
         field = np.empty(self.entropy.shape, np.float32)
         out, mean, precision = field.reshape(-1), view.mean.reshape(-1), view.precision.reshape(-1)
-        if self._known == "occupancy":
-            fill_occupancy_entropy(mean, precision, out)
-        else:
+        if self._exploring[1]:
             prior, end = view.scenario.sigma_prior**-2, view.scenario.ending.sigma_end**-2
             fill_deviation_entropy(precision, prior, end, out)
+        else:
+            fill_occupancy_entropy(mean, precision, out)
         self.entropy = filtered(field)
-        cost = np.ones(field.shape, np.float32) if self._by_length else self.entropy.copy()
+        cost = np.ones(field.shape, np.float32) if self._exploring[1] else self.entropy.copy()
         lattice = self._model_of(view).lattice
         x, y, z = (int(i) for i in np.unravel_index(here, field.shape))
         inflate_obstacles(view.mean, lattice.footprint, lattice.margin, lattice.layer, (x, y, z), cost)
         self.traversal_cost = cost
 
-    def divided(self, view: RobotKnowledge, here: int, explored: bool = False) -> Division:
-        """Return the division among the robots that are heard and share, and this one.
+    def divide(self, view: RobotKnowledge, here: int, explored: bool = False) -> np.ndarray:
+        """Divide the workspace among the robots that are heard and share, and this one.
 
         Args:
             view: Of the robot.
             here: The voxel in which it stands.
             explored: Whether all is explored: then the task is coverage, and lengths alone count.
+
+        Returns:
+            (N,) int64 voxels of the robot's own cell.
         """
-        heard = {
-            mate: voxel_of(view, seen.pose)
-            for mate, seen in teammates_that_share(view).items()
-            if seen.heard_s >= 0.0
-        }
-        heard[view.robot] = here
+        heard = {view.robot: here}
+        for mate, seen in teammates_that_share(view).items():
+            if seen.heard_s >= 0.0:
+                heard[mate] = voxel_of(view, seen.pose)
         robots = sorted(heard)
-        if explored and not self._by_length:
+        if explored and not self._exploring[1]:
             cost = self.traversal_cost
             self.traversal_cost = np.where(np.isinf(cost), cost, np.float32(1.0))
-        metric = (0.0, True) if explored or self._by_length else (self._eta, False)
+        self.metric = (0.0, True) if explored else self._exploring
         sources = np.array([heard[robot] for robot in robots], np.int64)
-        tessellate(self._space, self.traversal_cost, sources, *metric)
-        return Division(self._space.cells, self._space.costs, sources, robots.index(view.robot), metric)
+        tessellate(self.space, self.traversal_cost, sources, *self.metric)
+        return np.flatnonzero(self.space.cells == robots.index(view.robot))
 
-    def path_to(self, division: Division, target: int) -> np.ndarray:
+    def path_to(self, target: int) -> np.ndarray:
         """Return the voxels (N,) of the robot's path to a target of its cell, without its own."""
-        return extract_path(self._space, self.traversal_cost, target, *division.metric)[1:]
+        return extract_path(self.space, self.traversal_cost, target, *self.metric)[1:]
 
     def viewpoint_on(self, view: RobotKnowledge, path: np.ndarray) -> np.ndarray:
         """Return the viewpoint (5,) at the farthest place of a path that one drive reaches, the gaze best."""
-        grid, robot = view.scenario.grid, view.kind.robot
-        viewpoint = view.pose.copy()
+        grid, robot, viewpoint = view.scenario.grid, view.kind.robot, view.pose.copy()
         places = grid.centre_of(np.stack(np.unravel_index(path, grid.shape), axis=-1))
         if view.planar:
             places[:, 2] = view.pose[2]
@@ -193,3 +145,64 @@ class Territory:
 
     def _model_of(self, view: RobotKnowledge) -> RobotModel:
         return self._models[view.robot % len(self._models)]
+
+
+@lean_kernel
+def fill_deviation_entropy(
+    precision: np.ndarray, prior_precision: float, end_precision: float, entropy: np.ndarray
+) -> None:
+    """Fill (V,) float32: ln 2 at the prior, 0 from the end's precision on, linear in log σ between them.
+
+    Rocha04's missions ask for this: a voxel is known when its standard deviation is σ_end.
+    """
+    scale = LN2 / math.log(end_precision / prior_precision)
+    for voxel in range(len(precision)):
+        missing = math.log(end_precision / np.float64(precision[voxel])) * scale
+        entropy[voxel] = min(max(missing, 0.0), LN2)
+
+
+def filtered(entropy: np.ndarray) -> np.ndarray:
+    """Return the least entropy of each voxel and those around it (sect. 5.3): 3 × 3, or 3 × 3 × 3."""
+    return ndimage.minimum_filter(entropy, size=[3 if n > 1 else 1 for n in entropy.shape], mode="nearest")
+
+
+@lean_kernel
+def inflate_obstacles(
+    mean: np.ndarray,
+    footprint: np.ndarray,
+    margin: tuple[int, int, int],
+    layer: int,
+    start: tuple[int, int, int],
+    traversal_cost: np.ndarray,
+) -> None:
+    """Make the voxels impassable in which a body does not fit, except for its way out from where it starts.
+
+    Args:
+        mean: (X, Y, Z) float32, expected coverage; above ½ a voxel is an obstacle.
+        footprint: (B, 3) int64 index offsets of the voxels that the body touches; empty = its own only.
+        margin: Layers at either end of each axis in which the body would touch the boundary.
+        layer: The only one that can be entered; -1 = all.
+        start: Indices of the robot's voxel.
+        traversal_cost: (X, Y, Z) float32, set to inf there.
+    """
+    size_x, size_y, size_z = mean.shape
+    for x in range(size_x):
+        for y in range(size_y):
+            for z in range(size_z):
+                outside = x < margin[0] or y < margin[1] or z < margin[2]
+                outside = outside or x >= size_x - margin[0] or y >= size_y - margin[1]
+                if outside or z >= size_z - margin[2] or (layer >= 0 and z != layer):
+                    traversal_cost[x, y, z] = math.inf
+                if mean[x, y, z] > STOP_AT_COVERED:
+                    traversal_cost[x, y, z] = math.inf
+                    for offset in footprint:
+                        i, j, k = x - offset[0], y - offset[1], z - offset[2]
+                        if 0 <= i < size_x and 0 <= j < size_y and 0 <= k < size_z:
+                            traversal_cost[i, j, k] = math.inf
+    if math.isinf(traversal_cost[start[0], start[1], start[2]]):
+        for offset in footprint:
+            i, j, k = start[0] + offset[0], start[1] + offset[1], start[2] + offset[2]
+            if 0 <= i < size_x and 0 <= j < size_y and 0 <= k < size_z and (layer < 0 or k == layer):
+                if mean[i, j, k] <= STOP_AT_COVERED:
+                    traversal_cost[i, j, k] = LN2
+        traversal_cost[start[0], start[1], start[2]] = LN2

@@ -112,21 +112,16 @@ def test_distance_costs():
     assert near.max() <= far.min() + 1e-9 < far.max()
 
 
-def test_candidates_lie_within_the_mean_depth_but_for_a_floor_and_a_cap():
+def test_candidates_lie_within_the_mean_depth_but_for_a_floor():
     missions = frontier(1)
     missions.precision[0, 0][:] = np.random.default_rng(0).uniform(1e-3, 1.0, (7, 11, 5))
-    for coordination, most_m in (
-        (MutualInformationConfig(), 2.0),
-        (MutualInformationConfig(most_radius_m=0.7), 0.7),
-        (MutualInformationConfig(least_radius_m=0.5), 2.0),
-    ):
-        away = np.linalg.norm(chosen(missions, coordination)[:, :2] - (1.75, 2.75), axis=1)
-        assert away.max() <= most_m + 1e-6
+    away = np.linalg.norm(chosen(missions)[:, :2] - (1.75, 2.75), axis=1)
+    assert 0.5 < away.max() <= 2.0 + 1e-6
     missions.state.robots[0, 0]["depth_m"] = 0.1
-    strategy = MutualInformation(MutualInformationConfig(least_radius_m=0.8))
+    strategy = MutualInformation()
     strategy.reset(missions.scenario, np.random.default_rng(0))
     viewpoint = strategy.choose(view_of(missions, 0, 0))
-    assert 0.1 < np.linalg.norm(viewpoint[:2] - (1.75, 2.75)) <= 0.8 + 1e-6
+    assert 0.1 < np.linalg.norm(viewpoint[:2] - (1.75, 2.75)) <= 0.5 + 1e-6
 
 
 def test_nobody_goes_through_or_into_what_is_believed_covered():
@@ -150,7 +145,7 @@ def test_where_nothing_is_steep_and_behind_a_teammate_it_wanders():
 
 def test_a_viewpoint_chosen_too_often_is_a_trap():
     missions = frontier(1, robot={"reach_m": 0.5})
-    strategy = MutualInformation(MutualInformationConfig(repeats=2, memory=50, least_radius_m=0.4))
+    strategy = MutualInformation(MutualInformationConfig(repeats=2))
     strategy.reset(missions.scenario, np.random.default_rng(0))
     missions.precision[0, 0][:] = 1e4
     missions.precision[0, 0][3, 5, 2] = 1.0
@@ -210,11 +205,8 @@ def test_one_robot_is_not_coordinated_with_anybody():
         ("interference", 0.0),
         ("interference", 1.5),
         ("distance_cost", -0.1),
-        ("least_radius_m", 0.0),
-        ("most_radius_m", 0.1),
         ("known_sigma", 0.0),
         ("repeats", 0),
-        ("memory", 1.5),
     ],
 )
 def test_settings_out_of_range_are_refused(name, value):

@@ -25,10 +25,9 @@ from baselines.papers.bhattacharya.simulation.belief import (
 )
 from baselines.strategies.voronoi.controls import (
     CellFunctional,
-    coverage_functionals,
-    gradient_step,
+    coverage_functional,
     nearest_uncertain,
-    projected_centroids,
+    projected_centroid,
     step_is_free,
 )
 from entropy_explore_env.belief.paths.geodesic_cells import (
@@ -126,22 +125,24 @@ class Planner:
             self.cell_costs = cell_costs
             tessellate(self.space, cell_costs, places, length_cost, by_length)
             self.tessellations += 1
-            found = projected_centroids(self.space.cells, self.density, rules.tau, self._robots)
-            self.targets, self.uncertain = found
+            cells = [np.flatnonzero(self.space.cells == robot) for robot in range(self._robots)]
+            found = [projected_centroid(cell, self.density, rules.tau) for cell in cells]
+            self.targets, flat = np.array(found, np.int64), self.density.reshape(-1)
+            self.uncertain = np.array([np.count_nonzero(flat[cell] >= rules.tau) for cell in cells])
             explored = not self.uncertain.any()
             if explored == self.explored:
                 break
             self.explored = explored
         if rules.control == "nearest" and not explored:
-            arrays = self.space.cells, self.space.costs, self.density
-            near = nearest_uncertain(*arrays, rules.tau, self._robots)
-            self.targets = np.where(near == UNREACHED, self.targets, near)
+            near = [nearest_uncertain(cell, self.space.costs, self.density, rules.tau) for cell in cells]
+            self.targets = np.where(np.array(near) == UNREACHED, self.targets, near)
 
     def functionals(self) -> np.ndarray:
         """(A,) the coverage functional of each cell."""
         if self._functionals is None:
             arrays = self.space.cells, self.space.costs, self.density
-            self._functionals = coverage_functionals(*arrays, self._robots)
+            found = [coverage_functional(*arrays, robot)[0] for robot in range(self._robots)]
+            self._functionals = np.array(found)
         return self._functionals
 
     def path_to(self, voxel: int) -> np.ndarray:
@@ -153,17 +154,15 @@ class Planner:
         cell = self.space.cells == robot
         if not cell.any():  # another robot is in the same place, and comes first
             return place
+        functional = CellFunctional(self._scratch, self.cell_costs, self.density, cell, self._metric)
         if self.rules.control == "gradient-search":
-            functional = CellFunctional(self._scratch, self.cell_costs, self.density, cell)
-            return gradient_step(functional, cell, place, *self._metric)
+            return functional.step(place)
         path = self.path_to(int(self.targets[robot]))
         if len(path) < 2:
             return place
         step = int(path[1])
-        if self.rules.guarded:
-            functional = CellFunctional(self._scratch, self.cell_costs, self.density, cell)
-            if functional.value(step, *self._metric) >= float(self.functionals()[robot]):
-                return place
+        if self.rules.guarded and functional.value(step) >= float(self.functionals()[robot]):
+            return place
         return step
 
 
@@ -218,7 +217,6 @@ class Simulation:
         beliefs = [GridBelief(occupied.shape, rules.fusion) for _ in range(count)]
         self.planners = [Planner(belief, rules, robots) for belief in beliefs]
         self._scanner = Scanner(occupied, rules.sensor)
-        self._truth = occupied.astype(np.float32).reshape(-1)
         self._still_iterations = 0
         self._last_heard_at = np.tile(self.places, (robots, 1))
         self._paths: list[np.ndarray] = [np.zeros(0, np.int64)] * robots
@@ -336,7 +334,7 @@ class Simulation:
                 )
                 self._wants_to_see[robot] = target != UNREACHED and self._uncertain(planner, target)
                 step = int(self._paths[robot][0]) if len(self._paths[robot]) else place
-        if step != place and not step_is_free(self._truth, self.occupied.shape, place, step):
+        if step != place and not step_is_free(~self.occupied, place, step):
             step = place  # the next cell was not known to be occupied
             self._paths[robot] = self._paths[robot][:0]
         if step != place:
@@ -353,5 +351,5 @@ class Simulation:
             return False
         if (planner.belief.probability[path] > 0.5).any():
             return False
-        probability, size = planner.belief.probability, self.occupied.shape
-        return bool(step_is_free(probability, size, int(self.places[robot]), int(path[0])))
+        free = (planner.belief.probability <= 0.5).reshape(self.occupied.shape)
+        return step_is_free(free, int(self.places[robot]), int(path[0]))

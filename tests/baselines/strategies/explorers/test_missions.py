@@ -10,8 +10,8 @@ import pytest
 
 from baselines.experiments.mission import run_mission, scripted
 from baselines.strategies import make_strategy
-from baselines.strategies.rules.distance_advantage import DistanceAdvantage, DistanceAdvantageConfig
-from baselines.strategies.rules.information_gain import InformationGain, InformationGainConfig
+from baselines.strategies.rules.distance_advantage import DistanceAdvantage
+from baselines.strategies.rules.information_gain import InformationGain
 from baselines.strategies.rules.nearest_frontier import NearestFrontier
 from baselines.strategies.rules.receding_horizon import RecedingHorizon
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
@@ -22,6 +22,7 @@ from entropy_explore_env.reports.metrics import joint_figures, mission_figures
 from entropy_explore_env.scenario import with_settings
 from entropy_explore_env.scenarios import find_scenario
 from entropy_explore_env.settings import Grid
+from tests.baselines.strategies.explorers.scenes import varied
 from tests.reference import explorers as reference
 from tests.reference import planners
 
@@ -73,11 +74,11 @@ REACH = 15.0
 RULES = {
     "nearest-frontier": (NearestFrontier, lambda: reference.Textbook(reference.nearest_frontier)),
     "distance-advantage": (
-        partial(DistanceAdvantage, DistanceAdvantageConfig(radius=25, horizon=26.0)),
+        lambda: varied(DistanceAdvantage(), radius=25, horizon=26.0),
         lambda: reference.Textbook(partial(reference.distance_advantage, radius=25, horizon=26.0)),
     ),
     "information-gain": (
-        partial(InformationGain, InformationGainConfig(weight=0.4, horizon=3.0)),
+        lambda: varied(InformationGain(), weight=0.4, horizon=3.0),
         lambda: reference.Textbook(partial(planners.information_gain, weight=0.4, horizon=3.0, reach=REACH)),
     ),
     "tour": (Tour, lambda: reference.Textbook(planners.Tour(REACH, 0.4, 0.4, 1.0, 0.1))),

@@ -11,16 +11,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import ndimage
 
-from baselines.strategies.rules.distance_advantage import (
-    DistanceAdvantage,
-    DistanceAdvantageConfig,
-    advantages,
-)
-from baselines.strategies.rules.information_gain import InformationGain, InformationGainConfig
+from baselines.strategies.rules.distance_advantage import DistanceAdvantage, advantages
+from baselines.strategies.rules.information_gain import InformationGain
 from baselines.strategies.rules.nearest_frontier import NearestFrontier, best_of
 from entropy_explore_env.frontiers.blocks import NONE
 from entropy_explore_env.frontiers.voxel_frontiers import BLOCK
-from tests.baselines.strategies.explorers.scenes import belief_of_plan, cell, random_plan, scene_of
+from tests.baselines.strategies.explorers.scenes import belief_of_plan, cell, random_plan, scene_of, varied
 from tests.reference import explorers as reference
 from tests.reference.scenes import drawn, seeds
 
@@ -47,8 +43,7 @@ def test_advantages_are_the_textbooks_and_the_greatest_of_one_cell_a_block_is_ch
     plan, robot = random_plan(shape, np.random.default_rng(seed))
     scene = scene_of(plan, robot)
     wanted = reference.distance_advantage(plan, robot, radius, horizon)
-    config = DistanceAdvantageConfig(radius=radius, horizon=horizon)
-    picked = DistanceAdvantage(config).pick(scene)
+    picked = varied(DistanceAdvantage(), radius=radius, horizon=horizon).pick(scene)
     if not wanted:
         assert picked == NONE
         return
@@ -132,7 +127,7 @@ def test_counting_only_gains_that_may_be_best_changes_no_choice(weight, horizon,
     plan, robot = random_plan((31, 14), rng)
     scene = scene_of(plan, robot)
     for _ in range(3):
-        picked = InformationGain(InformationGainConfig(weight=weight, horizon=horizon)).pick(scene)
+        picked = varied(InformationGain(), weight=weight, horizon=horizon).pick(scene)
         scene.paths.start(scene.here)
         scene.paths.extend(math.inf)
         _, voxels = scene.cells.listed(all_of_them=True)
@@ -167,7 +162,7 @@ def test_beyond_the_horizon_the_nearest_frontier_is_taken():
     plan[1:28, 1] = reference.FREE
     plan[28, 1] = reference.UNKNOWN
     scene = scene_of(plan, (7, 1))
-    assert cell(plan, InformationGain(InformationGainConfig(horizon=0.1)).pick(scene)) == (27, 1)
+    assert cell(plan, varied(InformationGain(), horizon=0.1).pick(scene)) == (27, 1)
 
 
 @given(seeds)

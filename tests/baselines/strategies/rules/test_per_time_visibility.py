@@ -10,9 +10,10 @@ import pytest
 
 from baselines.experiments.mission import run_mission, scripted
 from baselines.papers.sawhney.mission import explore_until_done
-from baselines.strategies.allocation import Allocator, Choice
-from baselines.strategies.metrics import Coordinated, ExplorationConfig, Metric, Nearest
+from baselines.strategies.allocation import Allocator, Choice, seconds_of
+from baselines.strategies.metrics import Coordinated, ExplorationConfig, Metric, Nearest, Options
 from baselines.strategies.rules import per_time_visibility
+from baselines.strategies.rules.coordinated_frontier import taken
 from baselines.strategies.rules.per_time_visibility import PerTimeVisibility
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.errors import SettingError
@@ -68,15 +69,17 @@ def small_terrain(**settings):
 class Eager(Allocator):
     """Searches paths to all candidates, and counts V of each."""
 
-    def _best_listed(self, robot, taken):
+    def _best_listed(self, robot, targets):
         self._search(robot, math.inf)
         slots, voxels = self._candidates.listed(all_of_them=True)
         edges = self._lengths[robot].edges[slots]
         reached = np.isfinite(edges)
         slots, voxels, edges = slots[reached], voxels[reached], edges[reached]
         seen = self._candidates.count(slots, voxels) * self._candidates.point
-        seconds = self._seconds(robot, edges)
-        value = self._value(seen, seconds, edges, self._taken(voxels, taken))
+        seconds, takes = seconds_of(self._view.scenario, robot, edges), np.zeros(len(voxels))
+        for target in targets:
+            takes += taken(self._centres(voxels), target[:3], self._candidates.reach)
+        value = self._value(Options(seen, seconds, edges, takes))
         value = np.where(seen > 0.0, value, -math.inf)
         best = int(np.argmax(value)) if len(value) else -1
         if best < 0 or value[best] == -math.inf:
