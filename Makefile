@@ -95,16 +95,11 @@ night: $(STAMP)dev
 	exit $$failed
 
 reproduce: $(STAMP)baselines
-	$(RUN) baselines.papers.rocha04 --out docs/results
+	$(RUN) baselines.papers rocha04 --out docs/results
 	$(RUN) baselines.papers.rochami --out docs/results
 	$(RUN) baselines.papers.bhattacharya --out docs/results
 	$(RUN) baselines.papers.sawhney --out docs/results
-	$(RUN) baselines.papers.sujan --out docs/results
-	$(RUN) baselines.papers.sujan.cliff --out docs/results
-	$(RUN) baselines.papers.sujan.localization --out docs/results
-	$(RUN) baselines.papers.sujan.drift --out docs/results
-	$(RUN) baselines.papers.sujan.sharing --out docs/results
-	$(RUN) baselines.papers.sujan.summaries --out docs/results
+	$(RUN) baselines.papers sujan --out docs/results
 
 # PyTorch's CPU build, unless there is an NVIDIA GPU: pip's own index brings gigabytes of CUDA libraries on Linux.
 # Where PyTorch's index cannot be reached, pip's own one serves. $(1): python, $(2): the file with the pin.

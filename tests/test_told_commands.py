@@ -226,5 +226,4 @@ def test_the_page_of_speed_says_which_commands_share_missions_among_processes():
     named = {name: "--jobs" in options_of(name, ()) for name in re.findall(r"`((?:\w+\.)+\w+)`", row)}
     assert named.pop("baselines.world_sweep") is False
     assert len(named) > 2 and all(named.values())
-    papers = [path.parent.name for path in (ROOT / "baselines" / "papers").glob("*/__main__.py")]
-    assert len(papers) > 3 and all("--jobs" in options_of(f"baselines.papers.{name}", ()) for name in papers)
+    assert "--jobs" in options_of("baselines.papers", ())

@@ -4,16 +4,20 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Any
 
 from baselines.cli.arguments import print_json
-from baselines.experiments.tables import markdown_table
+from baselines.experiments.statistics import Interval
+from baselines.experiments.tables import csv_table, markdown_table
+from entropy_explore_env.errors import SettingError
 
 _DIGITS = 4
 """Significant digits of figures below 1000; above, whole numbers."""
+_FEW = 3
+"""Figures of a paper that stand in a line of a group of claims."""
 
 
 @dataclass(frozen=True)
@@ -43,6 +47,16 @@ class Claim:
         return asdict(self)
 
 
+def above(name: str, text: str, found: Interval, least: float = 1.0) -> Claim:
+    """Return the claim that something is above a number: it holds if the whole interval is."""
+    return Claim(name, text, f"> {least:g}", *found, found.low > least)
+
+
+def below(name: str, text: str, found: Interval, most: float = 1.0) -> Claim:
+    """Return the claim that something is below a number: it holds if the whole interval is."""
+    return Claim(name, text, f"< {most:g}", *found, found.high < most)
+
+
 def claims_table(claims: Sequence[Claim], interval_digits: int = _DIGITS, given: str = "paper") -> str:
     """The claims as a Markdown table.
 
@@ -62,6 +76,53 @@ def claims_table(claims: Sequence[Claim], interval_digits: int = _DIGITS, given:
         for claim in claims
     ]
     return markdown_table(["claim", given, "ours", "95 % interval", "holds"], rows)
+
+
+def groups_table(claims: Sequence[Claim], groups: Mapping[str, str]) -> str:
+    """Return a Markdown table of the claims in groups: how many hold, and where ours lie.
+
+    Args:
+        claims: All of them.
+        groups: Beginning of ids → what the claims are, in the order of the table; the longest one counts.
+
+    Raises:
+        SettingError: A claim is in no group.
+    """
+    found: dict[str, list[Claim]] = {start: [] for start in groups}
+    for claim in claims:
+        starts = [start for start in groups if claim.id.startswith(start)]
+        if not starts:
+            raise SettingError("claim", claim.id, f"in a group: {', '.join(groups)}")
+        found[max(starts, key=len)].append(claim)
+    rows = [
+        [groups[start], _paper_of(some), _ours_of(some), f"{sum(c.holds for c in some)} of {len(some)}"]
+        for start, some in found.items()
+        if some
+    ]
+    return markdown_table(["claim", "paper", "ours (95 % interval, or span)", "hold"], rows)
+
+
+def _paper_of(claims: Sequence[Claim]) -> str:
+    """Return what the paper has of some claims."""
+    values = dict.fromkeys(_shown(claim.paper) for claim in claims)
+    return ", ".join(values) if len(values) <= _FEW else f"{len(values)} figures"
+
+
+def _ours_of(claims: Sequence[Claim]) -> str:
+    """Return our figure with its interval, or of several claims the span of ours."""
+    if len(claims) == 1:
+        interval = _interval(claims[0], 3)
+        return f"{_shown(claims[0].ours)} ({interval})" if interval else _shown(claims[0].ours)
+    numbers = [claim.ours for claim in claims if isinstance(claim.ours, int | float)]
+    if not numbers:
+        return ", ".join(dict.fromkeys(_shown(claim.ours) for claim in claims))
+    return f"{_shown(min(numbers), 3)} … {_shown(max(numbers), 3)}"
+
+
+def claims_csv(claims: Sequence[Claim]) -> str:
+    """Return all claims as CSV, a line each."""
+    columns = {field.name: [getattr(claim, field.name) for claim in claims] for field in fields(Claim)}
+    return csv_table(columns)
 
 
 def print_claims(claims: Sequence[Claim], paper: str) -> None:

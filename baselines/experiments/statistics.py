@@ -36,10 +36,14 @@ class Interval(NamedTuple):
     low: float
     high: float
 
-    def text(self, form: str = ".2f") -> str:
-        """The figure and its ends in a format, as `0.98 (0.95 … 1.02)`."""
-        value, low, high = (format(number, form) for number in self)
+    def __format__(self, form: str) -> str:
+        """Return the figure and its ends in a format of numbers, as `0.98 (0.95 … 1.02)`."""
+        value, low, high = (format(number, form or ".4g") for number in self)
         return f"{value} ({low} … {high})"
+
+    def text(self, form: str = ".2f") -> str:
+        """Return the same with two digits behind the point."""
+        return format(self, form)
 
 
 def mean_interval(values: Sample) -> Interval:

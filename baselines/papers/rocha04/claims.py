@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
+from itertools import pairwise, product
 
 import numpy as np
 
 from baselines.experiments.claims import Claim
-from baselines.experiments.outcome import Record
+from baselines.experiments.experiment import Records
+from baselines.experiments.rows import Record
 from baselines.experiments.statistics import (
     central_range,
     mean_interval,
@@ -15,13 +16,42 @@ from baselines.experiments.statistics import (
     ratio_interval,
     small_mean_range,
 )
-from baselines.papers.rocha04.sweep import BURSTS, I_MINS, STANDARD, TEAMS, alternative_id, team_id
-
-Records = dict[str, list[Record]]
+from baselines.experiments.tables import markdown_table
+from baselines.papers.rocha04.sweep import (
+    ALTERNATIVES,
+    BURSTS,
+    CHANGES,
+    I_MINS,
+    STANDARD,
+    TEAMS,
+    alternative_id,
+    team_id,
+)
 
 PAPER_STARTS = 10
 PAPER_T_MISSION_S = 2142.0
 RAYS = 128
+GROUPS = {
+    "H0": "H(0) in bits",
+    "H_th": "H_th in bits",
+    "batch": "measurements in every batch",
+    "single-t_mission": "one robot (eqs. 33-34): mean seconds",
+    "single-k_max": "one robot: mean scans",
+    "single-measurements": "one robot: mean measurements",
+    "single-halves": "one robot: time to the end over time to half of the entropy; median",
+    "plane-t_mission": "one robot, motion plane (eqs. 38-40): mean seconds",
+    "plane-k_max": "the same: mean scans",
+    "plane-measurements": "the same: mean measurements",
+    "plane-halves": "the same: time to the end over time to half of the entropy; median",
+    "team-size-": "time falls from 1 to 4 robots, for every burst and I_min; t(4)/t(1)",
+    "burst-": "a larger burst is faster, for every I_min; ratio of times",
+    "i-min-": "a smaller I_min is not slower, for every burst; ratio of times",
+    "slope-": "2 robots: the first batches send as many measurements as the burst (32, 64, 128); median",
+    "binds-late-": "2 robots: I_min 0.6215 and 0.3219 bind late; rise of the share of batches not filled",
+    "never-binds": "2 robots: I_min 0.0291 never binds; share of batches not filled",
+    "random-": "ours: 1, 2, 3, 4 robots: the gradient rule is faster than a random walk; ratio of times",
+}
+"""Beginning of ids → what the claims are, on the page."""
 
 
 def all_claims(records: Records) -> list[Claim]:
@@ -195,3 +225,52 @@ def _random_claims(records: Records) -> list[Claim]:
         )
         claims.append(Claim(f"random-{robots}", text, None, ratio, low, high, high < 1))
     return claims
+
+
+def teams_table(records: Records) -> str:
+    """Return strategies beside each other for every team size, burst 64 and I_min 0.3219."""
+    rows = []
+    for robots, strategy in product((1, *TEAMS), ("gradient", *ALTERNATIVES)):
+        gradient = strategy == "gradient"
+        cell = team_id(robots, *STANDARD) if gradient else alternative_id(robots, strategy)
+        time_s, scans = times(records, cell), [record["scans"] / robots for record in records[cell]]
+        apart_m = np.mean([record["apart_m"] for record in records[cell]])
+        rows.append(
+            [
+                robots,
+                strategy,
+                f"{mean_interval(time_s):,.0f}",
+                f"{np.mean(scans):,.0f}",
+                f"{(time_s / scans).mean():.2f}",
+                "-" if robots == 1 else f"{apart_m:.2f}",
+            ]
+        )
+    head = ["robots", "strategy", "mean t (s)", "scans a robot", "s a scan", "mean distance apart (m)"]
+    return markdown_table(head, rows)
+
+
+def changes_table(records: Records) -> str:
+    """Return mission times with one setting changed, paired with the room as it is."""
+    base, rows = times(records, "single"), []
+    for name, text in {"": "nothing", **{name: change[0] for name, change in CHANGES.items()}}.items():
+        cell = f"change-{name}" if name else "single"
+        time_s, found = times(records, cell), records[cell]
+        rows.append(
+            [
+                text,
+                f"{time_s.mean():,.0f}",
+                f"{np.median(time_s):,.0f}",
+                f"{ratio_interval(time_s, base):.2f}",
+                f"{np.median([record['half_s'] for record in found if record['half_s']]):,.0f}",
+                f"{np.mean([record['scans'] for record in found]):,.0f}",
+                f"{time_s.sum() / sum(record['scans'] for record in found):.2f}",
+                sum(not record["finished"] for record in found),
+            ]
+        )
+    head = ["changed", "mean t (s)", "median t (s)", "t over the room's", "median half (s)", "mean scans"]
+    return markdown_table([*head, "s a scan", "cut off"], rows)
+
+
+def cut_off(records: Records) -> int:
+    """Return how many missions the time limit ended."""
+    return sum(not record["finished"] for cell in records.values() for record in cell)

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
+from itertools import product
 from typing import Any
 
-from baselines.experiments.cells import Cell
+from baselines.experiments.experiment import Amount
+from baselines.experiments.trials import Cell, CellTrial, trials_of
 from entropy_explore_env.scenario import Scenario, with_settings
 from entropy_explore_env.scenarios import ROOM
 
@@ -48,30 +50,23 @@ def alternative_id(robots: int, strategy: str) -> str:
     return f"single-{strategy}" if robots == 1 else f"team-{robots}-{strategy}"
 
 
-def experiment(starts: int, single_starts: int, changes: bool) -> list[Cell]:
-    """All cells.
-
-    Args:
-        starts: Missions a cell.
-        single_starts: Missions of the cells with one robot.
-        changes: Whether the room with one thing changed at a time is part of it.
-    """
-    single = with_settings(ROOM, {"robots": 1})
+def experiment(amount: Amount) -> list[CellTrial]:
+    """Return all missions: quick, nothing is changed, and one robot has three times as many starts."""
+    single, starts = with_settings(ROOM, {"robots": 1}), amount.seeds
+    alone = 3 * starts if amount.quick else starts
     cells = [
-        Cell("single", single, "gradient", single_starts),
-        *(Cell(f"single-{strategy}", single, strategy, single_starts) for strategy in ALTERNATIVES),
+        Cell("single", single, "gradient", alone),
+        *(Cell(alternative_id(1, strategy), single, strategy, alone) for strategy in ALTERNATIVES),
     ]
     for robots in TEAMS:
-        for burst in BURSTS:
-            for i_min_bits in I_MINS:
-                scenario = _team(robots, burst, i_min_bits)
-                cells.append(Cell(team_id(robots, burst, i_min_bits), scenario, "gradient", starts))
+        for burst, i_min_bits in product(BURSTS, I_MINS):
+            scenario = _team(robots, burst, i_min_bits)
+            cells.append(Cell(team_id(robots, burst, i_min_bits), scenario, "gradient", starts))
         for strategy in ALTERNATIVES:
-            cells.append(Cell(f"team-{robots}-{strategy}", _team(robots, *STANDARD), strategy, starts))
-    if changes:
-        for name, (_, settings, strategy) in CHANGES.items():
-            cells.append(Cell(f"change-{name}", with_settings(single, settings), strategy, single_starts))
-    return cells
+            cells.append(Cell(alternative_id(robots, strategy), _team(robots, *STANDARD), strategy, starts))
+    for name, (_, settings, strategy) in () if amount.quick else CHANGES.items():
+        cells.append(Cell(f"change-{name}", with_settings(single, settings), strategy, alone))
+    return trials_of(cells)
 
 
 def _team(robots: int, burst: int, i_min_bits: float) -> Scenario:

@@ -1,1 +1,1 @@
-"""The planar experiments of Sujan & Meggiolaro: five ways of choosing poses, one robot and two."""
+"""Sujan & Meggiolaro, reproduced in six experiments: `python -m baselines.papers sujan`."""

@@ -12,20 +12,21 @@ import pytest
 
 from baselines.experiments.claims import Claim
 from baselines.experiments.mission import mission_record, scripted
-from baselines.experiments.outcome import Record
+from baselines.experiments.rows import Record
+from baselines.papers.rocha04 import EXPERIMENT
 from baselines.papers.rocha04.claims import all_claims
 from baselines.papers.rocha04.sweep import BURSTS, I_MINS, TEAMS, team_id
-from baselines.papers.rocha04.sweep import experiment as cells_of
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.scenario import with_settings
 from entropy_explore_env.scenarios import ROOM
+from tests.baselines.papers.pages import cells_of
 
 
 def as_the_paper_says(starts: int = 12) -> dict[str, list[Record]]:
     """Missions in which every claim of the paper holds, and in which random walks are slower."""
     rng = np.random.default_rng(0)
     luck = rng.uniform(0.9, 1.1, starts)
-    room = cells_of(starts, starts, changes=True)
+    room = cells_of(EXPERIMENT, starts).values()
     start = 28_577 * (0.5 * math.log2(2 * math.pi * math.e) + math.log2(30.0))
     threshold = 28_577 * (0.5 * math.log2(2 * math.pi * math.e) + math.log2(0.03))
     records: dict[str, list[Record]] = {}

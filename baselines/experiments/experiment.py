@@ -1,0 +1,137 @@
+"""An experiment as data: its trials, the claims judged by them, its figures, its tables and its page."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from baselines.experiments.claims import Claim, claims_csv, groups_table
+from baselines.experiments.page import Page
+from baselines.experiments.rows import Record, origins_line
+from baselines.experiments.trials import How, Trial, by_cell, run_trials
+from entropy_explore_env.errors import SettingError
+from entropy_explore_env.writing import write_atomically
+
+Records = dict[str, list[Record]]
+"""Cell → records by seed."""
+
+
+@dataclass(frozen=True)
+class Amount:
+    """How much of an experiment is run.
+
+    Attributes:
+        quick: Fewer cells.
+        seeds: Missions a cell.
+        worlds: Files of worlds that are explored as well.
+    """
+
+    quick: bool
+    seeds: int
+    worlds: tuple[Path, ...] = ()
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """An experiment.
+
+    Attributes:
+        name: Of its table, its page and the folder of its figures.
+        title: What people call it.
+        template: Of its page.
+        trials: All of its trials.
+        claims: What is judged by their records.
+        groups: Beginning of the ids of some claims → what they claim: a line of the page each.
+        figures, tables, values: Name → what makes it from records; see `page.Page`.
+        seeds, quick_seeds: Missions a cell, where no number is asked for.
+        least_seeds: Fewest that can be judged.
+        takes_worlds: Whether files of worlds are explored as well.
+    """
+
+    name: str
+    title: str
+    template: Path
+    trials: Callable[[Amount], Sequence[Trial]]
+    claims: Callable[[Records], list[Claim]]
+    groups: Mapping[str, str]
+    figures: Mapping[str, Callable[[Records], Any]] = field(default_factory=dict)
+    tables: Mapping[str, Callable[[Records], str]] = field(default_factory=dict)
+    values: Mapping[str, Callable[[Records], Any]] = field(default_factory=dict)
+    seeds: int = 30
+    quick_seeds: int = 3
+    least_seeds: int = 1
+    takes_worlds: bool = False
+
+    def amount(self, quick: bool, seeds: int | None, worlds: tuple[Path, ...]) -> Amount:
+        """Return how much is run.
+
+        Raises:
+            SettingError: There are too few seeds, or world files that the experiment does not take.
+        """
+        if worlds and not self.takes_worlds:
+            raise SettingError("worlds", " ".join(map(str, worlds)), f"left out: {self.name} takes none")
+        for file in worlds:
+            if not file.is_file():
+                raise SettingError("worlds", str(file), "files of worlds")
+        if len({file.stem for file in worlds}) < len(worlds):
+            raise SettingError("worlds", " ".join(map(str, worlds)), "files of different names")
+        chosen = (self.quick_seeds if quick else self.seeds) if seeds is None else seeds
+        if chosen < self.least_seeds:
+            raise SettingError("seeds", chosen, f"a whole number ≥ {self.least_seeds}")
+        return Amount(quick, chosen, worlds)
+
+
+@dataclass(frozen=True)
+class Reproduced:
+    """What came of an experiment: its page, its claims, and the seconds on the clock that it took."""
+
+    page: Path
+    claims: list[Claim]
+    wall_s: float
+
+
+def reproduce(
+    experiment: Experiment, amount: Amount, table: Path, how: How, out: Path, command: str
+) -> Reproduced:
+    """Run what is missing of an experiment, judge it and write its page.
+
+    Args:
+        experiment: What.
+        amount: How much.
+        table: The file of its rows.
+        how: Where.
+        out: Folder of the page; in a folder beside it lie its figures and `claims.csv`.
+        command: What makes the same page again.
+    """
+    started = time.perf_counter()
+    rows = [row for row in run_trials(experiment.trials(amount), table, how) if row is not None]
+    records = by_cell(rows)
+    claims = experiment.claims(records)
+    page = Page(
+        experiment.template,
+        {name: partial(draw, records) for name, draw in experiment.figures.items()},
+        {name: partial(make, records) for name, make in experiment.tables.items()},
+        {name: make(records) for name, make in experiment.values.items()},
+        page_texts(experiment, claims, origins_line(rows), command, amount),
+    )
+    path = page.write(out, experiment.name)
+    write_atomically(out / experiment.name / "claims.csv", claims_csv(claims))
+    return Reproduced(path, claims, round(time.perf_counter() - started, 1))
+
+
+def page_texts(
+    experiment: Experiment, claims: Sequence[Claim], rows: str, command: str, amount: Amount
+) -> dict[str, Any]:
+    """Return what a template may use by name."""
+    return {
+        "claims": groups_table(claims, experiment.groups).strip(),
+        "held": f"{sum(claim.holds for claim in claims)} of {len(claims)} hold",
+        "rows": rows,
+        "command": command,
+        "seeds": amount.seeds,
+        "quick": amount.quick,
+    }

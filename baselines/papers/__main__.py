@@ -1,0 +1,90 @@
+"""Reproduce a paper: `python -m baselines.papers NAME [--quick] [--out DIR] [--json]`.
+
+Runs what is missing of its experiments, judges the paper's claims and writes a page of each experiment.
+Their rows are kept in --runs, a table an experiment: what was stopped goes on where it was.
+"""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from baselines.cli.arguments import Positional, given_options, make_folder, parse, print_json, run_command
+from baselines.cli.worker_options import TrialOptions
+from baselines.papers import PAPERS
+from entropy_explore_env.errors import SettingError, one_of
+
+if TYPE_CHECKING:
+    from baselines.experiments.experiment import Experiment
+
+
+@dataclass
+class Args(TrialOptions):
+    """Reproduce a paper."""
+
+    paper: Positional[str] = "rocha04"
+    """rocha04, rochami, bhattacharya, sawhney or sujan; of Sujan also one of its six experiments, such as
+    sujan-cliff."""
+    quick: bool = False
+    """Fewer seeds and cells."""
+    seeds: int | None = None
+    """Missions a cell, the same seeds in every cell; default: as many as the page says."""
+    worlds: tuple[Path, ...] = ()
+    """World files to explore as well: plans or height maps (sawhney), an OctoMap of a corridor
+    (bhattacharya)."""
+    out: Path = Path("results/papers")
+    """Folder for the pages, their figures and claims."""
+    runs: Path = Path("results/papers/rows")
+    """Folder that keeps the rows."""
+    json: bool = False
+    """Print one JSON object and nothing else."""
+    strict: bool = False
+    """Exit with 1 if a claim does not hold."""
+
+
+def main(words: Sequence[str]) -> int:
+    """Run the command."""
+    args = parse(Args, words, description=__doc__)
+    names = [name for name in PAPERS if name == args.paper or name.startswith(f"{args.paper}-")]
+    if not names:
+        raise SettingError("paper", args.paper, one_of(args.paper, [*PAPERS, "sujan"]))
+    how = args.how(args.paper, args.json)
+    experiments = [find_experiment(name) for name in names]
+    amounts = [each.amount(args.quick, args.seeds, args.worlds) for each in experiments]
+    make_folder("out", args.out)
+    make_folder("runs", args.runs)
+    from baselines.experiments.claims import print_claims
+    from baselines.experiments.experiment import reproduce
+
+    done = {}
+    for experiment, amount in zip(experiments, amounts, strict=True):
+        table = args.runs / f"{experiment.name}.jsonl"
+        done[experiment.name] = reproduce(experiment, amount, table, how, args.out, command_line(args))
+        if not args.json:
+            print_claims(done[experiment.name].claims, experiment.title)
+    if args.json:
+        found = {
+            name: {"claims": [claim.row() for claim in each.claims], "wall_s": each.wall_s}
+            for name, each in done.items()
+        }
+        print_json({"paper": args.paper, "experiments": found})
+    failed = [claim for each in done.values() for claim in each.claims if not claim.holds]
+    return 1 if args.strict and failed else 0
+
+
+def find_experiment(name: str) -> Experiment:
+    """Return the experiment with a name of PAPERS."""
+    return importlib.import_module(PAPERS[name]).EXPERIMENT
+
+
+def command_line(args: Args) -> str:
+    """Return the command that makes the same pages again, wherever the files lie that it reads."""
+    kept = ("paper", "out", "runs", "jobs", "cluster", "json", "strict", "rerun", "since")
+    return " ".join(["python -m baselines.papers", args.paper, *given_options(args, leave_out=kept)])
+
+
+if __name__ == "__main__":
+    raise SystemExit(run_command(main))

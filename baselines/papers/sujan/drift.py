@@ -1,0 +1,260 @@
+"""What drift does to the strategies of all papers: one robot in `cluttered` with landmarks."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from baselines.cli.figures import COLOURS
+from baselines.experiments.claims import Claim, below
+from baselines.experiments.experiment import Amount, Experiment, Records
+from baselines.experiments.mission import run_mission
+from baselines.experiments.rows import Record
+from baselines.experiments.statistics import mean_interval, ratio_interval
+from baselines.experiments.tables import markdown_table
+from baselines.experiments.trials import Cell, CellTrial, trials_of
+from baselines.strategies import make_strategy
+from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
+from entropy_explore_env.localization_settings import Localization
+from entropy_explore_env.reports.metrics import mission_figures
+from entropy_explore_env.scenario import Scenario, with_settings
+from entropy_explore_env.scenarios import CLUTTERED
+
+STRATEGIES = {
+    "gradient": "Rocha04",
+    "mutual-information": "RochaMI",
+    "voronoi": "Bhattacharya",
+    "per-time-visibility": "Sawhney",
+    "next-best-view": "Sujan",
+    "planned-rate": "ours",
+    "nearest-frontier": "Yamauchi",
+}
+"""Strategy → whose it is."""
+LEVELS = {"none": 0.0, "low": 0.3, "high": 1.0}
+"""Name → factor of `HIGH`."""
+DRIFTING = tuple(level for level, factor in LEVELS.items() if factor)
+HIGH = Localization(xy_m_per_sqrt_m=0.02, yaw_rad_per_sqrt_m=0.01, yaw_rad_per_sqrt_rad=0.01)
+"""After 25 m the standard deviation of x, and that of y, is 0.1 m, a voxel's edge, and that of the yaw 3°."""
+MARGIN_M = 0.1
+"""A voxel's edge: what plans keep clear of walls beyond the body."""
+FIDUCIALS = 10
+SEEN_SHARE = 0.8
+LIMIT_S = 250.0
+_QUICK_LIMIT_S = 100.0
+PLAIN = ("nearest-frontier", "planned-rate")
+"""Strategies that are run without margin and guard, too."""
+_MOST_SLOWER = 1.25
+_LEAST_SEEN = 0.95
+_MOST_CUT_OFF = 0.05
+"""A claim about times does not hold where more of the missions than this did not come so far."""
+GROUPS = {
+    "half-": "half is seen in at most 25 % more time than without drift, low and high drift; ratio",
+    "seen-": "at least 95 % is seen of what is seen without drift; ratio",
+    "blocked-": "margin and guard save blocked drives; difference",
+    "guard-": "with margin and guard half is seen in less time; ratio",
+}
+"""Beginning of ids → what the claims are, on the page."""
+
+
+@dataclass(frozen=True)
+class Run:
+    """Runs a mission of a cell.
+
+    Attributes:
+        guarded: Whether a robot that drifts backs off from what blocks it: see `planner.back_off`.
+    """
+
+    guarded: bool = True
+
+    def __call__(self, env: EntropyExploreEnv, strategy: str, seed: int) -> Record:
+        """Run the mission.
+
+        Returns:
+            The mission's figures, and `most_blocked`, the most drives in a row that something ended early.
+        """
+        blocked_before = in_a_row = most = scans_before = 0
+
+        def note(env: EntropyExploreEnv) -> None:
+            nonlocal blocked_before, in_a_row, most, scans_before
+            robots = env.missions.state.robots[0]
+            blocked, scans = int(robots["blocked_moves"].sum()), int(robots["scans"].sum())
+            if blocked > blocked_before:
+                in_a_row += blocked - blocked_before
+            elif scans > scans_before:
+                in_a_row = 0
+            most, blocked_before, scans_before = max(most, in_a_row), blocked, scans
+
+        run_mission(env, make_strategy(strategy), seed, note, backs_off=self.guarded)
+        return {**mission_figures(env.missions, 0, floor=False), "most_blocked": most}
+
+
+def cell_id(strategy: str, level: str, plain: bool = False) -> str:
+    """Name of the cell of a strategy and a level; `plain`, without margin and guard."""
+    return f"{strategy}-{level}-plain" if plain else f"{strategy}-{level}"
+
+
+def experiment(amount: Amount) -> list[CellTrial]:
+    """Return all missions, one a world; a quick one ends after 100 s."""
+    limit_s, worlds = _QUICK_LIMIT_S if amount.quick else LIMIT_S, amount.seeds
+    cells = [
+        Cell(cell_id(strategy, level), task(level, MARGIN_M, limit_s), strategy, worlds, Run())
+        for strategy in STRATEGIES
+        for level in LEVELS
+    ]
+    cells += [
+        Cell(cell_id(name, level, True), task(level, 0.0, limit_s), name, worlds, Run(guarded=False))
+        for name in PLAIN
+        for level in DRIFTING
+    ]
+    return trials_of(cells)
+
+
+def task(level: str, margin_m: float, limit_s: float) -> Scenario:
+    """`cluttered` for one robot, until so much is seen, with drift of a level."""
+    factor = LEVELS[level]
+    localization = Localization(
+        xy_m_per_sqrt_m=factor * HIGH.xy_m_per_sqrt_m,
+        yaw_rad_per_sqrt_m=factor * HIGH.yaw_rad_per_sqrt_m,
+        yaw_rad_per_sqrt_rad=factor * HIGH.yaw_rad_per_sqrt_rad,
+        margin_m=margin_m if factor else 0.0,
+    )
+    settings = {
+        "robots": 1,
+        "robot": {"localization": localization},
+        "fiducials": {"number": FIDUCIALS},
+        "ending": {"seen_share": SEEN_SHARE, "time_limit_s": limit_s},
+        "track_truth": True,
+    }
+    return with_settings(CLUTTERED, settings)
+
+
+def all_claims(records: Records) -> list[Claim]:
+    """Return every claim.
+
+    Missions are cut off at the time limit: so claims about times are about the time to half of what can be
+    seen, and others about the share that was seen by then.
+    """
+    strategies = [
+        claim for each in STRATEGIES for level in DRIFTING for claim in _claims(records, each, level)
+    ]
+    guard = [claim for each in PLAIN for level in DRIFTING for claim in _guard_claims(records, each, level)]
+    return strategies + guard
+
+
+def _claims(records: Records, strategy: str, level: str) -> list[Claim]:
+    """Return the claims that drift costs a strategy little time, and little of what it sees."""
+    drifting, exact = cell_id(strategy, level), cell_id(strategy, "none")
+    ratio = ratio_interval(half_times_s(records, drifting), half_times_s(records, exact))
+    reached = min(saw_half(records, cell) for cell in (drifting, exact))
+    text = f"{strategy}, {level} drift: half is seen in at most {_MOST_SLOWER - 1:.0%} more time; ratio"
+    enough = reached >= 1.0 - _MOST_CUT_OFF
+    if not enough:
+        text += f" (only {reached:.0%} of the missions did)"
+    holds = ratio.high <= _MOST_SLOWER and enough
+    half = Claim(f"half-{strategy}-{level}", text, f"≤ {_MOST_SLOWER}", *ratio, holds)
+    share = ratio_interval(*(joint(records, cell, "explored") for cell in (drifting, exact)))
+    text = f"{strategy}, {level} drift: sees at least {_LEAST_SEEN:.0%} of what it sees without; ratio"
+    seen = Claim(f"seen-{strategy}-{level}", text, f"≥ {_LEAST_SEEN}", *share, share.low >= _LEAST_SEEN)
+    return [half, seen]
+
+
+def _guard_claims(records: Records, strategy: str, level: str) -> list[Claim]:
+    """Return the claims that margin and guard save blocked drives and time."""
+    guarded, plain = cell_id(strategy, level), cell_id(strategy, level, True)
+    fewer = mean_interval(blocked(records, guarded) - blocked(records, plain))
+    text = f"{strategy}, {level} drift: margin and guard save blocked drives; difference"
+    drives = below(f"blocked-{strategy}-{level}", text, fewer, 0.0)
+    ratio = ratio_interval(half_times_s(records, guarded), half_times_s(records, plain))
+    text = f"{strategy}, {level} drift: with margin and guard half is seen in less time; ratio"
+    return [drives, below(f"guard-{strategy}-{level}", text, ratio)]
+
+
+def half_times_s(records: Records, cell: str) -> np.ndarray:
+    """(N,) seconds until half of what can be seen was; the whole mission where it was not."""
+    halves = [(record["joint"]["t50_seen_s"], record["t_mission_s"]) for record in records[cell]]
+    return np.asarray([end if half is None else half for half, end in halves], float)
+
+
+def saw_half(records: Records, cell: str) -> float:
+    """Share of the missions that saw half of what can be seen."""
+    return float(np.mean([record["joint"]["t50_seen_s"] is not None for record in records[cell]]))
+
+
+def blocked(records: Records, cell: str) -> np.ndarray:
+    """(N,) drives of each mission that something ended early."""
+    return np.asarray([record["blocked_moves"] for record in records[cell]], float)
+
+
+def joint(records: Records, cell: str, field: str) -> np.ndarray:
+    """(N,) a figure of each mission's joint map against the truth."""
+    return np.asarray([record["joint"][field] for record in records[cell]], float)
+
+
+def error_m(records: Records, cell: str) -> np.ndarray:
+    """(N,) root mean square error of the place over each mission's scans; 0 where nobody drifts."""
+    return np.asarray([record.get("localization", {}).get("rms_error_m", 0.0) for record in records[cell]])
+
+
+def _strategies_table(records: Records) -> str:
+    """Return a table of the strategies at each level of drift."""
+    return _table(records, [(strategy, level, False) for strategy in STRATEGIES for level in LEVELS])
+
+
+def _plain_table(records: Records) -> str:
+    """Return a table of strategies without margin and guard beside themselves with them."""
+    return _table(
+        records, [(n, level, plain) for n in PLAIN for level in DRIFTING for plain in (True, False)]
+    )
+
+
+def _table(records: Records, cells: Sequence[tuple[str, str, bool]]) -> str:
+    rows = []
+    for strategy, level, plain in cells:
+        cell = cell_id(strategy, level, plain)
+        rows.append(
+            [
+                f"{strategy}, plain" if plain else strategy,
+                level,
+                f"{mean_interval(half_times_s(records, cell)):.0f}",
+                f"{saw_half(records, cell):.0%}",
+                f"{joint(records, cell, 'explored').mean():.3f}",
+                f"{100.0 * joint(records, cell, 'wrong').mean():.2f}",
+                f"{error_m(records, cell).mean():.3f}",
+                f"{blocked(records, cell).mean():.1f}",
+            ]
+        )
+    head = ["strategy", "drift", "half seen (s)", "saw half", "share seen", "wrong (%)", "rms error (m)"]
+    return markdown_table([*head, "blocked"], rows)
+
+
+def figure_drift(records: Records) -> Figure:
+    """Draw wrong voxels and times to half of what can be seen, of every strategy over the level of drift."""
+    figure = Figure(figsize=(9.5, 4.0), layout="constrained")
+    wrongs, times = figure.subplots(1, 2)
+    factors = list(LEVELS.values())
+    for number, strategy in enumerate(STRATEGIES):
+        cells = [cell_id(strategy, level) for level in LEVELS]
+        style: Any = {"color": COLOURS[number % len(COLOURS)], "marker": "o"}
+        wrongs.plot(factors, [100.0 * joint(records, cell, "wrong").mean() for cell in cells], **style)
+        times.plot(factors, [half_times_s(records, cell).mean() for cell in cells], label=strategy, **style)
+    wrongs.set(xlabel="drift over high drift", ylabel="voxels on the wrong side of ½ (%)", ylim=(0, None))
+    times.set(xlabel="drift over high drift", ylabel="seconds to half of what can be seen", ylim=(0, None))
+    figure.legend(*times.get_legend_handles_labels(), loc="outside right center", frameon=False)
+    return figure
+
+
+EXPERIMENT = Experiment(
+    name="sujan-drift",
+    title="Strategies over drift",
+    template=Path(__file__).with_name("drift.md.j2"),
+    trials=experiment,
+    claims=all_claims,
+    groups=GROUPS,
+    figures={"drift": figure_drift},
+    tables={"strategies": _strategies_table, "plain": _plain_table},
+)

@@ -1,1 +1,0 @@
-"""Errors of localization over the way (fig. 19), and what weighing them in the rating brings."""

@@ -1,0 +1,284 @@
+"""Sujan's planar experiments: five ways of choosing poses, by one robot and by two (figs. 17, 20, 22)."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from baselines.cli.figures import COLOURS
+from baselines.experiments.claims import Claim, above, below
+from baselines.experiments.experiment import Amount, Experiment, Records
+from baselines.experiments.mission import Surroundings, run_mission
+from baselines.experiments.plots import mean_band
+from baselines.experiments.rows import Record
+from baselines.experiments.statistics import mean_interval, ratio_interval
+from baselines.experiments.tables import markdown_table
+from baselines.experiments.trials import Cell, CellTrial, trials_of
+from baselines.strategies import make_strategy
+from baselines.strategies.rules.next_best_view import NextBestView, NextBestViewConfig
+from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
+from entropy_explore_env.reports.metrics import mission_figures
+from entropy_explore_env.scenario import Scenario, with_settings
+from entropy_explore_env.scenarios import OCCLUSIONS
+
+METHODS = {
+    "i": "random-known",
+    "ii": "raster",
+    "iii": "most-unmapped",
+    "iv": "least-mapped",
+    "v": "next-best-view",
+}
+"""The paper's number of a method → its strategy."""
+TEAMS = (1, 2)
+SCANS = 150
+"""Of the team; the figures do not say how many the paper took."""
+OTHERS = ("random", "nearest-frontier")
+"""Strategies beside the paper's, for one robot."""
+CHANGES: dict[str, tuple[str, NextBestViewConfig]] = {
+    "near": ("w_d 0.05 bits a metre instead of 0.01", NextBestViewConfig(distance_weight=0.05)),
+    "far": ("w_d 0", NextBestViewConfig(distance_weight=0.0)),
+    "half": (
+        "unknown cells at ½, not at the mean of their neighbours",
+        NextBestViewConfig(extrapolated=False),
+    ),
+    "linear": ("q in place of -q log2 q", NextBestViewConfig(measure="linear")),
+    "half-linear": (
+        "both of these",
+        NextBestViewConfig(measure="linear", extrapolated=False),
+    ),
+    "half-linear-far": (
+        "both of these, and w_d 0",
+        NextBestViewConfig(measure="linear", extrapolated=False, distance_weight=0.0),
+    ),
+    "stretched": ("eqs. 6-7 instead of eq. 8", NextBestViewConfig(measure="stretched")),
+    "interest": ("β = 0: no interest is lost", NextBestViewConfig(interest_decay=0.0)),
+    "poses": ("400 poses instead of 100", NextBestViewConfig(poses=400)),
+}
+"""Name → what is changed in method (v), and its settings; one robot."""
+
+
+@dataclass(frozen=True)
+class Run:
+    """Runs a mission of a cell, with settings of its own for `next-best-view` where there are some."""
+
+    config: NextBestViewConfig | None = None
+
+    def __call__(self, env: EntropyExploreEnv, strategy: str, seed: int) -> Record:
+        """Run the mission.
+
+        Returns:
+            The mission's figures, and before the first and after each of the team's scans `mapped`, the share
+            mapped of what can be seen, and `driven_m_by_scan`, the way of all robots.
+        """
+        mapped, driven_m = [0.0], [0.0]
+
+        def note(env: EntropyExploreEnv) -> None:
+            robots, clock = env.missions.state.robots[0], env.missions.state.missions[0]
+            share = float(clock["explored_visible"] / clock["visible"])
+            missing = int(robots["scans"].sum()) + 1 - len(mapped)
+            mapped.extend([round(share, 5)] * missing)
+            driven_m.extend([round(float(robots["distance_m"].sum()), 2)] * missing)
+
+        made = make_strategy(strategy) if self.config is None else NextBestView(self.config)
+        run_mission(env, made, seed, note)
+        return {**mission_figures(env.missions, 0), "mapped": mapped, "driven_m_by_scan": driven_m}
+
+
+def cell_id(robots: int, method: str) -> str:
+    """Name of the cell of a method, or of a change of method (v)."""
+    return f"robots-{robots}-{method}"
+
+
+def experiment(amount: Amount) -> list[CellTrial]:
+    """Return all missions; a quick run changes nothing in method (v) one at a time."""
+    seeds = amount.seeds
+    cells = [
+        _cell(robots, method, strategy, seeds, Run())
+        for robots in TEAMS
+        for method, strategy in METHODS.items()
+    ]
+    cells += [_cell(1, strategy, strategy, seeds, Run()) for strategy in OTHERS]
+    for name, (_, config) in () if amount.quick else CHANGES.items():
+        cells.append(_cell(1, f"v-{name}", METHODS["v"], seeds, Run(config)))
+    return trials_of(cells)
+
+
+def _cell(robots: int, method: str, strategy: str, starts: int, run: Run) -> Cell:
+    return Cell(cell_id(robots, method), scenario_of(robots), strategy, starts, run, in_the_middle(robots))
+
+
+def scenario_of(robots: int) -> Scenario:
+    """The task: a sensor of 90° and 15 m for one robot, of 75° and 10 m for two; a number of scans.
+
+    A drive leads wherever the robot wants, so that each decision is one scan, as in the paper.
+    """
+    view, range_m = (math.pi / 2, 15.0) if robots == 1 else (math.radians(75.0), 10.0)
+    settings = {
+        "robots": robots,
+        "robot": {"reach_m": math.inf},
+        "sensor": {"field_of_view_rad": (view, 0.0), "max_range_m": range_m},
+        "channel": {"burst": 1000},
+        "ending": {"max_cycles": SCANS, "time_limit_s": 1e6, "seen_share": 1.0},
+        "track_truth": True,
+    }
+    return with_settings(OCCLUSIONS, settings)
+
+
+def in_the_middle(robots: int) -> Surroundings:
+    """All missions start in the middle; two robots a metre apart."""
+    middle = [0.5 * size for size in OCCLUSIONS.grid.size_m]
+    places = [[middle[0] + robot - 0.5 * (robots - 1), *middle[1:], 0.0, 0.0] for robot in range(robots)]
+    return Surroundings(every_reset=json.dumps({"starts": places}))
+
+
+GROUPS = {
+    "most-": "(v) maps more for the same scans than each other method, 1 and 2 robots; ratio",
+    "order-": "random poses (i) map more than (iii) and (iv); ratio",
+    "metre-": "(v) maps more for each metre than each other method; ratio",
+    "worst-": "random poses map less for each metre than each other method; ratio",
+    "way-": "(v) drives slightly more than (iii); ratio",
+}
+"""Beginning of ids → what the claims are, on the page."""
+
+
+def all_claims(records: Records) -> list[Claim]:
+    """Every claim, from the missions' records by cell."""
+    kinds = (_most_claims, _order_claims, _ratio_claims)
+    return [claim for robots in TEAMS for claims in kinds for claim in claims(records, robots)]
+
+
+def by_scan(records: Records, cell: str, field: str, scans: int = SCANS) -> np.ndarray:
+    """(N, scans + 1) a figure of each mission before its first scan and after each; at the end it stays."""
+    rows = [np.asarray(record[field], float)[: scans + 1] for record in records[cell]]
+    return np.stack([np.pad(row, (0, scans + 1 - len(row)), mode="edge") for row in rows])
+
+
+def at_end(records: Records, cell: str, field: str) -> np.ndarray:
+    """(N,) a figure of each mission after its last scan."""
+    return np.asarray([record[field][-1] for record in records[cell]], float)
+
+
+def mapped(records: Records, cell: str) -> np.ndarray:
+    """(N,) mean share mapped over the scans of each mission: how much is mapped for the same scans."""
+    return np.asarray(by_scan(records, cell, "mapped")[:, 1:].mean(axis=1))
+
+
+def mapped_per_metre(records: Records, cell: str) -> np.ndarray:
+    """(N,) share mapped at the end, over the way of the team in hundreds of metres."""
+    share, way_m = (at_end(records, cell, field) for field in ("mapped", "driven_m_by_scan"))
+    return np.asarray(100.0 * share / np.maximum(way_m, 1.0))
+
+
+def _team(robots: int) -> str:
+    return "one robot" if robots == 1 else f"{robots} robots"
+
+
+def _most_claims(records: Records, robots: int) -> list[Claim]:
+    """(v) maps most for the same number of scans."""
+    claims, best = [], mapped(records, cell_id(robots, "v"))
+    for method in ("i", "ii", "iii", "iv"):
+        ratio = ratio_interval(best, mapped(records, cell_id(robots, method)))
+        text = f"{_team(robots)}: (v) maps more for the same scans than ({method}) {METHODS[method]}; ratio"
+        claims.append(above(f"most-{robots}-{method}", text, ratio))
+    return claims
+
+
+def _order_claims(records: Records, robots: int) -> list[Claim]:
+    """Random poses map more than (iii) and (iv), as the paper's text says."""
+    claims, walk = [], mapped(records, cell_id(robots, "i"))
+    for method in ("iii", "iv"):
+        ratio = ratio_interval(walk, mapped(records, cell_id(robots, method)))
+        text = f"{_team(robots)}: (i) random poses map more than ({method}) {METHODS[method]}; ratio"
+        claims.append(above(f"order-{robots}-{method}", text, ratio))
+    return claims
+
+
+def _ratio_claims(records: Records, robots: int) -> list[Claim]:
+    """(v) maps most for each metre, random poses least; (v) drives a little more than (iii)."""
+    claims, team = [], _team(robots)
+    density = {method: mapped_per_metre(records, cell_id(robots, method)) for method in METHODS}
+    for method in ("i", "ii", "iii", "iv"):
+        ratio = ratio_interval(density["v"], density[method])
+        text = f"{team}: (v) maps more for each metre than ({method}) {METHODS[method]}; ratio"
+        claims.append(above(f"metre-{robots}-{method}", text, ratio))
+    for method in ("ii", "iii", "iv"):
+        ratio = ratio_interval(density["i"], density[method])
+        than = f"({method}) {METHODS[method]}"
+        text = f"{team}: (i) random poses map less for each metre than {than}; ratio"
+        claims.append(below(f"worst-{robots}-{method}", text, ratio))
+    ways = [at_end(records, cell_id(robots, name), "driven_m_by_scan") for name in ("v", "iii")]
+    text = f"{team}: (v) drives slightly more than (iii) most-unmapped; ratio"
+    return [*claims, above(f"way-{robots}", text, ratio_interval(*ways))]
+
+
+def figure_scans(records: Records, robots: int) -> Figure:
+    """Draw share mapped and way driven over scans, means of all worlds with intervals."""
+    figure = Figure(figsize=(9.0, 3.8), layout="constrained")
+    shares, ways = figure.subplots(1, 2)
+    at = np.arange(0, SCANS + 1, 5)
+    for number, (method, strategy) in enumerate(METHODS.items()):
+        for axes, field in ((shares, "mapped"), (ways, "driven_m_by_scan")):
+            samples = by_scan(records, cell_id(robots, method), field)[:, at]
+            mean_band(axes, at, samples, color=COLOURS[number], label=f"({method}) {strategy}")
+    shares.set(xlabel="scans of the team", ylabel="share mapped", ylim=(0, 1))
+    ways.set(xlabel="scans of the team", ylabel="way of the team (m)", ylim=(0, None))
+    ways.legend(frameon=False, loc="upper left")
+    team = "one robot, 90°, 15 m" if robots == 1 else "two robots, 75°, 10 m"
+    worlds = len(records[cell_id(robots, "v")])
+    figure.suptitle(f"Fig. {20 if robots == 1 else 22}: {team}; means of {worlds} worlds")
+    return figure
+
+
+def _row(records: Records, cell: str, first: list[str]) -> list[str]:
+    """A cell's figures, after what it is."""
+    share, way_m = (at_end(records, cell, field) for field in ("mapped", "driven_m_by_scan"))
+    return [
+        *first,
+        f"{mean_interval(mapped(records, cell)):.3f}",
+        f"{share.mean():.3f}",
+        f"{way_m.mean():,.0f}",
+        f"{mean_interval(mapped_per_metre(records, cell)):.3f}",
+    ]
+
+
+_HEAD = ["mean share mapped", f"share after {SCANS} scans", "way (m)", "share a 100 m"]
+
+
+def _methods_table(records: Records) -> str:
+    """Return a table of every method and what stands beside them."""
+    names = [(robots, f"({m}) {s}", cell_id(robots, m)) for robots in TEAMS for m, s in METHODS.items()]
+    names[len(METHODS) : len(METHODS)] = [(1, f"{s}, not the paper's", cell_id(1, s)) for s in OTHERS]
+    rows = [_row(records, cell, [str(robots), name]) for robots, name, cell in names]
+    return markdown_table(["robots", "method", *_HEAD], rows)
+
+
+def _changes_table(records: Records) -> str:
+    """Return a table of method (v) with one thing changed, and how much more it maps than it does."""
+    base = mapped(records, cell_id(1, "v"))
+    rows = [[*_row(records, cell_id(1, "v"), ["nothing"]), "1"]]
+    for name, (text, _) in CHANGES.items():
+        cell = cell_id(1, f"v-{name}")
+        rows.append([*_row(records, cell, [text]), f"{ratio_interval(mapped(records, cell), base):.2f}"])
+    return markdown_table(["changed", *_HEAD, "mean share over (v)'s"], rows)
+
+
+EXPERIMENT = Experiment(
+    name="sujan-planar",
+    title="Sujan, planar",
+    template=Path(__file__).with_name("planar.md.j2"),
+    trials=experiment,
+    claims=all_claims,
+    groups=GROUPS,
+    figures={
+        "figure-20": partial(figure_scans, robots=1),
+        "figure-22": partial(figure_scans, robots=2),
+    },
+    tables={"methods": _methods_table, "changes": _changes_table},
+    quick_seeds=5,
+)
