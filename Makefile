@@ -28,8 +28,8 @@ help:
 	@echo "make test-benchmarl   the tutorial with BenchMARL"
 	@echo "make lint         ruff, pyright and the contracts of imports"
 	@echo "make bench        speed against peers"
-	@echo "make reliability  goes on with the proofs of docs/results/reliability.md: many hours"
-	@echo "make night        a thousand drawn scenarios, others every night, and a little of the other proofs"
+	@echo "make reliability  all proofs, into docs/results/reliability.md: many hours"
+	@echo "make night        some minutes of each proof, other cases every night"
 	@echo "make reproduce    the experiments of the five papers, into docs/results: many hours"
 	@echo "make clean        remove the environments, builds and caches; results stay"
 
@@ -77,22 +77,12 @@ lint: $(STAMP)dev
 bench: $(STAMP)training $(STAMP)bench
 	$(RUN) benchmarks.speed
 
-# What was played is kept in results; what is missing is played.
 reliability: $(STAMP)dev
-	$(RUN) benchmarks.reliability.coverage
-	-for folder in missions belief robots; do \
-		$(RUN) benchmarks.reliability.mutants entropy_explore_env/$$folder --sample 100; done
-	$(RUN) benchmarks.reliability --page docs/results/reliability.md
+	$(RUN) benchmarks.proofs --full --out docs/results/reliability.md
 
-# What a night finds is in results/night. All of it is played, and the exit code is 1 where a case failed.
-NIGHT := $(RUN) benchmarks.reliability --results results/night
-TONIGHT := --first $$(date -u +%Y%m%d)000
+# Other cases every night; the exit code is 1 where one failed.
 night: $(STAMP)dev
-	failed=0; \
-	$(NIGHT) $(TONIGHT) --proofs settings --cases 1000 || failed=1; \
-	$(NIGHT) $(TONIGHT) --proofs states kills files soak memory --quick || failed=1; \
-	$(NIGHT) --proofs determinism --quick || failed=1; \
-	exit $$failed
+	$(RUN) benchmarks.proofs --first $$(date -u +%Y%m%d)000 --out results/night/proofs.md
 
 reproduce: $(STAMP)baselines
 	$(RUN) baselines.papers rocha04 --out docs/results

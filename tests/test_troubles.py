@@ -17,7 +17,7 @@ from numba.core import config
 
 from baselines import benchmark
 from baselines.cli.arguments import run_command
-from benchmarks.reliability.kills import contents
+from benchmarks.proofs.kills import contents
 from entropy_explore_env.compilation import announcement
 from entropy_explore_env.compilation.folder import MAX_DAYS, SUFFIX, remove_old_kernels
 from entropy_explore_env.compilation.kernels import lean_kernel

@@ -24,7 +24,7 @@ from baselines.scoreboard.chosen import chosen_strategies
 from baselines.scoreboard.mission import SuiteMission
 from baselines.strategies import make_strategy
 from baselines.strategies.rules.random_walk import RandomWalk
-from benchmarks.reliability.kills import contents
+from benchmarks.proofs.kills import contents
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.reports.metrics import mission_figures

@@ -1,4 +1,4 @@
-"""Broken and hostile files of every kind; `benchmarks.reliability.world_files` reads as many as one likes."""
+"""Broken and hostile files of every kind; `benchmarks.proofs files` reads as many as one likes."""
 
 from __future__ import annotations
 
@@ -8,8 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from benchmarks.proofs.files import read_worlds
+from benchmarks.proofs.hostile_worlds import MUTATORS, drawn_octree, mutant
 from benchmarks.proofs.world_samples import samples
-from benchmarks.reliability.world_files import MUTATORS, Outcome, drawn_octree, fuzz, mutants, table
 from entropy_explore_env.errors import WorldError
 from entropy_explore_env.worlds.files.process import ReaderProcess, kept_reader
 from entropy_explore_env.worlds.load import load_world
@@ -19,7 +20,7 @@ FEW, MANY = 40, 500
 
 
 def check_loader(loader: str, files: int, folder: Path) -> None:
-    found = fuzz(samples()[loader], files, 7, folder)
+    found = read_worlds(loader, folder, files, 7)
     assert found.wrong == []
     assert found.files == files
     assert found.loaded < files, "some were broken"
@@ -44,15 +45,19 @@ def test_only_worlds_and_named_errors_of_many_files(folder, loader):
     check_loader(loader, MANY, folder)
 
 
+def mutants(loader: str, count: int, seed: int) -> list:
+    sources = samples()[loader]
+    return [mutant(sources, number, np.random.default_rng([seed, number])) for number in range(count)]
+
+
 def test_mutants_are_the_same_for_the_same_seed():
-    sources = samples()["image"]
-    first, again, other = ([data for _, data in mutants(sources, 40, seed)] for seed in (1, 1, 2))
+    first, again, other = (mutants("image", 40, seed) for seed in (1, 1, 2))
     assert first == again != other
 
 
 def test_every_mutator_changes_something():
     for loader in ("map_server", "height npz", "height png", "glb", "octomap"):
-        named = {name for name, _ in mutants(samples()[loader], 120, 0)}
+        named = {name for name, _ in mutants(loader, 120, 0)}
         assert named == {mutate.__name__ for mutate in MUTATORS}
 
 
@@ -77,12 +82,8 @@ def test_drawn_octrees_are_read_and_refused(folder):
 def test_a_reader_that_is_given_goes_on_after_the_files(folder):
     reader = ReaderProcess()
     for part in ("first", "second"):
-        fuzz(samples()["image"], 5, 7, folder / part, reader)
+        (folder / part).mkdir()
+        read_worlds("image", folder / part, 5, 7, reader)
         running = reader._process
         assert running is not None and running.poll() is None
     reader.close()
-
-
-def test_the_table_counts():
-    text = table({"a": Outcome(files=5, loaded=2, killed=1, most_s=0.5, most_mib=100.0, wrong=["x"])}, 5)
-    assert "| a | 5 | 2 | 3 | 1 | 0.50 | 100 | 1 |" in text

@@ -1,42 +1,20 @@
-"""Broken and hostile files of every kind, made from seeds, and what the loaders make of them.
-
-A mutated file must give a World or a named error within 2 s of computing and 512 MiB, run nothing and read
-nothing outside its folder. `python -m benchmarks.reliability.world_files --files 10000 --loader pcd` reads so
-many files and prints a table; the proof of changed files (`file_fuzz`) reads and keeps far more.
-"""
+"""World files changed at random or made hostile, whatever their format, each drawn from a generator."""
 
 from __future__ import annotations
 
-import argparse
-import contextlib
 import io
 import re
 import struct
-import sys
-import tempfile
-import time
-import warnings
 import zipfile
 import zlib
-from collections import Counter
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from collections.abc import Callable
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 
-from benchmarks.proofs.world_samples import Sample, glb_of_json, samples
-from benchmarks.reliability.changed_bytes import doubled, flipped, overwritten, truncated
-from benchmarks.reliability.process_memory import peak_mib
-from entropy_explore_env.errors import SettingError, WorldWarning
-from entropy_explore_env.worlds.files.process import CPU_S, ReaderProcess, kept_reader
-from entropy_explore_env.worlds.load import load_world
-from entropy_explore_env.writing import write_atomically
+from benchmarks.proofs.changed_bytes import doubled, flipped, overwritten, truncated
+from benchmarks.proofs.world_samples import Sample, glb_of_json
 
-MOST_S, MOST_MIB = 2.0, 512
-MOST_GROWTH_MIB = 1024
-"""Of the command itself, which makes a world of what was read: five bytes a voxel, of at most 130 million."""
 _SIZES = (b"0", b"-1", b"65536", b"2147483647", b"4294967295", b"99999999999999999999", b"1e308", b"nan")
 
 
@@ -85,7 +63,7 @@ def packed_zeros(count: int) -> bytes:
 
 
 def repaired_png(data: bytes, rng: np.random.Generator) -> bytes:
-    """Changed chunks of a PNG with right checksums; a header of absurd size; a bomb of zeros."""
+    """Change chunks of a PNG under right checksums, give it a header of absurd size, or a bomb of zeros."""
     if not data.startswith(b"\x89PNG"):
         return flipped(data, rng)
     chunks, at = [], 8
@@ -258,148 +236,13 @@ MUTATORS: tuple[Callable[[bytes, np.random.Generator], bytes], ...] = (
 )
 
 
-def mutants(sources: list[Sample], count: int, seed: int) -> Iterator[tuple[str, Sample]]:
-    """So many changed samples, each with its mutator's name; the same for the same seed."""
-    for number in range(count):
-        rng = np.random.default_rng([seed, number])
-        source = sources[number % len(sources)]
-        mutate = MUTATORS[int(rng.integers(len(MUTATORS)))]
-        first = next(iter(source.files))
-        target = first
-        if len(source.files) > 1 and mutate is not hostile_yaml and rng.random() < 0.5:
-            target = list(source.files)[1]
-        changed = mutate(source.files[target], rng)
-        if rng.random() < 0.2:
-            changed = flipped(changed, rng) if changed else changed
-        yield mutate.__name__, Sample({**source.files, target: changed}, source.options)
-
-
-@dataclass
-class Outcome:
-    """What became of the files of one loader."""
-
-    files: int = 0
-    loaded: int = 0
-    killed: int = 0
-    most_s: float = 0.0
-    most_mib: float = 0.0
-    wrong: list[str] = field(default_factory=list)
-    causes: Counter = field(default_factory=Counter)
-
-
-def fuzz(
-    sources: list[Sample], count: int, seed: int, folder: Path, process: ReaderProcess | None = None
-) -> Outcome:
-    """Load mutants in an empty folder, and note what is wrong with how each was treated.
-
-    Args:
-        sources: What is changed.
-        count: How many mutants.
-        seed: Of the changes.
-        folder: Where they are written.
-        process: That reads them, and goes on afterwards; None = one of their own.
-    """
-    inside = folder / "maps"
-    (inside / "sub").mkdir(parents=True)
-    secret = folder / "outside.pgm"
-    secret.write_bytes(b"P5\n3 2\n255\n" + b"\xfe" * 6)  # 3 × 2 and all free: no mutant of ours
-    with contextlib.suppress(OSError):  # not everybody may make links on Windows
-        (inside / "link.pgm").symlink_to(secret)
-        (inside / "linked").symlink_to(folder)
-    found = Outcome()
-    there: dict[str, bytes] = {}
-    before_mib = peak_mib()
-    with kept_reader(process) as reader:
-        for number, (mutator, sample) in enumerate(mutants(sources, count, seed)):
-            for name, data in sample.files.items():
-                if there.get(name) != data:
-                    (inside / name).write_bytes(data)
-                    there[name] = data
-            complaint = _load(inside / next(iter(sample.files)), sample, reader, found)
-            if (inside / "executed").exists() or Path("executed").exists():
-                complaint = "ran code"
-            if complaint:
-                found.wrong.append(f"seed [{seed}, {number}] {mutator}: {complaint}")
-    if peak_mib() - before_mib > MOST_GROWTH_MIB:
-        found.wrong.append(f"the command itself grew to {peak_mib():.0f} MiB")
-    return found
-
-
-def _load(path: Path, sample: Sample, reader: ReaderProcess, found: Outcome) -> str:
-    """What is wrong with how one file was treated; "" = nothing."""
-    found.files += 1
-    before = reader.cost["cpu_s"] if reader.cost else 0.0
-    reader.cost, start = None, time.process_time()
-    complaint = ""
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", WorldWarning)
-            world = load_world(path, **sample.options)
-        found.loaded += 1
-        if world.grid.shape == (3, 2, 1):
-            complaint = "read a file outside"
-    except SettingError as error:
-        found.causes[error.allowed] += 1
-        if "\n" in str(error) or len(str(error)) > 1000:
-            complaint = "an error of more than a line"
-    except Exception as error:
-        complaint = f"{type(error).__name__}: {error}"
-    spent = time.process_time() - start
-    if reader.cost is None:
-        found.killed += 1
-        spent += CPU_S
-    else:
-        after = reader.cost["cpu_s"]
-        spent += after - before if after >= before else after
-        peak = reader.cost["peak_kib"] / 1024  # of the process's life: a file is blamed if it raised it
-        if peak > max(MOST_MIB, found.most_mib):
-            complaint = complaint or f"{peak:.0f} MiB"
-        found.most_mib = max(found.most_mib, peak)
-    found.most_s = max(found.most_s, spent)
-    return complaint or (f"{spent:.2f} s" if spent > MOST_S else "")
-
-
-def table(outcomes: dict[str, Outcome], count: int) -> str:
-    """The results as Markdown."""
-    lines = [
-        "# Broken and hostile files",
-        "",
-        f"`python -m benchmarks.reliability.world_files --files {count}`: mutants of small files of every",
-        f"kind, from seeds. Each must give a world or a named error within {MOST_S:g} s of computing and",
-        f"{MOST_MIB} MiB, run nothing and read nothing outside its folder. Ended: the reading process died",
-        "and was started anew, and an error was raised. Most MiB: the most that the reading process held.",
-        "",
-        "| loader | files | loaded | refused | of these ended | most s | most MiB | wrong |",
-        "| --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: |",
-    ]
-    for name, o in outcomes.items():
-        cells = (o.files, o.loaded, o.files - o.loaded, o.killed, f"{o.most_s:.2f}", f"{o.most_mib:.0f}")
-        lines.append(f"| {name} | " + " | ".join(str(cell) for cell in (*cells, len(o.wrong))) + " |")
-    return "\n".join(lines) + "\n"
-
-
-def main() -> int:
-    """Run the command; 1 if anything is wrong."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--files", type=int, default=500, help="mutants a loader")
-    parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--loader", help="one loader only")
-    parser.add_argument("--out", type=Path, help="a Markdown file for the table")
-    args = parser.parse_args()
-    outcomes: dict[str, Outcome] = {}
-    for number, (name, sources) in enumerate(samples().items()):
-        if args.loader in (None, name):
-            start = time.perf_counter()
-            with tempfile.TemporaryDirectory() as folder:
-                outcomes[name] = fuzz(sources, args.files, args.seed + number, Path(folder))
-            print(f"{name}: {time.perf_counter() - start:.0f} s", file=sys.stderr, flush=True)
-            print("\n".join(outcomes[name].wrong[:20]), file=sys.stderr)
-    text = table(outcomes, args.files)
-    print(text)
-    if args.out is not None:
-        write_atomically(args.out, text)
-    return int(any(o.wrong for o in outcomes.values()))
-
-
-if __name__ == "__main__":
-    sys.exit(main())
+def mutant(sources: list[Sample], number: int, rng: np.random.Generator) -> tuple[str, Sample]:
+    """Return one of the samples, by its number, with a drawn change, and the name of the change."""
+    source, mutate = sources[number % len(sources)], MUTATORS[int(rng.integers(len(MUTATORS)))]
+    target, *others = source.files
+    if others and mutate is not hostile_yaml and rng.random() < 0.5:
+        target = others[0]
+    changed = mutate(source.files[target], rng)
+    if changed and rng.random() < 0.2:
+        changed = flipped(changed, rng)
+    return mutate.__name__, Sample({**source.files, target: changed}, source.options)

@@ -1,7 +1,7 @@
 """Training runs of a million robot-steps, killed and resumed: they end, and all their numbers are finite.
 
-A case is a run of `training.ppo`, the next one of `training.rllib_ppo`. RLlib needs an environment of its
-own: where it is not installed here, its run takes the Python of `.venv-rllib` in the checkout.
+Cases take turns with `training.ppo` and `training.rllib_ppo`. RLlib needs an environment of its own: where it
+is not installed beside this command, its run takes the Python of `.venv-rllib` in the checkout.
 """
 
 from __future__ import annotations
@@ -19,15 +19,16 @@ import time
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from benchmarks.reliability.settings_fuzz import BrokenPromiseError
+from benchmarks.proofs.cases import BrokenPromiseError, Found
 
-ROBOT_STEPS = 1_000_000
+ROBOT_STEPS, KILLS = 1_000_000, 3
 """Of a run."""
-KILLS = 3
-"""Of a run, at drawn moments."""
 _ROOT = Path(__file__).parents[2]
 _MAY_BE_MISSING = ("bits_per_bit", "planner_ratio")
-"""Columns that are empty where nothing was sent, and where no planner proposes what is chosen."""
+"""Columns that are empty where nothing was sent, and where no planner proposes candidates."""
+_MOST_CHECKPOINTS = 4
+"""Most further checkpoints after which a run is killed again."""
+_WAIT_S = 900.0
 
 
 class Trainer(NamedTuple):
@@ -35,9 +36,9 @@ class Trainer(NamedTuple):
 
     Attributes:
         words: Its options.
-        checkpoints: The pattern of their names.
-        column: Of its curve: robot-steps.
-        needs: A module that not every environment has: of RLlib, one that Ray alone does not bring.
+        checkpoints: Pattern of their names.
+        column: Column of its curve that holds robot-steps.
+        needs: A module that only environments with this trainer have.
     """
 
     words: tuple[str, ...]
@@ -54,57 +55,53 @@ TRAINERS = {
         ("--checkpoint-every", "2", "--runners", "1"), "checkpoint-*", "robot_steps", "tree"
     ),
 }
-_MOST_CHECKPOINTS = 4
-"""After at most so many more a run is killed again."""
-_WAIT_S = 900.0
 
 
-def play_number(number: int) -> dict[str, Any]:
+def play(number: int) -> Found:
     """Train to the end, with KILLS kills on the way.
 
     Raises:
         BrokenPromiseError: A run ends with an error or too early, or one of its numbers is not finite.
     """
     name, moments = list(TRAINERS)[number % len(TRAINERS)], random.Random(number)
-    words = ("--scenario", "box-7x11x5", "--robots", "3", "--seed", str(number))
+    words = ("--scenario", "box-7x11x5", "--robots", "3", "--seed", str(number % 2**31))
     with tempfile.TemporaryDirectory() as folder:
-        return train(name, Path(folder) / "run", (*words, "--total-steps", str(ROBOT_STEPS)), KILLS, moments)
+        run = Path(folder) / "run"
+        steps = train(name, run, (*words, "--total-steps", str(ROBOT_STEPS)), KILLS, moments)
+    return Found({"robot-steps": steps, "kills": KILLS}, name)
 
 
-def train(name: str, run: Path, words: tuple[str, ...], kills: int, moments: random.Random) -> dict[str, Any]:
-    """Train in a folder, kill the trainer and resume it so many times, and look at what it wrote.
+def train(name: str, run: Path, words: tuple[str, ...], kills: int, moments: random.Random) -> int:
+    """Train in a folder, kill and resume the trainer, and check what it wrote; returns its robot-steps.
 
     Args:
         name: Of the trainer.
-        run: Its folder.
-        words: Its options.
-        kills: How often.
-        moments: When is drawn from this.
+        run: Folder of the run.
+        words: Options.
+        kills: Number of kills.
+        moments: Source of the moments.
 
     Raises:
-        BrokenPromiseError: See play_number.
+        BrokenPromiseError: See play.
     """
-    trainer, kept = TRAINERS[name], []
-    words = (*trainer.words, *words, "--out", str(run))
+    words = (*TRAINERS[name].words, *words, "--out", str(run))
     for _ in range(kills):
-        kept.append(_killed(name, words, run, moments))
+        _kill_one(name, words, run, moments)
         words = ("--resume", str(run))
     with tempfile.TemporaryFile("w+") as said, _started(name, words, said) as last:
         code = last.wait()
         said.seek(0)
         if code:
             raise BrokenPromiseError(f"{name} ended with {code}: {said.read()[-300:]}")
-    steps = check_curve(run / "curve.csv", trainer.column)
     check_policy(run)
-    return {"trainer": name, "kills": kills, "checkpoints_before": kept, "robot_steps": steps}
+    return check_curve(run / "curve.csv", TRAINERS[name].column)
 
 
-def _killed(name: str, words: tuple[str, ...], run: Path, moments: random.Random) -> int:
-    """Start a trainer and kill it, and all that it started, after some checkpoints; how many it has then."""
+def _kill_one(name: str, words: tuple[str, ...], run: Path, moments: random.Random) -> None:
+    """Start a trainer, and kill it with all its processes after some further checkpoints."""
     pattern, begun_s = TRAINERS[name].checkpoints, time.monotonic()
-    seen = set(run.glob(pattern))
+    seen, written = set(run.glob(pattern)), set[Path]()
     wanted = moments.randint(1, _MOST_CHECKPOINTS)
-    written: set[Path] = set()
     with _started(name, words, subprocess.DEVNULL) as child:
         while len(written) < wanted:
             if child.poll() is not None:
@@ -116,13 +113,14 @@ def _killed(name: str, words: tuple[str, ...], run: Path, moments: random.Random
             time.sleep(0.05)
         time.sleep(moments.uniform(0.0, 3.0))
         os.killpg(child.pid, signal.SIGKILL)
-    return len(written | seen)
 
 
 def _started(name: str, words: tuple[str, ...], said: Any) -> subprocess.Popen[Any]:  # noqa: ANN401 - a file
-    """A trainer in a group of processes of its own."""
+    """A trainer in a process group of its own."""
+    here = importlib.util.find_spec(TRAINERS[name].needs) is not None
+    python = sys.executable if here else str(_ROOT / ".venv-rllib" / "bin" / "python")
     return subprocess.Popen(
-        [_python(TRAINERS[name].needs), "-m", name, *words],
+        [python, "-m", name, *words],
         cwd=_ROOT,
         env={**os.environ, "PYTHONPATH": str(_ROOT)},
         stdout=subprocess.DEVNULL,
@@ -131,15 +129,8 @@ def _started(name: str, words: tuple[str, ...], said: Any) -> subprocess.Popen[A
     )
 
 
-def _python(module: str) -> str:
-    """This interpreter, or that of the environment of RLlib where it lacks a module."""
-    return (
-        sys.executable if importlib.util.find_spec(module) else str(_ROOT / ".venv-rllib" / "bin" / "python")
-    )
-
-
 def check_curve(curve: Path, column: str) -> int:
-    """Check that all figures of a run's validations are finite; its robot-steps.
+    """Check that all figures of a run's validations are finite; returns its robot-steps.
 
     Raises:
         BrokenPromiseError: One is not.

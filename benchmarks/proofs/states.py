@@ -1,14 +1,12 @@
-"""Saved states with a number changed: each is refused by name and changes nothing, or its missions go on."""
+"""Saved states with one number changed: each is refused by name and changes nothing, or missions go on."""
 
 from __future__ import annotations
 
-import dataclasses
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from benchmarks.reliability.settings_fuzz import BrokenPromiseError
+from benchmarks.proofs.cases import BrokenPromiseError, Found
 from entropy_explore_env.errors import EntropyExploreError
 from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.missions.snapshot import restore, snapshot
@@ -28,51 +26,42 @@ SETTINGS: tuple[dict[str, Any], ...] = (
     {"robot": {"localization": _DRIFT, "redecide": 0.6}, "channel": {"phase_s": 1.5, "repeats": 2}},
     {"channel": {"content": "summaries", "summary_every_s": 1.0, "delay_s": 3.0}, "decision_period_s": None},
 )
-"""Of the missions whose states are changed, so that every part of a state is in use."""
+"""Settings of the missions whose states are changed: together they use every part of a state."""
 _NUMBERS = (np.nan, np.inf, -np.inf, -1.0, 0.0, 1.0, 1e9, -1e9, 1e300, 5e-324)
 _COUNTS = (-1, 0, 1, 2, 31, 32, 33, 1000, 10**8, 2**31, 2**62, -(2**62))
 
 
-@dataclass(frozen=True)
-class Change:
-    """One number of one state, changed.
-
-    Attributes:
-        number: What it is drawn from.
-    """
-
-    number: int
-
-
-@dataclass(frozen=True)
-class Changed:
-    """What came of it.
-
-    Attributes:
-        what: `array.field[place] = value`.
-        refused: The error's message; empty = the missions went on.
-    """
-
-    what: str
-    refused: str
-
-
 def scenario_of(number: int) -> Scenario:
-    """The scenario of a change."""
+    """Return the scenario of a change."""
     return with_settings(with_settings(BOX, _BOX), SETTINGS[number % len(SETTINGS)])
 
 
-def play(change: Change) -> Changed:
+def play(number: int) -> Found:
     """Change a number of a saved state, and go on from it.
 
     Raises:
-        BrokenPromiseError: The state was refused but missions changed, or missions that went on observed what
-            is outside their space.
-        Exception: Whatever else a restored mission raises; and the process may end.
+        BrokenPromiseError: See `change`.
     """
-    scenario, rng = scenario_of(change.number), np.random.default_rng([change.number, 7])
+    _, refused = change(number)
+    return Found({"refused": int(bool(refused)), "went on": int(not refused)})
+
+
+def change(number: int) -> tuple[str, str]:
+    """Change a number of a saved state, and go on from it.
+
+    Args:
+        number: Everything is drawn from it.
+
+    Returns:
+        `array.field[place] = value`, and the message of the error that refused it; empty = missions went on.
+
+    Raises:
+        BrokenPromiseError: The state was refused but missions changed, or missions that went on observed
+            something outside their space.
+    """
+    scenario, rng = scenario_of(number), np.random.default_rng([number, 7])
     missions = Missions(scenario, 2)
-    missions.reset_some([0, 1], [change.number, change.number + 1])
+    missions.reset_some([0, 1], [number, number + 1])
     _walk(missions, rng)
     saved = snapshot(missions)
     what = _spoil(saved, rng)
@@ -84,25 +73,25 @@ def play(change: Change) -> Changed:
     except EntropyExploreError as error:
         if _all_of(others) != before:
             raise BrokenPromiseError(f"{what}: refused, and yet missions changed") from None
-        return Changed(what, str(error))
+        return what, str(error)
     _walk(others, rng)
     bounds = others.layout.flat_space()
     if not all(bounds.contains(seen) for team in others.observations for seen in team):
         raise BrokenPromiseError(f"{what}: an observation is outside its space")
     if not np.isfinite(others.state.robots["reward"]).all():
         raise BrokenPromiseError(f"{what}: a reward is not finite")
-    return Changed(what, "")
+    return what, ""
 
 
 def _all_of(missions: Missions) -> list[Any]:
-    """All that a state which is refused must leave as it was."""
+    """Everything that a refused state must leave as it was."""
     digests = [state_digest(missions, mission) for mission in range(missions.count)]
     worlds, truth = missions.worlds[:], missions.state.truth.tobytes()
     return [digests, worlds, truth, missions.seeds[:], missions.episodes[:], missions.observations.tobytes()]
 
 
 def _walk(missions: Missions, rng: np.random.Generator) -> None:
-    """Step by drawn actions."""
+    """Take STEPS steps with drawn actions."""
     team, rules = (missions.count, missions.scenario.robots), missions.rules
     choices = len(rules.actions.moves) * len(rules.actions.gazes)
     for _ in range(STEPS):
@@ -111,7 +100,7 @@ def _walk(missions: Missions, rng: np.random.Generator) -> None:
 
 
 def _spoil(arrays: dict[str, np.ndarray], rng: np.random.Generator) -> str:
-    """Change one number of one array, or of one field of it; says which."""
+    """Change one number of one array, or of one of its fields; returns which."""
     fields = [
         (name, field)
         for name, array in arrays.items()
@@ -134,8 +123,3 @@ def _spoil(arrays: dict[str, np.ndarray], rng: np.random.Generator) -> str:
         value = min(max(_COUNTS[int(rng.integers(len(_COUNTS)))], limits.min), limits.max)
         array[place] = value
     return f"{name}.{field}{list(place)} = {value!r}"
-
-
-def play_number(number: int) -> dict[str, Any]:
-    """The case of a number, as what is kept of it."""
-    return dataclasses.asdict(play(Change(number)))

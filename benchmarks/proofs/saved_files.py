@@ -1,8 +1,7 @@
-"""What the library saves itself, changed: records of missions, and checkpoints of policies.
+"""Files that the library saves itself, changed: records of missions, and checkpoints of policies.
 
-Both hold digests of their content. So half of the changes are made inside, and the digests made right again:
-what reads the content has to bear anything, not only what it wrote. Each file must be read or refused by a
-named error, in little time and memory.
+Both hold digests of their content. Half of the changes are followed by right digests, so that they reach the
+code that reads the content.
 """
 
 from __future__ import annotations
@@ -10,18 +9,14 @@ from __future__ import annotations
 import hashlib
 import io
 import json
-import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from benchmarks.reliability.changed_bytes import doubled, flipped, overwritten, truncated
-from benchmarks.reliability.process_memory import peak_mib
+from benchmarks.proofs.changed_bytes import doubled, flipped, overwritten, truncated
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
-from entropy_explore_env.errors import EntropyExploreError
 from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.reports.mission_record import (
     CommandRecorder,
@@ -35,22 +30,29 @@ from entropy_explore_env.scenario import with_settings
 from entropy_explore_env.scenarios import BOX
 
 Change = Callable[[bytes, np.random.Generator], bytes]
-MOST_S = 5.0
-"""Of the processor, to read a file and to make what it describes."""
-MOST_GROWTH_MIB = 1024
-"""By which the process may grow."""
 _VALUES: tuple[Any, ...] = (None, True, -1, 0, 1e308, 2**40, 2**70, "x", "", [], {}, [[]], float("nan"))
 
 
-class Kind(NamedTuple):
-    """Files of one kind."""
+class Saved(NamedTuple):
+    """What the library saved in a folder.
+
+    Attributes:
+        files: Name → sound content.
+        load: Reads those of a folder.
+        repair: Makes the digests right again, where that is possible.
+    """
 
     files: dict[str, bytes]
-    """Name → content, sound."""
     load: Callable[[Path], object]
-    """Reads those of a folder."""
     repair: Callable[[dict[str, bytes]], dict[str, bytes]]
-    """Makes the digests right again, where that can be."""
+
+    def changed(self, number: int, rng: np.random.Generator) -> tuple[str, dict[str, bytes]]:
+        """Return what was changed, and the files with it; half of them have right digests."""
+        del number
+        name = list(self.files)[int(rng.integers(len(self.files)))]
+        change = CHANGES[int(rng.integers(len(CHANGES)))]
+        files = {**self.files, name: change(self.files[name], rng)}
+        return f"{change.__name__} of {name}", self.repair(files) if rng.random() < 0.5 else files
 
 
 def another_value(data: bytes, rng: np.random.Generator) -> bytes:
@@ -120,7 +122,7 @@ CHANGES: tuple[Change, ...] = (
 )
 
 
-def record_files(folder: Path) -> Kind:
+def record_files(folder: Path) -> Saved:
     """The record of a short mission, with starts that were given."""
     env = EntropyExploreEnv(with_settings(BOX, {"channel": {"delay_s": 1.0}}))
     env.reset(seed=5)
@@ -135,7 +137,7 @@ def record_files(folder: Path) -> Kind:
         env.step(actions)
         recorder.note()
     save_record(recorder.record("random"), folder / "mission.npz")
-    return Kind({"mission.npz": (folder / "mission.npz").read_bytes()}, _play_record, _with_checksum)
+    return Saved({"mission.npz": (folder / "mission.npz").read_bytes()}, _play_record, _with_checksum)
 
 
 def _play_record(folder: Path) -> object:
@@ -158,7 +160,7 @@ def _with_checksum(files: dict[str, bytes]) -> dict[str, bytes]:
     return {"mission.npz": buffer.getvalue()}
 
 
-def checkpoint_files(folder: Path) -> Kind:
+def checkpoint_files(folder: Path) -> Saved:
     """A checkpoint of a small policy, with its trainer's state."""
     import torch
 
@@ -179,7 +181,7 @@ def checkpoint_files(folder: Path) -> Kind:
     )
     save_checkpoint(folder / "best-000000000012", kept)
     files = {path.name: path.read_bytes() for path in sorted((folder / "best-000000000012").iterdir())}
-    return Kind(files, _load_checkpoint, _with_digests)
+    return Saved(files, _load_checkpoint, _with_digests)
 
 
 def _load_checkpoint(folder: Path) -> object:
@@ -200,67 +202,4 @@ def _with_digests(files: dict[str, bytes]) -> dict[str, bytes]:
     return {**files, "policy.json": json.dumps(head).encode()}
 
 
-KINDS: dict[str, Callable[[Path], Kind]] = {"record": record_files, "checkpoint": checkpoint_files}
-
-
-def play_files(kind: Kind, folder: Path, count: int, seed: int) -> dict[str, Any]:
-    """Change files, read them, and say what came of it: `wrong` lists what must not be, file by file.
-
-    Args:
-        kind: Of the files.
-        folder: Where they are written.
-        count: How many times.
-        seed: Of the changes.
-    """
-    found: dict[str, Any] = {"files": count, "loaded": 0, "killed": 0, "most_s": 0.0, "wrong": []}
-    folder.mkdir(exist_ok=True)
-    before_mib, there = peak_mib(), {}
-    with _little_memory():
-        for number in range(count):
-            rng = np.random.default_rng([seed, number])
-            name = list(kind.files)[int(rng.integers(len(kind.files)))]
-            change = CHANGES[int(rng.integers(len(CHANGES)))]
-            files = {**kind.files, name: change(kind.files[name], rng)}
-            for each, content in (kind.repair(files) if rng.random() < 0.5 else files).items():
-                if there.get(each) != content:
-                    (folder / each).write_bytes(content)
-                    there[each] = content
-            begun_s, complaint = time.process_time(), ""
-            try:
-                kind.load(folder)
-                found["loaded"] += 1
-            except EntropyExploreError as error:
-                complaint = "an error of more than a line" if "\n" in str(error) else ""
-            except Exception as error:
-                complaint = f"{type(error).__name__}: {error}"
-            spent_s = time.process_time() - begun_s
-            found["most_s"] = max(found["most_s"], spent_s)
-            if spent_s > MOST_S:
-                complaint = complaint or f"{spent_s:.1f} s"
-            if complaint:
-                found["wrong"].append(f"[{seed}, {number}] {change.__name__} of {name}: {complaint[:150]}")
-    found["grew_mib"] = peak_mib() - before_mib
-    if found["grew_mib"] > MOST_GROWTH_MIB:
-        found["wrong"].append(f"grew by {found['grew_mib']:.0f} MiB")
-    return found
-
-
-@contextmanager
-def _little_memory() -> Iterator[None]:
-    """While the process may take 4 GiB more than it has, so that a file cannot take the machine's.
-
-    Only where the system says how much it has: on Linux.
-    """
-    told = Path("/proc/self/statm")
-    if not told.exists():
-        yield
-        return
-    import resource
-
-    pages = int(told.read_text("ascii").split()[0])
-    before = resource.getrlimit(resource.RLIMIT_AS)
-    resource.setrlimit(resource.RLIMIT_AS, (pages * resource.getpagesize() + (4 << 30), before[1]))
-    try:
-        yield
-    finally:
-        resource.setrlimit(resource.RLIMIT_AS, before)
+SAVED: dict[str, Callable[[Path], Saved]] = {"record": record_files, "checkpoint": checkpoint_files}

@@ -7,9 +7,9 @@ import random
 import pytest
 import torch
 
-from benchmarks.reliability import training_runs
-from benchmarks.reliability.settings_fuzz import BrokenPromiseError
-from benchmarks.reliability.training_runs import check_curve, check_policy, train
+from benchmarks.proofs import training
+from benchmarks.proofs.cases import BrokenPromiseError
+from benchmarks.proofs.training import check_curve, check_policy, train
 from entropy_explore_env.scenarios import BOX
 from tests.systems import needs_posix
 from training.checkpoints import Checkpoint, PolicySettings, checkpoint_name, save_checkpoint
@@ -24,11 +24,9 @@ SMALL = (
 
 @pytest.mark.long
 def test_a_run_is_killed_resumed_and_ends(tmp_path, monkeypatch):
-    trainer = training_runs.TRAINERS["training.ppo"]._replace(words=("--threads", "1", "--no-video"))
-    monkeypatch.setitem(training_runs.TRAINERS, "training.ppo", trainer)
-    row = train("training.ppo", tmp_path / "run", tuple(SMALL.split()), 2, random.Random(0))
-    assert row["kills"] == 2 and row["robot_steps"] == 16384
-    assert 1 <= row["checkpoints_before"][0] <= row["checkpoints_before"][1]
+    trainer = training.TRAINERS["training.ppo"]._replace(words=("--threads", "1", "--no-video"))
+    monkeypatch.setitem(training.TRAINERS, "training.ppo", trainer)
+    assert train("training.ppo", tmp_path / "run", tuple(SMALL.split()), 2, random.Random(0)) == 16384
 
 
 @pytest.mark.long

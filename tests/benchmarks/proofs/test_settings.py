@@ -8,10 +8,9 @@ import math
 import numpy as np
 import pytest
 
-from baselines.experiments.worker_pool import run_each
-from benchmarks.reliability.drawn_scenarios import FIELDS, Numbers, draw_scenario
-from benchmarks.reliability.settings_fuzz import WATCHDOG_S, BrokenPromiseError, Played, Task, play
-from benchmarks.reliability.settings_fuzz import _check as check
+from benchmarks.proofs.cases import BrokenPromiseError, Found, play_cases
+from benchmarks.proofs.drawn_scenarios import FIELDS, Numbers, draw_scenario
+from benchmarks.proofs.settings import WATCHDOG_S, check, play
 from entropy_explore_env import EntropyExploreEnv
 from entropy_explore_env.channel_settings import Channel
 from entropy_explore_env.decision_settings import Observation
@@ -106,14 +105,14 @@ def test_what_breaks_a_promise_is_found():
         check(env, observations, rewards, 0.0)
 
 
-@pytest.mark.parametrize("numbers", [range(60), pytest.param(range(2000), marks=pytest.mark.long)], ids=len)
+@pytest.mark.parametrize(
+    "numbers", [range(1, 61), pytest.param(range(2000), marks=pytest.mark.long)], ids=len
+)
 def test_drawn_scenarios_neither_hang_nor_crash_nor_break_promises(monkeypatch, numbers):
     """In a process of its own, with the assertions of kernels compiled in."""
     monkeypatch.setenv("ENTROPY_EXPLORE_ASSERT", "1")
-    tasks = [Task(number, few_kernels=True) for number in numbers]
-    outcomes = [outcome for _, outcome in run_each(play, tasks, 1, limit_s=180.0, apart=True)]
-    played = [outcome for outcome in outcomes if isinstance(outcome, Played)]
-    assert [outcome for outcome in outcomes if not isinstance(outcome, Played)] == []
-    assert sorted(outcome.number for outcome in played) == list(numbers)
-    assert max(outcome.seconds for outcome in played) < WATCHDOG_S
-    assert {outcome.episodes > 1 for outcome in played} == {False, True}
+    outcomes = [outcome for _, outcome in play_cases(play, numbers, 180.0)]
+    assert [outcome for outcome in outcomes if not isinstance(outcome, Found)] == []
+    figures = [outcome.figures for outcome in outcomes if isinstance(outcome, Found)]
+    assert max(each["s at most"] for each in figures) < WATCHDOG_S
+    assert {each["episodes"] > 1 for each in figures} == {False, True}

@@ -1,8 +1,8 @@
-"""Sweeps and trainers killed at drawn moments: nothing that was done is lost, results are the same bytes.
+"""Sweeps and trainers killed at drawn moments: nothing that was done is lost, and results are the same bytes.
 
-A sweep is killed several times before its last mission, and then ends; all that it writes, but times on the
-clock, is compared with what one wrote that nobody stopped. A trainer that does nothing but write checkpoints
-is killed while it does; the latest that is found has to be whole, and no older than the last that it wrote.
+A sweep is killed several times before its last mission, and then ends; everything that it writes, except
+times on the clock, is compared with the files of an undisturbed one. A trainer that only writes checkpoints
+is killed while it does; the latest one that is found has to be whole, and no older than the last one written.
 """
 
 from __future__ import annotations
@@ -20,14 +20,13 @@ from collections.abc import Callable
 from contextlib import redirect_stderr, redirect_stdout
 from functools import cache
 from pathlib import Path
-from typing import Any
 
 from baselines.experiments.confirmation import CLOCK
 from baselines.scoreboard.page import ARCHIVE
-from benchmarks.reliability.settings_fuzz import BrokenPromiseError
+from benchmarks.proofs.cases import BrokenPromiseError, Found
 
 KILLS = 10
-"""Of a case."""
+"""Of a sweep and of a trainer, in a case."""
 _SWEEP = ("--scenarios", "box-7x11x5", "--robots", "1,2", "--time-limit-s", "150")
 _WORDS = (*_SWEEP, "--strategies", "gradient", "--seeds", "6", "--jobs", "1")
 _MISSIONS = 24
@@ -37,7 +36,7 @@ _MILLISECONDS = re.compile(rb"\| [0-9.,-]+ \| [0-9.,-]+ \|$", re.MULTILINE)
 _WAIT_S = 300.0
 
 
-def play_number(number: int) -> dict[str, Any]:
+def play(number: int) -> Found:
     """Kill a sweep and a trainer, each KILLS times.
 
     Raises:
@@ -45,22 +44,15 @@ def play_number(number: int) -> dict[str, Any]:
     """
     with tempfile.TemporaryDirectory() as folder:
         moments = random.Random(number)
-        kept = kill_sweep(Path(folder) / "sweep", moments)
+        kill_sweep(Path(folder) / "sweep", moments)
         written = kill_trainer(Path(folder) / "trainer", moments)
-    return {"kills": KILLS, "missions_kept": kept, "checkpoints_written": written}
-
-
-def kills_of(row: dict[str, Any]) -> int:
-    """What a case counts for; one that failed for nothing."""
-    return row.get("kills", 0)
+    return Found({"kills of sweeps": KILLS, "kills of trainers": KILLS, "checkpoints written": written})
 
 
 def kill_sweep(folder: Path, moments: random.Random) -> list[int]:
-    """Kill a sweep; how many missions were kept each time."""
-    expected = _undisturbed()
-    kept: list[int] = []
-    targets = sorted(moments.sample(range(_MISSIONS - 1), KILLS))
-    for target in targets:
+    """Kill a sweep; returns the number of missions that were kept each time."""
+    expected, kept = _undisturbed(), list[int]()
+    for target in sorted(moments.sample(range(_MISSIONS - 1), KILLS)):
         child = _start(lambda: _sweep(folder))
         _until(lambda target=target: len(_missions(folder)) >= target, child)
         time.sleep(moments.uniform(0.0, 0.01))
@@ -100,29 +92,29 @@ def _missions(folder: Path) -> list[Path]:
 
 
 def contents(folder: Path) -> dict[str, bytes]:
-    """All that a sweep wrote but missions and the clock; what a kill left of half files is nobody's."""
+    """Everything that a sweep wrote, except missions, times on the clock and half-written files."""
     return {
-        str(path.relative_to(folder)): _but_for_clock(path)
+        str(path.relative_to(folder)): _without_clock(path)
         for path in sorted(folder.rglob("*"))
         if path.is_file() and "runs" not in path.parts and path.name[0] != "." and path.name != "timing.csv"
     }
 
 
-def _but_for_clock(path: Path) -> bytes:
-    """What a file holds but seconds on the clock, and checksums of what has them."""
+def _without_clock(path: Path) -> bytes:
+    """The content of a file without seconds on the clock, and without checksums of them."""
     if path.name != ARCHIVE:
         return _MILLISECONDS.sub(b"|", path.read_bytes())
     missions = [json.loads(line) for line in lzma.decompress(path.read_bytes()).splitlines()]
     for mission in missions:
-        mission["record"].pop(CLOCK, None)  # what failed has none
+        mission["record"].pop(CLOCK, None)  # failures have none
         del mission["checksum"]
     return json.dumps(missions).encode()
 
 
 def kill_trainer(folder: Path, moments: random.Random) -> int:
-    """Kill who writes checkpoints; how many were written.
+    """Kill a process that writes checkpoints; returns how many were written.
 
-    Each says in a file of its own, `told`, that it is written.
+    After each it writes the number of the checkpoint into the file `told`.
     """
     from training.checkpoints import latest_checkpoint, load_checkpoint
 
@@ -138,9 +130,7 @@ def kill_trainer(folder: Path, moments: random.Random) -> int:
         least = int(told.read_text() or before + 1)
         steps = load_checkpoint(latest_checkpoint(folder, "step"), training=True).progress["steps"]
         if steps < least:
-            raise BrokenPromiseError(
-                f"checkpoint {least} was written, and {steps} is the latest that is found"
-            )
+            raise BrokenPromiseError(f"checkpoint {least} was written, and the latest found is {steps}")
         told.write_text(str(steps))
     return int(told.read_text())
 
@@ -149,13 +139,8 @@ def _write_checkpoints(folder: Path, told: Path, before: int) -> None:
     import torch
 
     from entropy_explore_env.scenarios import BOX
-    from training.checkpoints import (
-        Checkpoint,
-        PolicySettings,
-        TrainerState,
-        checkpoint_name,
-        save_checkpoint,
-    )
+    from training import checkpoints
+    from training.checkpoints import Checkpoint, PolicySettings, TrainerState
 
     steps = before
     while True:
@@ -163,12 +148,12 @@ def _write_checkpoints(folder: Path, told: Path, before: int) -> None:
         weights = {"layer": torch.full((100, 100), float(steps))}
         state = TrainerState({"moments": torch.full((1000,), float(steps))}, {}, {"steps": steps})
         kept = Checkpoint(PolicySettings(BOX), {"steps": steps}, weights, {}, state)
-        save_checkpoint(folder / checkpoint_name("step", steps), kept)
+        checkpoints.save_checkpoint(folder / checkpoints.checkpoint_name("step", steps), kept)
         told.write_text(str(steps))
 
 
 def _start(work: Callable[[], None]) -> int:
-    """Do work in a forked process, which shares the imports and kernels; its number."""
+    """Do work in a forked process, which shares imports and kernels; returns its number."""
     child = os.fork()
     if child == 0:
         code = 1

@@ -1,0 +1,105 @@
+"""Drawn scenarios, played by drawn actions: none hangs, crashes, or breaks what environments promise."""
+
+from __future__ import annotations
+
+import math
+import time
+
+import numpy as np
+
+from benchmarks.proofs.cases import BrokenPromiseError, Found
+from benchmarks.proofs.drawn_scenarios import draw_scenario
+from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
+from entropy_explore_env.errors import EntropyExploreError, RecordError
+from entropy_explore_env.missions.state_ranges import check_ranges
+from entropy_explore_env.settings_json import settings_json
+
+STEPS = 50
+WATCHDOG_S = 20.0
+"""Most processor time of a scenario's steps, without the compilation of kernels."""
+_MOST_DRAWS = 10_000
+_ALL_KERNELS_EVERY = 100
+"""One scenario of so many may observe anything; all of them would compile for hours."""
+
+
+def play(number: int) -> Found:
+    """Draw scenarios until one is allowed, and play it.
+
+    Raises:
+        BrokenPromiseError: An observation is outside its space, a number is not finite, time ran backwards,
+            or the steps took longer than WATCHDOG_S.
+    """
+    few_kernels = number % _ALL_KERNELS_EVERY > 0
+    for refused in range(_MOST_DRAWS):
+        rng = np.random.default_rng([number, refused])
+        try:
+            drawn = draw_scenario(rng, few_kernels)
+            env = EntropyExploreEnv(drawn.scenario, **({"world": drawn.given} if drawn.given else {}))
+            env.reset(seed=number)
+        except EntropyExploreError:
+            continue
+        seconds, episodes = _play(env, rng, number)
+        if seconds > WATCHDOG_S:
+            raise BrokenPromiseError(f"{STEPS} steps took {seconds:.1f} s: {settings_json(drawn.scenario)}")
+        return Found({"episodes": episodes, "scenarios refused before": refused, "s at most": seconds})
+    raise BrokenPromiseError(f"none of {_MOST_DRAWS} drawn scenarios was allowed")
+
+
+def _play(env: EntropyExploreEnv, rng: np.random.Generator, number: int) -> tuple[float, int]:
+    """Return processor seconds of all steps after the first, which compiles, and the number of episodes."""
+    seconds, episodes, earlier_s = 0.0, 1, 0.0
+    for agent in env.possible_agents:
+        env.action_space(agent).seed(int(rng.integers(2**31)))
+    for step in range(STEPS):
+        if not env.agents:
+            _begin_another(env, number)
+            episodes, earlier_s = episodes + 1, 0.0
+        actions = {agent: env.action_space(agent).sample() for agent in env.agents}
+        begun_s = time.process_time()
+        observations, rewards = env.step(actions)[:2]
+        if step > 0:
+            seconds += time.process_time() - begun_s
+        earlier_s = check(env, observations, rewards, earlier_s)
+    return seconds, episodes
+
+
+def _begin_another(env: EntropyExploreEnv, seed: int) -> None:
+    """Begin the next episode, or the first again where the next world has too little room for the team."""
+    try:
+        env.reset()
+    except EntropyExploreError:
+        env.reset(seed)
+
+
+def check(env: EntropyExploreEnv, observations: dict, rewards: dict, earlier_s: float) -> float:
+    """Check what a step returned; returns the mission's time.
+
+    Raises:
+        BrokenPromiseError: See `play`.
+    """
+    for agent, observed in observations.items():
+        if not env.observation_space(agent).contains(observed):
+            raise BrokenPromiseError(
+                f"{agent} observed {_outside(env, agent)} outside its space: {env.scenario}"
+            )
+    figures = {f"the reward of {agent}": reward for agent, reward in rewards.items()}
+    figures["the time"] = time_s = float(env.missions.state.missions[0]["time_s"])
+    for name, value in figures.items():
+        if not math.isfinite(value):
+            raise BrokenPromiseError(f"{name} is {value}: {env.scenario}")
+    try:
+        check_ranges(env.scenario, env.missions.state._asdict())
+    except RecordError as error:
+        raise BrokenPromiseError(f"{error}: {env.scenario}") from None
+    if time_s < earlier_s:
+        raise BrokenPromiseError(f"time ran from {earlier_s} back to {time_s} s: {env.scenario}")
+    return time_s
+
+
+def _outside(env: EntropyExploreEnv, agent: str) -> str:
+    """The numbers of an observation that its space does not have, with their places in the flat one."""
+    layout, robot = env.missions.layout, env.possible_agents.index(agent)
+    seen = env.missions.observations[0, robot]
+    within = (seen >= layout.low.astype(np.float32)) & (seen <= layout.high.astype(np.float32))
+    wrong = np.flatnonzero(~within)
+    return ", ".join(f"{seen[place]!r} at {place} of {list(layout.parts)}" for place in wrong)

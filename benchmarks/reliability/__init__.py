@@ -1,1 +1,0 @@
-"""Proofs that missions never hang, crash or leave the contract; each is a long run that can be resumed."""

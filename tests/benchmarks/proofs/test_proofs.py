@@ -1,0 +1,105 @@
+"""The command of the proofs: what it prints of cases that pass, fail, hang and crash, and what it refuses."""
+
+from __future__ import annotations
+
+import os
+import time
+
+import pytest
+
+from baselines.cli.arguments import run_command
+from benchmarks.proofs import __main__ as command
+from benchmarks.proofs.__main__ import PROOFS, Args, Played, Proof, checked, main, page, table
+from benchmarks.proofs.cases import Found, play_cases
+from entropy_explore_env.errors import SettingError
+from tests.systems import needs_posix
+
+
+def squares(number):
+    if number == 13:
+        raise ValueError("unlucky\nnumber")
+    return Found({"squares": number * number, "s at most": number / 8}, "odd" if number % 2 else "even")
+
+
+def hangs_or_crashes(number):
+    if number == 1:
+        time.sleep(600.0)
+    if number == 2:
+        os._exit(3)
+    return Found({"assertions": float(os.environ.get("ENTROPY_EXPLORE_ASSERT", "0"))})
+
+
+@pytest.fixture
+def small(monkeypatch):
+    """One proof, of squares."""
+    monkeypatch.setattr(command, "PROOFS", {"squares": Proof(squares, 2, 5, 60.0)})
+
+
+def test_cases_are_drawn_from_their_numbers_and_a_failed_one_is_played_again(small, capsys, tmp_path):
+    out = tmp_path / "new" / "page.md"
+    assert main(["--first", "12", "--out", str(out)]) == 1
+    said = capsys.readouterr()
+    assert "python -m benchmarks.proofs squares --cases 1 --first 13" in said.err
+    assert "ValueError: unlucky number (test_proofs.py:" in said.err and "squares: 2 of 2" in said.err
+    assert "| squares | all | 2 | 1 | 144 squares, 1.5 s at most |" in said.out
+    text = out.read_text("utf-8")
+    assert "`python -m benchmarks.proofs squares --cases 1 --first 13`: ValueError: unlucky number" in text
+    assert f"`python -m benchmarks.proofs --first 12 --out {out}` at commit" in text
+    assert main(["squares", "--cases", "1", "--first", "13"]) == 1
+    assert main(["squares", "--cases", "1", "--first", "14"]) == 0
+
+
+def test_the_command_plays_as_many_cases_as_it_is_told(small, capsys):
+    late = ["--full", "--limit-s", "1e-9"]
+    for words, cases in ((["--full"], 5), (["--cases", "3"], 3), ([], 2), (late, 1)):
+        assert main(words) == 0
+        assert f"| squares | all | {cases} | 0 |" in capsys.readouterr().out
+
+
+@needs_posix
+def test_a_case_that_hangs_or_ends_its_process_fails_alone(monkeypatch):
+    monkeypatch.setenv("ENTROPY_EXPLORE_ASSERT", "1")
+    outcomes = dict(play_cases(hangs_or_crashes, range(4), 4.0))
+    assert outcomes == {
+        0: Found({"assertions": 1.0}),
+        1: "ran past 4 s",
+        2: "its process ended with exit code 3",
+        3: Found({"assertions": 1.0}),
+    }
+
+
+def test_groups_have_rows_of_their_own():
+    played = {"squares": Played(4, [squares(number) for number in range(3)], {13: "ValueError"})}
+    assert table(played).splitlines()[2:] == [
+        "| squares | all | 4 | 1 | 5 squares, 0.25 s at most |",
+        "| squares | even | 2 | - | 4 squares, 0.25 s at most |",
+        "| squares | odd | 1 | - | 1 squares, 0.125 s at most |",
+    ]
+
+
+def test_the_page_says_what_each_proof_is():
+    text = page({"squares": Played(1, [squares(1)], {})}, ["--full"])
+    assert all(f"- **{name}**: " in text for name in PROOFS)
+    assert len(text.split()) < 1500
+
+
+def test_bad_input_is_refused_before_anything_is_played(tmp_path):
+    (tmp_path / "file").write_text("")
+    for args, said in (
+        (Args(("luck",)), "names = 'luck': allowed is one of settings, states, determinism"),
+        (Args(cases=0), "cases = 0: allowed is a whole number ≥ 1"),
+        (Args(cases=5, full=True), "cases = 5: allowed is given without --full"),
+        (Args(first=-1), "first = -1: allowed is a whole number ≥ 0"),
+        (Args(limit_s=0.0), "limit_s = 0.0: allowed is a number > 0"),
+        (Args(limit_s=float("nan")), "limit_s = nan"),
+        (Args(out=tmp_path), "a file, and this is a folder"),
+        (Args(out=tmp_path / "file" / "page.md"), "a folder that can be made"),
+    ):
+        with pytest.raises(SettingError) as error:
+            checked(args)
+        assert said in str(error.value)
+
+
+def test_what_cannot_be_parsed_is_one_line_and_code_2(capsys):
+    assert run_command(main, ["--cases", "many"]) == 2
+    assert capsys.readouterr().err.count("\n") == 1
