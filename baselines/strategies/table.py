@@ -18,7 +18,7 @@ from types import MappingProxyType
 from baselines.strategies.mutual_information.neighbourhood import MutualInformationConfig
 from baselines.strategies.protocol import Strategy
 from baselines.strategies.rules.assigned_frontier import AssignedFrontier
-from baselines.strategies.rules.cliff import CliffConfig, CliffNextBestView
+from baselines.strategies.rules.cliff import CliffNextBestView
 from baselines.strategies.rules.cliff_raster import CliffRaster
 from baselines.strategies.rules.coordinated_frontier import CoordinatedFrontier
 from baselines.strategies.rules.distance_advantage import DistanceAdvantage
@@ -248,13 +248,13 @@ TABLE: tuple[Entry, ...] = (
     Entry(
         "cliff-straight-edge",
         Family.CLIFF,
-        partial(CliffNextBestView, CliffConfig(edge="line", interest_decay=0.0)),
+        partial(CliffNextBestView, "line", interest_decay=0.0),
         "`cliff-polygon-edge` with the edge a straight line (Sujan, method 3)",
     ),
     Entry(
         "cliff-polygon-edge",
         Family.CLIFF,
-        partial(CliffNextBestView, CliffConfig(interest_decay=0.0)),
+        partial(CliffNextBestView, interest_decay=0.0),
         "`cliff-next-best-view` without the interest function (Sujan, method 4)",
     ),
     Entry(
