@@ -8,7 +8,7 @@ from functools import partial
 from pathlib import Path
 from types import MappingProxyType, ModuleType
 
-from baselines.strategies.loading import entry_points, is_reference, make_referenced, module_of
+from baselines.strategies.loading import entry_points, make_referenced, module_of
 from baselines.strategies.protocol import Strategy
 from baselines.strategies.table import ALIASES, CLIFF_STRATEGIES, STRATEGIES
 from entropy_explore_env.command import home_path
@@ -93,7 +93,7 @@ def strategy_module(name: str) -> str | Path:
 
 def _reference(name: str) -> str:
     """`module:Class` or `file.py:Class` of a strategy from outside the package."""
-    if is_reference(name):
+    if ":" in name:
         return name
     declared = entry_points()
     if name in declared:
