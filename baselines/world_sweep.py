@@ -38,8 +38,9 @@ from entropy_explore_env.writing import write_atomically
 
 _IMAGES = (".png", ".pgm", ".ppm", ".pnm", ".jpg", ".jpeg", ".bmp", ".gif")
 _PLANS = (".yaml", ".yml", *_IMAGES)
-_MESHES = (".obj", ".stl", ".glb", ".ply")
-_HEIGHTS = (".tif", ".tiff", ".npz")
+_MESHES = (".obj", ".stl", ".glb", ".dae", ".ply")
+_CLOUDS = (".pcd", ".las", ".laz")
+_HEIGHTS = (".tif", ".tiff", ".npz", ".asc")
 _OF_SOME = {
     "height_m": _PLANS,
     "resolution_m": _IMAGES,
@@ -51,10 +52,13 @@ _OF_SOME = {
     "clearance_m": (*_HEIGHTS, *_MESHES),
     "ceiling_m": _HEIGHTS,
     "hollow": _MESHES,
+    "inside": _MESHES,
+    "scale": (*_MESHES, *_CLOUDS),
+    "up": (*_MESHES, *_CLOUDS),
 }
 """Option of reading → the files that it is for; a YAML says itself how its image is read."""
 _OWN = {"ending": {"time_limit_s": 600.0}}
-_SUFFIXES = (".bt", ".ot", *_PLANS, ".pcd", *_MESHES, *_HEIGHTS)
+_SUFFIXES = (".bt", ".ot", *_PLANS, *_CLOUDS, *_MESHES, *_HEIGHTS)
 
 
 @dataclass
