@@ -91,9 +91,9 @@ night: $(STAMP)dev
 
 reproduce: $(STAMP)baselines
 	$(RUN) baselines.papers rocha04 --out docs/results
-	$(RUN) baselines.papers.rochami --out docs/results
+	$(RUN) baselines.papers rochami --out docs/results
 	$(RUN) baselines.papers.bhattacharya --out docs/results
-	$(RUN) baselines.papers.sawhney --out docs/results
+	$(RUN) baselines.papers sawhney --out docs/results
 	$(RUN) baselines.papers sujan --out docs/results
 
 # PyTorch's CPU build, unless there is an NVIDIA GPU: pip's own index brings gigabytes of CUDA libraries on Linux.
