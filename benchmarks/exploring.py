@@ -166,11 +166,10 @@ def visibility_row(effort: Effort) -> Row:
     voxels = rng.choice(free, _PLACES).astype(np.int32)
     directions, counter = rays_around(30.0, np.zeros(1)), new_counter(state.size, shape)
     tree = grow_tree(directions, 30.0, shape)
-    met = np.empty(tree.cells, np.int32)
     seen, weighed = np.empty(_PLACES), np.empty(_PLACES)
 
     def work() -> None:
-        count_from(counter, state.reshape(-1), shape, voxels, tree, met, seen, weighed)
+        count_from(counter, state.reshape(-1), shape, voxels, tree, seen, weighed)
 
     work()
     rays = 1e-6 * _PLACES * len(directions)

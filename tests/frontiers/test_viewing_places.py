@@ -14,7 +14,7 @@ from baselines.experiments.mission import run_mission
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.frontiers.blocks import NONE
 from entropy_explore_env.frontiers.frontier_map import KNOWN_SIGMA
-from entropy_explore_env.frontiers.viewing_places import is_visible
+from entropy_explore_env.frontiers.voxel_map import is_visible
 from entropy_explore_env.planner.scene import Goal
 from entropy_explore_env.planner.shared_tour import SharedTour
 from entropy_explore_env.planner.tour import Tour
