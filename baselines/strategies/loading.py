@@ -27,7 +27,7 @@ _FORM = "module:Class or path/to/file.py:Class"
 
 
 def entry_points() -> dict[str, str]:
-    """Name → `module:Class` of the strategies that installed packages declare."""
+    """Return name → `module:Class` of the strategies that installed packages declare."""
     return {each.name: each.value for each in importlib.metadata.entry_points(group=ENTRY_POINTS)}
 
 
@@ -42,7 +42,7 @@ def module_of(name: str) -> str | Path:
 
 
 def make_referenced(name: str) -> Strategy:
-    """A new strategy of a class named by its module or file.
+    """Make a new strategy of a class named by its module or file.
 
     Args:
         name: `module:Class` or `path/to/file.py:Class`. A class, or a function without arguments, makes the

@@ -115,6 +115,6 @@ class PlateauRule(Driver):
         return stop
 
     def _arrived(self, view: RobotKnowledge, goal: np.ndarray) -> bool:
-        """Whether a drive to a goal has ended there."""
+        """Return whether a drive to a goal has ended there."""
         apart_m = float(np.linalg.norm(view.pose[:2] - goal[:2]))
         return not view.under_way and apart_m < _SAME_PLACE * self._scenario.grid.voxel_size_m

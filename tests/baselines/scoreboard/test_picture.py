@@ -9,7 +9,7 @@ from baselines.scoreboard import picture
 from baselines.scoreboard.picture import Watch, known_colours
 from baselines.strategies import make_strategy
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
-from tests.baselines.strategies.explorers.test_missions import small_plan
+from tests.planner.scenes import small_plan
 
 
 def test_moments_come_as_more_is_seen_and_the_map_is_coloured_by_what_is_known():
