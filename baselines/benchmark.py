@@ -1,19 +1,16 @@
-"""Strategies compared: `python -m baselines.benchmark --suite plans`, or `--scenarios room,office`.
+"""Strategies compared: `python -m baselines.benchmark --suite plans`, `--world map.yaml`, `--scenarios room`.
 
-A suite is a set of worlds, starts and seeds that is pinned (scoreboard/suites.py). Every strategy runs the
-same missions. Written are a page with tables and figures. Missions are kept, a file each: an interrupted run
-resumes and ends with the same page, byte for byte. `missions.jsonl.xz` beside a suite's tables holds them
-all: with `--archive FILE` another run begins with them, to go on or to add a strategy. Mission k of all tasks
-and strategies is run before any mission k + 1, so that a page of a part is fair. A mission that raises an
-error or runs past its limit is a row with the reason. In suites, a strategy that finishes none of its first
-three missions of a task is not run further there.
+A suite is a set of worlds, starts and seeds that is pinned: a file of data in baselines/suites. Every
+strategy runs the same missions; mission k of all tasks and strategies is run before any mission k + 1.
+Written are a page with a table over all tasks, a figure, and an archive of all missions, with which another
+run begins. An interrupted run goes on where it was. A mission that raises an error or runs past its limit is
+a row with the reason.
 """
 
 from __future__ import annotations
 
 import dataclasses
 import math
-import shlex
 import sys
 import time
 from collections.abc import Sequence
@@ -21,50 +18,47 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
-from baselines.cli.arguments import INLINE, make_folder, parse, print_json, run_command
-from baselines.cli.task_options import (
-    TaskOptions,
-    base_task,
-    files_told_apart,
-    first_change,
-    is_whole_scenario,
-    parsed_for,
-    words_of,
+from baselines.cli.arguments import INLINE, make_folder, parse, print_json, run_command, told_command
+from baselines.cli.task_options import TaskOptions, given_in, is_of_task, is_whole_scenario
+from baselines.cli.worker_options import TrialOptions
+from baselines.experiments.rows import read_table
+from baselines.experiments.trials import run_trials
+from baselines.strategies import STRATEGIES, make_strategy, resolved
+from baselines.suites import find_suite, suite_strategies
+from baselines.suites.own import (
+    DEFAULT_SCENARIOS,
+    QUICK_SCENARIOS,
+    default_sizes,
+    scenario_tasks,
+    world_tasks,
 )
-from baselines.cli.worker_options import WorkerOptions
-from baselines.experiments.archive import read_archive, write_archive
-from baselines.experiments.cells import missions_of, run_cells
-from baselines.scoreboard.chosen import (
-    Entry,
-    Mission,
-    chosen_entries,
-    chosen_strategies,
-    entry_mission,
-    own_tasks,
-)
-from baselines.scoreboard.suites import Suite, find_suite
+from baselines.suites.results import by_seed, results_of
+from baselines.suites.suite import BASELINE, REFERENCE, Suite
 from entropy_explore_env.errors import SettingError, one_of
 from entropy_explore_env.scenarios import SCENARIOS
 from entropy_explore_env.validation import check_whole
 
-_SCENARIOS = "room,room-furnished,lab,office,cave"
-_MOST_ROBOTS = 1000
-_TRIES = 3
-"""Missions of a suite's task after which a strategy that finished none is not run further there."""
+_SEEDS, _QUICK_SEEDS = 30, 5
+_PINNED = ("scenarios", "robots", "seeds", "world_scenario")
+"""Options that a suite pins, as it does all of a task's."""
+_WHERE = ("--out", "--runs", "--archive", "--jobs", "--cluster", "--json", "--tables", "--stop-after-s")
+_NOT_TOLD = (*_WHERE, "--rerun", "--since")
+"""Options that a page does not tell."""
 
 
 @dataclass
-class Args(WorkerOptions):
+class Args(TrialOptions):
     """Compare strategies."""
 
     suite: str | None = None
-    """plans, volumes, teams or others: worlds and starts that are pinned."""
+    """plans, volumes, teams, others or faults: worlds and starts that are pinned."""
     scenarios: str | None = None
-    """In place of a suite: names and world files, commas between, each changed by the options of the task;
-    default: room,room-furnished,lab,office,cave, or the scenario that --settings holds as a whole."""
+    """In place of a suite: names, commas between, each changed by the options of the task, also by --world;
+    default: room,room-furnished,lab,office,cave, or the scenario that --settings holds as a whole. With
+    --world alone every file, or every file of a folder, is a task of its own."""
     strategies: str | None = None
-    """Names as in baselines.run, commas between, or all; nearest-frontier is added in suites, random else.
-    Default: those that the suite's table compares; without a suite all."""
+    """Who runs: names as in baselines.run, commas between, or all; in suites nearest-frontier is added, else
+    random. Default: those that the suite's table compares; without a suite all."""
     robots: str | None = None
     """Team sizes of scenarios, commas between; default: 1,2,4, or that of the scenario in --settings."""
     seeds: int | None = None
@@ -78,18 +72,17 @@ class Args(WorkerOptions):
     wall_limit_s: float = 600.0
     """Time on the clock after which a mission is ended, and counts as failed."""
     stop_after_s: float | None = None
-    """Time on the clock after which no mission is begun any more; the page then holds what was run, and the
-    same command goes on."""
-    confirm: bool = False
-    """Keep missions that other code ran, of each strategy and task whose first mission comes out the same
-    when it is run again; else a change of the code runs all again."""
+    """Time on the clock after which no mission is begun any more; the same command goes on. 0: none is begun,
+    and the page is made again of what there is."""
     archive: Path | None = None
-    """missions.jsonl.xz of an earlier run: its missions of the same settings are not run again; what other
-    code ran counts with --confirm."""
+    """Missions of an earlier run, NAME.jsonl.xz beside its page: they are not run again. Those in --out are
+    never run again."""
+    tables: bool = False
+    """Print the table of every task, too."""
     out: Path = Path("results/scoreboard")
-    """Folder for scoreboard.md and, in scoreboard, its tables and figures."""
+    """Folder for the page and, in scoreboard, archives and figures."""
     runs: Path | None = None
-    """Folder that keeps the missions; default: runs in --out."""
+    """Folder for the tables that grow while missions run; default: runs in --out."""
     json: bool = False
     """Print one JSON object and nothing else."""
 
@@ -97,134 +90,99 @@ class Args(WorkerOptions):
 def main(words: Sequence[str]) -> int:
     """Run the command."""
     args = parse(Args, words, description=__doc__)
-    (suite, changes), workers = _suite(args, words), args.workers
-    from baselines.scoreboard.page import ARCHIVE, FILES, write_page  # matplotlib: after the help
-    from baselines.scoreboard.results import Results
-    from baselines.scoreboard.terminal import broken, printed_results, show_results
+    suite, refused = _suite(args, words)
+    stop_after_s = math.inf if args.stop_after_s is None else args.stop_after_s
+    title = "strategies" if args.suite is None else f"suite {suite.name}"
+    how = args.how(title, args.json, args.wall_limit_s, keep_failures=True, stop_after_s=stop_after_s)
+    from baselines.suites.page import archive_of, write_page  # matplotlib: after the help
+    from baselines.suites.terminal import printed_results, show_results
 
+    if args.archive is not None and not args.archive.is_file():
+        raise SettingError("archive", str(args.archive), "a file that is there")
+    archives = [archive_of(args.out, suite.name), *([] if args.archive is None else [args.archive])]
+    known = [row for archive in archives for row in read_table(archive)]
     runs = args.runs or args.out / "runs"
     make_folder("out", args.out)
     make_folder("runs", runs)
-    missions = missions_of(suite.cells)
-    if args.archive is not None:
-        taken = read_archive(args.archive, runs, missions)
-        print(f"{taken:,} missions taken from {args.archive}", file=sys.stderr)
-    started = time.perf_counter()
-    records = run_cells(
-        suite.cells,
-        runs,
-        workers,
-        f"suite {suite.name}" if args.suite else "strategies",
-        quiet=args.json,
-        limit_s=args.wall_limit_s,
-        keep_failures=True,
-        stop_after_s=math.inf if args.stop_after_s is None else args.stop_after_s,
-        confirm=args.confirm,
-        tries=None if args.suite is None else _TRIES,
-    )
-    results = Results(suite, records)
-    if not any(results.of(task, strategy) for task in suite.tasks for strategy in suite.strategies):
+    started = time.monotonic()
+    table = runs / f"{suite.name}.jsonl"
+    ran = run_trials(suite.trials, table, how, known)
+    if suite.later is not None:
+        suite = suite.completed(by_seed(row for row in ran if row is not None))
+        left_s = max(stop_after_s - (time.monotonic() - started), 0.0)
+        run_trials(suite.trials, table, dataclasses.replace(how, stop_after_s=left_s), known)
+    whole = suite if args.suite is None else find_suite(suite.name, strategies=suite.strategies)
+    results, rows = results_of(whole, [*known, *read_table(table)])
+    if not rows:
         print("nothing to write: no mission was run", file=sys.stderr)
         return 0
-    page = write_page(args.out, results, _command(args, suite, changes))
-    write_archive(page.parent / FILES / suite.name / ARCHIVE, runs, missions)
+    command = told_command("python -m baselines.benchmark", words, _NOT_TOLD)
+    page = write_page(args.out, results, rows, command, refused)
     if args.json:
-        print_json({**printed_results(results), "wall_s": round(time.perf_counter() - started, 1)})
+        wall_s = round(time.monotonic() - started, 1)
+        print_json({**printed_results(results), "refused": refused, "wall_s": wall_s})
     else:
-        show_results(results)
-        print(f"written: {page}, its tables and figures beside it", file=sys.stderr)
-    if names := broken(results):
+        show_results(results, refused, tables=args.tables)
+        print(f"written: {page}, its figure and archive beside it", file=sys.stderr)
+    if names := results.broken:
         print(f"error: every mission of {', '.join(names)} raised an error", file=sys.stderr)
         return 1
     return 0
 
 
 def _suite(args: Args, words: Sequence[str]) -> tuple[Suite, list[str]]:
-    """What the options ask for, and those of them that change scenarios, as words.
+    """Return what the options ask for, and why world files are refused.
 
     Raises:
         SettingError: An option has a value that is not allowed, or does not go with a suite.
-        WorldError: A world file cannot be used.
+        WorldError: No world file can be used.
     """
-    seeds = args.seeds if args.seeds is not None else (5 if args.quick else 30)
-    check_whole("seeds", seeds, 1)
-    for name in ("wall_limit_s", "stop_after_s"):
+    missions = args.seeds if args.seeds is not None else (_QUICK_SEEDS if args.quick else _SEEDS)
+    check_whole("seeds", missions, 1)
+    for name, least in (("wall_limit_s", math.ulp(0.0)), ("stop_after_s", 0.0)):
         limit_s = getattr(args, name)
-        if limit_s is not None and not 0.0 < limit_s < math.inf:
-            raise SettingError(name, limit_s, "a number > 0")
+        if limit_s is not None and not least <= limit_s < math.inf:
+            raise SettingError(name, limit_s, "a number > 0" if least else "a number ≥ 0")
     if args.suite is not None:
-        pinned = [(name, getattr(args, name)) for name in ("scenarios", "robots", "seeds", "world_scenario")]
-        changed = first_change(args.task)
-        for name, value in [*pinned, *([] if changed is None else [changed])]:
-            if value is not None:
-                raise SettingError(name, value, "left out together with --suite, which pins it")
-        strategies = chosen_strategies(args.strategies, args.suite)
-        return find_suite(args.suite, args.quick, strategies), []
+        suite_strategies(args.suite)  # refuses an unknown suite first
+        for name in given_in(words):
+            if name in _PINNED or is_of_task(name):
+                raise SettingError(name, "given", "left out together with --suite, which pins it")
+        return find_suite(args.suite, args.quick, chosen_strategies(args.strategies, args.suite)), []
     if args.world_scenario is not None and args.world_scenario not in SCENARIOS:
         raise SettingError("world_scenario", args.world_scenario, one_of(args.world_scenario, SCENARIOS))
     strategies = chosen_strategies(args.strategies)
-    missions: dict[str, list[Mission]] = {}
-    changes: dict[str, list[str]] = {}
-    for name, entry in _entries(args).items():
-        task = base_task(entry.scenario, args.task.settings)
-        options = parsed_for(task, args, words, __doc__).task
-        changes |= words_of(options, task)
-        missions[name] = [entry_mission(entry, task, options, team) for team in _team_sizes(args)]
-        if (limit_s := missions[name][0].scenario.ending.time_limit_s) == math.inf:
-            raise SettingError("time_limit_s", limit_s, "finite, so that every mission ends")
-    tasks = own_tasks(missions, seeds)
-    return Suite("own", tasks, strategies), [word for option in changes.values() for word in option]
-
-
-def _entries(args: Args) -> dict[str, Entry]:
-    """The scenarios that are asked for."""
-    settings = args.task.settings
-    if is_whole_scenario(settings):
-        if args.scenarios is not None:
-            allowed = "left out: --settings holds a scenario of its own"
-            raise SettingError("scenarios", args.scenarios, allowed)
-        scenario = base_task("room", settings).scenario
-        return {scenario.name: Entry(scenario)}
-    wanted = args.scenarios if args.scenarios is not None else ("room,office" if args.quick else _SCENARIOS)
-    return chosen_entries(wanted, args.world_scenario)
-
-
-def _team_sizes(args: Args) -> tuple[int, ...]:
-    """The team sizes that are asked for."""
-    if args.robots is None and is_whole_scenario(args.task.settings):
-        return (base_task("room", args.task.settings).scenario.robots,)
-    words = args.robots if args.robots is not None else ("1,2" if args.quick else "1,2,4")
-    sizes = tuple(int(word) for word in words.split(",") if word.isascii() and word.isdigit())
-    distinct = len(set(sizes)) == len(sizes) == len(words.split(","))
-    if not distinct or not all(1 <= size <= _MOST_ROBOTS for size in sizes):
-        raise SettingError(
-            "robots", words, f"different whole numbers from 1 to {_MOST_ROBOTS}, commas between"
-        )
-    return sizes
-
-
-def _command(args: Args, suite: Suite, changes: Sequence[str]) -> str:
-    """What makes the same page again, wherever the world files lie: no more of a path than tells it apart."""
-    given: dict[str, str | None] = {"strategies": args.strategies}
-    if args.suite is not None:
-        given = {"suite": args.suite, **given}
+    robots, names, refused = args.robots or default_sizes(args.task, args.quick), args.scenarios, []
+    if is_whole_scenario(args.task.settings):
+        if names is not None:
+            raise SettingError("scenarios", names, "left out: --settings holds a scenario of its own")
+        tasks = scenario_tasks(None, args.task, words, robots, missions)
+    elif args.task.world and names is None:
+        tasks, refused = world_tasks(args.world_scenario, args.task, words, robots, missions)
     else:
-        scenarios = args.scenarios or ",".join(dict.fromkeys(task.scenario.name for task in suite.tasks))
-        asked = scenarios.split(",")
-        files = [word for word in asked if word not in SCENARIOS]
-        told = dict(zip(files, files_told_apart(files), strict=True))
-        alone = is_whole_scenario(args.task.settings)
-        given |= {
-            "scenarios": None if alone else ",".join(told.get(word, word) for word in asked),
-            "robots": ",".join(map(str, dict.fromkeys(task.scenario.robots for task in suite.tasks))),
-            "seeds": str(suite.tasks[0].missions),
-            "world-scenario": args.world_scenario,
-        }
-    options = [f"--{name} {shlex.quote(value)}" for name, value in given.items() if value is not None]
-    changed = [shlex.join(changes)] if changes else []
-    flags = ["--quick"] if args.quick and args.suite is not None else []
-    flags += ["--confirm"] if args.confirm else []
-    return " ".join(["python -m baselines.benchmark", *options, *changed, *flags])
+        names = (QUICK_SCENARIOS if args.quick else DEFAULT_SCENARIOS) if names is None else names
+        tasks = scenario_tasks(names, args.task, words, robots, missions)
+    return Suite("own", "Scenarios of one's own", tasks, strategies), refused
+
+
+def chosen_strategies(words: str | None, suite: str | None = None) -> tuple[str, ...]:
+    """Return strategies from names with commas between them.
+
+    Args:
+        words: Names; `all` = every one; None = those of the suite's table, without a suite every one.
+        suite: Its name; the strategy that ratios are relative to is added, without a suite the random walk.
+
+    Raises:
+        SettingError: No strategy, or no suite, has such a name.
+    """
+    if words is None and suite is not None:
+        names = list(suite_strategies(suite))
+    else:
+        names = list(STRATEGIES) if words in (None, "all") else words.split(",")
+    for name in names:
+        make_strategy(name)
+    added = [] if suite == "faults" else [BASELINE if suite is None else REFERENCE]
+    return tuple(dict.fromkeys([*added, *map(resolved, names)]))
 
 
 if __name__ == "__main__":

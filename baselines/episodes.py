@@ -16,8 +16,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
-from baselines.cli.arguments import INLINE, Positional, make_folder, print_json, run_command
-from baselines.cli.task_options import TaskOptions, base_task, first_parsed, parsed_for, tasked
+from baselines.cli.arguments import INLINE, Positional, make_folder, parse, print_json, run_command
+from baselines.cli.task_options import TaskOptions, base_task, parsed_for, tasked
 from baselines.cli.worker_options import WorkerOptions
 from baselines.experiments.runner import Conditions, run_all
 from baselines.strategies import make_strategy, resolved
@@ -56,9 +56,9 @@ class Args(WorkerOptions):
 
 def main(words: Sequence[str]) -> int:
     """Run the command."""
-    first = first_parsed(Args, words, __doc__)
-    task = base_task(first.scenario, first.task.settings)
-    args = parsed_for(task, first, words, __doc__, robots=task.scenario.robots)
+    args = parse(Args, words, description=__doc__)
+    task = base_task(args.scenario, args.task.settings)
+    args = parsed_for(task, args, words, robots=task.scenario.robots)
     for name, least in (("missions", 1), ("missions_per_file", 1), ("first_seed", 0)):
         check_whole(name, getattr(args, name), least)
     if importlib.util.find_spec("pyarrow") is None:

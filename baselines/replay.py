@@ -20,7 +20,7 @@ import numpy as np
 from baselines.cli.arguments import ONCE_WORLD, OmitArgPrefixes, Positional, parse, run_command
 from baselines.cli.mission_outputs import MissionLog, Outputs, Wanted, show_results
 from baselines.cli.progress import progress_bar
-from baselines.cli.task_options import named_in
+from baselines.cli.task_options import is_of_task
 from entropy_explore_env.command import allow_read_memory
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.errors import SettingError
@@ -86,7 +86,8 @@ def _refuse_settings(words: Sequence[str]) -> None:
     for word, following in itertools.zip_longest(words, words[1:], fillvalue="--"):
         option, _, value = word.partition("=")
         name = option.removeprefix("--").replace("-", "_")
-        if name in _OWN or not (named_in(word) or (option.startswith("--") and name in _OF_A_MISSION)):
+        refused = name in _OF_A_MISSION or is_of_task(name)
+        if name in _OWN or not (option.startswith("--") and refused):
             continue
         given = value or (None if following.startswith("--") else following)
         raise SettingError(name, given, "left out: a record holds its settings, and runs again with them")

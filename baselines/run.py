@@ -14,10 +14,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
-from baselines.cli.arguments import INLINE, OmitArgPrefixes, Positional, option_help, run_command
+from baselines.cli.arguments import INLINE, OmitArgPrefixes, Positional, option_help, parse, run_command
 from baselines.cli.mission_outputs import MissionLog, Outputs, Wanted, show_results
 from baselines.cli.progress import progress_bar
-from baselines.cli.task_options import TaskOptions, base_task, first_parsed, parsed_for, tasked
+from baselines.cli.task_options import TaskOptions, base_task, parsed_for, tasked
 from baselines.experiments.mission import run_mission, scripted_env
 from baselines.strategies import make_strategy, resolved
 from baselines.strategies.table import help_text
@@ -52,9 +52,9 @@ class Args:
 
 def main(words: Sequence[str]) -> int:
     """Run the command."""
-    first = first_parsed(Args, words, __doc__)
-    task = base_task(first.scenario, first.task.settings)
-    args = parsed_for(task, first, words, __doc__, robots=task.scenario.robots)
+    args = parse(Args, words, description=__doc__)
+    task = base_task(args.scenario, args.task.settings)
+    args = parsed_for(task, args, words, robots=task.scenario.robots)
     name = resolved(args.strategy)
     strategy = make_strategy(name)
     check_whole("seed", args.seed, 0)

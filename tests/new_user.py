@@ -271,7 +271,7 @@ def strategy(user: User) -> None:
     out = user.home / "compared"
     words = f"--scenarios box-7x11x5 --strategies {named} --robots 1,2 --seeds 2 --jobs 1 --out {out}"
     user.run_module(f"baselines.benchmark {words} --robot.reach-m 1.5")
-    _expect("NearestUnknown" in (out / "scoreboard.md").read_text(encoding="utf-8"), "the page lacks it")
+    _expect("NearestUnknown" in (out / "own.md").read_text(encoding="utf-8"), "the page lacks it")
 
 
 def site(user: User) -> None:

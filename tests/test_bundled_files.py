@@ -11,7 +11,7 @@ import pytest
 
 from tests.code_blocks import DOCS, ROOT
 
-CODE_AND_TEXT = {".cff", ".cfg", ".css", ".md", ".py", ".toml", ".txt", ".typed", ".yml"}
+CODE_AND_TEXT = {".cff", ".cfg", ".css", ".j2", ".md", ".py", ".toml", ".txt", ".typed", ".yml"}
 NAMES = {".ci/run", ".gitignore", "LICENSE", "Makefile"}
 ROWS = re.compile(r"^\| (`.*?) \|", re.MULTILINE)
 
@@ -52,7 +52,7 @@ def test_every_row_is_of_files_that_are_there():
 
 
 def test_the_licence_of_every_world_of_others_is_here():
-    page = (ROOT / "baselines" / "scoreboard" / "worlds" / "README.md").read_text(encoding="utf-8")
+    page = (ROOT / "baselines" / "suites" / "worlds" / "README.md").read_text(encoding="utf-8")
     texts = "".join(path.read_text(encoding="utf-8") for path in (ROOT / "baselines").rglob("LICENSES/*.txt"))
     holders = re.findall(r"© [\d–]+ ([^|]+?) \|", page)
     assert len(holders) == 3 and [holder for holder in holders if holder not in texts] == []

@@ -11,6 +11,11 @@ import numpy as np
 import pytest
 from gymnasium.spaces import Discrete
 
+from baselines.experiments.origin import Origin
+from baselines.experiments.rows import Row, write_table
+from baselines.experiments.trials import CellTrial
+from baselines.suites import find_suite
+from baselines.suites.page import archive_of
 from docs.extensions import scenario_times
 from docs.extensions.attribute_docs import attribute_docs, constant_docs
 from docs.extensions.scenario_cards import card, gallery
@@ -144,21 +149,28 @@ def test_a_card_says_which_version_of_the_id_is_of_which_release(tmp_path):
 
 
 def test_times_come_from_the_suites_of_the_scoreboard(tmp_path):
-    columns = "task,strategy,missions,finished,{0},{0}_low,{0}_high"
-    for suite, column, row in (
-        ("plans", "time_s_99_seen", "office,nearest-frontier,30,29,312.4,300,330"),
-        ("volumes", "time_s_end", '"office, 3 robots",planned-rate,30,30,150,140,161'),
-        ("others", "time_s_end", '"office, 5 robots",gradient,5,4,200,,'),
-        ("teams", "time_s_end", '"office, 8 robots",planned-rate,30,30,99,90,101'),
+    """Of missions by hand: three of one cell finish, and one of them has no time to 99 %."""
+    for suite, strategy, seconds in (
+        ("plans", "nearest-frontier", [100, 200, 300]),
+        ("teams", "random", [9]),
     ):
-        folder = tmp_path / "scoreboard" / suite
-        folder.mkdir(parents=True)
-        (folder / "tasks.csv").write_text(f"{columns.format(column)}\n{row}\noffice-3d,random,1,1,7,,\n")
+        cells = {cell.id: cell for cell in find_suite(suite).cells}
+        cell = cells[f"office/{strategy}" if suite == "plans" else f"office-4-robots/{strategy}"]
+        rows = [
+            Row(
+                cell.id,
+                seed,
+                "office",
+                CellTrial(cell, seed).settings,
+                Origin(),
+                {"finished": True, "t_mission_s": 2.0 * time_s, "joint": {"t99_seen_s": float(time_s)}},
+            )
+            for seed, time_s in enumerate(seconds)
+        ]
+        write_table(archive_of(tmp_path, suite), rows)
     text = scenario_times.times_table(SCENARIOS["office"], tmp_path)
-    assert "| 1 robot (to 99 % seen) | `nearest-frontier` | 312 (300 … 330) | 29 of 30 |" in text
-    assert "| 3 robots | `planned-rate` | 150 (140 … 161) | 30 of 30 |" in text
-    assert "| 5 robots | `gradient` | 200 | 4 of 5 |" in text
-    assert "8 robots" not in text and "`random`" not in text
+    assert "| 1 robot (to 99 % seen) | `nearest-frontier` | 200 (100 … 300) | 3 of 3 |" in text
+    assert "4 robots" not in text and "`random`" not in text
     bare = with_settings(SCENARIOS["office"], {"name": "mine"})
     assert scenario_times.times_table(bare, tmp_path) == ""
 

@@ -21,7 +21,6 @@ from baselines.cli.arguments import INLINE, make_folder, parse, print_json, run_
 from baselines.cli.task_options import (
     TaskOptions,
     base_task,
-    first_parsed,
     is_whole_scenario,
     parsed_for,
     tasked,
@@ -72,7 +71,7 @@ class Args(WorkerOptions):
 
 def main(words: Sequence[str]) -> int:
     """Run the command."""
-    args = first_parsed(Args, words, __doc__)
+    args = parse(Args, words, description=__doc__)
     if (args.pretrained is None) == (args.strategy is None):
         parse(Args, words, description=__doc__)  # the help, if it is asked for
         raise SettingError("strategy", args.strategy, "given, or else --pretrained, not both")
@@ -85,7 +84,7 @@ def main(words: Sequence[str]) -> int:
     if args.scenario is not None and is_whole_scenario(args.task.settings):
         raise SettingError("scenario", args.scenario, "left out: --settings holds a scenario of its own")
     base = base._replace(scenario=with_settings(base.scenario, {"split": "test"}))
-    args = parsed_for(base, args, words, __doc__)
+    args = parsed_for(base, args, words)
     elsewhere = args.scenario or args.task.settings or args.task.world
     made = {scenario.world for scenario in SCENARIOS.values()}  # the recipes
     if trained.world not in made and not elsewhere:

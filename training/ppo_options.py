@@ -10,12 +10,11 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 
-from baselines.cli.arguments import INLINE, WholeNumber
+from baselines.cli.arguments import INLINE, WholeNumber, parse
 from baselines.cli.task_options import (
     TaskOptions,
     absolute_files,
     base_task,
-    first_parsed,
     is_whole_scenario,
     parsed_for,
     settled,
@@ -198,11 +197,11 @@ def parsed(words: Sequence[str], description: str | None = None) -> Args:
         UsageError: The words do not fit.
         SettingError: There is no such scenario.
     """
-    first = first_parsed(Args, words, description)
+    first = parse(Args, words, description=description)
     task = base_task(first.scenario, first.task.settings, OWN)
     robots = {"robots": task.scenario.robots} if is_whole_scenario(first.task.settings) else {}
     named = dataclasses.replace(first, **robots)
-    args = parsed_for(task, first, words, description, **robots, **rollout_that_fits(named))
+    args = parsed_for(task, first, words, **robots, **rollout_that_fits(named))
     return settled_arguments(args)
 
 

@@ -24,11 +24,10 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from baselines.cli.arguments import INLINE, WholeNumber, make_folder, run_command
+from baselines.cli.arguments import INLINE, WholeNumber, make_folder, parse, run_command
 from baselines.cli.task_options import (
     TaskOptions,
     base_task,
-    first_parsed,
     is_whole_scenario,
     parsed_for,
     settled,
@@ -189,10 +188,10 @@ def parsed(words: Sequence[str]) -> Args:
         UsageError: The words do not fit.
         SettingError: There is no such scenario.
     """
-    first = first_parsed(Args, words, __doc__)
+    first = parse(Args, words, description=__doc__)
     task = base_task(first.scenario, first.task.settings, OWN)
     robots = {"robots": task.scenario.robots} if is_whole_scenario(first.task.settings) else {}
-    return settled_arguments(parsed_for(task, first, words, __doc__, **robots))
+    return settled_arguments(parsed_for(task, first, words, **robots))
 
 
 def settled_arguments(args: Args) -> Args:

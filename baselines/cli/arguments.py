@@ -11,6 +11,7 @@ import dataclasses
 import io
 import json
 import re
+import shlex
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -19,6 +20,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 from entropy_explore_env import command
 from entropy_explore_env.command import UsageError, home_path, whole_number, with_meant
 from entropy_explore_env.errors import MissingExtraError, SettingError
+from entropy_explore_env.worlds.given import distinct_paths
 
 if TYPE_CHECKING:
     from tyro.conf import OmitArgPrefixes, Positional
@@ -183,6 +185,26 @@ def make_folder(option: str, folder: Path) -> None:
 def print_json(results: dict[str, Any]) -> None:
     """Print exactly one JSON object on standard output."""
     print(json.dumps(results, indent=2, allow_nan=False))
+
+
+def told_command(command: str, words: Sequence[str], leave_out: Sequence[str]) -> str:
+    """Return a command line as pages tell it: without some options, and of files what tells them apart.
+
+    Args:
+        command: What the words follow.
+        words: As they were typed.
+        leave_out: Options with their values, such as `--out`.
+    """
+    told: list[str] = []
+    left_out = False
+    for word in words:
+        if word.startswith("--"):
+            left_out = word.split("=")[0].replace("_", "-") in leave_out
+        if not left_out:
+            told.append(word)
+    files = [word for word in told if Path(word).expanduser().is_file()]
+    names = dict(zip(files, distinct_paths([Path(file) for file in files]), strict=True))
+    return " ".join([command, shlex.join(names.get(word, word) for word in told)]).strip()
 
 
 def given_options(args: Any, leave_out: Sequence[str] = ()) -> list[str]:  # noqa: ANN401 - any dataclass

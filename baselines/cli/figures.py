@@ -6,6 +6,7 @@ import io
 from typing import Any
 
 from matplotlib.figure import Figure
+from PIL import Image
 
 from entropy_explore_env.reports.colours import robot_colour
 from entropy_explore_env.settings import Grid
@@ -18,11 +19,17 @@ STYLE: Any = {"font.size": 9, "axes.spines.top": False, "axes.spines.right": Fal
 """Of all figures: matplotlib's settings."""
 
 
+_PALETTE = 256
+"""Colours of a PNG: files are a third as large, and look the same."""
+
+
 def png(figure: Figure, dots_per_inch: int = 110) -> bytes:
-    """The figure as the bytes of a PNG file, the same bytes for the same figure."""
-    buffer = io.BytesIO()
-    figure.savefig(buffer, format="png", dpi=dots_per_inch, metadata={"Software": None})
-    return buffer.getvalue()
+    """Return the figure as a PNG file, the same bytes for the same figure."""
+    drawn, packed = io.BytesIO(), io.BytesIO()
+    figure.savefig(drawn, format="png", dpi=dots_per_inch, metadata={"Software": None})
+    picture = Image.open(drawn).convert("RGB").quantize(_PALETTE, dither=Image.Dither.NONE)
+    picture.save(packed, format="png", optimize=True)
+    return packed.getvalue()
 
 
 def extent_of(grid: Grid) -> tuple[float, float, float, float]:

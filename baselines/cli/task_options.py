@@ -1,8 +1,8 @@
 """The task on a command line: one definition of the options for commands that run missions.
 
 A scenario, a named one or a file of settings, and what is changed of it: worlds, starts, robots, sensor,
-channel, fiducials, ending. Options that are not given have the scenario's own values, which the help shows;
-a command with several scenarios reads its words once for each of them.
+channel, fiducials, ending. A command parses its words once; options that they do not give have the values of
+each scenario that it runs, whatever default the help shows.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Literal, NamedTuple, Protocol, TypeVar
 
-from baselines.cli.arguments import OmitArgPrefixes, parse
+from baselines.cli.arguments import OmitArgPrefixes
 from baselines.cli.start_options import given_json, reset_options
 from baselines.cli.world_options import Reading, world_settings
 from baselines.experiments.mission import Surroundings
@@ -27,18 +27,12 @@ from entropy_explore_env.localization_settings import Fiducials
 from entropy_explore_env.scenario import Scenario, with_settings
 from entropy_explore_env.scenarios import ROOM, SCENARIOS, find_scenario
 from entropy_explore_env.settings import Ending, RangeSensor, Robot, RobotKind
-from entropy_explore_env.settings_json import dataclass_of, json_of, scenario_of, settings_of
-from entropy_explore_env.worlds.given import distinct_paths
+from entropy_explore_env.settings_json import dataclass_of, scenario_of, settings_of
 
 _WHOLE = ("name", "grid")
 """Settings of a file that is a scenario of its own, and no change of a named one."""
 _WITHIN = ("settings", "scenario")
 """Where mission.json and policy.json hold a scenario."""
-_HELP = ("-h", "--help")
-_FILES = ("world", "settings", "starts", "extra_kinds")
-"""Options that name files; all but the first may be texts of JSON instead."""
-_OF_THE_PROCESS = ("read_memory_mib",)
-"""Options that change no mission."""
 
 
 @dataclass
@@ -76,16 +70,17 @@ class TaskOptions:
     """Short for --ending.time-limit-s."""
 
 
-def named_in(word: str) -> str | None:
-    """The option of a task that a word of a command line gives, without the fields of a part; None = none.
+def given_in(words: Sequence[str]) -> list[str]:
+    """Return the names of the options that a command line gives, in order, such as `channel.burst`."""
+    options = (word[2:].split("=")[0] for word in words if word.startswith("--"))
+    return [option.replace("-", "_") for option in options]
 
-    Args:
-        word: Such as `--channel.burst`, `--time-limit-s=60` or `--no-negate`.
-    """
-    names = [each.name for kind in (TaskOptions, Reading) for each in dataclasses.fields(kind)]
-    name = word.removeprefix("--").split("=")[0].split(".")[0].replace("-", "_")
-    known = [each for each in names if each != "world_file" and name in (each, f"no_{each}")]
-    return known[0] if word.startswith("--") and known else None
+
+def is_of_task(option: str) -> bool:
+    """Return whether an option of a command line, as `given_in` has it, is one of a task."""
+    names = {each.name for kind in (TaskOptions, Reading) for each in dataclasses.fields(kind)}
+    first = option.split(".")[0]
+    return first in names or first.removeprefix("no_") in names
 
 
 class TaskArguments(Protocol):
@@ -185,40 +180,52 @@ def _merged(settings: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str
     return merged
 
 
-def first_parsed(
-    kind: type[Arguments], words: Sequence[str], description: str | None, default: Arguments | None = None
-) -> Arguments:
-    """A command's arguments before its scenario is known, of which `parsed_for` then says what is not given.
-
-    Args:
-        kind: The dataclass of arguments.
-        words: Of the command line; that help is asked for is left for `parsed_for`, which knows the defaults.
-        description: The first line of the help.
-        default: See `parse`.
-
-    Raises:
-        UsageError: The words do not fit.
-    """
-    return parse(kind, [word for word in words if word not in _HELP], default, description)
-
-
-def parsed_for(
-    task: BaseTask, default: Arguments, words: Sequence[str], description: str | None, **more: object
-) -> Arguments:
-    """A command's arguments where what is not given is the task's own.
+def parsed_for(task: BaseTask, args: Arguments, words: Sequence[str], **more: object) -> Arguments:
+    """Return a command's arguments where what is not given is the task's own.
 
     Args:
         task: The task.
-        default: The command's arguments as already parsed or by default; its `task` is replaced.
-        words: Of the command line.
-        description: The first line of the help.
+        args: As they were parsed, of whatever task; its `task` is replaced.
+        words: The command line.
         **more: Further fields whose defaults the task says.
+    """
+    options, given = options_for(task, args.task, words), given_in(words)
+    others = {name: value for name, value in more.items() if name not in given}
+    return dataclasses.replace(args, task=options, **others)  # type: ignore[type-var]
+
+
+def options_for(task: BaseTask, options: TaskOptions, words: Sequence[str]) -> TaskOptions:
+    """Return a task's own options, changed where a command line says so.
+
+    Args:
+        task: The task.
+        options: As they were parsed, of whatever task.
+        words: The command line.
 
     Raises:
-        UsageError: The words do not fit.
+        SettingError: An option is not allowed in this task.
     """
-    start: Any = dataclasses.replace(default, task=task.defaults(default.task.settings), **more)  # type: ignore[type-var]
-    return parse(type(default), words, default=start, description=description)
+    reading = {each.name for each in dataclasses.fields(Reading)}
+    given: dict[str, Any] = {}
+    for name in filter(is_of_task, given_in(words)):
+        path = name.split(".")
+        path = ["world_file", *path] if path[0].removeprefix("no_") in reading else path
+        inner = given
+        for part in path[:-1]:
+            inner = inner.setdefault(part, {})
+        inner[path[-1]] = None
+    return _overlaid(task.defaults(options.settings), options, given)
+
+
+def _overlaid(base: Any, options: Any, given: Mapping[str, Any]) -> Any:  # noqa: ANN401 - any dataclass
+    """Return a dataclass with some fields of another one, all changed at once."""
+    changes = {}
+    for part, inner in given.items():
+        name = part if hasattr(options, part) else part.removeprefix("no_")
+        own, other = getattr(base, name), getattr(options, name)
+        within = inner and dataclasses.is_dataclass(own)
+        changes[name] = _overlaid(own, other, inner) if within else other
+    return dataclasses.replace(base, **changes)
 
 
 def tasked(
@@ -307,61 +314,3 @@ def absolute_files(files: Iterable[str]) -> tuple[str, ...]:
     """World files as absolute paths; a name that is no file stays."""
     paths = ((file, Path(file).expanduser()) for file in files)
     return tuple(str(path.absolute()) if path.is_file() else file for file, path in paths)
-
-
-def first_change(options: TaskOptions) -> tuple[str, object] | None:
-    """An option of a task that is not as it is where nothing is given, and its value; None = all are."""
-    changes = _changes(json_of(TaskOptions()), json_of(options))
-    return next(iter(changes.items()), None)
-
-
-def words_of(options: TaskOptions, task: BaseTask) -> dict[str, list[str]]:
-    """Options that differ from a task's own: name → words of a command line; of files, what tells them apart.
-
-    Args:
-        options: Of the command.
-        task: What they change.
-    """
-    words: dict[str, list[str]] = {}
-    for name, value in _changes(json_of(task.defaults()), json_of(options)).items():
-        if name in _OF_THE_PROCESS:
-            continue
-        option = name.replace("_", "-")
-        if isinstance(value, bool):
-            front, dot, last = option.rpartition(".")
-            words[name] = [f"--{front}{dot}{'' if value else 'no-'}{last}"]
-            continue
-        if name in _FILES:
-            value = files_told_apart([value] if isinstance(value, str) else value)
-        words[name] = [f"--{option}", *map(_word, _flattened(value))]
-    return words
-
-
-def _flattened(value: object) -> list[object]:
-    """The numbers and texts of a value, lists of lists of them one after the other."""
-    return [each for part in value for each in _flattened(part)] if isinstance(value, list) else [value]
-
-
-def _word(value: object) -> str:
-    """A value as one types it."""
-    short = f"{value:g}" if isinstance(value, float) else str(value)
-    return short if not isinstance(value, float) or float(short) == value else repr(value)
-
-
-def files_told_apart(given: Sequence[str]) -> list[str]:
-    """The names of files, with as many of their folders as tell them apart; texts of JSON as they are."""
-    files = [each for each in given if not each.lstrip().startswith(("{", "["))]
-    names = dict(zip(files, distinct_paths([Path(file) for file in files]), strict=True))
-    return [names.get(each, each) for each in given]
-
-
-def _changes(before: Mapping[str, Any], after: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
-    """The options that differ, by their names on the command line."""
-    changes: dict[str, Any] = {}
-    for name, value in after.items():
-        if isinstance(value, Mapping):
-            inside = prefix if name == "world_file" else f"{prefix}{name}."
-            changes |= _changes(before[name], value, inside)
-        elif value != before[name]:
-            changes[prefix + name] = value
-    return changes

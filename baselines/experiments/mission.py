@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,7 +14,7 @@ import numpy as np
 
 from baselines.experiments.outcome import Record
 from baselines.strategies import make_strategy
-from baselines.strategies.protocol import Strategy, choose_all
+from baselines.strategies.protocol import Stopwatch, Strategy, choose_all
 from entropy_explore_env.decision_settings import Observation
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.missions.view import RobotView
@@ -26,6 +27,8 @@ NOTHING_OBSERVED = Observation(panorama=False, self_state=False, team=False)
 """Strategies read RobotViews: an observation for networks would cost time for nothing."""
 
 _SERIES_POINTS = 200
+_DIGITS = 7
+"""Significant digits of figures: archives of thousands of missions hold no noise."""
 
 
 @dataclass(frozen=True)
@@ -226,3 +229,43 @@ def _mean_distance_apart_m(places_m: np.ndarray) -> float:
     moments, robots, _ = places_m.shape
     distances_m = np.linalg.norm(places_m[:, :, None] - places_m[:, None], axis=-1)
     return float(distances_m.sum() / max(moments * robots * (robots - 1), 1))
+
+
+@dataclass(frozen=True)
+class SuiteMission:
+    """Runs a mission and says what is kept of it.
+
+    Attributes:
+        start: x, y, z, yaw, pitch of the one robot, metres and radians, map frame; None = drawn.
+    """
+
+    start: tuple[float, float, float, float, float] | None = None
+
+    def __call__(self, env: EntropyExploreEnv, strategy: str, seed: int) -> Record:
+        """Run a mission and keep its figures, and what it cost on the clock.
+
+        Returns:
+            `mission_figures` with `scans_over_floor`, without those of single robots, rounded; and `clock`:
+            `decision_ms` and `worst_decision_ms`, the time that the strategy took for one robot (median and
+            largest, the first decision left out, since it may compile), and `mission_s`.
+        """
+        timed, started = Stopwatch(make_strategy(strategy), time.perf_counter), time.perf_counter()
+        options = None if self.start is None else {"starts": [self.start]}
+        run_mission(env, timed, seed, options=options)
+        mission_s = time.perf_counter() - started
+        figures = mission_figures(env.missions, 0, floor=True)
+        del figures["per_robot"]
+        spent_ms = timed.decisions_ms[1:] or timed.decisions_ms
+        clock = {
+            "decision_ms": float(np.median(spent_ms)),
+            "worst_decision_ms": max(spent_ms),
+            "mission_s": mission_s,
+        }
+        return rounded({**figures, "clock": clock})
+
+
+def rounded(figures: Any) -> Any:  # noqa: ANN401 - a number, text or object of JSON
+    """Return figures with all floats at a few significant digits."""
+    if isinstance(figures, dict):
+        return {name: rounded(value) for name, value in figures.items()}
+    return float(f"{figures:.{_DIGITS}g}") if isinstance(figures, float) else figures

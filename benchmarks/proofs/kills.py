@@ -12,7 +12,6 @@ import json
 import lzma
 import os
 import random
-import re
 import signal
 import tempfile
 import time
@@ -21,8 +20,6 @@ from contextlib import redirect_stderr, redirect_stdout
 from functools import cache
 from pathlib import Path
 
-from baselines.experiments.confirmation import CLOCK
-from baselines.scoreboard.page import ARCHIVE
 from benchmarks.proofs.cases import BrokenPromiseError, Found
 
 KILLS = 10
@@ -31,8 +28,6 @@ _SWEEP = ("--scenarios", "box-7x11x5", "--robots", "1,2", "--time-limit-s", "150
 _WORDS = (*_SWEEP, "--strategies", "gradient", "--seeds", "6", "--jobs", "1")
 _MISSIONS = 24
 """Two strategies (the baseline is added), two team sizes, six seeds."""
-_MILLISECONDS = re.compile(rb"\| [0-9.,-]+ \| [0-9.,-]+ \|$", re.MULTILINE)
-"""The last two columns of the page's tables."""
 _WAIT_S = 300.0
 
 
@@ -87,8 +82,9 @@ def _sweep(folder: Path) -> None:
         raise BrokenPromiseError(f"the sweep ended with exit code {code}")
 
 
-def _missions(folder: Path) -> list[Path]:
-    return list(folder.rglob("seed-*.json"))
+def _missions(folder: Path) -> list[bytes]:
+    """Return the whole rows of the tables that grow."""
+    return [row for table in folder.rglob("*.jsonl") for row in table.read_bytes().split(b"\n")[:-1]]
 
 
 def contents(folder: Path) -> dict[str, bytes]:
@@ -96,18 +92,17 @@ def contents(folder: Path) -> dict[str, bytes]:
     return {
         str(path.relative_to(folder)): _without_clock(path)
         for path in sorted(folder.rglob("*"))
-        if path.is_file() and "runs" not in path.parts and path.name[0] != "." and path.name != "timing.csv"
+        if path.is_file() and "runs" not in path.parts and path.name[0] != "."
     }
 
 
 def _without_clock(path: Path) -> bytes:
-    """The content of a file without seconds on the clock, and without checksums of them."""
-    if path.name != ARCHIVE:
-        return _MILLISECONDS.sub(b"|", path.read_bytes())
+    """Return the content of a file without seconds on the clock."""
+    if path.suffix != ".xz":
+        return path.read_bytes()
     missions = [json.loads(line) for line in lzma.decompress(path.read_bytes()).splitlines()]
     for mission in missions:
-        mission["record"].pop(CLOCK, None)  # failures have none
-        del mission["checksum"]
+        mission["record"].pop("clock", None)  # what failed has none
     return json.dumps(missions).encode()
 
 

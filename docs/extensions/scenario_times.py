@@ -1,11 +1,17 @@
-"""How long strategies take in a scenario, by the tables of results that lie in `docs/results`."""
+"""How long strategies take in a scenario, by the archives of missions in `docs/results`."""
 
 from __future__ import annotations
 
-import csv
+from functools import lru_cache
 from pathlib import Path
 from typing import NamedTuple
 
+from baselines.experiments.rows import read_table
+from baselines.experiments.statistics import median_interval
+from baselines.suites import find_suite
+from baselines.suites.page import archive_of
+from baselines.suites.results import Results, results_of
+from baselines.suites.suite import TIME, TIME_99
 from entropy_explore_env.scenario import Scenario
 
 
@@ -14,8 +20,8 @@ class Time(NamedTuple):
 
     task: str
     strategy: str
-    missions: str
-    finished: str
+    missions: int
+    finished: int
     seconds: str
     page: str
 
@@ -25,7 +31,7 @@ def times_table(scenario: Scenario, results: Path) -> str:
 
     Args:
         scenario: One of the named scenarios.
-        results: The folder with the pages of results and their tables.
+        results: The folder with the pages of results and their archives.
     """
     times = scoreboard_times(scenario.name, results)
     if not times:
@@ -40,39 +46,30 @@ def times_table(scenario: Scenario, results: Path) -> str:
 
 
 SUITES = {
-    "plans": ("time_s_99_seen", " (to 99 % seen)"),
-    "volumes": ("time_s_end", ""),
-    "others": ("time_s_end", ""),
+    "plans": (TIME_99, " (to 99 % seen)"),
+    "volumes": (TIME, ""),
+    "others": (TIME, ""),
 }
-"""Suite → its column of times, and what is said of them; teams and channels stand on the page alone."""
+"""Suite → the time that is shown, and what is said of it; teams and channels stand on the page alone."""
 
 
 def scoreboard_times(scenario: str, results: Path) -> list[Time]:
-    """Rows of `scoreboard/SUITE/tasks.csv` of this scenario: tasks `office`, or `office, 3 robots`."""
+    """Return the times in tasks of this scenario: `office`, or `office, 3 robots`."""
     times = []
-    for suite, (column, words) in SUITES.items():
-        for row in _rows(results / "scoreboard" / suite / "tasks.csv"):
-            name, _, team = row["task"].partition(", ")
-            if name == scenario:
-                seconds = _interval(*(row.get(column + end) for end in ("", "_low", "_high")))
-                who = (team or "1 robot") + words
-                times.append(
-                    Time(who, row["strategy"], row["missions"], row["finished"], seconds, "scoreboard")
-                )
+    for suite, (measure, words) in SUITES.items():
+        found = suite_results(suite, archive_of(results, suite))
+        for task in found.tasks:
+            name, _, team = task.name.partition(", ")
+            for strategy in found.suite.strategies if name == scenario else ():
+                if records := found.of(task, strategy):
+                    finished = sum(record.get("finished", False) for record in records)
+                    seconds = median_interval(found.values(task, strategy, measure)).text(",.0f")
+                    who = (team or "1 robot") + words
+                    times.append(Time(who, strategy, len(records), finished, seconds, "scoreboard"))
     return times
 
 
-def _rows(path: Path) -> list[dict[str, str]]:
-    """The rows of a table; none where there is no such file."""
-    if not path.exists():
-        return []
-    with path.open(encoding="utf-8", newline="") as file:
-        return list(csv.DictReader(file))
-
-
-def _interval(middle: str | None, low: str | None, high: str | None) -> str:
-    """`33 (31 … 35)`."""
-    if not middle:
-        return "-"
-    text = f"{float(middle):,.0f}"
-    return f"{text} ({float(low):,.0f} … {float(high):,.0f})" if low and high else text
+@lru_cache(maxsize=len(SUITES))
+def suite_results(suite: str, archive: Path) -> Results:
+    """Return what the missions of an archive came to; those of no missions where there is none."""
+    return results_of(find_suite(suite), read_table(archive))[0]

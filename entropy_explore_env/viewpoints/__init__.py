@@ -1,1 +1,1 @@
-"""What scans from viewpoints should bring, and how soon: by a robot's own belief."""
+"""Drawing candidate viewpoints, and what scans from them should bring: by a robot's own belief."""

@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from baselines.cli.arguments import parse
-from baselines.cli.task_options import TaskOptions, base_task, first_change, settled, tasked, words_of
+from baselines.cli.arguments import parse, told_command
+from baselines.cli.task_options import TaskOptions, base_task, options_for, settled, tasked
 from baselines.experiments.mission import Surroundings, run_mission, scripted_env
 from baselines.strategies import make_strategy
 from entropy_explore_env.errors import SettingError
@@ -123,19 +123,36 @@ def test_options_are_settled_so_that_they_are_the_same_everywhere(plans, tmp_pat
     assert settled(there) == there
 
 
-def test_what_differs_from_the_scenario_is_told_as_words_that_say_it_again(plans):
-    task = base_task("office")
-    words = "--robot.redecide on_scan --channel.no-announcements --ending.time-limit-s 0.1 --split test"
+def test_what_is_given_changes_each_scenario_and_the_rest_is_its_own(plans):
+    words = "--robot.redecide on_scan --channel.no-announcements --ending.time-limit-s=0.1 --split test"
     words += " --robot.localization.yaw-rad-per-sqrt-m 0.01 --fiducials.positions-m 1 2 0.5 3 2 0.5"
-    words = [*words.split(), "--world", *plans, "--height-m", "2.5", "--read-memory-mib", "600"]
-    given = parse(TaskOptions, words, default=task.defaults())
-    told = [word for option in words_of(given, task).values() for word in option]
-    assert "--read-memory-mib" not in told  # changes no mission
-    again = parse(TaskOptions, told, default=task.defaults())
-    of_names = dataclasses.replace(given.world_file, read_memory_mib=None)
-    assert again == dataclasses.replace(given, world=("a/plan.png", "b/plan.png"), world_file=of_names)
-    assert words_of(task.defaults(), task) == {} and first_change(TaskOptions()) is None
-    assert first_change(TaskOptions(start_radius_m=1.5)) == ("start_radius_m", 1.5)
+    words = [*words.split(), "--world", *plans, "--height-m", "2.5", "--seeds", "3"]
+    parsed = parse(TaskOptions, words[:-2])
+    for name in ("office", "cave"):
+        own = base_task(name).defaults()
+        given = options_for(base_task(name), parsed, words)
+        assert given.robot == dataclasses.replace(
+            own.robot, redecide="on_scan", localization=given.robot.localization
+        )
+        assert given.robot.localization.yaw_rad_per_sqrt_m == 0.01
+        assert given.channel == dataclasses.replace(own.channel, announcements=False)
+        assert given.ending == dataclasses.replace(own.ending, time_limit_s=0.1)
+        assert (given.split, given.world, given.world_file.height_m) == ("test", tuple(plans), 2.5)
+        assert given.sensor == own.sensor and given.start_radius_m == own.start_radius_m
+    assert options_for(base_task("office"), TaskOptions(), []) == base_task("office").defaults()
+
+
+def test_an_option_that_is_given_as_the_default_counts():
+    parsed = parse(TaskOptions, ["--robot.reach-m", "0.5"])
+    assert parsed == TaskOptions()  # the room's
+    given = options_for(base_task("office"), parsed, ["--robot.reach-m", "0.5"])
+    assert given.robot.reach_m == 0.5 != base_task("office").scenario.robot.reach_m
+
+
+def test_a_page_tells_the_words_without_folders(plans, tmp_path):
+    words = ["room", "--world", *plans, "--out", str(tmp_path), "--json", "--settings", '{"robots": 2}']
+    told = "python -m a room --world a/plan.png b/plan.png --settings '{\"robots\": 2}'"
+    assert told_command("python -m a", words, ("--out", "--json")) == told
 
 
 FLAG = re.compile(r"^[│ ]+(--[a-z][a-z0-9.-]+)((?: [A-Z{\[][^\s│]*)*)", re.MULTILINE)
@@ -144,7 +161,6 @@ FLAG = re.compile(r"^[│ ]+(--[a-z][a-z0-9.-]+)((?: [A-Z{\[][^\s│]*)*)", re.M
 COMMANDS = (
     "baselines.run",
     "baselines.benchmark",
-    "baselines.world_sweep",
     "training.ppo",
     "training.evaluate",
     "training.rllib_ppo",
@@ -166,7 +182,7 @@ def flags_of(command, *words):
 def flags_of_tasks():
     said = io.StringIO()
     with contextlib.redirect_stdout(said), pytest.raises(SystemExit):
-        parse(TaskOptions, ["--help"], default=base_task("room").defaults())
+        parse(TaskOptions, ["--help"])
     return flags_in(said.getvalue())
 
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from baselines.experiments.mission import run_mission, scripted
-from baselines.resilience.sweep import STRATEGIES
 from baselines.strategies import make_strategy
+from baselines.suites.faults import STRATEGIES
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.missions.state import MissionEnd
 from entropy_explore_env.scenario import with_settings

@@ -13,11 +13,11 @@ import numpy as np
 import pytest
 
 from baselines.experiments.mission import run_mission, scripted
-from baselines.scoreboard.suites import WORLDS
 from baselines.strategies import STRATEGIES, make_strategy
 from baselines.strategies.metrics import Coordinated, ExplorationConfig, Nearest
 from baselines.strategies.protocol import Strategy
 from baselines.strategies.rules.per_time_visibility import PerTimeVisibility
+from baselines.suites.bundled_worlds import WORLDS
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.robots.motion import MoveEnd
 from entropy_explore_env.scenario import Scenario, with_settings

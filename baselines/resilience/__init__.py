@@ -1,1 +1,0 @@
-"""The experiment of `python -m baselines.resilience`: teams whose robots and messages fail."""

@@ -1,1 +1,0 @@
-"""Strategies head to head, run by `python -m baselines.benchmark`: cells, rows, figures, page."""

@@ -1,0 +1,229 @@
+"""Pages of suites, from Jinja2 templates: a table over all tasks, a figure, an archive of all missions."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from baselines.experiments.claims import Claim
+from baselines.experiments.page import Page
+from baselines.experiments.rows import Row as KeptRow
+from baselines.experiments.rows import origins_line, read_table, write_table
+from baselines.experiments.statistics import Interval
+from baselines.experiments.tables import markdown_table
+from baselines.suites import SCOREBOARD, find_suite
+from baselines.suites.faults import CONDITIONS, LOST_ISOLATED, NOTHING_FAILS, Times, all_claims
+from baselines.suites.figures import fault_figure, task_figure
+from baselines.suites.results import Results, Row, failed_rows, overall_rows, results_of, task_rows
+from baselines.suites.suite import Measure, Task
+
+_TEMPLATES = Path(__file__).parent
+
+
+def page_of(suite: str) -> str:
+    """Return the name of the page on which a suite stands, and of the folder beside it."""
+    return "scoreboard" if suite in SCOREBOARD else suite
+
+
+def archive_of(folder: Path, suite: str) -> Path:
+    """Return where all missions of a suite lie: in a folder beside its page."""
+    return folder / page_of(suite) / f"{suite}.jsonl.xz"
+
+
+def write_page(
+    folder: Path, results: Results, rows: Sequence[KeptRow], command: str, refused: Sequence[str] = ()
+) -> Path:
+    """Write the archive of a suite, and the page on which it stands.
+
+    Args:
+        folder: For the page.
+        results: What the missions came to.
+        rows: Of all missions.
+        command: What makes the same page again.
+        refused: Why world files are refused.
+
+    Returns:
+        Path of the page.
+    """
+    name = results.suite.name
+    archive_of(folder, name).parent.mkdir(parents=True, exist_ok=True)
+    write_table(archive_of(folder, name), rows)
+    texts = {"command": command, "refused": refused}
+    if name in SCOREBOARD:
+        read = {each: read_table(archive_of(folder, each)) for each in SCOREBOARD}
+        found = {each: results_of(find_suite(each), kept) for each, kept in read.items() if kept}
+        figures = {each: partial(task_figure, part[0]) for each, part in found.items()}
+        tables = {each: partial(overall_table, part[0]) for each, part in found.items()}
+        texts |= {"parts": [part_texts(*part) for part in found.values()]}
+    elif name == "faults":
+        times = Times(results.suite, results.records)
+        claims = all_claims(times)
+        figures = {"faults": partial(fault_figure, times)}
+        tables = {"ratios": partial(ratios_table, times), "judged": partial(judged_table, times, claims)}
+        texts |= {
+            **part_texts(results, rows),
+            "nothing_breaks": claims[0],
+            "held": f"{sum(claim.holds for claim in claims)} of {len(claims)} hold",
+            "cut": sum(not record.get("finished", False) for record in times.all_records()),
+            "seeds": max(map(len, results.records.values())),
+        }
+    else:
+        figures = {"tasks": partial(task_figure, results)}
+        tables = {"overall": partial(overall_table, results), "tasks": partial(tasks_table, results)}
+        texts |= {**part_texts(results, rows), "failed": failed_table(results)}
+    page = Page(_TEMPLATES / f"{page_of(name)}.md.j2", figures, tables, texts=texts)
+    return page.write(folder, page_of(name))
+
+
+def part_texts(results: Results, rows: Sequence[KeptRow]) -> dict[str, Any]:
+    """Return what a template says of a suite."""
+    return {
+        "name": results.suite.name,
+        "title": results.suite.title,
+        "missions": len(rows),
+        "rows": origins_line(rows),
+        "absent": [name for name in results.suite.strategies if name not in results.ran],
+    }
+
+
+def overall_table(results: Results) -> str:
+    """Return the table over all tasks: a row a strategy, best first."""
+    measures = results.suite.measures
+    head = ["strategy", "tasks", "missions", "finished"]
+    head += [f"{measure.words}, over `{results.reference}`" for measure in measures]
+    rows = [
+        [
+            f"`{row['strategy']}`",
+            row["tasks"],
+            row["missions"],
+            "-" if row["finished"] is None else f"{row['finished']:.0%}",
+            *(shown(row[f"{measure.name}_ratio"], ".2f") for measure in measures),
+        ]
+        for row in overall_rows(results)
+    ]
+    return markdown_table(head, rows)
+
+
+_TASK_COLUMNS = {
+    "scans": ("scans", ",.0f"),
+    "distance_m": ("driven (m)", ",.0f"),
+    "explored": ("explored", ".1%"),
+    "map_error": ("map error", ".3f"),
+}
+"""Figure of a task → head of its column, and format."""
+
+
+def tasks_table(results: Results) -> str:
+    """Return the table of tasks: of each what it is, and a row a strategy with medians over missions."""
+    measures = results.suite.measures
+    head = ["strategy", "finished", *(measure.words for measure in measures), f"over `{results.reference}`"]
+    head += [words for words, _ in _TASK_COLUMNS.values()]
+    first, parts = measures[0].name, []
+    for task in results.tasks:
+        rows = sorted(
+            (row for row in task_rows(results) if row["task"] == task.name), key=lambda row: row[first]
+        )
+        cells = [_task_cells(row, measures) for row in rows]
+        parts.append(f"**{task.name}**: {about(task)}\n\n{markdown_table(head, cells)}")
+    return "\n".join(parts)
+
+
+def _task_cells(row: Row, measures: Sequence[Measure]) -> list[str]:
+    finished = f"{row['finished']} of {row['missions']}" + (
+        f", {row['failed']} failed" if row["failed"] else ""
+    )
+    cells = [f"`{row['strategy']}`", finished]
+    for measure in measures:
+        limit = row[f"{measure.name}_limit"]
+        cut = row[measure.name].value >= limit
+        cells.append(f"> {limit:,.0f}" if cut else shown(row[measure.name], ",.0f"))
+    cells.append(shown(row[f"{measures[0].name}_ratio"], ".2f"))
+    figures = ((row[name], form) for name, (_, form) in _TASK_COLUMNS.items())
+    return cells + ["-" if value is None else format(value, form) for value, form in figures]
+
+
+def shown(interval: Interval | None, form: str) -> str:
+    """Return a figure and its interval; without one that has no width, as of a reference over itself."""
+    if interval is None:
+        return "-"
+    return format(interval.value if interval.low == interval.high else interval, form)
+
+
+def failed_table(results: Results) -> str:
+    """Return a table of missions that failed, a row for each strategy and reason; empty if none did."""
+    alike: dict[tuple[str, str], list[str]] = {}
+    for row in failed_rows(results):
+        missions = f"{row['task']}: {', '.join(map(str, row['missions']))}"
+        alike.setdefault((row["strategy"], row["reason"]), []).append(missions)
+    rows = [[f"`{name}`", "; ".join(where), _plain(reason)] for (name, reason), where in alike.items()]
+    return markdown_table(["strategy", "tasks and missions", "reason"], rows) if rows else ""
+
+
+def _plain(text: str) -> str:
+    """Return a text that Markdown shows as it is."""
+    return "".join(f"\\{sign}" if sign in r"\`*_{}[]<>()#!|~" else sign for sign in text)
+
+
+def about(task: Task) -> str:
+    """Return what kind of missions a task has."""
+    scenario = task.scenario
+    grid, around = scenario.grid, task.places[0].surroundings
+    files = [Path(scenario.world)] if around is None or not around.worlds else around.files()
+    shape = " × ".join(map(str, grid.shape if not grid.flat else grid.shape[:2]))
+    moving = ["ground" if kind.robot.motion == "planar" else "flying" for kind in scenario.kinds]
+    kind = " and ".join(dict.fromkeys(moving))
+    worlds = f"{len(task.places)} worlds" if len(task.places) > 1 else f"world `{scenario.world}`"
+    if files[0].is_file() and len(task.places) == 1:
+        names = [f"`{name}`" for name in dict.fromkeys(file.name for file in files)]
+        worlds = f"world file{'s' if len(names) > 1 else ''} {', '.join(names)}"
+    team = f"{scenario.robots} {kind} robot" + ("s" if scenario.robots > 1 else "")
+    sensor = scenario.sensor
+    if math.isfinite(sensor.scan_every_m):
+        team += f" that scans {sensor.rays} rays of {sensor.max_range_m:g} m every {sensor.scan_every_m:g} m"
+    return (
+        f"{task.missions} starts, {worlds}, {shape} voxels of {grid.voxel_size_m:g} m, {team}, "
+        f"time limit {scenario.ending.time_limit_s:,.0f} s."
+    )
+
+
+def ratios_table(times: Times) -> str:
+    """Return what faults cost: mean times over those without faults."""
+    conditions = [name for name in CONDITIONS if name not in (NOTHING_FAILS, LOST_ISOLATED)]
+    rows = [
+        [f"`{strategy}`", f"{team[0]}, {team[1]}", *_ratio_cells(times, team, strategy)]
+        for team in times.teams
+        for strategy in times.strategies
+        if times.records(*team, strategy, NOTHING_FAILS)
+    ]
+    return markdown_table(["strategy", "team", *conditions], rows)
+
+
+def judged_table(times: Times, claims: Sequence[Claim]) -> str:
+    """Return what teams are held to: a row for each strategy and team."""
+    judged, rows = {claim.id: claim for claim in claims}, []
+    for team in times.teams:
+        for strategy in times.strategies:
+            cells = [f"`{strategy}`", f"{team[0]}, {team[1]}"]
+            for kind in ("isolated", "lost"):
+                claim = judged[f"{kind}-{team[0]}-{team[1]}-{strategy}"]
+                value = (
+                    "-" if claim.ours is None else f"{claim.ours:.2f} ({claim.low:.2f} … {claim.high:.2f})"
+                )
+                cells += [value, "yes" if claim.holds else "**no**"]
+            rows.append(cells)
+    head = ["strategy", "team", "over isolation, worst", "holds", "one lost", "holds"]
+    return markdown_table(head, rows)
+
+
+def _ratio_cells(times: Times, team: tuple[str, int], strategy: str) -> list[str]:
+    """Return mean time over that without faults, under each condition; > where missions were cut off."""
+    cells = []
+    for name in CONDITIONS:
+        if name not in (NOTHING_FAILS, LOST_ISOLATED):
+            ratio = times.ratio(*team, strategy, name, NOTHING_FAILS)
+            bound = "> " if times.cut_off(*team, strategy, name) else ""
+            cells.append("-" if ratio is None else f"{bound}{ratio.value:.2f}")
+    return cells

@@ -1,0 +1,154 @@
+"""The suites: worlds, starts and seeds that stay as they are."""
+
+from __future__ import annotations
+
+import hashlib
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from baselines.suites import SCOREBOARD, SUITES, bundled_worlds, find_suite, plans
+from baselines.suites.bundled_worlds import WORLDS
+from baselines.suites.page import about
+from entropy_explore_env import load_world
+from entropy_explore_env.errors import SettingError
+from entropy_explore_env.scenarios import SCENARIOS
+
+TEAMS = ("random", "gradient")
+NAMES = {
+    "plans": ["dungeons", "office", "corridor", "cluttered", "hybrid", "depot", "warehouse", "willow"],
+    "volumes": [
+        f"{name}, {team}"
+        for name in ("room", "room-furnished", "office", "office-3d", "cave", "terrain", "geb079")
+        for team in ("1 robot", "3 robots")
+    ],
+    "teams": [
+        f"{name}, {team}"
+        for name in ("room-furnished", "office", "office-3d", "cave", "terrain", "warehouse")
+        for team in (
+            "1 robot",
+            "2 robots",
+            "4 robots",
+            "8 robots",
+            "4 robots, burst 64",
+            "4 robots, half of the messages lost",
+            "4 robots, in line of sight",
+        )
+    ],
+    "others": [
+        "box-7x11x5, 2 robots",
+        "lab, 2 robots",
+        "occlusions, 1 robot",
+        "cliff, 1 robot",
+        "bhattacharya-office, 5 robots",
+        "bhattacharya-cluttered, 4 robots",
+        "office-mixed, 3 robots",
+        "terrain-smooth, 3 robots",
+        "terrain-rough, 3 robots",
+    ],
+}
+
+
+@pytest.mark.parametrize("name", SCOREBOARD)
+def test_a_suite_is_pinned(name):
+    suite = find_suite(name, False, TEAMS)
+    assert [task.name for task in suite.tasks] == NAMES[name]
+    for task in suite.tasks:
+        assert task.missions == (100 if task.name == "dungeons" else 30)
+        assert task.scenario.track_truth
+        assert task.scenario.split == "test" or task.name == "dungeons"  # which has no split
+    ids = [cell.id for cell in suite.cells]
+    assert len(set(ids)) == len(ids) and all("," not in each and " " not in each for each in ids)
+
+
+def test_every_named_scenario_stands_in_a_suite():
+    there = {
+        task.name.partition(",")[0] for name in SCOREBOARD for task in find_suite(name, False, TEAMS).tasks
+    }
+    assert set(SCENARIOS) <= there
+
+
+def test_the_worlds_are_those_that_they_were():
+    digest = hashlib.sha256()
+    for path in sorted(WORLDS.rglob("*.npz")):
+        world = load_world(path)
+        digest.update(repr((path.relative_to(WORLDS).as_posix(), world.grid)).encode())
+        digest.update(np.packbits(world.occupied).tobytes())
+    digest.update((WORLDS / "starts.csv").read_bytes())
+    assert digest.hexdigest() == "51d9a6aa1c3dd334d6c5f6bbd321b90bb285c291445e1baeb6712078393672ac"
+
+
+def test_plans_replan_at_every_scan_until_everything_is_seen():
+    for task in find_suite("plans", False, TEAMS).tasks:
+        scenario = task.scenario
+        assert (scenario.robot.redecide, scenario.sensor.scan_every_m) == ("on_scan", plans.SCAN_EVERY_M)
+        assert (scenario.sensor.rays, scenario.sensor.max_range_m) == (720, 8.0)
+        if task.name == "dungeons":
+            assert scenario.ending.unseen_free_voxels == plans.DUNGEON_UNSEEN == 250
+            assert scenario.sensor.max_range_m == 80 * scenario.grid.voxel_size_m
+            assert scenario.robot.body_radius_m == 0.0
+        else:
+            assert scenario.ending.seen_share == 1.0
+
+
+def test_tables_say_with_what_plans_are_scanned():
+    plan, *_ = find_suite("plans", True, TEAMS).tasks
+    assert "1 ground robot that scans 720 rays of 8 m every 0.5 m, time limit" in about(plan)
+    _, team, *_ = find_suite("volumes", True, TEAMS).tasks
+    assert "3 flying robots, time limit" in about(team) and about(team).startswith("2 starts, world")
+    others = {task.name: about(task) for task in find_suite("others", False, TEAMS).tasks}
+    assert ", 1 ground robot, time limit" in others["cliff, 1 robot"]  # which looks down, and tilts
+    assert ", 3 ground and flying robots, time limit" in others["office-mixed, 3 robots"]
+
+
+def test_mission_k_of_every_task_comes_before_any_mission_k_plus_1():
+    """Each dungeon is a cell of its own; the others hold thirty starts."""
+    trials = find_suite("plans", False, TEAMS).trials
+    cells = {trial.cell for trial in trials[: 2 * len(NAMES["plans"])]}
+    assert {cell.split("/")[0] for cell in cells} == set(NAMES["plans"])
+    assert [trial.seed for trial in trials if trial.cell == "office/random"] == list(range(30))
+    dungeons = [trial.cell for trial in trials if trial.cell.startswith("dungeons/")]
+    assert dungeons[:3] == ["dungeons/1/random", "dungeons/1/gradient", "dungeons/2/random"]
+    assert len(trials) == 2 * (100 + 7 * 30)
+
+
+def test_dungeons_start_on_their_mark():
+    (dungeons,) = [task for task in find_suite("plans", False, TEAMS).tasks if task.name == "dungeons"]
+    for place in dungeons.places[:: len(dungeons.places) // 4]:
+        world, start = load_world(place.scenario.world), place.start
+        assert start is not None
+        x, y, z = world.grid.voxel_of(np.asarray(start[:3]))
+        assert not world.occupied[x, y, z]
+    assert len({place.scenario.world for place in dungeons.places}) == len(dungeons.places) == 100
+
+
+def test_teams_differ_in_their_channel_alone():
+    tasks = {task.name: task.scenario for task in find_suite("teams", True, TEAMS).tasks}
+    whole, narrow = tasks["office, 4 robots"], tasks["office, 4 robots, burst 64"]
+    lossy = tasks["office, 4 robots, half of the messages lost"]
+    assert whole.channel.burst >= whole.sensor.rays and whole.channel.i_min_bits == 0.0
+    assert (narrow.channel.burst, lossy.channel.loss_probability) == (64, 0.5)
+    hidden = tasks["office, 4 robots, in line of sight"].channel
+    assert (hidden.reach, hidden.burst, hidden.loss_probability) == (
+        "line_of_sight",
+        whole.channel.burst,
+        0.0,
+    )
+    assert whole.channel.reach != "line_of_sight"
+    assert lossy.channel.burst == whole.channel.burst and whole.channel.loss_probability == 0.0
+
+
+def test_unknown_suites_and_missing_worlds_are_named(monkeypatch):
+    with pytest.raises(SettingError, match=r"suite = .plan.: allowed is one of plans, volumes, teams"):
+        find_suite("plan", False, TEAMS)
+    monkeypatch.setattr(bundled_worlds, "WORLDS", Path("/nowhere"))
+    with pytest.raises(SettingError, match=r"suite world = '/nowhere/geb079.npz': allowed is there"):
+        find_suite("volumes", False, TEAMS)
+
+
+@pytest.mark.parametrize("name", SUITES)
+def test_a_quick_suite_is_a_part_of_the_whole(name):
+    whole, quick = (find_suite(name, few) for few in (False, True))
+    trials = {(trial.cell, trial.seed, str(trial.settings)) for trial in whole.trials}
+    assert {(trial.cell, trial.seed, str(trial.settings)) for trial in quick.trials} < trials
