@@ -116,13 +116,15 @@ def geotiff(
     scale: tuple[float, ...] = (1.0, 1.0, 0.0),
     tie: tuple[float, ...] = (0.0, 0.0, 0.0, 100.0, 200.0, 0.0),
     model: int = 1,
+    directory: tuple[int, ...] | None = None,
     **more: Any,  # noqa: ANN401 - options of tifffile
 ) -> bytes:
-    """A GeoTIFF of (rows, columns) heights."""
+    """A GeoTIFF of (rows, columns) heights; its tags of place, and its directory of keys, may be empty."""
     import tifffile
 
-    keys = (1, 1, 0, 1, 1024, 0, 1, model)
+    keys = (1, 1, 0, 1, 1024, 0, 1, model) if directory is None else directory
     tags = [(33550, "d", 3, scale, True), (33922, "d", 6, tie, True), (34735, "H", len(keys), keys, True)]
+    tags = [tag for tag in tags if tag[3]]
     tags += more.pop("tags", [])
     buffer = io.BytesIO()
     tifffile.imwrite(buffer, samples, extratags=tags, metadata=None, **more)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from benchmarks.proofs.world_samples import geotiff, heights, npz
-from entropy_explore_env.errors import SettingError, WorldError
+from entropy_explore_env.errors import SettingError, WorldError, WorldWarning
 from entropy_explore_env.worlds.files.elevation import columns, degrees_as_metres
 from entropy_explore_env.worlds.files.voxels import Options
 from entropy_explore_env.worlds.load import load_world
@@ -115,6 +115,121 @@ def test_geotiff_without_data_in_places_and_in_degrees(tmp_path):
     path.write_bytes(b"".join(degrees[i : i + 1] for i in range(len(degrees) // 2)))
     with pytest.raises(WorldError):
         load_world(path)
+
+
+@pytest.mark.parametrize(
+    ("text", "value"), [("-3.4028235e+38", -3.4028235e38), ("9999.9", 9999.9), ("nan", np.nan)]
+)
+def test_nodata_is_compared_in_the_rasters_type(tmp_path, text, value):
+    samples = heights()
+    samples[0, 0] = np.float32(value)
+    (tmp_path / "hills.tif").write_bytes(geotiff(samples, tags=[(42113, "s", 0, text, True)]))
+    world = load_world(tmp_path / "hills.tif")
+    assert world.grid.shape[2] < 20
+    assert world.unknown is not None and np.argwhere(world.unknown.any(axis=2)).tolist() == [[0, 10]]
+
+
+def test_nodata_without_text_is_none(tmp_path):
+    (tmp_path / "hills.tif").write_bytes(geotiff(heights(), tags=[(42113, "s", 0, " ", True)]))
+    assert load_world(tmp_path / "hills.tif").unknown is None
+
+
+def keyed(*entries, **more):
+    """A GeoTIFF of heights with these GeoKeys, (number, value) each."""
+    numbers = [1, 1, 0, 1 + len(entries), 1024, 0, 1, 1]
+    for key, value in entries:
+        numbers += [key, 0, 1, value]
+    return geotiff(heights(), directory=tuple(numbers), **more)
+
+
+FOOT, SURVEY_FOOT = 0.3048, 1200 / 3937
+
+
+@pytest.mark.parametrize(
+    ("entries", "across_m", "up_m"),
+    [
+        ([(3076, 9001), (4099, 9001)], 1.0, 1.0),
+        ([(3076, 9003)], SURVEY_FOOT, 1.0),
+        ([(3076, 9002), (4099, 9002)], FOOT, FOOT),
+        ([(4099, 9003)], 1.0, SURVEY_FOOT),
+        ([(3076, 9036)], 1000.0, 1.0),
+    ],
+)
+def test_feet_and_kilometres_become_metres(tmp_path, entries, across_m, up_m):
+    path = tmp_path / "hills.tif"
+    path.write_bytes(keyed(*entries))
+    world = load_world(path)
+    assert world.grid.voxel_size_m == pytest.approx(across_m)
+    assert world.grid.origin_m[:2] == pytest.approx((100 * across_m, 189 * across_m))
+    low = float(heights().min()) * up_m
+    assert world.grid.origin_m[2] == pytest.approx(low - across_m)
+
+
+def test_other_units_are_refused_by_name(tmp_path):
+    path = tmp_path / "hills.tif"
+    path.write_bytes(keyed((3076, 9005)))
+    with pytest.raises(WorldError, match=r"ProjLinearUnits are metres, .* not EPSG 9005"):
+        load_world(path)
+
+
+_ITEM = '<Item name="x" sample="0" role="{}">{}</Item>'
+GDAL = f"<GDALMetadata>{_ITEM}{_ITEM}</GDALMetadata>"
+
+
+def test_heights_are_scaled_and_offset_as_gdal_has_it(tmp_path):
+    path = tmp_path / "hills.tif"
+    counts = np.round(100 * (heights() - 10.0)).astype(np.int16)
+    metadata = (42112, "s", 0, GDAL.format("scale", "0.01", "offset", "10"), True)
+    path.write_bytes(geotiff(counts, tags=[metadata]))
+    world = load_world(path)
+    np.testing.assert_array_equal(world.occupied.sum(axis=2), expected(counts / 100 + 10.0, 1.0))
+    path.write_bytes(
+        geotiff(heights(), tags=[(42112, "s", 0, GDAL.format("unittype", "ftUS", "z", ""), True)])
+    )
+    assert load_world(path).grid.origin_m[2] == pytest.approx(float(heights().min()) * SURVEY_FOOT - 1.0)
+    path.write_bytes(
+        geotiff(heights(), tags=[(42112, "s", 0, GDAL.format("unittype", "fathom", "z", ""), True)])
+    )
+    with pytest.raises(WorldError, match="not in fathom"):
+        load_world(path)
+
+
+def test_tags_of_place_count_without_a_directory_of_keys(tmp_path):
+    path = tmp_path / "hills.tif"
+    path.write_bytes(geotiff(heights(), directory=()))
+    first = load_world(path)
+    assert first.grid.origin_m[:2] == (100.0, 189.0)
+    matrix = (1.0, 0, 0, 100.0, 0, -1.0, 0, 200.0, 0, 0, 0, 0, 0, 0, 0, 1.0)
+    path.write_bytes(
+        geotiff(heights(), directory=(), scale=(), tie=(), tags=[(34264, "d", 16, matrix, True)])
+    )
+    assert load_world(path).grid == first.grid
+    turned = (0.8, 0.6, *matrix[2:4], 0.6, -0.8, *matrix[6:])
+    path.write_bytes(
+        geotiff(heights(), directory=(), scale=(), tie=(), tags=[(34264, "d", 16, turned, True)])
+    )
+    with pytest.raises(WorldError, match="north up"):
+        load_world(path)
+
+
+@pytest.mark.parametrize(
+    "more", [{"compression": "lzw"}, {"compression": "lzw", "predictor": 3}, {"compression": "zstd"}]
+)
+def test_compressed_rasters_are_read(tmp_path, more):
+    pytest.importorskip("imagecodecs")
+    (tmp_path / "hills.tif").write_bytes(geotiff(heights(), **more))
+    world = load_world(tmp_path / "hills.tif")
+    np.testing.assert_array_equal(world.occupied.sum(axis=2), expected(heights(), 1.0))
+
+
+def test_large_margins_without_heights_are_cropped_and_places_stay(tmp_path):
+    samples = np.full((1000, 1100), np.nan, np.float32)
+    samples[980:991, 500:507] = heights()
+    (tmp_path / "hills.tif").write_bytes(geotiff(samples))
+    with pytest.warns(WorldWarning, match="cropped from 1100 × 1000 to 9 × 13"):
+        world = load_world(tmp_path / "hills.tif")
+    assert world.grid.origin_m[:2] == (100.0 + 499, 200.0 - 992)
+    np.testing.assert_array_equal(world.occupied[1:-1, 1:-1].sum(axis=2), expected(heights(), 1.0))
 
 
 def test_jacksboro():
