@@ -1,7 +1,7 @@
 """List, draw and convert worlds: `python -m entropy_explore_env.worlds list | show | convert`.
 
     list [FOLDER]                      scenarios and names, or the files of a folder that can be read
-    show NAME_OR_FILE --out world.png  a picture with metres
+    show NAME_OR_FILE --out world.png  a picture with metres, and where robots may start
     convert IN OUT.npz                 a file that loads fast, without loss
 
 Results go to standard output, errors in one line to standard error. Exit codes: 0 done, 2 bad input, 130
@@ -15,6 +15,8 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+import numpy as np
+
 from entropy_explore_env.command import LineParser, run_command
 from entropy_explore_env.errors import SettingError, one_of
 from entropy_explore_env.randomness import Stream, check_seed, generator
@@ -22,8 +24,14 @@ from entropy_explore_env.scenario import Scenario, with_settings
 from entropy_explore_env.scenarios import SCENARIOS
 from entropy_explore_env.validation import is_whole
 from entropy_explore_env.worlds.files.jacksboro import NAME as JACKSBORO
+<<<<<<< HEAD
 from entropy_explore_env.worlds.files.map_server import RULES
 from entropy_explore_env.worlds.load import FORMATS, load_world, make_world, save_world
+=======
+from entropy_explore_env.worlds.formats import FORMATS, WORDS
+from entropy_explore_env.worlds.given import in_given_worlds
+from entropy_explore_env.worlds.load import load_world, make_world, save_world
+>>>>>>> 102cb38 (Plans of different sizes share a grid, large margins are cropped, and a picture shows where robots may start)
 from entropy_explore_env.worlds.pictures import picture
 from entropy_explore_env.worlds.recipes.catalogue import RECIPES
 from entropy_explore_env.worlds.world import World
@@ -60,11 +68,14 @@ def main(words: Sequence[str]) -> int:
     if target.suffix.lower() != suffix or target.is_dir():
         raise SettingError("out", str(target), f"a file whose name ends in {suffix}")
     world = _world(args)
+    about = _about(world)
     if args.command == "show":
-        write_atomically(target, picture(world))
+        starts, said = _starts(world, args.source)
+        about += f"; {said}"
+        write_atomically(target, picture(world, starts))
     else:
         save_world(world, target)
-    print(f"{target}: {_about(world)}")
+    print(f"{target}: {about}")
     return 0
 
 
@@ -159,7 +170,21 @@ def _refuse(args: argparse.Namespace, names: Sequence[str], allowed: str) -> Non
 def _about(world: World) -> str:
     x, y, z = world.grid.shape
     free = 1.0 - float(world.occupied.mean())
-    return f"{x} × {y} × {z} voxels of {world.grid.voxel_size_m:.6g} m, {free:.1%} free"
+    metres = " × ".join(f"{edge:.6g}" for edge in world.grid.size_m[: 2 if world.grid.flat else 3])
+    return f"{x} × {y} × {z} voxels of {world.grid.voxel_size_m:.6g} m, {metres} m, {free:.1%} free"
+
+
+def _starts(world: World, source: str) -> tuple[np.ndarray | None, str]:
+    """Where robots may start, (X, Y, Z) bool, and a sentence about it; None where they have no room."""
+    name = source if source in SCENARIOS else "office" if world.grid.flat else "room"
+    try:
+        layout = world.layout(in_given_worlds(SCENARIOS[name], [world]))
+    except SettingError as error:
+        return None, f"robots of {name} have no room: {error.field}, expected {error.allowed}"
+    starts = np.zeros(world.grid.shape, bool)
+    starts.reshape(-1)[layout.starts] = True
+    share = float(starts.sum() / (~world.occupied).sum())
+    return starts, f"robots of {name} may start in {share:.1%} of the free voxels"
 
 
 def command() -> int:

@@ -4,21 +4,27 @@ from __future__ import annotations
 
 import dataclasses
 import os
+import warnings
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from entropy_explore_env.errors import SettingError, WorldError
+from entropy_explore_env.errors import SettingError, WorldError, WorldWarning
 from entropy_explore_env.scenario import Scenario, with_settings
 from entropy_explore_env.settings import Grid
+from entropy_explore_env.worlds.files.jacksboro import NAME as JACKSBORO
+from entropy_explore_env.worlds.files.voxels import box_of_use, cropped_note
+from entropy_explore_env.worlds.formats import FORMATS
 from entropy_explore_env.worlds.load import world_from_file
-from entropy_explore_env.worlds.world import World
+from entropy_explore_env.worlds.world import World, part_of
 
 GIVEN = "given"
 """`Scenario.world` of missions whose worlds were given as objects: nothing can be made from it alone."""
-_ALLOWED = "a recipe's name, a file's path, a World, a list of Worlds, or a mapping: `path` and options"
+_ALLOWED = (
+    "a recipe's name, a file's path, a World, a list of Worlds and paths, or a mapping: `path` and options"
+)
 _PATHS = "a mapping with the `path` of a file, or a list of paths"
 
 
@@ -27,10 +33,11 @@ def with_given_worlds(scenario: Scenario, settings: Mapping[str, Any]) -> tuple[
 
     Args:
         scenario: What to start from.
-        settings: As for `config.with_settings`; `world` may also be a World, a sequence of Worlds of one
-            grid, or a mapping of a file's `path` (or a list of paths) and options of `load_world`, whose
+        settings: As for `config.with_settings`; `world` may also be a World, a list of Worlds and of files'
+            paths, or a mapping of a file's `path` (or a list of paths) and options of `load_world`, whose
             voxels have the scenario's size unless it says another. The grid is then the world's; that of
-            several files holds each of them (`on_one_grid`).
+            several holds each of them (`on_one_grid`). Of a single world large margins without free space are
+            cropped.
 
     Returns:
         The scenario, and its worlds (N,); none where they come from a recipe or a file.
@@ -44,7 +51,8 @@ def with_given_worlds(scenario: Scenario, settings: Mapping[str, Any]) -> tuple[
         return with_settings(scenario, settings), ()
     if isinstance(world, os.PathLike):
         return with_settings(scenario, {**settings, "world": os.fspath(world)}), ()
-    given = _from_options(scenario, world) if isinstance(world, Mapping) else checked_worlds(world)
+    given = _from_options(scenario, world) if isinstance(world, Mapping) else _from_list(scenario, world)
+    given = tuple(_without_margins(each) for each in given) if len(given) == 1 else given
     grid = given[0].grid
     if settings.get("grid", grid) != grid:
         raise SettingError("Scenario.grid", settings["grid"], "not given: the world brings its own")
@@ -81,6 +89,45 @@ def checked_worlds(given: object) -> tuple[World, ...]:
 def world_in_turn(given: Sequence[World], seed: int, episode: int) -> World:
     """The world of a mission: dealt in turn by its seed, the next one with each episode that follows."""
     return given[(seed + episode) % len(given)]
+
+
+def _from_list(scenario: Scenario, asked: object) -> tuple[World, ...]:
+    """The worlds of a list of Worlds and paths, or a single World, on a grid that holds each.
+
+    Raises:
+        SettingError, WorldError: As of `with_given_worlds`.
+    """
+    several: list[Any] = list(asked) if isinstance(asked, list | tuple) else [asked]
+    known = all(isinstance(each, World | os.PathLike) or _names_a_file(each) for each in several)
+    if not several or not known:
+        raise SettingError("world", asked, _ALLOWED)
+    size_m = scenario.grid.voxel_size_m
+    worlds = [each if isinstance(each, World) else world_from_file(Path(each), size_m) for each in several]
+    for number, world in enumerate(worlds):
+        if world.grid.voxel_size_m != worlds[0].grid.voxel_size_m:
+            allowed = f"voxels of {worlds[0].grid.voxel_size_m} m, as the first one's"
+            raise WorldError(f"world[{number}].grid", world.grid, allowed)
+    if all(world.grid == worlds[0].grid for world in worlds):
+        return tuple(worlds)
+    return tuple(on_one_grid(worlds))
+
+
+def _names_a_file(word: object) -> bool:
+    return isinstance(word, str) and (word == JACKSBORO or Path(word).suffix.lower() in FORMATS)
+
+
+def _without_margins(world: World) -> World:
+    """A world without margins in which nothing is free, where they are large; the rest stays where it was.
+
+    Warns:
+        WorldWarning: Margins were cropped.
+    """
+    box = box_of_use(np.logical_not(world.occupied.all(axis=2)))
+    if box is None:
+        return world
+    note = cropped_note(world.grid.shape, box)
+    warnings.warn(f"{world.name}: {note}", WorldWarning, stacklevel=4)
+    return part_of(world, (*box, slice(0, world.grid.shape[2])))
 
 
 def _from_options(scenario: Scenario, asked: Mapping[str, Any]) -> tuple[World, ...]:

@@ -1,6 +1,6 @@
 """Pictures of worlds: walls dark, free space light, unknown space blue, metres along the edges.
 
-Solid voxels that give no return are red.
+Solid voxels that give no return are red. Where robots may start is green.
 
 Unknown is what a world's file says nothing of: to robots it is solid. Margins that hold no free space, and no
 wall that the file knows of, are cut off.
@@ -22,7 +22,7 @@ from scipy import ndimage
 
 from entropy_explore_env.picture_text import font, shortened, text_width
 from entropy_explore_env.settings import Grid
-from entropy_explore_env.worlds.world import World
+from entropy_explore_env.worlds.world import World, box_around, part_of
 
 _LONG_SIDE = 880
 _MARGIN = 64
@@ -39,7 +39,14 @@ _ROOFED = 0.5
 _PAPER, _INK = (255, 255, 255), (40, 44, 52)
 _SOLID, _FREE = (58, 64, 77), (236, 239, 243)
 _UNKNOWN, _UNREADABLE = (176, 200, 226), (190, 74, 72)
-_KEY = ((_SOLID, "wall"), (_FREE, "free"), (_UNKNOWN, "unknown"), (_UNREADABLE, "no return"))
+_START = (160, 205, 150)
+_KEY = (
+    (_SOLID, "wall"),
+    (_FREE, "free"),
+    (_UNKNOWN, "unknown"),
+    (_UNREADABLE, "no return"),
+    (_START, "may start"),
+)
 _KEY_SIZE = 12
 _HEIGHT_COLOURS = (
     (38, 70, 83),
@@ -79,11 +86,20 @@ class _Axes(NamedTuple):
     """Pixels a metre upwards."""
 
 
-def picture(world: World) -> bytes:
-    """A PNG of a world, at most 1008 pixels wide."""
-    name, whole, world = world.name, world.grid, _cropped(world)
+def picture(world: World, starts: np.ndarray | None = None) -> bytes:
+    """A PNG of a world, at most 1008 pixels wide.
+
+    Args:
+        world: The world.
+        starts: (X, Y, Z) bool, where robots may start, which the plan or the view from above shows; None =
+            not.
+    """
+    name, whole, box = world.name, world.grid, box_around(_seen(world))
+    world = part_of(world, box)
     scale = _LONG_SIDE / max(world.grid.size_m[0], world.grid.size_m[1])  # pixels a metre, of all views
     views = _views(world, scale)
+    if starts is not None:
+        views[0] = _with_starts(views[0], starts[box])
     panels = [_panel(view, scale * world.grid.voxel_size_m) for view in views]
     width = max(_LEAST_WIDTH, max(panel.width for panel in panels) + 2 * _MARGIN)
     height = _MARGIN + sum(panel.height + _GAP for panel in panels) + 12
@@ -99,32 +115,26 @@ def picture(world: World) -> bytes:
         _draw_ticks(draw, axes, view.corner_m)
         top += panel.height + _GAP
     shown = [_in(views, _UNKNOWN, world.unknown), _in(views, _UNREADABLE, world.unreadable)]
-    if any(shown):
-        _draw_key(draw, _MARGIN + panels[-1].width, top - _GAP / 4, [True, True, *shown])
+    if any(shown) or starts is not None:
+        walls = [world.grid.flat or any(shown)] * 2
+        key = [*walls, *shown, starts is not None]
+        _draw_key(draw, _MARGIN + panels[-1].width, top - _GAP / 4, key)
     buffer = io.BytesIO()
     sheet.save(buffer, "PNG", optimize=True)
     return buffer.getvalue()
 
 
-def _cropped(world: World) -> World:
-    """The part of a world that holds something to be seen: free space, what is around it, known walls."""
-    free = ~world.occupied
-    seen = np.asarray(ndimage.binary_dilation(free, np.ones((3, 3, 3))), np.bool_)
-    if world.unknown is not None:
-        seen |= world.occupied & ~world.unknown
-    inside = []
-    for axis in range(3):
-        found = np.flatnonzero(seen.any(axis=tuple(other for other in range(3) if other != axis)))
-        inside.append(slice(int(found[0]), int(found[-1]) + 1))
-    block, edge_m = tuple(inside), world.grid.voxel_size_m
-    x, y, z = (low + part.start * edge_m for low, part in zip(world.grid.origin_m, inside, strict=True))
-    occupied = world.occupied[block]
-    a, b, c = occupied.shape
-    unknown, unreadable = (
-        None if mask is None else mask[block] for mask in (world.unknown, world.unreadable)
-    )
-    grid = Grid((a, b, c), edge_m, (x, y, z))
-    return World(grid, occupied, world.name, unknown=unknown, unreadable=unreadable)
+def _seen(world: World) -> np.ndarray:
+    """(X, Y, Z) bool, what holds something to be seen: free space, what is around it, known walls."""
+    seen = np.asarray(ndimage.binary_dilation(~world.occupied, np.ones((3, 3, 3))), np.bool_)
+    return seen if world.unknown is None else seen | (world.occupied & ~world.unknown)
+
+
+def _with_starts(view: _View, starts: np.ndarray) -> _View:
+    """A view from above with the columns tinted in which robots may start."""
+    columns = _upright(np.atleast_3d(np.any(starts, axis=2)))
+    tinted = (0.5 * view.pixels + 0.5 * np.array(_START)).astype(np.uint8)
+    return view._replace(pixels=np.where(columns, tinted, view.pixels))
 
 
 def _in(views: list[_View], colour: tuple[int, int, int], mask: np.ndarray | None) -> bool:

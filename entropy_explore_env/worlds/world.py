@@ -317,6 +317,27 @@ class Layout:
         return int(self.visible.sum())
 
 
+def box_around(mask: np.ndarray) -> tuple[slice, ...]:
+    """Return the smallest box that holds all of a mask (X, Y, Z), which is not empty."""
+    found = [np.flatnonzero(mask.any(axis=tuple({0, 1, 2} - {axis}))) for axis in range(3)]
+    return tuple(slice(int(along[0]), int(along[-1]) + 1) for along in found)
+
+
+def part_of(world: World, box: tuple[slice, ...]) -> World:
+    """Return the part of a world in a box of voxels, which stays where it was."""
+    edge_m = world.grid.voxel_size_m
+    x, y, z = (low + part.start * edge_m for low, part in zip(world.grid.origin_m, box, strict=True))
+    occupied = world.occupied[box]
+    a, b, c = occupied.shape
+    ceiling = world.ceiling
+    if ceiling is not None:
+        ceiling = np.clip(ceiling[box[:2]] - box[2].start, 0, c)
+    masks = (world.unknown, world.unreadable)
+    unknown, unreadable = (None if mask is None else mask[box] for mask in masks)
+    grid = Grid((a, b, c), edge_m, (x, y, z))
+    return World(grid, occupied, world.name, ceiling, world.yaw_rad, unknown, unreadable)
+
+
 def no_fly_mask(ceiling: np.ndarray, layers: int, body_radius: float) -> np.ndarray:
     """Where a spherical body in a voxel's centre would reach above a ceiling.
 

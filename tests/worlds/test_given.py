@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from benchmarks.proofs.world_samples import pgm, sketch
-from entropy_explore_env.errors import EntropyExploreError, SettingError, WorldError
+from entropy_explore_env.errors import EntropyExploreError, SettingError, WorldError, WorldWarning
 from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.settings import Grid
 from entropy_explore_env.worlds.given import (
@@ -125,6 +125,7 @@ def test_a_mapping_loads_a_file_with_its_options(tmp_path):
         ({"world": []}, "a list of Worlds"),
         ({"world": [WORLDS[0], "office"]}, "a list of Worlds"),
         ({"world": [WORLDS[0], walled(2, grid=Grid(SHAPE, 0.5))]}, r"world\[1\]\.grid"),
+        ({"world": [WORLDS[0], "nowhere.png"]}, r"nowhere\.png"),
         ({"world": WORLDS[0], "grid": {"voxel_size_m": 0.1}}, "brings its own"),
         ({"world": WORLDS[0], "robots": 0}, "Scenario.robots"),
         ({"world": {}}, "`path`"),
@@ -141,6 +142,33 @@ def test_what_is_no_world_is_refused_in_one_line(settings, said):
     with pytest.raises(EntropyExploreError, match=said) as caught:
         with_given_worlds(free_box(), settings)
     assert "\n" not in str(caught.value) and len(str(caught.value)) < 600
+
+
+def test_plans_of_different_sizes_share_a_grid(tmp_path):
+    for name, rows, columns in (("a", 20, 30), ("b", 40, 10)):
+        (tmp_path / f"{name}.pgm").write_bytes(pgm(np.full((rows, columns), 255, np.uint8)))
+    paths = [str(tmp_path / "a.pgm"), tmp_path / "b.pgm"]
+    start = free_box(grid=Grid((4, 5, 1), 0.05))
+    scenario, given = with_given_worlds(start, {"world": paths})
+    assert scenario.grid.shape == (30, 40, 1) and [each.name for each in given] == ["a", "b"]
+    assert [int((~each.occupied).sum()) for each in given] == [600, 400]
+    worlds = [load_world(path) for path in paths]
+    for several in (worlds, [paths[0], worlds[1]]):
+        for one, two in zip(with_given_worlds(start, {"world": several})[1], given, strict=True):
+            assert one.grid == two.grid
+            np.testing.assert_array_equal(one.occupied, two.occupied)
+
+
+def test_large_margins_of_a_given_world_are_cropped_and_places_stay():
+    solid = np.ones((1200, 1000, 1), bool)
+    solid[400:420, 700:730] = False
+    with pytest.warns(WorldWarning, match="cropped from 1200 × 1000 to 22 × 32"):
+        scenario, given = with_given_worlds(
+            free_box(), {"world": World(Grid(solid.shape, 0.1), solid, "hall")}
+        )
+    assert scenario.grid.shape == (22, 32, 1)
+    assert scenario.grid.origin_m == pytest.approx((39.9, 69.9, 0.0))
+    assert (~given[0].occupied).sum() == 600 and given[0].occupied[0].all()
 
 
 def test_missions_check_the_worlds_that_they_are_given():

@@ -44,6 +44,8 @@ def test_show_writes_a_picture(floor, capsys, source):
     assert run_command(main, ["show", given, "--out", str(out)]) == 0
     said = capsys.readouterr()
     assert said.out.startswith(f"{out}: ") and "voxels of" in said.out and said.err == ""
+    assert "0.55 × 0.35 m" in said.out or "9 × 7 × 4 m" in said.out or source in SCENARIOS
+    assert "may start in" in said.out or "have no room" in said.out
     assert out.read_bytes().startswith(b"\x89PNG")
 
 
