@@ -34,6 +34,12 @@ class Reading:
     """Height of the exposure surface above the ground of a height map."""
     hollow: bool = False
     """Meshes: do not fill what they shut in."""
+    inside: bool = False
+    """Meshes: a building drawn by its inner walls, free inside and solid outside."""
+    scale: float | None = None
+    """Meshes and point clouds: metres of a unit, 0.001 for millimetres."""
+    up: Literal["y", "z"] | None = None
+    """Meshes and point clouds: the axis that points up."""
     read_limit_s: float | None = None
     """Seconds of computing that reading may take."""
     read_memory_mib: float | None = None

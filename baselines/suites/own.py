@@ -24,8 +24,8 @@ from baselines.suites.suite import Place, Task, team_name
 from entropy_explore_env.errors import EntropyExploreError, SettingError, WorldError, one_of
 from entropy_explore_env.scenario import with_settings
 from entropy_explore_env.scenarios import SCENARIOS, find_scenario
+from entropy_explore_env.worlds.formats import FORMATS
 from entropy_explore_env.worlds.given import GIVEN, distinct_names
-from entropy_explore_env.worlds.load import FORMATS
 
 DEFAULT_SCENARIOS, QUICK_SCENARIOS = "room,room-furnished,lab,office,cave", "room,office"
 MOST_ROBOTS = 1000

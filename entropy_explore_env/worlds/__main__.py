@@ -24,14 +24,9 @@ from entropy_explore_env.scenario import Scenario, with_settings
 from entropy_explore_env.scenarios import SCENARIOS
 from entropy_explore_env.validation import is_whole
 from entropy_explore_env.worlds.files.jacksboro import NAME as JACKSBORO
-<<<<<<< HEAD
-from entropy_explore_env.worlds.files.map_server import RULES
-from entropy_explore_env.worlds.load import FORMATS, load_world, make_world, save_world
-=======
 from entropy_explore_env.worlds.formats import FORMATS, WORDS
 from entropy_explore_env.worlds.given import in_given_worlds
 from entropy_explore_env.worlds.load import load_world, make_world, save_world
->>>>>>> 102cb38 (Plans of different sizes share a grid, large margins are cropped, and a picture shows where robots may start)
 from entropy_explore_env.worlds.pictures import picture
 from entropy_explore_env.worlds.recipes.catalogue import RECIPES
 from entropy_explore_env.worlds.world import World
@@ -46,12 +41,17 @@ _NUMBERS = {
     "elevation-step-m": "height of one count of a 16-bit image",
     "clearance-m": "free space above a height map, or around a mesh",
     "ceiling-m": "height of the exposure surface above the ground of a height map",
+    "scale": "meshes and point clouds: metres of a unit, 0.001 for millimetres",
     "read-limit-s": "limit of the processor time for reading",
     "read-memory-mib": "limit of the memory for reading; default: by the file's size",
 }
 """Options of `load_world` that are numbers."""
 _WORDS = {
-    "map-rule": (RULES, "how a YAML's thresholds and opacity are read: nav2 (default), or as before 2025"),
+    "up": (WORDS["up"], "meshes and point clouds: the axis that points up"),
+    "map-rule": (
+        WORDS["map_rule"],
+        "YAML: how it is read, as by nav2 (default) or as before 2025",
+    ),
 }
 """Options of `load_world` that are words: those that they may be, and what they say."""
 _OF_SCENARIOS = ("seed", "split", "world_number")
@@ -104,6 +104,8 @@ def _parser() -> argparse.ArgumentParser:
         command.add_argument(
             "--hollow", action="store_true", help="meshes: do not fill the space that they enclose"
         )
+        inside = "meshes: a building drawn by its inner walls, free inside"
+        command.add_argument("--inside", action="store_true", default=None, help=inside)
         command.add_argument("--seed", type=int, help="scenarios: of the mission in this world; default: 0")
         command.add_argument(
             "--world-number", type=int, help="scenarios: as of make_world, instead of --seed and --split"
@@ -135,8 +137,7 @@ def _world(args: argparse.Namespace) -> World:
     given = {name.replace("-", "_"): getattr(args, name.replace("-", "_")) for name in (*_NUMBERS, *_WORDS)}
     if args.hollow:
         given["fill"] = False
-    if args.negate:
-        given["negate"] = True
+    given |= {"negate": args.negate, "inside": args.inside}
     if args.source not in SCENARIOS:
         _refuse(args, _OF_SCENARIOS, "not given for a file")
         if not Path(args.source).suffix and args.source != JACKSBORO:

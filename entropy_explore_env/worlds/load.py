@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import inspect
-import math
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from functools import lru_cache, wraps
@@ -13,15 +12,14 @@ from typing import Any, ParamSpec
 
 import numpy as np
 
-from entropy_explore_env.errors import SettingError, WorldError, WorldWarning, did_you_mean, one_of
+from entropy_explore_env.errors import SettingError, WorldError, WorldWarning, did_you_mean
 from entropy_explore_env.scenario import Scenario
 from entropy_explore_env.scenarios import find_scenario
 from entropy_explore_env.settings import Grid
-from entropy_explore_env.validation import check_instance, checked_path, is_number, is_whole
+from entropy_explore_env.validation import check_instance, checked_path, is_whole
 from entropy_explore_env.worlds.files.archives import restored, saved
 from entropy_explore_env.worlds.files.jacksboro import NAME as JACKSBORO
-from entropy_explore_env.worlds.files.map_server import RULES
-from entropy_explore_env.worlds.files.process import Format, Limits, read_apart
+from entropy_explore_env.worlds.files.process import Limits, read_apart
 from entropy_explore_env.worlds.files.resampling import extruded, resampled
 from entropy_explore_env.worlds.files.voxels import (
     FREE,
@@ -31,35 +29,19 @@ from entropy_explore_env.worlds.files.voxels import (
     RefusedError,
     Voxels,
 )
+from entropy_explore_env.worlds.formats import (
+    FORMATS,
+    IMAGE,
+    JACKSBORO_FORMAT,
+    OCTOMAP,
+    check_options,
+    format_of,
+)
 from entropy_explore_env.worlds.recipes.catalogue import RECIPES
 from entropy_explore_env.worlds.recipes.empty import empty
 from entropy_explore_env.worlds.splits import draw_world_number, world_generator
 from entropy_explore_env.worlds.world import World
 from entropy_explore_env.writing import write_atomically
-
-_OCTOMAP = Format("octomap_tree", "OctoMap tree", memory_per_byte=512)  # octomap's own nodes take 230
-_MAP_SERVER = Format("map_server", "YAML of map_server with its image")
-_IMAGE = Format("images", "PNG, PGM, JPEG, BMP or GIF image")
-_GEOTIFF = Format("geotiff", "GeoTIFF height map")
-_MESH = Format("meshes", "mesh")
-_JACKSBORO = Format("jacksboro", "elevation model")
-FORMATS = {
-    ".bt": _OCTOMAP,
-    ".ot": _OCTOMAP,
-    ".yaml": _MAP_SERVER,
-    ".yml": _MAP_SERVER,
-    **dict.fromkeys((".png", ".pgm", ".ppm", ".pnm", ".jpg", ".jpeg", ".bmp", ".gif"), _IMAGE),
-    ".pcd": Format("point_clouds", "PCD point cloud"),
-    ".ply": _MESH,
-    ".obj": _MESH,
-    ".stl": _MESH,
-    ".glb": _MESH,
-    ".npz": Format("archives", "NumPy archive with a world or a height map"),
-    ".tif": _GEOTIFF,
-    ".tiff": _GEOTIFF,
-}
-"""Suffix in lower case → how the file is read."""
-
 
 _Given = ParamSpec("_Given")
 
@@ -99,6 +81,9 @@ def load_world(
     clearance_m: float | None = None,
     ceiling_m: float | None = None,
     fill: bool | None = None,
+    inside: bool | None = None,
+    scale: float | None = None,
+    up: str | None = None,
     read_limit_s: float | None = None,
     read_memory_mib: float | None = None,
 ) -> World:
@@ -129,6 +114,11 @@ def load_world(
             meshes: free space around them (None = none).
         ceiling_m: Height maps: the exposure surface above the ground (World.ceiling); None = none.
         fill: Meshes: whether the space that the surface encloses is solid; None = yes.
+        inside: Meshes: it is a building drawn by its inner walls: what the surface encloses is free, all else
+            solid.
+        scale: Meshes and point clouds: metres of a unit, 0.001 for millimetres; None = as the file says, or
+            1.
+        up: Meshes and point clouds: the axis that points up, "y" or "z"; None = as the file says, or z.
         read_limit_s: Limit of the processor time for reading; None = 1.5 s, and 20 s for each MiB. On Windows
             reading ends after ten times as much elapsed time and a minute.
         read_memory_mib: Limit of the memory of the process that reads; None = 448 MiB, and 16 for each MiB
@@ -155,18 +145,18 @@ def load_world(
         "clearance_m": clearance_m,
         "ceiling_m": ceiling_m,
         "fill": fill,
+        "inside": inside,
+        "scale": scale,
+        "up": up,
     }
-    _check(
+    check_options(
         {**options, "height_m": height_m, "read_limit_s": read_limit_s, "read_memory_mib": read_memory_mib}
     )
     limits = Limits(read_limit_s, read_memory_mib)
     path = checked_path("world file", path)
     if str(path) == JACKSBORO:
-        return _world(read_apart(_JACKSBORO, JACKSBORO, options, limits), JACKSBORO, options, height_m)
-    form = FORMATS.get(path.suffix.lower())
-    if form is None:
-        raise WorldError("world file", str(path), "a file of one of the kinds " + " ".join(FORMATS))
-    return _world(read_apart(form, path.absolute(), options, limits), str(path), options, height_m)
+        return _world(read_apart(JACKSBORO_FORMAT, JACKSBORO, options, limits), JACKSBORO, options, height_m)
+    return _world(read_apart(format_of(path), path.absolute(), options, limits), str(path), options, height_m)
 
 
 LOAD_OPTIONS = tuple(inspect.signature(load_world).parameters)[1:]
@@ -178,11 +168,11 @@ def load_octomap(
     path: Path | str, voxel_size_m: float | None = None, *, read_memory_mib: float | None = None
 ) -> World:
     """The world in an OctoMap tree, whatever its suffix; see `load_world`."""
-    _check({"voxel_size_m": voxel_size_m, "read_memory_mib": read_memory_mib})
+    check_options({"voxel_size_m": voxel_size_m, "read_memory_mib": read_memory_mib})
     options = {"voxel_size_m": voxel_size_m}
     path = checked_path("world file", path)
     return _world(
-        read_apart(_OCTOMAP, path.absolute(), options, Limits(None, read_memory_mib)),
+        read_apart(OCTOMAP, path.absolute(), options, Limits(None, read_memory_mib)),
         str(path),
         options,
         None,
@@ -226,28 +216,6 @@ def world_from_bytes(data: bytes) -> World:
     return _world(restored(data), "", {"voxel_size_m": None}, None)
 
 
-def _check(options: dict[str, Any]) -> None:
-    """Check that numbers are > 0 and finite, shades in their range, words known and flags booleans."""
-    for name, value in options.items():
-        if value is None:
-            continue
-        if name in ("negate", "fill"):
-            if not isinstance(value, bool):
-                raise SettingError(name, value, "True or False")
-        elif name in _WORDS:
-            if not isinstance(value, str) or value not in _WORDS[name]:
-                raise SettingError(name, value, one_of(value, _WORDS[name]))
-        elif name in ("occupied_below", "free_above"):
-            if not is_number(value) or not 0 <= value <= 255:
-                raise SettingError(name, value, "a shade from 0 (black) to 255")
-            options[name] = float(value)
-        elif not is_number(value) or not 0 < value < math.inf:
-            raise SettingError(name, value, "a number > 0")
-        else:
-            options[name] = float(value)
-
-
-_WORDS = {"map_rule": RULES}
 _NO_SPACE = "a map with free space at this voxel size"
 _SHADES = " (pixels darker than half of white are solid; occupied_below, --occupied-below, sets the limit)"
 
@@ -265,7 +233,7 @@ def _world(voxels: Voxels, path: str, options: dict[str, Any], height_m: float |
         )
         raise WorldError("world file", path, allowed)
     if (labels != FREE).all():
-        is_image = FORMATS.get(Path(path).suffix.lower()) is _IMAGE
+        is_image = FORMATS.get(Path(path).suffix.lower()) is IMAGE
         reasons = "".join(f"; {note}" for note in voxels.notes)
         raise WorldError("world file", path, _NO_SPACE + (_SHADES if is_image else "") + reasons)
     for note in voxels.notes:
@@ -358,8 +326,8 @@ def world_from_file(path: Path | str, voxel_size_m: float, **options: Any) -> Wo
         raise SettingError("Scenario.world", str(path), allowed + did_you_mean(str(path), RECIPES))
     _refuse_unknown(options, LOAD_OPTIONS)
     size = {"voxel_size_m": voxel_size_m}
-    _check(options)
-    _check(size)
+    check_options(options)
+    check_options(size)
     path = path if str(path) == JACKSBORO else path.resolve()
     return _cached_world(path, _file_version(path), size["voxel_size_m"], tuple(sorted(options.items())))
 

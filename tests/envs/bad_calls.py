@@ -339,7 +339,7 @@ class Stage:
         yield Target("load_octomap(voxel_size_m)", lambda v: load_octomap("x.bt", v))
         for option in LOAD_OPTIONS:
             # the file does not exist: what is wrong in its options is said first, and None is not wrong
-            allowed = Is.NONE | (Is.BOOL if option in ("negate", "fill") else Is(0))
+            allowed = Is.NONE | (Is.BOOL if option in ("negate", "fill", "inside") else Is(0))
             yield Target(
                 f"load_world({option})",
                 lambda v, o=option: named_first(o, load_world, "x.npz", **{o: v}),

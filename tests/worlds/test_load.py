@@ -5,6 +5,7 @@ from __future__ import annotations
 import inspect
 import math
 import pickle
+import re
 from pathlib import Path
 
 import numpy as np
@@ -18,8 +19,8 @@ from entropy_explore_env.errors import SettingError, WorldError
 from entropy_explore_env.scenarios import BOX
 from entropy_explore_env.settings import Grid
 from entropy_explore_env.worlds.files.process import kept_reader
+from entropy_explore_env.worlds.formats import FORMATS
 from entropy_explore_env.worlds.load import (
-    FORMATS,
     LOAD_OPTIONS,
     load_octomap,
     load_world,
@@ -54,9 +55,18 @@ def test_public_names():
     assert {"load_world", "save_world", "load_octomap"} <= set(entropy_explore_env.__all__)
 
 
-@pytest.mark.parametrize("name", ["castle", "castle.docx", "castle.las", "castle.bt.zip", ""])
+@pytest.mark.parametrize("name", ["castle", "castle.docx", "castle.bt.zip", ""])
 def test_a_suffix_that_nobody_knows_is_refused(name):
     with pytest.raises(WorldError, match=r"\.bt \.ot \.yaml"):
+        load_world(name)
+
+
+@pytest.mark.parametrize(
+    ("name", "line"),
+    [("plan.npy", "World(Grid(a.shape"), ("house.IFC", ".glb"), ("house.dxf", ".png"), ("scan.e57", "pdal")],
+)
+def test_what_is_not_read_is_refused_with_what_converts_it(name, line):
+    with pytest.raises(WorldError, match=f"convert it: .*{re.escape(line)}"):
         load_world(name)
 
 

@@ -12,7 +12,8 @@ from benchmarks.proofs.world_samples import heights, npz, pgm, sketch
 from entropy_explore_env.command import run_command
 from entropy_explore_env.scenarios import SCENARIOS
 from entropy_explore_env.worlds.__main__ import main
-from entropy_explore_env.worlds.load import FORMATS, load_world, make_world
+from entropy_explore_env.worlds.formats import FORMATS
+from entropy_explore_env.worlds.load import load_world, make_world
 
 
 @pytest.fixture

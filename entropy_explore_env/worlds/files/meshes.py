@@ -1,8 +1,10 @@
-"""Meshes in metres, OBJ, STL, GLB and PLY, read and made voxels of with trimesh.
+"""Meshes, OBJ, STL, GLB, DAE and PLY, read and made voxels of with trimesh.
 
-A voxel is solid if the surface passes through it, and, with `fill`, if the surface encloses it. All others
-in the mesh's box are free; `clearance_m` adds free space around it. A mesh has no resolution of its own. OBJ,
-STL and PLY are taken as they are, z up; GLB has y up (glTF 2.0, section 3.4) and is turned upright.
+A voxel is solid if the surface passes through it, and, with `fill`, if the surface encloses it. All others in
+the mesh's box are free; `clearance_m` adds free space around it. With `inside` the mesh is a building drawn
+by its inner walls: what the surface encloses is free, and all else is solid. A mesh has no resolution of its
+own. OBJ, STL and PLY are taken in metres with z up; GLB has y up (glTF 2.0, section 3.4), and DAE states its
+unit and its axis. The options `scale`, metres of a unit, and `up` say otherwise. All are turned upright.
 Nothing beside the file is read: no materials, no textures.
 """
 
@@ -10,19 +12,20 @@ from __future__ import annotations
 
 import io
 import math
+import re
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from entropy_explore_env.worlds.files.point_clouds import voxels_of
+from entropy_explore_env.errors import SettingError
+from entropy_explore_env.worlds.files.point_clouds import check_extent, upright, voxels_of
 from entropy_explore_env.worlds.files.voxels import (
     FREE,
     SOLID,
     Options,
     RefusedError,
     Voxels,
-    checked_shape,
     content,
 )
 
@@ -39,9 +42,17 @@ _HALVINGS_AT_ONCE = 8
 _POINTS_AT_ONCE = 1 << 18
 """Corners of small triangles that are made at once: memory follows the result, not the area."""
 
+_UP_AXIS = re.compile(rb"<up_axis>\s*([XYZ])_UP\s*</up_axis>")
+_UNIT = re.compile(rb"<unit\s[^>]*?meter\s*=\s*[\"']([^\"']+)[\"']")
+"""How a DAE states its axis, y unless stated, and its unit."""
+_ENCLOSES_NOTHING = (
+    "a mesh whose surface encloses space at this voxel size (a larger voxel_size_m closes gaps; "
+    "without inside, --inside, what lies around the surface is free)"
+)
 _HOLLOW = (
     "a map with free space at this voxel size: this mesh encloses all of it "
-    "(hollow keeps it free: fill=False, --hollow; clearance_m adds free space around)"
+    "(hollow keeps it free: fill=False, --hollow; clearance_m adds free space around; "
+    "inside, --inside: it is a building drawn by its inner walls)"
 )
 
 
@@ -51,39 +62,59 @@ def read(path: Path, options: Options) -> Voxels:
 
     kind = path.suffix.lower()[1:]
     extra: dict[str, Any] = {"skip_materials": True} if kind in ("obj", "glb") else {}
-    scene = trimesh.load_scene(io.BytesIO(content(path)), file_type=kind, **extra)
+    data = content(path)
+    scene = trimesh.load_scene(io.BytesIO(data), file_type=kind, **extra)
     mesh = scene.to_mesh()
     if len(mesh.faces) == 0:
         clouds = [part.vertices for part in scene.geometry.values() if isinstance(part, trimesh.PointCloud)]
         if kind != "ply" or not clouds:
             raise RefusedError("a mesh with faces")
         return voxels_of(np.concatenate(clouds).astype(np.float64), options)
-    return _voxels(mesh, kind == "glb", options)
+    up, unit_m = _axis_and_unit(data) if kind == "dae" else ("y" if kind == "glb" else "z", 1.0)
+    return _voxels(mesh, options, up, unit_m)
 
 
-def _voxels(mesh: Any, y_is_up: bool, options: Options) -> Voxels:  # noqa: ANN401 - trimesh comes late
+def _axis_and_unit(data: bytes) -> tuple[str, float]:
+    """The axis of a DAE that points up, and its unit in metres."""
+    axis, unit = _UP_AXIS.search(data), _UNIT.search(data)
+    up, unit_m = (axis[1].decode().lower() if axis else "y"), (float(unit[1]) if unit else 1.0)
+    if up == "x" or not 0 < unit_m < math.inf:
+        raise RefusedError("a DAE with y or z up and a unit > 0")
+    return up, unit_m
+
+
+def _voxels(mesh: Any, options: Options, up: str = "z", unit_m: float = 1.0) -> Voxels:  # noqa: ANN401
     from scipy import ndimage
 
     voxel_m = options.need("voxel_size_m", "a mesh")
     fill, clearance_m = options.get("fill"), options.get("clearance_m") or 0.0
-    vertices = np.asarray(mesh.vertices, np.float64)
+    inside = bool(options.get("inside"))
+    if inside and (fill is not None or clearance_m):
+        raise SettingError("inside", True, "None together with fill (--hollow) and clearance_m")
+    vertices = upright(np.asarray(mesh.vertices, np.float64), options, up, unit_m)
     if not np.isfinite(vertices).all():
         raise RefusedError("a mesh whose vertices are finite")
     margin = math.ceil(clearance_m / voxel_m - 1e-9)
-    checked_shape(np.ptp(vertices, axis=0) / voxel_m + 2.0 + 2.0 * margin)
+    check_extent(np.ptp(vertices, axis=0) + (2.0 + 2.0 * margin) * voxel_m, voxel_m, options)
     faces = np.asarray(mesh.faces)[mesh.unique_faces()]
-    vertices = vertices - _INWARDS * voxel_m * np.asarray(mesh.vertex_normals)
-    if y_is_up:
-        vertices = np.column_stack((vertices[:, 0], -vertices[:, 2], vertices[:, 1]))
+    normals = upright(np.asarray(mesh.vertex_normals), Options({"up": options.get("up")}), up)
+    if inside:  # the solid's side is the outer one, whichever way the triangles are wound
+        normals = -normals if mesh.volume >= 0 else normals
+    vertices = vertices - _INWARDS * voxel_m * normals
     solid, low = _surface(vertices - 0.5 * voxel_m, faces, voxel_m)
-    if fill is not False:
+    if inside:
+        enclosed = np.asarray(ndimage.binary_fill_holes(solid), np.bool_) & ~solid
+        if not enclosed.any():
+            raise RefusedError(_ENCLOSES_NOTHING)
+        solid = ~enclosed
+    elif fill is not False:
         filled = np.asarray(ndimage.binary_fill_holes(solid), np.bool_)
         if margin == 0 and filled.all() and not solid.all():
             raise RefusedError(_HOLLOW)
         solid = filled
     labels = np.full([n + 2 * margin for n in solid.shape], FREE, np.int8)
-    inside = tuple(slice(margin, margin + n) for n in solid.shape)
-    labels[inside][solid] = SOLID
+    box = tuple(slice(margin, margin + n) for n in solid.shape)
+    labels[box][solid] = SOLID
     x, y, z = (float(v) for v in (low - margin) * voxel_m)
     return Voxels(labels, voxel_m, (x, y, z))
 

@@ -1,14 +1,16 @@
 """OctoMap trees (Hornung et al. 2013), `.bt` and `.ot`, read with octomap-python.
 
-A node is solid from the tree's own occupancy threshold on; space that no leaf covers is unknown. The leaves
-are summed up in voxels of the wanted size, a slab of the map after the other: memory follows the result, and
-the grid of the tree's own resolution is never made.
+A node is solid from the tree's own occupancy threshold on; space that no leaf covers is unknown. Of trees
+with colours or times (ColorOcTree, OcTreeStamped) only the occupancy is read. The leaves are summed up in
+voxels of the wanted size, a slab of the map after the other: memory follows the result, and the grid of the
+tree's own resolution is never made.
 """
 
 from __future__ import annotations
 
 import itertools
 import math
+import re
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -29,6 +31,9 @@ from entropy_explore_env.worlds.files.voxels import (
 )
 
 NEEDS = (("octomap", "octomap-python"),)
+_RECORDS = {b"OcTree": 5, b"1": 5, b"OcTreeStamped": 5, b"ColorOcTree": 8}
+"""Id of a tree, "1" in old files → bytes of a node in an .ot: its occupancy, a colour, its children."""
+_DATA_LINE = re.compile(rb"\r?\ndata[ \t]*\r?\n")
 _BINARY_FILE, _FULL_FILE = b"# Octomap OcTree binary file", b"# Octomap OcTree file"
 _SIZED = "an OctoMap with a resolution > 0 and finite bounds"
 _DEPTH = 16
@@ -86,7 +91,7 @@ def _tree(data: bytes) -> Any:  # noqa: ANN401 - octomap has no types
     binary = data.startswith(_BINARY_FILE)
     if not binary and not data.startswith(_FULL_FILE):
         raise RefusedError("a whole OctoMap tree")
-    size, edge, body = _head_and_body(data)
+    size, edge, body = _head_and_body(data, binary)
     nodes, used = _counted_nodes(body, binary)
     if nodes != size:
         raise RefusedError(f"an OctoMap tree of as many nodes as its head says; there are {nodes}")
@@ -100,19 +105,26 @@ def _tree(data: bytes) -> Any:  # noqa: ANN401 - octomap has no types
     return tree
 
 
-def _head_and_body(data: bytes) -> tuple[int, float, bytes]:
-    """The number of nodes and the resolution that a file states, and the bytes of its nodes."""
-    head, _, body = data.partition(b"\ndata\n")
+def _head_and_body(data: bytes, binary: bool) -> tuple[int, float, bytes]:
+    """The number of nodes and the resolution that a file states, and its nodes' bytes without colours."""
+    found = _DATA_LINE.search(data)
+    if found is None:
+        raise RefusedError("a whole OctoMap tree")
+    head, body = data[: found.start()], data[found.end() :]
     rows = (line.split() for line in head.splitlines() if not line.startswith(b"#"))
     about = {row[0]: row[1] for row in rows if len(row) > 1}
-    if about.get(b"id") != b"OcTree":
-        raise RefusedError("an OctoMap whose id is OcTree")
+    record = _RECORDS.get(about.get(b"id", b""))
+    if record is None:
+        raise RefusedError("an OctoMap whose id is OcTree, OcTreeStamped or ColorOcTree")
     try:
         size, edge = int(about.get(b"size", b"0")), float(about.get(b"res", b"0"))
     except ValueError:
         raise RefusedError("an OctoMap whose size and res are numbers") from None
     if not 0.0 < edge < math.inf:
         raise RefusedError(_SIZED)
+    if record > _RECORDS[b"OcTree"] and not binary:
+        nodes = np.frombuffer(body, np.uint8, len(body) // record * record).reshape(-1, record)
+        body = nodes[:, [0, 1, 2, 3, record - 1]].tobytes()
     return size, edge, body
 
 

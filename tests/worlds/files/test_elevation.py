@@ -87,6 +87,32 @@ def test_npz_by_name_by_spacing_and_by_default(tmp_path):
         load_world(path, resolution_m=0.5)
 
 
+GRID = "ncols 4\nnrows 3\nxllcorner 500\nyllcorner -10\ncellsize 2\nNODATA_value -1\n"
+
+
+@pytest.mark.parametrize(
+    "head",
+    [
+        GRID,
+        GRID.upper().replace("\n", "\r\n"),
+        GRID.replace("xllcorner 500", "xllcenter 501").replace("yllcorner -10", "yllcenter -9"),
+        GRID.replace("cellsize 2", "dx 2\ndy 2"),
+    ],
+)
+def test_esri_grids(tmp_path, head):
+    """Rows from the north; layers of 2 m from -1 m on below the surfaces of 1 to 7 m, one column unknown."""
+    path = tmp_path / "grid.asc"
+    path.write_text(head + "1 3 5 7\n1 3 5 7\n1\t3 -1\n7\n")
+    world = load_world(path)
+    assert world.grid.origin_m == (500.0, -10.0, -1.0)
+    assert world.grid.shape == (4, 3, 4 + 5)
+    assert world.unknown is not None and world.unknown.any(axis=2).tolist() == [[False] * 3] * 2 + [
+        [True, False, False],
+        [False] * 3,
+    ]
+    assert world.occupied[:, 2].sum(axis=1).tolist() == [1, 2, 3, 4]
+
+
 @pytest.mark.parametrize("more", [{}, {"compression": "zlib"}])
 def test_geotiff_says_where_it_lies(tmp_path, more):
     path = tmp_path / "hills.TIFF"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import re
 
 import numpy as np
 import pytest
@@ -113,10 +114,10 @@ def test_a_surface_in_parts_has_the_same_voxels(monkeypatch):
     """Also faces that are first cut into four, since they alone would be too many small triangles."""
     turned = trimesh.transformations.euler_matrix(0.3, 0.2, 0.5)
     parts = [trimesh.creation.box((3.0, 2.0, 1.0), turned), trimesh.creation.icosphere(2, 0.8)]
-    whole = meshes._voxels(trimesh.util.concatenate(parts), False, Options({"voxel_size_m": 0.05}))
+    whole = meshes._voxels(trimesh.util.concatenate(parts), Options({"voxel_size_m": 0.05}))
     monkeypatch.setattr(meshes, "_POINTS_AT_ONCE", 2000)
     monkeypatch.setattr(meshes, "_HALVINGS_AT_ONCE", 3)
-    again = meshes._voxels(trimesh.util.concatenate(parts), False, Options({"voxel_size_m": 0.05}))
+    again = meshes._voxels(trimesh.util.concatenate(parts), Options({"voxel_size_m": 0.05}))
     np.testing.assert_array_equal(again.labels, whole.labels)
     assert again.origin_m == whole.origin_m and 0 < (whole.labels == 1).mean() < 1
 
@@ -124,7 +125,7 @@ def test_a_surface_in_parts_has_the_same_voxels(monkeypatch):
 def one_triangle(corners, voxel_m=1.0):
     """Its voxels, and the lower corner of the first one."""
     mesh = trimesh.Trimesh(corners, [[0, 1, 2]])
-    voxels = meshes._voxels(mesh, False, Options({"voxel_size_m": voxel_m, "fill": False}))
+    voxels = meshes._voxels(mesh, Options({"voxel_size_m": voxel_m, "fill": False}))
     return voxels.labels == 1, np.round(np.array(voxels.origin_m) / voxel_m).astype(int)
 
 
@@ -163,5 +164,65 @@ def test_faces_that_are_there_twice_are_drawn_once(monkeypatch):
     box = trimesh.creation.box((3.0, 2.0, 1.0))
     for faces in (box.faces, np.concatenate([box.faces, box.faces[::-1], np.roll(box.faces, 1, axis=1)])):
         mesh = trimesh.Trimesh(box.vertices, faces, process=False)
-        meshes._voxels(mesh, False, Options({"voxel_size_m": 0.25, "fill": False}))
+        meshes._voxels(mesh, Options({"voxel_size_m": 0.25, "fill": False}))
     assert drawn == [12, 12]
+
+
+def room(inverted=False):
+    """A hall of 4 × 3 × 2 m drawn by its inner walls."""
+    trimesh = pytest.importorskip("trimesh")
+    shell = trimesh.creation.box(bounds=[[1, 2, 0], [5, 5, 2]])
+    if inverted:
+        shell.invert()
+    return shell
+
+
+@pytest.mark.parametrize("inverted", [False, True])
+def test_a_building_drawn_by_its_inner_walls_is_free_inside(tmp_path, inverted):
+    path = tmp_path / "hall.stl"
+    path.write_bytes(room(inverted).export(file_type="stl"))
+    world = load_world(path, 0.5, inside=True)
+    assert world.grid.shape == (10, 8, 6) and world.grid.origin_m == (0.5, 1.5, -0.5)
+    free = ~world.occupied
+    assert free.sum() == 8 * 6 * 4 and free[1:-1, 1:-1, 1:-1].all()
+    with pytest.raises(SettingError, match=r"inside = True: .* fill"):
+        load_world(path, 0.5, inside=True, fill=False)
+
+
+def test_an_open_building_encloses_nothing(tmp_path):
+    shell = room()
+    shell.update_faces(shell.face_normals[:, 2] < 0.5)  # without its ceiling
+    (tmp_path / "hall.stl").write_bytes(shell.export(file_type="stl"))
+    with pytest.raises(WorldError, match="encloses space at this voxel size"):
+        load_world(tmp_path / "hall.stl", 0.5, inside=True)
+
+
+def test_units_and_the_upright_axis_of_a_mesh(tmp_path):
+    """The hall in millimetres with y up: its height is along the file's y."""
+    shell = room()
+    shell.vertices = 1000.0 * shell.vertices[:, [0, 2, 1]] * [1, 1, -1]
+    path = tmp_path / "hall.stl"
+    path.write_bytes(shell.export(file_type="stl"))
+    world = load_world(path, 0.5, inside=True, scale=0.001, up="y")
+    assert world.grid.shape == (10, 8, 6) and world.grid.origin_m == (0.5, 1.5, -0.5)
+    with pytest.raises(WorldError, match=r"the box is 4,000 × 2,000 × 3,000 m: is it in millimetres\?"):
+        load_world(path, 0.05)
+
+
+@pytest.mark.parametrize(("unit", "up", "factor"), [("0.01", "Z", 100.0), ("1", "Y", 1.0), (None, None, 1.0)])
+def test_a_dae_states_its_unit_and_its_axis(tmp_path, unit, up, factor):
+    pytest.importorskip("collada")
+    shell = room()
+    shell.vertices *= factor
+    if up != "Z":
+        shell.vertices = shell.vertices[:, [0, 2, 1]] * [1, 1, -1]
+    data = shell.export(file_type="dae")
+    asset = re.search(rb"<asset>.*?</asset>", data, re.DOTALL)
+    assert asset is not None
+    about = "" if unit is None else f'<unit name="x" meter="{unit}"/>'
+    about += "" if up is None else f"<up_axis>{up}_UP</up_axis>"
+    new = b"<asset><created>2026-01-01T00:00:00</created><modified>2026-01-01T00:00:00</modified>"
+    data = data.replace(asset[0], new + about.encode() + b"</asset>")
+    (tmp_path / "hall.dae").write_bytes(data)
+    world = load_world(tmp_path / "hall.dae", 0.5, inside=True)
+    assert world.grid.shape == (10, 8, 6) and world.grid.origin_m == (0.5, 1.5, -0.5)

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from benchmarks.proofs.world_samples import octomap_bytes
 from entropy_explore_env.command import READ_MEMORY_VARIABLE, allow_read_memory
 from entropy_explore_env.errors import SettingError, WorldError
 from entropy_explore_env.missions.simulation import Missions
@@ -206,7 +207,7 @@ HOSTILE = {
     ),
     "a level too many": (full_tree([1] * 17 + [0]), "an OctoMap tree of at most 16 levels below its root"),
     "a size that is not its": (full_tree([3, 0, 0], 4), "as many nodes as its head says; there are 3"),
-    "another tree": (full_tree([0]).replace(b"OcTree\nsize", b"ColorOcTree\nsize"), "whose id is OcTree"),
+    "another tree": (full_tree([0]).replace(b"OcTree\nsize", b"CountingOcTree\nsize"), "whose id is OcTree"),
     "a size that is no number": (full_tree([0]).replace(b"size 1", b"size 1x"), "size and res are numbers"),
     "no resolution": (full_tree([0], res=b"0"), "a resolution > 0"),
     "binary, a level too many": (
@@ -237,6 +238,36 @@ def test_a_tree_of_all_levels_is_read(tmp_path, binary):
     assert load_octomap(path).grid.shape == (1, 1, 1)
     body = path.read_bytes().partition(b"\ndata\n")[2]
     assert octomap_tree._counted_nodes(body + b"more", binary) == (17, 16 * 2 if binary else 17 * 5)
+
+
+def with_colours(data):
+    """The full tree with a colour after each node's occupancy, as ColorOcTree writes it."""
+    head, _, body = data.partition(b"\ndata\n")
+    nodes = np.frombuffer(body, np.uint8).reshape(-1, 5)
+    colours = np.full((len(nodes), 3), 200, np.uint8)
+    body = np.concatenate([nodes[:, :4], colours, nodes[:, 4:]], axis=1).tobytes()
+    return head.replace(b"id OcTree", b"id ColorOcTree") + b"\ndata\n" + body
+
+
+@pytest.mark.parametrize(
+    ("suffix", "change"),
+    [
+        (".bt", lambda data: data.replace(b"id OcTree", b"id ColorOcTree")),
+        (".bt", lambda data: data.replace(b"id OcTree", b"id OcTreeStamped")),
+        (".bt", lambda data: data.replace(b"id OcTree", b"id 1")),
+        (".bt", lambda data: b"\r\n".join(data.split(b"\n", 5))),
+        (".ot", lambda data: data.replace(b"id OcTree", b"id OcTreeStamped")),
+        (".ot", with_colours),
+    ],
+)
+def test_trees_of_other_kinds_have_the_same_occupancy(tmp_path, suffix, change):
+    data = octomap_bytes(suffix)
+    (tmp_path / f"plain{suffix}").write_bytes(data)
+    (tmp_path / f"other{suffix}").write_bytes(change(data))
+    first, other = (load_world(tmp_path / f"{name}{suffix}") for name in ("plain", "other"))
+    assert first.grid == other.grid
+    np.testing.assert_array_equal(first.occupied, other.occupied)
+    np.testing.assert_array_equal(first.unknown, other.unknown)
 
 
 @pytest.mark.parametrize("missing", [1, 2, 3, 40, 300])

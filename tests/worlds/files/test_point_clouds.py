@@ -70,6 +70,79 @@ def test_a_header_that_promises_too_many_points_is_refused(tmp_path, count):
         load_world(path, 0.5)
 
 
+CUBE = ["0 0 0", "1.5 1 0.5", "1.6 0.2 0.9"]
+
+
+def cloud_of(head, rows=CUBE, data="ascii", end="\n"):
+    lines = [*head, f"WIDTH {len(rows)}", "HEIGHT 1", f"POINTS {len(rows)}", f"DATA {data}"]
+    return end.join([*lines, *rows, ""]).encode()
+
+
+XYZ = ["FIELDS x y z", "SIZE 4 4 4", "TYPE F F F"]
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        cloud_of(["VERSION 0.7", *XYZ]),
+        cloud_of(["VERSION .5", "COLUMNS x y z", *XYZ[1:], "COUNT 1 1 1"]),
+        cloud_of([f"# {'x' * 6000}", "VERSION .6", *XYZ, "COUNT 1 1 1"]),
+        cloud_of(["VERSION\t0.7", "FIELDS  x\ty z ", *XYZ[1:]], [r.replace(" ", "  ") + " \t" for r in CUBE]),
+        cloud_of(["VERSION 0.7", *XYZ], end="\r\n"),
+        cloud_of(
+            ["FIELDS _ rgb y x z", "SIZE 1 4 8 8 8", "TYPE U F F F F", "COUNT 0 2 1 1 1"],
+            [f"7 8 {y} {x} {z}" for x, y, z in (row.split() for row in CUBE)],
+        ),
+        cloud_of(["FIELDS X Y Z", *XYZ[1:]]),
+    ],
+)
+def test_heads_of_every_age_are_read(tmp_path, data):
+    """Voxels of 0.5 m: 4 × 3 × 2, the points in (0, 0, 0), (3, 2, 1) and (3, 0, 1)."""
+    path = tmp_path / "cloud.pcd"
+    path.write_bytes(data)
+    world = load_world(path, 0.5)
+    assert world.grid.shape == (4, 3, 2)
+    assert np.argwhere(world.occupied).tolist() == [[0, 0, 0], [3, 0, 1], [3, 2, 1]]
+
+
+def test_fields_of_no_bytes_are_skipped_in_binary_clouds(tmp_path):
+    rows = np.array([tuple(map(float, row.split())) for row in CUBE])
+    kinds = np.dtype([("i", "<u2", (3,)), ("z", "<f8"), ("x", "<f4"), ("y", "<f4")])
+    some = np.zeros(3, kinds)
+    some["x"], some["y"], some["z"] = rows.T
+    head = ["FIELDS i _ z x y", "SIZE 2 1 8 4 4", "TYPE U U F F F", "COUNT 3 0 1 1 1"]
+    path = tmp_path / "cloud.pcd"
+    path.write_bytes(cloud_of(head, CUBE, "binary").split(CUBE[0].encode())[0] + some.tobytes())
+    assert np.argwhere(load_world(path, 0.5).occupied).tolist() == [[0, 0, 0], [3, 0, 1], [3, 2, 1]]
+
+
+@pytest.mark.parametrize("suffix", [".las", ".laz"])
+def test_laser_scans_are_read(tmp_path, suffix):
+    """In UTM coordinates, stored as whole millimetres."""
+    laspy = pytest.importorskip("laspy")
+    las = laspy.create(point_format=3, file_version="1.4")
+    las.header.offsets, las.header.scales = [500_000.0, 4_000_000.0, 0.0], [0.001] * 3
+    las.x = np.array([500_000.25, 500_001.75])
+    las.y = np.array([4_000_001.25, 4_000_000.25])
+    las.z = np.array([0.25, 0.75])
+    las.write(tmp_path / f"scan{suffix}")
+    world = load_world(tmp_path / f"scan{suffix}", 0.5)
+    assert world.grid.shape == (4, 3, 2)
+    assert world.grid.origin_m == (500_000.0, 4_000_000.0, 0.0)
+    assert np.argwhere(world.occupied).tolist() == [[0, 2, 0], [3, 0, 1]]
+
+
+def test_units_and_axes_of_a_cloud(tmp_path):
+    """Millimetres with y up: (x, y, z) is (x, -z, y)/1000 m."""
+    path = tmp_path / "cloud.pcd"
+    path.write_bytes(cloud_of(XYZ, ["250 250 -250", "1750 750 -1250"]))
+    world = load_world(path, 0.5, scale=0.001, up="y")
+    assert np.argwhere(world.occupied).tolist() == [[0, 0, 0], [3, 2, 1]]
+    assert world.grid.origin_m == (0.0, 0.0, 0.0)
+    with pytest.raises(WorldError, match=r"is it in millimetres\? scale=0\.001 \(--scale 0\.001\)"):
+        load_world(path, 0.01)
+
+
 def test_a_cloud_in_parts_has_the_same_voxels(monkeypatch):
     points_m = np.random.default_rng(0).normal(0.0, (1.0, 2.0, 0.5), (1000, 3))
     points_m[7] = np.nan
