@@ -85,11 +85,8 @@ night: $(STAMP)dev
 	$(RUN) benchmarks.proofs --first $$(date -u +%Y%m%d)000 --out results/night/proofs.md
 
 reproduce: $(STAMP)baselines
-	$(RUN) baselines.papers rocha04 --out docs/results
-	$(RUN) baselines.papers.rochami --out docs/results
-	$(RUN) baselines.papers.bhattacharya --out docs/results
-	$(RUN) baselines.papers.sawhney --out docs/results
-	$(RUN) baselines.papers sujan --out docs/results
+	for paper in rocha04 rochami bhattacharya sawhney sujan; do \
+		$(RUN) baselines.papers $$paper --out docs/results || exit 1; done
 
 # PyTorch's CPU build, unless there is an NVIDIA GPU: pip's own index brings gigabytes of CUDA libraries on Linux.
 # Where PyTorch's index cannot be reached, pip's own one serves. $(1): python, $(2): the file with the pin.

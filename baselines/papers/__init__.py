@@ -2,6 +2,9 @@
 
 PAPERS = {
     "rocha04": "baselines.papers.rocha04",
+    "rochami": "baselines.papers.rochami",
+    "bhattacharya": "baselines.papers.bhattacharya",
+    "sawhney": "baselines.papers.sawhney",
     "sujan-planar": "baselines.papers.sujan.planar",
     "sujan-cliff": "baselines.papers.sujan.cliff",
     "sujan-localization": "baselines.papers.sujan.localization",

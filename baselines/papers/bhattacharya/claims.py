@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+from itertools import product
 from typing import Any
 
 import numpy as np
 
 from baselines.experiments.claims import Claim
-from baselines.experiments.outcome import Record
-from baselines.experiments.statistics import mean_interval, median_interval, ratio_interval
+from baselines.experiments.experiment import Records
+from baselines.experiments.rows import Record
+from baselines.experiments.statistics import Interval, mean_interval, median_interval, ratio_interval
+from baselines.experiments.tables import markdown_table
+from baselines.papers.bhattacharya.missions import CHANNELS, LOSSES, channel_claims, channel_id
 from baselines.papers.bhattacharya.sweep import CONTROLS, FLOORS, coverage_id, exploration_id
-from baselines.papers.bhattacharya.timing import Seconds
 
-Records = dict[str, Record]
 STARTS = ("random", "cluster")
 _NAMES = {
     "projected": "projected centroid",
@@ -22,32 +24,44 @@ _NAMES = {
 _SECONDS = {"projected": 0.03, "gradient": 0.1}
 
 
+GROUPS = {
+    "converges-projected-": "(a) projected centroid: share of runs that converge",
+    "converges-projected-guarded-": "(a) the same, guarded (ours)",
+    "converges-gradient-": "(a) gradient search: the same",
+    "iterations-": "(a) iterations of those, median",
+    "falls-": "(d) iterations a run in which the functional rises",
+    "seconds-projected": "(a) projected centroid: seconds an iteration (2.1 GHz Pentium)",
+    "seconds-gradient": "(a) gradient search: seconds an iteration",
+    "explores-": "(b) share of runs that explore all, and converge",
+    "within-": "(b) iterations until then",
+    "seconds-exploration": "(b) seconds of an iteration with cells and controls",
+    "seconds-mean": "(b) the same, mean of all iterations",
+    "scipy": "(b) SciPy's Dijkstra over our tessellation; ratio",
+    "variant-metric-": "(b) entropy-weighted cells explore faster than plain ones",
+    "variant-nearest-": "ours: the nearest uncertain cell is faster than the centroid",
+    "variant-both-": "ours: plain cells and nearest targets are faster",
+    "variant-phases-": "perfect messages are faster than phases",
+    "variant-loss-": "phases without losses are faster than half lost",
+    "split-plain-": "(c) plain cells split the unknown area unevenly",
+    "split-": "(c) entropy-weighted cells split it evenly",
+    "utility-": "(f) sending at once brings more entropy a bit",
+    "time-": "(f) sending at once maps faster",
+}
+"""Beginning of ids → what the claims are, on the page."""
+
+
 def covering(records: Records, control: str, starts: str) -> list[Record]:
-    """Records of (a), by seed."""
-    found, seed = [], 0
-    while (name := coverage_id(control, starts, seed)) in records:
-        found.append(records[name])
-        seed += 1
-    return found
+    """Return the records of (a), by seed."""
+    return records.get(coverage_id(control, starts), [])
 
 
 def exploring(records: Records, floor: str, variant: str, range_cells: float) -> list[Record]:
-    """Records of (b) on a kind of plan, by seed."""
-    found, seed = [], 0
-    while (name := exploration_id(floor, variant, range_cells, seed)) in records:
-        found.append(records[name])
-        seed += 1
-    return found
+    """Return the records of (b) on a kind of plan, by seed."""
+    return records.get(exploration_id(floor, variant, range_cells), [])
 
 
-def all_claims(records: Records, splits: dict[str, Any], timing: Seconds) -> list[Claim]:
-    """Every claim of the runs; see `bhattacharya_missions` for the others.
-
-    Args:
-        records: Of all runs, by id.
-        splits: Ratios of (c).
-        timing: Seconds of a tessellation of (b)'s plan, ours and SciPy's.
-    """
+def all_claims(records: Records) -> list[Claim]:
+    """Return every claim."""
     points = [
         (floor, *point)
         for floor, plan in FLOORS.items()
@@ -56,18 +70,19 @@ def all_claims(records: Records, splits: dict[str, Any], timing: Seconds) -> lis
     return [
         *(claim for control in CONTROLS for claim in _coverage_claims(records, control)),
         *(claim for point in points for claim in _exploration_claims(records, *point)),
-        *_time_claims(records, timing),
+        *_time_claims(records),
         *(claim for floor in FLOORS for claim in _variant_claims(records, floor)),
-        *_split_claims(splits),
+        *_split_claims(records["measured"][0]["splits"]),
+        *(channel_claims(records) if channel_id(next(iter(CHANNELS)), LOSSES[0]) in records else []),
     ]
 
 
 def first_floor(records: Records, variant: str) -> str:
     """The first kind of plan, and so the largest, on which a variant was run at the middle range."""
-    return next(f for f, plan in FLOORS.items() if exploration_id(f, variant, plan.middle, 0) in records)
+    return next(f for f, plan in FLOORS.items() if exploration_id(f, variant, plan.middle) in records)
 
 
-def interval(found: tuple[float, float, float], runs: int) -> tuple[float, float | None, float | None]:
+def interval(found: Interval, runs: int) -> tuple[float, float | None, float | None]:
     """A figure with its interval, which one run does not have."""
     return found if runs > 1 else (found[0], None, None)
 
@@ -122,7 +137,8 @@ def _exploration_claims(records: Records, floor: str, variant: str, range_cells:
     return claims
 
 
-def _time_claims(records: Records, timing: Seconds) -> list[Claim]:
+def _time_claims(records: Records) -> list[Claim]:
+    measured = records["measured"][0]
     floor = first_floor(records, "paper")
     found = exploring(records, floor, "paper", FLOORS[floor].middle)
     seconds = [record["seconds_with_tessellation"] for record in found]
@@ -132,10 +148,9 @@ def _time_claims(records: Records, timing: Seconds) -> list[Claim]:
     mean = float(np.mean([record["seconds_an_iteration"] for record in found]))
     text = "(b) the same, mean of all iterations: a robot under way to its target needs no cells"
     claims.append(Claim("seconds-mean", text, 1.7, mean, None, None, mean <= 1.7))
-    text = (
-        f"(b) SciPy's Dijkstra over our tessellation of the plan ({timing.scipy:.3f} s, {timing.ours:.3f} s)"
-    )
-    ratio = timing.scipy / timing.ours
+    scipy_s, ours_s = measured["scipy_s"], measured["ours_s"]
+    text = f"(b) SciPy's Dijkstra over our tessellation of the plan ({scipy_s:.3f} s, {ours_s:.3f} s)"
+    ratio = scipy_s / ours_s
     return [*claims, Claim("scipy", text, None, ratio, None, None, ratio > 1.0)]
 
 
@@ -181,3 +196,48 @@ def _split_claims(splits: dict[str, Any]) -> list[Claim]:
         text = f"(c) {region}: entropy-weighted cells, η = 0.01, split it evenly; ratio"
         claims.append(Claim(f"split-{region}", text, 1.0, weighted, None, None, 0.9 <= weighted <= 1.1))
     return claims
+
+
+def coverage_table(records: Records) -> str:
+    """Return a table of (a) and (d)."""
+    rows = []
+    for control, starts in product(CONTROLS, STARTS):
+        found = covering(records, control, starts)
+        done = [record["iterations"] for record in found if record["ended"] == "converged"]
+        cycles = sorted(record["cycle"] for record in found if record["ended"] == "cycle")
+        rows.append(
+            [
+                control,
+                starts,
+                f"{len(done)} of {len(found)}",
+                f"{median_interval(done):,.0f}" if done else "-",
+                f"{cycles[0]} … {cycles[-1]}" if cycles else "-",
+                f"{np.mean([record['rises'] for record in found]):.1f}",
+            ]
+        )
+    head = ["control", "starts", "converged", "median iterations", "limit cycles", "rises of H a run"]
+    return markdown_table(head, rows)
+
+
+def exploration_table(records: Records) -> str:
+    """Return a table of (b)."""
+    rows = []
+    for name, floor in FLOORS.items():
+        points = [("paper", r) for r in floor.ranges]
+        points += [(variant, floor.middle) for variant in floor.variants]
+        for variant, range_cells in points:
+            if found := exploring(records, name, variant, range_cells):
+                ended = [record for record in found if record["ended"] == "converged"]
+                explored = [record for record in found if record["explored_at"] is not None]
+                middle = np.median([until_explored(record) for record in found])
+                at = ("" if len(explored) == len(found) else "≥ ") + f"{middle:,.0f}"
+                rows.append([name, variant, f"{range_cells:g}", f"{len(ended)} of {len(found)}", at])
+    return markdown_table(["plan", "variant", "range (cells)", "converged", "all explored at (median)"], rows)
+
+
+def split_table(records: Records) -> str:
+    """Return a table of (c)."""
+    splits = records["measured"][0]["splits"]
+    names = list(next(iter(splits.values())))
+    rows = [[region, *(f"{found[name]:.2f}" for name in names)] for region, found in splits.items()]
+    return markdown_table(["unknown region", "plain cells", *(f"η = {name}" for name in names[1:])], rows)

@@ -11,9 +11,12 @@ from matplotlib.figure import Figure
 from scipy import ndimage
 
 from baselines.cli.figures import COLOURS
-from baselines.experiments.outcome import Record
-from baselines.papers.bhattacharya.run import Run, start_cells
+from baselines.experiments.experiment import Records
+from baselines.experiments.plots import one_axes
+from baselines.papers.bhattacharya.claims import exploring, first_floor
+from baselines.papers.bhattacharya.run import Run, start_cells, unpacked
 from baselines.papers.bhattacharya.splitting import SHAPE, robot_cells, split, unknown_region
+from baselines.papers.bhattacharya.sweep import FLOORS, VARIANTS, all_runs, coverage_id, exploration_id
 from entropy_explore_env.belief.paths.geodesic_cells import new_tessellation, tessellate
 from entropy_explore_env.errors import counted
 
@@ -53,8 +56,15 @@ def _bare(axes: Axes, title: str) -> None:
     axes.spines[:].set_visible(True)
 
 
-def figure_2(office: Run) -> Figure:
-    """Geodesic cells: three robots on 200 × 200 cells, and five in the office, at random places (fig. 2)."""
+def _run(cell: str) -> Run:
+    """Return the first run of a cell."""
+    return next(run for run in all_runs(1, 1, 1) if run.cell == cell)
+
+
+def figure_2(records: Records) -> Figure:
+    """Draw geodesic cells: three robots on 200 × 200 cells, five in the office, at random places (fig. 2)."""
+    del records
+    office = _run(coverage_id("gradient", "cluster"))
     clutter = replace(office, world="bhattacharya-cluttered", shape=(200, 200), cell_m=0.1, robots=3, seed=0)
     figure = Figure(figsize=(7.2, 3.6), layout="constrained")
     for axes, run in zip(figure.subplots(1, 2), (clutter, office), strict=True):
@@ -68,9 +78,11 @@ def figure_2(office: Run) -> Figure:
     return figure
 
 
-def figure_3(rows: list[tuple[str, Run, Record]]) -> Figure:
-    """Cells and paths along the convergence, a row a control (fig. 3)."""
-    moments = 4
+def figure_3(records: Records) -> Figure:
+    """Draw cells and paths along the convergence, a row a control (fig. 3)."""
+    moments, names = 4, {"gradient": "gradient search", "projected-guarded": "projected centroid, guarded"}
+    cells = {name: coverage_id(control, "cluster") for control, name in names.items()}
+    rows = [(name, _run(cell), records[cell][0]) for name, cell in cells.items()]
     figure = Figure(figsize=(9.6, 2.9 * len(rows)), layout="constrained")
     axes = figure.subplots(len(rows), moments, squeeze=False)
     for line, (name, run, record) in zip(axes, rows, strict=True):
@@ -85,8 +97,9 @@ def figure_3(rows: list[tuple[str, Run, Record]]) -> Figure:
     return figure
 
 
-def figure_4() -> Figure:
-    """The boundary between two robots by length and by entropy."""
+def figure_4(records: Records) -> Figure:
+    """Draw the boundary between two robots by length and by entropy."""
+    del records
     figure = Figure(figsize=(9.6, 3.0), layout="constrained")
     region = unknown_region("band")[:, :, 0]
     for axes, (title, eta) in zip(
@@ -106,8 +119,14 @@ def figure_4() -> Figure:
     return figure
 
 
-def figure_6(run: Run, record: Record, maps: dict[str, np.ndarray], title: str) -> Figure:
-    """Entropy, cells and paths along an exploration; green = uncertain, dark = believed occupied."""
+def figure_6(records: Records, variant: str, settings: str) -> Figure:
+    """Draw entropy, cells and paths along an exploration; green = uncertain, dark = believed occupied."""
+    floor = first_floor(records, variant)
+    cell = exploration_id(floor, variant, FLOORS[floor].middle)
+    run, record = _run(cell), records[cell][0]
+    maps = unpacked(record["maps"])
+    team = f"{run.shape[0]} × {run.shape[1]} cells, {counted(run.robots, 'robot')}"
+    title = f"{team}, range {run.rules.sensor.range_cells:g}; {settings}"
     moments = sum(name.startswith("entropy_") for name in maps)
     figure = Figure(figsize=(10.2, 2.9 * math.ceil(moments / 3)), layout="constrained")
     places, width = np.array(record["places"]), run.shape[1]
@@ -139,23 +158,16 @@ def _borders(cells: np.ndarray) -> np.ndarray:
     return wide & (cells >= 0)
 
 
-def figure_progress(lines: list[tuple[str, Record]]) -> Figure:
-    """Uncertain cells that can be reached, along explorations."""
-    figure = Figure(figsize=(6.8, 3.8), layout="constrained")
-    axes = figure.subplots()
-    for number, (name, record) in enumerate(lines):
-        series = record["series"]
-        axes.plot(
-            series["iteration"],
-            np.array(series["uncertain"]) / 1000.0,
-            label=name,
-            color=COLOURS[number % len(COLOURS)],
-            linestyle="-" if number < len(COLOURS) else ":",
-        )
-    axes.set(
+def figure_progress(records: Records) -> Figure:
+    """Draw uncertain cells that can be reached, along explorations."""
+    figure, axes = one_axes(
         xlabel="iteration",
         ylabel="uncertain cells in reach (1000)",
         title="Exploration of the first small plan",
     )
+    for number, name in enumerate(("paper", *VARIANTS)):
+        series = exploring(records, "small", name, FLOORS["small"].middle)[0]["series"]
+        line = {"linestyle": "-" if number < len(COLOURS) else ":", "color": COLOURS[number % len(COLOURS)]}
+        axes.plot(series["iteration"], np.array(series["uncertain"]) / 1000.0, label=name, **line)
     axes.legend(frameon=False, fontsize=7)
     return figure

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import product
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from baselines.experiments.cells import Cell
 from baselines.experiments.claims import Claim
-from baselines.experiments.outcome import Record
-from baselines.experiments.statistics import mean_interval, ratio_interval
+from baselines.experiments.rows import Record
+from baselines.experiments.statistics import ratio_interval
 from baselines.experiments.tables import markdown_table
+from baselines.experiments.trials import Cell
 from entropy_explore_env.scenario import with_settings
 from entropy_explore_env.scenarios import find_scenario
 
@@ -83,55 +84,35 @@ def channel_claims(missions: Records) -> list[Claim]:
         for phases, utility in RIVALS.items():
             ours, theirs = missions[channel_id(utility, loss)], missions[channel_id(phases, loss)]
             where = f"(f) loss {loss:g}, {utility} beside {phases}"
-            ratio, low, high = ratio_interval(_utilities(ours), _utilities(theirs))
+            ratio = ratio_interval(_utilities(ours), _utilities(theirs))
             text = f"{where}: sending at once brings more entropy a bit; ratio"
-            claims.append(Claim(f"utility-{phases}-{loss:g}", text, None, ratio, low, high, low > 1.0))
-            ratio, low, high = ratio_interval(_times(ours), _times(theirs))
+            claims.append(Claim(f"utility-{phases}-{loss:g}", text, None, *ratio, ratio.low > 1.0))
+            ratio = ratio_interval(_times(ours), _times(theirs))
             text = f"{where}: sending at once maps faster; t ratio"
-            claims.append(Claim(f"time-{phases}-{loss:g}", text, None, ratio, low, high, high < 1.0))
+            claims.append(Claim(f"time-{phases}-{loss:g}", text, None, *ratio, ratio.high < 1.0))
     return claims
 
 
 def channel_table(missions: Records) -> str:
-    """Both schemes, loss by loss."""
+    """Return a table of both schemes: means for each share of messages that is lost."""
     rows = []
-    for loss in LOSSES:
-        for channel in CHANNELS:
-            found = missions[channel_id(channel, loss)]
-            rows.append(
-                [
-                    f"{loss:g}",
-                    channel,
-                    f"{sum(r['finished'] for r in found)} of {len(found)}",
-                    _shown(_times(found), ",.0f"),
-                    f"{np.mean([r['bits_sent'] for r in found]) / 1e6:.2f}",
-                    f"{np.mean([r['bits_sent'] / max(r['scans'], 1) for r in found]):,.0f}",
-                    _shown(_utilities(found), ".3f"),
-                ]
-            )
-    head = ["loss", "channel", "mapped", "mean t (s)", "Mbit sent", "bits sent a scan", "utility a bit sent"]
-    return markdown_table(head, rows)
+    for channel in CHANNELS:
+        both = [missions[channel_id(channel, loss)] for loss in LOSSES]
+        times = [f"{np.mean(_times(found)):,.0f}" for found in both]
+        rows.append([channel, *times, *(f"{np.mean(_utilities(found)):.3f}" for found in both)])
+    heads = [f"{what}, loss {loss:g}" for what in ("mean t (s)", "utility") for loss in LOSSES]
+    return markdown_table(["channel", *heads], rows)
 
 
 def flying_table(missions: Records) -> str:
-    """Flying teams, world by world; empty if there are none."""
+    """Return a table of flying teams, world by world; a sentence if there are none."""
     rows = []
-    for world in ("cave", "corridor"):
-        for strategy in FLYING:
-            found = missions.get(flying_id(world, strategy), [])
-            if found:
-                rows.append(
-                    [
-                        world,
-                        strategy,
-                        f"{sum(r['finished'] for r in found)} of {len(found)}",
-                        _shown(_times(found), ",.0f"),
-                        _shown([100.0 * r["joint"]["explored"] for r in found], ".1f"),
-                        f"{np.mean([r['scans'] for r in found]):,.0f}",
-                    ]
-                )
-    head = ["world", "strategy", "mapped", "mean t (s)", "explored (%)", "scans"]
-    return markdown_table(head, rows) if rows else ""
+    for world, strategy in product(("cave", "corridor"), FLYING):
+        if found := missions.get(flying_id(world, strategy), []):
+            explored = [100.0 * record["joint"]["explored"] for record in found]
+            rows.append([world, strategy, f"{np.mean(_times(found)):,.0f}", f"{np.mean(explored):.1f}"])
+    head = ["world", "strategy", "mean t (s)", "explored (%)"]
+    return markdown_table(head, rows) if rows else "None were run."
 
 
 def _times(found: Sequence[Record]) -> list[float]:
@@ -141,9 +122,3 @@ def _times(found: Sequence[Record]) -> list[float]:
 def _utilities(found: Sequence[Record]) -> list[float]:
     """Bits taken from the hearers' maps, for each bit sent."""
     return [r["bits_gained_per_bit_sent"] or 0.0 for r in found]
-
-
-def _shown(values: Sequence[float], form: str) -> str:
-    """Mean with its interval, which one mission does not have."""
-    mean, low, high = (format(value, form) for value in mean_interval(values))
-    return f"{mean} ({low} … {high})" if len(values) > 1 else mean

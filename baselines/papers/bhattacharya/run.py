@@ -1,15 +1,17 @@
-"""One run of Bhattacharya's simulation: its plan, its starts, and what is kept of it."""
+"""One run of Bhattacharya's simulation as a trial: its plan, its starts, and what is kept of it."""
 
 from __future__ import annotations
 
-import dataclasses
+import base64
+import io
 import math
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
-from baselines.experiments.outcome import Outcome, Record
+from baselines.experiments.rows import Record
+from baselines.experiments.trials import described
 from baselines.papers.bhattacharya.simulation.team import Rules, Simulation, Trace
 from entropy_explore_env.belief.paths.geodesic_cells import new_tessellation, tessellate
 from entropy_explore_env.scenario import with_settings
@@ -28,7 +30,7 @@ class Run:
     """One run.
 
     Attributes:
-        id: Its name, also that of its files.
+        cell: Name of the runs that differ by seed.
         world: Name of the recipe.
         shape: Cells of the plan along x and y.
         starts: `random` all over the plan; `cluster`, side by side somewhere; `corner`, in the lower left.
@@ -40,7 +42,7 @@ class Run:
         cell_m: What the recipe takes a cell for.
     """
 
-    id: str
+    cell: str
     world: str
     shape: tuple[int, int]
     starts: Literal["random", "cluster", "corner"]
@@ -52,13 +54,19 @@ class Run:
     pictured: bool = False
     cell_m: float = 0.1
 
-    def carry_out(self) -> Outcome:
+    @property
+    def settings(self) -> dict[str, Any]:
+        """All that decides its record, but the seed."""
+        fields = {name: value for name, value in described(self).items() if name not in ("cell", "seed")}
+        return {**fields, "rules": described(self.rules)}
+
+    def run(self) -> Record:
         """Carry it out: its record, and maps for its picture."""
         occupied = self.plan()
         starts = start_cells(occupied, self.starts, self.robots, self.seed)
         simulation = Simulation(occupied, starts, self.rules, self.known, self.seed)
         if not self.pictured:
-            return Outcome(record_of(self, simulation.run(self.limit, 1 if self.known else 0)))
+            return record_of(simulation.run(self.limit, 1 if self.known else 0))
         taken: list[dict[str, np.ndarray]] = []
         for _ in range(self.limit):
             goes_on = simulation.step(False)
@@ -71,13 +79,26 @@ class Run:
         chosen = np.unique(np.linspace(0, len(taken) - 1, SNAPSHOTS).round().astype(int))
         for number, index in enumerate(chosen):
             maps |= {f"{name}_{number}": array for name, array in taken[index].items()}
-        return Outcome(record_of(self, simulation.trace), maps)
+        return {**record_of(simulation.trace), "maps": packed(maps)}
 
     def plan(self) -> np.ndarray:
         """(X, Y, 1) bool, occupied."""
         grid = Grid((*self.shape, 1), self.cell_m)
         scenario = with_settings(find_scenario(self.world), {"grid": grid})
         return make_world(scenario, np.random.default_rng(self.seed)).occupied
+
+
+def packed(maps: dict[str, np.ndarray]) -> str:
+    """Return arrays as a text that `unpacked` reads."""
+    buffer = io.BytesIO()
+    np.savez_compressed(buffer, allow_pickle=False, **maps)
+    return base64.b64encode(buffer.getvalue()).decode("ascii")
+
+
+def unpacked(text: str) -> dict[str, np.ndarray]:
+    """Return the arrays of a record's maps."""
+    with np.load(io.BytesIO(base64.b64decode(text))) as maps:
+        return dict(maps)
 
 
 def start_cells(occupied: np.ndarray, starts: str, robots: int, seed: int) -> list[int]:
@@ -114,8 +135,8 @@ def _snapshot(simulation: Simulation) -> dict[str, np.ndarray]:
     }
 
 
-def record_of(run: Run, trace: Trace) -> Record:
-    """What reports need."""
+def record_of(trace: Trace) -> Record:
+    """Return what the page needs of a run."""
     functional = np.array(trace.functional)
     falls = -np.diff(functional) / functional[:-1] if np.isfinite(functional).all() else np.zeros(0)
     busy = np.array(trace.tessellations) > 0
@@ -143,7 +164,6 @@ def record_of(run: Run, trace: Trace) -> Record:
             "functional": [_number(value) for value in functional[rows]],
             "bits": np.array(trace.bits)[rows].tolist(),
         },
-        "rules": dataclasses.asdict(run.rules),
     }
 
 

@@ -1,20 +1,23 @@
-"""The runs of Bhattacharya's experiments (a), (b) and (d): controls, variants, plans and sensor ranges."""
+"""Bhattacharya's experiments as trials: controls, variants, plans and sensor ranges, and missions."""
 
 from __future__ import annotations
 
-import hashlib
-from collections.abc import Sequence
-from dataclasses import dataclass
-from pathlib import Path
+from dataclasses import dataclass, replace
+from itertools import product
 from typing import Any
 
-from baselines.experiments.outcome import Outcome, Record
-from baselines.experiments.provenance import code_digest
-from baselines.experiments.ray_cluster import RayCluster
-from baselines.experiments.runner import Conditions, run_all
-from baselines.papers.bhattacharya.run import Run
-from baselines.papers.bhattacharya.simulation.belief import Fusion, Sensor
-from baselines.papers.bhattacharya.simulation.team import Rules
+import numpy as np
+
+from baselines.experiments.experiment import Amount
+from baselines.experiments.rows import Record
+from baselines.experiments.trials import Trial, trials_of
+from baselines.papers.bhattacharya.missions import mission_cells
+from baselines.papers.bhattacharya.run import Run, start_cells
+from baselines.papers.bhattacharya.simulation.belief import Sensor
+from baselines.papers.bhattacharya.simulation.team import Rules, Simulation
+from baselines.papers.bhattacharya.splitting import ratios
+from baselines.papers.bhattacharya.timing import beside_scipy, changed_share
+from entropy_explore_env.errors import SettingError
 
 CONTROLS: dict[str, dict[str, Any]] = {
     "projected": {"control": "projected-centroid", "guarded": False},
@@ -33,12 +36,6 @@ VARIANTS: dict[str, dict[str, Any]] = {
 """Of (b): one thing changed at a time, but for `nearest-length`."""
 PICTURED = ("paper", "nearest-length")
 """Of (b), each in the largest plan in which it is run."""
-
-FUSIONS: dict[str, dict[str, Any]] = {
-    "far-mean": {"tau": 0.15, "tau_floor": 0.14},
-    "far-best": {"tau": 0.15, "tau_floor": 0.14, "fusion": Fusion(most_confident=True)},
-}
-"""Of (b), on the first small plan: τ below the entropy of a far reading, with either fusion."""
 
 
 @dataclass(frozen=True)
@@ -78,28 +75,44 @@ FLOORS = {
         917,
         35.0,
         (17.0, 35.0, 70.0, 140.0, 433.0),
-        (*VARIANTS, *FUSIONS),
+        tuple(VARIANTS),
         "the wide plans in cells three times as large",
     ),
 }
 """The largest range looks over the whole plan. There is time to run many small plans, and few others."""
 
 
-def coverage_id(control: str, starts: str, seed: int) -> str:
-    """Name of a run of (a)."""
-    return f"coverage-{control}-{starts}-{seed}"
+def coverage_id(control: str, starts: str) -> str:
+    """Return the name of runs of (a)."""
+    return f"coverage-{control}-{starts}"
 
 
-def exploration_id(floor: str, variant: str, range_cells: float, seed: int) -> str:
-    """Name of a run of (b); variant `paper` = nothing changed."""
-    return f"exploration-{floor}-{variant}-{range_cells:g}-{seed}"
+def exploration_id(floor: str, variant: str, range_cells: float) -> str:
+    """Return the name of runs of (b); variant `paper` = nothing changed."""
+    return f"exploration-{floor}-{variant}-{range_cells:g}"
+
+
+def experiment(amount: Amount) -> list[Trial]:
+    """Return all trials.
+
+    Of n seeds there are n runs of (a) for each control and kind of start, half as many small plans of (b)
+    and one of each other kind, a quarter of (e) and as many as seeds of (f), times missions of each. A quick
+    run has a fifth of small plans, and no others and no (e).
+    """
+    if len(amount.worlds) > 1:
+        raise SettingError("worlds", " ".join(map(str, amount.worlds)), "an OctoMap of one corridor")
+    small = max(1, amount.seeds // (5 if amount.quick else 2))
+    runs = all_runs(amount.seeds, 0 if amount.quick else 1, small)
+    cells = mission_cells(max(1, amount.seeds // 4), amount.worlds[0] if amount.worlds else None)
+    missions = [cell for cell in cells if not (amount.quick and cell.id.startswith("flying"))]
+    return [*runs, Measured(max((run for run in runs if not run.known), key=size_of)), *trials_of(missions)]
 
 
 def all_runs(coverage_seeds: int, plans: int, small_plans: int) -> list[Run]:
-    """The runs of (a), and of (b) in small plans and in those of the paper's size."""
+    """Return the runs of (a), and of (b) in small plans and in those of the paper's size."""
     runs = [
         Run(
-            coverage_id(name, starts, seed),
+            coverage_id(name, starts),
             "bhattacharya-office",
             (170, 200),
             starts,
@@ -116,20 +129,21 @@ def all_runs(coverage_seeds: int, plans: int, small_plans: int) -> list[Run]:
     for name, floor in FLOORS.items():
         points = [("paper", range_cells) for range_cells in floor.ranges]
         points += [(variant, floor.middle) for variant in floor.variants]
-        for seed in range(small_plans if name == "small" else plans):
-            runs += [
-                _exploration(name, variant, range_cells, seed)
-                for variant, range_cells in points
-                if seed == 0 or variant not in FUSIONS
-            ]
+        seeds = range(small_plans if name == "small" else plans)
+        runs += [_exploration(name, *point, seed) for seed, point in product(seeds, points)]
     return runs
 
 
+def size_of(run: Run) -> int:
+    """Return how many cells the plan of a run has."""
+    return run.shape[0] * run.shape[1]
+
+
 def _exploration(floor: str, variant: str, range_cells: float, seed: int) -> Run:
-    """A run of (b); of those that may be pictured, the first is, on each kind of plan."""
-    plan, changes = FLOORS[floor], {"paper": {}, **VARIANTS, **FUSIONS}[variant]
+    """Return a run of (b); of those that may be pictured, the first is, on each kind of plan."""
+    plan, changes = FLOORS[floor], {"paper": {}, **VARIANTS}[variant]
     return Run(
-        exploration_id(floor, variant, range_cells, seed),
+        exploration_id(floor, variant, range_cells),
         "bhattacharya-cluttered",
         plan.shape,
         "corner",
@@ -144,33 +158,34 @@ def _exploration(floor: str, variant: str, range_cells: float, seed: int) -> Run
 
 
 @dataclass(frozen=True)
-class KeptRun:
-    """A run as the runner of experiments takes it."""
+class Measured:
+    """What is measured beside the runs: (c), and a tessellation of the largest plan on the clock.
 
-    of: Run
+    Attributes:
+        largest: A run in that plan.
+    """
+
+    largest: Run
+    cell: str = "measured"
+    seed: int = 0
+    world: str = "bhattacharya-cluttered"
 
     @property
-    def file(self) -> str:
-        """Its file in the folder of results, without suffix."""
-        return self.of.id
+    def settings(self) -> dict[str, Any]:
+        """The run."""
+        return {"largest": self.largest.settings}
 
-    @property
-    def settings_digest(self) -> str:
-        """Of all that decides its result but the code."""
-        return hashlib.sha256(repr(self.of).encode()).hexdigest()
+    def run(self) -> Record:
+        """Measure.
 
-    def code_digest(self) -> str:
-        """Of the code that this process would run it with."""
-        return code_digest(Run.__module__)
-
-    def run(self) -> Outcome:
-        """Carry it out."""
-        return self.of.carry_out()
-
-
-def kept_records(
-    runs: Sequence[Run], folder: Path, workers: int | RayCluster, quiet: bool
-) -> dict[str, Record]:
-    """Run what is missing, under a progress bar; id → record."""
-    found = run_all([KeptRun(run) for run in runs], Conditions(folder, workers, "Bhattacharya", quiet))
-    return {run.id: record for run, record in zip(runs, found, strict=True)}
+        Returns:
+            `splits`, ratios of (c) by region; `ours_s` and `scipy_s` of a tessellation; `changed`, the share
+            of a small plan's cells whose cost or owner changes from one tessellation to the next.
+        """
+        plan = self.largest.plan()
+        costs = np.where(plan, np.inf, 1.0).astype(np.float32)
+        seconds = beside_scipy(costs, np.array(start_cells(plan, "random", 4, 0)))
+        run = replace(_exploration("small", "paper", FLOORS["small"].ranges[0], 0), pictured=False)
+        simulation = Simulation(run.plan(), start_cells(run.plan(), run.starts, run.robots, 0), run.rules)
+        changed = changed_share(simulation, 200)
+        return {"splits": ratios(), "ours_s": seconds.ours, "scipy_s": seconds.scipy, "changed": changed}

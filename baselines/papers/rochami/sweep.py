@@ -7,8 +7,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from baselines.experiments.cells import Cell
-from baselines.experiments.outcome import Record
+from baselines.experiments.experiment import Amount
+from baselines.experiments.rows import Record
+from baselines.experiments.trials import Cell, CellTrial, trials_of
 from baselines.papers.rochami.mission import Run
 from baselines.strategies.mutual_information.neighbourhood import MutualInformationConfig
 from entropy_explore_env.scenario import Scenario, with_settings
@@ -129,8 +130,9 @@ def sharing_id(robots: int, i_min_bits: float | None = None, fill: float | None 
     return f"sharing-n{robots}-" + (f"imin-{i_min_bits:g}" if fill is None else f"fill-{fill:g}")
 
 
-def experiment(starts: int, quick: bool) -> list[Cell]:
-    """All cells; a quick one has fewer team sizes and changes."""
+def experiment(amount: Amount) -> list[CellTrial]:
+    """Return all missions; a quick run has fewer team sizes and changes."""
+    starts, quick = amount.seeds, amount.quick
     teams = FEW if quick else TEAMS
     cells = [
         _cell(cell_id(1, "random"), {"robots": 1}, "random", starts),
@@ -161,7 +163,7 @@ def experiment(starts: int, quick: bool) -> list[Cell]:
                 settings = _merged({"robots": robots}, change.settings)
                 cell, few = change_id(name, robots, method), min(starts, change.starts)
                 cells.append(_cell(cell, settings, method, few, change.coordination))
-    return cells + _sharing_cells(starts, quick)
+    return trials_of(cells + _sharing_cells(starts, quick))
 
 
 def _cell(

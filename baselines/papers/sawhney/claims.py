@@ -11,23 +11,25 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from baselines.experiments.claims import Claim
-from baselines.experiments.outcome import Record
-from baselines.experiments.statistics import double_ratio_interval, ratio_interval
+from baselines.experiments.claims import Claim, above
+from baselines.experiments.experiment import Records
+from baselines.experiments.statistics import Interval, mean_interval, ratio_interval
+from baselines.experiments.tables import markdown_table
 from baselines.papers.sawhney.sweep import (
     BETAS,
     CHANGED_IN,
+    CHANGED_METHODS,
     CHANGED_TEAM,
     CHANGES,
     DEM,
     FARTHER_BETAS,
+    MAP_METHODS,
+    MAP_TEAM,
     PLANS,
     TEAMS,
     TERRAINS,
     cell_id,
 )
-
-Records = dict[str, list[Record]]
 
 ENDS = {"t95_s": "to 95 %", "t99_s": "to 99 %", "t_none_s": "to no frontier"}
 PARTS = {"plans": "2-D", "terrains": "3-D"}
@@ -39,6 +41,27 @@ PAPER_BETA = {"plans": 30, "terrains": 40}
 """The paper's best β."""
 PAPER_SINGLE = 0.93
 """V/t over the best β of one robot in plans (sect. 5, a robot with a laser): about 7 % faster."""
+GROUPS = {
+    f"{part}-{kind}": f"{name}{text}"
+    for part, name in PARTS.items()
+    for kind, text in (
+        ("async-t", ": asynchronous is faster than synchronous"),
+        ("beta-", ": V/t is faster than the best β"),
+        ("extreme-", ": β = 1 and 70 are slower than the best β"),
+        ("no-single-", ": each world's own best β is faster, on other seeds"),
+        ("points", ": V/t scans from nearly as many points as the best β"),
+        ("ways", ": ways of V/t are shorter than those of the best β"),
+        ("naive-", ": ray-cast V is faster than naive V"),
+        ("no-height-", ": the height factor helps"),
+        ("team-", ", each team size: V/t is faster than the best β"),
+        ("interior-", ", ours: others lie on both sides of the best β"),
+        ("finish-", ", ours: (V + bonus)/t is faster than V/t"),
+        ("nearest-", ", ours: V/t is faster than Yamauchi's metric"),
+        ("coordinated-", ", ours: V/t is faster than Burgard's metric"),
+        ("async-team-", ", ours, each team size: asynchronous is faster"),
+    )
+}
+"""Beginning of ids → what the claims are, on the page; ratios of times, if not said otherwise."""
 _ALIKE = 0.1
 """Numbers that differ by no more than this share are nearly the same."""
 _ALL = slice(None)
@@ -106,7 +129,7 @@ def compared(
     end: str,
     teams: Sequence[int] = (),
     worlds: Sequence[str] = (),
-) -> tuple[float, float, float]:
+) -> Interval:
     """Time of a method over that of another, with its 95 % interval."""
     pair = (relative(records, part, method, end, teams, worlds) for method in (ours, theirs))
     return ratio_interval(*pair)
@@ -164,9 +187,9 @@ def _part_claims(records: Records, part: str) -> list[Claim]:
     return [*claims, *_our_claims(records, part, name)]
 
 
-def _faster(name: str, claim: str, paper: float | str | None, ratio: tuple[float, float, float]) -> Claim:
+def _faster(name: str, claim: str, paper: float | str | None, ratio: Interval) -> Claim:
     """Holds if the whole interval is below 1."""
-    return Claim(name, claim, paper, *ratio, ratio[2] < 1.0)
+    return Claim(name, claim, paper, *ratio, ratio.high < 1.0)
 
 
 def _extreme_claims(records: Records, part: str, end: str, text: str) -> list[Claim]:
@@ -190,7 +213,7 @@ def _extreme_claims(records: Records, part: str, end: str, text: str) -> list[Cl
     for beta in (betas[0], betas[-1]):
         ratio = compared(records, part, f"beta-{beta}", f"beta-{best}", end)
         claim = f"{text}: β = {beta} is slower than the best β ({best}); t ratio"
-        claims.append(Claim(f"{part}-extreme-{beta}-{end}", claim, "> 1", *ratio, ratio[1] > 1.0))
+        claims.append(above(f"{part}-extreme-{beta}-{end}", claim, ratio))
     return claims
 
 
@@ -221,9 +244,9 @@ def _distance_claims(records: Records, part: str, name: str) -> list[Claim]:
     scans, lengths = (
         compared(records, part, "ptv", f"beta-{best}", what) for what in ("scans", "distance_m")
     )
-    alike = scans[1] > 1.0 - _ALIKE and scans[2] < 1.0 + _ALIKE
-    text = f"{name}, to no frontier: V/t scans from nearly as many points as the best β ({best}); ratio"
-    shorter = f"{name}, to no frontier: ways of V/t are shorter than those of the best β ({best}); ratio"
+    alike = scans.low > 1.0 - _ALIKE and scans.high < 1.0 + _ALIKE
+    text = f"{name}: V/t scans from nearly as many points as the best β ({best}); ratio"
+    shorter = f"{name}: ways of V/t are shorter than those of the best β ({best}); ratio"
     return [
         Claim(f"{part}-points", text, "about 1", *scans, alike),
         _faster(f"{part}-ways", shorter, "< 1", lengths),
@@ -268,33 +291,9 @@ def changes_in(records: Records, part: str) -> dict[str, tuple[str, ...]]:
 
 def changed_ratio(
     records: Records, change: str | None, method: str, end: str, worlds: Sequence[str]
-) -> tuple[float, float, float]:
+) -> Interval:
     """V/t over another method at `CHANGED_TEAM`, with one thing changed; relative in each world."""
     return ratio_interval(*_changed(records, change, method, end, worlds))
-
-
-def changed_from(
-    records: Records, change: str, methods: tuple[str, str], end: str, worlds: Sequence[str]
-) -> tuple[float, float, float]:
-    """That ratio with one thing changed over that as it is.
-
-    Args:
-        records: By cell.
-        change: What is changed.
-        methods: The other method with the change, and without.
-        end: Name of a time.
-        worlds: Where.
-    """
-    changed = _changed(records, change, methods[0], end, worlds)
-    return double_ratio_interval(*changed, *_changed(records, None, methods[1], end, worlds))
-
-
-def changed_itself(
-    records: Records, change: str, method: str, end: str, worlds: Sequence[str]
-) -> tuple[float, float, float]:
-    """A method with one thing changed over itself as it is; relative in each world."""
-    plain, changed = _in_units_of_first(records, ((method, None), (method, change)), end, worlds)
-    return ratio_interval(changed, plain)
 
 
 def fastest_changed(
@@ -321,3 +320,36 @@ def _in_units_of_first(
         for values, taken in zip(found, both, strict=True):
             values.append(taken / both[0].mean())
     return np.concatenate(found[0]), np.concatenate(found[1])
+
+
+def changed_table(records: Records) -> str:
+    """Return V/t over the faster of β = 5 and 20 to 95 %, with one thing changed."""
+    rows = []
+    for part in PARTS:
+        changes = changes_in(records, part)
+        betas = [method for method in CHANGED_METHODS[part] if method.startswith("beta-")]
+        worlds = next(iter(changes.values()), ())
+        for change in (None, *changes) if changes else ():
+            other = fastest_changed(records, change, betas, "t95_s", worlds)
+            text = "as it is" if change is None else CHANGES[part][change].text
+            ratio = changed_ratio(records, change, other, "t95_s", worlds)
+            rows.append([f"{PARTS[part]}, {text}", f"{ratio:.2f}"])
+    return markdown_table(["changed", "V/t over the faster β, to 95 %"], rows)
+
+
+def maps_table(records: Records) -> str:
+    """Return mean seconds to no frontier in plans from files, by method; without such plans a sentence."""
+    rows = []
+    for world in dict.fromkeys(cell.split("/")[0] for cell in records if cell.startswith("map-")):
+        cells = [cell_id(world, MAP_TEAM, method) for method in MAP_METHODS]
+        means = [f"{mean_interval(times(records, cell, 't_none_s')).value:,.0f}" for cell in cells]
+        rows.append([world.removeprefix("map-"), *means])
+    return markdown_table(["plan", *MAP_METHODS], rows) if rows else "None were given."
+
+
+def held_of_paper(records: Records) -> str:
+    """Return how many claims hold, the paper's and ours."""
+    claims = all_claims(records)
+    ours = [claim.holds for claim in claims if claim.paper is None]
+    paper = [claim.holds for claim in claims if claim.paper is not None]
+    return f"{sum(paper)} of the paper's {len(paper)}, and {sum(ours)} of {len(ours)} of ours"

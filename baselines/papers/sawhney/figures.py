@@ -1,20 +1,22 @@
-"""Figs. 6, 8 and 10 of Sawhney 2009, and sect. 4.1, with ours, each with the numbers that it shows."""
+"""Figs. 6, 8 and 10 of Sawhney 2009, and sect. 4.1, with ours."""
 
 from __future__ import annotations
+
+from typing import Any
 
 import numpy as np
 from matplotlib import colormaps
 from matplotlib.figure import Figure
 
 from baselines.cli.figures import COLOURS
-from baselines.experiments.statistics import mean_interval
+from baselines.experiments.experiment import Records
+from baselines.experiments.plots import interval_line, mean_band
 from baselines.papers.sawhney.claims import (
     ENDS,
     PAPER_ASYNCHRONOUS,
     PAPER_BEST_BETA,
     PAPER_BETA,
     PARTS,
-    Records,
     best_beta,
     betas_in,
     compared,
@@ -26,33 +28,22 @@ from baselines.papers.sawhney.claims import (
 from baselines.papers.sawhney.sweep import cell_id
 from entropy_explore_env.errors import counted
 
-Table = dict[str, list[object]]
 
-
-def figure_beta(records: Records, part: str) -> tuple[Figure, Table]:
-    """Relative time over β, at three ends, and in each world to 95 %; V/t is 1."""
+def figure_beta(records: Records, part: str) -> Figure:
+    """Draw relative time over β, at three ends, and in each world to 95 %; V/t is 1."""
     betas = betas_in(records, part)
     figure = Figure(figsize=(9.6, 4.0), layout="constrained")
     left, right = figure.subplots(1, 2, sharey=True)
-    table: Table = {name: [] for name in ("world", "end", "beta", "mean", "low", "high")}
-    lines = [(left, "all", end, ENDS[end]) for end in ENDS]
-    lines += [(right, world, "t95_s", world) for world in worlds_in(records, part)]
-    for number, (axes, world, end, label) in enumerate(lines):
-        chosen = () if world == "all" else (world,)
-        points = [mean_interval(relative(records, part, f"beta-{b}", end, (), chosen)) for b in betas]
-        colour = COLOURS[number % len(COLOURS)]
-        mean, low, high = zip(*points, strict=True)
-        axes.plot(betas, mean, "o-", color=colour, markersize=3, label=label)
-        axes.fill_between(betas, low, high, color=colour, alpha=0.15, linewidth=0)
-        for beta, point in zip(betas, points, strict=True):
-            values = (world, end, beta, *(round(value, 4) for value in point))
-            for name, value in zip(table, values, strict=True):
-                table[name].append(value)
+    lines: list[tuple[Any, tuple[str, ...], str, str]] = [(left, (), end, ENDS[end]) for end in ENDS]
+    lines += [(right, (world,), "t95_s", world) for world in worlds_in(records, part)]
+    for number, (axes, worlds, end, label) in enumerate(lines):
+        samples = [relative(records, part, f"beta-{beta}", end, (), worlds) for beta in betas]
+        style = {"color": COLOURS[number % len(COLOURS)], "marker": "o", "markersize": 3, "label": label}
+        mean_band(axes, betas, np.stack(samples, axis=1), **style)
     paper = 1.0 / PAPER_BEST_BETA[part]
     left.plot([PAPER_BETA[part]], [paper], "*", color="w", markeredgecolor="k", markersize=12)
-    left.annotate(
-        "the paper's best β", (PAPER_BETA[part], paper), (4, 8), textcoords="offset points", fontsize=8
-    )
+    place: Any = {"xytext": (4, 8), "textcoords": "offset points", "fontsize": 8}
+    left.annotate("the paper's best β", (PAPER_BETA[part], paper), **place)
     for axes, title in ((left, "all worlds and team sizes"), (right, "to 95 %, by world")):
         axes.axhline(1.0, color="0.3", linewidth=0.9, linestyle="--")
         axes.set(xscale="log", xlabel="β in the paper's numbers (units: see the text)")
@@ -62,50 +53,43 @@ def figure_beta(records: Records, part: str) -> tuple[Figure, Table]:
         axes.legend(frameon=False, fontsize=8)
     left.set_ylabel("time over that of V/t (dashed)")
     figure.suptitle(f"V - βt against V/t, {PARTS[part]}; means, 95 % intervals", fontsize=10)
-    return figure, table
+    return figure
 
 
-def figure_times(records: Records, part: str) -> tuple[Figure, Table]:
-    """Seconds to 95 % over team size: V/t and every β (figs. 6, 8); and synchronous and naive (4.1, 10)."""
-    teams, worlds, end = teams_in(records, part), worlds_in(records, part), "t95_s"
+def figure_times(records: Records, part: str) -> Figure:
+    """Draw seconds to 95 % over team size: V/t and every β (figs. 6, 8); synchronous and naive (4.1, 10)."""
+    teams, worlds, betas = teams_in(records, part), worlds_in(records, part), betas_in(records, part)
     figure = Figure(figsize=(9.6, 4.0), layout="constrained")
     left, right = figure.subplots(1, 2, sharey=True)
-    table: Table = {name: [] for name in ("method", "robots", "mean_s", "low_s", "high_s")}
-    betas = betas_in(records, part)
     shades = colormaps["viridis_r"].resampled(len(betas) + 1)
-    lines = [(left, f"beta-{beta}", f"β = {beta}", shades(number + 1)) for number, beta in enumerate(betas)]
+    lines: list[tuple[Any, str, str, Any]] = [
+        (left, f"beta-{beta}", f"β = {beta}", shades(number + 1)) for number, beta in enumerate(betas)
+    ]
     lines += [(left, "ptv", "V/t", "k"), (right, "ptv", "V/t, asynchronous", "k")]
     lines += [(right, "sync", "V/t, synchronous", COLOURS[0]), (right, "naive", "naive V/t", COLOURS[1])]
     for axes, method, label, colour in lines:
-        points = []
-        for n in teams:
-            found = np.concatenate([times(records, cell_id(world, n, method), end) for world in worlds])
-            points.append(mean_interval(found))
-        mean, low, high = zip(*points, strict=True)
-        axes.plot(teams, mean, "o-", color=colour, markersize=3, linewidth=1 + (method == "ptv"), label=label)
+        samples = [
+            np.concatenate([times(records, cell_id(w, n, method), "t95_s") for w in worlds]) for n in teams
+        ]
+        style = {"color": colour, "marker": "o", "markersize": 3, "label": label}
         if axes is right:
-            axes.fill_between(teams, low, high, color=colour, alpha=0.12, linewidth=0)
-        if axes is left or method != "ptv":
-            for n, point in zip(teams, points, strict=True):
-                values = (method, n, *(round(value, 2) for value in point))
-                for name, value in zip(table, values, strict=True):
-                    table[name].append(value)
+            mean_band(axes, teams, np.stack(samples, axis=1), **style)
+        else:
+            axes.plot(teams, [sample.mean() for sample in samples], linewidth=1 + (method == "ptv"), **style)
     for axes in (left, right):
         axes.set(xlabel="robots", xticks=teams)
         axes.legend(frameon=False, fontsize=7, ncols=2 if axes is left else 1)
+    plans = part == "plans"
     left.set_ylabel("simulated seconds to 95 %")
-    left.set_title("V - βt and V/t: fig. " + ("6" if part == "plans" else "8"), fontsize=9)
-    right.set_title(
-        "allocation and V: " + ("sect. 4.1" if part == "plans" else "sect. 4.1 and fig. 10"), fontsize=9
-    )
+    left.set_title(f"V - βt and V/t: fig. {6 if plans else 8}", fontsize=9)
+    right.set_title(f"allocation and V: sect. 4.1{'' if plans else ' and fig. 10'}", fontsize=9)
     figure.suptitle(f"{PARTS[part]}: mean times over all worlds", fontsize=10)
-    return figure, table
+    return figure
 
 
-def figure_teams(records: Records, part: str) -> tuple[Figure, Table]:
-    """Synchronous, naive and the rest over asynchronous V/t, by team size (sect. 4.1, fig. 10)."""
-    teams = teams_in(records, part)
-    best = best_beta(records, part, "t95_s")
+def figure_teams(records: Records, part: str) -> Figure:
+    """Draw synchronous, naive and the rest over asynchronous V/t, by team size (sect. 4.1, fig. 10)."""
+    teams, best = teams_in(records, part), best_beta(records, part, "t95_s")
     methods = {
         "sync": "synchronous",
         "naive": "naive V",
@@ -118,49 +102,36 @@ def figure_teams(records: Records, part: str) -> tuple[Figure, Table]:
         methods["no-height"] = "no height factor"
     figure = Figure(figsize=(9.6, 3.8), layout="constrained")
     panels = figure.subplots(1, len(ENDS), sharey=True)
-    table: Table = {name: [] for name in ("end", "method", "robots", "ratio", "low", "high")}
+    paper = 1.0 / PAPER_ASYNCHRONOUS[part]
     for axes, (end, text) in zip(panels, ENDS.items(), strict=True):
         for number, (method, label) in enumerate(methods.items()):
             points = [compared(records, part, method, "ptv", end, (n,)) for n in teams]
             shift = 0.06 * (number - 0.5 * (len(methods) - 1))
-            x = [n + shift for n in teams]
-            mean, low, high = zip(*points, strict=True)
-            axes.plot(x, mean, "o-", color=COLOURS[number % len(COLOURS)], markersize=3, label=label)
-            axes.vlines(x, low, high, color=COLOURS[number % len(COLOURS)], linewidth=0.8)
-            for n, point in zip(teams, points, strict=True):
-                values = (end, method, n, *(round(value, 4) for value in point))
-                for name, value in zip(table, values, strict=True):
-                    table[name].append(value)
-        paper = 1.0 / PAPER_ASYNCHRONOUS[part]
+            style = {"color": COLOURS[number % len(COLOURS)], "markersize": 3, "capsize": 0, "label": label}
+            interval_line(axes, [n + shift for n in teams], points, **style)
         axes.axhline(paper, color=COLOURS[0], linewidth=0.8, linestyle=":")
         axes.axhline(1.0, color="0.3", linewidth=0.9, linestyle="--")
         axes.set(xlabel="robots", xticks=teams, title=text)
     panels[0].set_ylabel("time over that of asynchronous V/t (dashed)")
     figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=4, frameon=False)
-    figure.suptitle(
-        f"{PARTS[part]}, by team size; dotted: the paper's synchronous allocation ({paper:.2f})", fontsize=10
-    )
-    return figure, table
+    dotted = f"dotted: the paper's synchronous allocation ({paper:.2f})"
+    figure.suptitle(f"{PARTS[part]}, by team size; {dotted}", fontsize=10)
+    return figure
 
 
-def figure_curves(records: Records, part: str) -> tuple[Figure, Table]:
-    """Explored share over time of one mission each of V/t and the best β, in every world (seed 0)."""
+def figure_curves(records: Records, part: str) -> Figure:
+    """Draw explored share over time of one mission each of V/t and the best β, in every world (seed 0)."""
     worlds = worlds_in(records, part)
     best, n = best_beta(records, part, "t95_s"), teams_in(records, part)[-1]
     figure = Figure(figsize=(2.5 * len(worlds), 2.6), layout="constrained")
     panels = figure.subplots(1, len(worlds), sharey=True, squeeze=False)[0]
-    table: Table = {name: [] for name in ("world", "method", "time_s", "explored")}
     for axes, world in zip(panels, worlds, strict=True):
         for number, method in enumerate(("ptv", f"beta-{best}", "sync")):
             series = records[cell_id(world, n, method)][0]["series"]
             label = {"ptv": "V/t", "sync": "V/t, synchronous"}.get(method, f"β = {best}")
             axes.step(series["time_s"], series["explored"], where="post", color=COLOURS[number], label=label)
-            table["time_s"] += series["time_s"]
-            table["explored"] += series["explored"]
-            table["world"] += [world] * len(series["time_s"])
-            table["method"] += [method] * len(series["time_s"])
         axes.set(xlabel="simulated time (s)", title=world)
     panels[0].set_ylabel("explored")
     panels[0].legend(frameon=False, fontsize=7, loc="lower right")
     figure.suptitle(f"{PARTS[part]}: a mission of {counted(n, 'robot')} (seed 0)", fontsize=10)
-    return figure, table
+    return figure

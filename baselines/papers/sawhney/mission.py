@@ -10,17 +10,17 @@ later than the last robot arrives.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
 
-from baselines.experiments.outcome import Record
+from baselines.experiments.rows import Record
+from baselines.papers.sawhney.terrain_model import JACKSBORO, model_file
 from baselines.strategies.metrics import ExplorationConfig
 from baselines.strategies.rules.per_time_visibility import PerTimeVisibility
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
-from entropy_explore_env.missions.view import RobotView
 from entropy_explore_env.reports.metrics import joint_figures, mission_figures
 from entropy_explore_env.scenario import Scenario
 
@@ -36,7 +36,7 @@ class Run:
 
     Attributes:
         exploring: Of the robots.
-        world: A height map's file to be in, in place of the scenario's world; None = that.
+        world: A height map's file to be in, or JACKSBORO, in place of the scenario's world; None = that.
         ceiling_m: Of the exposure surface above it.
     """
 
@@ -75,14 +75,14 @@ class Run:
 
     def placed(self, env: EntropyExploreEnv) -> EntropyExploreEnv:
         """The environment, or one in this cell's height map."""
-        return env if self.world is None else _in_world(env.scenario, self.world, self.ceiling_m)
+        if self.world is None:
+            return env
+        world = model_file() if self.world == JACKSBORO else self.world
+        return _in_world(env.scenario, world, self.ceiling_m)
 
 
 def explore_until_done(
-    env: EntropyExploreEnv,
-    explorer: PerTimeVisibility,
-    seed: int,
-    look: Callable[[float, Sequence[RobotView], Sequence[np.ndarray]], None] | None = None,
+    env: EntropyExploreEnv, explorer: PerTimeVisibility, seed: int
 ) -> tuple[Sequence[float], Sequence[float]]:
     """Run a mission until all robots find nothing unexplored, or it is cut off.
 
@@ -90,7 +90,6 @@ def explore_until_done(
         env: Of the mission.
         explorer: The robots' strategy.
         seed: Of the mission.
-        look: Called when robots have chosen, with the explored share, their views and their viewpoints.
 
     Returns:
         Times and explored shares after the reset and each step.
@@ -109,8 +108,6 @@ def explore_until_done(
             if over_terrain
             else float(joint_figures(env.missions, 0)["explored"] or 0.0)
         )
-        if look is not None:
-            look(shares[-1], views, chosen)
         if all(explorer.idle):
             break
         for view, viewpoint in zip(views, chosen, strict=True):

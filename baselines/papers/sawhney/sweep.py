@@ -8,18 +8,17 @@ numbers sweep 0.05 … 3.5 m²/s and 4 … 280 m³/s, from well below to well ab
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from itertools import product
 from pathlib import Path
 from typing import Any
 
-from baselines.experiments.cells import Cell
-from baselines.papers.sawhney.map_files import METHODS as MAP_METHODS
-from baselines.papers.sawhney.map_files import STARTS as MAP_STARTS
-from baselines.papers.sawhney.map_files import TEAM as MAP_TEAM
-from baselines.papers.sawhney.map_files import map_world
+from baselines.experiments.experiment import Amount
+from baselines.experiments.trials import Cell, CellTrial, trials_of
 from baselines.papers.sawhney.mission import MapRun, Run
+from baselines.papers.sawhney.terrain_model import JACKSBORO
 from baselines.strategies.metrics import Coordinated, ExplorationConfig, Metric, Nearest
+from entropy_explore_env.errors import SettingError
 from entropy_explore_env.frontiers.frontier_map import KNOWN_SIGMA, FrontierConfig
 from entropy_explore_env.scenario import Scenario, with_settings
 from entropy_explore_env.scenarios import find_scenario
@@ -39,6 +38,11 @@ BONUS = {"plans": 0.5, "terrains": 40.0}
 STRATEGY = "per-time-visibility"
 SIGMA = KNOWN_SIGMA
 TIME_LIMIT_S = 3600.0
+MAP_TEAM, MAP_STARTS = 3, 5
+MAP_METHODS = ("ptv", "beta-1", "beta-10", "beta-40", "finish", "nearest", "coordinated")
+"""Of plans from files: real ones have racks, clutter, and gaps that no robot gets through."""
+HEIGHT_MAPS = (".tif", ".tiff")
+"""How names of height maps' files end."""
 CHANGED_TEAM = 3
 """Team size at which one thing is changed at a time."""
 
@@ -129,58 +133,47 @@ def cell_id(world: str, robots: int, method: str, change: str | None = None) -> 
     return f"{world}/n{robots}/{method}" + ("" if change is None else f"-{change}")
 
 
-def experiment(
-    starts: int,
-    flights: int,
-    quick: bool,
-    dem: Path | None,
-    maps: Sequence[Path] = (),
-    teams: Sequence[int] = (),
-) -> list[Cell]:
-    """All cells.
+def map_world(file: Path) -> str:
+    """Return the name of the world of a plan's file."""
+    return f"map-{file.stem}"
 
-    Args:
-        starts: Missions a point in each plan.
-        flights: Missions a point over each terrain; 0 = none.
-        quick: Fewer team sizes and β.
-        dem: A height map's file, flown over as well.
-        maps: Files of plans of different names, explored by one team each, from MAP_STARTS starts at most.
-        teams: Team sizes; none = the usual ones. With CHANGED_TEAM things are changed one at a time.
+
+def experiment(amount: Amount) -> list[CellTrial]:
+    """Return all missions: a quick run has fewer team sizes and β, and no model of real ground.
+
+    World files that end as height maps do take the place of that model; others are plans.
     """
-    cells = []
+    grounds = [str(file) for file in amount.worlds if file.suffix in HEIGHT_MAPS]
+    plans = [file for file in amount.worlds if file.suffix not in HEIGHT_MAPS]
+    if len(grounds) > 1:
+        raise SettingError("worlds", " ".join(grounds), "one height map at most")
+    dem = grounds[0] if grounds else None if amount.quick else JACKSBORO
+    seeds, quick, cells = amount.seeds, amount.quick, list[Cell]()
     for world in (*PLANS, *TERRAINS, *((DEM,) if dem is not None else ())):
         part = part_of(world)
-        if (starts if part == "plans" else flights) == 0:
-            continue
-        for robots in teams or (QUICK_TEAMS[part] if quick else TEAMS):
+        for robots in QUICK_TEAMS[part] if quick else TEAMS:
             for method, exploring in methods(part, quick).items():
-                seeds = starts if part == "plans" else flights
                 cells.append(_cell(world, robots, method, exploring, seeds, dem))
-    for file in maps:
+    for file in plans:
         for method in MAP_METHODS:
             run = MapRun(_exploring(methods("plans", False)[method]), str(file))
             name = cell_id(map_world(file), MAP_TEAM, method)
-            cells.append(
-                Cell(name, _scenario(PLANS[0], MAP_TEAM, {}), STRATEGY, min(starts, MAP_STARTS), run)
-            )
-    for part, seeds in (("plans", starts), ("terrains", flights)):
-        ran = teams or (QUICK_TEAMS[part] if quick else TEAMS)
-        for name, change in CHANGES[part].items() if seeds and CHANGED_TEAM in ran else ():
-            for world in (QUICK_CHANGED_IN if quick else CHANGED_IN)[part]:
-                for method in CHANGED_METHODS[part]:
-                    exploring = {**methods(part, False)[method], **change.exploring}
-                    frontiers = exploring.get("frontiers", FrontierConfig())
-                    exploring["frontiers"] = replace(frontiers, **change.frontiers)
-                    cell = _cell(world, CHANGED_TEAM, method, exploring, seeds, None, change.settings, name)
-                    cells.append(cell)
-    return cells
+            scenario = _scenario(PLANS[0], MAP_TEAM, {})
+            cells.append(Cell(name, scenario, STRATEGY, min(seeds, MAP_STARTS), run))
+    for part, changes in CHANGES.items():
+        worlds = (QUICK_CHANGED_IN if quick else CHANGED_IN)[part]
+        for name, world, method in product(changes, worlds, CHANGED_METHODS[part]):
+            change = changes[name]
+            exploring = {**methods(part, False)[method], **change.exploring}
+            frontiers = exploring.get("frontiers", FrontierConfig())
+            exploring["frontiers"] = replace(frontiers, **change.frontiers)
+            cells.append(_cell(world, CHANGED_TEAM, method, exploring, seeds, None, change.settings, name))
+    return trials_of(cells)
 
 
-def world_cell(world: str, robots: int, method: str | Metric, dem: Path | None = None) -> Cell:
-    """A cell of one mission in a world, by a method of the experiment or by a metric."""
-    if isinstance(method, Metric):
-        return _cell(world, robots, f"metric-{method.beta}-{method.bonus}", {"metric": method}, 1, dem)
-    return _cell(world, robots, method, methods(part_of(world), False)[method], 1, dem)
+def world_cell(world: str, robots: int, method: str) -> Cell:
+    """Return a cell of one mission in a world, by a method of the experiment."""
+    return _cell(world, robots, method, methods(part_of(world), False)[method], 1, None)
 
 
 def _cell(
@@ -189,11 +182,11 @@ def _cell(
     method: str,
     exploring: dict[str, Any],
     seeds: int,
-    dem: Path | None,
+    dem: str | None,
     settings: dict[str, Any] | None = None,
     change: str | None = None,
 ) -> Cell:
-    run = Run(_exploring(exploring), str(dem) if world == DEM else None)
+    run = Run(_exploring(exploring), dem if world == DEM else None)
     name = cell_id(world, robots, method, change)
     return Cell(name, _scenario(world, robots, settings or {}), STRATEGY, seeds, run)
 

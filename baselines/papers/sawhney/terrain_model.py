@@ -7,6 +7,8 @@ the fault stand out as they do in pictures of it, eight times as steep as they a
 from __future__ import annotations
 
 import io
+import tempfile
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -15,18 +17,16 @@ from matplotlib import cbook
 from entropy_explore_env.writing import write_atomically
 
 JACKSBORO = "jacksboro"
+_FOLDER = tempfile.TemporaryDirectory(prefix="entropy_explore_env-")
 ACROSS, UP = 400.0, 50.0
 """Scales of the model."""
 _METRES_PER_DEGREE = 111_195.0
 """Along a meridian."""
 
 
-def write_model(folder: Path) -> Path:
-    """Write the model, a height map that `load_world` reads.
-
-    Returns:
-        Its file in the folder.
-    """
+@lru_cache(maxsize=1)
+def model_file() -> str:
+    """Return the path of the model, a height map that `load_world` reads, written for this process."""
     with np.load(
         cbook.get_sample_data("jacksboro_fault_dem.npz", asfileobj=False), allow_pickle=False
     ) as dem:
@@ -34,6 +34,6 @@ def write_model(folder: Path) -> Path:
         spacing_m = np.array([dem["dx"] * np.cos(middle), dem["dy"]]) * _METRES_PER_DEGREE / ACROSS
     buffer = io.BytesIO()
     np.savez_compressed(buffer, elevation=elevation_m, spacing_m=spacing_m)
-    path = folder / f"{JACKSBORO}.npz"
+    path = Path(_FOLDER.name) / f"{JACKSBORO}.npz"
     write_atomically(path, buffer.getvalue())
-    return path
+    return str(path)

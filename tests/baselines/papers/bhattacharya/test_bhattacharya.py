@@ -1,11 +1,8 @@
-"""The reproduction of Bhattacharya 2010: its belief, its simulation, and the command from end to end."""
+"""Bhattacharya: the belief and the simulation of its runs, and its page from end to end."""
 
 from __future__ import annotations
 
-import contextlib
 import dataclasses
-import io
-import json
 import math
 
 import numpy as np
@@ -13,14 +10,17 @@ import pytest
 from hypothesis import given
 
 from baselines.cli.arguments import run_command
-from baselines.papers.bhattacharya import __main__ as bhattacharya
-from baselines.papers.bhattacharya.run import Run, start_cells
+from baselines.experiments.trials import Trial
+from baselines.papers.__main__ import main
+from baselines.papers.bhattacharya import EXPERIMENT, sweep
+from baselines.papers.bhattacharya.run import packed, start_cells, unpacked
 from baselines.papers.bhattacharya.simulation.belief import Fusion, GridBelief, Readings, Scanner, Sensor
 from baselines.papers.bhattacharya.simulation.team import Rules, Simulation
 from baselines.papers.bhattacharya.splitting import split
-from baselines.papers.bhattacharya.sweep import FLOORS, KeptRun, all_runs
+from baselines.papers.bhattacharya.sweep import FLOORS, all_runs
 from baselines.papers.bhattacharya.timing import changed_share
 from entropy_explore_env.errors import SettingError
+from tests.baselines.papers.pages import run_paper
 from tests.reference.scenes import drawn, seeds
 
 SHAPE = (9, 13, 1)
@@ -195,27 +195,25 @@ def test_entropy_splits_a_band_evenly_and_length_does_not():
 # --- the command
 
 
-def test_the_command_writes_its_report_and_goes_on_where_it_was(tmp_path, monkeypatch):
+def without_missions(amount) -> list[Trial]:
+    return [trial for trial in sweep.experiment(amount) if not trial.cell.startswith(("channel", "flying"))]
+
+
+def test_the_command_writes_its_page_and_goes_on_where_it_was(tmp_path, monkeypatch, capsys):
     small = dataclasses.replace(FLOORS["small"], shape=(210, 170), limit=300, middle=60.0, ranges=(60.0,))
     monkeypatch.setitem(FLOORS, "small", small)
-    words = ["--quick", "--starts", "1", "--missions", "0", "--json"]
-    words += ["--out", str(tmp_path / "out"), "--runs", str(tmp_path / "runs")]
-    printed = []
-    for _ in range(2):
-        out = io.StringIO()
-        with contextlib.redirect_stdout(out):
-            assert run_command(bhattacharya.main, words) == 0
-        printed.append(json.loads(out.getvalue()))
-        monkeypatch.setattr(Run, "carry_out", None)  # nothing must be run again
-    claims = [
-        [{**claim, "ours": 0} if claim["id"] == "scipy" else claim for claim in p["claims"]] for p in printed
-    ]
-    assert [c["id"] for c in claims[0]] == [c["id"] for c in claims[1]]
-    page = (tmp_path / "out" / "bhattacharya.md").read_text()
-    for name in ("figure-2", "figure-3", "figure-4", "figure-6-paper", "figure-6-nearest-length", "progress"):
-        assert f"bhattacharya/{name}.png" in page
-        assert (tmp_path / "out" / "bhattacharya" / f"{name}.png").stat().st_size > 5000
-    assert str(tmp_path / "runs") not in page
+    object.__setattr__(EXPERIMENT, "trials", without_missions)
+    tables = {**EXPERIMENT.tables, "channel": lambda records: "None were run."}
+    before = EXPERIMENT.tables
+    object.__setattr__(EXPERIMENT, "tables", tables)
+    try:
+        ran = run_paper("bhattacharya", tmp_path, capsys, "--quick", "--seeds", "1")
+    finally:
+        object.__setattr__(EXPERIMENT, "trials", sweep.experiment)
+        object.__setattr__(EXPERIMENT, "tables", before)
+    assert ran.claims["scipy"]["ours"] > 0.0 and "split-band" in ran.claims
+    (measured,) = [row.record for row in ran.rows if row.cell == "measured"]
+    assert set(measured["splits"]) == {"band", "patch"} and 0.0 < measured["changed"] <= 1.0
 
 
 def test_changed_share_by_hand():
@@ -229,21 +227,27 @@ def test_changed_share_by_hand():
 
 def test_runs_differ_by_what_decides_their_results():
     runs = all_runs(2, 1, 2)
-    assert len({run.id for run in runs}) == len(runs) == len({KeptRun(run).settings_digest for run in runs})
+    assert len({(run.cell, run.seed) for run in runs}) == len(runs)
+    assert len({f"{run.settings} {run.seed}" for run in runs}) == len(runs)
     assert {run.rules.control for run in runs} == {"projected-centroid", "gradient-search", "nearest"}
+
+
+def test_maps_of_a_record_come_back():
+    maps = {"cells_0": np.arange(6, dtype=np.int8).reshape(2, 3), "iteration_0": np.array(7)}
+    found = unpacked(packed(maps))
+    assert set(found) == set(maps) and all((found[name] == maps[name]).all() for name in maps)
 
 
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["--starts", "0"], "starts"),
-        (["--plans", "-1"], "plans"),
-        (["--small-plans", "0"], "small-plans"),
-        (["--missions", "-1"], "missions"),
-        (["--corridor", "nowhere.bt"], "corridor"),
+        (["--seeds", "0"], "seeds"),
+        (["--worlds", "nowhere.bt"], "worlds"),
+        (["--worlds", "pyproject.toml", "README.md"], "an OctoMap of one corridor"),
     ],
 )
-def test_bad_words_are_refused_in_one_line(words, message, capsys):
-    assert run_command(bhattacharya.main, words) == 2
+def test_bad_words_are_refused_in_one_line(words, message, capsys, tmp_path):
+    folders = ["--out", str(tmp_path), "--runs", str(tmp_path)]
+    assert run_command(main, ["bhattacharya", *words, *folders]) == 2
     error = capsys.readouterr().err
     assert error.startswith("error: ") and message in error and error.count("\n") == 1

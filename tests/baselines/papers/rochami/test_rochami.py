@@ -1,29 +1,18 @@
-"""`python -m baselines.papers.rochami`: cells, claims, coverage, report and command."""
+"""RochaMI: its cells, claims, coverage and page."""
 
 from __future__ import annotations
 
-import contextlib
-import csv
-import io
-import json
 import math
-import re
-from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 import pytest
-from PIL import Image
 
-from baselines.cli.arguments import run_command
-from baselines.experiments import runner
 from baselines.experiments.mission import scripted
-from baselines.experiments.outcome import Record
-from baselines.papers.rochami import __main__ as rochami
-from baselines.papers.rochami import sweep as rochami_cells
+from baselines.experiments.rows import Record
+from baselines.experiments.trials import CellTrial
+from baselines.papers.rochami import EXPERIMENT, sweep
 from baselines.papers.rochami.claims import all_claims, steered_ratio
-from baselines.papers.rochami.coverage import TeamCoverage
-from baselines.papers.rochami.report import FIGURES
+from baselines.papers.rochami.mission import TeamCoverage
 from baselines.papers.rochami.sweep import (
     BLOCKED,
     CHANGES,
@@ -39,10 +28,10 @@ from baselines.papers.rochami.sweep import (
     kappa_id,
     sharing_id,
 )
-from baselines.papers.rochami.sweep import experiment as cells_of
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.scenario import with_settings
 from entropy_explore_env.scenarios import BOX
+from tests.baselines.papers.pages import cells_of, run_paper
 from tests.reference import rochami as reference
 from tests.reference.scenes import as_reference
 
@@ -50,8 +39,8 @@ from tests.reference.scenes import as_reference
 
 
 def test_the_cells_are_the_experiment_s():
-    cells = {cell.id: cell for cell in cells_of(50, quick=False)}
-    different = {cell.settings_digest for cell in cells.values()}
+    cells = cells_of(EXPERIMENT, 50)
+    different = {str(CellTrial(cell, 0).settings) for cell in cells.values()}
     assert len(different) >= len(cells) - 3  # κ = 0 with one thing changed
     for n in TEAMS:
         for blocked in BLOCKED:
@@ -75,7 +64,7 @@ def test_the_cells_are_the_experiment_s():
     for n in SHARING_TEAMS:
         assert {cells[sharing_id(n, i)].scenario.channel.i_min_fill for i in I_MINS} == {None}
         assert [cells[sharing_id(n, fill=f)].scenario.channel.i_min_fill for f in FILLS] == list(FILLS)
-    quick = {cell.id for cell in cells_of(10, quick=True)}
+    quick = set(cells_of(EXPERIMENT, 10, quick=True))
     assert quick < set(cells) and len(quick) < 60
 
 
@@ -88,7 +77,7 @@ def as_the_paper_says(starts=20) -> dict[str, list[Record]]:
     joint = {1: 1.0, 2: 0.59, 3: 0.55, 4: 0.5, 5: 0.46, 6: 0.43, 7: 0.41, 8: 0.4, 9: 0.42, 10: 0.44}
     apart = {1: 1.0, 2: 0.81, **{n: 0.81 + 0.07 * (n - 2) for n in range(3, 11)}}
     records = {}
-    for cell in cells_of(starts, quick=False):
+    for cell in cells_of(EXPERIMENT, starts).values():
         n, time_s, way_m, sent = cell.scenario.robots, 300.0, 20.0, 3.0
         if cell.id.startswith("sharing"):
             fill, i_min_bits = cell.scenario.channel.i_min_fill, cell.scenario.channel.i_min_bits
@@ -188,100 +177,15 @@ def test_the_team_s_coverage_is_that_of_the_reference():
 # --- the command, from end to end, in a tiny box
 
 
-class Tiny(NamedTuple):
-    folder: Path
-    words: list[str]
-    code: int
-    out: str
-    err: str
-
-
-@pytest.fixture(scope="module")
-def tiny(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("rochami")
-    words = ["--starts", "2", "--jobs", "2", "--runs", str(folder / "runs"), "--out", str(folder / "out")]
+def test_the_command_writes_its_page_and_goes_on_where_it_was(tmp_path, capsys, monkeypatch):
     robot = {"motion": "planar", "sensor_height_m": 1.25, "body_radius_m": 0.1}
-    box = with_settings(BOX, {"robot": robot, "ending": {"sigma_end": 0.5}})
-    out, err = io.StringIO(), io.StringIO()
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(rochami_cells, "LAB", box)
-        patch.setattr(
-            rochami_cells, "ROOM", with_settings(BOX, {"ending": {"sigma_end": 1.0, "time_limit_s": 100.0}})
-        )
-        base = {"robot": {"when_blocked": "wait"}, "ending": {"sigma_end": 0.5, "time_limit_s": 60.0}}
-        patch.setattr(rochami_cells, "_BASE", base)
-        patch.setattr(rochami, "_QUICK_STARTS", 2)
-        with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
-            code = run_command(rochami.main, [*words, "--json"])
-        yield Tiny(folder, words, code, out.getvalue(), err.getvalue())
-
-
-@pytest.fixture
-def no_process(monkeypatch):
-    """All missions are there: none must be run again."""
-
-    def nothing_to_do(_: object, tasks: list, *__: object) -> list:
-        assert not tasks, "missions were run"
-        return []
-
-    monkeypatch.setattr(runner, "run_each", nothing_to_do)
-
-
-def test_json_is_one_object_with_the_claims(tiny):
-    assert (tiny.code, tiny.err) == (0, "")
-    printed = json.loads(tiny.out, parse_constant=pytest.fail)
-    assert list(printed) == ["paper", "claims", "wall_s"] and printed["paper"] == "RochaMI"
-    ids = [claim["id"] for claim in printed["claims"]]
-    assert len(set(ids)) == len(ids) > 50
-    assert all(math.isfinite(claim["ours"]) for claim in printed["claims"])
-
-
-def check_report(folder: Path, quick: bool) -> None:
-    assert sorted(path.name for path in folder.iterdir()) == ["rochami", "rochami.md"]
-    beside = folder / "rochami"
-    wanted = [f"{name}.{kind}" for name in FIGURES for kind in ("png", "csv")]
-    assert sorted(path.name for path in beside.iterdir()) == sorted(wanted)
-    for name in FIGURES:
-        with Image.open(beside / f"{name}.png") as picture:
-            picture.load()
-            assert picture.format == "PNG" and min(picture.size) > 200
-        head, *rows = csv.reader((beside / f"{name}.csv").read_text().splitlines())
-        assert rows and len(set(head)) == len(head) and all(len(row) == len(head) for row in rows)
-    report = (folder / "rochami.md").read_text()
-    assert sorted(re.findall(r"\]\(([^)]+)\)", report)) == sorted(f"rochami/{name}.png" for name in FIGURES)
-    assert "nan" not in report.split() and ("--quick" in report) == quick
-
-
-def test_the_report_is_whole_and_its_table_holds_the_records_numbers(tiny):
-    check_report(tiny.folder / "out", quick=False)
-    with (tiny.folder / "out" / "rochami" / "figure-6.csv").open() as file:
-        rows = list(csv.DictReader(file))
-    for row in rows[:: len(rows) // 7]:
-        cell = cell_id(int(row["robots"]), row["method"], row["blocked"])
-        if row["method"] == "random-1m":
-            cell = f"n{row['robots']}-random-1m"
-        kept = [json.loads(path.read_text())["record"] for path in (tiny.folder / "runs" / cell).iterdir()]
-        assert float(row["mean_s"]) == pytest.approx(
-            np.mean([record["t_mission_s"] for record in kept]), abs=0.01
-        )
-        if row["method"] in METHODS[:2]:
-            assert all(sum(record["decisions"].values()) > 0 for record in kept)
-
-
-def test_a_quick_one_takes_what_is_there(tiny, no_process, capsys, tmp_path):
-    words = [*tiny.words, "--out", str(tmp_path), "--quick", "--json"]
-    assert run_command(rochami.main, words) == 0
-    ids = {claim["id"] for claim in json.loads(capsys.readouterr().out)["claims"]}
-    assert {"faster-wait-2", "faster-wander-8", "kappa-product", "steered-2-0.3219"} <= ids
-    check_report(tmp_path, quick=True)
-
-
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [(["--starts", "1"], ["starts", "1"]), (["--jobs", "-1"], ["jobs", "-1"]), (["lab"], ["lab"])],
-)
-def test_bad_input_is_one_line_and_code_2(words, said, capsys):
-    code = run_command(rochami.main, words)
-    out, err = capsys.readouterr()
-    assert (code, out) == (2, "")
-    assert err.startswith("error: ") and err.count("\n") == 1 and all(word in err for word in said)
+    room = with_settings(BOX, {"ending": {"sigma_end": 1.0, "time_limit_s": 100.0}})
+    base = {"robot": {"when_blocked": "wait"}, "ending": {"sigma_end": 0.5, "time_limit_s": 60.0}}
+    monkeypatch.setattr(sweep, "LAB", with_settings(BOX, {"robot": robot, "ending": {"sigma_end": 0.5}}))
+    monkeypatch.setattr(sweep, "ROOM", room)
+    monkeypatch.setattr(sweep, "_BASE", base)
+    ran = run_paper("rochami", tmp_path, capsys, "--quick", "--seeds", "2")
+    assert {"faster-wait-2", "faster-wander-8", "kappa-product", "steered-2-0.3219"} <= set(ran.claims)
+    assert all(math.isfinite(claim["ours"]) for claim in ran.claims.values())
+    decided = [row.record for row in ran.rows if row.cell == cell_id(4, "coordinated")]
+    assert len(decided) == 2 and all(sum(record["decisions"].values()) > 0 for record in decided)

@@ -1,0 +1,191 @@
+"""A new paper's skeleton: five claims on two cells, a figure and a page; and what pages refuse.
+
+What stands between the two lines of dashes is all that a paper needs: it is counted.
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import pytest
+
+from baselines import papers
+from baselines.cli.arguments import run_command
+from baselines.experiments.page import Page
+from baselines.papers.__main__ import find_experiment, main
+from entropy_explore_env.errors import SettingError
+from tests.baselines.papers.pages import run_paper
+
+SWEEP = """
+from baselines.experiments.experiment import Amount
+from baselines.experiments.trials import Cell, CellTrial, trials_of
+from entropy_explore_env.scenario import with_settings
+from entropy_explore_env.scenarios import BOX
+
+def experiment(amount: Amount) -> list[CellTrial]:
+    cells = []
+    for robots in (1, 2):
+        scenario = with_settings(BOX, {"robots": robots, "time_limit_s": 20.0})
+        cells.append(Cell(f"robots-{robots}", scenario, "random", amount.seeds))
+    return trials_of(cells)
+"""
+CLAIMS = """
+from baselines.experiments.claims import Claim, above, below
+from baselines.experiments.experiment import Records
+from baselines.experiments.statistics import mean_interval, ratio_interval
+from baselines.experiments.tables import markdown_table
+
+GROUPS = {"more-": "two robots do more than one", "time": "time", "none": "robots do not hit each other"}
+
+def of(records: Records, cell: str, field: str) -> list[float]:
+    return [record[field] for record in records[cell]]
+
+def all_claims(records: Records) -> list[Claim]:
+    ratios = {
+        field: ratio_interval(of(records, "robots-2", field), of(records, "robots-1", field))
+        for field in ("scans", "distance_m", "measurements", "t_mission_s")
+    }
+    time = ratios.pop("t_mission_s")
+    claims = [above(f"more-{field}", f"more {field}; ratio", ratio) for field, ratio in ratios.items()]
+    blocked = sum(of(records, "robots-1", "blocked_moves"))
+    claims.append(below("time", "less time; ratio", time, 1.5))
+    return [*claims, Claim("none", "drives of one robot that were blocked", 0, blocked, None, None, True)]
+
+def table(records: Records) -> str:
+    rows = [[cell, f"{mean_interval(of(records, cell, 'scans')):.1f}"] for cell in records]
+    return markdown_table(["cell", "scans"], rows)
+"""
+FIGURES = """
+from matplotlib.figure import Figure
+from baselines.experiments.experiment import Records
+from baselines.experiments.plots import interval_line, one_axes
+from baselines.experiments.statistics import mean_interval
+
+def figure_scans(records: Records) -> Figure:
+    figure, axes = one_axes(xlabel="robots", ylabel="scans")
+    points = [mean_interval([record["scans"] for record in found]) for found in records.values()]
+    interval_line(axes, (1, 2), points)
+    return figure
+"""
+INIT = """
+from pathlib import Path
+from baselines.experiments.experiment import Experiment
+from new_paper import claims, figures, sweep
+
+EXPERIMENT = Experiment(
+    name="new-paper",
+    title="A new paper",
+    template=Path(__file__).with_name("page.md.j2"),
+    trials=sweep.experiment,
+    claims=claims.all_claims,
+    groups=claims.GROUPS,
+    figures={"scans": figures.figure_scans},
+    tables={"scans": claims.table},
+    values={"worlds": lambda records: len(records["robots-1"])},
+)
+"""
+PAGE = """
+# A new paper, reproduced
+
+Written by `{{ command }}` in {{ value("worlds") }} worlds. {{ rows }}
+
+## Claims: {{ held }}
+
+{{ claims }}
+
+{{ table("scans") }}
+
+{{ figure("scans", "Scans over team size") }}
+"""
+# --- end of what a paper needs
+FILES = {
+    "sweep.py": SWEEP,
+    "claims.py": CLAIMS,
+    "figures.py": FIGURES,
+    "__init__.py": INIT,
+    "page.md.j2": PAGE,
+}
+
+
+@pytest.fixture
+def new_paper(tmp_path, monkeypatch):
+    """The skeleton as a package, which the command knows."""
+    for name, text in FILES.items():
+        (tmp_path / "new_paper").mkdir(exist_ok=True)
+        (tmp_path / "new_paper" / name).write_text(text)
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setitem(papers.PAPERS, "new-paper", "new_paper")
+    yield tmp_path / "new_paper"
+    for name in [name for name in sys.modules if name.split(".")[0] == "new_paper"]:
+        del sys.modules[name]
+
+
+def test_a_new_paper_takes_a_hundred_lines(new_paper, tmp_path, capsys):
+    assert sum(len(text.strip().splitlines()) for text in FILES.values()) <= 120
+    ran = run_paper("new-paper", tmp_path / "out", capsys, "--seeds", "2")
+    assert len(ran.claims) == 5 and ran.claims["more-scans"]["paper"] == "> 1"
+    assert [row.cell for row in ran.rows] == ["robots-1", "robots-1", "robots-2", "robots-2"]
+    assert "in 2 worlds. Rows: 4, of commit" in ran.page and "| two robots do more than one |" in ran.page
+
+
+def test_the_command_shows_a_table_and_can_be_strict(new_paper, tmp_path, capsys):
+    words = ["new-paper", "--seeds", "2", "--jobs", "1", "--out", str(tmp_path), "--runs", str(tmp_path)]
+    code = run_command(main, [*words, "--strict"])
+    said = capsys.readouterr()
+    assert "A new paper" in said.out and code == int("no" in said.out.split())
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["rocha05"], "paper = 'rocha05': allowed is one of rocha04"),
+        (["rocha04", "--seeds", "0"], "seeds = 0: allowed is a whole number"),
+        (["rocha04", "--jobs", "0"], "jobs = 0"),
+        (["rocha04", "--worlds", "pyproject.toml"], "left out: rocha04 takes none"),
+        (["rocha04", "--rerun", "--since", "HEAD"], "since = 'HEAD': allowed is left out"),
+        (["rocha04", "--since", "nothing"], "since = 'nothing': allowed is a commit"),
+        (["rocha04", "--frobnicate"], "--frobnicate"),
+    ],
+)
+def test_bad_input_is_one_line_and_nothing_is_run(words, said, tmp_path, capsys):
+    assert run_command(main, [*words, "--out", str(tmp_path / "o"), "--runs", str(tmp_path / "r")]) == 2
+    found = capsys.readouterr()
+    assert found.out == "" and found.err.startswith("error: ") and found.err.count("\n") == 1
+    assert said in found.err and not list(tmp_path.rglob("*.jsonl"))
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        (
+            '{{ figure("scan", "x") }}',
+            "figure of the page = 'scan': allowed is one of scans; did you mean scans",
+        ),
+        ('{{ table("scan") }}', "table of the page = 'scan'"),
+        ('{{ value("scan") }}', "value of the page = 'scan'"),
+        ("{{ clams }}", "template = 't.md.j2': allowed is one that asks for .*'clams' is undefined"),
+        ("{{ figure( }}", "template = 't.md.j2, line 1'"),
+    ],
+)
+def test_a_template_that_asks_for_what_is_not_there_is_named(text, said, tmp_path):
+    (tmp_path / "t.md.j2").write_text(text)
+    there = {"scans": lambda: "x"}
+    page = Page(tmp_path / "t.md.j2", there, there, {"scans": 1}, {"claims": "x"})
+    with pytest.raises(SettingError, match=said):
+        page.write(tmp_path, "page")
+    assert not (tmp_path / "page.md").exists()
+
+
+def test_a_template_that_is_not_there_is_named(tmp_path):
+    with pytest.raises(SettingError, match="template"):
+        Page(tmp_path / "none.md.j2").write(tmp_path, "page")
+
+
+@pytest.mark.parametrize("name", papers.PAPERS)
+def test_every_page_is_short_and_has_its_claims(name):
+    experiment = find_experiment(name)
+    assert experiment.name == name and experiment.template.is_file()
+    results = Path(__file__).parents[3] / "docs" / "results"
+    words = (results / f"{name}.md").read_text("utf-8").split()
+    assert len(words) <= 1500 and (results / name / "claims.csv").is_file()
